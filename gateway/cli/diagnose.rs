@@ -7,15 +7,6 @@ use rules::physics::explain::Language;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
 
-/// How hypotheses are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Engine {
-    /// Forms of laws one by one, by information.
-    Search,
-    /// Families of laws together, by evidence.
-    Evidence,
-}
-
 /// Arguments of `diagnose`.
 #[derive(Debug, Args)]
 pub(super) struct DiagnoseArguments {
@@ -38,7 +29,7 @@ pub(super) struct DiagnoseArguments {
     /// Write the extended, refitted model.
     #[arg(long, value_name = "NEW.toml")]
     accept: Option<PathBuf>,
-    /// Seed of the resampling: the same input and seed give the same bytes.
+    /// Seed by which runs are held out: the same input and seed give the same bytes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Directory of further hypotheses: .toml files with [[effect]] entries.
@@ -47,12 +38,9 @@ pub(super) struct DiagnoseArguments {
     /// Write the experiment that tells the explanations apart as a recording plan.
     #[arg(long, value_name = "PLAN.csv")]
     experiment: Option<PathBuf>,
-    /// Tell the leading hypotheses of the search on standard error.
+    /// Tell the leading explanations with their probabilities on standard error.
     #[arg(long)]
     search: bool,
-    /// Let one engine answer alone; without it, each claim needs both.
-    #[arg(long, value_enum, hide = true)]
-    engine: Option<Engine>,
     /// Language of the words, the page and the plan.
     #[arg(long, value_enum, default_value_t = super::effects::Lang::En)]
     lang: super::effects::Lang,
@@ -69,15 +57,11 @@ pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
         return Err(cannot_use(&unusable));
     }
     examination.notes.iter().for_each(|note| eprintln!("note: {note}"));
-    let found = match arguments.engine {
-        None => twin::compare(&given.recording, &model, arguments.seed),
-        Some(Engine::Search) => twin::diagnose(&given.recording, &model, arguments.seed),
-        Some(Engine::Evidence) => twin::evidence::diagnose(&given.recording, &model),
-    };
+    let found = twin::diagnose(&given.recording, &model, arguments.seed);
     let mut diagnosis = found.map_err(|all| cannot_use(&all))?;
     note_refusals(&mut diagnosis, &given);
     if arguments.search {
-        eprintln!("search: {}", diagnosis.debug);
+        eprintln!("{}", diagnosis.debug);
     }
     outputs(&arguments).write(&diagnosis, &given.recording).map_err(|problem| CannotRun::new(problem, ""))?;
     Ok(CommandOutcome::Fine)

@@ -135,7 +135,7 @@ fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Str
     if !examination.unusable.is_empty() {
         return Err(examination.unusable.join("; "));
     }
-    let found = twin::compare(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
+    let found = twin::diagnose(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
     tell(Stage::Writing, recording.rows())?;
     let row = history::Diagnosis {
         at_ns: job.to_ns,

@@ -2,7 +2,6 @@
 
 use super::diagnosis::{Diagnosis, UNKNOWN, Verdict};
 use super::locate::Condition;
-use super::outcome::FailedHoldout;
 
 /// One or two sentences for the machinist.
 #[must_use]
@@ -10,7 +9,7 @@ pub fn summary(diagnosis: &Diagnosis) -> String {
     let names: Vec<String> = diagnosis.missing.iter().map(|missing| missing.effect.replace('_', " ")).collect();
     let fit = improvement(diagnosis);
     match diagnosis.verdict {
-        Verdict::NoMismatch => "The recording agrees with the model: nothing remains beyond the noise.".to_owned(),
+        Verdict::NoMismatch => agreement(diagnosis),
         Verdict::CannotTell => diagnosis.summary.clone(),
         Verdict::Unexplained => {
             format!(
@@ -31,19 +30,34 @@ pub fn summary(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// Why nothing is told although something was found in the fitted runs.
+/// That nothing is missing is an answer too, and tells how it is known.
+fn agreement(diagnosis: &Diagnosis) -> String {
+    let known = diagnosis.existence.map_or_else(String::new, |existence| {
+        format!(
+            " Probability that nothing is missing: {:.2}; the recording is worth {:.0} independent rows.",
+            existence.probability_of_nothing, existence.effective_rows
+        )
+    });
+    format!("The recording agrees with the model: nothing remains beyond the noise.{known}")
+}
+
+/// Why nothing is told although something is there: what was `found`, in which runs the error does not fall with it, and the
+/// errors there without it and with it.
 #[must_use]
-pub(super) fn withdrawn(withdrawn: &FailedHoldout, unit: &str) -> String {
-    let names: Vec<String> = withdrawn.kinds.iter().map(|kind| kind.replace('_', " ")).collect();
-    let what = if names.is_empty() { "something without a name".to_owned() } else { names.join(" and ") };
-    let runs = if withdrawn.among_fitted {
+pub(super) fn withdrawn(found: &[String], among_fitted: bool, errors: Option<(f64, f64)>, unit: &str) -> String {
+    let names: Vec<String> =
+        found.iter().map(|kind| if kind == UNKNOWN { "something without a name".to_owned() } else { kind.replace('_', " ") }).collect();
+    let runs = if among_fitted {
         "fitted runs that are predicted from the others"
     } else {
         "runs that took no part in fitting"
     };
-    let (before, after) = withdrawn.errors;
+    let errors = errors.map_or_else(String::new, |(before, after)| {
+        format!(" ({before:.3} {unit} without it, {after:.3} {unit} with it)")
+    });
     format!(
-        "Cannot tell: {what} fits the runs it was fitted to, but the error on {runs} does not fall ({before:.3} {unit} without it, {after:.3} {unit} with it)."
+        "Cannot tell: {} fits the runs it was fitted to, but the error on {runs} does not fall{errors}.",
+        names.join(" and ")
     )
 }
 

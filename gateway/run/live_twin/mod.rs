@@ -15,7 +15,7 @@ use crate::pipeline::Pipeline;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
 use rules::twin::live::{self, ComparedSecond, Live, Mismatch, Regime, RegimeStage};
-use rules::twin::verdicts::unit_of;
+use rules::twin::diagnosis::unit_of;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

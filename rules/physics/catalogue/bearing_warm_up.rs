@@ -3,7 +3,7 @@
 use crate::physics::drive::{krpm, slide_to_the, sliding, speed_to_the};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::{decay, first_order};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Friction that falls as the bearings warm.
 #[derive(Debug, Clone, Copy)]
@@ -60,6 +60,11 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for BearingWarmUp {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn bound(&self) -> Bound {
+        // cold grease takes 10 to 40 % more at idle; twice that leaves room for a cold start
+        Bound::NoLoad(0.8)
     }
 
     fn form_names(&self) -> &'static [&'static str] {

@@ -62,6 +62,18 @@ impl Ground {
         }
     }
 
+    /// Inner products of every column with the output.
+    pub(super) fn along_output(&self) -> Array1<f64> {
+        let last = self.gram.nrows() - 1;
+        self.gram.slice(s![..last, last]).to_owned()
+    }
+
+    /// Sum of squares of the output.
+    pub(super) fn square(&self) -> f64 {
+        let last = self.gram.nrows() - 1;
+        self.gram[[last, last]].max(f64::MIN_POSITIVE)
+    }
+
     /// The part that holds some variants only.
     pub(super) fn of(&self, variants: impl Iterator<Item = usize>, columns: impl Fn(usize) -> usize) -> Self {
         let mut all = Vec::new();
@@ -82,6 +94,23 @@ impl MarginalState<'_> {
     fn at(&self, row: usize, column: usize) -> f64 {
         self.ground.gram[[row, column]] - self.reach.row(row).dot(&self.reach.row(column))
     }
+}
+
+/// A variant with what its evidence needs for any output.
+pub(super) struct AskedVariant {
+    variant: usize,
+    /// Its first column.
+    start: usize,
+    sizes: Vec<AskedSize>,
+}
+
+/// The same for one size.
+struct AskedSize {
+    lambda: f64,
+    ln_determinant: f64,
+    /// First line of the inverse.
+    first: Array1<f64>,
+    factor: CholeskyFactor,
 }
 
 /// What a variant adds to a state.
@@ -172,7 +201,7 @@ impl Comparison<'_> {
         likelihood - 0.5 * (ln_determinant - self.tangent_determinant(&gram.whole) - levels)
     }
 
-    fn tangent_determinant(&self, gram: &Array2<f64>) -> f64 {
+    pub(super) fn tangent_determinant(&self, gram: &Array2<f64>) -> f64 {
         let fixed: Vec<usize> = (0..self.tangents).collect();
         let mut inner = block(gram, &fixed, &fixed);
         let flat = self.flat(gram, FLAT);
@@ -196,13 +225,55 @@ impl Comparison<'_> {
         for (index, size) in SIZES.iter().enumerate() {
             let resolved = along.resolve(self.lambda(state, *size));
             let ln = self.ln_evidence(state, &resolved) + self.ln_sign(state, of, *size, &resolved);
-            let too_large = *size > 1.01 * of.largest && index > 0;
-            all[index] = ln + SIZE_PRIORS[index].ln() + if too_large { TOO_LARGE } else { 0.0 };
+            all[index] = ln + ln_size_prior(of, index);
             if all[index] > best.1 {
                 best = (index, all[index]);
             }
         }
         EvidenceGain { size: best.0, ln: ln_sum(all) }
+    }
+
+    /// Every variant, ready to be asked of many outputs.
+    pub(super) fn asked(&self, ground: &Ground) -> Vec<AskedVariant> {
+        (0..self.bank.variants.len()).map(|variant| self.asked_variant(ground, variant)).collect()
+    }
+
+    fn asked_variant(&self, ground: &Ground, variant: usize) -> AskedVariant {
+        let relative = &self.bank.variants[variant].relative;
+        let start = ground.starts[variant].unwrap_or(0);
+        let size = relative.len();
+        let inner = Array2::from_shape_fn((size, size), |(i, j)| {
+            ground.gram[[start + i, start + j]] * relative[i] * relative[j]
+        });
+        let of_size = |index: usize| {
+            let lambda = (SIZES[index] * self.deviation).powi(2) / ground.variance;
+            let factor = CholeskyFactor::of(&(Array2::eye(size) + &inner * lambda));
+            let mut unit = Array1::zeros(size);
+            unit[0] = 1.0;
+            AskedSize { lambda, ln_determinant: factor.ln_determinant(), first: factor.solve(&unit), factor }
+        };
+        AskedVariant { variant, start, sizes: (0..SIZES.len()).map(of_size).collect() }
+    }
+
+    /// Logarithm of the evidence that a variant has for an output, given its inner products with every column and its sum of
+    /// squares, the baseline projected out of both.
+    pub(super) fn answer(&self, ground: &Ground, asked: &AskedVariant, along: &Array1<f64>, square: f64) -> f64 {
+        let of = &self.bank.variants[asked.variant];
+        let own = Array1::from_iter(of.relative.iter().enumerate().map(|(k, relative)| along[asked.start + k] * relative));
+        let rows = self.tempering * count(self.rows.len());
+        let all = asked.sizes.iter().enumerate().map(|(index, size)| {
+            let explained = size.lambda * size.factor.half(&own);
+            let left = (square - explained).max(1e-6 * square);
+            let sign = if of.sign() == 0.0 {
+                0.0
+            } else {
+                let mean = size.lambda * size.first.dot(&own);
+                let variance = size.lambda * size.first[0] * ground.variance / self.tempering.max(1e-3);
+                (2.0 * normal_share(of.sign() * mean / (variance + 1e-300).sqrt()) + 1e-12).ln()
+            };
+            -0.5 * rows * (left / square).ln() - 0.5 * size.ln_determinant + sign + ln_size_prior(of, index)
+        });
+        ln_sum(all.collect::<Vec<_>>())
     }
 
     /// Prior variance of a size over that of the noise.
@@ -284,26 +355,35 @@ impl Comparison<'_> {
     /// Posterior means: coefficients of the tangents and of each member.
     pub(super) fn solve(&self, gram: &Array2<f64>, variance: f64, members: &[(usize, usize)]) -> PosteriorMeans {
         let last = gram.nrows() - 1;
-        let mut all: Vec<usize> = (0..self.first()).collect();
-        let mut ridge = self.fixed_ridge(gram, variance);
-        for (variant, size) in members {
-            let of = &self.bank.variants[*variant];
-            all.extend(self.columns(*variant));
-            ridge.extend(of.relative.iter().map(|d| variance / (SIZES[*size] * self.deviation * d).powi(2)));
-        }
+        let own = members.iter().flat_map(|(variant, _)| self.columns(*variant));
+        let all: Vec<usize> = (0..self.first()).chain(own).collect();
+        let ridge = self.ridges(gram, variance, members);
         let mut inner = block(gram, &all, &all);
         ridge.iter().enumerate().for_each(|(at, ridge)| inner[[at, at]] += ridge);
         let y = Array1::from_iter(all.iter().map(|index| gram[[*index, last]]));
-        let w = CholeskyFactor::of(&inner).solve(&y);
+        self.split(&CholeskyFactor::of(&inner).solve(&y), members)
+    }
+
+    /// Ridges of the tangents, the levels of the runs and the columns of some members, in this order.
+    pub(super) fn ridges(&self, gram: &Array2<f64>, variance: f64, members: &[(usize, usize)]) -> Vec<f64> {
+        let mut ridge = self.fixed_ridge(gram, variance);
+        for (variant, size) in members {
+            let of = &self.bank.variants[*variant];
+            ridge.extend(of.relative.iter().map(|d| variance / (SIZES[*size] * self.deviation * d).powi(2)));
+        }
+        ridge
+    }
+
+    /// Coefficients in the order of [`Self::ridges`] by what they belong to.
+    pub(super) fn split(&self, w: &Array1<f64>, members: &[(usize, usize)]) -> PosteriorMeans {
         let tangents = w.slice(s![..self.tangents]).to_vec();
         let mut at = self.first();
-        let mut of_members = Vec::new();
-        for (variant, _) in members {
-            let size = self.columns(*variant).len();
-            of_members.push(w.slice(s![at..at + size]).to_vec());
+        let of_member = |(variant, _): &(usize, usize)| {
+            let size = self.bank.variants[*variant].relative.len();
             at += size;
-        }
-        PosteriorMeans { tangents, members: of_members }
+            w.slice(s![at - size..at]).to_vec()
+        };
+        PosteriorMeans { tangents, members: members.iter().map(of_member).collect() }
     }
 }
 
@@ -312,6 +392,12 @@ impl Comparison<'_> {
 pub(super) struct PosteriorMeans {
     pub(super) tangents: Vec<f64>,
     pub(super) members: Vec<Vec<f64>>,
+}
+
+/// Logarithm of the prior probability of a size of a variant.
+pub(super) fn ln_size_prior(of: &Variant, size: usize) -> f64 {
+    let too_large = SIZES[size] > 1.01 * of.largest && size > 0;
+    SIZE_PRIORS[size].ln() + if too_large { TOO_LARGE } else { 0.0 }
 }
 
 /// Logarithm of a sum of exponentials.

@@ -32,6 +32,15 @@ pub(super) struct Claim {
     pub(super) laws: Vec<(usize, Vec<f64>)>,
 }
 
+/// A law in the place of a contribution.
+pub(super) struct StandIn {
+    pub(super) kind: String,
+    /// What it costs, nats.
+    pub(super) nats: f64,
+    /// Share of the contribution that it makes, the price of its columns taken off.
+    pub(super) share: f64,
+}
+
 /// Projects curves on named laws.
 pub(super) struct Naming<'a> {
     bank: &'a VariantBank,
@@ -223,18 +232,18 @@ impl<'a> Naming<'a> {
 
     /// What it costs in nats to put each named kind in the place of a contribution, given its inner products with every
     /// column in the metric of the noise and its square, the baseline projected out; the best of each kind.
-    pub(super) fn stand_ins(&self, along: &Array1<f64>, square: f64, nats: f64) -> Vec<(String, f64)> {
-        let mut all: Vec<(String, f64)> = Vec::new();
+    pub(super) fn stand_ins(&self, along: &Array1<f64>, square: f64, nats: f64) -> Vec<StandIn> {
+        let mut all: Vec<StandIn> = Vec::new();
         for variant in &self.named {
             let of = &self.bank.variants[*variant];
             let Some(fit) = self.regress(&self.metrics[0], along, square, &[*variant]) else { continue };
             let size = count(of.law_columns().len() - 1);
             let left = square * (1.0 - fit.share - PRICE * size).max(0.0);
-            let loss = nats * left + 0.7 * size - of.ln_prior.min(0.0);
+            let nats = nats * left + 0.7 * size - of.ln_prior.min(0.0);
             let kind = of.kind().unwrap_or_default().to_owned();
-            match all.iter_mut().find(|(known, _)| *known == kind) {
-                Some((_, known)) => *known = known.min(loss),
-                None => all.push((kind, loss)),
+            match all.iter_mut().find(|known| known.kind == kind) {
+                Some(known) => (known.nats, known.share) = (known.nats.min(nats), known.share.max(fit.share)),
+                None => all.push(StandIn { kind, nats, share: fit.share }),
             }
         }
         all

@@ -57,13 +57,20 @@ impl SecondStage {
         second
     }
 
-    /// Adds a hidden sequence with its own evidence as prior.
-    pub(super) fn add(&mut self, inputs: &RecordingInputs<'_>, owner: Owner, label: String, column: Vec<f64>, ln: f64) {
+    /// Adds a state that was read from the recording, with what it has cost to find it as prior.
+    pub(super) fn add(
+        &mut self,
+        inputs: &RecordingInputs<'_>,
+        owner: Owner,
+        label: String,
+        columns: impl IntoIterator<Item = (Vec<f64>, f64)>,
+        ln: f64,
+    ) {
         let before = self.bank.variants.len();
         let prior = if matches!(owner, Owner::Named(_)) { NAMED } else { NAMELESS };
         match owner {
-            Owner::Named(family) => self.bank.of(family, label).sized().column(inputs, column),
-            Owner::Nameless(drawn) => self.bank.nameless(drawn).sized().column(inputs, column),
+            Owner::Named(family) => self.bank.of(family, label).sized().columns(inputs, columns),
+            Owner::Nameless(drawn) => self.bank.nameless(drawn).sized().columns(inputs, columns),
         }
         if self.bank.variants.len() > before {
             self.priors.push(prior + ln);

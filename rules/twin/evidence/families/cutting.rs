@@ -5,6 +5,7 @@ use crate::physics::OutputKind;
 use crate::twin::evidence::bank::{Family, Since, VariantBank};
 use crate::twin::evidence::inputs::RecordingInputs;
 
+const CUT: Family = Family::of("cutting_power").beside_catalogue().signed(1.0).through(&["engaged"]);
 const LOAD_LOSS: Family = Family::of("load_loss").through(&["load"]);
 const EDGE_FORCE: Family = Family::of("edge_force").signed(1.0).beside_catalogue();
 const SOFTENING: Family = Family::of("speed_softening").signed(-1.0).through(&["cutting_speed_m_min"]);
@@ -42,6 +43,9 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
         return;
     }
     consumers(inputs, bank);
+    if inputs.engaged.is_some() && !inputs.knows_cut {
+        bank.of(CUT, "engaged").column(inputs, inputs.column(|row| inputs.cutting(row)));
+    }
     let Some(cut) = &inputs.cut else { return };
     if inputs.knows_cut {
         let power = |exponent: i32| inputs.column(|row| cut[row].powi(exponent));

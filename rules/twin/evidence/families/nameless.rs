@@ -7,7 +7,6 @@ use super::drive::is_drive;
 use crate::physics::OutputKind;
 use crate::twin::evidence::bank::{Drawn, VariantBank};
 use crate::twin::evidence::inputs::RecordingInputs;
-use crate::twin::model::Model;
 use adapters::channel::quantity::Quantity;
 
 /// Bumps over a channel, and over one that a machine may resonate or jam along.
@@ -48,9 +47,9 @@ struct Channel {
 }
 
 /// Adds every nameless curve.
-pub(super) fn add(inputs: &RecordingInputs<'_>, model: &Model, bank: &mut VariantBank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let carriers = carriers(inputs);
-    for channel in channels(inputs, model) {
+    for channel in channels(inputs) {
         let cut_only = OF_THE_CUT.contains(&channel.name.as_str());
         let in_cut = cut_only && inputs.engaged.is_some();
         let coarse = bumps(inputs, &channel.values, in_cut, BUMPS);
@@ -122,14 +121,10 @@ fn carriers(inputs: &RecordingInputs<'_>) -> Vec<Carrier> {
     all
 }
 
-fn channels(inputs: &RecordingInputs<'_>, model: &Model) -> Vec<Channel> {
+fn channels(inputs: &RecordingInputs<'_>) -> Vec<Channel> {
     let scene = inputs.scene;
-    let read: Vec<&str> = model.parts.iter().flat_map(|part| part.inputs()).collect();
-    let is_input = |name: &str| {
-        let measured = MEASURED.iter().any(|word| name.contains(word));
-        let declared = crate::physics::Role::ALL.iter().any(|role| scene.role_name(*role) == Some(name));
-        name != scene.output() && (!measured || declared || read.contains(&name))
-    };
+    // What is measured beside the output carries noise of its own, which would bend a curve over it.
+    let is_input = |name: &str| name != scene.output() && !MEASURED.iter().any(|word| name.contains(word));
     let mut all: Vec<Channel> = Vec::new();
     let mut add = |name: &str, values: Vec<f64>, fine: bool| {
         let spread = inputs.deviation_of(&values, false);
