@@ -46,7 +46,6 @@ chapters! {
     "outputs",
     "fleet",
     "mismatch",
-    "twin",
     "measured",
     "not-proven",
     "glossary",

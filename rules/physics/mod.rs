@@ -16,6 +16,7 @@ mod unit;
 
 pub use catalogue::{CATALOGUE, effect};
 pub use scene::{Block, LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError, blocks_of};
+use adapters::channel::quantity::Quantity;
 pub use unit::{unit_in, unit_of_quantity};
 
 /// How a parameter enters the law.
@@ -193,6 +194,11 @@ pub trait Effect: Sync + Send {
     /// How large its contribution can be.
     fn bound(&self) -> Bound {
         Bound::Any
+    }
+
+    /// Can it be what a curve over a channel of this quantity is? Few laws know a temperature or a voltage.
+    fn follows(&self, quantity: Quantity) -> bool {
+        quantity != Quantity::Temperature
     }
 
     /// Names of its forms, as a model file gives them; none for an effect of one form.

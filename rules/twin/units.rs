@@ -5,7 +5,7 @@
 //! repeats is held out as a whole where another choice exists.
 
 use crate::physics::Scene;
-use crate::statistics::count;
+use crate::statistics::{count, quantile};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -20,6 +20,8 @@ pub(super) const FOLDS: usize = 4;
 const CHOICES: u64 = 400;
 /// Columns of words that a choice should represent.
 const WORDS: [&str; 6] = ["tool", "lot", "operation", "program", "part", "pass"];
+/// Share of the rows of a unit beyond the ends of its range.
+const ENDS: f64 = 0.03;
 /// Words of a column beyond which each is nearly a unit of its own and nothing is represented.
 const WORDS_MAX: usize = 64;
 
@@ -119,12 +121,16 @@ struct Features {
 impl Features {
     fn of(scene: &Scene, units: &[Unit], known: &[usize]) -> Self {
         let mut columns: Vec<Vec<f64>> = Vec::new();
-        let mean_of = |values: &[f64]| -> Vec<f64> {
-            let mean = |unit: &usize| crate::statistics::mean(&values[units[*unit].rows.clone()]);
-            known.iter().map(mean).collect()
+        let over_units = |of: &dyn Fn(&[f64]) -> f64, values: &[f64]| -> Vec<f64> {
+            known.iter().map(|unit| of(&values[units[*unit].rows.clone()])).collect()
         };
-        for name in scene.column_names().filter(|name| *name != scene.output()) {
-            columns.extend(scene.column(name).map(mean_of));
+        let end = |values: &[f64], share: f64| quantile(values.iter().copied(), share).unwrap_or(0.0);
+        let names = scene.column_names().filter(|name| *name != scene.output());
+        for values in names.filter_map(|name| scene.column(name)).chain(scene.simulated()) {
+            columns.push(over_units(&crate::statistics::mean, values));
+            // What is held out should lie within what is fitted.
+            columns.push(over_units(&|values| end(values, ENDS), values));
+            columns.push(over_units(&|values| end(values, 1.0 - ENDS), values));
         }
         let place: Vec<f64> = (0..known.len()).map(count).collect();
         columns.push(place.iter().map(|at| (at - 0.5 * count(known.len())).abs()).collect());

@@ -22,7 +22,6 @@ const ORDER: [&str; 11] = [
     "gateway/handbook/sources.md",
     "gateway/handbook/contracts.md",
     "gateway/handbook/mismatch.md",
-    "gateway/handbook/twin.md",
     "gateway/handbook/fleet.md",
 ];
 /// Commands that end with another code than zero here, and why.

@@ -1,5 +1,6 @@
 //! Grease and bearings get thinner and freer as they warm: no-load power falls.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{krpm, slide_to_the, sliding, speed_to_the};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::{decay, first_order};
@@ -60,6 +61,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for BearingWarmUp {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn bound(&self) -> Bound {

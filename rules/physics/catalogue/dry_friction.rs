@@ -1,5 +1,6 @@
 //! Coulomb friction: a level with the sign of motion in a force, proportional to speed in a power.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{RAD_PER_S_OF_RPM, motion, soft_sign, turns};
 use crate::physics::excitation::greatest;
 use crate::physics::state::{bent_over_the_way, strokes};
@@ -61,6 +62,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for DryFriction {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn form_names(&self) -> &'static [&'static str] {

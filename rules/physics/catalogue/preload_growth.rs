@@ -1,5 +1,6 @@
 //! Inner rings warm before the housing: preload and friction rise, and fall again when the housing follows.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{driven_krpm, krpm, speed_to_the};
 use crate::physics::excitation::lag_forms;
 use crate::physics::state::first_order;
@@ -47,6 +48,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for PreloadGrowth {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn bound(&self) -> Bound {

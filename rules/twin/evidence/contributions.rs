@@ -105,7 +105,8 @@ impl Judge<'_> {
             let rows: Vec<usize> = self.inputs.left_out().filter(|row| self.inputs.unit[*row] == unit).collect();
             let acts = |(_, column, _): &&(String, &[f64], f64)| rows.iter().any(|row| column[*row] != 0.0);
             let here: Vec<&(String, &[f64], f64)> = states.iter().filter(acts).collect();
-            self.follow_unit(&rows, &here, (setting.gram.noise, variance.sqrt()), after, all);
+            let noise = self.comparison.row_by_row(setting.gram.noise);
+            self.follow_unit(&rows, &here, (noise, variance.sqrt()), after, all);
         }
     }
 

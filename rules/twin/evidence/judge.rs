@@ -8,6 +8,7 @@ use super::inputs::RecordingInputs;
 use super::naming::{Naming, StandIn};
 use super::posterior::{Explanation, Group, NoiseSetting, grouped};
 use super::second::SecondStage;
+use crate::physics::effect;
 use crate::statistics::count;
 use crate::twin::diagnosis::{Existence, UNKNOWN, Verdict};
 use std::collections::BTreeMap;
@@ -120,7 +121,10 @@ impl Judge<'_> {
                     let lost = best.members.len() < kept.len();
                     return self.told(answer, &best, &groups, lost);
                 }
-                Err(withdrawn) => answer.withdrawn = Some(withdrawn),
+                Err(withdrawn) => {
+                    answer.debug.push_str(&self.held_out_errors(&self.less(of, &kept)));
+                    answer.withdrawn = Some(withdrawn);
+                }
             }
             break;
         }
@@ -148,19 +152,18 @@ impl Judge<'_> {
         energy(&self.remaining(&sum_of(&contributions, self.inputs.rows))) / each.max(f64::MIN_POSITIVE)
     }
 
-    /// Of a group the explanation that carries over, by laws alone where a drawn curve does not; its members that do, and
-    /// what they gain.
+    /// Of a group the explanation that carries over better, with drawn curves or by laws alone; its members that do, and what
+    /// they gain.
     fn carried_over_best<'g>(&self, group: &Group<'g>) -> (&'g Explanation, Vec<usize>, f64) {
-        let of = group.best;
-        let (kept, gain) = self.carried_over(of);
-        let falls_short = kept.len() < of.members.len() || gain <= THRESHOLDS.inner_gain;
-        if let Some(by_law) = group.by_law.filter(|_| falls_short) {
+        let (kept, gain) = self.carried_over(group.best);
+        if let Some(by_law) = group.by_law {
             let (law_kept, law_gain) = self.carried_over(by_law);
-            if law_kept.len() == by_law.members.len() && law_gain > THRESHOLDS.inner_gain {
+            let whole = law_kept.len() == by_law.members.len();
+            if whole && (law_gain > gain || kept.len() < group.best.members.len()) {
                 return (by_law, law_kept, law_gain);
             }
         }
-        (of, kept, gain)
+        (group.best, kept, gain)
     }
 
     /// The members that carry over to fitted units which took no part in their sizes, and what they gain there together.
@@ -205,6 +208,23 @@ impl Judge<'_> {
     fn held_out_square(&self, total: &[f64]) -> f64 {
         let recorded = self.inputs.scene.recorded();
         self.inputs.left_out().map(|row| (recorded[row] - total[row]).powi(2)).sum()
+    }
+
+    /// Errors in each unit that is held out, without an explanation and with it, for engineers.
+    fn held_out_errors(&self, of: &Explanation) -> String {
+        let after = self.contributions(of).0;
+        let recorded = self.inputs.scene.recorded();
+        let mut units: BTreeMap<usize, (f64, f64, f64)> = BTreeMap::new();
+        for row in self.inputs.left_out() {
+            let sums = units.entry(self.inputs.unit[row]).or_default();
+            sums.0 += 1.0;
+            sums.1 += (recorded[row] - self.inputs.simulated[row]).powi(2);
+            sums.2 += (recorded[row] - after[row]).powi(2);
+        }
+        let of_unit = |(unit, (rows, before, after)): (&usize, &(f64, f64, f64))| {
+            format!("\nunit {unit}: {:.4} -> {:.4}", (before / rows).sqrt(), (after / rows).sqrt())
+        };
+        units.iter().map(of_unit).collect()
     }
 
     /// An explanation with some of its members only.
@@ -318,11 +338,13 @@ impl Judge<'_> {
                 }
             }
         }
-        answer.verdict = if answer.names.iter().all(alone) { Verdict::Explained } else { Verdict::Ambiguous };
+        let sure_of_something = answer.existence.probability_of_nothing < THRESHOLDS.nothing_sure;
+        let sure = sure_of_something && answer.names.iter().all(alone);
+        answer.verdict = if sure { Verdict::Explained } else { Verdict::Ambiguous };
         if answer.verdict == Verdict::Explained {
             beside.retain(|(name, _)| mass(name) > 0.1);
         } else if beside.is_empty() {
-            let sure: Vec<String> = answer.names.iter().filter(|name| alone(name)).cloned().collect();
+            let sure: Vec<String> = answer.names.iter().filter(|name| sure_of_something && alone(name)).cloned().collect();
             if sure.is_empty() {
                 answer.leave_unnamed(groups, ln);
                 return;
@@ -348,23 +370,24 @@ impl Judge<'_> {
     }
 
     /// Names whose law costs little in the place of a member.
-    fn class(&self, answer: &EvidenceAnswer, best: &Explanation) -> Vec<Rival> {
+    fn class(&self, answer: &mut EvidenceAnswer, best: &Explanation) -> Vec<Rival> {
         let (comparison, gram) = self.first;
         let variance = self.settings[best.noise].saturated.variance;
         let nats = 0.5 * comparison.tempering / variance;
         let mut class = Vec::new();
-        for (name, contribution) in &answer.contributions {
-            if !answer.names.contains(name) {
-                continue;
-            }
+        let told = answer.contributions.iter().filter(|(name, _)| answer.names.contains(name));
+        for (name, contribution) in &told.cloned().collect::<Vec<Named>>() {
             let (along, square) = self.naming.products(comparison, gram, contribution);
             let all = self.naming.stand_ins(&along, square, nats);
+            answer.debug.push_str(&nearest_stand_ins(name, &all));
             let own = all.iter().find(|other| other.kind == *name).map_or(0.0, |own| own.nats.min(1.0));
             // The form of a curve that got its name by projection is not known better than to a tenth.
             let claimed = answer.claimed.contains(name);
             let near = |other: &StandIn| {
                 let makes_curve = claimed && other.share >= THRESHOLDS.rival_share;
-                other.nats < own + THRESHOLDS.class_nats || makes_curve
+                let confused = are_confused(name, &other.kind);
+                let nats = if confused { THRESHOLDS.rival_nats } else { THRESHOLDS.class_nats };
+                other.nats < own + nats || makes_curve
             };
             let others = all.into_iter().filter(|other| !answer.names.contains(&other.kind) && near(other));
             class.extend(others.map(|other| Rival {
@@ -463,6 +486,20 @@ impl EvidenceAnswer {
             *all = vec![(UNKNOWN.to_owned(), sum_of(all, rows))];
         }
     }
+}
+
+/// Does the catalogue say of one of two laws that it is confused with the other?
+fn are_confused(a: &str, b: &str) -> bool {
+    let says = |a: &str, b: &str| effect(a).is_some_and(|effect| effect.doc().rivals.contains(&b));
+    says(a, b) || says(b, a)
+}
+
+/// The laws that come nearest to a contribution, for engineers.
+fn nearest_stand_ins(name: &str, all: &[StandIn]) -> String {
+    let mut near: Vec<&StandIn> = all.iter().collect();
+    near.sort_by(|a, b| a.nats.total_cmp(&b.nats));
+    let near = near.iter().take(6).map(|other| format!("{} {:.1} {:.2}", other.kind, other.nats, other.share));
+    format!("\n{name}: {}", near.collect::<Vec<_>>().join(", "))
 }
 
 /// Names of an explanation; `unknown` where it has none.

@@ -26,6 +26,9 @@ const SATURATED: f64 = 0.05;
 /// Ridge of the baseline's tangents, as a share of their mean size: the flat prior, made solvable.
 const FLAT: f64 = 1e-9;
 
+/// Share of its square that the baseline must leave of a law: below it rounding decides.
+const HIDDEN: f64 = 1e-6;
+
 /// The saturated model: what remains when every nameless curve is free.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Saturated {
@@ -38,6 +41,8 @@ pub(super) struct Saturated {
 /// The Gram matrix that a search starts from: the baseline projected out, and where each variant stands in it.
 pub(super) struct Ground {
     gram: Array2<f64>,
+    /// Variants of whose law the baseline leaves next to nothing: no recording like this one tells them.
+    hidden: Vec<bool>,
     /// First column of each variant; `None` of what is not in it.
     starts: Vec<Option<usize>>,
     variance: f64,
@@ -85,11 +90,22 @@ impl Ground {
             }
         }
         all.push(self.gram.nrows() - 1);
-        Self { gram: block(&self.gram, &all, &all), starts, variance: self.variance }
+        let hidden = self.hidden.clone();
+        Self { gram: block(&self.gram, &all, &all), hidden, starts, variance: self.variance }
+    }
+
+    /// Does the baseline leave next to nothing of this variant's law?
+    pub(super) fn hides(&self, variant: usize) -> bool {
+        self.hidden[variant]
     }
 }
 
 impl MarginalState<'_> {
+    /// Does the baseline leave next to nothing of this variant's law?
+    pub(super) fn hides(&self, variant: usize) -> bool {
+        self.ground.hides(variant)
+    }
+
     /// The entry that is left.
     fn at(&self, row: usize, column: usize) -> f64 {
         self.ground.gram[[row, column]] - self.reach.row(row).dot(&self.reach.row(column))
@@ -187,8 +203,10 @@ impl Comparison<'_> {
         let last = left.nrows() - 1;
         let q = left[[last, last]].max(1e-12 * gram.whole[[last, last]]);
         let ln = self.ln_of(gram, q, ln_determinant, &ridge);
-        let starts = (0..self.bank.variants.len()).map(|variant| Some(self.columns(variant).start)).collect();
-        (Ground { gram: left, starts, variance: saturated.variance }, ln)
+        let first: Vec<usize> = (0..self.bank.variants.len()).map(|variant| self.columns(variant).start).collect();
+        let hidden = first.iter().map(|at| left[[*at, *at]] < HIDDEN * gram.whole[[*at, *at]]).collect();
+        let starts = first.into_iter().map(Some).collect();
+        (Ground { gram: left, hidden, starts, variance: saturated.variance }, ln)
     }
 
     /// Evidence of a baseline that leaves this square; its tangents have no prior, so what they cost is the same for every

@@ -33,6 +33,8 @@ mod posterior;
 mod search;
 mod second;
 mod settings;
+mod states;
+mod step;
 mod told;
 mod wave;
 
@@ -40,9 +42,7 @@ use super::case::Case;
 use super::diagnosis::{Diagnosis, Experiment, Rows, Verdict, unit_of};
 use super::fit::{Fit, Metric, fit};
 use super::model::Model;
-use crate::physics::OutputKind;
 use adapters::Recording;
-use bank::{Drawn, Family, Owner};
 use existence::existence;
 use gram::{Comparison, ComparisonInput};
 use inputs::RecordingInputs;
@@ -54,18 +54,15 @@ use posterior::{NoiseSetting, explanations};
 use search::{SetEvidence, SetSearch, priors};
 use second::SecondStage;
 use settings::{NoiseSettings, settings};
+use states::Residuals;
 
 /// Rows below which nothing is claimed: the verdict is `cannot_tell`.
 const ROWS_MIN: usize = 40;
+/// Rows that are compared one by one; of more, neighbours are averaged. Twice as many cost twice the time; half as many lose
+/// delays of a few rows.
+const ROWS_MAX: usize = 4000;
 /// Sets that are followed in the first and in the second stage.
 const BEAMS: (usize, usize) = (5, 6);
-/// Shares of the memory of the noise with which hidden sequences are looked for: what switches poses as memory.
-const MEMORY_SHARES: [f64; 3] = [1.0, 0.7, 0.4];
-/// Share of the rows in which two hidden sequences may agree (or disagree) before they are one.
-const SAME_SEQUENCE: f64 = 0.97;
-
-/// Turns per row within which two lines are one.
-const SAME_LINE: f64 = 0.008;
 
 /// Compares a model with a recording; `seed` chooses what is held out.
 ///
@@ -90,7 +87,7 @@ pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagn
     let outliers = outliers(&inputs, &bank, &baseline.tangents);
     let compared =
         ComparisonInput { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
-    let first = Comparison::new(&inputs, &bank, &compared);
+    let first = Comparison::new(&inputs, &bank, &compared, ROWS_MAX);
     let (answer, noise) = answer(&inputs, &first, &compared, &baseline, &outliers);
     let report = told::EvidenceReport {
         case: &mut case,
@@ -151,8 +148,10 @@ fn answer(
     let own = priors(bank);
     let (found, prepared) = first_stage(first, &noises, &own);
     let mut second = SecondStage::of(inputs, bank, &own, &found);
-    add_sequences(inputs, first, &prepared, &found, outliers, &noises, &mut second);
-    let wide = Comparison::new(inputs, &second.bank, compared);
+    let residuals = Residuals { inputs, comparison: first, setting: &prepared[0], scale: &outliers.scale };
+    let slow = noises.leading.last().copied().unwrap_or(NoiseModel::WHITE);
+    residuals.add_states(&found, slow, &mut second);
+    let wide = Comparison::new(inputs, &second.bank, compared, ROWS_MAX);
     let settings: Vec<NoiseSetting> = noises
         .likely
         .iter()
@@ -175,7 +174,8 @@ fn answer(
     let left = best.map_or_else(Vec::new, |best| wide.left_by(&settings[best.noise], &best.members));
     let of = prepared.iter().find(|setting| best.is_some_and(|b| setting.gram.noise == settings[b.noise].gram.noise));
     let of = of.unwrap_or(&prepared[0]);
-    let over_nothing = best.map_or(0.0, |best| best.over_nothing);
+    let named = best.filter(|best| !best.members.is_empty());
+    let over_nothing = named.map_or(f64::NEG_INFINITY, |best| best.over_nothing);
     let test = existence(first, (&of.gram, of.saturated), &own, &left, over_nothing);
     let judge = Judge {
         inputs,
@@ -212,140 +212,6 @@ fn merge(into: &mut SetEvidence, from: SetEvidence) {
     for (members, ln) in from {
         let known = into.entry(members).or_insert(f64::NEG_INFINITY);
         *known = known.max(ln);
-    }
-}
-
-/// Hidden sequences and waves in what the empty and the leading sets leave.
-fn add_sequences(
-    inputs: &RecordingInputs<'_>,
-    first: &Comparison<'_>,
-    prepared: &[NoiseSetting],
-    found: &SetEvidence,
-    outliers: &Outliers,
-    noises: &NoiseSettings,
-    second: &mut SecondStage,
-) {
-    let mut sets: Vec<(&Vec<(usize, usize)>, f64)> = found.iter().map(|(members, ln)| (members, *ln)).collect();
-    sets.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let empty = Vec::new();
-    let leading = sets.iter().map(|(members, _)| *members).filter(|members| !members.is_empty()).take(2);
-    let mut known: Vec<Vec<f64>> = Vec::new();
-    let mut lines: Vec<wave::Line> = Vec::new();
-    let noise = noises.leading.last().copied().unwrap_or(NoiseModel::WHITE);
-    for members in std::iter::once(&empty).chain(leading) {
-        let setting = &prepared[0];
-        let left = first.left_by(setting, members);
-        if let Some(line) = wave::line(first, &left, setting.gram.noise)
-            && !lines.iter().any(|known: &wave::Line| (known.frequency - line.frequency).abs() < SAME_LINE)
-        {
-            lines.push(line);
-            add_wave(inputs, line, second);
-        }
-        for share in MEMORY_SHARES {
-            let memory = share * noise.share * noise.phi;
-            let Some(sequence) = hidden::sequence(inputs, &left, &outliers.scale, memory) else { continue };
-            if !is_more_than_slow_noise(inputs, first, &left, &sequence) {
-                continue;
-            }
-            if !known.iter().any(|other| is_same(inputs, other, &sequence.on)) {
-                known.push(sequence.on.clone());
-                add_sequence(inputs, second, sequence, known.len());
-            }
-        }
-    }
-}
-
-/// Nats by which a sequence must beat noise of any memory: a path through two levels has as many choices as rows. Chosen
-/// between what a sequence brings in noise alone (19 and 23 over the whole recording) and consumers (37 to 57) on six open
-/// recordings; two of noise with a memory of 33 rows still pass. Higher: weak consumers are lost; lower: a wandering meter
-/// passes for one.
-const SWITCH_NATS: f64 = 30.0;
-
-/// Is a sequence likelier than noise that may be as slow as it likes? What switches has edges, slow noise has none; the
-/// memory of the noise is bounded everywhere else, so that levels stay levels, and a wandering meter would pass for one.
-fn is_more_than_slow_noise(
-    inputs: &RecordingInputs<'_>,
-    first: &Comparison<'_>,
-    left: &[f64],
-    sequence: &hidden::Sequence,
-) -> bool {
-    let grid = NoiseModel::grid(f64::INFINITY, inputs.period_s);
-    let (mut slow, mut switching) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-    for noise in grid {
-        slow = slow.max(first.likelihood_of(left, noise));
-        let (x, y) = (first.whitened(&sequence.on, noise), first.whitened(left, noise));
-        let square: f64 = x.iter().map(|x| x * x).sum();
-        let step = x.iter().zip(&y).map(|(x, y)| x * y).sum::<f64>() / square.max(f64::MIN_POSITIVE);
-        let less = inputs.column(|row| left[row] - step * sequence.on[row]);
-        switching = switching.max(first.likelihood_of(&less, noise));
-    }
-    switching - slow > SWITCH_NATS
-}
-
-/// Is the output what a meter in the supply shows? Consumers and the ripple of the mains are nowhere else, and not in the
-/// current of a feed drive.
-fn shows_consumers(inputs: &RecordingInputs<'_>) -> bool {
-    !inputs.is_axis && (inputs.kind == OutputKind::Power || inputs.scene.output().ends_with("_a"))
-}
-
-/// A wave of one frequency as the ripple of the mains, where a meter in the supply is read, and as a wave without a name.
-fn add_wave(inputs: &RecordingInputs<'_>, line: wave::Line, second: &mut SecondStage) {
-    let angle = wave::angle(inputs, line);
-    let spells = families::waves::spells(inputs, false);
-    let all: Vec<&std::ops::Range<usize>> = spells.iter().collect();
-    let columns = || families::waves::of_spells(inputs, &all, &angle, &vec![1.0; inputs.rows]);
-    let label = format!("{:.4} turns per row", line.frequency);
-    if shows_consumers(inputs) {
-        let family = Family::of("ripple_alias").wide();
-        second.add(inputs, Owner::Named(family), label.clone(), columns(), -line.ln_choices);
-    } else {
-        let drawn = Drawn { over: "time".to_owned(), times: "1", shape: "wave" };
-        second.add(inputs, Owner::Nameless(drawn), label, columns(), -line.ln_choices);
-    }
-}
-
-fn is_same(inputs: &RecordingInputs<'_>, a: &[f64], b: &[f64]) -> bool {
-    let rows: Vec<usize> = inputs.taken(false).collect();
-    let equal = rows.iter().filter(|row| (a[**row] - b[**row]).abs() < 0.5).count();
-    let share = crate::statistics::count(equal) / crate::statistics::count(rows.len().max(1));
-    !(1.0 - SAME_SEQUENCE..=SAME_SEQUENCE).contains(&share)
-}
-
-/// Share of the rows in which it is on that lie in the cut, from which a sequence is an event of the cut and no consumer.
-/// A consumer knows nothing of the cut; 3 % are left for flags that are a row early or late. Chosen on recordings with
-/// concealed consumers. A wrong value costs the name, not the report.
-const OF_THE_CUT: f64 = 0.97;
-/// Mean length of being on, in rows, below which it is an event and no consumer: shorter ones are also made by noise with
-/// heavy tails. A wrong value costs the name of a consumer that is on briefly.
-const EVENT_ROWS: f64 = 4.0;
-/// What it costs to call an event a consumer, nats: odds of 400 to 1, so that only a much better fit gives it the name.
-const EVENT_AS_CONSUMER: f64 = -6.0;
-
-/// A sequence as a consumer, as an event in the cut, and as a regime of the coolant.
-fn add_sequence(inputs: &RecordingInputs<'_>, second: &mut SecondStage, sequence: hidden::Sequence, number: usize) {
-    let label = format!("hidden, {} changes, {:.0} nats", sequence.changes, sequence.ln);
-    let named = |kind: &'static str| Owner::Named(Family::of(kind).wide());
-    let all = crate::statistics::count(inputs.taken(false).count().max(1));
-    let over = |of: &dyn Fn(usize) -> f64| inputs.taken(false).map(of).sum::<f64>();
-    let on = over(&|row| sequence.on[row]).max(1.0);
-    let in_cut = over(&|row| inputs.cutting(row));
-    let cuts = inputs.engaged.is_some() && in_cut > 0.0 && in_cut < all;
-    let in_cut_only = cuts && over(&|row| sequence.on[row] * inputs.cutting(row)) > OF_THE_CUT * on;
-    let short = on < EVENT_ROWS * 0.5 * crate::statistics::count(sequence.changes);
-    let consumer = sequence.ln + if in_cut_only || short { EVENT_AS_CONSUMER } else { 0.0 };
-    let metered = shows_consumers(inputs) && !hidden::follows_inputs(inputs, &sequence.on);
-    if metered {
-        second.add(inputs, named("auxiliary_switch"), label.clone(), [(sequence.on.clone(), 1.0)], consumer);
-    }
-    if cuts || short || !metered {
-        let event = inputs.column(|row| sequence.on[row] * if cuts { inputs.cutting(row) } else { 1.0 });
-        let drawn = Drawn { over: format!("event {number}"), times: "engaged", shape: "event" };
-        second.add(inputs, Owner::Nameless(drawn), label.clone(), [(event, 1.0)], sequence.ln);
-    }
-    if let Some(cut) = inputs.cut.as_ref().filter(|_| inputs.knows_cut) {
-        let top = inputs.taken(false).map(|row| cut[row].abs()).fold(1e-12, f64::max);
-        let regime = inputs.column(|row| sequence.on[row] * cut[row] / top);
-        second.add(inputs, named("coolant_regime"), label, [(regime, 1.0)], sequence.ln - 1.0);
     }
 }
 

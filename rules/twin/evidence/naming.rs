@@ -9,7 +9,9 @@ use super::algebra::{CholeskyFactor, block, schur};
 use super::bank::{Variant, VariantBank};
 use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
+use crate::physics::effect;
 use crate::statistics::count;
+use adapters::channel::quantity::Quantity;
 use ndarray::{Array1, Array2};
 use std::ops::Range;
 
@@ -75,6 +77,13 @@ impl<'a> Naming<'a> {
         Self { bank, first: comparison.first(), metrics: grams.iter().map(cleared).collect(), named }
     }
 
+    /// May a law be what these curves are: does it know their channels?
+    fn may_be(&self, law: usize, parts: &[(usize, &[f64])]) -> bool {
+        let Some(effect) = self.bank.variants[law].kind().and_then(effect) else { return true };
+        let quantities = parts.iter().filter_map(|(variant, _)| self.bank.variants[*variant].drawn());
+        quantities.map(|drawn| Quantity::of(&drawn.over)).all(|quantity| effect.follows(quantity))
+    }
+
     /// The best claim on a curve, given as nameless variants with their coefficients.
     pub(super) fn claim(&self, parts: &[(usize, &[f64])]) -> Option<Claim> {
         let claims = self.metrics.iter().filter_map(|metric| self.claim_in(metric, parts));
@@ -96,6 +105,9 @@ impl<'a> Naming<'a> {
             for variant in &self.named {
                 let of = |(along, square): &(Array1<f64>, f64)| self.regress(metric, along, *square, &[*variant]);
                 let Some(fit) = self.regress(metric, &along, square, &[*variant]) else { continue };
+                if !self.may_be(*variant, parts) {
+                    continue;
+                }
                 let enough = best.as_ref().map_or(THRESHOLDS.name_share + THRESHOLDS.pair_more, |best| best.share);
                 let makes_each = |own: &(Array1<f64>, f64)| of(own).is_some_and(|own| own.share >= THRESHOLDS.of_each);
                 if fit.share > enough && each.iter().all(makes_each) {
@@ -148,6 +160,7 @@ impl<'a> Naming<'a> {
         let mut single: Vec<(f64, usize, Vec<f64>)> = self
             .named
             .iter()
+            .filter(|variant| self.may_be(**variant, parts))
             .filter_map(|variant| {
                 let fit = self.regress(metric, &along, square, &[*variant])?;
                 Some((fit.share, *variant, fit.coefficients))
@@ -162,13 +175,13 @@ impl<'a> Naming<'a> {
             .any(|(variant, _)| self.bank.variants[*variant].drawn().is_some_and(|drawn| drawn.shape == "levels"));
         let whole = THRESHOLDS.pair_whole.max(one.share + THRESHOLDS.pair_more);
         if one.share >= THRESHOLDS.name_share && !levels && whole < 1.0 {
-            let pair = self.pair(metric, &along, square, &single);
+            let pair = self.pair(metric, parts, (&along, square), &single);
             return Some(pair.filter(|pair| pair.share > whole).unwrap_or(one));
         }
         if one.share >= THRESHOLDS.name_share || levels {
             return Some(one);
         }
-        let pair = self.pair(metric, &along, square, &single);
+        let pair = self.pair(metric, parts, (&along, square), &single);
         let enough = (THRESHOLDS.name_share + THRESHOLDS.pair_more).max(one.share + THRESHOLDS.pair_gain);
         Some(pair.filter(|pair| pair.share > enough).unwrap_or(one))
     }
@@ -176,8 +189,8 @@ impl<'a> Naming<'a> {
     fn pair(
         &self,
         metric: &Array2<f64>,
-        along: &Array1<f64>,
-        square: f64,
+        parts: &[(usize, &[f64])],
+        (along, square): (&Array1<f64>, f64),
         single: &[(f64, usize, Vec<f64>)],
     ) -> Option<Claim> {
         let mut firsts: Vec<usize> = Vec::new();
@@ -189,7 +202,8 @@ impl<'a> Naming<'a> {
         }
         let mut best: Option<Claim> = None;
         for first in firsts {
-            for second in self.named.iter().copied().filter(|second| kind(*second) != kind(first)) {
+            let others = self.named.iter().copied().filter(|second| kind(*second) != kind(first));
+            for second in others.filter(|second| self.may_be(*second, parts)) {
                 let Some(fit) = self.regress(metric, along, square, &[first, second]) else { continue };
                 if best.as_ref().is_none_or(|best| fit.share > best.share) {
                     let size = self.law(first).len();

@@ -57,23 +57,13 @@ impl SecondStage {
         second
     }
 
-    /// Adds a state that was read from the recording, with what it has cost to find it as prior.
-    pub(super) fn add(
-        &mut self,
-        inputs: &RecordingInputs<'_>,
-        owner: Owner,
-        label: String,
-        columns: impl IntoIterator<Item = (Vec<f64>, f64)>,
-        ln: f64,
-    ) {
+    /// Adds a variant that was read from the recording, with what it has cost to find it as prior.
+    pub(super) fn add(&mut self, ln: f64, make: impl FnOnce(&mut VariantBank)) {
         let before = self.bank.variants.len();
-        let prior = if matches!(owner, Owner::Named(_)) { NAMED } else { NAMELESS };
-        match owner {
-            Owner::Named(family) => self.bank.of(family, label).sized().columns(inputs, columns),
-            Owner::Nameless(drawn) => self.bank.nameless(drawn).sized().columns(inputs, columns),
-        }
-        if self.bank.variants.len() > before {
-            self.priors.push(prior + ln);
+        make(&mut self.bank);
+        if let Some(variant) = self.bank.variants.get(before) {
+            let prior = if variant.kind().is_some() { NAMED } else { NAMELESS };
+            self.priors.push(prior + variant.ln_prior + ln);
             self.source.push(None);
         }
     }

@@ -20,7 +20,7 @@ use crate::twin::inputs::rows_with_inputs;
 use crate::twin::intervals::FittedRows;
 use crate::twin::linear::least_squares;
 use crate::twin::locate::{Region, conditions, spans};
-use crate::twin::model::{Model, Part};
+use crate::twin::model::{Model, Parameter, Part};
 use crate::twin::next_step::{alternative, of_effects, over_channel};
 use crate::twin::words;
 
@@ -335,7 +335,7 @@ impl EvidenceReport<'_, '_> {
         let pairs = self.baseline.parts.iter().zip(&fit.parts);
         let of = |(before, after): (&Part, &Part)| {
             let parameters = before.parameters.iter().zip(&after.parameters).filter(|(before, _)| !before.fixed);
-            let shift = |(b, a): (&crate::twin::model::Parameter, &crate::twin::model::Parameter)| Shift {
+            let shift = |(b, a): (&Parameter, &Parameter)| Shift {
                 parameter: format!("{}.{}", before.label(), b.name),
                 before: b.value,
                 after: a.value,
@@ -352,10 +352,11 @@ fn is_at_end(value: f64, (low, high): (f64, f64)) -> bool {
     value <= low + near || value >= high - near
 }
 
-/// Is every size of a part at the end of its range?
+/// Is every size of a part at an end of its range? A share of one is a whole, and no end.
 fn is_impossible(part: &Part) -> bool {
     let own = || part.parameters.iter().filter(|p| p.entry == Entry::Linear && !p.fixed);
-    own().count() > 0 && own().all(|p| is_at_end(p.value, p.range))
+    let is_whole = |p: &Parameter| p.range == (0.0, 1.0) && p.value > 0.5;
+    own().count() > 0 && own().all(|p| is_at_end(p.value, p.range) && !is_whole(p))
 }
 
 /// A candidate with these values of its linear parameters, within what is possible.

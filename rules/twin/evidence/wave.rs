@@ -21,7 +21,7 @@ const REFINED: usize = 40;
 /// A line of the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Line {
-    /// Turns per row.
+    /// Turns per recorded row.
     pub(super) frequency: f64,
     /// Logarithm of the number of frequencies that were looked at.
     pub(super) ln_choices: f64,
@@ -45,7 +45,7 @@ pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel)
     let width = 1.0 / count(SEGMENT_ROWS);
     let near = (0..=REFINED).map(|k| best + width * (2.0 * count(k) / count(REFINED) - 1.0));
     let refined = near.map(|frequency| (power(frequency), frequency)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(Line { frequency: refined.1, ln_choices: count(bins.len()).ln() })
+    Some(Line { frequency: refined.1 / count(comparison.group), ln_choices: count(bins.len()).ln() })
 }
 
 /// Angle of a line in every row, rad: by the clock, so that gaps do not shift it.

@@ -255,17 +255,8 @@ fn cuts_dry(inputs: &RecordingInputs<'_>, cut: &[f64], coolant: &[f64]) -> bool 
     dry > DRY_MIN * whole
 }
 
-/// Consumers that a word or a flag of the recording tells.
+/// Consumers that a flag of the recording tells; what a word of an operation tells has a level without a name.
 fn consumers(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
-    for column in ["operation", "program"] {
-        let Some(words) = inputs.scene.words(column).filter(|words| (3..=25).contains(&words.words().len())) else {
-            continue;
-        };
-        for (code, word) in words.words().iter().enumerate() {
-            let here = |row: usize| f64::from(u8::from(words.code(row).is_some_and(|at| at as usize == code)));
-            bank.of(CONSUMER, format!("{column} {word}")).prior(-1.0).column(inputs, inputs.column(here));
-        }
-    }
     for column in ["coolant_on", "hydraulics_on"] {
         if let Some(flag) = inputs.scene.column(column)
             && inputs.deviation_of(flag, false) > 0.0

@@ -39,6 +39,6 @@ pub(super) fn bank(inputs: &RecordingInputs<'_>, model: &Model) -> VariantBank {
         !vain && effect(kind).is_none_or(|effect| wanted(effect, model))
     });
     catalogue::hypotheses(inputs, model, &mut bank);
-    nameless::add(inputs, &mut bank);
+    nameless::add(inputs, model, &mut bank);
     bank
 }
