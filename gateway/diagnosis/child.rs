@@ -209,7 +209,7 @@ fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Str
         from_ns,
         to_ns,
         verdict: found.verdict.word().to_owned(),
-        summary: found.summary.clone(),
+        summary: found.summary.en.clone(),
         json: outputs::document(&found, &context).to_string(),
     };
     let kept = DiagnosisStore::at(job.kept.clone());

@@ -158,8 +158,11 @@ impl DiagnosisStore {
         for language in [Language::En, Language::Zh] {
             put(DiagnosisFile::Page(language), &page(&PageInput { diagnosis: found, recording, context, language }))?;
         }
-        let mut words =
-            DiagnosisTexts { summary_zh: summary_zh(found), effects: effect_texts(found), ..DiagnosisTexts::default() };
+        let mut words = DiagnosisTexts {
+            summary_zh: found.summary.zh.clone(),
+            effects: effect_texts(found),
+            ..DiagnosisTexts::default()
+        };
         if let Ok(plan) = plan::plan(found, recording) {
             (words.steps, words.minutes) = (steps(&plan), Some(plan.minutes()));
             for language in [Language::En, Language::Zh] {
@@ -190,13 +193,6 @@ impl DiagnosisStore {
         let at = files.iter().position(|(_, key, _)| *key == first_gone).unwrap_or(files.len());
         files[at..].iter().try_for_each(|(.., name)| std::fs::remove_file(self.directory.join(name)))
     }
-}
-
-/// The headline of the report in Chinese, without the word of the verdict before it.
-fn summary_zh(found: &twin::Diagnosis) -> String {
-    let report = text::report(found, Language::Zh);
-    let headline = report.lines().next().unwrap_or_default();
-    headline.split_once('：').map_or(headline, |(_, words)| words).to_owned()
 }
 
 #[cfg(test)]

@@ -14,9 +14,9 @@ pub mod state;
 mod tool_load;
 mod unit;
 
+use adapters::channel::quantity::Quantity;
 pub use catalogue::{CATALOGUE, effect};
 pub use scene::{Block, LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError, blocks_of};
-use adapters::channel::quantity::Quantity;
 pub use unit::{unit_in, unit_of_quantity};
 
 /// How a parameter enters the law.

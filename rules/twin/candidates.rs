@@ -70,10 +70,11 @@ fn is_rate_of(scene: &Scene, column: &[f64]) -> bool {
 
 /// May the search propose this effect beside this model?
 #[must_use]
-pub fn wanted(effect: &dyn Effect, model: &Model) -> bool {
+pub(super) fn wanted(effect: &dyn Effect, model: &Model) -> bool {
     let kind = effect.doc().kind;
     let listed = model.only.is_empty() || model.only.iter().any(|only| only == kind);
-    let excluded = model.exclude.iter().any(|excluded| excluded == kind) || kind == BUILDING || kind == CUT && may_hold_cut(model);
+    let excluded =
+        model.exclude.iter().any(|excluded| excluded == kind) || kind == BUILDING || kind == CUT && may_hold_cut(model);
     // A part whose every number is fixed may itself be wrong, so its kind stays a candidate.
     let modelled = model.parts.iter().any(|part| part.kind == kind && !part.parameters.iter().all(|p| p.fixed));
     let weighed = INERTIA.contains(&kind) && weighs_acceleration(model);

@@ -6,6 +6,7 @@ use super::quality::{Fault, clean};
 use super::units::{Unit, held_out, units};
 use crate::physics::Scene;
 use adapters::Recording;
+use adapters::bilingual::Bilingual;
 use std::collections::BTreeSet;
 
 /// A recording prepared for comparison with a model.
@@ -49,14 +50,22 @@ impl<'a> Case<'a> {
     }
 
     /// What is needed, where the fitted rows cannot tell anything.
-    pub(super) fn too_little(&self, least: usize) -> Option<String> {
+    pub(super) fn too_little(&self, least: usize) -> Option<Bilingual> {
         let fitted = self.fitted();
         if fitted.len() < least {
-            return Some(format!("at least {least} rows with a value of {}", self.model.output));
+            let output = &self.model.output;
+            return Some(Bilingual::new(
+                format!("at least {least} rows with a value of {output} that are not held out"),
+                format!("至少{least}个含{output}且未留出的行"),
+            ));
         }
         let first = self.scene.recorded()[fitted[0]];
         if fitted.iter().all(|row| self.scene.recorded()[*row] == first) {
-            return Some(format!("a recording in which {} changes", self.model.output));
+            let output = &self.model.output;
+            return Some(Bilingual::new(
+                format!("a recording in which {output} changes"),
+                format!("{output}有变化的记录"),
+            ));
         }
         None
     }

@@ -3,6 +3,7 @@
 use super::locate::Region;
 use super::model::Model;
 use super::quality::Fault;
+use adapters::bilingual::Bilingual;
 
 /// The unit of an output, from its name.
 #[must_use]
@@ -191,7 +192,7 @@ pub struct Diagnosis {
     /// The answer.
     pub verdict: Verdict,
     /// The answer for a machinist.
-    pub summary: String,
+    pub summary: Bilingual,
     /// Whether anything is missing; `None` when nothing could be fitted.
     pub existence: Option<Existence>,
     /// The fits; `None` when nothing could be fitted.

@@ -108,7 +108,8 @@ fn step(parts: &[Part], free: &[Free], metric: &Metric<'_>, total: &[f64], tange
             let parameter = &parts[free[index].part].parameters[free[index].parameter];
             let (low, high) = parameter.range;
             let held = metric.bounded || parameter.entry == Entry::Shape;
-            let outwards = parameter.value <= low && steps[index] < 0.0 || parameter.value >= high && steps[index] > 0.0;
+            let outwards =
+                parameter.value <= low && steps[index] < 0.0 || parameter.value >= high && steps[index] > 0.0;
             held && !resting[index] && outwards
         };
         let Some(index) = (0..free.len()).find(|index| leaves(*index)) else { return steps };

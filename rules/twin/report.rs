@@ -1,6 +1,8 @@
 //! The diagnosis as JSON (`diagnosis/1`) and as rows.
 
-use super::diagnosis::{Alternative, Diagnosis, Existence, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift};
+use super::diagnosis::{
+    Alternative, Diagnosis, Existence, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift,
+};
 use super::locate::{Condition, OnsetInterval, Region, Span};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
@@ -30,7 +32,7 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         "output": diagnosis.output,
         "unit": diagnosis.unit,
         "verdict": diagnosis.verdict.word(),
-        "summary": diagnosis.summary,
+        "summary": diagnosis.summary.en,
         "existence": diagnosis.existence.as_ref().map_or(Value::Null, existence),
         "fit": diagnosis.fit.as_ref().map_or(Value::Null, fits),
         "mismatch": diagnosis.mismatch.iter().map(region).collect::<Vec<_>>(),

@@ -195,7 +195,8 @@ impl<'a> Bag<'a> {
             }
             inner[[i, i]] += 1.0;
         }
-        let along = Array1::from_iter(all.iter().zip(&scales).map(|(index, scale)| ground.left[[*index, last]] * scale));
+        let along =
+            Array1::from_iter(all.iter().zip(&scales).map(|(index, scale)| ground.left[[*index, last]] * scale));
         let factor = CholeskyFactor::of(&inner);
         let solved = factor.solve(&along);
         let kept = (ground.square - along.dot(&solved)).max(1e-6 * ground.square);

@@ -1,10 +1,11 @@
 //! What an explanation contributes: the output with it, and every name's share of it row by row.
 
 use super::algebra::{CholeskyFactor, add_gram, mirror};
+use super::answer::Named;
 use super::bank::Since;
 use super::follow::Follower;
-use super::judge::{Judge, Named};
-use super::marginal::PosteriorMeans;
+use super::judge::Judge;
+use super::means::PosteriorMeans;
 use super::noise::NoiseModel;
 use super::posterior::Explanation;
 use crate::statistics::{count, rms};

@@ -56,7 +56,9 @@ pub(super) fn existence(
     let (ground, _) = comparison.baseline(gram, saturated);
     let asked = comparison.asked(&ground);
     let evidence_of = |along: &Array1<f64>, square: f64| -> f64 {
-        ln_sum(asked.iter().zip(priors).map(|(variant, prior)| prior + comparison.answer(&ground, variant, along, square)))
+        ln_sum(
+            asked.iter().zip(priors).map(|(variant, prior)| prior + comparison.answer(&ground, variant, along, square)),
+        )
     };
     let observed = evidence_of(&ground.along_output(), ground.square()).max(evidence);
     let square: f64 = innovations.dot(&innovations);

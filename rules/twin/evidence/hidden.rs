@@ -74,9 +74,7 @@ fn at_changes(inputs: &RecordingInputs<'_>, on: &[f64]) -> bool {
     let feed = inputs.scene.column("feed_mm_min");
     let paces = [inputs.speed.as_deref(), feed, inputs.engaged.as_deref()];
     let paced = |row: usize| row > 0 && paces.iter().flatten().any(|pace| differ(pace, row));
-    let near = |row: usize| {
-        (row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(inputs.rows)).any(paced)
-    };
+    let near = |row: usize| (row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(inputs.rows)).any(paced);
     let rows = || inputs.taken(false).filter(|row| *row > 0 && inputs.fitted[row - 1]);
     let changes: Vec<usize> = rows().filter(|row| (on[*row] - on[row - 1]).abs() > 0.5).collect();
     let share = |near: usize, all: usize| count(near) / count(all.max(1));

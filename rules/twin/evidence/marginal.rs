@@ -40,12 +40,12 @@ pub(super) struct Saturated {
 
 /// The Gram matrix that a search starts from: the baseline projected out, and where each variant stands in it.
 pub(super) struct Ground {
-    gram: Array2<f64>,
+    pub(super) gram: Array2<f64>,
     /// Variants of whose law the baseline leaves next to nothing: no recording like this one tells them.
     hidden: Vec<bool>,
     /// First column of each variant; `None` of what is not in it.
-    starts: Vec<Option<usize>>,
-    variance: f64,
+    pub(super) starts: Vec<Option<usize>>,
+    pub(super) variance: f64,
 }
 
 /// What a hypothesis takes out of it: `gram - reach reach'` is left.
@@ -110,23 +110,6 @@ impl MarginalState<'_> {
     fn at(&self, row: usize, column: usize) -> f64 {
         self.ground.gram[[row, column]] - self.reach.row(row).dot(&self.reach.row(column))
     }
-}
-
-/// A variant with what its evidence needs for any output.
-pub(super) struct AskedVariant {
-    variant: usize,
-    /// Its first column.
-    start: usize,
-    sizes: Vec<AskedSize>,
-}
-
-/// The same for one size.
-struct AskedSize {
-    lambda: f64,
-    ln_determinant: f64,
-    /// First line of the inverse.
-    first: Array1<f64>,
-    factor: CholeskyFactor,
 }
 
 /// What a variant adds to a state.
@@ -251,49 +234,6 @@ impl Comparison<'_> {
         EvidenceGain { size: best.0, ln: ln_sum(all) }
     }
 
-    /// Every variant, ready to be asked of many outputs.
-    pub(super) fn asked(&self, ground: &Ground) -> Vec<AskedVariant> {
-        (0..self.bank.variants.len()).map(|variant| self.asked_variant(ground, variant)).collect()
-    }
-
-    fn asked_variant(&self, ground: &Ground, variant: usize) -> AskedVariant {
-        let relative = &self.bank.variants[variant].relative;
-        let start = ground.starts[variant].unwrap_or(0);
-        let size = relative.len();
-        let inner = Array2::from_shape_fn((size, size), |(i, j)| {
-            ground.gram[[start + i, start + j]] * relative[i] * relative[j]
-        });
-        let of_size = |index: usize| {
-            let lambda = (SIZES[index] * self.deviation).powi(2) / ground.variance;
-            let factor = CholeskyFactor::of(&(Array2::eye(size) + &inner * lambda));
-            let mut unit = Array1::zeros(size);
-            unit[0] = 1.0;
-            AskedSize { lambda, ln_determinant: factor.ln_determinant(), first: factor.solve(&unit), factor }
-        };
-        AskedVariant { variant, start, sizes: (0..SIZES.len()).map(of_size).collect() }
-    }
-
-    /// Logarithm of the evidence that a variant has for an output, given its inner products with every column and its sum of
-    /// squares, the baseline projected out of both.
-    pub(super) fn answer(&self, ground: &Ground, asked: &AskedVariant, along: &Array1<f64>, square: f64) -> f64 {
-        let of = &self.bank.variants[asked.variant];
-        let own = Array1::from_iter(of.relative.iter().enumerate().map(|(k, relative)| along[asked.start + k] * relative));
-        let rows = self.tempering * count(self.rows.len());
-        let all = asked.sizes.iter().enumerate().map(|(index, size)| {
-            let explained = size.lambda * size.factor.half(&own);
-            let left = (square - explained).max(1e-6 * square);
-            let sign = if of.sign() == 0.0 {
-                0.0
-            } else {
-                let mean = size.lambda * size.first.dot(&own);
-                let variance = size.lambda * size.first[0] * ground.variance / self.tempering.max(1e-3);
-                (2.0 * normal_share(of.sign() * mean / (variance + 1e-300).sqrt()) + 1e-12).ln()
-            };
-            -0.5 * rows * (left / square).ln() - 0.5 * size.ln_determinant + sign + ln_size_prior(of, index)
-        });
-        ln_sum(all.collect::<Vec<_>>())
-    }
-
     /// Prior variance of a size over that of the noise.
     fn lambda(&self, state: &MarginalState<'_>, size: f64) -> f64 {
         (size * self.deviation).powi(2) / state.ground.variance
@@ -369,47 +309,6 @@ impl Comparison<'_> {
     pub(super) fn part_of(&self, ground: &Ground, members: &[(usize, usize)]) -> Ground {
         ground.of(members.iter().map(|(variant, _)| *variant), |variant| self.bank.variants[variant].relative.len())
     }
-
-    /// Posterior means: coefficients of the tangents and of each member.
-    pub(super) fn solve(&self, gram: &Array2<f64>, variance: f64, members: &[(usize, usize)]) -> PosteriorMeans {
-        let last = gram.nrows() - 1;
-        let own = members.iter().flat_map(|(variant, _)| self.columns(*variant));
-        let all: Vec<usize> = (0..self.first()).chain(own).collect();
-        let ridge = self.ridges(gram, variance, members);
-        let mut inner = block(gram, &all, &all);
-        ridge.iter().enumerate().for_each(|(at, ridge)| inner[[at, at]] += ridge);
-        let y = Array1::from_iter(all.iter().map(|index| gram[[*index, last]]));
-        self.split(&CholeskyFactor::of(&inner).solve(&y), members)
-    }
-
-    /// Ridges of the tangents, the levels of the runs and the columns of some members, in this order.
-    pub(super) fn ridges(&self, gram: &Array2<f64>, variance: f64, members: &[(usize, usize)]) -> Vec<f64> {
-        let mut ridge = self.fixed_ridge(gram, variance);
-        for (variant, size) in members {
-            let of = &self.bank.variants[*variant];
-            ridge.extend(of.relative.iter().map(|d| variance / (SIZES[*size] * self.deviation * d).powi(2)));
-        }
-        ridge
-    }
-
-    /// Coefficients in the order of [`Self::ridges`] by what they belong to.
-    pub(super) fn split(&self, w: &Array1<f64>, members: &[(usize, usize)]) -> PosteriorMeans {
-        let tangents = w.slice(s![..self.tangents]).to_vec();
-        let mut at = self.first();
-        let of_member = |(variant, _): &(usize, usize)| {
-            let size = self.bank.variants[*variant].relative.len();
-            at += size;
-            w.slice(s![at - size..at]).to_vec()
-        };
-        PosteriorMeans { tangents, members: members.iter().map(of_member).collect() }
-    }
-}
-
-/// Posterior means of a hypothesis.
-#[derive(Debug, Clone)]
-pub(super) struct PosteriorMeans {
-    pub(super) tangents: Vec<f64>,
-    pub(super) members: Vec<Vec<f64>>,
 }
 
 /// Logarithm of the prior probability of a size of a variant.

@@ -8,11 +8,13 @@
 //!    switches (`hidden.rs`).
 //! 5. A nameless curve that is the curve of a named law gets its name (`naming.rs`).
 //! 6. Whether anything is there is one test (`existence.rs`). One rule decides what is told of it (`decision.rs`,
-//!    `judge.rs`): probabilities averaged over resamples (`bag.rs`), better on inner parts of the fitted rows; rows that are
+//!    `judge.rs`, `verdict.rs`): probabilities averaged over resamples (`bag.rs`), better on inner parts of the fitted rows; rows that are
 //!    held out only withdraw.
 //! 7. The nearest textbook law gives parameters, texts and the experiment (`told.rs`).
 
 mod algebra;
+mod answer;
+mod asked;
 mod bag;
 mod bank;
 mod contributions;
@@ -26,6 +28,7 @@ mod inner;
 mod inputs;
 mod judge;
 mod marginal;
+mod means;
 mod naming;
 mod noise;
 mod outliers;
@@ -36,17 +39,21 @@ mod settings;
 mod states;
 mod step;
 mod told;
+mod verdict;
 mod wave;
 
 use super::case::Case;
 use super::diagnosis::{Diagnosis, Experiment, Rows, Verdict, unit_of};
 use super::fit::{Fit, Metric, fit};
 use super::model::Model;
+use super::words;
 use adapters::Recording;
+use adapters::bilingual::Bilingual;
+use answer::EvidenceAnswer;
 use existence::existence;
 use gram::{Comparison, ComparisonInput};
 use inputs::RecordingInputs;
-use judge::{EvidenceAnswer, Judge};
+use judge::Judge;
 use naming::Naming;
 use noise::NoiseModel;
 use outliers::{Outliers, outliers};
@@ -71,7 +78,7 @@ const BEAMS: (usize, usize) = (5, 6);
 pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
     let mut case = Case::new(recording, model, seed)?;
     if let Some(needed) = case.too_little(ROWS_MIN) {
-        return Ok(cannot_tell(&case, needed));
+        return Ok(cannot_tell(&case, &needed));
     }
     let fitted = case.fitted();
     let recorded = case.scene.recorded().to_vec();
@@ -80,7 +87,8 @@ pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagn
     let mut scene = case.scene.clone();
     let metric = Metric { recorded: &recorded, weigh: &weigh, bounded: false };
     let Some(baseline) = fit(&mut scene, &parts, &metric) else {
-        return Ok(cannot_tell(&case, "a model that can be fitted to this recording".to_owned()));
+        let needed = Bilingual::new("a model that can be fitted to this recording", "能对此记录拟合的模型");
+        return Ok(cannot_tell(&case, &needed));
     };
     let inputs = RecordingInputs::new(&scene, &case.units, &case.held, comparable(&scene, &baseline));
     let bank = families::bank(&inputs, model);
@@ -103,12 +111,12 @@ pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagn
 }
 
 /// The diagnosis of a recording that does not suffice.
-fn cannot_tell(case: &Case<'_>, needed: String) -> Diagnosis {
+fn cannot_tell(case: &Case<'_>, needed: &Bilingual) -> Diagnosis {
     Diagnosis {
         output: case.model.output.clone(),
         unit: unit_of(&case.model.output).to_owned(),
         verdict: Verdict::CannotTell,
-        summary: format!("Cannot tell: this needs {needed}."),
+        summary: words::needs(needed),
         existence: None,
         fit: None,
         mismatch: Vec::new(),

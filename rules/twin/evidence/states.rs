@@ -170,7 +170,9 @@ fn add_sequence(inputs: &RecordingInputs<'_>, second: &mut SecondStage, sequence
     let cuts = inputs.engaged.is_some() && in_cut > 0.0 && in_cut < all;
     let in_cut_only = cuts && over(&|row| sequence.on[row] * inputs.cutting(row)) > OF_THE_CUT * on;
     let short = on < EVENT_ROWS * 0.5 * count(sequence.changes);
-    let by_chance = count(sequence.changes) * 0.5 * divergence(over(&|row| sequence.on[row] * inputs.cutting(row)) / on, in_cut / all);
+    let by_chance = count(sequence.changes)
+        * 0.5
+        * divergence(over(&|row| sequence.on[row] * inputs.cutting(row)) / on, in_cut / all);
     let consumer = sequence.ln - by_chance + if in_cut_only || short { EVENT_AS_CONSUMER } else { 0.0 };
     let metered = shows_consumers(inputs) && !hidden::follows_inputs(inputs, &sequence.on);
     if metered {

@@ -4,16 +4,17 @@
 //! baseline, so that its parameters mean what the catalogue says and the extended model can be simulated. A name that no
 //! textbook law bears out is taken back.
 
+use super::answer::{EvidenceAnswer, sum_of};
 use super::decision::THRESHOLDS;
 use super::gram::Comparison;
 use super::inputs::RecordingInputs;
-use super::judge::{EvidenceAnswer, sum_of};
 use super::noise::NoiseModel;
 use crate::physics::{Bound, Effect, Entry, Form, Scene, effect};
 use crate::statistics::{count, rms};
 use crate::twin::case::Case;
 use crate::twin::diagnosis::{
-    Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict, unit_of,
+    Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
+    unit_of,
 };
 use crate::twin::fit::{Fit, Metric, fit};
 use crate::twin::inputs::rows_with_inputs;
@@ -23,6 +24,7 @@ use crate::twin::locate::{Region, conditions, spans};
 use crate::twin::model::{Model, Parameter, Part};
 use crate::twin::next_step::{alternative, of_effects, over_channel};
 use crate::twin::words;
+use adapters::bilingual::Bilingual;
 
 /// Share of the range of a shape within which it stands at its end.
 const AT_END: f64 = 1e-6;
@@ -76,7 +78,7 @@ impl EvidenceReport<'_, '_> {
             output: self.case.model.output.clone(),
             unit: unit_of(&self.case.model.output).to_owned(),
             verdict: self.answer.verdict,
-            summary: String::new(),
+            summary: Bilingual::default(),
             next_experiment: self.experiment(&alternatives, withdrawn.as_ref().map_or(&[], |gone| &gone.found)),
             mismatch: self.regions(),
             rows: self.rows(),

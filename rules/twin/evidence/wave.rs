@@ -34,7 +34,8 @@ pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel)
     if segments.len() < SEGMENTS_MIN {
         return None;
     }
-    let power = |frequency: f64| segments.iter().map(|rows| power_at(&innovations[rows.clone()], frequency)).sum::<f64>();
+    let power =
+        |frequency: f64| segments.iter().map(|rows| power_at(&innovations[rows.clone()], frequency)).sum::<f64>();
     let bins: Vec<f64> = (FIRST_BIN..SEGMENT_ROWS / 2).map(|bin| count(bin) / count(SEGMENT_ROWS)).collect();
     let powers: Vec<f64> = bins.iter().map(|frequency| power(*frequency)).collect();
     let mean = crate::statistics::mean(&powers);

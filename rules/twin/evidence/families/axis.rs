@@ -45,6 +45,7 @@ fn vertical_pace(inputs: &RecordingInputs<'_>) -> Option<Vec<f64>> {
     let name = inputs.scene.role_name(crate::physics::Role::Vertical)?;
     let letter = name.chars().next().filter(|_| name.len() == 1);
     let own = letter.map(|letter| format!("{letter}_axis_velocity_mm_min"));
-    let column = inputs.scene.column(own.as_deref().unwrap_or(name)).filter(|_| name.contains("velocity") || own.is_some());
+    let column =
+        inputs.scene.column(own.as_deref().unwrap_or(name)).filter(|_| name.contains("velocity") || own.is_some());
     pace(inputs, column?)
 }

@@ -64,9 +64,7 @@ pub(in crate::twin::evidence) fn spells(inputs: &RecordingInputs<'_>, in_cut: bo
             continue;
         }
         match all.last_mut() {
-            Some(last)
-                if last.end == row && inputs.block[row] == inputs.block[row - 1] && last.len() < longest =>
-            {
+            Some(last) if last.end == row && inputs.block[row] == inputs.block[row - 1] && last.len() < longest => {
                 last.end = row + 1;
             }
             _ => all.push(row..row + 1),
