@@ -10,7 +10,7 @@ use crate::reload::digest;
 use crate::report::{PageInput, page};
 use adapters::Recording;
 use rules::physics::explain::Language;
-use rules::twin::{self, diagnosis::Verdict, plan, text};
+use rules::twin::{self, diagnosis::Verdict, plan};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

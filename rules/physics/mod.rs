@@ -16,7 +16,7 @@ mod unit;
 
 use adapters::channel::quantity::Quantity;
 pub use catalogue::{CATALOGUE, effect};
-pub use scene::{Block, LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError, blocks_of};
+pub use scene::{LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError};
 pub use unit::{unit_in, unit_of_quantity};
 
 /// How a parameter enters the law.

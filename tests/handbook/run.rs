@@ -12,7 +12,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// The documents in the order of somebody who begins: a history must be there before it is asked.
-const ORDER: [&str; 11] = [
+const ORDER: [&str; 10] = [
     "README.md",
     "gateway/handbook/start.md",
     "gateway/handbook/configuration.md",

@@ -84,9 +84,11 @@ impl EvidenceAnswer {
         let whole = energy(&sum_of(&self.remaining, rows)).max(f64::MIN_POSITIVE);
         let unknown = self.remaining.iter().find(|(name, _)| name == UNKNOWN).map_or(0.0, |(_, x)| energy(x));
         self.names.retain(|name| !refused.contains(name));
-        // What could stand in the place of a refused name may be what has no name now.
-        for rival in self.rivals.iter_mut().filter(|rival| refused.contains(&rival.instead_of)) {
-            UNKNOWN.clone_into(&mut rival.instead_of);
+        if let Some(first) = self.names.first() {
+            // What stood beside a refused name stands beside what is told.
+            for rival in self.rivals.iter_mut().filter(|rival| refused.contains(&rival.instead_of)) {
+                first.clone_into(&mut rival.instead_of);
+            }
         }
         if self.names.is_empty() || unknown > THRESHOLDS.unknown_share * whole {
             self.unname(Vec::new());

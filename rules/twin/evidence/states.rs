@@ -11,7 +11,7 @@ use super::posterior::NoiseSetting;
 use super::search::SetEvidence;
 use super::second::SecondStage;
 use super::step::{Step, step};
-use super::wave::{self, Line};
+use super::wave::{self, SpectralLine};
 use crate::physics::OutputKind;
 use crate::statistics::count;
 
@@ -64,7 +64,7 @@ impl Residuals<'_> {
         }
     }
 
-    fn add_waves(&self, left: &[f64], lines: &mut Vec<Line>, second: &mut SecondStage) {
+    fn add_waves(&self, left: &[f64], lines: &mut Vec<SpectralLine>, second: &mut SecondStage) {
         let Some(line) = wave::line(self.comparison, left, self.setting.gram.noise) else { return };
         if !lines.iter().any(|known| (known.frequency - line.frequency).abs() < SAME_LINE) {
             lines.push(line);
@@ -129,7 +129,7 @@ fn shows_consumers(inputs: &RecordingInputs<'_>) -> bool {
 }
 
 /// A wave of one frequency: the ripple of the mains where the output is electric, and without a name where it is not.
-fn add_wave(inputs: &RecordingInputs<'_>, line: Line, second: &mut SecondStage) {
+fn add_wave(inputs: &RecordingInputs<'_>, line: SpectralLine, second: &mut SecondStage) {
     let angle = wave::angle(inputs, line);
     let spells = spells(inputs, false);
     let all: Vec<&std::ops::Range<usize>> = spells.iter().collect();

@@ -20,7 +20,7 @@ const REFINED: usize = 40;
 
 /// A line of the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Line {
+pub(super) struct SpectralLine {
     /// Turns per recorded row.
     pub(super) frequency: f64,
     /// Logarithm of the number of frequencies that were looked at.
@@ -28,7 +28,7 @@ pub(super) struct Line {
 }
 
 /// The line that stands out most in what is left over.
-pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel) -> Option<Line> {
+pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel) -> Option<SpectralLine> {
     let innovations = comparison.whitened(left, noise);
     let segments = segments(&comparison.blocks);
     if segments.len() < SEGMENTS_MIN {
@@ -46,11 +46,11 @@ pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel)
     let width = 1.0 / count(SEGMENT_ROWS);
     let near = (0..=REFINED).map(|k| best + width * (2.0 * count(k) / count(REFINED) - 1.0));
     let refined = near.map(|frequency| (power(frequency), frequency)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(Line { frequency: refined.1 / count(comparison.group), ln_choices: count(bins.len()).ln() })
+    Some(SpectralLine { frequency: refined.1 / count(comparison.group), ln_choices: count(bins.len()).ln() })
 }
 
 /// Angle of a line in every row, rad: by the clock, so that gaps do not shift it.
-pub(super) fn angle(inputs: &RecordingInputs<'_>, line: Line) -> Vec<f64> {
+pub(super) fn angle(inputs: &RecordingInputs<'_>, line: SpectralLine) -> Vec<f64> {
     inputs.column(|row| TAU * line.frequency * (inputs.clock_s[row] - inputs.clock_s[0]) / inputs.period_s)
 }
 
