@@ -11,15 +11,6 @@ use clap::Args;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
 
-/// How hypotheses are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Engine {
-    /// Forms of laws one by one, by information.
-    Search,
-    /// Families of laws together, by evidence.
-    Evidence,
-}
-
 /// Arguments of `diagnose`.
 #[derive(Debug, Args)]
 pub(super) struct DiagnoseArguments {
@@ -42,7 +33,7 @@ pub(super) struct DiagnoseArguments {
     /// Write the extended, refitted model.
     #[arg(long, value_name = "NEW.toml")]
     accept: Option<PathBuf>,
-    /// Seed of the resampling: the same input and seed give the same bytes.
+    /// Seed by which runs are held out: the same input and seed give the same bytes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Directory of further hypotheses: .toml files with [[effect]] entries.
@@ -51,12 +42,9 @@ pub(super) struct DiagnoseArguments {
     /// Write the experiment that tells the explanations apart as a recording plan.
     #[arg(long, value_name = "PLAN.csv")]
     experiment: Option<PathBuf>,
-    /// Tell the leading hypotheses of the search on standard error.
+    /// Tell the leading explanations with their probabilities on standard error.
     #[arg(long)]
     search: bool,
-    /// Let one engine answer alone; without it, each claim needs both.
-    #[arg(long, value_enum, hide = true)]
-    engine: Option<Engine>,
     /// A simulation that you already have, as a series of the output: CSV, Excel, Parquet, MAT of a simulation tool, and the column in it. Its error as
     /// given and as refitted stand side by side; without --model it is the model.
     #[arg(long, value_name = "FILE[:COLUMN]")]
@@ -83,16 +71,12 @@ pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
         return Err(cannot_use(&unusable));
     }
     examination.notes.iter().for_each(|note| eprintln!("{}{note}", pick("note: ", "提示：")));
-    let found = match arguments.engine {
-        None => twin::compare(&given.recording, &model, arguments.seed),
-        Some(Engine::Search) => twin::diagnose(&given.recording, &model, arguments.seed),
-        Some(Engine::Evidence) => twin::evidence::diagnose(&given.recording, &model),
-    };
+    let found = twin::diagnose(&given.recording, &model, arguments.seed);
     let mut diagnosis = found.map_err(|all| cannot_use(&all))?;
     note_refusals(&mut diagnosis, &given);
     let context = finish(&mut diagnosis, &given.recording, &model, context);
     if arguments.search {
-        eprintln!("search: {}", diagnosis.debug);
+        eprintln!("{}", diagnosis.debug);
     }
     outputs(&arguments).write(&diagnosis, &given.recording, &context).map_err(|problem| CannotRun::new(problem, ""))?;
     Ok(CommandOutcome::Fine)

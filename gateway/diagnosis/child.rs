@@ -205,7 +205,7 @@ fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Str
         let doubts = context.doubts.iter().map(|doubt| doubt.text.en.clone());
         return Err(examination.unusable.into_iter().chain(doubts).collect::<Vec<_>>().join("; "));
     }
-    let mut found = twin::compare(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
+    let mut found = twin::diagnose(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
     let context = super::finish(&mut found, &recording, &model, context);
     tell(Stage::Writing, recording.rows())?;
     let beside = match &job.input {
@@ -231,7 +231,7 @@ fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Str
 fn summary(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
     let moved: Vec<&str> = beside.iter().filter(|one| one.is_of_parameters()).map(|one| one.en.as_str()).collect();
     if found.verdict != Verdict::NoMismatch || moved.is_empty() {
-        return found.summary.clone();
+        return found.summary.en.clone();
     }
     format!("A parameter of the model has changed: {}. Nothing else is missing.", moved.join("; "))
 }

@@ -3,8 +3,8 @@
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
 use rules::physics::Scene;
+use rules::twin::diagnosis::unit_of;
 use rules::twin::text::short;
-use rules::twin::verdicts::unit_of;
 use rules::twin::{Model, bind::bind, inputs::rows_with_inputs, simulate};
 use serde_json::{Value, json};
 use std::fmt::Write as _;

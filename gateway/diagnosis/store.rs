@@ -11,7 +11,7 @@ use crate::reload::digest;
 use crate::report::{PageInput, page};
 use adapters::Recording;
 use rules::physics::explain::Language;
-use rules::twin::{self, diagnosis::Verdict, plan, text};
+use rules::twin::{self, diagnosis::Verdict, plan};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -203,9 +203,7 @@ fn summary_zh(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
     if found.verdict == Verdict::NoMismatch && !moved.is_empty() {
         return format!("模型参数已改变：{}。", moved.join("；"));
     }
-    let report = text::report(found, Language::Zh);
-    let headline = report.lines().next().unwrap_or_default();
-    headline.split_once('：').map_or(headline, |(_, words)| words).to_owned()
+    found.summary.zh.clone()
 }
 
 #[cfg(test)]

@@ -59,7 +59,6 @@ chapters! {
     "fleet",
     "conformance",
     "mismatch" zh,
-    "twin",
     "measured",
     "not-proven",
     "glossary",

@@ -6,7 +6,7 @@ use super::plot::{Curve, Plot, thinned};
 use super::text::{number, with_unit};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::Fits;
-use rules::twin::frame::Unit;
+use rules::twin::units::Unit;
 use std::fmt::Write as _;
 use std::ops::Range;
 

@@ -4,7 +4,7 @@ use super::PageInput;
 use super::text::{Tongue, escape};
 use adapters::recording::{Numbers, Run};
 use rules::twin::diagnosis::Diagnosis;
-use rules::twin::frame::{Unit, units_of};
+use rules::twin::units::{Unit, units_of};
 use std::ops::Range;
 
 /// Which simulation.

@@ -86,8 +86,8 @@ fn lead(data: &Data<'_>) -> String {
     let diagnosis = data.diagnosis;
     match diagnosis.verdict {
         Verdict::CannotTell => {
-            let needed = diagnosis.summary.strip_prefix("Cannot tell: ").unwrap_or(&diagnosis.summary);
-            super::place::capital(&escape(needed))
+            let needed = data.say(&diagnosis.summary.en, &diagnosis.summary.zh);
+            super::place::capital(&escape(needed.strip_prefix("Cannot tell: ").unwrap_or(needed)))
         }
         Verdict::NoMismatch => data
             .say(

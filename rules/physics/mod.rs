@@ -14,8 +14,9 @@ pub mod state;
 mod tool_load;
 mod unit;
 
+use adapters::channel::quantity::Quantity;
 pub use catalogue::{CATALOGUE, effect};
-pub use scene::{Block, LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError, blocks_of};
+pub use scene::{LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError};
 pub use unit::{unit_in, unit_of_quantity};
 
 /// How a parameter enters the law.
@@ -165,6 +166,17 @@ impl Form {
 /// unit over the parameter's unit.
 pub type ParameterColumns = Vec<(&'static str, Vec<f64>)>;
 
+/// How large a contribution can be beside what the machine takes anyway, in the same rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// No such bound.
+    Any,
+    /// So many times what the machine takes without a cut.
+    NoLoad(f64),
+    /// So many times the cut.
+    Cut(f64),
+}
+
 /// One physical law.
 pub trait Effect: Sync + Send {
     /// Everything a user is told.
@@ -173,6 +185,21 @@ pub trait Effect: Sync + Send {
     /// The forms worth trying as a candidate in this scene, coarse in the shape parameters; empty when the scene lacks
     /// what the effect needs or never excites it.
     fn forms(&self, scene: &Scene) -> Vec<Form>;
+
+    /// Least and greatest value of a parameter that is physically possible for this output.
+    fn range(&self, _scene: &Scene, parameter: &ParameterDoc) -> (f64, f64) {
+        parameter.range
+    }
+
+    /// How large its contribution can be.
+    fn bound(&self) -> Bound {
+        Bound::Any
+    }
+
+    /// Can it be what a curve over a channel of this quantity is? Few laws know a temperature or a voltage.
+    fn follows(&self, quantity: Quantity) -> bool {
+        quantity != Quantity::Temperature
+    }
 
     /// Names of its forms, as a model file gives them; none for an effect of one form.
     fn form_names(&self) -> &'static [&'static str] {

@@ -94,7 +94,6 @@ fn missing_input(part: &Part, scene: &Scene) -> String {
         PartFunction::Expression(_) => {
             format!("{place} needs {absent}: record these columns or give them as parameters")
         }
-        PartFunction::Empirical(form) => format!("{place} needs {}: record it", form.channel),
         PartFunction::Table(_) => {
             format!("{place} needs the spindle speed: record spindle_speed_rpm or declare the role speed")
         }

@@ -1,5 +1,4 @@
-//! Channels by name: those of the recording, and those that nobody records but that forms without a name and formulas may
-//! be drawn over - the time in the run and in the cut, the direction of a slide, and what the model itself simulates.
+//! Channels by name: those of the recording, and those that nobody records but that formulas may be drawn over - the time in the run and in the cut, the direction of a slide, and what the model itself simulates.
 
 use crate::physics::drive::{directions, goes_both_ways, sliding};
 use crate::physics::state::{first_order, first_order_behind};
@@ -46,11 +45,6 @@ pub(super) fn channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s,
         SIMULATED_OUTPUT => scene.simulated().map(Cow::Borrowed),
         _ => scene.column(name).or_else(|| by_role(scene, name)).map(Cow::Borrowed).or_else(|| derived(scene, name)),
     }
-}
-
-/// The recorded positions of slides.
-pub(super) fn positions(scene: &Scene) -> impl Iterator<Item = &str> {
-    scene.column_names().filter(|name| Quantity::of(name) == Quantity::Position)
 }
 
 /// A channel that is made of a column named in its own name.
@@ -137,10 +131,7 @@ fn cut_per_krpm(scene: &Scene) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::Entry;
-    use crate::twin::empirical::{Empirical, Multiplier, Shape};
-    use crate::twin::expression::Expression;
-    use crate::twin::model::{Parameter, simulate};
+    use crate::twin::model::simulate;
     use crate::twin::parse_model;
     use adapters::recording::read_csv;
     use std::collections::BTreeMap;
@@ -164,19 +155,6 @@ mod tests {
         scene
     }
 
-    /// A slide that goes to and fro.
-    fn slide() -> Scene {
-        let columns = "time_s,axis_force_n,axis_velocity_mm_min,axis_position_mm,axis_acceleration_mm_s2\n";
-        let mut text = String::from(columns);
-        for row in 0..200_u32 {
-            let (sin, cos) = (f64::from(row) / 9.0).sin_cos();
-            let (force, velocity, position) = (80.0 * sin.signum(), 900.0 * sin, 100.0 - 130.0 * cos);
-            writeln!(text, "{row},{force},{velocity:.1},{position:.2},{:.3}", 1.7 * cos).expect("a string takes it");
-        }
-        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
-        Scene::new(&recording, "axis_force_n", &BTreeMap::new()).expect("recorded")
-    }
-
     #[test]
     fn a_column_of_words_or_of_numbers_tells_how_long_ago_it_changed() {
         let text = "time_s,run,spindle_power_w,tool,depth_of_cut_mm\n0,a,1,T1,1\n2,a,1,T1,2\n4,a,1,T2,2\n7,a,1,T2,2\n";
@@ -197,60 +175,5 @@ mod tests {
         }
         let lag = channel_values(&scene, "lag_of_5_s_behind_spindle_speed_rpm").expect("there");
         assert!(lag.windows(2).all(|pair| pair[0] <= pair[1] && pair[1] < 900.0 + 1e-6), "from zero to the speed");
-    }
-
-    /// What a model that carries a form without a name makes of it is what the form was.
-    #[test]
-    fn a_form_is_the_same_as_a_formula() {
-        let channels = [
-            TIME_IN_RUN,
-            TIME_IN_CUT,
-            SIMULATED_CUT,
-            SIMULATED_CUT_PER_KRPM,
-            SIMULATED_OUTPUT,
-            "spindle_speed_rpm",
-            "time_since_change_of_depth_of_cut_mm",
-            "lag_of_5_s_behind_depth_of_cut_mm",
-        ];
-        for factor in
-            [Multiplier::Always, Multiplier::InTheCut, Multiplier::WithTheSpeed, Multiplier::WithTheSpeedSquared]
-        {
-            same_as_formulas(&cut(), &channels, factor);
-        }
-        for factor in [Multiplier::AgainstMotion, Multiplier::WithTheAcceleration] {
-            same_as_formulas(&slide(), &["axis_position_mm", TIME_IN_RUN, DIRECTION, ACCELERATION], factor);
-        }
-    }
-
-    fn same_as_formulas(scene: &Scene, channels: &[&str], factor: Multiplier) {
-        let shapes = || {
-            vec![
-                Shape::Bent(vec![2.0, 5.0]),
-                Shape::Peak(900.0, 80.0),
-                Shape::Fading(3.0),
-                Shape::Wave(7.0, 3),
-                Shape::RecurringPulses { every: 6.0, from: 2.3, over: 1.7, among: 3 },
-            ]
-        };
-        for (name, shape) in channels.iter().flat_map(|name| shapes().into_iter().map(move |shape| (name, shape))) {
-            let form = Empirical { channel: (*name).to_owned(), shape, origin: 1.5, scale: 20.0, factor };
-            let columns = form.columns(scene).expect("there");
-            let parameters = columns.iter().enumerate().map(|(k, (name, _))| Parameter {
-                name: name.clone(),
-                value: 1.0 + crate::statistics::count(k),
-                fixed: false,
-                entry: Entry::Linear,
-                range: (f64::NEG_INFINITY, f64::INFINITY),
-                unit: "output".to_owned(),
-            });
-            let parameters: Vec<Parameter> = parameters.collect();
-            let names: Vec<String> = parameters.iter().map(|parameter| parameter.name.clone()).collect();
-            let formula = Expression::compile(&form.expression(), &names).expect("compiles");
-            let got = formula.evaluate(scene, &parameters).expect("evaluates");
-            for (row, got) in got.iter().enumerate() {
-                let sum: f64 = columns.iter().zip(&parameters).map(|((_, column), p)| p.value * column[row]).sum();
-                assert!((got - sum).abs() < 1e-6 * sum.abs().max(1.0), "{}: {got} {sum}", form.equation());
-            }
-        }
     }
 }

@@ -3,6 +3,13 @@
 use super::locate::Region;
 use super::model::Model;
 use super::quality::Fault;
+use adapters::bilingual::Bilingual;
+
+/// The unit of an output, from its name.
+#[must_use]
+pub fn unit_of(output: &str) -> &'static str {
+    adapters::channel::quantity::unit_of(output).unwrap_or("1")
+}
 
 /// The name of what no law of the catalogue explains.
 pub(super) const UNKNOWN: &str = "unknown";
@@ -113,6 +120,17 @@ pub struct Quality {
     pub held_out_rmse: Option<f64>,
 }
 
+/// Is anything missing at all? One test, whatever it may be called.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Existence {
+    /// Probability that nothing is missing, averaged over resamples of the recording.
+    pub probability_of_nothing: f64,
+    /// How many independent rows the recording is worth.
+    pub effective_rows: f64,
+    /// Share of recordings in which nothing is missing that pass the test all the same.
+    pub false_alarm_rate: f64,
+}
+
 /// The fits compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fits {
@@ -130,23 +148,7 @@ pub struct Fits {
     pub after: Quality,
 }
 
-/// Error on the fitted rows, as a share of what it was before, below which an explanation claims much of them.
-const FITTED_SHARE: f64 = 0.5;
-/// The same on rows that took no part, above which it does little for those.
-const CARRIED_SHARE: f64 = 0.7;
-/// How many times the error on fitted rows is left on those that took no part, where an explanation does not carry over.
-const LEFT_RATIO: f64 = 1.5;
-
 impl Fits {
-    /// Does the error fall to half on the fitted rows, and hardly on those that took no part, of which much more is left?
-    /// Then what is named may be there, and something else with it.
-    #[must_use]
-    pub fn carries_little(&self) -> bool {
-        let more = self.after.held_out_rmse.is_some_and(|held_out| held_out > LEFT_RATIO * self.after.rmse);
-        let hardly = self.held_out_share().is_some_and(|share| share > CARRIED_SHARE);
-        self.after.rmse < FITTED_SHARE * self.before.rmse && hardly && more
-    }
-
     /// The error on those rows as a share of what it was before; `None` where none were held out.
     #[must_use]
     pub fn held_out_share(&self) -> Option<f64> {
@@ -190,7 +192,9 @@ pub struct Diagnosis {
     /// The answer.
     pub verdict: Verdict,
     /// The answer for a machinist.
-    pub summary: String,
+    pub summary: Bilingual,
+    /// Whether anything is missing; `None` when nothing could be fitted.
+    pub existence: Option<Existence>,
     /// The fits; `None` when nothing could be fitted.
     pub fit: Option<Fits>,
     /// Where, largest first.
@@ -199,9 +203,6 @@ pub struct Diagnosis {
     pub missing: Vec<Missing>,
     /// What else it could be.
     pub alternatives: Vec<Alternative>,
-    /// What was found in the fitted rows and not confirmed by those held out; `unknown` where it had no name, empty where
-    /// nothing was found.
-    pub withdrawn: Vec<String>,
     /// Baseline parameters that had been bent.
     pub baseline_shift: Vec<Shift>,
     /// Faults of the recording.
@@ -212,28 +213,6 @@ pub struct Diagnosis {
     pub rows: Rows,
     /// The extended, refitted model.
     pub model: Model,
-    /// The leading hypotheses of the search with their information, for engineers.
+    /// The leading explanations with their probabilities, for engineers.
     pub debug: String,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Errors before and after, on fitted rows and on those held out.
-    fn fits(fitted: (f64, f64), held_out: (f64, f64)) -> Fits {
-        let quality = |rmse, held_out| Quality { rmse, held_out_rmse: Some(held_out) };
-        let (before, after) = (quality(fitted.0, held_out.0), quality(fitted.1, held_out.1));
-        Fits { rows: 1000, runs: 8, held_out_runs: vec!["4".to_owned()], noise_floor: 1.0, before, after }
-    }
-
-    #[test]
-    fn what_halves_the_error_where_it_was_fitted_only_carries_little() {
-        assert!(fits((50.0, 24.0), (42.0, 41.0)).carries_little());
-        assert!(!fits((50.0, 24.0), (42.0, 25.0)).carries_little());
-        // What shows in the fitted runs only leaves no more of the others.
-        assert!(!fits((50.0, 24.0), (30.0, 25.0)).carries_little());
-        // Little is claimed of the fitted rows either, as by a warm-up that only the first run shows.
-        assert!(!fits((50.0, 31.0), (42.0, 41.0)).carries_little());
-    }
 }

@@ -2,9 +2,9 @@
 //! instead.
 
 use super::bind::bind;
+use super::diagnosis::unit_of;
 use super::inputs::columns;
 use super::model::{Model, Part, simulate};
-use super::verdicts::unit_of;
 use crate::physics::Scene;
 use crate::statistics::{count, median};
 use adapters::Recording;

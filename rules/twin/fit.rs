@@ -1,319 +1,183 @@
-//! Fitting: all free parameters of all parts together, by Gauss-Newton on whitened residuals, the noise profiled.
+//! Fitting: all free parameters of all parts together, by Gauss-Newton in the metric of a noise.
+//!
+//! The model without what is missing is fitted by plain least squares (`before`), the textbook laws of what was found in
+//! the metric of the likeliest noise. Every number is computed over all rows; only those that the metric takes are fitted.
 
-use super::frame::Frame;
-use super::linear::{Solution, dot, least_squares};
+use super::linear::{dot, least_squares};
 use super::model::{Part, Simulated, simulate, simulate_changed};
-use super::noise::Arma;
 use crate::physics::{Entry, Scene};
-use crate::statistics::{count, rms, robust_deviation};
+use crate::statistics::rms;
 
-/// Gauss-Newton steps at most, per noise model.
-const STEPS_MAX: usize = 8;
-/// Standard deviation of the weak prior on a baseline parameter, as a multiple of its nominal size.
-const PRIOR_SPREAD: f64 = 3.0;
+/// Gauss-Newton steps at most.
+const STEPS_MAX: usize = 12;
+/// Share of the sum of squares below which nothing improves any more.
+const AT_REST: f64 = 1e-10;
+/// Share of its value by which a shape may move in one step.
+const SHAPE_STEP: f64 = 0.5;
+/// Share of its value by which a parameter is moved to see what it does.
+const DIFFERENCE: f64 = 1e-4;
+/// Shares of a step that are tried.
+const SHARES: [f64; 6] = [1.0, 0.4, 0.16, 0.06, 0.025, 0.01];
 
 /// A parameter that is fitted: part and position within the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Free {
+pub(super) struct Free {
     /// Index of the part.
-    pub part: usize,
+    pub(super) part: usize,
     /// Index of the parameter within the part.
-    pub parameter: usize,
+    pub(super) parameter: usize,
 }
 
-/// A fitted set of parts.
+/// In what an error is measured: which rows take part, and how each counts.
+pub(super) struct Metric<'a> {
+    /// The recorded output, every row.
+    pub(super) recorded: &'a [f64],
+    /// From a column of every row to one number per row that takes part.
+    pub(super) weigh: &'a dyn Fn(&[f64]) -> Vec<f64>,
+    /// Must proportional parameters stay within what is physically possible? Shapes always do.
+    pub(super) bounded: bool,
+}
+
+/// Fitted parts.
 #[derive(Debug, Clone)]
-pub struct Fit {
+pub(super) struct Fit {
     /// The parts with fitted values.
-    pub parts: Vec<Part>,
+    pub(super) parts: Vec<Part>,
     /// The fitted parameters.
-    pub free: Vec<Free>,
-    /// The noise of this hypothesis.
-    pub noise: Arma,
-    /// Logarithm of the likelihood at that noise.
-    pub log_likelihood: f64,
-    /// Recorded minus simulated, per group.
-    pub residual: Vec<f64>,
-    /// Tangent columns at the solution, per group and free parameter, not whitened.
-    pub tangent: Vec<Vec<f64>>,
+    pub(super) free: Vec<Free>,
+    /// The simulated output, every row.
+    pub(super) simulated: Vec<f64>,
+    /// Change of the output with each fitted parameter, every row.
+    pub(super) tangents: Vec<Vec<f64>>,
 }
 
-/// Deviations beyond which an innovation counts as this many in the dispersion.
-const DISPERSION_CUT: f64 = 6.0;
-
-/// What is being fitted to.
-pub struct Data<'a> {
-    /// The recording.
-    pub scene: &'a mut Scene,
-    /// The groups that take part.
-    pub frame: &'a Frame,
-    /// The recorded output, per group.
-    pub recorded: &'a [f64],
-}
-
-/// Fits `parts`, starting from their present values, with the noise that makes the recording likeliest. `None` when a
-/// part lacks an input.
-///
-/// Parameters and noise can trap each other: much memory explains away what a level would explain. So the fit starts
-/// from several noises, and the likeliest end counts.
-#[must_use]
-pub fn fit(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option<Fit> {
-    let mut best: Option<Fit> = None;
-    for start in [Arma { phi: 0.4, theta: 0.0 }, noise] {
-        let fitted = fit_from(data, parts, start)?;
-        if best.as_ref().is_none_or(|best| fitted.log_likelihood > best.log_likelihood) {
-            best = Some(fitted);
+/// Fits everything in `parts` that is not fixed, from its present values; the scene keeps load and simulated output of the
+/// fitted parts. `None` when a part lacks an input.
+pub(super) fn fit(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) -> Option<Fit> {
+    let free = free_parameters(parts);
+    let mut parts = parts.to_vec();
+    let mut simulated = simulate(&parts, scene)?;
+    let mut error = square(metric, &simulated.total);
+    for _ in 0..STEPS_MAX {
+        let tangents = tangents(scene, &parts, &free, &simulated)?;
+        let step = step(&parts, &free, metric, &simulated.total, &tangents);
+        let Some((moved, total, less)) = advance(scene, &parts, &free, &step, metric, error)? else { break };
+        let gained = error - less;
+        (parts, simulated, error) = (moved, total, less);
+        if gained <= AT_REST * error {
+            break;
         }
     }
-    best
+    let tangents = tangents(scene, &parts, &free, &simulated)?;
+    let simulated = simulate(&parts, scene)?.total;
+    Some(Fit { parts, free, simulated, tangents })
 }
 
-/// Fits `parts` to the levels alone: as if the noise had no memory.
-#[must_use]
-pub(super) fn fit_levels(data: &mut Data<'_>, parts: &[Part]) -> Option<Fit> {
-    fit_at(data, parts, Arma::WHITE)
-}
-
-/// Fits `parts` in noise that is known.
-#[must_use]
-pub(super) fn fit_at(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option<Fit> {
-    let mut state = FitState::new(data, parts.to_vec())?;
-    state.descend(data, parts, noise)?;
-    let log_likelihood = data.frame.log_likelihood(state.cost(data, noise), noise);
-    let tangent = tangent(data, &state.parts, &state.free)?;
-    Some(Fit { log_likelihood, parts: state.parts, free: state.free, noise, residual: state.residual, tangent })
-}
-
-fn fit_from(data: &mut Data<'_>, nominal: &[Part], start: Arma) -> Option<Fit> {
-    let mut state = FitState::new(data, nominal.to_vec())?;
-    state.descend(data, nominal, start)?;
-    let (_, noise) = super::noise::fit_near(&state.residual, data.frame, start);
-    state.descend(data, nominal, noise)?;
-    let (log_likelihood, noise) = super::noise::fit_near(&state.residual, data.frame, noise);
-    let tangent = tangent(data, &state.parts, &state.free)?;
-    Some(Fit { log_likelihood, parts: state.parts, free: state.free, noise, residual: state.residual, tangent })
-}
-
-impl Fit {
-    /// The innovations at the fitted noise.
-    #[must_use]
-    pub fn innovations(&self, frame: &Frame) -> Vec<f64> {
-        frame.whiten(&self.residual, self.noise)
-    }
-
-    /// Sum of squares that the fit leaves in this noise: in its own, what is missing poses as slow noise.
-    #[must_use]
-    pub fn left_in(&self, frame: &Frame, noise: Arma) -> f64 {
-        let left = frame.whiten(&self.residual, noise);
-        dot(&left, &left)
-    }
-
-    /// By how much the squares of the innovations, the few greatest cut off, exceed those of the noise between them: one
-    /// where the fit leaves nothing but noise; likelihoods mean that many times less where it leaves more (Wedderburn,
-    /// Biometrika 61, 1974).
-    #[must_use]
-    pub fn dispersion(&self, frame: &Frame) -> f64 {
-        let innovations = self.innovations(frame);
-        let ordinary = robust_deviation(innovations.iter().copied()).unwrap_or(0.0).powi(2);
-        let cut = DISPERSION_CUT * DISPERSION_CUT * ordinary;
-        let mean = innovations.iter().map(|e| (e * e).min(cut)).sum::<f64>() / count(innovations.len().max(1));
-        if ordinary > 0.0 { (mean / ordinary).max(1.0) } else { 1.0 }
-    }
-
-    /// Variances of the free parameters: from the whitened tangent, or from how far the units of hold-out disagree
-    /// (Liang and Zeger, Biometrika 73, 1986) where that is more - the innovations are never quite white, and no law is
-    /// quite true.
-    #[must_use]
-    pub fn variances(&self, frame: &Frame) -> Vec<f64> {
-        let columns: Vec<Vec<f64>> = self.tangent.iter().map(|column| frame.whiten(column, self.noise)).collect();
-        let innovations = self.innovations(frame);
-        let inverse = least_squares(&columns, &innovations).inverse;
-        let variance = self.innovation_variance(&innovations);
-        let among_units = disagreement(&columns, &innovations, &inverse, &frame.unit);
-        (0..columns.len()).map(|index| (inverse[index][index] * variance).max(among_units[index])).collect()
-    }
-
-    /// Variance of one innovation, the freedom of the fit taken off.
-    #[must_use]
-    pub(super) fn innovation_variance(&self, innovations: &[f64]) -> f64 {
-        dot(innovations, innovations) / count(innovations.len().saturating_sub(self.free.len()).max(1))
-    }
-}
-
-/// Units below which their disagreement says nothing.
-pub(super) const UNITS_MIN: usize = 5;
-
-/// Variances of the parameters from the sums of each unit; zero for too few units.
-fn disagreement(columns: &[Vec<f64>], innovations: &[f64], inverse: &[Vec<f64>], unit: &[usize]) -> Vec<f64> {
-    let units = unit.last().map_or(0, |last| last + 1);
-    let mut scores = vec![vec![0.0; columns.len()]; units];
-    for (row, unit) in unit.iter().enumerate() {
-        columns.iter().zip(&mut scores[*unit]).for_each(|(column, score)| *score += column[row] * innovations[row]);
-    }
-    scores.retain(|score| score.iter().any(|x| *x != 0.0));
-    if scores.len() < UNITS_MIN {
-        return vec![0.0; columns.len()];
-    }
-    let few = count(scores.len()) / (count(scores.len()) - 1.0);
-    let of = |line: &Vec<f64>| few * scores.iter().map(|score| dot(line, score).powi(2)).sum::<f64>();
-    inverse.iter().map(of).collect()
-}
-
-/// The free parameters of parts: everything not fixed.
-#[must_use]
-pub fn free_parameters(parts: &[Part]) -> Vec<Free> {
-    let of_part = |(index, part): (usize, &Part)| -> Vec<Free> {
-        let open = part.parameters.iter().enumerate().filter(|(_, parameter)| !parameter.fixed);
-        open.map(|(parameter, _)| Free { part: index, parameter }).collect()
+/// Everything that is not fixed.
+fn free_parameters(parts: &[Part]) -> Vec<Free> {
+    let of = |(part, p): (usize, &Part)| {
+        let free = (0..p.parameters.len()).filter(|index| !p.parameters[*index].fixed);
+        free.map(|parameter| Free { part, parameter }).collect::<Vec<_>>()
     };
-    parts.iter().enumerate().flat_map(of_part).collect()
+    parts.iter().enumerate().flat_map(of).collect()
 }
 
-struct FitState {
-    parts: Vec<Part>,
-    free: Vec<Free>,
-    residual: Vec<f64>,
+/// What is left, as it counts.
+fn left(metric: &Metric<'_>, total: &[f64]) -> Vec<f64> {
+    let left: Vec<f64> = metric.recorded.iter().zip(total).map(|(recorded, total)| recorded - total).collect();
+    (metric.weigh)(&left)
 }
 
-impl FitState {
-    fn new(data: &mut Data<'_>, parts: Vec<Part>) -> Option<Self> {
-        let free = free_parameters(&parts);
-        let residual = residual(data, &parts)?;
-        Some(Self { parts, free, residual })
-    }
+fn square(metric: &Metric<'_>, total: &[f64]) -> f64 {
+    let left = left(metric, total);
+    dot(&left, &left)
+}
 
-    fn descend(&mut self, data: &mut Data<'_>, nominal: &[Part], noise: Arma) -> Option<()> {
-        let mut cost = self.cost(data, noise);
-        for _ in 0..STEPS_MAX {
-            let tangent = tangent(data, &self.parts, &self.free)?;
-            let step = self.step(data, nominal, noise, &tangent);
-            let (parts, residual, new_cost) = self.try_step(data, noise, &step, cost)?;
-            let gained = cost - new_cost;
-            if gained <= 0.0 {
-                break;
-            }
-            (self.parts, self.residual, cost) = (parts, residual, new_cost);
-            if gained < 3e-6 * cost {
-                break;
-            }
-        }
-        Some(())
-    }
-
-    fn cost(&self, data: &Data<'_>, noise: Arma) -> f64 {
-        let innovations = data.frame.whiten(&self.residual, noise);
-        dot(&innovations, &innovations)
-    }
-
-    /// Gauss-Newton step under a weak prior around the nominal values, so that a parameter the recording does not
-    /// touch stays where the file put it.
-    fn step(&self, data: &Data<'_>, nominal: &[Part], noise: Arma, tangent: &[Vec<f64>]) -> Vec<f64> {
-        let whitened = |column: &[f64]| data.frame.whiten(column, noise);
-        let mut target = whitened(&self.residual);
-        let sigma = (dot(&target, &target) / count(target.len().max(1))).sqrt();
-        let mut columns: Vec<Vec<f64>> = tangent.iter().map(|column| whitened(column)).collect();
-        for (index, free) in self.free.iter().enumerate() {
-            let now = self.parts[free.part].parameters[free.parameter].value;
-            let start = nominal[free.part].parameters[free.parameter].value;
-            let reach = rms(data.recorded) / rms(&tangent[index]).max(f64::MIN_POSITIVE);
-            let spread = PRIOR_SPREAD * if start == 0.0 { 10.0 * reach } else { start.abs().max(1e-6 * reach) };
-            let weight = sigma / spread;
-            columns
-                .iter_mut()
-                .enumerate()
-                .for_each(|(other, column)| column.push(if other == index { weight } else { 0.0 }));
-            target.push(weight * (start - now));
-        }
-        self.within_ranges(&mut columns, &target)
-    }
-
-    /// Solves with the parameters at rest that stand at the end of their range and would leave it: a step that is cut
-    /// off there afterwards need not lead downwards any more.
-    fn within_ranges(&self, columns: &mut [Vec<f64>], target: &[f64]) -> Vec<f64> {
-        let mut resting = vec![false; self.free.len()];
-        loop {
-            let Solution { mut coefficients, .. } = least_squares(columns, target);
-            coefficients.truncate(self.free.len());
-            resting.iter().zip(&mut coefficients).filter(|(rests, _)| **rests).for_each(|(_, step)| *step = 0.0);
-            let leaves = |index: usize| !resting[index] && self.leaves_range(index, coefficients[index]);
-            let Some(index) = (0..self.free.len()).find(|index| leaves(*index)) else { return coefficients };
-            resting[index] = true;
-            columns[index].fill(0.0);
-        }
-    }
-
-    /// Does the parameter stand at the end of its range that the step points beyond?
-    fn leaves_range(&self, index: usize, step: f64) -> bool {
-        let free = self.free[index];
-        let parameter = &self.parts[free.part].parameters[free.parameter];
-        let (low, high) = parameter.range;
-        (parameter.value <= low && step < 0.0) || (parameter.value >= high && step > 0.0)
-    }
-
-    fn try_step(
-        &self,
-        data: &mut Data<'_>,
-        noise: Arma,
-        step: &[f64],
-        cost: f64,
-    ) -> Option<(Vec<Part>, Vec<f64>, f64)> {
-        let mut share = 1.0;
-        loop {
-            let parts = self.moved(step, share);
-            let trial = FitState { residual: residual(data, &parts)?, parts, free: Vec::new() };
-            let new_cost = trial.cost(data, noise);
-            if new_cost < cost || share < 0.05 {
-                return Some((trial.parts, trial.residual, new_cost));
-            }
-            share *= 0.3;
-        }
-    }
-
-    fn moved(&self, step: &[f64], share: f64) -> Vec<Part> {
-        let mut parts = self.parts.clone();
-        for (free, delta) in self.free.iter().zip(step) {
-            let parameter = &mut parts[free.part].parameters[free.parameter];
-            let mut delta = share * delta;
-            if parameter.entry == Entry::Shape && parameter.range.0.is_finite() && parameter.range.1.is_finite() {
-                // A shape must not leap across its whole range in one linearised step.
-                let most = (0.5 * parameter.value.abs()).max(0.02 * (parameter.range.1 - parameter.range.0));
-                delta = delta.clamp(-most, most);
-            }
-            parameter.value = (parameter.value + delta).clamp(parameter.range.0, parameter.range.1);
-        }
-        parts
+/// The step to the least error if everything were proportional; parameters that stand at the end of their range and would
+/// leave it rest.
+fn step(parts: &[Part], free: &[Free], metric: &Metric<'_>, total: &[f64], tangents: &[Vec<f64>]) -> Vec<f64> {
+    let left = left(metric, total);
+    let mut columns: Vec<Vec<f64>> = tangents.iter().map(|tangent| (metric.weigh)(tangent)).collect();
+    let sizes: Vec<f64> = columns.iter().map(|column| rms(column).max(f64::MIN_POSITIVE)).collect();
+    columns.iter_mut().zip(&sizes).for_each(|(column, size)| column.iter_mut().for_each(|x| *x /= size));
+    let mut resting = vec![false; free.len()];
+    loop {
+        let solved = least_squares(&columns, &left).coefficients;
+        let steps: Vec<f64> = solved.iter().zip(&sizes).map(|(step, size)| step / size).collect();
+        let leaves = |index: usize| {
+            let parameter = &parts[free[index].part].parameters[free[index].parameter];
+            let (low, high) = parameter.range;
+            let held = metric.bounded || parameter.entry == Entry::Shape;
+            let outwards =
+                parameter.value <= low && steps[index] < 0.0 || parameter.value >= high && steps[index] > 0.0;
+            held && !resting[index] && outwards
+        };
+        let Some(index) = (0..free.len()).find(|index| leaves(*index)) else { return steps };
+        resting[index] = true;
+        columns[index].fill(0.0);
     }
 }
 
-/// Recorded minus simulated, per group.
-pub fn residual(data: &mut Data<'_>, parts: &[Part]) -> Option<Vec<f64>> {
-    let simulated = simulate(parts, data.scene)?;
-    let reduced = data.frame.reduce(&simulated.total);
-    Some(data.recorded.iter().zip(&reduced).map(|(recorded, simulated)| recorded - simulated).collect())
+/// Parts that have moved, what they simulate, and the error they leave.
+type Moved = (Vec<Part>, Simulated, f64);
+
+/// Goes the step, or as much of it as makes the error smaller; nothing where no share of it does.
+fn advance(
+    scene: &mut Scene,
+    parts: &[Part],
+    free: &[Free],
+    step: &[f64],
+    metric: &Metric<'_>,
+    error: f64,
+) -> Option<Option<Moved>> {
+    for share in SHARES {
+        let mut moved = parts.to_vec();
+        for (free, step) in free.iter().zip(step) {
+            let parameter = &mut moved[free.part].parameters[free.parameter];
+            let (low, high) = parameter.range;
+            let mut change = share * step;
+            if parameter.entry == Entry::Shape {
+                let narrow = if low.is_finite() && high.is_finite() { 0.02 * (high - low) } else { 0.05 };
+                let most = (SHAPE_STEP * parameter.value.abs()).max(narrow);
+                change = change.clamp(-most, most);
+            }
+            parameter.value += change;
+            if metric.bounded || parameter.entry == Entry::Shape {
+                parameter.value = parameter.value.clamp(low, high);
+            }
+        }
+        let simulated = simulate(&moved, scene)?;
+        let less = square(metric, &simulated.total);
+        if less < error {
+            return Some(Some((moved, simulated, less)));
+        }
+    }
+    Some(None)
 }
 
-/// Derivatives of the simulated output by each free parameter, per group.
-pub fn tangent(data: &mut Data<'_>, parts: &[Part], free: &[Free]) -> Option<Vec<Vec<f64>>> {
-    let base = simulate(parts, data.scene)?;
-    let direct = |free: &Free| is_direct(parts, *free);
-    let mut columns = vec![Vec::new(); free.len()];
-    // The direct columns first: they read the load and output that were just simulated.
+/// Change of the output with each free parameter: its own column where nothing else reads what it does, a difference
+/// quotient (exact where it is proportional) elsewhere.
+fn tangents(scene: &mut Scene, parts: &[Part], free: &[Free], base: &Simulated) -> Option<Vec<Vec<f64>>> {
+    simulate(parts, scene)?;
+    let mut columns: Vec<Option<Vec<f64>>> = vec![None; free.len()];
     for (index, part) in parts.iter().enumerate() {
-        if !free.iter().any(|free| free.part == index && direct(free)) {
+        let direct = |free: &Free| free.part == index && is_direct(parts, *free);
+        if !free.iter().any(direct) {
             continue;
         }
-        let known = part.columns(data.scene)?;
-        for (position, free) in free.iter().enumerate().filter(|(_, free)| free.part == index && direct(free)) {
+        let known = part.columns(scene)?;
+        for (position, free) in free.iter().enumerate().filter(|(_, free)| direct(free)) {
             let name = &part.parameters[free.parameter].name;
-            let column = known.iter().find(|(known, _)| known == name);
-            columns[position] =
-                column.map_or_else(|| vec![0.0; data.frame.len()], |(_, column)| data.frame.reduce(column));
+            let own = known.iter().find(|(known, _)| known == name).map(|(_, column)| column.clone());
+            columns[position] = Some(own.unwrap_or_else(|| vec![0.0; scene.rows()]));
         }
     }
-    for (position, free) in free.iter().enumerate().filter(|(_, free)| !direct(free)) {
-        columns[position] = difference(data, parts, *free, &base)?;
+    for (position, free) in free.iter().enumerate() {
+        if columns[position].is_none() {
+            columns[position] = Some(difference(scene, parts, *free, base)?);
+        }
     }
-    Some(columns)
+    columns.into_iter().collect()
 }
 
 /// Is the derivative simply the part's own column? Not where other parts read what this one simulates.
@@ -321,19 +185,65 @@ fn is_direct(parts: &[Part], free: Free) -> bool {
     let part = &parts[free.part];
     let linear = part.parameters[free.parameter].entry == Entry::Linear;
     let coupled = parts.iter().any(Part::acts_on_output) && !part.acts_on_output();
-    let read = parts.iter().any(|other| part.is_read_by(other));
-    linear && !coupled && !read
+    linear && !coupled && !parts.iter().any(|other| part.is_read_by(other))
 }
 
-fn difference(data: &mut Data<'_>, parts: &[Part], free: Free, base: &Simulated) -> Option<Vec<f64>> {
-    let mut parts = parts.to_vec();
-    let parameter = &mut parts[free.part].parameters[free.parameter];
-    let mut step = 1e-4 * parameter.value.abs().max(1e-3);
+fn difference(scene: &mut Scene, parts: &[Part], free: Free, base: &Simulated) -> Option<Vec<f64>> {
+    let mut moved = parts.to_vec();
+    let parameter = &mut moved[free.part].parameters[free.parameter];
+    let mut step = DIFFERENCE * parameter.value.abs().max(if parameter.entry == Entry::Shape { 1e-2 } else { 1e-6 });
     if parameter.value + step > parameter.range.1 {
         step = -step;
     }
     parameter.value += step;
-    let moved = simulate_changed(&parts, data.scene, base, free.part)?;
-    let slope: Vec<f64> = moved.iter().zip(&base.total).map(|(moved, base)| (moved - base) / step).collect();
-    Some(data.frame.reduce(&slope))
+    let ahead = simulate_changed(&moved, scene, base, free.part)?;
+    simulate(parts, scene)?;
+    Some(ahead.iter().zip(&base.total).map(|(ahead, base)| (ahead - base) / step).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::parse_model;
+    use adapters::recording::read_csv;
+    use std::fmt::Write;
+
+    const MODEL: &str = "schema = \"model/1\"\noutput = \"force_n\"\n[[effect]]\nkind = \"linear\"\n\
+                         columns = { acceleration_m_s2 = 10.0, velocity_m_s = 1.0 }\n\
+                         [[effect]]\nkind = \"dry_friction\"\nparameters = { level = 1.0, reversal_share = 0.05 }\n";
+
+    fn scene(level_n: f64) -> Scene {
+        let mut text = String::from("time_s,velocity_m_s,acceleration_m_s2,force_n\n");
+        for row in 0..400_u32 {
+            let t = 0.05 * f64::from(row);
+            let (v, a) = (0.1 * t.sin() + 0.05 * (3.0 * t).sin(), 0.1 * t.cos() + 0.15 * (3.0 * t).cos());
+            let force = 90.0 * a + 200.0 * v + level_n * (v / 0.0015).tanh();
+            writeln!(text, "{t},{v},{a},{force}").expect("a string takes it");
+        }
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        Scene::new(&recording, "force_n", &Default::default()).expect("recorded")
+    }
+
+    fn fitted(level_n: f64, bounded: bool) -> Fit {
+        let mut scene = scene(level_n);
+        let recorded = scene.recorded().to_vec();
+        let parts = parse_model(MODEL).expect("fine").parts;
+        let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), bounded };
+        fit(&mut scene, &parts, &metric).expect("every input is recorded")
+    }
+
+    #[test]
+    fn sizes_and_shapes_are_those_of_the_recording() {
+        let fit = fitted(20.0, true);
+        let value = |part: usize, name: &str| fit.parts[part].parameter(name).expect("a parameter").value;
+        assert!((value(0, "acceleration_m_s2") - 90.0).abs() < 0.5, "{:?}", fit.parts);
+        assert!((value(1, "level") - 20.0).abs() < 0.2, "{:?}", fit.parts);
+    }
+
+    #[test]
+    fn what_must_stay_possible_rests_at_its_bound() {
+        let level = |bounded: bool| fitted(-20.0, bounded).parts[1].parameter("level").expect("a level").value;
+        assert_eq!(level(true), 0.0);
+        assert!(level(false) < -15.0, "{}", level(false));
+    }
 }

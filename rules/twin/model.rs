@@ -1,7 +1,6 @@
 //! A model: a list of effects with parameters, whose sum is the simulated output (`model/1`).
 
 use super::channel::{SIMULATED_OUTPUT, is_simulated};
-use super::empirical::Empirical;
 use super::expression::Expression;
 use super::term::Term;
 use crate::physics::{Effect, Entry, Form, ParameterDoc, Role, Scene};
@@ -37,8 +36,6 @@ pub enum PartFunction {
     Table(super::table::SpeedTable),
     /// A user's expression over columns and its parameters.
     Expression(Expression),
-    /// A description of what no effect explains.
-    Empirical(Empirical),
 }
 
 impl fmt::Debug for PartFunction {
@@ -48,7 +45,6 @@ impl fmt::Debug for PartFunction {
             Self::Linear(terms) => write!(f, "Linear({terms:?})"),
             Self::Table(table) => write!(f, "{table:?}"),
             Self::Expression(expression) => write!(f, "Expression({})", expression.text()),
-            Self::Empirical(form) => write!(f, "{form:?}"),
         }
     }
 }
@@ -90,13 +86,12 @@ impl Part {
         self.name.as_deref().unwrap_or(&self.kind)
     }
 
-    /// The columns that a formula or form names; none of an effect or a table, whose inputs follow from what they are.
+    /// The columns that a formula names; none of an effect or a table, whose inputs follow from what they are.
     #[must_use]
     pub fn inputs(&self) -> Vec<&str> {
         match &self.body {
             PartFunction::Linear(terms) => terms.iter().filter_map(Term::input).collect(),
             PartFunction::Expression(expression) => expression.inputs().iter().map(String::as_str).collect(),
-            PartFunction::Empirical(form) => vec![&form.channel],
             PartFunction::Effect(..) | PartFunction::Table(_) => Vec::new(),
         }
     }
@@ -146,7 +141,6 @@ impl Part {
                 terms.iter().map(|term| Some((term.text().to_owned(), term.column(scene)?))).collect()
             }
             PartFunction::Table(table) => table.columns(scene),
-            PartFunction::Empirical(form) => form.columns(scene),
             PartFunction::Expression(_) => Some(Vec::new()),
         }
     }
@@ -175,10 +169,9 @@ impl Part {
         over_output || self.has_form("clipped") || acting.contains(&self.kind.as_str())
     }
 
-    /// Is it a form or a formula over such a channel?
+    /// Is it a formula over such a channel?
     fn is_drawn_over(&self, such: impl Fn(&str) -> bool) -> bool {
-        matches!(&self.body, PartFunction::Empirical(_) | PartFunction::Expression(_))
-            && self.inputs().into_iter().any(such)
+        matches!(&self.body, PartFunction::Expression(_)) && self.inputs().into_iter().any(such)
     }
 
     /// Does it read the load that the cut simulates?
@@ -297,6 +290,9 @@ fn simulate_again<'a>(
     scene.set_load_at_output(None);
     scene.set_simulated(None);
     let cut = parts.iter().any(Part::is_cut);
+    if !cut {
+        scene.set_load(linear_load(parts, scene));
+    }
     let losses = cut && parts.iter().any(Part::is_load_loss);
     if cut {
         run_stage(parts, scene, before, &mut contributions, &mut total, Part::is_cut)?;
@@ -314,6 +310,19 @@ fn simulate_again<'a>(
         scene.set_simulated(Some(total.clone()));
     }
     Some((total, contributions))
+}
+
+/// The load in the unit of the output, where the cut is a linear term of the column that plays its part.
+fn linear_load(parts: &[Part], scene: &Scene) -> Option<Vec<f64>> {
+    let name = scene.role_name(Role::Load)?;
+    let factor = parts.iter().find_map(|part| match &part.body {
+        PartFunction::Linear(terms) => {
+            let of = terms.iter().zip(&part.parameters).find(|(term, _)| term.text() == name);
+            of.map(|(_, parameter)| parameter.value).filter(|factor| *factor > 0.0)
+        }
+        _ => None,
+    })?;
+    Some(scene.column(name)?.iter().map(|x| factor * x).collect())
 }
 
 fn run_stage<'a>(

@@ -411,12 +411,6 @@ fn write_part(part: &Part) -> String {
         PartFunction::Expression(expression) => {
             text.push_str(&format!("expression = {}\nparameters = {{ {numbers} }}\n", quoted(expression.text())));
         }
-        PartFunction::Empirical(form) => {
-            let expression = quoted(&form.expression());
-            text = "\n[[effect]]\nkind = \"expression\"\n".to_owned();
-            text.push_str(&format!("name = {}\n", quoted(part.label())));
-            text.push_str(&format!("expression = {expression}\nparameters = {{ {numbers} }}\n"));
-        }
         PartFunction::Effect(_, form) => {
             text.push_str(&format!("parameters = {{ {numbers} }}\n"));
             if !form.name.is_empty() {

@@ -1,14 +1,7 @@
 //! The next step: what to record where an answer is not sure. Names are separated by the experiments of their effects;
-//! what has no name is asked for by the channel that its form was found over.
+//! what has no name is asked for by the channel that its curve was found over.
 
-use super::channel::{
-    ACCELERATION, DIRECTION, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, SIMULATED_OUTPUT, TIME, TIME_IN_CUT, TIME_IN_RUN,
-    TIME_SINCE_CHANGE_OF,
-};
-use super::diagnosis::{Alternative, Experiment, Verdict};
-use super::empirical::Empirical;
-use super::model::{Part, PartFunction};
-use super::outcome::Outcome;
+use super::diagnosis::{Alternative, Experiment};
 use crate::physics::effect;
 
 /// Minutes of an experiment over one channel: four levels of it, up and down, twice, half a minute each, and the way there.
@@ -16,21 +9,6 @@ const CHANNEL_MINUTES: f64 = 10.0;
 /// Bounds within which the gain of an experiment is told: below the first it is worth nothing to anybody, and beyond the
 /// second nothing is left to be decided.
 const GAIN_BOUNDS: (f64, f64) = (10.0, 100.0);
-
-/// What to record next: always where names compete, where none is known, and where nothing can be told.
-pub(super) fn next_step(outcome: &Outcome, verdict: Verdict, alternatives: &[Alternative]) -> Option<Experiment> {
-    if matches!(verdict, Verdict::NoMismatch | Verdict::Explained) {
-        return None;
-    }
-    let gain = outcome.information();
-    let open = alternatives.iter().flat_map(|other| [other.effect.as_str(), other.instead_of.as_str()]);
-    let gone = outcome.withdrawn.iter().flat_map(|withdrawn| withdrawn.kinds.iter().map(String::as_str));
-    of_effects(open.chain(gone), gain).or_else(|| {
-        let form = outcome.last().parts.iter().rev().find_map(form_of);
-        let statement = form.map_or_else(repeat, |form| over(&form.channel));
-        Some(experiment(statement, CHANNEL_MINUTES, gain, ""))
-    })
-}
 
 /// The experiment of the first of these kinds that the catalogue holds.
 pub(super) fn of_effects<'a>(mut kinds: impl Iterator<Item = &'a str>, gain: f64) -> Option<Experiment> {
@@ -56,11 +34,9 @@ pub(super) fn experiment(statement: String, minutes: f64, gain: f64, effect: &st
     Experiment { statement, minutes, expected_delta_ic, effect: effect.to_owned() }
 }
 
-fn form_of(part: &Part) -> Option<&Empirical> {
-    match &part.body {
-        PartFunction::Empirical(form) => Some(form),
-        _ => None,
-    }
+/// To learn what depends on this channel; on nothing that is known where there is none.
+pub(super) fn over_channel(channel: Option<&str>, gain: f64) -> Experiment {
+    experiment(channel.map_or_else(repeat, over), CHANNEL_MINUTES, gain, "")
 }
 
 fn repeat() -> String {
@@ -75,19 +51,16 @@ fn over(channel: &str) -> String {
         )
     };
     match channel {
-        TIME | TIME_IN_RUN => {
+        "time" | "run" => {
             "Record one run twice as long at constant speed and load, then pause for as long and repeat it: what follows the clock, the warmth and the program part then".to_owned()
         }
-        TIME_IN_CUT => {
+        "pass_progress" => {
             "Cut the same pass three times at the usual feed, half of it and double: what follows the time and what follows the way part then".to_owned()
         }
-        SIMULATED_CUT | SIMULATED_CUT_PER_KRPM => stepped("the load (depth, then feed) at one speed"),
-        SIMULATED_OUTPUT => stepped("the load at one speed"),
-        ACCELERATION => stepped("the acceleration between the same two speeds"),
-        DIRECTION => stepped("the speed of the slide in both directions"),
-        _ if channel.starts_with(TIME_SINCE_CHANGE_OF) => {
-            "Change it (the tool, the work, the program) twice as often as usual over one hour, with everything else constant".to_owned()
+        "tool" | "tool_age" => {
+            "Change the tool twice as often as usual over one hour, with everything else constant".to_owned()
         }
+        "load" | "torque" => stepped("the load (depth, then feed) at one speed"),
         _ => stepped(channel),
     }
 }
@@ -99,6 +72,6 @@ mod tests {
     #[test]
     fn a_channel_is_stepped_and_time_is_waited_for() {
         assert!(over("feed_mm_min").starts_with("Step feed_mm_min alone"));
-        assert!(over("time_in_run_s").starts_with("Record one run twice as long"));
+        assert!(over("time").starts_with("Record one run twice as long"));
     }
 }

@@ -1,6 +1,8 @@
 //! The diagnosis as JSON (`diagnosis/1`) and as rows.
 
-use super::diagnosis::{Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift};
+use super::diagnosis::{
+    Alternative, Diagnosis, Existence, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift,
+};
 use super::locate::{Condition, OnsetInterval, Region, Span};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
@@ -30,7 +32,8 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         "output": diagnosis.output,
         "unit": diagnosis.unit,
         "verdict": diagnosis.verdict.word(),
-        "summary": diagnosis.summary,
+        "summary": diagnosis.summary.en,
+        "existence": diagnosis.existence.as_ref().map_or(Value::Null, existence),
         "fit": diagnosis.fit.as_ref().map_or(Value::Null, fits),
         "mismatch": diagnosis.mismatch.iter().map(region).collect::<Vec<_>>(),
         "missing": diagnosis.missing.iter().map(missing).collect::<Vec<_>>(),
@@ -38,6 +41,14 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         "baseline_shift": diagnosis.baseline_shift.iter().map(shift).collect::<Vec<_>>(),
         "data_quality": faults.map(|f| json!({ "fault": f.fault, "column": f.column, "rows": f.rows })).collect::<Vec<_>>(),
         "next_experiment": diagnosis.next_experiment.as_ref().map_or(Value::Null, experiment),
+    })
+}
+
+fn existence(existence: &Existence) -> Value {
+    json!({
+        "probability_of_nothing": number(existence.probability_of_nothing),
+        "effective_rows": number(existence.effective_rows),
+        "false_alarm_rate": number(existence.false_alarm_rate),
     })
 }
 

@@ -11,6 +11,8 @@ use std::fmt::Write as _;
 const SPANS_SHOWN: usize = 6;
 /// Odds beyond which a number says no more.
 const ODDS_MAX: f64 = 1000.0;
+/// Odds below which two explanations are told to be about as likely.
+const ODDS_MIN: f64 = 1.5;
 
 /// The report.
 #[must_use]
@@ -79,19 +81,8 @@ impl Say<'_> {
     }
 
     fn headline(&self, diagnosis: &Diagnosis) -> String {
-        if self.language == Language::En {
-            return format!("{}: {}\n", diagnosis.verdict.word(), diagnosis.summary);
-        }
-        let names: Vec<String> = diagnosis.missing.iter().map(|missing| self.name(&missing.effect)).collect();
-        let names = names.join("、");
-        let text = match diagnosis.verdict {
-            Verdict::Explained => format!("模型缺少：{names}"),
-            Verdict::Ambiguous => format!("模型缺少某种效应，最可能是{names}，但本次记录不能排除其他解释"),
-            Verdict::Unexplained => "存在真实的偏差，但效应库中没有能解释它的效应".to_owned(),
-            Verdict::NoMismatch => "记录与模型一致：除噪声外没有其他偏差".to_owned(),
-            Verdict::CannotTell => format!("无法判断。{}", diagnosis.summary),
-        };
-        format!("{}：{text}\n", diagnosis.verdict.word())
+        let summary = self.pick(&diagnosis.summary.en, &diagnosis.summary.zh);
+        format!("{}{}{summary}\n", diagnosis.verdict.word(), self.pick(": ", "："))
     }
 
     fn where_it_is(&self, diagnosis: &Diagnosis) -> Vec<String> {
@@ -122,18 +113,7 @@ impl Say<'_> {
     }
 
     fn condition(&self, condition: &Condition) -> String {
-        if self.language == Language::En {
-            return words::condition(condition);
-        }
-        match condition {
-            Condition::Range { column, min: Some(min), max: Some(max) } => {
-                format!("{column}在{}与{}之间", short(*min), short(*max))
-            }
-            Condition::Range { column, min: Some(min), max: None } => format!("{column}大于{}", short(*min)),
-            Condition::Range { column, min: None, max: Some(max) } => format!("{column}小于{}", short(*max)),
-            Condition::Range { column, .. } => format!("{column}任意"),
-            Condition::Equals { column, words } => format!("{column}为{}", words.join("或")),
-        }
+        if self.language == Language::En { words::condition(condition) } else { words::condition_zh(condition) }
     }
 
     fn spans(&self, region: &Region) -> String {
@@ -221,12 +201,11 @@ impl Say<'_> {
 
     fn alternative(&self, other: &Alternative) -> Vec<String> {
         let (name, instead) = (self.name(&other.effect), self.name(&other.instead_of));
-        let odds = odds(other.delta_ic);
         let experiment = self.experiment_of(other);
         vec![
             self.words(
-                format!("it could also be {name} instead of {instead}: {odds} times less likely"),
-                format!("也可能是{name}而不是{instead}：可能性低{odds}倍"),
+                format!("it could also be {name} instead of {instead}, {}", less_likely(other.delta_ic)),
+                format!("也可能是{name}而不是{instead}，{}", less_likely_zh(other.delta_ic)),
             ),
             self.words(format!("  what separates them: {experiment}"), format!("  区分方法：{experiment}")),
         ]
@@ -292,10 +271,22 @@ impl Say<'_> {
     }
 }
 
-/// How many times less likely an explanation with so much less information is.
-fn odds(delta_ic: f64) -> String {
+/// How many times less likely an explanation with so much less information is; nothing where it is about as likely.
+fn odds(delta_ic: f64) -> Option<String> {
     let odds = (0.5 * delta_ic).exp();
-    if odds > ODDS_MAX { format!("> {ODDS_MAX}") } else { format!("{odds:.1}") }
+    if odds > ODDS_MAX {
+        return Some(format!("over {ODDS_MAX}"));
+    }
+    (odds >= ODDS_MIN).then(|| format!("{odds:.1}"))
+}
+
+fn less_likely(delta_ic: f64) -> String {
+    odds(delta_ic).map_or_else(|| "about as likely".to_owned(), |odds| format!("{odds} times less likely"))
+}
+
+fn less_likely_zh(delta_ic: f64) -> String {
+    let odds = odds(delta_ic).map(|odds| odds.replace("over ", "超过"));
+    odds.map_or_else(|| "可能性大致相同".to_owned(), |odds| format!("可能性为其{odds}分之一"))
 }
 
 /// The unit of `label.parameter`; empty for pure numbers.
@@ -320,6 +311,11 @@ mod tests {
 
     #[test]
     fn odds_are_those_of_the_information() {
-        assert_eq!((odds(0.0), odds(6.0), odds(60.0)), ("1.0".to_owned(), "20.1".to_owned(), "> 1000".to_owned()));
+        let told = [0.0, 6.0, 60.0].map(less_likely);
+        assert_eq!(told, ["about as likely", "20.1 times less likely", "over 1000 times less likely"]);
+        assert_eq!(
+            [0.0, 6.0, 60.0].map(less_likely_zh),
+            ["可能性大致相同", "可能性为其20.1分之一", "可能性为其超过1000分之一"]
+        );
     }
 }

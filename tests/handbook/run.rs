@@ -12,7 +12,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// The documents in the order of somebody who begins: a history must be there before it is asked.
-const ORDER: [&str; 11] = [
+const ORDER: [&str; 10] = [
     "README.md",
     "gateway/handbook/start.md",
     "gateway/handbook/configuration.md",
@@ -22,7 +22,6 @@ const ORDER: [&str; 11] = [
     "gateway/handbook/sources.md",
     "gateway/handbook/contracts.md",
     "gateway/handbook/mismatch.md",
-    "gateway/handbook/twin.md",
     "gateway/handbook/fleet.md",
 ];
 /// Commands that end with another code than zero here, and why.

@@ -1,5 +1,6 @@
 //! The machine follows the temperature of the shop, late.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{lag_forms, spread};
 use crate::physics::state::first_order_behind;
@@ -53,6 +54,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for AmbientDrift {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn form_names(&self) -> &'static [&'static str] {

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{axis_velocities, is_axis_output, is_power};
 use crate::physics::excitation::varies;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts, unit_in};
 
 /// Power to move the feed axes.
 #[derive(Debug, Clone, Copy)]
@@ -48,9 +48,17 @@ static DOC: EffectDoc = EffectDoc {
     },
 };
 
+/// Friction beyond which no feed axis of a machine tool could move itself, N: drives push with 5 to 30 kN in all.
+const THRUST_MAX_N: f64 = 10_000.0;
+
 impl Effect for AxisFriction {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn range(&self, scene: &Scene, parameter: &ParameterDoc) -> (f64, f64) {
+        let in_watts = unit_in("output", scene) == "W" && parameter.name == "force";
+        (parameter.range.0, if in_watts { THRUST_MAX_N } else { parameter.range.1 })
     }
 
     fn form_names(&self) -> &'static [&'static str] {

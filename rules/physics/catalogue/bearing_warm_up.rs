@@ -1,9 +1,10 @@
 //! Grease and bearings get thinner and freer as they warm: no-load power falls.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{krpm, slide_to_the, sliding, speed_to_the};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::{decay, first_order};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Friction that falls as the bearings warm.
 #[derive(Debug, Clone, Copy)]
@@ -60,6 +61,15 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for BearingWarmUp {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
+    }
+
+    fn bound(&self) -> Bound {
+        // cold grease takes 10 to 40 % more at idle; twice that leaves room for a cold start
+        Bound::NoLoad(0.8)
     }
 
     fn form_names(&self) -> &'static [&'static str] {

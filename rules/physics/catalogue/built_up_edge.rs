@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
 use crate::physics::excitation::visits;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Built-up edge at low cutting speed.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +51,11 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for BuiltUpEdge {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn bound(&self) -> Bound {
+        // a built-up edge takes up to half of the force
+        Bound::Cut(0.7)
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {

@@ -1,6 +1,6 @@
 //! The meter's clock is late or early against the controller's.
 
-use crate::physics::drive::rate;
+use crate::physics::drive::{is_displacement, rate};
 use crate::physics::excitation::{delays, varies};
 use crate::physics::state::delayed;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
@@ -60,7 +60,8 @@ impl Effect for ClockLag {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if !scene.simulated().is_some_and(varies) {
+        // What grows over minutes shows no fraction of a second.
+        if is_displacement(scene) || !scene.simulated().is_some_and(varies) {
             return Vec::new();
         }
         let delays = delays(scene, &[0.25, 0.5, 1.0, 1.5, 2.0, 3.0]);

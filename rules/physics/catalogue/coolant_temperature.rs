@@ -1,5 +1,6 @@
 //! Coolant warms bed, work and fixture.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{lag_forms, spread, varies};
 use crate::physics::state::first_order_behind;
@@ -54,6 +55,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for CoolantTemperature {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn form_names(&self) -> &'static [&'static str] {

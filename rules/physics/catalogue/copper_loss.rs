@@ -1,5 +1,6 @@
 //! Heat in the windings: grows with the square of torque.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{is_power, krpm, torque_at_1000_rpm};
 use crate::physics::excitation::varies;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
@@ -51,6 +52,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for CopperLoss {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn form_names(&self) -> &'static [&'static str] {

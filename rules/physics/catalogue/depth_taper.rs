@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times, way_mm};
 use crate::physics::excitation::varies;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -53,6 +53,11 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for DepthTaper {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn bound(&self) -> Bound {
+        // a depth that varies by more than itself is another operation
+        Bound::Cut(0.8)
     }
 
     fn form_names(&self) -> &'static [&'static str] {

@@ -1,5 +1,6 @@
 //! Coulomb friction: a level with the sign of motion in a force, proportional to speed in a power.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{RAD_PER_S_OF_RPM, motion, soft_sign, turns};
 use crate::physics::excitation::greatest;
 use crate::physics::state::{bent_over_the_way, strokes};
@@ -63,6 +64,10 @@ impl Effect for DryFriction {
         &DOC
     }
 
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
+    }
+
     fn form_names(&self) -> &'static [&'static str] {
         &[PRESLIDING]
     }
@@ -104,8 +109,6 @@ const PRESLIDING: &str = "presliding";
 const PRESLIDING_WAY_M: f64 = 1e-4;
 /// Ways that are tried, as shares of the longest stroke.
 const STROKE_SHARES: [f64; 3] = [3e-4, 3e-3, 0.02];
-/// Share of the longest stroke in which friction builds up at most: what takes longer is a spring.
-const SLIPS_SHARE: f64 = 0.1;
 /// Strokes below which nothing is seen of what happens at reversals.
 const STROKES_MIN: usize = 4;
 
@@ -118,11 +121,6 @@ fn presliding(scene: &Scene, velocity: &[f64]) -> Vec<Form> {
     }
     let form = |share: &f64| Form { name: PRESLIDING, ..Form::of(&[("presliding_way", share * longest)]) };
     STROKE_SHARES.iter().map(form).collect()
-}
-
-/// Does friction that builds up over such a way, in m or rad, slip in the longest stroke?
-pub(crate) fn slips(scene: &Scene, way: f64) -> bool {
-    motion(scene).is_some_and(|velocity| way <= SLIPS_SHARE * greatest(&strokes(scene, &velocity)))
 }
 
 #[cfg(test)]
@@ -161,15 +159,5 @@ mod tests {
             forms.iter().filter(|form| form.name == "presliding").count()
         };
         assert_eq!((forms(30), forms(200)), (3, 0));
-    }
-
-    #[test]
-    fn what_does_not_slip_within_a_tenth_of_a_stroke_is_a_spring() {
-        let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
-        set(&mut recording, "velocity_m_s", |row| if (row / 30).is_multiple_of(2) { 0.1 } else { -0.1 });
-        set(&mut recording, "axis_force_n", |_| 1.0);
-        let scene = scene(&recording, "axis_force_n");
-        // Strokes of 30 mm.
-        assert!(slips(&scene, 0.002) && !slips(&scene, 0.004));
     }
 }

@@ -4,7 +4,7 @@ use crate::physics::cut::{cut, cut_times};
 use crate::physics::excitation::{
     ln_count, run_named, since_run, step_forms, stretch_of_runs, where_word, within_runs, word_forms,
 };
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Hardness that differs between lots.
 #[derive(Debug, Clone, Copy)]
@@ -82,6 +82,11 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for HardnessBatch {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn bound(&self) -> Bound {
+        // lots of one material differ by 3 to 12 %, of two materials by 40 %
+        Bound::Cut(0.5)
     }
 
     fn form_names(&self) -> &'static [&'static str] {

@@ -1,5 +1,6 @@
 //! The meter averages over a window: edges are smeared.
 
+use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{delays, varies};
 use crate::physics::state::delayed;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
@@ -59,7 +60,8 @@ impl Effect for MeterWindow {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if !scene.simulated().is_some_and(varies) {
+        // What grows over minutes shows no fraction of a second.
+        if is_displacement(scene) || !scene.simulated().is_some_and(varies) {
             return Vec::new();
         }
         let windows = delays(scene, &[0.5, 1.0, 2.0, 4.0]);

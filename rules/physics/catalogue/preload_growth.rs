@@ -1,9 +1,10 @@
 //! Inner rings warm before the housing: preload and friction rise, and fall again when the housing follows.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{driven_krpm, krpm, speed_to_the};
 use crate::physics::excitation::lag_forms;
 use crate::physics::state::first_order;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Friction that rises with bearing preload.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +48,15 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for PreloadGrowth {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
+    }
+
+    fn bound(&self) -> Bound {
+        // a preload that doubles the friction of the bearings seizes them
+        Bound::NoLoad(0.8)
     }
 
     fn form_names(&self) -> &'static [&'static str] {

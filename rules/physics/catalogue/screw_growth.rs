@@ -1,5 +1,6 @@
 //! The ball screw grows as its nut rubs: the error grows with the distance from the fixed bearing.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{axis_velocities, in_si, is_displacement};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::first_order;
@@ -46,6 +47,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for ScrewGrowth {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {

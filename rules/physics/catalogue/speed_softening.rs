@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut_times, cutting_rows};
 use crate::physics::excitation::varies;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
 /// Specific force that falls with cutting speed.
@@ -37,6 +37,11 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for SpeedSoftening {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn bound(&self) -> Bound {
+        // exponents of 0.05 to 0.2 over a range of speeds of ten to one
+        Bound::Cut(0.7)
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {

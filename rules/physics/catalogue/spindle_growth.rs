@@ -1,5 +1,6 @@
 //! The spindle grows as it warms, quickly at the nose and slowly in the housing.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{is_displacement, krpm};
 use crate::physics::excitation::{lag_forms, time_constants, varies};
 use crate::physics::state::{decay, first_order};
@@ -75,6 +76,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for SpindleGrowth {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn form_names(&self) -> &'static [&'static str] {

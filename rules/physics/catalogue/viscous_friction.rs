@@ -1,5 +1,6 @@
 //! Friction that grows in proportion to speed.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{is_power, motion};
 use crate::physics::excitation::plain_where_it_varies;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
@@ -42,6 +43,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for ViscousFriction {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {

@@ -1,5 +1,6 @@
 //! The zero of the meter creeps, with cabinet temperature or age.
 
+use adapters::channel::quantity::Quantity;
 use crate::physics::excitation::{recording_elapsed_s, recording_share};
 use crate::physics::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
@@ -83,6 +84,10 @@ static DOC: EffectDoc = EffectDoc {
 impl Effect for ZeroDrift {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
+    }
+
+    fn follows(&self, _quantity: Quantity) -> bool {
+        true
     }
 
     fn form_names(&self) -> &'static [&'static str] {

@@ -1,9 +1,5 @@
 //! What an effect sees: the inputs of a recording by the part they play.
 
-mod excerpt;
-
-pub use excerpt::{Block, blocks_of};
-
 use adapters::channel::quantity::Quantity;
 use adapters::recording::{Recording, Words, with_derived};
 use std::cell::RefCell;
@@ -146,7 +142,6 @@ pub struct Scene {
     runs: Vec<Range<usize>>,
     run_names: Vec<String>,
     clock_s: Vec<f64>,
-    driven_s: Option<Vec<f64>>,
     latent: BTreeMap<&'static str, Vec<f64>>,
     period_s: f64,
     columns: BTreeMap<String, Vec<f64>>,
@@ -187,7 +182,6 @@ impl Scene {
             rows: recording.rows(),
             time_s: recording.time_s.clone(),
             clock_s: running_clock_s(&recording, &runs),
-            driven_s: None,
             latent: BTreeMap::new(),
             period_s: median_period_s(&recording.time_s, &runs),
             recorded: measured.iter().map(|value| value.unwrap_or(0.0)).collect(),
@@ -312,8 +306,7 @@ impl Scene {
     /// How long the row before this one drove a state, s: until this row, but for ten periods at most; `row` from 1 on.
     #[must_use]
     pub fn driven_s(&self, row: usize) -> f64 {
-        let since_s = || (self.clock_s[row] - self.clock_s[row - 1]).clamp(0.0, PAUSE_PERIODS * self.period_s);
-        self.driven_s.as_ref().map_or_else(since_s, |driven_s| driven_s[row])
+        (self.clock_s[row] - self.clock_s[row - 1]).clamp(0.0, PAUSE_PERIODS * self.period_s)
     }
 
     /// Median time between two rows of a run.

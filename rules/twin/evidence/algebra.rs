@@ -85,6 +85,18 @@ impl CholeskyFactor {
         x
     }
 
+    /// `b' matrix^-1 b`.
+    pub(super) fn half(&self, b: &Array1<f64>) -> f64 {
+        let mut x = b.clone();
+        let mut sum = 0.0;
+        for row in 0..b.len() {
+            let known = self.lower.slice(s![row, ..row]).dot(&x.slice(s![..row]));
+            x[row] = (x[row] - known) / self.lower[[row, row]];
+            sum += x[row] * x[row];
+        }
+        sum
+    }
+
     /// Logarithm of the determinant of the matrix.
     pub(super) fn ln_determinant(&self) -> f64 {
         2.0 * self.lower.diag().iter().map(|x| x.ln()).sum::<f64>()

@@ -1,12 +1,16 @@
 //! What an explanation contributes: the output with it, and every name's share of it row by row.
 
+use super::algebra::{CholeskyFactor, add_gram, mirror};
+use super::answer::Named;
 use super::bank::Since;
 use super::follow::Follower;
-use super::judge::{Judge, Named};
+use super::judge::Judge;
+use super::means::PosteriorMeans;
 use super::noise::NoiseModel;
 use super::posterior::Explanation;
-use crate::statistics::rms;
+use crate::statistics::{count, rms};
 use crate::twin::diagnosis::UNKNOWN;
+use ndarray::{Array1, Array2, ShapeBuilder, s};
 use std::ops::Range;
 
 /// Squared deviations gained from which a step is taken to have begun in a held-out run.
@@ -15,8 +19,7 @@ const BEGUN: f64 = 12.0;
 impl Judge<'_> {
     /// The output with what an explanation adds, and each name's contribution.
     pub(super) fn contributions(&self, of: &Explanation) -> (Vec<f64>, Vec<Named>) {
-        let setting = &self.settings[of.noise];
-        let solved = self.comparison.solve(&setting.gram.whole, setting.saturated.variance, &of.members);
+        let solved = self.solved_by_levels(of);
         let mut after = self.inputs.simulated.clone();
         for (index, w) in solved.tangents.iter().enumerate() {
             let tangent = self.comparison.tangent(index);
@@ -52,6 +55,38 @@ impl Judge<'_> {
         (after, all)
     }
 
+    /// Posterior means by plain least squares, as the baseline is fitted: in the metric of slow noise edges would decide
+    /// about levels. What the noise remembers makes each row worth less.
+    fn solved_by_levels(&self, of: &Explanation) -> PosteriorMeans {
+        let comparison = self.comparison;
+        let (fixed, output) = comparison.fixed_and_output();
+        let bank = &comparison.bank;
+        let members = of.members.iter().flat_map(|(variant, _)| &bank.columns[bank.variants[*variant].columns.clone()]);
+        let columns: Vec<&[f64]> = fixed.iter().chain(members).map(Vec::as_slice).chain([output]).collect();
+        let mut tall = Array2::zeros((comparison.rows.len(), columns.len()).f());
+        for (index, column) in columns.iter().enumerate() {
+            let plain = comparison.whitened(column, NoiseModel::WHITE);
+            tall.column_mut(index).iter_mut().zip(plain).for_each(|(cell, x)| *cell = x);
+        }
+        let mut gram = Array2::zeros((columns.len(), columns.len()));
+        add_gram(&mut gram, tall.view());
+        mirror(&mut gram);
+        let noise = self.settings[of.noise].gram.noise;
+        let rows = count(comparison.rows.len());
+        let last = columns.len() - 1;
+        let mut variance = gram[[last, last]] / rows;
+        let mut w = Array1::zeros(last);
+        for _ in 0..2 {
+            let ridge = comparison.ridges(&gram, variance, &of.members);
+            let mut inner = gram.slice(s![..last, ..last]).to_owned();
+            ridge.iter().enumerate().for_each(|(at, ridge)| inner[[at, at]] += ridge);
+            w = CholeskyFactor::of(&inner).solve(&gram.slice(s![..last, last]).to_owned());
+            let left = &tall.column(last) - &tall.slice(s![.., ..last]).dot(&w);
+            variance = left.dot(&left) / rows * noise.inflation();
+        }
+        comparison.split(&w, &of.members)
+    }
+
     /// States that act in rows held out only, followed through each unit from its own earlier rows.
     fn follow(&self, of: &Explanation, after: &mut [f64], all: &mut [Named]) {
         let setting = &self.settings[of.noise];
@@ -71,7 +106,8 @@ impl Judge<'_> {
             let rows: Vec<usize> = self.inputs.left_out().filter(|row| self.inputs.unit[*row] == unit).collect();
             let acts = |(_, column, _): &&(String, &[f64], f64)| rows.iter().any(|row| column[*row] != 0.0);
             let here: Vec<&(String, &[f64], f64)> = states.iter().filter(acts).collect();
-            self.follow_unit(&rows, &here, (setting.gram.noise, variance.sqrt()), after, all);
+            let noise = self.comparison.row_by_row(setting.gram.noise);
+            self.follow_unit(&rows, &here, (noise, variance.sqrt()), after, all);
         }
     }
 

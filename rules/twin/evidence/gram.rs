@@ -18,12 +18,16 @@ const ROWS_OF_A_FORM: f64 = 3000.0;
 /// What is compared: the recorded output less the refitted simulation, its tangents and the bank, over the fitted rows.
 pub(super) struct Comparison<'a> {
     pub(super) bank: &'a VariantBank,
-    /// Fitted rows in order.
+    /// Fitted rows in order; the first of each group where neighbours are averaged.
     pub(super) rows: Vec<usize>,
+    /// How many neighbours are averaged, at most.
+    pub(super) group: usize,
     /// Stretches of unbroken noise, as places in `rows`.
     pub(super) blocks: Vec<Range<usize>>,
     /// Noise of each row relative to the ordinary one.
     scale: Vec<f64>,
+    /// Row after the last of each group.
+    ends: Vec<usize>,
     /// Tangents of the baseline and levels of the runs, full length.
     fixed: Vec<Vec<f64>>,
     /// How many tangents there are; the levels of the runs follow.
@@ -54,9 +58,15 @@ pub(super) struct ComparisonInput<'a> {
 }
 
 impl<'a> Comparison<'a> {
-    /// Compares over the fitted rows.
-    pub(super) fn new(inputs: &RecordingInputs<'_>, bank: &'a VariantBank, of: &ComparisonInput<'_>) -> Self {
-        let rows: Vec<usize> = inputs.taken(false).collect();
+    /// Compares over the fitted rows, one by one where there are at most so many; beyond, neighbours are averaged *after*
+    /// every law has been evaluated row by row, so that edges keep their shape.
+    pub(super) fn new(
+        inputs: &RecordingInputs<'_>,
+        bank: &'a VariantBank,
+        of: &ComparisonInput<'_>,
+        rows_max: usize,
+    ) -> Self {
+        let (group, rows) = groups(inputs, rows_max);
         let mut blocks: Vec<Range<usize>> = Vec::new();
         for at in 0..rows.len() {
             let goes_on = at > 0 && inputs.block[rows[at]] == inputs.block[rows[at - 1]];
@@ -76,6 +86,8 @@ impl<'a> Comparison<'a> {
             bank,
             blocks,
             scale: rows.iter().map(|row| of.scale[*row]).collect(),
+            group,
+            ends: ends(&rows, inputs),
             fixed,
             tangents,
             output: of.recorded.iter().zip(&inputs.simulated).map(|(y, f)| y - f).collect(),
@@ -84,6 +96,11 @@ impl<'a> Comparison<'a> {
             tempering: (ROWS_OF_A_FORM / count(rows.len().max(1))).min(1.0),
             rows,
         }
+    }
+
+    /// A noise of these rows as it is from one recorded row to the next.
+    pub(super) fn row_by_row(&self, noise: NoiseModel) -> NoiseModel {
+        if self.group == 1 { noise } else { NoiseModel::of(noise.share, noise.phi.powf(1.0 / count(self.group))) }
     }
 
     /// How many columns stand before those of the bank.
@@ -109,7 +126,12 @@ impl<'a> Comparison<'a> {
 
     /// A full-length column whitened over the fitted rows.
     pub(super) fn whitened(&self, column: &[f64], noise: NoiseModel) -> Vec<f64> {
-        let mut white: Vec<f64> = self.rows.iter().zip(&self.scale).map(|(row, scale)| column[*row] / scale).collect();
+        let mut white: Vec<f64> = if self.group == 1 {
+            self.rows.iter().zip(&self.scale).map(|(row, scale)| column[*row] / scale).collect()
+        } else {
+            let groups = self.rows.iter().zip(&self.ends).zip(&self.scale);
+            groups.map(|((row, end), scale)| crate::statistics::mean(&column[*row..*end]) / scale).collect()
+        };
         noise.whiten(&mut white, &self.blocks);
         white
     }
@@ -140,6 +162,37 @@ impl<'a> Comparison<'a> {
         mirror(&mut whole);
         Gram { noise, whole }
     }
+}
+
+/// How many neighbours are averaged, and the first fitted row of each group: groups never cross stretches of unbroken noise
+/// or rows that are not fitted.
+fn groups(inputs: &RecordingInputs<'_>, rows_max: usize) -> (usize, Vec<usize>) {
+    let all: Vec<usize> = inputs.taken(false).collect();
+    let group = all.len().div_ceil(rows_max).max(1);
+    let mut rows: Vec<usize> = Vec::with_capacity(all.len() / group + 1);
+    let mut size = 0;
+    for (at, row) in all.iter().enumerate() {
+        let goes_on = at > 0 && all[at - 1] + 1 == *row && inputs.block[*row] == inputs.block[row - 1];
+        if goes_on && size < group {
+            size += 1;
+        } else {
+            rows.push(*row);
+            size = 1;
+        }
+    }
+    (group, rows)
+}
+
+/// Row after the last fitted one of each group that begins at these rows.
+fn ends(rows: &[usize], inputs: &RecordingInputs<'_>) -> Vec<usize> {
+    let mut ends: Vec<usize> = Vec::with_capacity(rows.len());
+    let mut next = rows.iter().skip(1).peekable();
+    for row in rows {
+        let limit = next.next().copied().unwrap_or(inputs.rows);
+        let last = (*row + 1..limit).take_while(|row| inputs.fitted[*row]).last().unwrap_or(*row);
+        ends.push(last + 1);
+    }
+    ends
 }
 
 fn unit(column: &[f64], rows: &[usize]) -> Vec<f64> {

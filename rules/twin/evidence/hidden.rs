@@ -33,6 +33,55 @@ pub(super) struct Sequence {
     pub(super) ln: f64,
 }
 
+/// Bins of a channel in which a sequence may be on or off as a whole.
+const BINS: usize = 12;
+/// Share of the rows that a channel must tell on from off in, and the share of what it leaves to chance that it may be wrong in.
+const TOLD: f64 = 0.3;
+/// Rows by which a change may be before or after a change of the process, and the share of the changes that may be.
+const BESIDE: usize = 2;
+const AT_CHANGES: f64 = 0.6;
+
+/// Is a sequence something of the process: told by the value of a channel, or changing when the process does? A consumer of
+/// its own knows nothing of either.
+pub(super) fn follows_inputs(inputs: &RecordingInputs<'_>, on: &[f64]) -> bool {
+    let rows: Vec<usize> = inputs.taken(false).collect();
+    let all = count(rows.len().max(1));
+    let high = rows.iter().filter(|row| on[**row] > 0.5).count();
+    let by_chance = count(high.min(rows.len() - high)) / all;
+    let channels = [&inputs.speed, &inputs.depth, &inputs.feed, &inputs.width, &inputs.velocity, &inputs.position];
+    let told = channels.into_iter().flatten().any(|channel| {
+        let mut sorted = rows.clone();
+        sorted.sort_by(|a, b| channel[*a].total_cmp(&channel[*b]));
+        let size = sorted.len().div_ceil(BINS).max(1);
+        let wrong: usize = sorted
+            .chunks(size)
+            .map(|bin| {
+                let high = bin.iter().filter(|row| on[**row] > 0.5).count();
+                high.min(bin.len() - high)
+            })
+            .sum();
+        count(wrong) / all < TOLD * by_chance
+    });
+    told || at_changes(inputs, on)
+}
+
+/// Do most changes of a sequence fall on changes of speed, feed or engagement, which are few?
+fn at_changes(inputs: &RecordingInputs<'_>, on: &[f64]) -> bool {
+    let differ = |values: &[f64], row: usize| {
+        let (a, b) = (values[row - 1], values[row]);
+        (a - b).abs() > 0.02 * a.abs().max(b.abs())
+    };
+    let feed = inputs.scene.column("feed_mm_min");
+    let paces = [inputs.speed.as_deref(), feed, inputs.engaged.as_deref()];
+    let paced = |row: usize| row > 0 && paces.iter().flatten().any(|pace| differ(pace, row));
+    let near = |row: usize| (row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(inputs.rows)).any(paced);
+    let rows = || inputs.taken(false).filter(|row| *row > 0 && inputs.fitted[row - 1]);
+    let changes: Vec<usize> = rows().filter(|row| (on[*row] - on[row - 1]).abs() > 0.5).collect();
+    let share = |near: usize, all: usize| count(near) / count(all.max(1));
+    let usual = share(rows().filter(|row| near(*row)).count(), rows().count());
+    share(changes.iter().filter(|row| near(**row)).count(), changes.len()) > AT_CHANGES.max(2.0 * usual)
+}
+
 struct Chain<'a> {
     inputs: &'a RecordingInputs<'a>,
     /// Innovations of the residual.

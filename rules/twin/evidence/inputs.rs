@@ -3,7 +3,7 @@
 use crate::physics::drive::{is_axis_output, rate};
 use crate::physics::{OutputKind, Role, Scene};
 use crate::statistics::{count, median};
-use crate::twin::frame::Unit;
+use crate::twin::units::Unit;
 use std::collections::BTreeSet;
 use std::ops::Range;
 

@@ -26,6 +26,9 @@ const SATURATED: f64 = 0.05;
 /// Ridge of the baseline's tangents, as a share of their mean size: the flat prior, made solvable.
 const FLAT: f64 = 1e-9;
 
+/// Share of its square that the baseline must leave of a law: below it rounding decides.
+const HIDDEN: f64 = 1e-6;
+
 /// The saturated model: what remains when every nameless curve is free.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Saturated {
@@ -37,10 +40,12 @@ pub(super) struct Saturated {
 
 /// The Gram matrix that a search starts from: the baseline projected out, and where each variant stands in it.
 pub(super) struct Ground {
-    gram: Array2<f64>,
+    pub(super) gram: Array2<f64>,
+    /// Variants of whose law the baseline leaves next to nothing: no recording like this one tells them.
+    hidden: Vec<bool>,
     /// First column of each variant; `None` of what is not in it.
-    starts: Vec<Option<usize>>,
-    variance: f64,
+    pub(super) starts: Vec<Option<usize>>,
+    pub(super) variance: f64,
 }
 
 /// What a hypothesis takes out of it: `gram - reach reach'` is left.
@@ -62,6 +67,18 @@ impl Ground {
         }
     }
 
+    /// Inner products of every column with the output.
+    pub(super) fn along_output(&self) -> Array1<f64> {
+        let last = self.gram.nrows() - 1;
+        self.gram.slice(s![..last, last]).to_owned()
+    }
+
+    /// Sum of squares of the output.
+    pub(super) fn square(&self) -> f64 {
+        let last = self.gram.nrows() - 1;
+        self.gram[[last, last]].max(f64::MIN_POSITIVE)
+    }
+
     /// The part that holds some variants only.
     pub(super) fn of(&self, variants: impl Iterator<Item = usize>, columns: impl Fn(usize) -> usize) -> Self {
         let mut all = Vec::new();
@@ -73,11 +90,22 @@ impl Ground {
             }
         }
         all.push(self.gram.nrows() - 1);
-        Self { gram: block(&self.gram, &all, &all), starts, variance: self.variance }
+        let hidden = self.hidden.clone();
+        Self { gram: block(&self.gram, &all, &all), hidden, starts, variance: self.variance }
+    }
+
+    /// Does the baseline leave next to nothing of this variant's law?
+    pub(super) fn hides(&self, variant: usize) -> bool {
+        self.hidden[variant]
     }
 }
 
 impl MarginalState<'_> {
+    /// Does the baseline leave next to nothing of this variant's law?
+    pub(super) fn hides(&self, variant: usize) -> bool {
+        self.ground.hides(variant)
+    }
+
     /// The entry that is left.
     fn at(&self, row: usize, column: usize) -> f64 {
         self.ground.gram[[row, column]] - self.reach.row(row).dot(&self.reach.row(column))
@@ -158,8 +186,10 @@ impl Comparison<'_> {
         let last = left.nrows() - 1;
         let q = left[[last, last]].max(1e-12 * gram.whole[[last, last]]);
         let ln = self.ln_of(gram, q, ln_determinant, &ridge);
-        let starts = (0..self.bank.variants.len()).map(|variant| Some(self.columns(variant).start)).collect();
-        (Ground { gram: left, starts, variance: saturated.variance }, ln)
+        let first: Vec<usize> = (0..self.bank.variants.len()).map(|variant| self.columns(variant).start).collect();
+        let hidden = first.iter().map(|at| left[[*at, *at]] < HIDDEN * gram.whole[[*at, *at]]).collect();
+        let starts = first.into_iter().map(Some).collect();
+        (Ground { gram: left, hidden, starts, variance: saturated.variance }, ln)
     }
 
     /// Evidence of a baseline that leaves this square; its tangents have no prior, so what they cost is the same for every
@@ -172,7 +202,7 @@ impl Comparison<'_> {
         likelihood - 0.5 * (ln_determinant - self.tangent_determinant(&gram.whole) - levels)
     }
 
-    fn tangent_determinant(&self, gram: &Array2<f64>) -> f64 {
+    pub(super) fn tangent_determinant(&self, gram: &Array2<f64>) -> f64 {
         let fixed: Vec<usize> = (0..self.tangents).collect();
         let mut inner = block(gram, &fixed, &fixed);
         let flat = self.flat(gram, FLAT);
@@ -196,8 +226,7 @@ impl Comparison<'_> {
         for (index, size) in SIZES.iter().enumerate() {
             let resolved = along.resolve(self.lambda(state, *size));
             let ln = self.ln_evidence(state, &resolved) + self.ln_sign(state, of, *size, &resolved);
-            let too_large = *size > 1.01 * of.largest && index > 0;
-            all[index] = ln + SIZE_PRIORS[index].ln() + if too_large { TOO_LARGE } else { 0.0 };
+            all[index] = ln + ln_size_prior(of, index);
             if all[index] > best.1 {
                 best = (index, all[index]);
             }
@@ -280,38 +309,12 @@ impl Comparison<'_> {
     pub(super) fn part_of(&self, ground: &Ground, members: &[(usize, usize)]) -> Ground {
         ground.of(members.iter().map(|(variant, _)| *variant), |variant| self.bank.variants[variant].relative.len())
     }
-
-    /// Posterior means: coefficients of the tangents and of each member.
-    pub(super) fn solve(&self, gram: &Array2<f64>, variance: f64, members: &[(usize, usize)]) -> PosteriorMeans {
-        let last = gram.nrows() - 1;
-        let mut all: Vec<usize> = (0..self.first()).collect();
-        let mut ridge = self.fixed_ridge(gram, variance);
-        for (variant, size) in members {
-            let of = &self.bank.variants[*variant];
-            all.extend(self.columns(*variant));
-            ridge.extend(of.relative.iter().map(|d| variance / (SIZES[*size] * self.deviation * d).powi(2)));
-        }
-        let mut inner = block(gram, &all, &all);
-        ridge.iter().enumerate().for_each(|(at, ridge)| inner[[at, at]] += ridge);
-        let y = Array1::from_iter(all.iter().map(|index| gram[[*index, last]]));
-        let w = CholeskyFactor::of(&inner).solve(&y);
-        let tangents = w.slice(s![..self.tangents]).to_vec();
-        let mut at = self.first();
-        let mut of_members = Vec::new();
-        for (variant, _) in members {
-            let size = self.columns(*variant).len();
-            of_members.push(w.slice(s![at..at + size]).to_vec());
-            at += size;
-        }
-        PosteriorMeans { tangents, members: of_members }
-    }
 }
 
-/// Posterior means of a hypothesis.
-#[derive(Debug, Clone)]
-pub(super) struct PosteriorMeans {
-    pub(super) tangents: Vec<f64>,
-    pub(super) members: Vec<Vec<f64>>,
+/// Logarithm of the prior probability of a size of a variant.
+pub(super) fn ln_size_prior(of: &Variant, size: usize) -> f64 {
+    let too_large = SIZES[size] > 1.01 * of.largest && size > 0;
+    SIZE_PRIORS[size].ln() + if too_large { TOO_LARGE } else { 0.0 }
 }
 
 /// Logarithm of a sum of exponentials.

@@ -9,7 +9,9 @@ use super::algebra::{CholeskyFactor, block, schur};
 use super::bank::{Variant, VariantBank};
 use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
+use crate::physics::effect;
 use crate::statistics::count;
+use adapters::channel::quantity::Quantity;
 use ndarray::{Array1, Array2};
 use std::ops::Range;
 
@@ -30,6 +32,15 @@ pub(super) struct Claim {
     pub(super) share: f64,
     /// Each law with its coefficients.
     pub(super) laws: Vec<(usize, Vec<f64>)>,
+}
+
+/// A law in the place of a contribution.
+pub(super) struct StandIn {
+    pub(super) kind: String,
+    /// What it costs, nats.
+    pub(super) nats: f64,
+    /// Share of the contribution that it makes, the price of its columns taken off.
+    pub(super) share: f64,
 }
 
 /// Projects curves on named laws.
@@ -66,6 +77,13 @@ impl<'a> Naming<'a> {
         Self { bank, first: comparison.first(), metrics: grams.iter().map(cleared).collect(), named }
     }
 
+    /// May a law be what these curves are: does it know their channels?
+    fn may_be(&self, law: usize, parts: &[(usize, &[f64])]) -> bool {
+        let Some(effect) = self.bank.variants[law].kind().and_then(effect) else { return true };
+        let quantities = parts.iter().filter_map(|(variant, _)| self.bank.variants[*variant].drawn());
+        quantities.map(|drawn| Quantity::of(&drawn.over)).all(|quantity| effect.follows(quantity))
+    }
+
     /// The best claim on a curve, given as nameless variants with their coefficients.
     pub(super) fn claim(&self, parts: &[(usize, &[f64])]) -> Option<Claim> {
         let claims = self.metrics.iter().filter_map(|metric| self.claim_in(metric, parts));
@@ -87,6 +105,9 @@ impl<'a> Naming<'a> {
             for variant in &self.named {
                 let of = |(along, square): &(Array1<f64>, f64)| self.regress(metric, along, *square, &[*variant]);
                 let Some(fit) = self.regress(metric, &along, square, &[*variant]) else { continue };
+                if !self.may_be(*variant, parts) {
+                    continue;
+                }
                 let enough = best.as_ref().map_or(THRESHOLDS.name_share + THRESHOLDS.pair_more, |best| best.share);
                 let makes_each = |own: &(Array1<f64>, f64)| of(own).is_some_and(|own| own.share >= THRESHOLDS.of_each);
                 if fit.share > enough && each.iter().all(makes_each) {
@@ -139,6 +160,7 @@ impl<'a> Naming<'a> {
         let mut single: Vec<(f64, usize, Vec<f64>)> = self
             .named
             .iter()
+            .filter(|variant| self.may_be(**variant, parts))
             .filter_map(|variant| {
                 let fit = self.regress(metric, &along, square, &[*variant])?;
                 Some((fit.share, *variant, fit.coefficients))
@@ -153,13 +175,13 @@ impl<'a> Naming<'a> {
             .any(|(variant, _)| self.bank.variants[*variant].drawn().is_some_and(|drawn| drawn.shape == "levels"));
         let whole = THRESHOLDS.pair_whole.max(one.share + THRESHOLDS.pair_more);
         if one.share >= THRESHOLDS.name_share && !levels && whole < 1.0 {
-            let pair = self.pair(metric, &along, square, &single);
+            let pair = self.pair(metric, parts, (&along, square), &single);
             return Some(pair.filter(|pair| pair.share > whole).unwrap_or(one));
         }
         if one.share >= THRESHOLDS.name_share || levels {
             return Some(one);
         }
-        let pair = self.pair(metric, &along, square, &single);
+        let pair = self.pair(metric, parts, (&along, square), &single);
         let enough = (THRESHOLDS.name_share + THRESHOLDS.pair_more).max(one.share + THRESHOLDS.pair_gain);
         Some(pair.filter(|pair| pair.share > enough).unwrap_or(one))
     }
@@ -167,8 +189,8 @@ impl<'a> Naming<'a> {
     fn pair(
         &self,
         metric: &Array2<f64>,
-        along: &Array1<f64>,
-        square: f64,
+        parts: &[(usize, &[f64])],
+        (along, square): (&Array1<f64>, f64),
         single: &[(f64, usize, Vec<f64>)],
     ) -> Option<Claim> {
         let mut firsts: Vec<usize> = Vec::new();
@@ -180,7 +202,8 @@ impl<'a> Naming<'a> {
         }
         let mut best: Option<Claim> = None;
         for first in firsts {
-            for second in self.named.iter().copied().filter(|second| kind(*second) != kind(first)) {
+            let others = self.named.iter().copied().filter(|second| kind(*second) != kind(first));
+            for second in others.filter(|second| self.may_be(*second, parts)) {
                 let Some(fit) = self.regress(metric, along, square, &[first, second]) else { continue };
                 if best.as_ref().is_none_or(|best| fit.share > best.share) {
                     let size = self.law(first).len();
@@ -223,18 +246,18 @@ impl<'a> Naming<'a> {
 
     /// What it costs in nats to put each named kind in the place of a contribution, given its inner products with every
     /// column in the metric of the noise and its square, the baseline projected out; the best of each kind.
-    pub(super) fn stand_ins(&self, along: &Array1<f64>, square: f64, nats: f64) -> Vec<(String, f64)> {
-        let mut all: Vec<(String, f64)> = Vec::new();
+    pub(super) fn stand_ins(&self, along: &Array1<f64>, square: f64, nats: f64) -> Vec<StandIn> {
+        let mut all: Vec<StandIn> = Vec::new();
         for variant in &self.named {
             let of = &self.bank.variants[*variant];
             let Some(fit) = self.regress(&self.metrics[0], along, square, &[*variant]) else { continue };
             let size = count(of.law_columns().len() - 1);
             let left = square * (1.0 - fit.share - PRICE * size).max(0.0);
-            let loss = nats * left + 0.7 * size - of.ln_prior.min(0.0);
+            let nats = nats * left + 0.7 * size - of.ln_prior.min(0.0);
             let kind = of.kind().unwrap_or_default().to_owned();
-            match all.iter_mut().find(|(known, _)| *known == kind) {
-                Some((_, known)) => *known = known.min(loss),
-                None => all.push((kind, loss)),
+            match all.iter_mut().find(|known| known.kind == kind) {
+                Some(known) => (known.nats, known.share) = (known.nats.min(nats), known.share.max(fit.share)),
+                None => all.push(StandIn { kind, nats, share: fit.share }),
             }
         }
         all

@@ -45,6 +45,16 @@ impl NoiseModel {
         Self { share, phi, theta, variance: at_1 / theta }
     }
 
+    /// How many samples it remembers: the correlation time of the share with a memory.
+    pub(super) fn memory(&self) -> f64 {
+        if self.phi > 0.0 { -1.0 / self.phi.ln() } else { 0.0 }
+    }
+
+    /// By how much its memory makes the variance of a mean larger than that of as many independent rows.
+    pub(super) fn inflation(&self) -> f64 {
+        1.0 + 2.0 * self.share * self.phi / (1.0 - self.phi).max(1e-6)
+    }
+
     /// Every setting worth trying for blocks of this median length; of endless ones every memory.
     pub(super) fn grid(median_block: f64, period_s: f64) -> Vec<Self> {
         let longest = (median_block / 4.0).max(3.0);

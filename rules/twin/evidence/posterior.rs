@@ -1,5 +1,6 @@
 //! The posterior: sets of the second stage summed over the likely noises, and by what they say.
 
+use super::bag::{Bag, Candidate};
 use super::gram::{Comparison, Gram};
 use super::marginal::{Ground, Saturated, ln_sum};
 use super::naming::{Claim, Naming};
@@ -10,6 +11,8 @@ use std::collections::BTreeMap;
 /// Sets that are evaluated for every noise, and those whose curves are offered names.
 const SETS: usize = 40;
 const OFFERED: usize = 25;
+/// Noises under which the posterior is averaged.
+const NOISES: usize = 2;
 
 /// A set of variants with its posterior probability.
 pub(super) struct Explanation {
@@ -19,6 +22,8 @@ pub(super) struct Explanation {
     pub(super) noise: usize,
     /// Logarithm of its probability.
     pub(super) ln: f64,
+    /// Logarithm of its evidence over that of nothing, from all rows as they are and under its likeliest noise.
+    pub(super) over_nothing: f64,
     /// The claim on each nameless member.
     pub(super) claims: Vec<Option<Claim>>,
     /// The names it comes to, sorted; `None` of what has none.
@@ -31,6 +36,23 @@ pub(super) struct NoiseSetting {
     pub(super) saturated: Saturated,
     pub(super) ground: Ground,
     pub(super) ln: f64,
+}
+
+impl Comparison<'_> {
+    /// What a set leaves of the output, full length.
+    pub(super) fn left_by(&self, setting: &NoiseSetting, members: &Members) -> Vec<f64> {
+        let solved = self.solve(&setting.gram.whole, setting.saturated.variance, members);
+        let (_, output) = self.fixed_and_output();
+        let mut left = output.to_vec();
+        for (index, w) in solved.tangents.iter().enumerate() {
+            left.iter_mut().zip(self.tangent(index)).for_each(|(left, t)| *left -= w * t);
+        }
+        for ((variant, _), w) in members.iter().zip(&solved.members) {
+            let x = self.bank.contribution(&self.bank.variants[*variant], w);
+            left.iter_mut().zip(&x).for_each(|(left, x)| *left -= x);
+        }
+        left
+    }
 }
 
 impl NoiseSetting {
@@ -56,7 +78,7 @@ pub(super) fn explanations(
     if !top.iter().any(|members| members.is_empty()) {
         top.push(&empty);
     }
-    let mut evaluated: BTreeMap<Vec<usize>, Vec<(f64, usize, Members)>> = BTreeMap::new();
+    let mut evaluated: BTreeMap<Vec<usize>, Vec<EvaluatedSet>> = BTreeMap::new();
     for (number, setting) in settings.iter().enumerate() {
         for members in &top {
             let (ln, sized) = search.evaluate(&setting.ground, setting.ln, members);
@@ -64,15 +86,16 @@ pub(super) fn explanations(
             evaluated.entry(key).or_default().push((ln, number, sized));
         }
     }
-    let total = |all: &Vec<(f64, usize, Members)>| ln_sum(all.iter().map(|(ln, _, _)| *ln).collect::<Vec<_>>());
-    let whole = ln_sum(evaluated.values().map(total).collect::<Vec<_>>());
-    let mut all: Vec<Explanation> = evaluated
-        .values()
-        .filter_map(|evaluated| {
+    let sets: Vec<Vec<EvaluatedSet>> = evaluated.into_values().collect();
+    let averaged = averaged(search, settings, &sets);
+    let mut all: Vec<Explanation> = sets
+        .iter()
+        .zip(averaged)
+        .filter_map(|(evaluated, ln)| {
             let best = evaluated.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
             let claims = vec![None; best.2.len()];
-            let (members, noise, ln) = (best.2.clone(), best.1, total(evaluated) - whole);
-            Some(Explanation { members, noise, ln, claims, names: Vec::new() })
+            let over_nothing = best.0 - settings[best.1].ln;
+            Some(Explanation { members: best.2.clone(), noise: best.1, ln, over_nothing, claims, names: Vec::new() })
         })
         .collect();
     all.sort_by(|a, b| b.ln.total_cmp(&a.ln));
@@ -84,6 +107,26 @@ pub(super) fn explanations(
         explanation.names = names(second, explanation, naming);
     }
     all
+}
+
+/// Logarithm of the evidence of a set under a noise, the number of the noise, and its members with their sizes there.
+type EvaluatedSet = (f64, usize, Members);
+
+/// Logarithm of the probability of each set, averaged over resamples, under the noises that hold most of it.
+fn averaged(search: &SetSearch<'_>, settings: &[NoiseSetting], sets: &[Vec<EvaluatedSet>]) -> Vec<f64> {
+    let mut by_noise: Vec<(f64, usize)> = (0..settings.len())
+        .map(|noise| (ln_sum(sets.iter().flatten().filter(|of| of.1 == noise).map(|of| of.0)), noise))
+        .collect();
+    by_noise.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut candidates = Vec::new();
+    for (set, all) in sets.iter().enumerate() {
+        for (_, noise) in by_noise.iter().take(NOISES) {
+            // Of a set that was met in several sizes the likeliest.
+            let best = all.iter().filter(|of| of.1 == *noise).max_by(|a, b| a.0.total_cmp(&b.0));
+            candidates.extend(best.map(|best| Candidate { set, noise: *noise, members: &best.2 }));
+        }
+    }
+    Bag::new(search.comparison, settings, search.priors, &candidates).averaged(&candidates, sets.len())
 }
 
 /// The claims on the nameless members of a set: each by itself, then those that are left together.

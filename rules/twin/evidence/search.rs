@@ -75,7 +75,7 @@ impl SetSearch<'_> {
         let mut best: BTreeMap<Vec<usize>, CandidateSet> = BTreeMap::new();
         for (parent, (members, state, ln)) in level.iter().enumerate() {
             for variant in 0..variants.len() {
-                if !self.may_join(members, variant) {
+                if state.hides(variant) || !self.may_join(members, variant) {
                     continue;
                 }
                 let gain = self.comparison.gain(state, variant);

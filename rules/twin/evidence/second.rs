@@ -57,16 +57,13 @@ impl SecondStage {
         second
     }
 
-    /// Adds a hidden sequence with its own evidence as prior.
-    pub(super) fn add(&mut self, inputs: &RecordingInputs<'_>, owner: Owner, label: String, column: Vec<f64>, ln: f64) {
+    /// Adds a variant that was read from the recording, with what it has cost to find it as prior.
+    pub(super) fn add(&mut self, ln: f64, make: impl FnOnce(&mut VariantBank)) {
         let before = self.bank.variants.len();
-        let prior = if matches!(owner, Owner::Named(_)) { NAMED } else { NAMELESS };
-        match owner {
-            Owner::Named(family) => self.bank.of(family, label).sized().column(inputs, column),
-            Owner::Nameless(drawn) => self.bank.nameless(drawn).sized().column(inputs, column),
-        }
-        if self.bank.variants.len() > before {
-            self.priors.push(prior + ln);
+        make(&mut self.bank);
+        if let Some(variant) = self.bank.variants.get(before) {
+            let prior = if variant.kind().is_some() { NAMED } else { NAMELESS };
+            self.priors.push(prior + variant.ln_prior + ln);
             self.source.push(None);
         }
     }

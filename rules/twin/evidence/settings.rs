@@ -4,6 +4,7 @@ use super::gram::{Comparison, Gram};
 use super::inputs::RecordingInputs;
 use super::marginal::Saturated;
 use super::noise::NoiseModel;
+use crate::statistics::count;
 
 /// Nameless curves that stand for everything that may be there.
 const CURVES_MAX: usize = 16;
@@ -65,7 +66,8 @@ pub(super) fn settings(inputs: &RecordingInputs<'_>, comparison: &Comparison<'_>
 
 /// The settings that make one of two residuals likely: that of the baseline, and that of a wide smooth model.
 fn preselected(inputs: &RecordingInputs<'_>, comparison: &Comparison<'_>, wide: &[f64]) -> Vec<NoiseModel> {
-    let grid = NoiseModel::grid(inputs.median_block(), inputs.period_s);
+    let group = count(comparison.group);
+    let grid = NoiseModel::grid(inputs.median_block() / group, inputs.period_s * group);
     let mut chosen = vec![NoiseModel::WHITE];
     let base = inputs.column(|row| inputs.scene.recorded()[row] - inputs.simulated[row]);
     for residual in [base.as_slice(), wide] {

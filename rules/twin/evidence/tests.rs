@@ -37,7 +37,7 @@ fn recorded(level_n: f64) -> String {
 
 fn diagnosed(level_n: f64) -> Diagnosis {
     let recording = read_csv(recorded(level_n).as_bytes(), "t.csv").expect("readable").recording;
-    diagnose(&recording, &parse_model(MODEL).expect("fine")).expect("usable")
+    diagnose(&recording, &parse_model(MODEL).expect("fine"), 1).expect("usable")
 }
 
 #[test]

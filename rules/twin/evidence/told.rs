@@ -1,75 +1,98 @@
 //! The answer as a diagnosis: texts, textbook parameters with intervals, places, and what to record next.
 //!
 //! What was found is a curve; what is told beside it is the textbook law that comes nearest, refitted together with the
-//! baseline, so that its parameters mean what the catalogue says and the extended model can be simulated.
+//! baseline, so that its parameters mean what the catalogue says and the extended model can be simulated. A name that no
+//! textbook law bears out is taken back.
 
-use super::baseline::Baseline;
+use super::answer::{EvidenceAnswer, sum_of};
+use super::decision::THRESHOLDS;
+use super::gram::Comparison;
 use super::inputs::RecordingInputs;
-use super::judge::{EvidenceAnswer, sum_of};
-use crate::physics::{Effect, effect};
+use super::noise::NoiseModel;
+use crate::physics::{Bound, Effect, Entry, Form, Scene, effect};
 use crate::statistics::{count, rms};
-use crate::twin::diagnose::Case;
+use crate::twin::case::Case;
 use crate::twin::diagnosis::{
     Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
+    unit_of,
 };
-use crate::twin::estimate::estimates;
-use crate::twin::fit::{Fit, fit};
+use crate::twin::fit::{Fit, Metric, fit};
 use crate::twin::inputs::rows_with_inputs;
+use crate::twin::intervals::FittedRows;
 use crate::twin::linear::least_squares;
 use crate::twin::locate::{Region, conditions, spans};
-use crate::twin::model::{Model, Part};
-use crate::twin::next_step::{alternative, experiment, of_effects};
-use crate::twin::noise::Arma;
-use crate::twin::verdicts::unit_of;
+use crate::twin::model::{Model, Parameter, Part};
+use crate::twin::next_step::{alternative, of_effects, over_channel};
 use crate::twin::words;
+use adapters::bilingual::Bilingual;
 
-/// Noise from which the fit of the textbook laws starts.
-const START: Arma = Arma { phi: 0.4, theta: 0.0 };
-/// Minutes of an experiment that varies one channel, and those asked for where nothing is known.
-const SWEEP_MINUTES: f64 = 10.0;
+/// Share of the range of a shape within which it stands at its end.
+const AT_END: f64 = 1e-6;
+
+/// Share of the greatest contribution from which a row counts as acted upon.
+const ACTING: f64 = 0.1;
 
 /// Everything that is told.
 pub(super) struct EvidenceReport<'a, 'm> {
     pub(super) case: &'a mut Case<'m>,
     pub(super) inputs: &'a RecordingInputs<'a>,
-    pub(super) baseline: &'a Baseline,
+    pub(super) baseline: &'a Fit,
     pub(super) answer: EvidenceAnswer,
+    pub(super) comparison: &'a Comparison<'a>,
+    /// The likeliest noise.
+    pub(super) noise: NoiseModel,
+    /// The recorded output with outliers cut.
+    pub(super) recorded: &'a [f64],
     /// Deviation of the ordinary noise.
     pub(super) ordinary: f64,
+}
+
+/// Textbook laws of what was found.
+struct Textbook {
+    /// The part of each name, and the share of its contribution that the textbook law makes; `None` of one without a law.
+    laws: Vec<Option<(usize, f64)>>,
+    /// Those parts beside the model's, refitted; `None` where nothing was found.
+    fit: Option<Fit>,
 }
 
 impl EvidenceReport<'_, '_> {
     /// The diagnosis.
     pub(super) fn diagnosis(mut self) -> Diagnosis {
         let fits = self.fits();
-        let (parts, fit) = self.textbook();
-        let missing = self.missing(&fits, &parts, fit.as_ref());
-        let alternatives = self.alternatives();
-        let model = fit.as_ref().map_or_else(
+        let mut textbook = self.textbook();
+        let refused = self.refused(&textbook);
+        if !refused.is_empty() {
+            self.answer.refuse(&refused, |x| self.inputs.taken(false).map(|row| x[row] * x[row]).sum());
+            textbook = self.textbook();
+        }
+        let missing = self.missing(&fits, &textbook);
+        let alternatives: Vec<Alternative> = self.alternatives();
+        let fit = textbook.fit.as_ref();
+        let model = fit.map_or_else(
             || self.case.model.clone(),
             |fit| Model { parts: fit.parts.clone(), ..self.case.model.clone() },
         );
-        let shift =
-            if missing.is_empty() { Vec::new() } else { fit.as_ref().map_or_else(Vec::new, |f| self.shifts(f)) };
+        let shift = if missing.is_empty() { Vec::new() } else { fit.map_or_else(Vec::new, |f| self.shifts(f)) };
+        let withdrawn = self.answer.withdrawn.take();
         let mut diagnosis = Diagnosis {
             output: self.case.model.output.clone(),
             unit: unit_of(&self.case.model.output).to_owned(),
             verdict: self.answer.verdict,
-            summary: String::new(),
-            next_experiment: self.experiment(&alternatives),
+            summary: Bilingual::default(),
+            next_experiment: self.experiment(&alternatives, withdrawn.as_ref().map_or(&[], |gone| &gone.found)),
             mismatch: self.regions(),
             rows: self.rows(),
+            existence: Some(self.answer.existence),
             fit: Some(fits),
             baseline_shift: shift,
             missing,
             alternatives,
-            withdrawn: self.answer.withdrawn.as_ref().map_or_else(Vec::new, |withdrawn| withdrawn.found.clone()),
             data_quality: self.case.faults.clone(),
             model,
             debug: self.answer.debug.clone(),
         };
-        diagnosis.summary = match &self.answer.withdrawn {
-            Some(withdrawn) => words::withdrawn(withdrawn, &diagnosis.unit),
+        diagnosis.summary = match &withdrawn {
+            Some(gone) => words::withdrawn(&gone.found, gone.among_fitted, gone.errors, &diagnosis.unit),
             None => words::summary(&diagnosis),
         };
         diagnosis
@@ -97,60 +120,117 @@ impl EvidenceReport<'_, '_> {
     }
 
     /// The nearest law of the catalogue for each name, and all of them refitted with the baseline.
-    fn textbook(&mut self) -> (Vec<Option<usize>>, Option<Fit>) {
+    fn textbook(&mut self) -> Textbook {
         let mut parts = self.baseline.parts.clone();
-        let mut places = Vec::new();
+        let mut laws = Vec::new();
         for name in &self.answer.names {
             let own = self.answer.contributions.iter().find(|(known, _)| known == name);
-            let part = own.and_then(|(_, x)| self.nearest(name, x));
-            places.push(part.is_some().then_some(parts.len()));
-            parts.extend(part);
+            let law = own.and_then(|(_, x)| self.nearest(name, x));
+            laws.push(law.as_ref().map(|(_, share)| (parts.len(), *share)));
+            parts.extend(law.map(|(part, _)| part));
         }
-        if self.answer.names.is_empty() {
-            return (places, None);
+        let fit = if self.answer.names.is_empty() { None } else { self.refit(&parts) };
+        Textbook { laws, fit }
+    }
+
+    /// The parts refitted in the metric of the likeliest noise; a shape that runs to the end of its range says nothing, and
+    /// stays as it was.
+    fn refit(&mut self, parts: &[Part]) -> Option<Fit> {
+        let fitted = self.fit(parts)?;
+        let mut held = parts.to_vec();
+        let mut ran_away = false;
+        for (part, fitted) in held.iter_mut().zip(&fitted.parts).skip(self.baseline.parts.len()) {
+            for (parameter, fitted) in part.parameters.iter_mut().zip(&fitted.parameters) {
+                if !parameter.fixed && parameter.entry == Entry::Shape && is_at_end(fitted.value, fitted.range) {
+                    parameter.fixed = true;
+                    ran_away = true;
+                }
+            }
         }
-        // Told as the inner split of the fitted runs wants it: much memory of the noise would swallow levels.
-        let fit = self.case.with_data(|data| fit(data, &parts, START));
-        (places, fit.map(|fit| self.case.checked(&fit, fit.noise).fit))
+        if ran_away { self.fit(&held) } else { Some(fitted) }
+    }
+
+    fn fit(&mut self, parts: &[Part]) -> Option<Fit> {
+        let weigh = |column: &[f64]| self.comparison.whitened(column, self.noise);
+        fit(&mut self.case.scene, parts, &Metric { recorded: self.recorded, weigh: &weigh, bounded: true })
+    }
+
+    /// Names that are taken back: impossible sizes, and curves that got a name whose textbook law makes little of them.
+    fn refused(&mut self, textbook: &Textbook) -> Vec<String> {
+        let mut refused = Vec::new();
+        for (name, law) in self.answer.names.iter().zip(&textbook.laws) {
+            let Some((place, share)) = law else { continue };
+            let part = textbook.fit.as_ref().map(|fit| &fit.parts[*place]);
+            let own = self.answer.contributions.iter().find(|(known, _)| known == name);
+            let is_claimed = self.answer.claimed.contains(name) && *share < THRESHOLDS.textbook_share;
+            let why = match (part, own) {
+                (Some(part), _) if is_impossible(part) => "a size at the end of its range",
+                (_, Some((_, x))) if self.is_too_large(name, x) => "larger than the machine allows",
+                _ if is_claimed => "its textbook law makes little of it",
+                _ => continue,
+            };
+            self.answer.debug.push_str(&format!("\n{name} refused: {why} ({share:.2})"));
+            refused.push(name.clone());
+        }
+        refused
+    }
+
+    /// Is a contribution larger than its effect can be beside what the machine takes anyway?
+    fn is_too_large(&self, name: &str, contribution: &[f64]) -> bool {
+        let cut = self.inputs.cut.as_deref().filter(|_| self.inputs.knows_cut);
+        let load = |row: usize| cut.map_or(0.0, |cut| cut[row].abs());
+        let bound = effect(name).map_or(Bound::Any, Effect::bound);
+        let (times, basis): (f64, &dyn Fn(usize) -> f64) = match (bound, cut) {
+            (Bound::NoLoad(times), _) => (times, &|row| (self.answer.after[row] - load(row)).abs()),
+            (Bound::Cut(times), Some(_)) => (times, &load),
+            _ => return false,
+        };
+        let top = self.inputs.taken(false).map(|row| contribution[row].abs()).fold(0.0, f64::max);
+        let acting = || self.inputs.taken(false).filter(|row| contribution[*row].abs() > ACTING * top);
+        let square = |of: &dyn Fn(usize) -> f64| acting().map(|row| of(row).powi(2)).sum::<f64>();
+        square(&|row| contribution[row]) > times * times * square(basis)
     }
 
     /// The form of a kind whose law, the baseline beside it, comes nearest to a contribution.
-    fn nearest(&self, kind: &str, contribution: &[f64]) -> Option<Part> {
+    fn nearest(&self, kind: &str, contribution: &[f64]) -> Option<(Part, f64)> {
         let hypothesis = self.case.model.hypotheses.iter().find(|part| part.label() == kind);
         if let Some(part) = hypothesis {
-            return Some(part.clone());
+            return Some((part.clone(), 1.0));
         }
         let effect = effect(kind)?;
         let scene = self.inputs.scene;
         let rows: Vec<usize> = self.inputs.taken(false).collect();
         let over = |column: &[f64]| rows.iter().map(|row| column[*row]).collect::<Vec<f64>>();
         let wanted = over(contribution);
+        let tangents: Vec<Vec<f64>> = self.baseline.tangents.iter().map(|tangent| over(tangent)).collect();
+        let whole = least_squares(&tangents, &wanted).rss;
         let mut best: Option<(f64, Part)> = None;
         for form in effect.forms(scene) {
             let Some(laws) = effect.columns(scene, &form) else { continue };
             let mut columns: Vec<Vec<f64>> = laws.iter().map(|(_, law)| over(law)).collect();
             let own = columns.len();
-            columns.extend(self.baseline.tangents.iter().map(|tangent| over(tangent)));
+            columns.extend_from_slice(&tangents);
             let solution = least_squares(&columns, &wanted);
             if best.as_ref().is_none_or(|(left, _)| solution.rss < *left) {
                 let names: Vec<&'static str> = laws.iter().map(|(name, _)| *name).collect();
-                let part = with_values(effect, &form, &names, &solution.coefficients[..own]);
+                let part = with_values(effect, scene, &form, (&names, &solution.coefficients[..own]));
                 best = Some((solution.rss, part));
             }
         }
-        best.map(|(_, part)| part)
+        best.map(|(left, part)| (part, 1.0 - left / whole.max(f64::MIN_POSITIVE)))
     }
 
-    fn missing(&mut self, fits: &Fits, places: &[Option<usize>], fit: Option<&Fit>) -> Vec<Missing> {
+    fn missing(&mut self, fits: &Fits, textbook: &Textbook) -> Vec<Missing> {
         let names = self.answer.names.clone();
         let mut all = Vec::new();
         for (at, name) in names.iter().enumerate() {
-            let place = places.get(at).copied().flatten();
-            let parameters: Vec<ParameterEstimate> = match (place, fit) {
-                (Some(place), Some(fit)) => estimates(self.case, fit, place),
+            let place = textbook.laws.get(at).copied().flatten().map(|(place, _)| place);
+            let parameters: Vec<ParameterEstimate> = match (place, &textbook.fit) {
+                (Some(place), Some(fit)) => self.estimates(fit, place),
                 _ => self.curve_size(name),
             };
-            let (statement, equation) = texts(name, place.and_then(|place| fit.map(|fit| &fit.parts[place])));
+            let part = place.and_then(|place| textbook.fit.as_ref().map(|fit| &fit.parts[place]));
+            let (statement, equation) = texts(name, part);
             all.push(Missing {
                 effect: name.clone(),
                 statement,
@@ -164,6 +244,20 @@ impl EvidenceReport<'_, '_> {
             });
         }
         all
+    }
+
+    fn estimates(&self, fit: &Fit, place: usize) -> Vec<ParameterEstimate> {
+        let rows = &self.comparison.rows;
+        let rows = FittedRows {
+            scene: &self.case.scene,
+            fit,
+            recorded: self.recorded,
+            whiten: &|column| self.comparison.whitened(column, self.noise),
+            rows,
+            unit: rows.iter().map(|row| self.inputs.unit[*row]).collect(),
+            of_model: self.baseline.parts.len(),
+        };
+        rows.estimates(place)
     }
 
     /// The size of a curve that has no law: its root mean square where it acts.
@@ -185,26 +279,18 @@ impl EvidenceReport<'_, '_> {
     }
 
     fn alternatives(&self) -> Vec<Alternative> {
-        self.answer.alternatives.iter().map(|(other, instead)| alternative(other, instead, 0.0)).collect()
+        self.answer.rivals.iter().map(|rival| alternative(&rival.name, &rival.instead_of, 2.0 * rival.nats)).collect()
     }
 
     /// What separates what is left; always where the answer is not sure.
-    fn experiment(&self, alternatives: &[Alternative]) -> Option<Experiment> {
+    fn experiment(&self, alternatives: &[Alternative], gone: &[String]) -> Option<Experiment> {
         if matches!(self.answer.verdict, Verdict::Explained | Verdict::NoMismatch) {
             return None;
         }
         let open = alternatives.iter().flat_map(|other| [other.effect.as_str(), other.instead_of.as_str()]);
-        let gone = self.answer.withdrawn.iter().flat_map(|withdrawn| &withdrawn.kinds);
-        let kinds = open.chain(self.answer.names.iter().chain(gone).map(String::as_str));
+        let kinds = open.chain(self.answer.names.iter().map(String::as_str)).chain(gone.iter().map(String::as_str));
         let gain = self.answer.information;
-        of_effects(kinds, gain).or_else(|| Some(experiment(self.sweep(), SWEEP_MINUTES, gain, "")))
-    }
-
-    /// To vary one input where the difference is largest.
-    fn sweep(&self) -> String {
-        let place = self.regions().into_iter().find_map(|region| region.conditions.into_iter().next());
-        let channel = place.map_or("the input that changes most".to_owned(), |condition| condition.column().to_owned());
-        format!("hold everything else and step {channel} through its range in five levels, upwards and downwards")
+        of_effects(kinds, gain).or_else(|| Some(over_channel(self.answer.drawn_over.as_deref(), gain)))
     }
 
     /// One region for each name, the largest share first.
@@ -251,7 +337,7 @@ impl EvidenceReport<'_, '_> {
         let pairs = self.baseline.parts.iter().zip(&fit.parts);
         let of = |(before, after): (&Part, &Part)| {
             let parameters = before.parameters.iter().zip(&after.parameters).filter(|(before, _)| !before.fixed);
-            let shift = |(b, a): (&crate::twin::model::Parameter, &crate::twin::model::Parameter)| Shift {
+            let shift = |(b, a): (&Parameter, &Parameter)| Shift {
                 parameter: format!("{}.{}", before.label(), b.name),
                 before: b.value,
                 after: a.value,
@@ -262,14 +348,32 @@ impl EvidenceReport<'_, '_> {
     }
 }
 
+/// Does a value stand at an end of its range?
+fn is_at_end(value: f64, (low, high): (f64, f64)) -> bool {
+    let near = if low.is_finite() && high.is_finite() { AT_END * (high - low) } else { 0.0 };
+    value <= low + near || value >= high - near
+}
+
+/// Is every size of a part at an end of its range? A share of one is a whole, and no end.
+fn is_impossible(part: &Part) -> bool {
+    let own = || part.parameters.iter().filter(|p| p.entry == Entry::Linear && !p.fixed);
+    let is_whole = |p: &Parameter| p.range == (0.0, 1.0) && p.value > 0.5;
+    own().count() > 0 && own().all(|p| is_at_end(p.value, p.range) && !is_whole(p))
+}
+
 /// A candidate with these values of its linear parameters, within what is possible.
 fn with_values(
     effect: &'static dyn Effect,
-    form: &crate::physics::Form,
-    names: &[&'static str],
-    values: &[f64],
+    scene: &Scene,
+    form: &Form,
+    (names, values): (&[&'static str], &[f64]),
 ) -> Part {
     let mut part = Part::candidate(effect, form, names);
+    for parameter in &mut part.parameters {
+        if let Some(doc) = effect.doc().parameter(&parameter.name) {
+            parameter.range = effect.range(scene, doc);
+        }
+    }
     for (name, value) in names.iter().zip(values) {
         if let Some(parameter) = part.parameters.iter_mut().find(|p| p.name == *name && !p.fixed) {
             parameter.value = value.clamp(parameter.range.0, parameter.range.1);

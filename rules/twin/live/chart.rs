@@ -6,7 +6,7 @@
 //! is kept up to date, so that a block costs one multiplication per onset. Evidence counts only for what the change is
 //! *beyond the band*: what the series did while it was learned is no change.
 
-use crate::twin::noise::Arma;
+use super::noise::Arma;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

@@ -4,8 +4,8 @@
 //! fits one cut better than another; the noise around it is shared within the regime.
 
 use super::chart::{Healthy, Point};
+use super::noise::{self, Arma, PHI_MAX};
 use crate::statistics::{count, robust_deviation};
-use crate::twin::noise::{self, Arma, PHI_MAX};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

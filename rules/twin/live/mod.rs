@@ -10,6 +10,7 @@ pub mod expected;
 #[cfg(test)]
 mod false_alarms;
 pub mod learn;
+pub mod noise;
 pub mod regime;
 pub mod second;
 pub mod watch;

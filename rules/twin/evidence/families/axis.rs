@@ -31,10 +31,21 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let rate = inputs.rate(&pace);
     bank.of(INERTIA, "v a").column(inputs, inputs.column(|row| pace[row] * rate[row]));
     if vertical {
+        let pace = vertical_pace(inputs).unwrap_or(pace);
         let (up, down) = (inputs.column(|row| pace[row].max(0.0)), inputs.column(|row| (-pace[row]).max(0.0)));
         bank.of(GRAVITY, "whole").column(inputs, pace);
         bank.of(GRAVITY, "counterweight").prior(-0.7).columns(inputs, [(up, 1.0), (down, 1.0)]);
     } else {
         bank.of(ASYMMETRY, "v").column(inputs, pace);
     }
+}
+
+/// Velocity of the axis that moves against gravity, where it has a column of its own.
+fn vertical_pace(inputs: &RecordingInputs<'_>) -> Option<Vec<f64>> {
+    let name = inputs.scene.role_name(crate::physics::Role::Vertical)?;
+    let letter = name.chars().next().filter(|_| name.len() == 1);
+    let own = letter.map(|letter| format!("{letter}_axis_velocity_mm_min"));
+    let column =
+        inputs.scene.column(own.as_deref().unwrap_or(name)).filter(|_| name.contains("velocity") || own.is_some());
+    pace(inputs, column?)
 }

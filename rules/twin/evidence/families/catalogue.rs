@@ -1,7 +1,7 @@
 //! Kinds without a family of their own: the laws of the catalogue as they are; and what users have written.
 
 use crate::physics::{CATALOGUE, Effect};
-use crate::twin::designs::law_columns;
+use crate::twin::candidates::law_columns;
 use crate::twin::evidence::bank::{Family, VariantBank};
 use crate::twin::evidence::inputs::RecordingInputs;
 use crate::twin::model::Model;

@@ -5,6 +5,7 @@ use crate::physics::OutputKind;
 use crate::twin::evidence::bank::{Family, Since, VariantBank};
 use crate::twin::evidence::inputs::RecordingInputs;
 
+const CUT: Family = Family::of("cutting_power").beside_catalogue().signed(1.0).through(&["engaged"]);
 const LOAD_LOSS: Family = Family::of("load_loss").through(&["load"]);
 const EDGE_FORCE: Family = Family::of("edge_force").signed(1.0).beside_catalogue();
 const SOFTENING: Family = Family::of("speed_softening").signed(-1.0).through(&["cutting_speed_m_min"]);
@@ -42,6 +43,9 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
         return;
     }
     consumers(inputs, bank);
+    if inputs.engaged.is_some() && !inputs.knows_cut {
+        bank.of(CUT, "engaged").column(inputs, inputs.column(|row| inputs.cutting(row)));
+    }
     let Some(cut) = &inputs.cut else { return };
     if inputs.knows_cut {
         let power = |exponent: i32| inputs.column(|row| cut[row].powi(exponent));
@@ -251,17 +255,8 @@ fn cuts_dry(inputs: &RecordingInputs<'_>, cut: &[f64], coolant: &[f64]) -> bool 
     dry > DRY_MIN * whole
 }
 
-/// Consumers that a word or a flag of the recording tells.
+/// Consumers that a flag of the recording tells; what a word of an operation tells has a level without a name.
 fn consumers(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
-    for column in ["operation", "program"] {
-        let Some(words) = inputs.scene.words(column).filter(|words| (3..=25).contains(&words.words().len())) else {
-            continue;
-        };
-        for (code, word) in words.words().iter().enumerate() {
-            let here = |row: usize| f64::from(u8::from(words.code(row).is_some_and(|at| at as usize == code)));
-            bank.of(CONSUMER, format!("{column} {word}")).prior(-1.0).column(inputs, inputs.column(here));
-        }
-    }
     for column in ["coolant_on", "hydraulics_on"] {
         if let Some(flag) = inputs.scene.column(column)
             && inputs.deviation_of(flag, false) > 0.0

@@ -15,6 +15,9 @@ const SATURATION: Family = Family::of("saturation").beside_catalogue().signed(1.
 const WIDTHS: [f64; 4] = [0.5, 0.2, 0.08, 0.04];
 /// Seconds below which no zero drifts: electronics warm up over minutes.
 const DRIFT_MIN_S: f64 = 60.0;
+/// Natural logarithm of how much rarer the zero of a displacement drifts than what it measures: odds of 20 to 1, so that a
+/// slow curve has no sure name. A wrong value costs the name of a drifting probe.
+const DRIFT_OF_DISPLACEMENT: f64 = -3.0;
 /// Delays in samples and in seconds.
 const SAMPLES: [f64; 8] = [0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 15.0, 30.0];
 const SECONDS: [f64; 4] = [0.2, 0.5, 1.0, 2.0];
@@ -42,6 +45,8 @@ fn drift(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let span_s = inputs.span_s();
     let time = inputs.column(|row| (inputs.clock_s[row] - inputs.clock_s[0]) / span_s);
     let several = inputs.scene.runs().len() > 3;
+    // Everything in a shop that is warm by turns moves a machine slowly.
+    let rarity = if inputs.kind == OutputKind::Displacement { DRIFT_OF_DISPLACEMENT } else { 0.0 };
     for width in WIDTHS {
         if width * span_s <= (20.0 * inputs.period_s).max(DRIFT_MIN_S) || width < 0.2 && !several {
             continue;
@@ -53,14 +58,14 @@ fn drift(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
             columns.push((bump(centre), 1.0));
             centre += width;
         }
-        bank.of(DRIFT, width).sized().columns(inputs, columns);
+        bank.of(DRIFT, width).prior(rarity).sized().columns(inputs, columns);
     }
     if span_s < DRIFT_MIN_S {
         return;
     }
     let linear = inputs.column(|row| time[row] - 0.5);
     let bent = inputs.column(|row| (time[row] - 0.5).powi(2) - 1.0 / 12.0);
-    bank.of(DRIFT, "line").columns(inputs, [(linear, 1.0), (bent, 0.6)]);
+    bank.of(DRIFT, "line").prior(rarity).columns(inputs, [(linear, 1.0), (bent, 0.6)]);
 }
 
 fn voltage(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {

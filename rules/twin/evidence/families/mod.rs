@@ -11,12 +11,13 @@ mod measurement;
 mod nameless;
 mod spindle;
 mod thermal;
+pub(super) mod waves;
 mod wear;
 
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
 use crate::physics::effect;
-use crate::twin::designs::{shifts_time_in_vain, wanted};
+use crate::twin::candidates::{shifts_time_in_vain, wanted};
 use crate::twin::model::Model;
 
 /// Every variant that this recording can tell anything about.
@@ -29,6 +30,7 @@ pub(super) fn bank(inputs: &RecordingInputs<'_>, model: &Model) -> VariantBank {
     wear::add(inputs, &mut bank);
     measurement::add(inputs, &mut bank);
     thermal::add(inputs, &mut bank);
+    waves::add(inputs, &mut bank);
     catalogue::add(inputs, &mut bank);
     let in_vain = shifts_time_in_vain(model, inputs.scene);
     bank.variants.retain(|variant| {

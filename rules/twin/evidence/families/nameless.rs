@@ -19,8 +19,10 @@ const LEVELS_MAX: usize = 30;
 const GROUPS: [&str; 7] = ["run", "tool", "operation", "program", "part", "lot", "pass"];
 /// Waves along the way of a slide.
 const WAVES: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
-/// Words in the names of channels that are outputs measured beside this one, and inputs of nothing.
-const MEASURED: [&str; 7] = ["_power", "_current", "_load_", "torque", "force_n", "_counts", "thermal_error"];
+/// Words in the names of channels that are measured beside the output: no inputs, unless the model reads them. A power or a
+/// current is none even then, for its own noise would bend a curve over it.
+const ELECTRIC: [&str; 3] = ["_power", "_current", "_load_"];
+const MEASURED: [&str; 4] = ["torque", "force_n", "_counts", "thermal_error"];
 /// Channels that mean something in the cut only.
 const OF_THE_CUT: [&str; 9] = [
     "depth_of_cut_mm",
@@ -126,9 +128,9 @@ fn channels(inputs: &RecordingInputs<'_>, model: &Model) -> Vec<Channel> {
     let scene = inputs.scene;
     let read: Vec<&str> = model.parts.iter().flat_map(|part| part.inputs()).collect();
     let is_input = |name: &str| {
-        let measured = MEASURED.iter().any(|word| name.contains(word));
+        let any = |words: &[&str]| words.iter().any(|word| name.contains(word));
         let declared = crate::physics::Role::ALL.iter().any(|role| scene.role_name(*role) == Some(name));
-        name != scene.output() && (!measured || declared || read.contains(&name))
+        name != scene.output() && !any(&ELECTRIC) && (!any(&MEASURED) || declared || read.contains(&name))
     };
     let mut all: Vec<Channel> = Vec::new();
     let mut add = |name: &str, values: Vec<f64>, fine: bool| {

@@ -4,7 +4,7 @@
 //! 1. The noise: generalised least squares over everything that is fitted together, shapes included, so that what a shape
 //!    leaves open is in the intervals of the sizes too (delta method).
 //! 2. The runs: innovations are never quite white, so the sandwich by units of hold-out counts where it is wider (Liang
-//!    and Zeger, Biometrika 73, 1986; both in `Fit::variances`).
+//!    and Zeger, Biometrika 73, 1986).
 //! 3. The law: where the machine does not follow it, its coefficient is another one where the law is small than where it
 //!    is large, or for one sign than for the other. How far the coefficient differs between these *levels* beyond their
 //!    noise is measured in the recording (DerSimonian and Laird, Controlled Clinical Trials 7, 1986), and the interval
@@ -13,15 +13,11 @@
 //! 4. What no recording shows: every law is a little wrong in proportion (GUM, type B), and an effect in the cut may or
 //!    may not pass through the load loss that the model knows.
 
-use super::diagnose::Case;
 use super::diagnosis::ParameterEstimate;
 use super::fit::Fit;
-use super::hidden_tone;
-use super::linear::{dot, extend_basis, project_out};
+use super::linear::{dot, extend_basis, least_squares, project_out};
 use super::model::{Part, PartFunction};
-use super::ripple::Ripple;
-use super::verdicts::unit_of;
-use crate::physics::{Entry, unit_in};
+use crate::physics::{Entry, Scene, unit_in};
 use crate::statistics::count;
 
 /// By how much of its value a parameter may be off because no machine follows a law to the letter, with a certainty of
@@ -35,60 +31,107 @@ const LEVELS: usize = 4;
 const NOTICED: f64 = 0.05;
 /// Share of all that is known of a coefficient below which a level tells nothing of it.
 const TELLS: f64 = 0.01;
+/// Units below which their disagreement says nothing.
+const UNITS_MIN: usize = 5;
 /// Kinds outside the family of the cut that mis-state it.
 const OF_THE_CUT: [&str; 1] = ["recipe_error"];
 
-/// The parameters of part number `part` of a fit, with intervals in their own units.
-#[must_use]
-pub(super) fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<ParameterEstimate> {
-    let variances = fit.variances(&case.frame);
-    let differences = differences(case, fit, part);
-    let passed_on = passed_on(case, fit, part);
-    let followed = case
-        .ripple
-        .iter()
-        .filter(|_| fit.parts[part].kind == "ripple_alias")
-        .flat_map(|ripple| wave_estimates(case, ripple));
-    let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
-    of_part
-        .zip(differences)
-        .map(|((index, free), between)| {
-            let parameter = &fit.parts[part].parameters[free.parameter];
-            let told = (variances[index].max(0.0) + between).sqrt();
-            let half = INTERVAL * told.hypot(LAW_SHARE * parameter.value / INTERVAL);
-            let (low, high) = (parameter.value - half, parameter.value + half);
-            let (low, high) = match parameter.entry {
-                Entry::Linear => (low.min(low / passed_on), high.max(high / passed_on)),
-                Entry::Shape => (low, high),
-            };
-            ParameterEstimate {
-                name: parameter.name.clone(),
-                value: parameter.value,
-                low: low.max(parameter.range.0),
-                high: high.min(parameter.range.1),
-                unit: unit_in(&parameter.unit, &case.scene),
-            }
-        })
-        .chain(followed)
-        .chain(tone_estimate(case, &fit.parts[part]))
-        .collect()
+/// A fit, and the rows that it was made from.
+pub(super) struct FittedRows<'a> {
+    /// The recording.
+    pub(super) scene: &'a Scene,
+    /// The fit.
+    pub(super) fit: &'a Fit,
+    /// The recorded output, every row.
+    pub(super) recorded: &'a [f64],
+    /// From a column of every row to innovations of the fitted rows.
+    pub(super) whiten: &'a dyn Fn(&[f64]) -> Vec<f64>,
+    /// The fitted rows.
+    pub(super) rows: &'a [usize],
+    /// Unit of hold-out of each of them.
+    pub(super) unit: Vec<usize>,
+    /// How many parts are those of the model.
+    pub(super) of_model: usize,
 }
 
-/// Variance between levels of each free parameter of a part: zero for shapes, whose tangent is no law by itself.
-fn differences(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<f64> {
-    let white: Vec<Vec<f64>> = fit.tangent.iter().map(|column| case.frame.whiten(column, fit.noise)).collect();
-    let innovations = fit.innovations(&case.frame);
-    let variance = fit.innovation_variance(&innovations);
-    let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
-    of_part
-        .map(|(index, free)| match fit.parts[part].parameters[free.parameter].entry {
-            Entry::Linear => {
-                let levels = levels(&fit.tangent[index]);
-                between_levels(&cleared(&white, index), &innovations, &levels, variance)
+impl FittedRows<'_> {
+    /// The parameters of part number `part`, with intervals in their own units.
+    pub(super) fn estimates(&self, part: usize) -> Vec<ParameterEstimate> {
+        let fit = self.fit;
+        let left: Vec<f64> = self.recorded.iter().zip(&fit.simulated).map(|(y, f)| y - f).collect();
+        let innovations = (self.whiten)(&left);
+        let white: Vec<Vec<f64>> = fit.tangents.iter().map(|tangent| (self.whiten)(tangent)).collect();
+        let freedom = innovations.len().saturating_sub(fit.free.len()).max(1);
+        let variance = dot(&innovations, &innovations) / count(freedom);
+        let inverse = least_squares(&white, &innovations).inverse;
+        let among_units = disagreement(&white, &innovations, &inverse, &self.unit);
+        let passed_on = self.passed_on(part);
+        let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
+        of_part
+            .map(|(index, free)| {
+                let parameter = &fit.parts[part].parameters[free.parameter];
+                let between = match parameter.entry {
+                    Entry::Linear => {
+                        let own: Vec<f64> = self.rows.iter().map(|row| fit.tangents[index][*row]).collect();
+                        between_levels(&cleared(&white, index), &innovations, &levels(&own), variance)
+                    }
+                    Entry::Shape => 0.0,
+                };
+                let told = ((inverse[index][index] * variance).max(among_units[index]) + between).max(0.0).sqrt();
+                let half = INTERVAL * told.hypot(LAW_SHARE * parameter.value / INTERVAL);
+                let (low, high) = (parameter.value - half, parameter.value + half);
+                let (low, high) = match parameter.entry {
+                    Entry::Linear => (low.min(low / passed_on), high.max(high / passed_on)),
+                    Entry::Shape => (low, high),
+                };
+                ParameterEstimate {
+                    name: parameter.name.clone(),
+                    value: parameter.value,
+                    low: low.max(parameter.range.0),
+                    high: high.min(parameter.range.1),
+                    unit: unit_in(&parameter.unit, self.scene),
+                }
+            })
+            .collect()
+    }
+
+    /// What one unit more in the cut comes to at the output if the load loss that the model has acts on this part too; one
+    /// for a part that does not change the cut.
+    fn passed_on(&self, part: usize) -> f64 {
+        let in_the_cut = |part: &Part| match &part.body {
+            PartFunction::Effect(effect, _) => {
+                effect.doc().family == "cutting" || OF_THE_CUT.contains(&part.kind.as_str())
             }
-            Entry::Shape => 0.0,
-        })
-        .collect()
+            _ => false,
+        };
+        let own = &self.fit.parts[..self.of_model];
+        let losses: Vec<&Part> = own.iter().filter(|part| part.kind == "load_loss").collect();
+        if losses.is_empty() || !in_the_cut(&self.fit.parts[part]) {
+            return 1.0;
+        }
+        let Some(load) = self.scene.load() else { return 1.0 };
+        let size: f64 = load.iter().map(|load| load.abs()).sum();
+        let typical = if size > 0.0 { dot(load, load) / size } else { 0.0 };
+        let value = |part: &Part, name: &str| part.parameter(name).map_or(0.0, |parameter| parameter.value);
+        let slope = |part: &&Part| value(part, "linear") + 2.0 * value(part, "quadratic_per_w") * typical;
+        (1.0 + losses.iter().map(slope).sum::<f64>()).max(0.5)
+    }
+}
+
+/// Variances of the parameters from the sums of each unit; zero for too few units.
+fn disagreement(columns: &[Vec<f64>], innovations: &[f64], inverse: &[Vec<f64>], unit: &[usize]) -> Vec<f64> {
+    let units = unit.iter().max().map_or(0, |last| last + 1);
+    let mut scores = vec![vec![0.0; columns.len()]; units];
+    for (row, unit) in unit.iter().enumerate() {
+        columns.iter().zip(&mut scores[*unit]).for_each(|(column, score)| *score += column[row] * innovations[row]);
+    }
+    scores.retain(|score| score.iter().any(|x| *x != 0.0));
+    if scores.len() < UNITS_MIN {
+        return vec![0.0; columns.len()];
+    }
+    let few = count(scores.len()) / (count(scores.len()) - 1.0);
+    let of = |line: &Vec<f64>| few * scores.iter().map(|score| dot(line, score).powi(2)).sum::<f64>();
+    inverse.iter().map(of).collect()
 }
 
 /// The level of each row by the value of a column, from the lowest to the highest; none where the column is next to
@@ -131,52 +174,6 @@ fn between_levels(own: &[f64], innovations: &[f64], levels: &[Option<usize>], va
     let mean = told.iter().map(|(_, score)| score).sum::<f64>() / sum;
     let q = told.iter().map(|(weight, score)| weight * (score / weight - mean).powi(2)).sum::<f64>() / variance;
     between(&told, q, variance)
-}
-
-/// What one unit more in the cut comes to at the output if the load loss that the model has acts on this part too; one
-/// for a part that does not change the cut.
-fn passed_on(case: &Case<'_>, fit: &Fit, part: usize) -> f64 {
-    let in_the_cut = |part: &Part| match &part.body {
-        PartFunction::Effect(effect, _) => effect.doc().family == "cutting" || OF_THE_CUT.contains(&part.kind.as_str()),
-        _ => false,
-    };
-    let losses: Vec<&Part> = fit.parts[..case.parts.len()].iter().filter(|part| part.kind == "load_loss").collect();
-    if losses.is_empty() || !in_the_cut(&fit.parts[part]) {
-        return 1.0;
-    }
-    let Some(load) = case.scene.load() else { return 1.0 };
-    let size: f64 = load.iter().map(|load| load.abs()).sum();
-    let typical = if size > 0.0 { dot(load, load) / size } else { 0.0 };
-    let value = |part: &Part, name: &str| part.parameter(name).map_or(0.0, |parameter| parameter.value);
-    let slope = |part: &&Part| value(part, "linear") + 2.0 * value(part, "quadratic_per_w") * typical;
-    (1.0 + losses.iter().map(slope).sum::<f64>()).max(0.5)
-}
-
-/// Frequency and size of a wave that was followed.
-fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [ParameterEstimate; 2] {
-    let per_s = 1.0 / case.scene.period_s();
-    let (hz, half_hz) = (ripple.wave.frequency * per_s, INTERVAL * ripple.frequency_error * per_s);
-    let amplitude = std::f64::consts::SQRT_2 * ripple.deviation;
-    // A wave that renews itself over `turns` rows has been seen that many times less often than there are rows.
-    let seen = count(case.frame.len()) * (1.0 - ripple.wave.rho.powi(2));
-    let half = INTERVAL * amplitude / (2.0 * seen.max(1.0)).sqrt();
-    let estimate = |name: &str, value: f64, half: f64, unit: &str| ParameterEstimate {
-        name: name.to_owned(),
-        value,
-        low: value - half,
-        high: value + half,
-        unit: unit.to_owned(),
-    };
-    [estimate("frequency_hz", hz, half_hz, "Hz"), estimate("amplitude", amplitude, half, unit_of(&case.model.output))]
-}
-
-/// Size of a tone that was followed, in the cut.
-fn tone_estimate(case: &Case<'_>, part: &Part) -> Option<ParameterEstimate> {
-    let tone = case.tone.as_ref().filter(|_| part.kind == hidden_tone::KIND && part.has_form("latent"))?;
-    let value = std::f64::consts::SQRT_2 * tone.deviation;
-    let half = INTERVAL * value / (2.0 * count(tone.spells)).sqrt();
-    let (low, high) = (value - half, value + half);
-    Some(ParameterEstimate { name: "amplitude".to_owned(), value, low, high, unit: "1".to_owned() })
 }
 
 /// Variance of a coefficient between groups beyond what the noise makes of it: DerSimonian and Laird, Controlled Clinical

@@ -3,8 +3,7 @@
 //! `x_t = phi x_{t-1} + e_t + theta e_{t-1}`; the innovations `e` are white when `phi` and `theta` are right. The first
 //! row of a stretch is weighted by the stationary variance. Every hypothesis profiles its own `phi` and `theta`.
 
-use super::frame::Frame;
-use super::linear::dot;
+use crate::linear::columns::dot;
 use crate::statistics::count;
 use std::ops::Range;
 
@@ -95,26 +94,6 @@ pub fn whiten(column: &[f64], stretches: &[Range<usize>], noise: Arma) -> Vec<f6
     out
 }
 
-/// The transpose of [`whiten`]: with it the inner product of innovations `e` and a whitened column is that of
-/// `unwhiten(e)` and the column itself.
-#[must_use]
-pub fn unwhiten(innovations: &[f64], stretches: &[Range<usize>], noise: Arma) -> Vec<f64> {
-    let mut out = vec![0.0; innovations.len()];
-    for rows in stretches {
-        let mut next = 0.0;
-        for row in rows.clone().rev() {
-            let rest = innovations[row] - noise.theta * next;
-            if row == rows.start {
-                out[row] = noise.first_weight() * innovations[row] - noise.phi * next;
-            } else {
-                out[row] = rest - noise.phi * next;
-                next = rest;
-            }
-        }
-    }
-    out
-}
-
 /// Logarithm of the likelihood, up to a constant, of innovations with this sum of squares.
 #[must_use]
 pub fn log_likelihood(rss: f64, rows: usize, stretches: usize, noise: Arma) -> f64 {
@@ -139,26 +118,8 @@ pub fn fit(residual: &[f64], stretches: &[Range<usize>]) -> Arma {
     refine(best, score).1
 }
 
-/// The noise of residuals near a known one, with its log-likelihood: the start, a few of the grid, refined.
-#[must_use]
-pub fn fit_near(residual: &[f64], frame: &Frame, start: Arma) -> (f64, Arma) {
-    let score = |noise: Arma| {
-        let e = frame.whiten(residual, noise);
-        frame.log_likelihood(dot(&e, &e), noise)
-    };
-    let start = Arma::lawful(start.phi, start.theta);
-    let mut best = (score(start), start);
-    for noise in GRID.iter().step_by(3) {
-        let score = score(*noise);
-        if score > best.0 {
-            best = (score, *noise);
-        }
-    }
-    refine(best, score)
-}
-
 /// Pattern search with shrinking steps around a start.
-pub fn refine(mut best: (f64, Arma), score: impl Fn(Arma) -> f64) -> (f64, Arma) {
+fn refine(mut best: (f64, Arma), score: impl Fn(Arma) -> f64) -> (f64, Arma) {
     let mut step = 0.1;
     while step > 0.01 {
         let Arma { phi, theta } = best.1;
@@ -210,14 +171,5 @@ mod tests {
         let noise: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut rng)).collect();
         let e = whiten(&noise, &ALL, fit(&noise, &ALL));
         assert!((dot(&e, &e) / dot(&noise, &noise) - 1.0).abs() < 0.02);
-    }
-
-    #[test]
-    fn unwhitening_is_the_transpose() {
-        let stretches = [0..7, 7..8, 8..20];
-        let noise = Arma { phi: 0.9, theta: -0.6 };
-        let (a, b): (Vec<f64>, Vec<f64>) = (0..20).map(count).map(|x| ((3.1 * x).sin(), (1.7 * x).cos())).unzip();
-        let one = dot(&whiten(&a, &stretches, noise), &b);
-        assert!((one - dot(&a, &unwhiten(&b, &stretches, noise))).abs() < 1e-12);
     }
 }

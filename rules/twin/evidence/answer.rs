@@ -1,0 +1,126 @@
+//! The answer: verdict, names, what stands beside them, and what each contributes.
+
+use super::decision::THRESHOLDS;
+use super::posterior::Group;
+use crate::twin::diagnosis::{Existence, UNKNOWN, Verdict};
+
+/// Another name, and what it would replace.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Rival {
+    pub(super) name: String,
+    pub(super) instead_of: String,
+    /// Nats by which it is less likely.
+    pub(super) nats: f64,
+}
+
+/// Why something that is there is not told.
+#[derive(Debug, Clone)]
+pub(super) struct Withdrawn {
+    /// Names of what was found in the fitted rows; `unknown` where it had none.
+    pub(super) found: Vec<String>,
+    /// Were they fitted runs that were predicted from the others, or those held out?
+    pub(super) among_fitted: bool,
+    /// Root mean square errors there without it and with it, where they were computed.
+    pub(super) errors: Option<(f64, f64)>,
+}
+
+/// The answer.
+#[derive(Debug)]
+pub(super) struct EvidenceAnswer {
+    pub(super) verdict: Verdict,
+    /// Names, the most important first.
+    pub(super) names: Vec<String>,
+    pub(super) rivals: Vec<Rival>,
+    /// The output with what is missing.
+    pub(super) after: Vec<f64>,
+    /// Contribution of each name.
+    pub(super) contributions: Vec<(String, Vec<f64>)>,
+    /// What each leaves once the baseline has been refitted.
+    pub(super) remaining: Vec<(String, Vec<f64>)>,
+    /// Twice the logarithm of the evidence over nothing.
+    pub(super) information: f64,
+    pub(super) existence: Existence,
+    /// What is there and not told.
+    pub(super) withdrawn: Option<Withdrawn>,
+    /// Names that a curve got by projection.
+    pub(super) claimed: Vec<String>,
+    /// Channel of the largest nameless curve.
+    pub(super) drawn_over: Option<String>,
+    /// Number of the likeliest noise.
+    pub(super) noise: usize,
+    /// For engineers.
+    pub(super) debug: String,
+}
+
+/// A contribution under a name.
+pub(super) type Named = (String, Vec<f64>);
+
+impl EvidenceAnswer {
+    /// Something real that no name explains; names that come near stand beside it.
+    pub(super) fn leave_unnamed(&mut self, groups: &[Group<'_>], ln: f64) {
+        let mut near: Vec<(String, f64)> = self.names.iter().map(|name| (name.clone(), 0.0)).collect();
+        for other in groups.iter().filter(|other| other.ln > ln - THRESHOLDS.beside) {
+            for name in other.names.iter().flatten() {
+                if !near.iter().any(|(known, _)| known == name) {
+                    near.push((name.clone(), (ln - other.ln).max(0.0)));
+                }
+            }
+        }
+        self.rivals = Vec::new();
+        self.names = Vec::new();
+        self.unname(near);
+    }
+
+    /// Takes some names back: what they contribute has no name. Where little is left under names, or none, all are taken back.
+    pub(super) fn refuse(&mut self, refused: &[String], energy: impl Fn(&[f64]) -> f64) {
+        for all in [&mut self.contributions, &mut self.remaining] {
+            let (gone, mut kept): (Vec<Named>, Vec<Named>) =
+                std::mem::take(all).into_iter().partition(|(name, _)| refused.contains(name) || name == UNKNOWN);
+            let rows = gone.first().map_or(0, |(_, x)| x.len());
+            kept.push((UNKNOWN.to_owned(), sum_of(&gone, rows)));
+            *all = kept;
+        }
+        let rows = self.remaining.first().map_or(0, |(_, x)| x.len());
+        let whole = energy(&sum_of(&self.remaining, rows)).max(f64::MIN_POSITIVE);
+        let unknown = self.remaining.iter().find(|(name, _)| name == UNKNOWN).map_or(0.0, |(_, x)| energy(x));
+        self.names.retain(|name| !refused.contains(name));
+        if let Some(first) = self.names.first() {
+            // What stood beside a refused name stands beside what is told.
+            for rival in self.rivals.iter_mut().filter(|rival| refused.contains(&rival.instead_of)) {
+                first.clone_into(&mut rival.instead_of);
+            }
+        }
+        if self.names.is_empty() || unknown > THRESHOLDS.unknown_share * whole {
+            self.unname(Vec::new());
+        }
+    }
+
+    /// Takes the names back: they and these others stand beside something without a name.
+    pub(super) fn unname(&mut self, others: Vec<(String, f64)>) {
+        let names = std::mem::take(&mut self.names).into_iter().map(|name| (name, 0.0));
+        let rivals = std::mem::take(&mut self.rivals).into_iter().map(|rival| (rival.name, rival.nats));
+        let mut near: Vec<(String, f64)> = Vec::new();
+        for (name, nats) in names.chain(rivals).chain(others).filter(|(name, _)| name != UNKNOWN) {
+            if !near.iter().any(|(known, _)| *known == name) {
+                near.push((name, nats));
+            }
+        }
+        let rival = |(name, nats)| Rival { name, instead_of: UNKNOWN.to_owned(), nats };
+        self.rivals = near.into_iter().map(rival).collect();
+        self.names = vec![UNKNOWN.to_owned()];
+        self.verdict = Verdict::Unexplained;
+        for all in [&mut self.contributions, &mut self.remaining] {
+            let rows = all.first().map_or(0, |(_, x)| x.len());
+            *all = vec![(UNKNOWN.to_owned(), sum_of(all, rows))];
+        }
+    }
+}
+
+/// The sum of all contributions.
+pub(super) fn sum_of(all: &[Named], rows: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; rows];
+    for (_, x) in all {
+        sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
+    }
+    sum
+}

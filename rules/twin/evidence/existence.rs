@@ -1,0 +1,92 @@
+//! Is anything missing at all? One test, whatever it may be called.
+//!
+//! What the best explanation leaves is cut into pieces that are longer than the memory of the noise, and the signs of whole
+//! pieces are drawn anew (wild bootstrap: Wu, Annals of Statistics 14, 1986). In each such recording nothing is missing, and
+//! it keeps whatever dependence the rows of a piece have. Everything that was asked of the recording is asked of it again:
+//! the evidence of every variant of every family, summed. The share of these recordings in which as much is found is the
+//! chance that noise alone does as well.
+
+use super::algebra::{CholeskyFactor, block};
+use super::bag::pieces;
+use super::gram::{Comparison, Gram};
+use super::marginal::{Saturated, ln_sum};
+use crate::statistics::count;
+use crate::twin::units::Random;
+use ndarray::{Array1, Array2, Axis, s};
+
+/// Recordings without anything missing that are made. The chance is known to one over their number.
+const DRAWS: usize = 199;
+/// Seed of the signs.
+const SEED: u64 = 2;
+
+/// What the test found.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ExistenceTest {
+    /// Chance that noise alone does as well.
+    pub(super) chance: f64,
+    /// How many independent rows the fitted rows are worth.
+    pub(super) effective_rows: f64,
+}
+
+/// Asks of a recording with what the best explanation leaves, and the evidence that this explanation has over nothing.
+pub(super) fn existence(
+    comparison: &Comparison<'_>,
+    (gram, saturated): (&Gram, Saturated),
+    priors: &[f64],
+    left: &[f64],
+    evidence: f64,
+) -> ExistenceTest {
+    let noise = gram.noise;
+    let pieces = pieces(&comparison.blocks, comparison.rows.len(), noise.memory());
+    let tall = comparison.whole(noise, |_| true);
+    let innovations = Array1::from(comparison.whitened(left, noise));
+    let last = tall.ncols() - 1;
+    let mut along = Array2::zeros((last, pieces.len()));
+    for (index, piece) in pieces.iter().enumerate() {
+        let rows = tall.select(Axis(0), piece);
+        let own = innovations.select(Axis(0), piece);
+        along.column_mut(index).assign(&rows.slice(s![.., ..last]).t().dot(&own));
+    }
+    let fixed: Vec<usize> = (0..comparison.first()).collect();
+    let ridge = comparison.fixed_ridge(&gram.whole, saturated.variance);
+    let mut inner = block(&gram.whole, &fixed, &fixed);
+    ridge.iter().enumerate().for_each(|(index, ridge)| inner[[index, index]] += ridge);
+    let factor = CholeskyFactor::of(&inner);
+    let reach = gram.whole.slice(s![..comparison.first(), ..last]).to_owned();
+    let (ground, _) = comparison.baseline(gram, saturated);
+    let asked = comparison.asked(&ground);
+    let evidence_of = |along: &Array1<f64>, square: f64| -> f64 {
+        ln_sum(
+            asked.iter().zip(priors).map(|(variant, prior)| prior + comparison.answer(&ground, variant, along, square)),
+        )
+    };
+    let observed = evidence_of(&ground.along_output(), ground.square()).max(evidence);
+    let square: f64 = innovations.dot(&innovations);
+    let mut random = Random::new(SEED);
+    let mut as_much = 0;
+    for _ in 0..DRAWS {
+        let signs = Array1::from_iter((0..pieces.len()).map(|_| if random.draw() < 0.5 { 1.0 } else { -1.0 }));
+        let mut drawn = along.dot(&signs);
+        let baseline = drawn.slice(s![..comparison.first()]).to_owned();
+        let coefficients = factor.solve(&baseline);
+        drawn -= &reach.t().dot(&coefficients);
+        let kept = (square - baseline.dot(&coefficients)).max(f64::MIN_POSITIVE);
+        as_much += usize::from(evidence_of(&drawn, kept) >= observed);
+    }
+    ExistenceTest {
+        chance: count(as_much + 1) / count(DRAWS + 1),
+        effective_rows: effective_rows(comparison, noise.inflation(), &pieces, &innovations),
+    }
+}
+
+/// Rows over what their dependence takes: that which the noise knows, and that which the sums of whole pieces show beyond it.
+fn effective_rows(
+    comparison: &Comparison<'_>,
+    inflation: f64,
+    pieces: &[Vec<usize>],
+    innovations: &Array1<f64>,
+) -> f64 {
+    let sums: f64 = pieces.iter().map(|piece| piece.iter().map(|at| innovations[*at]).sum::<f64>().powi(2)).sum();
+    let squares = innovations.dot(innovations).max(f64::MIN_POSITIVE);
+    count(comparison.rows.len()) / (inflation * (sums / squares).max(1.0))
+}

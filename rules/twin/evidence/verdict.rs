@@ -1,0 +1,165 @@
+//! What something that holds is called: one name, several that cannot be told apart, or none.
+
+use super::answer::{EvidenceAnswer, Named, Rival, sum_of};
+use super::decision::THRESHOLDS;
+use super::judge::Judge;
+use super::naming::StandIn;
+use super::posterior::{Explanation, Group};
+use crate::physics::effect;
+use crate::statistics::count;
+use crate::twin::diagnosis::{UNKNOWN, Verdict};
+use std::collections::BTreeMap;
+
+impl Judge<'_> {
+    /// Verdict and names of a group that holds.
+    pub(super) fn named(
+        &self,
+        silent: EvidenceAnswer,
+        best: &Explanation,
+        groups: &[Group<'_>],
+        information: f64,
+    ) -> EvidenceAnswer {
+        let ln = groups.iter().find(|group| *group.names == best.names).map_or(best.ln, |group| group.ln);
+        let (after, contributions) = self.contributions(best);
+        let remaining: Vec<Named> = contributions.iter().map(|(name, x)| (name.clone(), self.remaining(x))).collect();
+        let energy = |x: &[f64]| self.inputs.taken(false).map(|row| x[row] * x[row]).sum::<f64>();
+        let sum = sum_of(&remaining, self.inputs.rows);
+        let whole = energy(&sum).max(f64::MIN_POSITIVE);
+        let share: BTreeMap<&str, f64> = remaining.iter().map(|(name, x)| (name.as_str(), energy(x) / whole)).collect();
+        let rows = count(self.comparison.rows.len());
+        let small = |x: &[f64]| {
+            let size = (energy(x) / rows).sqrt();
+            size < THRESHOLDS.size_noise * self.ordinary && size < THRESHOLDS.size_output * self.comparison.size
+        };
+        let mut kept: Vec<&Named> =
+            remaining.iter().filter(|(name, x)| share[name.as_str()] > THRESHOLDS.name_energy && !small(x)).collect();
+        kept.sort_by(|a, b| share[b.0.as_str()].total_cmp(&share[a.0.as_str()]));
+        if kept.is_empty() {
+            let debug = format!("{}; too small", silent.debug);
+            return EvidenceAnswer { verdict: Verdict::NoMismatch, withdrawn: None, debug, ..silent };
+        }
+        let names: Vec<String> = kept.iter().map(|(name, _)| name.clone()).filter(|name| name != UNKNOWN).collect();
+        let unknown = share.get(UNKNOWN).copied().unwrap_or(0.0);
+        let mut answer = EvidenceAnswer {
+            verdict: Verdict::Unexplained,
+            names,
+            after,
+            contributions,
+            remaining,
+            information,
+            withdrawn: None,
+            claimed: self.claimed(best),
+            drawn_over: self.drawn_over(best),
+            noise: best.noise,
+            ..silent
+        };
+        if answer.names.is_empty() || unknown > THRESHOLDS.unknown_share {
+            answer.leave_unnamed(groups, best.ln);
+            return answer;
+        }
+        self.judge_names(&mut answer, (best, ln), groups);
+        answer
+    }
+
+    fn claimed(&self, best: &Explanation) -> Vec<String> {
+        let laws = best.claims.iter().flatten().flat_map(|claim| &claim.laws);
+        laws.filter_map(|(law, _)| self.naming.kind(*law)).collect()
+    }
+
+    fn drawn_over(&self, best: &Explanation) -> Option<String> {
+        let mut drawn = best.members.iter().filter_map(|(variant, _)| self.second.bank.variants[*variant].drawn());
+        drawn.next().map(|drawn| drawn.over.clone())
+    }
+
+    /// Explained or ambiguous, and what stands beside the names.
+    fn judge_names(&self, answer: &mut EvidenceAnswer, (best, ln): (&Explanation, f64), groups: &[Group<'_>]) {
+        let mass = |name: &str| {
+            let of = |g: &&Group<'_>| g.names.iter().any(|n| n.as_deref() == Some(name));
+            groups.iter().filter(of).map(|g| g.ln.exp()).sum::<f64>()
+        };
+        let alone = |name: &String| mass(name) >= THRESHOLDS.alone;
+        let mut beside: Vec<(String, f64)> = Vec::new();
+        for other in groups.iter().filter(|other| other.ln > ln - THRESHOLDS.beside) {
+            for name in other.names.iter().flatten().filter(|name| !answer.names.contains(name)) {
+                if !beside.iter().any(|(known, _)| known == name) {
+                    beside.push((name.clone(), (ln - other.ln).max(0.0)));
+                }
+            }
+        }
+        let sure_of_something = answer.existence.probability_of_nothing < THRESHOLDS.nothing_sure;
+        let sure = sure_of_something && answer.names.iter().all(alone);
+        answer.verdict = if sure { Verdict::Explained } else { Verdict::Ambiguous };
+        if answer.verdict == Verdict::Explained {
+            beside.retain(|(name, _)| mass(name) > 0.1);
+        } else if beside.is_empty() {
+            let sure: Vec<String> =
+                answer.names.iter().filter(|name| sure_of_something && alone(name)).cloned().collect();
+            if sure.is_empty() {
+                answer.leave_unnamed(groups, ln);
+                return;
+            }
+            answer.names = sure;
+            answer.verdict = Verdict::Explained;
+        }
+        let class = self.class(answer, best);
+        if !class.is_empty() {
+            answer.verdict = Verdict::Ambiguous;
+        }
+        if answer.verdict == Verdict::Ambiguous {
+            let unsure = answer.names.iter().find(|name| !alone(name)).or(answer.names.first()).cloned();
+            let instead_of = unsure.unwrap_or_default();
+            let rival = |(name, nats)| Rival { name, instead_of: instead_of.clone(), nats };
+            answer.rivals = beside.into_iter().map(rival).collect();
+            for other in class {
+                if !answer.rivals.iter().any(|known| known.name == other.name) {
+                    answer.rivals.push(other);
+                }
+            }
+        }
+    }
+
+    /// Names whose law costs little in the place of a member.
+    fn class(&self, answer: &mut EvidenceAnswer, best: &Explanation) -> Vec<Rival> {
+        let (comparison, gram) = self.first;
+        let variance = self.settings[best.noise].saturated.variance;
+        let nats = 0.5 * comparison.tempering / variance;
+        let mut class = Vec::new();
+        let told = answer.contributions.iter().filter(|(name, _)| answer.names.contains(name));
+        for (name, contribution) in &told.cloned().collect::<Vec<Named>>() {
+            let (along, square) = self.naming.products(comparison, gram, contribution);
+            let all = self.naming.stand_ins(&along, square, nats);
+            answer.debug.push_str(&nearest_stand_ins(name, &all));
+            let own = all.iter().find(|other| other.kind == *name).map_or(0.0, |own| own.nats.min(1.0));
+            // The form of a curve that got its name by projection is not known better than to a tenth.
+            let claimed = answer.claimed.contains(name);
+            let near = |other: &StandIn| {
+                let makes_curve = claimed && other.share >= THRESHOLDS.rival_share;
+                let confused = are_confused(name, &other.kind);
+                let nats = if confused { THRESHOLDS.rival_nats } else { THRESHOLDS.class_nats };
+                other.nats < own + nats || makes_curve
+            };
+            let others = all.into_iter().filter(|other| !answer.names.contains(&other.kind) && near(other));
+            class.extend(others.map(|other| Rival {
+                name: other.kind,
+                instead_of: name.clone(),
+                nats: (other.nats - own).max(0.0),
+            }));
+        }
+        class.sort_by(|a, b| a.nats.total_cmp(&b.nats).then_with(|| a.name.cmp(&b.name)));
+        class
+    }
+}
+
+/// Does the catalogue say of one of two laws that it is confused with the other?
+fn are_confused(a: &str, b: &str) -> bool {
+    let says = |a: &str, b: &str| effect(a).is_some_and(|effect| effect.doc().rivals.contains(&b));
+    says(a, b) || says(b, a)
+}
+
+/// The laws that come nearest to a contribution, for engineers.
+fn nearest_stand_ins(name: &str, all: &[StandIn]) -> String {
+    let mut near: Vec<&StandIn> = all.iter().collect();
+    near.sort_by(|a, b| a.nats.total_cmp(&b.nats));
+    let near = near.iter().take(6).map(|other| format!("{} {:.1} {:.2}", other.kind, other.nats, other.share));
+    format!("\n{name}: {}", near.collect::<Vec<_>>().join(", "))
+}
