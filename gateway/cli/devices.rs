@@ -1,11 +1,11 @@
 //! `cnc-gateway devices`: the `devices.xml` of this machine for an MTConnect agent.
 
 use super::{CannotRun, CommandOutcome, CommandResult, print};
+use crate::clock;
 use crate::config;
 use crate::history::{Query, Reader};
 use crate::moment;
 use crate::sinks::shdr::devices_xml;
-use adapters::clock::{Clock, SystemClock};
 use clap::Args;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
         CannotRun::new(lines.join("\n"), "")
     })?;
     let delivered = delivered(&config.history.path);
-    let created = moment::utc(SystemClock::new().now_ns());
+    let created = moment::utc(clock::now_ns());
     let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));
     let text = devices_xml(&config.gateway.name, &created, known);
     match &arguments.out {
@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
 /// The channels of which the history holds something; `None` before there is one.
 fn delivered(path: &Path) -> Option<BTreeSet<String>> {
     let reader = Reader::open(path).ok()?;
-    let (_, newest_ns) = reader.span().ok()??;
+    let (_, newest_ns) = reader.present().ok()??;
     let query = Query { from_ns: Some(newest_ns - 3_600_000_000_000), ..Query::default() };
     let mut names = BTreeSet::new();
     let read = reader.samples(&query, |chunk| {

@@ -58,7 +58,7 @@ pub(super) fn effects(arguments: EffectsArguments) -> CommandResult {
         EffectsCommand::List(printing) => explain::list(printing.lang.into()),
         EffectsCommand::Show { kind, printing } => show(&kind, &printing)?,
     };
-    print!("{text}");
+    super::print(&text);
     Ok(CommandOutcome::Fine)
 }
 

@@ -19,6 +19,7 @@ mod fleet;
 mod gateway_options;
 mod help;
 mod history;
+mod history_upkeep;
 mod identify;
 mod metrics;
 mod person;

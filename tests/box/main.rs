@@ -2,6 +2,7 @@
 
 mod backup;
 mod browser;
+mod clock;
 mod cost;
 mod diagnosing;
 mod editing;

@@ -22,8 +22,10 @@ use std::time::{Duration, Instant};
 const WAITING_BYTES_MAX: usize = 16_000_000;
 
 /// What the sinks have delivered is noted, and removed, this often: each time costs two pages of the disk (flash wears), and
-/// what is not noted is sent again after a kill.
+/// what is not noted is sent again after a kill. The first time comes with the first delivery, and each time after it twice as long
+/// after the one before: a box that lives for seconds only repeats no more than half of what it had sent.
 const TIDY_EVERY: Duration = Duration::from_secs(5);
+const TIDY_FIRST: Duration = Duration::from_millis(250);
 
 /// The line of one tick.
 #[derive(Debug)]
@@ -45,6 +47,8 @@ pub(crate) struct Gatherer {
     lost: u64,
     stored: OutboxContents,
     tidied: Instant,
+    /// Time until the next note.
+    tidy_after: Duration,
 }
 
 /// What a transaction has taken, to be forgotten when it is durable.
@@ -66,6 +70,7 @@ impl Gatherer {
             lost: 0,
             stored,
             tidied: Instant::now(),
+            tidy_after: Duration::ZERO,
             outbox,
         };
         gatherer.tell(&Reasons::default());
@@ -88,7 +93,12 @@ impl Gatherer {
 
     /// Would a commit change anything here?
     pub(crate) fn is_dirty(&self) -> bool {
-        self.outbox.has_news() && self.tidied.elapsed() >= TIDY_EVERY
+        self.outbox.has_news() && self.is_due()
+    }
+
+    /// Is it time to note what the sinks have delivered? A new connection is noted at once.
+    fn is_due(&self) -> bool {
+        self.tidied.elapsed() >= self.tidy_after || self.outbox.has_connections()
     }
 
     /// At the end: notes what the sinks have delivered.
@@ -97,14 +107,14 @@ impl Gatherer {
     }
 
     /// Puts into the running transaction the items of the ticks before row `end_row` and of these records, which belong
-    /// after as many rows from `opened_row` on as they say; then drops what the bounds do not allow, and now and then notes
-    /// what the sinks have delivered.
+    /// after as many rows from `opened_row` on as they say; then drops what the bounds do not allow (`ages`: the bound of age
+    /// too, which only a certain clock can tell), and now and then notes what the sinks have delivered.
     pub(crate) fn put<'a>(
         &self,
         db: &Connection,
         records: impl Iterator<Item = &'a QueuedRecord>,
-        opened_row: i64,
-        end_row: i64,
+        (opened_row, end_row): (i64, i64),
+        ages: bool,
     ) -> Result<TransactionWork, HistoryError> {
         let mut lines: Vec<(TimeNs, std::borrow::Cow<'_, str>)> = Vec::new();
         let mut ticks = self.waiting.iter().take_while(|line| line.row < end_row).peekable();
@@ -117,8 +127,8 @@ impl Gatherer {
         }
         lines.extend(ticks.map(|tick| (tick.at_ns, tick.text.as_str().into())));
         let ticks = self.waiting.iter().take_while(|line| line.row < end_row).count();
-        let tidy = self.tidied.elapsed() >= TIDY_EVERY;
-        let put = store::put(db, &self.outbox, &self.stored, &lines, tidy)?;
+        let tidy = self.outbox.has_news() && self.is_due();
+        let put = store::put(db, &self.outbox, &self.stored, &lines, (tidy, ages))?;
         Ok(TransactionWork { ticks, put, tidy })
     }
 
@@ -131,6 +141,8 @@ impl Gatherer {
         self.outbox.noted(&taken.put.dropped);
         if taken.tidy {
             self.tidied = Instant::now();
+            self.tidy_after = (2 * self.tidy_after).clamp(TIDY_FIRST, TIDY_EVERY);
+            self.outbox.connections_noted();
         }
         self.tell(reasons);
     }

@@ -35,6 +35,16 @@ pub(super) fn of_record(record: &Record) -> String {
     json!({ "t": record.at_ns(), "r": record }).to_string()
 }
 
+/// The same line, so much later; one that this version cannot read stays as it is.
+pub(super) fn moved(text: &str, by_ns: i64) -> String {
+    let Some(Parsed(line)) = parse(text) else { return text.to_owned() };
+    if let Some(mut record) = line.r {
+        record.shift(by_ns);
+        return of_record(&record);
+    }
+    json!({ "t": line.t.saturating_add(by_ns), "s": line.s }).to_string()
+}
+
 /// Series by their numbers.
 pub(super) type SeriesByNumber = HashMap<i64, Arc<SeriesInfo>>;
 
