@@ -47,7 +47,7 @@ pub fn state_of(text: &str) -> Option<&str> {
 /// The file cannot be written; what was there is there still, under one of its names.
 pub fn save(path: &Path, state: &str) -> io::Result<()> {
     match std::fs::rename(path, beside(path, BEFORE)) {
-        Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
         _ => replace(path, &sealed(state)),
     }
 }
