@@ -60,6 +60,7 @@ chapters! {
     "mismatch" zh,
     "twin",
     "measured",
+    "survives",
     "not-proven",
     "glossary",
     "inside",

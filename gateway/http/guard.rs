@@ -130,13 +130,13 @@ async fn named(shared: &ServerState, request: Request, peer: &Peer) -> Result<(R
     let broken = |error: axum::Error| ApiProblem::request(format!("the body broke off: {error}"), "send it again");
     let bytes = axum::body::to_bytes(body, usize::MAX).await.map_err(broken)?;
     let again = Request::from_parts(parts.clone(), Body::from(bytes.clone()));
-    let named = match serde_json::from_slice::<Named>(&bytes) {
+    let named = match serde_json::from_slice::<NameAndToken>(&bytes) {
         Ok(named) => Some(named),
-        Err(_) => Form::<Named>::from_request(again, &()).await.ok().map(|Form(named)| named),
+        Err(_) => Form::<NameAndToken>::from_request(again, &()).await.ok().map(|Form(named)| named),
     };
     let person = match named {
         None => None,
-        Some(Named { name, token }) => {
+        Some(NameAndToken { name, token }) => {
             let token = Token::typed(&token);
             let found = shared.access.check(&name, &token, peer.from, "disarmed", Urgency::GivesBack).await;
             Some(found.map_err(|error| wrong(&error))?)
@@ -146,7 +146,7 @@ async fn named(shared: &ServerState, request: Request, peer: &Peer) -> Result<(R
 }
 
 #[derive(Debug, Deserialize)]
-struct Named {
+struct NameAndToken {
     name: String,
     token: String,
 }

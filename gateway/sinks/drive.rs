@@ -205,32 +205,25 @@ impl SinkTask {
     }
 
     async fn batch(&mut self, sink: &mut dyn Sink, (from, to): (u64, u64), historical: bool) -> Result<(), Left> {
-        let (turn, begin, items_max) = match self.isolation.turn(from) {
-            Turn::Many => (Turn::Many, from, sink.items_max().max(1)),
-            // Nothing comes after the newest item yet: it is tried again.
-            Turn::Past(item) if item + 1 >= to => (Turn::Alone, from, 1),
-            Turn::Past(item) => (Turn::Past(item), item + 1, 1),
-            Turn::Alone => (Turn::Alone, from, 1),
-        };
-        let stretch = self.read(begin, to, items_max).await?;
+        let (turn, stretch) = self.next_items(from, to, sink.items_max().max(1)).await?;
+        let begin = if let Turn::Past(item) = turn { item + 1 } else { from };
         let Some(last) = stretch.items.last().map(|item| item.sequence) else {
             self.outbox.delivered(&self.name, begin, stretch.to.max(begin + 1));
             return Ok(());
         };
         let items = &stretch.items;
         let sent = timeout(DEADLINE, sink.send(Batch { items, historical })).await;
-        match sent.unwrap_or_else(|_| Err(too_slow("sending"))) {
+        let sent = sent.unwrap_or_else(|_| Err(too_slow("sending")));
+        if let (Turn::Past(item), Ok(()) | Err(SinkError::Item { .. })) = (turn, &sent) {
+            self.isolation.decide();
+            self.refused(&breaks_line(item), from, item);
+        }
+        match sent {
             Ok(()) => {
-                self.isolation.arrived();
-                if let Turn::Past(item) = turn {
-                    self.refused(&breaks_line(item), from, item);
-                }
+                self.isolation.arrived(begin, last);
                 self.delivered(&stretch, begin, historical);
             }
-            Err(SinkError::Item { sequence, what, next }) => {
-                let error = SinkError::Item { sequence, what, next };
-                self.refused(&error, from, sequence);
-            }
+            Err(error @ SinkError::Item { sequence, .. }) => self.refused(&error, begin, sequence),
             Err(error) => {
                 self.isolation.broke(turn, from, last);
                 return Err(error.into());
@@ -241,6 +234,22 @@ impl SinkTask {
             Ok(wanted) => attend(sink, wanted).await,
             Err(_nothing) => Ok(()),
         }
+    }
+
+    /// What is to be sent of the items `from..to`.
+    async fn next_items(&mut self, from: u64, to: u64, items_max: usize) -> Result<(Turn, OutboxStretch), Left> {
+        let turn = self.isolation.turn(from);
+        if let Turn::Past(item) = turn {
+            // At the end of a gap the next one has been delivered before: it decides by arriving once more.
+            let newest = self.outbox.head().borrow().next_sequence;
+            let stretch = self.read(item + 1, newest, 1).await?;
+            if !stretch.items.is_empty() {
+                return Ok((turn, stretch));
+            }
+        }
+        // Nothing comes after the newest item yet: it is tried again.
+        let (turn, items_max) = if turn == Turn::Many { (turn, items_max) } else { (Turn::Alone, 1) };
+        Ok((turn, self.read(from, to, items_max).await?))
     }
 
     async fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<OutboxStretch, Left> {

@@ -53,8 +53,15 @@ impl Isolation {
         }
     }
 
-    /// What was sent has arrived.
-    pub(super) fn arrived(&mut self) {
+    /// The items from `first` to `last` have arrived. Live data that arrive between two tries of a gap say nothing about its item.
+    pub(super) fn arrived(&mut self, first: u64, last: u64) {
+        if self.first.is_some_and(|suspect| (first..=last).contains(&suspect)) {
+            self.decide();
+        }
+    }
+
+    /// The item under suspicion has arrived, or is left out.
+    pub(super) fn decide(&mut self) {
         (self.first, self.breaks) = (None, 0);
     }
 }
@@ -82,9 +89,10 @@ mod tests {
                 isolation.broke(turn, next, to);
                 continue;
             }
-            isolation.arrived();
+            isolation.arrived(from, to);
             arrived.extend(from..=to);
             if let Turn::Past(item) = turn {
+                isolation.decide();
                 left_out.push(item);
             }
             next = to + 1;
@@ -100,6 +108,22 @@ mod tests {
             assert_eq!(arrived.len(), 40 - poison.len());
             assert!(breaks <= 7 * poison.len() as u32, "{poison:?}: {breaks} breaks");
         }
+    }
+
+    #[test]
+    fn live_data_between_do_not_hide_the_item_of_a_gap() {
+        let (mut isolation, mut live, mut breaks) = (Isolation::default(), 1_000, 0);
+        while isolation.turn(5) != Turn::Past(5) {
+            assert_eq!(isolation.turn(live), Turn::Many);
+            isolation.arrived(live, live);
+            live += 1;
+            isolation.broke(isolation.turn(5), 5, 14);
+            breaks += 1;
+            assert!(breaks < 10, "it is never found");
+        }
+        isolation.arrived(6, 6);
+        isolation.decide();
+        assert_eq!(isolation.turn(6), Turn::Alone);
     }
 
     #[test]

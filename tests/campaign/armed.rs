@@ -58,13 +58,16 @@ impl Machine {
         let (server, in_force) = (self.server.clone(), self.in_force.clone());
         let (outside, stop) = (self.outside.clone(), self.stop.clone());
         std::thread::spawn(move || {
+            // Before the first scan of the ladder the memory is empty.
+            let mut scanned = false;
             while !stop.load(Ordering::SeqCst) {
                 let held = server.lock().expect("whole");
                 let pct = held.as_ref().and_then(|server| {
                     server.with(|control| control.map(|control| 255 - control.memory.byte(Area::G, 12)))
                 });
                 drop(held);
-                if let Some(pct) = pct {
+                scanned |= pct.is_some_and(|pct| BAND.contains(&pct));
+                if let Some(pct) = pct.filter(|_| scanned) {
                     in_force.store(pct, Ordering::SeqCst);
                     outside.fetch_add(u64::from(!BAND.contains(&pct)), Ordering::SeqCst);
                 }

@@ -238,7 +238,7 @@ pub(crate) fn fsync_fails(scale: &Scale) -> Row {
         let directory = tempfile::tempdir().expect("a directory");
         let data = directory.path().join("data");
         let mut command = Command::new("strace");
-        command.args(["-f", "-q", "-o", "/dev/null", "-e", "trace=fdatasync,fsync", "--kill-on-exit", "-e"]);
+        command.args(["-f", "-q", "-o", "/dev/null", "-e", "trace=fdatasync,fsync", "-D", "-e"]);
         command.arg(format!("inject=fdatasync,fsync:error=EIO:when={}+", step * 10));
         command
             .arg(env!("CARGO_BIN_EXE_cnc-gateway"))

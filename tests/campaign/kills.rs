@@ -92,7 +92,8 @@ pub(crate) fn with_slow_disk(scale: &Scale) -> Row {
             "-e",
             "inject=fdatasync:delay_enter=50000",
         ]);
-        command.arg("--kill-on-exit").arg(env!("CARGO_BIN_EXE_cnc-gateway"));
+        // The tracer is a grandchild: what is killed is the gateway itself.
+        command.arg("-D").arg(env!("CARGO_BIN_EXE_cnc-gateway"));
         command.args(["run", "--listen", "127.0.0.1:0", "--speed", "60", "--data-dir"]).arg(data);
         Gateway::spawn(command)
     })
@@ -100,7 +101,7 @@ pub(crate) fn with_slow_disk(scale: &Scale) -> Row {
 
 /// Is there an strace that may trace?
 pub(crate) fn strace() -> bool {
-    let output = std::process::Command::new("strace").args(["-o", "/dev/null", "--kill-on-exit", "true"]).output();
+    let output = std::process::Command::new("strace").args(["-D", "-o", "/dev/null", "true"]).output();
     output.is_ok_and(|output| output.status.success())
 }
 
