@@ -2,14 +2,12 @@
 //! remembered as an event, and is shown while it lasts.
 
 use super::history_store::HistoryStore;
-use super::history_store::upkeep::{LOG_TOLD_BYTES, long_log};
+use super::problems::{apart, clock_problem, problems_of_files};
 use super::sample_feed::{SampleFeed, SourcePace};
 use super::save::Saver;
-use crate::access;
 use crate::alignment::{self, Alignment};
-use crate::clock::{BoxClock, ClockNews, Trust, span};
+use crate::clock::{BoxClock, ClockNews};
 use crate::history::{Audit, Event, ExtraValue, Record};
-use crate::learned;
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Pipeline, Store};
 use crate::status::{ClockStatus, HistoryStatus, SourceStatus, StatusProblem};
@@ -353,47 +351,6 @@ fn told_pace(SourcePace { name, wanted, kept }: &SourcePace) -> Notice {
 fn stored(at_ns: TimeNs, source: &str, notice: &Notice) -> Event {
     let detail = if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
     Event { at_ns, kind: notice.code.to_owned(), source: source.to_owned(), text: notice.operator.clone(), detail }
-}
-
-/// What the disk has changed, and nobody has looked at yet.
-fn problems_of_files(memory: &Path, history: &HistoryStatus) -> Vec<StatusProblem> {
-    let mut problems = learned::damaged(memory.parent().unwrap_or(Path::new(".")));
-    problems.extend(access::permission_problem(memory.parent().unwrap_or(Path::new("."))));
-    if history.log_bytes >= LOG_TOLD_BYTES {
-        let next =
-            "end the transaction, or the program that holds it: `lsof` names those that have the file open".to_owned();
-        problems.push(StatusProblem { what: long_log(history.log_bytes), next });
-    }
-    problems.extend(history.set_aside.iter().map(|file| StatusProblem {
-        what: format!("a damaged history is kept as {file}; storing goes on in a new one"),
-        next: format!("`cnc-gateway history repair NEW --history {file}` saves what is whole; then remove it"),
-    }));
-    problems
-}
-
-/// `5 min ahead of`, `11 years behind`.
-fn apart(ahead_ns: i64) -> String {
-    format!("{} {}", span(ahead_ns), if ahead_ns >= 0 { "ahead of" } else { "behind" })
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "saturates, which is meant")]
-fn clock_problem(ClockStatus { trust, wall_ahead_s }: ClockStatus) -> Option<(String, &'static str)> {
-    let ahead_ns = (wall_ahead_s * SECOND_NS as f64) as i64;
-    match trust {
-        Trust::Plausible | Trust::Confirmed => None,
-        Trust::Leapt => Some((
-            format!("the wall clock is {} the box, which keeps its own time", apart(ahead_ns)),
-            "set the clock of the computer right; if it is right, the box follows by itself after some time",
-        )),
-        Trust::Unset => Some((
-            format!(
-                "the clock of the computer is not set: it is {} the last certain time, with which the box goes on; times are \
-                 provisional and will be corrected",
-                apart(ahead_ns)
-            ),
-            "set the clock, or give the computer a time server or a battery",
-        )),
-    }
 }
 
 impl Store for Health {

@@ -9,7 +9,7 @@ mod partitions;
 mod recording;
 
 pub use csv::plain_cell;
-pub use partitions::{DayWritten, day_file, day_of};
+pub use partitions::{DayWritten, day_of};
 
 use super::error::{Doing, HistoryError, at};
 use super::query::Query;

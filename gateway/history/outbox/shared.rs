@@ -53,13 +53,15 @@ pub struct DeliveryState {
     pub dropped: u64,
     /// Connections that were begun, since it was first configured.
     pub connections: u64,
+    /// Is it connected, or about to be for the first time? At the end only such sinks are waited for.
+    pub linked: bool,
 }
 
 impl DeliveryState {
     /// Nothing before `next` is to be delivered any more, and nothing has happened yet.
     #[must_use]
     pub fn at(next: u64) -> Self {
-        Self { position: Position::at(next), dropped: 0, connections: 0 }
+        Self { position: Position::at(next), dropped: 0, connections: 0, linked: false }
     }
 }
 
@@ -73,6 +75,7 @@ struct SharedOutbox {
     /// Connections that are not noted yet, and how many times they were.
     connecting: AtomicBool,
     noted: watch::Sender<u64>,
+    hurried: AtomicBool,
     state: Mutex<OutboxState>,
 }
 
@@ -113,6 +116,7 @@ impl Outbox {
             news: AtomicBool::new(false),
             connecting: AtomicBool::new(false),
             noted: watch::Sender::new(0),
+            hurried: AtomicBool::new(false),
             state: Mutex::new(OutboxState::default()),
         };
         Self { shared: Arc::new(shared) }
@@ -124,8 +128,8 @@ impl Outbox {
         &self.shared.machine
     }
 
-    /// Names this box and this history: letters, digits and `-` of the machine's name, `-`, and six digits that were
-    /// made with the outbox. `<box>-<sequence>` names an item everywhere and for ever. Empty until the history is open.
+    /// Names this box and this history: letters, digits and `-` of the name that the machine had at first, `-`, and digits that
+    /// were made with the outbox. `<box>-<sequence>` names an item everywhere and for ever. Empty until the history is open.
     #[must_use]
     pub fn box_id(&self) -> String {
         locked(&self.shared.state).box_id.clone()
@@ -213,6 +217,18 @@ impl Outbox {
         jumped
     }
 
+    /// Sink `name` is connected, or is not.
+    pub fn set_linked(&self, name: &str, linked: bool) {
+        if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
+            standing.linked = linked;
+        }
+    }
+
+    /// At the end the sinks are not waited for any longer.
+    pub fn hurry(&self) {
+        self.shared.hurried.store(true, Ordering::Release);
+    }
+
     fn change(&self, name: &str, change: impl FnOnce(&mut DeliveryState)) {
         if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
             change(standing);
@@ -263,13 +279,17 @@ impl Outbox {
         }
     }
 
-    /// The writer's side: the six digits of this history.
-    pub(super) fn name_box(&self, mark: &str) {
-        let plain = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '-' };
-        let name: String = self.shared.machine.chars().map(plain).collect();
-        let name = name.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-");
-        let name = if name.is_empty() { "box".to_owned() } else { name };
-        locked(&self.shared.state).box_id = format!("{name}-{mark}");
+    /// The writer's side: the name of this box.
+    pub(super) fn name_box(&self, name: String) {
+        locked(&self.shared.state).box_id = name;
+    }
+
+    /// The writer's side: has every sink that is connected delivered everything before `next`, or is it not to be waited for?
+    pub(super) fn is_drained(&self, next: u64) -> bool {
+        self.shared.hurried.load(Ordering::Acquire)
+            || locked(&self.shared.sinks)
+                .values()
+                .all(|standing| !standing.linked || standing.position.waiting(next) == 0)
     }
 
     /// The writer's side: what is durable now.
