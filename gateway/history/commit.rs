@@ -82,7 +82,7 @@ pub(crate) fn commit(
     storing.try_for_each(|posted| record_sql::store(&writing, &posted.record)).doing("storing a record")?;
     let items = outbox.as_ref().map(|outbox| {
         let records = minute_buffer.records.iter().take(records);
-        let stored = minute_buffer.blocks.iter().take(blocks).map(|block| block.start_ns);
+        let stored = minute_buffer.blocks.iter().take(blocks).map(|block| block.key.start_ns);
         let rows = (minute_buffer.opened_row, end_row);
         outbox.put(&writing, records, rows, (stored, dated.1.is_certain()))
     });

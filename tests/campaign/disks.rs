@@ -98,18 +98,23 @@ pub(crate) fn replaced(scale: &Scale) -> Row {
     row
 }
 
-/// Bits of the file are turned while it is written.
+/// The file is noise but for its header: found when it is next read, at the latest at the next start.
 pub(crate) fn damaged(scale: &Scale) -> Row {
-    let mut row =
-        Row::new("every page of the running file overwritten with noise; the damaged file is kept, a new one is begun");
+    let mut row = Row::new(
+        "every page of the file but the first overwritten with noise, then SIGKILL and a start; the damaged file is kept, a new one is begun",
+    );
     for _ in 0..scale.of(5, 1) {
-        let running = Running::start();
-        let began = Instant::now();
-        let mut file = OpenOptions::new().write(true).open(&running.database).expect("opens");
+        let Running { _directory, database, gateway, .. } = Running::start();
+        let mut file = OpenOptions::new().write(true).open(&database).expect("opens");
         let length = file.metadata().expect("there").len();
         file.seek(SeekFrom::Start(4096)).expect("seeks");
         file.write_all(&vec![0x5a; usize::try_from(length).unwrap_or(0).saturating_sub(4096)]).expect("written");
         drop(file);
+        gateway.kill();
+        let began = Instant::now();
+        let mut gateway = Gateway::start(database.parent().expect("a directory"), &["--speed", "60"]);
+        let address = gateway.address();
+        let running = Running { _directory, database, gateway, address };
         running.survives(&mut row, "the history was damaged and is kept as", began);
     }
     row

@@ -16,7 +16,6 @@ const START_NS: i64 = 1_767_571_200_000_000_000;
 const PAGE: usize = 4_096;
 /// A frame of the log: its head and a page.
 const FRAME: usize = 24 + PAGE;
-const LOG_HEAD: usize = 32;
 
 fn value(row: i64) -> f64 {
     (row * 7 % 10_007) as f64 / 10.0
@@ -91,36 +90,36 @@ fn opened(directory: &Path, file: &[u8], log: &[u8], rows_per_part: i64) -> Resu
     found
 }
 
-/// The log ends anywhere, and what follows its end is what lay there before.
+/// The power goes while a commit is written: the log ends anywhere behind what had been synced, and what follows its end is
+/// nothing, zeros, noise, or what lay there before. (What has been synced stays: no page is copied into the file before that.)
 pub(crate) fn cuts(scale: &Scale) -> Row {
     let mut row = Row::new(
-        "the log cut at 512-byte steps and at random bytes, with old bytes or zeros behind; rows made durable before",
+        "the log of a commit cut at sectors, frames and random bytes, with nothing, zeros, noise or old frames behind; rows made durable before",
     );
     let directory = tempfile::tempdir().expect("a directory");
     let states = written(directory.path(), 60, 50);
+    let pairs: Vec<(&DiskState, &DiskState)> =
+        states.windows(2).filter(|pair| pair[0].file == pair[1].file).map(|pair| (&pair[0], &pair[1])).collect();
+    row.must(pairs.len() > 20, format!("{} commits that only wrote the log", pairs.len()));
     let (mut random, mut lost, mut wrong, count) = (random(), 0, 0, scale.of(200, 12));
     for step in 0..count {
-        let state = &states[random.random_range(0..states.len())];
-        let cut = match step % 3 {
-            0 => random.random_range(0..=state.log.len() / 512) * 512,
-            1 => random.random_range(0..=state.log.len()),
-            _ => LOG_HEAD + random.random_range(0..=state.log.len().saturating_sub(LOG_HEAD) / FRAME) * FRAME,
+        let Some((before, after)) = pairs.get(random.random_range(0..pairs.len().max(1))) else { break };
+        let goes_on = after.log.starts_with(&before.log);
+        let synced = if goes_on { before.log.len() } else { 0 };
+        let unit = [512, 1, FRAME][step % 3];
+        let cut = (synced + unit * random.random_range(0..=(after.log.len() - synced) / unit)).min(after.log.len());
+        let mut log = after.log[..cut].to_vec();
+        match step % 4 {
+            0 => {}
+            1 => log.resize(after.log.len(), 0),
+            2 => log.resize(after.log.len(), 0xa5),
+            _ => log.extend_from_slice(before.log.get(cut..).unwrap_or_default()),
         }
-        .min(state.log.len());
-        let mut log = state.log[..cut].to_vec();
-        if step % 2 == 1 {
-            let behind = if step % 4 == 1 { 0 } else { 0xa5 };
-            log.resize(state.log.len(), behind);
-        }
-        // The newest state whose log lies before the cut, in the same file, was durable.
-        let durable =
-            states.iter().filter(|it| it.file == state.file && it.log.len() <= cut && state.log.starts_with(&it.log));
-        let least = durable.map(|it| it.rows).max().unwrap_or(0);
-        match opened(directory.path(), &state.file, &log, 50) {
+        match opened(directory.path(), &before.file, &log, 50) {
             Ok((rows, bad)) => {
-                lost += u64::try_from(least - rows).unwrap_or(0);
+                lost += u64::try_from(before.rows - rows).unwrap_or(0);
                 wrong += bad;
-                row.must(rows <= state.rows, format!("{rows} rows of {} written", state.rows));
+                row.must(rows <= after.rows, format!("{rows} rows of {} written", after.rows));
             }
             Err(error) => row.must(false, error),
         }

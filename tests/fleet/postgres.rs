@@ -12,7 +12,6 @@ pub(crate) struct Postgres {
     directory: tempfile::TempDir,
     port: u16,
     bin: PathBuf,
-    settings: Vec<String>,
 }
 
 /// Where Debian keeps the programs of the server.
@@ -65,8 +64,7 @@ impl Postgres {
             let owned = Command::new("chown").arg("postgres").arg(directory.path()).status();
             assert!(owned.expect("chown runs").success());
         }
-        let settings = settings.iter().map(|setting| (*setting).to_owned()).collect();
-        let mut postgres = Self { child: None, directory, port: free_port(), bin, settings };
+        let mut postgres = Self { child: None, directory, port: free_port(), bin };
         let data = postgres.directory.path().join("data");
         let mut init = as_ordinary_user(&postgres.bin.join("initdb"));
         init.args(["--auth=trust", "--username=postgres", "--encoding=UTF8", "--no-sync", "-D"]).arg(&data);
@@ -76,29 +74,16 @@ impl Postgres {
         for (from, name) in files {
             place(from, &data.join(name));
         }
-        postgres.run();
-        Some(postgres)
-    }
-
-    /// Starts the server on what is in its directory, and waits until it answers.
-    pub(crate) fn run(&mut self) {
-        let mut server = as_ordinary_user(&self.bin.join("postgres"));
-        server.arg("-D").arg(self.directory.path().join("data"));
-        server.args(["-p", &self.port.to_string(), "-c", "listen_addresses=127.0.0.1"]);
-        server.arg("-c").arg(format!("unix_socket_directories={}", self.directory.path().display()));
-        self.settings.iter().for_each(|setting| {
+        let mut server = as_ordinary_user(&postgres.bin.join("postgres"));
+        server.arg("-D").arg(&data).args(["-p", &postgres.port.to_string(), "-c", "listen_addresses=127.0.0.1"]);
+        server.arg("-c").arg(format!("unix_socket_directories={}", postgres.directory.path().display()));
+        settings.iter().for_each(|setting| {
             server.args(["-c", setting]);
         });
         server.current_dir("/").stdout(Stdio::null()).stderr(Stdio::null());
-        self.child = Some(server.spawn().expect("it starts"));
-        wait_for("PostgreSQL", Duration::from_secs(60), || self.try_sql("SELECT 1").ok());
-    }
-
-    /// Ends it at once, as a crash does (SIGQUIT: the server ends its own children, and writes nothing more).
-    pub(crate) fn kill(&mut self) {
-        let Some(mut child) = self.child.take() else { return };
-        let _told = Command::new("kill").args(["-QUIT", &child.id().to_string()]).status();
-        let _ended = child.wait();
+        postgres.child = Some(server.spawn().expect("it starts"));
+        wait_for("PostgreSQL", Duration::from_secs(30), || postgres.try_sql("SELECT 1").ok());
+        Some(postgres)
     }
 
     /// Its address with this user and host, and these keys at the end.
@@ -149,6 +134,9 @@ impl Postgres {
 
 impl Drop for Postgres {
     fn drop(&mut self) {
-        self.kill();
+        let Some(mut child) = self.child.take() else { return };
+        // SIGQUIT: the server ends its own children at once.
+        let _told = Command::new("kill").args(["-QUIT", &child.id().to_string()]).status();
+        let _ended = child.wait();
     }
 }

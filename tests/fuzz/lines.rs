@@ -115,5 +115,5 @@ fn lines_that_change_bytes_break_nothing() {
 #[ignore = "10 minutes unless FUZZ_MINUTES says otherwise: the same for longer"]
 fn lines_for_hours() {
     let minutes = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0_f64);
-    run(Duration::from_secs_f64(minutes * 60.0), rand::random());
+    run(Duration::from_secs_f64(minutes * 60.0), crate::seed_of_now());
 }

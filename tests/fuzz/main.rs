@@ -32,7 +32,7 @@ use rand_pcg::Pcg64Mcg;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// For each parser in every run of the tests.
 const SHORT: Duration = Duration::from_millis(700);
@@ -104,6 +104,12 @@ fn seed() -> Option<u64> {
     std::env::var("CNC_GATEWAY_SEED").ok().and_then(|text| text.parse().ok())
 }
 
+/// The one that was given, or another one at each run.
+fn seed_of_now() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    seed().unwrap_or(u64::from(since.subsec_nanos()) ^ since.as_secs())
+}
+
 fn run_all(seed: u64, lasts: Duration) {
     // Panics are findings; their words are of no use a thousand times.
     let (mut all, mut total) = (Vec::new(), 0);
@@ -134,5 +140,5 @@ fn nothing_nearly_right_breaks_a_parser() {
 #[ignore = "10 minutes for each of the parsers unless FUZZ_MINUTES says otherwise: the same with new inputs, in release"]
 fn parsers_for_hours() {
     let minutes = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0_f64);
-    run_all(seed().unwrap_or_else(rand::random), Duration::from_secs_f64(minutes * 60.0));
+    run_all(seed_of_now(), Duration::from_secs_f64(minutes * 60.0));
 }
