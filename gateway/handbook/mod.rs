@@ -60,6 +60,7 @@ chapters! {
     "conformance",
     "mismatch" zh,
     "measured",
+    "survives",
     "not-proven",
     "glossary",
     "inside",

@@ -77,6 +77,23 @@ pub(super) fn of_record(record: &Record) -> String {
     json!({ "t": record.at_ns(), "r": record }).to_string()
 }
 
+/// The same line, so much later; one that this version cannot read stays as it is.
+pub(super) fn moved(text: &str, by_ns: i64) -> String {
+    let Some(Parsed(line)) = parse(text) else { return text.to_owned() };
+    let at_ns = line.t.saturating_add(by_ns);
+    if let Some(mut record) = line.r {
+        record.shift(by_ns);
+        return of_record(&record);
+    }
+    if let Some(GapLine { u, r }) = line.g {
+        return of_gap(at_ns, u.map(|until_ns| until_ns.saturating_add(by_ns)), &r);
+    }
+    if let Some(means) = line.m {
+        return of_means(at_ns, line.w, &means.into_iter().collect::<Vec<_>>());
+    }
+    json!({ "t": at_ns, "s": line.s }).to_string()
+}
+
 /// Series by their numbers.
 pub(super) type SeriesByNumber = HashMap<i64, Arc<SeriesInfo>>;
 
