@@ -2,8 +2,10 @@
 //! Contract: sources of the project, section on `doctor`.
 
 mod compare;
+mod computer;
 
 pub use compare::{ChannelDifference, Comparison, compare};
+pub use computer::{ComputerReport, SystemFiles, examine_computer};
 
 use crate::run::open::opened;
 use adapters::clock::{Clock, SystemClock};

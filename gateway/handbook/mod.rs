@@ -32,6 +32,7 @@ macro_rules! chapters {
 }
 
 chapters! {
+    "install",
     "start",
     "configuration",
     "sources",

@@ -19,6 +19,7 @@ mod history;
 mod host;
 mod identified;
 mod live;
+mod configuration_file;
 mod maintenance;
 mod metrics;
 mod operations;
@@ -177,6 +178,7 @@ const GROUPS: &[&[Route]] = &[
     twin::ROUTES,
     diagnoses::ROUTES,
     maintenance::ROUTES,
+    configuration_file::ROUTES,
     identified::ROUTES,
     operations::ROUTES,
     series::ROUTES,

@@ -20,6 +20,7 @@ pub mod report;
 pub mod rules;
 pub mod sample_feed;
 pub mod save;
+pub mod service_manager;
 pub mod thermal;
 pub mod tick;
 mod verdict_mailbox;
