@@ -11,11 +11,14 @@
 //! - no `unsafe` outside files named `ffi.rs`.
 
 pub mod address;
+pub mod bilingual;
 pub mod channel;
 pub mod child;
 pub mod clock;
+pub mod conversion;
 pub mod driver;
 pub mod eda9033a;
+pub mod electric;
 pub mod fanuc;
 pub mod histogram;
 pub mod hnc;
@@ -25,6 +28,8 @@ pub mod mqtt;
 pub mod nclink;
 pub mod offset;
 pub mod open;
+pub mod own;
+pub mod plausibility;
 pub mod reading;
 pub mod recording;
 pub mod replay;
@@ -33,6 +38,7 @@ pub mod serial;
 pub mod simulated;
 pub(crate) mod stream;
 pub mod temperature;
+pub mod text;
 pub mod tls;
 pub mod units;
 pub mod waveform;
@@ -41,7 +47,9 @@ pub mod worker;
 
 pub use address::Address;
 pub use channel::{Channel, ChannelId};
-pub use driver::{Actuator, Fact, FactValue, LadderRequest, LadderRule, Pull, Source, SourceError};
+pub use driver::{
+    Actuator, Fact, FactValue, LadderRequest, LadderRule, Offer, Pull, Source, SourceError, SourceProblem,
+};
 pub use offset::{Axis, OffsetSink};
 pub use reading::{Absence, Reading, Stamp, Value};
 pub use recording::Recording;

@@ -3,6 +3,7 @@
 mod fanuc;
 mod huazhong;
 mod keys;
+mod masked;
 mod meter;
 mod secured;
 mod target;
@@ -10,6 +11,7 @@ mod target;
 pub use fanuc::{FanucOptions, WriteMethod};
 pub use huazhong::{HncNetTarget, HncOffset, NcLinkTarget};
 pub use keys::Keys;
+pub use masked::{NO_SECRETS, masked};
 pub use meter::{Circuit, EdaTarget, MeterTarget, WaveformKeep};
 pub use secured::{Login, tls_files};
 pub use target::{
@@ -17,7 +19,7 @@ pub use target::{
     SimulatedTarget, Speed, Target, endpoint,
 };
 
-use crate::fanuc::own::OwnChannel;
+use crate::own::{Own, OwnChannel, OwnChannelError};
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
@@ -41,7 +43,7 @@ pub const SCHEMES: [&str; 11] = [
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{address}: {}", .problems.join("; "))]
 pub struct AddressError {
-    /// The text as given.
+    /// The text as given, without what could be a secret.
     pub address: String,
     /// Each problem, with what to do about it.
     pub problems: Vec<String>,
@@ -61,21 +63,28 @@ impl Address {
         &self.text
     }
 
-    /// The same with the user's own channels, all of which are declared, as are those of further axes and spindles.
+    /// The same with the user's own channels, all of which are declared, as are those of further axes and spindles. What each
+    /// kind of source can be asked for, it says itself.
     ///
     /// # Errors
     /// Which channel cannot be read there, and why.
-    pub fn with_channels(mut self, own: Vec<OwnChannel>) -> Result<Self, String> {
-        let first = own.first().map(|own| own.new.name.clone());
-        match (&mut self.target, first) {
-            (Target::Fanuc { path, options, .. }, _) => {
-                options.own = own;
-                let declared = crate::fanuc::extra::declared(options, *path);
-                declared.map(|_| self).map_err(|(name, error)| format!("channel {name}: {error}"))
+    pub fn with_channels(mut self, own: Vec<OwnChannel>) -> Result<Self, OwnChannelError> {
+        match &mut self.target {
+            Target::Fanuc { path, options, .. } => {
+                options.own = Own::all(own, &crate::fanuc::source::delivered(options))?;
+                crate::fanuc::extra::declared(options, *path).map_err(|(channel, error)| OwnChannelError {
+                    channel,
+                    key: "name",
+                    what: error.to_string(),
+                })?;
             }
-            (_, None) => Ok(self),
-            (_, Some(name)) => Err(format!("channel {name}: only fanuc:// sources have channels of your own")),
+            // What stands where in a model differs between makers: here every channel can be told its place.
+            Target::NcLink(target) => target.own = Own::all(own, &[])?,
+            Target::HncNet(target) => target.own = Own::all(own, &crate::hnc::delivered())?,
+            Target::ModbusTcp { meter, .. } | Target::ModbusRtu { meter, .. } => meter.own = Own::all(own, &[])?,
+            _ => none_here(own)?,
         }
+        Ok(self)
     }
 
     /// What it means.
@@ -83,6 +92,14 @@ impl Address {
     pub fn target(&self) -> &Target {
         &self.target
     }
+}
+
+/// A kind of source that has nothing besides what it delivers.
+fn none_here(own: Vec<OwnChannel>) -> Result<(), OwnChannelError> {
+    own.into_iter().next().map_or(Ok(()), |own| {
+        let what = "a source of this kind has nothing to be asked for besides what it delivers".to_owned();
+        Err(OwnChannelError { channel: own.new.name, key: "read", what })
+    })
 }
 
 impl fmt::Display for Address {
@@ -111,9 +128,12 @@ pub fn parse<T>(
     no_scheme: impl Fn(&str) -> String,
     target: impl Fn(&str, &str, &mut Keys) -> Result<T, String>,
 ) -> Result<T, AddressError> {
-    let fail = |problems| AddressError { address: text.to_owned(), problems };
+    let fail = |problems| AddressError { address: masked(text), problems };
     let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme(text)]))?;
     let (body, query) = rest.rsplit_once('?').unwrap_or((rest, ""));
+    if masked::names_somebody(body) {
+        return Err(fail(vec![NO_SECRETS.to_owned()]));
+    }
     let mut keys = Keys::of(query);
     let target = target(scheme, body, &mut keys);
     let problems = keys.finish();
@@ -208,6 +228,23 @@ mod tests {
         assert!(refused("nclink://b/S?write=mailbox&offset=D103").contains("lies over the mailbox at D100"));
         assert!(refused("hncnet://cnc?library=x.so&offset=zero").contains("offset_unit_um="));
         assert!(refused("hncnet://cnc?library=x.so&offset=D9&offset_unit_um=1").contains("only with offset=zero"));
+    }
+
+    #[test]
+    fn a_password_in_an_address_is_refused_and_never_repeated() {
+        for text in [
+            "nclinks://box:s3cret@broker:8883/SERIAL",
+            "nclink://s3cret@broker/SERIAL?user=u",
+            "fanuc://a:s3cret@10.0.0.5:8193?path=1",
+            "modbus-tcp:b:s3cret@meter",
+            "hncnet://x:half/s3cret@cnc?library=x.so",
+            "waveform://a:s3cret@b@daq:5000",
+            "fanuc://cnc?password=s3cret",
+        ] {
+            assert!(!refused(text).contains("s3cret"), "{}", refused(text));
+        }
+        assert!(refused("fanuc://a:s3cret@10.0.0.5:8193").contains("password_file="));
+        assert!(matches!(parse("replay:/data/a@b.csv"), Target::Replay(_)), "a path may hold it");
     }
 
     #[test]

@@ -207,7 +207,8 @@ pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target,
         "nclinks" => nclink(body, keys, true),
         "hncnet" => hncnet(body, keys),
         "modbus-tcp" => {
-            let meter = meter::modbus(keys, 0);
+            let (meter, framing) = (meter::modbus(keys, 0), meter::framing(keys));
+            let meter = meter.map(|meter| MeterTarget { framing, ..meter });
             Ok(Target::ModbusTcp { at: endpoint(body, Some(502))?, meter: meter? })
         }
         "modbus-rtu" => {
@@ -336,6 +337,9 @@ fn serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
 /// What is wrong, in words.
 pub fn endpoint(body: &str, default_port: Option<u16>) -> Result<Endpoint, String> {
     let text = body.strip_prefix("//").unwrap_or(body).trim_end_matches('/');
+    if text.contains('@') {
+        return Err(super::NO_SECRETS.to_owned());
+    }
     let (host, port) = split_port(text);
     let host = host.trim_start_matches('[').trim_end_matches(']');
     if host.is_empty() || host.contains('/') {
