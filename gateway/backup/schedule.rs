@@ -8,7 +8,7 @@ use crate::log::{Notice, Severity};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use thiserror::Error;
 
 /// Time between two looks whether a backup is due.
@@ -120,12 +120,12 @@ fn remove_oldest(directory: &Path, kind: (&str, &str), keep: usize) {
     }
 }
 
-/// Seconds since the newest archive was written; `None` where there is none.
+/// Time since the newest archive was written; `None` where there is none, or where its time lies in the future: then the clock was
+/// wrong when it was written, or is wrong now.
 fn newest_age(directory: &Path) -> Option<Duration> {
     let newest = list_archives(directory, ARCHIVE).pop()?;
     let written = fs::metadata(newest).and_then(|file| file.modified()).ok()?;
-    // A file of the future is as good as new: the clock was wrong then or is wrong now.
-    Some(written.elapsed().unwrap_or_default())
+    written.elapsed().ok()
 }
 
 /// Takes backups while it lives, on a thread of its own.
@@ -161,16 +161,20 @@ fn run_schedule(
     tell: &dyn Fn(&Notice),
 ) {
     let mut looks_to_wait = 0;
+    // After the first one the time of this thread counts, which no clock that is set wrongly can move.
+    let mut taken: Option<Instant> = None;
     while matches!(stopped.recv_timeout(LOOK_EVERY), Err(RecvTimeoutError::Timeout)) {
         if looks_to_wait > 0 {
             looks_to_wait -= 1;
             continue;
         }
-        if newest_age(&config.directory).is_some_and(|age| age < config.every) {
+        let age = taken.map_or_else(|| newest_age(&config.directory), |taken| Some(taken.elapsed()));
+        if age.is_some_and(|age| age < config.every) {
             continue;
         }
         match take_backup(paths, config, now_s()) {
             Ok(path) => {
+                taken = Some(Instant::now());
                 let text = format!("a backup was taken and restored into a scratch folder: {}", path.display());
                 tell(&Notice::new(Severity::Info, "backup_taken", text));
             }

@@ -101,7 +101,10 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
     let meters = choose_meters(&dialogue, &arguments.meter)?;
     let page_from_network = arguments.page_from_network
         || dialogue.confirm(
-            ("May other computers open the page (over TLS, with a token)?", "允许其他电脑打开页面吗(TLS 加密,需要令牌)?"),
+            (
+                "May other computers open the page (over TLS, with a token)?",
+                "允许其他电脑打开页面吗(TLS 加密,需要令牌)?",
+            ),
             false,
         )?;
     if control.is_none() && meters.is_empty() {
@@ -140,7 +143,7 @@ fn list_controls(dialogue: &Dialogue, range: AddressRange) {
 
 /// Opens the address once and shows what it says. True when it may be used.
 fn try_address(dialogue: &Dialogue, address: &str) -> Result<bool, CannotRun> {
-    let report = match doctor::examine(address) {
+    let report = match doctor::examine_text(address) {
         Ok(report) => report,
         Err(what) => {
             print(&format!("  {what}\n"));
@@ -242,14 +245,16 @@ fn write_configuration(
 /// The first person, whose token is shown once.
 fn add_administrator(dialogue: &Dialogue, arguments: &SetupArguments) -> Result<(), CannotRun> {
     let path = access::path(&arguments.data_dir);
-    let cannot = |error: access::PersonsError| CannotRun::new(error.to_string(), "cnc-gateway person add NAME --role admin");
+    let cannot =
+        |error: access::PersonsError| CannotRun::new(error.to_string(), "cnc-gateway person add NAME --role admin");
     let mut persons = Persons::read(&path).map_err(cannot)?.unwrap_or_default();
     if !persons.all().is_empty() && arguments.admin.is_none() {
         return Ok(());
     }
     let name = match &arguments.admin {
         Some(name) => name.clone(),
-        None => dialogue.ask(("Your name (you may change everything on the page)", "您的姓名(可在页面上修改全部内容)"), "admin")?,
+        None => dialogue
+            .ask(("Your name (you may change everything on the page)", "您的姓名(可在页面上修改全部内容)"), "admin")?,
     };
     let token = persons.add(&name, Role::Admin, "setup").map_err(cannot)?;
     persons.write(&path).map_err(cannot)?;

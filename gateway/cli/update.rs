@@ -57,7 +57,8 @@ fn cannot(error: &UpdateError) -> CannotRun {
 
 fn key_source(given: Option<&str>) -> Result<PublicKeySource, CannotRun> {
     let next = "--verify minisign.pub, the public key of whoever signs updates";
-    let given = given.ok_or_else(|| CannotRun::new("an update is installed only when its signature is verified", next))?;
+    let given =
+        given.ok_or_else(|| CannotRun::new("an update is installed only when its signature is verified", next))?;
     Ok(match Path::new(given).is_file() {
         true => PublicKeySource::File(given.into()),
         false => PublicKeySource::Text(given.to_owned()),

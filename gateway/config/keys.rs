@@ -1,9 +1,9 @@
 //! The one table of configuration keys: what is read, refused, suggested, printed by `check --keys` and explained.
 
 use super::channel_keys;
+use super::keys_of_backup::BACKUP;
 use super::keys_of_gate::GATE;
 use super::keys_of_outputs::OUTPUTS;
-use super::keys_of_backup::BACKUP;
 use super::keys_of_thermal::THERMAL;
 pub use super::shown::{example, table};
 
@@ -122,8 +122,10 @@ use ValueKind::{Address, Flag, Listen, Name, Number, OneOf, Path, Text};
 pub static KEYS: &[ConfigKey] = &ALL;
 
 /// The rows of every part of the table, one part behind the other.
-static ALL: [ConfigKey; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + BACKUP.len() + channel_keys::KEYS.len()] = {
-    let mut all = [CORE[0]; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + BACKUP.len() + channel_keys::KEYS.len()];
+static ALL: [ConfigKey;
+    CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + BACKUP.len() + channel_keys::KEYS.len()] = {
+    let mut all =
+        [CORE[0]; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + BACKUP.len() + channel_keys::KEYS.len()];
     let parts: [&[ConfigKey]; 6] = [CORE, GATE, OUTPUTS, THERMAL, BACKUP, &channel_keys::KEYS];
     let (mut part, mut filled) = (0, 0);
     while part < parts.len() {

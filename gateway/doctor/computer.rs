@@ -84,7 +84,8 @@ impl SystemFiles {
 
     fn list(&self, path: &str) -> Vec<String> {
         let entries = fs::read_dir(self.root.join(path)).ok();
-        let names = entries.into_iter().flatten().flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+        let names =
+            entries.into_iter().flatten().flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
         let mut names: Vec<String> = names.collect();
         names.sort();
         names
@@ -150,7 +151,8 @@ fn examine_wear(system: &SystemFiles, report: &mut ComputerReport) {
     let mut told = false;
     for disk in system.list("sys/block") {
         let Some(life) = system.read(&format!("sys/block/{disk}/device/life_time")) else { continue };
-        let tenths = life.split_whitespace().filter_map(|word| u32::from_str_radix(word.trim_start_matches("0x"), 16).ok());
+        let tenths =
+            life.split_whitespace().filter_map(|word| u32::from_str_radix(word.trim_start_matches("0x"), 16).ok());
         let Some(worst) = tenths.max().filter(|worst| *worst > 0) else { continue };
         told = true;
         report.text(&format!("wear of {disk}"), format!("{} to {} %", (worst - 1) * 10, worst * 10));

@@ -71,6 +71,15 @@ pub fn examine_address(address: &Address) -> Result<DoctorReport, String> {
     begin_at(address, &SystemClock::new()).map(|(report, _)| report)
 }
 
+/// Examines what somebody has typed.
+///
+/// # Errors
+/// It is no address, or cannot be opened, in words.
+pub fn examine_text(address: &str) -> Result<DoctorReport, String> {
+    let address: Address = address.parse().map_err(|error: adapters::address::AddressError| error.to_string())?;
+    examine_address(&address)
+}
+
 /// The same, and asks for everything that the device offers, mapped to a channel or not.
 ///
 /// # Errors

@@ -108,9 +108,9 @@ fn find_widened(before: &Config, after: &Config) -> Vec<String> {
 }
 
 fn problems_json(problems: &[Problem]) -> Value {
-    let rows = problems.iter().map(|problem| {
-        json!({ "line": problem.line, "column": problem.column, "what": problem.what, "next": problem.next })
-    });
+    let rows = problems.iter().map(
+        |problem| json!({ "line": problem.line, "column": problem.column, "what": problem.what, "next": problem.next }),
+    );
     Value::Array(rows.collect())
 }
 
@@ -166,7 +166,8 @@ async fn replace_file(
         let path = file_path(&shared)?;
         let now = read_limited(&path)?;
         if digest_of(&now) != edited.digest {
-            let hint = "nothing of yours was stored and nothing of theirs is lost: load it again, then make your change";
+            let hint =
+                "nothing of yours was stored and nothing of theirs is lost: load it again, then make your change";
             return Err(ApiProblem::conflict("somebody else has changed the configuration meanwhile", hint));
         }
         let problems = find_problems(&path, &edited.text);
@@ -213,12 +214,12 @@ async fn examine(
     let place = shared.doctor.clone().try_acquire_owned().map_err(|_| busy())?;
     let report = aside(move || {
         let _place = place;
-        crate::doctor::examine(&asked.address).map_err(|what| ApiProblem::request(what, "look at the address"))
+        crate::doctor::examine_text(&asked.address).map_err(|what| ApiProblem::request(what, "look at the address"))
     });
     let report = report.await?;
     let mut document = report.json();
     document["schema"] = json!("doctor/1");
-    document["address"] = json!(config::masked(&report.address));
+    document["address"] = json!(adapters::address::masked(&report.address));
     Ok(told(Json(document), "looked at an address that is not configured".to_owned()))
 }
 
@@ -238,7 +239,8 @@ mod tests {
         assert!(find_widened(&before, &parsed(&harmless)).is_empty());
         let armed = format!("{plain}[gate]\nmin_pct = 20.0\n");
         let arming = format!("{plain}[http]\nallow_arming = true\n");
-        let library = "[[source]]\naddress = \"fanuc://10.0.0.5?backend=vendor&library=/tmp/a.so\"\nname = \"control\"\n";
+        let library =
+            "[[source]]\naddress = \"fanuc://10.0.0.5?backend=vendor&library=/tmp/a.so\"\nname = \"control\"\n";
         for text in [armed.as_str(), arming.as_str(), library] {
             assert_eq!(find_widened(&before, &parsed(text)).len(), 1, "{text}");
         }

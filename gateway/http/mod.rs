@@ -9,6 +9,7 @@
 
 mod backtests;
 mod brought;
+mod configuration_file;
 mod connection;
 mod description;
 mod diagnoses;
@@ -20,7 +21,6 @@ mod history;
 mod host;
 mod identified;
 mod live;
-mod configuration_file;
 mod maintenance;
 mod metrics;
 mod operations;

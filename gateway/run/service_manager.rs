@@ -5,9 +5,11 @@
 //! that is off do not stop them: those are told, and starting again would not mend them. A thread that hangs does; then the
 //! service manager ends the process after its own limit (`WatchdogSec`) and starts it again.
 
+use crate::log::{Notice, Severity};
 use crate::update::{WELL_FOR, confirm_running_version};
 use sd_notify::NotifyState;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -123,6 +125,48 @@ impl ServiceManager {
     /// The box is being closed.
     pub fn report_stopping(&self) {
         send(&[NotifyState::Stopping]);
+    }
+}
+
+/// What the service manager hears, and what was last seen of the threads that it does not see itself.
+#[derive(Debug)]
+pub struct WatchedService {
+    manager: ServiceManager,
+    marks: Arc<ProgressMarks>,
+    /// Steps of the polling threads, and rounds of the thread that writes the history.
+    seen: (Option<u64>, Option<u64>),
+    /// The confirmation of a new version could not be written, which was told.
+    told: bool,
+}
+
+impl WatchedService {
+    /// `data_dir` is where a version on trial is confirmed.
+    #[must_use]
+    pub fn new(data_dir: PathBuf, marks: Arc<ProgressMarks>) -> Self {
+        Self { manager: ServiceManager::new(data_dir), marks, seen: (None, None), told: false }
+    }
+
+    /// Marks what has moved since the last look, and reports it. A history that is not open has no thread that could hang.
+    pub fn report(&mut self, steps: Option<u64>, rounds: Option<u64>) {
+        self.marks.mark(Part::Tick);
+        for (part, now, seen) in [(Part::Poll, steps, self.seen.0), (Part::History, rounds, self.seen.1)] {
+            if now.is_none() || now != seen {
+                self.marks.mark(part);
+            }
+        }
+        self.seen = (steps, rounds);
+        let Err(error) = self.manager.report_progress(&self.marks) else { return };
+        if !std::mem::replace(&mut self.told, true) {
+            let text = format!(
+                "that this version is well cannot be written down ({error}); an update goes back to the version before"
+            );
+            Notice::new(Severity::Warning, "not_confirmed", text).say();
+        }
+    }
+
+    /// The box is being closed.
+    pub fn report_stopping(&self) {
+        self.manager.report_stopping();
     }
 }
 

@@ -31,9 +31,7 @@ impl PublicKeySource {
             Self::File(path) => {
                 let text = fs::read_to_string(path).map_err(UpdateError::file(path))?;
                 let bad = || UpdateError::Key(path.display().to_string());
-                PublicKey::decode(text.trim())
-                    .or_else(|_| PublicKey::from_base64(text.trim()))
-                    .map_err(|_| bad())
+                PublicKey::decode(text.trim()).or_else(|_| PublicKey::from_base64(text.trim())).map_err(|_| bad())
             }
         }
     }

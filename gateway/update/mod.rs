@@ -28,7 +28,9 @@ mod trial;
 
 pub use bundle::{Bundle, PublicKeySource, read_bundle};
 pub use slots::{PACKAGE_SLOT, Trial, VersionSlots};
-pub use trial::{CONFIRM_WITHIN, ServiceControl, SystemdService, TrialOutcome, WELL_FOR, confirm_running_version, run_trial};
+pub use trial::{
+    CONFIRM_WITHIN, ServiceControl, SystemdService, TrialOutcome, WELL_FOR, confirm_running_version, run_trial,
+};
 
 use std::path::PathBuf;
 use thiserror::Error;

@@ -13,7 +13,7 @@ pub const WELL_FOR: Duration = Duration::from_secs(30);
 /// An update waits this long for the confirmation before it goes back.
 pub const CONFIRM_WITHIN: Duration = Duration::from_secs(75);
 /// The file in the data directory in which the service confirms a version: the name of its slot.
-pub const CONFIRMED: &str = "confirmed";
+pub(super) const CONFIRMED: &str = "confirmed";
 
 /// How the service is started anew.
 pub trait ServiceControl {

@@ -9,7 +9,10 @@ use std::time::Duration;
 const SECTION: &str = "backup";
 
 /// `Some(None)` without a directory; `None` where a value is missing.
-#[expect(clippy::option_option, reason = "the outer one is a value that is wrong, the inner one is a section that is not used")]
+#[expect(
+    clippy::option_option,
+    reason = "the outer one is a value that is wrong, the inner one is a section that is not used"
+)]
 pub(super) fn read_backup(reading: &ConfigInput<'_>, base: &Path) -> Option<Option<BackupConfig>> {
     let (every_h, keep) = (number(reading, SECTION, "every_h")?, number(reading, SECTION, "keep")?);
     let history = flag(reading, SECTION, "history")?;
