@@ -11,6 +11,7 @@ mod http;
 mod kill;
 mod lives;
 mod operations;
+mod package;
 mod page;
 mod process;
 mod replay;
