@@ -35,7 +35,7 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     bank.of(DRY, "sign").column(inputs, inputs.column(moving));
     // Friction of gears and screws grows with what they carry.
     let with_load = inputs.column(|row| moving(row) * inputs.simulated[row].abs());
-    bank.of(DRY, "carried").prior(-1.0).columns(inputs, [(with_load, 1.0), (inputs.column(moving), 0.5)]);
+    bank.of(DRY, "grows with the load").prior(-1.0).columns(inputs, [(with_load, 1.0), (inputs.column(moving), 0.5)]);
     bank.of(VISCOUS, "v").prior(-0.5).column(inputs, pace.clone());
     let forward = inputs.column(|row| f64::from(u8::from(pace[row] > 0.005)));
     let backward = inputs.column(|row| f64::from(u8::from(pace[row] < -0.005)));
