@@ -12,6 +12,7 @@
 #[expect(dead_code, reason = "the tests of the sinks use the rest of it")]
 mod box_under_test;
 #[path = "../huazhong/broker.rs"]
+#[expect(dead_code, reason = "the tests of NC-Link use the rest of it")]
 mod broker;
 #[path = "../outputs/host.rs"]
 #[expect(dead_code, reason = "the tests of the sinks use the rest of it")]

@@ -11,10 +11,8 @@
 //! version others in each, which prints its seed.
 
 #[path = "../huazhong/broker.rs"]
-#[expect(dead_code, reason = "other suites end it and look for programs")]
 mod broker;
 #[path = "../campaign/line.rs"]
-#[expect(dead_code, reason = "the campaign uses the rest of it")]
 mod line;
 #[path = "../support/port.rs"]
 mod port;

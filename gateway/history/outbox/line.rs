@@ -77,21 +77,18 @@ pub(super) fn of_record(record: &Record) -> String {
     json!({ "t": record.at_ns(), "r": record }).to_string()
 }
 
-/// The same line, so much later; one that this version cannot read stays as it is.
+/// The same line, so much later; one that this version cannot read stays as it is. Gaps and means of a wrong time are of other
+/// minutes than those of the right one: they become an empty line, which keeps its number and is passed over.
 pub(super) fn moved(text: &str, by_ns: i64) -> String {
     let Some(Parsed(line)) = parse(text) else { return text.to_owned() };
-    let at_ns = line.t.saturating_add(by_ns);
-    if let Some(mut record) = line.r {
-        record.shift(by_ns);
-        return of_record(&record);
+    match (line.s, line.r) {
+        (_, Some(mut record)) => {
+            record.shift(by_ns);
+            of_record(&record)
+        }
+        (Some(cells), None) => json!({ "t": line.t.saturating_add(by_ns), "s": cells }).to_string(),
+        (None, None) => String::new(),
     }
-    if let Some(GapLine { u, r }) = line.g {
-        return of_gap(at_ns, u.map(|until_ns| until_ns.saturating_add(by_ns)), &r);
-    }
-    if let Some(means) = line.m {
-        return of_means(at_ns, line.w, &means.into_iter().collect::<Vec<_>>());
-    }
-    json!({ "t": at_ns, "s": line.s }).to_string()
 }
 
 /// Series by their numbers.
