@@ -149,7 +149,8 @@ mod tests {
     #[test]
     fn a_mixture_has_the_mean_and_the_spread_of_both() {
         let (mut one, mut other) = (Gaussian::default(), Gaussian::default());
-        (one.add(0.0, 1.0), other.add(4.0, 3.0));
+        one.add(0.0, 1.0);
+        other.add(4.0, 3.0);
         one.mix(&other, 0.25);
         assert!((one.mean(0) - 1.0).abs() < 1e-12 && (one.covariance(0, 0) - (1.5 + 3.0)).abs() < 1e-12, "{one:?}");
     }
