@@ -46,14 +46,14 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
         }
         let bytes = axum::body::Bytes::from_request(request, state).await;
         let bytes = bytes.map_err(|error| ApiProblem::request(error.to_string(), "send it again"))?;
-        let unusable = |what: String| {
-            ApiProblem::request(format!("the body cannot be used: {what}"), "/openapi.json describes it")
+        let unusable = |error: &dyn std::fmt::Display| {
+            ApiProblem::request(format!("the body cannot be used: {error}"), "/openapi.json describes it")
         };
-        // A list would be taken for the fields of an object in their order.
-        if bytes.trim_ascii_start().first() != Some(&b'{') {
-            return Err(unusable("it is no object".to_owned()));
+        // A list in the place of an object would fill its fields in their order.
+        if !bytes.trim_ascii_start().starts_with(b"{") {
+            return Err(unusable(&"it is no object"));
         }
-        serde_json::from_slice(&bytes).map(Self).map_err(|error| unusable(error.to_string()))
+        serde_json::from_slice(&bytes).map(Self).map_err(|error| unusable(&error))
     }
 }
 
