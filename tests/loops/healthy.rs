@@ -10,7 +10,7 @@ use adapters::address::SimulatedMachine;
 use adapters::simulated::{DaySettings, LaterChange, SimulatedSettings};
 use gateway::config::{self, BUILT_IN_TEXT, GateConfig, GateMode};
 use rules::estimators::wear::WearRecord;
-use rules::script::{AlarmLevel, Stop, shipped};
+use rules::script::{AlarmLevel, Decision, Stop, shipped};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -58,9 +58,6 @@ struct Counted {
     /// Requests of a lower and of a higher feed that began.
     lower: u32,
     higher: u32,
-    /// What the machine itself counted.
-    written: u64,
-    least_pct: u8,
     told: Vec<String>,
 }
 
@@ -88,74 +85,81 @@ fn shift(setup: &Setup, seed: u64) -> Counted {
     bench.pipeline.wear_mut().set_models("", setup.models.iter().cloned().map(Arc::new).collect());
     bench.work_material = (!setup.models.is_empty()).then(|| "C45".into());
     bench.mains = setup.mains;
-    let mut counted = Counted { seed, least_pct: 100, ..Counted::default() };
-    let (mut holds, mut changes, mut asked) = (false, false, 0_u32);
+    let mut counted = Counted { seed, ..Counted::default() };
+    let mut before = Asked::default();
     while bench.now_s() < setup.hours * 3600.0 {
         bench.tick();
         if setup.armed && bench.now_s() > 30.0 && bench.pipeline.gate().armed().is_err() {
             bench.arm();
         }
-        let now_s = bench.now_s();
         let decision = bench.pipeline.scripts().decision().clone();
         for alarm in decision.alarms.iter().filter(|alarm| alarm.raised) {
             *counted.alarms.entry((alarm.level, alarm.name.to_string())).or_default() += 1;
         }
-        let asks = |stop| decision.stops.iter().find(|request| request.stop == stop);
-        if asks(Stop::FeedHold).is_some() && !std::mem::replace(&mut holds, true) {
-            counted.feed_holds += 1;
-            counted.told.push(format!("{now_s:.0} s: feed hold"));
-        }
-        holds &= asks(Stop::FeedHold).is_some();
-        match asks(Stop::ToolChange) {
-            Some(request) if !changes => {
-                changes = true;
-                counted.changes += 1;
-                let worn = |edge: &str| request.reason.split([' ', ',']).any(|word| word == edge);
-                let moment = bench.machine.moment((now_s * 1e9) as i64);
-                let edge = edge_name(moment.panel.tool, moment.panel.edge.into());
-                if worn(&edge) && moment.truth.flank_wear_mm < HALF_WORN_MM {
-                    counted.false_changes += 1;
-                    let (wear_mm, believed) = (moment.truth.flank_wear_mm, bench.pipeline.estimates().tool_wear_mm);
-                    let witness = decision.alarms.iter().find(|alarm| alarm.raised).map(|alarm| alarm.en.to_string());
-                    counted
-                        .told
-                        .push(format!("{now_s:.0} s: {edge} at {wear_mm:.3} mm, believed {believed:?}: {witness:?}"));
-                }
-            }
-            Some(_) => {}
-            None => changes = false,
-        }
-        match decision.request.as_ref().filter(|request| (request.pct - 100.0).abs() > 0.5) {
-            Some(request) => {
-                asked += 1;
-                if asked == ASKED_TICKS {
-                    *(if request.pct < 100.0 { &mut counted.lower } else { &mut counted.higher }) += 1;
-                    let estimates = bench.pipeline.estimates();
-                    let watts = |power: Result<f64, _>| power.map_or("-".to_owned(), |power| format!("{power:.0} W"));
-                    let moment = bench.machine.moment((now_s * 1e9) as i64);
-                    counted.told.push(format!(
-                        "{now_s:.0} s: {:.0} % ({}, {}) at {}, learned {}, load {:.0} %, {} at {:.3} mm, {} s in the cut",
-                        request.pct,
-                        request.script,
-                        request.reason,
-                        watts(estimates.cutting_power_w.map(|power| power.value)),
-                        watts(estimates.loads.learned_power_w),
-                        100.0 * estimates.loads.load_share.unwrap_or(0.0),
-                        edge_name(moment.panel.tool, moment.panel.edge.into()),
-                        moment.truth.flank_wear_mm,
-                        (estimates.at_ns - estimates.since_ns) / 1_000_000_000,
-                    ));
-                }
-            }
-            None => asked = 0,
-        }
-        if now_s.fract() < 0.05 {
-            let panel = bench.machine.moment((now_s * 1e9) as i64).panel;
-            counted.least_pct = counted.least_pct.min(panel.feed_override_pct);
-        }
+        counted.count_stops(&bench, &decision, &mut before);
+        counted.count_feeds(&bench, &decision, &mut before);
     }
-    counted.written = bench.machine.written().writes();
     counted
+}
+
+/// What was asked for at the tick before.
+#[derive(Debug, Default)]
+struct Asked {
+    hold: bool,
+    change: bool,
+    /// For so many ticks another feed.
+    feed: u32,
+}
+
+impl Counted {
+    fn count_stops(&mut self, bench: &Bench, decision: &Decision, before: &mut Asked) {
+        let asks = |stop| decision.stops.iter().find(|request| request.stop == stop);
+        let now_s = bench.now_s();
+        let holds = asks(Stop::FeedHold).is_some();
+        if holds && !before.hold {
+            self.feed_holds += 1;
+            self.told.push(format!("{now_s:.0} s: feed hold"));
+        }
+        before.hold = holds;
+        let change = asks(Stop::ToolChange);
+        if let Some(request) = change.filter(|_| !before.change) {
+            self.changes += 1;
+            let moment = bench.machine.moment((now_s * 1e9) as i64);
+            let (edge, wear_mm) = (edge_name(moment.panel.tool, moment.panel.edge.into()), moment.truth.flank_wear_mm);
+            let worn = request.reason.split([' ', ',']).any(|word| word == edge);
+            if worn && wear_mm < HALF_WORN_MM {
+                self.false_changes += 1;
+                let witness = decision.alarms.iter().find(|alarm| alarm.raised).map(|alarm| alarm.en.to_string());
+                self.told.push(format!("{now_s:.0} s: {edge} at {wear_mm:.3} mm: {}", witness.unwrap_or_default()));
+            }
+        }
+        before.change = change.is_some();
+    }
+
+    fn count_feeds(&mut self, bench: &Bench, decision: &Decision, before: &mut Asked) {
+        let other = decision.request.as_ref().filter(|request| (request.pct - 100.0).abs() > 0.5);
+        let Some(request) = other else {
+            before.feed = 0;
+            return;
+        };
+        before.feed += 1;
+        if before.feed != ASKED_TICKS {
+            return;
+        }
+        *(if request.pct < 100.0 { &mut self.lower } else { &mut self.higher }) += 1;
+        let (estimates, now_s) = (bench.pipeline.estimates(), bench.now_s());
+        let moment = bench.machine.moment((now_s * 1e9) as i64);
+        self.told.push(format!(
+            "{now_s:.0} s: {:.0} % ({}) at {:.0} W, learned {:.0} W, load {:.0} %, {} at {:.3} mm",
+            request.pct,
+            request.script,
+            estimates.cutting_power_w.map_or(0.0, |power| power.value),
+            estimates.loads.learned_power_w.unwrap_or(0.0),
+            100.0 * estimates.loads.load_share.unwrap_or(0.0),
+            edge_name(moment.panel.tool, moment.panel.edge.into()),
+            moment.truth.flank_wear_mm,
+        ));
+    }
 }
 
 fn edge_name(tool: u8, edge: u32) -> String {
