@@ -51,7 +51,7 @@ use history_store::HistoryStore;
 use live_twin::Twin;
 use open::{MachineSpeed, Sources};
 use outputs::ConfiguredSinks;
-use service_manager::{Part, ProgressMarks};
+use service_manager::{ProgressMarks, WatchedPart};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -170,7 +170,7 @@ async fn mark_page(marks: Arc<ProgressMarks>) {
     let mut beat = tokio::time::interval(PAGE_BEAT);
     loop {
         beat.tick().await;
-        marks.mark(Part::Page);
+        marks.mark(WatchedPart::Page);
     }
 }
 

@@ -19,7 +19,7 @@ pub const STILL_MAX: Duration = Duration::from_secs(20);
 
 /// A part of the box that must keep moving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub enum WatchedPart {
     /// The thread of the tick.
     Tick,
     /// The threads that poll.
@@ -31,9 +31,9 @@ pub enum Part {
 }
 
 /// All parts, in the order of their marks.
-const PARTS: [Part; 4] = [Part::Tick, Part::Poll, Part::History, Part::Page];
+const PARTS: [WatchedPart; 4] = [WatchedPart::Tick, WatchedPart::Poll, WatchedPart::History, WatchedPart::Page];
 
-impl Part {
+impl WatchedPart {
     /// The word in messages.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -62,15 +62,15 @@ impl ProgressMarks {
     }
 
     /// This part has moved.
-    pub fn mark(&self, part: Part) {
+    pub fn mark(&self, part: WatchedPart) {
         let now_ms = u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX);
         self.moved_ms[part as usize].store(now_ms, Ordering::Relaxed);
     }
 
     /// Parts that have stood still for longer than `limit`.
     #[must_use]
-    pub fn still(&self, limit: Duration) -> Vec<Part> {
-        let since = |part: &Part| Duration::from_millis(self.moved_ms[*part as usize].load(Ordering::Relaxed));
+    pub fn still(&self, limit: Duration) -> Vec<WatchedPart> {
+        let since = |part: &WatchedPart| Duration::from_millis(self.moved_ms[*part as usize].load(Ordering::Relaxed));
         let now = self.began.elapsed();
         PARTS.into_iter().filter(|part| now.saturating_sub(since(part)) > limit).collect()
     }
@@ -143,8 +143,8 @@ impl WatchedService {
 
     /// Marks what has moved since the last look, and reports it. A history that is not open has no thread that could hang.
     pub fn report(&mut self, steps: Option<u64>, rounds: Option<u64>) {
-        self.marks.mark(Part::Tick);
-        for (part, now, seen) in [(Part::Poll, steps, self.seen.0), (Part::History, rounds, self.seen.1)] {
+        self.marks.mark(WatchedPart::Tick);
+        for (part, now, seen) in [(WatchedPart::Poll, steps, self.seen.0), (WatchedPart::History, rounds, self.seen.1)] {
             if now.is_none() || now != seen {
                 self.marks.mark(part);
             }
@@ -178,10 +178,10 @@ mod tests {
     fn a_part_that_stands_still_is_named() {
         let marks = ProgressMarks::new();
         std::thread::sleep(Duration::from_millis(30));
-        marks.mark(Part::Tick);
-        marks.mark(Part::Poll);
-        marks.mark(Part::Page);
-        assert_eq!(marks.still(Duration::from_millis(20)), [Part::History]);
+        marks.mark(WatchedPart::Tick);
+        marks.mark(WatchedPart::Poll);
+        marks.mark(WatchedPart::Page);
+        assert_eq!(marks.still(Duration::from_millis(20)), [WatchedPart::History]);
         assert!(marks.still(Duration::from_secs(5)).is_empty());
     }
 }
