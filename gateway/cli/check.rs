@@ -31,7 +31,7 @@ pub(super) struct CheckArguments {
 pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
     if arguments.keys {
         print(&keys::table());
-        print(&crate::settings::table(&declared(arguments.config.as_deref())?));
+        print(&crate::settings::table(&read_declared_settings(arguments.config.as_deref())?));
     } else if arguments.example {
         print(&keys::example());
     } else if arguments.vocabulary {
@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
 }
 
 /// The settings that the scripts of a configuration declare, or those that come with the gateway.
-fn declared(config: Option<&Path>) -> Result<Vec<Declared>, CannotRun> {
+fn read_declared_settings(config: Option<&Path>) -> Result<Vec<Declared>, CannotRun> {
     let files = match config {
         Some(_) => super::rules::configured(&super::rules::configuration(config)?)?,
         None => shipped(),

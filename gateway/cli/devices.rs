@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
             "write a letter, then letters, digits and _",
         ));
     }
-    let delivered = delivered(path);
+    let delivered = read_delivered_channels(path);
     let created = moment::utc(clock::now_ns());
     let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));
     let others = arguments.others.iter().map(|file| read(file)).collect::<Result<Vec<_>, _>>()?;
@@ -70,7 +70,7 @@ fn read(file: &Path) -> Result<(String, String), CannotRun> {
 }
 
 /// The channels of which the history holds something; `None` before there is one.
-fn delivered(path: &Path) -> Option<BTreeSet<String>> {
+fn read_delivered_channels(path: &Path) -> Option<BTreeSet<String>> {
     let reader = Reader::open(path).ok()?;
     let (_, newest_ns) = reader.present().ok()??;
     let query = Query { from_ns: Some(newest_ns - 3_600_000_000_000), ..Query::default() };

@@ -46,7 +46,7 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
     }
     let Some(library) = &arguments.compare else {
         let address = match &arguments.config {
-            Some(file) => configured(file, address)?,
+            Some(file) => find_configured_address(file, address)?,
             None => address.parse().map_err(|error: AddressError| unusable(error.to_string()))?,
         };
         let report = if arguments.all { doctor::examine_all(&address) } else { doctor::examine_address(&address) };
@@ -106,7 +106,7 @@ fn sink(address: &str, json: bool) -> CommandResult {
 }
 
 /// The address of the source of this name in a configuration.
-fn configured(file: &Path, wanted: &str) -> Result<Address, CannotRun> {
+fn find_configured_address(file: &Path, wanted: &str) -> Result<Address, CannotRun> {
     let config = config::load(Some(file), []).map_err(|problems| {
         let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
         CannotRun::new(lines.join("\n"), "")

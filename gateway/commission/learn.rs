@@ -134,7 +134,7 @@ impl Learned {
     }
 
     fn wear(&mut self, recording: &Recording, machine: &str, criterion_mm: f64) {
-        let separated = self.separated(recording).map_err(WearLack::of_all);
+        let separated = self.separate_power(recording).map_err(WearLack::of_all);
         let found = separated.and_then(|recording| wear_of(&recording, criterion_mm));
         let known = found.as_ref().map(|learned| {
             format!("{} cuts, {} form, R2 {:.1} %", learned.cuts.len(), learned.model.form(), 100.0 * learned.r2)
@@ -158,7 +158,7 @@ impl Learned {
     }
 
     /// The recording with cutting power separated by the coefficients that were just learned.
-    fn separated(&self, recording: &Recording) -> Result<Recording, Refusal> {
+    fn separate_power(&self, recording: &Recording) -> Result<Recording, Refusal> {
         let loss = self.load_loss.as_ref().ok_or_else(|| {
             Refusal::new(
                 RefusalKind::Missing,

@@ -75,10 +75,11 @@ fn models(data_dir: &Path, history: &Path) -> Result<(), String> {
     let now_ns = clock::now_ns();
     if !model.exists() {
         let ended_s = (now_ns / SECOND_NS - HOUR_S) as f64;
-        replace(&data_dir.join("twin.json"), &moved(LEARNED, ended_s)?).map_err(words)?;
-        replace(&data_dir.join("wear.json"), &moved(WORN, ended_s)?).map_err(words)?;
+        replace(&data_dir.join("twin.json"), &shift_times(LEARNED, ended_s)?).map_err(words)?;
+        replace(&data_dir.join("wear.json"), &shift_times(WORN, ended_s)?).map_err(words)?;
         // The state that the estimators remember would otherwise seem to have lasted since then.
-        replace(&data_dir.join("estimators.json"), &moved(ESTIMATED, (now_ns / SECOND_NS) as f64)?).map_err(words)?;
+        replace(&data_dir.join("estimators.json"), &shift_times(ESTIMATED, (now_ns / SECOND_NS) as f64)?)
+            .map_err(words)?;
         replace(&model, MODEL).map_err(words)?;
     }
     let recipe = data_dir.join(RECIPE_FILE);
@@ -94,7 +95,7 @@ fn models(data_dir: &Path, history: &Path) -> Result<(), String> {
 }
 
 /// The same memory with all its times moved so that the newest of them is `newest_s`.
-fn moved(text: &str, newest_s: f64) -> Result<String, String> {
+fn shift_times(text: &str, newest_s: f64) -> Result<String, String> {
     let mut memory: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
     let mut newest: f64 = 0.0;
     each_time(&mut memory, &mut |at_s| {
@@ -153,7 +154,7 @@ mod tests {
     fn times_are_moved_and_nothing_else_is() {
         let text =
             r#"{"at_s":2000000000.5,"due":{"at_ns":2000000001000000000},"watts":850.25,"count":3,"word":"idle"}"#;
-        let memory: Value = serde_json::from_str(&moved(text, 1_700_000_000.0).expect("moved")).expect("JSON");
+        let memory: Value = serde_json::from_str(&shift_times(text, 1_700_000_000.0).expect("moved")).expect("JSON");
         assert_eq!(memory["at_s"], 1_699_999_999.5);
         assert_eq!(memory["due"]["at_ns"], 1_700_000_000_000_000_000_i64);
         assert_eq!((&memory["watts"], &memory["count"], &memory["word"]), (&json!(850.25), &json!(3), &json!("idle")));

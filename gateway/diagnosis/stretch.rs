@@ -28,7 +28,7 @@ pub fn read(history: &Path, from_ns: TimeNs, to_ns: TimeNs, output: &str) -> Res
     let names: Vec<String> = reader.series()?.iter().map(|series| series.name.to_string()).collect();
     let channels = names.iter().map(String::as_str).filter(|name| ChannelId::of(name).is_some());
     let recording = reader.recording(&Query::between(from_ns, to_ns).of(channels))?;
-    Ok(settled(complete(per_second(&recording, ROWS_MAX)), output))
+    Ok(select_settled_rows(complete(per_second(&recording, ROWS_MAX)), output))
 }
 
 /// A range of a history as `diagnose --recording history:...` reads it: the same as for the page. What was stored once a second or
@@ -38,11 +38,11 @@ pub fn of_history(recording: Recording, output: &str) -> Recording {
     let span_s = recording.time_s.last().zip(recording.time_s.first()).map_or(0.0, |(last, first)| last - first);
     #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
     let dense = recording.rows() as f64 > DENSE_PER_S * (span_s + 1.0);
-    if dense { settled(complete(per_second(&recording, usize::MAX)), output) } else { complete(recording) }
+    if dense { select_settled_rows(complete(per_second(&recording, usize::MAX)), output) } else { complete(recording) }
 }
 
 /// The output stands only in rows of settled work.
-fn settled(mut recording: Recording, output: &str) -> Recording {
+fn select_settled_rows(mut recording: Recording, output: &str) -> Recording {
     let Some(measured) = recording.numbers(output) else { return recording };
     let kept = |row: usize| measured.get(row).filter(|_| is_settled(&recording, row));
     let kept: Numbers = (0..recording.rows()).map(kept).collect();
@@ -168,7 +168,7 @@ mod tests {
         let engaged: Vec<_> = thinned.numbers("engaged").expect("told by the program").iter().flatten().collect();
         assert_eq!(engaged, [0.0, 0.0, 1.0, 1.0]);
         let settled: Vec<bool> = {
-            let settled = settled(thinned.clone(), "spindle_power_w");
+            let settled = select_settled_rows(thinned.clone(), "spindle_power_w");
             settled.numbers("spindle_power_w").expect("kept").iter().map(|power| power.is_some()).collect()
         };
         assert_eq!(settled, [false; 4], "the cut begins in the middle of four seconds");

@@ -182,7 +182,7 @@ fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: &Diagnos
     let found = in_child(&job, diagnoses);
     diagnoses.ended(found.as_ref().map(|(record, _)| store::key(record)).map_err(Clone::clone));
     match found {
-        Ok((record, missing)) => WorkerReport::Diagnosed(Box::new(finished(by, places, record, missing))),
+        Ok((record, missing)) => WorkerReport::Diagnosed(Box::new(finish_diagnosis(by, places, record, missing))),
         Err(problem) => WorkerReport::NotDiagnosed(problem, by),
     }
 }
@@ -213,7 +213,12 @@ pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Resul
     ended_by(diagnoses).map_or_else(|| outcome.unwrap_or_else(|| Err(broken())), Err)
 }
 
-fn finished(by: Option<String>, places: &WorkerPaths, record: history::Diagnosis, missing: Vec<String>) -> Finished {
+fn finish_diagnosis(
+    by: Option<String>,
+    places: &WorkerPaths,
+    record: history::Diagnosis,
+    missing: Vec<String>,
+) -> Finished {
     let model = places.kept.text(&store::key(&record), DiagnosisFile::Model);
     let written = model.map(|model| outputs::put(&places.improved, &model)).and_then(Result::ok);
     Finished { by, record, missing, improved: written.map(|()| places.improved.clone()) }

@@ -50,10 +50,10 @@ impl Samples {
         let mut columns = vec!["at_ns INTEGER".to_owned(), "time_utc TEXT".to_owned(), "segment INTEGER".to_owned()];
         for series in self.series.iter() {
             let kind = if series.kind == SeriesKind::Text { "TEXT" } else { "REAL" };
-            columns.push(format!("{} {kind}", quoted(&series.name)));
+            columns.push(format!("{} {kind}", quote_name(&series.name)));
         }
         for series in self.series.iter() {
-            columns.push(format!("{} TEXT HIDDEN", quoted(&format!("{}_missing", series.name))));
+            columns.push(format!("{} TEXT HIDDEN", quote_name(&format!("{}_missing", series.name))));
         }
         Ok(CString::new(format!("CREATE TABLE x({})", columns.join(", ")))?)
     }
@@ -85,7 +85,7 @@ impl Samples {
     }
 }
 
-fn quoted(name: &str) -> String {
+fn quote_name(name: &str) -> String {
     format!("\"{}\"", name.replace('"', "\"\""))
 }
 

@@ -124,7 +124,7 @@ impl Walk {
         match &stretch.form {
             StretchForm::Block { directory, columns, codes } => {
                 let Some(entry) = directory.entry(series) else { return Ok(None) };
-                let damaged = damaged(stretch.first_row);
+                let damaged = damage_error(stretch.first_row);
                 let mut cells = self.decoder.cells(directory, entry, columns).ok_or(damaged)?;
                 if entry.any_missing && !directory.words.is_empty() {
                     let missing = cells.missing_mut();
@@ -178,7 +178,7 @@ impl Walk {
     }
 }
 
-fn damaged(first_row: i64) -> HistoryError {
+fn damage_error(first_row: i64) -> HistoryError {
     HistoryError::Damaged { first_row, what: "the samples do not decode" }
 }
 

@@ -17,7 +17,7 @@ const WRITTEN: [&str; 7] = [
     include_str!("openapi_files.json"),
 ];
 
-static DESCRIPTION: LazyLock<String> = LazyLock::new(|| merged().to_string());
+static DESCRIPTION: LazyLock<String> = LazyLock::new(|| build_document().to_string());
 
 /// The whole document as text.
 #[must_use]
@@ -26,7 +26,7 @@ pub fn description() -> &'static str {
 }
 
 /// The whole document.
-fn merged() -> Value {
+fn build_document() -> Value {
     let mut parts = WRITTEN.iter().map(|text| serde_json::from_str::<Value>(text).unwrap_or(Value::Null));
     let mut document = parts.next().unwrap_or(Value::Null);
     for part in parts {

@@ -48,7 +48,7 @@ async fn arm(
     let again =
         shared.access.check(&person.name, &Token::typed(&wanted.token), peer.from, "armed", Urgency::Waits).await;
     again.map_err(|error| wrong(&error))?;
-    let order = Order::Arm { by: signed(&person, &peer), for_s: wanted.for_s };
+    let order = Order::Arm { by: format_author(&person, &peer), for_s: wanted.for_s };
     answer(shared.post.order(order).await, "look at [gate] in the configuration, and at the problems of /api/v1/status")
 }
 
@@ -59,7 +59,7 @@ async fn disarm(
     SignedIn(person): SignedIn,
     headers: HeaderMap,
 ) -> Result<Response, ApiProblem> {
-    let reply = shared.post.order(Order::Disarm { by: signed(&person, &peer) }).await;
+    let reply = shared.post.order(Order::Disarm { by: format_author(&person, &peer) }).await;
     match plain::wants_page(&headers) {
         true => Ok(Redirect::to("/plain").into_response()),
         false => answer(reply, "press the button at the machine's panel; the dial of the machine always works"),
@@ -80,7 +80,7 @@ async fn acknowledge(
     SignedIn(person): SignedIn,
     JsonBody(wanted): JsonBody<Acknowledge>,
 ) -> Result<Response, ApiProblem> {
-    let by = signed(&person, &peer);
+    let by = format_author(&person, &peer);
     let order = match wanted.code {
         Some(code) => Order::AcknowledgeAlarm { by, code },
         None => Order::Acknowledge { by },
@@ -89,7 +89,7 @@ async fn acknowledge(
 }
 
 /// The name as it stands in the audit.
-fn signed(person: &Person, peer: &Peer) -> String {
+fn format_author(person: &Person, peer: &Peer) -> String {
     format!("{} (from {})", person.name, peer.from)
 }
 

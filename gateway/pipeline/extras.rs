@@ -15,7 +15,7 @@ const DEVIATION_STEP: f64 = 0.1;
 /// Numbers that are stored so.
 const DEVIATIONS: usize = 5;
 
-/// The series, in the order of [`StoredEstimates::values`].
+/// The series, in the order of `StoredEstimates::values`.
 #[must_use]
 pub fn series() -> Vec<ExtraSeries> {
     let watts = |name, en, zh| ExtraSeries { decimals: Some(0), ..ExtraSeries::number(name, "W", en, zh) };

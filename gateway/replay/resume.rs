@@ -55,7 +55,7 @@ impl Before {
         }
         let reader = Reader::open(path)?;
         let free_ns = reader.span()?.map_or(0, |(_, newest_ns)| newest_ns + PAUSE_NS);
-        let (rows, first_ns, last_ns) = stored(&reader, origin)?;
+        let (rows, first_ns, last_ns) = read_stored_span(&reader, origin)?;
         if rows == 0 {
             return Ok(Self { free_ns, ..Self::default() });
         }
@@ -94,7 +94,7 @@ impl Before {
 }
 
 /// Rows of this origin, the time of the first and of the last one.
-fn stored(reader: &Reader, origin: &str) -> Result<(u64, TimeNs, TimeNs), HistoryError> {
+fn read_stored_span(reader: &Reader, origin: &str) -> Result<(u64, TimeNs, TimeNs), HistoryError> {
     let origin = origin.replace('\'', "''");
     let statement = format!(
         "WITH own AS (SELECT id FROM segments WHERE origin = '{origin}'),

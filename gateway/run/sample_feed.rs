@@ -129,7 +129,7 @@ fn milliseconds(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e3
 }
 
-fn dropped(counts: MergeCounts) -> u64 {
+fn count_dropped(counts: MergeCounts) -> u64 {
     counts.too_late + counts.clock_steps + counts.unannounced
 }
 
@@ -151,7 +151,7 @@ fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStat
         readings: counts.readings,
         failures: stats.failures,
         missed: stats.missed,
-        dropped: dropped(counts) + stats.dropped,
+        dropped: count_dropped(counts) + stats.dropped,
         facts: stats.facts.iter().map(shown).collect(),
         problems: stats.problems.iter().map(problem).collect(),
     }
@@ -191,7 +191,7 @@ fn of_step(name: &str, period: Duration, error: Option<&SourceError>, counts: Me
         readings: counts.readings,
         failures: counts.failures,
         missed: 0,
-        dropped: dropped(counts),
+        dropped: count_dropped(counts),
         facts: Vec::new(),
         problems: Vec::new(),
     }

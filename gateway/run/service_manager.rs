@@ -144,7 +144,8 @@ impl WatchedService {
     /// Marks what has moved since the last look, and reports it. A history that is not open has no thread that could hang.
     pub fn report(&mut self, steps: Option<u64>, rounds: Option<u64>) {
         self.marks.mark(WatchedPart::Tick);
-        for (part, now, seen) in [(WatchedPart::Poll, steps, self.seen.0), (WatchedPart::History, rounds, self.seen.1)] {
+        for (part, now, seen) in [(WatchedPart::Poll, steps, self.seen.0), (WatchedPart::History, rounds, self.seen.1)]
+        {
             if now.is_none() || now != seen {
                 self.marks.mark(part);
             }

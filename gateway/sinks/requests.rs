@@ -45,12 +45,12 @@ impl Requests {
     pub async fn ask(&mut self, change: Result<RequestedChange, String>) -> Option<Reply> {
         let left_out = self.rate.may_pass(clock::now_ns())?;
         let Some(post) = &self.post else { return Some(Reply::refused("there is no gate here")) };
-        let change = if self.allowed { change } else { Err(refused(&self.sink, change)) };
+        let change = if self.allowed { change } else { Err(describe_refusal(&self.sink, change)) };
         Some(post.request(NetworkRequest { sink: self.sink.clone(), change, left_out }).await)
     }
 }
 
-fn refused(sink: &str, change: Result<RequestedChange, String>) -> String {
+fn describe_refusal(sink: &str, change: Result<RequestedChange, String>) -> String {
     let what = change.map_or_else(|_| "a message that is no request".to_owned(), |change| change.to_string());
     format!(
         "{what}: the sink {sink} takes no requests; write allow_requests = true under its [[sink]] to let them reach the gate"

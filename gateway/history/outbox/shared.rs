@@ -98,7 +98,7 @@ impl PartialEq for Outbox {
     }
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+fn lock_mutex<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // Everything in there is complete whenever the lock is free.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -132,7 +132,7 @@ impl Outbox {
     /// were made with the outbox. `<box>-<sequence>` names an item everywhere and for ever. Empty until the history is open.
     #[must_use]
     pub fn box_id(&self) -> String {
-        locked(&self.shared.state).box_id.clone()
+        lock_mutex(&self.shared.state).box_id.clone()
     }
 
     /// What is gathered and how much of it is kept.
@@ -150,20 +150,20 @@ impl Outbox {
     /// How full it is.
     #[must_use]
     pub fn figures(&self) -> OutboxFigures {
-        locked(&self.shared.state).figures
+        lock_mutex(&self.shared.state).figures
     }
 
     /// Every series with what a receiver of all items knows by now; empty until the history is open. All values are
     /// missing until the first commit.
     #[must_use]
     pub fn latest(&self) -> Arc<Vec<Reading>> {
-        locked(&self.shared.state).latest.clone()
+        lock_mutex(&self.shared.state).latest.clone()
     }
 
     /// What sink `name` has delivered; `None` for a name that is not configured.
     #[must_use]
     pub fn standing(&self, name: &str) -> Option<DeliveryState> {
-        locked(&self.shared.sinks).get(name).cloned()
+        lock_mutex(&self.shared.sinks).get(name).cloned()
     }
 
     /// Sink `name` has delivered the items `from..to`. Becomes durable with the next commit.
@@ -219,7 +219,7 @@ impl Outbox {
 
     /// Sink `name` is connected, or is not.
     pub fn set_linked(&self, name: &str, linked: bool) {
-        if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
+        if let Some(standing) = lock_mutex(&self.shared.sinks).get_mut(name) {
             standing.linked = linked;
         }
     }
@@ -230,7 +230,7 @@ impl Outbox {
     }
 
     fn change(&self, name: &str, change: impl FnOnce(&mut DeliveryState)) {
-        if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
+        if let Some(standing) = lock_mutex(&self.shared.sinks).get_mut(name) {
             change(standing);
             self.shared.news.store(true, Ordering::Release);
         }
@@ -243,12 +243,12 @@ impl Outbox {
 
     /// The writer's side: the names of the sinks.
     pub(super) fn names(&self) -> Vec<String> {
-        locked(&self.shared.sinks).keys().cloned().collect()
+        lock_mutex(&self.shared.sinks).keys().cloned().collect()
     }
 
     /// The writer's side: the lowest number that some sink has not delivered.
     pub(super) fn lowest(&self) -> u64 {
-        locked(&self.shared.sinks).values().map(|standing| standing.position.lowest()).min().unwrap_or(u64::MAX)
+        lock_mutex(&self.shared.sinks).values().map(|standing| standing.position.lowest()).min().unwrap_or(u64::MAX)
     }
 
     /// The writer's side: looks at every sink, and may change it. What has been delivered until here is noted.
@@ -258,7 +258,7 @@ impl Outbox {
     ) -> Result<(), HistoryError> {
         self.shared.news.store(false, Ordering::Release);
         self.shared.connecting.store(false, Ordering::Release);
-        let mut sinks = locked(&self.shared.sinks);
+        let mut sinks = lock_mutex(&self.shared.sinks);
         let done = sinks.iter_mut().try_for_each(|(name, standing)| each(name, standing));
         if done.is_err() {
             self.shared.news.store(true, Ordering::Release);
@@ -271,7 +271,7 @@ impl Outbox {
         if dropped.is_empty() {
             return;
         }
-        for standing in locked(&self.shared.sinks).values_mut() {
+        for standing in lock_mutex(&self.shared.sinks).values_mut() {
             for (from, to) in dropped {
                 standing.dropped += standing.position.within(*from, *to);
                 standing.position.done(*from, *to);
@@ -281,20 +281,20 @@ impl Outbox {
 
     /// The writer's side: the name of this box.
     pub(super) fn name_box(&self, name: String) {
-        locked(&self.shared.state).box_id = name;
+        lock_mutex(&self.shared.state).box_id = name;
     }
 
     /// The writer's side: has every sink that is connected delivered everything before `next`, or is it not to be waited for?
     pub(super) fn is_drained(&self, next: u64) -> bool {
         self.shared.hurried.load(Ordering::Acquire)
-            || locked(&self.shared.sinks)
+            || lock_mutex(&self.shared.sinks)
                 .values()
                 .all(|standing| !standing.linked || standing.position.waiting(next) == 0)
     }
 
     /// The writer's side: what is durable now.
     pub(super) fn publish(&self, head: OutboxHead, figures: OutboxFigures, latest: Vec<Reading>) {
-        let mut state = locked(&self.shared.state);
+        let mut state = lock_mutex(&self.shared.state);
         state.figures = figures;
         state.latest = Arc::new(latest);
         drop(state);

@@ -57,11 +57,11 @@ impl OutboxContents {
     }
 }
 
-fn unsigned(number: i64) -> u64 {
+fn to_unsigned(number: i64) -> u64 {
     u64::try_from(number).unwrap_or(0)
 }
 
-fn signed(number: u64) -> i64 {
+fn to_signed(number: u64) -> i64 {
     i64::try_from(number).unwrap_or(i64::MAX)
 }
 
@@ -97,7 +97,7 @@ fn measure(db: &Connection, next_sequence: u64) -> Result<OutboxContents, Histor
     db.query_row(&select, [], |row| {
         Ok(OutboxContents {
             next_sequence,
-            bytes: unsigned(row.get(0)?),
+            bytes: to_unsigned(row.get(0)?),
             oldest_ns: row.get(1)?,
             newest_ns: row.get(2)?,
             added_bytes: 0,
@@ -109,7 +109,7 @@ fn measure(db: &Connection, next_sequence: u64) -> Result<OutboxContents, Histor
 
 /// The newest row is never removed: the numbering goes on from it.
 fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
-    db.query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| row.get(0).map(unsigned))
+    db.query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| row.get(0).map(to_unsigned))
         .doing("numbering the outbox")
 }
 
@@ -194,8 +194,8 @@ fn load(db: &Connection, name: &str, next: u64, standing: &mut DeliveryState) ->
         Some((text, dropped, connections)) => {
             // A text that this version cannot read begins anew rather than sending everything twice.
             standing.position = serde_json::from_str(&text).unwrap_or(Position::at(next));
-            standing.dropped = unsigned(dropped);
-            standing.connections = unsigned(connections);
+            standing.dropped = to_unsigned(dropped);
+            standing.connections = to_unsigned(connections);
         }
         None => {
             *standing = DeliveryState { linked: standing.linked, ..DeliveryState::at(next) };
@@ -210,7 +210,9 @@ fn save(db: &Connection, name: &str, standing: &DeliveryState) -> Result<(), His
     db.prepare_cached(
         "INSERT OR REPLACE INTO outbox_sinks (name, position, dropped, connections) VALUES (?1, ?2, ?3, ?4)",
     )
-    .and_then(|mut save| save.execute(params![name, position, signed(standing.dropped), signed(standing.connections)]))
+    .and_then(|mut save| {
+        save.execute(params![name, position, to_signed(standing.dropped), to_signed(standing.connections)])
+    })
     .map(drop)
     .doing("noting what a sink has delivered")
 }
@@ -265,8 +267,8 @@ fn add(db: &Connection, stored: &mut OutboxContents, lines: &[(TimeNs, Cow<'_, s
         "INSERT INTO outbox (first_sequence, items, start_ns, end_ns, bytes, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
     )
     .and_then(|mut insert| {
-        let first = signed(stored.next_sequence);
-        insert.execute(params![first, lines.len() as i64, start_ns, end_ns, signed(bytes), body])
+        let first = to_signed(stored.next_sequence);
+        insert.execute(params![first, lines.len() as i64, start_ns, end_ns, to_signed(bytes), body])
     })
     .doing("storing the outbox")?;
     stored.next_sequence += lines.len() as u64;
@@ -308,7 +310,7 @@ fn remove(
             break;
         }
         db.prepare_cached("DELETE FROM outbox WHERE first_sequence = ?1")
-            .and_then(|mut delete| delete.execute([signed(first)]))
+            .and_then(|mut delete| delete.execute([to_signed(first)]))
             .doing("shortening the outbox")?;
         stored.bytes = stored.bytes.saturating_sub(bytes);
         if !delivered {
@@ -320,7 +322,7 @@ fn remove(
 
 /// Removes the oldest rows whose items are all below `lowest`, but never the newest row.
 fn remove_delivered(db: &Connection, lowest: u64, stored: &mut OutboxContents) -> Result<(), HistoryError> {
-    let end = signed(lowest.min(stored.next_sequence.saturating_sub(1)));
+    let end = to_signed(lowest.min(stored.next_sequence.saturating_sub(1)));
     let (last, bytes): (Option<i64>, i64) = db
         .prepare_cached(
             "SELECT max(first_sequence), coalesce(sum(bytes), 0) FROM (
@@ -333,7 +335,7 @@ fn remove_delivered(db: &Connection, lowest: u64, stored: &mut OutboxContents) -
     db.prepare_cached("DELETE FROM outbox WHERE first_sequence <= ?1")
         .and_then(|mut delete| delete.execute([last]))
         .doing("shortening the outbox")?;
-    stored.bytes = stored.bytes.saturating_sub(unsigned(bytes));
+    stored.bytes = stored.bytes.saturating_sub(to_unsigned(bytes));
     Ok(())
 }
 
@@ -342,7 +344,7 @@ fn oldest(db: &Connection) -> Result<Option<(u64, u64, TimeNs, u64)>, HistoryErr
     db.prepare_cached("SELECT first_sequence, items, end_ns, bytes FROM outbox ORDER BY first_sequence LIMIT 1")
         .and_then(|mut select| {
             let row = |row: &rusqlite::Row<'_>| {
-                Ok((unsigned(row.get(0)?), unsigned(row.get(1)?), row.get(2)?, unsigned(row.get(3)?)))
+                Ok((to_unsigned(row.get(0)?), to_unsigned(row.get(1)?), row.get(2)?, to_unsigned(row.get(3)?)))
             };
             select.query_row([], row).optional()
         })

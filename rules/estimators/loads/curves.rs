@@ -29,7 +29,7 @@ const QUANTITIES: [(&str, LoadQuantity); 4] = [
     ("spindle_current_a", LoadQuantity::SpindleCurrent),
 ];
 
-/// See the [module](self).
+/// Curves of a load over the feed, each with what it holds for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadCurves {
     pub(super) quantity: LoadQuantity,

@@ -55,10 +55,10 @@ impl LibraryArguments {
 pub(super) fn store(arguments: &LibraryArguments, record: &WearRecord) -> Result<Option<String>, CannotRun> {
     let Some(path) = &arguments.store else { return Ok(None) };
     let id = store_wear_model(path, clock::now_ns(), record).map_err(|error| cannot(&error))?;
-    Ok(Some(format!("\nstored as model {id} in {}: {}\n", path.display(), named(&record.key))))
+    Ok(Some(format!("\nstored as model {id} in {}: {}\n", path.display(), format_key(&record.key))))
 }
 
-fn named(key: &WearKey) -> String {
+fn format_key(key: &WearKey) -> String {
     let texts = [
         ("machine", &key.machine),
         ("tool", &key.tool),
@@ -97,7 +97,7 @@ fn line(model: &StoredWearModel) -> String {
         record.criterion_mm,
         record.cuts,
         100.0 * record.r2,
-        named(&record.key),
+        format_key(&record.key),
         record.origin
     )
 }
