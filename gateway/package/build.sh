@@ -27,6 +27,8 @@ make_package_files() {
   "$program" package-files target/package
   gzip -9nf target/package/man/*
   gzip -9nc gateway/handbook/changelog.md > target/package/changelog.gz
+  printf 'cnc-gateway (%s-1) stable; urgency=medium\n\n  * See changelog.gz.\n\n -- cnc-gateway maintainers <maintainers@cnc-gateway.example>  %s\n' \
+    "$version" "$(date -uRd "@$SOURCE_DATE_EPOCH")" | gzip -9nc > target/package/changelog.Debian.gz
 }
 
 # The tree of files that a package holds, below a folder.
@@ -43,7 +45,7 @@ stage() {
   install -Dm644 target/package/completions/cnc-gateway.bash "$root/usr/share/bash-completion/completions/cnc-gateway"
   install -Dm644 target/package/completions/_cnc-gateway "$root/usr/share/zsh/vendor-completions/_cnc-gateway"
   install -Dm644 target/package/completions/cnc-gateway.fish "$root/usr/share/fish/vendor_completions.d/cnc-gateway.fish"
-  install -Dm644 -t "$doc" README.md gateway/package/debian/copyright target/package/changelog.gz
+  install -Dm644 -t "$doc" README.md gateway/package/debian/copyright target/package/changelog.gz target/package/changelog.Debian.gz
 }
 
 # The same with what the package manager needs, as a package.
@@ -58,7 +60,7 @@ make_deb() {
   install -m755 -t "$root/DEBIAN" gateway/package/debian/{postinst,prerm,postrm}
   (cd "$root" && find etc usr -type f -print0 | sort -z | xargs -0 md5sum > DEBIAN/md5sums)
   find "$root" -exec touch -h -d "@$SOURCE_DATE_EPOCH" {} +
-  dpkg-deb --root-owner-group -Zxz --build "$root" "$out/cnc-gateway_$version-1_$architecture.deb"
+  dpkg-deb --root-owner-group -Zxz -z${DEB_LEVEL:-6} --build "$root" "$out/cnc-gateway_$version-1_$architecture.deb"
 }
 
 make_archive() {

@@ -120,7 +120,7 @@ fn agreement_shows_one_simulation_and_too_little_data_says_what_is_needed() {
     let html = in_language(&diagnosis, &short, Language::En);
     check(&html);
     assert!(html.contains("cannot answer the question") && html.contains("What to record next"));
-    assert!(html.contains("at least 60 rows"));
+    assert!(html.contains("at least 40 rows with a value of"));
 }
 
 #[test]
