@@ -56,6 +56,9 @@ pub(super) struct Fit {
 pub(super) fn fit(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) -> Option<Fit> {
     let free = free_parameters(parts);
     let mut parts = parts.to_vec();
+    if metric.bounded {
+        parts.iter_mut().for_each(hold_in_range);
+    }
     let mut simulated = simulate(&parts, scene)?;
     let mut error = square(metric, &simulated.total);
     for _ in 0..STEPS_MAX {
@@ -71,6 +74,14 @@ pub(super) fn fit(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) -> Opt
     let tangents = tangents(scene, &parts, &free, &simulated)?;
     let simulated = simulate(&parts, scene)?.total;
     Some(Fit { parts, free, simulated, tangents })
+}
+
+/// A fit without bounds may have left a parameter outside of its range; from there no step would lead back.
+fn hold_in_range(part: &mut Part) {
+    for parameter in part.parameters.iter_mut().filter(|parameter| !parameter.fixed) {
+        let (low, high) = parameter.range;
+        parameter.value = parameter.value.clamp(low, high);
+    }
 }
 
 /// Everything that is not fixed.
@@ -245,5 +256,15 @@ mod tests {
         let level = |bounded: bool| fitted(-20.0, bounded).parts[1].parameter("level").expect("a level").value;
         assert_eq!(level(true), 0.0);
         assert!(level(false) < -15.0, "{}", level(false));
+    }
+
+    #[test]
+    fn what_a_free_fit_has_moved_outside_comes_back() {
+        let mut scene = scene(-20.0);
+        let recorded = scene.recorded().to_vec();
+        let outside = fitted(-20.0, false).parts;
+        let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), bounded: true };
+        let held = fit(&mut scene, &outside, &metric).expect("every input is recorded");
+        assert_eq!(held.parts[1].parameter("level").expect("a level").value, 0.0);
     }
 }
