@@ -1,6 +1,6 @@
 //! `cnc-gateway setup`: the questions that a box needs answered, each tried at once, and the configuration from the answers.
 
-use super::{CannotRun, CommandOutcome, CommandResult, print};
+use super::{CannotRun, CommandOutcome, CommandResult, lang, print};
 use crate::access::{self, Persons, Role};
 use crate::doctor;
 use crate::setup::{AddressRange, SetupAnswers, scan_for_controls};
@@ -18,9 +18,6 @@ pub(super) struct SetupArguments {
     /// Directory of the data of the box.
     #[arg(long, value_name = "DIR", default_value = "/var/lib/cnc-gateway")]
     data_dir: PathBuf,
-    /// Language of the questions and of the page.
-    #[arg(long, value_parser = ["en", "zh"])]
-    language: Option<String>,
     /// Name of the machine.
     #[arg(long)]
     name: Option<String>,
@@ -88,8 +85,10 @@ impl Dialogue {
 /// Asks, tries, writes.
 pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
     let asks = !arguments.yes && std::io::stdin().is_terminal();
-    let dialogue = Dialogue { zh: speaks_chinese(arguments.language.as_deref()), asks };
-    let language = arguments.language.as_deref().map(|word| if word == "zh" { Language::Zh } else { Language::En });
+    let zh = lang::language() == Language::Zh;
+    let dialogue = Dialogue { zh, asks };
+    // Otherwise the page opens in the language of the browser.
+    let language = zh.then_some(Language::Zh);
     let machine = match &arguments.name {
         Some(name) => name.clone(),
         None => dialogue.ask(("Name of the machine", "机床名称"), &host_name())?,
@@ -121,11 +120,6 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
     Ok(CommandOutcome::Fine)
 }
 
-fn speaks_chinese(chosen: Option<&str>) -> bool {
-    let from_system = || std::env::var("LC_ALL").or_else(|_| std::env::var("LANG")).unwrap_or_default();
-    chosen.map_or_else(|| from_system().starts_with("zh"), |word| word == "zh")
-}
-
 fn host_name() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     if name.trim().is_empty() { "machine".to_owned() } else { name.trim().to_owned() }
@@ -141,13 +135,22 @@ fn list_controls(dialogue: &Dialogue, range: AddressRange) {
     }
 }
 
-/// Opens the address once and shows what it says. True when it may be used.
-fn try_address(dialogue: &Dialogue, address: &str) -> Result<bool, CannotRun> {
+/// What one look at an address says.
+enum LookedAt {
+    /// It is no address, or cannot be opened.
+    Unusable,
+    /// It can be used, with problems.
+    Doubtful,
+    Good,
+}
+
+/// Opens the address once and shows what it says.
+fn show_address(dialogue: &Dialogue, address: &str) -> LookedAt {
     let report = match doctor::examine_text(address) {
         Ok(report) => report,
         Err(what) => {
             print(&format!("  {what}\n"));
-            return Ok(false);
+            return LookedAt::Unusable;
         }
     };
     let known = report.readings.iter().filter(|(_, value)| value.is_ok()).count();
@@ -156,15 +159,26 @@ fn try_address(dialogue: &Dialogue, address: &str) -> Result<bool, CannotRun> {
     for problem in &report.problems {
         print(&format!("  ! {}\n    {}\n", problem.what, problem.next));
     }
-    if report.problems.is_empty() {
-        return Ok(true);
+    if report.problems.is_empty() { LookedAt::Good } else { LookedAt::Doubtful }
+}
+
+/// Shows what an address says, and asks where there is a doubt. True when it may be used.
+fn try_address(dialogue: &Dialogue, address: &str) -> Result<bool, CannotRun> {
+    match show_address(dialogue, address) {
+        LookedAt::Unusable => Ok(false),
+        LookedAt::Good => Ok(true),
+        LookedAt::Doubtful => dialogue.confirm(("Use it all the same?", "仍然使用吗?"), false),
     }
-    dialogue.confirm(("Use it all the same?", "仍然使用吗?"), false)
 }
 
 fn choose_control(dialogue: &Dialogue, given: Option<&str>) -> Result<Option<String>, CannotRun> {
     if let Some(given) = given {
-        return Ok(Some(given.to_owned()).filter(|given| given != "none"));
+        let address = complete_address(given, "fanuc");
+        // A control that is off today is written all the same: whoever gave the address means it.
+        if let Some(address) = &address {
+            show_address(dialogue, address);
+        }
+        return Ok(address);
     }
     let question = (
         "Control: an address such as fanuc://192.168.1.10, nclink://BROKER/SERIAL, simulated://lathe, \"scan 192.168.1.0/24\", or none",
@@ -189,7 +203,11 @@ fn choose_control(dialogue: &Dialogue, given: Option<&str>) -> Result<Option<Str
 
 fn choose_meters(dialogue: &Dialogue, given: &[String]) -> Result<Vec<String>, CannotRun> {
     if !given.is_empty() {
-        return Ok(given.iter().filter(|given| *given != "none").cloned().collect());
+        let meters: Vec<String> = given.iter().filter_map(|given| complete_address(given, "modbus-tcp")).collect();
+        for meter in &meters {
+            show_address(dialogue, meter);
+        }
+        return Ok(meters);
     }
     let question = (
         "Power meter: an address such as modbus-tcp://192.168.1.20?profile=sdm630 or modbus-rtu:///dev/ttyUSB0?profile=sdm630&unit=1, or none",

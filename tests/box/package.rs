@@ -2,7 +2,7 @@
 //!
 //! The update under `tests/data/update` was signed with minisign itself; its program is a script that answers as version 9.9.9.
 
-use super::process::{Gateway, program, stderr, stdout, text, wait_for};
+use super::process::{Gateway, get, program, run, stderr, stdout, text, wait_for};
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::os::unix::net::UnixDatagram;
@@ -118,6 +118,33 @@ fn an_update_is_verified_tried_and_kept() {
     assert!(stdout(&output).contains("not armed"), "{}", stdout(&output));
     let told = update(place, "exit 0", &[]);
     assert!(stdout(&told).contains("runs: 9.9.9"), "{}", stdout(&told));
+}
+
+#[test]
+fn a_box_is_set_up_with_one_command() {
+    let mut control = program();
+    control.args(["serve", "fanuc", "--machine", "lathe", "--listen", "127.0.0.1:0"]);
+    let mut control = Gateway::spawn(control);
+    let line = control.wait_said("fanuc://");
+    let control_address = line.split_whitespace().next().expect("an address");
+    let directory = tempfile::tempdir().expect("a directory");
+    let (config, data) = (directory.path().join("box.toml"), directory.path().join("data"));
+    let command = ["setup", "--yes", "--name", "CK6136", "--admin", "Li Wei", "--control", control_address];
+    let files = ["--out", text(&config), "--data-dir", text(&data)];
+    let output = run(&[&command[..], &files[..]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let said = stdout(&output);
+    assert!(said.contains("answers") && said.contains("token, shown only now, of Li Wei"), "{said}");
+    let checked = run(&["check", "--config", text(&config)]);
+    assert_eq!(checked.status.code(), Some(0), "{}", stdout(&checked));
+    let mut gateway = Gateway::start(&data, &["--config", text(&config)]);
+    let address = gateway.address();
+    wait_for("a value of the control", Duration::from_secs(30), || {
+        let status = get(&address, "/api/v1/status").json();
+        let channels = status["channels"].as_array()?.clone();
+        channels.iter().any(|row| row["name"] == "program" && row["value"].is_string()).then_some(())
+    });
+    gateway.stop();
 }
 
 #[test]
