@@ -55,10 +55,7 @@ pub fn answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) -> Resu
             FocasAnswer::Numbers(each(&mut cursor, Number::LEN, |cursor| Ok(number(cursor)?.measured()))?)
         }
         FocasItem::FeedUnit => FocasAnswer::Unit(unit(generation, cursor.i16()?)),
-        FocasItem::PositionUnit(frame) => FocasAnswer::Units(each(&mut cursor, 4, |cursor| {
-            let pair = [cursor.i16()?, cursor.i16()?];
-            Ok(pair[usize::from(frame == PositionFrame::Machine)])
-        })?),
+        FocasItem::PositionUnit(frame) => FocasAnswer::Units(each(&mut cursor, 4, |c| position_unit(c, frame))?),
         FocasItem::SpindleUnit => {
             // The library says rpm whatever the number is.
             cursor.i16()?;
@@ -77,12 +74,7 @@ pub fn answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) -> Resu
             FocasAnswer::Alarms(each(&mut cursor, length, |cursor| alarm(cursor, encoding))?)
         }
         FocasItem::ModalGroup(_) => FocasAnswer::Groups(each(&mut cursor, 2, |cursor| Ok(cursor.bytes(2)?[0]))?),
-        FocasItem::ModalWord(_) => {
-            let value = cursor.i32()?;
-            // Which byte is which: what `libfwlib32` 1.0.5 makes of `000000fa 01020304` is flag 2 and 4 places.
-            let [_, flag, _, places] = [cursor.u8()?, cursor.u8()?, cursor.u8()?, cursor.u8()?];
-            FocasAnswer::Modal { value, flag, places }
-        }
+        FocasItem::ModalWord(_) => modal_word(&mut cursor)?,
         FocasItem::Parameter(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, REAL)?,
         FocasItem::Diagnosis(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, DIAGNOSIS_REAL)?,
         FocasItem::Pmc(stretch) => {
@@ -105,15 +97,29 @@ pub fn answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) -> Resu
             FocasAnswer::History(each(&mut cursor, length, |cursor| super::records::past_alarm(cursor, encoding))?)
         }
         FocasItem::GCodes => FocasAnswer::Names(each(&mut cursor, 12, super::records::g_code)?),
-        FocasItem::ToolGroup => {
-            let [_next, in_use, _selected] = [cursor.i32()?, cursor.i32()?, cursor.i32()?];
-            cursor.bytes(cursor.left())?;
-            FocasAnswer::Whole(in_use)
-        }
+        FocasItem::ToolGroup => tool_group(&mut cursor)?,
         FocasItem::ToolLife(group) => super::records::life(&mut cursor, group)?,
     };
     cursor.end()?;
     Ok(answer)
+}
+
+/// Which byte is which: what `libfwlib32` 1.0.5 makes of `000000fa 01020304` is flag 2 and 4 places.
+fn modal_word(cursor: &mut Cursor<'_>) -> Result<FocasAnswer, WireError> {
+    let value = cursor.i32()?;
+    let [_, flag, _, places] = [cursor.u8()?, cursor.u8()?, cursor.u8()?, cursor.u8()?];
+    Ok(FocasAnswer::Modal { value, flag, places })
+}
+
+fn position_unit(cursor: &mut Cursor<'_>, frame: PositionFrame) -> Result<i16, WireError> {
+    let [of_work, of_machine] = [cursor.i16()?, cursor.i16()?];
+    Ok(if frame == PositionFrame::Machine { of_machine } else { of_work })
+}
+
+fn tool_group(cursor: &mut Cursor<'_>) -> Result<FocasAnswer, WireError> {
+    let [_next, in_use, _selected] = [cursor.i32()?, cursor.i32()?, cursor.i32()?];
+    cursor.bytes(cursor.left())?;
+    Ok(FocasAnswer::Whole(in_use))
 }
 
 fn unit(generation: Generation, number: i16) -> SpeedUnit {

@@ -15,7 +15,6 @@ use crate::channel::ChannelId;
 use crate::conversion::Conversion;
 use crate::own::{Own, OwnRead};
 use crate::reading::{Absence, Value};
-use crate::text::TextEncoding;
 use std::sync::Arc;
 
 /// Longest text, registers.
@@ -130,7 +129,7 @@ impl Own<OwnRegister> {
                     .map(|(_, found)| found.and_then(|word| word.first().copied().ok_or(Absence::NotSupported)));
                 let bytes: Vec<u8> =
                     words.collect::<Result<Vec<u16>, _>>()?.into_iter().flat_map(u16::to_be_bytes).collect();
-                let encoding = self.channel.encoding.unwrap_or(TextEncoding::default());
+                let encoding = self.channel.encoding.unwrap_or_default();
                 Ok(Value::Text(Arc::from(encoding.text(&bytes))))
             }
         }

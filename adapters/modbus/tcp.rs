@@ -47,7 +47,10 @@ struct TcpPort {
 /// A connection that several sources share.
 type SharedPort = Arc<Mutex<TcpPort>>;
 
-static PORTS: Mutex<Option<HashMap<(String, u16), Weak<Mutex<TcpPort>>>>> = Mutex::new(None);
+/// The connections that are in use, by host and port.
+type PortsByEndpoint = HashMap<(String, u16), Weak<Mutex<TcpPort>>>;
+
+static PORTS: Mutex<Option<PortsByEndpoint>> = Mutex::new(None);
 
 /// The connection of this host and port; the same one for every address that names it.
 fn shared(at: &Endpoint, framing: TcpFraming) -> Result<SharedPort, String> {

@@ -166,7 +166,8 @@ impl DoctorReport {
         for reason in [Absence::OutOfRange, Absence::Refused, Absence::Timeout] {
             let silent = |reading: &&Reading| reading.value == Err(reason) && reading.implausible.is_none();
             let names: Vec<&str> = readings.iter().filter(silent).map(|reading| reading.channel.name()).collect();
-            if !names.is_empty() && !(reason == Absence::Refused && told_refusals) {
+            let is_told = reason == Absence::Refused && told_refusals;
+            if !names.is_empty() && !is_told {
                 self.trouble(Trouble {
                     what: format!("no value ({reason}): {}", names.join(", ")),
                     next: next(reason),
