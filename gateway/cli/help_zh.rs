@@ -23,14 +23,14 @@ fn zh(text: &StyledStr) -> Option<&'static str> {
 }
 
 /// Every text of the command and of those below it in Chinese, where the table has it.
-pub(super) fn translated(command: Command) -> Command {
+pub(super) fn translate_command(command: Command) -> Command {
     let about = command.get_about().and_then(zh);
     let command = match about {
         Some(text) => command.about(text),
         None => command,
     };
     let names: Vec<String> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
-    let command = names.into_iter().fold(command, |command, name| command.mut_subcommand(name, translated));
+    let command = names.into_iter().fold(command, |command, name| command.mut_subcommand(name, translate_command));
     command.mut_args(|arg| {
         let text = arg.get_help().and_then(zh);
         let long = arg.get_long_help().and_then(zh).or(text);
@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn a_translated_command_takes_the_same_arguments() {
-        let command = translated(Arguments::command());
+        let command = translate_command(Arguments::command());
         let found = command.try_get_matches_from([
             "cnc-gateway",
             "--lang",

@@ -180,7 +180,7 @@ pub fn main() -> ExitCode {
 /// The command line, its help in this language.
 fn command(language: Language) -> clap::Command {
     let command = Arguments::command();
-    if language == Language::Zh { help_zh::translated(command) } else { command }
+    if language == Language::Zh { help_zh::translate_command(command) } else { command }
 }
 
 fn dispatch(arguments: Arguments) -> CommandResult {

@@ -1,9 +1,9 @@
-//! `cnc-gateway recording`: how a foreign file is understood, and the map that says it.
+//! `cnc-gateway recording`: how a foreign file is describe_reading, and the map that says it.
 
 use super::lang::{pick, say};
 use super::{CannotRun, CommandOutcome, CommandResult, print};
 use crate::diagnosis::map_file::{MapProposal, first_rows};
-use crate::diagnosis::{put, understood};
+use crate::diagnosis::{describe_reading, put};
 use adapters::channel::ChannelId;
 use adapters::channel::unit::Unit;
 use adapters::recording::Mapping;
@@ -24,7 +24,7 @@ pub(super) struct RecordingArguments {
 
 #[derive(Debug, Subcommand)]
 enum RecordingCommand {
-    /// Tell how a file is understood, and show its first rows.
+    /// Tell how a file is describe_reading, and show its first rows.
     Show(RecordingFile),
     /// Propose the map of a file (map/1), ask where something is unsure, write it beside the file.
     Map {
@@ -77,7 +77,7 @@ fn show(file: &RecordingFile) -> CommandResult {
 fn tell(found: &Preview, path: &Path) -> Result<(), CannotRun> {
     let name = path.display().to_string();
     let read = found.read.as_ref().map_err(|error| CannotRun::new(pick(&error.to_string(), &error.zh()), ""))?;
-    understood(&name, read).iter().for_each(|line| print(&format!("{}\n", say(line))));
+    describe_reading(&name, read).iter().for_each(|line| print(&format!("{}\n", say(line))));
     let rows = read.recording.rows();
     let refused = read.refused;
     print(&pick(&format!("{rows} rows, {refused} refused\n"), &format!("{rows}行，拒绝{refused}行\n")).to_owned());

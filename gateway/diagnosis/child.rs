@@ -155,7 +155,7 @@ struct Compared {
     to_ns: TimeNs,
 }
 
-fn compared(job: &DiagnosisJob) -> Result<Compared, String> {
+fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
     let parsed = |text: &str| {
         parse_model(text).map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     };
@@ -193,7 +193,7 @@ fn compared(job: &DiagnosisJob) -> Result<Compared, String> {
 fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), String> {
     let tell = |stage, rows| say(&ChildMessage::Stage(stage, rows)).map_err(|error| error.to_string());
     tell(Stage::Reading, 0)?;
-    let Compared { model, recording, reading, from_ns, to_ns } = compared(job)?;
+    let Compared { model, recording, reading, from_ns, to_ns } = read_input(job)?;
     tell(Stage::Comparing, recording.rows())?;
     let examination = twin::examine(&recording, &model);
     let context = DiagnosisContext::before(&recording, &model, reading);

@@ -15,6 +15,7 @@ mod outputs;
 pub mod place;
 mod recordings;
 pub mod series;
+mod series_alignment;
 pub mod simulation;
 pub mod status;
 pub mod steps;
@@ -27,7 +28,7 @@ pub mod worker;
 pub use join::join;
 pub use models::{read_hypotheses, read_model};
 pub use outputs::{DiagnosisOutputs, put};
-pub use recordings::{InputRecordings, read_recordings, read_recordings_as, understood};
+pub use recordings::{InputRecordings, describe_reading, read_recordings, read_recordings_as};
 
 use adapters::Recording;
 use rules::twin::{Diagnosis, Model, words as engine_words};

@@ -33,20 +33,20 @@ pub struct Coverage {
 }
 
 /// A column as the search sees it.
-enum Column<'a> {
+enum PlaceColumn<'a> {
     Numbers(String, Vec<Option<f64>>),
     Words(&'a str, &'a Words),
 }
 
 /// The search over one recording.
-struct Search<'a> {
+struct PlaceSearch<'a> {
     rows: Vec<usize>,
-    columns: Vec<Column<'a>>,
+    columns: Vec<PlaceColumn<'a>>,
 }
 
 /// Replaces the conditions of each region where fewer or better ones are found.
 pub fn refine(diagnosis: &mut Diagnosis, recording: &Recording) {
-    let search = Search::new(recording, &diagnosis.output);
+    let search = PlaceSearch::new(recording, &diagnosis.output);
     let regions: Vec<(usize, Vec<f64>)> = diagnosis
         .mismatch
         .iter()
@@ -69,11 +69,11 @@ pub fn refine(diagnosis: &mut Diagnosis, recording: &Recording) {
 /// What these conditions cover of a contribution.
 #[must_use]
 pub fn coverage(recording: &Recording, output: &str, conditions: &[Condition], contribution: &[f64]) -> Coverage {
-    let search = Search::new(recording, output);
+    let search = PlaceSearch::new(recording, output);
     search.coverage(&search.inside(conditions), &search.energy(contribution))
 }
 
-impl<'a> Search<'a> {
+impl<'a> PlaceSearch<'a> {
     fn new(recording: &'a Recording, output: &str) -> Self {
         let every = recording.rows().div_ceil(ROWS_MAX).max(1);
         let rows: Vec<usize> = (0..recording.rows()).step_by(every).collect();
@@ -81,30 +81,30 @@ impl<'a> Search<'a> {
         for column in recording.columns() {
             let name = column.name.as_str();
             if let Some(numbers) = recording.numbers(name).filter(|_| tells_a_place(name, output)) {
-                columns.push(Column::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
+                columns.push(PlaceColumn::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
             }
             if let Some(words) = recording
                 .words(name)
                 .filter(|words| words.words().len() > 1 && !name.ends_with("_missing") && name != "time_utc")
             {
-                columns.push(Column::Words(name, words));
+                columns.push(PlaceColumn::Words(name, words));
             }
         }
         for name in ["cutting_speed_m_min", "cutting_time_min", "feed_per_rev_mm"] {
             if recording.numbers(name).is_none()
                 && let Some(numbers) = derived(recording, name)
             {
-                columns.push(Column::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
+                columns.push(PlaceColumn::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
             }
         }
         if recording.pauses_known() {
-            columns.push(Column::Numbers(
+            columns.push(PlaceColumn::Numbers(
                 "time_s".to_owned(),
                 rows.iter().map(|row| Some(recording.time_s[*row])).collect(),
             ));
         }
         if recording.runs().len() > 1 {
-            columns.push(Column::Numbers("time_in_run_s".to_owned(), time_in_run(recording, &rows)));
+            columns.push(PlaceColumn::Numbers("time_in_run_s".to_owned(), time_in_run(recording, &rows)));
         }
         Self { rows, columns }
     }
@@ -153,14 +153,14 @@ impl<'a> Search<'a> {
     fn narrow(&self, inside: &mut [bool], condition: &Condition) {
         for column in &self.columns {
             match (column, condition) {
-                (Column::Numbers(name, values), Condition::Range { column, min, max }) if name == column => {
+                (PlaceColumn::Numbers(name, values), Condition::Range { column, min, max }) if name == column => {
                     let holds = |x: &f64| min.is_none_or(|min| *x >= min) && max.is_none_or(|max| *x <= max);
                     inside
                         .iter_mut()
                         .zip(values)
                         .for_each(|(inside, value)| *inside &= value.as_ref().is_some_and(holds));
                 }
-                (Column::Words(name, cells), Condition::Equals { column, words }) if name == column => {
+                (PlaceColumn::Words(name, cells), Condition::Equals { column, words }) if name == column => {
                     let holds = |row: usize| cells.get(row).is_some_and(|word| words.iter().any(|known| known == word));
                     inside.iter_mut().zip(&self.rows).for_each(|(inside, row)| *inside &= holds(*row));
                 }
@@ -195,12 +195,12 @@ impl<'a> Search<'a> {
         (chosen, value)
     }
 
-    fn candidates(&self, column: &Column<'_>, inside: &[bool], energy: &[f64]) -> Vec<Condition> {
+    fn candidates(&self, column: &PlaceColumn<'_>, inside: &[bool], energy: &[f64]) -> Vec<Condition> {
         match column {
-            Column::Numbers(name, values) => {
+            PlaceColumn::Numbers(name, values) => {
                 thresholds(values, inside).into_iter().flat_map(|(low, high)| ranges(name, low, high)).collect()
             }
-            Column::Words(name, words) => self.lists(name, words, inside, energy),
+            PlaceColumn::Words(name, words) => self.lists(name, words, inside, energy),
         }
     }
 
@@ -305,7 +305,7 @@ mod tests {
     #[test]
     fn a_threshold_is_told_and_not_a_list_of_runs() {
         let (recording, effect) = recording();
-        let search = Search::new(&recording, "spindle_power_w");
+        let search = PlaceSearch::new(&recording, "spindle_power_w");
         let (found, _) = search.best(&search.weights(&effect));
         let [Condition::Range { column, min: Some(min), max: None }] = &found[..] else { panic!("{found:?}") };
         assert_eq!(column, "cutting_time_min");
@@ -317,7 +317,7 @@ mod tests {
     #[test]
     fn what_acts_everywhere_needs_no_words() {
         let (recording, _) = recording();
-        let search = Search::new(&recording, "spindle_power_w");
+        let search = PlaceSearch::new(&recording, "spindle_power_w");
         assert!(search.best(&search.weights(&vec![5.0; recording.rows()])).0.is_empty());
     }
 }

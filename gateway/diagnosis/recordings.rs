@@ -49,7 +49,7 @@ pub fn read_recordings_as(sources: &[String], map: Option<&PathBuf>) -> Result<I
     }
     let mut warnings = Vec::new();
     for (source, one) in &read {
-        warnings.extend(understood(source, one));
+        warnings.extend(describe_reading(source, one));
         if let Some(text) = refusals(source, one) {
             if is_too_much(one) { problems.push(text) } else { warnings.push(text) }
         }
@@ -89,7 +89,7 @@ fn whole(recording: Recording) -> ReadRecording {
 
 /// How a file was understood, line by line; nothing for a file that is written as the contract says.
 #[must_use]
-pub fn understood(source: &str, read: &ReadRecording) -> Vec<Bilingual> {
+pub fn describe_reading(source: &str, read: &ReadRecording) -> Vec<Bilingual> {
     let mut lines = Vec::new();
     let statement = read.statement();
     if !statement.en.is_empty() {

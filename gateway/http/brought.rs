@@ -36,7 +36,7 @@ const ROWS_SHOWN: usize = 6;
 pub(super) const ROUTES: &[Route] = &[
     Route::read("/api/v1/files", || get(list)),
     Route::post(Role::Setter, "/api/v1/files", FILE_MAX, || post(bring)),
-    Route::read("/api/v1/files/{key}", || get(understood)),
+    Route::read("/api/v1/files/{key}", || get(describe)),
     Route::put(Role::Setter, "/api/v1/files/{key}/map", BODY_MAX, || put(map)),
     Route::post(Role::Setter, "/api/v1/files/{key}/diagnosis", BODY_MAX, || post(begin)),
     Route::read("/api/v1/files-diagnosis", || get(state)),
@@ -118,7 +118,7 @@ fn now_ms(shared: &ServerState) -> i64 {
 }
 
 /// `GET /api/v1/files/{key}`: how it is understood.
-async fn understood(State(shared): State<ServerState>, Path(key): Path<String>) -> Result<Json<Value>, ApiProblem> {
+async fn describe(State(shared): State<ServerState>, Path(key): Path<String>) -> Result<Json<Value>, ApiProblem> {
     let files = shared.files()?.clone();
     aside(move || document(&files, &key).map(Json)).await
 }
@@ -265,7 +265,7 @@ struct FileDiagnosisRequest {
     toml: Option<String>,
     /// or the one that runs beside the machine.
     #[serde(default)]
-    in_charge: bool,
+    active_model: bool,
     /// A series: the key of another file, or of this one, and its column.
     #[serde(default)]
     simulated: Option<SeriesChoice>,
@@ -320,7 +320,7 @@ fn model_text(shared: &ServerState, asked: &FileDiagnosisRequest) -> Result<Stri
         rules::twin::parse_model(toml).map_err(wrong)?;
         return Ok(toml.clone());
     }
-    if asked.in_charge {
+    if asked.active_model {
         let none = || ApiProblem::conflict("no simulation runs beside this machine", "choose a kind of machine");
         let path = shared.diagnoses.as_ref().ok_or_else(none)?.model().to_owned();
         return crate::files::read_text(&path, 4 << 20).map_err(broken);

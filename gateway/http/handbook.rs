@@ -16,12 +16,12 @@ pub(super) const ROUTES: &[Route] = &[Route::file("/api/v1/handbook/{chapter}", 
 /// The language of a chapter.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct LanguageQuery {
+struct ChapterQuery {
     lang: String,
 }
 
 /// `GET /api/v1/handbook/{chapter}?lang=zh`: Markdown; `index` gives the list of the chapters with their titles.
-async fn chapter(Path(name): Path<String>, Query(asked): Query<LanguageQuery>) -> Response {
+async fn chapter(Path(name): Path<String>, Query(asked): Query<ChapterQuery>) -> Response {
     let language = if asked.lang == "zh" { Language::Zh } else { Language::En };
     if name == "index" {
         let row = |chapter: &Chapter| json!({ "name": chapter.topic, "title": chapter.title(language), "zh": chapter.zh.is_some() });

@@ -10,7 +10,8 @@ pub(super) fn section(data: &Data<'_>) -> String {
     if context.doubts.is_empty() {
         return String::new();
     }
-    let items: String = context.doubts.iter().map(|doubt| format!("<li>{}</li>", said(data, &doubt.text))).collect();
+    let items: String =
+        context.doubts.iter().map(|doubt| format!("<li>{}</li>", pick_text(data, &doubt.text))).collect();
     format!(
         "<section class=\"doubts\"><h2>{}</h2><ul>{items}</ul></section>\n",
         data.say(
@@ -21,6 +22,6 @@ pub(super) fn section(data: &Data<'_>) -> String {
 }
 
 /// One sentence of the context in the language of the page, escaped.
-pub(super) fn said(data: &Data<'_>, text: &Bilingual) -> String {
+pub(super) fn pick_text(data: &Data<'_>, text: &Bilingual) -> String {
     escape(data.say(&text.en, &text.zh))
 }

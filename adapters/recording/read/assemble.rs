@@ -1,16 +1,18 @@
 //! The second way through a table: rows become a block under the plan, and whatever is not used is counted by column and line.
 
-use super::cell::{Cell, flag, is_absent, is_absent_number, written_number};
+use super::cell::{Cell, flag, is_absent, written_number};
+use super::convert::{
+    is_nothing, join_date_and_time, moment_of_cell, number_of, show_cell, text_of, to_nanoseconds, unix_ns,
+    utc_or_local,
+};
 use super::error::{RecordingError, RowProblem};
 use super::head::Head;
 use super::limits::{CELLS_MAX, DESCRIBED_MAX, WORDS_BYTES_MAX};
 use super::mapping::Mapping;
-use super::moment::{WrittenMoment, written_moment};
 use super::plan::{BlockPlan, Note, NoteKind, PlannedColumn, PlannedKind, ReadPlan, TimeKind};
 use super::survey::{fitted, is_comment, repeats_header};
-use super::table::{Step, Table};
+use super::table::{Table, VisitStep};
 use super::time::{RawTime, resolve};
-use crate::clock::{SECOND_NS, TimeNs};
 use crate::recording::{Cells, Numbers, Recording, Words};
 
 /// Lines after the data that are taken for sums and remarks; more of them are refused rows.
@@ -49,15 +51,15 @@ pub(super) fn assemble(
     let (mut repeated, mut comments) = (0_u64, 0_u64);
     table.visit(&mut |row| {
         if row.line < head.data_line || row.cells.iter().all(|cell| *cell == Cell::Empty) {
-            return Ok(Step::Next);
+            return Ok(VisitStep::Next);
         }
         if repeats_header(row, head) {
             repeated += 1;
-            return Ok(Step::Next);
+            return Ok(VisitStep::Next);
         }
         if is_comment(row, head) {
             comments += 1;
-            return Ok(Step::Next);
+            return Ok(VisitStep::Next);
         }
         match fitted(row, head, short) {
             Some(cells) => blocks.iter_mut().for_each(|block| block.take(row.line, cells, &mut done)),
@@ -69,7 +71,7 @@ pub(super) fn assemble(
             }
         }
         blocks.iter().try_for_each(|block| block.within_limits(file))?;
-        Ok(Step::Next)
+        Ok(VisitStep::Next)
     })?;
     count_note(
         repeated,
@@ -188,32 +190,34 @@ impl<'p> BlockBuilder<'p> {
         let plan = &self.plan.time;
         let at = |index: usize| cells.get(index).copied().unwrap_or(Cell::Empty);
         let cell = at(plan.index);
-        let part_ns = plan.milliseconds.and_then(|index| number_of(at(index))).map_or(0, |ms| nanoseconds(ms / 1e3));
+        let part_ns = plan.milliseconds.and_then(|index| number_of(at(index))).map_or(0, |ms| to_nanoseconds(ms / 1e3));
         let time = match plan.kind {
             TimeKind::Seconds { factor, .. } => self.number(cell)?.map(|number| RawTime::Seconds(number * factor)),
             TimeKind::Unix { factor, .. } => unix_ns(cell, factor)
-                .or(self.number(cell)?.map(|number| nanoseconds(number * factor)))
+                .or(self.number(cell)?.map(|number| to_nanoseconds(number * factor)))
                 .map(RawTime::Utc),
             TimeKind::Days { .. } => {
-                self.number(cell)?.map(|days| RawTime::Local(nanoseconds((days - 25_569.0) * 86_400.0)))
+                self.number(cell)?.map(|days| RawTime::Local(to_nanoseconds((days - 25_569.0) * 86_400.0)))
             }
             TimeKind::TimesOfDay => {
-                moment(cell)?.and_then(|moment| moment.time_of_day_ns).map(|ns| RawTime::OfDay(ns + part_ns))
+                moment_of_cell(cell)?.and_then(|moment| moment.time_of_day_ns).map(|ns| RawTime::OfDay(ns + part_ns))
             }
             TimeKind::Moments { order } => match (cell, plan.date) {
                 (Cell::Instant(at_ns), _) => Some(RawTime::Utc(at_ns)),
                 (Cell::Local(at_ns), _) => Some(RawTime::Local(at_ns)),
-                (_, None) => {
-                    moment(cell)?.filter(|moment| moment.date.is_some()).and_then(|moment| utc_or_local(moment, order))
+                (_, None) => moment_of_cell(cell)?
+                    .filter(|moment| moment.date.is_some())
+                    .and_then(|moment| utc_or_local(moment, order)),
+                (_, Some(date)) => {
+                    join_date_and_time(at(date), cell, order)?.map(|at_ns| RawTime::Local(at_ns + part_ns))
                 }
-                (_, Some(date)) => joined(at(date), cell, order)?.map(|at_ns| RawTime::Local(at_ns + part_ns)),
             },
         };
         time.ok_or_else(|| match (cell, plan.source.as_str()) {
             (Cell::Empty, _) => "no time".to_owned(),
-            (cell, "time_utc") => format!("{} is not a time like 2026-01-31T08:15:00.5Z (RFC 3339)", shown(cell)),
-            (cell, "time_s") => format!("{} is not a time in seconds", shown(cell)),
-            (cell, _) => format!("{} is not a time as in the other rows", shown(cell)),
+            (cell, "time_utc") => format!("{} is not a time like 2026-01-31T08:15:00.5Z (RFC 3339)", show_cell(cell)),
+            (cell, "time_s") => format!("{} is not a time in seconds", show_cell(cell)),
+            (cell, _) => format!("{} is not a time as in the other rows", show_cell(cell)),
         })
     }
 
@@ -252,7 +256,7 @@ impl<'p> BlockBuilder<'p> {
         let first = kept.iter().position(|kept| *kept).unwrap_or(0);
         // Seconds count from the first row that is kept, where the day is known.
         let (start_ns, shift_s) = match (timed.start_ns, timed.time_s.get(first)) {
-            (Some(start_ns), Some(first_s)) => (Some(start_ns + nanoseconds(*first_s)), *first_s),
+            (Some(start_ns), Some(first_s)) => (Some(start_ns + to_nanoseconds(*first_s)), *first_s),
             (start_ns, _) => (start_ns, 0.0),
         };
         let time_s =
@@ -317,7 +321,7 @@ impl ColumnBuilder<'_> {
                 self.loss.lines.push(line);
             }
             if self.loss.example.is_empty() {
-                self.loss.example = shown(cell);
+                self.loss.example = show_cell(cell);
             }
         }
         self.numbers.push(number);
@@ -340,75 +344,4 @@ impl ColumnBuilder<'_> {
     fn finish(self) -> Cells {
         if self.plan.kind == PlannedKind::Words { Cells::Words(self.words) } else { Cells::Numbers(self.numbers) }
     }
-}
-
-fn is_nothing(cell: Cell<'_>) -> bool {
-    match cell {
-        Cell::Empty => true,
-        Cell::Text(text) => is_absent_number(text),
-        _ => false,
-    }
-}
-
-fn number_of(cell: Cell<'_>) -> Option<f64> {
-    match cell {
-        Cell::Number(number) => Some(number),
-        Cell::Text(text) => text.parse().ok().filter(|number: &f64| number.is_finite()),
-        _ => None,
-    }
-}
-
-/// Whole nanoseconds since 1970 exactly, which a double does not hold.
-fn unix_ns(cell: Cell<'_>, factor: f64) -> Option<TimeNs> {
-    let Cell::Text(text) = cell else { return None };
-    (factor <= 1e-9).then(|| text.parse().ok()).flatten()
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "saturates")]
-fn nanoseconds(seconds: f64) -> i64 {
-    (seconds * SECOND_NS as f64).round() as i64
-}
-
-fn moment(cell: Cell<'_>) -> Result<Option<WrittenMoment>, String> {
-    Ok(match cell {
-        Cell::Text(text) => written_moment(text),
-        _ => None,
-    })
-}
-
-fn utc_or_local(moment: WrittenMoment, order: super::moment::DateOrder) -> Option<RawTime> {
-    let local_ns = moment.local_ns(order)?;
-    Some(match moment.offset_s {
-        Some(offset_s) => RawTime::Utc(local_ns.checked_sub(i64::from(offset_s) * SECOND_NS)?),
-        None => RawTime::Local(local_ns),
-    })
-}
-
-/// A date in one column and the time of day in another.
-fn joined(date: Cell<'_>, time: Cell<'_>, order: super::moment::DateOrder) -> Result<Option<TimeNs>, String> {
-    let day_ns = match date {
-        Cell::Local(at_ns) | Cell::Instant(at_ns) => Some(at_ns),
-        date => moment(date)?.and_then(|date| WrittenMoment { time_of_day_ns: None, ..date }.local_ns(order)),
-    };
-    let of_day_ns = match time {
-        Cell::Local(at_ns) => Some(at_ns.rem_euclid(86_400 * SECOND_NS)),
-        Cell::Number(days) if (0.0..1.0).contains(&days) => Some(nanoseconds(days * 86_400.0)),
-        time => moment(time)?.and_then(|time| time.time_of_day_ns),
-    };
-    Ok(day_ns.zip(of_day_ns).map(|(day_ns, of_day_ns)| day_ns + of_day_ns))
-}
-
-fn text_of(cell: Cell<'_>) -> String {
-    match cell {
-        Cell::Empty => String::new(),
-        Cell::Text(text) => text.to_owned(),
-        Cell::Number(number) => number.to_string(),
-        Cell::Flag(flag) => flag.to_string(),
-        Cell::Instant(at_ns) | Cell::Local(at_ns) => jiff::Timestamp::from_nanosecond(i128::from(at_ns))
-            .map_or_else(|_| String::new(), |stamp| stamp.to_string()),
-    }
-}
-
-fn shown(cell: Cell<'_>) -> String {
-    format!("{:?}", text_of(cell).chars().take(60).collect::<String>())
 }

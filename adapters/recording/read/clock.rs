@@ -17,7 +17,7 @@ const LONG_STEP: f64 = 10.0;
 const EXCEL_DAYS: (f64, f64) = (36_526.0, 73_051.0);
 
 /// What is known of the columns of a table.
-pub(super) struct Columns<'a> {
+pub(super) struct ForeignColumns<'a> {
     pub(super) file: &'a str,
     pub(super) head: &'a Head,
     pub(super) names: &'a [ForeignName],
@@ -27,7 +27,7 @@ pub(super) struct Columns<'a> {
     pub(super) decimal: Option<Decimal>,
 }
 
-impl Columns<'_> {
+impl ForeignColumns<'_> {
     pub(super) fn wrong(&self, en: String, zh: String) -> RecordingError {
         RecordingError::Header { file: self.file.to_owned(), line: self.head.line, reason: Bilingual::new(en, zh) }
     }

@@ -4,7 +4,7 @@ use super::cell::{Cell, is_absent_number, written_number};
 use super::error::RecordingError;
 use super::limits::HEAD_ROWS;
 use super::moment::written_moment;
-use super::table::{OwnedCell, Step, Table};
+use super::table::{OwnedCell, Table, VisitStep};
 use crate::bilingual::Bilingual;
 use crate::channel::unit::Unit;
 
@@ -43,11 +43,11 @@ pub(super) struct GivenLines {
 pub(super) fn look(table: &dyn Table, given: GivenLines, file: &str) -> Result<Head, RecordingError> {
     let mut rows: Vec<HeadRow> = Vec::new();
     table.visit(&mut |row| {
-        let cells: Vec<OwnedCell> = row.cells.iter().map(owned).collect();
+        let cells: Vec<OwnedCell> = row.cells.iter().map(to_owned_cell).collect();
         if cells.iter().any(|cell| *cell != OwnedCell::Empty) {
             rows.push((row.line, cells));
         }
-        Ok(if rows.len() < HEAD_ROWS { Step::Next } else { Step::Enough })
+        Ok(if rows.len() < HEAD_ROWS { VisitStep::Next } else { VisitStep::Enough })
     })?;
     if rows.is_empty() {
         return Err(RecordingError::Empty { file: file.to_owned(), problems: Vec::new() });
@@ -83,7 +83,7 @@ pub(super) fn look(table: &dyn Table, given: GivenLines, file: &str) -> Result<H
     let width = rows[first..].first().map_or(0, |(_, cells)| cells.len());
     let mut head =
         Head { line: rows[names].0, data_line: rows.get(first).map_or(u64::MAX, |row| row.0), ..Head::default() };
-    head.names = paired(&rows[..first]).unwrap_or_else(|| texts(&rows[names].1));
+    head.names = paired_names(&rows[..first]).unwrap_or_else(|| texts(&rows[names].1));
     strip_comment_sign(&mut head.names);
     let filled = head.names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
     head.names.truncate(filled.max(1));
@@ -109,7 +109,7 @@ fn no_names() -> Bilingual {
     )
 }
 
-fn owned(cell: &Cell<'_>) -> OwnedCell {
+fn to_owned_cell(cell: &Cell<'_>) -> OwnedCell {
     match cell {
         Cell::Empty => OwnedCell::Empty,
         Cell::Text(text) => OwnedCell::text(text),
@@ -136,7 +136,7 @@ enum CellKind {
     Word,
 }
 
-fn kind(cell: &OwnedCell) -> CellKind {
+fn kind_of_cell(cell: &OwnedCell) -> CellKind {
     match cell {
         OwnedCell::Empty => CellKind::Nothing,
         OwnedCell::Text(text) if is_absent_number(text) => CellKind::Nothing,
@@ -150,7 +150,7 @@ fn kind(cell: &OwnedCell) -> CellKind {
 
 /// The first row that looks as the rows further down do; 0 where the first one does, the number of rows where none does.
 fn first_data_row(rows: &[HeadRow]) -> usize {
-    let kinds: Vec<Vec<CellKind>> = rows.iter().map(|(_, cells)| cells.iter().map(kind).collect()).collect();
+    let kinds: Vec<Vec<CellKind>> = rows.iter().map(|(_, cells)| cells.iter().map(kind_of_cell).collect()).collect();
     let further = &kinds[kinds.len() / 2..];
     let width = further.iter().map(Vec::len).max().unwrap_or(0);
     let usual: Vec<CellKind> = (0..width)
@@ -205,7 +205,7 @@ fn names_row(rows: &[HeadRow], units: Option<usize>) -> Option<usize> {
 }
 
 /// `Name X Name Y`, as TwinCAT writes it: every second column is the time of the one behind it, in the unit of the line below.
-fn paired(rows: &[HeadRow]) -> Option<Vec<String>> {
+fn paired_names(rows: &[HeadRow]) -> Option<Vec<String>> {
     let is_pair = |cells: &[String]| {
         cells.len() >= 4
             && cells.len().is_multiple_of(2)

@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 pub(super) struct Input {
     /// The name for messages.
     pub(super) file: String,
-    place: Place,
+    place: InputPlace,
 }
 
 #[derive(Debug, Clone)]
-enum Place {
+enum InputPlace {
     Path(PathBuf),
     Memory(Vec<u8>),
 }
@@ -27,11 +27,11 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 impl Input {
     pub(super) fn path(path: &Path) -> Self {
-        Self { file: path.display().to_string(), place: Place::Path(path.to_owned()) }
+        Self { file: path.display().to_string(), place: InputPlace::Path(path.to_owned()) }
     }
 
     pub(super) fn memory(bytes: Vec<u8>, file: &str) -> Self {
-        Self { file: file.to_owned(), place: Place::Memory(bytes) }
+        Self { file: file.to_owned(), place: InputPlace::Memory(bytes) }
     }
 
     pub(super) fn broken(&self, error: std::io::Error) -> RecordingError {
@@ -41,10 +41,10 @@ impl Input {
     /// As it is stored.
     pub(super) fn raw(&self) -> Result<Box<dyn Seekable + '_>, RecordingError> {
         Ok(match &self.place {
-            Place::Path(path) => {
+            InputPlace::Path(path) => {
                 Box::new(BufReader::with_capacity(1 << 16, File::open(path).map_err(|error| self.broken(error))?))
             }
-            Place::Memory(bytes) => Box::new(Cursor::new(bytes.as_slice())),
+            InputPlace::Memory(bytes) => Box::new(Cursor::new(bytes.as_slice())),
         })
     }
 

@@ -4,9 +4,9 @@ use super::cell::{Cell, is_absent};
 use super::error::RecordingError;
 use super::head::Head;
 use super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX};
-use super::names::squeezed;
+use super::names::squeeze_name;
 use super::survey::{Survey, fitted};
-use super::table::{ColumnCells, ColumnTable, OwnedCell, Step, Table};
+use super::table::{ColumnCells, ColumnTable, OwnedCell, Table, VisitStep};
 use crate::bilingual::Bilingual;
 use std::collections::HashMap;
 
@@ -34,13 +34,13 @@ const NAME: &[&str] = &[
 const VALUE: &[&str] = &["value", "wert", "messwert", "数值", "值", "测量值"];
 
 /// The table turned; `None` where it is none of this kind.
-pub(super) fn turned(
+pub(super) fn turn_table(
     table: &dyn Table,
     head: &Head,
     survey: &Survey,
     file: &str,
 ) -> Result<Option<ColumnTable>, RecordingError> {
-    let position = |known: &[&str]| head.names.iter().position(|name| known.contains(&squeezed(name).as_str()));
+    let position = |known: &[&str]| head.names.iter().position(|name| known.contains(&squeeze_name(name).as_str()));
     let (Some(name), Some(value)) = (position(NAME), position(VALUE)) else { return Ok(None) };
     let is_word = survey.columns[name].words * 2 > survey.columns[name].filled();
     let moments = |index: usize| {
@@ -57,21 +57,21 @@ pub(super) fn turned(
     let mut known: HashMap<String, usize> = HashMap::new();
     let mut cells = 0;
     table.visit(&mut |row| {
-        let Some(found) = fitted(row, head, true).filter(|_| row.line >= head.data_line) else { return Ok(Step::Next) };
+        let Some(found) = fitted(row, head, true).filter(|_| row.line >= head.data_line) else { return Ok(VisitStep::Next) };
         let at = |index: usize| found.get(index).copied().unwrap_or(Cell::Empty);
-        let Cell::Text(text) = at(name) else { return Ok(Step::Next) };
+        let Cell::Text(text) = at(name) else { return Ok(VisitStep::Next) };
         let place = *known.entry(text.to_owned()).or_insert_with(|| {
             series.push((text.to_owned(), Vec::new(), Vec::new()));
             series.len() - 1
         });
-        series[place].1.push(owned(at(time)));
-        series[place].2.push(owned(at(value)));
+        series[place].1.push(to_owned_cell(at(time)));
+        series[place].2.push(to_owned_cell(at(value)));
         cells += 2;
         if cells > CELLS_IN_MEMORY_MAX || series.len() > COLUMNS_MAX {
             let en = format!("more than {CELLS_IN_MEMORY_MAX} values or {COLUMNS_MAX} names, one line for each: export them as columns");
             return Err(RecordingError::format(file, en, format!("每行一个值，超过{CELLS_IN_MEMORY_MAX}个值或{COLUMNS_MAX}个名称：请按列导出")));
         }
-        Ok(Step::Next)
+        Ok(VisitStep::Next)
     })?;
     let label = head.names[time].clone();
     let mut form = table.form();
@@ -85,7 +85,7 @@ pub(super) fn turned(
     Ok(Some(ColumnTable { columns, form }))
 }
 
-fn owned(cell: Cell<'_>) -> OwnedCell {
+fn to_owned_cell(cell: Cell<'_>) -> OwnedCell {
     match cell {
         Cell::Text(text) if !is_absent(text) => OwnedCell::text(text),
         Cell::Text(_) | Cell::Empty => OwnedCell::Empty,

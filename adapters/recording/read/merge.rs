@@ -30,13 +30,16 @@ pub(super) fn merge(mut blocks: Vec<Recording>, together: bool, notes: &mut Vec<
         .filter(|index| SLOW_SHARE * blocks[*index].rows() >= most)
         .min_by_key(|index| blocks[*index].rows());
     let Some(axis) = axis else { return Recording::default() };
-    tell(&blocks, axis, same_rows, notes);
+    note_clocks(&blocks, axis, same_rows, notes);
     let mut merged = Recording::new(blocks[axis].source.clone(), blocks[axis].time_s.clone(), blocks[axis].start_ns);
     for (index, block) in blocks.iter().enumerate() {
         let shift_s = shift_s(&blocks[axis], block);
         for column in block.columns() {
-            let cells =
-                if index == axis { column.cells.clone() } else { onto(&merged.time_s, block, &column.cells, shift_s) };
+            let cells = if index == axis {
+                column.cells.clone()
+            } else {
+                bring_onto(&merged.time_s, block, &column.cells, shift_s)
+            };
             merged.set_column(&column.name, cells);
         }
     }
@@ -55,7 +58,7 @@ fn shift_s(axis: &Recording, block: &Recording) -> f64 {
     }
 }
 
-fn tell(blocks: &[Recording], axis: usize, same_rows: bool, notes: &mut Vec<Note>) {
+fn note_clocks(blocks: &[Recording], axis: usize, same_rows: bool, notes: &mut Vec<Note>) {
     let count = blocks.len();
     let name = blocks[axis].columns().first().map_or("", |column| column.name.as_str());
     notes.push(Note::new(
@@ -79,7 +82,7 @@ fn tell(blocks: &[Recording], axis: usize, same_rows: bool, notes: &mut Vec<Note
     }
 }
 
-fn onto(axis: &[f64], block: &Recording, cells: &Cells, shift_s: f64) -> Cells {
+fn bring_onto(axis: &[f64], block: &Recording, cells: &Cells, shift_s: f64) -> Cells {
     let times: Vec<f64> = block.time_s.iter().map(|time_s| time_s + shift_s).collect();
     match cells {
         Cells::Words(words) => {
@@ -88,7 +91,7 @@ fn onto(axis: &[f64], block: &Recording, cells: &Cells, shift_s: f64) -> Cells {
                 .for_each(|at_s| held.push(last_before(&times, *at_s).and_then(|row| words.get(row)).unwrap_or("")));
             Cells::Words(held)
         }
-        Cells::Numbers(numbers) => Cells::Numbers(resampled(axis, &times, numbers)),
+        Cells::Numbers(numbers) => Cells::Numbers(resample(axis, &times, numbers)),
     }
 }
 
@@ -102,7 +105,7 @@ fn usual_step(times: &[f64]) -> f64 {
     steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
 
-fn resampled(axis: &[f64], times: &[f64], numbers: &Numbers) -> Numbers {
+fn resample(axis: &[f64], times: &[f64], numbers: &Numbers) -> Numbers {
     let present: Vec<usize> = (0..times.len()).filter(|row| numbers.get(*row).is_some()).collect();
     let own: Vec<f64> = present.iter().map(|row| times[*row]).collect();
     let values: Vec<f64> = present.iter().filter_map(|row| numbers.get(*row)).collect();
@@ -113,13 +116,13 @@ fn resampled(axis: &[f64], times: &[f64], numbers: &Numbers) -> Numbers {
             if is_flag {
                 last_before(&own, *at_s).map(|row| values[row])
             } else {
-                interpolated(&own, &values, *at_s, GAP_STEPS * step)
+                interpolate_at(&own, &values, *at_s, GAP_STEPS * step)
             }
         })
         .collect()
 }
 
-fn interpolated(times: &[f64], values: &[f64], at_s: f64, gap_s: f64) -> Option<f64> {
+fn interpolate_at(times: &[f64], values: &[f64], at_s: f64, gap_s: f64) -> Option<f64> {
     let after = times.partition_point(|time_s| *time_s < at_s - 1e-9);
     if times.get(after).is_some_and(|time_s| (time_s - at_s).abs() < 1e-9) {
         return Some(values[after]);

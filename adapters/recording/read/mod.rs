@@ -18,6 +18,7 @@
 mod assemble;
 pub mod cell;
 mod clock;
+mod convert;
 pub(super) mod encoding;
 pub(super) mod error;
 mod formats;
@@ -31,8 +32,10 @@ mod moment;
 pub mod names;
 pub(super) mod plan;
 mod preview;
+mod splitter;
 mod survey;
 pub(super) mod table;
+mod targets;
 pub(super) mod text;
 mod time;
 mod understand;
@@ -115,7 +118,7 @@ pub fn read_csv(mut input: impl Read, file: &str) -> Result<ReadRecording, Recor
 fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, RecordingError> {
     let file = input.file.clone();
     let table = formats::open(input, mapping)?;
-    let (head, plan, table) = planned(table, mapping, &file)?;
+    let (head, plan, table) = plan_table(table, mapping, &file)?;
     let mut done = assemble::assemble(table.as_ref(), &head, &plan, mapping, &file)?;
     let together = mapping.time.clocks.as_deref() == Some("rows");
     let mut notes: Vec<Note> = table.form().into_iter().map(|text| Note { kind: NoteKind::Assumption, text }).collect();
@@ -136,7 +139,7 @@ fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, Recordin
 }
 
 /// Head and plan of a table; one that has a line for each value is turned first.
-fn planned(
+fn plan_table(
     table: Box<dyn Table>,
     mapping: &Mapping,
     file: &str,
@@ -144,7 +147,7 @@ fn planned(
     let given = head::GivenLines { names: mapping.header_line, units: mapping.units_line };
     let head = head::look(table.as_ref(), given, file)?;
     let survey = survey::survey(table.as_ref(), &head)?;
-    if let Some(turned) = long::turned(table.as_ref(), &head, &survey, file)? {
+    if let Some(turned) = long::turn_table(table.as_ref(), &head, &survey, file)? {
         let head = head::look(&turned, head::GivenLines::default(), file)?;
         let survey = survey::survey(&turned, &head)?;
         let plan = understand::understand(&head, &survey, mapping, file)?;

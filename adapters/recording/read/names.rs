@@ -3,11 +3,11 @@
 use crate::channel::unit::Unit;
 use crate::channel::{ChannelId, Kind, quantity};
 
-/// Words for a column, written as [`squeezed`] gives them.
-type Words = (&'static str, &'static [&'static str]);
+/// WordRow for a column, written as [`squeeze_name`] gives them.
+type WordRow = (&'static str, &'static [&'static str]);
 
 #[rustfmt::skip]
-const DICTIONARY: &[Words] = &[
+const DICTIONARY: &[WordRow] = &[
     ("spindle_speed_rpm", &["spindlespeed", "spindelspeed", "spindlerpm", "speed", "drehzahl", "spindeldrehzahl", "hauptspindeldrehzahl", "n", "rpm", "rotationalspeed", "rotaryvelocity", "spindlevelocity", "主轴转速", "转速", "主轴速度", "nckservodataactvelmot"]),
     ("spindle_programmed_rpm", &["programmedspindlespeed", "programmedspeed", "commandedspindlespeed", "commandedspeed", "solldrehzahl", "编程转速", "主轴编程转速", "指令转速", "主轴指令转速"]),
     ("feed_mm_min", &["feed", "feedrate", "pathfeedrate", "pathfeed", "vorschub", "vorschubgeschwindigkeit", "bahnvorschub", "bahngeschwindigkeit", "vf", "进给", "进给速度", "进给率"]),
@@ -57,7 +57,7 @@ const DICTIONARY: &[Words] = &[
 
 /// Names that mean one of several columns: a person has to say which.
 #[rustfmt::skip]
-const UNSURE: &[Words] = &[
+const UNSURE: &[WordRow] = &[
     ("spindle_power_w", &["power", "activepower", "wattage", "leistung", "wirkleistung", "p", "p1", "pavg", "功率", "有功功率"]),
     ("total_power_w", &["power", "activepower", "wattage", "leistung", "wirkleistung", "p", "p1", "ptotal", "psum", "pavg", "功率", "有功功率"]),
     ("spindle_current_a", &["current", "strom", "i", "irms1", "i1", "电流"]),
@@ -146,7 +146,7 @@ const NOISE: &[&str] = &[
 pub struct ForeignName {
     /// As it stands in the file.
     pub text: String,
-    /// What [`squeezed`] leaves of it without its unit,
+    /// What [`squeeze_name`] leaves of it without its unit,
     whole: String,
     /// and without words that say nothing of the quantity.
     squeezed: String,
@@ -156,7 +156,7 @@ pub struct ForeignName {
 
 /// Small letters and digits of every script, umlauts written out, nothing between them.
 #[must_use]
-pub fn squeezed(text: &str) -> String {
+pub fn squeeze_name(text: &str) -> String {
     let mut plain = String::new();
     for c in text.chars().flat_map(char::to_lowercase) {
         match c {
@@ -293,7 +293,7 @@ fn without_brackets(text: &str) -> String {
     for (open, close) in [('[', ']'), ('(', ')'), ('（', '）'), ('<', '>')] {
         while let Some((at, _, end)) = last_bracket(&kept, open, close) {
             let shorter = format!("{} {}", &kept[..at], &kept[end..]);
-            if squeezed(&shorter).is_empty() {
+            if squeeze_name(&shorter).is_empty() {
                 break;
             }
             kept = shorter;
@@ -330,7 +330,7 @@ fn words(text: &str) -> Vec<String> {
     for c in text.chars() {
         let boundary = !c.is_alphanumeric() || c.is_uppercase() && before.is_lowercase();
         if boundary && !word.is_empty() {
-            parts.push(squeezed(&word));
+            parts.push(squeeze_name(&word));
             word.clear();
         }
         if c.is_alphanumeric() {
@@ -339,7 +339,7 @@ fn words(text: &str) -> Vec<String> {
         before = c;
     }
     if !word.is_empty() {
-        parts.push(squeezed(&word));
+        parts.push(squeeze_name(&word));
     }
     parts
 }
@@ -390,7 +390,7 @@ mod tests {
             let known = crate::recording::TEXT_COLUMNS.contains(column) || quantity::unit_of(column).is_some();
             assert!(known, "{column}");
             for word in *words {
-                assert_eq!(squeezed(word), *word);
+                assert_eq!(squeeze_name(word), *word);
             }
         }
     }

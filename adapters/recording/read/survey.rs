@@ -4,7 +4,7 @@ use super::cell::{Cell, Shape, flag, is_absent, is_absent_number, written_number
 use super::error::RecordingError;
 use super::head::Head;
 use super::moment::{OrderEvidence, written_moment};
-use super::table::{Row, Step, Table};
+use super::table::{Row, Table, VisitStep};
 
 /// Examples kept of each strange kind.
 const EXAMPLES: usize = 5;
@@ -216,21 +216,21 @@ pub(super) fn survey(table: &dyn Table, head: &Head) -> Result<Survey, Recording
     let short = table.may_be_short();
     table.visit(&mut |row| {
         if row.line < head.data_line {
-            return Ok(Step::Next);
+            return Ok(VisitStep::Next);
         }
         if repeats_header(row, head) {
             found.repeated_headers.push(row.line);
-            return Ok(Step::Next);
+            return Ok(VisitStep::Next);
         }
         let Some(cells) = fitted(row, head, short).filter(|_| !is_comment(row, head)) else {
             found.odd_widths += 1;
-            return Ok(Step::Next);
+            return Ok(VisitStep::Next);
         };
         found.rows += 1;
         for (column, cell) in found.columns.iter_mut().zip(cells) {
             column.see(row.line, *cell);
         }
-        Ok(Step::Next)
+        Ok(VisitStep::Next)
     })?;
     Ok(found)
 }

@@ -15,13 +15,13 @@ pub(super) struct Row<'a> {
 }
 
 /// What becomes of going through a table.
-pub(super) enum Step {
+pub(super) enum VisitStep {
     Next,
     Enough,
 }
 
 /// Takes a row; an error ends the reading.
-pub(super) type Visit<'v> = dyn FnMut(&Row<'_>) -> Result<Step, RecordingError> + 'v;
+pub(super) type Visit<'v> = dyn FnMut(&Row<'_>) -> Result<VisitStep, RecordingError> + 'v;
 
 /// See the [module](self).
 pub(super) trait Table {
@@ -80,7 +80,7 @@ impl Table for MemoryTable {
         for (line, owned) in &self.rows {
             cells.clear();
             cells.extend(owned.iter().map(OwnedCell::cell));
-            if matches!(see(&Row { line: *line, cells: &cells })?, Step::Enough) {
+            if matches!(see(&Row { line: *line, cells: &cells })?, VisitStep::Enough) {
                 return Ok(());
             }
         }
@@ -136,7 +136,7 @@ impl ColumnCells {
 impl Table for ColumnTable {
     fn visit(&self, see: &mut Visit<'_>) -> Result<(), RecordingError> {
         let names: Vec<Cell<'_>> = self.columns.iter().map(|(name, _)| Cell::Text(name)).collect();
-        if matches!(see(&Row { line: 1, cells: &names })?, Step::Enough) {
+        if matches!(see(&Row { line: 1, cells: &names })?, VisitStep::Enough) {
             return Ok(());
         }
         let rows = self.columns.iter().map(|(_, cells)| cells.len()).max().unwrap_or(0);
@@ -144,7 +144,7 @@ impl Table for ColumnTable {
         for row in 0..rows {
             cells.clear();
             cells.extend(self.columns.iter().map(|(_, column)| column.cell(row)));
-            if matches!(see(&Row { line: row as u64 + 2, cells: &cells })?, Step::Enough) {
+            if matches!(see(&Row { line: row as u64 + 2, cells: &cells })?, VisitStep::Enough) {
                 return Ok(());
             }
         }

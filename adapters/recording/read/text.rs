@@ -6,9 +6,9 @@ use super::error::RecordingError;
 use super::input::Input;
 use super::limits::{COLUMNS_MAX, HEAD_BYTES, ROW_BYTES_MAX};
 use super::moment::written_moment;
-use super::table::{Row, Step, Table, Visit};
+use super::splitter::{SplitError, Splitter};
+use super::table::{Row, Table, Visit, VisitStep};
 use crate::bilingual::Bilingual;
-use csv_core::ReadRecordResult;
 use std::io::Read;
 
 /// What stands between two cells.
@@ -151,7 +151,7 @@ fn score(head: &str, separator: Separator) -> f64 {
     let mut splitter = Splitter::new(separator);
     let done = splitter.feed(head.as_bytes(), true, &mut |_, cells| {
         rows.push(cells.iter().map(|cell| is_meant(cell)).collect());
-        Ok(if rows.len() < JUDGED_ROWS { Step::Next } else { Step::Enough })
+        Ok(if rows.len() < JUDGED_ROWS { VisitStep::Next } else { VisitStep::Enough })
     });
     if done.is_err() || rows.is_empty() {
         return 0.0;
@@ -191,18 +191,18 @@ impl Table for TextTable {
             let length = text.read(&mut chunk).map_err(|error| self.input.broken(error))?;
             let fed = splitter.feed(&chunk[..length], length == 0, &mut |line, texts| {
                 if std::mem::take(&mut skip) {
-                    return Ok(Step::Next);
+                    return Ok(VisitStep::Next);
                 }
-                let mut row = recycled(std::mem::take(&mut cells));
+                let mut row = reuse_cells(std::mem::take(&mut cells));
                 row.extend(texts.iter().map(|text| if text.is_empty() { Cell::Empty } else { Cell::Text(text) }));
                 let step = see(&Row { line, cells: &row });
-                cells = recycled(row);
+                cells = reuse_cells(row);
                 step
             });
             match fed {
-                Ok(Step::Enough) => return Ok(()),
-                Ok(Step::Next) if length == 0 => return Ok(()),
-                Ok(Step::Next) => {}
+                Ok(VisitStep::Enough) => return Ok(()),
+                Ok(VisitStep::Next) if length == 0 => return Ok(()),
+                Ok(VisitStep::Next) => {}
                 Err(SplitError::TooLong(line)) => return Err(self.too_long(line)),
                 Err(SplitError::Visit(error)) => return Err(error),
             }
@@ -227,151 +227,9 @@ impl Table for TextTable {
 }
 
 /// The same allocation for cells of another life.
-fn recycled<'a>(mut cells: Vec<Cell<'_>>) -> Vec<Cell<'a>> {
+fn reuse_cells<'a>(mut cells: Vec<Cell<'_>>) -> Vec<Cell<'a>> {
     cells.clear();
     cells.into_iter().map(|_| Cell::Empty).collect()
-}
-
-enum SplitError {
-    TooLong(u64),
-    Visit(RecordingError),
-}
-
-type SeeTexts<'v> = dyn FnMut(u64, &[&str]) -> Result<Step, RecordingError> + 'v;
-
-/// Divides text into rows and cells, piece by piece.
-struct Splitter {
-    separator: Separator,
-    csv: csv_core::Reader,
-    /// Text of the cells of the running row, and their ends in it.
-    text: Vec<u8>,
-    ends: Vec<usize>,
-    filled: (usize, usize),
-    /// Ends of lines so far.
-    newlines: u64,
-    /// Of a table without a sign between its cells: the running line.
-    spaced: Vec<u8>,
-}
-
-impl Splitter {
-    fn new(separator: Separator) -> Self {
-        let mut builder = csv_core::ReaderBuilder::new();
-        if let Separator::Sign(sign) = separator {
-            builder.delimiter(sign);
-        }
-        let (text, ends) = match separator {
-            Separator::Sign(_) => (vec![0; 64 << 10], vec![0; COLUMNS_MAX + 1]),
-            Separator::Space => (Vec::new(), Vec::new()),
-        };
-        Self { separator, csv: builder.build(), text, ends, filled: (0, 0), newlines: 0, spaced: Vec::new() }
-    }
-
-    fn feed(&mut self, bytes: &[u8], last: bool, see: &mut SeeTexts<'_>) -> Result<Step, SplitError> {
-        match self.separator {
-            Separator::Sign(_) => {
-                let step = self.feed_csv(bytes, see)?;
-                if last && matches!(step, Step::Next) && !bytes.is_empty() { self.feed_csv(&[], see) } else { Ok(step) }
-            }
-            Separator::Space => self.feed_spaced(bytes, last, see),
-        }
-    }
-
-    /// An empty slice is the end.
-    fn feed_csv(&mut self, mut bytes: &[u8], see: &mut SeeTexts<'_>) -> Result<Step, SplitError> {
-        let at_end = bytes.is_empty();
-        loop {
-            let (text, ends) = self.filled;
-            let (result, read, written, ended) =
-                self.csv.read_record(bytes, &mut self.text[text..], &mut self.ends[ends..]);
-            let taken = &bytes[..read];
-            bytes = &bytes[read..];
-            self.filled = (text + written, ends + ended);
-            self.newlines += taken.iter().filter(|byte| **byte == b'\n').count() as u64;
-            match result {
-                ReadRecordResult::InputEmpty => return Ok(Step::Next),
-                ReadRecordResult::OutputFull if self.text.len() < ROW_BYTES_MAX => {
-                    let longer = (2 * self.text.len()).min(ROW_BYTES_MAX);
-                    self.text.resize(longer, 0);
-                }
-                ReadRecordResult::OutputFull | ReadRecordResult::OutputEndsFull => {
-                    return Err(SplitError::TooLong(self.newlines + 1));
-                }
-                ReadRecordResult::Record => {
-                    // Before `\r\n` a row ends with the first of both, and at the end of the file with neither.
-                    let end = self.newlines + u64::from(at_end || !taken.ends_with(b"\n"));
-                    let step = self.row(end, see)?;
-                    self.filled = (0, 0);
-                    if matches!(step, Step::Enough) {
-                        return Ok(Step::Enough);
-                    }
-                }
-                ReadRecordResult::End => return Ok(Step::Next),
-            }
-        }
-    }
-
-    fn row(&self, end: u64, see: &mut SeeTexts<'_>) -> Result<Step, SplitError> {
-        let (length, cells) = self.filled;
-        let text = String::from_utf8_lossy(&self.text[..length]);
-        // A cell of replaced characters would move the ends; the decoder gives UTF-8, so nothing is replaced.
-        if text.len() != length {
-            return Ok(Step::Next);
-        }
-        let mut start = 0;
-        let mut texts = Vec::with_capacity(cells);
-        for end in &self.ends[..cells] {
-            texts.push(
-                text.get(start..*end)
-                    .unwrap_or("")
-                    .trim_matches(['\u{feff}', ' ', '\t', '\r', '\n', '\u{a0}', '\u{3000}']),
-            );
-            start = *end;
-        }
-        let inner = text.matches('\n').count() as u64;
-        see(end.saturating_sub(inner).max(1), &texts).map_err(SplitError::Visit)
-    }
-
-    fn feed_spaced(&mut self, bytes: &[u8], last: bool, see: &mut SeeTexts<'_>) -> Result<Step, SplitError> {
-        for byte in bytes {
-            if *byte != b'\n' {
-                if self.spaced.len() >= ROW_BYTES_MAX {
-                    return Err(SplitError::TooLong(self.newlines + 1));
-                }
-                self.spaced.push(*byte);
-            } else if matches!(self.spaced_row(see)?, Step::Enough) {
-                return Ok(Step::Enough);
-            }
-        }
-        if last && !self.spaced.is_empty() { self.spaced_row(see) } else { Ok(Step::Next) }
-    }
-
-    fn spaced_row(&mut self, see: &mut SeeTexts<'_>) -> Result<Step, SplitError> {
-        let line = std::mem::take(&mut self.spaced);
-        let text = String::from_utf8_lossy(&line);
-        let cells = spaced_cells(text.trim());
-        self.newlines += 1;
-        let number = self.newlines;
-        if cells.len() > COLUMNS_MAX {
-            return Err(SplitError::TooLong(number));
-        }
-        if cells.is_empty() { Ok(Step::Next) } else { see(number, &cells).map_err(SplitError::Visit) }
-    }
-}
-
-/// Cells between spaces; a quoted cell may hold spaces.
-fn spaced_cells(text: &str) -> Vec<&str> {
-    let mut cells = Vec::new();
-    let mut rest = text.trim_start();
-    while !rest.is_empty() {
-        let quoted = rest.strip_prefix('"').and_then(|inner| Some((inner, inner.find('"')?)));
-        let (cell, next) = match quoted {
-            Some((inner, end)) => (&inner[..end], &inner[end + 1..]),
-            None => rest.split_at(rest.find(char::is_whitespace).unwrap_or(rest.len())),
-        };
-        cells.push(cell);
-        rest = next.trim_start();
-    }
-    cells
 }
 
 #[cfg(test)]
@@ -388,7 +246,7 @@ mod tests {
                     .iter()
                     .map(|cell| if let Cell::Text(text) = cell { (*text).to_owned() } else { String::new() });
                 rows.push((row.line, cells.collect()));
-                Ok(Step::Next)
+                Ok(VisitStep::Next)
             })
             .expect("read");
         (table.separator, rows)
@@ -419,7 +277,7 @@ mod tests {
         for (text, line) in [(endless, "line 2"), (wide, "line 1")] {
             let input = Input::memory(text.into_bytes(), "t.csv");
             let table = TextTable::new(input, None, Some(Separator::Sign(b','))).expect("text");
-            let error = table.visit(&mut |_| Ok(Step::Next)).expect_err("too long").to_string();
+            let error = table.visit(&mut |_| Ok(VisitStep::Next)).expect_err("too long").to_string();
             assert!(error.contains(line) && error.contains("4 MB"), "{error}");
         }
     }

@@ -38,17 +38,17 @@ const CLOCK_CHANGE_S: f64 = 3600.0;
 /// Turns the cells of a whole column into time.
 pub(super) fn resolve(raw: &[RawTime], runs: Option<&Words>, mapping: &TimeMapping, notes: &mut Vec<Note>) -> Timed {
     let mut timed = if raw.iter().any(|time| matches!(time, RawTime::Utc(_) | RawTime::Local(_))) {
-        moments(raw, mapping, notes)
+        resolve_moments(raw, mapping, notes)
     } else {
-        Timed { time_s: seconds(raw, notes), ..Timed::default() }
+        Timed { time_s: to_seconds(raw, notes), ..Timed::default() }
     };
     let is_absolute = timed.start_ns.is_some();
     if mapping.set_back.as_deref() == Some("join") {
-        join(&mut timed.time_s, notes);
+        join_set_back(&mut timed.time_s, notes);
     }
-    let stretches = stretches(raw.len(), runs.filter(|_| !is_absolute));
+    let stretches = time_stretches(raw.len(), runs.filter(|_| !is_absolute));
     for rows in stretches {
-        spread(&mut timed.time_s[rows.clone()], notes);
+        spread_stamps(&mut timed.time_s[rows.clone()], notes);
         let start = rows.start;
         let found = out_of_order(&timed.time_s[rows]);
         timed.out_of_order.extend(found.into_iter().map(|(row, reason)| (start + row, reason)));
@@ -57,7 +57,7 @@ pub(super) fn resolve(raw: &[RawTime], runs: Option<&Words>, mapping: &TimeMappi
 }
 
 /// Rows within which time must increase: all of them, or those of a run.
-fn stretches(rows: usize, runs: Option<&Words>) -> Vec<std::ops::Range<usize>> {
+fn time_stretches(rows: usize, runs: Option<&Words>) -> Vec<std::ops::Range<usize>> {
     let mut found: Vec<std::ops::Range<usize>> = Vec::new();
     for row in 0..rows {
         match found.last_mut() {
@@ -78,7 +78,7 @@ fn in_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }
 
-fn seconds(raw: &[RawTime], notes: &mut Vec<Note>) -> Vec<f64> {
+fn to_seconds(raw: &[RawTime], notes: &mut Vec<Note>) -> Vec<f64> {
     let mut times: Vec<f64> = raw
         .iter()
         .map(|time| match time {
@@ -100,7 +100,7 @@ fn seconds(raw: &[RawTime], notes: &mut Vec<Note>) -> Vec<f64> {
     times
 }
 
-fn moments(raw: &[RawTime], mapping: &TimeMapping, notes: &mut Vec<Note>) -> Timed {
+fn resolve_moments(raw: &[RawTime], mapping: &TimeMapping, notes: &mut Vec<Note>) -> Timed {
     let is_local = raw.iter().any(|time| matches!(time, RawTime::Local(_)));
     let zone = mapping.zone.as_deref().and_then(|name| TimeZone::get(name).ok()).unwrap_or_else(TimeZone::system);
     let mut local = LocalClock { zone, known: HashMap::new(), last_ns: None };
@@ -194,7 +194,7 @@ fn usual_step(times: &[f64]) -> f64 {
     steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
 
-fn join(times: &mut [f64], notes: &mut Vec<Note>) {
+fn join_set_back(times: &mut [f64], notes: &mut Vec<Note>) {
     let step = usual_step(times);
     let (mut shift, mut joined) = (0.0, 0);
     for row in 1..times.len() {
@@ -216,7 +216,7 @@ fn join(times: &mut [f64], notes: &mut Vec<Note>) {
 }
 
 /// Stamps rounded to whole seconds with several rows each: the rows are spread evenly between one stamp and the next.
-fn spread(times: &mut [f64], notes: &mut Vec<Note>) {
+fn spread_stamps(times: &mut [f64], notes: &mut Vec<Note>) {
     let mut groups: Vec<std::ops::Range<usize>> = Vec::new();
     for row in 0..times.len() {
         match groups.last_mut() {

@@ -38,7 +38,7 @@ pub(super) fn find(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
     // Coefficients of columns that the user chose mean what the user says.
     let is_physical =
         model.parts.iter().any(|part| matches!(part.body, PartFunction::Effect(..) | PartFunction::Table(_)));
-    let thin = thinned(recording);
+    let thin = thin_rows(recording);
     let Some(given) = error(&thin, model).filter(|_| is_physical) else { return Vec::new() };
     if given < POOR {
         return Vec::new();
@@ -47,7 +47,7 @@ pub(super) fn find(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
     let columns = INPUTS.iter().copied().filter(|name| thin.numbers(name).is_some()).chain([model.output.as_str()]);
     for column in columns {
         for (unit, factor) in mistakes(column) {
-            let Some(under) = error(&scaled(&thin, column, factor), model) else { continue };
+            let Some(under) = error(&scale_column(&thin, column, factor), model) else { continue };
             if best.as_ref().is_none_or(|(least, ..)| under < *least) {
                 best = Some((under, column.to_owned(), unit, factor));
             }
@@ -82,7 +82,7 @@ fn error(recording: &Recording, model: &Model) -> Option<f64> {
     (size > 0.0 && rmse.is_finite()).then(|| rmse / size)
 }
 
-fn thinned(recording: &Recording) -> Recording {
+fn thin_rows(recording: &Recording) -> Recording {
     let every = recording.rows().div_ceil(ROWS_MAX).max(1);
     if every == 1 {
         return recording.clone();
@@ -91,7 +91,7 @@ fn thinned(recording: &Recording) -> Recording {
     recording.only(&kept)
 }
 
-fn scaled(recording: &Recording, column: &str, factor: f64) -> Recording {
+fn scale_column(recording: &Recording, column: &str, factor: f64) -> Recording {
     let mut other = recording.clone();
     let cells =
         recording.numbers(column).map(|numbers| numbers.iter().map(|x| x.map(|x| x * factor)).collect::<Numbers>());

@@ -109,7 +109,7 @@ fn time(recording: &Recording) -> Option<UnitDoubt> {
     steps.sort_by(f64::total_cmp);
     let step = *steps.get(steps.len() / 2)?;
     let text = short(step);
-    if step >= LONG_ROW_S && busy(recording) {
+    if step >= LONG_ROW_S && changes_often(recording) {
         let unit = if step >= 5e5 { "us" } else { "ms" };
         return Some(UnitDoubt::new(
             "time_s",
@@ -134,7 +134,7 @@ fn time(recording: &Recording) -> Option<UnitDoubt> {
 }
 
 /// Do the speed or the cut change so often that a row cannot last minutes?
-fn busy(recording: &Recording) -> bool {
+fn changes_often(recording: &Recording) -> bool {
     let changes = |name: &str| {
         recording.numbers(name).map_or(0, |numbers| {
             let values: Vec<f64> = numbers.present().collect();

@@ -148,7 +148,7 @@ export class Brought {
   question() {
     const option = (value, text) => make("option", "", text, { value });
     const kinds = (this.known?.kinds ?? []).map((it) => option(it.kind, own(it)));
-    const kind = make("select", "", [...kinds, option("toml", t("model_from_file")), this.context.status()?.twin ? option("in_charge", t("model_in_charge")) : null].filter(Boolean), { "aria-label": t("model") });
+    const kind = make("select", "", [...kinds, option("toml", t("model_from_file")), this.context.status()?.twin ? option("active_model", t("model_in_charge")) : null].filter(Boolean), { "aria-label": t("model") });
     const material = make("select", "", (this.known?.materials ?? []).map((name) => option(name, name)), { "aria-label": t("material") });
     const axis = make("select", "", AXES.map((name) => option(name, name || t("only_axis"))), { "aria-label": t("axis") });
     const model = make("input", "", null, { type: "file", accept: ".toml", "aria-label": t("model_from_file") });
@@ -165,7 +165,7 @@ export class Brought {
     const begin = make("button", "primary", t("diagnose"), { type: "button", "data-changes": "yes", onclick: () => this.act(async () => {
       const asked = { simulated: series.value ? { key: series.value, column: column.value.trim() } : null };
       if (kind.value === "toml") asked.toml = await model.files[0]?.text();
-      else if (kind.value === "in_charge") asked.in_charge = true;
+      else if (kind.value === "active_model") asked.active_model = true;
       else Object.assign(asked, { kind: kind.value, material: material.value, axis: axis.value });
       await send(`/api/v1/files/${this.file.key}/diagnosis`, asked);
       await this.look();

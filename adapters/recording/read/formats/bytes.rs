@@ -2,7 +2,7 @@
 
 /// A place in a file that is held in memory.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Bytes<'a> {
+pub(super) struct ByteReader<'a> {
     pub(super) left: &'a [u8],
     pub(super) is_big: bool,
 }
@@ -16,7 +16,7 @@ macro_rules! number {
     };
 }
 
-impl<'a> Bytes<'a> {
+impl<'a> ByteReader<'a> {
     pub(super) fn new(left: &'a [u8], is_big: bool) -> Self {
         Self { left, is_big }
     }

@@ -8,7 +8,7 @@ use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::limits::CELLS_IN_MEMORY_MAX;
 use super::super::moment::{DateOrder, written_moment};
-use super::super::table::{MemoryTable, OwnedCell, Step, Table};
+use super::super::table::{MemoryTable, OwnedCell, Table, VisitStep};
 use super::super::text::{Separator, TextTable};
 use crate::bilingual::Bilingual;
 use crate::clock::{SECOND_NS, TimeNs};
@@ -50,23 +50,23 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
         let first = words.first().copied().unwrap_or("");
         if first == END {
             head.ends += 1;
-            return Ok(Step::Next);
+            return Ok(VisitStep::Next);
         }
         let is_key = row.cells.len() > 1 && !first.is_empty() && first.chars().all(|c| c.is_alphanumeric() || c == '_');
         if !named && first != "X_Value" {
             if is_key {
                 head.take(first, &words[1..]);
             }
-            return Ok(Step::Next);
+            return Ok(VisitStep::Next);
         }
         if first == "X_Value" {
             if named {
-                return Ok(Step::Enough);
+                return Ok(VisitStep::Enough);
             }
             named = true;
             of_time = (0..words.len()).filter(|place| words[*place] == "X_Value").collect();
             table.rows.extend(head.header_rows(row.line, &words));
-            return Ok(Step::Next);
+            return Ok(VisitStep::Next);
         }
         let mut owned: Vec<OwnedCell> = words.iter().map(|word| OwnedCell::text(word)).collect();
         if head.no_x {
@@ -89,18 +89,22 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
                 "数据过多：请分成几个文件导出",
             ));
         }
-        Ok(Step::Next)
+        Ok(VisitStep::Next)
     })?;
     if !named {
-        return Err(RecordingError::format(
-            &file,
-            "a LabVIEW measurement file without a line X_Value: export it with a header (one, or one per packet)",
-            "LabVIEW测量文件缺少X_Value行：请带表头导出",
-        ));
+        return Err(no_names(&file));
     }
     table.form = text.form().into_iter().filter(|form| form.en != "tab").collect();
     table.form.insert(0, Bilingual::new("LabVIEW measurement file", "LabVIEW测量文件"));
     Ok(table)
+}
+
+fn no_names(file: &str) -> RecordingError {
+    RecordingError::format(
+        file,
+        "a LabVIEW measurement file without a line X_Value: export it with a header (one, or one per packet)",
+        "LabVIEW测量文件缺少X_Value行：请带表头导出",
+    )
 }
 
 fn has_comma_key(input: &Input) -> Result<bool, RecordingError> {

@@ -5,7 +5,7 @@ use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::limits::UNPACKED_BYTES_MAX;
 use super::super::table::{ColumnCells, ColumnTable};
-use super::bytes::{Bytes, NumberKind};
+use super::bytes::{ByteReader, NumberKind};
 use crate::bilingual::Bilingual;
 use std::io::Read;
 
@@ -24,7 +24,7 @@ struct Variable {
 pub(super) fn is_mat(head: &[u8]) -> bool {
     head.starts_with(b"MATLAB 5.0 MAT-file")
         || head.starts_with(b"MATLAB 7.3 MAT-file")
-        || header_4(&mut Bytes::new(head, false)).is_some()
+        || header_4(&mut ByteReader::new(head, false)).is_some()
 }
 
 pub(super) fn open(input: &Input, wanted: Option<&str>) -> Result<ColumnTable, RecordingError> {
@@ -89,7 +89,7 @@ fn table(variables: Vec<Variable>, input: &Input) -> Result<ColumnTable, Recordi
 
 fn version_5(bytes: &[u8]) -> Option<Vec<Variable>> {
     let is_big = bytes.get(126..128)? == b"MI";
-    let mut left = Bytes::new(bytes.get(HEADER..)?, is_big);
+    let mut left = ByteReader::new(bytes.get(HEADER..)?, is_big);
     let mut found = Vec::new();
     let mut budget = UNPACKED_BYTES_MAX;
     while !left.left.is_empty() {
@@ -99,7 +99,7 @@ fn version_5(bytes: &[u8]) -> Option<Vec<Variable>> {
                 let mut plain = Vec::new();
                 flate2::read::ZlibDecoder::new(data).take(budget + 1).read_to_end(&mut plain).ok()?;
                 budget = budget.checked_sub(plain.len() as u64)?;
-                let (kind, data) = element(&mut Bytes::new(&plain, is_big))?;
+                let (kind, data) = element(&mut ByteReader::new(&plain, is_big))?;
                 if kind == 14 {
                     matrix(data, is_big, "", DEPTH_MAX, &mut found);
                 }
@@ -114,7 +114,7 @@ fn version_5(bytes: &[u8]) -> Option<Vec<Variable>> {
 }
 
 /// Type and bytes of the next element; what follows begins at a multiple of eight, except after a compressed one.
-fn element<'a>(bytes: &mut Bytes<'a>) -> Option<(u32, &'a [u8])> {
+fn element<'a>(bytes: &mut ByteReader<'a>) -> Option<(u32, &'a [u8])> {
     let tag = bytes.u32()?;
     if tag >> 16 != 0 {
         let data = bytes.take(4)?;
@@ -147,9 +147,9 @@ fn number_kind(code: u32) -> Option<NumberKind> {
 
 /// Adds the numbers of an array, or of the fields of a structure. `None` where it is damaged.
 fn matrix(data: &[u8], is_big: bool, parent: &str, depth: usize, found: &mut Vec<Variable>) -> Option<()> {
-    let mut bytes = Bytes::new(data, is_big);
+    let mut bytes = ByteReader::new(data, is_big);
     let (_, flags) = element(&mut bytes)?;
-    let class = Bytes::new(flags, is_big).u32()? & 0xff;
+    let class = ByteReader::new(flags, is_big).u32()? & 0xff;
     let (_, dimensions) = element(&mut bytes)?;
     let dimensions: Vec<f64> = NumberKind::I32.all(dimensions, is_big);
     let (_, own) = element(&mut bytes)?;
@@ -158,7 +158,7 @@ fn matrix(data: &[u8], is_big: bool, parent: &str, depth: usize, found: &mut Vec
     match class {
         2 if depth > 0 => {
             let (_, length) = element(&mut bytes)?;
-            let length = usize::try_from(Bytes::new(length, is_big).u32()?).ok().filter(|length| *length > 0)?;
+            let length = usize::try_from(ByteReader::new(length, is_big).u32()?).ok().filter(|length| *length > 0)?;
             let (_, names) = element(&mut bytes)?;
             let fields: Vec<String> = names
                 .chunks(length)
@@ -194,11 +194,11 @@ struct Header4 {
     name: String,
 }
 
-fn header_4(bytes: &mut Bytes<'_>) -> Option<Header4> {
+fn header_4(bytes: &mut ByteReader<'_>) -> Option<Header4> {
     let start = *bytes;
     let code = bytes.u32()?;
     let is_big = code > 0xffff;
-    let mut read = Bytes { is_big, ..start };
+    let mut read = ByteReader { is_big, ..start };
     let code = read.u32()?;
     let (machine, reserved, precision, kind) = (code / 1000, code / 100 % 10, code / 10 % 10, code % 10);
     let (rows, columns, imaginary, length) = (read.u32()?, read.u32()?, read.u32()?, read.u32()?);
@@ -234,7 +234,7 @@ fn header_4(bytes: &mut Bytes<'_>) -> Option<Header4> {
 }
 
 fn version_4(bytes: &[u8]) -> Option<Vec<Variable>> {
-    let mut left = Bytes::new(bytes, false);
+    let mut left = ByteReader::new(bytes, false);
     let (mut found, mut texts) = (Vec::new(), Vec::new());
     while !left.left.is_empty() {
         let header = header_4(&mut left)?;

@@ -7,6 +7,7 @@ mod matlab;
 mod mtconnect;
 mod parquet;
 mod tdms;
+mod tdms_channel;
 mod workbook;
 
 use super::error::RecordingError;
@@ -17,9 +18,9 @@ use super::table::Table;
 use super::text::{Separator, TextTable};
 
 /// First bytes, name of the format, what to do.
-type Refused = (&'static [u8], &'static str, &'static str, &'static str);
+type RefusedFormat = (&'static [u8], &'static str, &'static str, &'static str);
 
-const REFUSED: &[Refused] = &[
+const REFUSED: &[RefusedFormat] = &[
     (
         b"\x89HDF\r\n\x1a\n",
         "HDF5",

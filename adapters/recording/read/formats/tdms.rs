@@ -4,14 +4,12 @@
 
 use super::super::error::RecordingError;
 use super::super::input::Input;
-use super::super::table::{ColumnCells, ColumnTable, OwnedCell};
-use super::bytes::{Bytes, NumberKind};
+use super::super::table::{ColumnCells, ColumnTable};
+use super::bytes::ByteReader;
+use super::tdms_channel::{RawIndex, TdmsChannel, TdmsValues, ValueKind, WaveformClock, moment, parts};
 use crate::bilingual::Bilingual;
-use crate::clock::{SECOND_NS, TimeNs};
 use std::collections::HashMap;
 
-/// Seconds from 1904-01-01 to 1970-01-01.
-const EPOCH_1904_S: i64 = 2_082_844_800;
 const HAS_METADATA: u32 = 1 << 1;
 const NEW_OBJECTS: u32 = 1 << 2;
 const HAS_RAW_DATA: u32 = 1 << 3;
@@ -20,90 +18,9 @@ const IS_BIG_ENDIAN: u32 = 1 << 6;
 const IS_DAQMX: u32 = 1 << 7;
 const LEAD_IN: usize = 28;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ValueKind {
-    Number(NumberKind),
-    Text,
-    Flag,
-    Moment,
-    Nothing,
-}
-
-impl ValueKind {
-    fn of(code: u32) -> Option<Self> {
-        use NumberKind::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
-        Some(match code {
-            0 => Self::Nothing,
-            1 => Self::Number(I8),
-            2 => Self::Number(I16),
-            3 => Self::Number(I32),
-            4 => Self::Number(I64),
-            5 => Self::Number(U8),
-            6 => Self::Number(U16),
-            7 => Self::Number(U32),
-            8 => Self::Number(U64),
-            9 | 0x19 => Self::Number(F32),
-            10 | 0x1a => Self::Number(F64),
-            0x20 => Self::Text,
-            0x21 => Self::Flag,
-            0x44 => Self::Moment,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> usize {
-        match self {
-            Self::Number(kind) => kind.size(),
-            Self::Flag => 1,
-            Self::Moment => 16,
-            Self::Text | Self::Nothing => 0,
-        }
-    }
-}
-
-/// How many values of which kind a channel has in each chunk of a segment.
-#[derive(Debug, Clone, Copy)]
-struct RawIndex {
-    kind: ValueKind,
-    count: usize,
-    /// Of text: bytes altogether.
-    bytes: usize,
-}
-
-#[derive(Debug, Default)]
-struct Channel {
-    path: Vec<String>,
-    index: Option<RawIndex>,
-    values: Values,
-    unit: Option<String>,
-    increment_s: Option<f64>,
-    offset_s: f64,
-    start_ns: Option<TimeNs>,
-}
-
-#[derive(Debug, Default)]
-enum Values {
-    #[default]
-    None,
-    Numbers(Vec<f64>),
-    Moments(Vec<TimeNs>),
-    Texts(Vec<OwnedCell>),
-}
-
-impl Values {
-    fn len(&self) -> usize {
-        match self {
-            Self::None => 0,
-            Self::Numbers(values) => values.len(),
-            Self::Moments(values) => values.len(),
-            Self::Texts(values) => values.len(),
-        }
-    }
-}
-
 #[derive(Debug, Default)]
 struct TdmsFile {
-    channels: Vec<Channel>,
+    channels: Vec<TdmsChannel>,
     known: HashMap<String, usize>,
     /// Channels of the running segment, in the order of their raw data.
     active: Vec<usize>,
@@ -141,7 +58,7 @@ enum Problem {
 impl TdmsFile {
     /// Reads the segment here; where the next one begins.
     fn segment(&mut self, bytes: &[u8], at: usize) -> Result<usize, Problem> {
-        let mut lead = Bytes::new(&bytes[at..], false);
+        let mut lead = ByteReader::new(&bytes[at..], false);
         if lead.take(4) != Some(b"TDSm") {
             return Err(Problem::Damaged);
         }
@@ -161,24 +78,24 @@ impl TdmsFile {
                 self.active.clear();
             }
             let metadata = bytes.get(start..raw_at.min(end)).ok_or(Problem::Damaged)?;
-            self.metadata(Bytes::new(metadata, lead.is_big))?;
+            self.metadata(ByteReader::new(metadata, lead.is_big))?;
         }
         if mask & HAS_RAW_DATA != 0 {
             if mask & IS_DAQMX != 0 {
                 return Err(Problem::Daqmx);
             }
             let data = bytes.get(raw_at..end).ok_or(Problem::Damaged)?;
-            self.raw(Bytes::new(data, lead.is_big), mask & IS_INTERLEAVED != 0);
+            self.raw(ByteReader::new(data, lead.is_big), mask & IS_INTERLEAVED != 0);
         }
         Ok(end)
     }
 
-    fn metadata(&mut self, mut bytes: Bytes<'_>) -> Result<(), Problem> {
+    fn metadata(&mut self, mut bytes: ByteReader<'_>) -> Result<(), Problem> {
         let count = bytes.u32().ok_or(Problem::Damaged)?;
         for _ in 0..count {
             let path = bytes.text().ok_or(Problem::Damaged)?;
             let index = *self.known.entry(path.clone()).or_insert_with(|| {
-                self.channels.push(Channel { path: parts(&path), ..Channel::default() });
+                self.channels.push(TdmsChannel { path: parts(&path), ..TdmsChannel::default() });
                 self.channels.len() - 1
             });
             let length = bytes.u32().ok_or(Problem::Damaged)?;
@@ -210,7 +127,7 @@ impl TdmsFile {
         }
     }
 
-    fn properties(&mut self, bytes: &mut Bytes<'_>, index: usize) -> Option<()> {
+    fn properties(&mut self, bytes: &mut ByteReader<'_>, index: usize) -> Option<()> {
         for _ in 0..bytes.u32()? {
             let name = bytes.text()?;
             let kind = ValueKind::of(bytes.u32()?)?;
@@ -246,7 +163,7 @@ impl TdmsFile {
     }
 
     /// Chunks of equal layout follow one another; a last one that is not whole is left out.
-    fn raw(&mut self, mut bytes: Bytes<'_>, is_interleaved: bool) {
+    fn raw(&mut self, mut bytes: ByteReader<'_>, is_interleaved: bool) {
         let layout: Vec<(usize, RawIndex)> = self
             .active
             .iter()
@@ -276,7 +193,7 @@ impl TdmsFile {
     fn interleaved(&mut self, block: &[u8], layout: &[(usize, RawIndex)], is_big: bool) {
         let width: usize = layout.iter().map(|(_, index)| index.kind.size()).sum();
         for row in block.chunks_exact(width.max(1)) {
-            let mut bytes = Bytes::new(row, is_big);
+            let mut bytes = ByteReader::new(row, is_big);
             for (channel, index) in layout {
                 let Some(part) = bytes.take(index.kind.size()) else { return };
                 self.channels[*channel].push(part, RawIndex { count: 1, ..*index }, is_big);
@@ -322,7 +239,7 @@ impl TdmsFile {
             ));
         }
         let mut columns: Vec<(String, ColumnCells)> = Vec::new();
-        let mut clock: Option<Clock> = None;
+        let mut clock: Option<WaveformClock> = None;
         for channel in self
             .channels
             .into_iter()
@@ -336,112 +253,13 @@ impl TdmsFile {
             let name = channel.path.last().cloned().unwrap_or_default();
             let name = channel.unit.as_ref().map_or_else(|| name.clone(), |unit| format!("{name} [{unit}]"));
             let cells = match channel.values {
-                Values::Numbers(values) => ColumnCells::Numbers(values),
-                Values::Moments(values) => ColumnCells::Instants(values),
-                Values::Texts(values) => ColumnCells::Cells(values),
-                Values::None => continue,
+                TdmsValues::Numbers(values) => ColumnCells::Numbers(values),
+                TdmsValues::Moments(values) => ColumnCells::Instants(values),
+                TdmsValues::Texts(values) => ColumnCells::Cells(values),
+                TdmsValues::None => continue,
             };
             columns.push((name, cells));
         }
         Ok(ColumnTable { columns, form })
     }
-}
-
-/// The clock of a waveform.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Clock {
-    start_ns: Option<TimeNs>,
-    offset_s: f64,
-    step_s: f64,
-    rows: usize,
-}
-
-impl Clock {
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "numbers of rows are far below 2^53; saturates"
-    )]
-    fn column(self) -> (String, ColumnCells) {
-        let at_s = |row: usize| self.offset_s + row as f64 * self.step_s;
-        match self.start_ns {
-            Some(start_ns) => {
-                let at_ns = |row: usize| start_ns.saturating_add((at_s(row) * SECOND_NS as f64).round() as i64);
-                ("Time".to_owned(), ColumnCells::Instants((0..self.rows).map(at_ns).collect()))
-            }
-            None => ("Time [s]".to_owned(), ColumnCells::Numbers((0..self.rows).map(at_s).collect())),
-        }
-    }
-}
-
-impl Channel {
-    fn clock(&self) -> Option<Clock> {
-        // A waveform that was never started has the beginning of 1904.
-        let start_ns = self.start_ns.filter(|at_ns| *at_ns > 0);
-        Some(Clock { start_ns, offset_s: self.offset_s, step_s: self.increment_s?, rows: self.values.len() })
-    }
-
-    fn push(&mut self, part: &[u8], index: RawIndex, is_big: bool) {
-        match index.kind {
-            ValueKind::Number(kind) => self.numbers(kind.all(part, is_big)),
-            ValueKind::Flag => self.numbers(part.iter().map(|flag| f64::from(u8::from(*flag != 0))).collect()),
-            ValueKind::Moment => {
-                let mut bytes = Bytes::new(part, is_big);
-                let read: Vec<TimeNs> = std::iter::from_fn(|| moment(&mut bytes)).collect();
-                match &mut self.values {
-                    Values::Moments(values) => values.extend(read),
-                    values => *values = Values::Moments(read),
-                }
-            }
-            ValueKind::Text => {
-                let read = texts(part, index.count, is_big);
-                match &mut self.values {
-                    Values::Texts(values) => values.extend(read),
-                    values => *values = Values::Texts(read),
-                }
-            }
-            ValueKind::Nothing => {}
-        }
-    }
-
-    fn numbers(&mut self, read: Vec<f64>) {
-        match &mut self.values {
-            Values::Numbers(values) => values.extend(read),
-            values => *values = Values::Numbers(read),
-        }
-    }
-}
-
-/// `/'group'/'channel'`; a quote within a name is doubled.
-fn parts(path: &str) -> Vec<String> {
-    let inner = path.trim_start_matches('/');
-    if inner.is_empty() {
-        return Vec::new();
-    }
-    inner.split("'/'").map(|part| part.trim_matches('\'').replace("''", "'")).collect()
-}
-
-/// Sixteen bytes: fractions of 2^-64 s, then seconds since 1904; in the other order where the bytes are big endian.
-fn moment(bytes: &mut Bytes<'_>) -> Option<TimeNs> {
-    let (fraction, seconds) = if bytes.is_big {
-        let seconds = bytes.i64()?;
-        (bytes.u64()?, seconds)
-    } else {
-        (bytes.u64()?, bytes.i64()?)
-    };
-    let ns = i64::try_from((u128::from(fraction) * u128::from(SECOND_NS.unsigned_abs())) >> 64).ok()?;
-    seconds.checked_sub(EPOCH_1904_S)?.checked_mul(SECOND_NS)?.checked_add(ns)
-}
-
-fn texts(part: &[u8], count: usize, is_big: bool) -> Vec<OwnedCell> {
-    let mut bytes = Bytes::new(part, is_big);
-    let ends: Vec<usize> = (0..count).map_while(|_| usize::try_from(bytes.u32()?).ok()).collect();
-    let mut start = 0;
-    let text = |end: usize| {
-        let text =
-            bytes.left.get(start..end).map_or_else(String::new, |text| String::from_utf8_lossy(text).into_owned());
-        start = end;
-        OwnedCell::text(&text)
-    };
-    ends.into_iter().map(text).collect()
 }
