@@ -36,7 +36,7 @@ struct Printing {
 pub(super) fn effects(arguments: EffectsArguments) -> CommandResult {
     let text = match arguments.what {
         EffectsCommand::List(printing) if printing.json => format!("{:#}\n", explain::list_json()),
-        EffectsCommand::List(printing) => explain::list(language()),
+        EffectsCommand::List(_) => explain::list(language()),
         EffectsCommand::Show { kind, printing } => show(&kind, &printing)?,
     };
     print!("{text}");

@@ -80,7 +80,7 @@ fn tell(found: &Preview, path: &Path) -> Result<(), CannotRun> {
     describe_reading(&name, read).iter().for_each(|line| print(&format!("{}\n", say(line))));
     let rows = read.recording.rows();
     let refused = read.refused;
-    print(&pick(&format!("{rows} rows, {refused} refused\n"), &format!("{rows}行，拒绝{refused}行\n")).to_owned());
+    print(pick(&format!("{rows} rows, {refused} refused\n"), &format!("{rows}行，拒绝{refused}行\n")));
     print(&first_rows(&read.recording, SHOWN.0, SHOWN.1));
     Ok(())
 }

@@ -79,7 +79,7 @@ fn words(diagnosis: &Diagnosis, context: &DiagnosisContext, language: Language) 
 
 /// The document (`diagnosis/1`), with the report in words in both languages.
 #[must_use]
-pub fn document(diagnosis: &Diagnosis, context: &DiagnosisContext) -> serde_json::Value {
+pub(super) fn document(diagnosis: &Diagnosis, context: &DiagnosisContext) -> serde_json::Value {
     let mut document = report::to_json(diagnosis);
     context.add_to(&mut document);
     document["words"] = serde_json::json!({
