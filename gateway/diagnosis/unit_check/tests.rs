@@ -61,7 +61,7 @@ fn rich() -> Recording {
 /// An axis that goes back and forth over 400 mm.
 fn axis() -> Recording {
     let mut recording = Recording::new("t", (0..ROWS).map(|row| row as f64 * 0.1).collect(), None);
-    let velocity = |row: usize| if row / 40 % 2 == 0 { 6000.0 } else { -6000.0 };
+    let velocity = |row: usize| if (row / 40).is_multiple_of(2) { 6000.0 } else { -6000.0 };
     let position = |row: usize| {
         let place = (row % 80) as f64;
         (if place < 40.0 { place } else { 80.0 - place }) * 10.0
