@@ -6,6 +6,7 @@ mod appended;
 mod declared;
 mod paths;
 pub mod quantity;
+pub mod unit;
 
 pub use declared::{DECLARED_MAX, DeclareError, NewChannel, declare};
 pub use paths::{PATHS, on_path};
