@@ -42,6 +42,10 @@ const SIZES: [Size; 26] = [
 const FAHRENHEIT_AIR: (f64, f64) = (48.0, 110.0);
 /// A row that lasts longer than this while cuts come and go, s.
 const LONG_ROW_S: f64 = 90.0;
+/// Cuts and speeds that last no longer than this, on average, are not those of a machine that is recorded for more than a trial, s.
+const SHORT_CUT_S: f64 = 1.0;
+/// So many changes make an average.
+const LEAST_CHANGES: usize = 10;
 
 pub(super) fn find(recording: &Recording) -> Vec<UnitDoubt> {
     let mut found: Vec<UnitDoubt> = SIZES.iter().filter_map(|size| doubt(recording, size)).collect();
@@ -117,13 +121,11 @@ fn time(recording: &Recording) -> Option<UnitDoubt> {
             format!("time_s每行递增{text}，而转速或切削每隔几行就变化：单位是否为{unit}？"),
         ));
     }
-    let is_round = |step: f64| {
-        let parts = step * 1000.0;
-        parts.round() >= 1.0 && (parts - parts.round()).abs() < 2e-3 * parts.max(1.0)
-    };
+    // Rows at 60 Hz are a third of 50 ms apart as well, but their cuts last.
+    let is_odd = !is_round(step * 1e3) && !is_round(step * 1e6);
+    let is_hasty = seconds_per_change(recording).is_some_and(|seconds| seconds < SHORT_CUT_S);
     let units = [(60.0, "min"), (3600.0, "h"), (86_400.0, "d")];
-    let odd = !is_round(step) && !is_round(step * 1000.0);
-    let unit = units.into_iter().find(|(factor, _)| odd && is_round(step * factor) && step * factor >= 1e-3);
+    let unit = units.into_iter().find(|(factor, _)| is_odd && is_hasty && is_round(step * factor * 1e3));
     unit.map(|(_, unit)| {
         UnitDoubt::new(
             "time_s",
@@ -133,18 +135,30 @@ fn time(recording: &Recording) -> Option<UnitDoubt> {
     })
 }
 
+/// Is this a whole number of parts, to what a file with six digits keeps?
+fn is_round(parts: f64) -> bool {
+    parts.round() >= 1.0 && (parts - parts.round()).abs() < (2e-3 * parts.max(1.0)).min(0.1)
+}
+
+/// How long speed and cut stay as they are, on average.
+fn seconds_per_change(recording: &Recording) -> Option<f64> {
+    let span_s = recording.time_s.last()? - recording.time_s.first()?;
+    let changes = changes(recording);
+    (changes >= LEAST_CHANGES).then(|| span_s / changes as f64)
+}
+
 /// Do the speed or the cut change so often that a row cannot last minutes?
 fn changes_often(recording: &Recording) -> bool {
-    let changes = |name: &str| {
+    recording.rows() >= 60 && 40 * changes(recording) > recording.rows()
+}
+
+/// How often the speed or the cut becomes another.
+fn changes(recording: &Recording) -> usize {
+    let of = |name: &str| {
         recording.numbers(name).map_or(0, |numbers| {
             let values: Vec<f64> = numbers.present().collect();
             values.windows(2).filter(|pair| (pair[1] - pair[0]).abs() > 0.05 * pair[0].abs().max(pair[1].abs())).count()
         })
     };
-    let most = ["spindle_speed_rpm", "engaged", "feed_mm_min", "axis_velocity_mm_min"]
-        .map(changes)
-        .into_iter()
-        .max()
-        .unwrap_or(0);
-    recording.rows() >= 60 && 40 * most > recording.rows()
+    ["spindle_speed_rpm", "engaged", "feed_mm_min", "axis_velocity_mm_min"].map(of).into_iter().max().unwrap_or(0)
 }
