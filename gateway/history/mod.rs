@@ -83,7 +83,7 @@ mod writer;
 pub use audit::{AuditCheck, AuditEntry, Break, audit_document};
 pub use block::{Cells, NumberCells, ValueSummary, WordCells};
 pub use error::HistoryError;
-pub use export::{DayWritten, Format, day_file, day_of};
+pub use export::{DayWritten, Format, day_of};
 pub use info::{Dropped, Info, TableRows};
 pub use list::{AlarmEntry, RecordSpan, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};

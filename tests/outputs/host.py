@@ -52,6 +52,7 @@ def show(message):
         )
     seq = decoded.seq if decoded.HasField("seq") else None
     shown = {"topic": topic, "kind": kind, "seq": seq, "metrics": metrics, "qos": message.qos, "retain": bool(message.retain)}
+    shown["payload"] = message.payload.hex()
     shown["timestamp"] = decoded.timestamp if decoded.HasField("timestamp") else None
     print(json.dumps(shown), flush=True)
 

@@ -2,6 +2,7 @@
 
 use crate::box_under_test::Sending;
 use crate::broker::Broker;
+use crate::decoders::assert_both_read_the_same;
 use crate::host::Host;
 use adapters::channel::{CHANNELS, Form};
 use serde_json::Value as Json;
@@ -103,6 +104,7 @@ fn another_implementation_decodes_births_and_data_as_history_query_shows_them() 
     let heard = host.heard();
     assert_legal(&heard);
     births_say_units_and_ranges(&heard);
+    assert_both_read_the_same(&heard);
     let known = Known::of(&heard);
     let names = "spindle_power_w,spindle_speed_rpm,feed_mm_min,machine_state,cutting_power_w";
     let (mut compared, stored) = (0, sending.queried(names));

@@ -40,3 +40,4 @@ pub use reader::{OutboxReader, OutboxStretch};
 pub use report::OutboxSettings;
 pub use shared::{DeliveryState, Outbox, OutboxFigures, OutboxHead};
 pub use store::box_id;
+pub(crate) use store::known_box_id;

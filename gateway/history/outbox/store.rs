@@ -107,7 +107,7 @@ fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
 /// The name of this box, made once: a machine that is renamed stays the same box. The digits tell boxes apart whose machines
 /// have the same letters, or none that an address may hold.
 fn box_name(db: &Connection, machine: &str) -> Result<String, HistoryError> {
-    if let Some(name) = property(db, "outbox_box_id")? {
+    if let Some(name) = known_box_id(db)? {
         return Ok(name);
     }
     // Histories of before had six digits, and the name of the machine as it was at each start.
@@ -123,8 +123,7 @@ fn box_name(db: &Connection, machine: &str) -> Result<String, HistoryError> {
 /// The file cannot be read, or a name cannot be written into it.
 pub fn box_id(path: &Path, machine: &str) -> Result<String, HistoryError> {
     if path.is_file() {
-        let known = property(&open_for_reading(path)?, "outbox_box_id")?;
-        if let Some(name) = known {
+        if let Some(name) = known_box_id(&open_for_reading(path)?)? {
             return Ok(name);
         }
     } else if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
@@ -135,6 +134,11 @@ pub fn box_id(path: &Path, machine: &str) -> Result<String, HistoryError> {
     let name = box_name(&naming, machine)?;
     naming.commit().doing("naming the outbox")?;
     Ok(name)
+}
+
+/// The name of the box of an open history, where it has one.
+pub(crate) fn known_box_id(db: &Connection) -> Result<Option<String>, HistoryError> {
+    property(db, "outbox_box_id")
 }
 
 fn property(db: &Connection, key: &str) -> Result<Option<String>, HistoryError> {

@@ -224,6 +224,12 @@ fn types(space: &mut AddressSpace, numbers: Numbers) {
         .is_abstract(true)
         .subtype_of(ObjectTypeId::BaseEventType)
         .insert(space);
+    let identifier = NodeId::new(numbers.own, format!("{name}/Identifier"));
+    VariableBuilder::new(&identifier, QualifiedName::new(numbers.machine_tool, "Identifier"), "Identifier")
+        .data_type(DataTypeId::String)
+        .has_type_definition(VariableTypeId::PropertyType)
+        .property_of(notification.clone())
+        .insert(space);
     let own = NodeId::new(numbers.own, layout::MESSAGE_EVENT);
     ObjectTypeBuilder::new(&own, QualifiedName::new(numbers.own, layout::MESSAGE_EVENT), layout::MESSAGE_EVENT)
         .subtype_of(notification)
