@@ -4,10 +4,12 @@
 
 mod appended;
 mod declared;
+mod form;
 mod paths;
 pub mod quantity;
 
 pub use declared::{DECLARED_MAX, DeclareError, NewChannel, declare};
+pub use form::Form;
 pub use paths::{PATHS, on_path};
 
 use std::fmt;
@@ -21,17 +23,6 @@ pub enum Kind {
     Held,
     /// A state word or name; holds until it changes.
     Text,
-}
-
-/// Which numbers a channel can have, for receivers that tell them apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
-    /// Any number within the range.
-    Real,
-    /// Whole numbers.
-    Whole,
-    /// 0 for no, 1 for yes.
-    Flag,
 }
 
 /// One row of the table.

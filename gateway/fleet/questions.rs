@@ -2,7 +2,7 @@
 
 /// A question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Question {
+pub struct FleetQuestion {
     /// Name on the command line.
     pub name: &'static str,
     /// The text.
@@ -12,8 +12,8 @@ pub struct Question {
 macro_rules! questions {
     ($($name:literal => $file:literal),* $(,)?) => {
         /// Every question; those whose names end in `-parquet` are for the lake.
-        pub const QUESTIONS: &[Question] =
-            &[$(Question { name: $name, sql: include_str!(concat!("questions/", $file, ".sql")) }),*];
+        pub const QUESTIONS: &[FleetQuestion] =
+            &[$(FleetQuestion { name: $name, sql: include_str!(concat!("questions/", $file, ".sql")) }),*];
     };
 }
 
@@ -34,6 +34,6 @@ questions! {
 
 /// The question of this name.
 #[must_use]
-pub fn of_name(name: &str) -> Option<&'static Question> {
+pub fn of_name(name: &str) -> Option<&'static FleetQuestion> {
     QUESTIONS.iter().find(|question| question.name == name)
 }

@@ -71,7 +71,7 @@ struct FieldValue<'a> {
     #[serde(borrow)]
     name: Cow<'a, str>,
     #[serde(default, borrow)]
-    value: Scalar<'a>,
+    value: ValueInItem<'a>,
     #[serde(default, borrow)]
     unit: Cow<'a, str>,
     #[serde(default, borrow)]
@@ -88,7 +88,7 @@ struct FieldValue<'a> {
 
 #[derive(Deserialize, Default)]
 #[serde(untagged)]
-enum Scalar<'a> {
+enum ValueInItem<'a> {
     Number(f64),
     Text(#[serde(borrow)] Cow<'a, str>),
     #[default]
@@ -189,9 +189,9 @@ impl<'a> FleetRow<'a> {
             return Ok(());
         }
         match value.value {
-            Scalar::Number(number) => self.numbers.push((series, number)),
-            Scalar::Text(words) => self.texts.push((series, text(words))),
-            Scalar::Missing => self.missing.push((series, value.missing.map_or("not_provided".into(), text))),
+            ValueInItem::Number(number) => self.numbers.push((series, number)),
+            ValueInItem::Text(words) => self.texts.push((series, text(words))),
+            ValueInItem::Missing => self.missing.push((series, value.missing.map_or("not_provided".into(), text))),
         }
         Ok(())
     }

@@ -89,8 +89,8 @@ pub use list::{AlarmEntry, RecordSpan, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
 pub(crate) use outbox::unnested;
 pub use outbox::{
-    Cell, Content, DeliveryState, Gap, Item, Mean, Outbox, OutboxFigures, OutboxHead, OutboxReader, OutboxSettings,
-    OutboxStretch, Position, Reading, SeriesInfo, box_id,
+    Cell, Content, DeliveryState, Gap, Item, Outbox, OutboxFigures, OutboxHead, OutboxReader, OutboxSettings,
+    OutboxStretch, Position, Reading, SeriesInfo, SeriesMean, box_id,
 };
 pub use overview::{Buckets, Overview};
 pub use query::{Chunk, Query, STATE_SERIES};

@@ -87,7 +87,7 @@ pub struct Gap {
 
 /// One series over one minute, hour or day.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mean {
+pub struct SeriesMean {
     /// What was read or inferred.
     pub series: Arc<SeriesInfo>,
     /// For how long there was a value, s.
@@ -116,7 +116,7 @@ pub enum Content {
         /// Its length, s.
         width_s: u32,
         /// Every series that had a value.
-        means: Vec<Mean>,
+        means: Vec<SeriesMean>,
     },
 }
 
@@ -169,7 +169,7 @@ impl Item {
             Content::Gap(Gap { until_ns, reason }) => ("record", json!({"until_ns": until_ns, "reason": &**reason})),
             Content::Means { width_s, means } => {
                 document["width_s"] = Json::from(*width_s);
-                ("values", means.iter().map(Mean::json).collect())
+                ("values", means.iter().map(SeriesMean::json).collect())
             }
         };
         document[key] = value;
@@ -192,7 +192,7 @@ impl Reading {
     }
 }
 
-impl Mean {
+impl SeriesMean {
     fn json(&self) -> Json {
         let Self { series, seconds, mean, least, greatest } = self;
         json!({"name": &*series.name, "unit": &*series.unit, "mean": mean, "least": least, "greatest": greatest, "seconds": seconds})

@@ -4,7 +4,7 @@
 //! "r":"reason"}}` a gap, `{"t":start_ns,"w":width_s,"m":{"<series>":[seconds,mean,least,greatest]}}` the means of a minute, hour
 //! or day. A cell is a number, a text, or `{"m":"reason"}`.
 
-use super::item::{Cell, Content, Gap, Item, Mean, Reading, SeriesInfo};
+use super::item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 use crate::history::record::Record;
 use crate::history::tail::{comma, put_number};
 use adapters::clock::TimeNs;
@@ -115,8 +115,8 @@ impl Parsed {
     }
 }
 
-fn mean(id: i64, [seconds, mean, least, greatest]: [f64; 4], known: &SeriesByNumber) -> Option<Mean> {
-    Some(Mean { series: known.get(&id)?.clone(), seconds, mean, least, greatest })
+fn mean(id: i64, [seconds, mean, least, greatest]: [f64; 4], known: &SeriesByNumber) -> Option<SeriesMean> {
+    Some(SeriesMean { series: known.get(&id)?.clone(), seconds, mean, least, greatest })
 }
 
 fn reading(id: &str, cell: &Json, known: &SeriesByNumber) -> Option<Reading> {

@@ -34,7 +34,7 @@ mod store;
 
 pub(crate) use gather::Gatherer;
 pub(crate) use item::unnested;
-pub use item::{Cell, Content, Gap, Item, Mean, Reading, SeriesInfo};
+pub use item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 pub use position::Position;
 pub use reader::{OutboxReader, OutboxStretch};
 pub use report::OutboxSettings;

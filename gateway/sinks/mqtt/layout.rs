@@ -9,7 +9,7 @@
 //! What a subscriber that comes late must know is retained: the newest state, part and diagnosis, with `topics` the newest value of
 //! each channel, and in every layout `PREFIX/latest` ([`latest`]).
 
-use crate::history::{Cell, Content, Gap, Item, Mean, Outbox, Reading};
+use crate::history::{Cell, Content, Gap, Item, Outbox, Reading, SeriesMean};
 use crate::moment;
 use adapters::clock::TimeNs;
 use adapters::mqtt::Outgoing;
@@ -83,7 +83,7 @@ fn flat(outbox: &Outbox, item: &Item, historical: bool) -> Json {
         }
         Content::Means { width_s, means } => {
             fields.insert("width_s".to_owned(), json!(width_s));
-            fields.extend(means.iter().map(|Mean { series, mean, .. }| (series.name.to_string(), json!(mean))));
+            fields.extend(means.iter().map(|SeriesMean { series, mean, .. }| (series.name.to_string(), json!(mean))));
         }
     }
     Json::Object(fields)

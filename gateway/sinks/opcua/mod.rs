@@ -59,7 +59,7 @@ pub struct OpcuaTarget {
 
 /// Who the machine is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Identity {
+struct MachineIdentity {
     machine: String,
     box_id: String,
     manufacturer: Option<String>,
@@ -67,7 +67,7 @@ struct Identity {
     serial_number: Option<String>,
 }
 
-impl Identity {
+impl MachineIdentity {
     fn of(target: &OpcuaTarget, outbox: &Outbox) -> Self {
         let [manufacturer, model, serial_number] = target.plate.clone();
         Self { machine: outbox.machine().to_owned(), box_id: outbox.box_id(), manufacturer, model, serial_number }

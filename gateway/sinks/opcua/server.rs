@@ -3,7 +3,7 @@
 use super::event::AlarmEvent;
 use super::space::{self, Namespaces, Numbers};
 use super::values::Shown;
-use super::{APPLICATION, Identity, OpcuaTarget, PRODUCT, SinkError, certificates, layout};
+use super::{APPLICATION, MachineIdentity, OpcuaTarget, PRODUCT, SinkError, certificates, layout};
 use crate::history::{Alarm, Outbox, Reading};
 use adapters::clock::TimeNs;
 use opcua::crypto::{SecurityPolicy, X509Data};
@@ -70,7 +70,7 @@ impl Running {
             machinery: number(layout::MACHINERY)?,
             machine_tool: number(layout::MACHINE_TOOL)?,
         };
-        let (latest, identity) = (outbox.latest(), Identity::of(target, outbox));
+        let (latest, identity) = (outbox.latest(), MachineIdentity::of(target, outbox));
         let shown = {
             let mut space = manager.address_space().write();
             let shown = space::build(&mut space, numbers, &identity, &latest);

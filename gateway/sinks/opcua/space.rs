@@ -2,7 +2,7 @@
 
 use super::layout::{self, Form, StatePart};
 use super::values::{Shown, set_missing};
-use super::{Identity, units};
+use super::{MachineIdentity, units};
 use crate::history::{Reading, SeriesInfo, SeriesKind};
 use opcua::nodes::{
     DataTypeBuilder, EventNotifier, NodeSetImport, NodeSetNamespaceMapper, ObjectBuilder, ObjectTypeBuilder,
@@ -46,7 +46,12 @@ pub(super) struct Numbers {
 }
 
 /// Builds the nodes of the machine of this name and box, with one for each series.
-pub(super) fn build(space: &mut AddressSpace, numbers: Numbers, identity: &Identity, series: &[Reading]) -> Shown {
+pub(super) fn build(
+    space: &mut AddressSpace,
+    numbers: Numbers,
+    identity: &MachineIdentity,
+    series: &[Reading],
+) -> Shown {
     let machine = identity.machine.as_str();
     types(space, numbers);
     let machines = NodeId::new(numbers.machinery, layout::MACHINES);
@@ -186,7 +191,7 @@ fn alarms(space: &mut AddressSpace, numbers: Numbers) -> NodeId {
 }
 
 /// What is known of the machine's identity: no controller tells its maker and serial number, so a person has to.
-fn identification(space: &mut AddressSpace, numbers: Numbers, identity: &Identity) {
+fn identification(space: &mut AddressSpace, numbers: Numbers, identity: &MachineIdentity) {
     let localized = |text: &String| Variant::from(LocalizedText::new("", text));
     let rows = [
         ("Manufacturer", DataTypeId::LocalizedText, identity.manufacturer.as_ref().map(localized)),

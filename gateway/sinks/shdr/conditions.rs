@@ -8,7 +8,7 @@ use super::model::Component;
 
 /// A condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Condition {
+pub(super) struct AlarmKind {
     /// Name in the lines.
     pub(super) name: &'static str,
     /// Type of the standard.
@@ -16,26 +16,26 @@ pub(super) struct Condition {
     pub(super) component: Component,
 }
 
-const fn condition(name: &'static str, kind: &'static str, component: Component) -> Condition {
-    Condition { name, kind, component }
+const fn condition(name: &'static str, kind: &'static str, component: Component) -> AlarmKind {
+    AlarmKind { name, kind, component }
 }
 
 /// Of what no kind is known.
-pub(super) const OWN: Condition = condition("alarms", "SYSTEM", Component::Controller);
-const SYSTEM: Condition = condition("system", "SYSTEM", Component::Path);
-const LOGIC: Condition = condition("logic_program", "LOGIC_PROGRAM", Component::Controller);
-const MOTION: Condition = condition("motion_program", "MOTION_PROGRAM", Component::Path);
-const COMMUNICATIONS: Condition = condition("communications", "COMMUNICATIONS", Component::Controller);
-const SERVO: Condition = condition("servo", "ACTUATOR", Component::Axes);
-const TRAVEL: Condition = condition("travel", "POSITION", Component::Axes);
-const OVERHEAT: Condition = condition("overheat", "TEMPERATURE", Component::Axes);
-const SPINDLE: Condition = condition("spindle_drive", "ACTUATOR", Component::Spindle);
+pub(super) const OWN: AlarmKind = condition("alarms", "SYSTEM", Component::Controller);
+const SYSTEM: AlarmKind = condition("system", "SYSTEM", Component::Path);
+const LOGIC: AlarmKind = condition("logic_program", "LOGIC_PROGRAM", Component::Controller);
+const MOTION: AlarmKind = condition("motion_program", "MOTION_PROGRAM", Component::Path);
+const COMMUNICATIONS: AlarmKind = condition("communications", "COMMUNICATIONS", Component::Controller);
+const SERVO: AlarmKind = condition("servo", "ACTUATOR", Component::Axes);
+const TRAVEL: AlarmKind = condition("travel", "POSITION", Component::Axes);
+const OVERHEAT: AlarmKind = condition("overheat", "TEMPERATURE", Component::Axes);
+const SPINDLE: AlarmKind = condition("spindle_drive", "ACTUATOR", Component::Spindle);
 
 /// Every condition.
-pub(super) const ALL: [Condition; 9] = [OWN, SYSTEM, LOGIC, MOTION, COMMUNICATIONS, SERVO, TRAVEL, OVERHEAT, SPINDLE];
+pub(super) const ALL: [AlarmKind; 9] = [OWN, SYSTEM, LOGIC, MOTION, COMMUNICATIONS, SERVO, TRAVEL, OVERHEAT, SPINDLE];
 
 /// The two letters of a code, and the condition.
-const KINDS: [(&str, Condition); 15] = [
+const KINDS: [(&str, AlarmKind); 15] = [
     ("SW", SYSTEM),
     ("PW", SYSTEM),
     ("SR", SYSTEM),
@@ -61,7 +61,7 @@ pub(super) fn parts(
     source: &str,
     code: &str,
     text: &str,
-) -> impl Iterator<Item = (&'static Condition, String, String)> {
+) -> impl Iterator<Item = (&'static AlarmKind, String, String)> {
     let shown: Vec<&str> = if source == CONTROLLER { code.split("; ").collect() } else { Vec::new() };
     let alone = shown.is_empty().then(|| (&OWN, plain(code), plain(text)));
     let parts: Vec<_> = shown.into_iter().map(part).collect();
@@ -69,7 +69,7 @@ pub(super) fn parts(
 }
 
 /// `SV0417 (Y) SERVO ALARM`: kind, number and words.
-fn part(shown: &str) -> (&'static Condition, String, String) {
+fn part(shown: &str) -> (&'static AlarmKind, String, String) {
     let (code, words) = shown.split_once(' ').unwrap_or((shown, ""));
     let known = code.split_at_checked(2).filter(|(_, number)| number.chars().all(|digit| digit.is_ascii_digit()));
     let known = known.and_then(|(letters, _)| KINDS.iter().find(|(kind, _)| *kind == letters));

@@ -2,7 +2,7 @@
 //!
 //! Source: MTConnect Standard 1.4, Part 2, and its schema `MTConnectDevices_1.4.xsd`.
 
-use super::conditions::{self, Condition};
+use super::conditions::{self, AlarmKind};
 use super::model::{AVAILABILITY, Category, Component, DataItem, ITEMS};
 use std::fmt::Write;
 
@@ -104,7 +104,7 @@ impl Tree<'_> {
         self.put(indent, &format!("<{tag} id=\"{prefix}{id}\" name=\"{name}\">"));
     }
 
-    fn leaf(&mut self, indent: usize, (component, tag, id, name): Part) {
+    fn leaf(&mut self, indent: usize, (component, tag, id, name): DevicePart) {
         if self.is_empty(component) {
             return;
         }
@@ -114,7 +114,7 @@ impl Tree<'_> {
     }
 
     /// A component that holds others, and what stands at itself.
-    fn group(&mut self, (own, tag, id): (Option<Component>, &str, &str), parts: &[Part]) {
+    fn group(&mut self, (own, tag, id): (Option<Component>, &str, &str), parts: &[DevicePart]) {
         if own.is_none() && parts.iter().all(|(component, ..)| self.is_empty(*component)) {
             return;
         }
@@ -132,15 +132,15 @@ impl Tree<'_> {
 }
 
 /// Component, its tag, identifier and name. A name is optional in the standard; some agents cannot do without.
-type Part = (Component, &'static str, &'static str, &'static str);
+type DevicePart = (Component, &'static str, &'static str, &'static str);
 
-const AXES: [Part; 4] = [
+const AXES: [DevicePart; 4] = [
     (Component::Spindle, "Rotary", "spindle", "C"),
     (Component::X, "Linear", "x_axis", "X"),
     (Component::Y, "Linear", "y_axis", "Y"),
     (Component::Z, "Linear", "z_axis", "Z"),
 ];
-const SYSTEMS: [Part; 2] =
+const SYSTEMS: [DevicePart; 2] =
     [(Component::Electric, "Electric", "electric", "electric"), (Component::Coolant, "Coolant", "coolant", "coolant")];
 
 fn device(described: Described<'_>, delivered: impl Fn(&str) -> bool) -> String {
@@ -177,8 +177,8 @@ fn data_item(prefix: &str, item: &DataItem) -> String {
     )
 }
 
-fn condition_item(prefix: &str, condition: &Condition) -> String {
-    let Condition { name, kind, .. } = condition;
+fn condition_item(prefix: &str, condition: &AlarmKind) -> String {
+    let AlarmKind { name, kind, .. } = condition;
     format!("<DataItem id=\"{prefix}{name}\" name=\"{name}\" category=\"CONDITION\" type=\"{kind}\"/>")
 }
 

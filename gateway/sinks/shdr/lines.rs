@@ -2,7 +2,7 @@
 //!
 //! Source: MTConnect agent, "Adapter Agent Protocol" (SHDR): data items, conditions, assets, heartbeat.
 
-use super::conditions::{self, Condition, OWN};
+use super::conditions::{self, AlarmKind, OWN};
 use super::model::{AVAILABILITY, UNAVAILABLE, of_channel};
 use crate::history::{Alarm, Cell, Content, Item, Reading, Record};
 use crate::moment;
@@ -84,7 +84,7 @@ impl Machine {
                 }
                 Record::AlarmClear(clear) => {
                     self.alarms.remove(&(clear.source.clone(), clear.code.clone()));
-                    let normal = |(condition, code, _): (&Condition, String, String)| {
+                    let normal = |(condition, code, _): (&AlarmKind, String, String)| {
                         format!("{}|NORMAL|{code}|||", condition.name)
                     };
                     conditions::parts(&clear.source, &clear.code, "").map(normal).collect()
@@ -161,7 +161,7 @@ fn cells<'a>(values: impl Iterator<Item = (&'a str, &'a str)>) -> impl Iterator<
 fn raised(alarm: &Alarm) -> Vec<String> {
     let level = if alarm.severity == "critical" { "FAULT" } else { "WARNING" };
     let severity = plain(&alarm.severity);
-    let line = |(condition, code, text): (&Condition, String, String)| {
+    let line = |(condition, code, text): (&AlarmKind, String, String)| {
         format!("{}|{level}|{code}|{severity}||{text}", condition.name)
     };
     conditions::parts(&alarm.source, &alarm.code, &alarm.en).map(line).collect()

@@ -1,6 +1,6 @@
 //! Which channel is which data item of MTConnect: the one table that the lines and `devices.xml` are made of.
 //!
-//! The data item has the name of the channel. Values are sent as the channel has them ([`Form`]); where the standard wants another
+//! The data item has the name of the channel. Values are sent as the channel has them ([`ValueForm`]); where the standard wants another
 //! unit, `devices.xml` names the native one and the agent converts.
 //!
 //! Source: MTConnect Standard 1.4, Part 2 (devices), tables of data items and units. Newer agents read it as well.
@@ -22,12 +22,12 @@ pub(super) struct DataItem {
     /// Unit of the channel, where it is another one.
     pub(super) native_units: Option<&'static str>,
     pub(super) component: Component,
-    pub(super) form: Form,
+    pub(super) form: ValueForm,
 }
 
 /// How a value of the channel stands on a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum ValueForm {
     /// As it is.
     Plain,
     /// The number behind the letter: 30 of `N30`.
@@ -36,7 +36,7 @@ pub(super) enum Form {
     Words(&'static str, &'static str),
 }
 
-impl Form {
+impl ValueForm {
     pub(super) fn shown(self, value: &Cell) -> String {
         match (self, value) {
             (Self::Words(off, on), Cell::Number(number)) => if *number == 0.0 { off } else { on }.to_owned(),
@@ -83,14 +83,23 @@ const fn sample(
     units: &'static str,
 ) -> DataItem {
     let category = Category::Sample;
-    DataItem { channel, category, kind, sub_type, units: Some(units), native_units: None, component, form: Form::Plain }
+    DataItem {
+        channel,
+        category,
+        kind,
+        sub_type,
+        units: Some(units),
+        native_units: None,
+        component,
+        form: ValueForm::Plain,
+    }
 }
 
 const fn native(item: DataItem, unit: &'static str) -> DataItem {
     DataItem { native_units: Some(unit), ..item }
 }
 
-const fn with_form(item: DataItem, form: Form) -> DataItem {
+const fn with_form(item: DataItem, form: ValueForm) -> DataItem {
     DataItem { form, ..item }
 }
 
@@ -101,7 +110,7 @@ const fn event(
     sub_type: Option<&'static str>,
 ) -> DataItem {
     let category = Category::Event;
-    DataItem { channel, category, kind, sub_type, units: None, native_units: None, component, form: Form::Plain }
+    DataItem { channel, category, kind, sub_type, units: None, native_units: None, component, form: ValueForm::Plain }
 }
 
 use Component::{Controller, Coolant, Electric, Environment, Path, Spindle, X, Y, Z};
@@ -134,10 +143,10 @@ pub(super) const ITEMS: &[DataItem] = &[
     sample("z_axis_load_pct", Z, "LOAD", None, "PERCENT"),
     sample("z_axis_current_a", Z, "AMPERAGE", None, "AMPERE"),
     event("mode", Controller, "CONTROLLER_MODE", None),
-    with_form(event("emergency_stop", Controller, "EMERGENCY_STOP", None), Form::Words("ARMED", "TRIGGERED")),
+    with_form(event("emergency_stop", Controller, "EMERGENCY_STOP", None), ValueForm::Words("ARMED", "TRIGGERED")),
     event("execution", Path, "EXECUTION", None),
     event("program", Path, "PROGRAM", None),
-    with_form(event("block", Path, "LINE_NUMBER", None), Form::Number),
+    with_form(event("block", Path, "LINE_NUMBER", None), ValueForm::Number),
     event("block_text", Path, "BLOCK", None),
     event("tool", Path, "TOOL_NUMBER", None),
     event("part", Path, "PART_ID", None),
