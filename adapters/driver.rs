@@ -119,6 +119,26 @@ impl Fact {
     }
 }
 
+/// Something that is wrong with a source although it answers.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct SourceProblem {
+    /// What, in words, with the channels that it costs.
+    pub what: String,
+    /// What to do next.
+    pub next: String,
+}
+
+/// Something that a device offers, whether a channel takes it or not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Offer {
+    /// What it is called there; written after `read =` it makes a channel of it, where that is possible.
+    pub name: String,
+    /// What it says now, with its unit as the device tells it; or why it says nothing.
+    pub says: Result<String, String>,
+    /// The channel that takes it.
+    pub channel: Option<ChannelId>,
+}
+
 /// Something that can be read.
 pub trait Source: Send {
     /// The address, as in the configuration.
@@ -152,6 +172,21 @@ pub trait Source: Send {
     /// What it has found out about itself so far. Asked for about once a second; does not talk to the device.
     fn facts(&self) -> Vec<Fact> {
         Vec::new()
+    }
+
+    /// What is wrong although it answers, as of the last read. Asked for after every read; does not talk to the device. The
+    /// same trouble has the same words as long as it lasts.
+    fn problems(&self) -> Vec<SourceProblem> {
+        Vec::new()
+    }
+
+    /// Everything that the device offers, for whoever wants to make channels of it. Talks to the device and may take its
+    /// time; a kind that cannot tell gives nothing.
+    ///
+    /// # Errors
+    /// See [`SourceError`].
+    fn offers(&mut self, _clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
+        Ok(Vec::new())
     }
 }
 

@@ -11,7 +11,8 @@
 use crate::address::{Circuit, EdaTarget, SerialTarget};
 use crate::channel::ChannelId;
 use crate::clock::Clock;
-use crate::driver::{Fact, Source, SourceError};
+use crate::driver::{Fact, Source, SourceError, SourceProblem};
+use crate::electric::{Doubts, SupplyCheck, SupplyValues};
 use crate::modbus::line::{ModbusError, serial_fault, serial_silence};
 use crate::reading::{Reading, Stamp};
 use crate::serial::{Bus, SharedBus, wire_time};
@@ -38,6 +39,8 @@ pub struct Eda9033a {
     deadline: Duration,
     channels: Vec<ChannelId>,
     late: u64,
+    check: SupplyCheck,
+    doubts: Doubts,
 }
 
 impl Eda9033a {
@@ -52,7 +55,8 @@ impl Eda9033a {
             Circuit::Spindle => &["spindle_power_w", "supply_voltage_v", "spindle_current_a"],
         };
         let channels = names.iter().filter_map(|name| ChannelId::of(name)).collect();
-        Ok(Self { name: name.to_owned(), bus: Bus::of(line)?, address, ct, deadline, channels, late: 0 })
+        let (check, doubts) = (SupplyCheck::default(), Doubts::default());
+        Ok(Self { name: name.to_owned(), bus: Bus::of(line)?, address, ct, deadline, channels, late: 0, check, doubts })
     }
 
     fn ask(&mut self, clock: &dyn Clock) -> Result<(Values, Stamp), ModbusError> {
@@ -118,7 +122,7 @@ fn find(bytes: &[u8], address: u8) -> Option<[u8; ANSWER_BYTES]> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Values {
     power_w: f64,
-    between_phases_v: f64,
+    phases_v: [f64; 3],
     current_a: f64,
 }
 
@@ -126,12 +130,19 @@ impl Values {
     fn of(frame: &[u8; ANSWER_BYTES], ct: f64) -> Self {
         let word = |at: usize| u16::from_be_bytes([frame[at], frame[at + 1]]);
         let share = |at: usize| f64::from(word(at)) / COUNTS;
-        let mean = |at: [usize; 3]| at.into_iter().map(share).sum::<f64>() / 3.0;
         Self {
             power_w: signed(word(17)) / COUNTS * 3.0 * NOMINAL_V * NOMINAL_A * ct,
-            between_phases_v: 3.0_f64.sqrt() * NOMINAL_V * mean([5, 9, 13]),
-            current_a: NOMINAL_A * ct * mean([7, 11, 15]),
+            phases_v: [5, 9, 13].map(|at| NOMINAL_V * share(at)),
+            current_a: NOMINAL_A * ct * [7, 11, 15].map(share).iter().sum::<f64>() / 3.0,
         }
+    }
+
+    fn between_phases_v(&self) -> f64 {
+        3.0_f64.sqrt() * self.phases_v.iter().sum::<f64>() / 3.0
+    }
+
+    fn supply(&self) -> SupplyValues {
+        SupplyValues { power: Some(self.power_w), voltage: self.phases_v.map(Some), ..SupplyValues::default() }
     }
 }
 
@@ -160,9 +171,14 @@ impl Source for Eda9033a {
         let asked = self.ask(clock);
         let (values, stamp) =
             asked.map_err(|fault| fault.of_source(&self.name, "all values".to_owned(), self.deadline))?;
-        let numbers = [values.power_w, values.between_phases_v, values.current_a];
-        let readings = self.channels.iter().zip(numbers);
-        out.extend(readings.map(|(channel, number)| Reading::number(*channel, stamp, number)));
+        self.doubts = self.check.see(&values.supply());
+        let all = self.doubts.everything;
+        let numbers =
+            [(values.power_w, all), (values.between_phases_v(), all || self.doubts.voltage), (values.current_a, all)];
+        out.extend(self.channels.iter().zip(numbers).map(|(channel, (number, is_doubted))| match is_doubted {
+            true => Reading::implausible(*channel, stamp, number),
+            false => Reading::number(*channel, stamp, number),
+        }));
         Ok(())
     }
 
@@ -175,6 +191,10 @@ impl Source for Eda9033a {
             Fact::number("power_resolution_w", resolution_w),
             Fact::number("late_answers", late),
         ]
+    }
+
+    fn problems(&self) -> Vec<SourceProblem> {
+        self.doubts.problems.clone()
     }
 }
 
@@ -204,7 +224,7 @@ mod tests {
         let values = Values::of(&find(&bytes, 1).expect("behind noise and echo"), 20.0);
         // One count is 0.375 W times the ratio.
         assert!((values.power_w + 400.0 * 0.375 * 20.0).abs() < 1e-9, "{values:?}");
-        assert!((values.between_phases_v - 3.0_f64.sqrt() * 230.0).abs() < 1e-9);
+        assert!((values.between_phases_v() - 3.0_f64.sqrt() * 230.0).abs() < 1e-9);
         assert!((values.current_a - 40.0).abs() < 1e-9);
     }
 

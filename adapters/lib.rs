@@ -14,8 +14,10 @@ pub mod address;
 pub mod channel;
 pub mod child;
 pub mod clock;
+pub mod conversion;
 pub mod driver;
 pub mod eda9033a;
+pub mod electric;
 pub mod fanuc;
 pub mod histogram;
 pub mod hnc;
@@ -25,6 +27,8 @@ pub mod mqtt;
 pub mod nclink;
 pub mod offset;
 pub mod open;
+pub mod own;
+pub mod plausibility;
 pub mod reading;
 pub mod recording;
 pub mod replay;
@@ -33,6 +37,7 @@ pub mod serial;
 pub mod simulated;
 pub(crate) mod stream;
 pub mod temperature;
+pub mod text;
 pub mod tls;
 pub mod units;
 pub mod waveform;
@@ -41,7 +46,9 @@ pub mod worker;
 
 pub use address::Address;
 pub use channel::{Channel, ChannelId};
-pub use driver::{Actuator, Fact, FactValue, LadderRequest, LadderRule, Pull, Source, SourceError};
+pub use driver::{
+    Actuator, Fact, FactValue, LadderRequest, LadderRule, Offer, Pull, Source, SourceError, SourceProblem,
+};
 pub use offset::{Axis, OffsetSink};
 pub use reading::{Absence, Reading, Stamp, Value};
 pub use recording::Recording;

@@ -28,11 +28,13 @@ pub enum Absence {
     Stale,
     /// The recording holds an empty cell.
     NotRecorded,
+    /// The device gives it in a unit that is not known, or that measures something else.
+    UnknownUnit,
 }
 
 impl Absence {
     /// Every reason, in the order of their codes.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::NotProvided,
         Self::NotYetRead,
         Self::MachineOff,
@@ -43,6 +45,7 @@ impl Absence {
         Self::OutOfRange,
         Self::Stale,
         Self::NotRecorded,
+        Self::UnknownUnit,
     ];
 
     /// The word used in `<channel>_missing` columns, JSON and SQL.
@@ -59,6 +62,7 @@ impl Absence {
             Self::OutOfRange => "out_of_range",
             Self::Stale => "stale",
             Self::NotRecorded => "not_recorded",
+            Self::UnknownUnit => "unknown_unit",
         }
     }
 
@@ -157,26 +161,37 @@ pub struct Reading {
     pub stamp: Stamp,
     /// What, or why not.
     pub value: Result<Value, Absence>,
+    /// What the device said, where it is not believed.
+    pub implausible: Option<f64>,
 }
 
 impl Reading {
-    /// A number; one that is not finite or outside the channel's range becomes [`Absence::OutOfRange`].
+    /// A number that is believed if the channel can have it. What is not believed is [`Absence::OutOfRange`], never a value
+    /// that was cut off; what the device said stays beside it, to be counted and told by [`crate::plausibility`].
     #[must_use]
     pub fn number(channel: ChannelId, stamp: Stamp, number: f64) -> Self {
-        let value = if channel.channel().holds(number) { Value::number(number) } else { Err(Absence::OutOfRange) };
-        Self { channel, stamp, value }
+        if channel.channel().holds(number) {
+            return Self { channel, stamp, value: Value::number(number), implausible: None };
+        }
+        Self::implausible(channel, stamp, number)
+    }
+
+    /// A number that is not believed: the channel cannot have it, or something beside it in the same answer tells against it.
+    #[must_use]
+    pub fn implausible(channel: ChannelId, stamp: Stamp, number: f64) -> Self {
+        Self { channel, stamp, value: Err(Absence::OutOfRange), implausible: Some(number) }
     }
 
     /// A state word.
     #[must_use]
     pub fn text(channel: ChannelId, stamp: Stamp, text: Arc<str>) -> Self {
-        Self { channel, stamp, value: Ok(Value::Text(text)) }
+        Self { channel, stamp, value: Ok(Value::Text(text)), implausible: None }
     }
 
     /// No value, with the reason.
     #[must_use]
     pub fn absent(channel: ChannelId, stamp: Stamp, reason: Absence) -> Self {
-        Self { channel, stamp, value: Err(reason) }
+        Self { channel, stamp, value: Err(reason), implausible: None }
     }
 }
 

@@ -89,6 +89,31 @@ pub(crate) fn fill_counting(stream: &mut TcpStream, into: &mut [u8], until: Inst
     Ok(())
 }
 
+/// Appends what comes next, waiting until `until` at most.
+///
+/// # Errors
+/// Why nothing came.
+pub(crate) fn some(stream: &mut TcpStream, into: &mut Vec<u8>, until: Instant) -> Result<(), Short> {
+    let mut buffer = [0_u8; 512];
+    loop {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(Short::Silent);
+        }
+        stream.set_read_timeout(Some(left)).map_err(Short::Broken)?;
+        match stream.read(&mut buffer) {
+            Ok(0) => return Err(Short::Closed),
+            Ok(count) => {
+                into.extend_from_slice(&buffer[..count]);
+                return Ok(());
+            }
+            Err(error) if is_silence(&error) => return Err(Short::Silent),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(Short::Broken(error)),
+        }
+    }
+}
+
 /// Did a read end because its time was over?
 pub(crate) fn is_silence(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)

@@ -209,6 +209,9 @@ pub struct SourceStatus {
     /// Device, register map, effective refresh, load of the wire and the like.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub facts: Vec<FactStatus>,
+    /// What is wrong although it answers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub problems: Vec<StatusProblem>,
 }
 
 /// A script and whether its newest text is in charge.

@@ -6,7 +6,9 @@ use crate::fanuc::dial::Dial;
 use crate::fanuc::extra::AxisName;
 use crate::fanuc::feed_override;
 use crate::fanuc::item::{Area, Position};
-use crate::fanuc::own::OwnChannel;
+use crate::fanuc::own::OwnItem;
+use crate::own::Own;
+use crate::text::TextEncoding;
 use std::time::Duration;
 
 /// Most axes that have channels of their own names.
@@ -75,7 +77,9 @@ pub struct FanucOptions {
     /// Does the slow group read times, texts, codes and tool life?
     pub details: bool,
     /// The user's own channels, which the configuration adds.
-    pub own: Vec<OwnChannel>,
+    pub own: Vec<Own<OwnItem>>,
+    /// Character set of the control's texts.
+    pub encoding: TextEncoding,
 }
 
 impl Default for FanucOptions {
@@ -102,6 +106,7 @@ impl FanucOptions {
             spindles: keys.number("spindles", 1, 1, 8),
             details: keys.choice("details", &[("yes", true), ("no", false)]),
             own: Vec::new(),
+            encoding: super::keys::encoding(keys),
             further: Vec::new(),
             period: ms(keys, "period_ms", 100, 20, 60_000),
             slow: ms(keys, "slow_ms", 1000, 100, 600_000),

@@ -1,11 +1,15 @@
 //! Addresses of Huazhong controllers: `nclink://`, `nclinks://` and `hncnet://`.
 
-use super::keys::Keys;
+use super::keys::{self, Keys};
 use super::meter::{self, WaveformKeep};
 use super::secured::{Login, tls_files};
 use super::target::{Endpoint, Target, endpoint, library};
+use crate::hnc::OwnValue;
+use crate::nclink::OwnPath;
 use crate::nclink::mailbox::{ControllerRegister, Mailbox};
 use crate::nclink::offset_mailbox::OffsetMailbox;
+use crate::own::Own;
+use crate::text::TextEncoding;
 use crate::tls::TlsFiles;
 use std::path::PathBuf;
 
@@ -34,6 +38,10 @@ pub struct NcLinkTarget {
     pub sample: bool,
     /// Keep its raw samples around high currents?
     pub keep: Option<WaveformKeep>,
+    /// Character set of its messages.
+    pub encoding: TextEncoding,
+    /// The user's own channels, which the configuration adds.
+    pub own: Vec<Own<OwnPath>>,
 }
 
 /// A Huazhong controller through its vendor's library.
@@ -62,6 +70,8 @@ pub struct HncNetTarget {
     pub mailbox: Option<ControllerRegister>,
     /// How axes are shifted; without it none ever is.
     pub offset: Option<HncOffset>,
+    /// The user's own channels, which the configuration adds.
+    pub own: Vec<Own<OwnValue>>,
 }
 
 /// How the vendor's library shifts an axis.
@@ -85,6 +95,7 @@ pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, S
     let offset = keys.text("offset").and_then(|text| registers(keys, &text, mailbox));
     let sample = keys.choice("sample", &[("no", false), ("yes", true)]);
     let keep = kept(keys, sample, "sample=yes")?;
+    let encoding = keys::encoding(keys);
     let rest = body.strip_prefix("//").unwrap_or(body);
     let (broker, serial) = rest.split_once('/').unwrap_or((rest, ""));
     if serial.is_empty() || serial.contains(['+', '#']) {
@@ -104,6 +115,8 @@ pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, S
         offset,
         sample,
         keep,
+        encoding,
+        own: Vec::new(),
     }))
 }
 
@@ -141,6 +154,7 @@ pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
         keep,
         mailbox,
         offset,
+        own: Vec::new(),
     }))
 }
 

@@ -1,6 +1,7 @@
 //! The part of an address after the question mark, taken key by key so that what is left over can be refused.
 
 use crate::channel::nearest;
+use crate::text::TextEncoding;
 use std::fmt::Display;
 use std::str::FromStr;
 
@@ -94,6 +95,19 @@ impl Keys {
         }
         self.problems
     }
+}
+
+/// `encoding=gbk`: the character set of a device's texts.
+pub(super) fn encoding(keys: &mut Keys) -> TextEncoding {
+    let Some(label) = keys.text("encoding") else { return TextEncoding::default() };
+    TextEncoding::of_label(&label).unwrap_or_else(|| {
+        let near = nearest(&label, ["auto", "gbk", "gb18030", "shift_jis", "euc-kr", "big5", "utf-8", "windows-1252"]);
+        let hint = near.map(|near| format!("; did you mean {near}?")).unwrap_or_default();
+        keys.problem(format!(
+            "encoding={label}: give auto, gbk, shift_jis, utf-8 or another label of the Encoding Standard{hint}"
+        ));
+        TextEncoding::default()
+    })
 }
 
 /// `%20` and the like as the bytes they stand for; anything else as it is.

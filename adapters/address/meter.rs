@@ -1,6 +1,8 @@
 //! What an address says of a meter.
 
 use super::keys::Keys;
+use crate::modbus::{OwnRegister, TcpFraming};
+use crate::own::Own;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -30,6 +32,10 @@ pub struct MeterTarget {
     pub pt: f64,
     /// How long a request may take.
     pub timeout: Duration,
+    /// Frames on a network.
+    pub framing: TcpFraming,
+    /// The user's own channels, which the configuration adds.
+    pub own: Vec<Own<OwnRegister>>,
 }
 
 /// An EDA9033A in its native protocol.
@@ -63,7 +69,13 @@ pub(super) fn modbus(keys: &mut Keys, least_unit: u8) -> Result<MeterTarget, Str
     let (ct, pt) = (keys.number("ct", 1.0, 0.001, 100_000.0), keys.number("pt", 1.0, 0.001, 100_000.0));
     let timeout = timeout(keys);
     let profile = profile.ok_or_else(|| "name the meter's registers with profile=NAME".to_owned())?;
-    Ok(MeterTarget { unit, profile, profiles, circuit, ct, pt, timeout })
+    let framing = TcpFraming::default();
+    Ok(MeterTarget { unit, profile, profiles, circuit, ct, pt, timeout, framing, own: Vec::new() })
+}
+
+/// `framing=rtu`: frames of a serial line, as a transparent converter carries them.
+pub(super) fn framing(keys: &mut Keys) -> TcpFraming {
+    keys.choice("framing", &[("tcp", TcpFraming::Tcp), ("rtu", TcpFraming::Rtu)])
 }
 
 fn timeout(keys: &mut Keys) -> Duration {

@@ -19,7 +19,7 @@ pub use target::{
     SimulatedTarget, Speed, Target, endpoint,
 };
 
-use crate::fanuc::own::OwnChannel;
+use crate::own::{Own, OwnChannel, OwnChannelError};
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
@@ -63,21 +63,28 @@ impl Address {
         &self.text
     }
 
-    /// The same with the user's own channels, all of which are declared, as are those of further axes and spindles.
+    /// The same with the user's own channels, all of which are declared, as are those of further axes and spindles. What each
+    /// kind of source can be asked for, it says itself.
     ///
     /// # Errors
     /// Which channel cannot be read there, and why.
-    pub fn with_channels(mut self, own: Vec<OwnChannel>) -> Result<Self, String> {
-        let first = own.first().map(|own| own.new.name.clone());
-        match (&mut self.target, first) {
-            (Target::Fanuc { path, options, .. }, _) => {
-                options.own = own;
-                let declared = crate::fanuc::extra::declared(options, *path);
-                declared.map(|_| self).map_err(|(name, error)| format!("channel {name}: {error}"))
+    pub fn with_channels(mut self, own: Vec<OwnChannel>) -> Result<Self, OwnChannelError> {
+        match &mut self.target {
+            Target::Fanuc { path, options, .. } => {
+                options.own = Own::all(own, &crate::fanuc::source::delivered(options))?;
+                crate::fanuc::extra::declared(options, *path).map_err(|(channel, error)| OwnChannelError {
+                    channel,
+                    key: "name",
+                    what: error.to_string(),
+                })?;
             }
-            (_, None) => Ok(self),
-            (_, Some(name)) => Err(format!("channel {name}: only fanuc:// sources have channels of your own")),
+            // What stands where in a model differs between makers: here every channel can be told its place.
+            Target::NcLink(target) => target.own = Own::all(own, &[])?,
+            Target::HncNet(target) => target.own = Own::all(own, &crate::hnc::delivered())?,
+            Target::ModbusTcp { meter, .. } | Target::ModbusRtu { meter, .. } => meter.own = Own::all(own, &[])?,
+            _ => none_here(own)?,
         }
+        Ok(self)
     }
 
     /// What it means.
@@ -85,6 +92,14 @@ impl Address {
     pub fn target(&self) -> &Target {
         &self.target
     }
+}
+
+/// A kind of source that has nothing besides what it delivers.
+fn none_here(own: Vec<OwnChannel>) -> Result<(), OwnChannelError> {
+    own.into_iter().next().map_or(Ok(()), |own| {
+        let what = "a source of this kind has nothing to be asked for besides what it delivers".to_owned();
+        Err(OwnChannelError { channel: own.new.name, key: "read", what })
+    })
 }
 
 impl fmt::Display for Address {

@@ -207,7 +207,8 @@ pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target,
         "nclinks" => nclink(body, keys, true),
         "hncnet" => hncnet(body, keys),
         "modbus-tcp" => {
-            let meter = meter::modbus(keys, 0);
+            let (meter, framing) = (meter::modbus(keys, 0), meter::framing(keys));
+            let meter = meter.map(|meter| MeterTarget { framing, ..meter });
             Ok(Target::ModbusTcp { at: endpoint(body, Some(502))?, meter: meter? })
         }
         "modbus-rtu" => {

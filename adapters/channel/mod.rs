@@ -25,6 +25,10 @@ pub enum Kind {
     Text,
 }
 
+/// Of an electrical quantity that begins at zero, noise below zero up to this share of its greatest value. A thousandth is ten times
+/// what a class 1 meter shows at rest, and far from any current that would mean something.
+const NOISE: f64 = 1e-3;
+
 /// One row of the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Channel {
@@ -45,10 +49,19 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// Is this a finite number within the physical range?
+    /// Is this a finite number within the physical range? An electrical quantity that begins at zero is judged by its size:
+    /// the noise of a meter about zero, up to [`NOISE`] of the greatest value, is believed as it is.
     #[must_use]
     pub fn holds(&self, number: f64) -> bool {
-        number.is_finite() && number >= self.range.0 && number <= self.range.1
+        let (least, greatest) = self.range;
+        let noise = if self.is_electric() && least == 0.0 { NOISE * greatest } else { 0.0 };
+        number.is_finite() && number >= least - noise && number <= greatest
+    }
+
+    /// Is it an electrical quantity that a meter shows as exactly zero where it sees nothing?
+    #[must_use]
+    pub fn is_electric(&self) -> bool {
+        self.kind == Kind::Continuous && matches!(self.unit, "W" | "A" | "V" | "VA")
     }
 }
 

@@ -8,7 +8,7 @@
 use super::ChannelId;
 
 /// Units by the end of a name, for columns outside the table of channels. A longer ending stands before a shorter one.
-const ENDINGS: [(&str, &str); 27] = [
+const ENDINGS: [(&str, &str); 29] = [
     ("_rpm_per_s", "rpm/s"),
     ("_cm3_min", "cm3/min"),
     ("_mm_min", "mm/min"),
@@ -26,6 +26,8 @@ const ENDINGS: [(&str, &str); 27] = [
     ("_nm", "N m"),
     ("_um", "um"),
     ("_mm", "mm"),
+    ("_kwh", "kWh"),
+    ("_va", "VA"),
     ("_kw", "kW"),
     ("_hz", "Hz"),
     ("_w", "W"),
@@ -36,6 +38,23 @@ const ENDINGS: [(&str, &str); 27] = [
     ("_m", "m"),
     ("_s", "s"),
     ("_l", "l"),
+];
+
+/// Quantities that the user's own channels can have: word, unit, and what is possible, in the unit. Those of the table of channels
+/// have the limits of their rows.
+pub const LIMITS: [(&str, &str, (f64, f64)); 12] = [
+    ("power", "W", (-1e6, 1e6)),
+    ("current", "A", (-1e4, 1e4)),
+    ("voltage", "V", (0.0, 1000.0)),
+    ("frequency", "Hz", (0.0, 100_000.0)),
+    ("energy", "kWh", (-1e9, 1e9)),
+    ("temperature", "°C", (-60.0, 300.0)),
+    ("pressure", "bar", (-1.0, 5000.0)),
+    ("rotation", "rpm", (-100_000.0, 100_000.0)),
+    ("length", "mm", (-100_000.0, 100_000.0)),
+    ("speed", "mm/min", (-200_000.0, 200_000.0)),
+    ("load", "%", (-500.0, 500.0)),
+    ("count", "1", (0.0, 1e9)),
 ];
 
 /// The unit of a column: from the table of channels, else by the end of its name; `None` where neither tells.

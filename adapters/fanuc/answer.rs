@@ -39,7 +39,7 @@ pub struct Status {
     pub auxiliary: i16,
     /// 1 emergency stop, 2 reset.
     pub emergency: i16,
-    /// 1 alarm, 2 battery low and other warnings.
+    /// 1 alarm; 2 battery low, 3 fan and further warnings, which stop nothing.
     pub alarm: i16,
     /// Editing state.
     pub edit: i16,
@@ -138,12 +138,31 @@ impl SpeedUnit {
     }
 }
 
+/// Unit of a position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PositionUnit {
+    /// Millimetres.
+    Mm,
+    /// Inches.
+    Inch,
+    /// Degrees.
+    Degrees,
+}
+
+impl PositionUnit {
+    /// The unit with this number; `None` for one that is in no manual. Source: FOCAS2 manual, `POSELM.unit`.
+    #[must_use]
+    pub fn of_number(number: i16) -> Option<Self> {
+        [Self::Mm, Self::Inch, Self::Degrees].get(usize::try_from(number).ok()?).copied()
+    }
+}
+
 /// One alarm.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Alarm {
     /// Number within its type.
     pub number: i32,
-    /// Type: 0 SW, 1 PW, 2 IO, 3 PS, 4 OT, 5 OH, 6 SV, 7 SR, 8 MC, 9 SP, 10 DS, 11 IE, 12 BG, 13 SN, 15 EX.
+    /// Type; what it means depends on the generation: see [`states`](super::states).
     pub kind: i32,
     /// Axis from 1; 0 none.
     pub axis: i32,
@@ -200,6 +219,8 @@ pub enum FocasAnswer {
     },
     /// The unit of a speed.
     Unit(SpeedUnit),
+    /// Numbers of the units of positions, one per axis; see [`PositionUnit`].
+    Units(Vec<i16>),
     /// Names of axes or spindles.
     Names(Vec<String>),
     /// A text.
@@ -219,12 +240,15 @@ pub enum FocasAnswer {
         /// How much of it is used.
         count: i32,
     },
-    /// A modal word; flags as on the wire.
+    /// A modal word: its value is `value / 10^places`.
     Modal {
         /// Its value without a decimal point.
         value: i32,
-        /// First and second flag.
-        flags: [u8; 2],
+        /// Bits about the word (`flag1` of the library): bit 6 says that a decimal point was written, bit 7 that the block
+        /// holds the word. No bit of it counts decimals.
+        flag: u8,
+        /// Places after the point (`flag2` of the library).
+        places: u8,
     },
     /// Modal G codes of the groups from 0, as the control numbers them.
     Groups(Vec<u8>),

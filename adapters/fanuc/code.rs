@@ -94,8 +94,8 @@ const TABLE: [CodeRow; 35] = [
         7,
         "EW_PROT",
         State,
-        "write protected",
-        "Enable writing on the controller (parameter PWE, data protection key)",
+        "protected",
+        "Lift the protection on the controller: data protection key or parameter PWE, for PMC memory the protection of the PMC's data",
     ),
     row(8, "EW_OVRFLOW", State, "the memory of the controller is full", "Delete programs"),
     row(

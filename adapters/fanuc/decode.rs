@@ -2,20 +2,38 @@
 //! value.
 
 use super::answer::{Alarm, FocasAnswer, SpeedUnit, Status, System};
-use super::item::{FocasItem, PmcWidth, Spindle};
+use super::item::{FocasItem, PmcWidth, PositionFrame, Spindle};
 use super::opening::Generation;
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, Number, WireError};
+use crate::text::TextEncoding;
 
 /// Types of parameters and diagnosis numbers whose values are reals.
 const REAL: i16 = 4;
 const DIAGNOSIS_REAL: i16 = 5;
 
+/// How the answers of a control are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dialect {
+    /// Encoding of numbers and units.
+    pub generation: Generation,
+    /// Character set of its texts.
+    pub encoding: TextEncoding,
+}
+
+impl From<Generation> for Dialect {
+    fn from(generation: Generation) -> Self {
+        Self { generation, encoding: TextEncoding::default() }
+    }
+}
+
 /// The answer to an item from its data.
 ///
 /// # Errors
 /// The length does not fit the item.
-pub fn answer(item: FocasItem, generation: Generation, data: &[u8]) -> Result<FocasAnswer, WireError> {
+pub fn answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) -> Result<FocasAnswer, WireError> {
+    let Dialect { generation, encoding } = dialect.into();
+    let text = |bytes: &[u8]| encoding.text(bytes);
     let mut cursor = Cursor::new("data of an answer", data);
     let answer = match item {
         FocasItem::System => FocasAnswer::System(system(&mut cursor)?),
@@ -31,12 +49,13 @@ pub fn answer(item: FocasItem, generation: Generation, data: &[u8]) -> Result<Fo
         FocasItem::Macro(_) => FocasAnswer::Number(number(&mut cursor)?.value()),
         FocasItem::ToolOffset(..) | FocasItem::WorkOffset(..) => FocasAnswer::Number(number(&mut cursor)?.measured()),
         FocasItem::Spindles(Spindle::PlainLoad | Spindle::MaxSpeed | Spindle::Gear) => {
-            FocasAnswer::Numbers(each(&mut cursor, Number::LEN, |c| Ok(Some(f64::from(number(c)?.mantissa))))?)
+            FocasAnswer::Numbers(each(&mut cursor, Number::LEN, |c| Ok(Some(f64::from(low_half(number(c)?)))))?)
         }
         FocasItem::Spindles(_) | FocasItem::Servos(_) | FocasItem::Position(..) => {
             FocasAnswer::Numbers(each(&mut cursor, Number::LEN, |cursor| Ok(number(cursor)?.measured()))?)
         }
         FocasItem::FeedUnit => FocasAnswer::Unit(unit(generation, cursor.i16()?)),
+        FocasItem::PositionUnit(frame) => FocasAnswer::Units(each(&mut cursor, 4, |c| position_unit(c, frame))?),
         FocasItem::SpindleUnit => {
             // The library says rpm whatever the number is.
             cursor.i16()?;
@@ -50,13 +69,12 @@ pub fn answer(item: FocasItem, generation: Generation, data: &[u8]) -> Result<Fo
         FocasItem::Program => FocasAnswer::Program { running: cursor.i32()?, main: cursor.i32()? },
         FocasItem::ProgramName => FocasAnswer::Named { number: cursor.i32()?, name: text(rest(&mut cursor)?) },
         FocasItem::ProgramPath | FocasItem::MainProgram => FocasAnswer::Text(text(rest(&mut cursor)?)),
-        FocasItem::Alarms(_) => FocasAnswer::Alarms(each(&mut cursor, 16 + super::request::ALARM_TEXT_LEN, alarm)?),
-        FocasItem::ModalGroup(_) => FocasAnswer::Groups(each(&mut cursor, 2, |cursor| Ok(cursor.bytes(2)?[0]))?),
-        FocasItem::ModalWord(_) => {
-            let (value, flags) = (cursor.i32()?, [cursor.u8()?, cursor.u8()?]);
-            cursor.bytes(2)?;
-            FocasAnswer::Modal { value, flags }
+        FocasItem::Alarms(_) => {
+            let length = 16 + super::request::ALARM_TEXT_LEN;
+            FocasAnswer::Alarms(each(&mut cursor, length, |cursor| alarm(cursor, encoding))?)
         }
+        FocasItem::ModalGroup(_) => FocasAnswer::Groups(each(&mut cursor, 2, |cursor| Ok(cursor.bytes(2)?[0]))?),
+        FocasItem::ModalWord(_) => modal_word(&mut cursor)?,
         FocasItem::Parameter(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, REAL)?,
         FocasItem::Diagnosis(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, DIAGNOSIS_REAL)?,
         FocasItem::Pmc(stretch) => {
@@ -70,22 +88,38 @@ pub fn answer(item: FocasItem, generation: Generation, data: &[u8]) -> Result<Fo
         FocasItem::PanelSignals(_) => FocasAnswer::Signals(each(&mut cursor, 2, |cursor| cursor.i16())?),
         FocasItem::CncId => FocasAnswer::Text(super::records::cnc_id(&mut cursor)?),
         FocasItem::Messages(_) => {
-            FocasAnswer::Messages(each(&mut cursor, 12 + MESSAGE_TEXT_LEN, super::records::message)?)
+            let length = 12 + MESSAGE_TEXT_LEN;
+            FocasAnswer::Messages(each(&mut cursor, length, |cursor| super::records::message(cursor, encoding))?)
         }
         FocasItem::HistoryCount => FocasAnswer::Whole(cursor.i32()?),
         FocasItem::AlarmHistory(..) => {
-            FocasAnswer::History(each(&mut cursor, 28 + HISTORY_TEXT_LEN, super::records::past_alarm)?)
+            let length = 28 + HISTORY_TEXT_LEN;
+            FocasAnswer::History(each(&mut cursor, length, |cursor| super::records::past_alarm(cursor, encoding))?)
         }
         FocasItem::GCodes => FocasAnswer::Names(each(&mut cursor, 12, super::records::g_code)?),
-        FocasItem::ToolGroup => {
-            let [_next, in_use, _selected] = [cursor.i32()?, cursor.i32()?, cursor.i32()?];
-            cursor.bytes(cursor.left())?;
-            FocasAnswer::Whole(in_use)
-        }
+        FocasItem::ToolGroup => tool_group(&mut cursor)?,
         FocasItem::ToolLife(group) => super::records::life(&mut cursor, group)?,
     };
     cursor.end()?;
     Ok(answer)
+}
+
+/// Which byte is which: what `libfwlib32` 1.0.5 makes of `000000fa 01020304` is flag 2 and 4 places.
+fn modal_word(cursor: &mut Cursor<'_>) -> Result<FocasAnswer, WireError> {
+    let value = cursor.i32()?;
+    let [_, flag, _, places] = [cursor.u8()?, cursor.u8()?, cursor.u8()?, cursor.u8()?];
+    Ok(FocasAnswer::Modal { value, flag, places })
+}
+
+fn position_unit(cursor: &mut Cursor<'_>, frame: PositionFrame) -> Result<i16, WireError> {
+    let [of_work, of_machine] = [cursor.i16()?, cursor.i16()?];
+    Ok(if frame == PositionFrame::Machine { of_machine } else { of_work })
+}
+
+fn tool_group(cursor: &mut Cursor<'_>) -> Result<FocasAnswer, WireError> {
+    let [_next, in_use, _selected] = [cursor.i32()?, cursor.i32()?, cursor.i32()?];
+    cursor.bytes(cursor.left())?;
+    Ok(FocasAnswer::Whole(in_use))
 }
 
 fn unit(generation: Generation, number: i16) -> SpeedUnit {
@@ -117,11 +151,10 @@ fn each<T>(
     (0..cursor.left() / len).map(|_| read(cursor)).collect()
 }
 
-/// Text up to the first NUL, without the blanks around it. Controllers of Asian shops send other character sets; what
-/// is not UTF-8 is replaced.
-pub(super) fn text(bytes: &[u8]) -> String {
-    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-    String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
+/// The second half of the mantissa: what `libfwlib32` 1.0.5 takes of these quantities, whatever stands in the first half.
+fn low_half(number: Number) -> i16 {
+    let [_, _, high, low] = number.mantissa.to_be_bytes();
+    i16::from_be_bytes([high, low])
 }
 
 /// One or two characters; the bytes behind them may be anything.
@@ -132,6 +165,7 @@ fn name(cursor: &mut Cursor<'_>) -> Result<String, WireError> {
 }
 
 fn system(cursor: &mut Cursor<'_>) -> Result<System, WireError> {
+    let text = |bytes: &[u8]| TextEncoding::default().text(bytes);
     let (additional, axes_max) = (cursor.i16()?, cursor.i16()?);
     Ok(System {
         additional,
@@ -156,11 +190,11 @@ fn status(cursor: &mut Cursor<'_>) -> Result<Status, WireError> {
     })
 }
 
-fn alarm(cursor: &mut Cursor<'_>) -> Result<Alarm, WireError> {
+fn alarm(cursor: &mut Cursor<'_>, encoding: TextEncoding) -> Result<Alarm, WireError> {
     let (number, kind, axis, length) = (cursor.i32()?, cursor.i32()?, cursor.i32()?, cursor.i32()?);
     let bytes = cursor.bytes(super::request::ALARM_TEXT_LEN)?;
     let length = usize::try_from(length).unwrap_or(0).min(bytes.len());
-    Ok(Alarm { number, kind, axis, text: text(&bytes[..length]) })
+    Ok(Alarm { number, kind, axis, text: encoding.text(&bytes[..length]) })
 }
 
 fn element(cursor: &mut Cursor<'_>, width: PmcWidth) -> Result<i32, WireError> {

@@ -4,11 +4,12 @@
 //! Only values that hold between readings: one that is interpolated would keep all the others waiting for it. What a control
 //! does not have is asked for once per connection.
 
+use super::alarms;
 use super::answer::{FocasAnswer, OperatorMessage, PastAlarm};
 use super::item::{BlockWord, FocasItem, Question, Spindle, Timer};
 use super::line::Asked;
 use super::readings::reading;
-use super::states::{self, OrAbsence};
+use super::states::OrAbsence;
 use super::view::{View, number, text};
 use crate::channel::ChannelId;
 use crate::reading::{Absence, Reading, Stamp, Value};
@@ -19,7 +20,7 @@ const PARTS_TOTAL: FocasItem = FocasItem::Parameter(6712, 0);
 const PARTS_REQUIRED: FocasItem = FocasItem::Parameter(6713, 0);
 const GEAR: FocasItem = FocasItem::Spindles(Spindle::Gear);
 /// Bytes of the block that runs.
-const BLOCK: FocasItem = FocasItem::ExecutedText(128);
+const BLOCK: FocasItem = FocasItem::ExecutedText(112);
 /// At most so many messages are shown.
 const MESSAGES: FocasItem = FocasItem::Messages(2);
 /// So many of the last alarms are shown.
@@ -38,8 +39,16 @@ const TIMES: [(&str, FocasItem); 4] = [
 ];
 
 /// The others, in the order of [`others`].
-const OTHERS: [&str; 7] =
-    ["block_text", "operator_message", "g_codes", "m_code", "alarm_history", "tool_life", "tool_life_used"];
+const OTHERS: [&str; 8] = [
+    "block_text",
+    "operator_message",
+    "g_codes",
+    "m_code",
+    "main_program",
+    "alarm_history",
+    "tool_life",
+    "tool_life_used",
+];
 
 /// Channels of the group; without details the first two only.
 pub(super) fn channels(details: bool) -> Vec<ChannelId> {
@@ -54,6 +63,7 @@ pub(super) fn questions(path: u8, details: bool) -> Vec<Question> {
         MESSAGES,
         FocasItem::GCodes,
         FocasItem::ModalWord(BlockWord::M),
+        FocasItem::Program,
         FocasItem::HistoryCount,
         FocasItem::ToolGroup,
     ];
@@ -61,8 +71,8 @@ pub(super) fn questions(path: u8, details: bool) -> Vec<Question> {
     items.take(if details { usize::MAX } else { 2 }).map(|item| item.on(path)).collect()
 }
 
-/// What has to be asked for besides, which follows from the first answers: the last alarms, and the life of the tools in
-/// use.
+/// What has to be asked for besides, which follows from the first answers: the last alarms, the life of the tools in use, and
+/// the path of a main program that has no number.
 pub(super) fn further(asked: &Asked) -> Vec<Question> {
     let view = View { asked, path: asked.path };
     let whole = |item| match view.answer(item) {
@@ -72,7 +82,9 @@ pub(super) fn further(asked: &Asked) -> Vec<Question> {
     let first = |last: u16| last.saturating_sub(ALARMS_SHOWN - 1).max(1);
     let history = whole(FocasItem::HistoryCount).map(|last| FocasItem::AlarmHistory(first(last), last));
     let life = whole(FocasItem::ToolGroup).map(FocasItem::ToolLife);
-    history.into_iter().chain(life).map(|item| item.on(asked.path)).collect()
+    let is_named = matches!(view.answer(FocasItem::Program), Ok(FocasAnswer::Program { main: 0, .. }));
+    let main = is_named.then_some(FocasItem::MainProgram);
+    history.into_iter().chain(life).chain(main).map(|item| item.on(asked.path)).collect()
 }
 
 /// The readings of the group. `further` are the results of what was asked for besides.
@@ -96,7 +108,7 @@ fn seconds(view: &View<'_>, item: FocasItem) -> OrAbsence<f64> {
     }
 }
 
-fn others(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<Value>; 7] {
+fn others(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<Value>; 8] {
     let block = match view.answer(BLOCK) {
         Ok(FocasAnswer::Named { name, .. }) => Ok(name.lines().next().unwrap_or_default().trim().to_owned()),
         other => other.and(Err(Absence::OutOfRange)),
@@ -111,7 +123,9 @@ fn others(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<Value>; 7] {
     };
     let m_code = view.number(FocasItem::ModalWord(BlockWord::M)).map(|code| format!("M{code}"));
     let [life, used] = life(view, further);
-    [text(block), text(messages), text(codes), text(m_code), text(history(view, further)), number(life), number(used)]
+    let texts = [block, messages, codes, m_code, main_program(view, further), history(view, further)];
+    let [block, messages, codes, m_code, main, history] = texts.map(text);
+    [block, messages, codes, m_code, main, history, number(life), number(used)]
 }
 
 /// Number and text of every message; a control without one sends a number that is none.
@@ -137,7 +151,7 @@ fn history(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
                 let year = i32::from(*year);
                 // Older controls give two digits.
                 let year = if year < 100 { 2000 + year } else { year };
-                let text = states::one(alarm, axes);
+                let text = alarms::one(alarm, axes, view.asked.facts.alarm_table());
                 format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02} {text}")
             };
             Ok(past.iter().rev().map(one).collect::<Vec<_>>().join("; "))
@@ -145,6 +159,21 @@ fn history(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
         Some(Ok(_)) => Err(Absence::OutOfRange),
         Some(Err(error)) => Err(error.absence()),
         None => Err(Absence::NotSupported),
+    }
+}
+
+/// Number of the main program, or the end of its path where it has none. Source: FOCAS2 manual, `cnc_rdprgnum`, which gives 0 for a
+/// program whose name is no number.
+fn main_program(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
+    match view.answer(FocasItem::Program)? {
+        FocasAnswer::Program { main: 0, .. } => {}
+        FocasAnswer::Program { main, .. } => return Ok(format!("O{main}")),
+        _ => return Err(Absence::OutOfRange),
+    }
+    match further.and_then(|further| further.of(FocasItem::MainProgram)) {
+        Some(Ok(FocasAnswer::Text(path))) => Ok(crate::nclink::last_part(path).to_owned()),
+        Some(Err(error)) => Err(error.absence()),
+        _ => Err(Absence::NotSupported),
     }
 }
 

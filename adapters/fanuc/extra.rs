@@ -4,12 +4,15 @@
 use super::answer::FocasAnswer;
 use super::item::{FocasItem, Position, Question, Servo, Spindle};
 use super::line::Asked;
-use super::own::{OwnChannel, ReadWith};
+use super::own::OwnItem;
+use super::readings::reading;
 use super::states::OrAbsence;
 use super::view::{View, number};
 use crate::address::FanucOptions;
 use crate::channel::{ChannelId, DeclareError, Kind, NewChannel, declare};
-use crate::reading::{Absence, Value};
+use crate::own::{Own, ReadWith};
+use crate::reading::{Absence, Reading, Stamp, Value};
+use crate::text::TextEncoding;
 
 /// An axis that has channels of its own.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -66,7 +69,7 @@ enum From {
     Axis(AxisName, Of),
     /// A quantity of the spindle at this place, counted from 0.
     Spindle(usize, Spindle),
-    Own(OwnChannel),
+    Own(Own<OwnItem>),
 }
 
 /// A channel besides those of the table.
@@ -154,8 +157,8 @@ pub fn declared(options: &FanucOptions, path: u8) -> Result<Vec<(ReadWith, Extra
         }
     }
     for own in &options.own {
-        let path = own.path.unwrap_or(path);
-        extras.push((own.pace, put(&own.new, path, From::Own(own.clone()))?));
+        let path = own.channel.path.unwrap_or(path);
+        extras.push((own.channel.pace, Extra { channel: own.id, path, from: From::Own(own.clone()) }));
     }
     Ok(extras)
 }
@@ -171,26 +174,36 @@ fn put(new: &NewChannel, path: u8, from: From) -> Result<Extra, (String, Declare
 }
 
 impl Extra {
-    /// What has to be asked for.
-    #[must_use]
-    pub fn question(&self) -> Question {
-        let item = match &self.from {
-            From::Axis(_, of) => of.item(),
-            From::Spindle(_, what) => FocasItem::Spindles(*what),
-            From::Own(own) => own.item,
+    /// What has to be asked for: its item, and the unit of a position.
+    pub fn questions(&self) -> impl Iterator<Item = Question> {
+        let (item, unit) = match &self.from {
+            From::Axis(_, of @ Of::Position(which)) => (of.item(), Some(FocasItem::PositionUnit(which.frame()))),
+            From::Axis(_, of) => (of.item(), None),
+            From::Spindle(_, what) => (FocasItem::Spindles(*what), None),
+            From::Own(own) => (own.item.item, None),
         };
-        item.on(self.path)
+        let path = self.path;
+        std::iter::once(item).chain(unit).map(move |item| item.on(path))
     }
 
-    /// The channel's value in what was answered.
-    pub(super) fn read(&self, asked: &Asked) -> OrAbsence<Value> {
+    /// The channel's reading of what was answered. `encoding` is the character set of the source.
+    pub(super) fn reading(&self, asked: &Asked, stamp: Stamp, encoding: TextEncoding) -> Reading {
         let view = View { asked, path: self.path };
+        if let From::Own(own) = &self.from {
+            let found = view.answer(own.item.item).and_then(|answer| own.found(answer, encoding));
+            return own.reading(stamp, found);
+        }
+        reading(self.channel, stamp, self.read(&view))
+    }
+
+    fn read(&self, view: &View<'_>) -> OrAbsence<Value> {
         match &self.from {
             From::Axis(axis, Of::Position(which)) => number(view.position(*which, &axis.name, axis.rotary)),
-            From::Axis(axis, of @ (Of::Load | Of::Current)) => number(view.axis(of.item(), &axis.name)),
-            From::Axis(axis, of) => number(place(&view, of.item(), view.place(&axis.name)?)),
-            From::Spindle(at, what) => number(place(&view, FocasItem::Spindles(*what), *at)),
-            From::Own(own) => number(own.value(view.answer(own.item)?)),
+            From::Axis(axis, Of::Load) => number(view.axis_load(&axis.name)),
+            From::Axis(axis, of @ Of::Current) => number(view.axis(of.item(), &axis.name)),
+            From::Axis(axis, of) => number(place(view, of.item(), view.place(&axis.name)?)),
+            From::Spindle(at, what) => number(place(view, FocasItem::Spindles(*what), *at)),
+            From::Own(_) => Err(Absence::NotSupported),
         }
     }
 }

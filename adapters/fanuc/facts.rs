@@ -4,6 +4,7 @@
 //! asked again with every poll until it has answered; until then what depends on it is absent with the reason, because
 //! a guess would be silently wrong (an inch machine read as millimetres).
 
+use super::alarms::AlarmTable;
 use super::answer::{FocasAnswer, FocasItemError, FocasItemResult, System};
 use super::code::{Consequence, FocasReturnCode};
 use super::item::{FocasItem, Question};
@@ -89,6 +90,20 @@ impl Facts {
     /// Every path with the names of its axes, the one that is written to first.
     pub fn axes(&self) -> impl Iterator<Item = (u8, KnownFact<&[String]>)> {
         self.paths.iter().map(|facts| (facts.path, facts.axes.as_deref().map_err(|reason| *reason)))
+    }
+
+    /// Which table of alarm types it has. The vendor's library does not tell the generation; the series does.
+    #[must_use]
+    pub fn alarm_table(&self) -> AlarmTable {
+        let older = match (self.opening.generation, &self.system) {
+            (Generation::Older(_), _) => true,
+            (Generation::Newer(0), Some(system)) => {
+                let zero_of_b = system.kind.trim_start_matches('0').is_empty() && system.series.starts_with('B');
+                zero_of_b || matches!(system.kind.as_str(), "16" | "18" | "21")
+            }
+            _ => false,
+        };
+        if older { AlarmTable::Older } else { AlarmTable::Newer }
     }
 
     /// Does this axis, counted from 0, turn? A control that does not tell is taken for one without axes that turn.

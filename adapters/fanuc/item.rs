@@ -28,6 +28,23 @@ impl Position {
     }
 }
 
+/// Whose unit a position has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum PositionFrame {
+    /// Of the machine coordinates.
+    Machine,
+    /// Of all others: work, relative, still to go.
+    Work,
+}
+
+impl Position {
+    /// Whose unit it has. Source: what `libfwlib32` 1.0.5 makes of marked answers in `cnc_rdposition`.
+    #[must_use]
+    pub fn frame(self) -> PositionFrame {
+        if self == Self::Machine { PositionFrame::Machine } else { PositionFrame::Work }
+    }
+}
+
 /// What of the spindles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Spindle {
@@ -145,6 +162,8 @@ pub enum FocasItem {
     FeedUnit,
     /// Unit of [`FocasItem::SpindleSpeed`].
     SpindleUnit,
+    /// Units of the positions of every axis.
+    PositionUnit(PositionFrame),
     /// Numbers of the program running and of the main program.
     Program,
     /// Name and number of the program running.

@@ -1,9 +1,10 @@
 //! The one connection to a controller, shared by everything that reads or writes it: opened when it is needed, given
-//! up when it breaks, never open twice. A controller that answered before and cannot be reached now is switched off,
-//! which is a state and not a fault.
+//! up when it breaks, never open twice. A controller that answered before and now cannot be reached, or whose computer
+//! refuses connections, is switched off, which is a state and not a fault. One that accepts and is silent, or closes what it
+//! has accepted, is none of that: it gives no answer.
 
 use super::allow::AllowList;
-use super::answer::{FocasItemError, FocasItemResult};
+use super::answer::{FocasItemError, FocasItemResult, Refusal};
 use super::code::Consequence;
 use super::facts::Facts;
 use super::focas::{Focas, FocasError};
@@ -11,7 +12,7 @@ use super::item::{FocasItem, Question, Write};
 use super::opening::Opening;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::SourceError;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Makes a connection.
@@ -20,6 +21,10 @@ pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Focas>, FocasError> + Send>
 /// A controller that refuses connections this long after it was lost is starting or off; afterwards something is wrong
 /// with it.
 const STARTING_NS: i64 = 180 * crate::clock::SECOND_NS;
+
+/// The control may be owed this much rest before anybody waits: what one answer that takes long costs is paid by the pauses
+/// after it, and does not delay the next poll by as much again.
+const OWED_NS: i64 = crate::clock::SECOND_NS;
 
 /// Next step where something listens and has never opened a session: perhaps it is no controller.
 const NEVER_OPENED: &str = "Something listens there and opens no session: is it the FOCAS2 port (8193 unless changed), and \
@@ -45,9 +50,12 @@ struct FanucConnection {
     paths: (u8, Vec<u8>),
     /// What this control does not have, found out once per connection.
     unsupported: HashSet<Question>,
+    /// What was refused when it was last asked for.
+    refusals: HashMap<Question, Refusal>,
     allow: AllowList,
     duty_pct: u8,
-    not_before_ns: TimeNs,
+    /// When the control will have rested for as long as its share of all answers wants.
+    rested_ns: TimeNs,
     lost_ns: Option<TimeNs>,
     known: bool,
     counts: LineCounts,
@@ -103,9 +111,10 @@ impl FanucLine {
             facts: None,
             paths,
             unsupported: HashSet::new(),
+            refusals: HashMap::new(),
             allow,
             duty_pct: duty_pct.clamp(1, 100),
-            not_before_ns: TimeNs::MIN,
+            rested_ns: TimeNs::MIN,
             lost_ns: None,
             known: false,
             counts: LineCounts::default(),
@@ -154,6 +163,13 @@ impl FanucLine {
     #[must_use]
     pub fn counts(&self) -> LineCounts {
         self.locked(|inner| inner.counts)
+    }
+
+    /// Which of these questions were refused when they were last asked.
+    #[must_use]
+    pub fn refusals(&self, questions: &[Question]) -> Vec<(Question, Refusal)> {
+        let of = |inner: &FanucConnection, question: &Question| Some((*question, *inner.refusals.get(question)?));
+        self.locked(|inner| questions.iter().filter_map(|question| of(inner, question)).collect())
     }
 
     /// What this control does not have.
@@ -219,16 +235,19 @@ impl FanucConnection {
         Ok((began_ns, found))
     }
 
-    /// Waits until the controller has had its share of time for itself.
+    /// Waits while the control is owed more rest than [`OWED_NS`].
     fn rest(&self, clock: &dyn Clock) {
-        if clock.now_ns() < self.not_before_ns {
-            clock.sleep_until(self.not_before_ns);
+        let until_ns = self.rested_ns.saturating_sub(OWED_NS);
+        if clock.now_ns() < until_ns {
+            clock.sleep_until(until_ns);
         }
     }
 
+    /// An answer of so long wants a rest of `(100 - duty) / duty` times as long, after what is still owed.
     fn busy(&mut self, began_ns: TimeNs, ended_ns: TimeNs) {
         let (took_ns, duty) = ((ended_ns - began_ns).max(0), i64::from(self.duty_pct));
-        self.not_before_ns = ended_ns + took_ns.min(60 * crate::clock::SECOND_NS) * (100 - duty) / duty;
+        let owed_ns = (self.rested_ns.saturating_sub(began_ns)).clamp(0, OWED_NS);
+        self.rested_ns = ended_ns + owed_ns + took_ns.min(60 * crate::clock::SECOND_NS) * (100 - duty) / duty;
     }
 
     fn learn(&mut self, questions: &[Question], results: &[FocasItemResult]) {
@@ -237,6 +256,12 @@ impl FanucConnection {
             Err(FocasItemError::NotOffered) => true,
             _ => false,
         };
+        for (question, result) in questions.iter().zip(results) {
+            match result {
+                Err(FocasItemError::Refused(refusal)) => drop(self.refusals.insert(*question, *refusal)),
+                _ => drop(self.refusals.remove(question)),
+            }
+        }
         let absent = questions.iter().zip(results).filter(|(_, result)| missing(result));
         self.unsupported.extend(absent.map(|(question, _)| *question));
     }
@@ -250,6 +275,7 @@ impl FanucConnection {
         self.paths_exist(&opening)?;
         self.focas = Some(focas);
         self.unsupported.clear();
+        self.refusals.clear();
         let (own, further) = self.paths.clone();
         let paths: Vec<u8> = std::iter::once(own).chain(further).collect();
         let facts = Arc::new(Facts::unknown(opening, &paths));
@@ -310,11 +336,10 @@ impl FanucConnection {
     fn not_opened(&mut self, error: &FocasError, now_ns: TimeNs) -> SourceError {
         self.counts.refused += 1;
         let lost_ns = *self.lost_ns.get_or_insert(now_ns);
+        // Silence is no evidence: a control that accepts and says nothing may be cutting.
         let off = match error {
             FocasError::Unreachable(_) => true,
-            FocasError::NobodyThere(_) | FocasError::Broken(_) | FocasError::Timeout(_) => {
-                now_ns - lost_ns < STARTING_NS
-            }
+            FocasError::NobodyThere(_) => now_ns - lost_ns < STARTING_NS,
             _ => false,
         };
         if off && self.known {

@@ -114,10 +114,24 @@ fn refused(code: i16) -> FocasItemResult {
 fn the_controller_has_its_share_of_the_time_for_itself() {
     let (line, told, clock) = line(25);
     told.takes_ns.store(20_000_000, Ordering::SeqCst);
+    let asked: Vec<_> = (0..200).map(|_| line.ask(&clock, &[FocasItem::Feed]).expect("well")).collect();
+    let (first, last) = (&asked[0], &asked[199]);
+    // 200 answers of 20 ms want 16 s at 25 %; a second of rest may be owed.
+    assert!(last.ended_ns - first.began_ns > 14_800_000_000, "{}", last.ended_ns - first.began_ns);
+}
+
+#[test]
+fn one_answer_that_takes_long_delays_the_next_poll_by_little() {
+    let (line, told, clock) = line(50);
+    told.takes_ns.store(5_000_000, Ordering::SeqCst);
     line.ask(&clock, &[FocasItem::Feed]).expect("well");
-    let first = line.ask(&clock, &[FocasItem::Feed]).expect("well");
-    let second = line.ask(&clock, &[FocasItem::Feed]).expect("well");
-    assert_eq!(second.began_ns - first.ended_ns, 60_000_000, "busy 20 ms of every 80 ms");
+    told.now_ns.fetch_add(100_000_000, Ordering::SeqCst);
+    told.takes_ns.store(1_500_000_000, Ordering::SeqCst);
+    let hiccup = line.ask(&clock, &[FocasItem::Feed]).expect("well");
+    told.takes_ns.store(5_000_000, Ordering::SeqCst);
+    let next = line.ask(&clock, &[FocasItem::Feed]).expect("well");
+    let waited_ms = (next.began_ns - hiccup.ended_ns) / 1_000_000;
+    assert_eq!(waited_ms, 500, "a second of rest stays owed, and is paid by the pauses after it");
 }
 
 #[test]
@@ -175,6 +189,20 @@ fn off_is_what_was_on_before() {
     assert!(matches!(error, SourceError::Line { .. }), "the host lives and nobody listens: {error}");
     *told.connect.lock().expect("sound") = Some(FocasError::Unreachable("no route".into()));
     assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Off { .. })), "however long");
+}
+
+#[test]
+fn silence_and_a_closed_door_are_no_machine_that_is_off() {
+    let (line, told, clock) = line(100);
+    line.ask(&clock, &[FocasItem::Feed]).expect("on");
+    *told.fail.lock().expect("sound") = Some(FocasError::Timeout(Duration::from_secs(2)));
+    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Timeout { .. })));
+    *told.connect.lock().expect("sound") = Some(FocasError::Timeout(Duration::from_secs(2)));
+    let error = line.ask(&clock, &[FocasItem::Feed]).expect_err("it accepts and is silent");
+    assert_eq!(error.absence(), Absence::Timeout, "{error}");
+    *told.connect.lock().expect("sound") = Some(FocasError::Broken("closed".into()));
+    let error = line.ask(&clock, &[FocasItem::Feed]).expect_err("it accepts and closes");
+    assert_eq!(error.absence(), Absence::Disconnected, "{error}");
 }
 
 #[test]

@@ -26,7 +26,8 @@
 //! | `poll`, `source` | what is asked for at which pace; the groups as sources |
 //! | `states`, `view`, `readings` | status words and signals as states, answers as channels; pure |
 //! | `details` | the slow group: parts, times, texts, codes, tool life |
-//! | `extra`, `own` | further axes and spindles, and the user's own channels |
+//! | `extra`, `own` | further axes and spindles, and what the user can have read |
+//! | `refusals` | what is refused, one sentence per return code |
 //! | `feed_override` | the inverted byte, and nothing else |
 //! | `allow` | what may be written |
 //! | `dial` | where the operator's dial stands |
@@ -51,6 +52,7 @@
 //! connection, no thread, no write outside the allowed addresses.
 
 pub mod actuator;
+pub mod alarms;
 pub mod allow;
 pub mod answer;
 mod asking;
@@ -73,6 +75,7 @@ mod pmc;
 pub mod poll;
 pub mod readings;
 mod records;
+mod refusals;
 pub mod request;
 pub mod server;
 pub mod source;

@@ -7,7 +7,7 @@
 
 use super::answer::{FocasItemError, FocasItemResult, Refusal};
 use super::code::FocasReturnCode;
-use super::decode;
+use super::decode::{self, Dialect};
 use super::focas::{Focas, FocasError};
 use super::item::{FocasItem, Question, Write};
 use super::opening::{Generation, Opening};
@@ -18,6 +18,7 @@ use super::wire::{
 };
 use crate::address::Endpoint;
 use crate::stream::{self, Short};
+use crate::text::TextEncoding;
 use std::io::{ErrorKind, Write as _};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
@@ -40,6 +41,8 @@ pub struct NativeSettings {
     pub path: u8,
     /// Longest time for connecting, and for one exchange.
     pub timeout: Duration,
+    /// Character set of its texts.
+    pub encoding: TextEncoding,
 }
 
 /// A connection to a controller.
@@ -144,8 +147,9 @@ impl Focas for Native {
         let mut rest = questions;
         while !rest.is_empty() {
             let (now, later) = rest.split_at(self.fitting(rest));
-            let (generation, requests) = (self.opening.generation, self.blocks(now));
-            let asked = self.exchange(&requests, |index, reply| out.push(result(now[index].item, generation, reply)));
+            let dialect = Dialect { generation: self.opening.generation, encoding: self.settings.encoding };
+            let requests = self.blocks(now);
+            let asked = self.exchange(&requests, |index, reply| out.push(result(now[index].item, dialect, reply)));
             asked.inspect_err(|_| out.truncate(before))?;
             rest = later;
         }
@@ -170,12 +174,10 @@ fn refused(reply: &Reply<'_>) -> Option<Refusal> {
     (reply.code != 0).then_some(Refusal { code: FocasReturnCode(reply.code), detail: reply.detail })
 }
 
-fn result(item: FocasItem, generation: Generation, reply: &Reply<'_>) -> FocasItemResult {
+fn result(item: FocasItem, dialect: Dialect, reply: &Reply<'_>) -> FocasItemResult {
     match refused(reply) {
         Some(refusal) => Err(FocasItemError::Refused(refusal)),
-        None => {
-            decode::answer(item, generation, reply.data).map_err(|error| FocasItemError::Malformed(error.to_string()))
-        }
+        None => decode::answer(item, dialect, reply.data).map_err(|error| FocasItemError::Malformed(error.to_string())),
     }
 }
 

@@ -7,7 +7,6 @@ use super::feed_override;
 use super::item::Area;
 use super::line::{Connect, FanucLine};
 use super::native::{Native, NativeSettings};
-use super::own::ReadWith;
 use super::pace::SharedPace;
 use super::poll;
 use super::readings::Manner;
@@ -17,6 +16,7 @@ use super::work_offset::ExternalOffsets;
 use crate::address::{Endpoint, FanucOptions, WriteMethod};
 use crate::driver::{Actuator, Source};
 use crate::offset::OffsetSink;
+use crate::own::ReadWith;
 use std::path::Path;
 
 /// What an address opens.
@@ -36,7 +36,7 @@ pub struct OpenedFanuc {
 /// Opens a controller that we talk to ourselves. Nothing is sent before the first poll.
 #[must_use]
 pub fn native(name: &str, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
-    let settings = NativeSettings { at: at.clone(), path, timeout: options.timeout };
+    let settings = NativeSettings { at: at.clone(), path, timeout: options.timeout, encoding: options.encoding };
     let connect: Connect = Box::new(move || Ok(Box::new(Native::connect(settings.clone())?)));
     opened(name, connect, path, options)
 }
@@ -49,6 +49,7 @@ pub fn vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &Fan
         at: at.clone(),
         path,
         timeout: options.timeout,
+        encoding: options.encoding,
         deadline: None,
         program: None,
         environment: Vec::new(),

@@ -1,27 +1,21 @@
-//! The user's own channels: a custom macro variable, a parameter, a diagnosis number, PMC memory or an offset, with a name,
-//! a unit and a scale. Written in the configuration as
+//! What the user can have read of a FANUC control: a custom macro variable, a parameter, a diagnosis number, PMC memory or an
+//! offset. Written in the configuration as
 //!
 //! ```text
 //! read = "macro 500"                 read = "pmc R100.3"
 //! read = "parameter 6711"            read = "pmc D20 word"
 //! read = "parameter 1420 axis 2"     read = "tool_offset 1 type 3"
 //! read = "diagnosis 301 axis 1"      read = "work_offset 1 axis 3"
+//! read = "pmc D100 text 20"
 //! ```
 
 use super::answer::FocasAnswer;
 use super::item::{Area, FocasItem, PmcWidth, Stretch};
 use super::states::OrAbsence;
-use crate::channel::NewChannel;
-use crate::reading::Absence;
-
-/// With which group a channel is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ReadWith {
-    /// With motion and states.
-    Fast,
-    /// With parts and times.
-    Slow,
-}
+use crate::own::{Own, OwnRead};
+use crate::reading::{Absence, Value};
+use crate::text::TextEncoding;
+use std::sync::Arc;
 
 /// What is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,33 +24,12 @@ pub struct OwnItem {
     pub item: FocasItem,
     /// A single bit of a byte of PMC memory.
     pub bit: Option<u8>,
+    /// Bytes of PMC memory that are a text.
+    pub text: bool,
 }
 
-/// One of the user's own channels.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OwnChannel {
-    /// Name, unit and range.
-    pub new: NewChannel,
-    /// What is read.
-    pub item: FocasItem,
-    /// A single bit of it.
-    pub bit: Option<u8>,
-    /// Factor by which what is read becomes the unit.
-    pub scale: f64,
-    /// Added after the factor, in the unit.
-    pub offset: f64,
-    /// With which group.
-    pub pace: ReadWith,
-    /// Path from 1; `None` is the one that is written to.
-    pub path: Option<u8>,
-}
-
-impl OwnItem {
-    /// Reads the text of a configuration.
-    ///
-    /// # Errors
-    /// What is wrong with it, and an example.
-    pub fn read(text: &str) -> Result<Self, String> {
+impl OwnRead for OwnItem {
+    fn read(text: &str) -> Result<Self, String> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let found = match words.as_slice() {
             ["macro", number] => whole(number, 1, 65_535).map(FocasItem::Macro).map(Self::plain),
@@ -76,6 +49,7 @@ impl OwnItem {
             ["pmc", place, "byte"] => pmc(place, PmcWidth::Byte),
             ["pmc", place, "word"] => pmc(place, PmcWidth::Word),
             ["pmc", place, "long"] => pmc(place, PmcWidth::Long),
+            ["pmc", place, "text", bytes] => whole(bytes, 1, TEXT_MAX).and_then(|bytes| pmc_text(place, bytes)),
             ["tool_offset", number, "type", kind] => whole(number, 1, 9999)
                 .zip(whole(kind, 0, 15))
                 .map(|(number, kind)| FocasItem::ToolOffset(number, kind))
@@ -88,15 +62,31 @@ impl OwnItem {
         found.ok_or_else(|| {
             format!(
                 "`{text}` is nothing that can be read; write `macro 500`, `parameter 6711`, `parameter 1420 axis 2`, \
-                 `diagnosis 301 axis 1`, `pmc R100`, `pmc R100.3`, `pmc D20 word`, `tool_offset 1 type 3` or \
-                 `work_offset 1 axis 3`"
+                 `diagnosis 301 axis 1`, `pmc R100`, `pmc R100.3`, `pmc D20 word`, `pmc D100 text 20`, \
+                 `tool_offset 1 type 3` or `work_offset 1 axis 3`"
             )
         })
     }
 
-    fn plain(item: FocasItem) -> Self {
-        Self { item, bit: None }
+    fn is_text(&self) -> Option<bool> {
+        Some(self.text)
     }
+}
+
+impl OwnItem {
+    fn plain(item: FocasItem) -> Self {
+        Self { item, bit: None, text: false }
+    }
+}
+
+/// Longest text in PMC memory, bytes.
+const TEXT_MAX: u16 = 128;
+
+/// Bytes of PMC memory from this one on.
+fn pmc_text(place: &str, bytes: u16) -> Option<OwnItem> {
+    let OwnItem { item: FocasItem::Pmc(stretch), bit: None, .. } = pmc(place, PmcWidth::Byte)? else { return None };
+    let item = FocasItem::Pmc(Stretch::bytes(stretch.area, stretch.from, bytes));
+    Some(OwnItem { item, bit: None, text: true })
 }
 
 fn whole(text: &str, least: u16, greatest: u16) -> Option<u16> {
@@ -120,16 +110,25 @@ fn pmc(place: &str, width: PmcWidth) -> Option<OwnItem> {
         Some(bit) if width == PmcWidth::Byte => Some(bit.parse::<u8>().ok().filter(|bit| *bit < 8)?),
         Some(_) => return None,
     };
-    Some(OwnItem { item: FocasItem::Pmc(Stretch { area, from, to: from + width.bytes() - 1, width }), bit })
+    Some(OwnItem {
+        item: FocasItem::Pmc(Stretch { area, from, to: from + width.bytes() - 1, width }),
+        bit,
+        text: false,
+    })
 }
 
-impl OwnChannel {
-    /// The value in its unit.
+impl Own<OwnItem> {
+    /// What was answered, before the scale. `encoding` is the character set of the source.
     ///
     /// # Errors
-    /// The answer holds no number: a vacant variable, or another kind of answer.
-    pub fn value(&self, answer: &FocasAnswer) -> OrAbsence<f64> {
-        let raw = match (answer, self.bit) {
+    /// The answer holds no value: a vacant variable, or another kind of answer.
+    pub fn found(&self, answer: &FocasAnswer, encoding: TextEncoding) -> OrAbsence<Value> {
+        let number = match (answer, self.item.bit) {
+            (FocasAnswer::Memory(elements), _) if self.item.text => {
+                let bytes: Vec<u8> = elements.iter().filter_map(|byte| u8::try_from(*byte).ok()).collect();
+                let text = self.channel.encoding.unwrap_or(encoding).text(&bytes);
+                return Ok(Value::Text(Arc::from(text)));
+            }
             (FocasAnswer::Memory(elements), Some(bit)) => {
                 f64::from(elements.first().ok_or(Absence::OutOfRange)? >> bit & 1)
             }
@@ -140,7 +139,7 @@ impl OwnChannel {
             (FocasAnswer::Whole(whole), _) => f64::from(*whole),
             _ => return Err(Absence::OutOfRange),
         };
-        Ok(raw * self.scale + self.offset)
+        Value::number(number)
     }
 }
 
@@ -165,8 +164,12 @@ mod tests {
         assert_eq!(item("work_offset 0 axis 1"), FocasItem::WorkOffset(0, 1));
         let bit = OwnItem::read("pmc r100.3").expect("readable");
         assert_eq!((bit.item, bit.bit), (FocasItem::Pmc(Stretch::bytes(Area::R, 100, 1)), Some(3)));
+        let text = OwnItem::read("pmc D100 text 20").expect("readable");
+        assert_eq!((text.item, text.is_text()), (FocasItem::Pmc(Stretch::bytes(Area::D, 100, 20)), Some(true)));
         for wrong in [
             "",
+            "pmc D100 text 0",
+            "pmc D100.1 text 4",
             "macro",
             "macro 0",
             "macro x",

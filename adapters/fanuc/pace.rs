@@ -5,7 +5,8 @@
 //! is asked every `W` seconds needs the share `b / W`. Where the shares do not fit, the slow groups are stretched first until
 //! together they take a quarter of the cap, and the first group gets what is left: its period is `b / share`. The periods are
 //! measured anew with every answer, so that a control that becomes slow under load is asked less often, and a quick one again
-//! at the period that was wanted.
+//! at the period that was wanted. Between the plan and what happens stands the line, which makes every group wait while the
+//! control has been busy for longer than its share.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -17,10 +18,9 @@ const PLANNED: f64 = 0.9;
 /// The slow groups give way until they take this share of what is planned.
 const SLOW_SHARE: f64 = 0.25;
 
-/// A longer answer is believed by this share at once, a shorter one slowly: a period that is too short loses data, one that
-/// is too long only some resolution.
-const LONGER: f64 = 0.5;
-const SHORTER: f64 = 0.1;
+/// Answers within this factor of the known time are noise about it, and move it by [`SMOOTH`].
+const OTHER: f64 = 2.0;
+const SMOOTH: f64 = 0.25;
 
 /// No group is asked less often than this, however slow the control is.
 const PERIOD_MAX: Duration = Duration::from_secs(60);
@@ -31,9 +31,28 @@ struct PollGroup {
     wanted_s: f64,
     /// How long the control takes to answer it; `None` before the first answer.
     busy_s: Option<f64>,
+    /// The answer before, where it was much longer than what is known.
+    longer_s: Option<f64>,
 }
 
 impl PollGroup {
+    /// An answer that takes much longer is believed when the next one does too: one hiccup changes no period. A much shorter
+    /// one is believed at once: a control that has recovered is read as was wanted from its first quick answer on. What a
+    /// wrong belief costs is bounded by the line, which keeps the duty over a second.
+    fn took(&mut self, busy_s: f64) {
+        let known_s = self.busy_s.unwrap_or(busy_s);
+        let before_s = self.longer_s.take();
+        self.busy_s = Some(match before_s {
+            _ if busy_s * OTHER < known_s => busy_s,
+            Some(before_s) if busy_s > known_s * OTHER => before_s.min(busy_s),
+            None if busy_s > known_s * OTHER => {
+                self.longer_s = Some(busy_s);
+                known_s
+            }
+            _ => known_s + SMOOTH * (busy_s - known_s),
+        });
+    }
+
     /// Share of the control's time that it takes at the period that is wanted.
     fn share(&self) -> f64 {
         self.busy_s.unwrap_or(0.0) / self.wanted_s
@@ -65,7 +84,7 @@ impl SharedPace {
     #[must_use]
     pub fn group(&self, wanted: Duration) -> GroupPace {
         let mut groups = self.lock();
-        groups.push(PollGroup { wanted_s: wanted.as_secs_f64().max(1e-3), busy_s: None });
+        groups.push(PollGroup { wanted_s: wanted.as_secs_f64().max(1e-3), busy_s: None, longer_s: None });
         GroupPace { shared: self.clone(), at: groups.len() - 1 }
     }
 
@@ -80,10 +99,7 @@ impl GroupPace {
     pub fn took(&self, busy: Duration) {
         let mut groups = self.shared.lock();
         let Some(group) = groups.get_mut(self.at) else { return };
-        let busy_s = busy.as_secs_f64();
-        let known_s = group.busy_s.unwrap_or(busy_s);
-        let weight = if busy_s > known_s { LONGER } else { SHORTER };
-        group.busy_s = Some(known_s + weight * (busy_s - known_s));
+        group.took(busy.as_secs_f64());
     }
 
     /// How long the control takes to answer this group; `None` before the first answer.
@@ -154,16 +170,31 @@ mod tests {
     }
 
     #[test]
-    fn a_longer_answer_counts_at_once_and_a_shorter_one_in_the_long_run() {
+    fn a_hiccup_changes_no_period_and_a_slow_spell_ends_with_its_first_quick_answer() {
         let shared = SharedPace::new(50);
         let fast = shared.group(Duration::from_millis(100));
+        let took = |ms: u64| {
+            fast.took(Duration::from_millis(ms));
+            fast.period()
+        };
         assert_eq!((fast.busy(), fast.period()), (None, Duration::from_millis(100)));
-        (0..4).for_each(|_| fast.took(Duration::from_millis(200)));
-        let slow = fast.period();
-        assert!(slow > Duration::from_millis(440), "{slow:?}");
-        fast.took(Duration::from_millis(5));
-        assert!(fast.period() > Duration::from_millis(380), "one quick answer says little");
-        (0..60).for_each(|_| fast.took(Duration::from_millis(5)));
-        assert_eq!(fast.period(), Duration::from_millis(100));
+        assert_eq!([took(5), took(1500), took(5)], [Duration::from_millis(100); 3], "one hiccup");
+        took(1500);
+        assert!(took(1500) > Duration::from_secs(3), "twice is a slow control");
+        assert_eq!(took(5), Duration::from_millis(100), "and it is quick again");
+        assert_eq!(
+            [took(300), took(5), took(300), took(5)],
+            [Duration::from_millis(100); 4],
+            "the line keeps the duty"
+        );
+    }
+
+    #[test]
+    fn noise_about_the_usual_time_moves_the_period_little() {
+        let shared = SharedPace::new(50);
+        let fast = shared.group(Duration::from_millis(100));
+        (0..40).for_each(|n| fast.took(Duration::from_millis(150 + 100 * (n % 2))));
+        let period_s = fast.period().as_secs_f64();
+        assert!((period_s - 0.2 / 0.45).abs() < 0.05, "{period_s}");
     }
 }

@@ -1,7 +1,7 @@
 //! What is asked for, group by group. Every group is a source with its own period; both share one connection. The
 //! questions of all paths travel together.
 
-use super::item::{Area, BlockWord, FocasItem, Position, Question, Servo, Spindle, Stretch};
+use super::item::{Area, BlockWord, FocasItem, Position, PositionFrame, Question, Servo, Spindle, Stretch};
 
 /// Signals of one path lie this many bytes after those of the one before.
 const PATH_STEP: u16 = 1000;
@@ -44,11 +44,12 @@ pub const PER_REVOLUTION: u8 = 1;
 pub const ALARMS: FocasItem = FocasItem::Alarms(8);
 
 /// What changes quickly on every path.
-fn quick(path: u8) -> [FocasItem; 16] {
+fn quick(path: u8) -> [FocasItem; 17] {
     [
         FocasItem::Status,
         // Before what the vendor's call for the positions answers besides.
         FocasItem::Position(Position::Machine, -1),
+        FocasItem::PositionUnit(PositionFrame::Machine),
         FocasItem::Feed,
         FocasItem::SpindleSpeed,
         FocasItem::Spindles(Spindle::Load),

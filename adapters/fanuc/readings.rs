@@ -1,5 +1,6 @@
 //! Answers to channels: units, states, and a reason where there is no value. Pure.
 
+use super::alarms;
 use super::answer::{FocasAnswer, Status};
 use super::dial::Dial;
 use super::extra::Extra;
@@ -10,11 +11,12 @@ use super::states::{self, OrAbsence};
 use super::view::{View, flag, number, text, word};
 use crate::channel::{ChannelId, on_path};
 use crate::reading::{Absence, Reading, Stamp, Value};
+use crate::text::TextEncoding;
 use std::sync::Arc;
 
 /// Channels of the quick group, in the order of [`fast`]. A further path has those of them that the table of channels
 /// has for it.
-pub const FAST: [&str; 30] = [
+pub const FAST: [&str; 33] = [
     "spindle_programmed_rpm",
     "feed_programmed_mm_min",
     "spindle_speed_rpm",
@@ -45,6 +47,9 @@ pub const FAST: [&str; 30] = [
     "single_block",
     "dry_run",
     "feed_override_dial_pct",
+    "control_warning",
+    "rapid_override_pct",
+    "jog_override_pct",
 ];
 
 /// The channel of threads: present only while one is cut, so that a recipe can name the operation otherwise.
@@ -70,7 +75,16 @@ pub fn columns<'a>(further: Option<u8>, names: impl IntoIterator<Item = &'a str>
 /// Does the answer say that alarms of this path have to be asked for?
 #[must_use]
 pub fn alarmed(asked: &Asked, path: u8) -> bool {
-    matches!(asked.on(FocasItem::Status.on(path)), Some(Ok(FocasAnswer::Status(status))) if states::alarmed(status))
+    matches!(asked.on(FocasItem::Status.on(path)), Some(Ok(FocasAnswer::Status(status))) if alarms::alarmed(status))
+}
+
+/// The warning of a path, with what to do; `None` without one.
+#[must_use]
+pub fn warning(asked: &Asked, path: u8) -> Option<(String, &'static str)> {
+    match asked.on(FocasItem::Status.on(path)) {
+        Some(Ok(FocasAnswer::Status(status))) => alarms::warning(status),
+        _ => None,
+    }
 }
 
 /// How answers are read besides what they say.
@@ -110,7 +124,7 @@ pub fn fast(
     let status = view.status();
     let axes = ["X", "Y", "Z"];
     let position = axes.map(|letter| number(view.position(Position::Machine, letter, false)));
-    let load = axes.map(|letter| number(view.axis(FocasItem::Servos(Servo::Load), letter)));
+    let load = axes.map(|letter| number(view.axis_load(letter)));
     let current = axes.map(|letter| number(view.axis(FocasItem::Servos(Servo::Current), letter)));
     let single_block = signals.single_block() == Ok(true);
     let values = [
@@ -137,6 +151,9 @@ pub fn fast(
         flag(signals.single_block()),
         flag(signals.dry_run()),
         number(view.dial(manner.dial)),
+        text(status.map(|status| alarms::warning(&status).map(|(warning, _)| warning).unwrap_or_default())),
+        number(signals.rapid_override()),
+        number(signals.jog_override()),
     ];
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
     let all = values.into_iter().chain(position).chain(load).chain(current).chain(words);
@@ -152,13 +169,14 @@ fn alarm_text(status: &Status, view: &View<'_>, alarms: Option<&Asked>) -> Strin
         Some(Ok(FocasAnswer::Alarms(alarms))) => alarms.as_slice(),
         _ => &[],
     };
-    states::alarm(status, alarms, view.asked.facts.axes_of(view.path).unwrap_or_default())
+    let facts = &view.asked.facts;
+    alarms::text(status, alarms, facts.axes_of(view.path).unwrap_or_default(), facts.alarm_table())
 }
 
 /// The readings of channels that an address or a configuration adds.
-pub(super) fn extra(extras: &[Extra], asked: &Asked, out: &mut Vec<Reading>) {
+pub(super) fn extra(extras: &[Extra], asked: &Asked, encoding: TextEncoding, out: &mut Vec<Reading>) {
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
-    out.extend(extras.iter().map(|extra| reading(extra.channel, stamp, extra.read(asked))));
+    out.extend(extras.iter().map(|extra| extra.reading(asked, stamp, encoding)));
 }
 
 pub(super) fn reading(channel: ChannelId, stamp: Stamp, value: OrAbsence<Value>) -> Reading {

@@ -2,9 +2,9 @@
 //! comes from what the vendor's library makes of them.
 
 use super::answer::{Alarm, FocasAnswer, OperatorMessage, PastAlarm};
-use super::decode::text;
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, WireError};
+use crate::text::TextEncoding;
 
 type Read<T> = Result<T, WireError>;
 
@@ -15,25 +15,25 @@ pub(super) fn cnc_id(cursor: &mut Cursor<'_>) -> Read<String> {
 }
 
 /// Text of so many bytes, of which the first `told` count.
-fn told(cursor: &mut Cursor<'_>, told: i32, length: usize) -> Read<String> {
+fn told(cursor: &mut Cursor<'_>, told: i32, length: usize, encoding: TextEncoding) -> Read<String> {
     let bytes = cursor.bytes(length)?;
     let told = usize::try_from(told).unwrap_or(0).min(bytes.len());
-    Ok(text(&bytes[..told]))
+    Ok(encoding.text(&bytes[..told]))
 }
 
-pub(super) fn message(cursor: &mut Cursor<'_>) -> Read<OperatorMessage> {
+pub(super) fn message(cursor: &mut Cursor<'_>, encoding: TextEncoding) -> Read<OperatorMessage> {
     let (number, kind, length) = (cursor.i32()?, cursor.i32()?, cursor.i32()?);
-    Ok(OperatorMessage { number, kind, text: told(cursor, length, MESSAGE_TEXT_LEN)? })
+    Ok(OperatorMessage { number, kind, text: told(cursor, length, MESSAGE_TEXT_LEN, encoding)? })
 }
 
-pub(super) fn past_alarm(cursor: &mut Cursor<'_>) -> Read<PastAlarm> {
+pub(super) fn past_alarm(cursor: &mut Cursor<'_>, encoding: TextEncoding) -> Read<PastAlarm> {
     let (number, kind, axis) = (cursor.i32()?, cursor.i32()?, cursor.i32()?);
     let mut at = [0; 6];
     for part in &mut at {
         *part = cursor.i16()?;
     }
     let length = cursor.i32()?;
-    let text = told(cursor, length, HISTORY_TEXT_LEN)?;
+    let text = told(cursor, length, HISTORY_TEXT_LEN, encoding)?;
     Ok(PastAlarm { alarm: Alarm { number, kind, axis, text }, at })
 }
 

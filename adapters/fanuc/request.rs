@@ -1,6 +1,6 @@
 //! Items and writes as blocks on the wire, in the encoding of the controller's generation.
 
-use super::item::{FocasItem, Write};
+use super::item::{FocasItem, PositionFrame, Write};
 use super::opening::{Generation, Opening};
 use super::wire::{Number, Request};
 
@@ -10,6 +10,12 @@ pub use super::table::function;
 pub const UNIT_OF_FEED: i32 = 3;
 /// See [`UNIT_OF_FEED`].
 pub const UNIT_OF_SPINDLE: i32 = 4;
+
+/// Units of positions: in pairs, work and machine coordinates, with this number; newer controls are asked with
+/// [`UNIT_OF_WORK`] for those of the work coordinates.
+pub const UNIT_OF_POSITIONS: i32 = 2;
+/// See [`UNIT_OF_POSITIONS`].
+pub const UNIT_OF_WORK: i32 = 1;
 
 /// Longest text of an alarm that is asked for.
 pub const ALARM_TEXT_LEN: usize = 64;
@@ -46,6 +52,10 @@ pub fn reading(item: FocasItem, generation: Generation) -> Request {
             Request::cnc(f::SPEED_UNIT, &[if matches!(generation, Generation::Newer(_)) { UNIT_OF_FEED } else { 0 }])
         }
         FocasItem::SpindleUnit => Request::cnc(f::SPEED_UNIT, &[UNIT_OF_SPINDLE]),
+        FocasItem::PositionUnit(frame) => {
+            let of_work = frame == PositionFrame::Work && matches!(generation, Generation::Newer(_));
+            Request::cnc(f::SPEED_UNIT, &[if of_work { UNIT_OF_WORK } else { UNIT_OF_POSITIONS }])
+        }
         FocasItem::Program => Request::cnc(f::PROGRAM, &[]),
         FocasItem::ProgramName => Request::cnc(f::PROGRAM_NAME, &[]),
         FocasItem::ProgramPath => Request::cnc(f::PROGRAM_PATH, &[]),
@@ -153,7 +163,7 @@ pub fn answer_len(item: FocasItem, opening: &Opening) -> usize {
     let data = match item {
         FocasItem::Servos(_) | FocasItem::Position(_, -1) => 8 * axes,
         FocasItem::Spindles(_) => 8 * spindles,
-        FocasItem::AxisNames => 4 * axes,
+        FocasItem::AxisNames | FocasItem::PositionUnit(_) => 4 * axes,
         FocasItem::SpindleNames(_) => 4 * spindles,
         FocasItem::Parameter(..) | FocasItem::Diagnosis(..) => 8 + values,
         FocasItem::Alarms(most) => usize::from(most) * (16 + ALARM_TEXT_LEN),

@@ -11,8 +11,9 @@ use super::readings::{self, Manner};
 use crate::address::FanucOptions;
 use crate::channel::{ChannelId, on_path};
 use crate::clock::Clock;
-use crate::driver::{Fact, Source, SourceError};
+use crate::driver::{Fact, Source, SourceError, SourceProblem};
 use crate::reading::{Absence, Reading};
+use crate::text::TextEncoding;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -38,6 +39,10 @@ pub struct FanucSource {
     details: bool,
     pace: GroupPace,
     facts: Option<Arc<Facts>>,
+    /// Character set of texts that the user has read.
+    encoding: TextEncoding,
+    /// Warning of the last poll, with what to do.
+    warning: Option<(String, &'static str)>,
 }
 
 impl FanucSource {
@@ -76,6 +81,8 @@ impl FanucSource {
             details: false,
             pace,
             facts: None,
+            encoding: options.encoding,
+            warning: None,
         }
     }
 
@@ -105,6 +112,8 @@ impl FanucSource {
             details: options.details,
             pace: shared.group(options.slow),
             facts: None,
+            encoding: options.encoding,
+            warning: None,
         }
     }
 
@@ -142,15 +151,16 @@ impl Source for FanucSource {
             let further = if further.is_empty() { None } else { Some(self.line.ask_on(clock, &further)?) };
             self.pace.took(busy(&asked) + further.as_ref().map(busy).unwrap_or_default());
             details::readings(&asked, further.as_ref(), self.details, out);
-            readings::extra(&self.extras, &asked, out);
+            readings::extra(&self.extras, &asked, self.encoding, out);
             return Ok(());
         }
         let alarms = self.alarms(clock, &asked)?;
         self.pace.took(busy(&asked) + alarms.as_ref().map_or(Duration::ZERO, busy));
+        self.warning = readings::warning(&asked, self.line.path());
         for (manner, columns) in &self.paths {
             readings::fast(columns, &asked, alarms.as_ref(), *manner, out);
         }
-        readings::extra(&self.extras, &asked, out);
+        readings::extra(&self.extras, &asked, self.encoding, out);
         Ok(())
     }
 
@@ -164,6 +174,26 @@ impl Source for FanucSource {
             (None, _) => Vec::new(),
         }
     }
+
+    fn problems(&self) -> Vec<SourceProblem> {
+        let essential = self.group == PolledGroup::Fast;
+        let refusals = self.line.refusals(&self.questions);
+        let mut problems = super::refusals::problems(&refusals, self.questions.len(), essential);
+        problems.extend(self.warning.iter().map(|(warning, next)| SourceProblem {
+            what: format!("the control warns: {warning}"),
+            next: (*next).to_owned(),
+        }));
+        problems
+    }
+}
+
+/// The channels that a control delivers by itself, of the path with the plain names.
+#[must_use]
+pub fn delivered(options: &FanucOptions) -> Vec<ChannelId> {
+    let power = options.power_diagnosis.map(|_| readings::POWER);
+    let mut channels: Vec<ChannelId> = readings::columns(None, power).into_iter().flatten().collect();
+    channels.extend(details::channels(options.details));
+    channels
 }
 
 /// How long the control was busy with these questions.
@@ -187,7 +217,7 @@ fn paced(pace: &GroupPace, group: PolledGroup) -> impl Iterator<Item = Fact> {
 
 /// What further channels need, each question once.
 fn add(questions: &mut Vec<Question>, extras: &[Extra]) {
-    for question in extras.iter().map(Extra::question) {
+    for question in extras.iter().flat_map(Extra::questions) {
         if !questions.contains(&question) {
             questions.push(question);
         }

@@ -2,18 +2,11 @@
 //!
 //! Signals: B-63943EN, "Signal address list" (F000 to F004 from the control, G006 to G030 to it).
 
-use super::answer::{Alarm, Status};
+use super::answer::Status;
 use super::feed_override;
 use crate::reading::Absence;
 use crate::units::OverridePct;
 use crate::words::{execution, mode, operation};
-
-/// Kinds of alarms, by their number.
-const ALARM_KINDS: [&str; 16] =
-    ["SW", "PW", "IO", "PS", "OT", "OH", "SV", "SR", "MC", "SP", "DS", "IE", "BG", "SN", "", "EX"];
-
-/// At most so many alarms stand in the channel.
-const ALARMS_SHOWN: usize = 4;
 
 /// A signal, or why it is not known.
 pub type OrAbsence<T> = Result<T, Absence>;
@@ -128,6 +121,30 @@ impl Signals {
         Ok(f64::from(pct.percent()))
     }
 
+    /// G014.0 and .1, ROV1 and ROV2, or the one-percent steps of G096 where the machine uses them, which are not read: the
+    /// rapid override in %. F0 is a speed and no share, so it is *not supported*.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn rapid_override(&self) -> OrAbsence<f64> {
+        match self.g(14)? & 0b11 {
+            0b00 => Ok(100.0),
+            0b01 => Ok(50.0),
+            0b10 => Ok(25.0),
+            _ => Err(Absence::NotSupported),
+        }
+    }
+
+    /// G010 and G011, *JV0 to *JV15: override of the feed in manual operation, %; inverted hundredths of a percent. All bits
+    /// 0 count like all bits 1: 0 %.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn jog_override(&self) -> OrAbsence<f64> {
+        let hundredths = !u16::from_le_bytes([self.g(10)?, self.g(11)?]);
+        Ok(if hundredths == u16::MAX { 0.0 } else { f64::from(hundredths) / 100.0 })
+    }
+
     /// What the feed follows the spindle in.
     ///
     /// # Errors
@@ -184,38 +201,6 @@ pub fn motion(status: &Status) -> Option<&'static str> {
         2 => Some("DWELL"),
         _ => None,
     }
-}
-
-/// Does the status say that there is an alarm? A low battery (2 and more) is none.
-#[must_use]
-pub fn alarmed(status: &Status) -> bool {
-    status.alarm == 1
-}
-
-/// The text of the channel `alarm`: empty without one. `alarms` are those that could be read.
-#[must_use]
-pub fn alarm(status: &Status, alarms: &[Alarm], axes: &[String]) -> String {
-    let mut texts = Vec::new();
-    if status.emergency == 1 {
-        texts.push("EMERGENCY STOP".to_owned());
-    }
-    if alarmed(status) {
-        texts.extend(alarms.iter().take(ALARMS_SHOWN).map(|alarm| one(alarm, axes)));
-        if alarms.len() > ALARMS_SHOWN {
-            texts.push(format!("and {} more", alarms.len() - ALARMS_SHOWN));
-        }
-        if alarms.is_empty() {
-            texts.push("ALARM".to_owned());
-        }
-    }
-    texts.join("; ")
-}
-
-pub(super) fn one(alarm: &Alarm, axes: &[String]) -> String {
-    let kind = usize::try_from(alarm.kind).ok().and_then(|kind| ALARM_KINDS.get(kind)).copied().unwrap_or("");
-    let axis = usize::try_from(alarm.axis - 1).ok().and_then(|axis| axes.get(axis));
-    let axis = axis.map_or(String::new(), |axis| format!(" ({axis})"));
-    format!("{kind}{:04}{axis} {}", alarm.number, alarm.text).trim().to_owned()
 }
 
 #[cfg(test)]
@@ -283,15 +268,12 @@ mod tests {
     }
 
     #[test]
-    fn alarms_are_named_with_their_axis() {
-        let axes = ["X".to_owned(), "Y".to_owned()];
-        let alarms = vec![Alarm { number: 417, kind: 6, axis: 2, text: "SERVO ALARM".to_owned() }; 6];
-        let on = Status { alarm: 1, ..status(1, 0) };
-        assert_eq!(alarm(&on, &alarms[..1], &axes), "SV0417 (Y) SERVO ALARM");
-        assert!(alarm(&on, &alarms, &axes).ends_with("and 2 more"));
-        assert_eq!(alarm(&on, &[], &axes), "ALARM");
-        assert_eq!(alarm(&status(1, 3), &alarms, &axes), "", "cleared on the control");
-        assert_eq!(alarm(&Status { alarm: 2, ..status(1, 3) }, &[], &axes), "", "a low battery stops nothing");
-        assert_eq!(alarm(&Status { emergency: 1, ..on }, &[], &axes), "EMERGENCY STOP; ALARM");
+    fn rapid_and_jog_overrides_as_the_signals_give_them() {
+        let rapid = |byte| signals(&[('G', 14, byte)]).rapid_override();
+        assert_eq!([rapid(0), rapid(1), rapid(2)], [Ok(100.0), Ok(50.0), Ok(25.0)]);
+        assert_eq!(rapid(3), Err(Absence::NotSupported), "F0 is a speed");
+        let jog = |low, high| signals(&[('G', 10, low), ('G', 11, high)]).jog_override();
+        // 100.00 % is 10000 hundredths, 0x2710; inverted 0xD8EF, the low byte first.
+        assert_eq!([jog(0xEF, 0xD8), jog(0xFF, 0xFF), jog(0, 0)], [Ok(100.0), Ok(0.0), Ok(0.0)]);
     }
 }

@@ -1,8 +1,8 @@
 //! A look at what one poll has answered about one path: every value typed, with the reason where there is none. Pure.
 
-use super::answer::{FocasAnswer, SpeedUnit, Status};
+use super::answer::{FocasAnswer, PositionUnit, SpeedUnit, Status};
 use super::dial::Dial;
-use super::item::{FocasItem, Position, Stretch};
+use super::item::{FocasItem, Position, Servo, Stretch};
 use super::line::Asked;
 use super::poll;
 use super::states::{OrAbsence, Signals};
@@ -30,7 +30,9 @@ impl View<'_> {
         match self.answer(item)? {
             FocasAnswer::Number(number) => number.ok_or(Absence::OutOfRange),
             FocasAnswer::Whole(whole) => Ok(f64::from(*whole)),
-            FocasAnswer::Modal { value, flags } => Ok(f64::from(*value) / 10f64.powi(i32::from(flags[1] & 0x07))),
+            FocasAnswer::Modal { value, places: places @ 0..=9, .. } => {
+                Ok(f64::from(*value) / 10f64.powi(i32::from(*places)))
+            }
             FocasAnswer::Data { values, .. } => values.first().copied().flatten().ok_or(Absence::OutOfRange),
             FocasAnswer::Numbers(numbers) => numbers.first().copied().flatten().ok_or(Absence::NotSupported),
             _ => Err(Absence::OutOfRange),
@@ -77,15 +79,41 @@ impl View<'_> {
         }
     }
 
+    /// Load of the drive of the axis of this name: its size, as the load meter shows it. The vendor's library takes the sign
+    /// off; natively it is there, and would give the same channel two meanings.
+    pub(super) fn axis_load(&self, name: &str) -> OrAbsence<f64> {
+        self.axis(FocasItem::Servos(Servo::Load), name).map(f64::abs)
+    }
+
     /// A position of the axis of this name: in millimetres whatever the machine measures in, in degrees where the caller
     /// says that it turns. An axis of the other kind has no such position.
     pub(super) fn position(&self, which: Position, name: &str, rotary: bool) -> OrAbsence<f64> {
-        let facts = &self.asked.facts;
-        if facts.is_rotary(self.path, self.place(name)?)? != rotary {
-            return Err(Absence::NotSupported);
-        }
         let position = self.axis(FocasItem::Position(which, -1), name)?;
-        Ok(if !rotary && facts.inch? { position * MM_PER_INCH } else { position })
+        match (self.position_unit(which, self.place(name)?)?, rotary) {
+            (PositionUnit::Degrees, true) | (PositionUnit::Mm, false) => Ok(position),
+            (PositionUnit::Inch, false) => Ok(position * MM_PER_INCH),
+            _ => Err(Absence::NotSupported),
+        }
+    }
+
+    /// The unit of a position of the axis at this place: what the control says beside the position. A control that does not
+    /// say it has it in parameters: 1001 for the machine, 1006 for axes that turn.
+    fn position_unit(&self, which: Position, place: usize) -> OrAbsence<PositionUnit> {
+        match self.answer(FocasItem::PositionUnit(which.frame())) {
+            Ok(FocasAnswer::Units(units)) => {
+                units.get(place).and_then(|number| PositionUnit::of_number(*number)).ok_or(Absence::OutOfRange)
+            }
+            Ok(_) => Err(Absence::OutOfRange),
+            Err(Absence::NotSupported) => {
+                let facts = &self.asked.facts;
+                Ok(match (facts.is_rotary(self.path, place)?, facts.inch?) {
+                    (true, _) => PositionUnit::Degrees,
+                    (_, true) => PositionUnit::Inch,
+                    _ => PositionUnit::Mm,
+                })
+            }
+            Err(reason) => Err(reason),
+        }
     }
 
     /// Is the program in inches? A control whose signals cannot be read says it by the unit of its feed.

@@ -3,12 +3,12 @@
 use super::answer::{HncAnswer, HncItemError, HncItemResult};
 use super::item::{HncItem, channel, flag};
 use crate::reading::Absence;
+use crate::text::TextEncoding;
 use crate::words::{execution, mode, operation};
 
-/// Text up to the first zero, out of GBK. What is no GBK becomes the replacement character.
+/// Text up to the first zero, out of GBK; bytes that are none stay as marks.
 pub(super) fn text_of(bytes: &[u8]) -> String {
-    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-    encoding_rs::GBK.decode_without_bom_handling(&bytes[..end]).0.trim().to_owned()
+    TextEncoding::Named(encoding_rs::GBK).text(bytes)
 }
 
 /// The whole number of an answer.
@@ -138,7 +138,7 @@ mod tests {
     fn texts_come_out_of_gbk() {
         assert_eq!(text_of(b"\xbb\xfa\xb4\xb2\xc5\xdc\xb7\xc9\xb3\xb5\0rest"), "机床跑飞车");
         assert_eq!(text_of(b" O1234 "), "O1234");
-        assert!(text_of(&[0xff; 3]).chars().all(|c| c == char::REPLACEMENT_CHARACTER));
+        assert_eq!(text_of(&[0xff; 3]), "\\xFF\\xFF\\xFF", "nothing is lost");
     }
 
     #[test]

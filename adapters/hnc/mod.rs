@@ -47,13 +47,15 @@ pub mod line;
 mod message;
 mod offsets;
 mod open;
+mod own;
 pub mod sampling;
 mod source;
 
 pub use actuator::HncActuator;
 pub use child::child;
 pub use open::{offsets, open, open_sampled};
-pub use source::HncSource;
+pub use own::OwnValue;
+pub use source::{HncSource, channels as delivered};
 
 /// What the hidden subcommand calls this child.
 pub const KIND: &str = "hnc";

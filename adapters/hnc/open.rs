@@ -35,7 +35,8 @@ pub fn open_sampled(address: &Address, target: &HncNetTarget, sink: Option<Block
         program: None,
         environment: Vec::new(),
     });
-    let mut source = HncSource::new(line.clone(), Duration::from_millis(target.period_ms), target.sample);
+    let source = HncSource::new(line.clone(), Duration::from_millis(target.period_ms), target.sample);
+    let mut source = source.with_channels(target.own.clone());
     if let Some(sink) = sink {
         source.on_block(sink);
     }

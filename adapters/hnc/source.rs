@@ -4,12 +4,14 @@ use super::answer::{HncItemError, HncItemResult};
 use super::decode::{Answers, alarms, number, text, whole};
 use super::item::{self, HncItem, HncWidth, axis, channel, flag, real};
 use super::line::{Alive, HncLine};
+use super::own::OwnValue;
 use super::sampling::{Sampled, Sampling};
 use crate::channel::ChannelId;
 use crate::clock::Clock;
 use crate::driver::{Fact, Source, SourceError};
 use crate::nclink::sample::SampleBlock;
 use crate::nclink::{BlockSink, last_part};
+use crate::own::Own;
 use crate::reading::{Absence, Reading, Stamp};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -75,6 +77,7 @@ pub struct HncSource {
     line: HncLine,
     period: Duration,
     channels: Vec<ChannelId>,
+    own: Vec<Own<OwnValue>>,
     layout: HncLayout,
     alive: Alive,
     sampling: Option<Sampling>,
@@ -90,11 +93,20 @@ impl HncSource {
             line,
             period,
             channels: channels(),
+            own: Vec::new(),
             layout: HncLayout::default(),
             alive: Alive::default(),
             sampling,
             sink: None,
         }
+    }
+
+    /// The user's own channels besides.
+    #[must_use]
+    pub fn with_channels(mut self, own: Vec<Own<OwnValue>>) -> Self {
+        self.channels.extend(own.iter().map(|own| own.id));
+        self.own = own;
+        self
     }
 
     /// Whole blocks of samples go there from now on.
@@ -152,11 +164,17 @@ impl HncSource {
         for (_, number) in &self.layout.axes {
             items.extend(AXIS.map(|(_, kind, width)| HncItem::Axis(kind, *number, width)));
         }
+        let own: Vec<HncItem> = self.own.iter().map(|own| own.item.item).filter(|item| !items.contains(item)).collect();
+        items.extend(own);
         items
     }
 
     fn readings(&self, poll: &HncPoll, stamp: Stamp, out: &mut Vec<Reading>) {
-        for channel in &self.channels {
+        for own in &self.own {
+            out.push(own.reading(stamp, own.found(&poll.of(own.item.item))));
+        }
+        let of_table = self.channels.len() - self.own.len();
+        for channel in &self.channels[..of_table] {
             let value = self.value(channel.name(), poll);
             out.push(match value {
                 Ok(HncValue::Number(number)) => Reading::number(*channel, stamp, number),
@@ -220,7 +238,9 @@ impl HncValue {
     }
 }
 
-fn channels() -> Vec<ChannelId> {
+/// Every channel that a control delivers by itself.
+#[must_use]
+pub fn channels() -> Vec<ChannelId> {
     let words = ["execution", "operation", "alarm", "program", "block", "tool", "spindle_current_a"];
     let axes = ["x", "y", "z"].into_iter().flat_map(|axis| AXIS.iter().map(move |(name, ..)| format!("{axis}_{name}")));
     let numbers = NUMBERS.iter().map(|(_, name)| (*name).to_owned());

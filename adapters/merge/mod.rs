@@ -6,7 +6,7 @@
 //! the reason the source gave, or [`Absence::Stale`]. Every value carries its age.
 //!
 //! A source may deliver late and out of order: a reading that still matters is put in its place, one that does not is
-//! counted and dropped. Where a clock steps, readings stamped by the wrong clock are dropped and counted.
+//! counted and dropped. A poll that failed ends the freshness of its source: what came before it is not held any longer. Where a clock steps, readings stamped by the wrong clock are dropped and counted.
 //!
 //! A source whose readings were true some time before their stamps (a meter that averages and transmits) is told so by
 //! [`Merge::set_lag_ns`]; its stamps are shifted and every tick looks back further by as much.
@@ -224,8 +224,7 @@ impl Merge {
         readings.drain(..).for_each(|reading| self.push(source, reading));
     }
 
-    /// A whole poll of the source failed at `at_ns`. Its channels get the reason once their last values are too old; at
-    /// once when the machine is off.
+    /// A whole poll of the source failed at `at_ns`. Its channels have the reason from then on until the next answer.
     pub fn fail(&mut self, source: SourceId, at_ns: TimeNs, error: &SourceError) {
         let Some(state) = self.sources.get_mut(source.0) else { return };
         state.counts.failures += 1;
@@ -284,15 +283,17 @@ fn best(tracks: &mut [ReadingTrack], sources: &mut [SourceState], at_ns: TimeNs)
     reason.unwrap_or_else(|| Slot::absent(Absence::NotProvided))
 }
 
-/// Replaces "stale" and "not yet read" by what the source itself said; a machine that is off has no fresh values.
+/// Replaces "stale" and "not yet read" by what the source itself said. A poll that failed ends the freshness of what came
+/// before it: nothing is known from its end until the next answer. A number between two answers was measured on either
+/// side and stays.
 fn explained(slot: Slot, failure: Option<Failure>, at_ns: TimeNs) -> Slot {
     let Some(failure) = failure.filter(|failure| !failure.ended_by(at_ns)) else { return slot };
     match slot.value {
         Err(Absence::Stale | Absence::NotYetRead) if failure.after_ns <= at_ns => {
             Slot { value: Err(failure.reason), age_ns: slot.age_ns }
         }
-        Ok(_) if failure.reason == Absence::MachineOff && failure.since_ns <= at_ns => {
-            Slot { value: Err(Absence::MachineOff), age_ns: at_ns - failure.since_ns }
+        Ok(_) if failure.since_ns <= at_ns && slot.age_ns > 0 => {
+            Slot { value: Err(failure.reason), age_ns: slot.age_ns }
         }
         _ => slot,
     }

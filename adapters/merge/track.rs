@@ -51,6 +51,8 @@ struct TrackPoint {
 
 pub(super) struct ReadingTrack {
     continuous: bool,
+    /// A meter that says exactly zero beside another number has seen nothing, or shows nothing at all.
+    electric: bool,
     /// Position of the source in the merge's list.
     pub(super) source: usize,
     points: VecDeque<TrackPoint>,
@@ -60,7 +62,8 @@ pub(super) struct ReadingTrack {
 impl ReadingTrack {
     pub(super) fn new(channel: ChannelId, source: usize, pace: PeriodLimits) -> Self {
         let continuous = channel.channel().kind == Kind::Continuous;
-        Self { continuous, source, points: VecDeque::with_capacity(pace.depth), depth: pace.depth }
+        let electric = channel.channel().is_electric();
+        Self { continuous, electric, source, points: VecDeque::with_capacity(pace.depth), depth: pace.depth }
     }
 
     /// Stamp of the newest reading.
@@ -140,13 +143,17 @@ impl ReadingTrack {
         Slot { value: before.value.clone(), age_ns }
     }
 
-    /// Linear between two numbers around the tick, when they are close enough together.
+    /// Linear between two numbers around the tick, when they are close enough together and of one kind: between nothing and
+    /// something an electrical quantity was never measured, so the earlier number is held.
     fn between(&self, before: &TrackPoint, after: &TrackPoint, at_ns: TimeNs, gap_ns: i64) -> Option<f64> {
         let width_ns = after.mid_ns.checked_sub(before.mid_ns).filter(|width_ns| *width_ns <= gap_ns)?;
         if !self.continuous || before.mid_ns == at_ns {
             return None;
         }
         let (from, to) = (before.value.as_ref().ok()?.as_number()?, after.value.as_ref().ok()?.as_number()?);
+        if self.electric && (from == 0.0) != (to == 0.0) {
+            return None;
+        }
         Some(from + (to - from) * share(at_ns - before.mid_ns, width_ns))
     }
 }

@@ -1,72 +1,53 @@
 //! A Modbus meter as a source.
 
 use super::line::{ModbusError, ModbusLine};
-use super::number::Format;
-use super::pdu::{NoRegisters, RegisterBlock};
+use super::outputs::{self, MeterChannel};
+use super::own::OwnRegister;
 use super::plan::PollBlocks;
-use super::profile::{MeterRegister, Profile, RegisterMeaning, find};
+use super::poll::RegisterPoll;
+use super::profile::{self, Profile};
 use super::refresh::Refresh;
+use super::register::{MeterRegister, RegisterMeaning};
 use super::rtu::RtuLine;
 use super::tcp::TcpLine;
-use crate::address::{Address, Circuit, Endpoint, MeterTarget, SerialTarget};
+use crate::address::{Address, Endpoint, MeterTarget, SerialTarget};
 use crate::channel::ChannelId;
 use crate::clock::Clock;
-use crate::driver::{Fact, Source, SourceError};
-use crate::reading::{Absence, Reading, Stamp};
+use crate::driver::{Fact, Offer, Source, SourceError, SourceProblem};
+use crate::electric::{Doubts, SupplyCheck};
+use crate::own::Own;
+use crate::reading::{Absence, Reading};
 use crate::serial::Bus;
+use std::ops::Range;
 use std::time::Duration;
-
-/// How the registers of an output are put together.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Law {
-    Sum,
-    Mean,
-    /// Mean of the phases against neutral, times the square root of three.
-    BetweenPhases,
-}
-
-/// A channel and the registers that it comes from.
-#[derive(Debug, Clone, PartialEq)]
-struct MeterChannel {
-    channel: ChannelId,
-    law: Law,
-    parts: Vec<Part>,
-}
-
-/// Where a register stands in what a poll brings, and what is made of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Part {
-    block: usize,
-    /// Registers into the block.
-    offset: usize,
-    format: Format,
-    /// To the unit of the channel.
-    factor: f64,
-}
 
 /// A meter that is polled over Modbus.
 pub struct ModbusMeter {
     name: String,
     line: Box<dyn ModbusLine>,
-    unit: u8,
+    target: MeterTarget,
     profile: Profile,
-    plan: PollBlocks,
+    /// Those of the profile, then those of the user's own channels.
+    registers: Vec<MeterRegister>,
     outputs: Vec<MeterChannel>,
+    /// The user's own channels, each with the places of its registers.
+    own: Vec<(Own<OwnRegister>, Range<usize>)>,
     channels: Vec<ChannelId>,
+    poll: RegisterPoll,
     period: Duration,
     serial: Option<SerialTarget>,
     refresh: Refresh,
-    registers: Vec<Result<Vec<u16>, u8>>,
-    stamps: Vec<Stamp>,
+    check: SupplyCheck,
+    doubts: Doubts,
 }
 
 impl ModbusMeter {
     /// A meter on the network.
     ///
     /// # Errors
-    /// In words: an unusable profile.
+    /// In words: an unusable profile; another address that uses the same host and port with other frames.
     pub fn tcp(address: &Address, at: &Endpoint, meter: &MeterTarget) -> Result<Self, String> {
-        let line = TcpLine::new(at.clone(), meter.timeout);
+        let line = TcpLine::new(at, meter.framing, meter.timeout)?;
         Self::new(address, Box::new(line), meter, None)
     }
 
@@ -85,24 +66,33 @@ impl ModbusMeter {
         meter: &MeterTarget,
         serial: Option<SerialTarget>,
     ) -> Result<Self, String> {
-        let profile = find(&meter.profile, meter.profiles.as_deref()).map_err(|error| error.to_string())?;
-        let plan = PollBlocks::of(&profile)?;
-        let parts = parts(&profile, &plan, &factors(&profile, meter)?)?;
-        let outputs = outputs(&profile, &parts, meter.circuit)?;
-        let busy = serial.as_ref().map(|line| plan.wire_time(line) * 5 / 4).unwrap_or_default();
+        let profile = profile::find(&meter.profile, meter.profiles.as_deref()).map_err(|error| error.to_string())?;
+        let mut registers = outputs::registers(&profile, meter)?;
+        let outputs = outputs::of(&profile, meter.circuit)?;
+        let mut own = Vec::new();
+        for channel in &meter.own {
+            let from = registers.len();
+            registers.extend(channel.item.registers(channel.id));
+            own.push((channel.clone(), from..registers.len()));
+        }
+        let blocks = PollBlocks::of(&registers, profile.block_max, profile.block_gap)?;
+        let busy = serial.as_ref().map(|line| blocks.wire_time(line) * 5 / 4).unwrap_or_default();
+        let channels = outputs.iter().map(|output| output.channel).chain(own.iter().map(|(own, _)| own.id));
         Ok(Self {
             name: address.text().to_owned(),
             line,
-            unit: meter.unit,
+            target: meter.clone(),
             period: profile.period.max(busy),
-            channels: outputs.iter().map(|output| output.channel).collect(),
-            plan,
+            channels: channels.collect(),
+            poll: RegisterPoll::new(blocks),
             profile,
+            registers,
             outputs,
+            own,
             serial,
             refresh: Refresh::default(),
-            registers: Vec::new(),
-            stamps: Vec::new(),
+            check: SupplyCheck::default(),
+            doubts: Doubts::default(),
         })
     }
 
@@ -112,154 +102,67 @@ impl ModbusMeter {
         &self.profile
     }
 
-    /// Reads every block; a block that is refused is kept as refused, anything else ends the poll.
-    fn poll(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
-        self.registers.clear();
-        self.stamps.clear();
-        for block in &self.plan.blocks {
-            let asked = ask(self.line.as_mut(), clock, self.unit, block);
-            let (registers, stamp) = match asked {
-                Ok((registers, stamp)) => (Ok(registers), stamp),
-                Err(ModbusError::Refused(code)) if self.plan.blocks.len() > 1 => {
-                    (Err(code), Stamp::exact(clock.now_ns()))
-                }
-                Err(fault) => return Err(fault.of_source(&self.name, block.told(), self.line.deadline())),
-            };
-            self.registers.push(registers);
-            self.stamps.push(stamp);
+    fn failed(&self, (error, request): (ModbusError, String)) -> SourceError {
+        error.of_source(&self.name, request, self.line.deadline())
+    }
+
+    fn own_reading(&self, own: &Own<OwnRegister>, places: &Range<usize>) -> Reading {
+        let registers = self.registers.get(places.clone()).unwrap_or_default();
+        let parts: Vec<(&MeterRegister, Result<&[u16], Absence>)> = registers
+            .iter()
+            .map(|register| (register, self.poll.registers(register).map(|(found, _)| found).map_err(|(why, _)| why)))
+            .collect();
+        own.reading(self.poll.all().1, own.found(&parts))
+    }
+
+    /// Tries a profile on this meter: what it would give, or why it does not fit.
+    fn tried(&mut self, clock: &dyn Clock, name: &str) -> Result<String, String> {
+        let profile = profile::find(name, self.target.profiles.as_deref()).map_err(|error| error.to_string())?;
+        let outputs = outputs::of(&profile, self.target.circuit)?;
+        let blocks = PollBlocks::of(&profile.registers, profile.block_max, profile.block_gap)?;
+        let mut poll = RegisterPoll::new(blocks);
+        poll.read(self.line.as_mut(), clock, self.target.unit).map_err(|(error, request)| match error {
+            ModbusError::Refused(code) => format!("{request}: exception {code}, {}", super::pdu::exception(code).0),
+            ModbusError::Timeout { .. } => format!("{request}: no answer"),
+            ModbusError::Line { what, .. } | ModbusError::Garbled(what) => what,
+        })?;
+        let doubts = SupplyCheck::default().see(&outputs::supply(&profile.registers, &poll));
+        if let Some(problem) = doubts.problems.first() {
+            return Err(problem.what.clone());
         }
-        match self.registers.first() {
-            Some(Err(code)) if self.registers.iter().all(Result::is_err) => {
-                Err(ModbusError::Refused(*code).of_source(&self.name, self.plan.blocks[0].told(), self.line.deadline()))
+        let shown = |output: &MeterChannel| {
+            let reading = output.reading(&profile.registers, &poll, &doubts);
+            let unit = output.channel.channel().unit;
+            match (reading.value.ok().and_then(|value| value.as_number()), reading.implausible) {
+                (Some(number), _) => Ok(format!("{} {number:.6} {unit}", output.channel)),
+                (None, Some(number)) => Err(format!("{} {number:.4e} {unit} cannot be", output.channel)),
+                (None, None) => Ok(format!("{} -", output.channel)),
             }
-            _ => Ok(()),
-        }
+        };
+        let values: Vec<String> = outputs.iter().map(shown).collect::<Result<_, String>>()?;
+        let note = if poll.is_split() { "; not all of its registers at once" } else { "" };
+        Ok(format!("may be it: {}{note}", values.join(", ")))
     }
 
-    fn reading(&self, output: &MeterChannel) -> Reading {
-        let mut stamp = self.stamps[0];
-        let mut numbers = Vec::with_capacity(3);
-        for part in &output.parts {
-            match self.number(part) {
-                Ok((number, at)) => {
-                    stamp = at;
-                    numbers.push(number);
-                }
-                Err((reason, at)) => return Reading::absent(output.channel, at, reason),
-            }
-        }
-        Reading::number(output.channel, stamp, output.law.of(&numbers))
-    }
-
-    fn number(&self, part: &Part) -> Result<(f64, Stamp), (Absence, Stamp)> {
-        let stamp = self.stamps[part.block];
-        let registers = self.registers[part.block].as_ref().map_err(|_| (Absence::Refused, stamp))?;
-        let decoded = part.format.decode(&registers[part.offset..], self.profile.word_order);
-        // What a meter does not measure it gives as an IEEE number that is none.
-        let number = decoded.ok_or((Absence::NotSupported, stamp))?;
-        Ok((number * part.factor, stamp))
-    }
-
-    fn look_at_refresh(&mut self) {
-        if let Some(stamp) = self.stamps.first() {
-            self.refresh.push(self.registers.iter().flatten().flatten().copied(), stamp.mid_ns);
-        }
+    fn missing(&self) -> Option<SourceProblem> {
+        let missing = self.registers.iter().filter(|register| !self.poll.has(register));
+        let addresses: Vec<String> = missing.map(|register| register.address.to_string()).collect();
+        (!addresses.is_empty()).then(|| SourceProblem {
+            what: format!(
+                "the meter does not have {} of the registers that are read: {}",
+                addresses.len(),
+                addresses.join(", ")
+            ),
+            next: "Choose the profile of this very model, or take these values out of it".to_owned(),
+        })
     }
 }
 
-fn ask(
-    line: &mut dyn ModbusLine,
-    clock: &dyn Clock,
-    unit: u8,
-    block: &RegisterBlock,
-) -> Result<(Vec<u16>, Stamp), ModbusError> {
-    let answer = line.ask(clock, unit, &block.request(), block.answer_bytes())?;
-    match block.registers(&answer.pdu) {
-        Ok(registers) => Ok((registers, answer.stamp)),
-        Err(NoRegisters::Refused(code)) => Err(ModbusError::Refused(code)),
-        Err(NoRegisters::Other(bytes)) => {
-            Err(ModbusError::Garbled(format!("{bytes} bytes that answer another question")))
-        }
-    }
-}
-
-impl Law {
-    fn of(self, numbers: &[f64]) -> f64 {
-        let sum: f64 = numbers.iter().sum();
-        let count = f64::from(u32::try_from(numbers.len()).unwrap_or(1)).max(1.0);
-        match self {
-            Self::Sum => sum,
-            Self::Mean => sum / count,
-            Self::BetweenPhases => 3.0_f64.sqrt() * sum / count,
-        }
-    }
-}
-
-/// Register to channel unit, with the transformers where the meter does not count them in.
-fn factors(profile: &Profile, meter: &MeterTarget) -> Result<Vec<f64>, String> {
-    let given = (meter.ct - 1.0).abs() > 1e-12 || (meter.pt - 1.0).abs() > 1e-12;
-    if given && !profile.secondary {
-        return Err(format!("{} counts its transformers in: leave ct and pt out", profile.meter));
-    }
-    let ratio = |quantity| match quantity {
-        RegisterMeaning::Power | RegisterMeaning::PhasePower(_) => meter.ct * meter.pt,
-        RegisterMeaning::Current(_) => meter.ct,
-        RegisterMeaning::Voltage(_) | RegisterMeaning::LineVoltage => meter.pt,
-        RegisterMeaning::Channel(_) => 1.0,
-    };
-    Ok(profile.registers.iter().map(|register| register.factor * ratio(register.quantity)).collect())
-}
-
-/// Where each register of the profile is found in the blocks.
-fn parts(profile: &Profile, plan: &PollBlocks, factors: &[f64]) -> Result<Vec<Part>, String> {
-    let part = |(register, factor): (&MeterRegister, &f64)| {
-        let place = plan.place(register).ok_or_else(|| format!("no block holds register {}", register.address));
-        place.map(|(block, offset)| Part { block, offset, format: register.format, factor: *factor })
-    };
-    profile.registers.iter().zip(factors).map(part).collect()
-}
-
-fn outputs(profile: &Profile, parts: &[Part], circuit: Circuit) -> Result<Vec<MeterChannel>, String> {
-    let where_is = |wanted: &dyn Fn(RegisterMeaning) -> bool| -> Vec<Part> {
-        let each = profile.registers.iter().zip(parts);
-        each.filter(|(register, _)| wanted(register.quantity)).map(|(_, part)| *part).collect()
-    };
-    let total = where_is(&|quantity| quantity == RegisterMeaning::Power);
-    let phases = where_is(&|quantity| matches!(quantity, RegisterMeaning::PhasePower(_)));
-    let currents = where_is(&|quantity| matches!(quantity, RegisterMeaning::Current(_)));
-    let line = where_is(&|quantity| quantity == RegisterMeaning::LineVoltage);
-    let voltages = where_is(&|quantity| matches!(quantity, RegisterMeaning::Voltage(_)));
-    let power = if circuit == Circuit::Spindle { "spindle_power_w" } else { "total_power_w" };
-    let mut outputs = Vec::new();
-    let mut add = |name: &str, law, parts: Vec<Part>| {
-        if let Some(channel) = ChannelId::of(name).filter(|_| !parts.is_empty()) {
-            outputs.push(MeterChannel { channel, law, parts });
-        }
-    };
-    add(power, Law::Sum, if total.is_empty() { phases } else { total });
-    if circuit == Circuit::Spindle {
-        add("spindle_current_a", Law::Mean, currents);
-    }
-    let (law, voltages) = if line.is_empty() { (Law::BetweenPhases, voltages) } else { (Law::Mean, line) };
-    add("supply_voltage_v", law, voltages);
-    for (register, part) in profile.registers.iter().zip(parts) {
-        if let RegisterMeaning::Channel(channel) = register.quantity {
-            outputs.push(MeterChannel { channel, law: Law::Sum, parts: vec![*part] });
-        }
-    }
-    let mut seen = Vec::new();
-    for output in &outputs {
-        if seen.contains(&output.channel) {
-            return Err(format!("profile {} gives {} twice", profile.name, output.channel));
-        }
-        seen.push(output.channel);
-    }
-    if outputs.is_empty() { Err(format!("profile {} gives no channel", profile.name)) } else { Ok(outputs) }
-}
-
+/// What a point is called on this machine, as a fact.
 fn point_name(register: &MeterRegister) -> Option<Fact> {
     let RegisterMeaning::Channel(channel) = register.quantity else { return None };
-    register.name.as_ref().map(|name| Fact::text(channel.name(), name.clone()))
+    let name = register.name.as_ref()?;
+    Some(Fact::text(channel.name(), name.clone()))
 }
 
 impl Source for ModbusMeter {
@@ -276,12 +179,15 @@ impl Source for ModbusMeter {
     }
 
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
-        if let Err(error) = self.poll(clock) {
+        if let Err(failed) = self.poll.read(self.line.as_mut(), clock, self.target.unit) {
             self.refresh.interrupt();
-            return Err(error);
+            return Err(self.failed(failed));
         }
-        self.look_at_refresh();
-        out.extend(self.outputs.iter().map(|output| self.reading(output)));
+        let (all, stamp) = self.poll.all();
+        self.refresh.push(all, stamp.mid_ns);
+        self.doubts = self.check.see(&outputs::supply(&self.registers, &self.poll));
+        out.extend(self.outputs.iter().map(|output| output.reading(&self.registers, &self.poll, &self.doubts)));
+        out.extend(self.own.iter().map(|(own, places)| self.own_reading(own, places)));
         Ok(())
     }
 
@@ -291,9 +197,13 @@ impl Source for ModbusMeter {
             facts.push(Fact::text("register_map", format!("to be confirmed: {}", self.profile.source)));
         }
         if let Some(line) = &self.serial {
-            let wire = self.plan.wire_time(line);
+            let wire = self.poll.wire_time(line);
             facts.push(Fact::number("wire_time_ms", wire.as_secs_f64() * 1e3));
             facts.push(Fact::number("wire_share_pct", 100.0 * wire.as_secs_f64() / self.period.as_secs_f64()));
+        }
+        if self.poll.is_split() {
+            let requests = u32::try_from(self.poll.requests()).unwrap_or(u32::MAX);
+            facts.push(Fact::number("requests_per_poll", f64::from(requests)));
         }
         match self.refresh.effective() {
             Some(found) if found.at_least_as_fast => {
@@ -309,5 +219,16 @@ impl Source for ModbusMeter {
         facts.push(Fact::number("late_answers", self.line.late_answers() as f64));
         facts.extend(self.profile.registers.iter().filter_map(point_name));
         facts
+    }
+
+    fn problems(&self) -> Vec<SourceProblem> {
+        self.doubts.problems.iter().cloned().chain(self.missing()).collect()
+    }
+
+    fn offers(&mut self, clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
+        let names: Vec<&str> = profile::SHIPPED.iter().map(|(name, _)| *name).collect();
+        let offer =
+            |name: &str| Offer { name: format!("profile={name}"), says: self.tried(clock, name), channel: None };
+        Ok(names.into_iter().map(offer).collect())
     }
 }

@@ -10,8 +10,11 @@
 //! | `line` | one request and its answer over either carrier, and every way in which that fails |
 //! | `tcp`, `rtu` | the two carriers |
 //! | `number` | registers to numbers and back: widths, word order, sign and magnitude |
-//! | `profile` | which register holds what: shipped files, the user's own, everything wrong with one told at once |
+//! | `profile`, `register` | which register holds what: shipped files, the user's own, everything wrong with one told at once |
+//! | `own` | what the user can have read besides |
 //! | `plan` | the fewest blocks that hold all registers of a profile, and what they take on the wire |
+//! | `poll` | one poll, in parts where the meter does not give a block as a whole |
+//! | `outputs` | from registers to channels, and to what [`electric`](crate::electric) judges |
 //! | `refresh` | how often the meter really has something new |
 //! | `meter` | the source |
 //! | `server` | the other side: the simulated machine as a meter |
@@ -31,15 +34,21 @@ mod crc;
 pub(crate) mod line;
 mod meter;
 mod number;
+mod outputs;
+mod own;
 pub mod pdu;
 mod plan;
+mod poll;
 pub mod profile;
 mod refresh;
+pub mod register;
 mod rtu;
 pub mod server;
 mod tcp;
 
 pub use meter::ModbusMeter;
 pub use number::{Format, WordOrder};
+pub use own::{InRegisters, OwnRegister};
 pub use plan::{PollBlocks, wire_time};
 pub use refresh::Refresh;
+pub use tcp::TcpFraming;

@@ -29,15 +29,44 @@ pub enum Format {
     F64,
 }
 
-/// Which register of a number comes first.
+/// In which order the bytes of a number come; A is the highest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum WordOrder {
-    /// The high word first.
+    /// ABCD: the high word first, its high byte first.
     #[default]
+    #[serde(alias = "abcd")]
     Big,
-    /// The low word first.
+    /// CDAB: the low word first, the high byte of each first.
+    #[serde(alias = "cdab")]
     Little,
+    /// BADC: the high word first, the low byte of each first.
+    Badc,
+    /// DCBA: the low word first, the low byte of each first.
+    Dcba,
+}
+
+impl WordOrder {
+    /// The order of this name, as a profile writes it.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        Some(match name {
+            "big" | "abcd" => Self::Big,
+            "little" | "cdab" => Self::Little,
+            "badc" => Self::Badc,
+            "dcba" => Self::Dcba,
+            _ => return None,
+        })
+    }
+
+    /// A register with its high byte first.
+    fn word(self, register: u16) -> u16 {
+        if matches!(self, Self::Badc | Self::Dcba) { register.swap_bytes() } else { register }
+    }
+
+    fn low_word_first(self) -> bool {
+        matches!(self, Self::Little | Self::Dcba)
+    }
 }
 
 impl Format {
@@ -48,6 +77,43 @@ impl Format {
             Self::U16 | Self::I16 | Self::Sm16 => 1,
             Self::U32 | Self::I32 | Self::Sm32 | Self::F32 => 2,
             Self::I64 | Self::F64 => 4,
+        }
+    }
+
+    /// The format of this name, as a profile writes it.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        const NAMES: [(&str, Format); 9] = [
+            ("u16", Format::U16),
+            ("i16", Format::I16),
+            ("sm16", Format::Sm16),
+            ("u32", Format::U32),
+            ("i32", Format::I32),
+            ("sm32", Format::Sm32),
+            ("f32", Format::F32),
+            ("i64", Format::I64),
+            ("f64", Format::F64),
+        ];
+        NAMES.iter().find(|(known, _)| *known == name).map(|(_, format)| *format)
+    }
+
+    /// The bits in these registers; `None` when they are too few.
+    #[must_use]
+    pub fn raw(self, registers: &[u16], order: WordOrder) -> Option<u64> {
+        Some(bits(registers.get(..usize::from(self.registers()))?, order))
+    }
+
+    /// Bits that stand for no value unless a profile says otherwise: the ends of the range of a whole number, where meters
+    /// put what they do not measure. An IEEE number has its own.
+    #[must_use]
+    pub fn no_values(self) -> &'static [u64] {
+        match self {
+            Self::U16 | Self::Sm16 => &[0xFFFF],
+            Self::I16 => &[0x8000, 0x7FFF],
+            Self::U32 | Self::Sm32 => &[0xFFFF_FFFF],
+            Self::I32 => &[0x8000_0000, 0x7FFF_FFFF],
+            Self::I64 => &[0x8000_0000_0000_0000, 0x7FFF_FFFF_FFFF_FFFF],
+            Self::F32 | Self::F64 => &[],
         }
     }
 
@@ -87,16 +153,14 @@ impl Format {
             Self::F64 => number.to_bits(),
         };
         let words = (0..self.registers()).map(|word| u16::try_from((bits >> (16 * word)) & 0xFFFF).unwrap_or(0));
-        if order == WordOrder::Little { words.collect() } else { words.rev().collect() }
+        let words = words.map(|word| order.word(word));
+        if order.low_word_first() { words.collect() } else { words.rev().collect() }
     }
 }
 
 fn bits(registers: &[u16], order: WordOrder) -> u64 {
-    let join = |bits: u64, word: &u16| (bits << 16) | u64::from(*word);
-    match order {
-        WordOrder::Big => registers.iter().fold(0, join),
-        WordOrder::Little => registers.iter().rev().fold(0, join),
-    }
+    let join = |bits: u64, register: &u16| (bits << 16) | u64::from(order.word(*register));
+    if order.low_word_first() { registers.iter().rev().fold(0, join) } else { registers.iter().fold(0, join) }
 }
 
 #[expect(clippy::cast_precision_loss, reason = "31 bits fit a double")]
@@ -136,6 +200,10 @@ mod tests {
         assert!((volts - 230.2).abs() < 1e-4);
         let [high, low] = words;
         assert_eq!(Format::F32.decode(&[low, high], WordOrder::Little), Some(volts));
+        // The same four bytes 43 66 33 33 as B A D C and D C B A.
+        assert_eq!(Format::F32.decode(&[0x6643, 0x3333], WordOrder::Badc), Some(volts));
+        assert_eq!(Format::F32.decode(&[0x3333, 0x6643], WordOrder::Dcba), Some(volts));
+        assert_eq!(WordOrder::of_name("cdab"), Some(WordOrder::Little));
     }
 
     #[test]
@@ -154,8 +222,9 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn what_is_encoded_is_decoded(whole in -30000_i32..30000, which in 0_usize..9, little in proptest::bool::ANY) {
-            let (format, order) = (ALL[which], if little { WordOrder::Little } else { WordOrder::Big });
+        fn what_is_encoded_is_decoded(whole in -30000_i32..30000, which in 0_usize..9, order in 0_usize..4) {
+            let orders = [WordOrder::Big, WordOrder::Little, WordOrder::Badc, WordOrder::Dcba];
+            let (format, order) = (ALL[which], orders[order]);
             let signed = !matches!(format, Format::U16 | Format::U32);
             let number = f64::from(if signed { whole } else { whole.abs() });
             proptest::prop_assert_eq!(format.decode(&format.encode(number, order), order), Some(number));

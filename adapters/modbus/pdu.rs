@@ -6,7 +6,7 @@
 pub const REGISTERS_MAX: u16 = 125;
 
 /// Which table of registers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RegisterTable {
     /// Function 3.
     Holding,
@@ -90,8 +90,14 @@ pub enum NoRegisters {
 pub fn exception(code: u8) -> (&'static str, &'static str) {
     match code {
         1 => ("illegal function", "The meter keeps its values in the other table: see registers= in the profile"),
-        2 => ("illegal data address", "These registers do not exist: choose the profile of this very model"),
-        3 => ("illegal data value", "The meter does not give so many registers at once: set block_max in the profile"),
+        2 => (
+            "illegal data address",
+            "None of the registers of the profile exists: choose the profile of this very model",
+        ),
+        3 => (
+            "illegal data value",
+            "The meter gives none of the registers of the profile, not even one number at a time",
+        ),
         4 => ("device failure", "Look at the meter's own display"),
         6 => ("device busy", "It will be asked again"),
         10 | 11 => {

@@ -1,7 +1,11 @@
 //! The fewest blocks that hold every register of a profile, and what they take on the wire.
+//!
+//! A meter may not give as many registers at once as the protocol allows, or not those that nobody reads. It says so with an
+//! exception (2 or 3), and the block is then read in parts: first without what nobody reads, then in halves, down to single
+//! numbers. What was found out is remembered as long as the source lives.
 
-use super::pdu::RegisterBlock;
-use super::profile::{MeterRegister, Profile};
+use super::pdu::{RegisterBlock, RegisterTable};
+use super::register::MeterRegister;
 use crate::address::SerialTarget;
 use crate::serial;
 use std::time::Duration;
@@ -14,47 +18,74 @@ const REQUEST_BYTES: usize = 8;
 /// Address, function, byte count, CRC.
 const ANSWER_AROUND: usize = 5;
 
+/// Registers of one number, from the first to behind the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct NumberSpan {
+    table: RegisterTable,
+    from: u32,
+    to: u32,
+}
+
 /// The blocks of one poll.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PollBlocks {
-    /// In the order of their addresses; no two overlap.
+    /// In the order of their tables and addresses; no two overlap.
     pub blocks: Vec<RegisterBlock>,
+    spans: Vec<NumberSpan>,
 }
 
 impl PollBlocks {
-    /// The fewest blocks within the profile's limits.
+    /// The fewest blocks of at most `most` registers that run across at most `gap` which nobody reads.
     ///
     /// # Errors
     /// In words: a profile that needs too many requests.
-    pub fn of(profile: &Profile) -> Result<Self, String> {
-        let end = |register: &MeterRegister| u32::from(register.address) + u32::from(register.format.registers());
-        let mut spans: Vec<(u32, u32)> =
-            profile.registers.iter().map(|register| (u32::from(register.address), end(register))).collect();
+    pub fn of<'a>(registers: impl IntoIterator<Item = &'a MeterRegister>, most: u16, gap: u16) -> Result<Self, String> {
+        let span = |register: &MeterRegister| {
+            let from = u32::from(register.address);
+            NumberSpan { table: register.table, from, to: from + u32::from(register.format.registers()) }
+        };
+        let mut spans: Vec<NumberSpan> = registers.into_iter().map(span).collect();
         spans.sort_unstable();
-        let mut joined: Vec<(u32, u32)> = Vec::new();
-        for (from, to) in spans {
-            match joined.last_mut().filter(|last| fits(last, from, to, profile)) {
-                Some(last) => last.1 = last.1.max(to),
-                None => joined.push((from, to)),
-            }
+        spans.dedup();
+        let blocks = joined(&spans, most, gap);
+        if blocks.len() > BLOCKS_MAX {
+            return Err(format!("{} requests per poll; at most {BLOCKS_MAX}, so make it two profiles", blocks.len()));
         }
-        if joined.len() > BLOCKS_MAX {
-            return Err(format!("{} requests per poll; at most {BLOCKS_MAX}, so make it two profiles", joined.len()));
-        }
-        let word = |number: u32| u16::try_from(number).unwrap_or(u16::MAX);
-        let block =
-            |(from, to): (u32, u32)| RegisterBlock { table: profile.table, start: word(from), count: word(to - from) };
-        Ok(Self { blocks: joined.into_iter().map(block).collect() })
+        Ok(Self { blocks, spans })
     }
 
-    /// In which block a register stands, and how many registers into it.
+    /// In which block a register stands, and how many registers into it; `None` where the meter does not have it.
     pub(super) fn place(&self, register: &MeterRegister) -> Option<(usize, usize)> {
         let holds = |block: &RegisterBlock| {
-            register.address >= block.start
+            block.table == register.table
+                && register.address >= block.start
                 && register.address - block.start + register.format.registers() <= block.count
         };
         let at = self.blocks.iter().position(holds)?;
         Some((at, usize::from(register.address - self.blocks[at].start)))
+    }
+
+    /// The meter refuses this block: it is read in parts from now on. A single number that is refused does not exist, and
+    /// nothing is read in its place.
+    pub(super) fn split(&mut self, at: usize) {
+        let Some(block) = self.blocks.get(at).copied() else { return };
+        let (from, to) = (u32::from(block.start), u32::from(block.start) + u32::from(block.count));
+        let inside: Vec<NumberSpan> = self
+            .spans
+            .iter()
+            .filter(|span| span.table == block.table && span.from >= from && span.to <= to)
+            .copied()
+            .collect();
+        let without_gaps = joined(&inside, block.count, 0);
+        let parts = match (without_gaps.len(), inside.len()) {
+            (_, 0 | 1) => Vec::new(),
+            (1, count) => {
+                let (first, second) = inside.split_at(count / 2);
+                [joined(first, block.count, 0), joined(second, block.count, 0)].concat()
+            }
+            _ => without_gaps,
+        };
+        self.blocks.splice(at..=at, parts);
     }
 
     /// What a poll takes on a serial line, with all silences.
@@ -64,9 +95,26 @@ impl PollBlocks {
     }
 }
 
-fn fits(last: &(u32, u32), from: u32, to: u32, profile: &Profile) -> bool {
-    let gap = from.saturating_sub(last.1);
-    to.max(last.1) - last.0 <= u32::from(profile.block_max) && gap <= u32::from(profile.block_gap)
+fn joined(spans: &[NumberSpan], most: u16, gap: u16) -> Vec<RegisterBlock> {
+    let mut joined: Vec<NumberSpan> = Vec::new();
+    let fits = |last: &NumberSpan, span: &NumberSpan| {
+        last.table == span.table
+            && span.to.max(last.to) - last.from <= u32::from(most)
+            && span.from.saturating_sub(last.to) <= u32::from(gap)
+    };
+    for span in spans {
+        match joined.last_mut().filter(|last| fits(last, span)) {
+            Some(last) => last.to = last.to.max(span.to),
+            None => joined.push(*span),
+        }
+    }
+    let word = |number: u32| u16::try_from(number).unwrap_or(u16::MAX);
+    let block = |span: NumberSpan| RegisterBlock {
+        table: span.table,
+        start: word(span.from),
+        count: word(span.to - span.from),
+    };
+    joined.into_iter().map(block).collect()
 }
 
 /// What a request for so many registers and its answer take on a serial line, with the silence behind each; the meter's
@@ -79,32 +127,49 @@ pub fn wire_time(line: &SerialTarget, registers: u16) -> Duration {
 
 #[cfg(test)]
 mod tests {
-    use super::super::profile::{SHIPPED, find};
+    use super::super::profile::{Profile, SHIPPED, find};
     use super::*;
     use crate::address::Parity;
     use std::path::PathBuf;
 
-    fn blocks(name: &str) -> Vec<(u16, u16)> {
-        let plan = PollBlocks::of(&find(name, None).expect("shipped")).expect("a plan");
+    fn plan(profile: &Profile) -> PollBlocks {
+        PollBlocks::of(&profile.registers, profile.block_max, profile.block_gap).expect("a plan")
+    }
+
+    fn blocks(plan: &PollBlocks) -> Vec<(u16, u16)> {
         plan.blocks.iter().map(|block| (block.start, block.count)).collect()
     }
 
     #[test]
     fn every_shipped_profile_is_one_block() {
+        let of = |name| blocks(&plan(&find(name, None).expect("shipped")));
         for (name, _) in SHIPPED {
-            assert_eq!(blocks(name).len(), 1, "{name}");
+            assert_eq!(of(name).len(), 1, "{name}");
         }
-        assert_eq!(blocks("sdm630"), [(0, 54)]);
-        assert_eq!(blocks("iem3000"), [(0x0BB7, 62)]);
+        assert_eq!(of("sdm630"), [(0, 54)]);
+        assert_eq!(of("iem3000"), [(0x0BB7, 62)]);
     }
 
     #[test]
     fn a_meter_with_limits_gets_more_blocks() {
         let profile = Profile { block_gap: 10, ..find("sdm630", None).expect("shipped") };
-        let plan = PollBlocks::of(&profile).expect("a plan");
-        assert_eq!(plan.blocks.iter().map(|b| (b.start, b.count)).collect::<Vec<_>>(), [(0, 18), (52, 2)]);
+        assert_eq!(blocks(&plan(&profile)), [(0, 18), (52, 2)]);
         let narrow = Profile { block_max: 4, ..profile };
-        assert!(PollBlocks::of(&narrow).expect("a plan").blocks.iter().all(|block| block.count <= 4));
+        assert!(plan(&narrow).blocks.iter().all(|block| block.count <= 4));
+    }
+
+    #[test]
+    fn a_block_that_is_refused_is_read_in_parts() {
+        let mut plan = plan(&find("sdm630", None).expect("shipped"));
+        plan.split(0);
+        assert_eq!(blocks(&plan), [(0, 18), (52, 2)], "without the gap first");
+        plan.split(0);
+        assert_eq!(blocks(&plan), [(0, 8), (8, 10), (52, 2)], "then in halves");
+        plan.split(2);
+        assert_eq!(blocks(&plan), [(0, 8), (8, 10)], "a single number is not there");
+        while !plan.blocks.is_empty() {
+            plan.split(0);
+        }
     }
 
     #[test]

@@ -4,7 +4,8 @@
 //! format = "meter/1"
 //! meter = "Eastron SDM630"         # who it is, as people call it
 //! registers = "input"              # input (function 4) or holding (function 3)
-//! word_order = "big"               # which register of a number comes first: the high word (big) or the low one
+//! addresses = "protocol"           # protocol: from 0 as on the wire; manual: 30001 and 40001 are the first ones
+//! word_order = "big"               # big (ABCD), little (CDAB), badc, dcba: the bytes of a number, A the highest
 //! values = "primary"               # primary: transformers are counted in; secondary: multiply by ct= and pt=
 //! period_s = 0.1                   # pace of polling, unless the configuration says otherwise
 //! block_max = 125                  # so many registers at once at most
@@ -14,20 +15,25 @@
 //!
 //! [[value]]
 //! quantity = "power"               # or channel = "bearing_temperature_c" with name = "front bearing"
-//! address = 0x34                   # protocol address, from 0
+//! address = 0x34                   # of its first register
 //! type = "f32"                     # u16 i16 sm16 u32 i32 sm32 f32 i64 f64; sm: the highest bit is the sign
-//! unit = "W"                       # W kW A mA V mV C, or "1"
+//! unit = "W"                       # W kW A mA V mV VA Hz kWh C K bar and so on, or "1"
 //! scale = 1.0                      # the register times this is the number in that unit
+//! no_value = [0xFFFF]              # what stands for no value; else the ends of the range of a whole number
+//! registers = "holding"            # of this value, where it is in the other table
+//! word_order = "badc"              # of this value, where it is another one
 //! ```
 //!
 //! Quantities: `power`, `power_l1` to `_l3`, `current_l1` to `_l3`, `voltage_l1` to `_l3` (against neutral), `voltage_l12`
-//! (between phases). Where the meter sits decides the channel: `circuit=machine` in the address gives `total_power_w`,
-//! `circuit=spindle` gives `spindle_power_w` and `spindle_current_a` (mean of the phases); both give `supply_voltage_v`.
-//! Without `power` the sum of the phases is taken.
+//! (between phases), `energy`, `power_factor`, `apparent_power`, `frequency`. Where the meter sits decides the channel:
+//! `circuit=machine` in the address gives `total_power_w`, `total_energy_kwh` and so on, `circuit=spindle` gives `spindle_power_w`
+//! and so on and `spindle_current_a` (mean of the phases); both give `supply_voltage_v` and `supply_frequency_hz`. Without
+//! `power` the sum of the phases is taken. A channel can be given by its name, too.
 
-use super::number::{Format, WordOrder};
+use super::number::WordOrder;
 use super::pdu::{REGISTERS_MAX, RegisterTable};
-use crate::channel::{self, CHANNELS, ChannelId};
+use super::register::{self, MeterRegister, RawAddresses, RawTable, RawValue, Whole};
+use crate::channel;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -51,38 +57,6 @@ pub const SHIPPED: [(&str, &str); 9] = [
     ("generic", include_str!("profiles/generic.toml")),
 ];
 
-/// What a register means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RegisterMeaning {
-    /// Of all phases together, W.
-    Power,
-    /// Of one phase, 0 to 2, W.
-    PhasePower(usize),
-    /// Of one phase, 0 to 2, A.
-    Current(usize),
-    /// One phase against neutral, 0 to 2, V.
-    Voltage(usize),
-    /// Between the first two phases, V.
-    LineVoltage,
-    /// A channel by its name, in its unit.
-    Channel(ChannelId),
-}
-
-/// One number of the meter.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MeterRegister {
-    /// What it means.
-    pub quantity: RegisterMeaning,
-    /// Protocol address of its first register.
-    pub address: u16,
-    /// How it lies there.
-    pub format: Format,
-    /// The number in the register times this is W, A, V or the channel's unit.
-    pub factor: f64,
-    /// What the point is called on this machine.
-    pub name: Option<String>,
-}
-
 /// A meter's map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
@@ -92,8 +66,6 @@ pub struct Profile {
     pub meter: String,
     /// Where its numbers are.
     pub table: RegisterTable,
-    /// Which word comes first.
-    pub word_order: WordOrder,
     /// Are the numbers those of the secondary side of transformers?
     pub secondary: bool,
     /// Pace of polling.
@@ -126,6 +98,7 @@ struct RawProfile {
     format: String,
     meter: String,
     registers: RawTable,
+    addresses: Option<RawAddresses>,
     #[serde(default)]
     word_order: WordOrder,
     #[serde(default)]
@@ -143,13 +116,6 @@ struct RawProfile {
     value: Vec<RawValue>,
 }
 
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "lowercase")]
-enum RawTable {
-    Holding,
-    Input,
-}
-
 #[derive(Deserialize, Clone, Copy, Default, PartialEq)]
 #[serde(rename_all = "lowercase")]
 enum RawSide {
@@ -158,25 +124,8 @@ enum RawSide {
     Secondary,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawValue {
-    quantity: Option<String>,
-    channel: Option<String>,
-    address: u16,
-    r#type: Format,
-    unit: String,
-    #[serde(default = "one")]
-    scale: f64,
-    name: Option<String>,
-}
-
 fn tenth() -> f64 {
     0.1
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 fn most() -> u16 {
@@ -223,20 +172,21 @@ pub fn parse(name: &str, place: &str, text: &str) -> Result<Profile, ProfileErro
     let raw: RawProfile = toml::from_str(text).map_err(|error| refused(vec![error.to_string().trim().to_owned()]))?;
     let mut problems = of_whole(&raw);
     let mut registers = Vec::new();
+    let whole = Whole { registers: raw.registers, addresses: raw.addresses, word_order: raw.word_order };
     for (index, value) in raw.value.iter().enumerate() {
-        match register(value) {
+        match register::read(value, whole) {
             Ok(register) => registers.push(register),
             Err(problem) => problems.push(format!("value {}: {problem}", index + 1)),
         }
     }
+    problems.extend(register::twice(&registers));
     if !problems.is_empty() {
         return Err(refused(problems));
     }
     Ok(Profile {
         name: name.to_owned(),
         meter: raw.meter,
-        table: if matches!(raw.registers, RawTable::Input) { RegisterTable::Input } else { RegisterTable::Holding },
-        word_order: raw.word_order,
+        table: raw.registers.table(),
         secondary: raw.values == RawSide::Secondary,
         period: Duration::from_secs_f64(raw.period_s),
         block_max: raw.block_max,
@@ -260,72 +210,6 @@ fn of_whole(raw: &RawProfile) -> Vec<String> {
     let values = raw.value.len();
     ask((1..=VALUES_MAX).contains(&values), format!("{values} values: there are 1 to {VALUES_MAX}"));
     problems
-}
-
-fn register(raw: &RawValue) -> Result<MeterRegister, String> {
-    let (quantity, base) = match (&raw.quantity, &raw.channel) {
-        (Some(quantity), None) => of_quantity(quantity)?,
-        (None, Some(channel)) => of_channel(channel)?,
-        _ => return Err("give quantity or channel, one of the two".to_owned()),
-    };
-    let unit = unit_factor(&raw.unit, base)?;
-    if !(raw.scale.is_finite() && raw.scale != 0.0) {
-        return Err(format!("scale = {}: give a number that is not 0", raw.scale));
-    }
-    if u32::from(raw.address) + u32::from(raw.r#type.registers()) > 65536 {
-        return Err(format!("address = {}: the number does not end within the 65536 registers", raw.address));
-    }
-    let factor = raw.scale * unit;
-    Ok(MeterRegister { quantity, address: raw.address, format: raw.r#type, factor, name: raw.name.clone() })
-}
-
-const QUANTITIES: [(&str, RegisterMeaning, &str); 11] = [
-    ("power", RegisterMeaning::Power, "W"),
-    ("power_l1", RegisterMeaning::PhasePower(0), "W"),
-    ("power_l2", RegisterMeaning::PhasePower(1), "W"),
-    ("power_l3", RegisterMeaning::PhasePower(2), "W"),
-    ("current_l1", RegisterMeaning::Current(0), "A"),
-    ("current_l2", RegisterMeaning::Current(1), "A"),
-    ("current_l3", RegisterMeaning::Current(2), "A"),
-    ("voltage_l1", RegisterMeaning::Voltage(0), "V"),
-    ("voltage_l2", RegisterMeaning::Voltage(1), "V"),
-    ("voltage_l3", RegisterMeaning::Voltage(2), "V"),
-    ("voltage_l12", RegisterMeaning::LineVoltage, "V"),
-];
-
-fn of_quantity(name: &str) -> Result<(RegisterMeaning, &'static str), String> {
-    if let Some((_, quantity, base)) = QUANTITIES.iter().find(|(known, ..)| *known == name) {
-        return Ok((*quantity, base));
-    }
-    let names = QUANTITIES.iter().map(|(known, ..)| *known);
-    let hint = channel::nearest(name, names).map(|near| format!("; did you mean {near}?")).unwrap_or_default();
-    Err(format!("no quantity {name:?}{hint}"))
-}
-
-fn of_channel(name: &str) -> Result<(RegisterMeaning, &'static str), String> {
-    let id = ChannelId::of(name).filter(|id| !id.channel().unit.is_empty());
-    if let Some(id) = id {
-        return Ok((RegisterMeaning::Channel(id), id.channel().unit));
-    }
-    let names = CHANNELS.iter().map(|channel| channel.name);
-    let hint = channel::nearest(name, names).map(|near| format!("; did you mean {near}?")).unwrap_or_default();
-    Err(format!("no channel {name:?} that holds a number{hint}"))
-}
-
-/// A number in `unit` times this is one in `base`.
-fn unit_factor(unit: &str, base: &str) -> Result<f64, String> {
-    let same = match base {
-        "°C" => unit == "C" || unit == base,
-        _ => unit == base,
-    };
-    match (unit, base) {
-        _ if same => Ok(1.0),
-        ("kW", "W") => Ok(1e3),
-        ("MW", "W") => Ok(1e6),
-        ("mA", "A") | ("mV", "V") => Ok(1e-3),
-        ("kV", "V") => Ok(1e3),
-        _ => Err(format!("unit = {unit:?} is no unit for a number in {base}")),
-    }
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ const AROUND: usize = 3;
 /// An exception: address, function, code, CRC.
 const EXCEPTION: usize = 5;
 /// More bytes than this without a frame among them are noise.
-const BYTES_MAX: usize = 1024;
+pub(super) const BYTES_MAX: usize = 1024;
 
 pub(super) struct RtuLine {
     bus: SharedBus,
@@ -40,11 +40,8 @@ impl ModbusLine for RtuLine {
         answer_bytes: usize,
     ) -> Result<ModbusResponse, ModbusError> {
         let mut bus = self.bus.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut frame = vec![unit];
-        frame.extend(request);
-        let check = crc(&frame);
-        frame.extend(check);
-        let answer = exchange(&mut bus, clock, &frame, answer_bytes, self.deadline);
+        let wanted = Wanted::of(unit, request, answer_bytes);
+        let answer = exchange(&mut bus, clock, &frame(unit, request), &wanted, self.deadline);
         if matches!(answer, Err(ModbusError::Timeout { .. } | ModbusError::Garbled(_))) {
             bus.keep_quiet(2 * self.deadline);
         }
@@ -65,14 +62,13 @@ fn exchange(
     bus: &mut Bus,
     clock: &dyn Clock,
     frame: &[u8],
-    answer_bytes: usize,
+    wanted: &Wanted,
     deadline: Duration,
 ) -> Result<ModbusResponse, ModbusError> {
     let target = bus.target().clone();
     let failed = |error| serial_fault(&error, &target);
     bus.send(frame).map_err(failed)?;
     let (began_ns, until) = (clock.now_ns(), Instant::now() + deadline);
-    let wanted = Wanted { unit: frame[0], function: frame[1], bytes: answer_bytes + AROUND };
     let mut bytes = Vec::new();
     while bytes.len() < BYTES_MAX && bus.receive(until, &mut bytes).map_err(failed)? {
         if let Some(found) = wanted.find(&bytes) {
@@ -85,7 +81,21 @@ fn exchange(
     if bytes.is_empty() {
         return Err(serial_silence(&target));
     }
-    Err(ModbusError::Garbled(format!("{} bytes without a good frame among them: {}", bytes.len(), excerpt(&bytes))))
+    Err(ModbusError::Garbled(without_frame(&bytes)))
+}
+
+/// What came instead of an answer.
+pub(super) fn without_frame(bytes: &[u8]) -> String {
+    format!("{} bytes without a good frame among them: {}", bytes.len(), excerpt(bytes))
+}
+
+/// Unit, request and check.
+pub(super) fn frame(unit: u8, request: &[u8]) -> Vec<u8> {
+    let mut frame = vec![unit];
+    frame.extend(request);
+    let check = crc(&frame);
+    frame.extend(check);
+    frame
 }
 
 /// The value was taken after the request had left and before the answer began to come; the wire's own time is known.
@@ -105,14 +115,20 @@ fn excerpt(bytes: &[u8]) -> String {
 }
 
 /// The frame that answers.
-struct Wanted {
+pub(super) struct Wanted {
     unit: u8,
     function: u8,
     bytes: usize,
 }
 
 impl Wanted {
-    fn find<'a>(&self, bytes: &'a [u8]) -> Option<&'a [u8]> {
+    /// The answer to this request, whose good answer has so many bytes without address and check.
+    pub(super) fn of(unit: u8, request: &[u8], answer_bytes: usize) -> Self {
+        Self { unit, function: request.first().copied().unwrap_or(0), bytes: answer_bytes + AROUND }
+    }
+
+    /// The whole frame, wherever it begins.
+    pub(super) fn find<'a>(&self, bytes: &'a [u8]) -> Option<&'a [u8]> {
         (0..bytes.len()).find_map(|at| self.at(&bytes[at..]))
     }
 

@@ -8,7 +8,8 @@
 //! Limits: 16 connections, a minute of silence on each.
 
 use super::pdu::{self, RegisterBlock};
-use super::profile::{Profile, RegisterMeaning};
+use super::profile::Profile;
+use super::register::RegisterMeaning;
 use super::tcp::{frame, header};
 use crate::clock::Clock;
 use crate::simulated::{MeterValues, Simulated, SimulatedMeter};
@@ -168,8 +169,9 @@ impl ServedMeter {
         }
         let mut image = vec![0_u16; to - from];
         for register in registers {
-            let number = number(register.quantity, values, spindle).unwrap_or(f64::NAN) / register.factor;
-            let words = register.format.encode(number, self.profile.word_order);
+            let number = number(register.quantity, values, spindle).unwrap_or(f64::NAN);
+            let number = (number - register.conversion.offset) / register.conversion.scale;
+            let words = register.format.encode(number, register.order);
             for (offset, word) in words.into_iter().enumerate() {
                 let place = (usize::from(register.address) + offset).checked_sub(from);
                 if let Some(place) = place.and_then(|place| image.get_mut(place)) {
@@ -195,6 +197,9 @@ fn number(quantity: RegisterMeaning, values: &MeterValues, spindle: bool) -> Opt
         RegisterMeaning::Current(_) => Some(current_a),
         RegisterMeaning::Voltage(_) => Some(phase_v),
         RegisterMeaning::LineVoltage => Some(values.supply_voltage_v),
+        RegisterMeaning::PowerFactor => Some(POWER_FACTOR),
+        RegisterMeaning::ApparentPower => Some(power_w.abs() / POWER_FACTOR),
+        RegisterMeaning::Energy | RegisterMeaning::Frequency => None,
         RegisterMeaning::Channel(channel) => match channel.name() {
             "bearing_temperature_c" => Some(values.bearing_temperature_c),
             "ambient_temperature_c" => Some(values.ambient_temperature_c),

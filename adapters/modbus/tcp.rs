@@ -1,55 +1,186 @@
 //! Modbus over TCP.
 //!
 //! Source: Modbus Messaging on TCP/IP Implementation Guide V1.0b, 3.1.3 (the header: transaction, protocol 0, length,
-//! unit) and 4.2 (TCP_NODELAY; a connection per server).
+//! unit) and 4.2 (TCP_NODELAY; a connection per server). Every source that names the same host and port shares the connection,
+//! as those on one serial line share the line.
 
 use super::line::{ModbusError, ModbusLine, ModbusResponse};
+use super::rtu;
 use crate::address::Endpoint;
 use crate::clock::Clock;
 use crate::reading::Stamp;
 use crate::stream::{self, Short};
+use std::collections::HashMap;
 use std::io::{self, ErrorKind, Write};
 use std::net::TcpStream;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 const HEADER: usize = 7;
 /// The longest PDU.
 const PDU_MAX: usize = 253;
 /// So many answers to other requests are passed over before the connection is given up.
-const STRAY_MAX: usize = 4;
+const STRAY_MAX: u64 = 4;
 /// A request has at least so long to leave, however late the connection was made.
 const WRITE_LEAST: Duration = Duration::from_millis(10);
 
-pub(super) struct TcpLine {
+/// How a frame looks on a TCP connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TcpFraming {
+    /// Modbus TCP: a header with a transaction number.
+    #[default]
+    Tcp,
+    /// RTU frames as on a serial line, as transparent converters carry them.
+    Rtu,
+}
+
+/// One connection to a host and port, with every unit that is asked over it: a converter to a serial line serves one client as a
+/// rule, and one request at a time in any case.
+struct TcpPort {
     at: Endpoint,
-    deadline: Duration,
+    framing: TcpFraming,
     stream: Option<TcpStream>,
     transaction: u16,
     stray: u64,
 }
 
+/// A connection that several sources share.
+type SharedPort = Arc<Mutex<TcpPort>>;
+
+/// The connections that are in use, by host and port.
+type PortsByEndpoint = HashMap<(String, u16), Weak<Mutex<TcpPort>>>;
+
+static PORTS: Mutex<Option<PortsByEndpoint>> = Mutex::new(None);
+
+/// The connection of this host and port; the same one for every address that names it.
+fn shared(at: &Endpoint, framing: TcpFraming) -> Result<SharedPort, String> {
+    let mut ports = PORTS.lock().unwrap_or_else(PoisonError::into_inner);
+    let ports = ports.get_or_insert_with(HashMap::new);
+    ports.retain(|_, port| port.strong_count() > 0);
+    let key = (at.host.clone(), at.port);
+    let Some(port) = ports.get(&key).and_then(Weak::upgrade) else {
+        let new = TcpPort { at: at.clone(), framing, stream: None, transaction: 0, stray: 0 };
+        let port = Arc::new(Mutex::new(new));
+        ports.insert(key, Arc::downgrade(&port));
+        return Ok(port);
+    };
+    let same = port.lock().unwrap_or_else(PoisonError::into_inner).framing == framing;
+    let differs =
+        || format!("two addresses use {}:{} with different framing=; one connection has one of them", at.host, at.port);
+    same.then_some(port).ok_or_else(differs)
+}
+
+pub(super) struct TcpLine {
+    port: SharedPort,
+    deadline: Duration,
+    stray: u64,
+}
+
 impl TcpLine {
-    pub(super) fn new(at: Endpoint, deadline: Duration) -> Self {
-        Self { at, deadline, stream: None, transaction: 0, stray: 0 }
+    /// A line to a host and port.
+    ///
+    /// # Errors
+    /// In words: another address uses them with other frames.
+    pub(super) fn new(at: &Endpoint, framing: TcpFraming, deadline: Duration) -> Result<Self, String> {
+        Ok(Self { port: shared(at, framing)?, deadline, stray: 0 })
     }
+}
 
-    /// The open connection, or a new one. It is put back only after a good exchange: whatever still comes on another one
-    /// belongs to a request that was given up.
-    fn connection(&mut self, until: Instant) -> Result<TcpStream, ModbusError> {
-        let open = self.stream.take();
-        open.map_or_else(|| connect(&self.at, until), Ok).map_err(|error| unreachable(&self.at, &error))
-    }
-
-    fn matching(&mut self, stream: &mut TcpStream, unit: u8, until: Instant) -> Result<Vec<u8>, ModbusError> {
-        for _ in 0..STRAY_MAX {
-            let (header, pdu) = receive(stream, until)?;
-            if header.transaction == self.transaction {
-                return of_unit(header.unit, unit).map(|()| pdu);
-            }
-            self.stray += 1;
+impl TcpPort {
+    /// One request and its answer. A connection that was open and is closed without a byte is opened anew once: many converters
+    /// close what has been idle. It is put back only after a good exchange: whatever still comes on another one belongs to a
+    /// request that was given up.
+    fn exchange(&mut self, clock: &dyn Clock, asked: TcpRequest<'_>) -> Result<ModbusResponse, ModbusError> {
+        let was_open = self.stream.is_some();
+        match self.attempt(clock, asked) {
+            Err(Attempt::ClosedIdle(_)) if was_open => self.attempt(clock, asked),
+            other => other,
         }
-        Err(ModbusError::Garbled(format!("{STRAY_MAX} answers, all to other requests")))
+        .map_err(|attempt| match attempt {
+            Attempt::ClosedIdle(error) | Attempt::Failed(error) => error,
+        })
     }
+
+    fn attempt(&mut self, clock: &dyn Clock, asked: TcpRequest<'_>) -> Result<ModbusResponse, Attempt> {
+        self.transaction = self.transaction.wrapping_add(1);
+        let open = self.stream.take();
+        let connected = open.map_or_else(|| connect(&self.at, asked.until), Ok);
+        let mut stream = connected.map_err(|error| Attempt::Failed(unreachable(&self.at, &error)))?;
+        let began_ns = clock.now_ns();
+        let bytes = match self.framing {
+            TcpFraming::Tcp => frame(self.transaction, asked.unit, asked.request),
+            TcpFraming::Rtu => rtu::frame(asked.unit, asked.request),
+        };
+        stream.write_all(&bytes).map_err(|error| Attempt::ClosedIdle(broken(&error)))?;
+        let pdu = match self.framing {
+            TcpFraming::Tcp => self.matching(&mut stream, asked),
+            TcpFraming::Rtu => in_rtu(&mut stream, asked),
+        }?;
+        let stamp = Stamp::of_request(began_ns, clock.now_ns());
+        self.stream = Some(stream);
+        Ok(ModbusResponse { pdu, stamp })
+    }
+
+    fn matching(&mut self, stream: &mut TcpStream, asked: TcpRequest<'_>) -> Result<Vec<u8>, Attempt> {
+        let mut strays = 0;
+        loop {
+            let (header, pdu) = match receive(stream, asked.until) {
+                Ok(found) => found,
+                Err(Attempt::Failed(ModbusError::Timeout { .. })) if strays > 0 => return Err(others(strays)),
+                Err(error) => return Err(error),
+            };
+            if header.transaction == self.transaction {
+                return of_unit(header.unit, asked.unit).map(|()| pdu).map_err(Attempt::Failed);
+            }
+            (self.stray, strays) = (self.stray + 1, strays + 1);
+            if strays >= STRAY_MAX {
+                return Err(others(strays));
+            }
+        }
+    }
+}
+
+/// A request on its way.
+#[derive(Clone, Copy)]
+struct TcpRequest<'a> {
+    unit: u8,
+    request: &'a [u8],
+    answer_bytes: usize,
+    until: Instant,
+}
+
+/// Why an attempt gave nothing.
+enum Attempt {
+    /// The other side had closed before a byte came.
+    ClosedIdle(ModbusError),
+    /// Anything else.
+    Failed(ModbusError),
+}
+
+/// Answers came, and none to this request: somebody mixes up the numbers.
+fn others(count: u64) -> Attempt {
+    Attempt::Failed(ModbusError::Garbled(format!(
+        "{count} answers came, none with the transaction number of this request; the device or the converter before it answers \
+         with numbers of its own. Try framing=rtu, or let this box be its only client"
+    )))
+}
+
+/// An RTU frame out of whatever comes.
+fn in_rtu(stream: &mut TcpStream, asked: TcpRequest<'_>) -> Result<Vec<u8>, Attempt> {
+    let wanted = rtu::Wanted::of(asked.unit, asked.request, asked.answer_bytes);
+    let mut bytes = Vec::new();
+    while bytes.len() < rtu::BYTES_MAX {
+        match stream::some(stream, &mut bytes, asked.until) {
+            Ok(()) => {}
+            Err(Short::Silent) if !bytes.is_empty() => break,
+            Err(Short::Closed) if bytes.is_empty() => return Err(Attempt::ClosedIdle(short(Short::Closed))),
+            Err(other) => return Err(Attempt::Failed(short(other))),
+        }
+        if let Some(found) = wanted.find(&bytes) {
+            return Ok(found[1..found.len() - 2].to_vec());
+        }
+    }
+    Err(Attempt::Failed(ModbusError::Garbled(rtu::without_frame(&bytes))))
 }
 
 /// Some gateways answer as unit 0 or 255 whatever was asked.
@@ -61,16 +192,19 @@ fn of_unit(answered: u8, asked: u8) -> Result<(), ModbusError> {
 }
 
 impl ModbusLine for TcpLine {
-    fn ask(&mut self, clock: &dyn Clock, unit: u8, request: &[u8], _: usize) -> Result<ModbusResponse, ModbusError> {
+    fn ask(
+        &mut self,
+        clock: &dyn Clock,
+        unit: u8,
+        request: &[u8],
+        answer_bytes: usize,
+    ) -> Result<ModbusResponse, ModbusError> {
+        let mut port = self.port.lock().unwrap_or_else(PoisonError::into_inner);
+        // Others may have been served before; the deadline is for this request alone.
         let until = Instant::now() + self.deadline;
-        self.transaction = self.transaction.wrapping_add(1);
-        let mut stream = self.connection(until)?;
-        let began_ns = clock.now_ns();
-        stream.write_all(&frame(self.transaction, unit, request)).map_err(|error| broken(&error))?;
-        let pdu = self.matching(&mut stream, unit, until)?;
-        let stamp = Stamp::of_request(began_ns, clock.now_ns());
-        self.stream = Some(stream);
-        Ok(ModbusResponse { pdu, stamp })
+        let answer = port.exchange(clock, TcpRequest { unit, request, answer_bytes, until });
+        self.stray = port.stray;
+        answer
     }
 
     fn deadline(&self) -> Duration {
@@ -134,25 +268,30 @@ pub(super) fn header(bytes: [u8; HEADER]) -> Option<MbapHeader> {
     modbus.then_some(MbapHeader { transaction: u16::from_be_bytes([t_high, t_low]), unit, pdu })
 }
 
-fn receive(stream: &mut TcpStream, until: Instant) -> Result<(MbapHeader, Vec<u8>), ModbusError> {
+fn receive(stream: &mut TcpStream, until: Instant) -> Result<(MbapHeader, Vec<u8>), Attempt> {
     let mut head = [0_u8; HEADER];
-    fill(stream, &mut head, until)?;
+    stream::fill_counting(stream, &mut head, until).map_err(|(got, why)| match why {
+        Short::Closed | Short::Broken(_) if got == 0 => Attempt::ClosedIdle(short(why)),
+        why => Attempt::Failed(short(why)),
+    })?;
     let header = header(head).ok_or_else(|| {
-        ModbusError::Garbled(format!("{head:02X?} is no Modbus header; is this the port of another protocol?"))
+        Attempt::Failed(ModbusError::Garbled(format!(
+            "{head:02X?} is no Modbus header; is this the port of another protocol, or does the converter want framing=rtu?"
+        )))
     })?;
     let mut pdu = vec![0_u8; header.pdu];
-    fill(stream, &mut pdu, until)?;
+    stream::fill(stream, &mut pdu, until).map_err(|why| Attempt::Failed(short(why)))?;
     Ok((header, pdu))
 }
 
-fn fill(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), ModbusError> {
-    stream::fill(stream, into, until).map_err(|short| match short {
+fn short(why: Short) -> ModbusError {
+    match why {
         Short::Silent => ModbusError::Timeout {
             next: "Check the unit number and the power of the meter; a slow one may need timeout_ms=2000.".to_owned(),
         },
         Short::Closed => broken(&io::Error::new(ErrorKind::UnexpectedEof, "the meter closed it")),
         Short::Broken(error) => broken(&error),
-    })
+    }
 }
 
 #[cfg(test)]

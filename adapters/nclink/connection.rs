@@ -6,6 +6,7 @@ use super::topic::Subject;
 use crate::address::NcLinkTarget;
 use crate::driver::SourceError;
 use crate::mqtt::{self, MqttClient, MqttError, MqttMessage, Qos};
+use crate::text::TextEncoding;
 use crate::tls::TlsFiles;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
@@ -33,6 +34,8 @@ pub struct Link {
     pub tls: Option<TlsFiles>,
     /// Longest wait for an answer.
     pub deadline: Duration,
+    /// Character set of its messages.
+    pub encoding: TextEncoding,
 }
 
 impl Link {
@@ -47,6 +50,7 @@ impl Link {
             login,
             tls: target.tls.clone(),
             deadline: DEADLINE,
+            encoding: target.encoding,
         }
     }
 }
@@ -184,7 +188,7 @@ impl Connection {
             _ => Subject::QueryAnswer,
         };
         Subject::of(&message.topic, &self.link.serial).filter(|(subject, _)| *subject == wanted)?;
-        match serde_json::from_slice::<Value>(&message.payload) {
+        match self.link.encoding.json(&message.payload) {
             Ok(answer) => (message::identifier(&answer).as_deref() == Some(id)).then_some(Ok(answer)),
             Err(error) => Some(Err(format!("it is no JSON ({error})"))),
         }
@@ -195,7 +199,7 @@ impl Connection {
         if !matches!(subject, Subject::Sample | Subject::Event) {
             return;
         }
-        match serde_json::from_slice(&message.payload) {
+        match self.link.encoding.json(&message.payload) {
             Ok(said) => {
                 let (tail, arrived) = (tail.to_owned(), message.arrived);
                 self.unasked.push_back(Unasked { subject, tail, arrived, message: said });

@@ -9,7 +9,7 @@
 //! | `message` | query and set: requests as JSON, answers as values or reasons |
 //! | `model` | the answer to a probe: data items with their paths, sample channels |
 //! | `sample` | one message of a sample channel: columns of values, their times |
-//! | `map` | which data item feeds which channel |
+//! | `map`, `own` | which data item feeds which channel, in which unit; what the user can have read |
 //! | `decode` | state words from the status item and from the channel's F register |
 //! | `connection` | one client at the broker: probe, query, set, by request identifier |
 //! | `source`, `open` | the [`Source`](crate::Source), and how an address becomes one |
@@ -34,6 +34,10 @@
 //! values per instant. Which way a device names its items is seen in its model, and tried the other way round once when
 //! everything is refused.
 //!
+//! **Units.** Where the model tells the unit of an item, its number is converted; a unit that is not known costs the channel
+//! its value, with that reason. An item that another maker has put under another component is found where it is the only one
+//! of its name.
+//!
 //! **Limits.** A model of at most [`model::ITEMS_MAX`] items, [`sample::VALUES_MAX`] values in a sample message, one
 //! request at a time. `nclinks://` is the same over TLS.
 //!
@@ -54,6 +58,7 @@ pub mod model;
 pub mod offset_mailbox;
 mod offsets;
 mod open;
+mod own;
 mod registers;
 pub mod sample;
 mod source;
@@ -64,5 +69,6 @@ pub use actuator::NcLinkActuator;
 pub(crate) use decode::last_part;
 pub use message::{NcLinkAnswer, Params, RequestedItem};
 pub use open::{open, open_sampled};
+pub use own::OwnPath;
 pub use source::{BlockSink, NcLinkSource};
 pub use track::{ChannelTrack, SampleTracks};

@@ -23,6 +23,8 @@ pub struct ModelItem {
     pub settable: bool,
     /// The value that the model itself tells, as the name of an axis.
     pub value: Option<Value>,
+    /// The unit of its number, as the device writes it.
+    pub unit: Option<String>,
 }
 
 /// A channel on which the device sends values by itself.
@@ -82,6 +84,17 @@ impl Model {
         self.items.get(*index)
     }
 
+    /// Items that end as `path` does and stand elsewhere, outside the axes: what another maker has put under another
+    /// component.
+    pub fn elsewhere<'a>(&'a self, path: &'a str) -> impl Iterator<Item = &'a ModelItem> {
+        let end = path.rsplit('/').next().unwrap_or(path);
+        let of_axis = |item: &&ModelItem| item.path.split('/').any(|part| part.starts_with("AXIS@"));
+        self.items
+            .iter()
+            .filter(move |item| item.path.rsplit('/').next() == Some(end))
+            .filter(move |item| !of_axis(item))
+    }
+
     /// Does this device call its items by path? Seen in its sample channels.
     #[must_use]
     pub fn names_by_path(&self) -> bool {
@@ -121,6 +134,7 @@ impl Model {
             id,
             path,
             settable,
+            unit: text(item, &["units", "unit", "Units"]).filter(|unit| !unit.trim().is_empty()),
             value: item.get("value").filter(|value| !value.is_null()).cloned(),
         });
     }

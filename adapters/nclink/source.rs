@@ -2,15 +2,17 @@
 
 use super::connection::{Connection, Link, Unasked};
 use super::map::{self, NcLinkLayout, NcLinkPoll};
-use super::message::NcLinkAnswer;
-use super::model::Model;
+use super::message::{NcLinkAnswer, RequestedItem};
+use super::model::{Model, ModelItem};
+use super::own::OwnPath;
 use super::sample::SampleBlock;
 use super::topic::Subject;
 use super::track::SampleTracks;
 use crate::address::NcLinkTarget;
 use crate::channel::ChannelId;
 use crate::clock::Clock;
-use crate::driver::{Fact, Source, SourceError};
+use crate::driver::{Fact, Offer, Source, SourceError, SourceProblem};
+use crate::own::Own;
 use crate::reading::{Reading, Stamp};
 use std::time::{Duration, Instant};
 
@@ -23,6 +25,7 @@ pub struct NcLinkSource {
     layout: NcLinkLayout,
     period: Duration,
     channels: Vec<ChannelId>,
+    own: Vec<Own<OwnPath>>,
     session: Option<NcLinkSession>,
     track: SampleTracks,
     sink: Option<BlockSink>,
@@ -52,7 +55,8 @@ impl NcLinkSource {
             link,
             layout,
             period,
-            channels: map::channels(),
+            channels: map::channels(&target.own),
+            own: target.own.clone(),
             session: None,
             track: SampleTracks::default(),
             sink: None,
@@ -79,9 +83,9 @@ impl NcLinkSource {
     fn poll(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let mut session = match self.session.take() {
             Some(session) => session,
-            None => NcLinkSession::open(&self.link, self.layout)?,
+            None => NcLinkSession::open(&self.link, self.layout, &self.own)?,
         };
-        let answers = session.ask(self.layout, clock);
+        let answers = session.ask(self.layout, &self.own, clock);
         // What came by itself is taken in any case: a device that does not answer may still send.
         let unasked = session.connection.take_unasked()?;
         self.track.lost_messages(session.connection.lost());
@@ -112,11 +116,11 @@ impl NcLinkSource {
 }
 
 impl NcLinkSession {
-    fn open(link: &Link, layout: NcLinkLayout) -> Result<Self, SourceError> {
+    fn open(link: &Link, layout: NcLinkLayout, own: &[Own<OwnPath>]) -> Result<Self, SourceError> {
         let mut connection = Connection::open(link, true)?;
         let model = connection.probe()?;
         let by_path = model.names_by_path();
-        let plan = NcLinkPoll::of(&model, layout, by_path);
+        let plan = NcLinkPoll::of(&model, layout, own, by_path);
         if plan.asks().is_empty() {
             return Err(SourceError::Decode {
                 source_name: link.name.clone(),
@@ -128,9 +132,9 @@ impl NcLinkSession {
     }
 
     /// Asks a device that was silent for its model again.
-    fn renew(&mut self, layout: NcLinkLayout) -> Result<(), SourceError> {
+    fn renew(&mut self, layout: NcLinkLayout, own: &[Own<OwnPath>]) -> Result<(), SourceError> {
         self.model = self.connection.probe()?;
-        self.plan = NcLinkPoll::of(&self.model, layout, self.by_path);
+        self.plan = NcLinkPoll::of(&self.model, layout, own, self.by_path);
         self.doubtful = false;
         Ok(())
     }
@@ -139,10 +143,11 @@ impl NcLinkSession {
     fn ask(
         &mut self,
         layout: NcLinkLayout,
+        own: &[Own<OwnPath>],
         clock: &dyn Clock,
     ) -> Result<(Vec<Option<NcLinkAnswer>>, Stamp), SourceError> {
         if self.doubtful {
-            self.renew(layout)?;
+            self.renew(layout, own)?;
         }
         loop {
             let began_ns = clock.now_ns();
@@ -154,7 +159,7 @@ impl NcLinkSession {
             }
             self.turned = true;
             self.by_path = !self.by_path;
-            self.plan = NcLinkPoll::of(&self.model, layout, self.by_path);
+            self.plan = NcLinkPoll::of(&self.model, layout, own, self.by_path);
         }
     }
 }
@@ -193,4 +198,57 @@ impl Source for NcLinkSource {
         facts.extend(self.model().map(|model| Fact::text("device", &model.name)));
         facts
     }
+
+    fn problems(&self) -> Vec<SourceProblem> {
+        self.session.as_ref().map_or_else(Vec::new, |session| session.plan.problems().to_vec())
+    }
+
+    fn offers(&mut self, _: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
+        let mut session = match self.session.take() {
+            Some(session) => session,
+            None => NcLinkSession::open(&self.link, self.layout, &self.own)?,
+        };
+        let offers = session.offers();
+        self.session = offers.is_ok().then_some(session);
+        offers
+    }
+}
+
+/// At most so many items are asked for in one request.
+const OFFERED_AT_ONCE: usize = 50;
+/// A value is shown up to this length.
+const SHOWN_MAX: usize = 60;
+
+impl NcLinkSession {
+    /// Every item of the model, with what it says now. What the model itself tells is no data item.
+    fn offers(&mut self) -> Result<Vec<Offer>, SourceError> {
+        let items: Vec<ModelItem> = self.model.items.iter().filter(|item| item.value.is_none()).cloned().collect();
+        let mut offers = Vec::with_capacity(items.len());
+        for some in items.chunks(OFFERED_AT_ONCE) {
+            let names: Vec<String> = some.iter().map(|item| map::name(item, self.by_path)).collect();
+            let asks: Vec<RequestedItem> = names.iter().map(|name| RequestedItem::value(name)).collect();
+            let answers = self.connection.query(&asks)?;
+            for ((item, name), answer) in some.iter().zip(&names).zip(answers) {
+                offers.push(Offer {
+                    name: item.path.clone(),
+                    says: said(item, answer),
+                    channel: self.plan.takes(name),
+                });
+            }
+        }
+        Ok(offers)
+    }
+}
+
+fn said(item: &ModelItem, answer: Option<NcLinkAnswer>) -> Result<String, String> {
+    if item.path.contains("VARIABLE@") {
+        return Ok("a list: name an element, as in `read = \"PATH 120\"`".to_owned());
+    }
+    let values = answer.unwrap_or_else(|| Err("nothing".to_owned()))?;
+    let shown: Vec<String> = values.iter().map(ToString::to_string).collect();
+    let mut text: String = shown.join(", ").chars().take(SHOWN_MAX).collect();
+    if let Some(unit) = &item.unit {
+        text.push_str(&format!(" {unit}"));
+    }
+    Ok(text)
 }

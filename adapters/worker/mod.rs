@@ -3,8 +3,9 @@
 //! Vendor libraries block for seconds; nothing else waits for them. The thread sleeps to absolute times, skips the
 //! beats it missed and counts them, and fills a bounded queue from which the gateway takes what there is at each tick.
 //! The pace is the one that was wanted until the source says that the device keeps a slower one; from then on it is polled, and
-//! its values count as fresh, at that one. A poll that fails is repeated at the next beat; from the second failure on, the pause grows from 1 s to 30 s. A
-//! machine that is off is a normal state and asked again every two seconds.
+//! its values count as fresh, at that one. A poll that fails is repeated at the next beat; from the second failure on, the pause
+//! is a quarter of the time for which nothing has come, from 1 s to 30 s: what is over is found out within a quarter of its
+//! length. A machine that is off is a normal state and asked again every two seconds.
 
 mod queue;
 mod stats;
@@ -17,6 +18,7 @@ pub use stats::{Spread, WorkerState, WorkerStats};
 use crate::clock::{Clock, SECOND_NS, TimeNs};
 use crate::driver::{Source, SourceError};
 use crate::merge::{Merge, SourceId};
+use crate::plausibility::Plausibility;
 use crate::reading::Reading;
 use queue::Queue;
 use stats::WorkerCounters;
@@ -34,7 +36,7 @@ const STOP_LOOK_NS: i64 = SECOND_NS / 5;
 pub struct WorkerSettings {
     /// At most this many polls wait to be taken; then the oldest is dropped and counted.
     pub queue_polls: usize,
-    /// First pause after repeated failures.
+    /// Shortest pause after repeated failures.
     pub backoff_min: Duration,
     /// Longest pause after repeated failures.
     pub backoff_max: Duration,
@@ -102,7 +104,16 @@ impl Worker {
             ledger: Mutex::new(ledger),
         });
         let asked_ns = TimeNs::MIN;
-        let mut poller = Poller { source, clock, settings, period, shared: shared.clone(), failures: 0, asked_ns };
+        let mut poller = Poller {
+            source,
+            clock,
+            settings,
+            period,
+            shared: shared.clone(),
+            failing_ns: None,
+            asked_ns,
+            plausibility: Plausibility::default(),
+        };
         let thread = std::thread::Builder::new().name("source".to_owned()).spawn(move || poller.run())?;
         Ok(Self { name, shared, thread: Some(thread) })
     }
@@ -188,9 +199,11 @@ struct Poller {
     settings: WorkerSettings,
     period: Duration,
     shared: Arc<Shared>,
-    failures: u32,
+    /// When the first of the failures in a row was over.
+    failing_ns: Option<TimeNs>,
     /// When the source was last asked for its facts.
     asked_ns: TimeNs,
+    plausibility: Plausibility,
 }
 
 impl Poller {
@@ -201,10 +214,12 @@ impl Poller {
             let (began_ns, poll) = self.poll(readings);
             let ended_ns = poll.ended_ns;
             let error = poll.error.clone();
+            self.plausibility.see(&poll.readings);
             locked(&self.shared.queue).put(poll);
             self.follow_pace();
             locked(&self.shared.ledger).poll_over(due_ns, began_ns, ended_ns, error.as_ref());
             self.take_facts(ended_ns);
+            self.take_problems(error.is_none());
             if matches!(error, Some(SourceError::End { .. })) {
                 return;
             }
@@ -226,8 +241,18 @@ impl Poller {
             return;
         }
         self.asked_ns = now_ns;
-        let facts = self.source.facts();
+        let facts = self.source.facts().into_iter().chain(self.plausibility.fact()).collect();
         locked(&self.shared.ledger).facts(facts);
+    }
+
+    /// A source that does not answer has an error instead.
+    fn take_problems(&mut self, answers: bool) {
+        let problems = if answers {
+            self.source.problems().into_iter().chain(self.plausibility.problems()).collect()
+        } else {
+            Vec::new()
+        };
+        locked(&self.shared.ledger).problems(problems);
     }
 
     fn stopping(&self) -> bool {
@@ -245,10 +270,13 @@ impl Poller {
     /// The next beat after `ended_ns`, or the end of the pause after a failure.
     fn next_due(&mut self, due_ns: TimeNs, ended_ns: TimeNs, error: Option<&SourceError>) -> TimeNs {
         let period_ns = nanoseconds(self.period).max(1);
-        self.failures = if error.is_some() { self.failures.saturating_add(1) } else { 0 };
-        match error {
-            Some(SourceError::Off { .. }) => return ended_ns + nanoseconds(self.settings.off_pause).max(period_ns),
-            Some(_) if self.failures > 1 => return ended_ns + self.backoff_ns().max(period_ns),
+        let failing_ns = self.failing_ns;
+        self.failing_ns = error.map(|_| failing_ns.unwrap_or(ended_ns));
+        match (error, failing_ns) {
+            (Some(SourceError::Off { .. }), _) => {
+                return ended_ns + nanoseconds(self.settings.off_pause).max(period_ns);
+            }
+            (Some(_), Some(since_ns)) => return ended_ns + self.backoff_ns(ended_ns - since_ns).max(period_ns),
             _ => {}
         }
         let beats = (ended_ns - due_ns).max(0) / period_ns;
@@ -258,10 +286,10 @@ impl Poller {
         due_ns + (beats + 1) * period_ns
     }
 
-    /// 1, 2, 4 ... seconds for the second, third, fourth ... failure in a row.
-    fn backoff_ns(&self) -> i64 {
-        let doublings = self.failures.saturating_sub(2).min(16);
-        nanoseconds((self.settings.backoff_min * (1 << doublings)).min(self.settings.backoff_max))
+    /// The pause when nothing has come for so long.
+    fn backoff_ns(&self, failing_ns: i64) -> i64 {
+        let (least_ns, most_ns) = (nanoseconds(self.settings.backoff_min), nanoseconds(self.settings.backoff_max));
+        (failing_ns / 4).clamp(least_ns, most_ns.max(least_ns))
     }
 
     fn sleep_until(&self, until_ns: TimeNs) {

@@ -1,7 +1,7 @@
 //! How a source has been doing: pace, lateness, round trip, failures.
 
-use crate::clock::TimeNs;
-use crate::driver::{Fact, SourceError};
+use crate::clock::{SECOND_NS, TimeNs};
+use crate::driver::{Fact, SourceError, SourceProblem};
 use crate::histogram::Histogram;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -9,9 +9,12 @@ use std::time::Duration;
 /// Percentiles are over at most this many polls.
 const WINDOW: usize = 512;
 
-/// The pace that is kept follows from the last so many intervals. Of these one in ten may be longer: a single poll that hangs
-/// must not make old values count as fresh.
-const PACE_POLLS: usize = 32;
+/// The pace that is kept follows from the intervals that ended within this time, and from the last two at least. The longest of
+/// them does not count: a single poll that hangs must not make old values count as fresh.
+const PACE_NS: i64 = 2 * SECOND_NS;
+
+/// Of quick sources at most so many intervals are looked at.
+const PACE_POLLS: usize = 64;
 
 /// A source is never taken for slower than this: what is older than two minutes is old, whatever the pace.
 const SLOWEST: Duration = Duration::from_secs(60);
@@ -98,6 +101,8 @@ pub struct WorkerStats {
     pub last_error_since_ns: Option<TimeNs>,
     /// What the source knows of itself, at most about a second old.
     pub facts: Vec<Fact>,
+    /// What is wrong although it answers.
+    pub problems: Vec<SourceProblem>,
 }
 
 /// The last durations, in nanoseconds.
@@ -148,13 +153,14 @@ pub(super) struct WorkerCounters {
     last_error: Option<SourceError>,
     last_error_since_ns: Option<TimeNs>,
     facts: Vec<Fact>,
+    problems: Vec<SourceProblem>,
     /// At which it is polled now.
     beat: Duration,
     /// At which its values come, as was last told.
     pace: Duration,
     new_pace: Option<Duration>,
-    /// The last intervals, ns; the newest at the end.
-    latest: VecDeque<i64>,
+    /// The last intervals with their ends, ns; the newest at the end.
+    latest: VecDeque<(TimeNs, i64)>,
 }
 
 impl WorkerCounters {
@@ -177,6 +183,7 @@ impl WorkerCounters {
             last_error: None,
             last_error_since_ns: None,
             facts: Vec::new(),
+            problems: Vec::new(),
             beat: period,
             pace: period,
             new_pace: None,
@@ -213,7 +220,7 @@ impl WorkerCounters {
             if self.latest.len() >= PACE_POLLS {
                 self.latest.pop_front();
             }
-            self.latest.push_back(began_ns - last_ns);
+            self.latest.push_back((began_ns, began_ns - last_ns));
         }
         self.last_began_ns = error.is_none().then_some(began_ns);
         if let Some(error) = error {
@@ -250,12 +257,16 @@ impl WorkerCounters {
         }
     }
 
-    /// The interval that nine in ten of the last ones do not exceed, where it is visibly longer than the beat.
+    /// The second longest of the last intervals, where it is visibly longer than the beat.
     fn kept(&self) -> Duration {
-        let mut sorted: Vec<i64> = self.latest.iter().copied().collect();
-        sorted.sort_unstable();
-        let rank = (sorted.len() * 9).div_ceil(10).saturating_sub(1);
-        let kept = sorted.get(rank).map_or(Duration::ZERO, |ns| Duration::from_nanos(ns.unsigned_abs()));
+        let since_ns = self.latest.back().map_or(TimeNs::MIN, |(ended_ns, _)| ended_ns.saturating_sub(PACE_NS));
+        let late = self.latest.iter().rev().enumerate();
+        let late = late.take_while(|(place, (ended_ns, _))| *place < 2 || *ended_ns > since_ns);
+        let mut longest = [0_i64; 2];
+        for (_, (_, ns)) in late {
+            longest = [longest[0].max(*ns), longest[1].max((*ns).min(longest[0]))];
+        }
+        let kept = Duration::from_nanos(longest[1].unsigned_abs());
         if kept > self.beat * 6 / 5 { kept } else { Duration::ZERO }
     }
 
@@ -266,6 +277,10 @@ impl WorkerCounters {
 
     pub(super) fn facts(&mut self, facts: Vec<Fact>) {
         self.facts = facts;
+    }
+
+    pub(super) fn problems(&mut self, problems: Vec<SourceProblem>) {
+        self.problems = problems;
     }
 
     pub(super) fn missed(&mut self, beats: u64) {
@@ -296,6 +311,7 @@ impl WorkerCounters {
             last_error: self.last_error.clone(),
             last_error_since_ns: self.last_error_since_ns,
             facts: self.facts.clone(),
+            problems: self.problems.clone(),
         }
     }
 }

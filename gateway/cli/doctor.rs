@@ -5,6 +5,7 @@ use crate::config;
 use crate::doctor::{self, DoctorReport};
 use crate::sinks::{self, SinkAddress};
 use adapters::Address;
+use adapters::address::AddressError;
 use adapters::driver::FactValue;
 use clap::Args;
 use std::fmt::Write;
@@ -21,6 +22,9 @@ pub(super) struct DoctorArguments {
     /// Read a FANUC controller through this library of the vendor's too, and list where the two differ.
     #[arg(long, value_name = "LIBRARY")]
     compare: Option<PathBuf>,
+    /// List everything that the device offers too, and which channel takes it: for channels of your own.
+    #[arg(long, conflicts_with = "compare")]
+    all: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -33,10 +37,11 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
         return sink(arguments);
     }
     let Some(library) = &arguments.compare else {
-        let report = match &arguments.config {
-            Some(file) => doctor::examine_address(&configured(file, &arguments.address)?),
-            None => doctor::examine(&arguments.address),
+        let address = match &arguments.config {
+            Some(file) => configured(file, &arguments.address)?,
+            None => arguments.address.parse().map_err(|error: AddressError| unusable(error.to_string()))?,
         };
+        let report = if arguments.all { doctor::examine_all(&address) } else { doctor::examine_address(&address) };
         let report = report.map_err(unusable)?;
         if arguments.json {
             print_json(&report.json())
@@ -87,6 +92,24 @@ fn outcome(well: bool) -> CommandOutcome {
     if well { CommandOutcome::Fine } else { CommandOutcome::No }
 }
 
+/// What the device offers, what nobody takes at the end.
+fn offers(report: &DoctorReport, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
+    let Some(offers) = &report.offers else { return };
+    if offers.is_empty() {
+        return line(format_args!("  a device of this kind does not tell what else it offers"));
+    }
+    line(format_args!("  offers (the name behind `read =` makes a channel of what nobody takes):"));
+    let (taken, free): (Vec<_>, Vec<_>) = offers.iter().partition(|offer| offer.channel.is_some());
+    for offer in taken.into_iter().chain(free) {
+        let says = match &offer.says {
+            Ok(says) => says.clone(),
+            Err(why) => format!("- ({why})"),
+        };
+        let channel = offer.channel.map_or_else(String::new, |channel| format!(" -> {channel}"));
+        line(format_args!("    {}{channel}: {says}", offer.name));
+    }
+}
+
 fn text(report: &DoctorReport) -> String {
     let mut text = format!("{}\n", report.address);
     let mut line = |what: std::fmt::Arguments<'_>| {
@@ -107,6 +130,7 @@ fn text(report: &DoctorReport) -> String {
             Err(missing) => line(format_args!("    {:<26} - ({missing})", channel.name())),
         }
     }
+    offers(report, &mut line);
     for problem in &report.problems {
         line(format_args!("  problem: {}\n    next: {}", problem.what, problem.next));
     }

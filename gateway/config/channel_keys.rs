@@ -1,6 +1,7 @@
 //! The keys of `[[source.channel]]`: the user's own channels.
 
 use super::keys::{Absent, ConfigKey, ValueKind};
+use adapters::channel::quantity::LIMITS;
 
 /// The section, below a source.
 pub(super) const SECTION: &str = "source.channel";
@@ -9,10 +10,21 @@ const fn key(name: &'static str, kind: ValueKind, absent: Absent, en: &'static s
     ConfigKey { section: SECTION, name, kind, absent, en, zh }
 }
 
+/// Words of the key `quantity`.
+const QUANTITIES: [&str; LIMITS.len()] = {
+    let mut words = [""; LIMITS.len()];
+    let mut at = 0;
+    while at < words.len() {
+        words[at] = LIMITS[at].0;
+        at += 1;
+    }
+    words
+};
+
 /// Greatest number that a scale or a limit can have.
 const GREATEST: f64 = 1e12;
 
-pub(super) const KEYS: [ConfigKey; 9] = [
+pub(super) const KEYS: [ConfigKey; 11] = [
     key(
         "name",
         ValueKind::Text,
@@ -24,14 +36,21 @@ pub(super) const KEYS: [ConfigKey; 9] = [
         "read",
         ValueKind::Text,
         Absent::Required,
-        "What is read: macro 500, parameter 6711, diagnosis 301 axis 1, pmc R100.3, pmc D20 word, tool_offset 1 type 3",
+        "What is read, in the words of the source: pmc D20 word, AXIS@5/MOTOR/TEMPERATURE, register D120, input 52 f32",
         "读取内容",
+    ),
+    key(
+        "quantity",
+        ValueKind::OneOf(&QUANTITIES),
+        Absent::Optional,
+        "What it is: gives unit, least and greatest where they are left out",
+        "物理量",
     ),
     key(
         "unit",
         ValueKind::Text,
-        Absent::Default("\"1\""),
-        "Unit of the value after the scale; 1 for a pure number",
+        Absent::Optional,
+        "Unit of the value after the scale; 1 for a pure number, text for a text; default: that of the quantity, else 1",
         "单位",
     ),
     key(
@@ -51,15 +70,15 @@ pub(super) const KEYS: [ConfigKey; 9] = [
     key(
         "least",
         ValueKind::Number(-GREATEST, GREATEST),
-        Absent::Default("-1000000.0"),
-        "Least possible value, in the unit",
+        Absent::Optional,
+        "Least possible value, in the unit; default: that of the quantity, else -1000000",
         "最小值",
     ),
     key(
         "greatest",
         ValueKind::Number(-GREATEST, GREATEST),
-        Absent::Default("1000000.0"),
-        "Greatest possible value, in the unit",
+        Absent::Optional,
+        "Greatest possible value, in the unit; default: that of the quantity, else 1000000",
         "最大值",
     ),
     key(
@@ -75,5 +94,12 @@ pub(super) const KEYS: [ConfigKey; 9] = [
         Absent::Optional,
         "Path of the control; default: that of the address",
         "通道号",
+    ),
+    key(
+        "encoding",
+        ValueKind::Text,
+        Absent::Optional,
+        "Character set of a text, for example gbk; default: that of the source",
+        "字符编码",
     ),
 ];

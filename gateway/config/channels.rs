@@ -3,9 +3,16 @@
 use super::SourceConfig;
 use super::check_value::Scalar;
 use super::read::{ConfigInput, Origin, SectionValues};
-use adapters::channel::{Kind, NewChannel};
-use adapters::fanuc::own::{OwnChannel, OwnItem, ReadWith};
+use adapters::channel::quantity::LIMITS;
+use adapters::channel::{CHANNELS, Kind, NewChannel};
+use adapters::own::{OwnChannel, ReadWith};
+use adapters::text::TextEncoding;
 use rules::estimators::Estimates;
+
+/// The unit of a channel that holds a text.
+const TEXT: &str = "text";
+/// What is possible where nothing says it.
+const LIMIT: f64 = 1e6;
 
 /// Adds the channels below a source to it, and reports what cannot be added.
 pub(super) fn add(reading: &mut ConfigInput<'_>, source: &mut SourceConfig, values: &SectionValues) {
@@ -18,45 +25,81 @@ pub(super) fn add(reading: &mut ConfigInput<'_>, source: &mut SourceConfig, valu
             None => {}
         }
     }
-    let at = values.inner.first().map_or(Origin::Default, |channel| channel.origin("name"));
     match source.address.clone().with_channels(own) {
         Ok(address) => source.address = address,
-        Err(what) => reading.problem(&at, what, "give it another name, or start the gateway again after a change"),
+        Err(error) => {
+            let of = |channel: &&SectionValues| text(channel, "name").is_some_and(|name| name == error.channel);
+            let at = values.inner.iter().find(of).map_or(Origin::Default, |channel| channel.origin(error.key));
+            let next = match error.key {
+                "name" => "give it another name, or start the gateway again after a change",
+                _ => "",
+            };
+            reading.problem(&at, error.to_string(), next);
+        }
     }
 }
 
 type ChannelRefusal = (Origin, String, String);
 
-fn own_channel(values: &SectionValues) -> Option<Result<OwnChannel, ChannelRefusal>> {
-    let text = |key: &str| match &values.found.get(key)?.value {
+fn text(values: &SectionValues, key: &str) -> Option<String> {
+    match &values.found.get(key)?.value {
         Scalar::Text(text) => Some(text.clone()),
         _ => None,
-    };
-    let number = |key: &str| match &values.found.get(key)?.value {
+    }
+}
+
+fn number(values: &SectionValues, key: &str) -> Option<f64> {
+    match &values.found.get(key)?.value {
         Scalar::Number(number) => Some(*number),
         _ => None,
-    };
-    let (name, read, unit, pace) = (text("name")?, text("read")?, text("unit")?, text("pace")?);
-    let (scale, offset, range) = (number("scale")?, number("offset")?, (number("least")?, number("greatest")?));
+    }
+}
+
+fn own_channel(values: &SectionValues) -> Option<Result<OwnChannel, ChannelRefusal>> {
+    let (name, read, pace) = (text(values, "name")?, text(values, "read")?, text(values, "pace")?);
+    let (scale, offset) = (number(values, "scale")?, number(values, "offset")?);
     let refused = |key: &str, what: String, next: &str| Some(Err((values.origin(key), what, next.to_owned())));
-    let found = match OwnItem::read(&read) {
-        Ok(found) => found,
-        Err(what) => return refused("read", what, ""),
-    };
-    if range.0 >= range.1 {
-        return refused("least", format!("least {} is not below greatest {}", range.0, range.1), "correct one of them");
+    let new = new_channel(values, name, &read);
+    if new.range.0 >= new.range.1 && new.kind != Kind::Text {
+        let what = format!("least {} is not below greatest {}", new.range.0, new.range.1);
+        return refused("least", what, "correct one of them");
     }
     if scale == 0.0 {
         return refused("scale", "a scale of 0 makes every value 0".to_owned(), "leave it out, or give the factor");
     }
-    if Estimates::none(0).quantities().iter().any(|(known, _)| *known == name) || name == "state" {
-        return refused("name", format!("`{name}` is the name of an estimate"), "choose another name");
+    if Estimates::none(0).quantities().iter().any(|(known, _)| *known == new.name) || new.name == "state" {
+        return refused("name", format!("`{}` is the name of an estimate", new.name), "choose another name");
     }
-    let (en, zh) = (format!("{read}, as configured"), format!("用户通道 {read}"));
-    let new = NewChannel { name, unit, range, kind: Kind::Held, en, zh };
+    let label = text(values, "encoding");
+    let encoding = label.as_deref().map(|label| TextEncoding::of_label(label).ok_or(label));
+    let encoding = match encoding.transpose() {
+        Ok(encoding) => encoding,
+        Err(label) => {
+            let what = format!("no character set is called `{label}`");
+            return refused("encoding", what, "give auto, gbk, gb18030, shift_jis, utf-8 or windows-1252");
+        }
+    };
     let pace = if pace == "fast" { ReadWith::Fast } else { ReadWith::Slow };
-    let path = number("path").map(|path| path as u8);
-    Some(Ok(OwnChannel { new, item: found.item, bit: found.bit, scale, offset, pace, path }))
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 10, checked by its key")]
+    let path = number(values, "path").map(|path| path as u8);
+    Some(Ok(OwnChannel { new, read, scale, offset, pace, path, encoding }))
+}
+
+/// Unit and limits: as they are written, else of the quantity, else of the channel of the table with this name.
+fn new_channel(values: &SectionValues, name: String, read: &str) -> NewChannel {
+    let quantity = text(values, "quantity").and_then(|word| LIMITS.iter().find(|(known, ..)| *known == word));
+    let known = CHANNELS.iter().find(|channel| channel.name == name);
+    let of_quantity = quantity.map(|(_, unit, range)| (*unit, *range));
+    let (unit, range) = of_quantity.or(known.map(|row| (row.unit, row.range))).unwrap_or(("1", (-LIMIT, LIMIT)));
+    let is_text =
+        text(values, "unit").is_some_and(|unit| unit == TEXT) || known.is_some_and(|row| row.kind == Kind::Text);
+    let range = (number(values, "least").unwrap_or(range.0), number(values, "greatest").unwrap_or(range.1));
+    let (en, zh) = (format!("{read}, as configured"), format!("用户通道 {read}"));
+    if is_text {
+        return NewChannel { name, unit: String::new(), range: (0.0, 0.0), kind: Kind::Text, en, zh };
+    }
+    let unit = text(values, "unit").unwrap_or_else(|| unit.to_owned());
+    NewChannel { name, unit, range, kind: Kind::Held, en, zh }
 }
 
 #[cfg(test)]
@@ -96,6 +139,42 @@ mod tests {
         let text =
             "[[source]]\naddress = \"simulated://lathe\"\n[[source.channel]]\nname = \"v_bar\"\nread = \"macro 1\"\n";
         let told = parse("test.toml", text, Path::new("."), []).expect_err("refused");
-        assert!(format!("{}", told[0]).contains("only fanuc://"), "{}", told[0]);
+        assert!(format!("{}", told[0]).contains("nothing to be asked for"), "{}", told[0]);
+        assert!(refused("name = \"u_c\"\nread = \"macro 1\"\nquantity = \"temperatur\"\n").contains("temperature"));
+        let told = refused("name = \"t_text\"\nread = \"pmc D1 text 8\"\nunit = \"text\"\nencoding = \"klingon\"\n");
+        assert!(told.contains("test.toml:7") && told.contains("klingon"), "{told}");
+        assert!(refused("name = \"s_text\"\nread = \"pmc D1 text 8\"\n").contains("write unit = \"text\""));
+    }
+
+    #[test]
+    fn every_kind_of_source_reads_channels_in_its_own_words() {
+        let cases = [
+            ("nclink://b/S", "AXIS@5/MOTOR/TEMPERATURE", "AXIS@5 MOTOR TEMPERATURE", "doctor --all"),
+            ("hncnet://cnc?library=x.so", "register D120", "macro 500", "register D120"),
+            ("modbus-tcp://m?profile=sdm630", "input 70 f32", "macro 500", "input 52 f32"),
+            ("fanuc://cnc", "macro 500", "input 70 f32", "macro 500"),
+        ];
+        for (at, (address, good, bad, hint)) in cases.into_iter().enumerate() {
+            let with = |name: &str, read: &str| {
+                let text = format!(
+                    "[[source]]\naddress = \"{address}\"\n[[source.channel]]\nname = \"{name}\"\nread = \"{read}\"\nquantity = \"temperature\"\n"
+                );
+                parse("test.toml", &text, Path::new("."), [])
+            };
+            let name = format!("kind_test_{at}_c");
+            with(&name, good).unwrap_or_else(|problems| panic!("{address}: {}", problems[0]));
+            let id = adapters::ChannelId::of(&name).expect("declared");
+            assert_eq!((id.channel().unit, id.channel().range), ("°C", (-60.0, 300.0)));
+            let told = format!("{}", with(&format!("kind_test_bad_{at}_c"), bad).expect_err("refused")[0]);
+            assert!(told.contains("test.toml:5") && told.contains(hint), "{told}");
+        }
+    }
+
+    #[test]
+    fn a_channel_of_the_table_can_be_fed_by_what_the_source_does_not_deliver() {
+        let told = read("name = \"spindle_drive_energy_kwh\"\nread = \"diagnosis 4930 axis 1\"\nscale = 0.001\n");
+        assert!(told.is_ok(), "{:?}", told.err());
+        let wrong = refused("name = \"spindle_drive_energy_kwh\"\nread = \"diagnosis 4930 axis 1\"\nunit = \"W\"\n");
+        assert!(wrong.contains("kWh"), "{wrong}");
     }
 }

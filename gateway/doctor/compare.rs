@@ -23,8 +23,6 @@ pub struct ChannelDifference {
     pub native: Value,
     /// What the vendor's library reads.
     pub vendor: Value,
-    /// Why they differ, where that is known; then it is nobody's mistake.
-    pub known: Option<&'static str>,
 }
 
 /// What a comparison has shown.
@@ -129,8 +127,7 @@ impl Rounds {
         let always = self.seen.into_iter().filter(|(_, seen)| seen.differed == seen.rounds);
         let differences = always.filter_map(|(index, seen)| {
             let (channel, (native, vendor)) = (ChannelId::at(index)?, seen.pair?);
-            let known = known(channel, &native, &vendor);
-            Some(ChannelDifference { channel, native, vendor, known })
+            Some(ChannelDifference { channel, native, vendor })
         });
         let differences = differences.collect();
         Comparison { ours, theirs, compared, differences, only_native, only_vendor }
@@ -157,19 +154,14 @@ fn agree(channel: ChannelId, before: &Value, vendor: &Value, after: &Value) -> b
     }
 }
 
-fn known(channel: ChannelId, native: &Value, vendor: &Value) -> Option<&'static str> {
-    let (Value::Number(native), Value::Number(vendor)) = (native, vendor) else { return None };
-    let mirrored =
-        *native < 0.0 && agree(channel, &Value::Number(-native), &Value::Number(*vendor), &Value::Number(-native));
-    (channel.name().ends_with("_axis_load_pct") && mirrored).then_some("the library's load meter has no sign")
-}
-
 impl Comparison {
-    /// Do both ways work, and does nothing differ for a reason that is not known?
+    /// Do both ways work, and does nothing differ?
     #[must_use]
     pub fn is_well(&self) -> bool {
-        let explained = self.differences.iter().all(|difference| difference.known.is_some());
-        self.compared > 0 && explained && self.ours.problems.is_empty() && self.theirs.problems.is_empty()
+        self.compared > 0
+            && self.differences.is_empty()
+            && self.ours.problems.is_empty()
+            && self.theirs.problems.is_empty()
     }
 
     /// For `doctor --json`: our own report, with the rest beside it.
@@ -216,14 +208,13 @@ impl ChannelDifference {
             Value::Text(text) => json!(&**text),
         };
         let (native, vendor) = (value(&self.native), value(&self.vendor));
-        json!({"channel": self.channel.name(), "native": native, "vendor": vendor, "known": self.known})
+        json!({"channel": self.channel.name(), "native": native, "vendor": vendor})
     }
 
     fn line(&self) -> String {
         let shown = |value: &Value| ValueWithUnit(self.channel, value.clone()).to_string();
-        let known = self.known.map_or(String::new(), |known| format!("   ({known})"));
         let (native, vendor) = (shown(&self.native), shown(&self.vendor));
-        format!("    {:<26} native {native:<16} library {vendor}{known}", self.channel.name())
+        format!("    {:<26} native {native:<16} library {vendor}", self.channel.name())
     }
 }
 

@@ -8,7 +8,8 @@ pub use compare::{ChannelDifference, Comparison, compare};
 use crate::run::open::opened;
 use adapters::clock::{Clock, SystemClock};
 use adapters::driver::{Fact, FactValue};
-use adapters::{Absence, Address, ChannelId, Reading, Source, SourceError, Value};
+use adapters::plausibility::Plausibility;
+use adapters::{Absence, Address, ChannelId, Offer, Reading, Source, SourceError, Value};
 use serde_json::{Map, json};
 use std::fmt;
 use std::time::Instant;
@@ -56,22 +57,34 @@ pub struct DoctorReport {
     pub read_ms: f64,
     /// What is wrong.
     pub problems: Vec<Trouble>,
+    /// Everything that the device offers, where that was asked for; `None` where it was not.
+    pub offers: Option<Vec<Offer>>,
 }
 
-/// Examines an address. Takes as long as its sources' own deadlines at most.
-///
-/// # Errors
-/// The text is no usable address, in words.
-pub fn examine(text: &str) -> Result<DoctorReport, String> {
-    begin(text, &SystemClock::new()).map(|(report, _)| report)
-}
-
-/// The same of an address that has been read, with the channels that a configuration adds to it.
+/// Examines an address, with the channels that a configuration adds to it. Takes as long as its sources' own deadlines at most.
 ///
 /// # Errors
 /// It cannot be opened, in words.
 pub fn examine_address(address: &Address) -> Result<DoctorReport, String> {
     begin_at(address, &SystemClock::new()).map(|(report, _)| report)
+}
+
+/// The same, and asks for everything that the device offers, mapped to a channel or not.
+///
+/// # Errors
+/// It cannot be opened, in words.
+pub fn examine_all(address: &Address) -> Result<DoctorReport, String> {
+    let clock = SystemClock::new();
+    let (mut report, mut sources) = begin_at(address, &clock)?;
+    let mut offers = Vec::new();
+    for source in &mut sources {
+        match source.offers(&clock) {
+            Ok(found) => offers.extend(found),
+            Err(error) => report.failed(&error),
+        }
+    }
+    report.offers = Some(offers);
+    Ok(report)
 }
 
 /// Examines an address and leaves open what works.
@@ -91,6 +104,7 @@ fn begin_at(address: &Address, clock: &SystemClock) -> Result<(DoctorReport, Vec
         open_ms: 0.0,
         read_ms: 0.0,
         problems: Vec::new(),
+        offers: None,
     };
     let mut sources = opened.sources;
     sources.retain_mut(|source| report.first(source.as_mut(), clock));
@@ -98,7 +112,6 @@ fn begin_at(address: &Address, clock: &SystemClock) -> Result<(DoctorReport, Vec
     let began = Instant::now();
     sources.iter_mut().for_each(|source| report.again(source.as_mut(), clock));
     report.read_ms = milliseconds(began);
-    report.judge();
     Ok((report, sources))
 }
 
@@ -136,7 +149,37 @@ impl DoctorReport {
         let new = |fact: &Fact| self.identity.iter().all(|known| known.name != fact.name);
         let fresh: Vec<Fact> = named.chain(source.facts()).filter(new).collect();
         self.identity.extend(fresh);
+        self.judge(source, &readings);
         self.readings.extend(readings.into_iter().map(shown));
+    }
+
+    /// What is wrong with a source that answers: what it says itself, what is not believed, and what has no value for a reason
+    /// that neither of them has told; one sentence per reason.
+    fn judge(&mut self, source: &dyn Source, readings: &[Reading]) {
+        let mut plausibility = Plausibility::default();
+        plausibility.see(readings);
+        let own = source.problems();
+        let told_refusals = !own.is_empty();
+        for problem in own.into_iter().chain(plausibility.problems()) {
+            self.trouble(Trouble { what: problem.what, next: problem.next });
+        }
+        for reason in [Absence::OutOfRange, Absence::Refused, Absence::Timeout] {
+            let silent = |reading: &&Reading| reading.value == Err(reason) && reading.implausible.is_none();
+            let names: Vec<&str> = readings.iter().filter(silent).map(|reading| reading.channel.name()).collect();
+            let is_told = reason == Absence::Refused && told_refusals;
+            if !names.is_empty() && !is_told {
+                self.trouble(Trouble {
+                    what: format!("no value ({reason}): {}", names.join(", ")),
+                    next: next(reason),
+                });
+            }
+        }
+    }
+
+    fn trouble(&mut self, trouble: Trouble) {
+        if !self.problems.contains(&trouble) {
+            self.problems.push(trouble);
+        }
     }
 
     /// A device that answers too slowly for the period that is wanted.
@@ -160,17 +203,7 @@ impl DoctorReport {
     fn failed(&mut self, error: &SourceError) {
         // A machine that refuses or answers nonsense is there all the same.
         self.reachable |= matches!(error, SourceError::Refused { .. } | SourceError::Decode { .. });
-        let trouble = trouble(error);
-        if !self.problems.contains(&trouble) {
-            self.problems.push(trouble);
-        }
-    }
-
-    fn judge(&mut self) {
-        for (channel, value) in &self.readings {
-            let Err(absence @ (Absence::OutOfRange | Absence::Refused | Absence::Timeout)) = value else { continue };
-            self.problems.push(Trouble { what: format!("{channel} has no value: {absence}"), next: next(*absence) });
-        }
+        self.trouble(trouble(error));
     }
 
     /// The report as the contract lays it out.
@@ -185,15 +218,27 @@ impl DoctorReport {
             Ok(ValueWithUnit(_, Value::Text(text))) => json!({"channel": channel.name(), "value": &**text, "unit": ""}),
             Err(absence) => json!({"channel": channel.name(), "missing": absence.word()}),
         };
-        json!({
+        let mut report = json!({
             "address": self.address,
             "reachable": self.reachable,
             "identity": identity,
             "readings": self.readings.iter().map(reading).collect::<Vec<_>>(),
             "timing": {"open_ms": self.open_ms, "read_ms": self.read_ms},
             "problems": self.problems.iter().map(|one| json!({"what": one.what, "next": one.next})).collect::<Vec<_>>(),
-        })
+        });
+        if let Some(offers) = &self.offers {
+            report["offers"] = offers.iter().map(offer_json).collect();
+        }
+        report
     }
+}
+
+fn offer_json(offer: &Offer) -> serde_json::Value {
+    let (key, text) = match &offer.says {
+        Ok(text) => ("says", text),
+        Err(text) => ("missing", text),
+    };
+    json!({"name": offer.name, key: text, "channel": offer.channel.map(ChannelId::name)})
 }
 
 fn fact_json(value: &FactValue) -> serde_json::Value {

@@ -1,4 +1,5 @@
-//! Reasons of absence as one byte: 0 is a value, 1 to 10 the reasons of a reading, above that words of estimators.
+//! Reasons of absence as one byte: 0 is a value, 1 to 10 the first ten reasons of a reading, above that words of estimators, and from
+//! 252 on the further reasons of a reading. A code means the same in every history that was ever written.
 
 use adapters::Absence;
 use std::sync::Arc;
@@ -11,6 +12,8 @@ pub(crate) const NOT_PROVIDED: u8 = 1;
 pub(crate) const OUT_OF_RANGE: u8 = 8;
 /// The first code given to an estimator's own word.
 const FIRST_OWN: u8 = 11;
+/// The code of the reason of a reading that came after the first ten.
+const FIRST_FURTHER: u8 = 252;
 /// At most this many own words; further ones share the last code. Reasons are a handful of constants.
 const OWN_MAX: usize = 240;
 /// The word of everything beyond [`OWN_MAX`].
@@ -18,7 +21,8 @@ const OTHER: &str = "other";
 
 /// The code of a reading's reason.
 pub(crate) fn code_of(absence: Absence) -> u8 {
-    absence.code() + 1
+    let code = absence.code() + 1;
+    if code < FIRST_OWN { code } else { FIRST_FURTHER + (code - FIRST_OWN) }
 }
 
 /// Words and codes, both ways.
@@ -53,13 +57,14 @@ impl Reasons {
         match code {
             PRESENT => None,
             1..FIRST_OWN => Absence::from_code(code - 1).map(Absence::word),
+            FIRST_FURTHER.. => Absence::from_code(code - FIRST_FURTHER + FIRST_OWN - 1).map(Absence::word),
             _ => Some(self.own.get(usize::from(code - FIRST_OWN)).map_or(OTHER, |word| word)),
         }
     }
 
     /// Is this an estimator's own word, whose code means nothing outside these reasons?
     pub(crate) fn is_own(code: u8) -> bool {
-        code >= FIRST_OWN
+        (FIRST_OWN..FIRST_FURTHER).contains(&code)
     }
 }
 
@@ -90,5 +95,6 @@ mod tests {
         let codes: Vec<u8> = (0..400).map(|number| reasons.code(&format!("word_{number}"))).collect();
         assert_eq!(reasons.word(codes[0]), Some("word_0"));
         assert_eq!(reasons.word(codes[399]), Some("other"));
+        assert!(codes.iter().all(|code| Reasons::is_own(*code)), "none of them is the reason of a reading");
     }
 }

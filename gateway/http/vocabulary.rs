@@ -61,6 +61,7 @@ fn absence(reason: Absence) -> (&'static str, &'static str) {
         Absence::OutOfRange => ("outside the possible range", "超出物理范围"),
         Absence::Stale => ("too old", "数据过旧"),
         Absence::NotRecorded => ("not recorded", "未记录"),
+        Absence::UnknownUnit => ("unit of the device not known", "设备单位未知"),
     }
 }
 

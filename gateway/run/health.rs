@@ -9,9 +9,10 @@ use crate::alignment::{self, Alignment};
 use crate::history::{Audit, Event, ExtraValue, Record};
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Pipeline, Store};
-use crate::status::{HistoryStatus, StatusProblem};
+use crate::status::{HistoryStatus, SourceStatus, StatusProblem};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::worker::WorkerState;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -38,7 +39,7 @@ pub struct Health {
     behind_ns: i64,
     port: watch::Receiver<Option<String>>,
     memory: PathBuf,
-    sources: Vec<Option<String>>,
+    sources: Vec<KnownSource>,
     /// The pace of each source that was last told, s.
     paces: Vec<Option<f64>>,
     looked: Option<Instant>,
@@ -167,15 +168,11 @@ impl Health {
 
     fn look_at_sources(&mut self, feed: &SampleFeed, now_ns: TimeNs) {
         let status = feed.status(now_ns);
-        self.sources.resize(status.len(), None);
+        self.sources.resize_with(status.len(), KnownSource::default);
         for (index, source) in status.into_iter().enumerate() {
-            let before = std::mem::replace(&mut self.sources[index], source.error.clone());
-            let notice = match (before, source.error) {
-                (None, Some(error)) => Notice::new(Severity::Warning, "source_lost", error),
-                (Some(_), None) => Notice::new(Severity::Info, "source_back", format!("{} answers again", source.name)),
-                _ => continue,
-            };
-            self.event(now_ns, &source.name, &notice);
+            for notice in self.sources[index].notices(&source) {
+                self.event(now_ns, &source.name, &notice);
+            }
         }
     }
 
@@ -243,10 +240,50 @@ impl Health {
             let what = format!("the wall clock is {} behind the box", span(self.behind_ns));
             add(what, "set the clock right, or start the box again when it is right");
         }
-        for error in self.sources.iter().flatten() {
-            add(error.clone(), "the other sources go on");
+        for source in &self.sources {
+            if let Some(error) = &source.error {
+                add(error.clone(), "the other sources go on");
+            }
+            source.problems.iter().for_each(|problem| add(problem.what.clone(), &problem.next));
         }
         problems
+    }
+}
+
+/// What was last told of a source.
+#[derive(Debug, Default)]
+struct KnownSource {
+    /// Why it gives nothing.
+    error: Option<String>,
+    /// It gave nothing and has not answered since; it may have been switched off meanwhile.
+    is_lost: bool,
+    /// What is wrong although it answers.
+    problems: Vec<StatusProblem>,
+}
+
+impl KnownSource {
+    /// What is new, and what is over.
+    fn notices(&mut self, now: &SourceStatus) -> Vec<Notice> {
+        let mut notices = Vec::new();
+        let before = std::mem::replace(&mut self.error, now.error.clone());
+        if let (None, Some(error)) = (&before, &now.error) {
+            notices.push(Notice::new(Severity::Warning, "source_lost", error.clone()));
+            self.is_lost = true;
+        }
+        if self.is_lost && now.state == WorkerState::Reading.word() {
+            notices.push(Notice::new(Severity::Info, "source_back", format!("{} answers again", now.name)));
+            self.is_lost = false;
+        }
+        let known = std::mem::replace(&mut self.problems, now.problems.clone());
+        let told = |one: &StatusProblem| format!("{}: {}", now.name, one.what);
+        let new = self.problems.iter().filter(|problem| !known.contains(problem));
+        notices.extend(
+            new.map(|one| Notice::new(Severity::Warning, "source_problem", told(one)).detail(one.next.as_str())),
+        );
+        let over = known.iter().filter(|problem| !self.problems.contains(problem));
+        notices
+            .extend(over.map(|one| Notice::new(Severity::Info, "source_problem_over", format!("over: {}", told(one)))));
+        notices
     }
 }
 

@@ -1,12 +1,12 @@
 //! Where samples come from: sources on their own threads for a real machine, sources in step for an accelerated one.
 
 use crate::alignment::Alignment;
-use crate::status::{FactStatus, NumberOrWord, SourceStatus};
+use crate::status::{FactStatus, NumberOrWord, SourceStatus, StatusProblem};
 use adapters::clock::TimeNs;
 use adapters::histogram::Histogram;
 use adapters::merge::{Lockstep, Merge, MergeCounts, SourceId};
 use adapters::worker::{Poll, Worker, WorkerState, WorkerStats};
-use adapters::{Fact, FactValue, Sample, SourceError};
+use adapters::{Fact, FactValue, Sample, SourceError, SourceProblem};
 use std::time::Duration;
 
 /// See the [module](self).
@@ -144,7 +144,12 @@ fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStat
         missed: stats.missed,
         dropped: dropped(counts) + stats.dropped,
         facts: stats.facts.iter().map(shown).collect(),
+        problems: stats.problems.iter().map(problem).collect(),
     }
+}
+
+fn problem(problem: &SourceProblem) -> StatusProblem {
+    StatusProblem { what: problem.what.clone(), next: problem.next.clone() }
 }
 
 fn shown(fact: &Fact) -> FactStatus {
@@ -179,5 +184,6 @@ fn of_step(name: &str, period: Duration, error: Option<&SourceError>, counts: Me
         missed: 0,
         dropped: dropped(counts),
         facts: Vec::new(),
+        problems: Vec::new(),
     }
 }

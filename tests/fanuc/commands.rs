@@ -90,11 +90,11 @@ fn doctor_compares_our_own_words_with_the_librarys() {
         (output.status.code(), report["differences"].clone())
     };
     let (code, differences) = compare("as it is");
-    let channels: Vec<&str> =
-        differences.as_array().expect("a list").iter().filter_map(|one| one["channel"].as_str()).collect();
-    assert_eq!(channels, ["z_axis_load_pct"], "the library loses the sign of the load");
-    assert!(differences[0]["known"].as_str().is_some_and(|why| why.contains("no sign")));
-    assert_eq!(code, Some(0), "nothing differs that is not explained");
+    assert_eq!(
+        (code, differences),
+        (Some(0), Value::Array(Vec::new())),
+        "nothing differs, a load has no sign on either way"
+    );
     server.with(|control| control.expect("on").sequence = 130);
     let (code, differences) = compare("another block");
     assert_eq!(code, Some(1));
@@ -111,10 +111,7 @@ fn doctor_compares_for_people_and_says_when_there_is_nothing_to_compare() {
     let shown = |file: &str| for_people(&[&address, "--compare", file]);
     let (code, text) = shown(&library.file.display().to_string());
     assert_eq!(code, Some(0), "{text}");
-    for part in ["channels compared in 3 rounds, 1 differ", "native -17 %", "library 17 %   (the library's load meter"]
-    {
-        assert!(text.contains(part), "{part}: {text}");
-    }
+    assert!(text.contains("channels compared in 3 rounds, 0 differ"), "{text}");
     assert!(text.contains("only native has: ") && text.contains("x_axis_current_a"), "{text}");
     let (code, text) = shown("/does/not/exist.so");
     assert_eq!(code, Some(1), "{text}");

@@ -3,6 +3,7 @@
  * makes every call that a real library sends take so long. The second path cuts at half the speed of the first.
  * FAKE_LIBRARY_FEED holds "DATA DECIMALS UNIT GROUP INCH": the feed of cnc_rdspeed, the modal group of feed per revolution,
  * and whether the machine measures in inches.
+ * FAKE_LIBRARY_MODAL holds "DATA FLAG1 FLAG2": what cnc_modal says of the S word.
  * Compiled by the tests with the system's compiler. */
 #include <pthread.h>
 #include <stdint.h>
@@ -208,6 +209,14 @@ int16_t cnc_modal(uint16_t h, int16_t kind, int16_t block, int32_t *out) {
     CHECKED(out, 260);
     if (kind < 100) {
         ((uint8_t *)out)[4] = kind == 4 ? (uint8_t)feed_group : 0;
+        return 0;
+    }
+    const char *modal = getenv("FAKE_LIBRARY_MODAL");
+    int data, flag1, flag2;
+    if (modal && kind == 107 && sscanf(modal, "%d %d %d", &data, &flag1, &flag2) == 3) {
+        out[1] = data;
+        ((uint8_t *)out)[8] = (uint8_t)flag1;
+        ((uint8_t *)out)[9] = (uint8_t)flag2;
         return 0;
     }
     out[1] = kind == 103 ? 250 / path_now : kind == 107 ? 1200 / path_now : kind == 108 ? 303 : 0;

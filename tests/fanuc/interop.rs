@@ -16,6 +16,7 @@ use adapters::fanuc::vendor::VendorSettings;
 use adapters::fanuc::wire::Number;
 use serde_json::{Value, json};
 use std::io::Write;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -345,11 +346,16 @@ fn interop_units_as_the_vendors_library_and_our_child_with_it_read_them() {
 }
 
 pub(crate) fn real(library: &Path, server: &Server) -> VendorSettings {
+    real_at(library, server.address())
+}
+
+pub(crate) fn real_at(library: &Path, address: SocketAddr) -> VendorSettings {
     VendorSettings {
         vendor_library: library.to_owned(),
-        at: Endpoint { host: server.address().ip().to_string(), port: server.address().port() },
+        at: Endpoint { host: address.ip().to_string(), port: address.port() },
         path: 1,
         timeout: Duration::from_secs(2),
+        encoding: adapters::text::TextEncoding::default(),
         deadline: None,
         program: Some(Library::program()),
         environment: Vec::new(),

@@ -1,5 +1,7 @@
 //! FANUC controllers: the adapter against its own server over real sockets, faults on purpose, the commands.
 
+mod ages;
+mod bytes;
 mod channels;
 mod closed_loop;
 mod commands;
@@ -8,8 +10,10 @@ mod faults;
 mod flapping;
 mod handbook;
 mod interop;
+mod layouts;
 #[path = "../support/library.rs"]
 mod library;
+mod options;
 mod paths;
 #[path = "../box/process.rs"]
 #[allow(dead_code, reason = "the suite of the box uses more of it")]

@@ -17,7 +17,7 @@ fn every_channel_of_a_cut_in_all_generations() {
         let numbers = [
             ("x_axis_position_mm", 79.0),
             ("z_axis_position_mm", -12.345),
-            ("z_axis_load_pct", -17.0),
+            ("z_axis_load_pct", 17.0),
             ("z_axis_current_a", 3.1),
             ("rapid", 0.0),
             ("drive_on", 1.0),

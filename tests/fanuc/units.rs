@@ -124,8 +124,8 @@ fn the_bytes_are_those_that_the_library_asks_for_and_takes_three_off() {
             let server = serve(control(version, case, false), ServerSettings::default());
             assert_eq!(asked(&server, question), (version, vec![0, expected]), "{:?} of {version}", case.unit);
             // 1000 is 0x3e8 and 77 is 0x4d.
-            assert_eq!(asked(&server, MODAL_S).1, [0, 0, 3, 0xe8, 0x40, 0, 0, 0], "S of {version}");
-            assert_eq!(asked(&server, MODAL_R).1, [0, 0, 0, 0x4d, 0x40, 0, 0, 0], "R of {version}");
+            assert_eq!(asked(&server, MODAL_S).1, [0, 0, 3, 0xe8, 0, 0, 0, 0], "S of {version}");
+            assert_eq!(asked(&server, MODAL_R).1, [0, 0, 0, 0x4d, 0, 0, 0, 0], "R of {version}");
         }
     }
 }

@@ -9,6 +9,7 @@ mod process;
 
 mod broker;
 mod dialects;
+mod foreign;
 mod hnc;
 #[path = "../support/library.rs"]
 mod library;

@@ -123,6 +123,7 @@ pub(crate) fn link(port: u16) -> Link {
         serial: SERIAL.to_owned(),
         login: None,
         tls: None,
+        encoding: adapters::text::TextEncoding::default(),
         deadline: Duration::from_secs(2),
     }
 }

@@ -87,18 +87,30 @@ fn silence_and_half_an_answer_are_timeouts() {
 
 #[test]
 fn garbage_makes_no_sense_and_no_numbers() {
-    for behaviour in [Behaviour::WrongUnit, Behaviour::WrongLength, Behaviour::NotModbus] {
+    for behaviour in [Behaviour::WrongUnit, Behaviour::WrongLength, Behaviour::NotModbus, Behaviour::WrongTransaction] {
         let error = second_meets(behaviour);
         assert!(matches!(error, SourceError::Decode { .. }), "{error}");
     }
-    // An answer to another request is waited out.
-    assert!(matches!(second_meets(Behaviour::WrongTransaction), SourceError::Timeout { .. }));
+    // An answer to another request is waited out, and told as what it is.
+    let error = second_meets(Behaviour::WrongTransaction);
+    assert!(error.to_string().contains("none with the transaction number"), "{error}");
 }
 
 #[test]
 fn a_meter_that_hangs_up_is_called_again() {
-    let error = second_meets(Behaviour::HangUp);
+    // Once is the end of an idle connection, which costs no poll; twice in a row is a fault of the line.
+    let once = meter(move |count| if count == 2 { Behaviour::HangUp } else { Behaviour::Good });
+    let mut meter_once = source(&once);
+    for expected in [1.0, 3.0] {
+        let readings = poll(meter_once.as_mut()).unwrap_or_else(|error| panic!("{error}"));
+        assert!((number(&readings, "total_power_w") - expected).abs() < 1e-9, "{readings:?}");
+    }
+    let twice = meter(move |count| if (2..=3).contains(&count) { Behaviour::HangUp } else { Behaviour::Good });
+    let mut meter_twice = source(&twice);
+    poll(meter_twice.as_mut()).unwrap_or_else(|error| panic!("{error}"));
+    let error = poll(meter_twice.as_mut()).expect_err("twice");
     assert!(matches!(error, SourceError::Line { .. }), "{error}");
+    poll(meter_twice.as_mut()).unwrap_or_else(|error| panic!("{error}"));
 }
 
 #[test]

@@ -10,4 +10,5 @@ mod partner;
 mod port;
 mod serial_faults;
 mod served;
+mod shop;
 mod waveforms;

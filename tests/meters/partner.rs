@@ -61,6 +61,20 @@ pub(crate) fn pymodbus(arguments: &[&str], cells: &[Cell]) -> Running {
     running
 }
 
+/// Meters of a shop at this port, as `partner_shop.py` describes them; `carrier` is `tcp` or `rtu-over-tcp`.
+pub(crate) fn shop(carrier: &str, port: u16, meters: &serde_json::Value) -> Running {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/meters/partner_shop.py");
+    let mut command = Command::new("python3");
+    command.arg(script).args([carrier, &port.to_string()]).stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut child = command.stderr(Stdio::null()).spawn().expect("python3 starts");
+    writeln!(child.stdin.take().expect("piped"), "{meters}").expect("it reads");
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("it says something");
+    let running = Running(child);
+    assert_eq!(line.trim(), "ready", "the shop did not open");
+    running
+}
+
 /// Two ends of a serial line.
 pub(crate) struct Cable {
     _socat: Running,

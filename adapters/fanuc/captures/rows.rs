@@ -80,7 +80,7 @@ fn names(names: &[&str]) -> FocasAnswer {
 }
 
 pub(super) fn modal(value: i32) -> FocasAnswer {
-    FocasAnswer::Modal { value, flags: [0x40, 0] }
+    FocasAnswer::Modal { value, flag: 0, places: 0 }
 }
 
 /// Every captured call, in the order of the captures.

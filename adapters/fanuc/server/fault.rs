@@ -8,8 +8,10 @@ pub enum InjectedFault {
     /// Nothing.
     #[default]
     None,
-    /// No answer at all.
+    /// No answer to a question; connections are opened.
     Silence,
+    /// Connections are accepted, and nothing is ever said on them.
+    Blackhole,
     /// The answer comes later.
     Delay(Duration),
     /// The answer comes byte by byte, with this pause.
@@ -28,7 +30,7 @@ pub enum InjectedFault {
     HugeLength,
     /// Every new connection is refused: all are in use.
     NoSession,
-    /// The control is switched off: connections are closed at once.
+    /// The control is switched off: open connections end, new ones are refused.
     PowerOff,
 }
 

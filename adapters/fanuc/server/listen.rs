@@ -8,7 +8,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A control that is served.
 pub trait ServedControl: Send {
@@ -42,6 +42,8 @@ struct ServerState {
     settings: ServerSettings,
     fault: Mutex<InjectedFault>,
     stop: AtomicBool,
+    /// Does it listen? A control that is switched off does not.
+    listens: AtomicBool,
     sessions: AtomicUsize,
     opened: AtomicU64,
     frames: AtomicU64,
@@ -73,12 +75,13 @@ impl Server {
             settings,
             fault: Mutex::new(InjectedFault::None),
             stop: AtomicBool::new(false),
+            listens: AtomicBool::new(true),
             sessions: AtomicUsize::new(0),
             opened: AtomicU64::new(0),
             frames: AtomicU64::new(0),
         });
         let own = shared.clone();
-        std::thread::Builder::new().name("focas-listen".to_owned()).spawn(move || accept(&listener, &own))?;
+        std::thread::Builder::new().name("focas-listen".to_owned()).spawn(move || accept(listener, address, &own))?;
         Ok(Self { shared, address })
     }
 
@@ -88,9 +91,14 @@ impl Server {
         self.address
     }
 
-    /// From now on this goes wrong.
+    /// From now on this goes wrong. Returns when a control that is to be off does not listen any more, and one that is to be on
+    /// does.
     pub fn fault(&self, fault: InjectedFault) {
         *self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner) = fault;
+        let until = Instant::now() + Duration::from_secs(2);
+        while self.shared.listens.load(Ordering::SeqCst) == self.shared.is_off() && Instant::now() < until {
+            std::thread::sleep(ACCEPT_LOOK);
+        }
     }
 
     /// Connections at this moment.
@@ -123,13 +131,41 @@ impl Drop for Server {
     }
 }
 
-fn accept(listener: &TcpListener, shared: &Arc<ServerState>) {
+/// How often it is looked for new connections.
+const ACCEPT_LOOK: Duration = Duration::from_millis(2);
+
+/// How often it is looked whether the control has been switched on or off.
+const POWER_LOOK: Duration = Duration::from_millis(100);
+
+impl ServerState {
+    /// A computer that is switched off refuses connections.
+    fn is_off(&self) -> bool {
+        *self.fault.lock().unwrap_or_else(PoisonError::into_inner) == InjectedFault::PowerOff
+            || self.served.lock().unwrap_or_else(PoisonError::into_inner).now().is_none()
+    }
+}
+
+fn accept(listener: TcpListener, address: SocketAddr, shared: &Arc<ServerState>) {
+    let (mut listener, mut looked, mut fault) = (Some(listener), Instant::now(), InjectedFault::None);
     while !shared.stop.load(Ordering::SeqCst) {
-        match listener.accept() {
-            Ok((stream, _)) => begin(stream, shared),
-            Err(_) => std::thread::sleep(Duration::from_millis(2)),
+        let injected = *shared.fault.lock().unwrap_or_else(PoisonError::into_inner);
+        if injected != fault || looked.elapsed() >= POWER_LOOK {
+            (fault, looked) = (injected, Instant::now());
+            listener = if shared.is_off() { None } else { listener.or_else(|| listen_again(address)) };
+            shared.listens.store(listener.is_some(), Ordering::SeqCst);
+        }
+        match listener.as_ref().map(TcpListener::accept) {
+            Some(Ok((stream, _))) => begin(stream, shared),
+            Some(Err(_)) | None => std::thread::sleep(ACCEPT_LOOK),
         }
     }
+}
+
+/// The same address once more; another program may hold it by now.
+fn listen_again(address: SocketAddr) -> Option<TcpListener> {
+    let listener = TcpListener::bind(address).ok()?;
+    listener.set_nonblocking(true).ok()?;
+    Some(listener)
 }
 
 fn begin(stream: TcpStream, shared: &Arc<ServerState>) {
@@ -216,6 +252,9 @@ impl ClientSession {
         let fault = self.fault();
         if fault == InjectedFault::PowerOff {
             return Err(End::Closed);
+        }
+        if fault == InjectedFault::Blackhole {
+            return Ok(());
         }
         let reply = self.reply(request)?;
         let opening = !matches!(request.kind, FrameKind::Request);

@@ -12,6 +12,9 @@ pub(super) const FOLDER: &str = "//CNC_MEM/USER/PATH1/";
 /// Longest list of a directory in one answer.
 const LISTED_MAX: usize = 20;
 
+/// Bit of the flag of a modal word: a decimal point was written.
+const DECIMAL_POINT: u8 = 0x40;
+
 /// Bytes of memory for programs of which those that are there take their part.
 const MEMORY_BYTES: i32 = 512 * 1024;
 
@@ -68,8 +71,9 @@ pub(super) fn folder(controller: &Controller, request: &Request) -> Data8 {
 pub(super) fn modal_word(controller: &Controller, number: i32) -> Data8 {
     let word = BlockWord::of_number(number).ok_or(NUMBER)?;
     let value = controller.modal_words.get(&word).ok_or(NUMBER)?;
-    let places = u8::try_from(value.exponent).unwrap_or(0) & 0x07;
-    Ok([&longs(&[value.mantissa])[..], &[0x40, places, 0, 0]].concat())
+    let places = u8::try_from(value.exponent).map_err(|_| NUMBER)?;
+    let flag = if places > 0 { DECIMAL_POINT } else { 0 };
+    Ok([&longs(&[value.mantissa])[..], &[0, flag, 0, places]].concat())
 }
 
 pub(super) fn groups(controller: &Controller, group: i32) -> Data8 {

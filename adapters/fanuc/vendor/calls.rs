@@ -3,13 +3,13 @@
 use super::child::{FocasSession, pmc_words};
 use super::layout::{
     LONG_LEN, LoadElm, MAX_AXIS, ODBDY2_ALL_LEN, OdbAct, OdbAlmMsg2, OdbAxDt, OdbExePrg, OdbM, OdbPro, OdbSeq,
-    OdbSpLoad, OdbSpn, OdbSt, OdbSys, PMC_HEAD_LEN, SpeedElm, ZOFS_LEN,
+    OdbSpLoad, OdbSpn, OdbSt, OdbSys, PMC_HEAD_LEN, POSITIONS_LEN, PosElm, SpeedElm, ZOFS_LEN,
 };
 use super::structure::{Bytes, POSITION_PLACES, checked, decimal, filled};
 use crate::child::Guarded;
 use crate::fanuc::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, Refusal, SpeedUnit, Status, System};
 use crate::fanuc::code::FocasReturnCode;
-use crate::fanuc::item::{BlockWord, FocasItem, PmcWidth, Servo, Spindle, Stretch};
+use crate::fanuc::item::{BlockWord, FocasItem, PmcWidth, PositionFrame, Servo, Spindle, Stretch};
 use std::mem::{offset_of, size_of};
 
 /// Most alarms, spindles and PMC bytes that are asked for at a time.
@@ -75,6 +75,7 @@ impl FocasSession {
                 let speed = |at: usize| Some(f64::from(bytes.i32(4 + 4 * at)));
                 Ok(FocasAnswer::Numbers((0..count(found, 8)).map(speed).collect()))
             }
+            FocasItem::PositionUnit(frame) => self.position_units(frame),
             FocasItem::Pmc(stretch) => self.memory(stretch),
             FocasItem::WorkOffset(number, axis) => {
                 let number = i16::try_from(number).unwrap_or(i16::MAX);
@@ -98,7 +99,7 @@ impl FocasSession {
             }
             FocasItem::ProgramName => {
                 let bytes = filled(size_of::<OdbExePrg>(), |out| f.cnc_exeprgname(h, out))?;
-                let (number, name) = (bytes.i32(offset_of!(OdbExePrg, o_num)), bytes.text(0, 36));
+                let (number, name) = (bytes.i32(offset_of!(OdbExePrg, o_num)), bytes.text_in(0, 36, self.encoding));
                 Ok(FocasAnswer::Named { number, name })
             }
             FocasItem::Sequence => {
@@ -178,7 +179,7 @@ impl FocasSession {
                 number: bytes.i32(at),
                 kind: i32::from(bytes.i16(at + offset_of!(OdbAlmMsg2, kind))),
                 axis: i32::from(bytes.i16(at + offset_of!(OdbAlmMsg2, axis))),
-                text: bytes.text(at + offset_of!(OdbAlmMsg2, alm_msg), length),
+                text: bytes.text_in(at + offset_of!(OdbAlmMsg2, alm_msg), length, self.encoding),
             }
         };
         Ok(FocasAnswer::Alarms((0..count(found, usize::from(most))).map(alarm).collect()))
@@ -200,8 +201,8 @@ impl FocasSession {
     fn modal(&self, word: BlockWord) -> FocasItemResult {
         let number = word.number_in_library().ok_or(FocasItemError::NotOffered)?;
         let bytes = filled(LONG_LEN, |out| self.functions.cnc_modal(self.handle, number, 0, out))?;
-        let [first, second] = bytes.array(8);
-        Ok(FocasAnswer::Modal { value: bytes.i32(4), flags: [first, second] })
+        let [flag, places] = bytes.array(8);
+        Ok(FocasAnswer::Modal { value: bytes.i32(4), flag, places })
     }
 
     pub(super) fn every_axis(&self) -> Result<Bytes, FocasItemError> {
@@ -215,6 +216,18 @@ impl FocasSession {
         let call = |out: &mut Guarded| self.functions.cnc_getfigure(self.handle, 0, &mut found, &mut entered, out);
         let bytes = filled(2 * MAX_AXIS, call)?;
         Ok((0..count(found, MAX_AXIS)).map(|axis| bytes.i16(2 * axis)).collect())
+    }
+
+    /// Units of the positions of every axis: of one that the frame has.
+    fn position_units(&self, frame: PositionFrame) -> FocasItemResult {
+        let mut found = i16::try_from(MAX_AXIS).unwrap_or(32);
+        let length = POSITIONS_LEN * MAX_AXIS;
+        let (kind, place) = if frame == PositionFrame::Machine { (1, 1) } else { (0, 0) };
+        let call = |out: &mut Guarded| self.functions.cnc_rdposition(self.handle, kind, &mut found, out);
+        let bytes = filled(length, call)?;
+        let unit =
+            |axis: usize| bytes.i16(axis * POSITIONS_LEN + place * size_of::<PosElm>() + offset_of!(PosElm, unit));
+        Ok(FocasAnswer::Units((0..count(found, MAX_AXIS)).map(unit).collect()))
     }
 
     fn variable(&self, number: u16) -> FocasItemResult {

@@ -11,6 +11,7 @@ use crate::fanuc::code::{Consequence, FocasReturnCode};
 use crate::fanuc::item::{FocasItem, Question, Stretch, Write};
 use crate::fanuc::opening::{Generation, Opening};
 use crate::reading::Absence;
+use crate::text::TextEncoding;
 use std::collections::HashMap;
 use std::ffi::CString;
 use std::path::Path;
@@ -29,10 +30,11 @@ pub fn child() -> std::io::Result<()> {
 }
 
 fn answer(session: &mut Option<FocasSession>, ask: FocasRequest) -> FocasReply {
-    if let FocasRequest::Open { vendor_library, host, port, path, timeout_s } = ask {
+    if let FocasRequest::Open { vendor_library, host, port, path, timeout_s, encoding } = ask {
         *session = None;
         return match FocasSession::open(&vendor_library, &host, port, path, timeout_s) {
-            Ok((opened, opening)) => {
+            Ok((mut opened, opening)) => {
+                opened.encoding = encoding;
                 *session = Some(opened);
                 FocasReply::Opened(opening)
             }
@@ -58,6 +60,8 @@ pub(super) struct FocasSession {
     own: u8,
     /// The path that the library's questions carry now.
     path: u8,
+    /// Character set of the controller's texts.
+    pub(super) encoding: TextEncoding,
     /// Places for axes in what the library fills in.
     pub(super) axes_max: usize,
     /// The call for the positions, which has answered other questions of this poll too.
@@ -103,6 +107,7 @@ impl FocasSession {
             handle,
             own: path,
             path: 1,
+            encoding: TextEncoding::default(),
             axes_max: 0,
             dynamic: None,
             speed: None,

@@ -9,8 +9,11 @@ use crate::fanuc::code::{Consequence, FocasReturnCode};
 use crate::fanuc::focas::{Focas, FocasError};
 use crate::fanuc::item::{Question, Write};
 use crate::fanuc::opening::Opening;
+use crate::stream;
+use crate::text::TextEncoding;
+use std::io::ErrorKind;
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What the child may take longer than the library's own patience, which is about a second more than it is told.
 const GRACE: Duration = Duration::from_millis(1500);
@@ -26,6 +29,8 @@ pub struct VendorSettings {
     pub path: u8,
     /// The library's patience with the controller; whole seconds, at least one.
     pub timeout: Duration,
+    /// Character set of the controller's texts.
+    pub encoding: TextEncoding,
     /// Longest wait for the child; `None` follows from `timeout`.
     pub deadline: Option<Duration>,
     /// The program that runs as the child; `None` is this one.
@@ -109,10 +114,11 @@ fn open(child: &mut ChildClient<Question>, settings: &VendorSettings) -> Result<
         port: settings.at.port,
         path: settings.path,
         timeout_s: seconds(settings.timeout),
+        encoding: settings.encoding,
     };
     let opened = match child.told(&ask).map_err(|error| FocasError::Library(error.to_string()))? {
         FocasReply::Opened(opening) => return Ok(opening),
-        FocasReply::Code(FocasReturnCode(-16)) => FocasError::Unreachable(FocasReturnCode::SOCKET.to_string()),
+        FocasReply::Code(code @ FocasReturnCode::SOCKET) => no_socket(settings, code),
         FocasReply::Code(FocasReturnCode(-17)) => FocasError::NoSession,
         FocasReply::Code(code) => FocasError::Refused(Refusal { code, detail: 0 }),
         FocasReply::Unloadable(what) => FocasError::Unusable(format!("{}: {what}", settings.vendor_library.display())),
@@ -120,6 +126,15 @@ fn open(child: &mut ChildClient<Question>, settings: &VendorSettings) -> Result<
     };
     child.end();
     Err(opened)
+}
+
+/// What the library's one code for every failed connection means: a connection of our own tells.
+fn no_socket(settings: &VendorSettings, code: FocasReturnCode) -> FocasError {
+    match stream::connect(&settings.at, Instant::now() + settings.timeout) {
+        Ok(_) => FocasError::Timeout(settings.timeout),
+        Err(error) if error.kind() == ErrorKind::ConnectionRefused => FocasError::NobodyThere(code.to_string()),
+        Err(_) => FocasError::Unreachable(code.to_string()),
+    }
 }
 
 impl Focas for Vendor {

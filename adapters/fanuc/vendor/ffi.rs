@@ -46,6 +46,7 @@ functions! {
     cnc_rdprgnum(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_exeprgname(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_rdseqnum(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdposition(handle: u16 => u16, kind: i16 => i16, count: &mut i16 => *mut i16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_rddynamic2(handle: u16 => u16, axis: i16 => i16, length: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_modal(handle: u16 => u16, kind: i16 => i16, block: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_rdalmmsg2(handle: u16 => u16, kind: i16 => i16, count: &mut i16 => *mut i16, out: &mut Guarded => *mut c_void) -> i16;

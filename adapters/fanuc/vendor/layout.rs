@@ -55,6 +55,17 @@ pub(super) struct LoadElm {
     pub(super) reserve: u8,
 }
 
+/// `POSELM`; `ODBPOS` is four of them: absolute, machine, relative and to go.
+#[repr(C)]
+pub(super) struct PosElm {
+    pub(super) data: i32,
+    pub(super) dec: i16,
+    pub(super) unit: i16,
+    pub(super) disp: i16,
+    pub(super) name: u8,
+    pub(super) suff: u8,
+}
+
 #[repr(C)]
 pub(super) struct OdbSpLoad {
     pub(super) spload: LoadElm,
@@ -137,6 +148,8 @@ pub(super) const ODBDY2_ALL_LEN: usize = size_of::<OdbDy2>() + 4 * 4 * MAX_AXIS;
 pub(super) const LONG_LEN: usize = 260;
 /// `IODBZOFS`.
 pub(super) const ZOFS_LEN: usize = 132;
+/// `ODBPOS`, of one axis.
+pub(super) const POSITIONS_LEN: usize = 4 * size_of::<PosElm>();
 /// Head of `IODBPMC`; the bytes follow.
 pub(super) const PMC_HEAD_LEN: usize = 8;
 
@@ -144,6 +157,7 @@ const _: () = assert!(size_of::<OdbSys>() == 18 && offset_of!(OdbSys, series) ==
 const _: () = assert!(size_of::<OdbSt>() == 18 && offset_of!(OdbSt, aut) == 4);
 const _: () = assert!(size_of::<OdbAct>() == 8 && offset_of!(OdbAct, data) == 4);
 const _: () = assert!(size_of::<SpeedElm>() == 12 && offset_of!(SpeedElm, unit) == 6);
+const _: () = assert!(size_of::<PosElm>() == 12 && offset_of!(PosElm, unit) == 6);
 const _: () = assert!(size_of::<LoadElm>() == 12 && offset_of!(LoadElm, name) == 8);
 const _: () = assert!(size_of::<OdbSpLoad>() == 24);
 const _: () = assert!(size_of::<OdbSpn>() == 20 && offset_of!(OdbSpn, data) == 4);

@@ -4,6 +4,7 @@ use crate::fanuc::answer::FocasItemResult;
 use crate::fanuc::code::FocasReturnCode;
 use crate::fanuc::item::{Question, Write};
 use crate::fanuc::opening::Opening;
+use crate::text::TextEncoding;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -22,6 +23,8 @@ pub(super) enum FocasRequest {
         path: u8,
         /// The library's own patience, s.
         timeout_s: i32,
+        /// Character set of the controller's texts.
+        encoding: TextEncoding,
     },
     /// Read these, one answer for each as soon as it is there. After an answer that cannot be trusted no other comes.
     Read(Vec<Question>),

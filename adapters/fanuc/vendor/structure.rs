@@ -4,6 +4,7 @@ use super::layout::LoadElm;
 use crate::child::{Guarded, Missing};
 use crate::fanuc::answer::{FocasItemError, Refusal};
 use crate::fanuc::code::FocasReturnCode;
+use crate::text::TextEncoding;
 use std::mem::offset_of;
 
 /// Decimals of offsets that the library gives without them (increment system IS-B, millimetres).
@@ -47,10 +48,14 @@ impl Bytes {
         i32::from_le_bytes(self.array(at))
     }
 
+    /// A name in ASCII.
     pub(super) fn text(&self, at: usize, length: usize) -> String {
-        let bytes = self.0.get(at..(at + length).min(self.0.len())).unwrap_or_default();
-        let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-        String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
+        self.text_in(at, length, TextEncoding::default())
+    }
+
+    /// A text in the character set of the controller.
+    pub(super) fn text_in(&self, at: usize, length: usize, encoding: TextEncoding) -> String {
+        encoding.text(self.0.get(at..(at + length).min(self.0.len())).unwrap_or_default())
     }
 
     /// A number with its decimals.

@@ -5,6 +5,7 @@ use super::child::FocasSession;
 use super::structure::{Bytes, checked, filled};
 use crate::fanuc::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, OperatorMessage, PastAlarm};
 use crate::fanuc::item::FocasItem;
+use crate::text::TextEncoding;
 
 /// `ODBGCD`: group, flag, text of eight bytes.
 const G_CODE_LEN: usize = 12;
@@ -25,13 +26,18 @@ impl FocasSession {
             FocasItem::ExecutedText(most) => {
                 let (mut length, mut block) = (most.clamp(1, 1000), 0);
                 let bytes = filled(1024, |out| f.cnc_rdexecprog(h, &mut length, &mut block, out))?;
-                Ok(FocasAnswer::Named { number: i32::from(block), name: bytes.text(0, usize::from(length)) })
+                Ok(FocasAnswer::Named {
+                    number: i32::from(block),
+                    name: bytes.text_in(0, usize::from(length), self.encoding),
+                })
             }
             FocasItem::Messages(most) => {
                 let mut found = i16::try_from(most.clamp(1, 5)).unwrap_or(1);
                 let bytes = filled(MESSAGE_LEN * 5, |out| f.cnc_rdopmsg3(h, -1, &mut found, out))?;
                 let count = usize::try_from(found).unwrap_or(0).min(5);
-                Ok(FocasAnswer::Messages((0..count).map(|at| message(&bytes, at * MESSAGE_LEN)).collect()))
+                Ok(FocasAnswer::Messages(
+                    (0..count).map(|at| message(&bytes, at * MESSAGE_LEN, self.encoding)).collect(),
+                ))
             }
             FocasItem::GCodes => {
                 let mut found = G_CODES_MAX;
@@ -57,7 +63,7 @@ impl FocasSession {
                 let length = HISTORY_HEAD_LEN + HISTORY_LEN * count;
                 let asked = u16::try_from(length).unwrap_or(u16::MAX);
                 let bytes = filled(length, |out| f.cnc_rdalmhistry(h, first, last, asked, out))?;
-                let record = |at: usize| past_alarm(&bytes, HISTORY_HEAD_LEN + at * HISTORY_LEN);
+                let record = |at: usize| past_alarm(&bytes, HISTORY_HEAD_LEN + at * HISTORY_LEN, self.encoding);
                 Ok(FocasAnswer::History((0..count).map(record).collect()))
             }
             _ => Err(FocasItemError::NotOffered),
@@ -82,16 +88,16 @@ impl FocasSession {
     }
 }
 
-fn message(bytes: &Bytes, at: usize) -> OperatorMessage {
+fn message(bytes: &Bytes, at: usize, encoding: TextEncoding) -> OperatorMessage {
     let length = usize::try_from(bytes.i16(at + 4)).unwrap_or(0).min(256);
     let (number, kind) = (i32::from(bytes.i16(at)), i32::from(bytes.i16(at + 2)));
-    OperatorMessage { number, kind, text: bytes.text(at + 6, length) }
+    OperatorMessage { number, kind, text: bytes.text_in(at + 6, length, encoding) }
 }
 
-fn past_alarm(bytes: &Bytes, at: usize) -> PastAlarm {
+fn past_alarm(bytes: &Bytes, at: usize, encoding: TextEncoding) -> PastAlarm {
     let byte = |offset: usize| i16::from(bytes.array::<1>(at + offset)[0]);
     let length = usize::try_from(bytes.i16(at + 12)).unwrap_or(0).min(32);
     let (kind, number) = (i32::from(bytes.i16(at)), i32::from(bytes.i16(at + 2)));
-    let alarm = Alarm { number, kind, axis: i32::from(byte(4)), text: bytes.text(at + 14, length) };
+    let alarm = Alarm { number, kind, axis: i32::from(byte(4)), text: bytes.text_in(at + 14, length, encoding) };
     PastAlarm { alarm, at: [byte(5), byte(6), byte(7), byte(8), byte(9), byte(10)] }
 }

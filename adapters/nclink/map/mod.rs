@@ -4,8 +4,12 @@ use super::decode::{self, ChannelWord};
 use super::liberal::integer;
 use super::message::{NcLinkAnswer, RequestedItem, first_number};
 use super::model::{Model, ModelItem};
+use super::own::OwnPath;
 use crate::channel::ChannelId;
-use crate::reading::{Absence, Reading, Stamp};
+use crate::conversion::{self, Conversion};
+use crate::driver::SourceProblem;
+use crate::own::Own;
+use crate::reading::{Absence, Reading, Stamp, Value as Held};
 use serde_json::Value;
 use std::sync::Arc;
 
@@ -47,17 +51,17 @@ const FIXED: [ItemRow; 10] = [
     ("CONTROLLER/VARIABLE@REG_F", "mode", How::ChannelWord),
 ];
 
-/// Below `AXIS@n`: item, ending of the channel's name.
-const LINEAR: [(&str, &str); 3] = [
-    ("SCREW/POSITION", "axis_position_mm"),
-    ("SCREW/SPEED", "axis_velocity_mm_min"),
-    ("MOTOR/CURRENT", "axis_current_a"),
+/// Below `AXIS@n`: item, where others put it, ending of the channel's name.
+const LINEAR: [(&str, &str, &str); 3] = [
+    ("SCREW/POSITION", "POSITION", "axis_position_mm"),
+    ("SCREW/SPEED", "SPEED", "axis_velocity_mm_min"),
+    ("MOTOR/CURRENT", "CURRENT", "axis_current_a"),
 ];
 
-const SPINDLE: [(&str, &str); 3] = [
-    ("SERVO_DRIVER/SPEED", "spindle_programmed_rpm"),
-    ("MOTOR/SPEED", "spindle_speed_rpm"),
-    ("MOTOR/CURRENT", "spindle_current_a"),
+const SPINDLE: [(&str, &str, &str); 3] = [
+    ("SERVO_DRIVER/SPEED", "PROGRAMMED_SPEED", "spindle_programmed_rpm"),
+    ("MOTOR/SPEED", "SPEED", "spindle_speed_rpm"),
+    ("MOTOR/CURRENT", "CURRENT", "spindle_current_a"),
 ];
 
 fn line(value: &Value) -> Option<String> {
@@ -72,14 +76,21 @@ fn alarm(value: &Value) -> Option<String> {
     Some(decode::alarm(value))
 }
 
-/// Every channel that a device can feed; those that it has not are absent with a reason.
-pub(super) fn channels() -> Vec<ChannelId> {
+/// Every channel that a device can feed, and the user's own; those that it has not are absent with a reason.
+#[must_use]
+pub(super) fn channels(own: &[Own<OwnPath>]) -> Vec<ChannelId> {
     let fixed = FIXED.iter().map(|(_, channel, _)| (*channel).to_owned());
     let axes =
-        ["x", "y", "z"].into_iter().flat_map(|axis| LINEAR.iter().map(move |(_, name)| format!("{axis}_{name}")));
-    let spindle = SPINDLE.iter().map(|(_, name)| (*name).to_owned());
+        ["x", "y", "z"].into_iter().flat_map(|axis| LINEAR.iter().map(move |(.., name)| format!("{axis}_{name}")));
+    let spindle = SPINDLE.iter().map(|(.., name)| (*name).to_owned());
     let names = fixed.chain(axes).chain(spindle).chain(["operation".to_owned()]);
-    names.filter_map(|name| ChannelId::of(&name)).collect()
+    let mut channels: Vec<ChannelId> = names.filter_map(|name| ChannelId::of(&name)).collect();
+    for own in own {
+        if !channels.contains(&own.id) {
+            channels.push(own.id);
+        }
+    }
+    channels
 }
 
 /// One item that is asked for at every poll.
@@ -87,6 +98,10 @@ pub(super) fn channels() -> Vec<ChannelId> {
 struct PolledItem {
     channel: ChannelId,
     how: How,
+    /// From the unit of the device to that of the channel; `None` where that is not known.
+    conversion: Option<Conversion>,
+    /// The user's own channel, whose way of reading goes before `how`.
+    own: Option<Own<OwnPath>>,
 }
 
 /// What is asked of this device, and what becomes of its answers.
@@ -98,38 +113,120 @@ pub(super) struct NcLinkPoll {
     execution: Option<ChannelId>,
     /// Channels that this device does not have.
     absent: Vec<ChannelId>,
+    /// Channels whose place the user has told.
+    named: Vec<ChannelId>,
+    /// What of the model cannot be used as it is.
+    problems: Vec<SourceProblem>,
 }
 
 impl NcLinkPoll {
     /// The plan for a device; its items are named by path or by node number.
-    pub(super) fn of(model: &Model, layout: NcLinkLayout, by_path: bool) -> Self {
+    pub(super) fn of(model: &Model, layout: NcLinkLayout, own: &[Own<OwnPath>], by_path: bool) -> Self {
+        let named: Vec<ChannelId> = own.iter().map(|own| own.id).collect();
+        let computed = |name| ChannelId::of(name).filter(|channel| !named.contains(channel));
         let mut plan =
-            Self { operation: ChannelId::of("operation"), execution: ChannelId::of("execution"), ..Self::default() };
+            Self { operation: computed("operation"), execution: computed("execution"), named, ..Self::default() };
         for (path, channel, how) in FIXED {
             let indexes: &[u32] = if matches!(how, How::ChannelWord) { &[layout.f_channel] } else { &[] };
             plan.add(model, (path, channel, how), indexes, by_path);
         }
         plan.add(model, ("CONTROLLER/VARIABLE@CHAN_0", "operation", How::Tapping), &[RIGID_TAPPING], by_path);
         for (number, letter) in axes(model, layout) {
-            let (rows, beginning): (&[(&str, &str)], _) = match letter {
+            let (rows, beginning): (&[(&str, &str, &str)], _) = match letter {
                 Some(letter) => (&LINEAR, format!("{letter}_")),
                 None => (&SPINDLE, String::new()),
             };
-            for (item, channel) in rows {
-                let path = format!("AXIS@{number}/{item}");
-                plan.add(model, (&path, &format!("{beginning}{channel}"), How::Number), &[], by_path);
+            for (item, other, channel) in rows {
+                let path = [item, other].map(|item| format!("AXIS@{number}/{item}"));
+                let path = path.iter().find(|path| model.find(path).is_some()).unwrap_or(&path[0]);
+                plan.add(model, (path, &format!("{beginning}{channel}"), How::Number), &[], by_path);
             }
         }
+        own.iter().for_each(|own| plan.add_own(model, own, by_path));
         let fed: Vec<ChannelId> = plan.entries.iter().map(|entry| entry.channel).collect();
-        plan.absent = channels().into_iter().filter(|channel| !fed.contains(channel)).collect();
+        plan.absent = channels(own).into_iter().filter(|channel| !fed.contains(channel)).collect();
         plan
     }
 
     fn add(&mut self, model: &Model, row: (&str, &str, How), indexes: &[u32], by_path: bool) {
         let (path, channel, how) = row;
-        let (Some(item), Some(channel)) = (model.find(path), ChannelId::of(channel)) else { return };
+        // Where the user has said what feeds a channel, that counts.
+        let Some(channel) = ChannelId::of(channel).filter(|channel| !self.named.contains(channel)) else { return };
+        let Some(item) = model.find(path).or_else(|| self.elsewhere(model, path, channel)) else { return };
+        let conversion =
+            if matches!(how, How::Number) { self.conversion(item, channel) } else { Some(Conversion::NONE) };
         self.asks.push(RequestedItem::elements(name(item, by_path).as_str(), indexes));
-        self.entries.push(PolledItem { channel, how });
+        self.entries.push(PolledItem { channel, how, conversion, own: None });
+    }
+
+    fn add_own(&mut self, model: &Model, own: &Own<OwnPath>, by_path: bool) {
+        let Some(item) = model.find(&own.item.name) else {
+            return self.problems.push(SourceProblem {
+                what: format!("{} has no value: the device's model has no {}", own.id, own.item.name),
+                next: "Write the path as doctor --all lists it".to_owned(),
+            });
+        };
+        let is_text = own.channel.new.unit.is_empty();
+        let conversion = if is_text { Some(Conversion::NONE) } else { self.conversion(item, own.id) };
+        let indexes: Vec<u32> = own.item.index.into_iter().collect();
+        self.asks.push(RequestedItem::elements(name(item, by_path).as_str(), &indexes));
+        self.entries.push(PolledItem { channel: own.id, how: How::Number, conversion, own: Some(own.clone()) });
+    }
+
+    /// The only item that ends in the same word, wherever it stands; with several, nobody knows which is meant.
+    fn elsewhere<'a>(&mut self, model: &'a Model, path: &'a str, channel: ChannelId) -> Option<&'a ModelItem> {
+        if path.starts_with("AXIS@") || path.contains("VARIABLE@") {
+            return None;
+        }
+        let found: Vec<&ModelItem> = model.elsewhere(path).collect();
+        if let [only] = found.as_slice() {
+            return Some(only);
+        }
+        if !found.is_empty() {
+            let places: Vec<&str> = found.iter().map(|item| item.path.as_str()).collect();
+            self.problems.push(SourceProblem {
+                what: format!("{channel} has no value: the device has {path} in several places, {}", places.join(", ")),
+                next: format!(
+                    "Name one of them: [[source.channel]] with name = \"{channel}\" and read = \"{}\"",
+                    places[0]
+                ),
+            });
+        }
+        None
+    }
+
+    /// From the unit that the model tells to that of the channel. A model without units means those of the channels.
+    fn conversion(&mut self, item: &ModelItem, channel: ChannelId) -> Option<Conversion> {
+        let Some(unit) = &item.unit else { return Some(Conversion::NONE) };
+        let wanted = channel.channel().unit;
+        let found = conversion::between(unit, wanted);
+        if found.is_none() {
+            let why = if conversion::is_known(unit) {
+                "which measures something else"
+            } else {
+                "which is no unit that is known"
+            };
+            self.problems.push(SourceProblem {
+                what: format!(
+                    "{channel} has no value: the device gives {} in {unit:?}, {why}; {wanted} is wanted",
+                    item.path
+                ),
+                next: "Correct the unit in the device's model, or read it as a channel of your own with a scale"
+                    .to_owned(),
+            });
+        }
+        found
+    }
+
+    /// What of the model cannot be used as it is.
+    pub(super) fn problems(&self) -> &[SourceProblem] {
+        &self.problems
+    }
+
+    /// The channel that takes the item of this name and, of a list, any of its elements.
+    pub(super) fn takes(&self, id: &str) -> Option<ChannelId> {
+        let at = self.asks.iter().position(|ask| ask.id == id)?;
+        self.entries.get(at).map(|entry| entry.channel)
     }
 
     /// One request for everything.
@@ -150,6 +247,7 @@ impl NcLinkPoll {
         }
         for (entry, answer) in self.entries.iter().zip(answers) {
             let reading = match entry.how {
+                _ if entry.own.is_some() || entry.conversion.is_none() => entry.number(answer, stamp),
                 How::Tapping => continue,
                 How::ChannelWord => {
                     entry.text(answer, stamp, |value| Some(ChannelWord(integer(value)?).mode().to_owned()))
@@ -191,6 +289,12 @@ impl PolledItem {
     }
 
     fn number(&self, answer: &Option<NcLinkAnswer>, stamp: Stamp) -> Reading {
+        let Some(conversion) = self.conversion else {
+            return Reading::absent(self.channel, stamp, Absence::UnknownUnit);
+        };
+        if let Some(own) = &self.own {
+            return own.reading(stamp, own.found(answer.as_ref()).map(|value| converted(value, conversion)));
+        }
         let found = self.value(answer).and_then(|value| {
             if value.is_null() {
                 Err(Absence::NotYetRead)
@@ -199,7 +303,7 @@ impl PolledItem {
             }
         });
         match found {
-            Ok(number) => Reading::number(self.channel, stamp, number),
+            Ok(number) => Reading::number(self.channel, stamp, conversion.of(number)),
             Err(reason) => Reading::absent(self.channel, stamp, reason),
         }
     }
@@ -218,7 +322,15 @@ impl PolledItem {
     }
 }
 
-fn name(item: &ModelItem, by_path: bool) -> String {
+fn converted(value: Held, conversion: Conversion) -> Held {
+    match value {
+        Held::Number(number) => Held::Number(conversion.of(number)),
+        text @ Held::Text(_) => text,
+    }
+}
+
+/// The name by which the device knows an item.
+pub(super) fn name(item: &ModelItem, by_path: bool) -> String {
     if by_path { format!("/{}", item.path) } else { item.id.clone() }
 }
 

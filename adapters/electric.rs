@@ -1,0 +1,229 @@
+//! Can this be a supply? What the values of one answer of a power meter say about each other.
+//!
+//! A meter that is read with the map of another one answers promptly and nothing fails: 0 W, 4e-35 V. Its voltage gives it away,
+//! because a meter that measures anything hangs on a supply. So a voltage that no supply has costs everything in the same answer its
+//! value, and so does an answer that is all zero for one poll. What is missing on one phase only, and powers that contradict each
+//! other, cost themselves. Nothing is corrected.
+//!
+//! Limits: low-voltage supplies of the world are 100 to 400 V against neutral (IEC 60038), with 20 % on either side; 45 to
+//! 65 Hz holds 50 and 60 Hz with 10 %. Powers of phases and their sum are refreshed one after the other by some meters; only what stays
+//! apart for [`LASTS`] answers counts.
+
+use crate::driver::SourceProblem;
+
+/// A phase against neutral, V.
+const PHASE_V: (f64, f64) = (80.0, 480.0);
+/// Between two phases, V.
+const LINE_V: (f64, f64) = (138.0, 831.0);
+/// Of the supply, Hz.
+const SUPPLY_HZ: (f64, f64) = (45.0, 65.0);
+/// Powers of the phases and their sum may be apart by this share, and by so many watts.
+const APART: (f64, f64) = (0.1, 20.0);
+/// So many answers in a row.
+const LASTS: u32 = 2;
+
+/// What one answer of a meter says, in W, A, V, Hz and VA; what it does not measure is `None`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SupplyValues {
+    /// Of all phases together.
+    pub power: Option<f64>,
+    /// Of each phase.
+    pub phase_power: [Option<f64>; 3],
+    /// Of each phase.
+    pub current: [Option<f64>; 3],
+    /// Of each phase against neutral.
+    pub voltage: [Option<f64>; 3],
+    /// Between two phases.
+    pub line_voltage: Option<f64>,
+    /// Of the supply.
+    pub frequency: Option<f64>,
+    /// Of all phases together.
+    pub power_factor: Option<f64>,
+    /// Of all phases together.
+    pub apparent_power: Option<f64>,
+}
+
+/// What is not believed of an answer.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Doubts {
+    /// All of it.
+    pub everything: bool,
+    /// The voltage of the supply.
+    pub voltage: bool,
+    /// Powers, power factor.
+    pub power: bool,
+    /// Frequency.
+    pub frequency: bool,
+    /// Why, in words.
+    pub problems: Vec<SourceProblem>,
+}
+
+/// Looks at the answers of one meter.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SupplyCheck {
+    /// Answers in a row in which the phases do not make the sum.
+    sum_apart: u32,
+    /// Answers in a row with less apparent than active power.
+    less_apparent: u32,
+}
+
+const WRONG_MAP: &str = "Compare with the meter's own display: is this the profile of this very model, with its word order? doctor --all tries \
+                         the shipped profiles";
+
+fn within(number: f64, (least, greatest): (f64, f64)) -> bool {
+    number >= least && number <= greatest
+}
+
+impl SupplyCheck {
+    /// What is not believed of this answer.
+    pub fn see(&mut self, values: &SupplyValues) -> Doubts {
+        let mut doubts = Doubts::default();
+        voltages(values, &mut doubts);
+        self.powers(values, &mut doubts);
+        if let Some(hz) = values.frequency.filter(|hz| !within(*hz, SUPPLY_HZ)) {
+            let what = format!("the meter says {hz:.4e} Hz, which is no frequency of a supply");
+            doubts.add(what, WRONG_MAP, |doubts| doubts.frequency = true);
+        }
+        zeros(values, &mut doubts);
+        doubts
+    }
+
+    fn powers(&mut self, values: &SupplyValues, doubts: &mut Doubts) {
+        let phases: Vec<f64> = values.phase_power.iter().flatten().copied().collect();
+        let sum: f64 = phases.iter().sum();
+        let apart = |total: f64| {
+            let size = phases.iter().map(|power| power.abs()).sum::<f64>().max(total.abs());
+            (total - sum).abs() > APART.0 * size + APART.1
+        };
+        let is_apart = values.power.is_some_and(|total| phases.len() == 3 && apart(total));
+        self.sum_apart = if is_apart { self.sum_apart + 1 } else { 0 };
+        let less = |(apparent, power): (f64, f64)| apparent < power.abs() * (1.0 - APART.0) - APART.1;
+        let is_less = values.apparent_power.zip(values.power).is_some_and(less);
+        self.less_apparent = if is_less { self.less_apparent + 1 } else { 0 };
+        if self.sum_apart >= LASTS {
+            let what = format!(
+                "the powers of the phases make {sum:.0} W, and the meter says {:.0} W",
+                values.power.unwrap_or(0.0)
+            );
+            doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
+        }
+        if self.less_apparent >= LASTS {
+            let (apparent, power) = (values.apparent_power.unwrap_or(0.0), values.power.unwrap_or(0.0));
+            let what = format!(
+                "the meter says {apparent:.0} VA of apparent power and {power:.0} W of active power, which cannot be more"
+            );
+            doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
+        }
+        if let Some(factor) = values.power_factor.filter(|factor| factor.abs() > 1.001) {
+            let what = format!("the meter says a power factor of {factor:.4e}, which cannot be more than 1");
+            doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
+        }
+    }
+}
+
+fn voltages(values: &SupplyValues, doubts: &mut Doubts) {
+    let phases: Vec<(usize, f64)> = (1..).zip(values.voltage).filter_map(|(at, volts)| Some((at, volts?))).collect();
+    let bad: Vec<&(usize, f64)> = phases.iter().filter(|(_, volts)| !within(*volts, PHASE_V)).collect();
+    let line_bad = values.line_voltage.filter(|volts| !within(*volts, LINE_V));
+    let some_good = bad.len() < phases.len() || (values.line_voltage.is_some() && line_bad.is_none());
+    let told = |(at, volts): &(usize, f64)| format!("phase {at} {volts:.4e} V");
+    let mut all: Vec<String> = bad.iter().map(|phase| told(phase)).collect();
+    all.extend(line_bad.map(|volts| format!("between phases {volts:.4e} V")));
+    if all.is_empty() {
+        return;
+    }
+    let all = all.join(", ");
+    if some_good {
+        let next = "Look at the fuse and the voltage input of this phase; a meter on one phase needs a profile with one voltage";
+        return doubts.add(format!("a phase has no voltage of a supply: {all}"), next, |doubts| doubts.voltage = true);
+    }
+    let what = format!("the meter shows no supply voltage ({all}), so nothing that it says is believed");
+    let next = "Is the main switch off? Else the registers are those of another meter: choose its profile; doctor --all tries the \
+                shipped ones";
+    doubts.add(what, next, |doubts| doubts.everything = true);
+}
+
+/// A meter without voltage and frequency that says nothing but zero: perhaps nothing flows.
+fn zeros(values: &SupplyValues, doubts: &mut Doubts) {
+    let said = [values.power, values.power_factor, values.apparent_power];
+    let mut said: Vec<f64> = said.into_iter().chain(values.phase_power).chain(values.current).flatten().collect();
+    let witness = values.voltage.iter().any(Option::is_some) || values.line_voltage.or(values.frequency).is_some();
+    said.retain(|number| *number != 0.0);
+    let count =
+        values.phase_power.iter().chain(&values.current).flatten().count() + usize::from(values.power.is_some());
+    if !witness && said.is_empty() && count >= 2 {
+        let next = "Nothing may flow; else compare with the meter's display, and read a voltage too, which would tell";
+        doubts.add("the meter says nothing but zero".to_owned(), next, |_| {});
+    }
+}
+
+impl Doubts {
+    fn add(&mut self, what: String, next: &str, mark: impl FnOnce(&mut Self)) {
+        mark(self);
+        self.problems.push(SourceProblem { what, next: next.to_owned() });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn well() -> SupplyValues {
+        SupplyValues {
+            power: Some(3000.0),
+            phase_power: [Some(1000.0); 3],
+            current: [Some(5.0); 3],
+            voltage: [Some(230.0); 3],
+            line_voltage: None,
+            frequency: Some(50.0),
+            power_factor: Some(0.9),
+            apparent_power: Some(3300.0),
+        }
+    }
+
+    #[test]
+    fn a_meter_that_measures_is_believed() {
+        let mut check = SupplyCheck::default();
+        for values in [
+            well(),
+            SupplyValues { power: Some(-3000.0), phase_power: [Some(-1000.0); 3], power_factor: Some(-0.9), ..well() },
+            SupplyValues { power: Some(4000.0), ..SupplyValues::default() },
+            SupplyValues { voltage: [Some(120.0); 3], ..well() },
+            SupplyValues { voltage: [None; 3], line_voltage: Some(400.0), ..well() },
+        ] {
+            assert_eq!(check.see(&values), Doubts::default(), "{values:?}");
+        }
+    }
+
+    #[test]
+    fn what_no_supply_has_costs_everything() {
+        for volts in [0.0, 4e-35, 2.3, 23_000.0, -230.0] {
+            let doubts = SupplyCheck::default().see(&SupplyValues { voltage: [Some(volts); 3], ..well() });
+            assert!(doubts.everything && doubts.problems.len() == 1, "{volts}: {doubts:?}");
+        }
+        let one =
+            SupplyCheck::default().see(&SupplyValues { voltage: [Some(230.0), Some(0.0), Some(230.0)], ..well() });
+        assert!(!one.everything && one.voltage && one.problems[0].what.contains("phase 2"), "{one:?}");
+    }
+
+    #[test]
+    fn powers_that_contradict_each_other_are_not_believed_when_they_stay_apart() {
+        let wrong = SupplyValues { power: Some(9000.0), ..well() };
+        let mut check = SupplyCheck::default();
+        assert!(!check.see(&wrong).power, "a meter may refresh them one after the other");
+        assert!(check.see(&wrong).power);
+        assert!(!check.see(&well()).power);
+        let apparent = SupplyValues { apparent_power: Some(1000.0), ..well() };
+        check.see(&apparent);
+        assert!(check.see(&apparent).power);
+        assert!(check.see(&SupplyValues { power_factor: Some(90.0), ..well() }).power);
+        assert!(check.see(&SupplyValues { frequency: Some(0.05), ..well() }).frequency);
+    }
+
+    #[test]
+    fn nothing_but_zero_is_told() {
+        let zero = SupplyValues { power: Some(0.0), current: [Some(0.0); 3], ..SupplyValues::default() };
+        let doubts = SupplyCheck::default().see(&zero);
+        assert!(!doubts.everything && doubts.problems.len() == 1, "{doubts:?}");
+    }
+}

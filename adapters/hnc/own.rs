@@ -1,0 +1,117 @@
+//! What the user can have read through the vendor's library of a Huazhong control, by the numbers of its headers. Written in
+//! the configuration as
+//!
+//! ```text
+//! read = "register D120"        read = "channel 7 real"        read = "system 24 text"
+//! read = "register G2560.3"     read = "axis 5 29 real"
+//! ```
+
+use super::answer::{HncAnswer, HncItemResult};
+use super::item::{HncItem, HncWidth, register_type};
+use crate::nclink::mailbox::ControllerRegister;
+use crate::own::{Own, OwnRead};
+use crate::reading::{Absence, Value};
+use std::sync::Arc;
+
+/// A value of the library.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OwnValue {
+    /// What is asked.
+    pub item: HncItem,
+    /// A single bit of a register.
+    pub bit: Option<u8>,
+}
+
+impl OwnRead for OwnValue {
+    fn read(text: &str) -> Result<Self, String> {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let plain = |item| Some(Self { item, bit: None });
+        let found = match words.as_slice() {
+            ["register", place] => register(place),
+            ["channel", kind, rest @ ..] => {
+                number(kind).zip(width(rest)).and_then(|(kind, width)| plain(HncItem::Channel(kind, 0, width)))
+            }
+            ["axis", axis, kind, rest @ ..] => number(axis)
+                .zip(number(kind))
+                .zip(width(rest))
+                .and_then(|((axis, kind), width)| plain(HncItem::Axis(kind, axis, width))),
+            ["system", kind, rest @ ..] => {
+                number(kind).zip(width(rest)).and_then(|(kind, width)| plain(HncItem::System(kind, width)))
+            }
+            _ => None,
+        };
+        found.ok_or_else(|| {
+            format!(
+                "`{text}` is nothing that can be read; write `register D120`, `register G2560.3`, `channel 7 real`, \
+                 `axis 5 29 real` or `system 24 text`"
+            )
+        })
+    }
+
+    fn is_text(&self) -> Option<bool> {
+        let width = match self.item {
+            HncItem::System(_, width) | HncItem::Channel(_, _, width) | HncItem::Axis(_, _, width) => width,
+            _ => HncWidth::Whole,
+        };
+        Some(width == HncWidth::Text)
+    }
+}
+
+fn number(text: &str) -> Option<i32> {
+    text.parse().ok().filter(|number| (0..10_000).contains(number))
+}
+
+fn width(words: &[&str]) -> Option<HncWidth> {
+    match words {
+        [] | ["whole"] => Some(HncWidth::Whole),
+        ["real"] => Some(HncWidth::Real),
+        ["text"] => Some(HncWidth::Text),
+        _ => None,
+    }
+}
+
+fn register(place: &str) -> Option<OwnValue> {
+    let (name, bit) = place.split_once('.').map_or((place, None), |(name, bit)| (name, Some(bit)));
+    let at: ControllerRegister = name.parse().ok()?;
+    let index = i32::try_from(at.index).ok()?;
+    let bit = match bit {
+        None => None,
+        Some(bit) => Some(bit.parse::<u8>().ok().filter(|bit| *bit < 32)?),
+    };
+    Some(OwnValue { item: HncItem::Register(register_type(at)?, index), bit })
+}
+
+impl Own<OwnValue> {
+    /// What was answered, before the scale.
+    ///
+    /// # Errors
+    /// There is no value of the kind that the channel has.
+    pub(super) fn found(&self, result: &HncItemResult) -> Result<Value, Absence> {
+        match (result, self.item.bit) {
+            (Ok(HncAnswer::Whole(whole)), Some(bit)) => Value::number(f64::from(whole >> bit & 1)),
+            (Ok(HncAnswer::Whole(whole)), None) => Value::number(f64::from(*whole)),
+            (Ok(HncAnswer::Real(real)), _) => Value::number(*real),
+            (Ok(HncAnswer::Text(text)), _) => Ok(Value::Text(Arc::from(text.as_str()))),
+            (Ok(HncAnswer::Alarms(_)), _) => Err(Absence::OutOfRange),
+            (Err(error), _) => Err(error.absence()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_can_be_read() {
+        let of = |text: &str| OwnValue::read(text).map(|value| (value.item, value.bit));
+        assert_eq!(of("register D120"), Ok((HncItem::Register(6, 120), None)));
+        assert_eq!(of("register G2560.3"), Ok((HncItem::Register(3, 2560), Some(3))));
+        assert_eq!(of("channel 7 real"), Ok((HncItem::Channel(7, 0, HncWidth::Real), None)));
+        assert_eq!(of("axis 5 29 real"), Ok((HncItem::Axis(29, 5, HncWidth::Real), None)));
+        assert_eq!(OwnValue::read("system 24 text").map(|value| value.is_text()), Ok(Some(true)));
+        for wrong in ["", "register", "register Q1", "register D1.40", "channel x", "axis 5", "channel 7 float"] {
+            assert!(of(wrong).is_err_and(|why| why.contains("register D120")), "{wrong}");
+        }
+    }
+}

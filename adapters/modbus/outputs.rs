@@ -1,0 +1,193 @@
+//! From the registers of a meter to channels, and to what they say about each other.
+
+use super::poll::RegisterPoll;
+use super::profile::Profile;
+use super::register::{MeterRegister, RegisterMeaning};
+use crate::address::{Circuit, MeterTarget};
+use crate::channel::ChannelId;
+use crate::electric::{Doubts, SupplyValues};
+use crate::reading::Reading;
+
+/// How the registers of an output are put together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Law {
+    Sum,
+    Mean,
+    /// Mean of the phases against neutral, times the square root of three.
+    BetweenPhases,
+}
+
+/// What a doubt about the answer costs an output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Believed {
+    /// Nothing: it is no electrical quantity.
+    Always,
+    /// Its value, while all of the answer is in doubt.
+    WithAll,
+    /// As a power.
+    AsPower,
+    /// As the voltage of the supply.
+    AsVoltage,
+    /// As its frequency.
+    AsFrequency,
+}
+
+/// A channel and the registers that it comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MeterChannel {
+    pub(super) channel: ChannelId,
+    law: Law,
+    believed: Believed,
+    /// Places in the list of registers.
+    parts: Vec<usize>,
+}
+
+impl Law {
+    fn of(self, numbers: &[f64]) -> f64 {
+        let sum: f64 = numbers.iter().sum();
+        let count = f64::from(u32::try_from(numbers.len()).unwrap_or(1)).max(1.0);
+        match self {
+            Self::Sum => sum,
+            Self::Mean => sum / count,
+            Self::BetweenPhases => 3.0_f64.sqrt() * sum / count,
+        }
+    }
+}
+
+impl Believed {
+    fn is_doubted(self, doubts: &Doubts) -> bool {
+        match self {
+            Self::Always => false,
+            Self::WithAll => doubts.everything,
+            Self::AsPower => doubts.everything || doubts.power,
+            Self::AsVoltage => doubts.everything || doubts.voltage,
+            Self::AsFrequency => doubts.everything || doubts.frequency,
+        }
+    }
+}
+
+impl MeterChannel {
+    /// What the last poll says of it.
+    pub(super) fn reading(&self, registers: &[MeterRegister], poll: &RegisterPoll, doubts: &Doubts) -> Reading {
+        let mut numbers = Vec::with_capacity(3);
+        let mut at = None;
+        for register in self.parts.iter().filter_map(|part| registers.get(*part)) {
+            match poll.number(register) {
+                Ok((number, stamp)) => {
+                    at = Some(stamp);
+                    numbers.push(number);
+                }
+                Err((reason, stamp)) => return Reading::absent(self.channel, stamp, reason),
+            }
+        }
+        let stamp = at.unwrap_or_else(|| poll.all().1);
+        let number = self.law.of(&numbers);
+        if self.believed.is_doubted(doubts) {
+            return Reading::implausible(self.channel, stamp, number);
+        }
+        Reading::number(self.channel, stamp, number)
+    }
+}
+
+/// The registers of a profile with the transformers in them that the meter does not count in.
+///
+/// # Errors
+/// Transformers were given for a meter that counts them in.
+pub(super) fn registers(profile: &Profile, meter: &MeterTarget) -> Result<Vec<MeterRegister>, String> {
+    let given = (meter.ct - 1.0).abs() > 1e-12 || (meter.pt - 1.0).abs() > 1e-12;
+    if given && !profile.secondary {
+        return Err(format!("{} counts its transformers in: leave ct and pt out", profile.meter));
+    }
+    let ratio = |quantity| match quantity {
+        RegisterMeaning::Power
+        | RegisterMeaning::PhasePower(_)
+        | RegisterMeaning::Energy
+        | RegisterMeaning::ApparentPower => meter.ct * meter.pt,
+        RegisterMeaning::Current(_) => meter.ct,
+        RegisterMeaning::Voltage(_) | RegisterMeaning::LineVoltage => meter.pt,
+        RegisterMeaning::PowerFactor | RegisterMeaning::Frequency | RegisterMeaning::Channel(_) => 1.0,
+    };
+    let scaled = |register: &MeterRegister| {
+        let mut register = register.clone();
+        register.conversion.scale *= ratio(register.quantity);
+        register
+    };
+    Ok(profile.registers.iter().map(scaled).collect())
+}
+
+/// The channels of a profile.
+///
+/// # Errors
+/// It gives none, or one twice.
+pub(super) fn of(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel>, String> {
+    let all = |wanted: &dyn Fn(RegisterMeaning) -> bool| -> Vec<usize> {
+        let each = profile.registers.iter().enumerate();
+        each.filter(|(_, register)| wanted(register.quantity)).map(|(at, _)| at).collect()
+    };
+    let one = |wanted: RegisterMeaning| all(&|quantity| quantity == wanted);
+    let (total, line) = (one(RegisterMeaning::Power), one(RegisterMeaning::LineVoltage));
+    let phases = all(&|quantity| matches!(quantity, RegisterMeaning::PhasePower(_)));
+    let currents = all(&|quantity| matches!(quantity, RegisterMeaning::Current(_)));
+    let voltages = all(&|quantity| matches!(quantity, RegisterMeaning::Voltage(_)));
+    let place = if circuit == Circuit::Spindle { "spindle" } else { "total" };
+    let mut outputs = Vec::new();
+    let mut add = |name: &str, law, believed, parts: Vec<usize>| {
+        if let Some(channel) = ChannelId::of(name).filter(|_| !parts.is_empty()) {
+            outputs.push(MeterChannel { channel, law, believed, parts });
+        }
+    };
+    let power = if total.is_empty() { phases } else { total };
+    add(&format!("{place}_power_w"), Law::Sum, Believed::AsPower, power);
+    if circuit == Circuit::Spindle {
+        add("spindle_current_a", Law::Mean, Believed::WithAll, currents);
+    }
+    let (law, voltages) = if line.is_empty() { (Law::BetweenPhases, voltages) } else { (Law::Mean, line) };
+    add("supply_voltage_v", law, Believed::AsVoltage, voltages);
+    for (name, believed, meaning) in [
+        (format!("{place}_energy_kwh"), Believed::WithAll, RegisterMeaning::Energy),
+        (format!("{place}_power_factor"), Believed::AsPower, RegisterMeaning::PowerFactor),
+        (format!("{place}_apparent_power_va"), Believed::AsPower, RegisterMeaning::ApparentPower),
+        ("supply_frequency_hz".to_owned(), Believed::AsFrequency, RegisterMeaning::Frequency),
+    ] {
+        add(&name, Law::Mean, believed, one(meaning));
+    }
+    for (at, register) in profile.registers.iter().enumerate() {
+        if let RegisterMeaning::Channel(channel) = register.quantity {
+            let believed = if channel.channel().is_electric() { Believed::WithAll } else { Believed::Always };
+            outputs.push(MeterChannel { channel, law: Law::Sum, believed, parts: vec![at] });
+        }
+    }
+    let mut seen = Vec::new();
+    for output in &outputs {
+        if seen.contains(&output.channel) {
+            return Err(format!("profile {} gives {} twice", profile.name, output.channel));
+        }
+        seen.push(output.channel);
+    }
+    if outputs.is_empty() { Err(format!("profile {} gives no channel", profile.name)) } else { Ok(outputs) }
+}
+
+/// What the last poll says of the supply.
+pub(super) fn supply(registers: &[MeterRegister], poll: &RegisterPoll) -> SupplyValues {
+    let mut values = SupplyValues::default();
+    for register in registers {
+        let number = poll.number(register).ok().map(|(number, _)| number);
+        let phase = |of: &mut [Option<f64>; 3], at: usize| {
+            if let Some(place) = of.get_mut(at) {
+                *place = number;
+            }
+        };
+        match register.quantity {
+            RegisterMeaning::Power => values.power = number,
+            RegisterMeaning::PhasePower(at) => phase(&mut values.phase_power, at),
+            RegisterMeaning::Current(at) => phase(&mut values.current, at),
+            RegisterMeaning::Voltage(at) => phase(&mut values.voltage, at),
+            RegisterMeaning::LineVoltage => values.line_voltage = number,
+            RegisterMeaning::PowerFactor => values.power_factor = number,
+            RegisterMeaning::ApparentPower => values.apparent_power = number,
+            RegisterMeaning::Frequency => values.frequency = number,
+            RegisterMeaning::Energy | RegisterMeaning::Channel(_) => {}
+        }
+    }
+    values
+}

@@ -1,0 +1,132 @@
+//! One poll of a meter: every block is asked for, and one that the meter does not give as a whole is read in parts from then on.
+
+use super::line::{ModbusError, ModbusLine};
+use super::pdu::{NoRegisters, RegisterBlock};
+use super::plan::PollBlocks;
+use super::register::MeterRegister;
+use crate::address::SerialTarget;
+use crate::clock::Clock;
+use crate::reading::{Absence, Stamp};
+use std::time::Duration;
+
+/// What a block gave, and when.
+type BlockAnswer = (Result<Vec<u16>, u8>, Stamp);
+
+/// The blocks of a meter and what the last poll brought.
+#[derive(Debug, Clone)]
+pub(super) struct RegisterPoll {
+    /// As the profile has it.
+    whole: PollBlocks,
+    /// As the meter gives it.
+    blocks: PollBlocks,
+    answers: Vec<BlockAnswer>,
+    /// Stamp of the last poll, for what was not read in it.
+    stamp: Stamp,
+}
+
+impl RegisterPoll {
+    pub(super) fn new(blocks: PollBlocks) -> Self {
+        Self { whole: blocks.clone(), blocks, answers: Vec::new(), stamp: Stamp::exact(0) }
+    }
+
+    /// Asks for everything once. A block that is refused is kept as refused while another one is answered.
+    ///
+    /// # Errors
+    /// Why nothing came, with what was asked for.
+    pub(super) fn read(
+        &mut self,
+        line: &mut dyn ModbusLine,
+        clock: &dyn Clock,
+        unit: u8,
+    ) -> Result<(), (ModbusError, String)> {
+        self.answers.clear();
+        self.stamp = Stamp::exact(clock.now_ns());
+        let mut refused = None;
+        while let Some(block) = self.blocks.blocks.get(self.answers.len()).copied() {
+            match ask(line, clock, unit, &block) {
+                Ok((registers, stamp)) => self.answers.push((Ok(registers), stamp)),
+                Err(ModbusError::Refused(code)) => {
+                    refused.get_or_insert((code, block.told()));
+                    self.refused(code, clock);
+                }
+                Err(fault) => return Err((fault, block.told())),
+            }
+        }
+        if self.answers.iter().any(|(answer, _)| answer.is_ok()) {
+            return Ok(());
+        }
+        // Perhaps it is another meter now: the next poll begins with whole blocks again.
+        self.blocks = self.whole.clone();
+        let (code, told) = refused.unwrap_or((2, "any register".to_owned()));
+        Err((ModbusError::Refused(code), told))
+    }
+
+    /// Exception 2 is an address that is not there, 3 a number of registers that is too great: the block is split, and its
+    /// parts are asked for next. Any other one is an answer.
+    fn refused(&mut self, code: u8, clock: &dyn Clock) {
+        if matches!(code, 2 | 3) {
+            self.blocks.split(self.answers.len());
+        } else {
+            self.answers.push((Err(code), Stamp::exact(clock.now_ns())));
+        }
+    }
+
+    /// The registers of a number, and when they were read.
+    pub(super) fn registers(&self, register: &MeterRegister) -> Result<(&[u16], Stamp), (Absence, Stamp)> {
+        let (block, offset) = self.blocks.place(register).ok_or((Absence::NotSupported, self.stamp))?;
+        let (answer, stamp) = self.answers.get(block).ok_or((Absence::NotYetRead, self.stamp))?;
+        match answer {
+            Ok(registers) => Ok((registers.get(offset..).unwrap_or_default(), *stamp)),
+            Err(_) => Err((Absence::Refused, *stamp)),
+        }
+    }
+
+    /// A number, in the unit of its quantity.
+    pub(super) fn number(&self, register: &MeterRegister) -> Result<(f64, Stamp), (Absence, Stamp)> {
+        let (registers, stamp) = self.registers(register)?;
+        // What a meter does not measure it gives as an IEEE number that is none, or as a number of its own that says so.
+        register.number(registers).map(|number| (number, stamp)).ok_or((Absence::NotSupported, stamp))
+    }
+
+    /// Everything that came, in order, with the time of its first block.
+    pub(super) fn all(&self) -> (impl Iterator<Item = u16> + Clone + '_, Stamp) {
+        let registers = self.answers.iter().filter_map(|(answer, _)| answer.as_ref().ok()).flatten().copied();
+        (registers, self.answers.first().map_or(self.stamp, |(_, stamp)| *stamp))
+    }
+
+    /// Does the meter have the registers of this number, as far as is known?
+    pub(super) fn has(&self, register: &MeterRegister) -> bool {
+        self.blocks.place(register).is_some()
+    }
+
+    /// Requests of a poll; more than the profile needs where the meter gives less at once.
+    pub(super) fn requests(&self) -> usize {
+        self.blocks.blocks.len()
+    }
+
+    /// Did the meter refuse a block of the profile?
+    pub(super) fn is_split(&self) -> bool {
+        self.blocks != self.whole
+    }
+
+    /// What a poll takes on a serial line.
+    pub(super) fn wire_time(&self, line: &SerialTarget) -> Duration {
+        self.blocks.wire_time(line)
+    }
+}
+
+fn ask(
+    line: &mut dyn ModbusLine,
+    clock: &dyn Clock,
+    unit: u8,
+    block: &RegisterBlock,
+) -> Result<(Vec<u16>, Stamp), ModbusError> {
+    let answer = line.ask(clock, unit, &block.request(), block.answer_bytes())?;
+    match block.registers(&answer.pdu) {
+        Ok(registers) => Ok((registers, answer.stamp)),
+        Err(NoRegisters::Refused(code)) => Err(ModbusError::Refused(code)),
+        Err(NoRegisters::Other(bytes)) => {
+            Err(ModbusError::Garbled(format!("{bytes} bytes that answer another question")))
+        }
+    }
+}

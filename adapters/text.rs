@@ -1,0 +1,150 @@
+//! Texts of devices: bytes in the character set of whoever built them.
+//!
+//! A control in a Chinese shop sends GBK, one in a Japanese shop Shift JIS, a newer one UTF-8, and none of them says so. The
+//! address of a source names the set (`encoding=gbk`), or leaves it to be found out: what is UTF-8 is UTF-8, what is no UTF-8
+//! and is GB 18030 (which holds GBK) is that. Bytes that are no text in the set are written as `\xB5`, so that they are never
+//! lost: a text with such a mark in it gives its bytes back.
+
+use encoding_rs::{Encoding, GB18030, UTF_8};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+
+/// The character set of a source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum TextEncoding {
+    /// UTF-8 where it is that, else GB 18030 where it is that.
+    #[default]
+    Found,
+    /// This one.
+    Named(&'static Encoding),
+}
+
+impl TextEncoding {
+    /// `auto`, or a label of the Encoding Standard: `gbk`, `shift_jis`, `windows-1252` and so on.
+    #[must_use]
+    pub fn of_label(label: &str) -> Option<Self> {
+        if label == AUTO {
+            return Some(Self::Found);
+        }
+        Encoding::for_label(label.as_bytes()).map(Self::Named)
+    }
+
+    /// The text up to the first NUL, without the blanks around it.
+    #[must_use]
+    pub fn text(self, bytes: &[u8]) -> String {
+        let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+        self.decode(&bytes[..end]).trim().to_owned()
+    }
+
+    /// All of the bytes as text; what is none in this set as marks.
+    #[must_use]
+    pub fn decode(self, bytes: &[u8]) -> String {
+        self.whole(bytes).map_or_else(|| marked(bytes), Cow::into_owned)
+    }
+
+    /// JSON in this set. Where a text in it does not fit the set, that text has marks and the rest is read.
+    ///
+    /// # Errors
+    /// It is no JSON.
+    pub fn json(self, bytes: &[u8]) -> Result<serde_json::Value, serde_json::Error> {
+        match self.whole(bytes) {
+            Some(text) => serde_json::from_str(&text),
+            None => serde_json::from_str(&marked_within(bytes)),
+        }
+    }
+
+    fn whole(self, bytes: &[u8]) -> Option<Cow<'_, str>> {
+        let sets: &[&'static Encoding] = match &self {
+            Self::Found => &[UTF_8, GB18030],
+            Self::Named(set) => &[UTF_8, set],
+        };
+        // A device that is set to another character set may send UTF-8 all the same; nothing else looks like UTF-8.
+        sets.iter().find_map(|set| set.decode_without_bom_handling_and_without_replacement(bytes))
+    }
+}
+
+/// ASCII as it is, every other byte as a mark within a text of JSON, where a backslash is written twice.
+fn marked_within(bytes: &[u8]) -> String {
+    let mark = |byte: &u8| if byte.is_ascii() { char::from(*byte).to_string() } else { format!("\\\\x{byte:02X}") };
+    bytes.iter().map(mark).collect()
+}
+
+/// What stands for finding out.
+const AUTO: &str = "auto";
+
+impl From<TextEncoding> for String {
+    fn from(encoding: TextEncoding) -> Self {
+        match encoding {
+            TextEncoding::Found => AUTO.to_owned(),
+            TextEncoding::Named(set) => set.name().to_owned(),
+        }
+    }
+}
+
+impl TryFrom<String> for TextEncoding {
+    type Error = String;
+
+    fn try_from(label: String) -> Result<Self, String> {
+        Self::of_label(&label).ok_or_else(|| format!("no character set is called {label}"))
+    }
+}
+
+/// ASCII as it is, every other byte and the backslash as marks.
+fn marked(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(bytes.len() + 16);
+    for byte in bytes {
+        match byte {
+            b'\\' => text.push_str("\\x5C"),
+            0x20..=0x7E | b'\n' | b'\t' | b'\r' => text.push(char::from(*byte)),
+            other => text.push_str(&format!("\\x{other:02X}")),
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(label: &str) -> TextEncoding {
+        TextEncoding::of_label(label).expect("a label")
+    }
+
+    #[test]
+    fn the_set_is_found_or_named() {
+        // 急停 in GBK, UTF-8 and Shift JIS, by hand.
+        let (gbk, utf8, sjis) = (b"\xBC\xB1\xCD\xA3 1\0rest", "急停 1".as_bytes(), b"\x8B\x7D\x92\xE2 1");
+        assert_eq!(of("auto").text(gbk), "急停 1");
+        assert_eq!(of("auto").text(utf8), "急停 1");
+        assert_eq!(of("gbk").text(gbk), "急停 1");
+        assert_eq!(of("shift_jis").text(sjis), "急停 1");
+        assert_eq!(of("auto").text(b"  SERVO ALARM \0"), "SERVO ALARM");
+        assert_eq!(TextEncoding::of_label("klingon"), None);
+    }
+
+    #[test]
+    fn bytes_that_fit_no_set_are_kept() {
+        assert_eq!(of("utf-8").text(b"a\\\xB5\xFF b"), "a\\x5C\\xB5\\xFF b");
+        assert_eq!(of("auto").text(&[0xFF, 0xFF]), "\\xFF\\xFF");
+    }
+
+    #[test]
+    fn one_text_that_fits_no_set_costs_itself_and_no_other() {
+        let gbk = [&b"{\"a\":1,\"t\":\""[..], b"\xBC\xB1\xCD\xA3", b"\"}"].concat();
+        let read = of("auto").json(&gbk).expect("JSON");
+        assert_eq!((&read["a"], &read["t"]), (&serde_json::json!(1), &serde_json::json!("急停")));
+        let broken = [&b"{\"a\":1,\"t\":\"x"[..], b"\xFF\xFE", b"\"}"].concat();
+        let read = of("auto").json(&broken).expect("JSON");
+        assert_eq!((&read["a"], &read["t"]), (&serde_json::json!(1), &serde_json::json!("x\\xFF\\xFE")));
+        assert!(of("auto").json(b"no JSON").is_err());
+    }
+
+    #[test]
+    fn it_survives_the_way_to_the_child() {
+        for label in ["auto", "gbk", "shift_jis"] {
+            let json = serde_json::to_string(&of(label)).expect("JSON");
+            assert_eq!(serde_json::from_str::<TextEncoding>(&json).expect("back"), of(label));
+        }
+    }
+}
