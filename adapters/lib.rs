@@ -11,6 +11,7 @@
 //! - no `unsafe` outside files named `ffi.rs`.
 
 pub mod address;
+pub mod bilingual;
 pub mod channel;
 pub mod child;
 pub mod clock;

@@ -284,9 +284,11 @@ fn check_recording(path: &Path, report: &mut CheckReport) {
                 "look at the path",
             ));
         }
-        Err(RecordingError::Header { reason, .. }) => {
-            report.problems.push(Problem { line: Some(1), ..Problem::of(name.clone(), reason, "") });
+        Err(RecordingError::Header { line, reason, .. }) => {
+            let line = usize::try_from(line).ok();
+            report.problems.push(Problem { line, ..Problem::of(name.clone(), reason.en, "") });
         }
+        Err(RecordingError::Format { reason, .. }) => report.problems.push(Problem::of(name.clone(), reason.en, "")),
         Err(RecordingError::Empty { problems, .. }) => {
             report.problems.push(Problem::of(name.clone(), "the recording has no usable row", ""));
             report.problems.extend(problems.into_iter().map(row));

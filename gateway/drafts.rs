@@ -82,6 +82,17 @@ impl Drafts {
         serde_json::from_str(&text).ok()
     }
 
+    /// The scripts that have a draft.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.data_dir.join("drafts")).into_iter().flatten().flatten();
+        let names =
+            entries.filter_map(|entry| Some(entry.file_name().into_string().ok()?.strip_suffix(".json")?.to_owned()));
+        let mut names: Vec<String> = names.filter(|name| is_name(name)).collect();
+        names.sort();
+        names
+    }
+
     /// Keeps a draft.
     ///
     /// # Errors

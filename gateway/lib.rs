@@ -20,6 +20,7 @@ pub mod drafts;
 pub mod files;
 #[cfg(feature = "fleet")]
 pub mod fleet;
+pub mod gallery;
 pub mod gate;
 pub mod handbook;
 pub mod history;

@@ -96,7 +96,7 @@ fn the_tables_are_printed() {
     let directory = tempfile::tempdir().expect("a directory");
     assert!(text(&check(directory.path(), &["--keys"])).contains("| `gateway.tick_hz` | 10.0 |"));
     assert!(text(&check(directory.path(), &["--vocabulary"])).contains("| `spindle_power_w` | W |"));
-    assert!(text(&check(directory.path(), &["--vocabulary", "--language", "zh"])).contains("主轴驱动功率"));
+    assert!(text(&check(directory.path(), &["--vocabulary", "--lang", "zh"])).contains("主轴驱动功率"));
 }
 
 /// What the state follows from is told before a machine is involved, and nothing is armed without a known dial.

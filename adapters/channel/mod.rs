@@ -7,6 +7,7 @@ mod declared;
 mod form;
 mod paths;
 pub mod quantity;
+pub mod unit;
 
 pub use declared::{DECLARED_MAX, DeclareError, NewChannel, declare};
 pub use form::Form;

@@ -8,7 +8,8 @@
 use super::ChannelId;
 
 /// Units by the end of a name, for columns outside the table of channels. A longer ending stands before a shorter one.
-const ENDINGS: [(&str, &str); 29] = [
+const ENDINGS: [(&str, &str); 30] = [
+    ("_l_min", "l/min"),
     ("_rpm_per_s", "rpm/s"),
     ("_cm3_min", "cm3/min"),
     ("_mm_min", "mm/min"),

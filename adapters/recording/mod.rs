@@ -3,11 +3,13 @@
 //! Columns are numbers or text; an empty cell has no value and, where the recording says so, a reason. Rows stand in
 //! the order they were measured.
 
-mod csv;
 mod derive;
+pub mod read;
 
-pub use csv::{ReadRecording, RecordingError, RowProblem, read_csv, read_path};
 pub use derive::{derived, with_derived};
+pub use read::mapping::{ColumnMapping, Mapping, MappingError, TimeMapping};
+pub use read::plan::{Note, NoteKind};
+pub use read::{ReadRecording, RecordingError, RowProblem, read_csv, read_path, read_path_as};
 
 use crate::clock::TimeNs;
 use std::collections::HashMap;
@@ -181,6 +183,18 @@ pub enum Cells {
     Words(Words),
 }
 
+impl Cells {
+    /// The cells of the rows that are kept.
+    #[must_use]
+    pub(crate) fn only(&self, kept: &[bool]) -> Self {
+        let rows = || (0..kept.len()).filter(|row| kept[*row]);
+        match self {
+            Self::Numbers(numbers) => Self::Numbers(rows().map(|row| numbers.get(row)).collect()),
+            Self::Words(words) => Self::Words(words.at_rows(rows())),
+        }
+    }
+}
+
 /// A named column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
@@ -239,6 +253,21 @@ impl Recording {
     #[must_use]
     pub fn rows(&self) -> usize {
         self.time_s.len()
+    }
+
+    /// The rows that are kept.
+    #[must_use]
+    pub fn only(&self, kept: &[bool]) -> Self {
+        let times = self.time_s.iter().zip(kept).filter(|(_, kept)| **kept).map(|(time_s, _)| *time_s).collect();
+        let columns =
+            self.columns.iter().map(|column| Column { name: column.name.clone(), cells: column.cells.only(kept) });
+        Self {
+            source: self.source.clone(),
+            time_s: times,
+            start_ns: self.start_ns,
+            columns: columns.collect(),
+            joined: self.joined,
+        }
     }
 
     /// The columns besides time, in the order of the recording.

@@ -25,9 +25,6 @@ pub(super) struct CheckArguments {
     /// Print everything that a script can see, call and set.
     #[arg(long, group = "print")]
     vocabulary: bool,
-    /// Language of the vocabulary.
-    #[arg(long, value_parser = ["en", "zh"], default_value = "en", value_name = "LANGUAGE")]
-    language: String,
 }
 
 /// Checks, or prints a table.
@@ -38,7 +35,7 @@ pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
     } else if arguments.example {
         print!("{}", keys::example());
     } else if arguments.vocabulary {
-        print!("{}", ::rules::script::vocabulary(arguments.language == "zh"));
+        print!("{}", ::rules::script::vocabulary(super::lang::language() == ::rules::physics::explain::Language::Zh));
     } else {
         return tell(arguments);
     }

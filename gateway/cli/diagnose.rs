@@ -1,9 +1,11 @@
 //! `cnc-gateway diagnose`: where model and recordings differ, which physics was left out, the model with it.
 
+use super::lang::{language, pick, say};
 use super::{CannotRun, CommandOutcome, CommandResult};
-use crate::diagnosis::{DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings};
+use crate::diagnosis::context::DiagnosisContext;
+use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach, series_model};
+use crate::diagnosis::{DiagnosisOutputs, InputRecordings, finish, read_hypotheses, read_model, read_recordings_as};
 use clap::Args;
-use rules::physics::explain::Language;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
 
@@ -20,10 +22,10 @@ enum Engine {
 #[derive(Debug, Args)]
 pub(super) struct DiagnoseArguments {
     /// What the simulation believes (model/1).
-    #[arg(long, value_name = "M.toml")]
-    model: PathBuf,
-    /// Recordings (recording/1): .csv, .csv.gz, .parquet, or history:DB?from=..&to=..; several are put together, and
-    /// their runs stay distinct.
+    #[arg(long, value_name = "M.toml", required_unless_present = "simulated")]
+    model: Option<PathBuf>,
+    /// Recordings: CSV in any writing, Excel, OpenDocument, LabVIEW, MATLAB, Parquet, MTConnect, or history:DB?from=..&to=..; several are put
+    /// together, and their runs stay distinct.
     #[arg(long, value_name = "R.csv", num_args = 1.., required = true)]
     recording: Vec<String>,
     /// Write the diagnosis as JSON (diagnosis/1); without a path, or with -, to standard output in place of the words.
@@ -53,22 +55,32 @@ pub(super) struct DiagnoseArguments {
     /// Let one engine answer alone; without it, each claim needs both.
     #[arg(long, value_enum, hide = true)]
     engine: Option<Engine>,
-    /// Language of the words, the page and the plan.
-    #[arg(long, value_enum, default_value_t = super::effects::Lang::En)]
-    lang: super::effects::Lang,
+    /// A simulation that you already have, as a series of the output: CSV, Excel, Parquet, MAT of a simulation tool, and the column in it. Its error as
+    /// given and as refitted stand side by side; without --model it is the model.
+    #[arg(long, value_name = "FILE[:COLUMN]")]
+    simulated: Option<String>,
+    /// How the series is laid beside the recording.
+    #[arg(long, value_enum, default_value_t = AlignBy::Auto, value_name = "HOW", requires = "simulated")]
+    align: AlignBy,
+    /// The map under which the recordings are read (map/1); without it the one beside each file, FILE.map.toml.
+    #[arg(long, value_name = "MAP.toml")]
+    map: Option<PathBuf>,
 }
 
 /// Reads, examines, compares, writes.
 pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
     let (model, given) = inputs(&arguments)?;
-    given.warnings.iter().for_each(|warning| eprintln!("{warning}"));
+    given.warnings.iter().for_each(|warning| eprintln!("{}", say(warning)));
     let examination = twin::examine(&given.recording, &model);
     let mut unusable = examination.unusable;
     unusable.extend(outputs(&arguments).trouble());
+    let context = DiagnosisContext::before(&given.recording, &model, given.warnings.clone());
     if !unusable.is_empty() {
+        // What the file may have under another name, or in another unit, is the likeliest cure.
+        unusable.extend(context.doubts.iter().map(|doubt| say(&doubt.text).to_owned()));
         return Err(cannot_use(&unusable));
     }
-    examination.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    examination.notes.iter().for_each(|note| eprintln!("{}{note}", pick("note: ", "提示：")));
     let found = match arguments.engine {
         None => twin::compare(&given.recording, &model, arguments.seed),
         Some(Engine::Search) => twin::diagnose(&given.recording, &model, arguments.seed),
@@ -76,28 +88,82 @@ pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
     };
     let mut diagnosis = found.map_err(|all| cannot_use(&all))?;
     note_refusals(&mut diagnosis, &given);
+    let context = finish(&mut diagnosis, &given.recording, &model, context);
     if arguments.search {
         eprintln!("search: {}", diagnosis.debug);
     }
-    outputs(&arguments).write(&diagnosis, &given.recording).map_err(|problem| CannotRun::new(problem, ""))?;
+    outputs(&arguments).write(&diagnosis, &given.recording, &context).map_err(|problem| CannotRun::new(problem, ""))?;
     Ok(CommandOutcome::Fine)
 }
 
 /// Model, hypotheses and recordings; every problem of all of them at once.
 fn inputs(arguments: &DiagnoseArguments) -> Result<(Model, InputRecordings), CannotRun> {
-    let mut problems = Vec::new();
-    let model = read_model(&arguments.model).map_err(|wrong| problems.extend(wrong));
+    let mut problems: Vec<String> = Vec::new();
+    let model =
+        arguments.model.as_ref().map(|path| read_model(path)).transpose().map_err(|wrong| problems.extend(wrong));
     let hypotheses = arguments.effects_dir.as_ref().map_or(Ok(Vec::new()), |directory| read_hypotheses(directory));
     let hypotheses = hypotheses.map_err(|wrong| problems.extend(wrong));
-    let given = read_recordings(&arguments.recording).map_err(|wrong| problems.extend(wrong));
-    match (model, hypotheses, given) {
-        (Ok(model), Ok(hypotheses), Ok(given)) => Ok((Model { hypotheses, ..model }, given)),
-        _ => Err(cannot_use(&problems)),
-    }
+    let given = read_recordings_as(&arguments.recording, arguments.map.as_ref());
+    let given = given.map_err(|wrong| problems.extend(wrong.iter().map(|problem| say(problem).to_owned())));
+    let (Ok(model), Ok(hypotheses), Ok(given)) = (model, hypotheses, given) else { return Err(cannot_use(&problems)) };
+    let (model, given) = with_series(arguments, model, given)?;
+    Ok((Model { hypotheses, ..model }, given))
+}
+
+/// The series that is given becomes a column; without a model it is the model.
+fn with_series(
+    arguments: &DiagnoseArguments,
+    model: Option<Model>,
+    mut given: InputRecordings,
+) -> Result<(Model, InputRecordings), CannotRun> {
+    let Some(text) = &arguments.simulated else {
+        return model
+            .map(|model| (model, given))
+            .ok_or_else(|| CannotRun::new("no model", "give --model or --simulated"));
+    };
+    let series = SimulatedSeries::of(text, arguments.align);
+    let output = model.as_ref().map(|model| model.output.clone()).or_else(|| output_of(&given.recording, &series));
+    let Some(output) = output else {
+        let en = "which recorded quantity does the series simulate? Give --model with an output, or record spindle_power_w, axis_current_a or such";
+        return Err(CannotRun::new(
+            pick(en, "仿真序列对应哪个实测量？请用--model指定output，或记录spindle_power_w、axis_current_a等"),
+            "",
+        ));
+    };
+    let attached = attach(&given.recording, &output, &series, None).map_err(|all| cannot_use_as(&all))?;
+    given.recording = attached.recording;
+    given.warnings.extend(attached.told);
+    let model = match model {
+        Some(model) => model,
+        None => series_model(&output).map_err(|wrong| cannot_use(&wrong))?,
+    };
+    Ok((model, given))
+}
+
+/// The recorded quantity of the same name as the series, else the first that is measured of a machine's drives.
+fn output_of(recording: &adapters::Recording, series: &SimulatedSeries) -> Option<String> {
+    let has = |name: &str| recording.numbers(name).is_some_and(|numbers| numbers.count_present() > 0);
+    let own = series.column.as_deref().filter(|name| has(name)).map(str::to_owned);
+    let usual = [
+        "spindle_power_w",
+        "axis_current_a",
+        "cutting_force_n",
+        "total_power_w",
+        "spindle_current_a",
+        "thermal_error_um",
+        "torque_nm",
+        "force_n",
+    ];
+    own.or_else(|| usual.into_iter().find(|name| has(name)).map(str::to_owned))
 }
 
 pub(super) fn cannot_use(problems: &[String]) -> CannotRun {
-    CannotRun::new(format!("the input cannot be used:\n{}", problems.join("\n")), "")
+    let head = pick("the input cannot be used:", "输入无法使用：");
+    CannotRun::new(format!("{head}\n{}", problems.join("\n")), "")
+}
+
+pub(super) fn cannot_use_as(problems: &[adapters::bilingual::Bilingual]) -> CannotRun {
+    cannot_use(&problems.iter().map(|problem| say(problem).to_owned()).collect::<Vec<_>>())
 }
 
 /// Rows that were refused while reading belong to the quality of the recording.
@@ -115,6 +181,6 @@ fn outputs(arguments: &DiagnoseArguments) -> DiagnosisOutputs {
         rows: arguments.rows.clone(),
         accept: arguments.accept.clone(),
         experiment: arguments.experiment.clone(),
-        language: Language::from(arguments.lang),
+        language: language(),
     }
 }

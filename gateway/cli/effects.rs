@@ -1,8 +1,9 @@
 //! `cnc-gateway effects`: the catalogue of physical effects, listed and explained.
 
+use super::lang::language;
 use super::{CannotRun, CommandOutcome, CommandResult};
-use clap::{Args, Subcommand, ValueEnum};
-use rules::physics::explain::{self, Language};
+use clap::{Args, Subcommand};
+use rules::physics::explain;
 
 /// Arguments of `effects`.
 #[derive(Debug, Args)]
@@ -26,36 +27,16 @@ enum EffectsCommand {
 
 #[derive(Debug, Args)]
 struct Printing {
-    /// Language of the texts.
-    #[arg(long, value_enum, default_value_t = Lang::En)]
-    lang: Lang,
     /// Print JSON, with the texts in both languages.
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Lang {
-    /// English.
-    En,
-    /// Chinese.
-    Zh,
-}
-
-impl From<Lang> for Language {
-    fn from(lang: Lang) -> Self {
-        match lang {
-            Lang::En => Self::En,
-            Lang::Zh => Self::Zh,
-        }
-    }
 }
 
 /// Prints the catalogue or one effect.
 pub(super) fn effects(arguments: EffectsArguments) -> CommandResult {
     let text = match arguments.what {
         EffectsCommand::List(printing) if printing.json => format!("{:#}\n", explain::list_json()),
-        EffectsCommand::List(printing) => explain::list(printing.lang.into()),
+        EffectsCommand::List(_) => explain::list(language()),
         EffectsCommand::Show { kind, printing } => show(&kind, &printing)?,
     };
     print!("{text}");
@@ -66,7 +47,7 @@ fn show(kind: &str, printing: &Printing) -> Result<String, CannotRun> {
     let text = if printing.json {
         explain::explain_json(kind).map(|json| format!("{json:#}\n"))
     } else {
-        explain::explain(kind, printing.lang.into())
+        explain::explain(kind, language())
     };
     text.map_err(|unknown| CannotRun::new(format!("there is no effect {}", unknown.kind), unknown.hint))
 }

@@ -1,10 +1,12 @@
 //! `cnc-gateway help`: the chapters of the handbook, and what a command takes.
 
-use super::{Arguments, CannotRun, CommandOutcome, CommandResult, print};
+use super::lang::language;
+use super::{CannotRun, CommandOutcome, CommandResult, print};
 use crate::handbook::{chapter, contents, nearest_topic};
+use ::rules::physics::explain::Language;
 use ::rules::script::{RECIPES, recipe};
 use adapters::channel::nearest;
-use clap::{Args, CommandFactory};
+use clap::Args;
 
 /// Arguments of `help`.
 #[derive(Debug, Args)]
@@ -22,8 +24,8 @@ pub(super) fn help(arguments: &HelpArguments) -> CommandResult {
         None => list(),
         Some(topic) => match (chapter(topic), recipe(topic)) {
             (_, Some(recipe)) if arguments.script => recipe.text.to_owned(),
-            (Some(chapter), _) if chapter.topic == "rules" => format!("{}\n{}", chapter.text, recipes()),
-            (Some(chapter), _) => chapter.text.to_owned(),
+            (Some(chapter), _) if chapter.topic == "rules" => format!("{}\n{}", chapter.text_in(language()), recipes()),
+            (Some(chapter), _) => chapter.text_in(language()).to_owned(),
             (None, Some(recipe)) => recipe.page(),
             (None, None) => of_command(topic).ok_or_else(|| unknown(topic))?,
         },
@@ -33,10 +35,15 @@ pub(super) fn help(arguments: &HelpArguments) -> CommandResult {
 }
 
 fn list() -> String {
-    format!(
-        "Chapters of the handbook (cnc-gateway help TOPIC):\n\n{}\nWhat a command takes: cnc-gateway COMMAND --help\n",
-        contents()
-    )
+    let contents = contents(language());
+    match language() {
+        Language::En => format!(
+            "Chapters of the handbook (cnc-gateway help TOPIC):\n\n{contents}\nWhat a command takes: cnc-gateway COMMAND --help\n"
+        ),
+        Language::Zh => {
+            format!("手册章节（cnc-gateway help 主题）：\n\n{contents}\n命令的参数：cnc-gateway 命令 --help\n")
+        }
+    }
 }
 
 /// One line for each recipe.
@@ -48,7 +55,7 @@ fn recipes() -> String {
 }
 
 fn of_command(name: &str) -> Option<String> {
-    let mut arguments = Arguments::command();
+    let mut arguments = super::command(language());
     // The usage of a command then begins with the name of the program.
     arguments.build();
     let command = arguments.find_subcommand_mut(name).filter(|command| !command.is_hide_set())?;

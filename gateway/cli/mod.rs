@@ -18,11 +18,15 @@ mod effects;
 mod fleet;
 mod gateway_options;
 mod help;
+mod help_zh;
 mod history;
 mod identify;
+mod lang;
 mod metrics;
+mod model;
 mod person;
 mod pulses;
+mod recording;
 mod replay;
 mod rules;
 mod run;
@@ -34,8 +38,9 @@ pub(crate) use crate::cannot_run::CannotRun;
 use crate::config::LogConfig;
 use crate::log::{self, LogFormat};
 use crate::reload::read_directory;
+use ::rules::physics::explain::Language;
 use ::rules::script::{Host, ScriptProblem, shipped};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -58,6 +63,9 @@ pub type CommandResult = Result<CommandOutcome, CannotRun>;
 struct Arguments {
     #[command(flatten)]
     log: LogArguments,
+    /// Language of everything that is printed; without it that of the computer (LANG).
+    #[arg(long, global = true, value_enum, value_name = "LANG")]
+    lang: Option<lang::Lang>,
     #[command(subcommand)]
     command: Option<CliCommand>,
     #[command(flatten)]
@@ -106,6 +114,10 @@ enum CliCommand {
     Simulate(simulate::SimulateArguments),
     /// Compare a model with recordings: where they differ, which physics was left out, the model with it.
     Diagnose(diagnose::DiagnoseArguments),
+    /// How a file of another program is understood; its map.
+    Recording(recording::RecordingArguments),
+    /// A first model of a machine; whether a model fits a recording.
+    Model(model::ModelArguments),
     /// The catalogue of physical effects.
     Effects(effects::EffectsArguments),
     /// Learn a machine's numbers from recordings of it.
@@ -149,7 +161,10 @@ enum CliCommand {
 /// Parses the arguments of this process and does what they say.
 #[must_use]
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let language = lang::asked_in(std::env::args_os()).unwrap_or_else(lang::of_computer);
+    let matches = command(language).get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    lang::choose(arguments.lang);
     let done = dispatch(arguments);
     log::flush();
     match done {
@@ -160,6 +175,12 @@ pub fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// The command line, its help in this language.
+fn command(language: Language) -> clap::Command {
+    let command = Arguments::command();
+    if language == Language::Zh { help_zh::translate_command(command) } else { command }
 }
 
 fn dispatch(arguments: Arguments) -> CommandResult {
@@ -181,6 +202,8 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         CliCommand::History(history) => history::run(history),
         CliCommand::Simulate(simulate) => simulate::simulate(simulate),
         CliCommand::Diagnose(diagnose) => diagnose::diagnose(diagnose),
+        CliCommand::Recording(recording) => recording::run(&recording),
+        CliCommand::Model(model) => model::run(model),
         CliCommand::Effects(effects) => effects::effects(effects),
         CliCommand::Identify(identify) => identify::identify(&identify),
         CliCommand::Commission(commission) => commission::run(&commission),

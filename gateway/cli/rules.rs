@@ -1,6 +1,6 @@
 //! `cnc-gateway rules`: what scripts can see, call and set; their trials; edited ones over stored history.
 
-use super::effects::Lang;
+use super::lang::language;
 use super::{CannotRun, CommandOutcome, CommandResult, print, print_json, refused};
 use crate::active_scripts;
 use crate::backtest::{BacktestPlan, backtest};
@@ -9,6 +9,7 @@ use crate::history::Reader;
 use crate::moment;
 use crate::reload::{read_directory, read_file};
 use crate::settings;
+use ::rules::physics::explain::Language;
 use ::rules::script::{self, ScriptFile, ScriptProblem, ScriptSet, SettingValues, TrialResult};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
@@ -25,9 +26,6 @@ pub(super) struct RulesArguments {
 enum RulesCommand {
     /// Every method, variable, handler, function, trial function and setting of scripts, with units.
     Api {
-        /// Language of the texts.
-        #[arg(long, value_enum, default_value_t = Lang::En)]
-        lang: Lang,
         /// Print JSON (rules-api/1), with the texts in both languages.
         #[arg(long)]
         json: bool,
@@ -85,7 +83,7 @@ struct BacktestArguments {
 pub(super) fn run(arguments: &RulesArguments) -> CommandResult {
     match &arguments.what {
         RulesCommand::Api { json: true, .. } => print_json(&script::api_json()),
-        RulesCommand::Api { lang, .. } => print(&script::api(*lang == Lang::Zh)),
+        RulesCommand::Api { .. } => print(&script::api(language() == Language::Zh)),
         RulesCommand::Test(arguments) => return test(arguments),
         RulesCommand::Backtest(arguments) => return compare(arguments),
     }

@@ -4,11 +4,16 @@
 //! The gateway writes one line, the [`DiagnosisJob`], and holds the pipe open: the child ends when the pipe does, so that nothing is left
 //! behind by a gateway that was killed. The child answers with a line for every stage and one with the outcome, each a [`ChildMessage`].
 
+use super::context::DiagnosisContext;
+use super::recordings::read_recordings_as;
+use super::series::{AlignBy, SimulatedSeries, attach, series_model};
 use super::store::DiagnosisStore;
-use super::stretch;
+use super::{outputs, stretch};
 use crate::history;
+use adapters::Recording;
+use adapters::bilingual::Bilingual;
 use adapters::clock::{SECOND_NS, TimeNs};
-use rules::twin::{self, parse_model, report};
+use rules::twin::{self, Model, parse_model};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
@@ -26,16 +31,36 @@ pub const COMMAND: &str = "diagnosis-child";
 /// What is to be diagnosed.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct DiagnosisJob {
-    /// The model, `model/1`.
+    /// The model, `model/1`; empty: the simulated series alone.
     pub toml: String,
-    /// The history.
-    pub history: PathBuf,
-    /// Beginning of the stretch.
-    pub from_ns: TimeNs,
-    /// Its end.
-    pub to_ns: TimeNs,
+    /// What is compared with it.
+    pub input: JobInput,
     /// Where report, plan and model are kept.
     pub kept: PathBuf,
+}
+
+/// What a diagnosis is made of.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JobInput {
+    /// A stretch of the history.
+    Stretch {
+        /// The history.
+        history: PathBuf,
+        /// Beginning of the stretch.
+        from_ns: TimeNs,
+        /// Its end.
+        to_ns: TimeNs,
+    },
+    /// A file, read under the map beside it.
+    File {
+        /// The recording.
+        path: PathBuf,
+        /// A simulated series, `FILE:COLUMN`.
+        simulated: Option<String>,
+        /// When it was asked for.
+        at_ns: TimeNs,
+    },
 }
 
 /// How far it is.
@@ -121,38 +146,81 @@ fn say(said: &ChildMessage) -> std::io::Result<()> {
     out.flush()
 }
 
+/// What is compared: model, recording, and what is known of how it was read.
+struct Compared {
+    model: Model,
+    recording: Recording,
+    reading: Vec<Bilingual>,
+    from_ns: TimeNs,
+    to_ns: TimeNs,
+}
+
+fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
+    let parsed = |text: &str| {
+        parse_model(text).map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+    };
+    match &job.input {
+        JobInput::Stretch { history, from_ns, to_ns } => {
+            let model = parsed(&job.toml)?;
+            let recording = stretch::read(history, *from_ns, *to_ns, &model.output).map_err(|it| it.to_string())?;
+            if recording.rows() == 0 {
+                return Err("the history holds no sample of this time; choose another one".to_owned());
+            }
+            let from_ns = begin_ns(&recording).unwrap_or(*from_ns);
+            Ok(Compared { model, recording, reading: Vec::new(), from_ns, to_ns: *to_ns })
+        }
+        JobInput::File { path, simulated, at_ns } => {
+            let together =
+                |all: Vec<Bilingual>| all.into_iter().map(|problem| problem.en).collect::<Vec<_>>().join("; ");
+            let mut model = Some(job.toml.as_str()).filter(|toml| !toml.is_empty()).map(parsed).transpose()?;
+            let given = read_recordings_as(&[path.display().to_string()], None).map_err(together)?;
+            let (mut recording, mut reading) = (given.recording, given.warnings);
+            if let Some(text) = simulated {
+                let output = model.as_ref().map_or_else(|| "spindle_power_w".to_owned(), |model| model.output.clone());
+                let found =
+                    attach(&recording, &output, &SimulatedSeries::of(text, AlignBy::Auto), None).map_err(together)?;
+                recording = found.recording;
+                reading.extend(found.told);
+                model = Some(model.map_or_else(|| series_model(&output).map_err(|wrong| wrong.join("; ")), Ok)?);
+            }
+            let model = model.ok_or_else(|| "no model was given".to_owned())?;
+            let from_ns = recording.start_ns.unwrap_or(*at_ns);
+            Ok(Compared { model, recording, reading, from_ns, to_ns: *at_ns })
+        }
+    }
+}
+
 fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), String> {
     let tell = |stage, rows| say(&ChildMessage::Stage(stage, rows)).map_err(|error| error.to_string());
-    let model = parse_model(&job.toml)
-        .map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;
     tell(Stage::Reading, 0)?;
-    let recording = stretch::read(&job.history, job.from_ns, job.to_ns, &model.output).map_err(|it| it.to_string())?;
-    if recording.rows() == 0 {
-        return Err("the history holds no sample of this time; choose another one".to_owned());
-    }
+    let Compared { model, recording, reading, from_ns, to_ns } = read_input(job)?;
     tell(Stage::Comparing, recording.rows())?;
     let examination = twin::examine(&recording, &model);
+    let context = DiagnosisContext::before(&recording, &model, reading);
     if !examination.unusable.is_empty() {
-        return Err(examination.unusable.join("; "));
+        let doubts = context.doubts.iter().map(|doubt| doubt.text.en.clone());
+        return Err(examination.unusable.into_iter().chain(doubts).collect::<Vec<_>>().join("; "));
     }
-    let found = twin::compare(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
+    let mut found = twin::compare(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
+    let context = super::finish(&mut found, &recording, &model, context);
     tell(Stage::Writing, recording.rows())?;
     let row = history::Diagnosis {
-        at_ns: job.to_ns,
-        from_ns: begin_ns(&recording).unwrap_or(job.from_ns),
-        to_ns: job.to_ns,
+        at_ns: to_ns,
+        from_ns,
+        to_ns,
         verdict: found.verdict.word().to_owned(),
         summary: found.summary.clone(),
-        json: report::to_json(&found).to_string(),
+        json: outputs::document(&found, &context).to_string(),
     };
     let kept = DiagnosisStore::at(job.kept.clone());
-    kept.keep(&row, &found, &recording).map_err(|error| format!("{}: {error}", kept.directory().display()))?;
+    kept.keep(&row, &found, &recording, &context)
+        .map_err(|error| format!("{}: {error}", kept.directory().display()))?;
     Ok((row, found.missing.iter().map(|missing| missing.effect.clone()).collect()))
 }
 
 /// When the stretch that was really examined began: of a long one the beginning is left out.
 #[expect(clippy::cast_possible_truncation, reason = "seconds of a stretch of eight hours")]
-fn begin_ns(recording: &adapters::Recording) -> Option<TimeNs> {
+fn begin_ns(recording: &Recording) -> Option<TimeNs> {
     let first_s = recording.time_s.first()?;
     Some(recording.start_ns? + (first_s * SECOND_NS as f64) as i64)
 }

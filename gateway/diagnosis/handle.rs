@@ -106,6 +106,12 @@ impl DiagnosisHandle {
         Self { state: Arc::default(), requests, model, kept }
     }
 
+    /// A handle of the same diagnoses that asks for none: its thread ends when the others are gone.
+    pub(super) fn without_requests(&self) -> Self {
+        let (requests, _nobody_listens) = std::sync::mpsc::sync_channel(0);
+        Self { requests, ..self.clone() }
+    }
+
     fn lock(&self) -> MutexGuard<'_, DiagnosisState> {
         // The state is complete whenever the lock is free.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
@@ -143,16 +149,24 @@ impl DiagnosisHandle {
     /// # Errors
     /// No model is in charge, or one is under way.
     pub fn ask(&self, by: Option<String>, from_ns: TimeNs, to_ns: TimeNs) -> Result<(), DiagnosisRefusal> {
+        let none =
+            || DiagnosisRefusal::new("no model is in charge", "name one under [twin] model in the configuration");
+        let toml = self.lock().model.as_ref().ok_or_else(none)?.toml.clone();
+        self.begin(DiagnosisRequest { toml, by, from_ns, to_ns, file: None })
+    }
+
+    /// Asks for a diagnosis.
+    ///
+    /// # Errors
+    /// One is under way.
+    pub(super) fn begin(&self, request: DiagnosisRequest) -> Result<(), DiagnosisRefusal> {
         let mut state = self.lock();
         if let Run::Running(running) = &state.run {
             let who = running.by.as_deref().unwrap_or("the box itself");
             let what = format!("a diagnosis is under way (asked for by {who})");
             return Err(DiagnosisRefusal::new(what, "wait for it or end it; there is one at a time"));
         }
-        let none =
-            || DiagnosisRefusal::new("no model is in charge", "name one under [twin] model in the configuration");
-        let toml = state.model.as_ref().ok_or_else(none)?.toml.clone();
-        let request = DiagnosisRequest { toml, by: by.clone(), from_ns, to_ns };
+        let (by, from_ns, to_ns) = (request.by.clone(), request.from_ns, request.to_ns);
         let busy = |_| DiagnosisRefusal::new("the thread of the twin does not answer", "try again in a few seconds");
         self.requests.try_send(request).map_err(busy)?;
         let (since, stage) = (Instant::now(), Stage::Waiting);

@@ -1,5 +1,6 @@
 //! Where a diagnosis goes: words, JSON, a page, rows, the accepted model, the next experiment.
 
+use super::context::DiagnosisContext;
 use crate::report::{PageInput, page};
 use adapters::Recording;
 use rules::physics::explain::Language;
@@ -37,14 +38,19 @@ impl DiagnosisOutputs {
     ///
     /// # Errors
     /// The file that cannot be written, and why.
-    pub fn write(&self, diagnosis: &Diagnosis, recording: &Recording) -> Result<(), String> {
+    pub fn write(
+        &self,
+        diagnosis: &Diagnosis,
+        recording: &Recording,
+        context: &DiagnosisContext,
+    ) -> Result<(), String> {
         if let Some(path) = &self.json {
-            put(path, &format!("{:#}\n", report::to_json(diagnosis)))?;
+            put(path, &format!("{:#}\n", document(diagnosis, context)))?;
         } else {
-            put(Path::new("-"), &text::report(diagnosis, self.language))?;
+            put(Path::new("-"), &words(diagnosis, context, self.language))?;
         }
         if let Some(path) = &self.html {
-            put(path, &page(&PageInput { diagnosis, recording, language: self.language }))?;
+            put(path, &page(&PageInput { diagnosis, recording, context, language: self.language }))?;
         }
         if let Some(path) = &self.rows {
             put(path, &rows(diagnosis, recording))?;
@@ -64,6 +70,23 @@ impl DiagnosisOutputs {
         }
         Ok(())
     }
+}
+
+/// The report in words, with what is doubtful before it.
+fn words(diagnosis: &Diagnosis, context: &DiagnosisContext, language: Language) -> String {
+    context.words(language, &diagnosis.unit) + text::report(diagnosis, language).as_str()
+}
+
+/// The document (`diagnosis/1`), with the report in words in both languages.
+#[must_use]
+pub(super) fn document(diagnosis: &Diagnosis, context: &DiagnosisContext) -> serde_json::Value {
+    let mut document = report::to_json(diagnosis);
+    context.add_to(&mut document);
+    document["words"] = serde_json::json!({
+        "en": words(diagnosis, context, Language::En),
+        "zh": words(diagnosis, context, Language::Zh),
+    });
+    document
 }
 
 /// The rows as the contract wants them: one line per row of the input, in input order.

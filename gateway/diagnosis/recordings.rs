@@ -1,9 +1,10 @@
-//! The recordings that a command is given: CSV, gzipped CSV, Parquet, or a range of a history, read and put together.
+//! The recordings that a command is given: a file of any kind that people have, or a range of a history, read and put together.
 
-use super::{history, join, parquet};
+use super::{history, join};
 use adapters::Recording;
-use adapters::recording::{self, ReadRecording};
-use std::path::Path;
+use adapters::bilingual::Bilingual;
+use adapters::recording::{self, Mapping, NoteKind, ReadRecording, RecordingError};
+use std::path::{Path, PathBuf};
 
 /// Share of refused rows beyond which a recording is not used: what was lost then is no longer a few bad samples.
 const REFUSED_SHARE_MAX: f64 = 0.01;
@@ -19,25 +20,36 @@ pub struct InputRecordings {
     pub refused: usize,
     /// Column of the first refused row, where one cell was to blame.
     pub refused_column: Option<String>,
-    /// For the user, on standard error: what was refused although the rest is used.
-    pub warnings: Vec<String>,
+    /// For the user, on standard error: how each file was understood, and what was refused although the rest is used.
+    pub warnings: Vec<Bilingual>,
 }
 
-/// Reads every recording and puts them together in the order given.
+/// Reads every recording and puts them together in the order given. A file is read under the map that lies beside it, if there is one.
 ///
 /// # Errors
 /// Everything that makes any of them unusable, at once.
 pub fn read_recordings(sources: &[String]) -> Result<InputRecordings, Vec<String>> {
+    read_recordings_as(sources, None).map_err(|problems| problems.into_iter().map(|problem| problem.en).collect())
+}
+
+/// The same, each file under this map where one is given.
+///
+/// # Errors
+/// Everything that makes any of them unusable, at once, in both languages.
+pub fn read_recordings_as(sources: &[String], map: Option<&PathBuf>) -> Result<InputRecordings, Vec<Bilingual>> {
+    let mapping = map.map(|path| Mapping::read(path)).transpose();
+    let mapping = mapping.map_err(|wrong| vec![Bilingual::new(wrong.to_string(), wrong.to_string())])?;
     let mut problems = Vec::new();
     let mut read = Vec::new();
     for source in sources {
-        match read_one(source) {
+        match read_one(source, mapping.as_ref()) {
             Ok(one) => read.push((source, one)),
             Err(problem) => problems.push(problem),
         }
     }
     let mut warnings = Vec::new();
     for (source, one) in &read {
+        warnings.extend(describe_reading(source, one));
         if let Some(text) = refusals(source, one) {
             if is_too_much(one) { problems.push(text) } else { warnings.push(text) }
         }
@@ -47,30 +59,48 @@ pub fn read_recordings(sources: &[String]) -> Result<InputRecordings, Vec<String
     }
     let refused = read.iter().map(|(_, one)| usize::try_from(one.refused).unwrap_or(usize::MAX)).sum();
     let refused_column = read.iter().find_map(|(_, one)| one.problems.first()?.column.clone());
-    let recording = join(read.into_iter().map(|(_, one)| one.recording).collect()).map_err(|problem| vec![problem])?;
+    let recordings = read.into_iter().map(|(_, one)| one.recording).collect();
+    let recording = join(recordings).map_err(|problem| vec![Bilingual::new(problem.clone(), problem)])?;
     Ok(InputRecordings { recording, refused, refused_column, warnings })
 }
 
-fn read_one(source: &str) -> Result<ReadRecording, String> {
+fn read_one(source: &str, mapping: Option<&Mapping>) -> Result<ReadRecording, Bilingual> {
     if let Some(address) = source.strip_prefix("history:") {
-        return history::read(address).map(whole);
+        return history::read(address).map(whole).map_err(|problem| Bilingual::new(problem.clone(), problem));
     }
     let path = Path::new(source);
-    if source.to_lowercase().ends_with(".parquet") {
-        return parquet::read(path);
-    }
-    recording::read_path(path).map_err(|error| match error {
-        recording::RecordingError::Empty { file, problems } => {
+    let read = mapping.map_or_else(|| recording::read_path(path), |mapping| recording::read_path_as(path, mapping));
+    read.map_err(|error| match &error {
+        RecordingError::Empty { file, problems } => {
             let lines: Vec<String> = problems.iter().take(LISTED_MAX).map(|problem| format!("\n  {problem}")).collect();
-            format!("{file}: no usable row{}", lines.concat())
+            Bilingual::new(
+                format!("{file}: no usable row{}", lines.concat()),
+                format!("{file}：没有可用的行{}", lines.concat()),
+            )
         }
-        other => other.to_string(),
+        other => Bilingual::new(other.to_string(), other.zh()),
     })
 }
 
 /// A recording of which nothing was refused.
 fn whole(recording: Recording) -> ReadRecording {
-    ReadRecording { recording, problems: Vec::new(), refused: 0 }
+    ReadRecording { recording, problems: Vec::new(), refused: 0, notes: Vec::new() }
+}
+
+/// How a file was understood, line by line; nothing for a file that is written as the contract says.
+#[must_use]
+pub fn describe_reading(source: &str, read: &ReadRecording) -> Vec<Bilingual> {
+    let mut lines = Vec::new();
+    let statement = read.statement();
+    if !statement.en.is_empty() {
+        lines.push(Bilingual::new(format!("{source}: {}", statement.en), format!("{source}：{}", statement.zh)));
+    }
+    for note in read.notes.iter().filter(|note| note.kind != NoteKind::Assumption) {
+        let (en, zh) = (&note.text.en, &note.text.zh);
+        let (word, word_zh) = if note.kind == NoteKind::Doubt { ("unsure: ", "存疑：") } else { ("", "") };
+        lines.push(Bilingual::new(format!("  {word}{en}"), format!("  {word_zh}{zh}")));
+    }
+    lines
 }
 
 #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
@@ -79,22 +109,25 @@ fn is_too_much(read: &ReadRecording) -> bool {
     refused > REFUSED_SHARE_MAX * (refused + read.recording.rows() as f64)
 }
 
-fn refusals(source: &str, read: &ReadRecording) -> Option<String> {
+fn refusals(source: &str, read: &ReadRecording) -> Option<Bilingual> {
     if read.refused == 0 {
         return None;
     }
     let all = read.refused + read.recording.rows() as u64;
-    let verdict = if is_too_much(read) {
-        "more than 1 %: correct the file or record again"
+    let (verdict, verdict_zh) = if is_too_much(read) {
+        ("more than 1 %: correct the file or record again", "超过1 %：请改正文件或重新记录")
     } else {
-        "these rows are left out, the rest is used"
+        ("these rows are left out, the rest is used", "这些行未使用，其余照常使用")
     };
-    let mut text = format!("{source}: {} of {all} rows refused; {verdict}", read.refused);
+    let mut list = String::new();
     for problem in read.problems.iter().take(LISTED_MAX) {
-        text.push_str(&format!("\n  {source}, {problem}"));
+        list.push_str(&format!("\n  {source}, {problem}"));
     }
-    if read.refused > LISTED_MAX as u64 {
-        text.push_str(&format!("\n  and {} more", read.refused - LISTED_MAX as u64));
-    }
-    Some(text)
+    let more = read.refused.saturating_sub(LISTED_MAX as u64);
+    let (more, more_zh) =
+        if more > 0 { (format!("\n  and {more} more"), format!("\n  另有{more}行")) } else { Default::default() };
+    Some(Bilingual::new(
+        format!("{source}: {} of {all} rows refused; {verdict}{list}{more}", read.refused),
+        format!("{source}：{all}行中有{}行被拒绝；{verdict_zh}{list}{more_zh}", read.refused),
+    ))
 }

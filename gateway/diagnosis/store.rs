@@ -2,6 +2,7 @@
 //! the experiment it asks for as a plan and as steps. Files in a folder of the data directory, found by a key that follows from
 //! the row, so that no second list can disagree with the history.
 
+use super::context::DiagnosisContext;
 use super::steps::{DiagnosisStep, steps};
 use crate::files::{read_text, replace};
 use crate::history;
@@ -11,6 +12,7 @@ use adapters::Recording;
 use rules::physics::explain::Language;
 use rules::twin::{self, diagnosis::Verdict, plan, text};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Diagnoses whose files are kept: half a megabyte each, and one in six hours at most without being asked for.
@@ -46,6 +48,40 @@ pub struct DiagnosisTexts {
     pub steps: Vec<DiagnosisStep>,
     /// How long the experiment takes, minutes.
     pub minutes: Option<f64>,
+    /// Names, statements and experiments of the effects in it, by kind.
+    #[serde(default)]
+    pub effects: BTreeMap<String, EffectTexts>,
+}
+
+/// What the catalogue says of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectTexts {
+    /// Its name.
+    pub name: DiagnosisStep,
+    /// One sentence.
+    pub statement: DiagnosisStep,
+    /// What tells it apart.
+    pub experiment: DiagnosisStep,
+}
+
+impl EffectTexts {
+    fn of(kind: &str) -> Option<Self> {
+        let doc = rules::physics::effect(kind)?.doc();
+        let both = |en: &str, zh: &str| DiagnosisStep { en: en.to_owned(), zh: zh.to_owned() };
+        Some(Self {
+            name: both(doc.en.name, doc.zh.name),
+            statement: both(doc.en.statement, doc.zh.statement),
+            experiment: both(doc.en.experiment, doc.zh.experiment),
+        })
+    }
+}
+
+/// Texts of every effect that a diagnosis names.
+fn effect_texts(found: &twin::Diagnosis) -> BTreeMap<String, EffectTexts> {
+    let missing = found.missing.iter().map(|missing| &missing.effect);
+    let others = found.alternatives.iter().flat_map(|other| [&other.effect, &other.instead_of]);
+    let next = found.next_experiment.iter().map(|next| &next.effect);
+    missing.chain(others).chain(next).filter_map(|kind| Some((kind.clone(), EffectTexts::of(kind)?))).collect()
 }
 
 /// The key of a row: the end of its stretch and what was found.
@@ -115,13 +151,15 @@ impl DiagnosisStore {
         row: &history::Diagnosis,
         found: &twin::Diagnosis,
         recording: &Recording,
+        context: &DiagnosisContext,
     ) -> std::io::Result<()> {
         let key = key(row);
         let put = |part, text: &str| replace(&self.path(&key, part), text);
         for language in [Language::En, Language::Zh] {
-            put(DiagnosisFile::Page(language), &page(&PageInput { diagnosis: found, recording, language }))?;
+            put(DiagnosisFile::Page(language), &page(&PageInput { diagnosis: found, recording, context, language }))?;
         }
-        let mut words = DiagnosisTexts { summary_zh: summary_zh(found), ..DiagnosisTexts::default() };
+        let mut words =
+            DiagnosisTexts { summary_zh: summary_zh(found), effects: effect_texts(found), ..DiagnosisTexts::default() };
         if let Ok(plan) = plan::plan(found, recording) {
             (words.steps, words.minutes) = (steps(&plan), Some(plan.minutes()));
             for language in [Language::En, Language::Zh] {

@@ -1,7 +1,7 @@
 //! Beside the tick: looks whether the model file has changed, and has diagnoses made in the background, one stretch at a time, in
 //! a process that has only the processor time that nobody else wants.
 
-use super::child::{self, ChildMessage, DiagnosisJob, Stage};
+use super::child::{self, ChildMessage, DiagnosisJob, JobInput, Stage};
 use super::handle::DiagnosisHandle;
 use super::outputs;
 use super::store::{self, DiagnosisFile, DiagnosisStore};
@@ -37,6 +37,8 @@ pub struct DiagnosisRequest {
     pub from_ns: TimeNs,
     /// End.
     pub to_ns: TimeNs,
+    /// A file in place of a stretch: its path, and the simulated series beside it.
+    pub file: Option<(PathBuf, Option<String>)>,
 }
 
 /// What the worker has to tell.
@@ -171,14 +173,9 @@ impl FileWatch {
 
 fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: &DiagnosisHandle) -> WorkerReport {
     wait_for_samples(&places.history, request.to_ns, diagnoses);
-    let DiagnosisRequest { toml, by, from_ns, to_ns } = request;
-    let job = DiagnosisJob {
-        toml,
-        history: places.history.clone(),
-        from_ns,
-        to_ns,
-        kept: places.kept.directory().to_owned(),
-    };
+    let DiagnosisRequest { toml, by, from_ns, to_ns, .. } = request;
+    let input = JobInput::Stretch { history: places.history.clone(), from_ns, to_ns };
+    let job = DiagnosisJob { toml, input, kept: places.kept.directory().to_owned() };
     let found = in_child(&job, diagnoses);
     diagnoses.ended(found.as_ref().map(|(record, _)| store::key(record)).map_err(Clone::clone));
     match found {
@@ -188,9 +185,9 @@ fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: &Diagnos
 }
 
 /// Row of the history and what is missing.
-type FoundDiagnosis = (history::Diagnosis, Vec<String>);
+pub(super) type FoundDiagnosis = (history::Diagnosis, Vec<String>);
 
-fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, String> {
+pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, String> {
     let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled().map(|by| format!("{by} has ended it"));
     if let Some(ended) = ended_by(diagnoses) {
         return Err(ended);

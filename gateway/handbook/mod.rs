@@ -5,6 +5,7 @@
 //! of the table below; `tests/handbook/` fails when a file of the folder has no row.
 
 use adapters::channel::nearest;
+use rules::physics::explain::Language;
 
 /// One chapter of the handbook.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,40 +14,51 @@ pub struct Chapter {
     pub topic: &'static str,
     /// The chapter, Markdown.
     pub text: &'static str,
+    /// The same in Chinese, where it is written.
+    pub zh: Option<&'static str>,
 }
 
 impl Chapter {
+    /// The chapter in this language; in English where there is no other.
+    #[must_use]
+    pub fn text_in(&self, language: Language) -> &'static str {
+        self.zh.filter(|_| language == Language::Zh).unwrap_or(self.text)
+    }
+
     /// The first heading, without its mark; the topic where there is none.
     #[must_use]
-    pub fn title(&self) -> &'static str {
-        self.text.lines().find_map(|line| line.strip_prefix("# ")).map_or(self.topic, str::trim)
+    pub fn title(&self, language: Language) -> &'static str {
+        self.text_in(language).lines().find_map(|line| line.strip_prefix("# ")).map_or(self.topic, str::trim)
     }
 }
 
 macro_rules! chapters {
-    ($($topic:literal),* $(,)?) => {
-        /// Every chapter, in the order in which a reader wants them.
+    (@zh $topic:literal) => { None };
+    (@zh $topic:literal zh) => { Some(include_str!(concat!("zh/", $topic, ".md"))) };
+    ($($topic:literal $($zh:ident)?),* $(,)?) => {
+        /// Every chapter, in the order in which a reader wants them; those with `zh` also in Chinese.
         pub static CHAPTERS: &[Chapter] =
-            &[$(Chapter { topic: $topic, text: include_str!(concat!($topic, ".md")) }),*];
+            &[$(Chapter { topic: $topic, text: include_str!(concat!($topic, ".md")), zh: chapters!(@zh $topic $($zh)?) }),*];
     };
 }
 
 chapters! {
-    "start",
-    "configuration",
-    "sources",
-    "rules",
+    "start" zh,
+    "configuration" zh,
+    "sources" zh,
+    "recordings" zh,
+    "rules" zh,
     "history",
     "contracts",
-    "fanuc",
+    "fanuc" zh,
     "pace",
-    "gate",
-    "access",
-    "page",
+    "gate" zh,
+    "access" zh,
+    "page" zh,
     "outputs",
     "fleet",
     "conformance",
-    "mismatch",
+    "mismatch" zh,
     "twin",
     "measured",
     "not-proven",
@@ -70,8 +82,8 @@ pub fn nearest_topic(topic: &str) -> Option<&'static str> {
 
 /// One line for each chapter: topic and title.
 #[must_use]
-pub fn contents() -> String {
+pub fn contents(language: Language) -> String {
     let width = CHAPTERS.iter().map(|chapter| chapter.topic.len()).max().unwrap_or(0);
-    let line = |chapter: &Chapter| format!("  {:width$}  {}\n", chapter.topic, chapter.title());
+    let line = |chapter: &Chapter| format!("  {:width$}  {}\n", chapter.topic, chapter.title(language));
     CHAPTERS.iter().map(line).collect()
 }

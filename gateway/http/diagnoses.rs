@@ -59,13 +59,17 @@ impl ServerState {
     }
 }
 
-fn refused(refusal: DiagnosisRefusal) -> ApiProblem {
+pub(super) fn refused(refusal: DiagnosisRefusal) -> ApiProblem {
     ApiProblem::conflict(refusal.what, refusal.next)
 }
 
 /// `GET /api/v1/diagnosis`
 async fn state(State(shared): State<ServerState>) -> Json<Value> {
-    let (run, about_s) = shared.diagnoses.as_ref().map(DiagnosisHandle::run).unwrap_or_default();
+    Json(run_document(shared.diagnoses.as_ref().map(DiagnosisHandle::run).unwrap_or_default()))
+}
+
+/// What is being done, and about how long it takes in all.
+pub(super) fn run_document((run, about_s): (Run, Option<f64>)) -> Value {
     let (mut told, by) = match run {
         Run::None => (json!({ "state": "none" }), None),
         Run::Running(it) => {
@@ -86,7 +90,7 @@ async fn state(State(shared): State<ServerState>) -> Json<Value> {
     };
     told["schema"] = json!("diagnosis-run/1");
     told["by"] = json!(by);
-    Json(told)
+    told
 }
 
 /// `POST /api/v1/diagnosis`: begins; `GET` tells how it goes.
@@ -119,9 +123,14 @@ type DiagnosisQuery = Pairs<Vec<(String, String)>>;
 /// A file that was kept of a diagnosis.
 async fn kept(shared: ServerState, key: String, part: DiagnosisFile) -> Result<String, ApiProblem> {
     let gone = || ApiProblem::not_found(&format!("the files of diagnosis {key:?} (the newest 40 are kept)"));
-    let diagnoses = shared.diagnoses.clone().filter(|_| is_key(&key)).ok_or_else(gone)?;
+    if !is_key(&key) {
+        return Err(gone());
+    }
+    let of_files = shared.files.as_ref().map(|files| files.handle().clone());
+    let stores: Vec<_> = shared.diagnoses.iter().cloned().chain(of_files).collect();
     let wanted = key.clone();
-    let text = super::rules::aside(move || Ok(diagnoses.kept().text(&wanted, part))).await?;
+    let text =
+        super::rules::aside(move || Ok(stores.iter().find_map(|store| store.kept().text(&wanted, part)))).await?;
     text.ok_or_else(gone)
 }
 

@@ -44,6 +44,7 @@ pub(super) static FILES: &[WebFile] = files! {
     SCRIPT "thermal.js" from "views/thermal.js",
     SCRIPT "twin.js" from "views/twin.js",
     SCRIPT "diagnosis.js" from "views/diagnosis.js",
+    SCRIPT "brought.js" from "views/brought.js",
     SCRIPT "system.js" from "views/system.js",
     SCRIPT "rules.js" from "views/rules.js",
     SCRIPT "settings.js" from "views/settings.js",

@@ -147,9 +147,13 @@ fn allowed(shared: &ServerState, route: &Route, person: Option<&Person>) -> Resu
 fn ask_to_sign_in(request: &Request, problem: ApiProblem) -> Response {
     let accepts = request.headers().get(header::ACCEPT).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let wants_page = request.method() == axum::http::Method::GET && accepts.contains("text/html");
-    let path = request.uri().path();
+    let path = request.uri().path_and_query().map_or("/", |path| path.as_str());
     match problem.status == StatusCode::UNAUTHORIZED.as_u16() && wants_page && super::plain::local(path) {
-        true => Redirect::to(&format!("/sign-in?next={path}")).into_response(),
+        // The signs that would end the value, or be read as others in it.
+        true => {
+            let next = path.replace('%', "%25").replace('&', "%26").replace('+', "%2B");
+            Redirect::to(&format!("/sign-in?next={next}")).into_response()
+        }
         false => problem.into_response(),
     }
 }

@@ -3,23 +3,35 @@
 use super::problem::ApiProblem;
 use super::route::Route;
 use crate::handbook::{CHAPTERS, Chapter};
-use axum::extract::Path;
+use axum::extract::{Path, Query};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use rules::physics::explain::Language;
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 pub(super) const ROUTES: &[Route] = &[Route::file("/api/v1/handbook/{chapter}", || get(chapter))];
 
-/// `GET /api/v1/handbook/{chapter}`: Markdown; `index` gives the list of the chapters with their titles.
-async fn chapter(Path(name): Path<String>) -> Response {
+/// The language of a chapter.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct ChapterQuery {
+    lang: String,
+}
+
+/// `GET /api/v1/handbook/{chapter}?lang=zh`: Markdown; `index` gives the list of the chapters with their titles.
+async fn chapter(Path(name): Path<String>, Query(asked): Query<ChapterQuery>) -> Response {
+    let language = if asked.lang == "zh" { Language::Zh } else { Language::En };
     if name == "index" {
-        let row = |chapter: &Chapter| json!({ "name": chapter.topic, "title": chapter.title() });
+        let row = |chapter: &Chapter| json!({ "name": chapter.topic, "title": chapter.title(language), "zh": chapter.zh.is_some() });
         let list: Vec<Value> = CHAPTERS.iter().map(row).collect();
         return axum::Json(json!({ "schema": "handbook/1", "chapters": list })).into_response();
     }
     match crate::handbook::chapter(&name) {
-        Some(chapter) => ([(header::CONTENT_TYPE, "text/markdown; charset=utf-8")], chapter.text).into_response(),
+        Some(chapter) => {
+            ([(header::CONTENT_TYPE, "text/markdown; charset=utf-8")], chapter.text_in(language)).into_response()
+        }
         None => ApiProblem::not_found(&format!("/api/v1/handbook/{name}")).into_response(),
     }
 }

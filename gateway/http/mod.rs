@@ -8,6 +8,7 @@
 //! demands stands in the row of the table of routes, see [`Route`].
 
 mod backtests;
+mod brought;
 mod connection;
 mod description;
 mod diagnoses;
@@ -52,6 +53,7 @@ pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
 use crate::access::Access;
 use crate::control::OrderSender;
+use crate::diagnosis::files::FileDiagnoses;
 use crate::diagnosis::handle::DiagnosisHandle;
 use crate::status::Status;
 use ::rules::physics::explain::Language;
@@ -122,6 +124,7 @@ pub struct ServerState {
     post: OrderSender,
     hosts: Arc<[String]>,
     diagnoses: Option<DiagnosisHandle>,
+    files: Option<FileDiagnoses>,
     configured: Configured,
     doctor: Arc<Semaphore>,
 }
@@ -133,6 +136,7 @@ impl ServerState {
         let ServerParts { live, history, scripts, data_dir, language, access, post, hosts, diagnoses, configured } =
             parts;
         let readers = Arc::new(Semaphore::new(history::READERS_MAX));
+        let files = FileDiagnoses::below(&data_dir).ok();
         Self {
             live,
             streams: Streams::default(),
@@ -146,6 +150,7 @@ impl ServerState {
             post,
             hosts: hosts.into(),
             diagnoses,
+            files,
             configured,
             doctor: Arc::new(Semaphore::new(1)),
         }
@@ -176,6 +181,7 @@ const GROUPS: &[&[Route]] = &[
     history::ROUTES,
     twin::ROUTES,
     diagnoses::ROUTES,
+    brought::ROUTES,
     maintenance::ROUTES,
     identified::ROUTES,
     operations::ROUTES,

@@ -54,8 +54,14 @@ struct LanguageQuery {
 
 /// Is this a path of this box that a browser may be sent to?
 pub(super) fn local(path: &str) -> bool {
+    let (path, query) = path.split_once('?').unwrap_or((path, ""));
     let plain = |sign: char| sign.is_ascii_alphanumeric() || "/-_.".contains(sign);
-    path.starts_with('/') && !path.starts_with("//") && path.len() <= 200 && path.chars().all(plain)
+    let of_query = |sign: char| plain(sign) || "=&%:+,~".contains(sign);
+    path.starts_with('/')
+        && !path.starts_with("//")
+        && path.len() + query.len() <= 400
+        && path.chars().all(plain)
+        && query.chars().all(of_query)
 }
 
 /// Was the request made by a form, rather than by a script?
@@ -102,7 +108,7 @@ pub(super) fn sign_in_again(shared: &ServerState, headers: &HeaderMap, next: &st
 
 fn form(zh: bool, next: &str, trouble: &str) -> Response {
     let say = |en: &'static str, cn: &'static str| if zh { cn } else { en };
-    let next = if local(next) { next } else { "/" };
+    let next = escape(if local(next) { next } else { "/" });
     let trouble =
         if trouble.is_empty() { String::new() } else { format!("<p class=\"trouble\">{}</p>", escape(trouble)) };
     let body = format!(

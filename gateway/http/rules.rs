@@ -82,7 +82,12 @@ pub(super) fn with(files: Vec<ScriptFile>, name: &str, text: &str) -> Vec<Script
 async fn rules(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     aside(move || {
         let drafts = Drafts::of(&shared.data_dir);
-        let rows: Vec<Value> = on_disk(&shared)?.iter().map(|file| row(&drafts, file)).collect();
+        let mut files = on_disk(&shared)?;
+        // Drafts of rules that are not in charge yet.
+        let fresh =
+            drafts.names().into_iter().filter(|name| files.iter().all(|file| file.name != *name)).collect::<Vec<_>>();
+        files.extend(fresh.into_iter().map(|name| ScriptFile { name, text: String::new() }));
+        let rows: Vec<Value> = files.iter().map(|file| row(&drafts, file)).collect();
         let directory = shared.scripts.display().to_string();
         Ok(Json(json!({ "schema": "rules/1", "directory": directory, "scripts": rows })))
     })
@@ -98,7 +103,8 @@ fn row(drafts: &Drafts, file: &ScriptFile) -> Value {
         .iter()
         .map(|it| json!({ "digest": digest_of(&it.text), "by": it.by, "at_ms": it.at_ms }))
         .collect();
-    json!({ "file": file.name, "digest": digest_of(&file.text), "text": file.text, "draft": draft, "versions": versions })
+    let digest = if file.text.is_empty() { String::new() } else { digest_of(&file.text) };
+    json!({ "file": file.name, "digest": digest, "text": file.text, "draft": draft, "versions": versions })
 }
 
 /// `GET /api/v1/rules/words`: what `rules api --json` prints.

@@ -49,6 +49,7 @@ fn diagnosis(found: &Diagnosis, kept: Option<&DiagnosisStore>) -> Value {
         "key": key,
         "steps": words.as_ref().map(|words| &words.steps),
         "minutes": words.as_ref().and_then(|words| words.minutes),
+        "effects": words.as_ref().map(|words| &words.effects),
         "diagnosis": serde_json::from_str::<Value>(&found.json).unwrap_or(Value::Null),
     })
 }

@@ -109,6 +109,32 @@ impl<'a> Data<'a> {
         self.start_s(run) + self.time_s(row) - self.time_s(first)
     }
 
+    /// A moment as the recording knows it: by the clock where it knows the day, else run and seconds.
+    pub(super) fn moment(&self, run: &str, time_s: f64) -> String {
+        let at = self.clock(time_s).unwrap_or_else(|| {
+            let seconds = super::text::with_unit(&super::text::fixed(time_s, self.decimals()), "s");
+            format!("{}{seconds}", self.say("at ", ""))
+        });
+        format!("{}, {at}", self.unit_name(run))
+    }
+
+    /// The clock of this computer's zone; `None` where the recording does not know the day.
+    pub(super) fn clock(&self, time_s: f64) -> Option<String> {
+        let start_ns = self.input.recording.start_ns?;
+        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+        let at_ns = i128::from(start_ns) + (time_s * 1e9) as i128;
+        let stamp = jiff::Timestamp::from_nanosecond(at_ns).ok()?.to_zoned(jiff::tz::TimeZone::system());
+        Some(stamp.strftime("%Y-%m-%d %H:%M:%S").to_string())
+    }
+
+    /// Decimals that the steps of time need: none at 1 Hz, two at 200 Hz.
+    pub(super) fn decimals(&self) -> i32 {
+        let times = &self.input.recording.time_s;
+        let rows = times.len().max(2);
+        let step_s = (times.last().unwrap_or(&0.0) - times.first().unwrap_or(&0.0)) / (rows - 1) as f64;
+        if step_s > 0.0 { (-super::text::exponent(step_s)).clamp(0, 4) } else { 0 }
+    }
+
     /// Length of a stretch in seconds.
     pub(super) fn length_s(&self, rows: &Range<usize>) -> f64 {
         if rows.is_empty() { 0.0 } else { (self.time_s(rows.end - 1) - self.time_s(rows.start)).max(0.0) }

@@ -9,6 +9,7 @@ mod better;
 mod bins;
 mod contribution;
 mod data;
+mod doubts;
 mod maps;
 mod missing;
 mod next;
@@ -22,6 +23,7 @@ mod tests;
 mod text;
 mod verdict;
 
+use crate::diagnosis::context::DiagnosisContext;
 use adapters::Recording;
 use data::Data;
 use rules::physics::explain::Language;
@@ -41,6 +43,8 @@ pub struct PageInput<'a> {
     pub diagnosis: &'a Diagnosis,
     /// The recording it was made from, with the same rows in the same order.
     pub recording: &'a Recording,
+    /// What is said besides: units that are doubtful, the series that was given.
+    pub context: &'a DiagnosisContext,
     /// Language of the page.
     pub language: Language,
 }
@@ -50,6 +54,7 @@ pub struct PageInput<'a> {
 pub fn page(input: &PageInput<'_>) -> String {
     let data = Data::new(input);
     let mut html = head(&data);
+    html.push_str(&doubts::section(&data));
     html.push_str(&verdict::section(&data));
     html.push_str(&place::section(&data));
     html.push_str(&missing::section(&data));

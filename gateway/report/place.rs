@@ -48,25 +48,29 @@ pub(super) fn capital(text: &str) -> String {
 }
 
 fn facts(data: &Data<'_>, region: &Region) -> String {
-    let unit = data.unit();
     let share = super::missing::percent(100.0 * region.share);
-    let size = size(data, &region.effect);
     let mut facts = match data.tongue.0 {
         Language::En => vec![format!("{share} of what is missing lies here")],
         Language::Zh => vec![format!("缺失部分的{share}位于此处")],
     };
-    facts.push(match size.filter(|size| region.mean.abs() < MEAN_TELLS * size) {
-        Some(size) => {
-            let size = with_unit(&format!("±{}", number(size)), &unit);
-            format!("{}{size}", data.say("of both signs, typically ", "正负交替，典型大小"))
-        }
-        None => format!("{}{}", data.say("on average ", "平均"), with_unit(&signed(region.mean), &unit)),
-    });
+    facts.push(amount(data, region));
     facts.push(stretches(data, region));
     if let Some(onset) = &region.onset {
         facts.push(since(data, onset));
     }
     facts.join(" · ")
+}
+
+/// How much it is there: a mean, or a typical size where both signs would cancel.
+pub(super) fn amount(data: &Data<'_>, region: &Region) -> String {
+    let unit = data.unit();
+    match size(data, &region.effect).filter(|size| region.mean.abs() < MEAN_TELLS * size) {
+        Some(size) => {
+            let size = with_unit(&format!("±{}", number(size)), &unit);
+            format!("{}{size}", data.say("of both signs, typically ", "正负交替，典型大小"))
+        }
+        None => format!("{}{}", data.say("on average ", "平均"), with_unit(&signed(region.mean), &unit)),
+    }
 }
 
 fn stretches(data: &Data<'_>, region: &Region) -> String {
@@ -83,11 +87,12 @@ fn stretches(data: &Data<'_>, region: &Region) -> String {
 }
 
 fn since(data: &Data<'_>, onset: &OnsetInterval) -> String {
-    let run = data.unit_name(&onset.run);
-    let [at, low, high] = [onset.time_s, onset.low_s, onset.high_s].map(|t| fixed(t, 0));
+    let at = data.moment(&onset.run, onset.time_s);
+    let [low, high] = [onset.low_s, onset.high_s]
+        .map(|time_s| data.clock(time_s).unwrap_or_else(|| with_unit(&fixed(time_s, data.decimals()), "s")));
     match data.tongue.0 {
-        Language::En => format!("since {run}, at {at}\u{a0}s (95\u{202f}% between {low} and {high}\u{a0}s)"),
-        Language::Zh => format!("自{run}的{at}\u{a0}s起（95\u{202f}%区间{low}至{high}\u{a0}s）"),
+        Language::En => format!("since {at} (95\u{202f}% between {low} and {high})"),
+        Language::Zh => format!("自{at}起（95\u{202f}%区间{low}至{high}）"),
     }
 }
 

@@ -1,6 +1,7 @@
 //! The page of real diagnoses of small synthetic recordings: complete, self-contained, escaped, bounded, repeatable.
 
 use super::{PageInput, page};
+use crate::diagnosis::context::DiagnosisContext;
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers, Words};
 use rand::{Rng, SeedableRng};
@@ -54,7 +55,7 @@ fn diagnosed(recording: &Recording) -> Diagnosis {
 }
 
 fn in_language(diagnosis: &Diagnosis, recording: &Recording, language: Language) -> String {
-    page(&PageInput { diagnosis, recording, language })
+    page(&PageInput { diagnosis, recording, context: &DiagnosisContext::default(), language })
 }
 
 /// Every tag that opens closes, in order.

@@ -30,7 +30,7 @@ pub(super) fn section(data: &Data<'_>) -> String {
     if let Some(fit) = &data.diagnosis.fit {
         html.push_str(&tiles(data, fit));
     }
-    html + "</section>\n"
+    html + next(data).as_str() + "</section>\n"
 }
 
 fn scale(data: &Data<'_>) -> String {
@@ -99,6 +99,19 @@ fn lead(data: &Data<'_>) -> String {
     }
 }
 
+/// What to do next, in one line; the whole stands below.
+fn next(data: &Data<'_>) -> String {
+    let Some(next) = &data.diagnosis.next_experiment else { return String::new() };
+    let statement = data.tongue.catalogue(&next.statement);
+    let minutes = with_unit(&number(next.minutes), "min");
+    format!(
+        "<p class=\"do-next\"><b>{}</b> {} ({} {minutes})</p>",
+        data.say("Do next:", "下一步："),
+        statement.trim_end_matches(['.', '。']),
+        data.say("about", "约")
+    )
+}
+
 /// Where the largest region lies, and since when.
 fn place(data: &Data<'_>) -> String {
     let Some(region) = data.diagnosis.mismatch.first() else { return String::new() };
@@ -114,10 +127,11 @@ fn place(data: &Data<'_>) -> String {
         }
     };
     let since = region.onset.as_ref().map(|onset| match tongue.0 {
-        Language::En => format!(", since {}", data.unit_name(&onset.run)),
-        Language::Zh => format!("，自{}起", data.unit_name(&onset.run)),
+        Language::En => format!(", since {}", data.moment(&onset.run, onset.time_s)),
+        Language::Zh => format!("，自{}起", data.moment(&onset.run, onset.time_s)),
     });
-    format!("{place}{}{}", since.unwrap_or_default(), data.say(".", "。"))
+    let size = super::place::amount(data, region);
+    format!("{place}{}: {size}{}", since.unwrap_or_default(), data.say(".", "。"))
 }
 
 fn others(data: &Data<'_>) -> String {
@@ -154,6 +168,20 @@ fn tiles(data: &Data<'_>, fit: &Fits) -> String {
         &format!("{} <small>{unit}</small>", number(fit.noise_floor)),
         data.say("ordinary noise of this recording", "此记录的普通噪声"),
     ));
+    if let Some(series) = &data.input.context.series {
+        let value = format!("{}<i>→</i>{} <small>{unit}</small>", number(series.as_given), number(series.refitted));
+        let gain = number(series.gain);
+        let label = match data.tongue.0 {
+            Language::En => format!(
+                "error of your simulation: as given, and with gain {gain} and offset {}",
+                with_unit(&number(series.offset), &unit)
+            ),
+            Language::Zh => {
+                format!("您的仿真误差：给定值，以及乘以{gain}加{}之后", with_unit(&number(series.offset), &unit))
+            }
+        };
+        html.push_str(&tile(&value, &label));
+    }
     if data.added() {
         html.push_str(&removed(data, before, after, fit.noise_floor));
     }

@@ -1,6 +1,7 @@
 //! The whole box: real child processes, sockets, files, signals and a browser.
 
 mod backup;
+mod brought;
 mod browser;
 mod cost;
 mod diagnosing;

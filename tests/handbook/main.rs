@@ -15,6 +15,7 @@ mod settings;
 
 use documents::{documents, root};
 use gateway::handbook::{CHAPTERS, chapter, contents, nearest_topic};
+use rules::physics::explain::Language;
 use std::collections::BTreeSet;
 
 #[test]
@@ -33,10 +34,10 @@ fn every_file_of_the_handbook_is_a_chapter() {
 
 #[test]
 fn a_chapter_is_found_by_its_topic() {
-    assert_eq!(chapter("Glossary").map(|found| found.title()), Some("Glossary"));
+    assert_eq!(chapter("Glossary").map(|found| found.title(Language::En)), Some("Glossary"));
     assert_eq!(chapter("nothing"), None);
     assert_eq!(nearest_topic("configuraton"), Some("configuration"));
-    assert!(contents().lines().count() == CHAPTERS.len());
+    assert!(contents(Language::En).lines().count() == CHAPTERS.len());
 }
 
 #[test]
@@ -84,4 +85,51 @@ fn the_readme_is_one_page() {
     let readme = documents().into_iter().find(|document| document.name == "README.md").expect("there is one");
     let lines = readme.text.lines().count();
     assert!(lines <= 100, "{lines} lines: what does not help to decide in a minute belongs into the handbook");
+}
+
+/// What integrators and machinists read.
+const BOTH_LANGUAGES: [&str; 10] =
+    ["start", "sources", "configuration", "page", "rules", "gate", "access", "mismatch", "fanuc", "recordings"];
+
+/// Sections, blocks of code and tables of a chapter, in their order.
+fn shape(text: &str) -> Vec<String> {
+    let mut shape = Vec::new();
+    let mut inside = false;
+    for line in text.lines() {
+        if let Some(kind) = line.trim_start().strip_prefix("```") {
+            if !inside {
+                shape.push(format!("code {kind}"));
+            }
+            inside = !inside;
+        } else if !inside && line.starts_with("## ") {
+            shape.push("section".to_owned());
+        } else if !inside && line.starts_with("|---") {
+            shape.push(format!("table of {}", line.matches("|---").count()));
+        }
+    }
+    shape
+}
+
+#[test]
+fn chapters_for_the_shop_are_there_in_chinese_section_by_section() {
+    let mut wrong = Vec::new();
+    for topic in BOTH_LANGUAGES {
+        let found = chapter(topic).expect("a chapter");
+        match found.zh {
+            None => wrong.push(format!("{topic}: not in Chinese (gateway/handbook/zh/{topic}.md)")),
+            Some(zh) => {
+                let (own, other) = (shape(found.text), shape(zh));
+                if own != other {
+                    let at = own.iter().zip(&other).position(|(a, b)| a != b).unwrap_or(own.len().min(other.len()));
+                    wrong.push(format!(
+                        "{topic}: the Chinese text differs from part {} on: {:?} for {:?}",
+                        at + 1,
+                        other.get(at),
+                        own.get(at)
+                    ));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -91,22 +91,31 @@ export function drawDiagnoses(latest, past, diagnoses, context, done) {
   fill(past, rows.length ? [table([t("time"), t("verdict"), t("what"), t("examined"), t("report")], rows, { caption: t("past_diagnoses") })] : [make("p", "empty", t("no_past_diagnosis"))]);
 }
 
+/** What the catalogue says of an effect, in the language of the page. */
+function effectText(found, kind, which, otherwise) {
+  const texts = found.effects?.[kind]?.[which];
+  return texts ? own(texts) : kind?.startsWith("unknown") ? t("unknown_effect") : otherwise ?? kind;
+}
+
 function told(found, context, done) {
   const d = found.diagnosis ?? {};
   const parts = [make("p", "summary", summaryOf(found)), make("p", "note", `${t(`verdict_${found.verdict}`)} · ${t("examined")} ${dateTime(found.from_ms)} – ${dateTime(found.to_ms)} · ${dateTime(found.at_ms)}`)];
+  for (const doubt of d.unit_doubts ?? []) parts.push(make("p", "warn-text", own(doubt)));
+  if (d.simulated) parts.push(make("p", "", t("series_words", quantity(d.simulated.as_given_rmse, d.unit), quantity(d.simulated.refitted_rmse, d.unit), number(d.simulated.gain), quantity(d.simulated.offset, d.unit))));
   if (d.fit?.before) parts.push(make("p", "", t("fit_words", quantity(d.fit.before.held_out_rmse, d.unit), quantity(d.fit.after?.held_out_rmse ?? d.fit.before.held_out_rmse, d.unit), quantity(d.fit.noise_floor, d.unit))));
   for (const it of d.missing ?? []) {
     const numbers = (it.parameters ?? []).map((p) => `${p.name} = ${number(p.value)}${p.low == null ? "" : ` (${number(p.low)} … ${number(p.high)})`} ${p.unit ?? ""}`);
-    parts.push(row(language() === "zh" ? it.effect : it.statement ?? it.effect, it.effect, [it.equation, ...numbers].filter(Boolean).join(" · "), { dot: "bad" }));
+    const name = effectText(found, it.effect, "name");
+    parts.push(row(effectText(found, it.effect, "statement", it.statement ?? it.effect), name, [it.equation, ...numbers].filter(Boolean).join(" · "), { dot: "bad" }));
   }
-  if (d.alternatives?.length) parts.push(make("h3", "", t("alternatives")), ...d.alternatives.map((a) => row(a.effect, t("instead_of", a.instead_of), a.separating_experiment)));
+  if (d.alternatives?.length) parts.push(make("h3", "", t("alternatives")), ...d.alternatives.map((a) => row(effectText(found, a.effect, "name"), t("instead_of", effectText(found, a.instead_of, "name")), effectText(found, a.effect, "experiment", a.separating_experiment))));
   parts.push(...experiment(found, d, done), buttons(found, context));
   return make("div", "diagnosis", parts);
 }
 
 function experiment(found, d, done) {
   const steps = (found.steps ?? []).map(own);
-  const statement = d.next_experiment?.statement;
+  const statement = d.next_experiment && (language() === "zh" ? effectText(found, d.next_experiment.effect, "experiment", d.next_experiment.statement) : d.next_experiment.statement);
   if (!statement && !steps.length) return [];
   const title = found.minutes ? `${t("experiment")} (${t("about", `${number(Math.ceil(found.minutes))} ${t("min")}`)})` : t("experiment");
   const list = steps.length ? steps : [statement];

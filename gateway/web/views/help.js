@@ -11,7 +11,7 @@ export function mount(root, context) {
   const chapters = new Map();
   const read = async (name) => {
     if (!chapters.get(name)?.text) {
-      const answer = await fetch(`/api/v1/handbook/${name}`);
+      const answer = await fetch(`/api/v1/handbook/${name}?lang=${language()}`);
       chapters.get(name).text = answer.ok ? await answer.text() : t("no_chapter");
     }
     return chapters.get(name).text;
@@ -33,7 +33,7 @@ export function mount(root, context) {
     await Promise.all(names.map(read));
     list(names.filter((name) => !wanted || chapters.get(name).text.toLowerCase().includes(wanted)));
   });
-  ask("/api/v1/handbook/index").then((found) => {
+  ask(`/api/v1/handbook/index?lang=${language()}`).then((found) => {
     for (const { name, title } of found.chapters) chapters.set(name, { title, text: null });
     list([...chapters.keys()]);
     const asked = new URLSearchParams(location.search).get("chapter");

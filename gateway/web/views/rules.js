@@ -7,6 +7,16 @@ import { Editor, vocabulary } from "/web/editor.js";
 import { SettingsForm } from "/web/settings.js";
 
 const BACKTESTS = ["1h", "8h", "24h", "7d", "30d"];
+/** What a new rule begins with: one handler and one trial that passes. */
+const NEW_RULE = [
+  "// What this rule is for. 该规则的用途。",
+  "fn on_part_finished(count) {",
+  "    if count > 100.0 {",
+  "        raise_alarm(\"many_parts\", \"info\", `Part ${count} is finished`, `工件 ${count} 已完成`);",
+  "    }",
+  "}",
+  "",
+].join("\n");
 
 export function mount(root, context) {
   const view = new RulesView(root, context);
@@ -28,9 +38,10 @@ class RulesView {
     this.actions = { save: button("save_draft", () => this.save()), trial: button("run_trials", () => this.trial()), backtest: button("backtest", () => this.backtest()), activate: button("activate", () => this.activate(), "primary"), discard: button("discard_draft", () => this.discard()) };
     const tools = make("div", "head", [make("div", "buttons", [this.actions.save, this.actions.trial]), make("div", "buttons", [this.actions.backtest, this.since]), make("div", "buttons", [this.actions.activate, this.actions.discard])]);
     this.title = make("h2", "", t("scripts"));
+    this.fresh = make("button", "", t("new_rule"), { type: "button", onclick: () => this.create() });
     const words = make("input", "", null, { type: "search", placeholder: t("search_words"), "aria-label": t("search_words") });
     words.addEventListener("input", () => this.drawWords(words.value.toLowerCase()));
-    root.append(make("div", "rules", [card(t("scripts"), [this.list, make("p", "note", t("rules_words"))]), make("section", "card editing", [this.title, tools, this.note, this.host, this.result, make("h3", "", t("earlier_versions")), this.versions]), card(t("words_title"), [words, this.words])]));
+    root.append(make("div", "rules", [card(t("scripts"), [this.list, this.fresh, make("p", "note", t("rules_words"))]), make("section", "card editing", [this.title, tools, this.note, this.host, this.result, make("h3", "", t("earlier_versions")), this.versions]), card(t("words_title"), [words, this.words])]));
     this.settings = new SettingsForm(context);
     root.append(this.settings.box);
   }
@@ -46,6 +57,26 @@ class RulesView {
       if (first) this.open(first.file); else say(this.note, t("no_scripts"));
     } catch (error) { say(this.note, error.message); }
     this.enable();
+  }
+
+  /** A new rule begins as a text of its own; nothing is on the box before it is saved as a draft or activated. */
+  create() {
+    if (!this.may()) { location.href = `/sign-in?next=${encodeURIComponent(location.pathname + location.search)}`; return; }
+    const name = make("input", "", null, { type: "text", pattern: "[a-z0-9_]+", required: true, maxlength: "40", placeholder: "my_rule", "aria-label": t("new_rule_name") });
+    const answers = make("div", "buttons", [make("button", "primary", t("new_rule"), { value: "yes" }), make("button", "", t("cancel"), { value: "no", formnovalidate: true })]);
+    const form = make("form", "", [make("h2", "", t("new_rule")), make("p", "", t("new_rule_words")), make("label", "field", [t("new_rule_name"), name]), answers], { method: "dialog" });
+    const dialog = make("dialog", "", form);
+    dialog.addEventListener("close", () => {
+      dialog.remove();
+      if (dialog.returnValue !== "yes") return;
+      const file = `${name.value}.rhai`;
+      if (this.file(file)) { this.open(file); say(this.note, t("rule_exists", file)); return; }
+      this.files.push({ file, digest: "", text: "", draft: null, versions: [] });
+      this.texts.set(file, NEW_RULE);
+      this.open(file);
+    });
+    document.body.append(dialog);
+    dialog.showModal();
   }
 
   file(name = this.current) { return this.files.find((f) => f.file === name); }

@@ -4,6 +4,7 @@ import { clock, number, quantity } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { TimePlot, drawnFrom } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
+import { Brought } from "/web/brought.js";
 import { Asking, drawDiagnoses, ticked } from "/web/diagnosis.js";
 
 const SPANS = [3600, 6 * 3600, 86400, 7 * 86400];
@@ -22,7 +23,8 @@ export function mount(root, context) {
   const press = () => { for (const b of ranges.children) b.setAttribute("aria-pressed", String(Number(b.dataset.span) === state.span)); };
   press();
   const asking = new Asking(context, () => setTimeout(() => read(), 1500));
-  root.append(make("div", "columns", [card(t("twin_now"), [verdict, facts], "ages"), card(t("twin_watched"), regimes, "ages")]), card("", [make("div", "head", [make("h2", "", t("twin_figure")), ranges]), make("div", "legend", [["line-a", "recorded_value"], ["line-c", "simulated_value"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); })), figure, make("h3", "", t("twin_residual")), left, note]), card(t("latest_diagnosis"), latest), asking.box, card(t("past_diagnoses"), past));
+  const brought = new Brought(context, () => {});
+  root.append(make("div", "columns", [card(t("twin_now"), [verdict, facts], "ages"), card(t("twin_watched"), regimes, "ages")]), card("", [make("div", "head", [make("h2", "", t("twin_figure")), ranges]), make("div", "legend", [["line-a", "recorded_value"], ["line-c", "simulated_value"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); })), figure, make("h3", "", t("twin_residual")), left, note]), card(t("latest_diagnosis"), latest), brought.box, asking.box, card(t("past_diagnoses"), past));
   const read = async () => {
     const status = context.status();
     if (!status) return;
@@ -57,9 +59,10 @@ export function mount(root, context) {
       if (!begun) { begun = true; read(); }
       drawNow(verdict, facts, regimes, status, context);
       asking.update(status);
+      brought.update();
     },
     session: () => read(),
-    leave() { clearInterval(timer); asking.leave(); state.plots.forEach((plot) => plot.destroy()); },
+    leave() { clearInterval(timer); asking.leave(); brought.leave(); state.plots.forEach((plot) => plot.destroy()); },
   };
 }
 

@@ -1,0 +1,256 @@
+//! Units as people write them, with what turns a number of one into a number of another.
+//!
+//! The factors are those of the SI brochure and, for inch and pound, of the yard and pound agreement of 1959 (25.4 mm, 0.45359237 kg).
+
+/// What a unit measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Dimension {
+    /// Base: s.
+    Time,
+    /// Base: mm.
+    Length,
+    /// Base: mm/min.
+    Velocity,
+    /// Base: m/s2.
+    Acceleration,
+    /// Base: rpm.
+    Rotation,
+    /// Base: rpm/s.
+    RotationRate,
+    /// Base: mm/rev.
+    FeedPerRevolution,
+    /// Base: cm3/min.
+    RemovalRate,
+    /// Base: W.
+    Power,
+    /// Base: A.
+    Current,
+    /// Base: V.
+    Voltage,
+    /// Base: N.
+    Force,
+    /// Base: N m.
+    Torque,
+    /// Base: °C.
+    Temperature,
+    /// Base: %.
+    Share,
+    /// Base: l/min.
+    Flow,
+    /// Base: bar.
+    Pressure,
+    /// Base: Wh.
+    Energy,
+    /// A number without a unit.
+    Number,
+}
+
+/// A unit: `base = factor * x + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    /// What it measures.
+    pub dimension: Dimension,
+    /// See [`Unit`].
+    pub factor: f64,
+    /// See [`Unit`].
+    pub offset: f64,
+}
+
+const fn unit(dimension: Dimension, factor: f64) -> Unit {
+    Unit { dimension, factor, offset: 0.0 }
+}
+
+const INCH_MM: f64 = 25.4;
+/// 0.45359237 kg * 9.80665 m/s2.
+const POUND_N: f64 = 4.448_221_615_260_5;
+const RAD_RPM: f64 = 60.0 / std::f64::consts::TAU;
+
+use Dimension::{
+    Acceleration, Current, Energy, FeedPerRevolution, Flow, Force, Length, Number, Power, Pressure, RemovalRate,
+    Rotation, RotationRate, Share, Temperature, Time, Torque, Velocity, Voltage,
+};
+
+/// Spellings, without spaces, in lower case where case says nothing; then the unit. Those in which it does stand first, as written.
+const EXACT: [(&[&str], Unit); 8] = [
+    (&["mW"], unit(Power, 1e-3)),
+    (&["MW"], unit(Power, 1e6)),
+    (&["mV"], unit(Voltage, 1e-3)),
+    (&["mA"], unit(Current, 1e-3)),
+    (&["mN"], unit(Force, 1e-3)),
+    (&["MN"], unit(Force, 1e6)),
+    (&["K"], Unit { dimension: Temperature, factor: 1.0, offset: -273.15 }),
+    (&["M/min"], unit(Velocity, 1e3)),
+];
+
+const SPELLINGS: &[(&[&str], Unit)] = &[
+    (&["s", "sec", "secs", "second", "seconds", "sek", "sekunden", "秒"], unit(Time, 1.0)),
+    (&["ms", "msec", "millisecond", "milliseconds", "毫秒"], unit(Time, 1e-3)),
+    (&["us", "µs", "μs", "usec", "microseconds", "微秒"], unit(Time, 1e-6)),
+    (&["ns", "nsec", "nanoseconds"], unit(Time, 1e-9)),
+    (&["min", "minute", "minutes", "minuten", "分", "分钟"], unit(Time, 60.0)),
+    (&["h", "hr", "hour", "hours", "std", "stunden", "小时"], unit(Time, 3600.0)),
+    (&["d", "day", "days", "tage", "天"], unit(Time, 86_400.0)),
+    (&["mm", "毫米", "millimeter", "millimetre"], unit(Length, 1.0)),
+    (&["um", "µm", "μm", "micron", "microns", "微米"], unit(Length, 1e-3)),
+    (&["nm_length"], unit(Length, 1e-6)),
+    (&["cm"], unit(Length, 10.0)),
+    (&["m", "meter", "米"], unit(Length, 1e3)),
+    (&["in", "inch", "inches", "\"", "zoll", "英寸"], unit(Length, INCH_MM)),
+    (&["mil", "thou"], unit(Length, INCH_MM / 1e3)),
+    (&["mm/min", "mm/minute", "毫米/分", "毫米/分钟"], unit(Velocity, 1.0)),
+    (&["m/min", "米/分", "米/分钟"], unit(Velocity, 1e3)),
+    (&["mm/s", "mm/sec", "毫米/秒", "millimeter/second"], unit(Velocity, 60.0)),
+    (&["m/s", "m/sec", "米/秒"], unit(Velocity, 60e3)),
+    (&["um/min", "µm/min"], unit(Velocity, 1e-3)),
+    (&["cm/min"], unit(Velocity, 10.0)),
+    (&["in/min", "inch/min", "ipm"], unit(Velocity, INCH_MM)),
+    (&["in/s", "ips"], unit(Velocity, 60.0 * INCH_MM)),
+    (&["ft/min", "sfm"], unit(Velocity, 12.0 * INCH_MM)),
+    (&["m/s2", "m/s^2", "m/s²"], unit(Acceleration, 1.0)),
+    (&["mm/s2", "mm/s^2", "mm/s²"], unit(Acceleration, 1e-3)),
+    (
+        &[
+            "rpm",
+            "1/min",
+            "min-1",
+            "min^-1",
+            "min⁻¹",
+            "u/min",
+            "umdr/min",
+            "rev/min",
+            "r/min",
+            "upm",
+            "转/分",
+            "转/分钟",
+            "转/min",
+            "revolution/minute",
+        ],
+        unit(Rotation, 1.0),
+    ),
+    (&["1/s", "s-1", "s^-1", "s⁻¹", "hz", "rps", "r/s", "rev/s", "u/s", "转/秒"], unit(Rotation, 60.0)),
+    (&["krpm", "1000/min", "x1000rpm"], unit(Rotation, 1e3)),
+    (&["rad/s"], unit(Rotation, RAD_RPM)),
+    (&["deg/s", "°/s", "grad/s"], unit(Rotation, 1.0 / 6.0)),
+    (&["rpm/s"], unit(RotationRate, 1.0)),
+    (&["rad/s2", "rad/s^2", "rad/s²"], unit(RotationRate, RAD_RPM)),
+    (&["mm/rev", "mm/u", "mm/r", "mm/umdr", "mm/转"], unit(FeedPerRevolution, 1.0)),
+    (&["um/rev", "µm/rev", "µm/u"], unit(FeedPerRevolution, 1e-3)),
+    (&["in/rev", "ipr"], unit(FeedPerRevolution, INCH_MM)),
+    (&["cm3/min", "cm^3/min", "cm³/min", "ccm/min"], unit(RemovalRate, 1.0)),
+    (&["mm3/min", "mm^3/min", "mm³/min"], unit(RemovalRate, 1e-3)),
+    (&["mm3/s", "mm^3/s", "mm³/s"], unit(RemovalRate, 0.06)),
+    (&["in3/min", "in^3/min", "in³/min"], unit(RemovalRate, 16.387_064)),
+    (&["w", "watt", "watts", "瓦"], unit(Power, 1.0)),
+    (&["kw", "kilowatt", "千瓦"], unit(Power, 1e3)),
+    (&["hp"], unit(Power, 745.699_871_582_270_2)),
+    (&["ps", "马力"], unit(Power, 735.498_75)),
+    (&["a", "amp", "amps", "ampere", "arms", "aeff", "安"], unit(Current, 1.0)),
+    (&["ka"], unit(Current, 1e3)),
+    (&["v", "volt", "vrms", "veff", "伏"], unit(Voltage, 1.0)),
+    (&["kv"], unit(Voltage, 1e3)),
+    (&["n", "newton", "牛"], unit(Force, 1.0)),
+    (&["kn", "千牛"], unit(Force, 1e3)),
+    (&["dan"], unit(Force, 10.0)),
+    (&["lbf"], unit(Force, POUND_N)),
+    (&["nm", "n·m", "n*m", "n.m", "n-m", "牛米"], unit(Torque, 1.0)),
+    (&["ncm"], unit(Torque, 1e-2)),
+    (&["nmm", "n·mm"], unit(Torque, 1e-3)),
+    (&["knm"], unit(Torque, 1e3)),
+    (&["ft-lb", "ftlb", "lbft", "lbf·ft"], unit(Torque, POUND_N * 0.3048)),
+    (&["°c", "degc", "c", "celsius", "grad", "℃", "摄氏度"], unit(Temperature, 1.0)),
+    (&["kelvin"], Unit { dimension: Temperature, factor: 1.0, offset: -273.15 }),
+    (&["°f", "degf", "f", "fahrenheit", "℉"], Unit { dimension: Temperature, factor: 5.0 / 9.0, offset: -160.0 / 9.0 }),
+    (&["%", "pct", "percent", "prozent", "百分比"], unit(Share, 1.0)),
+    (&["‰"], unit(Share, 0.1)),
+    (&["l/min", "lpm", "升/分"], unit(Flow, 1.0)),
+    (&["m3/h", "m³/h"], unit(Flow, 1000.0 / 60.0)),
+    (&["bar", "巴"], unit(Pressure, 1.0)),
+    (&["mbar"], unit(Pressure, 1e-3)),
+    (&["kpa"], unit(Pressure, 0.01)),
+    (&["mpa", "兆帕"], unit(Pressure, 10.0)),
+    (&["psi"], unit(Pressure, 0.068_947_572_931_68)),
+    (&["wh"], unit(Energy, 1.0)),
+    (&["kwh"], unit(Energy, 1e3)),
+    (&["1", "-", "–", "bool", "0/1", "dimensionless", "unitless", "count", "counts", "无"], unit(Number, 1.0)),
+];
+
+impl Unit {
+    /// The unit of a symbol as people write it; `None` where it is none that is known.
+    #[must_use]
+    pub fn of(symbol: &str) -> Option<Self> {
+        let plain: String = symbol.chars().filter(|c| !c.is_whitespace()).collect();
+        if let Some((_, unit)) = EXACT.iter().find(|(spellings, _)| spellings.contains(&plain.as_str())) {
+            return Some(*unit);
+        }
+        let plain = plain.to_lowercase();
+        SPELLINGS.iter().find(|(spellings, _)| spellings.contains(&plain.as_str())).map(|(_, unit)| *unit)
+    }
+
+    /// What turns a number of this unit into one of the other: factor and offset; `None` where they measure different things.
+    #[must_use]
+    pub fn to(self, other: Self) -> Option<(f64, f64)> {
+        (self.dimension == other.dimension)
+            .then(|| (self.factor / other.factor, (self.offset - other.offset) / other.factor))
+    }
+
+    /// The symbol of this unit: its first spelling.
+    #[must_use]
+    pub fn symbol(self) -> &'static str {
+        let known = EXACT.iter().chain(SPELLINGS);
+        known.clone().find(|(_, unit)| *unit == self).map_or("", |(spellings, _)| spellings[0])
+    }
+}
+
+/// Every unit of a dimension with its symbol, the base first.
+pub fn units_of(dimension: Dimension) -> impl Iterator<Item = (&'static str, Unit)> {
+    let of = move |(_, unit): &&(&[&str], Unit)| unit.dimension == dimension;
+    SPELLINGS.iter().chain(&EXACT).filter(of).map(|(spellings, unit)| (spellings[0], *unit))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{CHANNELS, Kind};
+    use super::*;
+
+    fn convert(x: f64, from: &str, to: &str) -> f64 {
+        let (factor, offset) = Unit::of(from).expect("known").to(Unit::of(to).expect("known")).expect("alike");
+        factor * x + offset
+    }
+
+    #[test]
+    fn published_conversions() {
+        for (x, from, to, y) in [
+            (1.0, "in", "mm", 25.4),
+            (0.0, "°C", "K", 273.15),
+            (212.0, "°F", "°C", 100.0),
+            (3000.0, "1/min", "rad/s", 314.159_265_358_979_3),
+            (50.0, "1/s", "rpm", 3000.0),
+            (1.5, "kW", "W", 1500.0),
+            (2.0, "m/min", "mm/s", 33.333_333_333_333_336),
+            (1.0, "hp", "W", 745.699_871_582_270_2),
+            (250.0, "mA", "A", 0.25),
+            (20.0, "mm³/s", "cm3/min", 1.2),
+        ] {
+            let got = convert(x, from, to);
+            assert!((got - y).abs() < 1e-9 * y.abs().max(1.0), "{x} {from} = {got} {to}, not {y}");
+        }
+        assert_eq!(Unit::of("kW").and_then(|unit| unit.to(Unit::of("A")?)), None);
+        assert_eq!(Unit::of("Zeit"), None);
+    }
+
+    #[test]
+    fn no_spelling_means_two_units() {
+        let all: Vec<&str> =
+            EXACT.iter().chain(SPELLINGS).flat_map(|(spellings, _)| spellings.iter().copied()).collect();
+        for (index, spelling) in all.iter().enumerate() {
+            assert!(!all[..index].contains(spelling), "{spelling}");
+        }
+    }
+
+    #[test]
+    fn every_unit_of_the_channels_is_known() {
+        for channel in CHANNELS.iter().filter(|channel| channel.kind != Kind::Text) {
+            assert!(Unit::of(channel.unit).is_some(), "{}: {}", channel.name, channel.unit);
+        }
+    }
+}

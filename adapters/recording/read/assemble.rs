@@ -1,0 +1,347 @@
+//! The second way through a table: rows become a block under the plan, and whatever is not used is counted by column and line.
+
+use super::cell::{Cell, flag, is_absent, written_number};
+use super::convert::{
+    is_nothing, join_date_and_time, moment_of_cell, number_of, show_cell, text_of, to_nanoseconds, unix_ns,
+    utc_or_local,
+};
+use super::error::{RecordingError, RowProblem};
+use super::head::Head;
+use super::limits::{CELLS_MAX, DESCRIBED_MAX, WORDS_BYTES_MAX};
+use super::mapping::Mapping;
+use super::plan::{BlockPlan, Note, NoteKind, PlannedColumn, PlannedKind, ReadPlan, TimeKind};
+use super::survey::{fitted, is_comment, repeats_header};
+use super::table::{Table, VisitStep};
+use super::time::{RawTime, resolve};
+use crate::recording::{Cells, Numbers, Recording, Words};
+
+/// Lines after the data that are taken for sums and remarks; more of them are refused rows.
+const FOOTER_MAX: usize = 12;
+
+/// What a table came to.
+#[derive(Debug, Default)]
+pub(super) struct Assembled {
+    /// One recording for each clock.
+    pub(super) blocks: Vec<Recording>,
+    pub(super) problems: Vec<RowProblem>,
+    pub(super) refused: u64,
+    pub(super) notes: Vec<Note>,
+}
+
+impl Assembled {
+    fn refuse(&mut self, problem: RowProblem) {
+        self.refused += 1;
+        if self.problems.len() < DESCRIBED_MAX {
+            self.problems.push(problem);
+        }
+    }
+}
+
+/// Goes through the table once more.
+pub(super) fn assemble(
+    table: &dyn Table,
+    head: &Head,
+    plan: &ReadPlan,
+    mapping: &Mapping,
+    file: &str,
+) -> Result<Assembled, RecordingError> {
+    let mut done = Assembled::default();
+    let mut blocks: Vec<BlockBuilder<'_>> = plan.blocks.iter().map(BlockBuilder::new).collect();
+    let short = table.may_be_short();
+    let (mut repeated, mut comments) = (0_u64, 0_u64);
+    table.visit(&mut |row| {
+        if row.line < head.data_line || row.cells.iter().all(|cell| *cell == Cell::Empty) {
+            return Ok(VisitStep::Next);
+        }
+        if repeats_header(row, head) {
+            repeated += 1;
+            return Ok(VisitStep::Next);
+        }
+        if is_comment(row, head) {
+            comments += 1;
+            return Ok(VisitStep::Next);
+        }
+        match fitted(row, head, short) {
+            Some(cells) => blocks.iter_mut().for_each(|block| block.take(row.line, cells, &mut done)),
+            None => {
+                let one_more = row.cells.len() == head.names.len() + 1;
+                let hint = if one_more { "; a number with a decimal comma has to stand in quotes here" } else { "" };
+                let reason = format!("{} cells where the header has {}{hint}", row.cells.len(), head.names.len());
+                done.refuse(RowProblem { line: row.line, column: None, reason });
+            }
+        }
+        blocks.iter().try_for_each(|block| block.within_limits(file))?;
+        Ok(VisitStep::Next)
+    })?;
+    count_note(
+        repeated,
+        ("times the header stands again among the data; left out", "次列名行在数据中重复，未读取"),
+        &mut done.notes,
+    );
+    count_note(comments, ("lines of remarks among the data left out", "行注释未读取"), &mut done.notes);
+    for block in blocks {
+        let recording = block.finish(file, mapping, &mut done);
+        done.blocks.push(recording);
+    }
+    done.problems.sort_by_key(|problem| problem.line);
+    Ok(done)
+}
+
+fn count_note(count: u64, (en, zh): (&str, &str), notes: &mut Vec<Note>) {
+    if count > 0 {
+        notes.push(Note::new(NoteKind::Loss, format!("{count} {en}"), format!("{count}{zh}")));
+    }
+}
+
+/// Cells of one column that were not used.
+#[derive(Debug, Default)]
+struct Loss {
+    count: u64,
+    lines: Vec<u64>,
+    example: String,
+}
+
+struct ColumnBuilder<'p> {
+    plan: &'p PlannedColumn,
+    numbers: Numbers,
+    words: Words,
+    words_bytes: usize,
+    loss: Loss,
+}
+
+struct BlockBuilder<'p> {
+    plan: &'p BlockPlan,
+    lines: Vec<u32>,
+    times: Vec<RawTime>,
+    columns: Vec<ColumnBuilder<'p>>,
+    /// Rows without a time since the last one that had one: the end of the file says whether they are a footer.
+    waiting: Vec<RowProblem>,
+}
+
+impl<'p> BlockBuilder<'p> {
+    fn new(plan: &'p BlockPlan) -> Self {
+        let column = |plan| ColumnBuilder {
+            plan,
+            numbers: Numbers::default(),
+            words: Words::default(),
+            words_bytes: 0,
+            loss: Loss::default(),
+        };
+        Self {
+            plan,
+            lines: Vec::new(),
+            times: Vec::new(),
+            columns: plan.columns.iter().map(column).collect(),
+            waiting: Vec::new(),
+        }
+    }
+
+    /// Takes the row as a whole or not at all.
+    fn take(&mut self, line: u64, cells: &[Cell<'_>], done: &mut Assembled) {
+        let at = |index: usize| cells.get(index).copied().unwrap_or(Cell::Empty);
+        let time = at(self.plan.time.index);
+        // Of several clocks the shorter ones end earlier.
+        if time == Cell::Empty && self.plan.columns.iter().all(|column| at(column.index) == Cell::Empty) {
+            return;
+        }
+        let column = Some(self.plan.time.source.clone());
+        let time = match self.time(cells) {
+            Ok(time) => time,
+            Err(reason) => return self.waiting.push(RowProblem { line, column, reason }),
+        };
+        std::mem::take(&mut self.waiting).into_iter().for_each(|problem| done.refuse(problem));
+        for builder in self.columns.iter().filter(|builder| builder.plan.strict) {
+            if let Err(reason) = builder.check(at(builder.plan.index)) {
+                return done.refuse(RowProblem { line, column: Some(builder.plan.source.clone()), reason });
+            }
+        }
+        self.columns.iter_mut().for_each(|builder| builder.push(line, at(builder.plan.index)));
+        self.lines.push(u32::try_from(line).unwrap_or(u32::MAX));
+        self.times.push(time);
+    }
+
+    fn within_limits(&self, file: &str) -> Result<(), RecordingError> {
+        let cells = self.times.len() * (self.columns.len() + 1);
+        if cells > CELLS_MAX {
+            let rows = self.times.len();
+            return Err(RecordingError::format(
+                file,
+                format!(
+                    "more than {CELLS_MAX} cells ({rows} rows so far): leave columns out in a map, or give the file in parts"
+                ),
+                format!("超过{CELLS_MAX}个单元格（已读{rows}行）：请在映射文件中去掉一些列，或分成几个文件"),
+            ));
+        }
+        match self.columns.iter().find(|column| column.words_bytes > WORDS_BYTES_MAX) {
+            Some(column) => Err(RecordingError::format(
+                file,
+                format!(
+                    "column {}: more than {} MB of different words: leave it out in a map",
+                    column.plan.source,
+                    WORDS_BYTES_MAX >> 20
+                ),
+                format!("列{}：不同的文字超过{} MB：请在映射文件中去掉该列", column.plan.source, WORDS_BYTES_MAX >> 20),
+            )),
+            None => Ok(()),
+        }
+    }
+
+    fn time(&self, cells: &[Cell<'_>]) -> Result<RawTime, String> {
+        let plan = &self.plan.time;
+        let at = |index: usize| cells.get(index).copied().unwrap_or(Cell::Empty);
+        let cell = at(plan.index);
+        let part_ns = plan.milliseconds.and_then(|index| number_of(at(index))).map_or(0, |ms| to_nanoseconds(ms / 1e3));
+        let time = match plan.kind {
+            TimeKind::Seconds { factor, .. } => self.number(cell)?.map(|number| RawTime::Seconds(number * factor)),
+            TimeKind::Unix { factor, .. } => unix_ns(cell, factor)
+                .or(self.number(cell)?.map(|number| to_nanoseconds(number * factor)))
+                .map(RawTime::Utc),
+            TimeKind::Days { .. } => {
+                self.number(cell)?.map(|days| RawTime::Local(to_nanoseconds((days - 25_569.0) * 86_400.0)))
+            }
+            TimeKind::TimesOfDay => {
+                moment_of_cell(cell)?.and_then(|moment| moment.time_of_day_ns).map(|ns| RawTime::OfDay(ns + part_ns))
+            }
+            TimeKind::Moments { order } => match (cell, plan.date) {
+                (Cell::Instant(at_ns), _) => Some(RawTime::Utc(at_ns)),
+                (Cell::Local(at_ns), _) => Some(RawTime::Local(at_ns)),
+                (_, None) => moment_of_cell(cell)?
+                    .filter(|moment| moment.date.is_some())
+                    .and_then(|moment| utc_or_local(moment, order)),
+                (_, Some(date)) => {
+                    join_date_and_time(at(date), cell, order)?.map(|at_ns| RawTime::Local(at_ns + part_ns))
+                }
+            },
+        };
+        time.ok_or_else(|| match (cell, plan.source.as_str()) {
+            (Cell::Empty, _) => "no time".to_owned(),
+            (cell, "time_utc") => format!("{} is not a time like 2026-01-31T08:15:00.5Z (RFC 3339)", show_cell(cell)),
+            (cell, "time_s") => format!("{} is not a time in seconds", show_cell(cell)),
+            (cell, _) => format!("{} is not a time as in the other rows", show_cell(cell)),
+        })
+    }
+
+    fn number(&self, cell: Cell<'_>) -> Result<Option<f64>, String> {
+        let decimal = match self.plan.time.kind {
+            TimeKind::Seconds { decimal, .. } | TimeKind::Unix { decimal, .. } | TimeKind::Days { decimal } => decimal,
+            TimeKind::Moments { .. } | TimeKind::TimesOfDay => return Ok(None),
+        };
+        Ok(match cell {
+            Cell::Number(number) => Some(number),
+            Cell::Text(text) => written_number(text).and_then(|number| number.value(decimal)),
+            _ => None,
+        })
+    }
+
+    fn finish(self, file: &str, mapping: &Mapping, done: &mut Assembled) -> Recording {
+        if self.waiting.len() <= FOOTER_MAX && !self.waiting.is_empty() && !self.times.is_empty() {
+            let (lines, first) = (self.waiting.len(), self.waiting[0].line);
+            done.notes.push(Note::new(
+                NoteKind::Loss,
+                format!("{lines} lines after the data left out (from line {first})"),
+                format!("数据之后的{lines}行未读取（自第{first}行起）"),
+            ));
+        } else {
+            self.waiting.into_iter().for_each(|problem| done.refuse(problem));
+        }
+        let runs = self.columns.iter().find(|column| column.plan.name == "run").map(|column| &column.words);
+        let timed = resolve(&self.times, runs, &mapping.time, &mut done.notes);
+        let mut kept = vec![true; self.times.len()];
+        for (row, reason) in timed.out_of_order {
+            kept[row] = false;
+            let line = u64::from(self.lines[row]);
+            done.refuse(RowProblem { line, column: Some(self.plan.time.source.clone()), reason });
+        }
+        let all = kept.iter().all(|kept| *kept);
+        let first = kept.iter().position(|kept| *kept).unwrap_or(0);
+        // Seconds count from the first row that is kept, where the day is known.
+        let (start_ns, shift_s) = match (timed.start_ns, timed.time_s.get(first)) {
+            (Some(start_ns), Some(first_s)) => (Some(start_ns + to_nanoseconds(*first_s)), *first_s),
+            (start_ns, _) => (start_ns, 0.0),
+        };
+        let time_s =
+            timed.time_s.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(time_s, _)| time_s - shift_s).collect();
+        let mut recording = Recording::new(file, time_s, start_ns);
+        for column in self.columns {
+            column.loss_note(&mut done.notes);
+            let name = column.plan.name.clone();
+            let cells = column.finish();
+            recording.set_column(&name, if all { cells } else { cells.only(&kept) });
+        }
+        recording
+    }
+}
+
+impl ColumnBuilder<'_> {
+    fn check(&self, cell: Cell<'_>) -> Result<(), String> {
+        match (self.plan.kind, cell) {
+            (PlannedKind::Numbers { .. }, Cell::Text(text)) if !is_absent(text) && self.number(cell).is_none() => {
+                Err(format!(
+                    "{text:?} is not a finite number with a decimal point; leave the cell empty where there is no value"
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn number(&self, cell: Cell<'_>) -> Option<f64> {
+        match (self.plan.kind, cell) {
+            (PlannedKind::Flags, Cell::Text(text)) => flag(text)
+                .map(|(_, yes)| f64::from(u8::from(yes)))
+                .or_else(|| text.parse().ok().filter(|x: &f64| x.is_finite())),
+            (PlannedKind::Flags, Cell::Number(number)) => Some(number),
+            (PlannedKind::Numbers { decimal, factor, offset }, Cell::Text(text)) => {
+                let value = written_number(text).and_then(|number| number.value(decimal));
+                let value = value.or_else(|| flag(text).map(|(_, yes)| f64::from(u8::from(yes))));
+                value.map(|value| value * factor + offset)
+            }
+            (PlannedKind::Numbers { factor, offset, .. }, Cell::Number(number)) => Some(number * factor + offset),
+            (_, Cell::Flag(flag)) => Some(f64::from(u8::from(flag))),
+            _ => None,
+        }
+    }
+
+    fn push(&mut self, line: u64, cell: Cell<'_>) {
+        if self.plan.kind == PlannedKind::Words {
+            let text = match cell {
+                Cell::Text(text) if is_absent(text) => String::new(),
+                cell => text_of(cell),
+            };
+            let before = self.words.words().len();
+            self.words.push(&text);
+            if self.words.words().len() > before {
+                self.words_bytes += text.len() + 64;
+            }
+            return;
+        }
+        let number = self.number(cell);
+        if number.is_none() && !is_nothing(cell) {
+            self.loss.count += 1;
+            if self.loss.lines.len() < 5 {
+                self.loss.lines.push(line);
+            }
+            if self.loss.example.is_empty() {
+                self.loss.example = show_cell(cell);
+            }
+        }
+        self.numbers.push(number);
+    }
+
+    fn loss_note(&self, notes: &mut Vec<Note>) {
+        let Loss { count, lines, example } = &self.loss;
+        if *count == 0 {
+            return;
+        }
+        let lines: Vec<String> = lines.iter().map(u64::to_string).collect();
+        let (name, lines) = (&self.plan.source, lines.join(", "));
+        notes.push(Note::new(
+            NoteKind::Loss,
+            format!("{name}: {count} cells are no numbers and count as absent, such as {example} (lines {lines})"),
+            format!("{name}：{count}个单元格不是数字，按缺失处理，例如{example}（第{lines}行）"),
+        ));
+    }
+
+    fn finish(self) -> Cells {
+        if self.plan.kind == PlannedKind::Words { Cells::Words(self.words) } else { Cells::Numbers(self.numbers) }
+    }
+}

@@ -1,0 +1,108 @@
+//! The formats of files, told by their first bytes and not by their names; each becomes rows of cells (`Table`). What is not read is refused
+//! by its name, with what to do instead.
+
+mod bytes;
+mod labview;
+mod matlab;
+mod mtconnect;
+mod parquet;
+mod tdms;
+mod tdms_channel;
+mod workbook;
+
+use super::error::RecordingError;
+use super::input::Input;
+use super::limits::UNPACKED_BYTES_MAX;
+use super::mapping::Mapping;
+use super::table::Table;
+use super::text::{Separator, TextTable};
+
+/// First bytes, name of the format, what to do.
+type RefusedFormat = (&'static [u8], &'static str, &'static str, &'static str);
+
+const REFUSED: &[RefusedFormat] = &[
+    (
+        b"\x89HDF\r\n\x1a\n",
+        "HDF5",
+        "export it as CSV or Parquet (pandas: to_csv, to_parquet)",
+        "请导出为CSV或Parquet（pandas：to_csv、to_parquet）",
+    ),
+    (b"MDF     ", "an MDF file (ASAM)", "export it as CSV or MAT (version 7)", "请导出为CSV或MAT（版本7）"),
+    (
+        b"SQLite format 3\0",
+        "a database of SQLite",
+        "a history of this box is written history:FILE",
+        "本网关的历史数据库请写作history:文件",
+    ),
+    (b"ARROW1", "Feather (Arrow)", "write Parquet in its place (to_parquet)", "请改用Parquet（to_parquet）"),
+    (b"RIFF", "a sound file", "export it as CSV with its rate", "请连同采样率导出为CSV"),
+    (b"7z\xbc\xaf", "a 7z archive", "unpack it first", "请先解压"),
+    (b"Rar!", "a RAR archive", "unpack it first", "请先解压"),
+    (b"%PDF", "a PDF", "export the table as CSV or xlsx", "请将表格导出为CSV或xlsx"),
+    (b"\x80\x04\x95", "a pickle of Python", "write Parquet in its place (to_parquet)", "请改用Parquet（to_parquet）"),
+    (b"RDX3\n", "a workspace of R", "write it as CSV (write.csv)", "请导出为CSV（write.csv）"),
+    (b"\x28\xb5\x2f\xfd", "a file packed by zstd", "unpack it first, or pack it with gzip", "请先解压，或用gzip压缩"),
+];
+
+/// Opens a file as a table.
+pub(super) fn open(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, RecordingError> {
+    let head = input.head(1024)?;
+    if let Some((_, name, en, zh)) = REFUSED.iter().find(|(start, ..)| head.starts_with(start)) {
+        return Err(RecordingError::format(
+            &input.file,
+            format!("this is {name}, which is not read: {en}"),
+            format!("该文件是{name}，无法读取：{zh}"),
+        ));
+    }
+    if head.starts_with(b"PAR1") {
+        return Ok(Box::new(parquet::open(&input)?));
+    }
+    if head.starts_with(b"PK\x03\x04") || head.starts_with(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1") {
+        return Ok(Box::new(workbook::open(&input, mapping.sheet.as_deref())?));
+    }
+    if head.starts_with(b"TDSm") {
+        return Ok(Box::new(tdms::open(&input, mapping.sheet.as_deref())?));
+    }
+    if matlab::is_mat(&head) {
+        return Ok(Box::new(matlab::open(&input, mapping.sheet.as_deref())?));
+    }
+    let encoding = mapping.encoding.as_deref().and_then(|name| encoding_rs::Encoding::for_label(name.as_bytes()));
+    let separator = mapping.separator.as_deref().and_then(Separator::named);
+    let text = TextTable::new(input, encoding, separator)?;
+    let start = text.head()?;
+    let start = start.trim_start();
+    if start.starts_with('<') {
+        return Ok(Box::new(mtconnect::open(&text.input)?));
+    }
+    if start.starts_with('{') || start.starts_with('[') {
+        return Err(RecordingError::format(
+            &text.input.file,
+            "this is JSON, which is not read: write CSV or Parquet (pandas: to_csv, to_parquet)",
+            "该文件是JSON，无法读取：请导出为CSV或Parquet（pandas：to_csv、to_parquet）",
+        ));
+    }
+    if start.starts_with("LabVIEW Measurement") {
+        return Ok(Box::new(labview::open(text.input)?));
+    }
+    if head.iter().take(512).filter(|byte| **byte == 0).count() > 8 && text.encoding.encoding == encoding_rs::UTF_8 {
+        return Err(RecordingError::format(
+            &text.input.file,
+            "this is no text and no format that is known (CSV, Excel, OpenDocument, LabVIEW lvm and tdms, MATLAB up to version 7, Parquet, MTConnect)",
+            "该文件不是文本，也不是已知格式（CSV、Excel、OpenDocument、LabVIEW lvm与tdms、MATLAB 7及以下、Parquet、MTConnect）",
+        ));
+    }
+    Ok(Box::new(text))
+}
+
+/// Everything of a file, for formats that jump about in it.
+fn whole(input: &Input) -> Result<Vec<u8>, RecordingError> {
+    let too_big = || {
+        let mb = UNPACKED_BYTES_MAX >> 20;
+        RecordingError::format(
+            &input.file,
+            format!("larger than {mb} MB: export it as CSV, or in parts"),
+            format!("超过{mb} MB：请导出为CSV，或分成几个文件"),
+        )
+    };
+    input.whole(UNPACKED_BYTES_MAX)?.ok_or_else(too_big)
+}

@@ -1,0 +1,265 @@
+//! TDMS files of LabVIEW: segments of metadata and raw values, as "TDMS File Format Internal Structure" (NI) describes them.
+//!
+//! A channel with the properties of a waveform brings its own clock; channels of equal clocks share it.
+
+use super::super::error::RecordingError;
+use super::super::input::Input;
+use super::super::table::{ColumnCells, ColumnTable};
+use super::bytes::ByteReader;
+use super::tdms_channel::{RawIndex, TdmsChannel, TdmsValues, ValueKind, WaveformClock, moment, parts};
+use crate::bilingual::Bilingual;
+use std::collections::HashMap;
+
+const HAS_METADATA: u32 = 1 << 1;
+const NEW_OBJECTS: u32 = 1 << 2;
+const HAS_RAW_DATA: u32 = 1 << 3;
+const IS_INTERLEAVED: u32 = 1 << 5;
+const IS_BIG_ENDIAN: u32 = 1 << 6;
+const IS_DAQMX: u32 = 1 << 7;
+const LEAD_IN: usize = 28;
+
+#[derive(Debug, Default)]
+struct TdmsFile {
+    channels: Vec<TdmsChannel>,
+    known: HashMap<String, usize>,
+    /// Channels of the running segment, in the order of their raw data.
+    active: Vec<usize>,
+}
+
+pub(super) fn open(input: &Input, group: Option<&str>) -> Result<ColumnTable, RecordingError> {
+    let bytes = super::whole(input)?;
+    let mut file = TdmsFile::default();
+    let mut at = 0;
+    while at + LEAD_IN <= bytes.len() {
+        let damaged = || {
+            RecordingError::format(
+                &input.file,
+                format!("the TDMS file is damaged in the segment at byte {at}: copy it again"),
+                format!("TDMS文件在第{at}字节的段损坏：请重新复制"),
+            )
+        };
+        at = file.segment(&bytes, at).map_err(|problem| match problem {
+            Problem::Damaged => damaged(),
+            Problem::Daqmx => RecordingError::format(
+                &input.file,
+                "raw data of DAQmx, which is not read: save it as waveforms, or convert it in LabVIEW",
+                "DAQmx原始数据，无法读取：请在LabVIEW中另存为波形",
+            ),
+        })?;
+    }
+    file.table(input, group)
+}
+
+enum Problem {
+    Damaged,
+    Daqmx,
+}
+
+impl TdmsFile {
+    /// Reads the segment here; where the next one begins.
+    fn segment(&mut self, bytes: &[u8], at: usize) -> Result<usize, Problem> {
+        let mut lead = ByteReader::new(&bytes[at..], false);
+        if lead.take(4) != Some(b"TDSm") {
+            return Err(Problem::Damaged);
+        }
+        let mask = lead.u32().ok_or(Problem::Damaged)?;
+        lead.is_big = mask & IS_BIG_ENDIAN != 0;
+        let _version = lead.u32();
+        let (next, raw) = lead.u64().zip(lead.u64()).ok_or(Problem::Damaged)?;
+        let start = at + LEAD_IN;
+        // A segment that was not finished has no length: it goes to the end of the file.
+        let end = usize::try_from(next)
+            .ok()
+            .and_then(|next| start.checked_add(next))
+            .map_or(bytes.len(), |end| end.min(bytes.len()));
+        let raw_at = usize::try_from(raw).ok().and_then(|raw| start.checked_add(raw)).ok_or(Problem::Damaged)?;
+        if mask & HAS_METADATA != 0 {
+            if mask & NEW_OBJECTS != 0 {
+                self.active.clear();
+            }
+            let metadata = bytes.get(start..raw_at.min(end)).ok_or(Problem::Damaged)?;
+            self.metadata(ByteReader::new(metadata, lead.is_big))?;
+        }
+        if mask & HAS_RAW_DATA != 0 {
+            if mask & IS_DAQMX != 0 {
+                return Err(Problem::Daqmx);
+            }
+            let data = bytes.get(raw_at..end).ok_or(Problem::Damaged)?;
+            self.raw(ByteReader::new(data, lead.is_big), mask & IS_INTERLEAVED != 0);
+        }
+        Ok(end)
+    }
+
+    fn metadata(&mut self, mut bytes: ByteReader<'_>) -> Result<(), Problem> {
+        let count = bytes.u32().ok_or(Problem::Damaged)?;
+        for _ in 0..count {
+            let path = bytes.text().ok_or(Problem::Damaged)?;
+            let index = *self.known.entry(path.clone()).or_insert_with(|| {
+                self.channels.push(TdmsChannel { path: parts(&path), ..TdmsChannel::default() });
+                self.channels.len() - 1
+            });
+            let length = bytes.u32().ok_or(Problem::Damaged)?;
+            match length {
+                u32::MAX => {}
+                0 => self.activate(index),
+                0x1269 | 0x1369 => return Err(Problem::Daqmx),
+                _ => {
+                    let kind = bytes.u32().and_then(ValueKind::of).ok_or(Problem::Damaged)?;
+                    let _dimension = bytes.u32();
+                    let count = bytes.u64().and_then(|count| usize::try_from(count).ok()).ok_or(Problem::Damaged)?;
+                    let size = if kind == ValueKind::Text {
+                        bytes.u64().and_then(|size| usize::try_from(size).ok())
+                    } else {
+                        Some(0)
+                    };
+                    self.channels[index].index = Some(RawIndex { kind, count, bytes: size.ok_or(Problem::Damaged)? });
+                    self.activate(index);
+                }
+            }
+            self.properties(&mut bytes, index).ok_or(Problem::Damaged)?;
+        }
+        Ok(())
+    }
+
+    fn activate(&mut self, index: usize) {
+        if !self.active.contains(&index) {
+            self.active.push(index);
+        }
+    }
+
+    fn properties(&mut self, bytes: &mut ByteReader<'_>, index: usize) -> Option<()> {
+        for _ in 0..bytes.u32()? {
+            let name = bytes.text()?;
+            let kind = ValueKind::of(bytes.u32()?)?;
+            let channel = &mut self.channels[index];
+            match kind {
+                ValueKind::Text => {
+                    let text = bytes.text()?;
+                    if name == "unit_string" {
+                        channel.unit = Some(text).filter(|unit| !unit.is_empty());
+                    }
+                }
+                ValueKind::Moment => {
+                    let at_ns = moment(bytes)?;
+                    if name == "wf_start_time" {
+                        channel.start_ns = Some(at_ns);
+                    }
+                }
+                ValueKind::Number(kind) => {
+                    let value = kind.all(bytes.take(kind.size())?, bytes.is_big).first().copied()?;
+                    match name.as_str() {
+                        "wf_increment" => channel.increment_s = Some(value).filter(|step_s| *step_s > 0.0),
+                        "wf_start_offset" => channel.offset_s = value,
+                        _ => {}
+                    }
+                }
+                ValueKind::Flag => {
+                    bytes.take(1)?;
+                }
+                ValueKind::Nothing => {}
+            }
+        }
+        Some(())
+    }
+
+    /// Chunks of equal layout follow one another; a last one that is not whole is left out.
+    fn raw(&mut self, mut bytes: ByteReader<'_>, is_interleaved: bool) {
+        let layout: Vec<(usize, RawIndex)> = self
+            .active
+            .iter()
+            .filter_map(|index| Some((*index, self.channels[*index].index?)))
+            .filter(|(_, index)| index.count > 0)
+            .collect();
+        let size = |index: &RawIndex| {
+            if index.kind == ValueKind::Text { index.bytes } else { index.kind.size().saturating_mul(index.count) }
+        };
+        let chunk: usize = layout.iter().map(|(_, index)| size(index)).fold(0, usize::saturating_add);
+        if chunk == 0 {
+            return;
+        }
+        while bytes.left.len() >= chunk {
+            if is_interleaved {
+                let Some(block) = bytes.take(chunk) else { return };
+                self.interleaved(block, &layout, bytes.is_big);
+                continue;
+            }
+            for (channel, index) in &layout {
+                let Some(part) = bytes.take(size(index)) else { return };
+                self.channels[*channel].push(part, *index, bytes.is_big);
+            }
+        }
+    }
+
+    fn interleaved(&mut self, block: &[u8], layout: &[(usize, RawIndex)], is_big: bool) {
+        let width: usize = layout.iter().map(|(_, index)| index.kind.size()).sum();
+        for row in block.chunks_exact(width.max(1)) {
+            let mut bytes = ByteReader::new(row, is_big);
+            for (channel, index) in layout {
+                let Some(part) = bytes.take(index.kind.size()) else { return };
+                self.channels[*channel].push(part, RawIndex { count: 1, ..*index }, is_big);
+            }
+        }
+    }
+
+    fn table(self, input: &Input, group: Option<&str>) -> Result<ColumnTable, RecordingError> {
+        let groups: Vec<String> = {
+            let mut all: Vec<String> = Vec::new();
+            for channel in self.channels.iter().filter(|channel| channel.values.len() > 0 && channel.path.len() == 2) {
+                if !all.contains(&channel.path[0]) {
+                    all.push(channel.path[0].clone());
+                }
+            }
+            all
+        };
+        let Some(first) = groups.first() else {
+            return Err(RecordingError::format(
+                &input.file,
+                "the TDMS file has no channel with values",
+                "TDMS文件没有带数值的通道",
+            ));
+        };
+        let chosen = group.map_or_else(
+            || Ok(first.clone()),
+            |asked| {
+                groups.iter().find(|name| *name == asked).cloned().ok_or_else(|| {
+                    let list = groups.join(", ");
+                    RecordingError::format(
+                        &input.file,
+                        format!("there is no group {asked}; there are {list}"),
+                        format!("没有组{asked}；现有：{list}"),
+                    )
+                })
+            },
+        )?;
+        let mut form = vec![Bilingual::new("TDMS", "TDMS")];
+        if groups.len() > 1 {
+            form.push(Bilingual::new(
+                format!("group {chosen} of {}", groups.join(", ")),
+                format!("组{chosen}（共有{}）", groups.join("、")),
+            ));
+        }
+        let mut columns: Vec<(String, ColumnCells)> = Vec::new();
+        let mut clock: Option<WaveformClock> = None;
+        for channel in self
+            .channels
+            .into_iter()
+            .filter(|channel| channel.path.first() == Some(&chosen) && channel.values.len() > 0)
+        {
+            let own = channel.clock();
+            if let Some(own) = own.filter(|own| Some(*own) != clock) {
+                columns.push(own.column());
+                clock = Some(own);
+            }
+            let name = channel.path.last().cloned().unwrap_or_default();
+            let name = channel.unit.as_ref().map_or_else(|| name.clone(), |unit| format!("{name} [{unit}]"));
+            let cells = match channel.values {
+                TdmsValues::Numbers(values) => ColumnCells::Numbers(values),
+                TdmsValues::Moments(values) => ColumnCells::Instants(values),
+                TdmsValues::Texts(values) => ColumnCells::Cells(values),
+                TdmsValues::None => continue,
+            };
+            columns.push((name, cells));
+        }
+        Ok(ColumnTable { columns, form })
+    }
+}

@@ -1,0 +1,157 @@
+//! Workbooks of Excel (xlsx, xlsb, xls) and OpenDocument (ods), by `calamine`.
+
+use super::super::error::RecordingError;
+use super::super::input::Input;
+use super::super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX, UNPACKED_BYTES_MAX};
+use super::super::table::{MemoryTable, OwnedCell};
+use crate::bilingual::Bilingual;
+use crate::clock::{SECOND_NS, TimeNs};
+use calamine::{Data, ExcelDateTime, Reader, Sheets};
+use std::io::{Cursor, Read};
+
+/// Days from 1899-12-30 to 1970-01-01.
+const EPOCH_DAYS: f64 = 25_569.0;
+
+pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, RecordingError> {
+    let bytes = super::whole(input)?;
+    if bytes.starts_with(b"PK") {
+        unpacks_within_limit(&bytes, input)?;
+    } else if has_encrypted_package(&bytes) {
+        return Err(password(input));
+    }
+    let mut book = calamine::open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(|error| broken(input, &error))?;
+    let names = book.sheet_names();
+    let chosen = choose(&mut book, &names, sheet, input)?;
+    let range = book.worksheet_range(&chosen).map_err(|error| broken(input, &error))?;
+    let (rows, columns) = range.get_size();
+    if columns > COLUMNS_MAX || rows.saturating_mul(columns) > CELLS_IN_MEMORY_MAX {
+        return Err(RecordingError::format(
+            &input.file,
+            format!(
+                "sheet {chosen} has {rows} rows of {columns} columns, more than are read: save it as CSV, or in parts"
+            ),
+            format!("工作表{chosen}有{rows}行{columns}列，超出限制：请另存为CSV，或分成几个文件"),
+        ));
+    }
+    let first = range.start().map_or(0, |(row, _)| u64::from(row));
+    let mut table = MemoryTable::default();
+    for (index, cells) in range.rows().enumerate() {
+        table.rows.push((first + index as u64 + 1, cells.iter().map(cell).collect()));
+    }
+    if names.len() > 1 {
+        table.form.push(Bilingual::new(
+            format!("sheet {chosen} of {}", names.len()),
+            format!("{}个工作表中的{chosen}", names.len()),
+        ));
+    }
+    Ok(table)
+}
+
+type Book = Sheets<Cursor<Vec<u8>>>;
+
+/// The sheet that is asked for; else the one with the most cells.
+fn choose(book: &mut Book, names: &[String], asked: Option<&str>, input: &Input) -> Result<String, RecordingError> {
+    if let Some(asked) = asked {
+        let known = || names.join(", ");
+        return names.iter().find(|name| *name == asked).cloned().ok_or_else(|| {
+            RecordingError::format(
+                &input.file,
+                format!("there is no sheet {asked}; there are {}", known()),
+                format!("没有工作表{asked}；现有：{}", known()),
+            )
+        });
+    }
+    let size =
+        |book: &mut Book, name: &String| book.worksheet_range(name).map_or(0, |range| range.used_cells().count());
+    let mut best: Option<(usize, String)> = None;
+    for name in names {
+        let cells = size(book, name);
+        if best.as_ref().is_none_or(|(most, _)| cells > *most) {
+            best = Some((cells, name.clone()));
+        }
+    }
+    best.filter(|(cells, _)| *cells > 0)
+        .map(|(_, name)| name)
+        .ok_or_else(|| RecordingError::format(&input.file, "the workbook is empty", "工作簿为空"))
+}
+
+fn cell(data: &Data) -> OwnedCell {
+    match data {
+        Data::Empty | Data::Error(_) => OwnedCell::Empty,
+        #[expect(clippy::cast_precision_loss, reason = "a cell of a workbook holds 15 digits")]
+        Data::Int(number) => OwnedCell::Number(*number as f64),
+        Data::Float(number) => OwnedCell::Number(*number),
+        Data::String(text) | Data::DurationIso(text) => OwnedCell::text(text.trim()),
+        Data::Bool(flag) => OwnedCell::Flag(*flag),
+        Data::DateTime(at) => moment(*at),
+        Data::DateTimeIso(text) => text.parse::<jiff::civil::DateTime>().map_or_else(
+            |_| OwnedCell::text(text),
+            |at| {
+                at.to_zoned(jiff::tz::TimeZone::UTC)
+                    .ok()
+                    .and_then(|at| TimeNs::try_from(at.timestamp().as_nanosecond()).ok())
+                    .map_or(OwnedCell::Empty, OwnedCell::Local)
+            },
+        ),
+    }
+}
+
+/// A day with a time is a moment on the wall; a time alone stays a share of a day.
+fn moment(at: ExcelDateTime) -> OwnedCell {
+    let days = at.as_f64();
+    if at.is_duration() || days < 1.0 {
+        return OwnedCell::Number(days);
+    }
+    // A workbook counts in days; milliseconds are what its digits hold.
+    #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+    let ms = ((days - EPOCH_DAYS) * 86_400e3).round() as i64;
+    OwnedCell::Local(ms.saturating_mul(SECOND_NS / 1000))
+}
+
+/// Counts what the parts of the archive really come to: what they claim may be a lie.
+fn unpacks_within_limit(bytes: &[u8], input: &Input) -> Result<(), RecordingError> {
+    let wrong = |error: zip::result::ZipError| broken(input, &error);
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(wrong)?;
+    let mut left = UNPACKED_BYTES_MAX;
+    for index in 0..archive.len() {
+        let part = archive.by_index(index).map_err(wrong)?;
+        let taken =
+            std::io::copy(&mut part.take(left + 1), &mut std::io::sink()).map_err(|error| input.broken(error))?;
+        if taken > left {
+            let mb = UNPACKED_BYTES_MAX >> 20;
+            return Err(RecordingError::format(
+                &input.file,
+                format!("unpacked it is larger than {mb} MB: save it as CSV, or in parts"),
+                format!("解压后超过{mb} MB：请另存为CSV，或分成几个文件"),
+            ));
+        }
+        left -= taken;
+    }
+    Ok(())
+}
+
+/// The stream of an encrypted workbook, by its name in UTF-16.
+fn has_encrypted_package(bytes: &[u8]) -> bool {
+    let name: Vec<u8> = "EncryptedPackage".bytes().flat_map(|byte| [byte, 0]).collect();
+    bytes.windows(name.len()).any(|part| part == name)
+}
+
+fn password(input: &Input) -> RecordingError {
+    RecordingError::format(
+        &input.file,
+        "the workbook is protected by a password: open it, save it without one, and try again",
+        "工作簿有密码保护：请打开后去掉密码另存，再试",
+    )
+}
+
+fn broken(input: &Input, error: &dyn std::fmt::Display) -> RecordingError {
+    let text = error.to_string();
+    if text.to_lowercase().contains("password") {
+        return password(input);
+    }
+    RecordingError::format(
+        &input.file,
+        format!("not a readable workbook: {text}; save it again, or as CSV"),
+        format!("无法读取的工作簿：{text}；请重新保存或另存为CSV"),
+    )
+}

@@ -1,0 +1,71 @@
+//! The bytes of a recording, readable as often as needed: a file or a text in memory, unpacked where it is gzipped.
+
+use super::error::RecordingError;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
+use std::path::{Path, PathBuf};
+
+/// See the [module](self).
+#[derive(Debug, Clone)]
+pub(super) struct Input {
+    /// The name for messages.
+    pub(super) file: String,
+    place: InputPlace,
+}
+
+#[derive(Debug, Clone)]
+enum InputPlace {
+    Path(PathBuf),
+    Memory(Vec<u8>),
+}
+
+/// What a format reader that jumps about needs.
+pub(super) trait Seekable: Read + Seek {}
+impl<T: Read + Seek> Seekable for T {}
+
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+impl Input {
+    pub(super) fn path(path: &Path) -> Self {
+        Self { file: path.display().to_string(), place: InputPlace::Path(path.to_owned()) }
+    }
+
+    pub(super) fn memory(bytes: Vec<u8>, file: &str) -> Self {
+        Self { file: file.to_owned(), place: InputPlace::Memory(bytes) }
+    }
+
+    pub(super) fn broken(&self, error: std::io::Error) -> RecordingError {
+        RecordingError::Io { file: self.file.clone(), error }
+    }
+
+    /// As it is stored.
+    pub(super) fn raw(&self) -> Result<Box<dyn Seekable + '_>, RecordingError> {
+        Ok(match &self.place {
+            InputPlace::Path(path) => {
+                Box::new(BufReader::with_capacity(1 << 16, File::open(path).map_err(|error| self.broken(error))?))
+            }
+            InputPlace::Memory(bytes) => Box::new(Cursor::new(bytes.as_slice())),
+        })
+    }
+
+    /// Unpacked where it is gzipped.
+    pub(super) fn open(&self) -> Result<Box<dyn Read + '_>, RecordingError> {
+        let mut buffered = BufReader::with_capacity(1 << 16, self.raw()?);
+        let packed = buffered.fill_buf().map_err(|error| self.broken(error))?.starts_with(&GZIP);
+        Ok(if packed { Box::new(flate2::bufread::MultiGzDecoder::new(buffered)) } else { Box::new(buffered) })
+    }
+
+    /// The first bytes after unpacking, at most so many.
+    pub(super) fn head(&self, most: usize) -> Result<Vec<u8>, RecordingError> {
+        let mut head = Vec::new();
+        self.open()?.take(most as u64).read_to_end(&mut head).map_err(|error| self.broken(error))?;
+        Ok(head)
+    }
+
+    /// Everything after unpacking, for formats that jump about; `None` beyond this many bytes.
+    pub(super) fn whole(&self, most: u64) -> Result<Option<Vec<u8>>, RecordingError> {
+        let mut bytes = Vec::new();
+        self.open()?.take(most + 1).read_to_end(&mut bytes).map_err(|error| self.broken(error))?;
+        Ok((bytes.len() as u64 <= most).then_some(bytes))
+    }
+}

@@ -1,0 +1,161 @@
+//! Reading a recording from any file that people have.
+//!
+//! A file is gone through twice. The first time every cell is only counted (`survey`); then it is decided, with all of the file known, what each
+//! column is (`understand`, `clock`, `names`); the second time the rows are taken (`assemble`). So no single cell can change what a column is,
+//! and nothing is decided without a sentence in [`ReadRecording::notes`]. A file that is written as `recording/1` says is read as it stands
+//! there. A [`Mapping`] overrides every assumption.
+//!
+//! | file | what |
+//! |---|---|
+//! | `input`, `encoding`, `text` | bytes, characters, rows of cells |
+//! | `formats` | workbooks, LabVIEW, MATLAB, MTConnect, Parquet as the same rows of cells |
+//! | `head` | where the data begin, which line names the columns, which holds units |
+//! | `cell`, `moment` | what one cell may be |
+//! | `survey`, `understand`, `clock`, `names` | what a column is |
+//! | `assemble`, `time`, `merge` | rows, time, several clocks in one file |
+//! | `limits` | how much is taken at most |
+
+mod assemble;
+pub mod cell;
+mod clock;
+mod convert;
+pub(super) mod encoding;
+pub(super) mod error;
+mod formats;
+mod head;
+pub(super) mod input;
+pub(super) mod limits;
+mod long;
+pub(super) mod mapping;
+mod merge;
+mod moment;
+pub mod names;
+pub(super) mod plan;
+mod preview;
+mod splitter;
+mod survey;
+pub(super) mod table;
+mod targets;
+pub(super) mod text;
+mod time;
+mod understand;
+
+pub use error::{RecordingError, RowProblem};
+pub use preview::{ColumnPreview, Preview, preview, preview_rows};
+
+use super::Recording;
+
+use crate::bilingual::Bilingual;
+use input::Input;
+use mapping::Mapping;
+use plan::{Note, NoteKind, ReadPlan};
+use std::io::Read;
+use std::path::Path;
+use table::Table;
+
+/// What was read, and what was refused.
+#[derive(Debug)]
+pub struct ReadRecording {
+    /// The accepted rows.
+    pub recording: Recording,
+    /// The refused rows, at most a hundred of them described.
+    pub problems: Vec<RowProblem>,
+    /// How many rows were refused.
+    pub refused: u64,
+    /// How the file was understood, and what of it was not used. Empty for a file that is written as the contract says.
+    pub notes: Vec<Note>,
+}
+
+impl ReadRecording {
+    /// How the file was taken to be written, in one line; empty where nothing had to be assumed.
+    #[must_use]
+    pub fn statement(&self) -> Bilingual {
+        let of = |pick: fn(&Bilingual) -> &str, between: &str| {
+            let assumed = self.notes.iter().filter(|note| note.kind == NoteKind::Assumption);
+            assumed.map(|note| pick(&note.text).to_owned()).collect::<Vec<_>>().join(between)
+        };
+        Bilingual::new(of(|text| &text.en, ", "), of(|text| &text.zh, "，"))
+    }
+}
+
+/// Reads a recording from a file of any format that is known, under the map beside it (`FILE.map.toml`) where there is one.
+///
+/// # Errors
+/// See [`RecordingError`]; single bad rows are no error but listed beside the recording.
+pub fn read_path(path: &Path) -> Result<ReadRecording, RecordingError> {
+    let beside = Mapping::beside(path);
+    if !beside.is_file() {
+        return read_path_as(path, &Mapping::default());
+    }
+    let mapping = Mapping::read(&beside).map_err(|wrong| RecordingError::Format {
+        file: wrong.file,
+        reason: Bilingual::new(wrong.reason.clone(), wrong.reason),
+    })?;
+    let mut read = read_path_as(path, &mapping)?;
+    let name = beside.file_name().unwrap_or_default().to_string_lossy();
+    read.notes.insert(0, Note::new(NoteKind::Assumption, format!("map {name}"), format!("映射文件{name}")));
+    Ok(read)
+}
+
+/// Reads a recording under a map.
+///
+/// # Errors
+/// See [`RecordingError`].
+pub fn read_path_as(path: &Path, mapping: &Mapping) -> Result<ReadRecording, RecordingError> {
+    read_input(Input::path(path), mapping)
+}
+
+/// Reads a recording from CSV text; `file` is its name for messages.
+///
+/// # Errors
+/// See [`RecordingError`].
+pub fn read_csv(mut input: impl Read, file: &str) -> Result<ReadRecording, RecordingError> {
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes).map_err(|error| RecordingError::Io { file: file.to_owned(), error })?;
+    read_input(Input::memory(bytes, file), &Mapping::default())
+}
+
+fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, RecordingError> {
+    let file = input.file.clone();
+    let table = formats::open(input, mapping)?;
+    let (head, plan, table) = plan_table(table, mapping, &file)?;
+    let mut done = assemble::assemble(table.as_ref(), &head, &plan, mapping, &file)?;
+    let together = mapping.time.clocks.as_deref() == Some("rows");
+    let mut notes: Vec<Note> = table.form().into_iter().map(|text| Note { kind: NoteKind::Assumption, text }).collect();
+    notes.extend(plan.notes);
+    let recording = merge::merge(std::mem::take(&mut done.blocks), together, &mut done.notes);
+    notes.extend(done.notes);
+    // The same of every clock of the file is said once.
+    let mut said: Vec<Note> = Vec::new();
+    for note in notes {
+        if !said.contains(&note) {
+            said.push(note);
+        }
+    }
+    if recording.rows() == 0 {
+        return Err(RecordingError::Empty { file, problems: done.problems });
+    }
+    Ok(ReadRecording { recording, problems: done.problems, refused: done.refused, notes: said })
+}
+
+/// Head and plan of a table; one that has a line for each value is turned first.
+fn plan_table(
+    table: Box<dyn Table>,
+    mapping: &Mapping,
+    file: &str,
+) -> Result<(head::Head, ReadPlan, Box<dyn Table>), RecordingError> {
+    let given = head::GivenLines { names: mapping.header_line, units: mapping.units_line };
+    let head = head::look(table.as_ref(), given, file)?;
+    let survey = survey::survey(table.as_ref(), &head)?;
+    if let Some(turned) = long::turn_table(table.as_ref(), &head, &survey, file)? {
+        let head = head::look(&turned, head::GivenLines::default(), file)?;
+        let survey = survey::survey(&turned, &head)?;
+        let plan = understand::understand(&head, &survey, mapping, file)?;
+        return Ok((head, plan, Box::new(turned)));
+    }
+    let plan = understand::understand(&head, &survey, mapping, file)?;
+    Ok((head, plan, table))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,105 @@
+//! What is to be made of a table: which columns, under which names, in which units, by which clock; and every assumption in words.
+
+use super::cell::Decimal;
+use super::moment::DateOrder;
+use crate::bilingual::Bilingual;
+
+/// What a sentence about the reading is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoteKind {
+    /// How the file was taken to be written.
+    Assumption,
+    /// A foreign column and what it became.
+    Column,
+    /// Cells or lines that are not used.
+    Loss,
+    /// Something that may be wrong, with what to do.
+    Doubt,
+}
+
+/// A sentence about the reading, for the user.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Note {
+    /// See [`NoteKind`].
+    pub kind: NoteKind,
+    /// The sentence.
+    pub text: Bilingual,
+}
+
+impl Note {
+    pub(super) fn new(kind: NoteKind, en: impl Into<String>, zh: impl Into<String>) -> Self {
+        Self { kind, text: Bilingual::new(en, zh) }
+    }
+}
+
+/// How the cells of a column become numbers or words.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum PlannedKind {
+    /// `factor * x + offset`.
+    Numbers {
+        decimal: Decimal,
+        factor: f64,
+        offset: f64,
+    },
+    /// Words for no and yes become 0 and 1.
+    Flags,
+    Words,
+}
+
+/// One column to be read.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PlannedColumn {
+    /// Its place in the table.
+    pub(super) index: usize,
+    /// Its name in the recording.
+    pub(super) name: String,
+    /// Its name in the file.
+    pub(super) source: String,
+    pub(super) kind: PlannedKind,
+    /// A cell that is no number refuses its row; otherwise it is absent, and counted.
+    pub(super) strict: bool,
+}
+
+/// How the cells of time become time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum TimeKind {
+    /// Seconds after the factor, on a clock that begins anywhere.
+    Seconds { decimal: Decimal, factor: f64 },
+    /// Seconds since 1970 after the factor.
+    Unix { decimal: Decimal, factor: f64 },
+    /// Days since 1899-12-30, on the clock of the place.
+    Days { decimal: Decimal },
+    /// Dates with times.
+    Moments { order: DateOrder },
+    /// Times of day without a date.
+    TimesOfDay,
+}
+
+/// The clock of a block.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct TimePlan {
+    pub(super) index: usize,
+    /// A column with the date, where the other holds the time of day.
+    pub(super) date: Option<usize>,
+    /// A column with the milliseconds beside them.
+    pub(super) milliseconds: Option<usize>,
+    pub(super) kind: TimeKind,
+    /// Its name in the file.
+    pub(super) source: String,
+}
+
+/// Columns of one clock.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct BlockPlan {
+    pub(super) time: TimePlan,
+    pub(super) columns: Vec<PlannedColumn>,
+}
+
+/// See the [module](self).
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ReadPlan {
+    pub(super) blocks: Vec<BlockPlan>,
+    /// The file is written as our contract says: nothing of it was renamed.
+    pub(super) is_contract: bool,
+    pub(super) notes: Vec<Note>,
+}

@@ -1,0 +1,236 @@
+//! What stands in each column, counted over every row before anything is decided: one strange cell in the first row decides nothing.
+
+use super::cell::{Cell, Shape, flag, is_absent, is_absent_number, written_number};
+use super::error::RecordingError;
+use super::head::Head;
+use super::moment::{OrderEvidence, written_moment};
+use super::table::{Row, Table, VisitStep};
+
+/// Examples kept of each strange kind.
+const EXAMPLES: usize = 5;
+
+/// A cell and where it stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Example {
+    pub(super) line: u64,
+    pub(super) text: String,
+}
+
+/// Counts of one column. Absent cells are in none of them but `absent`.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ColumnSurvey {
+    pub(super) absent: u64,
+    /// Numbers of a format that knows numbers.
+    pub(super) typed: u64,
+    /// Moments of such a format, with and without a zone.
+    pub(super) instants: u64,
+    pub(super) locals: u64,
+    /// Numbers as text, by what they say of the decimal sign.
+    pub(super) whole: u64,
+    pub(super) point: u64,
+    pub(super) comma: u64,
+    pub(super) point_or_thousands: u64,
+    pub(super) comma_or_thousands: u64,
+    pub(super) point_example: Option<Example>,
+    pub(super) comma_example: Option<Example>,
+    /// What stands behind every number; `None` where they differ.
+    pub(super) suffix: Option<String>,
+    pub(super) suffixed: u64,
+    suffix_differs: bool,
+    /// Text that is a moment: with date, without one, with a zone.
+    pub(super) moments: u64,
+    pub(super) times_of_day: u64,
+    pub(super) dates: u64,
+    pub(super) zoned: u64,
+    pub(super) order: OrderEvidence,
+    /// Words of a pair for no and yes; which pair, where all are of one.
+    pub(super) flags: u64,
+    pub(super) pair: Option<usize>,
+    pairs_differ: bool,
+    /// Any other word.
+    pub(super) words: u64,
+    pub(super) word_examples: Vec<Example>,
+    /// Of the numbers, under a decimal point: least, greatest, whether each is the one before plus one.
+    pub(super) range: Option<(f64, f64)>,
+    first: Option<f64>,
+    last: Option<f64>,
+    pub(super) counts_rows: bool,
+    steps: u64,
+}
+
+impl ColumnSurvey {
+    pub(super) fn numbers(&self) -> u64 {
+        self.typed + self.whole + self.point + self.comma + self.point_or_thousands + self.comma_or_thousands
+    }
+
+    /// Cells that have something to say.
+    pub(super) fn filled(&self) -> u64 {
+        self.numbers() + self.instants + self.locals + self.moments + self.times_of_day + self.flags + self.words
+    }
+
+    /// Mean step from one number to the next.
+    pub(super) fn step(&self) -> Option<f64> {
+        let (first, last) = self.first.zip(self.last)?;
+        #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
+        (self.steps > 0).then(|| (last - first) / self.steps as f64)
+    }
+
+    fn see(&mut self, line: u64, cell: Cell<'_>) {
+        match cell {
+            Cell::Empty => self.absent += 1,
+            Cell::Number(number) if number.is_finite() => {
+                self.typed += 1;
+                self.size(number);
+            }
+            Cell::Number(_) => self.absent += 1,
+            Cell::Flag(_) => {
+                self.flags += 1;
+                self.see_pair(1);
+            }
+            Cell::Instant(_) => self.instants += 1,
+            Cell::Local(_) => self.locals += 1,
+            Cell::Text(text) => self.see_text(line, text),
+        }
+    }
+
+    fn see_text(&mut self, line: u64, text: &str) {
+        if is_absent(text) {
+            self.absent += 1;
+        } else if let Some(number) = written_number(text) {
+            let example = || Example { line, text: text.to_owned() };
+            match number.shape {
+                Shape::Whole => self.whole += 1,
+                Shape::Point => {
+                    self.point += 1;
+                    self.point_example.get_or_insert_with(example);
+                }
+                Shape::Comma => {
+                    self.comma += 1;
+                    self.comma_example.get_or_insert_with(example);
+                }
+                Shape::PointOrThousands => self.point_or_thousands += 1,
+                Shape::CommaOrThousands => self.comma_or_thousands += 1,
+            }
+            self.see_suffix(number.suffix);
+            if let Some(number) = number.value(super::cell::Decimal::Point) {
+                self.size(number);
+            }
+        } else if let Some(moment) = written_moment(text) {
+            match (moment.date, moment.time_of_day_ns) {
+                (None, _) => self.times_of_day += 1,
+                (Some(date), time) => {
+                    self.moments += 1;
+                    self.dates += u64::from(time.is_none());
+                    self.order.see(date);
+                }
+            }
+            self.zoned += u64::from(moment.offset_s.is_some());
+        } else if let Some((pair, _)) = flag(text) {
+            self.flags += 1;
+            self.see_pair(pair);
+        } else if is_absent_number(text) {
+            self.absent += 1;
+        } else {
+            self.words += 1;
+            if self.word_examples.len() < EXAMPLES {
+                self.word_examples.push(Example { line, text: text.chars().take(40).collect() });
+            }
+        }
+    }
+
+    fn see_suffix(&mut self, suffix: &str) {
+        self.suffixed += u64::from(!suffix.is_empty());
+        match &self.suffix {
+            None if !suffix.is_empty() && !self.suffix_differs => self.suffix = Some(suffix.to_owned()),
+            Some(known) if known != suffix && !suffix.is_empty() => {
+                self.suffix_differs = true;
+                self.suffix = None;
+            }
+            _ => {}
+        }
+    }
+
+    fn see_pair(&mut self, pair: usize) {
+        match self.pair {
+            None if !self.pairs_differ => self.pair = Some(pair),
+            Some(known) if known != pair => {
+                self.pairs_differ = true;
+                self.pair = None;
+            }
+            _ => {}
+        }
+    }
+
+    #[expect(clippy::float_cmp, reason = "a row number is a whole number, exactly")]
+    fn size(&mut self, number: f64) {
+        self.range = Some(self.range.map_or((number, number), |(low, high)| (low.min(number), high.max(number))));
+        self.first.get_or_insert(number);
+        if let Some(last) = self.last {
+            self.counts_rows = (self.steps == 0 || self.counts_rows) && number == last + 1.0;
+            self.steps += 1;
+        }
+        self.last = Some(number);
+    }
+}
+
+/// The survey of a table.
+#[derive(Debug, Default)]
+pub(super) struct Survey {
+    pub(super) columns: Vec<ColumnSurvey>,
+    pub(super) rows: u64,
+    /// Rows whose width differs from that of the header, beyond empty cells at their end.
+    pub(super) odd_widths: u64,
+    /// The header as data, again.
+    pub(super) repeated_headers: Vec<u64>,
+}
+
+/// Is this row the header once more?
+pub(super) fn repeats_header(row: &Row<'_>, head: &Head) -> bool {
+    let same = |(cell, name): (&Cell<'_>, &String)| match cell {
+        Cell::Text(text) => text == name || text.trim_start_matches('#').trim() == name,
+        Cell::Empty => name.is_empty(),
+        _ => false,
+    };
+    row.cells.len() >= head.names.len() && row.cells.iter().zip(&head.names).all(same)
+}
+
+/// A line of remarks among the data: a sign before it, and not as many cells as there are columns.
+pub(super) fn is_comment(row: &Row<'_>, head: &Head) -> bool {
+    matches!(row.cells.first(), Some(Cell::Text(text)) if text.starts_with('#') || text.starts_with("//"))
+        && row.cells.iter().filter(|cell| **cell != Cell::Empty).count() < head.names.len()
+}
+
+/// The cells of a row that belong to columns with a name; `None` where the row is wider or narrower than the header.
+pub(super) fn fitted<'a>(row: &Row<'a>, head: &Head, may_be_short: bool) -> Option<&'a [Cell<'a>]> {
+    let width = head.names.len();
+    if row.cells.len() >= width {
+        row.cells[width..].iter().all(|cell| *cell == Cell::Empty).then(|| &row.cells[..width])
+    } else {
+        may_be_short.then_some(row.cells)
+    }
+}
+
+/// Goes through the whole table.
+pub(super) fn survey(table: &dyn Table, head: &Head) -> Result<Survey, RecordingError> {
+    let mut found = Survey { columns: vec![ColumnSurvey::default(); head.names.len()], ..Survey::default() };
+    let short = table.may_be_short();
+    table.visit(&mut |row| {
+        if row.line < head.data_line {
+            return Ok(VisitStep::Next);
+        }
+        if repeats_header(row, head) {
+            found.repeated_headers.push(row.line);
+            return Ok(VisitStep::Next);
+        }
+        let Some(cells) = fitted(row, head, short).filter(|_| !is_comment(row, head)) else {
+            found.odd_widths += 1;
+            return Ok(VisitStep::Next);
+        };
+        found.rows += 1;
+        for (column, cell) in found.columns.iter_mut().zip(cells) {
+            column.see(row.line, *cell);
+        }
+        Ok(VisitStep::Next)
+    })?;
+    Ok(found)
+}

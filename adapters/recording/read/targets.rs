@@ -1,0 +1,224 @@
+//! Which column of a file becomes which of ours: by a map, by our own names, by a foreign name that leaves no doubt.
+
+use super::clock::ForeignColumns;
+use super::error::RecordingError;
+use super::mapping::ColumnMapping;
+use super::names::{ForeignName, conversion};
+use super::plan::{Note, NoteKind, TimePlan};
+use super::survey::ColumnSurvey;
+use crate::channel::unit::Unit;
+use crate::channel::{ChannelId, quantity};
+use crate::recording::TEXT_COLUMNS;
+use std::collections::BTreeMap;
+
+/// Which column of the table becomes which of ours, in the order of the table.
+pub(super) fn find_targets(
+    columns: &ForeignColumns<'_>,
+    clocks: &[TimePlan],
+    is_contract: bool,
+    notes: &mut Vec<Note>,
+) -> Result<Vec<(usize, ColumnTarget)>, RecordingError> {
+    let of_time = |index: &usize| {
+        clocks
+            .iter()
+            .any(|clock| clock.index == *index || clock.date == Some(*index) || clock.milliseconds == Some(*index))
+            || is_contract && ["time_s", "time_utc"].contains(&columns.names[*index].text.as_str())
+    };
+    unknown_mappings(columns)?;
+    let mut all: Vec<(usize, ColumnTarget)> = Vec::new();
+    for index in (0..columns.names.len()).filter(|index| !of_time(index)) {
+        if let Some(target) = find_target(columns, index, is_contract, notes)? {
+            all.push((index, target));
+        }
+    }
+    resolve_duplicates(columns, &mut all, notes)?;
+    Ok(all)
+}
+
+/// A column's place in the recording.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ColumnTarget {
+    pub(super) name: String,
+    pub(super) factor: f64,
+    pub(super) offset: f64,
+    /// Found by its foreign name, not by a map and not by ours.
+    pub(super) is_guess: bool,
+}
+
+/// ForeignColumns that a map names and the file does not have.
+fn unknown_mappings(columns: &ForeignColumns<'_>) -> Result<(), RecordingError> {
+    let has = |mapped: &&ColumnMapping| {
+        columns.names.iter().enumerate().any(|(index, name)| {
+            columns.mapping.column(&name.text, index).is_some_and(|found| found.from == mapped.from)
+        })
+    };
+    let Some(lost) = columns.mapping.column.iter().find(|mapped| !has(mapped)) else { return Ok(()) };
+    let known: Vec<&str> = columns.names.iter().map(|name| name.text.as_str()).collect();
+    let near = crate::channel::nearest(&lost.from, known);
+    let hint = near.map_or_else(String::new, |near| format!("; did you mean {near}?"));
+    Err(columns.wrong(
+        format!("the map names a column {:?}, which the file does not have{hint}", lost.from),
+        format!("映射文件中的列{:?}在文件中不存在", lost.from),
+    ))
+}
+
+fn find_target(
+    columns: &ForeignColumns<'_>,
+    index: usize,
+    is_contract: bool,
+    notes: &mut Vec<Note>,
+) -> Result<Option<ColumnTarget>, RecordingError> {
+    let name = &columns.names[index];
+    let survey = &columns.surveys[index];
+    if let Some(mapped) = columns.mapping.column(&name.text, index) {
+        return mapped_target(columns, index, mapped);
+    }
+    if name.text.is_empty() {
+        if survey.filled() > 0 && !survey.counts_rows {
+            notes.push(Note::new(
+                NoteKind::Loss,
+                format!("column {} has no name and is left out", index + 1),
+                format!("第{}列没有列名，未读取", index + 1),
+            ));
+        }
+        return Ok(None);
+    }
+    let own = ColumnTarget { name: name.text.clone(), factor: 1.0, offset: 0.0, is_guess: false };
+    let is_ours = ChannelId::of(&name.text).is_some() || TEXT_COLUMNS.contains(&name.text.as_str());
+    if is_ours || is_contract {
+        if ChannelId::of(&name.text).is_some() {
+            unit_agrees(columns, index)?;
+        }
+        return Ok(Some(own));
+    }
+    match name.meaning() {
+        Some(ours) => {
+            let (factor, offset) = name.conversion(ours).unwrap_or((1.0, 0.0));
+            Ok(Some(ColumnTarget { name: ours.to_owned(), factor, offset, is_guess: true }))
+        }
+        None => {
+            note_doubt(name, survey, notes);
+            Ok(Some(own))
+        }
+    }
+}
+
+/// One of ours whose line of units says another unit.
+fn unit_agrees(columns: &ForeignColumns<'_>, index: usize) -> Result<(), RecordingError> {
+    let (name, said) = (&columns.names[index].text, &columns.head.units[index]);
+    let (Some(own), Some(said)) = (quantity::unit_of(name).and_then(Unit::of), said.as_deref()) else { return Ok(()) };
+    let bare = said.trim_matches(['(', ')', '[', ']']);
+    match Unit::of(bare).and_then(|said| said.to(own)) {
+        Some((factor, offset)) if (factor - 1.0).abs() < 1e-9 && offset.abs() < 1e-9 => Ok(()),
+        // A feed per revolution is often written as a length.
+        None if quantity::unit_of(name) == Some("mm/rev") && bare == "mm" || bare == "-" || bare == "1" => Ok(()),
+        _ => {
+            let own = quantity::unit_of(name).unwrap_or_default();
+            Err(columns.wrong(
+                format!("column {name}: its name says {own}, the line of units says {bare}: rename the column, or say the unit in a map"),
+                format!("列{name}：列名表示单位{own}，单位行为{bare}：请改列名，或在映射文件中指定单位"),
+            ))
+        }
+    }
+}
+
+fn mapped_target(
+    columns: &ForeignColumns<'_>,
+    index: usize,
+    mapped: &ColumnMapping,
+) -> Result<Option<ColumnTarget>, RecordingError> {
+    if mapped.to.is_empty() {
+        return Ok(None);
+    }
+    let name = &columns.names[index];
+    let unit = mapped.unit.as_deref().or(name.unit.as_deref());
+    let own = quantity::unit_of(&mapped.to);
+    let (factor, offset) = match (conversion(unit, &mapped.to), unit, own) {
+        (Some(found), ..) => found,
+        (None, None, _) | (None, Some(_), None) => (1.0, 0.0),
+        (None, Some(unit), Some(own)) => {
+            return Err(columns.wrong(
+                format!("column {}: {unit} cannot become {} in {own}: these are different quantities, or a unit that is not known", name.text, mapped.to),
+                format!("列{}：单位{unit}无法换算为{}（{own}）：物理量不同或单位未知", name.text, mapped.to),
+            ));
+        }
+    };
+    let scale = mapped.scale.unwrap_or(1.0);
+    let target = ColumnTarget {
+        name: mapped.to.clone(),
+        factor: factor * scale,
+        offset: offset * scale + mapped.offset.unwrap_or(0.0),
+        is_guess: false,
+    };
+    Ok(Some(target))
+}
+
+/// A name that may mean one of ours: a person has to say.
+fn note_doubt(name: &ForeignName, survey: &ColumnSurvey, notes: &mut Vec<Note>) {
+    let candidates = name.candidates();
+    let Some(first) = candidates.first().filter(|_| survey.filled() > 0) else { return };
+    let list = candidates.iter().take(3).copied().collect::<Vec<_>>();
+    let why = if name.unit.is_none() && candidates.len() == 1 { "it has no unit" } else { "that is not sure" };
+    notes.push(Note::new(
+        NoteKind::Doubt,
+        format!(
+            "{}: may be {} ({why}); kept under its own name. A map says it: cnc-gateway recording map",
+            name.text,
+            list.join(" or ")
+        ),
+        format!(
+            "{}：可能是{}，不能确定，保留原名。可用映射文件指定：cnc-gateway recording map",
+            name.text,
+            list.join("或")
+        ),
+    ));
+    let _ = first;
+}
+
+/// Two columns that would get the same name: guesses give way, anything else is refused.
+fn resolve_duplicates(
+    columns: &ForeignColumns<'_>,
+    all: &mut [(usize, ColumnTarget)],
+    notes: &mut Vec<Note>,
+) -> Result<(), RecordingError> {
+    let mut by_name: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (place, (_, target)) in all.iter().enumerate() {
+        by_name.entry(target.name.clone()).or_default().push(place);
+    }
+    for (name, places) in by_name.into_iter().filter(|(_, places)| places.len() > 1) {
+        let sure: Vec<usize> = places.iter().copied().filter(|place| !all[*place].1.is_guess).collect();
+        if sure.len() > 1 {
+            return Err(columns.wrong(
+                format!("column {name} appears twice: rename one of them, or leave one out in a map (from = \"#{}\", to = \"\")", all[sure[1]].0 + 1),
+                format!("列{name}出现两次：请改名，或在映射文件中去掉一个（from = \"#{}\", to = \"\"）", all[sure[1]].0 + 1),
+            ));
+        }
+        let texts: Vec<String> = places.iter().map(|place| columns.names[all[*place].0].text.clone()).collect();
+        for place in places {
+            let (index, target) = &mut all[place];
+            if !target.is_guess {
+                continue;
+            }
+            let foreign = &columns.names[*index].text;
+            *target = ColumnTarget { name: foreign.clone(), factor: 1.0, offset: 0.0, is_guess: false };
+        }
+        notes.push(Note::new(
+            NoteKind::Doubt,
+            format!(
+                "{} could all be {name}: each keeps its own name. A map says which: cnc-gateway recording map",
+                texts.join(" and ")
+            ),
+            format!("{}都可能是{name}：均保留原名。请用映射文件指定：cnc-gateway recording map", texts.join("和")),
+        ));
+    }
+    let mut seen: Vec<&str> = Vec::new();
+    for (_, target) in all.iter() {
+        if seen.contains(&target.name.as_str()) {
+            return Err(
+                columns.wrong(format!("column {} appears twice", target.name), format!("列{}出现两次", target.name))
+            );
+        }
+        seen.push(&target.name);
+    }
+    Ok(())
+}

@@ -1,0 +1,284 @@
+//! A table written as text: the separator found, quotes understood, lines counted, every row bounded.
+
+use super::cell::{Cell, flag, is_absent, written_number};
+use super::encoding::{Decoded, TextEncoding, detect};
+use super::error::RecordingError;
+use super::input::Input;
+use super::limits::{COLUMNS_MAX, HEAD_BYTES, ROW_BYTES_MAX};
+use super::moment::written_moment;
+use super::splitter::{SplitError, Splitter};
+use super::table::{Row, Table, Visit, VisitStep};
+use crate::bilingual::Bilingual;
+use std::io::Read;
+
+/// What stands between two cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Separator {
+    /// This character.
+    Sign(u8),
+    /// Any number of spaces or tabs.
+    Space,
+}
+
+/// Tried in this order; the first of equally good ones is taken.
+const CANDIDATES: [Separator; 5] =
+    [Separator::Sign(b','), Separator::Sign(b';'), Separator::Sign(b'\t'), Separator::Sign(b'|'), Separator::Space];
+
+/// Rows that are judged for a separator.
+const JUDGED_ROWS: usize = 400;
+
+impl Separator {
+    fn words(self) -> Bilingual {
+        match self {
+            Self::Sign(b',') => Bilingual::new("comma", "逗号分隔"),
+            Self::Sign(b';') => Bilingual::new("semicolon", "分号分隔"),
+            Self::Sign(b'\t') => Bilingual::new("tab", "制表符分隔"),
+            Self::Sign(b'|') => Bilingual::new("bar |", "竖线分隔"),
+            Self::Sign(other) => {
+                let other = char::from(other);
+                Bilingual::new(format!("separator {other}"), format!("分隔符{other}"))
+            }
+            Self::Space => Bilingual::new("spaces between the columns", "空格分隔"),
+        }
+    }
+
+    /// From the text of a map; `None`: no separator.
+    pub(super) fn named(text: &str) -> Option<Self> {
+        match text {
+            "space" | " " => Some(Self::Space),
+            "tab" => Some(Self::Sign(b'\t')),
+            _ => text
+                .as_bytes()
+                .first()
+                .copied()
+                .filter(|byte| text.len() == 1 && byte.is_ascii_punctuation() || *byte == b'\t')
+                .map(Self::Sign),
+        }
+    }
+}
+
+/// See the [module](self).
+#[derive(Debug)]
+pub(super) struct TextTable {
+    pub(super) input: Input,
+    pub(super) encoding: TextEncoding,
+    pub(super) separator: Separator,
+    /// A line `sep=;` stands before everything.
+    separator_line: bool,
+    /// Rows may leave out cells at their end.
+    pub(super) short: bool,
+}
+
+impl TextTable {
+    /// Looks how the text is written; what is given is not looked for.
+    pub(super) fn new(
+        input: Input,
+        encoding: Option<&'static encoding_rs::Encoding>,
+        separator: Option<Separator>,
+    ) -> Result<Self, RecordingError> {
+        let encoding = match encoding {
+            Some(encoding) => TextEncoding { encoding, has_mark: false },
+            None => detect(&input)?,
+        };
+        let mut table = Self { input, encoding, separator: Separator::Sign(b','), separator_line: false, short: false };
+        let head = table.head()?;
+        let told = told_separator(&head);
+        table.separator_line = told.is_some();
+        table.separator = match separator.or(told) {
+            Some(separator) => separator,
+            None => best_separator(&head),
+        };
+        Ok(table)
+    }
+
+    /// The first characters, up to the end of a line.
+    pub(super) fn head(&self) -> Result<String, RecordingError> {
+        let mut head = Vec::new();
+        let broken = |error| self.input.broken(error);
+        Decoded::new(self.input.open()?, self.encoding)
+            .take(HEAD_BYTES as u64)
+            .read_to_end(&mut head)
+            .map_err(broken)?;
+        let is_all = head.len() < HEAD_BYTES;
+        if let Some(end) = head.iter().rposition(|byte| *byte == b'\n').filter(|_| !is_all) {
+            head.truncate(end + 1);
+        }
+        Ok(String::from_utf8_lossy(&head).into_owned())
+    }
+
+    fn too_long(&self, line: u64) -> RecordingError {
+        let file = &self.input.file;
+        RecordingError::Header {
+            file: file.clone(),
+            line,
+            reason: Bilingual::new(
+                format!(
+                    "the row is longer than {} MB, or has more than {COLUMNS_MAX} columns; a quote that is never closed does that too: \
+                     correct the row, or export fewer columns",
+                    ROW_BYTES_MAX >> 20
+                ),
+                format!(
+                    "该行超过{} MB或超过{COLUMNS_MAX}列；未闭合的引号也会造成这种情况：请改正该行，或减少导出的列",
+                    ROW_BYTES_MAX >> 20
+                ),
+            ),
+        }
+    }
+}
+
+/// `sep=;`, as spreadsheets write it.
+fn told_separator(head: &str) -> Option<Separator> {
+    let line = head.lines().next()?.trim_matches('"');
+    let sign = line.strip_prefix("sep=").or_else(|| line.strip_prefix("SEP="))?;
+    Separator::named(sign)
+}
+
+fn best_separator(head: &str) -> Separator {
+    let mut best = (0.0, Separator::Sign(b','));
+    for separator in CANDIDATES {
+        let score = score(head, separator);
+        if score > best.0 + 0.02 {
+            best = (score, separator);
+        }
+    }
+    best.1
+}
+
+/// How well a separator divides the text: the share of rows with the usual number of cells, times the share of their cells that mean
+/// something. Zero where no row is divided.
+fn score(head: &str, separator: Separator) -> f64 {
+    let mut rows: Vec<Vec<bool>> = Vec::new();
+    let mut splitter = Splitter::new(separator);
+    let done = splitter.feed(head.as_bytes(), true, &mut |_, cells| {
+        rows.push(cells.iter().map(|cell| is_meant(cell)).collect());
+        Ok(if rows.len() < JUDGED_ROWS { VisitStep::Next } else { VisitStep::Enough })
+    });
+    if done.is_err() || rows.is_empty() {
+        return 0.0;
+    }
+    // The header may be anything; the data begin somewhere in the first half.
+    let rows = &rows[rows.len() / 2..];
+    let mut widths: Vec<usize> = rows.iter().map(Vec::len).collect();
+    widths.sort_unstable();
+    let usual = widths[widths.len() / 2];
+    if usual < 2 {
+        return 0.0;
+    }
+    let alike: Vec<&Vec<bool>> = rows.iter().filter(|row| row.len() == usual).collect();
+    let meant = alike.iter().flat_map(|row| row.iter()).filter(|meant| **meant).count();
+    #[expect(clippy::cast_precision_loss, reason = "some hundred rows")]
+    let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
+    share(alike.len(), rows.len()) * share(meant, alike.len() * usual)
+}
+
+/// Is this a number, a moment, a flag, nothing, or a word without any separator in it?
+fn is_meant(cell: &str) -> bool {
+    is_absent(cell)
+        || written_number(cell).is_some()
+        || written_moment(cell).is_some()
+        || flag(cell).is_some()
+        || !cell.contains([',', ';', '\t', '|'])
+}
+
+impl Table for TextTable {
+    fn visit(&self, see: &mut Visit<'_>) -> Result<(), RecordingError> {
+        let mut text = Decoded::new(self.input.open()?, self.encoding);
+        let mut splitter = Splitter::new(self.separator);
+        let mut chunk = vec![0; 64 << 10];
+        let mut cells: Vec<Cell<'static>> = Vec::new();
+        let mut skip = self.separator_line;
+        loop {
+            let length = text.read(&mut chunk).map_err(|error| self.input.broken(error))?;
+            let fed = splitter.feed(&chunk[..length], length == 0, &mut |line, texts| {
+                if std::mem::take(&mut skip) {
+                    return Ok(VisitStep::Next);
+                }
+                let mut row = reuse_cells(std::mem::take(&mut cells));
+                row.extend(texts.iter().map(|text| if text.is_empty() { Cell::Empty } else { Cell::Text(text) }));
+                let step = see(&Row { line, cells: &row });
+                cells = reuse_cells(row);
+                step
+            });
+            match fed {
+                Ok(VisitStep::Enough) => return Ok(()),
+                Ok(VisitStep::Next) if length == 0 => return Ok(()),
+                Ok(VisitStep::Next) => {}
+                Err(SplitError::TooLong(line)) => return Err(self.too_long(line)),
+                Err(SplitError::Visit(error)) => return Err(error),
+            }
+        }
+    }
+
+    fn form(&self) -> Vec<Bilingual> {
+        let mut form = Vec::new();
+        let encoding = self.encoding.encoding;
+        if encoding != encoding_rs::UTF_8 {
+            form.push(Bilingual::new(format!("encoding {}", encoding.name()), format!("编码{}", encoding.name())));
+        }
+        if self.separator != Separator::Sign(b',') {
+            form.push(self.separator.words());
+        }
+        form
+    }
+
+    fn may_be_short(&self) -> bool {
+        self.short
+    }
+}
+
+/// The same allocation for cells of another life.
+fn reuse_cells<'a>(mut cells: Vec<Cell<'_>>) -> Vec<Cell<'a>> {
+    cells.clear();
+    cells.into_iter().map(|_| Cell::Empty).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(text: &str) -> (Separator, Vec<(u64, Vec<String>)>) {
+        let table = TextTable::new(Input::memory(text.as_bytes().to_vec(), "t.csv"), None, None).expect("text");
+        let mut rows = Vec::new();
+        table
+            .visit(&mut |row| {
+                let cells = row
+                    .cells
+                    .iter()
+                    .map(|cell| if let Cell::Text(text) = cell { (*text).to_owned() } else { String::new() });
+                rows.push((row.line, cells.collect()));
+                Ok(VisitStep::Next)
+            })
+            .expect("read");
+        (table.separator, rows)
+    }
+
+    #[test]
+    fn the_separator_follows_from_the_data() {
+        assert_eq!(rows("time_s,a\n0,1.5\n1,2.5\n").0, Separator::Sign(b','));
+        assert_eq!(rows("time_s;a\n0,0;1,5\n1,0;2,5\n").0, Separator::Sign(b';'));
+        assert_eq!(rows("t\ta\n0,0\t1,5\n1,0\t2,5\n").0, Separator::Sign(b'\t'));
+        assert_eq!(rows("# t a\n0.0 1.5\n1.0 2.5\n").0, Separator::Space);
+        assert_eq!(rows("sep=;\na;b,c\n1;2\n").0, Separator::Sign(b';'));
+        assert_eq!(rows("time_s,run\n0,a b\n1,a b\n").0, Separator::Sign(b','));
+    }
+
+    #[test]
+    fn lines_are_counted_through_blank_lines_and_quotes() {
+        let (_, rows) = rows("a,b\n\n1,\"x\ny\"\n2,3\n\n\n4,5");
+        let lines: Vec<u64> = rows.iter().map(|(line, _)| *line).collect();
+        assert_eq!(lines, [1, 3, 5, 8]);
+        assert_eq!(rows[1].1, ["1", "x\ny"]);
+    }
+
+    #[test]
+    fn no_row_fills_the_memory() {
+        let endless = format!("time_s,a\n0,\"{}", "x".repeat(ROW_BYTES_MAX + 10));
+        let wide = format!("time_s{}\n", ",a".repeat(COLUMNS_MAX + 5));
+        for (text, line) in [(endless, "line 2"), (wide, "line 1")] {
+            let input = Input::memory(text.into_bytes(), "t.csv");
+            let table = TextTable::new(input, None, Some(Separator::Sign(b','))).expect("text");
+            let error = table.visit(&mut |_| Ok(VisitStep::Next)).expect_err("too long").to_string();
+            assert!(error.contains(line) && error.contains("4 MB"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! The language of everything that a command prints: `--lang`, else what the computer is set to (`LC_ALL`, `LC_MESSAGES`, `LANG`).
+
+use adapters::bilingual::Bilingual;
+use clap::ValueEnum;
+use rules::physics::explain::Language;
+use std::sync::OnceLock;
+
+/// A language of the product.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Lang {
+    /// English.
+    En,
+    /// Chinese.
+    Zh,
+}
+
+impl From<Lang> for Language {
+    fn from(lang: Lang) -> Self {
+        match lang {
+            Lang::En => Self::En,
+            Lang::Zh => Self::Zh,
+        }
+    }
+}
+
+static CHOSEN: OnceLock<Language> = OnceLock::new();
+
+/// Chooses once, before anything is printed.
+pub(super) fn choose(asked: Option<Lang>) {
+    let _already_chosen = CHOSEN.set(asked.map_or_else(of_computer, Language::from));
+}
+
+/// The language of this process.
+pub(super) fn language() -> Language {
+    CHOSEN.get().copied().unwrap_or(Language::En)
+}
+
+/// What the computer is set to; the first of the variables that says anything decides, as in every program.
+pub(super) fn of_computer() -> Language {
+    let said = ["LC_ALL", "LC_MESSAGES", "LANG"]
+        .into_iter()
+        .filter_map(|name| std::env::var(name).ok())
+        .find(|value| !value.is_empty());
+    if said.is_some_and(|said| said.starts_with("zh")) { Language::Zh } else { Language::En }
+}
+
+/// The language that the arguments ask for, before they are understood: help is printed while they are read.
+pub(super) fn asked_in(arguments: impl Iterator<Item = std::ffi::OsString>) -> Option<Language> {
+    let texts: Vec<String> = arguments.filter_map(|argument| argument.into_string().ok()).collect();
+    let value = texts.iter().enumerate().find_map(|(index, text)| {
+        text.strip_prefix("--lang=")
+            .map(str::to_owned)
+            .or_else(|| (text == "--lang").then(|| texts.get(index + 1).cloned()).flatten())
+    })?;
+    match value.as_str() {
+        "zh" => Some(Language::Zh),
+        "en" => Some(Language::En),
+        _ => None,
+    }
+}
+
+/// A sentence in the language of this process.
+pub(super) fn say(text: &Bilingual) -> &str {
+    pick(&text.en, &text.zh)
+}
+
+/// One of two texts.
+pub(super) fn pick<'t>(en: &'t str, zh: &'t str) -> &'t str {
+    if language() == Language::En { en } else { zh }
+}

@@ -1,0 +1,160 @@
+//! `cnc-gateway model`: a first model of a machine, and whether a model and a recording fit before anything runs.
+
+use super::diagnose::cannot_use_as;
+use super::lang::{language, pick, say};
+use super::{CannotRun, CommandOutcome, CommandResult, print};
+use crate::diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
+use crate::diagnosis::{put, read_model, read_recordings_as, simulation, unit_check};
+use clap::{Args, Subcommand};
+use rules::physics::explain::Language;
+use rules::twin::text::short;
+use rules::twin::verdicts::unit_of;
+use rules::twin::{self};
+use std::io::{BufRead, IsTerminal};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `model`.
+#[derive(Debug, Args)]
+pub(super) struct ModelArguments {
+    #[command(subcommand)]
+    what: ModelCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum ModelCommand {
+    /// Write a first model with a word about every line; what is not given is asked.
+    New(NewArguments),
+    /// Compare a model with the columns of recordings before anything runs: what is there, what is missing, which units are doubtful.
+    Check {
+        /// The model (model/1).
+        #[arg(value_name = "M.toml")]
+        model: PathBuf,
+        /// The recordings, as for diagnose.
+        #[arg(long, value_name = "R", num_args = 1.., required = true)]
+        recording: Vec<String>,
+        /// The map under which they are read.
+        #[arg(long, value_name = "MAP.toml")]
+        map: Option<PathBuf>,
+    },
+}
+
+#[derive(Debug, Args)]
+struct NewArguments {
+    /// What is modelled.
+    #[arg(value_enum)]
+    kind: Option<ModelKind>,
+    /// Name of the machine.
+    #[arg(long, value_name = "TEXT")]
+    name: Option<String>,
+    /// The recorded quantity that is simulated; without it the usual one of the kind.
+    #[arg(long, value_name = "COLUMN")]
+    output: Option<String>,
+    /// Material of the work, for kc1.1 and mc: C45, 42CrMo4, 16MnCr5, C15, X5CrNi18-10, GG25, AlMgSi1, Ti6Al4V.
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
+    /// Which feed axis: x, y or z.
+    #[arg(long, value_name = "AXIS")]
+    axis: Option<String>,
+    /// Where the model goes; without it to standard output.
+    #[arg(long, value_name = "M.toml")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: ModelArguments) -> CommandResult {
+    match arguments.what {
+        ModelCommand::New(new) => create(new),
+        ModelCommand::Check { model, recording, map } => check(&model, &recording, map.as_ref()),
+    }
+}
+
+fn create(arguments: NewArguments) -> CommandResult {
+    let asks = std::io::stdin().is_terminal();
+    let kind = arguments.kind.or_else(|| asks.then(ask_kind).flatten());
+    let kind = kind.ok_or_else(|| {
+        CannotRun::new(
+            pick("which kind of model?", "要建哪种模型？"),
+            "model new lathe, mill, drill, axis, spindle, thermal or series",
+        )
+    })?;
+    if let Some(material) = &arguments.material
+        && MATERIALS.iter().all(|(known, ..)| !known.eq_ignore_ascii_case(material))
+    {
+        let known: Vec<&str> = MATERIALS.iter().map(|(known, ..)| *known).collect();
+        return Err(CannotRun::new(format!("--material {material}"), known.join(", ")));
+    }
+    let cuts = matches!(kind, ModelKind::Lathe | ModelKind::Mill | ModelKind::Drill);
+    let material = arguments.material.or_else(|| (asks && cuts).then(ask_material).flatten());
+    let word = KINDS.iter().find(|(known, ..)| *known == kind).map_or("machine", |(_, word, ..)| word);
+    let new = NewModel {
+        kind,
+        name: arguments.name.unwrap_or_else(|| word.to_owned()),
+        output: arguments.output,
+        material,
+        axis: arguments.axis,
+    };
+    let out = arguments.out.unwrap_or_else(|| PathBuf::from("-"));
+    put(&out, &new.toml()).map_err(|problem| CannotRun::new(problem, ""))?;
+    if out.as_os_str() != "-" {
+        let path = out.display();
+        print(pick(
+            &format!("written: {path}\nnext: cnc-gateway model check {path} --recording FILE\n"),
+            &format!("已写入：{path}\n下一步：cnc-gateway model check {path} --recording 文件\n"),
+        ));
+    }
+    Ok(CommandOutcome::Fine)
+}
+
+fn ask_kind() -> Option<ModelKind> {
+    for (index, (_, word, en, zh)) in KINDS.iter().enumerate() {
+        print(&format!("  {} {word}: {}\n", index + 1, pick(en, zh)));
+    }
+    let text = line()?;
+    let by_number = text.parse::<usize>().ok().and_then(|number| KINDS.get(number.checked_sub(1)?));
+    by_number.or_else(|| KINDS.iter().find(|(_, word, ..)| *word == text)).map(|(kind, ..)| *kind)
+}
+
+fn ask_material() -> Option<String> {
+    let names: Vec<&str> = MATERIALS.iter().map(|(name, ..)| *name).collect();
+    let list = names.join(", ");
+    print(pick(&format!("material ({list}; Enter: C45)?\n"), &format!("工件材料（{list}；回车：C45）？\n")));
+    line().filter(|text| !text.is_empty())
+}
+
+fn line() -> Option<String> {
+    let mut text = String::new();
+    std::io::stdin().lock().read_line(&mut text).ok().filter(|length| *length > 0)?;
+    Some(text.trim().to_owned())
+}
+
+fn check(path: &Path, recordings: &[String], map: Option<&PathBuf>) -> CommandResult {
+    let model = read_model(path).map_err(|wrong| super::diagnose::cannot_use(&wrong))?;
+    let given = read_recordings_as(recordings, map).map_err(|all| cannot_use_as(&all))?;
+    given.warnings.iter().for_each(|warning| print(&format!("{}\n", say(warning))));
+    let examination = twin::examine(&given.recording, &model);
+    let (rows, runs) = (given.recording.rows(), given.recording.runs().len());
+    print(pick(&format!("{rows} rows in {runs} runs\n"), &format!("{rows}行，{runs}个批次\n")));
+    if let Ok(simulation) = simulation::run(&given.recording, &model)
+        && let Some((rmse, rows)) = simulation.rmse()
+    {
+        let (error, unit) = (short(rmse), unit_of(&model.output));
+        print(pick(
+            &format!("the model as given misses {} by {error} {unit} over {rows} rows\n", model.output),
+            &format!("按给定模型，{}的误差为{error} {unit}（{rows}行）\n", model.output),
+        ));
+    }
+    let doubts = unit_check::inputs(&given.recording, &model);
+    for doubt in &doubts {
+        print(&format!("{}{}\n", pick("unit? ", "单位？"), say(&doubt.text)));
+    }
+    examination.notes.iter().for_each(|note| print(&format!("{}{note}\n", pick("note: ", "提示："))));
+    examination.unusable.iter().for_each(|problem| print(&format!("{}{problem}\n", pick("missing: ", "缺少："))));
+    let fine = examination.unusable.is_empty() && doubts.is_empty();
+    let closing = match (fine, language()) {
+        (true, Language::En) => "model and recording fit: cnc-gateway diagnose\n",
+        (true, Language::Zh) => "模型与记录相符：可运行cnc-gateway diagnose\n",
+        (false, Language::En) => "not yet: see above\n",
+        (false, Language::Zh) => "尚不能使用：见上\n",
+    };
+    print(closing);
+    Ok(if fine { CommandOutcome::Fine } else { CommandOutcome::No })
+}

@@ -1,0 +1,176 @@
+//! `cnc-gateway recording`: how a foreign file is describe_reading, and the map that says it.
+
+use super::lang::{pick, say};
+use super::{CannotRun, CommandOutcome, CommandResult, print};
+use crate::diagnosis::map_file::{MapProposal, first_rows};
+use crate::diagnosis::{describe_reading, put};
+use adapters::channel::ChannelId;
+use adapters::channel::unit::Unit;
+use adapters::recording::Mapping;
+use adapters::recording::read::{Preview, preview};
+use clap::{Args, Subcommand};
+use std::io::{BufRead, IsTerminal};
+use std::path::{Path, PathBuf};
+
+/// Rows and columns that are shown.
+const SHOWN: (usize, usize) = (5, 8);
+
+/// Arguments of `recording`.
+#[derive(Debug, Args)]
+pub(super) struct RecordingArguments {
+    #[command(subcommand)]
+    what: RecordingCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum RecordingCommand {
+    /// Tell how a file is describe_reading, and show its first rows.
+    Show(RecordingFile),
+    /// Propose the map of a file (map/1), ask where something is unsure, write it beside the file.
+    Map {
+        #[command(flatten)]
+        file: RecordingFile,
+        /// Where the map goes; - for standard output. Without it FILE.map.toml, which is found by itself when FILE is read.
+        #[arg(long, value_name = "MAP.toml")]
+        out: Option<PathBuf>,
+        /// Ask nothing: what is unsure keeps its own name.
+        #[arg(long)]
+        yes: bool,
+    },
+}
+
+#[derive(Debug, Args)]
+struct RecordingFile {
+    /// The file: CSV, Excel, OpenDocument, LabVIEW (lvm, tdms), MATLAB (to version 7), Parquet, MTConnect.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// A map that is taken into account.
+    #[arg(long, value_name = "MAP.toml")]
+    map: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &RecordingArguments) -> CommandResult {
+    match &arguments.what {
+        RecordingCommand::Show(file) => show(file),
+        RecordingCommand::Map { file, out, yes } => map(file, out.as_deref(), *yes),
+    }
+}
+
+fn look(file: &RecordingFile) -> Result<(Preview, Mapping), CannotRun> {
+    let beside = Mapping::beside(&file.file);
+    let path = file.map.clone().or_else(|| beside.is_file().then_some(beside));
+    let mapping = path
+        .map_or_else(|| Ok(Mapping::default()), |path| Mapping::read(&path))
+        .map_err(|wrong| CannotRun::new(wrong.to_string(), ""))?;
+    let found =
+        preview(&file.file, &mapping).map_err(|error| CannotRun::new(pick(&error.to_string(), &error.zh()), ""))?;
+    Ok((found, mapping))
+}
+
+fn show(file: &RecordingFile) -> CommandResult {
+    let (found, _) = look(file)?;
+    tell(&found, &file.file)?;
+    Ok(CommandOutcome::Fine)
+}
+
+/// What was assumed, and the first rows.
+fn tell(found: &Preview, path: &Path) -> Result<(), CannotRun> {
+    let name = path.display().to_string();
+    let read = found.read.as_ref().map_err(|error| CannotRun::new(pick(&error.to_string(), &error.zh()), ""))?;
+    describe_reading(&name, read).iter().for_each(|line| print(&format!("{}\n", say(line))));
+    let rows = read.recording.rows();
+    let refused = read.refused;
+    print(pick(&format!("{rows} rows, {refused} refused\n"), &format!("{rows}行，拒绝{refused}行\n")));
+    print(&first_rows(&read.recording, SHOWN.0, SHOWN.1));
+    Ok(())
+}
+
+fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
+    let (found, _) = look(file)?;
+    let mut proposal = MapProposal::of(&found);
+    let asks = !yes && std::io::stdin().is_terminal();
+    if asks {
+        ask_all(&mut proposal, &found);
+    }
+    let statement = found.read.as_ref().map(adapters::recording::ReadRecording::statement).unwrap_or_default();
+    let name = file.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let text = proposal.toml(&statement, &name);
+    Mapping::parse(&text, "map").map_err(|wrong| CannotRun::new(wrong.to_string(), ""))?;
+    let beside = Mapping::beside(&file.file);
+    let out = out.unwrap_or(&beside);
+    put(out, &text).map_err(|problem| CannotRun::new(problem, ""))?;
+    if out.as_os_str() == "-" {
+        return Ok(CommandOutcome::Fine);
+    }
+    let unsure = if asks { 0 } else { proposal.questions().len() };
+    let path = out.display();
+    if unsure > 0 {
+        let en = format!("{unsure} columns are not sure and keep their names; they are marked in {path}\n");
+        print(pick(&en, &format!("{unsure}列不能确定，保留原名；已在{path}中标出\n")));
+    }
+    let (after, _) = look(&RecordingFile { file: file.file.clone(), map: Some(out.to_owned()) })?;
+    tell(&after, &file.file)?;
+    print(pick(&format!("written: {path}\n"), &format!("已写入：{path}\n")));
+    Ok(CommandOutcome::Fine)
+}
+
+/// One question for each column that may be one of ours, and one for the time where none is known.
+fn ask_all(proposal: &mut MapProposal, found: &Preview) {
+    if found.read.is_err() && proposal.columns.iter().all(|column| !column.is_time) {
+        let names: Vec<String> = proposal.columns.iter().map(|column| column.from.clone()).collect();
+        print(pick("Which column is the time?\n", "哪一列是时间？\n"));
+        if let Some(index) = choice(&names) {
+            proposal.time = Some(names[index].clone());
+        }
+    }
+    for index in proposal.questions() {
+        let column = proposal.columns[index].clone();
+        let mut options: Vec<String> = column.candidates.iter().map(|name| (*name).to_owned()).collect();
+        options.push(pick("keep its own name", "保留原名").to_owned());
+        options.push(pick("leave it out", "不读取").to_owned());
+        print(&format!("{}\n", pick(&format!("{}: what is it?", column.from), &format!("{}：是什么？", column.from))));
+        let Some(chosen) = choice(&options) else { continue };
+        let to = match options.len() - chosen {
+            1 => String::new(),
+            2 => column.from.clone(),
+            _ => options[chosen].clone(),
+        };
+        let unit =
+            unit_needed(&to, &found.columns[index_of(found, &column.from)].unit).then(|| ask_unit(&to)).flatten();
+        (proposal.columns[index].to, proposal.columns[index].unit) = (Some(to), unit);
+    }
+}
+
+fn index_of(found: &Preview, from: &str) -> usize {
+    found.columns.iter().position(|column| column.from == from).unwrap_or(0)
+}
+
+/// A number of ours whose unit the file does not say.
+fn unit_needed(to: &str, said: &Option<String>) -> bool {
+    said.is_none() && ChannelId::of(to).is_some_and(|id| !["", "1"].contains(&id.channel().unit))
+}
+
+fn ask_unit(to: &str) -> Option<String> {
+    let own = ChannelId::of(to)?.channel().unit;
+    print(pick(&format!("in which unit? (Enter: {own})\n"), &format!("单位是什么？（回车：{own}）\n")));
+    let text = line()?;
+    let known = Unit::of(&text).is_some();
+    if !known && !text.is_empty() {
+        print(pick("that unit is not known; the file says what stands there\n", "未知单位，忽略\n"));
+    }
+    known.then_some(text)
+}
+
+/// Shows numbered choices; `None` where nothing usable was typed.
+fn choice(options: &[String]) -> Option<usize> {
+    for (index, option) in options.iter().enumerate() {
+        print(&format!("  {} {option}\n", index + 1));
+    }
+    line()?.parse::<usize>().ok()?.checked_sub(1).filter(|index| *index < options.len())
+}
+
+fn line() -> Option<String> {
+    let mut text = String::new();
+    std::io::stdin().lock().read_line(&mut text).ok().filter(|length| *length > 0)?;
+    Some(text.trim().to_owned())
+}

@@ -1,0 +1,210 @@
+//! Files that persons bring to the page, and the diagnoses of them: kept in a folder of the data directory, so that they can be looked at and compared
+//! later. The work is done by the same child process as a diagnosis of the history, one at a time.
+
+use super::child::{DiagnosisJob, JobInput};
+use super::handle::{DiagnosisHandle, DiagnosisRefusal};
+use super::store::{DiagnosisStore, key};
+use super::worker::{DiagnosisRequest, in_child};
+use crate::files::{read_text, replace};
+use crate::reload::digest;
+use adapters::clock::TimeNs;
+use adapters::recording::Mapping;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, sync_channel};
+
+/// Files that are kept; of more the oldest goes.
+const FILES_MAX: usize = 20;
+/// Diagnoses that are listed.
+const RESULTS_MAX: usize = 40;
+/// The longest index.
+const INDEX_MAX: usize = 8 << 20;
+
+/// A file that was brought.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BroughtFile {
+    /// Its key.
+    pub key: String,
+    /// As it was called.
+    pub name: String,
+    /// When, milliseconds since 1970.
+    pub at_ms: i64,
+    /// How long it is.
+    pub bytes: usize,
+}
+
+/// A finished diagnosis of a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FileDiagnosis {
+    /// Key of what is kept of it.
+    pub key: String,
+    /// Name of the file.
+    pub file: String,
+    /// Who asked.
+    pub by: Option<String>,
+    /// When, milliseconds since 1970.
+    pub at_ms: i64,
+    /// The verdict.
+    pub verdict: String,
+    /// In words.
+    pub summary: String,
+    /// What is missing.
+    pub missing: Vec<String>,
+    /// The document.
+    pub diagnosis: serde_json::Value,
+}
+
+/// See the [module](self). Clones are handles of the same.
+#[derive(Debug, Clone)]
+pub struct FileDiagnoses {
+    directory: PathBuf,
+    handle: DiagnosisHandle,
+}
+
+impl FileDiagnoses {
+    /// Below this data directory; a thread waits for what is asked.
+    ///
+    /// # Errors
+    /// No thread could be started.
+    pub fn below(data_dir: &Path) -> std::io::Result<Self> {
+        let directory = data_dir.join("recordings");
+        let (requests, asked) = sync_channel(1);
+        let kept = DiagnosisStore::at(directory.join("diagnoses"));
+        let handle = DiagnosisHandle::new(requests, directory.join("model.toml"), kept);
+        let own = Self { directory, handle };
+        let (index, kept) = (own.index(), own.handle.kept().clone());
+        // The thread holds no handle that could ask: it ends when the last one outside is gone.
+        let state = own.handle.without_requests();
+        std::thread::Builder::new().name("files".to_owned()).spawn(move || work(&asked, &state, &kept, &index))?;
+        Ok(own)
+    }
+
+    /// What is being done.
+    #[must_use]
+    pub fn handle(&self) -> &DiagnosisHandle {
+        &self.handle
+    }
+
+    fn index(&self) -> PathBuf {
+        self.directory.join("diagnoses.json")
+    }
+
+    /// The files, newest first.
+    #[must_use]
+    pub fn files(&self) -> Vec<BroughtFile> {
+        let text = read_text(&self.directory.join("files.json"), INDEX_MAX).unwrap_or_default();
+        serde_json::from_str(&text).unwrap_or_default()
+    }
+
+    /// Keeps a file.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn add(&self, name: &str, bytes: &[u8], at_ms: i64) -> std::io::Result<BroughtFile> {
+        let key = format!("{:016x}", digest(bytes));
+        let file = BroughtFile { key: key.clone(), name: plain(name), at_ms, bytes: bytes.len() };
+        let folder = self.directory.join(&key);
+        std::fs::create_dir_all(&folder)?;
+        std::fs::write(folder.join("data"), bytes)?;
+        let mut files = self.files();
+        files.retain(|known| known.key != key);
+        files.insert(0, file.clone());
+        for gone in files.split_off(FILES_MAX.min(files.len())) {
+            let _already_gone = std::fs::remove_dir_all(self.directory.join(gone.key));
+        }
+        replace(&self.directory.join("files.json"), &serde_json::to_string(&files)?)?;
+        Ok(file)
+    }
+
+    /// The path of a file; `None` where there is none of this key.
+    #[must_use]
+    pub fn path(&self, key: &str) -> Option<PathBuf> {
+        let known = self.files().into_iter().any(|file| file.key == key);
+        known.then(|| self.directory.join(key).join("data"))
+    }
+
+    /// Puts a map beside a file.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn set_map(&self, path: &Path, toml: &str) -> std::io::Result<()> {
+        replace(&Mapping::beside(path), toml)
+    }
+
+    /// The finished diagnoses, newest first.
+    #[must_use]
+    pub fn results(&self) -> Vec<FileDiagnosis> {
+        results(&self.index())
+    }
+
+    /// Asks for a diagnosis of a file.
+    ///
+    /// # Errors
+    /// One is under way.
+    pub fn ask(
+        &self,
+        by: String,
+        toml: String,
+        path: PathBuf,
+        simulated: Option<String>,
+        at_ns: TimeNs,
+    ) -> Result<(), DiagnosisRefusal> {
+        self.handle.begin(DiagnosisRequest {
+            toml,
+            by: Some(by),
+            from_ns: at_ns,
+            to_ns: at_ns,
+            file: Some((path, simulated)),
+        })
+    }
+}
+
+/// A name without a path, and not longer than a line.
+fn plain(name: &str) -> String {
+    let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
+    last.chars().filter(|c| !c.is_control()).take(120).collect()
+}
+
+fn results(index: &Path) -> Vec<FileDiagnosis> {
+    let text = read_text(index, INDEX_MAX).unwrap_or_default();
+    serde_json::from_str(&text).unwrap_or_default()
+}
+
+fn work(asked: &Receiver<DiagnosisRequest>, handle: &DiagnosisHandle, kept: &DiagnosisStore, index: &Path) {
+    while let Ok(request) = asked.recv() {
+        let DiagnosisRequest { toml, by, to_ns, file, .. } = request;
+        let Some((path, simulated)) = file else { continue };
+        let name = index.parent().map(|directory| name_of(directory, &path)).unwrap_or_default();
+        let job = DiagnosisJob {
+            toml,
+            input: JobInput::File { path, simulated, at_ns: to_ns },
+            kept: kept.directory().to_owned(),
+        };
+        let found = in_child(&job, handle);
+        if let Ok((row, missing)) = &found {
+            let mut all = results(index);
+            let result = FileDiagnosis {
+                key: key(row),
+                file: name,
+                by,
+                at_ms: row.to_ns.div_euclid(1_000_000),
+                verdict: row.verdict.clone(),
+                summary: row.summary.clone(),
+                missing: missing.clone(),
+                diagnosis: serde_json::from_str(&row.json).unwrap_or_default(),
+            };
+            all.retain(|known| known.key != result.key);
+            all.insert(0, result);
+            all.truncate(RESULTS_MAX);
+            let _told_by_the_handle = serde_json::to_string(&all).map(|text| replace(index, &text));
+        }
+        handle.ended(found.as_ref().map(|(row, _)| key(row)).map_err(Clone::clone));
+    }
+}
+
+fn name_of(directory: &Path, path: &Path) -> String {
+    let key = path.parent().and_then(Path::file_name).map(|key| key.to_string_lossy().into_owned()).unwrap_or_default();
+    let text = read_text(&directory.join("files.json"), INDEX_MAX).unwrap_or_default();
+    let files: Vec<BroughtFile> = serde_json::from_str(&text).unwrap_or_default();
+    files.into_iter().find(|file| file.key == key).map_or(key, |file| file.name)
+}

@@ -1,0 +1,323 @@
+//! Where an effect acts, in the fewest words that cover it: conditions on what a person can set or see (a speed, a tool, the age of an edge, the time on
+//! the clock), found by what they cover of the rows in which it acts, less the share of the rows that they take in, less a price for each condition and each
+//! word of a list. So a threshold is told in place of a list of runs.
+
+use adapters::Recording;
+use adapters::channel::quantity::Quantity;
+use adapters::recording::{Words, derived};
+use rules::twin::Diagnosis;
+use rules::twin::locate::Condition;
+
+/// Price of one condition, in shares of what is covered,
+const CONDITION_PRICE: f64 = 0.03;
+/// and of each further word of a list.
+const WORD_PRICE: f64 = 0.02;
+/// Conditions that hold together, at most.
+const CONDITIONS_MAX: usize = 3;
+/// Thresholds that are tried for each column.
+const THRESHOLDS: usize = 24;
+/// Words of a list, at most.
+const WORDS_MAX: usize = 4;
+/// Rows that are looked at; a long recording is thinned.
+const ROWS_MAX: usize = 6000;
+/// What another description must be better by, to take the place of that of the engine.
+const BETTER: f64 = 0.01;
+
+/// How well a description covers an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coverage {
+    /// Share of the effect's energy within.
+    pub energy: f64,
+    /// Share of the rows within.
+    pub rows: f64,
+}
+
+/// A column as the search sees it.
+enum PlaceColumn<'a> {
+    Numbers(String, Vec<Option<f64>>),
+    Words(&'a str, &'a Words),
+}
+
+/// The search over one recording.
+struct PlaceSearch<'a> {
+    rows: Vec<usize>,
+    columns: Vec<PlaceColumn<'a>>,
+}
+
+/// Replaces the conditions of each region where fewer or better ones are found.
+pub fn refine(diagnosis: &mut Diagnosis, recording: &Recording) {
+    let search = PlaceSearch::new(recording, &diagnosis.output);
+    let regions: Vec<(usize, Vec<f64>)> = diagnosis
+        .mismatch
+        .iter()
+        .enumerate()
+        .filter_map(|(index, region)| {
+            let (_, values) = diagnosis.rows.effects.iter().find(|(name, _)| *name == region.effect)?;
+            (values.len() == recording.rows()).then(|| (index, values.clone()))
+        })
+        .collect();
+    for (index, values) in regions {
+        let energy = search.weights(&values);
+        let known = diagnosis.mismatch[index].conditions.clone();
+        let (found, value) = search.best(&energy);
+        if value > search.value(&known, &energy) + BETTER {
+            diagnosis.mismatch[index].conditions = found;
+        }
+    }
+}
+
+/// What these conditions cover of a contribution.
+#[must_use]
+pub fn coverage(recording: &Recording, output: &str, conditions: &[Condition], contribution: &[f64]) -> Coverage {
+    let search = PlaceSearch::new(recording, output);
+    search.coverage(&search.inside(conditions), &search.energy(contribution))
+}
+
+impl<'a> PlaceSearch<'a> {
+    fn new(recording: &'a Recording, output: &str) -> Self {
+        let every = recording.rows().div_ceil(ROWS_MAX).max(1);
+        let rows: Vec<usize> = (0..recording.rows()).step_by(every).collect();
+        let mut columns = Vec::new();
+        for column in recording.columns() {
+            let name = column.name.as_str();
+            if let Some(numbers) = recording.numbers(name).filter(|_| tells_a_place(name, output)) {
+                columns.push(PlaceColumn::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
+            }
+            if let Some(words) = recording
+                .words(name)
+                .filter(|words| words.words().len() > 1 && !name.ends_with("_missing") && name != "time_utc")
+            {
+                columns.push(PlaceColumn::Words(name, words));
+            }
+        }
+        for name in ["cutting_speed_m_min", "cutting_time_min", "feed_per_rev_mm"] {
+            if recording.numbers(name).is_none()
+                && let Some(numbers) = derived(recording, name)
+            {
+                columns.push(PlaceColumn::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
+            }
+        }
+        if recording.pauses_known() {
+            columns.push(PlaceColumn::Numbers(
+                "time_s".to_owned(),
+                rows.iter().map(|row| Some(recording.time_s[*row])).collect(),
+            ));
+        }
+        if recording.runs().len() > 1 {
+            columns.push(PlaceColumn::Numbers("time_in_run_s".to_owned(), time_in_run(recording, &rows)));
+        }
+        Self { rows, columns }
+    }
+
+    fn energy(&self, contribution: &[f64]) -> Vec<f64> {
+        self.rows.iter().map(|row| contribution.get(*row).map_or(0.0, |x| x * x)).collect()
+    }
+
+    /// How much the effect acts in each row: fully from the lower quarter of its sizes on, so that neither one great row nor slow growth decides where it
+    /// is said to act.
+    fn weights(&self, contribution: &[f64]) -> Vec<f64> {
+        let sizes: Vec<f64> = self.rows.iter().map(|row| contribution.get(*row).map_or(0.0, |x| x.abs())).collect();
+        let mut acting: Vec<f64> = sizes.iter().copied().filter(|size| *size > 0.0).collect();
+        acting.sort_by(f64::total_cmp);
+        let usual = acting.get(acting.len() / 2).copied().unwrap_or(0.0);
+        let acting: Vec<f64> = acting.into_iter().filter(|size| *size > 0.1 * usual).collect();
+        let full = acting.get(acting.len() / 4).copied().unwrap_or(f64::MIN_POSITIVE);
+        sizes.into_iter().map(|size| (size / full).min(1.0)).collect()
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "some thousand rows")]
+    fn coverage(&self, inside: &[bool], energy: &[f64]) -> Coverage {
+        let all: f64 = energy.iter().sum();
+        let within: f64 = energy.iter().zip(inside).filter(|(_, inside)| **inside).map(|(energy, _)| energy).sum();
+        let rows = inside.iter().filter(|inside| **inside).count();
+        Coverage { energy: within / all.max(f64::MIN_POSITIVE), rows: rows as f64 / self.rows.len().max(1) as f64 }
+    }
+
+    fn gain(&self, inside: &[bool], energy: &[f64]) -> f64 {
+        let found = self.coverage(inside, energy);
+        found.energy - found.rows
+    }
+
+    fn value(&self, conditions: &[Condition], energy: &[f64]) -> f64 {
+        self.gain(&self.inside(conditions), energy) - price(conditions)
+    }
+
+    fn inside(&self, conditions: &[Condition]) -> Vec<bool> {
+        let mut inside = vec![true; self.rows.len()];
+        for condition in conditions {
+            self.narrow(&mut inside, condition);
+        }
+        inside
+    }
+
+    fn narrow(&self, inside: &mut [bool], condition: &Condition) {
+        for column in &self.columns {
+            match (column, condition) {
+                (PlaceColumn::Numbers(name, values), Condition::Range { column, min, max }) if name == column => {
+                    let holds = |x: &f64| min.is_none_or(|min| *x >= min) && max.is_none_or(|max| *x <= max);
+                    inside
+                        .iter_mut()
+                        .zip(values)
+                        .for_each(|(inside, value)| *inside &= value.as_ref().is_some_and(holds));
+                }
+                (PlaceColumn::Words(name, cells), Condition::Equals { column, words }) if name == column => {
+                    let holds = |row: usize| cells.get(row).is_some_and(|word| words.iter().any(|known| known == word));
+                    inside.iter_mut().zip(&self.rows).for_each(|(inside, row)| *inside &= holds(*row));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// One condition after the other, each the one that gains most.
+    fn best(&self, energy: &[f64]) -> (Vec<Condition>, f64) {
+        let (mut chosen, mut value): (Vec<Condition>, f64) = (Vec::new(), 0.0);
+        let mut inside = vec![true; self.rows.len()];
+        while chosen.len() < CONDITIONS_MAX {
+            let mut best: Option<(f64, Condition, Vec<bool>)> = None;
+            for candidate in self.columns.iter().flat_map(|column| self.candidates(column, &inside, energy)) {
+                if chosen.iter().any(|known| known.column() == candidate.column()) {
+                    continue;
+                }
+                let mut narrowed = inside.clone();
+                self.narrow(&mut narrowed, &candidate);
+                let mut all = chosen.clone();
+                all.push(candidate.clone());
+                let worth = self.gain(&narrowed, energy) - price(&all);
+                if best.as_ref().is_none_or(|(most, ..)| worth > *most) {
+                    best = Some((worth, candidate, narrowed));
+                }
+            }
+            let Some((worth, condition, narrowed)) = best.filter(|(worth, ..)| *worth > value + 1e-9) else { break };
+            (value, inside) = (worth, narrowed);
+            chosen.push(condition);
+        }
+        (chosen, value)
+    }
+
+    fn candidates(&self, column: &PlaceColumn<'_>, inside: &[bool], energy: &[f64]) -> Vec<Condition> {
+        match column {
+            PlaceColumn::Numbers(name, values) => {
+                thresholds(values, inside).into_iter().flat_map(|(low, high)| ranges(name, low, high)).collect()
+            }
+            PlaceColumn::Words(name, words) => self.lists(name, words, inside, energy),
+        }
+    }
+
+    /// The words that hold most of the energy for their rows: the first one, the first two, and so on.
+    fn lists(&self, name: &str, words: &Words, inside: &[bool], energy: &[f64]) -> Vec<Condition> {
+        let mut sums = vec![(0.0, 0.0); words.words().len()];
+        for ((row, inside), energy) in self.rows.iter().zip(inside).zip(energy) {
+            if let Some(code) = words.code(*row).filter(|_| *inside) {
+                sums[code as usize].0 += energy;
+                sums[code as usize].1 += 1.0;
+            }
+        }
+        let mut order: Vec<usize> = (0..sums.len()).filter(|code| sums[*code].1 > 0.0).collect();
+        order.sort_by(|a, b| (sums[*b].0 / sums[*b].1).total_cmp(&(sums[*a].0 / sums[*a].1)));
+        (1..=WORDS_MAX.min(order.len().saturating_sub(1)))
+            .map(|count| {
+                let mut list: Vec<usize> = order[..count].to_vec();
+                list.sort_unstable();
+                Condition::Equals {
+                    column: name.to_owned(),
+                    words: list.into_iter().map(|code| words.words()[code].clone()).collect(),
+                }
+            })
+            .collect()
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a few conditions")]
+fn price(conditions: &[Condition]) -> f64 {
+    let words = |condition: &Condition| match condition {
+        Condition::Equals { words, .. } => words.len().saturating_sub(1) as f64,
+        Condition::Range { min: Some(_), max: Some(_), .. } => 0.5,
+        Condition::Range { .. } => 0.0,
+    };
+    conditions.iter().map(|condition| CONDITION_PRICE + WORD_PRICE * words(condition)).sum()
+}
+
+/// A person can set it or see it, and it is not what the effect acts on.
+fn tells_a_place(name: &str, output: &str) -> bool {
+    let measured =
+        [Quantity::Power, Quantity::Current, Quantity::Force, Quantity::Torque, Quantity::Load, Quantity::Displacement];
+    name != output && !name.starts_with("simulated_") && !measured.contains(&Quantity::of(name))
+}
+
+fn time_in_run(recording: &Recording, rows: &[usize]) -> Vec<Option<f64>> {
+    let runs = recording.runs();
+    let start = |row: usize| runs.get(runs.partition_point(|run| run.rows.end <= row)).map(|run| run.rows.start);
+    rows.iter().map(|row| Some(recording.time_s[*row] - recording.time_s[start(*row)?])).collect()
+}
+
+/// Pairs of neighbouring values at even shares of the rows that are inside: a threshold lies between both.
+fn thresholds(values: &[Option<f64>], inside: &[bool]) -> Vec<(f64, f64)> {
+    let mut sorted: Vec<f64> =
+        values.iter().zip(inside).filter(|(_, inside)| **inside).filter_map(|(value, _)| *value).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
+    if sorted.len() < 2 {
+        return Vec::new();
+    }
+    let count = THRESHOLDS.min(sorted.len() - 1);
+    let mut places: Vec<usize> = (0..count).map(|k| (2 * k + 1) * (sorted.len() - 1) / (2 * count)).collect();
+    places.dedup();
+    let bounds: Vec<f64> = places.into_iter().map(|place| f64::midpoint(sorted[place], sorted[place + 1])).collect();
+    let mut pairs: Vec<(f64, f64)> = bounds.iter().map(|bound| (*bound, f64::INFINITY)).collect();
+    pairs.extend(bounds.iter().map(|bound| (f64::NEG_INFINITY, *bound)));
+    for (index, low) in bounds.iter().enumerate() {
+        pairs.extend(bounds[index + 1..].iter().map(|high| (*low, *high)));
+    }
+    pairs
+}
+
+fn ranges(name: &str, low: f64, high: f64) -> Option<Condition> {
+    Some(Condition::Range {
+        column: name.to_owned(),
+        min: low.is_finite().then_some(low),
+        max: high.is_finite().then_some(high),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adapters::recording::{Cells, Numbers};
+
+    /// 24 parts, an edge changed every six; an effect from the second minute of an edge on.
+    fn recording() -> (Recording, Vec<f64>) {
+        let rows = 24 * 30;
+        let mut recording = Recording::new("t", (0..rows).map(f64::from).collect(), None);
+        let number = |of: &dyn Fn(i32) -> f64| Cells::Numbers((0..rows).map(|row| Some(of(row))).collect::<Numbers>());
+        recording.set_column("spindle_speed_rpm", number(&|row| f64::from(800 + 400 * (row % 3))));
+        recording.set_column("engaged", number(&|_| 1.0));
+        recording.set_column("spindle_power_w", number(&|row| f64::from(row)));
+        let text = |of: &dyn Fn(i32) -> String| {
+            Cells::Words((0..rows).map(of).collect::<Vec<_>>().iter().map(String::as_str).collect::<Words>())
+        };
+        recording.set_column("run", text(&|row| format!("Teil {}", row / 30 + 1)));
+        recording.set_column("tool", text(&|row| format!("T{}", row / 180)));
+        let effect = (0..rows).map(|row| if row % 180 >= 60 { 50.0 } else { 0.0 }).collect();
+        (recording, effect)
+    }
+
+    #[test]
+    fn a_threshold_is_told_and_not_a_list_of_runs() {
+        let (recording, effect) = recording();
+        let search = PlaceSearch::new(&recording, "spindle_power_w");
+        let (found, _) = search.best(&search.weights(&effect));
+        let [Condition::Range { column, min: Some(min), max: None }] = &found[..] else { panic!("{found:?}") };
+        assert_eq!(column, "cutting_time_min");
+        assert!((min - 1.0).abs() < 0.1, "{min}");
+        let covered = coverage(&recording, "spindle_power_w", &found, &effect);
+        assert!(covered.energy > 0.99 && covered.rows < 0.7, "{covered:?}");
+    }
+
+    #[test]
+    fn what_acts_everywhere_needs_no_words() {
+        let (recording, _) = recording();
+        let search = PlaceSearch::new(&recording, "spindle_power_w");
+        assert!(search.best(&search.weights(&vec![5.0; recording.rows()])).0.is_empty());
+    }
+}

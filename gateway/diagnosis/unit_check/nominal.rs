@@ -1,0 +1,102 @@
+//! The model as it was given, over the recording as it is and under each unit that one of its columns might be in. Where the model misses the output by
+//! half of it, and one unit makes it fit, that unit is asked for.
+
+use super::{UnitDoubt, mistakes};
+use crate::diagnosis::simulation;
+use adapters::Recording;
+use adapters::channel::quantity::unit_of;
+use adapters::recording::{Cells, Numbers};
+use rules::twin::text::short;
+use rules::twin::{Model, PartFunction};
+
+/// Error over the size of the output from which a model is asked whether a unit is wrong,
+const POOR: f64 = 0.4;
+/// below which another unit makes it fit,
+const GOOD: f64 = 0.3;
+/// and by how much it must lower the error.
+const BETTER: f64 = 0.35;
+/// Rows that are simulated; a long recording is thinned.
+const ROWS_MAX: usize = 4000;
+/// Columns that inputs follow from, so that they count as inputs too.
+const INPUTS: [&str; 13] = [
+    "spindle_speed_rpm",
+    "feed_mm_min",
+    "feed_per_rev_mm",
+    "depth_of_cut_mm",
+    "width_of_cut_mm",
+    "diameter_mm",
+    "removal_rate_cm3_min",
+    "cutting_speed_m_min",
+    "axis_velocity_mm_min",
+    "axis_position_mm",
+    "velocity_m_s",
+    "acceleration_m_s2",
+    "supply_voltage_v",
+];
+
+pub(super) fn find(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
+    // Coefficients of columns that the user chose mean what the user says.
+    let is_physical =
+        model.parts.iter().any(|part| matches!(part.body, PartFunction::Effect(..) | PartFunction::Table(_)));
+    let thin = thin_rows(recording);
+    let Some(given) = error(&thin, model).filter(|_| is_physical) else { return Vec::new() };
+    if given < POOR {
+        return Vec::new();
+    }
+    let mut best: Option<(f64, String, &'static str, f64)> = None;
+    let columns = INPUTS.iter().copied().filter(|name| thin.numbers(name).is_some()).chain([model.output.as_str()]);
+    for column in columns {
+        for (unit, factor) in mistakes(column) {
+            let Some(under) = error(&scale_column(&thin, column, factor), model) else { continue };
+            if best.as_ref().is_none_or(|(least, ..)| under < *least) {
+                best = Some((under, column.to_owned(), unit, factor));
+            }
+        }
+    }
+    let Some((under, column, unit, factor)) = best.filter(|(under, ..)| *under < GOOD && *under < BETTER * given)
+    else {
+        return Vec::new();
+    };
+    let (before, after, factor) = (short(100.0 * given), short(100.0 * under), short(factor));
+    let own = unit_of(&column).unwrap_or("");
+    vec![UnitDoubt::new(
+        &column,
+        format!(
+            "the model as given misses {} by {before} %; with {column} taken as {unit} ({factor} times as many {own}) it misses by {after} %: is {column} in {unit}?",
+            model.output
+        ),
+        format!(
+            "按给定模型，{}的误差为{before} %；若{column}以{unit}为单位（换算为{own}乘以{factor}），误差为{after} %：{column}是否以{unit}为单位？",
+            model.output
+        ),
+    )]
+}
+
+/// Error of the model as given over the size of the output, about its mean where the output has a sign of its own.
+fn error(recording: &Recording, model: &Model) -> Option<f64> {
+    let simulation = simulation::run(recording, model).ok()?;
+    let (rmse, _) = simulation.rmse()?;
+    let numbers = recording.numbers(&model.output)?;
+    let (sum, count) = numbers.present().fold((0.0, 0.0), |(sum, count), x| (sum + x * x, count + 1.0));
+    let size = (sum / f64::max(count, 1.0)).sqrt();
+    (size > 0.0 && rmse.is_finite()).then(|| rmse / size)
+}
+
+fn thin_rows(recording: &Recording) -> Recording {
+    let every = recording.rows().div_ceil(ROWS_MAX).max(1);
+    if every == 1 {
+        return recording.clone();
+    }
+    let kept: Vec<bool> = (0..recording.rows()).map(|row| row.is_multiple_of(every)).collect();
+    recording.only(&kept)
+}
+
+fn scale_column(recording: &Recording, column: &str, factor: f64) -> Recording {
+    let mut other = recording.clone();
+    let cells =
+        recording.numbers(column).map(|numbers| numbers.iter().map(|x| x.map(|x| x * factor)).collect::<Numbers>());
+    if let Some(cells) = cells {
+        other.set_column(column, Cells::Numbers(cells));
+    }
+    other
+}
