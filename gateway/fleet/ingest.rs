@@ -5,7 +5,7 @@
 
 use super::database::DatabaseSettings;
 use super::row::{FleetRow, RefusedMessage};
-use super::write::{Arrived, BatchResult, Database, RefusedMessage};
+use super::write::{Arrived, BatchResult, Database, RefusalRecord};
 use crate::log::{Notice, Severity};
 use crate::nats::{Connection, FetchLimits, Message, NatsError, NatsTarget, StreamSettings};
 use std::time::{Duration, Instant};
@@ -130,7 +130,7 @@ impl Ingest<'_> {
         self.done.known += written.result.known;
         self.done.refused += written.refused.len() as u64;
         // One of them is enough to go and look.
-        if let Some(RefusedMessage { subject, reason, .. }) = written.refused.first() {
+        if let Some(RefusalRecord { subject, reason, .. }) = written.refused.first() {
             let text =
                 format!("{} messages are kept in the table `refused`; {subject}: {reason}", written.refused.len());
             Notice::new(Severity::Warning, "refused", text).say();
@@ -149,7 +149,7 @@ impl Ingest<'_> {
 #[derive(Debug, Default)]
 struct Written {
     result: BatchResult,
-    refused: Vec<RefusedMessage>,
+    refused: Vec<RefusalRecord>,
 }
 
 /// Writes what are items, and notes what are none.
@@ -188,12 +188,12 @@ async fn write(database: &mut Database, messages: &[Message]) -> Result<Written,
     Ok(written)
 }
 
-fn refusal(message: &Message, why: &str) -> RefusedMessage {
+fn refusal(message: &Message, why: &str) -> RefusalRecord {
     let kept =
         |text: &str, letters: usize| text.chars().filter(|letter| *letter != '\0').take(letters).collect::<String>();
     // So many bytes hold so many letters.
     let start = &message.payload[..message.payload.len().min(4 * REFUSED_KEPT)];
-    RefusedMessage {
+    RefusalRecord {
         stream_sequence: message.stream_sequence().unwrap_or(0),
         subject: kept(&message.subject, REASON_KEPT),
         reason: kept(why, REASON_KEPT),

@@ -32,7 +32,7 @@ pub(super) struct BatchResult {
 
 /// A message that is kept apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct RefusedMessage {
+pub(super) struct RefusalRecord {
     pub(super) stream_sequence: i64,
     pub(super) subject: String,
     pub(super) reason: String,
@@ -108,10 +108,10 @@ impl Database {
     }
 
     /// Notes what is not taken.
-    pub(super) async fn refuse(&self, refused: &[RefusedMessage]) -> Result<(), DatabaseError> {
+    pub(super) async fn refuse(&self, refused: &[RefusalRecord]) -> Result<(), DatabaseError> {
         let noting = |error| DatabaseError::new("noting what is refused", &error);
         let insert = "INSERT INTO refused (stream_sequence, subject, reason, payload) VALUES ($1, $2, $3, $4) ON CONFLICT DO NOTHING";
-        for RefusedMessage { stream_sequence, subject, reason, payload } in refused {
+        for RefusalRecord { stream_sequence, subject, reason, payload } in refused {
             self.client.execute(insert, &[stream_sequence, subject, reason, payload]).await.map_err(noting)?;
         }
         Ok(())

@@ -53,7 +53,6 @@ use outputs::ConfiguredSinks;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 use thermal::Thermal;
 use tick::{Identity, RunFlags, Ticker};
