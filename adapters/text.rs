@@ -40,7 +40,7 @@ impl TextEncoding {
     /// All of the bytes as text; what is none in this set as marks.
     #[must_use]
     pub fn decode(self, bytes: &[u8]) -> String {
-        self.whole(bytes).map_or_else(|| marked(bytes), Cow::into_owned)
+        self.whole(bytes).map_or_else(|| mark_bytes(bytes), Cow::into_owned)
     }
 
     /// JSON in this set. Where a text in it does not fit the set, that text has marks and the rest is read.
@@ -91,7 +91,7 @@ impl TryFrom<String> for TextEncoding {
 }
 
 /// ASCII as it is, every other byte and the backslash as marks.
-fn marked(bytes: &[u8]) -> String {
+fn mark_bytes(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len() + 16);
     for byte in bytes {
         match byte {

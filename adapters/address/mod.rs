@@ -3,6 +3,7 @@
 mod fanuc;
 mod huazhong;
 mod keys;
+mod masked;
 mod meter;
 mod secured;
 mod target;
@@ -10,6 +11,7 @@ mod target;
 pub use fanuc::{FanucOptions, WriteMethod};
 pub use huazhong::{HncNetTarget, HncOffset, NcLinkTarget};
 pub use keys::Keys;
+pub use masked::{NO_SECRETS, masked};
 pub use meter::{Circuit, EdaTarget, MeterTarget, WaveformKeep};
 pub use secured::{Login, tls_files};
 pub use target::{
@@ -41,7 +43,7 @@ pub const SCHEMES: [&str; 11] = [
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{address}: {}", .problems.join("; "))]
 pub struct AddressError {
-    /// The text as given.
+    /// The text as given, without what could be a secret.
     pub address: String,
     /// Each problem, with what to do about it.
     pub problems: Vec<String>,
@@ -126,9 +128,12 @@ pub fn parse<T>(
     no_scheme: impl Fn(&str) -> String,
     target: impl Fn(&str, &str, &mut Keys) -> Result<T, String>,
 ) -> Result<T, AddressError> {
-    let fail = |problems| AddressError { address: text.to_owned(), problems };
+    let fail = |problems| AddressError { address: masked(text), problems };
     let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme(text)]))?;
     let (body, query) = rest.rsplit_once('?').unwrap_or((rest, ""));
+    if masked::names_somebody(body) {
+        return Err(fail(vec![NO_SECRETS.to_owned()]));
+    }
     let mut keys = Keys::of(query);
     let target = target(scheme, body, &mut keys);
     let problems = keys.finish();
@@ -223,6 +228,23 @@ mod tests {
         assert!(refused("nclink://b/S?write=mailbox&offset=D103").contains("lies over the mailbox at D100"));
         assert!(refused("hncnet://cnc?library=x.so&offset=zero").contains("offset_unit_um="));
         assert!(refused("hncnet://cnc?library=x.so&offset=D9&offset_unit_um=1").contains("only with offset=zero"));
+    }
+
+    #[test]
+    fn a_password_in_an_address_is_refused_and_never_repeated() {
+        for text in [
+            "nclinks://box:s3cret@broker:8883/SERIAL",
+            "nclink://s3cret@broker/SERIAL?user=u",
+            "fanuc://a:s3cret@10.0.0.5:8193?path=1",
+            "modbus-tcp:b:s3cret@meter",
+            "hncnet://x:half/s3cret@cnc?library=x.so",
+            "waveform://a:s3cret@b@daq:5000",
+            "fanuc://cnc?password=s3cret",
+        ] {
+            assert!(!refused(text).contains("s3cret"), "{}", refused(text));
+        }
+        assert!(refused("fanuc://a:s3cret@10.0.0.5:8193").contains("password_file="));
+        assert!(matches!(parse("replay:/data/a@b.csv"), Target::Replay(_)), "a path may hold it");
     }
 
     #[test]

@@ -337,6 +337,9 @@ fn serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
 /// What is wrong, in words.
 pub fn endpoint(body: &str, default_port: Option<u16>) -> Result<Endpoint, String> {
     let text = body.strip_prefix("//").unwrap_or(body).trim_end_matches('/');
+    if text.contains('@') {
+        return Err(super::NO_SECRETS.to_owned());
+    }
     let (host, port) = split_port(text);
     let host = host.trim_start_matches('[').trim_end_matches(']');
     if host.is_empty() || host.contains('/') {

@@ -2,7 +2,7 @@
 //! meter tells besides power, current and voltage.
 
 use super::Kind::{Continuous, Held};
-use super::{Channel, number, text};
+use super::{Channel, flag, number, text, whole};
 
 const COUNTS: (f64, f64) = (0.0, 1e9);
 /// About three hundred years.
@@ -13,9 +13,9 @@ const ENERGIES: (f64, f64) = (-1e9, 1e9);
 const APPARENT: (f64, f64) = (0.0, 1e6);
 
 /// Came into the table after the channels of the paths.
-pub(super) const LATER: [Channel; 25] = [
-    number("parts_required", "1", COUNTS, Held, "Parts required, as set on the control", "所需零件数"),
-    number("parts_total", "1", COUNTS, Held, "Parts made in all, as the control counts", "零件总数"),
+pub(super) const LATER: [Channel; 26] = [
+    whole(number("parts_required", "1", COUNTS, Held, "Parts required, as set on the control", "所需零件数")),
+    whole(number("parts_total", "1", COUNTS, Held, "Parts made in all, as the control counts", "零件总数")),
     number("power_on_time_s", "s", TIMES, Held, "Time for which the control has been switched on", "通电时间"),
     number("operating_time_s", "s", TIMES, Held, "Time for which programs have run", "运行时间"),
     number("cutting_time_s", "s", TIMES, Held, "Time of cutting feed", "切削时间"),
@@ -81,4 +81,5 @@ pub(super) const LATER: [Channel; 25] = [
         "主轴视在功率",
     ),
     number("supply_frequency_hz", "Hz", (45.0, 65.0), Continuous, "Frequency of the supply", "电源频率"),
+    flag(number("emergency_stop", "1", (0.0, 1.0), Held, "Emergency stop is pressed", "急停按下")),
 ];

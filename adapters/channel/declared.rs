@@ -4,7 +4,7 @@
 //! A declared channel stays declared as long as the process runs: what is stored and what scripts were checked against must
 //! not lose its meaning. Declaring the same channel again changes nothing.
 
-use super::{CHANNELS, Channel, ChannelId, Kind};
+use super::{CHANNELS, Channel, ChannelId, Form, Kind};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use thiserror::Error;
 
@@ -101,7 +101,7 @@ pub fn declare(new: &NewChannel) -> Result<ChannelId, DeclareError> {
     let place = count();
     let text = |text: &str| -> &'static str { String::leak(text.to_owned()) };
     let (name, unit, en, zh) = (text(&new.name), text(&new.unit), text(&new.en), text(&new.zh));
-    let channel = Channel { name, unit, range: new.range, kind: new.kind, en, zh };
+    let channel = Channel { name, unit, range: new.range, kind: new.kind, form: Form::Real, en, zh };
     DECLARED.get(place).ok_or(DeclareError::Full)?.get_or_init(|| channel);
     ChannelId::at(CHANNELS.len() + place).ok_or(DeclareError::Full)
 }

@@ -4,11 +4,13 @@
 
 mod appended;
 mod declared;
+mod form;
 mod paths;
 pub mod quantity;
 pub mod unit;
 
 pub use declared::{DECLARED_MAX, DeclareError, NewChannel, declare};
+pub use form::Form;
 pub use paths::{PATHS, on_path};
 
 use std::fmt;
@@ -39,6 +41,8 @@ pub struct Channel {
     pub range: (f64, f64),
     /// Continuous, held or text.
     pub kind: Kind,
+    /// Which numbers it can have.
+    pub form: Form,
     /// What it is, in English.
     pub en: &'static str,
     /// What it is, in Chinese.
@@ -70,11 +74,21 @@ const fn number(
     en: &'static str,
     zh: &'static str,
 ) -> Channel {
-    Channel { name, unit, range, kind, en, zh }
+    Channel { name, unit, range, kind, form: Form::Real, en, zh }
+}
+
+/// The same with whole numbers only.
+const fn whole(channel: Channel) -> Channel {
+    Channel { form: Form::Whole, ..channel }
+}
+
+/// The same with 0 for no and 1 for yes.
+const fn flag(channel: Channel) -> Channel {
+    Channel { form: Form::Flag, ..channel }
 }
 
 const fn text(name: &'static str, en: &'static str, zh: &'static str) -> Channel {
-    Channel { name, unit: "", range: (0.0, 0.0), kind: Kind::Text, en, zh }
+    Channel { name, unit: "", range: (0.0, 0.0), kind: Kind::Text, form: Form::Real, en, zh }
 }
 
 /// Every channel the gateway knows. The position is the [`ChannelId`]; new channels are appended.
@@ -146,7 +160,7 @@ const FIRST: &[Channel] = &[
         "Diameter of the work (turning) or of the tool (milling)",
         "工件或刀具直径",
     ),
-    number("teeth", "1", (0.0, 1000.0), Kind::Held, "Number of teeth of the tool", "刀具齿数"),
+    whole(number("teeth", "1", (0.0, 1000.0), Kind::Held, "Number of teeth of the tool", "刀具齿数")),
     number("removal_rate_cm3_min", "cm3/min", (0.0, 100000.0), Kind::Continuous, "Material removal rate", "材料去除率"),
     number("engaged", "1", (0.0, 1.0), Kind::Held, "Tool in the work: 0 to 1", "刀具切入标志"),
     number("axis_position_mm", "mm", (-100000.0, 100000.0), Kind::Continuous, "Axis position", "轴位置"),
@@ -232,12 +246,12 @@ const FIRST: &[Channel] = &[
         "热误差",
     ),
     number("supply_voltage_v", "V", (0.0, 1000.0), Kind::Continuous, "Supply voltage, phase to phase", "供电电压"),
-    number("coolant_on", "1", (0.0, 1.0), Kind::Held, "Coolant pump running", "冷却泵运行"),
-    number("hydraulics_on", "1", (0.0, 1.0), Kind::Held, "Hydraulic pump running", "液压泵运行"),
-    number("gear_stage", "1", (0.0, 20.0), Kind::Held, "Gear or belt stage of the spindle", "主轴档位"),
-    number("rapid", "1", (0.0, 1.0), Kind::Held, "Rapid traverse (G0) active", "快速移动标志"),
-    number("part_count", "1", (0.0, 1000000000.0), Kind::Held, "Parts counted by the controller", "工件计数"),
-    number("drive_on", "1", (0.0, 1.0), Kind::Held, "Drives ready", "驱动就绪"),
+    flag(number("coolant_on", "1", (0.0, 1.0), Kind::Held, "Coolant pump running", "冷却泵运行")),
+    flag(number("hydraulics_on", "1", (0.0, 1.0), Kind::Held, "Hydraulic pump running", "液压泵运行")),
+    whole(number("gear_stage", "1", (0.0, 20.0), Kind::Held, "Gear or belt stage of the spindle", "主轴档位")),
+    flag(number("rapid", "1", (0.0, 1.0), Kind::Held, "Rapid traverse (G0) active", "快速移动标志")),
+    whole(number("part_count", "1", (0.0, 1000000000.0), Kind::Held, "Parts counted by the controller", "工件计数")),
+    flag(number("drive_on", "1", (0.0, 1.0), Kind::Held, "Drives ready", "驱动就绪")),
     text("run", "Grouping: the unit of hold-out", "批次"),
     text("pass", "Grouping: one pass of the tool", "走刀"),
     text("part", "Work piece", "工件号"),
@@ -280,8 +294,8 @@ const FIRST: &[Channel] = &[
         "Feed override as the operator's dial has it, before the gateway's",
         "操作面板进给倍率",
     ),
-    number("single_block", "1", (0.0, 1.0), Kind::Held, "Single block is switched on", "单段开关"),
-    number("dry_run", "1", (0.0, 1.0), Kind::Held, "Dry run is switched on", "空运行开关"),
+    flag(number("single_block", "1", (0.0, 1.0), Kind::Held, "Single block is switched on", "单段开关")),
+    flag(number("dry_run", "1", (0.0, 1.0), Kind::Held, "Dry run is switched on", "空运行开关")),
     number("torque_nm", "N·m", (-100000.0, 100000.0), Kind::Continuous, "Torque at the spindle", "主轴扭矩"),
 ];
 
@@ -349,26 +363,10 @@ pub fn nearest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> Opti
     let limit = (name.len() / 3).max(2);
     names
         .into_iter()
-        .map(|known| (distance(name, known), known))
+        .map(|known| (strsim::levenshtein(name, known), known))
         .min()
         .filter(|(d, _)| *d <= limit)
         .map(|(_, known)| known)
-}
-
-/// Levenshtein distance in characters.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let above = row[j + 1];
-            row[j + 1] = (diagonal + usize::from(ca != *cb)).min(above + 1).min(row[j] + 1);
-            diagonal = above;
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! unit stays at the end of the name.
 
 use super::Kind::{Continuous, Held};
-use super::{Channel, number, text};
+use super::{Channel, flag, number, text};
 
 /// Paths that have channels.
 pub const PATHS: std::ops::RangeInclusive<u8> = 1..=3;
@@ -58,7 +58,7 @@ macro_rules! path {
             numbered!($number, "x_axis_load_pct", "%", LOADS, Continuous, "X axis load", "X轴负载"),
             numbered!($number, "y_axis_load_pct", "%", LOADS, Continuous, "Y axis load", "Y轴负载"),
             numbered!($number, "z_axis_load_pct", "%", LOADS, Continuous, "Z axis load", "Z轴负载"),
-            numbered!($number, "rapid", "1", (0.0, 1.0), Held, "Rapid traverse active", "快速移动标志"),
+            flag(numbered!($number, "rapid", "1", (0.0, 1.0), Held, "Rapid traverse active", "快速移动标志")),
             named!($number, "mode", "Controller mode", "控制方式"),
             named!($number, "execution", "Execution state", "执行状态"),
             named!($number, "program", "NC program running", "数控程序"),

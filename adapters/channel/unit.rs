@@ -41,6 +41,10 @@ pub enum Dimension {
     Pressure,
     /// Base: Wh.
     Energy,
+    /// Base: VA.
+    ApparentPower,
+    /// Base: °.
+    Angle,
     /// A number without a unit.
     Number,
 }
@@ -66,12 +70,12 @@ const POUND_N: f64 = 4.448_221_615_260_5;
 const RAD_RPM: f64 = 60.0 / std::f64::consts::TAU;
 
 use Dimension::{
-    Acceleration, Current, Energy, FeedPerRevolution, Flow, Force, Length, Number, Power, Pressure, RemovalRate,
-    Rotation, RotationRate, Share, Temperature, Time, Torque, Velocity, Voltage,
+    Acceleration, Angle, ApparentPower, Current, Energy, FeedPerRevolution, Flow, Force, Length, Number, Power,
+    Pressure, RemovalRate, Rotation, RotationRate, Share, Temperature, Time, Torque, Velocity, Voltage,
 };
 
 /// Spellings, without spaces, in lower case where case says nothing; then the unit. Those in which it does stand first, as written.
-const EXACT: [(&[&str], Unit); 8] = [
+const EXACT: &[(&[&str], Unit)] = &[
     (&["mW"], unit(Power, 1e-3)),
     (&["MW"], unit(Power, 1e6)),
     (&["mV"], unit(Voltage, 1e-3)),
@@ -80,6 +84,9 @@ const EXACT: [(&[&str], Unit); 8] = [
     (&["MN"], unit(Force, 1e6)),
     (&["K"], Unit { dimension: Temperature, factor: 1.0, offset: -273.15 }),
     (&["M/min"], unit(Velocity, 1e3)),
+    (&["MWh"], unit(Energy, 1e6)),
+    (&["MJ"], unit(Energy, 1e6 / 3600.0)),
+    (&["mHz"], unit(Rotation, 60e-3)),
 ];
 
 const SPELLINGS: &[(&[&str], Unit)] = &[
@@ -97,14 +104,14 @@ const SPELLINGS: &[(&[&str], Unit)] = &[
     (&["m", "meter", "米"], unit(Length, 1e3)),
     (&["in", "inch", "inches", "\"", "zoll", "英寸"], unit(Length, INCH_MM)),
     (&["mil", "thou"], unit(Length, INCH_MM / 1e3)),
-    (&["mm/min", "mm/minute", "毫米/分", "毫米/分钟"], unit(Velocity, 1.0)),
+    (&["mm/min", "mm/m", "mm/minute", "毫米/分", "毫米/分钟"], unit(Velocity, 1.0)),
     (&["m/min", "米/分", "米/分钟"], unit(Velocity, 1e3)),
     (&["mm/s", "mm/sec", "毫米/秒", "millimeter/second"], unit(Velocity, 60.0)),
     (&["m/s", "m/sec", "米/秒"], unit(Velocity, 60e3)),
     (&["um/min", "µm/min"], unit(Velocity, 1e-3)),
     (&["cm/min"], unit(Velocity, 10.0)),
-    (&["in/min", "inch/min", "ipm"], unit(Velocity, INCH_MM)),
-    (&["in/s", "ips"], unit(Velocity, 60.0 * INCH_MM)),
+    (&["in/min", "inch/min", "ipm", "英寸/分"], unit(Velocity, INCH_MM)),
+    (&["in/s", "inch/s", "ips"], unit(Velocity, 60.0 * INCH_MM)),
     (&["ft/min", "sfm"], unit(Velocity, 12.0 * INCH_MM)),
     (&["m/s2", "m/s^2", "m/s²"], unit(Acceleration, 1.0)),
     (&["mm/s2", "mm/s^2", "mm/s²"], unit(Acceleration, 1e-3)),
@@ -127,7 +134,8 @@ const SPELLINGS: &[(&[&str], Unit)] = &[
         ],
         unit(Rotation, 1.0),
     ),
-    (&["1/s", "s-1", "s^-1", "s⁻¹", "hz", "rps", "r/s", "rev/s", "u/s", "转/秒"], unit(Rotation, 60.0)),
+    (&["1/s", "s-1", "s^-1", "s⁻¹", "hz", "赫兹", "rps", "r/s", "rev/s", "u/s", "转/秒"], unit(Rotation, 60.0)),
+    (&["khz"], unit(Rotation, 60e3)),
     (&["krpm", "1000/min", "x1000rpm"], unit(Rotation, 1e3)),
     (&["rad/s"], unit(Rotation, RAD_RPM)),
     (&["deg/s", "°/s", "grad/s"], unit(Rotation, 1.0 / 6.0)),
@@ -140,13 +148,14 @@ const SPELLINGS: &[(&[&str], Unit)] = &[
     (&["mm3/min", "mm^3/min", "mm³/min"], unit(RemovalRate, 1e-3)),
     (&["mm3/s", "mm^3/s", "mm³/s"], unit(RemovalRate, 0.06)),
     (&["in3/min", "in^3/min", "in³/min"], unit(RemovalRate, 16.387_064)),
-    (&["w", "watt", "watts", "瓦"], unit(Power, 1.0)),
+    (&["w", "watt", "watts", "瓦", "瓦特"], unit(Power, 1.0)),
     (&["kw", "kilowatt", "千瓦"], unit(Power, 1e3)),
     (&["hp"], unit(Power, 745.699_871_582_270_2)),
     (&["ps", "马力"], unit(Power, 735.498_75)),
-    (&["a", "amp", "amps", "ampere", "arms", "aeff", "安"], unit(Current, 1.0)),
+    (&["a", "amp", "amps", "ampere", "arms", "aeff", "安", "安培"], unit(Current, 1.0)),
+    (&["毫安"], unit(Current, 1e-3)),
     (&["ka"], unit(Current, 1e3)),
-    (&["v", "volt", "vrms", "veff", "伏"], unit(Voltage, 1.0)),
+    (&["v", "volt", "vrms", "veff", "伏", "伏特"], unit(Voltage, 1.0)),
     (&["kv"], unit(Voltage, 1e3)),
     (&["n", "newton", "牛"], unit(Force, 1.0)),
     (&["kn", "千牛"], unit(Force, 1e3)),
@@ -169,9 +178,18 @@ const SPELLINGS: &[(&[&str], Unit)] = &[
     (&["kpa"], unit(Pressure, 0.01)),
     (&["mpa", "兆帕"], unit(Pressure, 10.0)),
     (&["psi"], unit(Pressure, 0.068_947_572_931_68)),
+    (&["pa"], unit(Pressure, 1e-5)),
     (&["wh"], unit(Energy, 1.0)),
-    (&["kwh"], unit(Energy, 1e3)),
-    (&["1", "-", "–", "bool", "0/1", "dimensionless", "unitless", "count", "counts", "无"], unit(Number, 1.0)),
+    (&["kwh", "kw·h", "千瓦时", "度电"], unit(Energy, 1e3)),
+    (&["j"], unit(Energy, 1.0 / 3600.0)),
+    (&["va"], unit(ApparentPower, 1.0)),
+    (&["kva"], unit(ApparentPower, 1e3)),
+    (&["°", "deg", "degree", "degrees", "度"], unit(Angle, 1.0)),
+    (&["rad"], unit(Angle, 360.0 / std::f64::consts::TAU)),
+    (
+        &["1", "-", "–", "bool", "0/1", "dimensionless", "unitless", "count", "counts", "pcs", "无", "件", "个"],
+        unit(Number, 1.0),
+    ),
 ];
 
 impl Unit {
@@ -204,7 +222,7 @@ impl Unit {
 /// Every unit of a dimension with its symbol, the base first.
 pub fn units_of(dimension: Dimension) -> impl Iterator<Item = (&'static str, Unit)> {
     let of = move |(_, unit): &&(&[&str], Unit)| unit.dimension == dimension;
-    SPELLINGS.iter().chain(&EXACT).filter(of).map(|(spellings, unit)| (spellings[0], *unit))
+    SPELLINGS.iter().chain(EXACT).filter(of).map(|(spellings, unit)| (spellings[0], *unit))
 }
 
 #[cfg(test)]

@@ -114,7 +114,7 @@ fn others(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<Value>; 8] {
         other => other.and(Err(Absence::OutOfRange)),
     };
     let messages = match view.answer(MESSAGES) {
-        Ok(FocasAnswer::Messages(messages)) => Ok(joined(messages)),
+        Ok(FocasAnswer::Messages(messages)) => Ok(join_messages(messages)),
         other => other.and(Err(Absence::OutOfRange)),
     };
     let codes = match view.answer(FocasItem::GCodes) {
@@ -129,7 +129,7 @@ fn others(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<Value>; 8] {
 }
 
 /// Number and text of every message; a control without one sends a number that is none.
-fn joined(messages: &[OperatorMessage]) -> String {
+fn join_messages(messages: &[OperatorMessage]) -> String {
     let shown = messages.iter().filter(|message| message.number >= 0 && !message.text.is_empty());
     shown.map(|message| format!("{} {}", message.number, message.text)).collect::<Vec<_>>().join("; ")
 }

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// Channels of the quick group, in the order of [`fast`]. A further path has those of them that the table of channels
 /// has for it.
-pub const FAST: [&str; 32] = [
+pub const FAST: [&str; 33] = [
     "spindle_programmed_rpm",
     "feed_programmed_mm_min",
     "spindle_speed_rpm",
@@ -41,6 +41,7 @@ pub const FAST: [&str; 32] = [
     "block",
     "tool",
     "alarm",
+    "emergency_stop",
     "motion",
     "motor_temperature_c",
     "single_block",
@@ -144,6 +145,7 @@ pub fn fast(
         text(view.number(FocasItem::Sequence).map(|number| format!("N{number}"))),
         text(view.number(poll::MODAL_T).map(|number| format!("T{number}"))),
         text(status.map(|status| alarm_text(&status, &view, alarms))),
+        flag(status.map(|status| status.emergency == 1)),
         word(status.map(|status| states::motion(&status))),
         number(view.number(poll::MOTOR_TEMPERATURE)),
         flag(signals.single_block()),

@@ -116,7 +116,7 @@ impl ModbusMeter {
     }
 
     /// Tries a profile on this meter: what it would give, or why it does not fit.
-    fn tried(&mut self, clock: &dyn Clock, name: &str) -> Result<String, String> {
+    fn try_profile(&mut self, clock: &dyn Clock, name: &str) -> Result<String, String> {
         let profile = profile::find(name, self.target.profiles.as_deref()).map_err(|error| error.to_string())?;
         let outputs = outputs::of(&profile, self.target.circuit)?;
         let blocks = PollBlocks::of(&profile.registers, profile.block_max, profile.block_gap)?;
@@ -228,7 +228,7 @@ impl Source for ModbusMeter {
     fn offers(&mut self, clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
         let names: Vec<&str> = profile::SHIPPED.iter().map(|(name, _)| *name).collect();
         let offer =
-            |name: &str| Offer { name: format!("profile={name}"), says: self.tried(clock, name), channel: None };
+            |name: &str| Offer { name: format!("profile={name}"), says: self.try_profile(clock, name), channel: None };
         Ok(names.into_iter().map(offer).collect())
     }
 }

@@ -47,7 +47,7 @@ impl PollBlocks {
         let mut spans: Vec<NumberSpan> = registers.into_iter().map(span).collect();
         spans.sort_unstable();
         spans.dedup();
-        let blocks = joined(&spans, most, gap);
+        let blocks = join_spans(&spans, most, gap);
         if blocks.len() > BLOCKS_MAX {
             return Err(format!("{} requests per poll; at most {BLOCKS_MAX}, so make it two profiles", blocks.len()));
         }
@@ -76,12 +76,12 @@ impl PollBlocks {
             .filter(|span| span.table == block.table && span.from >= from && span.to <= to)
             .copied()
             .collect();
-        let without_gaps = joined(&inside, block.count, 0);
+        let without_gaps = join_spans(&inside, block.count, 0);
         let parts = match (without_gaps.len(), inside.len()) {
             (_, 0 | 1) => Vec::new(),
             (1, count) => {
                 let (first, second) = inside.split_at(count / 2);
-                [joined(first, block.count, 0), joined(second, block.count, 0)].concat()
+                [join_spans(first, block.count, 0), join_spans(second, block.count, 0)].concat()
             }
             _ => without_gaps,
         };
@@ -95,7 +95,7 @@ impl PollBlocks {
     }
 }
 
-fn joined(spans: &[NumberSpan], most: u16, gap: u16) -> Vec<RegisterBlock> {
+fn join_spans(spans: &[NumberSpan], most: u16, gap: u16) -> Vec<RegisterBlock> {
     let mut joined: Vec<NumberSpan> = Vec::new();
     let fits = |last: &NumberSpan, span: &NumberSpan| {
         last.table == span.table

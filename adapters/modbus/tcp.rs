@@ -53,7 +53,7 @@ type PortsByEndpoint = HashMap<(String, u16), Weak<Mutex<TcpPort>>>;
 static PORTS: Mutex<Option<PortsByEndpoint>> = Mutex::new(None);
 
 /// The connection of this host and port; the same one for every address that names it.
-fn shared(at: &Endpoint, framing: TcpFraming) -> Result<SharedPort, String> {
+fn open_shared_port(at: &Endpoint, framing: TcpFraming) -> Result<SharedPort, String> {
     let mut ports = PORTS.lock().unwrap_or_else(PoisonError::into_inner);
     let ports = ports.get_or_insert_with(HashMap::new);
     ports.retain(|_, port| port.strong_count() > 0);
@@ -82,7 +82,7 @@ impl TcpLine {
     /// # Errors
     /// In words: another address uses them with other frames.
     pub(super) fn new(at: &Endpoint, framing: TcpFraming, deadline: Duration) -> Result<Self, String> {
-        Ok(Self { port: shared(at, framing)?, deadline, stray: 0 })
+        Ok(Self { port: open_shared_port(at, framing)?, deadline, stray: 0 })
     }
 }
 

@@ -22,6 +22,7 @@ pub struct MqttClient {
     deadline: Duration,
     version: Version,
     allows: Allows,
+    will_at_leave: bool,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -62,6 +63,7 @@ impl MqttClient {
             deadline: options.deadline,
             version: options.version,
             allows,
+            will_at_leave: options.version == Version::V5 && options.will.as_ref().is_some_and(|will| will.at_leave),
             thread: Some(thread),
         })
     }
@@ -151,7 +153,8 @@ impl MqttClient {
 
 impl Drop for MqttClient {
     fn drop(&mut self) {
-        let _broker_is_gone = self.writer.write(&packet::DISCONNECT);
+        let farewell: &[u8] = if self.will_at_leave { &packet::DISCONNECT_WITH_WILL } else { &packet::DISCONNECT };
+        let _broker_is_gone = self.writer.write(farewell);
         self.writer.shut();
         if let Some(thread) = self.thread.take() {
             // The reading thread cannot panic; if it did, there is nobody to tell.

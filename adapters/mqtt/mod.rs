@@ -59,6 +59,8 @@ pub struct Will {
     pub qos: Qos,
     /// Does the broker keep it for later subscribers?
     pub retain: bool,
+    /// Is it published, too, when the client leaves by itself? Only version 5 can say so.
+    pub at_leave: bool,
 }
 
 /// How to talk to a broker.

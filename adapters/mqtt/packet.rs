@@ -24,6 +24,8 @@ impl Qos {
 pub(super) const PING: [u8; 2] = [0xc0, 0];
 /// `DISCONNECT` (section 3.14): the will is not published.
 pub(super) const DISCONNECT: [u8; 2] = [0xe0, 0];
+/// `DISCONNECT` of version 5 with the reason "Disconnect with Will Message".
+pub(super) const DISCONNECT_WITH_WILL: [u8; 3] = [0xe0, 1, 0x04];
 /// No properties (section 5-2.2.2).
 const NO_PROPERTIES: u8 = 0;
 
@@ -139,7 +141,13 @@ mod tests {
     fn a_connection_is_asked_for_as_the_standard_writes_it() {
         let expected = b"\x10\x14\x00\x04MQTT\x04\xc2\x00\x14\x00\x02ab\x00\x01u\x00\x01p";
         assert_eq!(connect(&options()).expect("short enough"), expected);
-        let will = Will { topic: "t".to_owned(), payload: b"xyz".to_vec(), qos: Qos::AtLeastOnce, retain: true };
+        let will = Will {
+            topic: "t".to_owned(),
+            payload: b"xyz".to_vec(),
+            qos: Qos::AtLeastOnce,
+            retain: true,
+            at_leave: false,
+        };
         let five = Options { version: Version::V5, will: Some(will), login: None, ..options() };
         let expected = b"\x10\x1a\x00\x04MQTT\x05\x2e\x00\x14\x00\x00\x02ab\x00\x00\x01t\x00\x03xyz";
         assert_eq!(connect(&five).expect("short enough")[2..], expected[2..]);

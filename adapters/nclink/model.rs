@@ -113,7 +113,7 @@ impl Model {
         }
         if depth < DEPTH_MAX {
             for part in list(node, &["components", "component"]) {
-                self.component(part, &joined(above, part), depth + 1);
+                self.component(part, &join_path(above, part), depth + 1);
             }
         }
     }
@@ -123,7 +123,7 @@ impl Model {
         if self.items.len() >= ITEMS_MAX {
             return;
         }
-        let path = normal(&joined(above, item));
+        let path = normal(&join_path(above, item));
         let settable = flag(item, &["setable", "settable"]);
         self.by_name.entry(id.clone()).or_insert(self.items.len());
         self.by_name.entry(path.clone()).or_insert(self.items.len());
@@ -148,7 +148,7 @@ impl Model {
     }
 }
 
-fn joined(above: &str, node: &Value) -> String {
+fn join_path(above: &str, node: &Value) -> String {
     let kind = text(node, &["type"]).unwrap_or_default();
     let own = match text(node, &["number"]) {
         Some(number) => format!("{kind}@{number}"),

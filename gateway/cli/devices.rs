@@ -2,9 +2,9 @@
 
 use super::{CannotRun, CommandOutcome, CommandResult, print};
 use crate::config;
-use crate::history::{Query, Reader};
+use crate::history::{Query, Reader, box_id};
 use crate::moment;
-use crate::sinks::shdr::devices_xml;
+use crate::sinks::shdr::{Described, devices_xml, is_prefix, prefix_of};
 use adapters::clock::{Clock, SystemClock};
 use clap::Args;
 use std::collections::BTreeSet;
@@ -19,6 +19,12 @@ pub(super) struct DevicesArguments {
     /// Write it there instead of printing it.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// What every identifier begins with, so that several machines can stand in one agent; default: the digits of the box.
+    #[arg(long, value_name = "TEXT")]
+    prefix: Option<String>,
+    /// The file that this command wrote for another machine, which stands in the same agent; can be given several times.
+    #[arg(long = "with", value_name = "FILE")]
+    others: Vec<PathBuf>,
 }
 
 /// Prints or writes the document. Where the machine has been read already, it holds what the machine delivers; before that,
@@ -30,10 +36,22 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
         let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
         CannotRun::new(lines.join("\n"), "")
     })?;
-    let delivered = delivered(&config.history.path);
+    let path = &config.history.path;
+    let box_id = box_id(path, &config.gateway.name)
+        .map_err(|error| CannotRun::new(format!("the history gives the machine no identity: {error}"), ""))?;
+    let prefix = arguments.prefix.clone().unwrap_or_else(|| prefix_of(&box_id));
+    if !is_prefix(&prefix) {
+        return Err(CannotRun::new(
+            format!("{prefix:?} is no beginning of an identifier"),
+            "write a letter, then letters, digits and _",
+        ));
+    }
+    let delivered = delivered(path);
     let created = moment::utc(SystemClock::new().now_ns());
     let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));
-    let text = devices_xml(&config.gateway.name, &created, known);
+    let others = arguments.others.iter().map(|file| read(file)).collect::<Result<Vec<_>, _>>()?;
+    let described = Described { machine: &config.gateway.name, box_id: &box_id, prefix: &prefix };
+    let text = devices_xml(described, &created, known, &others).map_err(|what| CannotRun::new(what, ""))?;
     match &arguments.out {
         None => print(&text),
         Some(file) => std::fs::write(file, text).map_err(|error| {
@@ -41,6 +59,14 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
         })?,
     }
     Ok(CommandOutcome::Fine)
+}
+
+fn read(file: &Path) -> Result<(String, String), CannotRun> {
+    let name = file.display().to_string();
+    match std::fs::read_to_string(file) {
+        Ok(text) => Ok((name, text)),
+        Err(error) => Err(CannotRun::new(format!("{name} cannot be read: {error}"), "write the path of a devices.xml")),
+    }
 }
 
 /// The channels of which the history holds something; `None` before there is one.

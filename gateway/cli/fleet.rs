@@ -2,10 +2,12 @@
 
 use super::{CannotRun, CommandOutcome, CommandResult, print};
 use crate::fleet::ingest::{self, Done, IngestSettings};
-use crate::fleet::{DatabaseSettings, SAME_FINDING, SAME_FINDING_PARQUET, SCHEMA, cluster};
+use crate::fleet::questions::{QUESTIONS, of_name};
+use crate::fleet::retention::{self, Going, KEEPING};
+use crate::fleet::{DatabaseSettings, TABLES, VIEWS, cluster};
 use crate::nats::{Connection, NatsError, NatsTarget, StreamSettings};
 use crate::signals::{SignalRequest, Signals};
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -16,23 +18,62 @@ pub(super) enum Fleet {
     Ingest(IngestArguments),
     /// Create the stream that takes what the boxes send, unless it is there.
     Stream(StreamArguments),
+    /// Remove what is too old from the database.
+    Retain(RetainArguments),
     /// Print the tables, or a question over all machines.
     Sql {
-        /// Which text.
-        #[arg(value_enum)]
-        text: Text,
+        /// `tables`, or the name of a question; without one, the names.
+        name: Option<String>,
     },
 }
 
-/// A text in SQL.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Text {
-    /// The tables and views that `fleet ingest` creates.
-    Tables,
-    /// Which machines have had the same finding of the twin (PostgreSQL).
-    SameFinding,
-    /// The same over Parquet partitions (DuckDB).
-    SameFindingParquet,
+/// The database.
+#[derive(Debug, Args)]
+pub(super) struct DatabaseArguments {
+    /// The database: postgres://USER@HOST:5432/DATABASE; on another computer with ?sslmode=require&ca=/etc/cnc/ca.pem, which encrypts
+    /// the line and checks the certificate.
+    #[arg(long, value_name = "ADDRESS")]
+    database: String,
+    /// The file whose first line is the password of the database.
+    #[arg(long, value_name = "FILE")]
+    password_file: Option<PathBuf>,
+}
+
+impl DatabaseArguments {
+    fn settings(&self) -> DatabaseSettings {
+        DatabaseSettings { address: self.database.clone(), password_file: self.password_file.clone() }
+    }
+}
+
+/// How long what is kept, days.
+#[derive(Debug, Args)]
+pub(super) struct RetainArguments {
+    #[command(flatten)]
+    database: DatabaseArguments,
+    /// Raw items.
+    #[arg(long, default_value_t = KEEPING[0].days, value_name = "DAYS")]
+    items_d: u32,
+    /// Means of minutes.
+    #[arg(long, default_value_t = KEEPING[1].days, value_name = "DAYS")]
+    minutes_d: u32,
+    /// Means of hours and days.
+    #[arg(long, default_value_t = KEEPING[2].days, value_name = "DAYS")]
+    hours_d: u32,
+    /// States, parts, operations, events, diagnoses and gaps.
+    #[arg(long, default_value_t = KEEPING[3].days, value_name = "DAYS")]
+    records_d: u32,
+    /// Alarms and decisions.
+    #[arg(long, default_value_t = KEEPING[4].days, value_name = "DAYS")]
+    alarms_d: u32,
+    /// Refused messages.
+    #[arg(long, default_value_t = KEEPING[5].days, value_name = "DAYS")]
+    refused_d: u32,
+    /// Say what would go, and change nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 /// The stream.
@@ -59,13 +100,8 @@ pub(super) struct StreamArguments {
 pub(super) struct IngestArguments {
     #[command(flatten)]
     stream: StreamArguments,
-    /// The database: postgres://USER@HOST:5432/DATABASE; on another computer with ?sslmode=require&ca=/etc/cnc/ca.pem, which encrypts
-    /// the line and checks the certificate.
-    #[arg(long, value_name = "ADDRESS")]
-    database: String,
-    /// The file whose first line is the password of the database.
-    #[arg(long, value_name = "FILE")]
-    password_file: Option<PathBuf>,
+    #[command(flatten)]
+    database: DatabaseArguments,
     /// Name of the durable consumer; all that share the work give the same.
     #[arg(long, default_value = "fleet", value_name = "NAME")]
     consumer: String,
@@ -121,15 +157,42 @@ pub(super) fn run(fleet: Fleet) -> CommandResult {
     match fleet {
         Fleet::Ingest(arguments) => runtime.block_on(ingest(&arguments)),
         Fleet::Stream(arguments) => runtime.block_on(stream(&arguments)),
-        Fleet::Sql { text } => {
-            print(match text {
-                Text::Tables => SCHEMA,
-                Text::SameFinding => SAME_FINDING,
-                Text::SameFindingParquet => SAME_FINDING_PARQUET,
-            });
-            Ok(CommandOutcome::Fine)
-        }
+        Fleet::Retain(arguments) => runtime.block_on(retain(&arguments)),
+        Fleet::Sql { name } => sql(name.as_deref()),
     }
+}
+
+fn sql(name: Option<&str>) -> CommandResult {
+    let names = || QUESTIONS.iter().map(|question| question.name).collect::<Vec<_>>().join(", ");
+    match name {
+        None => print(&format!("tables, {}\n", names())),
+        Some("tables") => print(&format!("{TABLES}{VIEWS}")),
+        Some(name) => match of_name(name) {
+            Some(question) => print(question.sql),
+            None => return Err(CannotRun::new(format!("{name} is no question"), format!("write tables, {}", names()))),
+        },
+    }
+    Ok(CommandOutcome::Fine)
+}
+
+async fn retain(arguments: &RetainArguments) -> CommandResult {
+    let RetainArguments { items_d, minutes_d, hours_d, records_d, alarms_d, refused_d, dry_run, .. } = *arguments;
+    let days = [items_d, minutes_d, hours_d, records_d, alarms_d, refused_d];
+    let going = retention::retain(&arguments.database.settings(), &days, dry_run).await?;
+    if arguments.json {
+        print(&format!("{}\n", serde_json::json!({"schema": "retain/1", "dry_run": dry_run, "removed": going})));
+        return Ok(CommandOutcome::Fine);
+    }
+    let line = |Going { table, before, rows, bytes }: &Going| {
+        format!("{table}: {rows} rows before {before} UTC, {:.1} MB\n", *bytes as f64 / 1e6)
+    };
+    let said = match (going.is_empty(), dry_run) {
+        (true, _) => "nothing is too old\n",
+        (false, true) => "nothing was removed: this was a dry run\n",
+        (false, false) => "removed\n",
+    };
+    print(&(going.iter().map(line).collect::<String>() + said));
+    Ok(CommandOutcome::Fine)
 }
 
 async fn stream(arguments: &StreamArguments) -> CommandResult {
@@ -151,10 +214,7 @@ async fn ingest(arguments: &IngestArguments) -> CommandResult {
         servers,
         stream,
         consumer: arguments.consumer.clone(),
-        database: DatabaseSettings {
-            address: arguments.database.clone(),
-            password_file: arguments.password_file.clone(),
-        },
+        database: arguments.database.settings(),
         once: arguments.once,
     };
     let mut signals =

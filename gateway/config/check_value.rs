@@ -1,6 +1,6 @@
 //! One value against one row of the table of keys.
 
-use super::keys::{ConfigKey, ValueKind};
+use super::keys::{ConfigKey, NAME_MAX, ValueKind};
 use crate::sinks::SinkAddress;
 use adapters::Address;
 use adapters::address::AddressError;
@@ -51,7 +51,7 @@ fn wrong_type(key: &ConfigKey, value: &DeValue<'_>) -> ValueRefusal {
 
 fn needed(kind: ValueKind) -> &'static str {
     match kind {
-        ValueKind::Text => "text",
+        ValueKind::Text | ValueKind::Name => "text",
         ValueKind::OneOf(_) => "a word",
         ValueKind::Number(..) => "a number",
         ValueKind::Flag => "true or false",
@@ -63,7 +63,7 @@ fn needed(kind: ValueKind) -> &'static str {
 
 fn example(key: &ConfigKey) -> String {
     let value = match key.kind {
-        ValueKind::Text | ValueKind::Path => "\"...\"".to_owned(),
+        ValueKind::Text | ValueKind::Name | ValueKind::Path => "\"...\"".to_owned(),
         ValueKind::OneOf(words) => format!("\"{}\"", words.first().copied().unwrap_or_default()),
         ValueKind::Number(min, max) => format!("{:?}", 1.0_f64.clamp(min, max)),
         ValueKind::Flag => "true".to_owned(),
@@ -83,13 +83,25 @@ pub(super) fn check_scalar(key: &ConfigKey, text: &str) -> Result<Scalar, ValueR
             "false" => Ok(Scalar::Flag(false)),
             _ => Err((format!("`{}` is {text:?}; true or false is needed", key.name), String::new())),
         },
+        _ if text.contains(char::is_control) => Err(with_control(key, text)),
         _ if text.trim().is_empty() => Err((format!("`{}` is empty", key.name), example(key))),
         ValueKind::OneOf(words) => word(key, text, words),
         ValueKind::Listen => listen(key, text),
         ValueKind::Address => address(text, text.parse::<Address>().map(drop)),
         ValueKind::SinkAddress => address(text, text.parse::<SinkAddress>().map(drop)),
-        ValueKind::Text | ValueKind::Path => Ok(Scalar::Text(text.to_owned())),
+        ValueKind::Name if text.chars().count() > NAME_MAX => {
+            let what = format!("`{}` has {} letters", key.name, text.chars().count());
+            Err((what, format!("give a name of at most {NAME_MAX}")))
+        }
+        ValueKind::Text | ValueKind::Name | ValueKind::Path => Ok(Scalar::Text(text.to_owned())),
     }
+}
+
+/// Neither databases nor the lines of a protocol take ends of lines or NUL within a text.
+fn with_control(key: &ConfigKey, text: &str) -> ValueRefusal {
+    let first = text.chars().find(|letter| letter.is_control()).unwrap_or_default();
+    let what = format!("`{}` holds the control character U+{:04X}", key.name, u32::from(first));
+    (what, "write it on one line, with letters, digits and signs only".to_owned())
 }
 
 fn number(key: &ConfigKey, text: &str, min: f64, max: f64) -> Result<Scalar, ValueRefusal> {

@@ -5,6 +5,7 @@ use super::channel_keys;
 use super::check_value::Scalar;
 use super::keys::{SECTIONS, keys_of};
 use super::read::{ConfigInput, Origin, SectionValues};
+use adapters::address::masked;
 use serde::Serialize;
 
 /// One key.
@@ -21,9 +22,6 @@ pub struct InForce {
     /// What it does, in Chinese.
     pub zh: &'static str,
 }
-
-/// Keys in the query of an address whose values are masked.
-const SECRET: [&str; 5] = ["password", "token", "secret", "key", "passphrase"];
 
 pub(super) fn in_force(reading: &ConfigInput<'_>) -> Vec<InForce> {
     let mut all = Vec::new();
@@ -64,28 +62,8 @@ fn rows<'a>(
     }
 }
 
-/// The text with stars in the place of what stands before `@`, and of what a key of a secret holds. Names of files stay.
-#[must_use]
-pub fn masked(text: &str) -> String {
-    let (before, query) = text.split_once('?').unwrap_or((text, ""));
-    let mut told = match before.split_once("://").and_then(|(scheme, rest)| Some((scheme, rest.rsplit_once('@')?))) {
-        Some((scheme, (_, host))) => format!("{scheme}://***@{host}"),
-        None => before.to_owned(),
-    };
-    let hidden = |pair: &str| match pair.split_once('=') {
-        Some((key, value)) if SECRET.contains(&key) && !value.contains('/') => format!("{key}=***"),
-        _ => pair.to_owned(),
-    };
-    if text.contains('?') {
-        told.push('?');
-        told.push_str(&query.split('&').map(hidden).collect::<Vec<_>>().join("&"));
-    }
-    told
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
     use std::path::Path;
 
     #[test]
@@ -102,18 +80,5 @@ mod tests {
         assert_eq!(told("[http] tls"), (Some("false".to_owned()), "default"));
         assert_eq!(told("[[source]] 1 address"), (Some("simulated://lathe".to_owned()), "file"));
         assert_eq!(told("[twin] model"), (None, "default"));
-    }
-
-    #[test]
-    fn what_could_be_a_secret_is_masked() {
-        assert_eq!(
-            masked("mqtt://user:word@broker:1883/plant?password=x&qos=1"),
-            "mqtt://***@broker:1883/plant?password=***&qos=1"
-        );
-        assert_eq!(
-            masked("nclinks://broker/S?password_file=/etc/pw&key=/etc/box.key"),
-            "nclinks://broker/S?password_file=/etc/pw&key=/etc/box.key"
-        );
-        assert_eq!(masked("127.0.0.1:8080"), "127.0.0.1:8080");
     }
 }

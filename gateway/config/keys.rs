@@ -6,11 +6,16 @@ use super::keys_of_outputs::OUTPUTS;
 use super::keys_of_thermal::THERMAL;
 pub use super::shown::{example, table};
 
+/// Most letters of a name.
+pub const NAME_MAX: usize = 100;
+
 /// What a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ValueKind {
     /// Any text that is not empty.
     Text,
+    /// A text of at most [`NAME_MAX`] letters: it is an index in databases, and stands in titles.
+    Name,
     /// One of these words.
     OneOf(&'static [&'static str]),
     /// A number from the first to the second limit, both included.
@@ -90,6 +95,7 @@ pub const SECTIONS: &[Section] = &[
         repeated: true,
         en: "one receiver of what leaves the box; write the section once for each",
     },
+    section("sinks", "all receivers together"),
     section("outbox", "what the sinks are sent, and how much of it waits for them during an outage"),
     section("http", "the page and the interface on the network"),
     section("twin", "the simulation that the machine is compared with"),
@@ -108,7 +114,7 @@ pub(super) const fn key(
 }
 
 use Absent::{Default, Optional, Required};
-use ValueKind::{Address, Flag, Listen, Number, OneOf, Path, Text};
+use ValueKind::{Address, Flag, Listen, Name, Number, OneOf, Path, Text};
 
 /// Every key the gateway knows.
 pub static KEYS: &[ConfigKey] = &ALL;
@@ -134,7 +140,7 @@ static ALL: [ConfigKey; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() 
 const CORE: &[ConfigKey] = &[
     key(
         ("gateway", "name"),
-        Text,
+        Name,
         Default("\"cnc-gateway\""),
         "Name of the machine on the page and in exports",
         "机床名称",
@@ -167,7 +173,7 @@ const CORE: &[ConfigKey] = &[
         "Which controller, meter or recording, and how to reach it",
         "数据源地址",
     ),
-    key(("source", "name"), Text, Optional, "Short name in messages and in [gate]; default: the address", "数据源名称"),
+    key(("source", "name"), Name, Optional, "Short name in messages and in [gate]; default: the address", "数据源名称"),
     key(
         ("source", "period_s"),
         Number(0.001, 3600.0),

@@ -1,10 +1,10 @@
 //! The rows of the table of keys that concern what leaves the box.
 
 use super::keys::Absent::{Default, Optional, Required};
-use super::keys::ValueKind::{Flag, Number, SinkAddress, Text};
+use super::keys::ValueKind::{Flag, Name, Number, SinkAddress, Text};
 use super::keys::{ConfigKey, key};
 
-/// Keys of `[[sink]]` and `[outbox]`.
+/// Keys of `[[sink]]`, `[sinks]` and `[outbox]`.
 pub(super) const OUTPUTS: &[ConfigKey] = &[
     key(
         ("sink", "address"),
@@ -15,7 +15,7 @@ pub(super) const OUTPUTS: &[ConfigKey] = &[
     ),
     key(
         ("sink", "name"),
-        Text,
+        Name,
         Optional,
         "Short name in messages; what is delivered is remembered under it; default: the address",
         "接收端名称",
@@ -26,6 +26,13 @@ pub(super) const OUTPUTS: &[ConfigKey] = &[
         Default("false"),
         "Computers on the network of an mqtt or sparkplug sink may ask the gate for a slower feed and acknowledge alarms; the gate decides",
         "允许网络向闸门提出请求",
+    ),
+    key(
+        ("sinks", "drain_s"),
+        Number(0.0, 60.0),
+        Default("5.0"),
+        "When the gateway is stopped, the sinks that are connected may take so long to deliver what waits; the rest follows after the next start",
+        "停止时等待发送完成的最长时间（秒）",
     ),
     key(
         ("outbox", "every_nth"),
@@ -40,6 +47,13 @@ pub(super) const OUTPUTS: &[ConfigKey] = &[
         Optional,
         "A value that differs from the one sent last by at most this is not sent again: \"spindle_power_w=5, feed_mm_min=1\", each in the unit of its name",
         "死区：变化不超过此值时不发送",
+    ),
+    key(
+        ("outbox", "ranges"),
+        Text,
+        Optional,
+        "Least and greatest value on this machine, for receivers that draw scales (Sparkplug engLow and engHigh, OPC UA EURange): \"spindle_speed_rpm=0..4500\"",
+        "本机的数值范围",
     ),
     key(
         ("outbox", "refresh_s"),

@@ -19,7 +19,7 @@ mod problem;
 mod read;
 mod shown;
 
-pub use in_force::{InForce, masked};
+pub use in_force::InForce;
 pub use problem::Problem;
 
 use crate::history::OutboxSettings;

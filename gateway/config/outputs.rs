@@ -54,13 +54,16 @@ pub(super) fn outbox(reading: &mut ConfigInput<'_>) -> Option<OutboxSettings> {
     if every_nth.fract() != 0.0 {
         reading.problem(&origin, format!("`every_nth = {every_nth}` is no whole number"), "write 1, 2, 10, ...");
     }
-    let dead_bands = dead_bands(reading);
+    let (dead_bands, ranges) = (dead_bands(reading), ranges(reading));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the table holds their ranges")]
     let (every_nth, max_bytes) = (every_nth as u32, (number(reading, "outbox", "max_gb")? * 1e9) as u64);
     Some(OutboxSettings {
         every_nth,
         dead_bands,
+        ranges,
         refresh: Duration::from_secs_f64(number(reading, "outbox", "refresh_s")?),
+        tick: Duration::from_secs_f64(1.0 / number(reading, "gateway", "tick_hz")?),
+        drain: Duration::from_secs_f64(number(reading, "sinks", "drain_s")?),
         max_bytes,
         max_age: Duration::from_secs_f64(number(reading, "outbox", "max_age_h")? * 3600.0),
     })
@@ -68,25 +71,50 @@ pub(super) fn outbox(reading: &mut ConfigInput<'_>) -> Option<OutboxSettings> {
 
 /// `spindle_power_w=5, feed_mm_min=1`; what is wrong is reported.
 fn dead_bands(reading: &mut ConfigInput<'_>) -> Vec<(String, f64)> {
-    let Some(written) = text(reading, "outbox", "dead_band") else { return Vec::new() };
-    let origin = reading.get("outbox", "dead_band").map_or(Origin::Default, |found| found.origin.clone());
-    let mut bands = Vec::new();
+    let band = |text: &str| text.parse::<f64>().ok().filter(|band| band.is_finite() && *band >= 0.0);
+    named_values(reading, "dead_band", ("a number from 0 up", "spindle_power_w=5, feed_mm_min=1"), band)
+}
+
+/// `spindle_speed_rpm=0..4500`; what is wrong is reported.
+fn ranges(reading: &mut ConfigInput<'_>) -> Vec<(String, (f64, f64))> {
+    let range = |text: &str| {
+        let (low, high) = text.split_once("..")?;
+        let (low, high) = (low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?);
+        (low.is_finite() && high.is_finite() && low < high).then_some((low, high))
+    };
+    named_values(reading, "ranges", ("a range", "spindle_speed_rpm=0..4500, spindle_power_w=-5000..15000"), range)
+}
+
+/// The values of a key `NAME=VALUE, NAME=VALUE`, each name a series. `form` says what a value is, and gives an example.
+fn named_values<T>(
+    reading: &mut ConfigInput<'_>,
+    key: &str,
+    form: (&str, &str),
+    value: impl Fn(&str) -> Option<T>,
+) -> Vec<(String, T)> {
+    let Some(written) = text(reading, "outbox", key) else { return Vec::new() };
+    let origin = reading.get("outbox", key).map_or(Origin::Default, |found| found.origin.clone());
+    let mut values = Vec::new();
     for part in written.split(',').map(str::trim).filter(|part| !part.is_empty()) {
-        match dead_band(part) {
-            Ok(band) => bands.push(band),
+        match named_value(part, key, form, &value) {
+            Ok(value) => values.push(value),
             Err((what, next)) => reading.problem(&origin, what, next),
         }
     }
-    bands
+    values
 }
 
-fn dead_band(part: &str) -> Result<(String, f64), (String, String)> {
-    let form = "write \"spindle_power_w=5, feed_mm_min=1\"".to_owned();
-    let (name, number) = part.split_once('=').ok_or_else(|| (format!("`dead_band` holds {part:?}"), form.clone()))?;
-    let (name, number) = (name.trim(), number.trim());
-    let band = number.parse::<f64>().ok().filter(|band| band.is_finite() && *band >= 0.0);
-    let band =
-        band.ok_or_else(|| (format!("the dead band of {name} is {number:?}, which is no number from 0 up"), form))?;
+fn named_value<T>(
+    part: &str,
+    key: &str,
+    (kind, example): (&str, &str),
+    value: impl Fn(&str) -> Option<T>,
+) -> Result<(String, T), (String, String)> {
+    let form = format!("write \"{example}\"");
+    let (name, written) = part.split_once('=').ok_or_else(|| (format!("`{key}` holds {part:?}"), form.clone()))?;
+    let (name, written) = (name.trim(), written.trim());
+    let value =
+        value(written).ok_or_else(|| (format!("`{key}` of {name} is {written:?}, which is not {kind}"), form))?;
     let stored: Vec<String> = crate::pipeline::stored_series().into_iter().map(|series| series.name).collect();
     let names = || CHANNELS.iter().map(|channel| channel.name).chain(stored.iter().map(String::as_str));
     if !names().any(|known| known == name) {
@@ -94,7 +122,7 @@ fn dead_band(part: &str) -> Result<(String, f64), (String, String)> {
             Some(near) => format!("did you mean {near}?"),
             None => "`cnc-gateway check --vocabulary` prints the names".to_owned(),
         };
-        return Err((format!("`dead_band` names {name}, which is no channel"), next));
+        return Err((format!("`{key}` names {name}, which is no channel"), next));
     }
-    Ok((name.to_owned(), band))
+    Ok((name.to_owned(), value))
 }

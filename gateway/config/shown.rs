@@ -1,7 +1,7 @@
 //! The table of keys as a reader sees it: what `check --keys` and `check --example` print.
 
 use super::keys::Absent::{self, Default, Optional, Required};
-use super::keys::{ConfigKey, KEYS, SECTIONS, ValueKind, find_section, keys_of};
+use super::keys::{ConfigKey, KEYS, NAME_MAX, SECTIONS, ValueKind, find_section, keys_of};
 
 impl ValueKind {
     /// What is accepted, as a reader of the table needs it.
@@ -9,6 +9,7 @@ impl ValueKind {
     pub fn range(&self) -> String {
         match self {
             Self::Text => "text".to_string(),
+            Self::Name => format!("text of at most {NAME_MAX} letters"),
             Self::OneOf(words) => words.join(", "),
             Self::Number(min, max) => format!("{min} to {max}"),
             Self::Flag => "true, false".to_string(),

@@ -1,20 +1,16 @@
-//! PostgreSQL: the tables, a partition for each day, and a batch in one transaction.
+//! PostgreSQL: the address, the connection, and what it says in words.
 
-use super::SCHEMA;
-use super::row::FleetRow;
+use super::schema;
 use super::secured::{self, Securing};
 use crate::log::{Notice, Severity};
 use crate::nats::NatsError;
 use adapters::tls::{TlsError, TlsFiles};
-use std::collections::{BTreeSet, HashMap};
 use std::path::PathBuf;
 use std::time::Duration;
 use tokio_postgres::config::{Host, SslMode};
 use tokio_postgres::tls::MakeTlsConnect;
-use tokio_postgres::{Client, Config, NoTls, Socket, Transaction};
+use tokio_postgres::{Client, Config, NoTls, Socket};
 
-/// Of the advisory lock under which tables and partitions are created: any number that nothing else uses.
-const LOCK: i64 = 0x636e_6367_7731;
 /// A connection that is not made within this time is not made.
 const DEADLINE: Duration = Duration::from_secs(10);
 
@@ -28,22 +24,31 @@ pub struct DatabaseSettings {
     pub password_file: Option<PathBuf>,
 }
 
-/// What a batch did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct BatchResult {
-    /// Rows that are new.
-    pub new: u64,
-    /// Rows that were there already.
-    pub known: u64,
+/// What went wrong with a statement.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct DatabaseError {
+    /// In words.
+    pub(super) said: NatsError,
+    /// The database does not take these data; without them it would go on.
+    pub(super) of_the_data: bool,
 }
 
-/// A connection whose tables are there.
-#[derive(Debug)]
-pub struct Database {
-    client: Client,
-    boxes: HashMap<String, i32>,
-    series: HashMap<(String, String), i32>,
-    days: BTreeSet<String>,
+impl From<DatabaseError> for NatsError {
+    fn from(error: DatabaseError) -> Self {
+        error.said
+    }
+}
+
+/// Classes of SQLSTATE that say something of the data: wrong values, constraints, cardinality, a limit of the program such as the
+/// greatest row of an index.
+const OF_THE_DATA: [&str; 5] = ["21", "22", "23", "54", "0A"];
+
+impl DatabaseError {
+    pub(super) fn new(doing: &str, error: &tokio_postgres::Error) -> Self {
+        let of_the_data =
+            error.code().is_some_and(|code| OF_THE_DATA.iter().any(|class| code.code().starts_with(class)));
+        Self { said: words(doing, error), of_the_data }
+    }
 }
 
 /// An error of the database in words.
@@ -67,6 +72,9 @@ fn words(doing: &str, error: &tokio_postgres::Error) -> NatsError {
         "42501" => "give this user the right: GRANT CREATE, USAGE ON SCHEMA public",
         "28P02" => "sign the client certificate by the authority that ssl_ca_file of the server names",
         "53100" => "make room on the disk of the database; what waits stays in the stream",
+        "" if text.contains("password missing") => {
+            "the server asks for a password: write it into a file that only this user may read, and give --password-file FILE"
+        }
         "" if text.contains("support TLS") => {
             "write `ssl = on` into its postgresql.conf, or leave sslmode=require, ca=, cert= and key= out"
         }
@@ -97,10 +105,16 @@ impl DatabaseSettings {
         let mut config: Config = address.parse().map_err(|error: tokio_postgres::Error| {
             let cause = std::error::Error::source(&error).map_or(String::new(), |cause| format!(": {cause}"));
             NatsError::new(
-                format!("{:?} is no address of PostgreSQL: {error}{cause}", self.address),
+                format!("{:?} is no address of PostgreSQL: {error}{cause}", adapters::address::masked(&self.address)),
                 "write postgres://USER@HOST:5432/DATABASE, and ?sslmode=require for an encrypted line",
             )
         })?;
+        if config.get_password().is_some() {
+            return Err(NatsError::new(
+                "a password does not stand in the address of the database, because whoever lists the processes reads it",
+                "write it into a file that only this user may read, and give --password-file FILE",
+            ));
+        }
         // Without a word about it the line is plain, whatever the server offers.
         config.ssl_mode(if files.is_some() { SslMode::Require } else { SslMode::Disable });
         if let Some(file) = &self.password_file {
@@ -112,7 +126,7 @@ impl DatabaseSettings {
             })?;
             config.password(text.lines().next().unwrap_or_default());
         }
-        config.connect_timeout(DEADLINE).application_name("cnc-gateway fleet ingest");
+        config.connect_timeout(DEADLINE).application_name("cnc-gateway fleet");
         Ok((config, files))
     }
 }
@@ -120,7 +134,7 @@ impl DatabaseSettings {
 const PLAIN: &str = "the line to PostgreSQL is not encrypted: write ?sslmode=require at the end of the address, or run this on the \
                      computer of the database";
 
-async fn connect<T>(config: &Config, tls: T) -> Result<Client, NatsError>
+async fn connect_with<T>(config: &Config, tls: T) -> Result<Client, NatsError>
 where
     T: MakeTlsConnect<Socket> + Send,
     T::Stream: Send + 'static,
@@ -134,124 +148,26 @@ where
     Ok(client)
 }
 
-impl Database {
-    /// Connects, and creates what is missing.
-    ///
-    /// # Errors
-    /// What is wrong, in words.
-    pub async fn open(settings: &DatabaseSettings) -> Result<Self, NatsError> {
-        let (config, files) = settings.config()?;
-        let mut client = match files {
-            Some(files) => {
-                let tls = files.config().map_err(|error| NatsError::new(error.what, error.next))?;
-                connect(&config, Securing(tls)).await?
-            }
-            None => {
-                if !is_here(&config) {
-                    Notice::new(Severity::Warning, "database_plain", PLAIN).say();
-                }
-                connect(&config, NoTls).await?
-            }
-        };
-        let creating = |error| words("creating the tables", &error);
-        let transaction = client.transaction().await.map_err(creating)?;
-        transaction.execute("SELECT pg_advisory_xact_lock($1)", &[&LOCK]).await.map_err(creating)?;
-        let there = transaction
-            .query_one("SELECT to_regclass('items') IS NOT NULL AND to_regclass('diagnoses') IS NOT NULL", &[]);
-        if !there.await.map_err(creating)?.get::<_, bool>(0) {
-            transaction.batch_execute(SCHEMA).await.map_err(creating)?;
+/// Connects, and brings the tables to the newest version.
+///
+/// # Errors
+/// What is wrong, in words.
+pub(super) async fn connect(settings: &DatabaseSettings) -> Result<(Client, schema::Partitioning), NatsError> {
+    let (config, files) = settings.config()?;
+    let mut client = match files {
+        Some(files) => {
+            let tls = files.config().map_err(|error| NatsError::new(error.what, error.next))?;
+            connect_with(&config, Securing(tls)).await?
         }
-        transaction.commit().await.map_err(creating)?;
-        let incoming = "SET client_encoding = 'UTF8'; CREATE TEMP TABLE incoming (LIKE items) ON COMMIT DELETE ROWS";
-        client.batch_execute(incoming).await.map_err(creating)?;
-        Ok(Self { client, boxes: HashMap::new(), series: HashMap::new(), days: BTreeSet::new() })
-    }
-
-    /// Writes the rows and notes what is no row, in one transaction.
-    ///
-    /// # Errors
-    /// What is wrong, in words; nothing is written then.
-    pub(super) async fn write(
-        &mut self,
-        rows: &[FleetRow],
-        refused: &[(String, String, String)],
-    ) -> Result<BatchResult, NatsError> {
-        self.prepare_days(rows).await?;
-        self.learn(rows).await?;
-        let mut lines: Vec<(i32, u64, String)> = Vec::with_capacity(rows.len());
-        for row in rows {
-            let Some(box_id) = self.boxes.get(&row.box_name) else { continue };
-            let id = |(name, unit, _): &(String, String, f64)| self.series.get(&(name.clone(), unit.clone())).copied();
-            let series: Vec<i32> = row.numbers.iter().filter_map(id).collect();
-            lines.push((*box_id, row.sequence, row.line(*box_id, &series)));
-        }
-        // Several write at a time: the same order everywhere leaves no two that wait for each other.
-        lines.sort_unstable_by_key(|(box_id, sequence, _)| (*box_id, *sequence));
-        let text: String = lines.iter().map(|(_, _, line)| line.as_str()).collect();
-        let failed = |error| words("writing a batch", &error);
-        let transaction = self.client.transaction().await.map_err(failed)?;
-        let new = copy(&transaction, text).await.map_err(failed)?;
-        for (subject, reason, payload) in refused {
-            let insert = "INSERT INTO refused (subject, reason, payload) VALUES ($1, $2, $3)";
-            transaction.execute(insert, &[subject, reason, payload]).await.map_err(failed)?;
-        }
-        transaction.commit().await.map_err(failed)?;
-        Ok(BatchResult { new, known: lines.len() as u64 - new })
-    }
-
-    /// A partition for each day of the rows, outside the transaction of the batch: creating one stops every other writer for
-    /// a moment.
-    async fn prepare_days(&mut self, rows: &[FleetRow]) -> Result<(), NatsError> {
-        let day = |row: &FleetRow| row.at.to_string().chars().take(10).collect::<String>();
-        let wanted: BTreeSet<String> = rows.iter().map(day).collect();
-        let creating = |error| words("creating the partition of a day", &error);
-        for day in wanted.difference(&self.days.clone()) {
-            let transaction = self.client.transaction().await.map_err(creating)?;
-            transaction.execute("SELECT pg_advisory_xact_lock($1)", &[&LOCK]).await.map_err(creating)?;
-            let name = format!("items_{}", day.replace('-', "_"));
-            let create = format!(
-                "SET LOCAL TimeZone = 'UTC'; CREATE TABLE IF NOT EXISTS {name} PARTITION OF items
-                 FOR VALUES FROM ('{day} 00:00:00+00') TO (timestamptz '{day} 00:00:00+00' + interval '1 day')"
-            );
-            let there =
-                transaction.query_one("SELECT to_regclass($1::text) IS NOT NULL", &[&name]).await.map_err(creating)?;
-            if !there.get::<_, bool>(0) {
-                transaction.batch_execute(&create).await.map_err(creating)?;
+        None => {
+            if !is_here(&config) {
+                Notice::new(Severity::Warning, "database_plain", PLAIN).say();
             }
-            transaction.commit().await.map_err(creating)?;
-            self.days.insert(day.clone());
+            connect_with(&config, NoTls).await?
         }
-        Ok(())
-    }
-
-    /// The numbers of boxes and series that were not known.
-    async fn learn(&mut self, rows: &[FleetRow]) -> Result<(), NatsError> {
-        let failed = |error| words("naming boxes and series", &error);
-        for row in rows {
-            if !self.boxes.contains_key(&row.box_name) {
-                let insert = "INSERT INTO boxes (box, machine) VALUES ($1, $2) ON CONFLICT (box) DO UPDATE SET machine = excluded.machine RETURNING box_id";
-                let found = self.client.query_one(insert, &[&row.box_name, &row.machine]).await.map_err(failed)?;
-                self.boxes.insert(row.box_name.clone(), found.get(0));
-            }
-            for (name, unit, _) in &row.numbers {
-                let key = (name.clone(), unit.clone());
-                if self.series.contains_key(&key) {
-                    continue;
-                }
-                let insert = "INSERT INTO series (name, unit) VALUES ($1, $2) ON CONFLICT (name, unit) DO UPDATE SET unit = excluded.unit RETURNING series_id";
-                let found = self.client.query_one(insert, &[name, unit]).await.map_err(failed)?;
-                self.series.insert(key, found.get(0));
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Rows that are new.
-async fn copy(transaction: &Transaction<'_>, text: String) -> Result<u64, tokio_postgres::Error> {
-    use futures_util::SinkExt;
-    let mut sink = Box::pin(transaction.copy_in::<_, bytes::Bytes>("COPY incoming FROM STDIN").await?);
-    sink.send(text.into()).await?;
-    sink.close().await?;
-    transaction.execute("INSERT INTO items SELECT * FROM incoming ON CONFLICT DO NOTHING", &[]).await
+    };
+    let settings = "SET client_encoding = 'UTF8'; SET TimeZone = 'UTC'; SET client_min_messages = warning";
+    client.batch_execute(settings).await.map_err(|error| words("connecting", &error))?;
+    let partitioning = schema::bring_up(&mut client).await?;
+    Ok((client, partitioning))
 }

@@ -1,13 +1,19 @@
 //! The loop of `fleet ingest`: fetch, write, commit, acknowledge; after any failure again from the beginning.
+//!
+//! While a batch is written the next one is fetched. An item that the database does not take is found by halving its batch, and kept in
+//! the table `refused`; the others are written.
 
-use super::database::{Database, DatabaseSettings};
+use super::database::DatabaseSettings;
 use super::row::{FleetRow, RefusedMessage};
+use super::write::{Arrived, BatchResult, Database, RefusalRecord};
 use crate::log::{Notice, Severity};
-use crate::nats::{Connection, NatsError, NatsTarget, StreamSettings};
+use crate::nats::{Connection, FetchLimits, Message, NatsError, NatsTarget, StreamSettings};
 use std::time::{Duration, Instant};
 
-/// Messages in one batch: a transaction of some hundred kilobytes.
-const BATCH: usize = 1000;
+/// A batch is one transaction of some megabytes: larger ones gain little, and are given out again when they take longer than the
+/// stream waits.
+const BATCH_MESSAGES: usize = 10_000;
+const BATCH_BYTES: usize = 16_000_000;
 /// A batch is written when it is full or this old: rows are in the database within about a second.
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Pauses after a failure: the first, and the longest.
@@ -15,8 +21,9 @@ const PAUSE_FIRST: Duration = Duration::from_millis(250);
 const PAUSE_MAX: Duration = Duration::from_secs(10);
 /// How often it tells how far it is.
 const TELL_EVERY: Duration = Duration::from_secs(60);
-/// Letters of a refused message that are kept.
+/// Letters of a refused message, of its subject and of the reason that are kept.
 const REFUSED_KEPT: usize = 4000;
+const REASON_KEPT: usize = 1000;
 
 /// From where to where.
 #[derive(Debug, Clone)]
@@ -40,7 +47,7 @@ pub struct Done {
     pub new: u64,
     /// Rows that were there already: given out again after a failure.
     pub known: u64,
-    /// Messages that are no items; see the table `refused`.
+    /// Messages that are no items, or that the database does not take; see the table `refused`.
     pub refused: u64,
 }
 
@@ -95,40 +102,101 @@ impl Ingest<'_> {
         }
         connection.create_consumer(&stream.name, consumer).await?;
         Notice::new(Severity::Info, "ingest_running", format!("taking items from stream {}", stream.name)).say();
+        let limits = FetchLimits { messages: BATCH_MESSAGES, bytes: BATCH_BYTES, patience: PATIENCE };
+        let mut batch = connection.fetch(&stream.name, consumer, limits).await?;
         loop {
-            let messages = connection.fetch(&stream.name, consumer, BATCH, PATIENCE).await?;
-            if messages.is_empty() {
+            let fetching = connection.fetch(&stream.name, consumer, limits);
+            let (written, fetched) = tokio::join!(write(&mut database, &batch), fetching);
+            self.count(written?);
+            connection.acknowledge(&batch);
+            connection.flush().await?;
+            batch = fetched?;
+            if batch.is_empty() {
                 let backlog = connection.backlog(&stream.name, consumer).await?;
                 if *once && backlog.pending == 0 && backlog.under_way == 0 {
                     return Ok(());
                 }
-            } else {
-                let (mut rows, mut refused) = (Vec::with_capacity(messages.len()), Vec::new());
-                for message in &messages {
-                    match FleetRow::of(&message.subject, &message.payload) {
-                        Ok(row) => rows.push(row),
-                        Err(RefusedMessage(why)) => {
-                            let payload = String::from_utf8_lossy(&message.payload).replace('\0', "");
-                            refused.push((message.subject.clone(), why, payload.chars().take(REFUSED_KEPT).collect()));
-                        }
-                    }
-                }
-                let written = database.write(&rows, &refused).await?;
-                connection.acknowledge(&messages);
-                connection.flush().await?;
-                self.done.new += written.new;
-                self.done.known += written.known;
-                self.done.refused += refused.len() as u64;
             }
             if self.told.elapsed() >= TELL_EVERY {
                 self.told = Instant::now();
-                let Done { new, known, refused } = self.done;
                 let pending = connection.backlog(&stream.name, consumer).await?.pending;
-                let text = format!(
-                    "{new} rows written, {known} known already, {refused} refused; {pending} wait in the stream"
-                );
-                Notice::new(Severity::Info, "ingest", text).say();
+                self.tell(pending);
             }
         }
+    }
+
+    fn count(&mut self, written: Written) {
+        self.done.new += written.result.new;
+        self.done.known += written.result.known;
+        self.done.refused += written.refused.len() as u64;
+        // One of them is enough to go and look.
+        if let Some(RefusalRecord { subject, reason, .. }) = written.refused.first() {
+            let text =
+                format!("{} messages are kept in the table `refused`; {subject}: {reason}", written.refused.len());
+            Notice::new(Severity::Warning, "refused", text).say();
+        }
+    }
+
+    fn tell(&self, pending: u64) {
+        let Done { new, known, refused } = self.done;
+        let text =
+            format!("{new} rows written, {known} known already, {refused} refused; {pending} wait in the stream");
+        Notice::new(Severity::Info, "ingest", text).say();
+    }
+}
+
+/// What became of a batch.
+#[derive(Debug, Default)]
+struct Written {
+    result: BatchResult,
+    refused: Vec<RefusalRecord>,
+}
+
+/// Writes what are items, and notes what are none.
+async fn write(database: &mut Database, messages: &[Message]) -> Result<Written, NatsError> {
+    let mut written = Written::default();
+    let mut items: Vec<(FleetRow<'_>, &Message)> = Vec::with_capacity(messages.len());
+    for message in messages {
+        match FleetRow::of(&message.subject, &message.payload) {
+            Ok(row) => items.push((row, message)),
+            Err(RefusedMessage(why)) => written.refused.push(refusal(message, &why)),
+        }
+    }
+    // Stretches that are still to be written; one that the database does not take is halved.
+    let mut stretches = vec![(0, items.len())];
+    while let Some((from, to)) = stretches.pop() {
+        let arrived = |(row, message): &'_ (FleetRow<'_>, &Message)| message.stored_us().unwrap_or(row.at_us());
+        let mut rows: Vec<Arrived<'_>> =
+            items[from..to].iter().map(|item| Arrived { row: &item.0, arrived_us: arrived(item) }).collect();
+        match database.write(&mut rows).await {
+            Ok(result) => {
+                written.result.new += result.new;
+                written.result.known += result.known;
+            }
+            Err(error) if error.of_the_data && to - from > 1 => {
+                let middle = from + (to - from) / 2;
+                stretches.extend([(middle, to), (from, middle)]);
+            }
+            Err(error) if error.of_the_data => {
+                let message = items[from].1;
+                written.refused.push(refusal(message, &error.said.what));
+            }
+            Err(error) => return Err(error.said),
+        }
+    }
+    database.refuse(&written.refused).await?;
+    Ok(written)
+}
+
+fn refusal(message: &Message, why: &str) -> RefusalRecord {
+    let kept =
+        |text: &str, letters: usize| text.chars().filter(|letter| *letter != '\0').take(letters).collect::<String>();
+    // So many bytes hold so many letters.
+    let start = &message.payload[..message.payload.len().min(4 * REFUSED_KEPT)];
+    RefusalRecord {
+        stream_sequence: message.stream_sequence().unwrap_or(0),
+        subject: kept(&message.subject, REASON_KEPT),
+        reason: kept(why, REASON_KEPT),
+        payload: kept(&String::from_utf8_lossy(start), REFUSED_KEPT),
     }
 }

@@ -8,27 +8,34 @@
 //! | file | what |
 //! |---|---|
 //! | `row` | a message as a row; pure |
-//! | `database` | tables, partitions by day, writing a batch |
-//! | `secured` | TLS for the line to the database |
+//! | `copy` | rows in the binary format of `COPY`; pure |
+//! | `latest`, `means` | the newest values, and the means of minutes, hours and days, of a batch; pure |
+//! | `names` | the numbers of boxes and series, and machines that get another name |
+//! | `write` | a batch in one transaction |
+//! | `schema` | tables, their version, partitions; the SQL is in the folder `schema` |
+//! | `database`, `secured` | the connection, what it says in words, TLS |
 //! | `ingest` | the loop |
-//! | `schema.sql`, `same_finding*.sql` | what is created, and questions over all machines |
+//! | `retention` | what is too old goes |
+//! | `questions` | what a shop asks, in SQL |
 
+mod copy;
 mod database;
 pub mod ingest;
+mod latest;
+mod means;
+mod names;
+pub mod questions;
+pub mod retention;
 mod row;
+mod schema;
 mod secured;
+mod write;
 
-pub use database::{Database, DatabaseSettings};
+pub use database::DatabaseSettings;
 pub use row::RefusedMessage;
+pub use schema::{TABLES, VIEWS};
 
 use crate::nats::NatsTarget;
-
-/// The tables that `fleet ingest` creates.
-pub const SCHEMA: &str = include_str!("schema.sql");
-/// Which machines have had the same finding of the twin, in PostgreSQL.
-pub const SAME_FINDING: &str = include_str!("same_finding.sql");
-/// The same over Parquet partitions, for `DuckDB`.
-pub const SAME_FINDING_PARQUET: &str = include_str!("same_finding_parquet.sql");
 
 /// Reads `nats://SERVER,SERVER/PREFIX` or `natss://`; gives the servers and the prefix of the subjects.
 ///

@@ -57,6 +57,7 @@ chapters! {
     "page" zh,
     "outputs",
     "fleet",
+    "conformance",
     "mismatch" zh,
     "twin",
     "measured",

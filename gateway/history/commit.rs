@@ -80,7 +80,9 @@ pub(crate) fn commit(
     let mut storing = minute_buffer.records.iter().take(records);
     storing.try_for_each(|posted| record_sql::store(&writing, &posted.record)).doing("storing a record")?;
     let items = outbox.as_ref().map(|outbox| {
-        outbox.put(&writing, minute_buffer.records.iter().take(records), minute_buffer.opened_row, end_row)
+        let records = minute_buffer.records.iter().take(records);
+        let stored = minute_buffer.blocks.iter().take(blocks).map(|block| block.start_ns);
+        outbox.put(&writing, records, (minute_buffer.opened_row, end_row), stored)
     });
     let items = items.transpose()?;
     writing.commit().doing("making samples durable")?;

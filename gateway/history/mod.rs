@@ -83,13 +83,14 @@ mod writer;
 pub use audit::{AuditCheck, AuditEntry, Break, audit_document};
 pub use block::{Cells, NumberCells, ValueSummary, WordCells};
 pub use error::HistoryError;
-pub use export::{DayWritten, Format, day_file, day_of};
+pub use export::{DayWritten, Format, day_of};
 pub use info::{Dropped, Info, TableRows};
 pub use list::{AlarmEntry, RecordSpan, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
+pub(crate) use outbox::unnested;
 pub use outbox::{
-    Cell, Content, DeliveryState, Item, Outbox, OutboxFigures, OutboxHead, OutboxReader, OutboxSettings, OutboxStretch,
-    Position, Reading, SeriesInfo,
+    Cell, Content, DeliveryState, Gap, Item, Outbox, OutboxFigures, OutboxHead, OutboxReader, OutboxSettings,
+    OutboxStretch, Position, Reading, SeriesInfo, SeriesMean, box_id,
 };
 pub use overview::{Buckets, Overview};
 pub use query::{Chunk, Query, STATE_SERIES};

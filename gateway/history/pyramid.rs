@@ -42,6 +42,11 @@ pub(crate) static LEVELS: [Level; 3] =
 pub(crate) const MINUTE_NS: i64 = 60 * SECOND_NS;
 
 impl Level {
+    /// Length of a bucket, s.
+    pub(crate) fn width_s(&self) -> u32 {
+        u32::try_from(self.width_ns / SECOND_NS).unwrap_or(u32::MAX)
+    }
+
     /// Number of the bucket that holds `at_ns`.
     pub(crate) fn bucket(&self, at_ns: TimeNs) -> i64 {
         at_ns.div_euclid(self.width_ns)

@@ -222,13 +222,16 @@ impl Thread {
         if let Some(number) = self.pace.maintaining {
             self.mailbox.finish(number);
         }
+        // The running minute becomes a block, so that its summaries are complete and leave the box; where this fails, the tail has it.
+        self.minute_buffer.seal();
+        let _ = self.commit_all(false);
         // A clean end ends the state that the machine was in; after a failure the next start does it.
         if let Some(newest_ns) = self.minute_buffer.newest_ns() {
             let _ = end_state(&mut self.db, newest_ns);
         }
-        if let Some(outbox) = &self.outbox {
+        if let Some(outbox) = &mut self.outbox {
             // Where this fails, the sinks send again what they sent last.
-            let _ = outbox.close(&self.db);
+            let _ = outbox.close(&mut self.db, &self.minute_buffer.reasons);
         }
         // What is committed is in the log already; a failing last checkpoint loses nothing.
         let _ = self.db.close();

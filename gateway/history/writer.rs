@@ -52,7 +52,8 @@ impl Writer {
         schema::register(&mut db, &mut series)?;
         schema::note_limit(&db, options.retention.max_bytes)?;
         let end = recover(&mut db, options.goes_on.then_some(options.origin.as_str()))?;
-        let outbox = options.outbox.clone().map(|outbox| Gatherer::open(&mut db, outbox, &series)).transpose()?;
+        let outbox =
+            options.outbox.clone().map(|outbox| Gatherer::open(&mut db, outbox, &series, end.last_ns)).transpose()?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));
         let shared = Arc::new(SharedStatus::default());
         let maintenance = Maintenance::new(path, options.retention, options.reserve_bytes);

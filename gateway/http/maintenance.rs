@@ -102,7 +102,7 @@ async fn doctor(
     let report = report.await?;
     let mut document = report.json();
     document["schema"] = json!("doctor/1");
-    document["address"] = json!(crate::config::masked(&report.address));
+    document["address"] = json!(adapters::address::masked(&report.address));
     Ok(told(Json(document), format!("looked at source {}", asked.source)))
 }
 
@@ -172,7 +172,7 @@ fn without_secrets(mut status: Value) -> Value {
     for list in ["sources", "sinks"] {
         for one in status[list].as_array_mut().into_iter().flatten() {
             for key in ["name", "address"] {
-                if let Some(text) = one[key].as_str().map(crate::config::masked) {
+                if let Some(text) = one[key].as_str().map(adapters::address::masked) {
                     one[key] = json!(text);
                 }
             }

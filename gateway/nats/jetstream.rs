@@ -11,13 +11,18 @@ use tokio::time::{Instant, timeout_at};
 
 /// Nobody listens on this subject.
 const NO_RESPONDERS: u16 = 503;
-/// Error numbers that say that this message will never be taken: larger than the stream allows.
-const TOO_LARGE: [u64; 1] = [10054];
+/// The error number of a message that is larger than the stream allows.
+const TOO_LARGE: u64 = 10054;
+/// The error number of a message that could not be stored, for whatever reason; with these words it never will be: the files of a
+/// stream take at most 32 MB.
+const NOT_STORED: (u64, &str) = (10077, "message too large");
 /// A message that is not acknowledged within this time is given out again: ten times what a batch takes on a slow computer. Too
 /// short, and work is done twice; too long, and rows of a reader that died come late.
 const ACKNOWLEDGE_WITHIN: Duration = Duration::from_secs(10);
-/// Messages that may be under way to all readers of one consumer together.
-const UNDER_WAY_MAX: u64 = 20_000;
+/// Messages that may be under way to all readers of one consumer together: two batches of each of five readers.
+const UNDER_WAY_MAX: u64 = 100_000;
+/// Subject, reply and header of a message, bytes at most.
+const ENVELOPE: usize = 65_536;
 
 /// A message to be stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,6 +59,17 @@ pub struct StreamSettings {
     pub max_bytes: u64,
     /// A second message with the same id within this time is not stored.
     pub duplicate_window: Duration,
+}
+
+/// How much is fetched at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FetchLimits {
+    /// Messages.
+    pub messages: usize,
+    /// Bytes; a single message may be larger.
+    pub bytes: usize,
+    /// How long messages are waited for.
+    pub patience: Duration,
 }
 
 /// How far the readers of a consumer are behind.
@@ -203,7 +219,7 @@ impl Connection {
         Ok(Backlog { pending: number("num_pending"), under_way: number("num_ack_pending") })
     }
 
-    /// Up to `most` messages of a consumer; fewer, or none, after `patience`.
+    /// Messages of a consumer within these limits; fewer, or none, when the patience is over.
     ///
     /// # Errors
     /// The connection is over, the consumer is gone, or the server does not answer.
@@ -211,12 +227,14 @@ impl Connection {
         &mut self,
         stream: &str,
         consumer: &str,
-        most: usize,
-        patience: Duration,
+        limits: FetchLimits,
     ) -> Result<Vec<Message>, NatsError> {
+        let FetchLimits { messages: most, bytes, patience } = limits;
         let inbox = format!("_INBOX.{}", adapters::mqtt::unique());
         let number = self.subscribe(&inbox);
-        let request = json!({"batch": most, "expires": nanoseconds(patience)}).to_string();
+        // A single message that is larger would never be given out.
+        let bytes = bytes.max(self.max_payload() + ENVELOPE);
+        let request = json!({"batch": most, "expires": nanoseconds(patience), "max_bytes": bytes}).to_string();
         self.put(&format!("$JS.API.CONSUMER.MSG.NEXT.{stream}.{consumer}"), Some(&inbox), None, request.as_bytes());
         let until = Instant::now() + patience + DEADLINE;
         let mut messages = Vec::new();
@@ -265,10 +283,12 @@ fn acknowledgement(came: &Message, subject: &str) -> Result<bool, JetStreamFailu
     }
     let answer: Json = serde_json::from_slice(&came.payload).unwrap_or(Json::Null);
     match refusal(&answer) {
-        Some((code, said)) if TOO_LARGE.contains(&code) => Err(JetStreamFailure::Message(NatsError::new(
-            format!("JetStream says {said:?}"),
-            "raise max_msg_size of the stream",
-        ))),
+        Some((code, said)) if code == TOO_LARGE || (code, said.as_str()) == NOT_STORED => {
+            Err(JetStreamFailure::Message(NatsError::new(
+                format!("JetStream says {said:?}"),
+                "raise max_msg_size of the stream",
+            )))
+        }
         Some((code, said)) => Err(JetStreamFailure::Line(words::of_jetstream(code, &said))),
         None => Ok(answer["duplicate"].as_bool().unwrap_or(false)),
     }

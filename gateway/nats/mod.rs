@@ -22,7 +22,7 @@ mod wire;
 mod words;
 
 pub use connection::{Connection, Message};
-pub use jetstream::{Backlog, JetStreamFailure, Outgoing, StreamSettings};
+pub use jetstream::{Backlog, FetchLimits, JetStreamFailure, Outgoing, StreamSettings};
 pub use target::NatsTarget;
 
 use std::fmt;

@@ -38,6 +38,28 @@ pub struct Message {
     pub payload: Vec<u8>,
 }
 
+impl Message {
+    /// The words of the subject on which a message of JetStream is acknowledged: `$JS.ACK.` and, from newer servers, domain and
+    /// account; then stream, consumer, how often it was given out, its number in the stream, ...
+    fn acknowledgement(&self, index: usize) -> Option<i64> {
+        let words: Vec<&str> = self.reply.as_deref()?.strip_prefix("$JS.ACK.")?.split('.').collect();
+        let further = if words.len() >= 9 { 2 } else { 0 };
+        words.get(index + further)?.parse().ok()
+    }
+
+    /// Its number in the stream.
+    #[must_use]
+    pub fn stream_sequence(&self) -> Option<i64> {
+        self.acknowledgement(3)
+    }
+
+    /// When the stream stored it, microseconds since 1970.
+    #[must_use]
+    pub fn stored_us(&self) -> Option<i64> {
+        self.acknowledgement(5).map(|at_ns| at_ns.div_euclid(1000))
+    }
+}
+
 /// What a server says.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum ServerOperation {
@@ -158,6 +180,24 @@ mod tests {
         assert_eq!(inbox.take(), Ok(Some(ServerOperation::Error("Authorization Violation".to_owned()))));
         assert_eq!(inbox.take(), Ok(None));
         assert!(inbox.bytes.is_empty());
+    }
+
+    #[test]
+    fn the_place_in_the_stream_stands_in_the_reply_of_old_and_new_servers() {
+        let message = |reply: &str| Message {
+            subject: "a".to_owned(),
+            subscription: 1,
+            reply: Some(reply.to_owned()),
+            status: None,
+            payload: Vec::new(),
+        };
+        for reply in
+            ["$JS.ACK.CNC.fleet.1.42.7.1769847300100000999.3", "$JS.ACK._.acc.CNC.fleet.1.42.7.1769847300100000999.3.x"]
+        {
+            assert_eq!(message(reply).stream_sequence(), Some(42), "{reply}");
+            assert_eq!(message(reply).stored_us(), Some(1_769_847_300_100_000), "{reply}");
+        }
+        assert_eq!(message("_INBOX.x").stream_sequence(), None);
     }
 
     #[test]

@@ -5,6 +5,7 @@ pub mod actuator_worker;
 pub mod clock;
 pub mod command;
 pub mod deadline;
+mod end;
 pub mod health;
 pub mod history_store;
 pub mod live_twin;
@@ -37,7 +38,6 @@ use crate::http::{Certificate, Configured, Published, Server, ServerParts, Serve
 use crate::log::{self, Notice, Severity};
 use crate::operations::Operations;
 use crate::pipeline::Pipeline;
-use crate::signals::{SignalRequest, Signals};
 use actuator_worker::{ActuatorWorker, Tools};
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::{Actuator, OffsetSink};
@@ -53,7 +53,6 @@ use outputs::ConfiguredSinks;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 use thermal::Thermal;
 use tick::{Identity, RunFlags, Ticker};
@@ -334,15 +333,10 @@ async fn serve(
         }
         _ => None,
     };
-    tokio::select! {
-        () = obey(run_flags) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
-        () = until_closed(live) => {}
-    }
-    // What the sinks have delivered is noted by the last commit of the history.
+    end::wait_for_end(run_flags, outputs, live).await;
     if let Some(sinks) = sinks {
         sinks.stop().await;
     }
-    run_flags.stop.store(true, Ordering::SeqCst);
     if let Some(server) = server {
         server.stop().await;
     }
@@ -374,27 +368,4 @@ async fn follow(access: Arc<Access>) {
         beat.tick().await;
         access.follow().await;
     }
-}
-
-/// Returns when a signal says stop.
-async fn obey(run_flags: &RunFlags) {
-    let mut signals = match Signals::listen() {
-        Ok(signals) => signals,
-        Err(error) => {
-            let text = format!("signals cannot be heard ({error}): stop the box with SIGKILL; nothing stored is lost");
-            Notice::new(Severity::Warning, "no_signals", text).say();
-            return std::future::pending().await;
-        }
-    };
-    loop {
-        match signals.next().await {
-            SignalRequest::Stop => return,
-            SignalRequest::Reload => run_flags.reload.store(true, Ordering::SeqCst),
-        }
-    }
-}
-
-/// Returns when the tick has ended and nothing will be published any more.
-async fn until_closed(mut live: watch::Receiver<Option<Published>>) {
-    while live.changed().await.is_ok() {}
 }

@@ -145,7 +145,9 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String
 #[cfg(not(feature = "opcua"))]
 fn without_opcua(keys: &mut Keys) -> String {
     let _login = adapters::address::Login::of(keys);
-    let _further = (keys.text("anonymous"), keys.text("certificates"));
+    for key in ["anonymous", "certificates", "manufacturer", "model", "serial_number"] {
+        let _known_elsewhere = keys.text(key);
+    }
     "this program was built without OPC UA; `cargo build --release --features opcua` makes one that has it".to_owned()
 }
 

@@ -18,6 +18,8 @@ pub(super) struct Progress {
     pub(super) delay_s: Option<f64>,
     pub(super) delays: Histogram,
     pub(super) error: Option<String>,
+    /// The last item that the receiver would not take, and why.
+    pub(super) refusal: Option<String>,
     pub(super) failing: bool,
     /// Time of the newest delivered item of the oldest gap, or of live data where there is no gap.
     pub(super) reached_ns: Option<TimeNs>,
@@ -105,6 +107,7 @@ impl Board {
                 connections: progress.connections,
                 outage_fits_h: fits,
                 error: progress.error.clone(),
+                refusal: progress.refusal.clone(),
                 failing: progress.failing,
             }
         };

@@ -52,6 +52,8 @@ pub fn start(
 pub fn start_with(sinks: Vec<(String, Box<dyn Sink>)>, outbox: &Outbox, board: &Board, path: &Path) -> Sinks {
     let (stop, stopping) = watch::channel(false);
     let task = |(index, (name, sink)): (usize, (String, Box<dyn Sink>))| {
+        // Until the first connection has failed it is about to be there.
+        outbox.set_linked(&name, true);
         let task = SinkTask {
             index,
             name,
@@ -116,6 +118,7 @@ impl SinkTask {
                 Left::Stop => break,
                 Left::Failed(error) => error,
             };
+            self.outbox.set_linked(&self.name, false);
             if self.board.failed(self.index, &error) {
                 let text = format!("sink {}: {error}", self.name);
                 Notice::new(Severity::Warning, "sink_failed", text).detail(format!("{error:?}")).say();
@@ -126,6 +129,7 @@ impl SinkTask {
                 _ = stopping.wait_for(|stop| *stop) => break,
             }
         }
+        self.outbox.set_linked(&self.name, false);
         // The receiver finds out by itself where the farewell does not reach it.
         let _late = timeout(FAREWELL, sink.close()).await;
         self.board.change(self.index, |progress| progress.state = Some("stopped"));
@@ -148,9 +152,13 @@ impl SinkTask {
             return Left::Failed(error);
         }
         *tries = 0;
+        self.outbox.set_linked(&self.name, true);
         let mut failed = false;
         self.board.change(self.index, |progress| {
             failed = std::mem::replace(&mut progress.failing, false);
+            if failed {
+                progress.error = None;
+            }
             progress.state = Some("connected");
             progress.connections += 1;
         });
@@ -237,17 +245,17 @@ impl SinkTask {
 
     fn delivered(&self, stretch: &OutboxStretch, from: u64, historical: bool) {
         self.outbox.delivered(&self.name, from, stretch.to);
-        let reached_ns = stretch.items.last().map(|item| item.at_ns);
+        let reached_ns = stretch.items.iter().rev().find(|item| item.is_live()).map(|item| item.at_ns);
         let gap = self.outbox.standing(&self.name).is_some_and(|standing| standing.position.oldest_gap().is_some());
         // A record may have no time; an accelerated machine is ahead of the clock.
         let delay_s = reached_ns.filter(|at_ns| *at_ns > 0).map(|at_ns| seconds(now_ns() - at_ns).max(0.0));
         self.board.change(self.index, |progress| {
             progress.delivered += stretch.items.len() as u64;
             if historical || !gap {
-                progress.reached_ns = reached_ns;
+                progress.reached_ns = reached_ns.or(progress.reached_ns);
             }
             if !historical {
-                progress.delay_s = delay_s;
+                progress.delay_s = delay_s.or(progress.delay_s);
                 delay_s.into_iter().for_each(|delay_s| progress.delays.add_s(delay_s));
             }
         });
@@ -260,9 +268,7 @@ impl SinkTask {
         self.board.change(self.index, |progress| {
             progress.refused += 1;
             progress.delivered += sequence - from;
-            let text = error.to_string();
-            first = progress.error.is_none();
-            progress.error = Some(text);
+            first = progress.refusal.replace(error.to_string()).is_none();
         });
         if first {
             Notice::new(Severity::Warning, "sink_refused", format!("sink {}: {error}", self.name)).say();

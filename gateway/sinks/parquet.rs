@@ -5,7 +5,7 @@
 //! away, is made up for as long as the history holds the days.
 
 use super::{Batch, Pending, Sink, SinkError};
-use crate::history::{DAY_NS, HistoryError, Outbox, Reader, day_file, day_of};
+use crate::history::{DAY_NS, HistoryError, Outbox, Reader, day_of};
 use adapters::address::Keys;
 use adapters::clock::TimeNs;
 use std::path::{Path, PathBuf};
@@ -84,7 +84,7 @@ fn write_missing(target: &ParquetTarget, history: &Path, machine: &str, today_ns
     let Some((first_ns, _)) = reader.span()? else { return Ok(()) };
     let mut day_ns = day_of(first_ns).max(today_ns - i64::from(target.days) * DAY_NS);
     while day_ns < today_ns {
-        if !day_file(&target.root, "samples", machine, day_ns).exists() {
+        if !reader.has_day_file(&target.root, machine, day_ns)? {
             reader.export_day(&target.root, machine, day_ns)?;
         }
         day_ns += DAY_NS;

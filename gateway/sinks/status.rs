@@ -31,8 +31,10 @@ pub struct SinkStatus {
     pub connections: u64,
     /// How long an outage fits at the present rate, hours; `null` in the first minute.
     pub outage_fits_h: Option<f64>,
-    /// What went wrong last and what to do.
+    /// What is wrong and what to do; `null` while it is connected.
     pub error: Option<String>,
+    /// The last item that the receiver would not take, why, and what to do; it was left out.
+    pub refusal: Option<String>,
     /// Does the error last?
     pub failing: bool,
 }

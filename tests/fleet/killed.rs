@@ -89,7 +89,7 @@ fn every_row_is_there_once_although_leader_reader_and_box_are_killed() {
 }
 
 fn values_are_those_of_the_history(sending: &Sending, postgres: &Postgres) {
-    let select = "SELECT floor(extract(epoch FROM at) * 1000)::bigint, number FROM readings WHERE name = 'spindle_power_w' AND unit = 'W'";
+    let select = "SELECT floor(extract(epoch FROM valid_from) * 1000)::bigint, number FROM readings WHERE name = 'spindle_power_w' AND number IS NOT NULL";
     let stored = sending.queried("spindle_power_w");
     let mut compared = 0;
     for line in postgres.sql(select).lines() {

@@ -98,6 +98,7 @@ fn a_day_is_written_by_itself_and_duckdb_reads_equal_values_units_and_findings()
     for (read, point) in read.iter().zip(&points) {
         assert_eq!((read[0].as_i64(), read[1].as_f64()), (point[0].as_i64(), point[1].as_f64()));
     }
+    the_questions_of_the_lake(lake.path());
     let units = duckdb(
         lake.path(),
         "SELECT DISTINCT decode(value) FROM parquet_kv_metadata('samples/*/*/*.parquet') WHERE decode(key) = 'unit.spindle_power_w'",
@@ -113,6 +114,40 @@ fn a_day_is_written_by_itself_and_duckdb_reads_equal_values_units_and_findings()
         json!([found[0][0], found[0][1], found[0][2], found[0][3]]),
         json!(["bearing_friction", 2, 2, "Lathe 7, Mill 2"])
     );
+}
+
+/// The same mean from two engines that are not ours, and from what was recorded: 300 ticks from 970 to 999.9 W on the first day, from 1000 on the
+/// second.
+fn the_questions_of_the_lake(lake: &Path) {
+    let question = |name: &str| stdout(&run(&["fleet", "sql", name])).trim_end().trim_end_matches(';').to_owned();
+    let expected = json!([
+        ["Lathe 7", "2023-12-08", 984.95, 300],
+        ["Lathe 7", "2023-12-09", 1014.95, 300],
+        ["Mill 2", "2023-12-08", 984.95, 300]
+    ]);
+    let near = |rows: Vec<Vec<Json>>| {
+        let row = |row: Vec<Json>| {
+            json!([row[0], row[1], (row[2].as_f64().expect("a mean") * 100.0).round() / 100.0, row[3]])
+        };
+        Json::Array(rows.into_iter().map(row).collect())
+    };
+    assert_eq!(near(duckdb(lake, &question("mean-by-machine-parquet")).expect("installed")), expected, "DuckDB");
+    let script = "import chdb, json, sys\nprint(json.dumps([list(row.values()) for row in json.loads(str(chdb.query(sys.argv[1], 'JSON')))['data']]))";
+    let sql = question("mean-by-machine-clickhouse");
+    let said = Command::new("python3").args(["-c", script, &sql]).current_dir(lake).output().expect("python3 runs");
+    let error = String::from_utf8_lossy(&said.stderr).into_owned();
+    if error.contains("No module named 'chdb'") {
+        assert!(std::env::var_os("CNC_GATEWAY_CI").is_none(), "chdb is not installed");
+        eprintln!("SKIPPED: chdb is not installed (python3 -m pip install chdb)");
+        return;
+    }
+    assert!(said.status.success(), "{error}");
+    let rows: Vec<Vec<Json>> = serde_json::from_slice(&said.stdout).expect("rows");
+    // ClickHouse writes 64-bit integers as texts.
+    let whole = |cell: Json| cell.as_str().and_then(|text| text.parse::<u64>().ok()).map_or(cell.clone(), Json::from);
+    let rows = rows.into_iter().map(|row| row.into_iter().map(whole).collect()).collect();
+    assert_eq!(near(rows), expected, "ClickHouse");
+    println!("the mean of a day: DuckDB, ClickHouse and what was recorded agree");
 }
 
 #[test]

@@ -87,10 +87,14 @@ def shown(value):
 
 
 class Listener:
-    """Keeps every change that the server sends."""
+    """Keeps every change and every event that the server sends."""
 
     def __init__(self, names):
-        self.names, self.changes = names, []
+        self.names, self.changes, self.events = names, [], []
+
+    def event_notification(self, event):
+        told = {name: getattr(event, name) for name in ("Identifier", "Severity", "SourceName")}
+        self.events.append(told | {"text": event.Message.Text, "type": event.EventType.Identifier})
 
     def datachange_notification(self, node, _value, data):
         entry = shown(data.monitored_item.Value)
@@ -145,6 +149,9 @@ async def look(url, directory, name, user, password, seconds):
         subscription = await made.create_subscription(100, listener)
         nodes = [made.get_node(node) for node in listened]
         await subscription.subscribe_data_change(nodes, queuesize=100)
+        messages = found["Notification/Messages"]["node"]
+        own = made.get_node(ua.NodeId("GatewayMessageEventType", spaces.index("urn:cnc-gateway:machine")))
+        await subscription.subscribe_events(messages, own)
         await asyncio.sleep(float(seconds))
         await subscription.delete()
         refused = await refused_writes([entry["node"] for entry in variables.values()])
@@ -155,6 +162,7 @@ async def look(url, directory, name, user, password, seconds):
             "values": {path: shown(value) for path, value in zip(variables, values)},
             "units": units,
             "changes": listener.changes,
+            "events": listener.events,
             "writes": refused,
             "methods": [path for path, entry in found.items() if entry["class"] == "Method"],
         }

@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 const MACHINE_TOOL: &str = "http://opcfoundation.org/UA/MachineTool/";
+/// An alarm that begins and ends every ten seconds of the machine while its spindle turns.
+const SCRIPT: &str =
+    "if held_s(\"turns\", spindle_speed_rpm > 100.0) % 10.0 > 5.0 { alarm(\"door\", \"the door was opened\") }";
 
 /// What the client prints.
 fn client(arguments: &[&str]) -> Json {
@@ -53,8 +56,11 @@ impl Served {
             client(&["make", process::text(clients.path()), name, days]);
         }
         let port = port::free_port();
-        let address = format!("opcua://127.0.0.1:{port}?user=plant&password_file={}", file.display());
-        let sending = Sending::fast(&address);
+        let address = format!(
+            "opcua://127.0.0.1:{port}?user=plant&password_file={}&manufacturer=Acme&model=L7&serial_number=4711",
+            file.display()
+        );
+        let sending = Sending::with_script("simulated://lathe?seed=3", "20", &address, "", Some(SCRIPT));
         sending.wait_sink("listening", |sink| sink["state"] == "connected");
         Self { sending, clients, url: format!("opc.tcp://127.0.0.1:{port}/") }
     }
@@ -93,12 +99,14 @@ fn a_client_that_is_not_ours_reads_the_machine_and_changes_nothing() {
     served.sending.wait_spindle();
     served.attempt("known", &LOGIN);
     served.trust("known");
-    let seen = served.look("4");
+    let seen = served.look("6");
     let status = served.sending.status();
     served.sending.stop();
     the_nodes_are_those_of_the_specification(&seen);
     absent_values_are_absent(&seen, &status);
     words_are_numbers_of_the_specification(&seen);
+    the_program_has_a_state(&seen);
+    alarms_are_events(&seen);
     assert_eq!(seen["methods"], json!([]));
     let writes: Vec<&str> =
         seen["writes"].as_array().expect("a list").iter().map(|said| said.as_str().expect("a word")).collect();
@@ -120,6 +128,7 @@ fn the_nodes_are_those_of_the_specification(seen: &Json) {
         ("Monitoring/Spindle", 22),
         ("Production", 21),
         ("Production/ActiveProgram", 32),
+        ("Production/ActiveProgram/State", 15),
         ("Notification", 7),
         ("Notification/Messages", 38),
     ];
@@ -130,7 +139,11 @@ fn the_nodes_are_those_of_the_specification(seen: &Json) {
         assert_eq!(seen["nodes"][path]["space"], MACHINE_TOOL, "{path}");
         assert_eq!(seen["nodes"][path]["class"], "Variable", "{path}");
     }
-    assert_eq!(seen["values"]["Identification/ComponentName"]["value"], "Lathe 7");
+    for (name, value) in
+        [("ComponentName", "Lathe 7"), ("Manufacturer", "Acme"), ("Model", "L7"), ("SerialNumber", "4711")]
+    {
+        assert_eq!(seen["values"][format!("Identification/{name}")]["value"], value, "{name}");
+    }
     assert_eq!(seen["units"]["Values/spindle_power_w"], json!(["W", 5_723_220]));
     assert_eq!(seen["units"]["Monitoring/Channel1/FeedOverride"], json!(["%", 20529]));
 }
@@ -150,7 +163,7 @@ fn absent_values_are_absent(seen: &Json, status: &Json) {
     }
     println!("{present} values present, {absent} absent");
     assert!(absent > 10 && present > 30, "{absent} absent, {present} present");
-    assert_eq!(seen["values"]["Identification/SerialNumber"]["status"], "BadNotSupported");
+    assert_eq!(seen["values"]["Monitoring/MachineTool/PowerOnDuration"]["status"], "BadNotSupported");
 }
 
 fn words_are_numbers_of_the_specification(seen: &Json) {
@@ -163,6 +176,34 @@ fn words_are_numbers_of_the_specification(seen: &Json) {
     assert_eq!(value("Monitoring/Channel1/ChannelState") == 0, active, "{}", value("Values/execution"));
     let speed_rpm = value("Values/spindle_speed_rpm").as_f64().expect("a speed");
     assert_eq!(value("Monitoring/Spindle/IsRotating"), speed_rpm.abs() >= 1.0);
+}
+
+/// The state of the program is the number, the node and the name of the published type.
+fn the_program_has_a_state(seen: &Json) {
+    let value = |path: &str| &seen["values"][format!("Production/ActiveProgram/State/{path}")]["value"];
+    let (number, node) = match value("CurrentState").as_str().expect("a state") {
+        "Initializing" => (0, 5039),
+        "Running" => (1, 5041),
+        "Ended" => (2, 5038),
+        "Interrupted" => (3, 5040),
+        other => panic!("{other} is no state of a program"),
+    };
+    assert_eq!(value("CurrentState/Number"), number);
+    assert!(value("CurrentState/Id").to_string().contains(&node.to_string()), "{}", value("CurrentState/Id"));
+}
+
+/// Whoever subscribes to the messages hears an alarm begin and end.
+fn alarms_are_events(seen: &Json) {
+    let events = seen["events"].as_array().expect("a list");
+    let of = |severity: u16| events.iter().filter(|event| event["Severity"] == severity).collect::<Vec<_>>();
+    let (raised, cleared) = (of(500), of(1));
+    println!("{} alarms began and {} ended in six seconds", raised.len(), cleared.len());
+    assert!(!raised.is_empty() && !cleared.is_empty(), "{events:?}");
+    for event in raised {
+        assert_eq!(event["text"], "the door was opened");
+        assert_eq!(event["Identifier"], "door (own.rhai)");
+        assert_eq!(event["type"], "GatewayMessageEventType");
+    }
 }
 
 /// How many changes that the client was told are those of the history, at their time.

@@ -30,7 +30,9 @@ def plain(devices):
 def main():
     devices, port, seconds = plain(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
     agent = MTConnect(loc=devices, hostname="http://127.0.0.1:5000")
-    known = set(agent.item_dict)
+    # Lines have names; this agent wants the identifiers, which begin with the digits of the box.
+    ids = {item.name: item.id for item in agent.item_dict.values()}
+    known = set(ids)
     line = socket.create_connection(("127.0.0.1", port), timeout=10)
     line.sendall(b"* PING\r\n")
     heard, pushed, unknown, conditions, assets, pong = b"", [], [], [], [], None
@@ -53,19 +55,20 @@ def main():
         if cells[0] == "@ASSET@":
             assets.append({"id": cells[1], "type": cells[2], "root": ElementTree.fromstring(cells[3]).tag})
             continue
-        if cells[0] == "alarms":
-            conditions.append({"at": at, "level": cells[1], "code": cells[2], "text": cells[-1]})
-            agent.push_data("alarms", cells[1])
+        if cells[0] in known and agent.item_dict[ids[cells[0]]].category == "CONDITION":
+            conditions.append({"at": at, "name": cells[0], "level": cells[1], "code": cells[2], "text": cells[-1]})
+            agent.push_data(ids[cells[0]], cells[1])
             continue
         for name, value in zip(cells[::2], cells[1::2]):
             if name not in known:
                 unknown.append(name)
                 continue
-            sample = agent.item_dict[name].category == "SAMPLE" and value != "UNAVAILABLE"
-            agent.push_data(name, float(value) if sample else value)
+            sample = agent.item_dict[ids[name]].category == "SAMPLE" and value != "UNAVAILABLE"
+            agent.push_data(ids[name], float(value) if sample else value)
             pushed.append([name, at, value])
     current = ElementTree.fromstring(agent.current().get_xml())
-    values = {entry.get("dataItemId"): entry.text for entry in current.iter() if entry.get("dataItemId")}
+    names = {identifier: name for name, identifier in ids.items()}
+    values = {names[entry.get("dataItemId")]: entry.text for entry in current.iter() if entry.get("dataItemId")}
     print(
         json.dumps(
             {

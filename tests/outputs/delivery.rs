@@ -2,7 +2,9 @@
 
 use crate::fake_sink::{FakeSink, Seen};
 use adapters::{ChannelId, Sample, Slot, Value};
-use gateway::history::{Event, ExtraSeries, ExtraValue, Item, Options, Outbox, OutboxReader, OutboxSettings, Writer};
+use gateway::history::{
+    Content, Event, ExtraSeries, ExtraValue, Gap, Item, Options, Outbox, OutboxReader, OutboxSettings, Writer,
+};
 use gateway::sinks::{Board, Sinks, drive};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -74,9 +76,9 @@ impl Stand {
         self.open();
     }
 
-    /// How many items there should be by now.
+    /// How many items there are by now: ticks and events, the means of minutes, and what a start and an end tell.
     fn items(&self) -> u64 {
-        u64::try_from(self.ticks + self.ticks / 10).expect("positive")
+        self.outbox.head().borrow().next_sequence - 1
     }
 
     fn start(&self, sink: FakeSink) -> (Sinks, Board) {
@@ -118,15 +120,24 @@ fn items_are_numbered_without_holes_in_the_order_of_time_and_over_restarts() {
     let mut stand = Stand::new(settings());
     stand.write(25);
     let box_id = stand.outbox.box_id();
-    assert!(box_id.starts_with("lathe-1-") && box_id.len() == "lathe-1-".len() + 6, "{box_id}");
+    assert!(box_id.starts_with("lathe-1-") && box_id.len() == "lathe-1-".len() + 10, "{box_id}");
     stand.reopen(settings());
     assert_eq!(stand.outbox.box_id(), box_id, "the same file is the same box");
     stand.write(25);
     let items = read(&stand.path(), 0, u64::MAX);
     let sequences: Vec<u64> = items.iter().map(|item| item.sequence).collect();
     assert_eq!(sequences, (1..=stand.items()).collect::<Vec<u64>>());
-    assert!(items.is_sorted_by_key(|item| item.at_ns), "an event follows the tick it belongs to");
-    assert_eq!(items.iter().filter(|item| item.kind() == "event").count(), 5);
+    let live: Vec<&Item> = items.iter().filter(|item| item.is_live()).collect();
+    assert!(live.is_sorted_by_key(|item| item.at_ns), "an event follows the tick it belongs to");
+    let count = |kind: &str| items.iter().filter(|item| item.kind() == kind).count();
+    assert_eq!((count("sample"), count("event")), (50, 5));
+    // The end of the first run, and what the second found of the minute, hour and day that were running.
+    assert_eq!(count("gap"), 1, "there is no gap of time between the two");
+    assert!(
+        count("minute") >= 2 && count("hour") >= 2 && count("day") >= 2,
+        "{:?}",
+        items.iter().map(Item::kind).collect::<Vec<_>>()
+    );
 }
 
 #[test]
@@ -175,6 +186,56 @@ fn after_an_outage_live_data_comes_first_and_the_gap_is_history() {
     assert!(numbers(&seen).windows(2).all(|pair| pair[1] == pair[0] + 1), "0 lost, 0 twice");
 }
 
+/// The name of a box is made once: a machine that is renamed is the same box, one whose name has no letter is a box of its own.
+#[test]
+fn a_machine_that_is_renamed_stays_the_same_box() {
+    let mut stand = Stand::new(settings());
+    stand.write(5);
+    let box_id = stand.outbox.box_id();
+    stand.close();
+    stand.outbox = Outbox::new("车床七号", settings(), ["plant".to_owned()]);
+    stand.open();
+    assert_eq!((stand.outbox.box_id(), stand.outbox.machine()), (box_id, "车床七号"));
+    let other = |name: &str| {
+        let directory = tempfile::tempdir().expect("a directory");
+        gateway::history::box_id(&directory.path().join("history.db"), name).expect("named")
+    };
+    let (first, second) = (other("车床一号"), other("车床二号"));
+    assert!(first.starts_with("box-") && first != second, "{first} {second}");
+}
+
+/// A box that was off, and samples that did not come, leave a gap that says since when and why; the next tick tells everything again.
+#[test]
+fn a_gap_is_told_with_its_reason() {
+    let mut stand = Stand::new(settings());
+    stand.write(10);
+    stand.ticks += 600;
+    stand.write(10);
+    stand.close();
+    stand.ticks += 3000;
+    stand.open();
+    stand.write(10);
+    let gaps: Vec<(i64, Option<i64>, String)> = read(&stand.path(), 0, u64::MAX)
+        .iter()
+        .filter_map(|item| match &item.content {
+            Content::Gap(Gap { until_ns, reason }) => {
+                let tick = |at_ns: i64| (at_ns - BEGIN_NS) / TICK_NS;
+                Some((tick(item.at_ns), until_ns.map(tick), reason.to_string()))
+            }
+            _ => None,
+        })
+        .collect();
+    let expected = [(10, Some(610), "no_samples"), (620, None, "stopped"), (620, Some(3620), "not_running")];
+    assert_eq!(gaps, expected.map(|(from, until, reason)| (from, until, reason.to_owned())));
+    let after = read(&stand.path(), 0, u64::MAX)
+        .into_iter()
+        .find(|item| item.at_ns == BEGIN_NS + 3620 * TICK_NS && item.kind() == "sample");
+    assert!(
+        matches!(after.expect("there").content, Content::Sample(readings) if readings.len() == 2),
+        "power and state"
+    );
+}
+
 #[test]
 fn what_was_delivered_is_remembered_over_a_restart() {
     let (mut stand, seen) = (Stand::new(settings()), Arc::new(Mutex::new(Seen::default())));
@@ -205,7 +266,9 @@ fn an_item_that_nobody_takes_is_left_out_and_counted() {
     runtime.block_on(sinks.stop());
     let expected: Vec<u64> = (1..=stand.items()).filter(|number| ![5, 17].contains(number)).collect();
     assert_eq!(numbers(&seen), expected);
-    assert!(board.status()[0].error.as_ref().is_some_and(|error| error.contains("too large")));
+    let status = &board.status()[0];
+    assert!(status.refusal.as_ref().is_some_and(|refusal| refusal.contains("too large")), "{status:?}");
+    assert_eq!(status.error, None, "nothing is wrong with the receiver");
 }
 
 #[test]
@@ -237,7 +300,9 @@ fn the_outbox_stays_within_its_bounds_and_tells_what_it_dropped() {
     assert!(dropped > 0 && figures.outage_fits_h(&bounded).is_some(), "{dropped} {figures:?}");
     // It is remembered, and what is left arrives.
     stand.reopen(bounded);
-    let left = stand.outbox.standing("plant").expect("configured").position.waiting(stand.items() + 1);
+    let standing = stand.outbox.standing("plant").expect("configured");
+    let (before, dropped, left) = (dropped, standing.dropped, standing.position.waiting(stand.items() + 1));
+    assert!(dropped >= before, "what the end told has pushed out some more");
     assert_eq!(dropped + left, stand.items());
     let runtime = runtime();
     let (sinks, board) = runtime.block_on(async { stand.start(fake(&seen)) });

@@ -1,7 +1,7 @@
 """A Sparkplug host that is not ours: decodes with pysparkplug what comes over a broker, one JSON line per message.
 
 Arguments: PORT. Standard input: a line "rebirth GROUP NODE" asks that node for its birth, "command GROUP/NODE NAME KIND VALUE"
-sends it a metric in an NCMD.
+sends it a metric in an NCMD, "state ONLINE TIMESTAMP" says whether this host is there.
 """
 
 import json
@@ -21,17 +21,28 @@ def properties(metric):
     return {name: getattr(value, PROPERTY_FIELDS[value.type]) for name, value in zip(names, metric.properties.values)}
 
 
-def show(topic, payload):
+# Data has no types: they stand in the birth.
+TYPES = {}
+
+
+def show(message):
+    topic = message.topic
     kind = topic.split("/")[2]
-    decoded = _protobuf.Payload.FromString(payload)
+    decoded = _protobuf.Payload.FromString(message.payload)
     metrics = []
     for raw in decoded.metrics:
+        typed = raw.HasField("datatype")
+        if typed and raw.HasField("alias"):
+            TYPES[raw.alias] = raw.datatype
+        elif not typed and raw.alias in TYPES:
+            raw.datatype = TYPES[raw.alias]
         metric = pysparkplug.Metric.from_pb(raw)
         metrics.append(
             {
                 "name": metric.name,
                 "alias": metric.alias,
                 "datatype": metric.datatype.name,
+                "typed": typed,
                 "value": metric.value,
                 "null": metric.is_null,
                 "historical": metric.is_historical,
@@ -40,7 +51,10 @@ def show(topic, payload):
             }
         )
     seq = decoded.seq if decoded.HasField("seq") else None
-    print(json.dumps({"topic": topic, "kind": kind, "seq": seq, "metrics": metrics}), flush=True)
+    shown = {"topic": topic, "kind": kind, "seq": seq, "metrics": metrics, "qos": message.qos, "retain": bool(message.retain)}
+    shown["payload"] = message.payload.hex()
+    shown["timestamp"] = decoded.timestamp if decoded.HasField("timestamp") else None
+    print(json.dumps(shown), flush=True)
 
 
 def rebirth(client, group, node):
@@ -68,18 +82,23 @@ def command(client, node, name, kind, value):
     client.publish(f"spBv1.0/{group}/NCMD/{edge}", message.encode(include_dtypes=True), qos=1)
 
 
+def state(client, online, timestamp):
+    says = {"online": online == "true", "timestamp": int(timestamp)}
+    client.publish("spBv1.0/STATE/host", json.dumps(says), qos=1, retain=True)
+
+
 def main():
-    client = mqtt.Client(client_id="host", clean_session=False)
-    state = "spBv1.0/STATE/host"
-    client.will_set(state, json.dumps({"online": False, "timestamp": 1}), qos=1, retain=True)
+    # paho-mqtt 2 wants to be told that the callbacks are those of version 1.
+    version = [mqtt.CallbackAPIVersion.VERSION1] if hasattr(mqtt, "CallbackAPIVersion") else []
+    client = mqtt.Client(*version, client_id="host", clean_session=False)
+    topic = "spBv1.0/STATE/host"
+    client.will_set(topic, json.dumps({"online": False, "timestamp": 1}), qos=1, retain=True)
     client.on_connect = lambda client, *_: client.subscribe("spBv1.0/+/#", qos=1)
     client.on_subscribe = lambda client, *_: (
-        client.publish(state, json.dumps({"online": True, "timestamp": 1}), qos=1, retain=True),
+        client.publish(topic, json.dumps({"online": True, "timestamp": 1}), qos=1, retain=True),
         print(json.dumps({"kind": "connected"}), flush=True),
     )
-    client.on_message = lambda client, _, message: (
-        None if "/STATE/" in message.topic else show(message.topic, message.payload)
-    )
+    client.on_message = lambda client, _, message: None if "/STATE/" in message.topic else show(message)
     client.reconnect_delay_set(min_delay=1, max_delay=1)
     while True:
         try:
@@ -91,7 +110,7 @@ def main():
     def listen():
         for line in sys.stdin:
             what, *words = line.split()
-            {"rebirth": rebirth, "command": command}[what](client, *words)
+            {"rebirth": rebirth, "command": command, "state": state}[what](client, *words)
 
     threading.Thread(target=listen, daemon=True).start()
     while True:

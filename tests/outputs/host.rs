@@ -67,6 +67,11 @@ impl Host {
             .expect("it listens");
     }
 
+    /// Says whether this host is there.
+    pub(crate) fn say_state(&mut self, online: bool, timestamp: i64) {
+        writeln!(self.child.stdin.as_mut().expect("piped"), "state {online} {timestamp}").expect("it listens");
+    }
+
     fn last_kinds(&self) -> String {
         let heard = self.heard.lock().expect("whole");
         let last = &heard[heard.len().saturating_sub(60)..];

@@ -15,9 +15,11 @@ mod port;
 #[expect(dead_code, reason = "the tests of the fleet use the rest of it")]
 mod box_under_test;
 mod certificates;
+mod decoders;
 mod delivery;
 mod fake_sink;
 mod host;
+mod layouts;
 mod outage;
 mod plain;
 mod requests;

@@ -38,7 +38,14 @@ fn an_agent_reads_the_machine_with_the_devices_that_the_box_wrote() {
     assert_eq!(agent["unknown"], Json::Array(Vec::new()), "every name of the lines stands in devices.xml");
     assert_eq!(agent["pong"], "* PONG 10000");
     assert_eq!(agent["values"]["avail"], "AVAILABLE");
-    assert_eq!(agent["conditions"][0]["level"], "NORMAL");
+    let conditions = agent["conditions"].as_array().expect("a list");
+    assert_eq!(conditions.iter().filter(|condition| condition["level"] == "NORMAL").count(), conditions.len());
+    assert!(conditions.iter().any(|condition| condition["name"] == "servo"), "{conditions:?}");
+    assert!(
+        agent["values"]["block"].as_str().is_some_and(|line| line.parse::<u32>().is_ok()),
+        "{}",
+        agent["values"]["block"]
+    );
     assert!(agent["assets"].as_array().is_some_and(|assets| !assets.is_empty()), "{}", agent["assets"]);
     let names = "spindle_speed_rpm,spindle_power_w,total_power_w,supply_voltage_v";
     let (stored, mut compared) = (sending.queried(names), 0);
@@ -84,13 +91,75 @@ fn an_agent_that_sends_nonsense_or_reads_nothing_harms_nobody() {
     sending.stop();
 }
 
+/// The `devices.xml` of a machine of this name that has never run.
+fn devices(directory: &Path, name: &str, more: &[&str]) -> (std::path::PathBuf, String) {
+    let own = directory.join(name);
+    std::fs::create_dir_all(&own).expect("a directory");
+    let (config, file) = (own.join("gateway.toml"), own.join("devices.xml"));
+    let lines = format!(
+        "[gateway]\nname = \"{name}\"\ndata_dir = \"{}\"\n[[source]]\naddress = \"simulated://lathe\"\n",
+        text(&own)
+    );
+    std::fs::write(&config, lines).expect("writable");
+    let written = run(&[&["devices", "--config", text(&config), "--out", text(&file)], more].concat());
+    assert!(written.status.success(), "{}", crate::process::stderr(&written));
+    let written = std::fs::read_to_string(&file).expect("written");
+    (file, written)
+}
+
+fn attribute<'a>(document: &'a str, name: &str) -> Vec<&'a str> {
+    let mark = format!(" {name}=\"");
+    document.split(&mark).skip(1).filter_map(|rest| rest.split('"').next()).collect()
+}
+
 #[test]
-fn the_devices_are_valid_xml_of_everything_before_the_first_run() {
+fn two_machines_with_chinese_names_stand_in_one_agent() {
     let directory = tempfile::tempdir().expect("a directory");
-    let file = directory.path().join("devices.xml");
-    let written = run(&["devices", "--out", text(&file)]);
-    assert!(written.status.success());
-    let text = std::fs::read_to_string(&file).expect("written");
-    assert!(text.matches("<DataItem ").count() > 30 && text.contains("type=\"PATH_FEEDRATE\""));
-    assert!(text.contains("nativeUnits=\"MILLIMETER/MINUTE\""), "{text}");
+    let (first, text_of_first) = devices(directory.path(), "车床一号", &[]);
+    assert!(text_of_first.matches("<DataItem ").count() > 30 && text_of_first.contains("type=\"PATH_FEEDRATE\""));
+    assert!(text_of_first.contains("nativeUnits=\"MILLIMETER/MINUTE\""), "{text_of_first}");
+    let (_, both) = devices(directory.path(), "车床二号", &["--with", text(&first)]);
+    let (uuids, mut ids) = (attribute(&both, "uuid"), attribute(&both, "id"));
+    let all = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert!(uuids.len() == 2 && uuids[0] != uuids[1], "{uuids:?}");
+    assert_eq!(ids.len(), all, "no identifier stands twice");
+    assert!(
+        both.contains("<Description>车床一号</Description>") && both.contains("<Description>车床二号</Description>")
+    );
+    let (_, again) = devices(directory.path(), "车床一号", &[]);
+    assert_eq!(attribute(&again, "uuid"), attribute(&text_of_first, "uuid"), "the identity stays");
+    let (_, named) = devices(directory.path(), "车床一号", &["--prefix", "hall2_"]);
+    assert!(attribute(&named, "id").iter().all(|id| id.starts_with("hall2_")));
+}
+
+/// Times that an adapter has told, read over its port.
+fn times(port: u16, lines: usize) -> Vec<String> {
+    let stream = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+    stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a limit");
+    let read = std::io::BufRead::lines(std::io::BufReader::new(stream));
+    let line = |line: std::io::Result<String>| line.ok()?.split_once('|').map(|(at, _)| at.to_owned());
+    read.map_while(line).take(lines).collect()
+}
+
+#[test]
+fn what_an_agent_is_told_after_a_kill_comes_after_the_moment_of_the_kill() {
+    let port = free_port();
+    let mut sending = Sending::to(&format!("shdr://127.0.0.1:{port}"), "");
+    for _ in 0..2 {
+        sending.wait_sink("listening", |sink| sink["delivered"].as_u64() > Some(20));
+        let before = times(port, 20);
+        sending.kill();
+        // As an agent does it: unavailable, with the time of its own clock.
+        let killed = gateway::moment::utc(adapters::clock::Clock::now_ns(&adapters::clock::SystemClock::new()));
+        sending.start();
+        crate::process::wait_for("it listens again", Duration::from_secs(30), || {
+            TcpStream::connect(("127.0.0.1", port)).ok()
+        });
+        let after = times(port, 60);
+        assert!(before.is_sorted() && after.is_sorted(), "{before:?} {after:?}");
+        assert!(*before.last().expect("some") <= killed && after[0] > killed, "{killed}: {:?}", after[0]);
+    }
+    sending.stop();
 }

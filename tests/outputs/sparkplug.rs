@@ -2,8 +2,9 @@
 
 use crate::box_under_test::Sending;
 use crate::broker::Broker;
+use crate::decoders::assert_both_read_the_same;
 use crate::host::Host;
-use adapters::channel::CHANNELS;
+use adapters::channel::{CHANNELS, Form};
 use serde_json::Value as Json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
@@ -89,7 +90,7 @@ fn another_implementation_decodes_births_and_data_as_history_query_shows_them() 
     let Some(broker) = Broker::start() else { return };
     let Some(mut host) = Host::at(broker.port) else { return };
     let address = format!("sparkplug://127.0.0.1:{}/plant/line-1/lathe-7", broker.port);
-    let mut sending = Sending::fast(&address);
+    let mut sending = Sending::at_speed("20", &address, "[outbox]\nranges = \"spindle_speed_rpm=0..4500\"\n");
     host.wait("data", |heard| heard.iter().filter(|message| message["kind"] == "DDATA").count() > 400);
     host.ask_rebirth("plant", "line-1");
     let before = host.count("NBIRTH");
@@ -103,6 +104,7 @@ fn another_implementation_decodes_births_and_data_as_history_query_shows_them() 
     let heard = host.heard();
     assert_legal(&heard);
     births_say_units_and_ranges(&heard);
+    assert_both_read_the_same(&heard);
     let known = Known::of(&heard);
     let names = "spindle_power_w,spindle_speed_rpm,feed_mm_min,machine_state,cutting_power_w";
     let (mut compared, stored) = (0, sending.queried(names));
@@ -120,24 +122,37 @@ fn another_implementation_decodes_births_and_data_as_history_query_shows_them() 
 
 fn births_say_units_and_ranges(heard: &[Json]) {
     let birth = heard.iter().rfind(|message| message["kind"] == "DBIRTH").expect("born");
-    let mut checked = 0;
+    let (mut checked, mut others) = (0, BTreeSet::new());
     for channel in CHANNELS {
         let metric = named(birth, channel.name);
         if metric.is_null() || channel.unit.is_empty() {
             continue;
         }
         let properties = &metric["properties"];
-        assert_eq!(metric["datatype"], "DOUBLE");
-        assert_eq!(properties["engUnit"], channel.unit, "{metric}");
-        assert_eq!(
-            (properties["engLow"].as_f64(), properties["engHigh"].as_f64()),
-            (Some(channel.range.0), Some(channel.range.1))
-        );
+        let datatype = match channel.form {
+            Form::Flag => "BOOLEAN",
+            Form::Whole => "INT64",
+            Form::Real => "DOUBLE",
+        };
+        assert_eq!(metric["datatype"], datatype, "{metric}");
+        let unit = if channel.unit == "1" { Json::Null } else { Json::from(channel.unit) };
+        assert_eq!(properties["engUnit"], unit, "a pure number has no unit: {metric}");
+        let range = (properties["engLow"].as_f64(), properties["engHigh"].as_f64());
+        let expected = match (channel.name, channel.form) {
+            ("spindle_speed_rpm", _) => (Some(0.0), Some(4500.0)),
+            (_, Form::Flag) => (Some(0.0), Some(1.0)),
+            // What is possible on any machine says nothing of this one.
+            _ => (None, None),
+        };
+        assert_eq!(range, expected, "{metric}");
         assert_eq!(properties["description"], channel.en);
         checked += 1;
+        if channel.form != Form::Real {
+            others.insert(channel.name);
+        }
     }
-    println!("{checked} channels with unit and range of {} metrics", metrics(birth).len());
-    assert!(checked > 5, "{checked}");
+    println!("{checked} channels with type and unit of {} metrics; not Double: {others:?}", metrics(birth).len());
+    assert!(checked > 5 && others.contains("coolant_on") && others.contains("part_count"), "{checked} {others:?}");
 }
 
 /// How often the broker dies: 200 times by hand, fewer in every run.
@@ -187,4 +202,101 @@ fn every_restart_of_the_broker_begins_a_legal_sequence_and_nothing_is_lost() {
         took_s[took_s.len() - 1]
     );
     assert_eq!(lost, 0, "nothing may be lost");
+}
+
+/// What the specification asks of an edge node and of its device, message by message; the chapter `conformance` lists the requirements by
+/// their names.
+fn assert_by_the_book(heard: &[Json]) {
+    let mut aliases: BTreeMap<u64, String> = BTreeMap::new();
+    let mut dead = true;
+    for message in heard {
+        let kind = message["kind"].as_str().unwrap_or_default();
+        if kind == "connected" || kind == "NCMD" {
+            continue;
+        }
+        assert_eq!(message["retain"], false, "nothing is retained: {message}");
+        assert_eq!(message["qos"], if kind == "NDEATH" { 1 } else { 0 }, "{message}");
+        assert!(message["timestamp"].as_u64().is_some_and(|at_ms| at_ms > 1_600_000_000_000), "{message}");
+        let device = message["topic"].as_str().expect("a topic").split('/').count() == 5;
+        assert_eq!(device, kind.starts_with('D'), "{message}");
+        match kind {
+            "NDEATH" => {
+                let names: Vec<&Json> = metrics(message).iter().map(|metric| &metric["name"]).collect();
+                assert_eq!((names, &message["seq"]), (vec![&Json::from("bdSeq")], &Json::Null));
+            }
+            "NBIRTH" => {
+                assert_eq!(named(message, "bdSeq")["datatype"], "INT64");
+                let rebirth = named(message, "Node Control/Rebirth");
+                assert_eq!(
+                    (&rebirth["datatype"], &rebirth["value"], &rebirth["alias"]),
+                    (&"BOOLEAN".into(), &false.into(), &Json::Null)
+                );
+                aliases.clear();
+            }
+            "DBIRTH" => dead = false,
+            "DDEATH" => dead = true,
+            "DDATA" => assert!(!dead, "data of a device that is dead or not born: {message}"),
+            _ => {}
+        }
+        let births = kind.ends_with("BIRTH");
+        for metric in metrics(message) {
+            assert!(metric["timestamp"].as_u64().is_some(), "{metric}");
+            assert_eq!(
+                metric["null"] == true,
+                metric["value"].is_null(),
+                "null has no value, and the other way round: {metric}"
+            );
+            let alias = metric["alias"].as_u64().unwrap_or(0);
+            if births {
+                assert!(metric["typed"] == true && metric["name"].is_string(), "{metric}");
+                let name = metric["name"].as_str().expect("named").to_owned();
+                assert!(alias == 0 || aliases.insert(alias, name).is_none(), "an alias stands once: {metric}");
+            } else if kind == "DDATA" {
+                assert!(
+                    metric["typed"] == false && metric["name"].is_null() && aliases.contains_key(&alias),
+                    "{metric}"
+                );
+            }
+            let quality = &metric["properties"]["Quality"];
+            assert!(quality.is_null() || [0, 192, 500].map(Json::from).contains(quality), "{metric}");
+        }
+    }
+}
+
+#[test]
+fn the_node_obeys_its_primary_host_and_every_message_is_by_the_book() {
+    let Some(broker) = Broker::start() else { return };
+    let Some(mut host) = Host::at(broker.port) else { return };
+    let address = format!("sparkplug://127.0.0.1:{}/plant/line-1/lathe-7?host=host", broker.port);
+    let mut sending = Sending::fast(&address);
+    host.wait_more("data", "DDATA", 100);
+    // A word that is older than the one by which the host is there changes nothing.
+    host.say_state(false, 0);
+    let data = host.count("DDATA");
+    host.wait_more("data goes on", "DDATA", data + 50);
+    assert_eq!(host.count("NDEATH"), 0);
+    host.say_state(false, 2_000_000_000_000);
+    let began = Instant::now();
+    host.wait_more("the death of the node", "NDEATH", 0);
+    let death_s = began.elapsed().as_secs_f64();
+    std::thread::sleep(Duration::from_secs(2));
+    let silent = host.heard();
+    assert_eq!(silent.last().expect("heard")["kind"], "NDEATH", "nothing follows the death: {:?}", silent.last());
+    let births = host.count("NBIRTH");
+    host.say_state(true, 2_000_000_000_001);
+    host.wait_more("the node is born again", "NBIRTH", births);
+    host.wait("what waited comes", |heard| {
+        heard.iter().rev().take(50).flat_map(metrics).any(|metric| metric["historical"] == true)
+    });
+    sending.stop();
+    host.wait("the end", |heard| heard.last().is_some_and(|message| message["kind"] == "NDEATH"));
+    let heard = host.heard();
+    assert_legal(&heard);
+    assert_by_the_book(&heard);
+    let numbers: Vec<u64> = heard
+        .iter()
+        .filter(|message| message["kind"] == "NBIRTH")
+        .filter_map(|message| named(message, "bdSeq")["value"].as_u64())
+        .collect();
+    println!("{} messages by the book; the node died {death_s:.2} s after its host; bdSeq {numbers:?}", heard.len());
 }

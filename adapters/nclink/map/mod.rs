@@ -293,7 +293,7 @@ impl PolledItem {
             return Reading::absent(self.channel, stamp, Absence::UnknownUnit);
         };
         if let Some(own) = &self.own {
-            return own.reading(stamp, own.found(answer.as_ref()).map(|value| converted(value, conversion)));
+            return own.reading(stamp, own.found(answer.as_ref()).map(|value| convert_value(value, conversion)));
         }
         let found = self.value(answer).and_then(|value| {
             if value.is_null() {
@@ -322,7 +322,7 @@ impl PolledItem {
     }
 }
 
-fn converted(value: Held, conversion: Conversion) -> Held {
+fn convert_value(value: Held, conversion: Conversion) -> Held {
     match value {
         Held::Number(number) => Held::Number(conversion.of(number)),
         text @ Held::Text(_) => text,

@@ -10,7 +10,7 @@ use super::head::Head;
 use super::limits::{CELLS_MAX, DESCRIBED_MAX, WORDS_BYTES_MAX};
 use super::mapping::Mapping;
 use super::plan::{BlockPlan, Note, NoteKind, PlannedColumn, PlannedKind, ReadPlan, TimeKind};
-use super::survey::{fitted, is_comment, repeats_header};
+use super::survey::{fit_row, is_comment, repeats_header};
 use super::table::{Table, VisitStep};
 use super::time::{RawTime, resolve};
 use crate::recording::{Cells, Numbers, Recording, Words};
@@ -61,7 +61,7 @@ pub(super) fn assemble(
             comments += 1;
             return Ok(VisitStep::Next);
         }
-        match fitted(row, head, short) {
+        match fit_row(row, head, short) {
             Some(cells) => blocks.iter_mut().for_each(|block| block.take(row.line, cells, &mut done)),
             None => {
                 let one_more = row.cells.len() == head.names.len() + 1;

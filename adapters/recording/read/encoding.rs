@@ -12,14 +12,14 @@ const CHUNK: usize = 64 << 10;
 
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct TextEncoding {
+pub(super) struct DetectedEncoding {
     pub(super) encoding: &'static Encoding,
     /// A byte order mark stands before it.
     pub(super) has_mark: bool,
 }
 
 /// Looks at every byte of the file, unless a mark at its beginning says it.
-pub(super) fn detect(input: &Input) -> Result<TextEncoding, RecordingError> {
+pub(super) fn detect(input: &Input) -> Result<DetectedEncoding, RecordingError> {
     let head = input.head(4096)?;
     if head.starts_with(&[0xff, 0xfe, 0, 0]) || head.starts_with(&[0, 0, 0xfe, 0xff]) {
         return Err(RecordingError::format(
@@ -29,18 +29,18 @@ pub(super) fn detect(input: &Input) -> Result<TextEncoding, RecordingError> {
         ));
     }
     if let Some((encoding, _)) = Encoding::for_bom(&head) {
-        return Ok(TextEncoding { encoding, has_mark: true });
+        return Ok(DetectedEncoding { encoding, has_mark: true });
     }
     // Without a mark every second byte of Latin text in UTF-16 is zero.
     let zeros = |odd: usize| head.iter().skip(odd).step_by(2).filter(|byte| **byte == 0).count();
     let many = head.len() / 5;
     if head.len() > 20 && zeros(1) > many && zeros(0) == 0 {
-        return Ok(TextEncoding { encoding: UTF_16LE, has_mark: false });
+        return Ok(DetectedEncoding { encoding: UTF_16LE, has_mark: false });
     }
     if head.len() > 20 && zeros(0) > many && zeros(1) == 0 {
-        return Ok(TextEncoding { encoding: UTF_16BE, has_mark: false });
+        return Ok(DetectedEncoding { encoding: UTF_16BE, has_mark: false });
     }
-    Ok(TextEncoding { encoding: guess(input)?, has_mark: false })
+    Ok(DetectedEncoding { encoding: guess(input)?, has_mark: false })
 }
 
 fn guess(input: &Input) -> Result<&'static Encoding, RecordingError> {
@@ -86,7 +86,7 @@ pub(super) struct Decoded<R> {
 }
 
 impl<R: Read> Decoded<R> {
-    pub(super) fn new(bytes: R, encoding: TextEncoding) -> Self {
+    pub(super) fn new(bytes: R, encoding: DetectedEncoding) -> Self {
         let decoder = encoding.encoding.new_decoder_with_bom_removal();
         let (chunk, text) = (vec![0; CHUNK], vec![0; CHUNK]);
         Self { bytes, decoder, chunk, left: 0..0, text, ready: 0..0, at_end: false, done: false }

@@ -5,7 +5,7 @@ use super::error::RecordingError;
 use super::head::Head;
 use super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX};
 use super::names::squeeze_name;
-use super::survey::{Survey, fitted};
+use super::survey::{Survey, fit_row};
 use super::table::{ColumnCells, ColumnTable, OwnedCell, Table, VisitStep};
 use crate::bilingual::Bilingual;
 use std::collections::HashMap;
@@ -57,7 +57,7 @@ pub(super) fn turn_table(
     let mut known: HashMap<String, usize> = HashMap::new();
     let mut cells = 0;
     table.visit(&mut |row| {
-        let Some(found) = fitted(row, head, true).filter(|_| row.line >= head.data_line) else { return Ok(VisitStep::Next) };
+        let Some(found) = fit_row(row, head, true).filter(|_| row.line >= head.data_line) else { return Ok(VisitStep::Next) };
         let at = |index: usize| found.get(index).copied().unwrap_or(Cell::Empty);
         let Cell::Text(text) = at(name) else { return Ok(VisitStep::Next) };
         let place = *known.entry(text.to_owned()).or_insert_with(|| {

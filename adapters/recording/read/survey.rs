@@ -201,7 +201,7 @@ pub(super) fn is_comment(row: &Row<'_>, head: &Head) -> bool {
 }
 
 /// The cells of a row that belong to columns with a name; `None` where the row is wider or narrower than the header.
-pub(super) fn fitted<'a>(row: &Row<'a>, head: &Head, may_be_short: bool) -> Option<&'a [Cell<'a>]> {
+pub(super) fn fit_row<'a>(row: &Row<'a>, head: &Head, may_be_short: bool) -> Option<&'a [Cell<'a>]> {
     let width = head.names.len();
     if row.cells.len() >= width {
         row.cells[width..].iter().all(|cell| *cell == Cell::Empty).then(|| &row.cells[..width])
@@ -222,7 +222,7 @@ pub(super) fn survey(table: &dyn Table, head: &Head) -> Result<Survey, Recording
             found.repeated_headers.push(row.line);
             return Ok(VisitStep::Next);
         }
-        let Some(cells) = fitted(row, head, short).filter(|_| !is_comment(row, head)) else {
+        let Some(cells) = fit_row(row, head, short).filter(|_| !is_comment(row, head)) else {
             found.odd_widths += 1;
             return Ok(VisitStep::Next);
         };

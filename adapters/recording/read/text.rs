@@ -1,7 +1,7 @@
 //! A table written as text: the separator found, quotes understood, lines counted, every row bounded.
 
 use super::cell::{Cell, flag, is_absent, written_number};
-use super::encoding::{Decoded, TextEncoding, detect};
+use super::encoding::{Decoded, DetectedEncoding, detect};
 use super::error::RecordingError;
 use super::input::Input;
 use super::limits::{COLUMNS_MAX, HEAD_BYTES, ROW_BYTES_MAX};
@@ -61,7 +61,7 @@ impl Separator {
 #[derive(Debug)]
 pub(super) struct TextTable {
     pub(super) input: Input,
-    pub(super) encoding: TextEncoding,
+    pub(super) encoding: DetectedEncoding,
     pub(super) separator: Separator,
     /// A line `sep=;` stands before everything.
     separator_line: bool,
@@ -77,7 +77,7 @@ impl TextTable {
         separator: Option<Separator>,
     ) -> Result<Self, RecordingError> {
         let encoding = match encoding {
-            Some(encoding) => TextEncoding { encoding, has_mark: false },
+            Some(encoding) => DetectedEncoding { encoding, has_mark: false },
             None => detect(&input)?,
         };
         let mut table = Self { input, encoding, separator: Separator::Sign(b','), separator_line: false, short: false };

@@ -8,7 +8,7 @@ mod parquet;
 mod partitions;
 mod recording;
 
-pub use partitions::{DayWritten, day_file, day_of};
+pub use partitions::{DayWritten, day_of};
 
 use super::error::{Doing, HistoryError, at};
 use super::query::Query;

@@ -1,13 +1,15 @@
-//! Days as files for a data lake: `ROOT/samples/machine=M/date=D/samples.parquet`, and beside it
-//! `ROOT/diagnoses/machine=M/date=D/diagnoses.parquet`.
+//! Days as files for a data lake: `ROOT/samples/machine=M/date=D/BOX.parquet`, and beside it
+//! `ROOT/diagnoses/machine=M/date=D/BOX.parquet`.
 //!
 //! The layout is that of Hive, which `DuckDB`, `ClickHouse`, Spark and pandas read as two further columns. Days are those of
-//! UTC. A file appears whole or not at all: it is written under another name first. Units and the name of the machine stand
-//! in the metadata of the file as `unit.<column>` and `machine`.
+//! UTC. The file has the name of the box: two boxes whose machines have the same name do not overwrite each other. It appears whole or
+//! not at all: it is written under another name first. Units and the name of the machine stand in the metadata of the file as
+//! `unit.<column>` and `machine`.
 
 use super::super::error::{HistoryError, at};
 use super::super::list::RecordSpan;
 use super::super::options::DAY_NS;
+use super::super::outbox::known_box_id;
 use super::super::query::Query;
 use super::super::reader::Reader;
 use super::parquet;
@@ -37,17 +39,29 @@ fn escaped(name: &str) -> String {
     name.bytes().map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") }).collect()
 }
 
-/// The file of a machine and day for one kind of rows.
-#[must_use]
-pub fn day_file(root: &Path, kind: &str, machine: &str, day_ns: TimeNs) -> PathBuf {
+/// The file of a machine, box and day for one kind of rows.
+fn day_file(root: &Path, kind: &str, (machine, box_id): (&str, &str), day_ns: TimeNs) -> PathBuf {
     let date: String = crate::moment::utc(day_ns).chars().take(10).collect();
     root.join(kind)
         .join(format!("machine={}", escaped(machine)))
         .join(format!("date={date}"))
-        .join(format!("{kind}.parquet"))
+        .join(format!("{}.parquet", escaped(box_id)))
 }
 
 impl Reader {
+    /// The name of the box that keeps this history; `local` where it has none, because it has never sent anything.
+    fn box_name(&self) -> Result<String, HistoryError> {
+        Ok(known_box_id(&self.db)?.unwrap_or_else(|| "local".to_owned()))
+    }
+
+    /// Are the samples of this day in the lake already?
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn has_day_file(&self, root: &Path, machine: &str, day_ns: TimeNs) -> Result<bool, HistoryError> {
+        Ok(day_file(root, "samples", (machine, &self.box_name()?), day_ns).exists())
+    }
+
     /// Writes the files of the UTC day that begins at `day_ns`; an older file of that day is replaced. Without samples there
     /// is no file of samples, without a diagnosis none of diagnoses.
     ///
@@ -55,19 +69,19 @@ impl Reader {
     /// As [`Reader::export`].
     pub fn export_day(&self, root: &Path, machine: &str, day_ns: TimeNs) -> Result<DayWritten, HistoryError> {
         let mut written = DayWritten::default();
+        let box_id = self.box_name()?;
+        let file = |kind: &str| day_file(root, kind, (machine, &box_id), day_ns);
         let query = Query::between(day_ns, day_ns + DAY_NS);
         if self.has_samples(&query)? {
             let plan = self.plan(&query)?;
             let about = [("machine".to_owned(), machine.to_owned())];
-            written.samples = whole(&day_file(root, "samples", machine, day_ns), |out, path| {
-                parquet::write(self, &query, &plan, &about, out, path)
-            })?;
+            written.samples =
+                whole(&file("samples"), |out, path| parquet::write(self, &query, &plan, &about, out, path))?;
         }
         let diagnoses = self.diagnoses(RecordSpan { from_ns: day_ns, to_ns: day_ns + DAY_NS, limit: u32::MAX })?;
         if !diagnoses.is_empty() {
-            written.diagnoses = whole(&day_file(root, "diagnoses", machine, day_ns), |out, path| {
-                parquet::write_diagnoses(&diagnoses, machine, out, path)
-            })?;
+            written.diagnoses =
+                whole(&file("diagnoses"), |out, path| parquet::write_diagnoses(&diagnoses, machine, out, path))?;
         }
         Ok(written)
     }
@@ -104,9 +118,10 @@ mod tests {
 
     #[test]
     fn names_of_machines_become_names_of_directories() {
-        let file = day_file(Path::new("/lake"), "samples", "Lathe 7/车", 1_769_847_300_100_000_000);
+        let file =
+            day_file(Path::new("/lake"), "samples", ("Lathe 7/车", "Lathe-7-3fa9c1b2d4"), 1_769_847_300_100_000_000);
         let text = file.display().to_string();
-        assert_eq!(text, "/lake/samples/machine=Lathe%207%2F%E8%BD%A6/date=2026-01-31/samples.parquet");
+        assert_eq!(text, "/lake/samples/machine=Lathe%207%2F%E8%BD%A6/date=2026-01-31/Lathe-7-3fa9c1b2d4.parquet");
         assert_eq!(day_of(1_769_847_300_100_000_000) % DAY_NS, 0);
         assert!(day_of(-1) < 0);
     }

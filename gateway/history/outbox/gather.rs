@@ -3,16 +3,19 @@
 
 use super::item::{SeriesInfo, leaves};
 use super::line;
-use super::report::OutboxReport;
+use super::means::{self, MeanSchedule};
+use super::report::{OutboxReport, OutboxSettings};
 use super::shared::{Outbox, OutboxHead};
 use super::store::{self, OutboxContents, Put};
 use crate::history::HistoryError;
+use crate::history::error::Doing;
 use crate::history::mailbox::QueuedRecord;
 use crate::history::reason::Reasons;
 use crate::history::rows::SeriesRows;
 use crate::history::series::Series;
 use adapters::clock::TimeNs;
 use rusqlite::Connection;
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -24,6 +27,13 @@ const WAITING_BYTES_MAX: usize = 16_000_000;
 /// What the sinks have delivered is noted, and removed, this often: each time costs two pages of the disk (flash wears), and
 /// what is not noted is sent again after a kill.
 const TIDY_EVERY: Duration = Duration::from_secs(5);
+
+/// Ticks that are further apart than this, and than three ticks, have a gap between them. Shorter: a tick that was late would end
+/// every value; longer: a value is carried so far into a time of which nothing is known.
+const GAP: Duration = Duration::from_secs(2);
+
+/// How often it is looked whether the sinks have delivered everything, at the end.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
 
 /// The line of one tick.
 #[derive(Debug)]
@@ -45,6 +55,9 @@ pub(crate) struct Gatherer {
     lost: u64,
     stored: OutboxContents,
     tidied: Instant,
+    /// Time of the newest tick, of an earlier run too; with why there may be a gap after it.
+    last: Option<(TimeNs, &'static str)>,
+    means: MeanSchedule,
 }
 
 /// What a transaction has taken, to be forgotten when it is durable.
@@ -52,20 +65,34 @@ pub(crate) struct TransactionWork {
     ticks: usize,
     put: Put,
     tidy: bool,
+    means: MeanSchedule,
+}
+
+fn info(series: &Series, settings: &OutboxSettings) -> SeriesInfo {
+    let info = SeriesInfo::from(series);
+    SeriesInfo { range: settings.range_of(&info), ..info }
 }
 
 impl Gatherer {
-    /// Creates the tables where they are missing, and finds what each sink still has to deliver.
-    pub(crate) fn open(db: &mut Connection, outbox: Outbox, series: &[Series]) -> Result<Self, HistoryError> {
+    /// Creates the tables where they are missing, and finds what each sink still has to deliver. `newest_ns` is the time of the
+    /// newest row of the history.
+    pub(crate) fn open(
+        db: &mut Connection,
+        outbox: Outbox,
+        series: &[Series],
+        newest_ns: Option<TimeNs>,
+    ) -> Result<Self, HistoryError> {
         let stored = store::open(db, &outbox)?;
         let gatherer = Self {
             report: OutboxReport::new(outbox.settings(), series),
-            known: series.iter().map(|series| Arc::new(SeriesInfo::from(series))).collect(),
+            known: series.iter().map(|series| Arc::new(info(series, outbox.settings()))).collect(),
             waiting: VecDeque::new(),
             bytes: 0,
             lost: 0,
             stored,
             tidied: Instant::now(),
+            last: newest_ns.map(|newest_ns| (newest_ns, "not_running")),
+            means: MeanSchedule::new(newest_ns),
             outbox,
         };
         gatherer.tell(&Reasons::default());
@@ -74,11 +101,21 @@ impl Gatherer {
 
     /// Takes on a batch of ticks whose first has the number `first_row`.
     pub(crate) fn gather(&mut self, rows: &SeriesRows, first_row: i64, series: &[Series], reasons: &Reasons) {
+        let gaps = self.gaps(rows);
         let Self { report, waiting, bytes, .. } = self;
-        report.lines(rows, series, reasons, |index, text| {
+        let mut put = |index: usize, at_ns: TimeNs, text: String| {
             *bytes += text.len();
-            waiting.push_back(PendingLine { row: first_row + index as i64, at_ns: rows.at_ns[index], text });
-        });
+            waiting.push_back(PendingLine { row: first_row + index as i64, at_ns, text });
+        };
+        for (row, at_ns) in rows.at_ns.iter().enumerate() {
+            if let Some((_, from_ns, reason)) = gaps.iter().find(|(index, ..)| *index == row) {
+                put(row, *from_ns, line::of_gap(*from_ns, Some(*at_ns), reason));
+                report.begin_anew();
+            }
+            if let Some(text) = report.tick(rows, row, series, reasons) {
+                put(row, *at_ns, text);
+            }
+        }
         while self.bytes > WAITING_BYTES_MAX {
             let Some(oldest) = self.waiting.pop_front() else { break };
             self.bytes -= oldest.text.len();
@@ -86,27 +123,66 @@ impl Gatherer {
         }
     }
 
+    /// Which of these rows come after a gap: index of the row, where the gap begins, and why.
+    fn gaps(&mut self, rows: &SeriesRows) -> Vec<(usize, TimeNs, &'static str)> {
+        let tick_ns = i64::try_from(self.outbox.settings().tick.as_nanos()).unwrap_or(i64::MAX);
+        let greatest_ns = (GAP.as_nanos() as i64).max(tick_ns.saturating_mul(3));
+        let mut gaps = Vec::new();
+        for (row, at_ns) in rows.at_ns.iter().enumerate() {
+            let last = self.last.replace((*at_ns, "no_samples"));
+            // A clock that went back leaves no gap.
+            if let Some((last_ns, reason)) = last.filter(|(last_ns, _)| at_ns - last_ns > greatest_ns) {
+                gaps.push((row, last_ns + tick_ns, reason));
+            }
+        }
+        gaps
+    }
+
     /// Would a commit change anything here?
     pub(crate) fn is_dirty(&self) -> bool {
         self.outbox.has_news() && self.tidied.elapsed() >= TIDY_EVERY
     }
 
-    /// At the end: notes what the sinks have delivered.
-    pub(crate) fn close(&self, db: &Connection) -> Result<(), HistoryError> {
+    /// At the end: tells that nothing comes any more, waits for the sinks within the time that the settings allow, and notes what
+    /// they have delivered.
+    pub(crate) fn close(&mut self, db: &mut Connection, reasons: &Reasons) -> Result<(), HistoryError> {
+        self.tell_end(db, reasons)?;
+        let until = Instant::now() + self.outbox.settings().drain;
+        while Instant::now() < until && !self.outbox.is_drained(self.stored.next_sequence) {
+            std::thread::sleep(LOOK_EVERY);
+        }
         store::note(db, &self.outbox, &[])
     }
 
+    /// The last items: the hour and the day that are running, and that there are no samples from here on.
+    fn tell_end(&mut self, db: &mut Connection, reasons: &Reasons) -> Result<(), HistoryError> {
+        let Some((last_ns, "no_samples")) = self.last else { return Ok(()) };
+        let tick = self.outbox.settings().tick;
+        let ending = db.transaction().doing("ending the outbox")?;
+        let running = self.means.running().collect();
+        let mut lines: Vec<(TimeNs, Cow<'_, str>)> =
+            means::lines(&ending, &running, tick)?.into_iter().map(|(at_ns, text)| (at_ns, text.into())).collect();
+        let from_ns = last_ns.saturating_add(i64::try_from(tick.as_nanos()).unwrap_or(0));
+        lines.push((from_ns, line::of_gap(from_ns, None, "stopped").into()));
+        let put = store::put(&ending, &self.outbox, &self.stored, &lines, false)?;
+        ending.commit().doing("ending the outbox")?;
+        self.stored = put.stored;
+        self.outbox.noted(&put.dropped);
+        self.tell(reasons);
+        Ok(())
+    }
+
     /// Puts into the running transaction the items of the ticks before row `end_row` and of these records, which belong
-    /// after as many rows from `opened_row` on as they say; then drops what the bounds do not allow, and now and then notes
-    /// what the sinks have delivered.
+    /// after as many rows from `opened_row` on as they say, and the means that the stored blocks complete, which begin at these
+    /// times; then drops what the bounds do not allow, and now and then notes what the sinks have delivered.
     pub(crate) fn put<'a>(
         &self,
         db: &Connection,
         records: impl Iterator<Item = &'a QueuedRecord>,
-        opened_row: i64,
-        end_row: i64,
+        (opened_row, end_row): (i64, i64),
+        blocks: impl Iterator<Item = TimeNs>,
     ) -> Result<TransactionWork, HistoryError> {
-        let mut lines: Vec<(TimeNs, std::borrow::Cow<'_, str>)> = Vec::new();
+        let mut lines: Vec<(TimeNs, Cow<'_, str>)> = Vec::new();
         let mut ticks = self.waiting.iter().take_while(|line| line.row < end_row).peekable();
         for posted in records.filter(|posted| leaves(&posted.record)) {
             let before = opened_row.saturating_add_unsigned(posted.after_rows);
@@ -116,10 +192,14 @@ impl Gatherer {
             lines.push((posted.record.at_ns(), line::of_record(&posted.record).into()));
         }
         lines.extend(ticks.map(|tick| (tick.at_ns, tick.text.as_str().into())));
+        let mut means = self.means;
+        let due = means.take(blocks);
+        let told = means::lines(db, &due, self.outbox.settings().tick)?;
+        lines.extend(told.into_iter().map(|(at_ns, text)| (at_ns, text.into())));
         let ticks = self.waiting.iter().take_while(|line| line.row < end_row).count();
         let tidy = self.tidied.elapsed() >= TIDY_EVERY;
         let put = store::put(db, &self.outbox, &self.stored, &lines, tidy)?;
-        Ok(TransactionWork { ticks, put, tidy })
+        Ok(TransactionWork { ticks, put, tidy, means })
     }
 
     /// What was put is durable.
@@ -128,6 +208,7 @@ impl Gatherer {
             self.bytes -= line.text.len();
         }
         self.stored = taken.put.stored;
+        self.means = taken.means;
         self.outbox.noted(&taken.put.dropped);
         if taken.tidy {
             self.tidied = Instant::now();

@@ -1,9 +1,11 @@
 //! One thing that leaves the box.
 
+use crate::history::pyramid::LEVELS;
 use crate::history::record::Record;
 use crate::history::{Series, SeriesKind};
 use crate::moment;
-use adapters::channel::CHANNELS;
+use adapters::ChannelId;
+use adapters::channel::{Channel, Form};
 use adapters::clock::TimeNs;
 use serde_json::{Value as Json, json};
 use std::sync::Arc;
@@ -30,8 +32,10 @@ pub struct SeriesInfo {
     pub unit: Arc<str>,
     /// Number or text.
     pub kind: SeriesKind,
-    /// Least and greatest value that is physically possible, in the unit; `None` for text and for what is inferred.
+    /// Least and greatest value of this machine, in the unit; `None` where nobody has said.
     pub range: Option<(f64, f64)>,
+    /// Which numbers it can have.
+    pub form: Form,
     /// What it is, in English.
     pub en: Arc<str>,
     /// What it is, in Chinese.
@@ -42,18 +46,25 @@ pub struct SeriesInfo {
 
 impl From<&Series> for SeriesInfo {
     fn from(series: &Series) -> Self {
-        let channel = CHANNELS.iter().find(|channel| !series.estimated && *channel.name == *series.name);
+        let channel = ChannelId::of(&series.name).filter(|_| !series.estimated).map(ChannelId::channel);
         Self {
             id: series.id,
             name: series.name.clone(),
             unit: series.unit.clone(),
             kind: series.kind,
-            range: channel.map(|channel| channel.range).filter(|_| series.kind == SeriesKind::Number),
+            range: channel.and_then(natural_range),
+            form: channel.map_or(Form::Real, |channel| channel.form),
             en: series.en.clone(),
             zh: series.zh.clone(),
             estimated: series.estimated,
         }
     }
+}
+
+/// The range of a channel where that is one of its nature: a share of what is programmed, a flag. The table of channels holds what is physically
+/// possible on any machine, which says nothing of this one.
+fn natural_range(channel: &Channel) -> Option<(f64, f64)> {
+    (channel.form == Form::Flag).then_some(channel.range)
 }
 
 /// A series and its value.
@@ -65,6 +76,30 @@ pub struct Reading {
     pub value: Cell,
 }
 
+/// A stretch of time in which the box had no samples: no value is known in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gap {
+    /// When samples begin again; `None`: not yet.
+    pub until_ns: Option<TimeNs>,
+    /// Why, as one word: `stopped`, `not_running`, `no_samples`.
+    pub reason: Arc<str>,
+}
+
+/// One series over one minute, hour or day.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeriesMean {
+    /// What was read or inferred.
+    pub series: Arc<SeriesInfo>,
+    /// For how long there was a value, s.
+    pub seconds: f64,
+    /// Mean over that time, in the unit of the series.
+    pub mean: f64,
+    /// Least value.
+    pub least: f64,
+    /// Greatest value.
+    pub greatest: f64,
+}
+
 /// What an item tells.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Content {
@@ -73,6 +108,16 @@ pub enum Content {
     /// [`Record::State`], [`Record::Part`], [`Record::Alarm`], [`Record::AlarmClear`], [`Record::Decision`],
     /// [`Record::Diagnosis`] or [`Record::Event`].
     Record(Box<Record>),
+    /// There are no samples from the time of the item on.
+    Gap(Gap),
+    /// The summaries of a minute, hour or day that begins at the time of the item, as the history holds them by now. A later item
+    /// of the same time replaces it.
+    Means {
+        /// Its length, s.
+        width_s: u32,
+        /// Every series that had a value.
+        means: Vec<SeriesMean>,
+    },
 }
 
 /// One thing that leaves the box.
@@ -87,17 +132,28 @@ pub struct Item {
 }
 
 impl Item {
-    /// One word: `sample`, `state`, `part`, `alarm`, `alarm_clear`, `decision`, `diagnosis`, `event`.
+    /// One word: `sample`, `state`, `part`, `alarm`, `alarm_clear`, `decision`, `diagnosis`, `event`, `gap`, `minute`, `hour`,
+    /// `day`.
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match &self.content {
             Content::Sample(_) => "sample",
             Content::Record(record) => kind_of(record),
+            Content::Gap(_) => "gap",
+            Content::Means { width_s, .. } => {
+                LEVELS.iter().find(|level| level.width_s() == *width_s).map_or("minute", |level| level.key)
+            }
         }
     }
 
+    /// Does its time say how far the receiver is? What is told of a time that is over does not.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        matches!(self.content, Content::Sample(_) | Content::Record(_))
+    }
+
     /// The item as a document (`item/1`): `sequence`, `time_utc`, `at_ns`, `kind`, and `values` (each with its unit) or
-    /// `record`.
+    /// `record`; of means also `width_s`.
     #[must_use]
     pub fn json(&self) -> Json {
         let mut document = json!({
@@ -110,6 +166,11 @@ impl Item {
         let (key, value) = match &self.content {
             Content::Sample(readings) => ("values", readings.iter().map(Reading::json).collect()),
             Content::Record(record) => ("record", record_json(record)),
+            Content::Gap(Gap { until_ns, reason }) => ("record", json!({"until_ns": until_ns, "reason": &**reason})),
+            Content::Means { width_s, means } => {
+                document["width_s"] = Json::from(*width_s);
+                ("values", means.iter().map(SeriesMean::json).collect())
+            }
         };
         document[key] = value;
         document
@@ -117,15 +178,24 @@ impl Item {
 }
 
 impl Reading {
-    /// `{"name", "value", "unit"}`, or with `missing` in place of the value.
+    /// `{"name", "value", "unit"}`, with `missing` where the value is null.
     #[must_use]
     pub fn json(&self) -> Json {
         let name = &*self.series.name;
         match &self.value {
             Cell::Number(number) => json!({"name": name, "value": number, "unit": &*self.series.unit}),
             Cell::Text(text) => json!({"name": name, "value": &**text, "unit": ""}),
-            Cell::Missing(reason) => json!({"name": name, "value": null, "missing": &**reason}),
+            Cell::Missing(reason) => {
+                json!({"name": name, "value": null, "unit": &*self.series.unit, "missing": &**reason})
+            }
         }
+    }
+}
+
+impl SeriesMean {
+    fn json(&self) -> Json {
+        let Self { series, seconds, mean, least, greatest } = self;
+        json!({"name": &*series.name, "unit": &*series.unit, "mean": mean, "least": least, "greatest": greatest, "seconds": seconds})
     }
 }
 
@@ -145,13 +215,26 @@ fn kind_of(record: &Record) -> &'static str {
     }
 }
 
-/// The fields of the record alone.
+/// Fields of a record that hold JSON as a text; they are empty where there is nothing to add.
+const NESTED: [&str; 2] = ["detail", "json"];
+
+/// The fields of the record alone, with what is JSON in a text as JSON.
 fn record_json(record: &Record) -> Json {
     let tagged = serde_json::to_value(record).unwrap_or(Json::Null);
-    match tagged {
-        Json::Object(fields) => fields.into_iter().next().map_or(Json::Null, |(_, fields)| fields),
-        other => other,
+    let Json::Object(tagged) = tagged else { return tagged };
+    tagged.into_iter().next().map_or(Json::Null, |(_, fields)| unnested(fields))
+}
+
+/// The fields of a record with what is JSON in a text as JSON. A detail that is plain words stays a text.
+pub(crate) fn unnested(mut fields: Json) -> Json {
+    for name in NESTED {
+        let Some(Json::String(text)) = fields.get(name) else { continue };
+        let nested = if text.is_empty() { Some(Json::Null) } else { serde_json::from_str(text).ok() };
+        if let Some(nested) = nested {
+            fields[name] = nested;
+        }
     }
+    fields
 }
 
 /// Is this a record that leaves the box? The audit, commands and models stay where they can be verified.

@@ -1,14 +1,17 @@
 //! An item as one line of JSON, without its number: what the rows of the table `outbox` hold, compressed.
 //!
-//! `{"t":at_ns,"s":{"<series>":cell}}` is a sample, `{"t":at_ns,"r":{"<kind>":{...}}}` a record. A cell is a number, a
-//! text, or `{"m":"reason"}`.
+//! `{"t":at_ns,"s":{"<series>":cell}}` is a sample, `{"t":at_ns,"r":{"<kind>":{...}}}` a record, `{"t":at_ns,"g":{"u":until_ns,
+//! "r":"reason"}}` a gap, `{"t":start_ns,"w":width_s,"m":{"<series>":[seconds,mean,least,greatest]}}` the means of a minute, hour
+//! or day. A cell is a number, a text, or `{"m":"reason"}`.
 
-use super::item::{Cell, Content, Item, Reading, SeriesInfo};
+use super::item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 use crate::history::record::Record;
+use crate::history::tail::{comma, put_number};
 use adapters::clock::TimeNs;
 use serde::Deserialize;
 use serde_json::{Map, Value as Json, json};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write;
 use std::sync::Arc;
 
 /// The JSON of a diagnosis beyond this is left out: it can be asked for on the box, and brokers refuse larger messages.
@@ -21,6 +24,45 @@ struct OutboxLine {
     s: Option<Map<String, Json>>,
     #[serde(default)]
     r: Option<Record>,
+    #[serde(default)]
+    g: Option<GapLine>,
+    #[serde(default)]
+    w: u32,
+    #[serde(default)]
+    m: Option<BTreeMap<i64, [f64; 4]>>,
+}
+
+#[derive(Debug, Deserialize)]
+struct GapLine {
+    u: Option<TimeNs>,
+    r: String,
+}
+
+impl OutboxLine {
+    fn holds_something(&self) -> bool {
+        self.s.is_some() || self.r.is_some() || self.g.is_some() || self.m.is_some()
+    }
+}
+
+/// The line of a gap.
+pub(super) fn of_gap(from_ns: TimeNs, until_ns: Option<TimeNs>, reason: &str) -> String {
+    json!({"t": from_ns, "g": {"u": until_ns, "r": reason}}).to_string()
+}
+
+/// The line of means: of each series its number, and seconds, mean, least and greatest value.
+pub(super) fn of_means(start_ns: TimeNs, width_s: u32, means: &[(i64, [f64; 4])]) -> String {
+    let mut text = format!("{{\"t\":{start_ns},\"w\":{width_s},\"m\":{{");
+    for (index, (series, numbers)) in means.iter().enumerate() {
+        comma(&mut text, index);
+        // Writing to a string cannot fail.
+        let _ = write!(text, "\"{series}\":[");
+        for (index, number) in numbers.iter().enumerate() {
+            comma(&mut text, index);
+            put_number(&mut text, *number);
+        }
+        text.push(']');
+    }
+    text + "}}"
 }
 
 /// The line of a record.
@@ -44,7 +86,7 @@ pub(super) struct Parsed(OutboxLine);
 
 /// Reads a line; `None` for one that this version cannot read.
 pub(super) fn parse(text: &str) -> Option<Parsed> {
-    serde_json::from_str(text).ok().filter(|line: &OutboxLine| line.s.is_some() || line.r.is_some()).map(Parsed)
+    serde_json::from_str(text).ok().filter(OutboxLine::holds_something).map(Parsed)
 }
 
 impl Parsed {
@@ -52,19 +94,29 @@ impl Parsed {
     pub(super) fn names_unknown(&self, known: &SeriesByNumber) -> bool {
         let is_unknown = |id: &String| id.parse().map_or(true, |id: i64| !known.contains_key(&id));
         self.0.s.as_ref().is_some_and(|cells| cells.keys().any(is_unknown))
+            || self.0.m.as_ref().is_some_and(|means| means.keys().any(|id| !known.contains_key(id)))
     }
 
     /// The item; values of unknown series are left out.
     pub(super) fn item(self, sequence: u64, known: &SeriesByNumber) -> Item {
-        let OutboxLine { t, s, r } = self.0;
+        let OutboxLine { t, s, r, g, w, m } = self.0;
         let readings =
             |cells: Map<String, Json>| cells.iter().filter_map(|(id, cell)| reading(id, cell, known)).collect();
-        let content = match r {
-            Some(record) => Content::Record(Box::new(record)),
-            None => Content::Sample(s.map(readings).unwrap_or_default()),
+        let content = match (r, g, m) {
+            (Some(record), ..) => Content::Record(Box::new(record)),
+            (_, Some(GapLine { u, r }), _) => Content::Gap(Gap { until_ns: u, reason: r.into() }),
+            (.., Some(numbers)) => {
+                let mean = |(id, numbers)| mean(id, numbers, known);
+                Content::Means { width_s: w, means: numbers.into_iter().filter_map(mean).collect() }
+            }
+            _ => Content::Sample(s.map(readings).unwrap_or_default()),
         };
         Item { sequence, at_ns: t, content }
     }
+}
+
+fn mean(id: i64, [seconds, mean, least, greatest]: [f64; 4], known: &SeriesByNumber) -> Option<SeriesMean> {
+    Some(SeriesMean { series: known.get(&id)?.clone(), seconds, mean, least, greatest })
 }
 
 fn reading(id: &str, cell: &Json, known: &SeriesByNumber) -> Option<Reading> {

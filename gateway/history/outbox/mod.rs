@@ -6,8 +6,9 @@
 //! therefore neither sent something it does not remember, nor remembers something that is never sent.
 //!
 //! # Data
-//! An [`Item`] is the values of one tick that changed ([`OutboxSettings`] says what counts as a change), or one record: a state,
-//! part, alarm, decision, diagnosis or event. Items are numbered from 1 without holes over the life of the database; the
+//! An [`Item`] is the values of one tick that changed ([`OutboxSettings`] says what counts as a change), one record (a state,
+//! part, alarm, decision, diagnosis or event), a [`Gap`] in which there were no samples, or the means of a minute, hour or
+//! day. Items are numbered from 1 without holes over the life of the database; the
 //! number together with [`Outbox::box_id`] names an item everywhere. The items of one commit lie in one compressed row of
 //! the table `outbox`; the table `outbox_sinks` holds what each sink still has to deliver.
 //!
@@ -17,13 +18,14 @@
 //! is gathered and the tables do not exist.
 //!
 //! # Who does what
-//! `report` decides which values of a tick are worth sending, `gather` numbers them on the writer thread, `store` puts them
+//! `report` decides which values of a tick are worth sending, `means` when a minute, hour or day is over, `gather` numbers them on the writer thread, `store` puts them
 //! into the transaction of the commit, `position` is the arithmetic of what is delivered, [`Outbox`] is the handle through
 //! which sinks read ([`OutboxReader`]) and acknowledge.
 
 mod gather;
 mod item;
 mod line;
+mod means;
 mod position;
 mod reader;
 mod report;
@@ -31,8 +33,11 @@ mod shared;
 mod store;
 
 pub(crate) use gather::Gatherer;
-pub use item::{Cell, Content, Item, Reading, SeriesInfo};
+pub(crate) use item::unnested;
+pub use item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 pub use position::Position;
 pub use reader::{OutboxReader, OutboxStretch};
 pub use report::OutboxSettings;
 pub use shared::{DeliveryState, Outbox, OutboxFigures, OutboxHead};
+pub use store::box_id;
+pub(crate) use store::known_box_id;

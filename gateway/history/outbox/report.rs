@@ -21,8 +21,14 @@ pub struct OutboxSettings {
     /// A value that differs from the one sent last by at most this, in the unit of the series, is not sent again. A
     /// series that is not named here is sent when it differs at all in the digits that the history keeps.
     pub dead_bands: Vec<(String, f64)>,
+    /// Least and greatest value of a series on this machine, in its unit, for receivers that draw scales.
+    pub ranges: Vec<(String, (f64, f64))>,
     /// All values are sent this often even if none has changed.
     pub refresh: Duration,
+    /// Time between two ticks.
+    pub tick: Duration,
+    /// At the end the sinks may take so long to deliver what waits.
+    pub drain: Duration,
     /// Greatest size of what waits, bytes on disk.
     pub max_bytes: u64,
     /// Greatest age of what waits.
@@ -34,10 +40,22 @@ impl Default for OutboxSettings {
         Self {
             every_nth: 1,
             dead_bands: Vec::new(),
+            ranges: Vec::new(),
             refresh: Duration::from_secs(60),
+            tick: Duration::from_millis(100),
+            drain: Duration::from_secs(5),
             max_bytes: 1_000_000_000,
             max_age: Duration::from_secs(7 * 86_400),
         }
+    }
+}
+
+impl OutboxSettings {
+    /// The range of a series on this machine; `None` where nobody has said.
+    #[must_use]
+    pub fn range_of(&self, series: &SeriesInfo) -> Option<(f64, f64)> {
+        let named = self.ranges.iter().find(|(name, _)| **name == *series.name);
+        named.map(|(_, range)| *range).or(series.range)
     }
 }
 
@@ -76,30 +94,32 @@ impl OutboxReport {
         }
     }
 
-    /// Hands the line of each tick that has something to tell to `put`, with the index of its row.
-    pub(super) fn lines(
+    /// The receiver knows nothing any more: the next tick tells everything.
+    pub(super) fn begin_anew(&mut self) {
+        self.last.fill(Last::Missing(NOT_PROVIDED));
+        self.whole_at = None;
+    }
+
+    /// The line of a tick, where it has something to tell.
+    pub(super) fn tick(
         &mut self,
         rows: &SeriesRows,
+        row: usize,
         series: &[Series],
         reasons: &Reasons,
-        mut put: impl FnMut(usize, String),
-    ) {
-        for row in 0..rows.len() {
-            let due = self.ticks.is_multiple_of(self.every_nth);
-            self.ticks += 1;
-            if !due {
-                continue;
-            }
-            let at_ns = rows.at_ns[row];
-            // A clock that went back begins anew as well.
-            let whole = self.whole_at.is_none_or(|since| at_ns < since || at_ns - since >= self.refresh_ns);
-            if whole {
-                self.whole_at = Some(at_ns);
-            }
-            if let Some(line) = self.line(rows, row, whole, series, reasons) {
-                put(row, line);
-            }
+    ) -> Option<String> {
+        let at_ns = rows.at_ns[row];
+        // A clock that went back begins anew as well.
+        let whole = self.whole_at.is_none_or(|since| at_ns < since || at_ns - since >= self.refresh_ns);
+        let due = whole || self.ticks.is_multiple_of(self.every_nth);
+        self.ticks += 1;
+        if !due {
+            return None;
         }
+        if whole {
+            self.whole_at = Some(at_ns);
+        }
+        self.line(rows, row, whole, series, reasons)
     }
 
     fn line(
@@ -213,10 +233,12 @@ mod tests {
         let series = series();
         let mut found = Vec::new();
         let mut report = OutboxReport::new(settings, &series);
-        report.lines(&rows(powers), &series, &Reasons::default(), |row, line| {
+        let rows = rows(powers);
+        for row in 0..rows.len() {
+            let Some(line) = report.tick(&rows, row, &series, &Reasons::default()) else { continue };
             let line: Json = serde_json::from_str(&line).expect("JSON");
             found.push((row, line["s"].clone()));
-        });
+        }
         found
     }
 

@@ -50,6 +50,8 @@ pub struct DeliveryState {
     pub position: Position,
     /// Items dropped before it had delivered them, since it was first configured.
     pub dropped: u64,
+    /// Is it connected, or about to be for the first time? At the end only such sinks are waited for.
+    pub linked: bool,
 }
 
 #[derive(Debug)]
@@ -59,6 +61,7 @@ struct SharedOutbox {
     head: watch::Sender<OutboxHead>,
     sinks: Mutex<BTreeMap<String, DeliveryState>>,
     news: AtomicBool,
+    hurried: AtomicBool,
     state: Mutex<OutboxState>,
 }
 
@@ -90,13 +93,14 @@ impl Outbox {
     /// The outbox of a machine for these sinks. Hand it to [`Options::outbox`](crate::history::Options::outbox).
     #[must_use]
     pub fn new(machine: &str, settings: OutboxSettings, sinks: impl IntoIterator<Item = String>) -> Self {
-        let standing = || DeliveryState { position: Position::at(1), dropped: 0 };
+        let standing = || DeliveryState { position: Position::at(1), dropped: 0, linked: false };
         let shared = SharedOutbox {
             machine: machine.to_owned(),
             settings,
             head: watch::Sender::new(OutboxHead::default()),
             sinks: Mutex::new(sinks.into_iter().map(|name| (name, standing())).collect()),
             news: AtomicBool::new(false),
+            hurried: AtomicBool::new(false),
             state: Mutex::new(OutboxState::default()),
         };
         Self { shared: Arc::new(shared) }
@@ -108,8 +112,8 @@ impl Outbox {
         &self.shared.machine
     }
 
-    /// Names this box and this history: letters, digits and `-` of the machine's name, `-`, and six digits that were
-    /// made with the outbox. `<box>-<sequence>` names an item everywhere and for ever. Empty until the history is open.
+    /// Names this box and this history: letters, digits and `-` of the name that the machine had at first, `-`, and digits that
+    /// were made with the outbox. `<box>-<sequence>` names an item everywhere and for ever. Empty until the history is open.
     #[must_use]
     pub fn box_id(&self) -> String {
         locked(&self.shared.state).box_id.clone()
@@ -168,6 +172,18 @@ impl Outbox {
         jumped
     }
 
+    /// Sink `name` is connected, or is not.
+    pub fn set_linked(&self, name: &str, linked: bool) {
+        if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
+            standing.linked = linked;
+        }
+    }
+
+    /// At the end the sinks are not waited for any longer.
+    pub fn hurry(&self) {
+        self.shared.hurried.store(true, Ordering::Release);
+    }
+
     fn change(&self, name: &str, change: impl FnOnce(&mut DeliveryState)) {
         if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
             change(standing);
@@ -217,13 +233,17 @@ impl Outbox {
         }
     }
 
-    /// The writer's side: the six digits of this history.
-    pub(super) fn name_box(&self, mark: &str) {
-        let plain = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '-' };
-        let name: String = self.shared.machine.chars().map(plain).collect();
-        let name = name.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-");
-        let name = if name.is_empty() { "box".to_owned() } else { name };
-        locked(&self.shared.state).box_id = format!("{name}-{mark}");
+    /// The writer's side: the name of this box.
+    pub(super) fn name_box(&self, name: String) {
+        locked(&self.shared.state).box_id = name;
+    }
+
+    /// The writer's side: has every sink that is connected delivered everything before `next`, or is it not to be waited for?
+    pub(super) fn is_drained(&self, next: u64) -> bool {
+        self.shared.hurried.load(Ordering::Acquire)
+            || locked(&self.shared.sinks)
+                .values()
+                .all(|standing| !standing.linked || standing.position.waiting(next) == 0)
     }
 
     /// The writer's side: what is durable now.

@@ -4,9 +4,11 @@ use super::position::Position;
 use super::shared::{DeliveryState, Outbox, OutboxFigures};
 use crate::history::HistoryError;
 use crate::history::error::Doing;
+use crate::history::schema::{open_for_reading, open_for_writing};
 use adapters::clock::{SECOND_NS, TimeNs};
-use rusqlite::{Connection, OptionalExtension, params};
+use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use std::borrow::Cow;
+use std::path::Path;
 
 /// Made when the first sink is configured; a box without one has a file without these.
 const TABLES: &str = "
@@ -66,7 +68,7 @@ fn signed(number: u64) -> i64 {
 pub(super) fn open(db: &mut Connection, outbox: &Outbox) -> Result<OutboxContents, HistoryError> {
     let opening = db.transaction().doing("opening the outbox")?;
     opening.execute_batch(TABLES).doing("creating the outbox")?;
-    outbox.name_box(&box_mark(&opening)?);
+    outbox.name_box(box_name(&opening, outbox.machine())?);
     let next = next_sequence(&opening)?;
     outbox.for_each_sink(|name, standing| load(&opening, name, next, standing))?;
     let names = outbox.names();
@@ -102,18 +104,55 @@ fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
         .doing("numbering the outbox")
 }
 
-/// Six digits made with the outbox: another database on the same box numbers other items.
-fn box_mark(db: &Connection) -> Result<String, HistoryError> {
-    let found: Option<String> = db
-        .query_row("SELECT CAST(value AS TEXT) FROM meta WHERE key = 'outbox_box'", [], |row| row.get(0))
-        .optional()
-        .doing("reading the outbox")?;
-    if let Some(mark) = found {
-        return Ok(mark);
+/// The name of this box, made once: a machine that is renamed stays the same box. The digits tell boxes apart whose machines
+/// have the same letters, or none that an address may hold.
+fn box_name(db: &Connection, machine: &str) -> Result<String, HistoryError> {
+    if let Some(name) = known_box_id(db)? {
+        return Ok(name);
     }
-    let mark = adapters::mqtt::unique()[..6].to_owned();
-    db.execute("INSERT INTO meta (key, value) VALUES ('outbox_box', ?1)", [&mark]).doing("naming the outbox")?;
-    Ok(mark)
+    // Histories of before had six digits, and the name of the machine as it was at each start.
+    let mark = property(db, "outbox_box")?.unwrap_or_else(|| adapters::mqtt::unique()[..10].to_owned());
+    let name = format!("{}-{mark}", letters_of(machine));
+    db.execute("INSERT INTO meta (key, value) VALUES ('outbox_box_id', ?1)", [&name]).doing("naming the outbox")?;
+    Ok(name)
+}
+
+/// The name of the box that keeps the history at `path`; made now where it has none. `machine` is the name of the machine.
+///
+/// # Errors
+/// The file cannot be read, or a name cannot be written into it.
+pub fn box_id(path: &Path, machine: &str) -> Result<String, HistoryError> {
+    if path.is_file() {
+        if let Some(name) = known_box_id(&open_for_reading(path)?)? {
+            return Ok(name);
+        }
+    } else if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+        std::fs::create_dir_all(parent).map_err(|error| HistoryError::Io { path: parent.to_owned(), error })?;
+    }
+    let mut db = open_for_writing(path)?;
+    let naming = db.transaction_with_behavior(TransactionBehavior::Immediate).doing("naming the outbox")?;
+    let name = box_name(&naming, machine)?;
+    naming.commit().doing("naming the outbox")?;
+    Ok(name)
+}
+
+/// The name of the box of an open history, where it has one.
+pub(crate) fn known_box_id(db: &Connection) -> Result<Option<String>, HistoryError> {
+    property(db, "outbox_box_id")
+}
+
+fn property(db: &Connection, key: &str) -> Result<Option<String>, HistoryError> {
+    db.query_row("SELECT CAST(value AS TEXT) FROM meta WHERE key = ?1", [key], |row| row.get(0))
+        .optional()
+        .doing("reading the outbox")
+}
+
+/// Letters, digits and `-` of a machine's name, `box` where there are none.
+fn letters_of(machine: &str) -> String {
+    let plain = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '-' };
+    let name: String = machine.chars().map(plain).collect();
+    let name = name.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-");
+    if name.is_empty() { "box".to_owned() } else { name }
 }
 
 /// A sink that is new begins with what is made from now on.
@@ -203,8 +242,9 @@ fn add(db: &Connection, stored: &mut OutboxContents, lines: &[(TimeNs, Cow<'_, s
     stored.next_sequence += lines.len() as u64;
     stored.bytes += bytes;
     stored.added_bytes += bytes;
-    stored.first_ns.get_or_insert(start_ns);
-    stored.oldest_ns.get_or_insert(start_ns);
+    // The beginning of an hour or a day is no time at which something was added.
+    stored.first_ns.get_or_insert(end_ns);
+    stored.oldest_ns.get_or_insert(end_ns);
     stored.newest_ns = Some(end_ns);
     Ok(())
 }

@@ -1,10 +1,9 @@
 //! Which value stands where in a machine tool of OPC 40501-1: the one table that the nodes are made of. Pure.
 //!
-//! Only what the box knows is there. Parts of the types that the specification calls mandatory and that no controller tells
-//! (power-on duration, the state machine of the program) are missing; no event is sent.
+//! Only what the box knows is there. The handbook says, requirement by requirement, what of the specification is met.
 //!
-//! Sources: OPC 40501-1 (machine tools, monitoring and job), OPC 40001-1 (machinery); the numbers of types are those of the published
-//! list of node identifiers.
+//! Sources: OPC 40501-1 v1.02 (machine tools, monitoring and job), OPC 40001-1 (machinery); the numbers of types and states are those of
+//! the published node set.
 
 use adapters::words::{execution, mode};
 
@@ -21,11 +20,12 @@ pub(super) const MACHINES: u32 = 1001;
 pub(super) const MACHINE_TOOL_TYPE: u32 = 13;
 
 /// Types that objects of a machine tool have, by number in the namespace of machine tools.
-pub(super) const TYPES: [(u32, &str); 10] = [
+pub(super) const TYPES: [(u32, &str); 11] = [
     (7, "NotificationType"),
     (11, "MachineToolIdentificationType"),
     (MACHINE_TOOL_TYPE, "MachineToolType"),
     (14, "MonitoringType"),
+    (15, "ProductionProgramStateMachineType"),
     (16, "ChannelMonitoringType"),
     (21, "ProductionType"),
     (22, "SpindleMonitoringType"),
@@ -38,8 +38,15 @@ pub(super) const TYPES: [(u32, &str); 10] = [
 pub(super) const ENUMERATIONS: [(u32, &str); 3] =
     [(64, "ChannelState"), (65, "MachineOperationMode"), (67, "ChannelMode")];
 
+/// The event type of which that of the gateway's messages is a kind: it is abstract itself.
+pub(super) const NOTIFICATION_EVENT: (u32, &str) = (35, "NotificationEventType");
+/// The gateway's own event type, in its own namespace.
+pub(super) const MESSAGE_EVENT: &str = "GatewayMessageEventType";
+/// The object that sends events.
+pub(super) const MESSAGES: &str = "Notification/Messages";
+
 /// An object below the machine: path, and number of its type.
-pub(super) const OBJECTS: [(&str, u32); 9] = [
+pub(super) const OBJECTS: [(&str, u32); 10] = [
     ("Identification", 11),
     ("Monitoring", 14),
     ("Monitoring/MachineTool", 26),
@@ -47,8 +54,9 @@ pub(super) const OBJECTS: [(&str, u32); 9] = [
     ("Monitoring/Spindle", 22),
     ("Production", 21),
     ("Production/ActiveProgram", 32),
+    ("Production/ActiveProgram/State", 15),
     ("Notification", 7),
-    ("Notification/Messages", 38),
+    (MESSAGES, 38),
 ];
 
 /// How a value of the box becomes one of the specification.
@@ -62,19 +70,58 @@ pub(super) enum Form {
     Rotating,
     /// A word, as the number of an enumeration: its type, and what stands for which word.
     Word(u32, fn(&str) -> i32),
+    /// Seconds as full hours.
+    Hours,
+    /// The state of the program: its name, its node in the type, or its number.
+    State(StatePart),
+}
+
+/// What of a state a variable shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum StatePart {
+    Name,
+    Node,
+    Number,
+}
+
+/// A state of a program: name, number, and node of the type `ProductionProgramStateMachineType`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct ProgramState {
+    pub(super) name: &'static str,
+    pub(super) number: u32,
+    pub(super) node: u32,
+}
+
+/// The state of the program that an execution state of the controller means.
+pub(super) fn program_state(word: &str) -> ProgramState {
+    let (name, number, node) = match word {
+        execution::ACTIVE => ("Running", 1, 5041),
+        execution::PROGRAM_COMPLETED => ("Ended", 2, 5038),
+        execution::INTERRUPTED | execution::FEED_HOLD | execution::STOPPED => ("Interrupted", 3, 5040),
+        _ => ("Initializing", 0, 5039),
+    };
+    ProgramState { name, number, node }
 }
 
 /// A variable: object, name, series of the box, form.
-pub(super) const VARIABLES: [(&str, &str, &str, Form); 9] = [
+pub(super) const VARIABLES: [(&str, &str, &str, Form); 11] = [
     ("Monitoring/MachineTool", "OperationMode", "mode", Form::Word(65, operation_mode)),
     ("Monitoring/MachineTool", "FeedOverride", "feed_override_pct", Form::Percent),
+    ("Monitoring/MachineTool", "PowerOnDuration", "power_on_time_s", Form::Hours),
     ("Monitoring/Channel1", "ChannelMode", "mode", Form::Word(67, channel_mode)),
     ("Monitoring/Channel1", "ChannelState", "execution", Form::Word(64, channel_state)),
     ("Monitoring/Channel1", "FeedOverride", "feed_override_pct", Form::Percent),
     ("Monitoring/Spindle", "Override", "spindle_override_pct", Form::Percent),
     ("Monitoring/Spindle", "IsRotating", "spindle_speed_rpm", Form::Rotating),
     ("Production/ActiveProgram", "Name", "program", Form::Text),
-    ("Notification/Messages", "ControllerAlarm", "alarm", Form::Text),
+    ("Production/ActiveProgram/State", "CurrentState", "execution", Form::State(StatePart::Name)),
+    (MESSAGES, "ControllerAlarm", "alarm", Form::Text),
+];
+
+/// A property of a variable: the variable, name, series of the box, form.
+pub(super) const PROPERTIES: [(&str, &str, &str, Form); 2] = [
+    ("Production/ActiveProgram/State/CurrentState", "Id", "execution", Form::State(StatePart::Node)),
+    ("Production/ActiveProgram/State/CurrentState", "Number", "execution", Form::State(StatePart::Number)),
 ];
 
 /// A spindle that is slower than this stands: controllers show noise of a revolution around 0.

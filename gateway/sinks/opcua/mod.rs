@@ -14,10 +14,12 @@
 //! OPC UA has a way to tell of old values which this server does not offer: what an outage leaves behind is in the history.
 
 mod certificates;
+mod event;
 mod layout;
 mod server;
 mod space;
 mod units;
+mod values;
 
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
@@ -51,6 +53,30 @@ pub struct OpcuaTarget {
     pub anonymous: bool,
     /// Directory of the certificates; `None`: `opcua` beside the history.
     pub certificates: Option<PathBuf>,
+    /// What stands on the plate of the machine: maker, model and serial number.
+    pub plate: [Option<String>; 3],
+}
+
+/// Who the machine is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct MachineIdentity {
+    machine: String,
+    box_id: String,
+    manufacturer: Option<String>,
+    model: Option<String>,
+    serial_number: Option<String>,
+}
+
+impl MachineIdentity {
+    fn of(target: &OpcuaTarget, outbox: &Outbox) -> Self {
+        let [manufacturer, model, serial_number] = target.plate.clone();
+        Self { machine: outbox.machine().to_owned(), box_id: outbox.box_id(), manufacturer, model, serial_number }
+    }
+
+    /// Names the machine over all plants.
+    fn uri(&self) -> String {
+        format!("{PRODUCT}:{}", self.box_id)
+    }
 }
 
 impl OpcuaTarget {
@@ -58,10 +84,11 @@ impl OpcuaTarget {
         let login = Login::of(keys);
         let anonymous = keys.choice("anonymous", &[("no", false), ("yes", true)]);
         let certificates = keys.text("certificates").map(PathBuf::from);
+        let plate = ["manufacturer", "model", "serial_number"].map(|key| keys.text(key));
         if !anonymous && login.user.is_none() {
             return Err("nobody could sign in: write user= and password_file=, or anonymous=yes".to_owned());
         }
-        Ok(Self { at: endpoint(body, Some(PORT))?, login, anonymous, certificates })
+        Ok(Self { at: endpoint(body, Some(PORT))?, login, anonymous, certificates, plate })
     }
 
     /// What is wrong with the files that the address names, each with what to do.
@@ -126,15 +153,18 @@ impl OpcuaSink {
             Content::Record(record) => {
                 match &**record {
                     Record::Alarm(alarm) => {
+                        running.raise(alarm);
                         self.alarms.insert(alarm.code.clone(), format!("{}: {}", alarm.code, alarm.en));
                     }
                     Record::AlarmClear(clear) => {
+                        running.clear(&clear.code, &clear.source, clear.at_ns);
                         self.alarms.remove(&clear.code);
                     }
                     _ => return,
                 }
                 running.tell_alarms(&self.standing(), item.at_ns);
             }
+            Content::Gap(_) | Content::Means { .. } => {}
         }
     }
 

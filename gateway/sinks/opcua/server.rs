@@ -1,13 +1,15 @@
 //! The server: users, values, and its task.
 
-use super::space::{self, Namespaces, Numbers, Shown};
-use super::{APPLICATION, OpcuaTarget, PRODUCT, SinkError, certificates, layout};
-use crate::history::{Outbox, Reading};
+use super::event::AlarmEvent;
+use super::space::{self, Namespaces, Numbers};
+use super::values::Shown;
+use super::{APPLICATION, MachineIdentity, OpcuaTarget, PRODUCT, SinkError, certificates, layout};
+use crate::history::{Alarm, Outbox, Reading};
 use adapters::clock::TimeNs;
 use opcua::crypto::{SecurityPolicy, X509Data};
 use opcua::server::node_manager::memory::{SimpleNodeManager, simple_node_manager_imports};
 use opcua::server::{ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken};
-use opcua::types::{DataValue, MessageSecurityMode, NodeId};
+use opcua::types::{DataValue, MessageSecurityMode, NodeId, ObjectId};
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -27,6 +29,7 @@ pub(super) struct Running {
     handle: ServerHandle,
     manager: Arc<SimpleNodeManager>,
     shown: Shown,
+    numbers: Numbers,
     task: JoinHandle<Result<(), String>>,
     rejected: PathBuf,
     counted: Mutex<Instant>,
@@ -67,15 +70,15 @@ impl Running {
             machinery: number(layout::MACHINERY)?,
             machine_tool: number(layout::MACHINE_TOOL)?,
         };
-        let (latest, name) = (outbox.latest(), (outbox.machine(), outbox.box_id()));
+        let (latest, identity) = (outbox.latest(), MachineIdentity::of(target, outbox));
         let shown = {
             let mut space = manager.address_space().write();
-            let shown = space::build(&mut space, numbers, (name.0, &name.1), &latest);
+            let shown = space::build(&mut space, numbers, &identity, &latest);
             space.load_into_type_tree(&mut handle.type_tree().write());
             shown
         };
         let task = tokio::spawn(server.run_with(listener));
-        let running = Self { handle, manager, shown, task, rejected, counted: Mutex::new(Instant::now()) };
+        let running = Self { handle, manager, shown, numbers, task, rejected, counted: Mutex::new(Instant::now()) };
         let at_ns = outbox.head().borrow().newest_ns.unwrap_or(0);
         running.tell(&latest, at_ns);
         Ok(running)
@@ -96,6 +99,22 @@ impl Running {
         self.put(&[self.shown.alarms(alarms, at_ns)]);
     }
 
+    /// An alarm begins: an event for whoever has subscribed to the messages, or to everything that the server sends.
+    pub(super) fn raise(&self, alarm: &Alarm) {
+        self.send(&AlarmEvent::raised(self.numbers, alarm));
+    }
+
+    /// An alarm has ended.
+    pub(super) fn clear(&self, code: &str, source: &str, at_ns: TimeNs) {
+        self.send(&AlarmEvent::cleared(self.numbers, code, source, at_ns));
+    }
+
+    fn send(&self, event: &AlarmEvent) {
+        let from = [NodeId::new(self.numbers.own, layout::MESSAGES), ObjectId::Server.into()];
+        let event: &dyn opcua::nodes::Event = event;
+        self.handle.subscriptions().notify_events(from.iter().map(|node| (event, node)));
+    }
+
     fn put(&self, values: &[(NodeId, DataValue)]) {
         let each = values.iter().map(|(node, value)| (node, None, value.clone()));
         // Every node of the list was made by `space::build`.
@@ -106,7 +125,7 @@ impl Running {
     #[cfg(test)]
     pub(super) fn alarms(&self) -> DataValue {
         let node = self.shown.alarms(&[], 0).0;
-        space::read(&self.manager.address_space().read(), &node).expect("made with the others")
+        super::values::read(&self.manager.address_space().read(), &node).expect("made with the others")
     }
 
     /// An error when the server has ended; keeps the number of strangers' certificates bounded.

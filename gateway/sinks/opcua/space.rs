@@ -1,22 +1,18 @@
-//! The nodes of a machine, and the values in them.
+//! The nodes of a machine.
 
-use super::layout::{self, Form};
-use super::{PRODUCT, units};
-use crate::history::{Cell, Reading, SeriesInfo, SeriesKind};
-use adapters::clock::TimeNs;
+use super::layout::{self, Form, StatePart};
+use super::values::{Shown, set_missing};
+use super::{MachineIdentity, units};
+use crate::history::{Reading, SeriesInfo, SeriesKind};
 use opcua::nodes::{
-    DataTypeBuilder, NodeSetImport, NodeSetNamespaceMapper, ObjectBuilder, ObjectTypeBuilder, VariableBuilder,
+    DataTypeBuilder, EventNotifier, NodeSetImport, NodeSetNamespaceMapper, ObjectBuilder, ObjectTypeBuilder,
+    VariableBuilder,
 };
 use opcua::server::address_space::AddressSpace;
 use opcua::types::{
-    DataTypeId, DataValue, DateTime, ExtensionObject, LocalizedText, NodeId, ObjectId, ObjectTypeId, QualifiedName,
-    Range, StatusCode, VariableTypeId, Variant,
+    DataTypeId, ExtensionObject, LocalizedText, NodeId, ObjectId, ObjectTypeId, QualifiedName, Range, StatusCode,
+    VariableTypeId, Variant,
 };
-use std::collections::HashMap;
-use std::sync::Arc;
-
-/// Hundred nanoseconds between 1601, where times of OPC UA begin, and 1970.
-const EPOCH_TICKS: i64 = 116_444_736_000_000_000;
 
 /// Makes the namespaces known to the server; the nodes come later, when their numbers are known.
 pub(super) struct Namespaces;
@@ -49,98 +45,14 @@ pub(super) struct Numbers {
     pub(super) machine_tool: u16,
 }
 
-/// Which nodes show a series, each with how.
-#[derive(Debug)]
-pub(super) struct Shown {
-    nodes: HashMap<Arc<str>, Vec<(NodeId, Option<Form>)>>,
-    alarms: NodeId,
-}
-
-impl Shown {
-    /// The nodes of these readings with their new values.
-    pub(super) fn values(&self, readings: &[Reading], at_ns: TimeNs) -> Vec<(NodeId, DataValue)> {
-        let of = |reading: &Reading| {
-            let nodes = self.nodes.get(&reading.series.name).into_iter().flatten();
-            let value = |(node, form): &(NodeId, Option<Form>)| (node.clone(), value(&reading.value, *form, at_ns));
-            nodes.map(value).collect::<Vec<_>>()
-        };
-        readings.iter().flat_map(of).collect()
-    }
-
-    /// All of them without a value: nothing has come for too long.
-    pub(super) fn nothing(&self) -> Vec<(NodeId, DataValue)> {
-        let all = self.nodes.values().flatten().map(|(node, _)| node).chain([&self.alarms]);
-        all.map(|node| (node.clone(), missing(StatusCode::BadNoCommunication))).collect()
-    }
-
-    /// The node of the alarms of the gateway with those that stand.
-    pub(super) fn alarms(&self, standing: &[String], at_ns: TimeNs) -> (NodeId, DataValue) {
-        (self.alarms.clone(), known(Variant::from(standing.to_vec()), at_ns))
-    }
-}
-
-fn value(cell: &Cell, form: Option<Form>, at_ns: TimeNs) -> DataValue {
-    let variant = match (cell, form) {
-        (Cell::Number(number), Some(Form::Rotating)) => Ok(Variant::from(layout::rotates(*number))),
-        (Cell::Number(number), _) => Ok(Variant::from(*number)),
-        (Cell::Text(word), Some(Form::Word(_, number))) => Ok(Variant::from(number(word))),
-        (Cell::Text(text), _) => Ok(Variant::from(&**text)),
-        (Cell::Missing(reason), _) => Err(absent(reason)),
-    };
-    match variant {
-        Ok(variant) => known(variant, at_ns),
-        Err(status) => DataValue { source_timestamp: Some(time(at_ns)), ..missing(status) },
-    }
-}
-
-fn known(variant: Variant, at_ns: TimeNs) -> DataValue {
-    DataValue {
-        value: Some(variant),
-        status: Some(StatusCode::Good),
-        source_timestamp: Some(time(at_ns)),
-        server_timestamp: Some(DateTime::now()),
-        ..DataValue::default()
-    }
-}
-
-fn missing(status: StatusCode) -> DataValue {
-    DataValue {
-        // Not `None`: a node of the library forgets the status of a value that is not there, and then it would be read as good.
-        value: Some(Variant::Empty),
-        status: Some(status),
-        server_timestamp: Some(DateTime::now()),
-        ..DataValue::default()
-    }
-}
-
-fn set_missing(space: &mut AddressSpace, node: &NodeId, status: StatusCode) {
-    if let Some(opcua::nodes::NodeType::Variable(variable)) = space.find_mut(node) {
-        variable.set_data_value(missing(status));
-    }
-}
-
-fn time(at_ns: TimeNs) -> DateTime {
-    DateTime::from(at_ns.div_euclid(100).saturating_add(EPOCH_TICKS))
-}
-
-/// The status that says why there is no value.
-fn absent(reason: &str) -> StatusCode {
-    match reason {
-        "not_provided" | "not_supported" => StatusCode::BadNotSupported,
-        "machine_off" | "disconnected" | "timeout" | "stale" => StatusCode::BadNoCommunication,
-        "not_yet_read" => StatusCode::BadWaitingForInitialData,
-        "out_of_range" => StatusCode::BadOutOfRange,
-        _ => StatusCode::BadNoData,
-    }
-}
-
 /// Builds the nodes of the machine of this name and box, with one for each series.
 pub(super) fn build(
     space: &mut AddressSpace,
     numbers: Numbers,
-    (machine, box_id): (&str, &str),
+    identity: &MachineIdentity,
     series: &[Reading],
 ) -> Shown {
+    let machine = identity.machine.as_str();
     types(space, numbers);
     let machines = NodeId::new(numbers.machinery, layout::MACHINES);
     ObjectBuilder::new(&machines, QualifiedName::new(numbers.machinery, "Machines"), "Machines")
@@ -156,20 +68,31 @@ pub(super) fn build(
         let (parent, name) = path.rsplit_once('/').unwrap_or(("Machine", path));
         // The identification comes from the specification of devices, the rest from that of machine tools.
         let namespace = if name == "Identification" { numbers.devices } else { numbers.machine_tool };
-        ObjectBuilder::new(&NodeId::new(numbers.own, path), QualifiedName::new(namespace, name), name)
+        let object = ObjectBuilder::new(&NodeId::new(numbers.own, path), QualifiedName::new(namespace, name), name)
             .has_type_definition(NodeId::new(numbers.machine_tool, kind))
-            .component_of(NodeId::new(numbers.own, parent))
-            .insert(space);
+            .component_of(NodeId::new(numbers.own, parent));
+        let sends = if path == layout::MESSAGES { EventNotifier::SUBSCRIBE_TO_EVENTS } else { EventNotifier::empty() };
+        object.event_notifier(sends).insert(space);
     }
-    identification(space, numbers, (machine, box_id));
-    let mut shown = Shown { nodes: HashMap::new(), alarms: alarms(space, numbers) };
+    identification(space, numbers, identity);
+    let mut shown = Shown::new(numbers, alarms(space, numbers));
     for (object, name, channel, form) in layout::VARIABLES {
         let Some(reading) = series.iter().find(|reading| &*reading.series.name == channel) else { continue };
         let node = NodeId::new(numbers.own, format!("{object}/{name}"));
-        let variable = VariableBuilder::new(&node, QualifiedName::new(numbers.machine_tool, name), name)
+        // The state machine is one of the base specification.
+        let namespace = if matches!(form, Form::State(_)) { 0 } else { numbers.machine_tool };
+        let variable = VariableBuilder::new(&node, QualifiedName::new(namespace, name), name)
             .component_of(NodeId::new(numbers.own, object));
         typed(space, numbers, variable, &reading.series, Some(form));
-        shown.nodes.entry(reading.series.name.clone()).or_default().push((node, Some(form)));
+        shown.add(&reading.series.name, node, Some(form));
+    }
+    for (variable, name, channel, form) in layout::PROPERTIES {
+        let Some(reading) = series.iter().find(|reading| &*reading.series.name == channel) else { continue };
+        let node = NodeId::new(numbers.own, format!("{variable}/{name}"));
+        let property = VariableBuilder::new(&node, QualifiedName::new(0, name), name)
+            .property_of(NodeId::new(numbers.own, variable));
+        typed(space, numbers, property, &reading.series, Some(form));
+        shown.add(&reading.series.name, node, Some(form));
     }
     values(space, numbers, series, &mut shown);
     shown
@@ -189,7 +112,7 @@ fn values(space: &mut AddressSpace, numbers: Numbers, series: &[Reading], shown:
             .description(LocalizedText::new("en", &reading.series.en))
             .component_of(folder.clone());
         typed(space, numbers, variable, &reading.series, None);
-        shown.nodes.entry(name.clone()).or_default().push((node, None));
+        shown.add(name, node, None);
     }
 }
 
@@ -211,6 +134,18 @@ fn typed(
         Some(Form::Rotating) => {
             let variable = variable.data_type(DataTypeId::Boolean);
             variable.has_type_definition(VariableTypeId::BaseDataVariableType).insert(space);
+        }
+        Some(Form::Hours) => {
+            let variable = variable.data_type(DataTypeId::UInt32);
+            variable.has_type_definition(VariableTypeId::BaseDataVariableType).insert(space);
+        }
+        Some(Form::State(part)) => {
+            let (data, kind) = match part {
+                StatePart::Name => (DataTypeId::LocalizedText, VariableTypeId::FiniteStateVariableType),
+                StatePart::Node => (DataTypeId::NodeId, VariableTypeId::PropertyType),
+                StatePart::Number => (DataTypeId::UInt32, VariableTypeId::PropertyType),
+            };
+            variable.data_type(data).has_type_definition(kind).insert(space);
         }
         _ if series.kind == SeriesKind::Number => {
             variable.data_type(DataTypeId::Double).has_type_definition(VariableTypeId::AnalogUnitType).insert(space);
@@ -255,14 +190,15 @@ fn alarms(space: &mut AddressSpace, numbers: Numbers) -> NodeId {
     node
 }
 
-/// What the box knows of the machine's identity: the name that it was given. Maker and serial number are not told by a controller.
-fn identification(space: &mut AddressSpace, numbers: Numbers, (machine, box_id): (&str, &str)) {
-    let uri = format!("{PRODUCT}:{box_id}");
+/// What is known of the machine's identity: no controller tells its maker and serial number, so a person has to.
+fn identification(space: &mut AddressSpace, numbers: Numbers, identity: &MachineIdentity) {
+    let localized = |text: &String| Variant::from(LocalizedText::new("", text));
     let rows = [
-        ("Manufacturer", DataTypeId::LocalizedText, None),
-        ("SerialNumber", DataTypeId::String, None),
-        ("ProductInstanceUri", DataTypeId::String, Some(Variant::from(uri.as_str()))),
-        ("ComponentName", DataTypeId::LocalizedText, Some(Variant::from(LocalizedText::new("", machine)))),
+        ("Manufacturer", DataTypeId::LocalizedText, identity.manufacturer.as_ref().map(localized)),
+        ("Model", DataTypeId::LocalizedText, identity.model.as_ref().map(localized)),
+        ("SerialNumber", DataTypeId::String, identity.serial_number.as_ref().map(|text| Variant::from(text.as_str()))),
+        ("ProductInstanceUri", DataTypeId::String, Some(Variant::from(identity.uri().as_str()))),
+        ("ComponentName", DataTypeId::LocalizedText, Some(localized(&identity.machine))),
     ];
     for (name, kind, value) in rows {
         let node = NodeId::new(numbers.own, format!("Identification/{name}"));
@@ -287,37 +223,26 @@ fn types(space: &mut AddressSpace, numbers: Numbers) {
             .subtype_of(ObjectTypeId::BaseObjectType)
             .insert(space);
     }
+    let (number, name) = layout::NOTIFICATION_EVENT;
+    let notification = NodeId::new(numbers.machine_tool, number);
+    ObjectTypeBuilder::new(&notification, QualifiedName::new(numbers.machine_tool, name), name)
+        .is_abstract(true)
+        .subtype_of(ObjectTypeId::BaseEventType)
+        .insert(space);
+    let identifier = NodeId::new(numbers.own, format!("{name}/Identifier"));
+    VariableBuilder::new(&identifier, QualifiedName::new(numbers.machine_tool, "Identifier"), "Identifier")
+        .data_type(DataTypeId::String)
+        .has_type_definition(VariableTypeId::PropertyType)
+        .property_of(notification.clone())
+        .insert(space);
+    let own = NodeId::new(numbers.own, layout::MESSAGE_EVENT);
+    ObjectTypeBuilder::new(&own, QualifiedName::new(numbers.own, layout::MESSAGE_EVENT), layout::MESSAGE_EVENT)
+        .subtype_of(notification)
+        .insert(space);
     for (number, name) in layout::ENUMERATIONS {
         let node = NodeId::new(numbers.machine_tool, number);
         DataTypeBuilder::new(&node, QualifiedName::new(numbers.machine_tool, name), name)
             .subtype_of(DataTypeId::Enumeration)
             .insert(space);
-    }
-}
-
-/// The value of a node as a client reads it.
-#[cfg(test)]
-pub(super) fn read(space: &AddressSpace, node: &NodeId) -> Option<DataValue> {
-    use opcua::types::{AttributeId, DataEncoding, NumericRange, TimestampsToReturn};
-    let (stamps, encoding) = (TimestampsToReturn::Both, DataEncoding::Binary);
-    space.find(node)?.as_node().get_attribute(stamps, AttributeId::Value, &NumericRange::None, &encoding)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_missing_is_never_read_as_good() {
-        let mut space = AddressSpace::new();
-        space.add_namespace(layout::OWN, 1);
-        let node = NodeId::new(1, "it");
-        VariableBuilder::new(&node, "it", "it").value(1.0).data_type(DataTypeId::Double).insert(&mut space);
-        for reason in ["not_provided", "timeout", "not_yet_read", "out_of_range", "stale", "not_learned"] {
-            let status = absent(reason);
-            assert!(status.is_bad(), "{reason}");
-            set_missing(&mut space, &node, status);
-            assert_eq!(read(&space, &node).and_then(|value| value.status), Some(status), "{reason}");
-        }
     }
 }

@@ -1,127 +1,198 @@
 //! `devices.xml`: what an MTConnect agent must know of the machine before it reads the lines.
 //!
-//! Source: MTConnect Standard 1.6, Part 2, and its schema `MTConnectDevices_1.6.xsd`.
+//! Source: MTConnect Standard 1.4, Part 2, and its schema `MTConnectDevices_1.4.xsd`.
 
-use super::model::{ALARMS, AVAILABILITY, Category, Component, DataItem, ITEMS};
+use super::conditions::{self, AlarmKind};
+use super::model::{AVAILABILITY, Category, Component, DataItem, ITEMS};
 use std::fmt::Write;
 
-/// The document for a machine of this name. `delivered` tells of a channel whether the machine has it.
-#[must_use]
-pub fn devices_xml(machine: &str, created_utc: &str, delivered: impl Fn(&str) -> bool) -> String {
-    let items: Vec<&DataItem> = ITEMS.iter().filter(|item| delivered(item.channel)).collect();
-    let (name, uuid) = (xml_name(machine), uuid(machine));
-    let mut out = format!(
+/// The machine in the file of an agent.
+#[derive(Debug, Clone, Copy)]
+pub struct Described<'a> {
+    /// Its name, as people know it.
+    pub machine: &'a str,
+    /// The name of the box: the `uuid`, and the name under which the agent's `Adapters` refer to it.
+    pub box_id: &'a str,
+    /// What every identifier begins with, so that several machines can stand in one agent.
+    pub prefix: &'a str,
+}
+
+/// The document. `delivered` tells of a channel whether the machine has it; `others` are such documents of other machines, which stand in
+/// the same agent.
+///
+/// # Errors
+/// Which of the others is none, or has the identifiers of another machine.
+pub fn devices_xml(
+    described: Described<'_>,
+    created_utc: &str,
+    delivered: impl Fn(&str) -> bool,
+    others: &[(String, String)],
+) -> Result<String, String> {
+    let mut devices = vec![device(described, delivered)];
+    for (name, text) in others {
+        let found = devices_of(text);
+        if found.is_empty() {
+            return Err(format!("{name} holds no device that `cnc-gateway devices` wrote"));
+        }
+        for one in found {
+            if devices.iter().any(|known| first_id(known) == first_id(one)) {
+                return Err(format!(
+                    "{name} has a machine with the identifiers of another one: give each its own --prefix"
+                ));
+            }
+            devices.push(format!("{one}\n"));
+        }
+    }
+    Ok(format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <MTConnectDevices xmlns:m=\"urn:mtconnect.org:MTConnectDevices:1.6\" \
-         xmlns=\"urn:mtconnect.org:MTConnectDevices:1.6\" xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" \
-         xsi:schemaLocation=\"urn:mtconnect.org:MTConnectDevices:1.6 \
-         http://schemas.mtconnect.org/schemas/MTConnectDevices_1.6.xsd\">\n\
+         <MTConnectDevices xmlns:m=\"urn:mtconnect.org:MTConnectDevices:1.4\" \
+         xmlns=\"urn:mtconnect.org:MTConnectDevices:1.4\" xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" \
+         xsi:schemaLocation=\"urn:mtconnect.org:MTConnectDevices:1.4 \
+         http://schemas.mtconnect.org/schemas/MTConnectDevices_1.4.xsd\">\n\
          \u{20} <Header creationTime=\"{created_utc}\" sender=\"cnc-gateway\" instanceId=\"1\" bufferSize=\"131072\" \
-         assetBufferSize=\"1024\" assetCount=\"0\" version=\"1.6.0.0\"/>\n  <Devices>\n    \
-         <Device id=\"machine\" name=\"{name}\" uuid=\"{uuid}\">\n"
-    );
-    let mut put = |indent: usize, line: &str| {
+         assetBufferSize=\"1024\" assetCount=\"0\" version=\"1.4.0.0\"/>\n  <Devices>\n{}  </Devices>\n</MTConnectDevices>\n",
+        devices.concat()
+    ))
+}
+
+const BEGIN: &str = "    <Device ";
+const END: &str = "</Device>";
+
+/// The devices of a document that this wrote.
+fn devices_of(text: &str) -> Vec<&str> {
+    let begins = text.match_indices(BEGIN).map(|(at, _)| at);
+    begins.filter_map(|begin| text[begin..].find(END).map(|end| &text[begin..begin + end + END.len()])).collect()
+}
+
+fn first_id(device: &str) -> &str {
+    device.split('"').nth(1).unwrap_or_default()
+}
+
+/// Writes one component after the other.
+struct Tree<'a> {
+    out: String,
+    prefix: &'a str,
+    items: Vec<&'static DataItem>,
+}
+
+impl Tree<'_> {
+    fn put(&mut self, indent: usize, line: &str) {
         // Writing to a string cannot fail.
-        let _ = writeln!(out, "{:indent$}{line}", "");
-    };
-    put(6, &format!("<Description>{}</Description>", escaped(machine)));
-    put(6, "<DataItems>");
-    put(
-        8,
-        &format!("<DataItem id=\"{AVAILABILITY}\" name=\"{AVAILABILITY}\" category=\"EVENT\" type=\"AVAILABILITY\"/>"),
-    );
-    put(6, "</DataItems>");
-    put(6, "<Components>");
-    let of = |component| items.iter().copied().filter(|item| item.component == component).collect::<Vec<_>>();
-    axes(&of, &mut put);
-    controller(&of, &mut put);
-    systems(&of, &mut put);
-    put(6, "</Components>");
-    out + "    </Device>\n  </Devices>\n</MTConnectDevices>\n"
-}
-
-/// Identifies the machine over all agents of a plant.
-#[must_use]
-pub(super) fn uuid(machine: &str) -> String {
-    format!("cnc-gateway-{}", xml_name(machine))
-}
-
-type Of<'a> = dyn Fn(Component) -> Vec<&'a DataItem> + 'a;
-type WriteLine<'a> = dyn FnMut(usize, &str) + 'a;
-
-fn axes(of: &Of<'_>, put: &mut WriteLine<'_>) {
-    let parts = [
-        (Component::Spindle, "Rotary", "spindle", "C"),
-        (Component::X, "Linear", "x_axis", "X"),
-        (Component::Y, "Linear", "y_axis", "Y"),
-        (Component::Z, "Linear", "z_axis", "Z"),
-    ];
-    group(put, "Axes", "axes", &parts.map(|(part, tag, id, name)| (tag, id, Some(name), of(part))));
-}
-
-fn controller(of: &Of<'_>, put: &mut WriteLine<'_>) {
-    put(8, "<Controller id=\"controller\" name=\"controller\">");
-    put(10, "<DataItems>");
-    of(Component::Controller).iter().for_each(|item| put(12, &data_item(item)));
-    put(12, &format!("<DataItem id=\"{ALARMS}\" name=\"{ALARMS}\" category=\"CONDITION\" type=\"SYSTEM\"/>"));
-    put(10, "</DataItems>");
-    let path = of(Component::Path);
-    if !path.is_empty() {
-        put(10, "<Components>");
-        component(put, 12, "Path", "path", Some("path"), &path);
-        put(10, "</Components>");
+        let _ = writeln!(self.out, "{:indent$}{line}", "");
     }
-    put(8, "</Controller>");
-}
 
-fn systems(of: &Of<'_>, put: &mut WriteLine<'_>) {
-    let systems = [(Component::Electric, "Electric", "electric"), (Component::Coolant, "Coolant", "coolant")];
-    group(put, "Systems", "systems", &systems.map(|(part, tag, id)| (tag, id, None, of(part))));
-    let around = [("Environmental", "environment", None, of(Component::Environment))];
-    group(put, "Auxiliaries", "auxiliaries", &around);
-}
-
-/// A component that only holds others; left out where they are all empty.
-fn group(put: &mut WriteLine<'_>, tag: &str, id: &str, parts: &[(&str, &str, Option<&str>, Vec<&DataItem>)]) {
-    if parts.iter().all(|(.., items)| items.is_empty()) {
-        return;
+    /// The data items and conditions of a component.
+    fn data_items(&mut self, indent: usize, component: Component) {
+        let prefix = self.prefix;
+        let items: Vec<String> =
+            self.items.iter().filter(|item| item.component == component).map(|item| data_item(prefix, item)).collect();
+        let conditions = conditions::ALL.iter().filter(|condition| condition.component == component);
+        let lines: Vec<String> =
+            items.into_iter().chain(conditions.map(|condition| condition_item(prefix, condition))).collect();
+        self.put(indent, "<DataItems>");
+        lines.iter().for_each(|line| self.put(indent + 2, line));
+        self.put(indent, "</DataItems>");
     }
-    put(8, &format!("<{tag} id=\"{id}\">"));
-    put(10, "<Components>");
-    for (tag, id, name, items) in parts.iter().filter(|(.., items)| !items.is_empty()) {
-        component(put, 12, tag, id, *name, items);
+
+    fn is_empty(&self, component: Component) -> bool {
+        !self.items.iter().any(|item| item.component == component)
+            && !conditions::ALL.iter().any(|condition| condition.component == component)
     }
-    put(10, "</Components>");
-    put(8, &format!("</{tag}>"));
+
+    fn open(&mut self, indent: usize, tag: &str, id: &str, name: &str) {
+        let prefix = self.prefix;
+        self.put(indent, &format!("<{tag} id=\"{prefix}{id}\" name=\"{name}\">"));
+    }
+
+    fn leaf(&mut self, indent: usize, (component, tag, id, name): DevicePart) {
+        if self.is_empty(component) {
+            return;
+        }
+        self.open(indent, tag, id, name);
+        self.data_items(indent + 2, component);
+        self.put(indent, &format!("</{tag}>"));
+    }
+
+    /// A component that holds others, and what stands at itself.
+    fn group(&mut self, (own, tag, id): (Option<Component>, &str, &str), parts: &[DevicePart]) {
+        if own.is_none() && parts.iter().all(|(component, ..)| self.is_empty(*component)) {
+            return;
+        }
+        self.open(8, tag, id, id);
+        if let Some(own) = own {
+            self.data_items(10, own);
+        }
+        if parts.iter().any(|(component, ..)| !self.is_empty(*component)) {
+            self.put(10, "<Components>");
+            parts.iter().for_each(|part| self.leaf(12, *part));
+            self.put(10, "</Components>");
+        }
+        self.put(8, &format!("</{tag}>"));
+    }
 }
 
-fn component(put: &mut WriteLine<'_>, indent: usize, tag: &str, id: &str, name: Option<&str>, items: &[&DataItem]) {
-    // A name is optional in the standard; some agents cannot do without.
-    put(indent, &format!("<{tag} id=\"{id}\" name=\"{}\">", name.unwrap_or(id)));
-    put(indent + 2, "<DataItems>");
-    items.iter().for_each(|item| put(indent + 4, &data_item(item)));
-    put(indent + 2, "</DataItems>");
-    put(indent, &format!("</{tag}>"));
+/// Component, its tag, identifier and name. A name is optional in the standard; some agents cannot do without.
+type DevicePart = (Component, &'static str, &'static str, &'static str);
+
+const AXES: [DevicePart; 4] = [
+    (Component::Spindle, "Rotary", "spindle", "C"),
+    (Component::X, "Linear", "x_axis", "X"),
+    (Component::Y, "Linear", "y_axis", "Y"),
+    (Component::Z, "Linear", "z_axis", "Z"),
+];
+const SYSTEMS: [DevicePart; 2] =
+    [(Component::Electric, "Electric", "electric", "electric"), (Component::Coolant, "Coolant", "coolant", "coolant")];
+
+fn device(described: Described<'_>, delivered: impl Fn(&str) -> bool) -> String {
+    let Described { machine, box_id, prefix } = described;
+    let items = ITEMS.iter().filter(|item| delivered(item.channel)).collect();
+    let mut tree = Tree { out: String::new(), prefix, items };
+    tree.put(4, &format!("<Device id=\"{prefix}machine\" name=\"{box_id}\" uuid=\"{box_id}\">"));
+    tree.put(6, &format!("<Description>{}</Description>", escaped(machine)));
+    tree.put(6, "<DataItems>");
+    let availability = format!("id=\"{prefix}{AVAILABILITY}\" name=\"{AVAILABILITY}\" category=\"EVENT\"");
+    tree.put(8, &format!("<DataItem {availability} type=\"AVAILABILITY\"/>"));
+    tree.put(6, "</DataItems>");
+    tree.put(6, "<Components>");
+    tree.group((Some(Component::Axes), "Axes", "axes"), &AXES);
+    tree.group((Some(Component::Controller), "Controller", "controller"), &[(Component::Path, "Path", "path", "path")]);
+    tree.group((None, "Systems", "systems"), &SYSTEMS);
+    // The standard has a component of its own for it from 1.6 on.
+    tree.leaf(8, (Component::Environment, "Sensor", "environment", "environment"));
+    tree.put(6, "</Components>");
+    tree.put(4, END);
+    tree.out
 }
 
-fn data_item(item: &DataItem) -> String {
+fn data_item(prefix: &str, item: &DataItem) -> String {
     let category = if item.category == Category::Sample { "SAMPLE" } else { "EVENT" };
-    let (id, kind) = (item.channel, item.kind);
+    let (name, kind) = (item.channel, item.kind);
     let optional =
         |name: &str, value: Option<&str>| value.map_or(String::new(), |value| format!(" {name}=\"{value}\""));
     format!(
-        "<DataItem id=\"{id}\" name=\"{id}\" category=\"{category}\" type=\"{kind}\"{}{}{}/>",
+        "<DataItem id=\"{prefix}{name}\" name=\"{name}\" category=\"{category}\" type=\"{kind}\"{}{}{}/>",
         optional("subType", item.sub_type),
         optional("units", item.units),
         optional("nativeUnits", item.native_units)
     )
 }
 
-/// A name as XML allows it: begins with a letter, no blanks.
-fn xml_name(text: &str) -> String {
-    let plain = |letter: char| if letter.is_ascii_alphanumeric() || letter == '-' { letter } else { '_' };
-    let name: String = text.chars().map(plain).collect();
-    if name.starts_with(|first: char| first.is_ascii_alphabetic()) { name } else { format!("machine_{name}") }
+fn condition_item(prefix: &str, condition: &AlarmKind) -> String {
+    let AlarmKind { name, kind, .. } = condition;
+    format!("<DataItem id=\"{prefix}{name}\" name=\"{name}\" category=\"CONDITION\" type=\"{kind}\"/>")
+}
+
+/// What identifiers begin with where nobody says otherwise: the digits of the box, behind a letter as XML wants it.
+#[must_use]
+pub fn prefix_of(box_id: &str) -> String {
+    format!("m{}_", box_id.rsplit('-').next().unwrap_or_default())
+}
+
+/// Can identifiers of XML begin with this?
+#[must_use]
+pub fn is_prefix(text: &str) -> bool {
+    text.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
+        && text.chars().all(|letter| letter.is_ascii_alphanumeric() || "-_.".contains(letter))
 }
 
 fn escaped(text: &str) -> String {

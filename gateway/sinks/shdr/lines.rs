@@ -2,74 +2,131 @@
 //!
 //! Source: MTConnect agent, "Adapter Agent Protocol" (SHDR): data items, conditions, assets, heartbeat.
 
-use super::devices::uuid;
-use super::model::{ALARMS, AVAILABILITY, UNAVAILABLE, of_channel};
+use super::conditions::{self, AlarmKind, OWN};
+use super::model::{AVAILABILITY, UNAVAILABLE, of_channel};
 use crate::history::{Alarm, Cell, Content, Item, Reading, Record};
 use crate::moment;
+use adapters::clock::TimeNs;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// A line without its time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Line {
+    pub(super) at_ns: TimeNs,
+    pub(super) body: String,
+}
+
+/// The lines with their times. Each agent is told times that never go back, from `least_ns` on: an agent that has lost its
+/// adapter notes every value as unavailable with the time of its own clock, and what it is told then must come after that.
+pub(super) fn stamped(lines: &[Line], least_ns: &mut TimeNs) -> String {
+    let mut text = String::new();
+    for Line { at_ns, body } in lines {
+        *least_ns = (*least_ns).max(*at_ns);
+        text += &moment::utc(*least_ns);
+        text.push('|');
+        text += body;
+        text.push('\n');
+    }
+    text
+}
 
 /// What an agent that connects now must be told.
 #[derive(Debug, Default)]
 pub(super) struct Machine {
-    name: String,
-    at_utc: String,
+    box_id: String,
+    at_ns: TimeNs,
     values: BTreeMap<&'static str, String>,
-    /// Alarms that stand, by code.
-    alarms: BTreeMap<String, Alarm>,
+    /// Does the controller tell whether there are alarms?
+    alarms_known: bool,
+    /// Alarms that stand, by source and code.
+    alarms: BTreeMap<(String, String), Alarm>,
     tools: BTreeSet<String>,
 }
 
 impl Machine {
-    pub(super) fn new(name: &str, latest: &[Reading], at_ns: i64) -> Self {
-        let mut machine = Self { name: name.to_owned(), at_utc: moment::utc(at_ns), ..Self::default() };
+    pub(super) fn new(box_id: &str, latest: &[Reading], at_ns: TimeNs) -> Self {
+        let mut machine = Self { box_id: box_id.to_owned(), at_ns, ..Self::default() };
         machine.take(latest);
         machine
     }
 
-    /// Everything that an agent must know at the beginning.
-    pub(super) fn greeting(&self) -> String {
-        let at = &self.at_utc;
-        let mut text = format!("* shdrVersion: 2.0\n{at}|{AVAILABILITY}|AVAILABLE\n");
-        text += &line(at, self.values.iter().map(|(name, value)| (*name, value.as_str())));
-        text += &format!("{at}|{ALARMS}|NORMAL||||\n");
-        self.alarms.values().for_each(|alarm| text += &condition(alarm));
-        self.tools.iter().for_each(|tool| text += &self.asset(tool));
-        text
+    /// Everything that an agent must know at the beginning, as of `now_ns`.
+    pub(super) fn greeting(&self, now_ns: TimeNs) -> Vec<Line> {
+        let at_ns = self.at_ns.max(now_ns);
+        let line = |body| Line { at_ns, body };
+        let mut lines = vec![line(format!("{AVAILABILITY}|AVAILABLE"))];
+        let values = cells(self.values.iter().map(|(name, value)| (*name, value.as_str())));
+        lines.extend(values.map(line));
+        lines.extend(self.standing().into_iter().map(line));
+        lines.extend(self.tools.iter().map(|tool| line(self.asset(tool, at_ns))));
+        lines
     }
 
-    /// The lines of an item; empty where the standard has no counterpart.
-    pub(super) fn lines(&mut self, item: &Item) -> String {
-        self.at_utc = moment::utc(item.at_ns);
-        match &item.content {
-            Content::Sample(readings) => {
-                let (changed, tool) = (self.take(readings), self.new_tool(readings));
-                let values = changed.iter().map(|(name, value)| (*name, value.as_str()));
-                let asset = tool.map(|tool| self.asset(&tool)).unwrap_or_default();
-                [line(&self.at_utc, values), asset].concat()
-            }
+    /// Every condition as it stands.
+    fn standing(&self) -> Vec<String> {
+        let level = if self.alarms_known { "NORMAL" } else { UNAVAILABLE };
+        let basis = conditions::ALL.iter().map(|condition| {
+            let level = if *condition == OWN { "NORMAL" } else { level };
+            format!("{}|{level}||||", condition.name)
+        });
+        basis.chain(self.alarms.values().flat_map(raised)).collect()
+    }
+
+    /// The lines of an item; none where the standard has no counterpart.
+    pub(super) fn lines(&mut self, item: &Item) -> Vec<Line> {
+        self.at_ns = self.at_ns.max(item.at_ns);
+        let bodies = match &item.content {
+            Content::Sample(readings) => self.sample(readings, item.at_ns),
             Content::Record(record) => match &**record {
                 Record::Alarm(alarm) => {
-                    self.alarms.insert(alarm.code.clone(), alarm.clone());
-                    condition(alarm)
+                    self.alarms.insert((alarm.source.clone(), alarm.code.clone()), alarm.clone());
+                    raised(alarm)
                 }
                 Record::AlarmClear(clear) => {
-                    self.alarms.remove(&clear.code);
-                    format!("{}|{ALARMS}|NORMAL|{}|||\n", self.at_utc, plain(&clear.code))
+                    self.alarms.remove(&(clear.source.clone(), clear.code.clone()));
+                    let normal = |(condition, code, _): (&AlarmKind, String, String)| {
+                        format!("{}|NORMAL|{code}|||", condition.name)
+                    };
+                    conditions::parts(&clear.source, &clear.code, "").map(normal).collect()
                 }
-                _ => String::new(),
+                _ => Vec::new(),
             },
+            Content::Gap(_) => self.forget(),
+            Content::Means { .. } => Vec::new(),
+        };
+        bodies.into_iter().map(|body| Line { at_ns: item.at_ns, body }).collect()
+    }
+
+    fn sample(&mut self, readings: &[Reading], at_ns: TimeNs) -> Vec<String> {
+        let known = self.alarms_known;
+        let (changed, tool) = (self.take(readings), self.new_tool(readings));
+        let mut lines: Vec<String> = cells(changed.iter().map(|(name, value)| (*name, value.as_str()))).collect();
+        if known != self.alarms_known {
+            lines.extend(self.standing());
         }
+        lines.extend(tool.map(|tool| self.asset(&tool, at_ns)));
+        lines
+    }
+
+    /// There were no samples from here on.
+    fn forget(&mut self) -> Vec<String> {
+        self.values.values_mut().for_each(|value| UNAVAILABLE.clone_into(value));
+        cells(self.values.iter().map(|(name, value)| (*name, value.as_str()))).collect()
     }
 
     fn take(&mut self, readings: &[Reading]) -> Vec<(&'static str, String)> {
-        let changed = readings.iter().filter_map(|reading| {
-            let item = of_channel(&reading.series.name).filter(|_| !reading.series.estimated)?;
+        let mut changed = Vec::new();
+        for reading in readings.iter().filter(|reading| !reading.series.estimated) {
+            if &*reading.series.name == "alarm" {
+                self.alarms_known = matches!(reading.value, Cell::Text(_));
+            }
+            let Some(item) = of_channel(&reading.series.name) else { continue };
             // What the machine has never delivered need not stand in its `devices.xml`.
             let never = matches!(&reading.value, Cell::Missing(reason) if **reason == *"not_provided");
-            let known = self.values.contains_key(item.channel);
-            (known || !never).then(|| (item.channel, shown(&reading.value)))
-        });
-        let changed: Vec<(&'static str, String)> = changed.collect();
+            if self.values.contains_key(item.channel) || !never {
+                changed.push((item.channel, item.form.shown(&reading.value)));
+            }
+        }
         self.values.extend(changed.iter().cloned());
         changed
     }
@@ -83,43 +140,85 @@ impl Machine {
     }
 
     /// A tool that was in use, as an asset of the standard.
-    fn asset(&self, tool: &str) -> String {
-        let (at, device, tool) = (&self.at_utc, uuid(&self.name), attribute(tool));
+    fn asset(&self, tool: &str, at_ns: TimeNs) -> String {
+        let (at, device, tool) = (moment::utc(at_ns), &self.box_id, attribute(tool));
         let id = format!("{device}.{tool}");
         format!(
-            "{at}|@ASSET@|{id}|CuttingTool|<CuttingTool serialNumber=\"{tool}\" toolId=\"{tool}\" timestamp=\"{at}\" \
+            "@ASSET@|{id}|CuttingTool|<CuttingTool serialNumber=\"{tool}\" toolId=\"{tool}\" timestamp=\"{at}\" \
              assetId=\"{id}\" deviceUuid=\"{device}\"><CuttingToolLifeCycle><CutterStatus><Status>USED</Status></CutterStatus>\
-             </CuttingToolLifeCycle></CuttingTool>\n"
+             </CuttingToolLifeCycle></CuttingTool>"
         )
     }
 }
 
-fn line<'a>(at: &str, values: impl Iterator<Item = (&'a str, &'a str)>) -> String {
-    let cells: String = values.map(|(name, value)| format!("|{name}|{value}")).collect();
-    if cells.is_empty() { cells } else { format!("{at}{cells}\n") }
+/// Names and values on one line; none for no values.
+fn cells<'a>(values: impl Iterator<Item = (&'a str, &'a str)>) -> impl Iterator<Item = String> {
+    let cells: Vec<String> = values.map(|(name, value)| format!("{name}|{value}")).collect();
+    Some(cells.join("|")).filter(|line| !line.is_empty()).into_iter()
 }
 
-fn condition(alarm: &Alarm) -> String {
+/// An alarm is one condition for each alarm of the control that it names.
+fn raised(alarm: &Alarm) -> Vec<String> {
     let level = if alarm.severity == "critical" { "FAULT" } else { "WARNING" };
-    let (at, code) = (moment::utc(alarm.at_ns), plain(&alarm.code));
-    format!("{at}|{ALARMS}|{level}|{code}|{}||{}\n", plain(&alarm.severity), plain(&alarm.en))
-}
-
-fn shown(value: &Cell) -> String {
-    match value {
-        Cell::Number(number) => number.to_string(),
-        // An empty word is a value that the agent would take for none.
-        Cell::Text(text) if !text.is_empty() => plain(text),
-        Cell::Text(_) | Cell::Missing(_) => UNAVAILABLE.to_owned(),
-    }
+    let severity = plain(&alarm.severity);
+    let line = |(condition, code, text): (&AlarmKind, String, String)| {
+        format!("{}|{level}|{code}|{severity}||{text}", condition.name)
+    };
+    conditions::parts(&alarm.source, &alarm.code, &alarm.en).map(line).collect()
 }
 
 /// Bars and ends of lines have a meaning of their own.
-fn plain(text: &str) -> String {
-    text.replace(['|', '\n', '\r'], " ")
+pub(super) fn plain(text: &str) -> String {
+    text.replace(|letter: char| letter == '|' || letter.is_control(), " ")
 }
 
 /// Text within an attribute of XML.
 fn attribute(text: &str) -> String {
     plain(text).replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::{AlarmClear, Gap};
+
+    #[test]
+    fn times_never_go_back() {
+        let lines: Vec<Line> =
+            [5, 9, 7].map(|second| Line { at_ns: second * 1_000_000_000, body: "a|1".to_owned() }).into();
+        let mut least_ns = 6_000_000_000;
+        let text = stamped(&lines, &mut least_ns);
+        let seconds: Vec<&str> = text.lines().map(|line| &line[17..19]).collect();
+        assert_eq!((seconds, least_ns), (vec!["06", "09", "09"], 9_000_000_000));
+    }
+
+    #[test]
+    fn an_alarm_of_the_control_is_a_condition_of_its_kind_and_cleared_there() {
+        let mut machine = Machine::new("box-1", &[], 0);
+        let code = "SV0417 (Y) SERVO ALARM; PS0010 IMPROPER G-CODE".to_owned();
+        let alarm = Alarm {
+            code: code.clone(),
+            source: "controller".to_owned(),
+            severity: "critical".to_owned(),
+            en: code.clone(),
+            ..Alarm::default()
+        };
+        let bodies = |lines: Vec<Line>| lines.into_iter().map(|line| line.body).collect::<Vec<_>>();
+        let item = |record| Item { sequence: 1, at_ns: 5, content: Content::Record(Box::new(record)) };
+        assert_eq!(
+            bodies(machine.lines(&item(alarm.into()))),
+            ["servo|FAULT|SV0417|critical||(Y) SERVO ALARM", "motion_program|FAULT|PS0010|critical||IMPROPER G-CODE"]
+        );
+        let clear = AlarmClear { code, source: "controller".to_owned(), at_ns: 6 };
+        assert_eq!(
+            bodies(machine.lines(&item(clear.into()))),
+            ["servo|NORMAL|SV0417|||", "motion_program|NORMAL|PS0010|||"]
+        );
+        let greeting = bodies(machine.greeting(9));
+        assert!(greeting.contains(&"servo|UNAVAILABLE||||".to_owned()), "nobody tells of alarms: {greeting:?}");
+        assert!(greeting.contains(&"alarms|NORMAL||||".to_owned()), "{greeting:?}");
+        let gap =
+            Item { sequence: 2, at_ns: 8, content: Content::Gap(Gap { until_ns: None, reason: "stopped".into() }) };
+        assert_eq!(machine.lines(&gap), [], "there were no values");
+    }
 }

@@ -1,23 +1,26 @@
 //! `shdr://HOST:7878`: an adapter of MTConnect. The box listens, agents connect and read lines (SHDR).
 //!
-//! An agent that connects is told everything first, then what changes. Missing values are `UNAVAILABLE`; alarms are the
-//! condition `alarms`; each tool that comes into use is an asset. `* PING` is answered, so that both sides find a broken
-//! line. `cnc-gateway devices` writes the `devices.xml` that belongs to these lines.
+//! An agent that connects is told everything first, then what changes. Missing values are `UNAVAILABLE`; alarms are conditions by their
+//! kind; each tool that comes into use is an asset. `* PING` is answered, so that both sides find a broken line.
+//! `cnc-gateway devices` writes the `devices.xml` that belongs to these lines. What an agent is told has times from that of its
+//! connection on, and they never go back.
 //!
 //! The protocol has no way to say that something is old: what happened while no agent was connected is not sent later
 //! (it is in the history). An agent that reads too slowly is disconnected and begins anew.
 
+mod conditions;
 mod devices;
 mod lines;
 mod model;
 
-pub use devices::devices_xml;
+pub use devices::{Described, devices_xml, is_prefix, prefix_of};
 
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
 use crate::history::Outbox;
 use adapters::address::{Endpoint, Keys, endpoint};
-use lines::Machine;
+use adapters::clock::{Clock, SystemClock, TimeNs};
+use lines::{Line, Machine, stamped};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
@@ -57,7 +60,7 @@ impl ShdrTarget {
 #[derive(Debug)]
 struct AgentContext {
     machine: Mutex<Machine>,
-    lines: broadcast::Sender<Arc<str>>,
+    lines: broadcast::Sender<Arc<[Line]>>,
     heartbeat_ms: u128,
 }
 
@@ -85,7 +88,7 @@ impl ShdrSink {
         self.stop();
         let listener = listen_on(&self.target.at).await?;
         let at_ns = self.outbox.head().borrow().newest_ns.unwrap_or(0);
-        let machine = Machine::new(self.outbox.machine(), &self.outbox.latest(), at_ns);
+        let machine = Machine::new(&self.outbox.box_id(), &self.outbox.latest(), at_ns);
         let shared = Arc::new(AgentContext {
             machine: Mutex::new(machine),
             lines: broadcast::Sender::new(WAITING_MAX),
@@ -118,9 +121,10 @@ async fn serve(stream: TcpStream, shared: Arc<AgentContext>) -> std::io::Result<
     let (reading, mut writing) = stream.into_split();
     let (greeting, mut lines) = {
         let machine = shared.machine.lock().unwrap_or_else(PoisonError::into_inner);
-        (machine.greeting(), shared.lines.subscribe())
+        (machine.greeting(SystemClock::new().now_ns()), shared.lines.subscribe())
     };
-    put(&mut writing, &greeting).await?;
+    let mut least_ns = TimeNs::MIN;
+    put(&mut writing, &stamped(&greeting, &mut least_ns)).await?;
     let mut asked = BufReader::new(tokio::io::AsyncReadExt::take(reading, LINE_MAX));
     let mut question = String::new();
     loop {
@@ -136,7 +140,7 @@ async fn serve(stream: TcpStream, shared: Arc<AgentContext>) -> std::io::Result<
                 question.clear();
             }
             line = lines.recv() => match line {
-                Ok(line) => put(&mut writing, &line).await?,
+                Ok(lines) => put(&mut writing, &stamped(&lines, &mut least_ns)).await?,
                 Err(RecvError::Lagged(_) | RecvError::Closed) => return Ok(()),
             },
         }
@@ -158,10 +162,10 @@ impl Sink for ShdrSink {
         };
         // An agent that connects meanwhile gets each line once: in its greeting or after it.
         let mut machine = shared.machine.lock().unwrap_or_else(PoisonError::into_inner);
-        let text: String = batch.items.iter().map(|item| machine.lines(item)).collect();
-        if !text.is_empty() {
+        let lines: Arc<[Line]> = batch.items.iter().flat_map(|item| machine.lines(item)).collect();
+        if !lines.is_empty() {
             // Without an agent nobody hears it.
-            let _agents = shared.lines.send(text.into());
+            let _agents = shared.lines.send(lines);
         }
         Box::pin(std::future::ready(Ok(())))
     }

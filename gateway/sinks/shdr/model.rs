@@ -1,9 +1,12 @@
 //! Which channel is which data item of MTConnect: the one table that the lines and `devices.xml` are made of.
 //!
-//! The data item has the name of the channel. Values are sent as the channel has them; where the standard wants another
+//! The data item has the name of the channel. Values are sent as the channel has them ([`ValueForm`]); where the standard wants another
 //! unit, `devices.xml` names the native one and the agent converts.
 //!
-//! Source: MTConnect Standard 1.6, Part 2 (devices), tables of data items and units.
+//! Source: MTConnect Standard 1.4, Part 2 (devices), tables of data items and units. Newer agents read it as well.
+
+use super::lines::plain;
+use crate::history::Cell;
 
 /// A data item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +22,34 @@ pub(super) struct DataItem {
     /// Unit of the channel, where it is another one.
     pub(super) native_units: Option<&'static str>,
     pub(super) component: Component,
+    pub(super) form: ValueForm,
+}
+
+/// How a value of the channel stands on a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ValueForm {
+    /// As it is.
+    Plain,
+    /// The number behind the letter: 30 of `N30`.
+    Number,
+    /// 0 and 1 as words.
+    Words(&'static str, &'static str),
+}
+
+impl ValueForm {
+    pub(super) fn shown(self, value: &Cell) -> String {
+        match (self, value) {
+            (Self::Words(off, on), Cell::Number(number)) => if *number == 0.0 { off } else { on }.to_owned(),
+            (Self::Number, Cell::Text(text)) => {
+                let digits = text.trim_start_matches(|letter: char| !letter.is_ascii_digit());
+                if digits.is_empty() { UNAVAILABLE.to_owned() } else { plain(digits) }
+            }
+            (_, Cell::Number(number)) => number.to_string(),
+            // An empty word is a value that the agent would take for none.
+            (_, Cell::Text(text)) if !text.is_empty() => plain(text),
+            (_, Cell::Text(_) | Cell::Missing(_)) => UNAVAILABLE.to_owned(),
+        }
+    }
 }
 
 /// What a data item is.
@@ -31,6 +62,8 @@ pub(super) enum Category {
 /// Where a data item stands in the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Component {
+    /// All axes together; conditions only.
+    Axes,
     Spindle,
     X,
     Y,
@@ -50,11 +83,24 @@ const fn sample(
     units: &'static str,
 ) -> DataItem {
     let category = Category::Sample;
-    DataItem { channel, category, kind, sub_type, units: Some(units), native_units: None, component }
+    DataItem {
+        channel,
+        category,
+        kind,
+        sub_type,
+        units: Some(units),
+        native_units: None,
+        component,
+        form: ValueForm::Plain,
+    }
 }
 
 const fn native(item: DataItem, unit: &'static str) -> DataItem {
     DataItem { native_units: Some(unit), ..item }
+}
+
+const fn with_form(item: DataItem, form: ValueForm) -> DataItem {
+    DataItem { form, ..item }
 }
 
 const fn event(
@@ -64,7 +110,7 @@ const fn event(
     sub_type: Option<&'static str>,
 ) -> DataItem {
     let category = Category::Event;
-    DataItem { channel, category, kind, sub_type, units: None, native_units: None, component }
+    DataItem { channel, category, kind, sub_type, units: None, native_units: None, component, form: ValueForm::Plain }
 }
 
 use Component::{Controller, Coolant, Electric, Environment, Path, Spindle, X, Y, Z};
@@ -97,9 +143,11 @@ pub(super) const ITEMS: &[DataItem] = &[
     sample("z_axis_load_pct", Z, "LOAD", None, "PERCENT"),
     sample("z_axis_current_a", Z, "AMPERAGE", None, "AMPERE"),
     event("mode", Controller, "CONTROLLER_MODE", None),
+    with_form(event("emergency_stop", Controller, "EMERGENCY_STOP", None), ValueForm::Words("ARMED", "TRIGGERED")),
     event("execution", Path, "EXECUTION", None),
     event("program", Path, "PROGRAM", None),
-    event("block", Path, "BLOCK", None),
+    with_form(event("block", Path, "LINE_NUMBER", None), ValueForm::Number),
+    event("block_text", Path, "BLOCK", None),
     event("tool", Path, "TOOL_NUMBER", None),
     event("part", Path, "PART_ID", None),
     event("part_count", Path, "PART_COUNT", None),
@@ -112,8 +160,6 @@ pub(super) const ITEMS: &[DataItem] = &[
     sample("ambient_temperature_c", Environment, "TEMPERATURE", None, "CELSIUS"),
 ];
 
-/// The condition that tells of alarms.
-pub(super) const ALARMS: &str = "alarms";
 /// The event that tells whether the box is there.
 pub(super) const AVAILABILITY: &str = "avail";
 /// What stands where there is no value.

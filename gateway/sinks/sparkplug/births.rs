@@ -1,11 +1,13 @@
 //! The payloads of a node: birth, data, death. Pure.
 //!
-//! A metric is a series under its own name, with the alias that stands for it in data; properties say unit (`engUnit`),
-//! range (`engLow`, `engHigh`), descriptions and whether it is inferred. A value that is missing is null, with the property
+//! A metric is a series under its own name, with the alias that stands for it in data; flags are Boolean, counts Int64, other numbers
+//! Double. Properties say unit (`engUnit`, where there is one), range (`engLow`, `engHigh`, where somebody has said), descriptions and
+//! whether it is inferred. A value that is missing is null, with the property
 //! `Quality` (0 bad, 500 stale) and the reason as one word in `missing`. Records are metrics of type String that hold JSON.
 
 use super::payload::{Metric, MetricValue, Payload, Property, PropertySet, datatype};
 use crate::history::{Cell, Content, Item, Reading, SeriesInfo, SeriesKind};
+use adapters::channel::Form;
 use adapters::clock::TimeNs;
 use std::collections::BTreeSet;
 
@@ -39,7 +41,7 @@ pub(super) fn milliseconds(at_ns: TimeNs) -> u64 {
 
 /// What stands behind the will: a death is matched to its birth by this number.
 pub(super) fn birth_death(number: u8, at_ms: u64) -> Metric {
-    Metric::named(BIRTH_DEATH, datatype::UINT64, at_ms, MetricValue::Long(number.into()))
+    Metric::named(BIRTH_DEATH, datatype::INT64, at_ms, MetricValue::Long(number.into()))
 }
 
 /// Death of the node: no sequence number, the number of its birth.
@@ -81,10 +83,10 @@ fn is_unprovided(value: &Cell) -> bool {
 fn described(reading: &Reading, at_ms: u64) -> Metric {
     let SeriesInfo { name, unit, range, en, zh, estimated, .. } = &*reading.series;
     let mut metric = valued(reading, at_ms);
-    metric.name = Some(name.to_string());
     metric.datatype = Some(kind(&reading.series));
+    metric.name = Some(name.to_string());
     let mut properties = PropertySet::default();
-    if reading.series.kind == SeriesKind::Number {
+    if reading.series.kind == SeriesKind::Number && **unit != *"1" {
         properties.put("engUnit", Property::Text(unit.to_string()));
     }
     if let Some((least, greatest)) = range {
@@ -102,15 +104,33 @@ fn described(reading: &Reading, at_ms: u64) -> Metric {
 }
 
 fn kind(series: &SeriesInfo) -> u32 {
-    if series.kind == SeriesKind::Number { datatype::DOUBLE } else { datatype::STRING }
+    match (series.kind, series.form) {
+        (SeriesKind::Text, _) => datatype::STRING,
+        (SeriesKind::Number, Form::Flag) => datatype::BOOLEAN,
+        (SeriesKind::Number, Form::Whole) => datatype::INT64,
+        (SeriesKind::Number, Form::Real) => datatype::DOUBLE,
+    }
 }
 
-/// A metric as data has it: alias and value.
+/// A number as the type of its series has it.
+fn numeric(series: &SeriesInfo, number: f64) -> MetricValue {
+    match series.form {
+        Form::Flag => MetricValue::Boolean(number != 0.0),
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "an Int64 stands as its two's complement; saturates"
+        )]
+        Form::Whole => MetricValue::Long(number.round() as i64 as u64),
+        Form::Real => MetricValue::Double(number),
+    }
+}
+
+/// A metric as data has it: alias and value. Its type stands in the birth.
 fn valued(reading: &Reading, at_ms: u64) -> Metric {
     let mut metric = Metric { alias: Some(alias(&reading.series)), timestamp: Some(at_ms), ..Metric::default() };
-    metric.datatype = Some(kind(&reading.series));
     match &reading.value {
-        Cell::Number(number) => metric.value = Some(MetricValue::Double(*number)),
+        Cell::Number(number) => metric.value = Some(numeric(&reading.series, *number)),
         Cell::Text(text) => metric.value = Some(MetricValue::Text(text.to_string())),
         Cell::Missing(reason) => {
             let mut quality = PropertySet::default();
@@ -132,7 +152,6 @@ pub(super) fn data(item: &Item, historical: bool) -> Vec<Metric> {
     let sequence = Metric {
         alias: Some(SEQUENCE.1),
         timestamp: Some(at_ms),
-        datatype: Some(datatype::UINT64),
         value: Some(MetricValue::Long(item.sequence)),
         ..Metric::default()
     };
@@ -140,6 +159,8 @@ pub(super) fn data(item: &Item, historical: bool) -> Vec<Metric> {
     match &item.content {
         Content::Sample(readings) => metrics.extend(readings.iter().map(|reading| valued(reading, at_ms))),
         Content::Record(_) => metrics.extend(record(item, at_ms)),
+        // Sparkplug has no word for them; the number of the item tells that nothing is missing.
+        Content::Gap(_) | Content::Means { .. } => {}
     }
     if historical {
         metrics.iter_mut().for_each(|metric| metric.is_historical = Some(true));
@@ -152,17 +173,30 @@ fn record(item: &Item, at_ms: u64) -> Option<Metric> {
     Some(Metric {
         alias: Some(*alias),
         timestamp: Some(at_ms),
-        datatype: Some(datatype::STRING),
         value: Some(MetricValue::Text(item.json()["record"].to_string())),
         ..Metric::default()
     })
+}
+
+/// Does the item tell anything of the device while that is dead: a value, or a record?
+pub(super) fn is_of_living(item: &Item) -> bool {
+    match &item.content {
+        Content::Sample(readings) => readings.iter().any(is_read),
+        Content::Record(_) => true,
+        Content::Gap(_) | Content::Means { .. } => false,
+    }
+}
+
+/// A value that was read, not inferred.
+pub(super) fn is_read(reading: &Reading) -> bool {
+    !reading.series.estimated && !matches!(reading.value, Cell::Missing(_))
 }
 
 /// Does the item tell of a series that no birth has named?
 pub(super) fn is_unknown(item: &Item, known: &BTreeSet<i64>) -> bool {
     match &item.content {
         Content::Sample(readings) => readings.iter().any(|reading| !known.contains(&reading.series.id)),
-        Content::Record(_) => false,
+        Content::Record(_) | Content::Gap(_) | Content::Means { .. } => false,
     }
 }
 

@@ -37,7 +37,6 @@ pub(super) fn answer(done: bool, text: &str, at_ms: u64) -> Metric {
     Metric {
         alias: Some(ANSWER.1),
         timestamp: Some(at_ms),
-        datatype: Some(datatype::STRING),
         value: Some(MetricValue::Text(json!({"done": done, "text": text}).to_string())),
         ..Metric::default()
     }

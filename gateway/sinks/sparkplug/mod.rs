@@ -8,8 +8,9 @@
 //! - The specification wants data at quality of service 0, which nobody acknowledges. After each batch the broker is asked
 //!   for a sign of life on the same connection: its answer says that it has read everything before. Only then is the
 //!   batch delivered.
+//! - Death of the device: while no source of the machine delivers a value. What happens in this time begins with its birth.
 //! - Primary host: with `host=ID` nothing is sent before that host says `online` on `spBv1.0/STATE/ID`, and when it says
-//!   that it goes the connection ends; meanwhile everything waits in the outbox. Without it, data that the broker has
+//!   that it goes the death of the node is sent and the connection ends; meanwhile everything waits in the outbox. Without it, data that the broker has
 //!   read while nobody listened is gone: at quality of service 0 a broker keeps nothing.
 //! - Commands: `Node Control/Rebirth` is obeyed. With `allow_requests` the metrics `request/...` are handed to the gate
 //!   ([`Requests`]), otherwise they are refused; both are told in `request/answer`. Nothing else that comes from the network
@@ -21,6 +22,7 @@
 
 mod births;
 mod commands;
+mod host;
 mod payload;
 
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
@@ -30,6 +32,7 @@ use crate::history::{Cell, Outbox};
 use adapters::address::Keys;
 use adapters::clock::{Clock, SystemClock};
 use adapters::mqtt::{Outgoing, Qos, Will};
+use host::PrimaryHost;
 use payload::Payload;
 use prost::Message;
 use std::collections::BTreeSet;
@@ -95,6 +98,9 @@ pub(super) struct SparkplugSink {
     /// Series that a birth has named.
     known: BTreeSet<i64>,
     rebirth: bool,
+    /// The death of the device has been sent.
+    dead: bool,
+    host: PrimaryHost,
     requests: Requests,
     /// What the network has asked for and is not answered yet.
     asked: Vec<Result<RequestedChange, String>>,
@@ -113,6 +119,8 @@ impl SparkplugSink {
             next: 0,
             known: BTreeSet::new(),
             rebirth: false,
+            dead: false,
+            host: PrimaryHost::default(),
             requests,
             asked: Vec::new(),
         }
@@ -153,7 +161,7 @@ impl SparkplugSink {
     }
 
     async fn birth(&mut self) -> Result<(), SinkError> {
-        (self.next, self.rebirth) = (0, false);
+        (self.next, self.rebirth, self.dead) = (0, false, false);
         let at_ms = now_ms();
         let latest = self.outbox.latest();
         let mut machine = births::machine(&latest, &mut self.known, at_ms);
@@ -184,17 +192,49 @@ impl SparkplugSink {
     }
 
     /// Waits until the primary host is there.
-    async fn host(&self) -> Result<(), SinkError> {
+    async fn wait_for_host(&mut self) -> Result<(), SinkError> {
         let Some(topic) = self.state_topic() else { return Ok(()) };
+        // The broker tells again what it has kept.
+        let mut host = self.host.asked_again();
         let waiting = async {
             loop {
                 let message = self.link.next(&self.target.broker).await?;
-                if message.topic == topic && is_online(&message.payload) {
+                if message.topic == topic {
+                    host.hear(&message.payload);
+                }
+                if host.online {
                     return Ok(());
                 }
             }
         };
-        tokio::time::timeout(HOST_WITHIN, waiting).await.unwrap_or_else(|_| Err(self.no_host()))
+        let waited = tokio::time::timeout(HOST_WITHIN, waiting).await;
+        self.host = host;
+        waited.unwrap_or_else(|_| Err(self.no_host()))
+    }
+
+    /// The host says that it goes: the node dies as the specification wants it, and the connection ends.
+    async fn lose_host(&mut self) -> SinkError {
+        self.say_death().await;
+        self.no_host()
+    }
+
+    async fn say_death(&mut self) {
+        let payload = births::death(self.number, now_ms()).encode_to_vec();
+        let death = Outgoing { topic: self.target.topic("NDEATH"), payload, retain: false };
+        // Where this does not go through, the will says the same.
+        let _gone = self.link.publish(vec![death], Qos::AtLeastOnce, &self.target.broker).await;
+        self.link.leave().await;
+    }
+
+    /// The device dies when no source delivers anything, and lives as soon as one does.
+    async fn say_device_death(&mut self) -> Result<(), SinkError> {
+        let lives = self.outbox.latest().iter().any(births::is_read);
+        if self.target.device.is_none() || self.dead || lives {
+            return Ok(());
+        }
+        self.dead = true;
+        let death = self.message("DDEATH", Vec::new(), now_ms());
+        self.publish(vec![death]).await.map_err(|(_, failure)| failure.of_item(0))
     }
 
     fn no_host(&self) -> SinkError {
@@ -207,19 +247,23 @@ impl SparkplugSink {
         self.first_values().await;
         self.number = self.number.wrapping_add(1);
         let payload = births::death(self.number, now_ms()).encode_to_vec();
-        let will = Will { topic: self.target.topic("NDEATH"), payload, qos: Qos::AtLeastOnce, retain: false };
+        let will =
+            Will { topic: self.target.topic("NDEATH"), payload, qos: Qos::AtLeastOnce, retain: false, at_leave: true };
         let name = client_name(&self.outbox.box_id(), &self.name);
         self.link.connect(&self.target.broker, &name, Some(will)).await?;
         let mut commands = vec![self.target.topic("NCMD")];
         commands.extend(self.target.device.as_ref().map(|_| self.target.topic("DCMD")));
         commands.extend(self.state_topic());
         self.link.subscribe(commands, Qos::AtLeastOnce, &self.target.broker).await?;
-        self.host().await?;
+        self.wait_for_host().await?;
         self.birth().await
     }
 
     async fn deliver(&mut self, batch: Batch<'_>) -> Result<(), SinkError> {
-        if self.rebirth || batch.items.iter().any(|item| births::is_unknown(item, &self.known)) {
+        if self.dead && !batch.items.iter().any(births::is_of_living) {
+            return Ok(());
+        }
+        if self.rebirth || self.dead || batch.items.iter().any(|item| births::is_unknown(item, &self.known)) {
             let told = |item| births::is_unknown(item, &self.known);
             let unknown: Vec<_> = batch.items.iter().filter(|item| told(item)).flat_map(series_of).collect();
             self.known.extend(unknown);
@@ -235,20 +279,17 @@ impl SparkplugSink {
             // Those after it did not go out; their numbers are used again.
             self.next = first.wrapping_add(u8::try_from(index % 256).unwrap_or(0));
             failure.of_item(batch.items.get(index).map_or(0, |item| item.sequence))
-        })
+        })?;
+        // Old data says nothing of now.
+        if batch.historical { Ok(()) } else { self.say_device_death().await }
     }
 }
 
 fn series_of(item: &crate::history::Item) -> Vec<i64> {
     match &item.content {
         crate::history::Content::Sample(readings) => readings.iter().map(|reading| reading.series.id).collect(),
-        crate::history::Content::Record(_) => Vec::new(),
+        _ => Vec::new(),
     }
-}
-
-/// `{"online":true,"timestamp":...}`, retained by the broker (specification, 6.3).
-fn is_online(payload: &[u8]) -> bool {
-    serde_json::from_slice(payload).is_ok_and(|state: serde_json::Value| state["online"] == true)
 }
 
 fn now_ms() -> u64 {
@@ -271,8 +312,11 @@ impl Sink for SparkplugSink {
                 if self.hear(&message) {
                     return Ok(());
                 }
-                if self.state_topic().is_some_and(|topic| topic == message.topic) && !is_online(&message.payload) {
-                    return Err(self.no_host());
+                if self.state_topic().is_some_and(|topic| topic == message.topic) {
+                    self.host.hear(&message.payload);
+                    if !self.host.online {
+                        return Ok(());
+                    }
                 }
                 // Everything else that the network says is heard by nobody.
             }
@@ -281,6 +325,9 @@ impl Sink for SparkplugSink {
 
     fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
+            if self.target.host.is_some() && !self.host.online {
+                return Err(self.lose_host().await);
+            }
             if self.rebirth {
                 self.birth().await?;
             }
@@ -294,16 +341,11 @@ impl Sink for SparkplugSink {
 
     fn close(&mut self) -> Pending<'_, ()> {
         Box::pin(async move {
-            let at_ms = now_ms();
-            if self.target.device.is_some() {
-                let death = self.message("DDEATH", Vec::new(), at_ms);
+            if self.target.device.is_some() && !self.dead {
+                let death = self.message("DDEATH", Vec::new(), now_ms());
                 let _gone = self.publish(vec![death]).await;
             }
-            let payload = births::death(self.number, at_ms).encode_to_vec();
-            let death = Outgoing { topic: self.target.topic("NDEATH"), payload, retain: false };
-            // Where this does not go through, the will says the same.
-            let _gone = self.link.publish(vec![death], Qos::AtLeastOnce, &self.target.broker).await;
-            self.link.leave().await;
+            self.say_death().await;
         })
     }
 

@@ -9,6 +9,8 @@ use prost::{Message, Oneof};
 pub(super) mod datatype {
     /// `Int32`.
     pub(in super::super) const INT32: u32 = 3;
+    /// `Int64`.
+    pub(in super::super) const INT64: u32 = 4;
     /// `UInt64`.
     pub(in super::super) const UINT64: u32 = 8;
     /// `Double`.

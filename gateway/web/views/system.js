@@ -32,7 +32,8 @@ function sinksCard() {
       const more = [behind, t("delivered", s.delivered.toLocaleString())];
       if (s.dropped) more.push(t("dropped", s.dropped.toLocaleString()));
       if (s.outage_fits_h !== null) more.push(t("outage_fits", duration(s.outage_fits_h * 3600)));
-      if (s.error) more.push(`${t(s.failing ? "error_now" : "error_before")} ${box(s.error)}`);
+      if (s.error) more.push(`${t("error_now")} ${box(s.error)}`);
+      if (s.refusal) more.push(`${t("left_out")} ${box(s.refusal)}`);
       return row(s.name, t(`sink_${s.state}`), more.join(" · "), { dot: s.failing ? "bad" : s.state === "connected" ? "good" : "warn", tone: s.failing ? "bad" : "" });
     }));
   };

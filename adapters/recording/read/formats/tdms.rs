@@ -180,7 +180,7 @@ impl TdmsFile {
         while bytes.left.len() >= chunk {
             if is_interleaved {
                 let Some(block) = bytes.take(chunk) else { return };
-                self.interleaved(block, &layout, bytes.is_big);
+                self.read_interleaved(block, &layout, bytes.is_big);
                 continue;
             }
             for (channel, index) in &layout {
@@ -190,7 +190,7 @@ impl TdmsFile {
         }
     }
 
-    fn interleaved(&mut self, block: &[u8], layout: &[(usize, RawIndex)], is_big: bool) {
+    fn read_interleaved(&mut self, block: &[u8], layout: &[(usize, RawIndex)], is_big: bool) {
         let width: usize = layout.iter().map(|(_, index)| index.kind.size()).sum();
         for row in block.chunks_exact(width.max(1)) {
             let mut bytes = ByteReader::new(row, is_big);

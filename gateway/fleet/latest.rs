@@ -1,0 +1,102 @@
+//! The newest value of every series of the boxes of a batch. Pure.
+
+use super::row::FleetRow;
+use serde_json::{Map, Value as Json, json};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+/// Of one box.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LatestOfBox {
+    /// The oldest of the values.
+    pub(super) first_us: i64,
+    pub(super) last_us: i64,
+    pub(super) arrived_us: i64,
+    pub(super) sequence: i64,
+    /// Time and value, or no value and why, by series.
+    cells: BTreeMap<i32, (i64, Json, Option<String>)>,
+}
+
+impl LatestOfBox {
+    /// `{"12":[microseconds,2249.5],"13":[microseconds,null,"stale"]}`.
+    pub(super) fn json(&self) -> String {
+        let cell = |(id, (at_us, value, reason)): (&i32, &(i64, Json, Option<String>))| {
+            let cell = match reason {
+                None => json!([at_us, value]),
+                Some(reason) => json!([at_us, value, reason]),
+            };
+            (id.to_string(), cell)
+        };
+        Json::Object(self.cells.iter().map(cell).collect::<Map<String, Json>>()).to_string()
+    }
+}
+
+/// Of all boxes of a batch, by their numbers.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Latest {
+    pub(super) boxes: BTreeMap<i32, LatestOfBox>,
+}
+
+impl Latest {
+    /// Takes the cells of a row on, whose series have these numbers: those of numbers, texts and missing values in this order.
+    pub(super) fn add(&mut self, box_id: i32, row: &FleetRow<'_>, series: &[i32], arrived_us: i64) {
+        let at_us = row.at_us();
+        // What is told of a time that is over says nothing about now.
+        let live = row.means.is_empty() && row.kind != "gap";
+        let fresh = || LatestOfBox {
+            first_us: at_us,
+            last_us: i64::MIN,
+            arrived_us: i64::MIN,
+            sequence: 0,
+            cells: BTreeMap::new(),
+        };
+        let latest = self.boxes.entry(box_id).or_insert_with(fresh);
+        latest.arrived_us = latest.arrived_us.max(arrived_us);
+        latest.sequence = latest.sequence.max(row.sequence);
+        if !live {
+            return;
+        }
+        latest.first_us = latest.first_us.min(at_us);
+        latest.last_us = latest.last_us.max(at_us);
+        let numbers = row.numbers.iter().map(|(_, number)| (json!(number), None));
+        let texts = row.texts.iter().map(|(_, text)| (json!(text), None));
+        let missing = row.missing.iter().map(|(_, reason)| (Json::Null, Some(reason.to_string())));
+        for (id, (value, reason)) in series.iter().zip(numbers.chain(texts).chain(missing)) {
+            match latest.cells.entry(*id) {
+                Entry::Occupied(known) if known.get().0 > at_us => {}
+                Entry::Occupied(mut known) => drop(known.insert((at_us, value, reason))),
+                Entry::Vacant(free) => drop(free.insert((at_us, value, reason))),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fleet::row::SeriesName;
+
+    #[test]
+    fn the_newest_value_stays_whatever_comes_last() {
+        let series = || SeriesName { name: "p".into(), unit: "W".into() };
+        let row = |at_ns: i64, number: f64, historical: bool| FleetRow {
+            box_name: "b".into(),
+            machine: "m".into(),
+            sequence: at_ns,
+            at_ns: at_ns * 1000,
+            kind: "sample".into(),
+            historical,
+            numbers: vec![(series(), number)],
+            texts: Vec::new(),
+            missing: Vec::new(),
+            means: Vec::new(),
+            record: None,
+        };
+        let mut latest = Latest::default();
+        latest.add(1, &row(20, 5.0, false), &[3], 21);
+        latest.add(1, &row(10, 4.0, true), &[3], 22);
+        let found = &latest.boxes[&1];
+        assert_eq!((found.first_us, found.last_us, found.arrived_us, found.sequence), (10, 20, 22, 20));
+        assert_eq!(found.json(), r#"{"3":[20,5.0]}"#);
+    }
+}

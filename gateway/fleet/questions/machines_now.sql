@@ -1,0 +1,2 @@
+-- What every machine is doing now; one that nobody hears has no_data.
+SELECT machine, state, now() - since AS since, program, tool, connected, last_arrival FROM machines_now ORDER BY machine;

@@ -1,0 +1,5 @@
+-- One series over all machines, a point per hour, the last week.
+SELECT machine, at, mean, least, greatest, seconds
+FROM hours
+WHERE name = 'spindle_power_w' AND day >= date_trunc('day', now() - interval '7 days') AND at >= now() - interval '7 days'
+ORDER BY machine, at;

@@ -1,0 +1,7 @@
+-- Hours of each machine in each state, the last seven days.
+SELECT machine, state,
+       sum(extract(epoch FROM least(coalesce(until, now()), now()) - greatest(since, now() - interval '7 days'))) / 3600 AS hours
+FROM states
+WHERE since < now() AND coalesce(until, now()) > now() - interval '7 days' AND since >= now() - interval '37 days'
+GROUP BY machine, state
+ORDER BY machine, hours DESC;

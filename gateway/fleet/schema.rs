@@ -1,0 +1,264 @@
+//! The tables: their version, what brings an older one up to it, and partitions by time, as PostgreSQL or TimescaleDB makes them.
+
+use super::database::DatabaseError;
+use crate::log::{Notice, Severity};
+use crate::nats::NatsError;
+use jiff::{Span, Timestamp, civil::Date, tz::TimeZone};
+use std::collections::BTreeSet;
+use tokio_postgres::{Client, Transaction};
+
+/// The version of the tables that this program writes.
+const VERSION: i32 = 2;
+/// The tables.
+pub const TABLES: &str = include_str!("schema/tables.sql");
+/// The views and functions.
+pub const VIEWS: &str = include_str!("schema/views.sql");
+/// Records of a batch into their tables.
+pub(super) const RECORDS: &str = include_str!("schema/records.sql");
+/// From version 1: what makes room for the new tables, and what fills them.
+const FROM_1: [&str; 2] = [include_str!("schema/migrate_1.sql"), include_str!("schema/migrate_1_rows.sql")];
+
+/// Of the advisory lock under which tables and partitions are created: any number that nothing else uses.
+const LOCK: i64 = 0x636e_6367_7731;
+
+/// How long the time is that one partition holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Period {
+    Day,
+    Month,
+    Year,
+}
+
+/// A table that is partitioned by time.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct PartitionedTable {
+    pub(super) name: &'static str,
+    /// The column of time.
+    pub(super) column: &'static str,
+    pub(super) period: Period,
+    /// How a partition keeps its rows: room for rows that grow, and lists of means that are compressed from 256 bytes on.
+    storage: &'static str,
+}
+
+const fn table(name: &'static str, column: &'static str, period: Period) -> PartitionedTable {
+    PartitionedTable { name, column, period, storage: "" }
+}
+
+const MEANS: &str = "WITH (fillfactor = 80, toast_tuple_target = 256)";
+
+/// Every table that is partitioned.
+pub(super) const PARTITIONED: [PartitionedTable; 7] = [
+    table("items", "at", Period::Day),
+    PartitionedTable { storage: MEANS, ..table("minute_means", "hour", Period::Month) },
+    PartitionedTable { storage: MEANS, ..table("hour_means", "day", Period::Year) },
+    PartitionedTable { storage: MEANS, ..table("day_means", "month", Period::Year) },
+    table("state_list", "since", Period::Month),
+    table("part_list", "ended", Period::Month),
+    table("operation_list", "ended", Period::Month),
+];
+
+/// Who divides tables by time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Partitioning {
+    /// PostgreSQL: this program creates each partition.
+    Declared,
+    /// The extension TimescaleDB, where the database has it: it creates its chunks by itself, and compresses old items.
+    Timescale,
+}
+
+impl Period {
+    /// The first and the day after the last day of the period that holds this time.
+    fn around(self, at_us: i64) -> Option<(Date, Date)> {
+        let day = Timestamp::from_microsecond(at_us).ok()?.to_zoned(TimeZone::UTC).date();
+        let (first, span) = match self {
+            Self::Day => (day, Span::new().days(1)),
+            Self::Month => (day.first_of_month(), Span::new().months(1)),
+            Self::Year => (day.first_of_year(), Span::new().years(1)),
+        };
+        Some((first, first.checked_add(span).ok()?))
+    }
+
+    fn suffix(self, first: Date) -> String {
+        let (year, month, day) = (first.year(), first.month(), first.day());
+        match self {
+            Self::Day => format!("{year:04}_{month:02}_{day:02}"),
+            Self::Month => format!("{year:04}_{month:02}"),
+            Self::Year => format!("{year:04}"),
+        }
+    }
+
+    fn interval(self) -> &'static str {
+        match self {
+            Self::Day => "1 day",
+            Self::Month => "1 month",
+            Self::Year => "1 year",
+        }
+    }
+}
+
+/// A partition.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Partition {
+    name: String,
+    create: String,
+}
+
+impl PartitionedTable {
+    /// The partition of this time.
+    pub(super) fn partition(&self, at_us: i64) -> Option<Partition> {
+        let (first, after) = self.period.around(at_us)?;
+        let name = format!("{}_{}", self.name, self.period.suffix(first));
+        let create = format!(
+            "CREATE TABLE IF NOT EXISTS {name} PARTITION OF {} FOR VALUES FROM ('{first} 00:00:00+00') TO ('{after} 00:00:00+00') {}",
+            self.name, self.storage
+        );
+        Some(Partition { name, create })
+    }
+
+    /// The table becomes one of TimescaleDB. It had been declared as partitioned, and is empty.
+    fn hypertable(&self) -> String {
+        let Self { name, column, period, .. } = self;
+        format!(
+            "SELECT create_hypertable('{name}', '{column}', chunk_time_interval => interval '{}');\n",
+            period.interval()
+        )
+    }
+}
+
+/// The table of the name.
+pub(super) fn partitioned(name: &str) -> Option<&'static PartitionedTable> {
+    PARTITIONED.iter().find(|table| table.name == name)
+}
+
+/// The tables without declared partitions, which TimescaleDB brings itself.
+fn tables_of(partitioning: Partitioning) -> String {
+    match partitioning {
+        Partitioning::Declared => TABLES.to_owned(),
+        Partitioning::Timescale => {
+            let plain = PARTITIONED.iter().fold(TABLES.to_owned(), |text, table| {
+                text.replace(&format!(") PARTITION BY RANGE ({});", table.column), ");")
+            });
+            let hyper: String = PARTITIONED.iter().map(PartitionedTable::hypertable).collect();
+            format!("{plain}{hyper}{COMPRESSION}")
+        }
+    }
+}
+
+/// Items of one box stand beside each other in a compressed chunk. The edition of the extension without compression goes on without.
+const COMPRESSION: &str = "DO $$ BEGIN
+  ALTER TABLE items SET (timescaledb.compress, timescaledb.compress_segmentby = 'box_id', timescaledb.compress_orderby = 'at, sequence');
+  PERFORM add_compression_policy('items', interval '7 days');
+EXCEPTION WHEN OTHERS THEN RAISE WARNING 'old items are not compressed: %', SQLERRM; END $$;\n";
+
+fn failed(doing: &str) -> impl Fn(tokio_postgres::Error) -> NatsError + Copy + '_ {
+    move |error| DatabaseError::new(doing, &error).said
+}
+
+/// Creates what is missing, and brings older tables to the version of this program. Several processes may ask at once.
+pub(super) async fn bring_up(client: &mut Client) -> Result<Partitioning, NatsError> {
+    let creating = failed("creating the tables");
+    let transaction = client.transaction().await.map_err(creating)?;
+    transaction.execute("SELECT pg_advisory_xact_lock($1)", &[&LOCK]).await.map_err(creating)?;
+    let partitioning = partitioning(&transaction).await?;
+    match version(&transaction).await? {
+        0 => create(&transaction, partitioning).await?,
+        1 => from_1(&transaction, partitioning).await?,
+        VERSION => {}
+        newer => {
+            let what = format!("the tables have version {newer}, this program knows {VERSION}");
+            return Err(NatsError::new(what, "use the newer program that has made them"));
+        }
+    }
+    transaction.commit().await.map_err(creating)?;
+    Ok(partitioning)
+}
+
+/// 0: there are none; 1: those of before, which had no number.
+async fn version(transaction: &Transaction<'_>) -> Result<i32, NatsError> {
+    let asking = failed("asking for the version of the tables");
+    let there = "SELECT to_regclass('fleet_schema') IS NOT NULL, to_regclass('items') IS NOT NULL";
+    let row = transaction.query_one(there, &[]).await.map_err(asking)?;
+    if !row.get::<_, bool>(0) {
+        return Ok(i32::from(row.get::<_, bool>(1)));
+    }
+    let newest =
+        transaction.query_one("SELECT coalesce(max(version), 0) FROM fleet_schema", &[]).await.map_err(asking)?;
+    Ok(newest.get(0))
+}
+
+/// TimescaleDB, where the database has the extension.
+async fn partitioning(transaction: &Transaction<'_>) -> Result<Partitioning, NatsError> {
+    let asking = failed("asking for extensions");
+    let found = transaction.query_one("SELECT count(*) FROM pg_extension WHERE extname = 'timescaledb'", &[]).await;
+    let has_it = found.map_err(asking)?.get::<_, i64>(0) > 0;
+    if !has_it {
+        return Ok(Partitioning::Declared);
+    }
+    // Tables that were made before the extension stay as they are.
+    let declared = "SELECT count(*) FROM pg_partitioned_table WHERE partrelid = to_regclass('items')";
+    let declared = transaction.query_one(declared, &[]).await.map_err(asking)?.get::<_, i64>(0) > 0;
+    Ok(if declared { Partitioning::Declared } else { Partitioning::Timescale })
+}
+
+async fn create(transaction: &Transaction<'_>, partitioning: Partitioning) -> Result<(), NatsError> {
+    let text = format!("{}{VIEWS}\nINSERT INTO fleet_schema (version) VALUES ({VERSION});", tables_of(partitioning));
+    transaction.batch_execute(&text).await.map_err(failed("creating the tables"))
+}
+
+async fn from_1(transaction: &Transaction<'_>, partitioning: Partitioning) -> Result<(), NatsError> {
+    let moving = failed("bringing the tables from version 1 to 2");
+    Notice::new(Severity::Info, "tables_move", "the tables are brought from version 1 to 2; this may take minutes")
+        .say();
+    transaction.batch_execute(FROM_1[0]).await.map_err(moving)?;
+    create(transaction, partitioning).await?;
+    let times = "SELECT (extract(epoch FROM min(at)) * 1000000)::bigint FROM items_1 GROUP BY date_trunc('day', at)";
+    let days: Vec<i64> = transaction.query(times, &[]).await.map_err(moving)?.iter().map(|row| row.get(0)).collect();
+    if partitioning == Partitioning::Declared {
+        let partitions = PARTITIONED.iter().flat_map(|table| days.iter().filter_map(|at_us| table.partition(*at_us)));
+        let statements: Vec<String> = partitions.collect::<BTreeSet<_>>().into_iter().map(|it| it.create).collect();
+        transaction.batch_execute(&statements.join(";")).await.map_err(moving)?;
+    }
+    let text = format!("{INCOMING_RECORDS}{}{RECORDS}DROP TABLE incoming;", FROM_1[1]);
+    transaction.batch_execute(&text).await.map_err(moving)
+}
+
+/// Where the records of a batch lie before they go into their tables.
+pub(super) const INCOMING_RECORDS: &str = "CREATE TEMP TABLE incoming (box_id int, sequence bigint, at timestamptz, kind text, record jsonb) ON COMMIT DELETE ROWS;\n";
+
+/// Creates the partitions that are missing, in a transaction of its own: creating one stops every other writer for a moment.
+pub(super) async fn create_partitions(client: &mut Client, wanted: &BTreeSet<Partition>) -> Result<(), DatabaseError> {
+    let creating = |error| DatabaseError::new("creating the partition of a time", &error);
+    let transaction = client.transaction().await.map_err(creating)?;
+    transaction.execute("SELECT pg_advisory_xact_lock($1)", &[&LOCK]).await.map_err(creating)?;
+    for Partition { name, create } in wanted {
+        let there =
+            transaction.query_one("SELECT to_regclass($1::text) IS NOT NULL", &[name]).await.map_err(creating)?;
+        if !there.get::<_, bool>(0) {
+            transaction.batch_execute(create).await.map_err(creating)?;
+        }
+    }
+    transaction.commit().await.map_err(creating)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_partition_holds_its_day_month_or_year() {
+        let at_us = "2026-02-28T23:59:59Z".parse::<Timestamp>().expect("a time").as_microsecond();
+        let created = |name: &str| partitioned(name).and_then(|table| table.partition(at_us)).expect("a partition");
+        assert_eq!(created("items").name, "items_2026_02_28");
+        assert!(created("items").create.contains("FROM ('2026-02-28 00:00:00+00') TO ('2026-03-01 00:00:00+00')"));
+        assert!(created("part_list").create.contains("FROM ('2026-02-01 00:00:00+00') TO ('2026-03-01 00:00:00+00')"));
+        assert!(created("hour_means").create.contains("TO ('2027-01-01 00:00:00+00') WITH (fillfactor"));
+    }
+
+    #[test]
+    fn every_partitioned_table_is_a_plain_one_for_the_extension() {
+        let text = tables_of(Partitioning::Timescale);
+        assert!(!text.contains("PARTITION BY"), "{text}");
+        assert_eq!(text.matches("create_hypertable").count(), PARTITIONED.len());
+        assert_eq!(tables_of(Partitioning::Declared).matches("PARTITION BY").count(), PARTITIONED.len());
+    }
+}

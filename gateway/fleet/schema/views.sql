@@ -1,0 +1,122 @@
+-- Functions and views; made anew by every version of `cnc-gateway fleet ingest`.
+CREATE OR REPLACE FUNCTION fleet_time(ns bigint) RETURNS timestamptz LANGUAGE sql IMMUTABLE PARALLEL SAFE AS
+  $$SELECT timestamptz 'epoch' + div(ns, 1000) * interval '1 microsecond'$$;
+-- Of two lists of cells the newer of each.
+CREATE OR REPLACE FUNCTION fleet_cells(a jsonb, b jsonb) RETURNS jsonb LANGUAGE sql IMMUTABLE PARALLEL SAFE AS
+  $$SELECT jsonb_object_agg(key, value) FROM (
+      SELECT DISTINCT ON (key) key, value FROM (SELECT * FROM jsonb_each(a) UNION ALL SELECT * FROM jsonb_each(b)) AS every
+      ORDER BY key, (value ->> 0)::bigint DESC) AS newest$$;
+
+-- A box that has gone is a row, too: `connected` says whether something has come within three minutes (a box sends at least once a
+-- minute).
+CREATE OR REPLACE VIEW last_seen AS
+  SELECT machine, box, first_seen, last_at, last_arrival, now() - last_arrival AS silent,
+         now() - last_arrival < interval '3 minutes' AS connected, last_sequence, box_id
+  FROM boxes LEFT JOIN box_latest USING (box_id);
+
+-- The newest value of every series; `missing_reason` where there is none.
+CREATE OR REPLACE VIEW latest AS
+  SELECT boxes.machine, boxes.box, series.name, series.unit, fleet_time((cell.value ->> 0)::bigint * 1000) AS at,
+         CASE jsonb_typeof(cell.value -> 1) WHEN 'number' THEN (cell.value ->> 1)::float8 END AS number,
+         CASE jsonb_typeof(cell.value -> 1) WHEN 'string' THEN cell.value ->> 1 END AS text,
+         cell.value ->> 2 AS missing_reason, now() - box_latest.last_arrival < interval '3 minutes' AS connected
+  FROM box_latest
+  JOIN boxes USING (box_id)
+  CROSS JOIN LATERAL jsonb_each(box_latest.cells) AS cell
+  JOIN series ON series.series_id = cell.key::int;
+
+-- What every machine is doing now: a row for each. A box that nobody hears has no state, whatever it said last.
+CREATE OR REPLACE VIEW machines_now AS
+  SELECT machine, box, connected,
+         CASE WHEN connected THEN newest.state ELSE 'no_data' END AS state,
+         CASE WHEN connected THEN newest.since ELSE last_at END AS since,
+         newest.program, newest.tool, newest.state AS last_state, last_at, last_arrival, box_id
+  FROM last_seen
+  LEFT JOIN LATERAL (
+    SELECT state, since, program, tool FROM state_list WHERE state_list.box_id = last_seen.box_id ORDER BY since DESC, sequence DESC LIMIT 1
+  ) AS newest ON true;
+
+-- Every value with the time for which it held: until the next one of its series, a gap, or what was heard last of the box. Conditions on
+-- box, name and `valid_from` are fast. Means: sum(number * seconds) / sum(seconds), where number is not null.
+CREATE OR REPLACE VIEW readings AS
+  SELECT boxes.machine, boxes.box, series.name, series.unit, items.at AS valid_from, held.until AS valid_to,
+         items.numbers[cell.place] AS number, items.texts[cell.place - cardinality(items.numbers)] AS text,
+         items.reasons[cell.place - cardinality(items.numbers) - cardinality(items.texts)] AS missing_reason,
+         extract(epoch FROM held.until - items.at)::float8 AS seconds,
+         items.sequence, items.at_ns, items.arrived, items.historical, items.box_id
+  FROM items
+  CROSS JOIN LATERAL unnest(items.series) WITH ORDINALITY AS cell (series_id, place)
+  JOIN series ON series.series_id = cell.series_id
+  JOIN boxes ON boxes.box_id = items.box_id
+  CROSS JOIN LATERAL (
+    SELECT coalesce(
+      (SELECT next.at FROM items AS next
+       WHERE next.box_id = items.box_id AND next.at > items.at AND next.at < items.at + interval '1 day'
+         AND (next.series @> ARRAY[cell.series_id] OR next.kind = 'gap')
+       ORDER BY next.at LIMIT 1),
+      (SELECT least(last_at, items.at + interval '1 day') FROM box_latest WHERE box_latest.box_id = items.box_id)) AS until
+  ) AS held
+  WHERE items.kind = 'sample';
+
+-- Means of minutes, hours and days. Conditions on name and on `hour`, `day`, `month` are fast; `at` is the beginning of the minute, hour, day.
+CREATE OR REPLACE VIEW minutes AS
+  SELECT boxes.machine, boxes.box, series.name, series.unit, hour, hour + (place - 1) * interval '1 minute' AS at,
+         each.mean, each.least, each.greatest, each.seconds, minute_means.box_id
+  FROM minute_means JOIN series USING (series_id) JOIN boxes USING (box_id)
+  CROSS JOIN LATERAL unnest(minute_means.mean, minute_means.least, minute_means.greatest, minute_means.seconds)
+    WITH ORDINALITY AS each (mean, least, greatest, seconds, place)
+  WHERE each.seconds > 0;
+CREATE OR REPLACE VIEW hours AS
+  SELECT boxes.machine, boxes.box, series.name, series.unit, day, day + (place - 1) * interval '1 hour' AS at,
+         each.mean, each.least, each.greatest, each.seconds, hour_means.box_id
+  FROM hour_means JOIN series USING (series_id) JOIN boxes USING (box_id)
+  CROSS JOIN LATERAL unnest(hour_means.mean, hour_means.least, hour_means.greatest, hour_means.seconds)
+    WITH ORDINALITY AS each (mean, least, greatest, seconds, place)
+  WHERE each.seconds > 0;
+CREATE OR REPLACE VIEW days AS
+  SELECT boxes.machine, boxes.box, series.name, series.unit, month, month + (place - 1) * interval '1 day' AS at,
+         each.mean, each.least, each.greatest, each.seconds, day_means.box_id
+  FROM day_means JOIN series USING (series_id) JOIN boxes USING (box_id)
+  CROSS JOIN LATERAL unnest(day_means.mean, day_means.least, day_means.greatest, day_means.seconds)
+    WITH ORDINALITY AS each (mean, least, greatest, seconds, place)
+  WHERE each.seconds > 0;
+
+-- The newest stretch of a machine that is connected has no end yet; of one that has gone it ends with what was heard last.
+CREATE OR REPLACE VIEW states AS
+  SELECT boxes.machine, boxes.box, since,
+         CASE WHEN until IS NULL AND NOT last_seen.connected THEN greatest(since, last_at) ELSE until END AS until,
+         state, program, tool, reason, sequence, box_id
+  FROM state_list JOIN boxes USING (box_id) JOIN last_seen USING (box_id);
+CREATE OR REPLACE VIEW parts AS
+  SELECT boxes.machine, boxes.box, began, ended, part, program, count, extract(epoch FROM ended - began)::float8 AS seconds,
+         cutting_s, energy_j, detail, sequence, box_id
+  FROM part_list JOIN boxes USING (box_id);
+CREATE OR REPLACE VIEW operations AS
+  SELECT boxes.machine, boxes.box, ended, program, part, operation, place, seconds, cutting_s, energy_j, mean_power_w, sequence, box_id
+  FROM operation_list JOIN boxes USING (box_id);
+-- An alarm that was raised again while it stood is one alarm.
+CREATE OR REPLACE VIEW alarms AS
+  SELECT boxes.machine, boxes.box, mark.code, mark.source, mark.severity, mark.at AS raised, cleared.at AS cleared, mark.en, mark.zh, mark.sequence, box_id
+  FROM alarm_marks AS mark JOIN boxes USING (box_id)
+  LEFT JOIN LATERAL (
+    SELECT raised FROM alarm_marks AS before
+    WHERE (before.box_id, before.source, before.code) = (mark.box_id, mark.source, mark.code) AND before.at < mark.at
+    ORDER BY before.at DESC, before.raised LIMIT 1
+  ) AS before ON true
+  LEFT JOIN LATERAL (
+    SELECT at FROM alarm_marks AS after
+    WHERE (after.box_id, after.source, after.code) = (mark.box_id, mark.source, mark.code) AND after.at >= mark.at AND NOT after.raised
+    ORDER BY after.at LIMIT 1
+  ) AS cleared ON true
+  WHERE mark.raised AND before.raised IS DISTINCT FROM true;
+CREATE OR REPLACE VIEW gaps AS
+  SELECT boxes.machine, boxes.box, since, until, reason, box_id FROM gap_list JOIN boxes USING (box_id);
+CREATE OR REPLACE VIEW events AS
+  SELECT boxes.machine, boxes.box, at, kind, source, text, detail, sequence, box_id FROM event_list JOIN boxes USING (box_id);
+CREATE OR REPLACE VIEW decisions AS
+  SELECT boxes.machine, boxes.box, at, decision ->> 'script' AS script, decision ->> 'wanted' AS wanted, (decision ->> 'value')::float8 AS value,
+         decision ->> 'unit' AS unit, decision ->> 'reason' AS reason, decision ->> 'outcome' AS outcome,
+         decision ->> 'outcome_reason' AS outcome_reason, sequence, box_id
+  FROM decision_list JOIN boxes USING (box_id);
+CREATE OR REPLACE VIEW diagnoses AS
+  SELECT boxes.machine, boxes.box, at, verdict, summary, diagnosis, sequence, box_id FROM diagnosis_list JOIN boxes USING (box_id);

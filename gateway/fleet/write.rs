@@ -1,0 +1,271 @@
+//! A batch into the database: names, partitions, and everything else in one transaction.
+
+use super::copy::CopyRows;
+use super::database::{self, DatabaseError, DatabaseSettings};
+use super::latest::Latest;
+use super::means::{self, MeanRows};
+use super::names::Names;
+use super::row::FleetRow;
+use super::schema::{self, Partition, Partitioning};
+use crate::nats::NatsError;
+use std::collections::BTreeSet;
+use tokio_postgres::error::SqlState;
+use tokio_postgres::{Client, Transaction};
+
+/// Columns of `items` in the order in which they are copied.
+const ITEM_COLUMNS: &str =
+    "sequence, at, at_ns, arrived, box_id, historical, kind, series, numbers, texts, reasons, record";
+
+/// Where a batch lies that cannot be copied into its tables directly.
+const INCOMING: &str = "CREATE TEMP TABLE incoming_items (LIKE items) ON COMMIT DELETE ROWS;
+CREATE TEMP TABLE incoming_means (series_id int, box_id int, start timestamptz, mean real[], least real[], greatest real[], seconds real[]) ON COMMIT DELETE ROWS;
+CREATE TEMP TABLE incoming_latest (box_id int, first_at timestamptz, last_at timestamptz, last_arrival timestamptz, last_sequence bigint, cells jsonb) ON COMMIT DELETE ROWS;";
+
+/// What a batch did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct BatchResult {
+    /// Rows that are new.
+    pub new: u64,
+    /// Rows that were there already.
+    pub known: u64,
+}
+
+/// A message that is kept apart.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct RefusalRecord {
+    pub(super) stream_sequence: i64,
+    pub(super) subject: String,
+    pub(super) reason: String,
+    pub(super) payload: String,
+}
+
+/// A row, and when the stream had it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arrived<'a> {
+    pub(super) row: &'a FleetRow<'a>,
+    /// Microseconds since 1970.
+    pub(super) arrived_us: i64,
+}
+
+/// A connection whose tables are there.
+#[derive(Debug)]
+pub(super) struct Database {
+    client: Client,
+    partitioning: Partitioning,
+    names: Names,
+    partitions: BTreeSet<Partition>,
+}
+
+/// Everything of a batch, ready to be copied.
+struct Encoded {
+    items: CopyRows,
+    records: CopyRows,
+    latest: CopyRows,
+    means: Vec<(&'static means::MeanLevel, CopyRows)>,
+    partitions: BTreeSet<Partition>,
+}
+
+fn writing(error: tokio_postgres::Error) -> DatabaseError {
+    DatabaseError::new("writing a batch", &error)
+}
+
+impl Database {
+    /// Connects, and creates what is missing.
+    pub(super) async fn open(settings: &DatabaseSettings) -> Result<Self, NatsError> {
+        let (client, partitioning) = database::connect(settings).await?;
+        let text = format!("{}{INCOMING}", schema::INCOMING_RECORDS);
+        client.batch_execute(&text).await.map_err(|error| writing(error).said)?;
+        Ok(Self { client, partitioning, names: Names::default(), partitions: BTreeSet::new() })
+    }
+
+    /// Writes the rows in one transaction; nothing is written where it fails.
+    pub(super) async fn write(&mut self, rows: &mut [Arrived<'_>]) -> Result<BatchResult, DatabaseError> {
+        if rows.is_empty() {
+            return Ok(BatchResult::default());
+        }
+        self.names.learn(&self.client, rows).await?;
+        // Several write at a time: the same order everywhere leaves no two that wait for each other.
+        rows.sort_by(|a, b| {
+            (&a.row.box_name, a.row.at_ns, a.row.sequence).cmp(&(&b.row.box_name, b.row.at_ns, b.row.sequence))
+        });
+        let encoded = self.encode(rows);
+        self.prepare(&encoded.partitions).await?;
+        let mut transaction = self.client.transaction().await.map_err(writing)?;
+        let count = encoded.items.count();
+        let new = put_items(&mut transaction, encoded.items).await?;
+        if encoded.records.count() > 0 {
+            copy(&transaction, "incoming (box_id, sequence, at, kind, record)", encoded.records).await?;
+            transaction.batch_execute(schema::RECORDS).await.map_err(writing)?;
+        }
+        for (level, rows) in encoded.means {
+            copy(&transaction, "incoming_means", rows).await?;
+            transaction.batch_execute(&merge_means(level)).await.map_err(writing)?;
+        }
+        copy(&transaction, "incoming_latest", encoded.latest).await?;
+        transaction.batch_execute(MERGE_LATEST).await.map_err(writing)?;
+        transaction.commit().await.map_err(writing)?;
+        Ok(BatchResult { new, known: count - new })
+    }
+
+    /// Notes what is not taken.
+    pub(super) async fn refuse(&self, refused: &[RefusalRecord]) -> Result<(), DatabaseError> {
+        let noting = |error| DatabaseError::new("noting what is refused", &error);
+        let insert = "INSERT INTO refused (stream_sequence, subject, reason, payload) VALUES ($1, $2, $3, $4) ON CONFLICT DO NOTHING";
+        for RefusalRecord { stream_sequence, subject, reason, payload } in refused {
+            self.client.execute(insert, &[stream_sequence, subject, reason, payload]).await.map_err(noting)?;
+        }
+        Ok(())
+    }
+
+    fn encode(&self, rows: &[Arrived<'_>]) -> Encoded {
+        let (mut items, mut records) = (CopyRows::new(), CopyRows::new());
+        let (mut latest, mut of_levels) = (Latest::default(), [const { None::<MeanRows> }; means::LEVELS.len()]);
+        let mut times = BTreeSet::new();
+        for Arrived { row, arrived_us } in rows {
+            let Some(box_id) = self.names.box_id(&row.box_name) else { continue };
+            let series: Vec<i32> = row.series().filter_map(|series| self.names.series_id(series)).collect();
+            let record = row.record.as_ref().map(serde_json::Value::to_string);
+            put_item(&mut items, row, (box_id, *arrived_us), &series, record.as_deref());
+            times.insert(("items", day_of(row.at_us())));
+            if let Some(record) = &record {
+                let place = records.begin(5).int4(box_id).int8(row.sequence).time(row.at_us());
+                place.text(&row.kind).json(Some(record));
+                times.extend(RECORD_TABLES.iter().map(|table| (*table, day_of(row.at_us()))));
+                let until_us = row.record.as_ref().and_then(|record| record["until_ns"].as_i64()).map(|ns| ns / 1000);
+                times.extend(until_us.map(|until_us| ("state_list", day_of(until_us))));
+            }
+            latest.add(box_id, row, &series, *arrived_us);
+            for (level, rows) in means::LEVELS.iter().zip(&mut of_levels).filter(|(level, _)| *level.kind == *row.kind)
+            {
+                rows.get_or_insert_default().add(level, box_id, row, &series);
+                times.insert((level.table, day_of(row.at_us())));
+            }
+        }
+        let of_time = |(table, day): (&str, i64)| schema::partitioned(table)?.partition(day * DAY_US);
+        let partitions = times.into_iter().filter_map(of_time).collect();
+        let of_level = |(level, rows): (&'static means::MeanLevel, Option<MeanRows>)| Some((level, copy_means(&rows?)));
+        let means = means::LEVELS.iter().zip(of_levels).filter_map(of_level).collect();
+        Encoded { items, records, latest: copy_latest(&latest), means, partitions }
+    }
+
+    async fn prepare(&mut self, wanted: &BTreeSet<Partition>) -> Result<(), DatabaseError> {
+        let missing: BTreeSet<Partition> = wanted.difference(&self.partitions).cloned().collect();
+        if self.partitioning == Partitioning::Timescale || missing.is_empty() {
+            return Ok(());
+        }
+        schema::create_partitions(&mut self.client, &missing).await?;
+        self.partitions.extend(missing);
+        Ok(())
+    }
+}
+
+/// Tables of records that are partitioned by the time of the record.
+const RECORD_TABLES: [&str; 3] = ["state_list", "part_list", "operation_list"];
+const DAY_US: i64 = 86_400_000_000;
+
+fn day_of(at_us: i64) -> i64 {
+    at_us.div_euclid(DAY_US)
+}
+
+fn put_item(
+    items: &mut CopyRows,
+    row: &FleetRow<'_>,
+    (box_id, arrived_us): (i32, i64),
+    series: &[i32],
+    record: Option<&str>,
+) {
+    items.begin(12).int8(row.sequence).time(row.at_us()).int8(row.at_ns).time(arrived_us).int4(box_id);
+    items.flag(row.historical).text(&row.kind);
+    if row.kind == "sample" {
+        let texts: Vec<&str> = row.texts.iter().map(|(_, text)| &**text).collect();
+        let reasons: Vec<&str> = row.missing.iter().map(|(_, reason)| &**reason).collect();
+        let numbers: Vec<f64> = row.numbers.iter().map(|(_, number)| *number).collect();
+        items.int4_list(series).float8_list(&numbers).text_list(&texts).text_list(&reasons);
+    } else {
+        items.null().null().null().null();
+    }
+    items.json(record);
+}
+
+fn copy_means(rows: &MeanRows) -> CopyRows {
+    let mut copied = CopyRows::new();
+    for ((series, box_id, start_us), places) in &rows.rows {
+        copied.begin(7).int4(*series).int4(*box_id).time(*start_us);
+        places.iter().for_each(|column| {
+            copied.float4_list(column);
+        });
+    }
+    copied
+}
+
+fn copy_latest(latest: &Latest) -> CopyRows {
+    let mut copied = CopyRows::new();
+    for (box_id, one) in &latest.boxes {
+        copied.begin(6).int4(*box_id).time(one.first_us);
+        // A batch that tells nothing of now leaves the time as it is.
+        if one.last_us == i64::MIN {
+            copied.null()
+        } else {
+            copied.time(one.last_us)
+        };
+        copied.time(one.arrived_us).int8(one.sequence).json(Some(&one.json()));
+    }
+    copied
+}
+
+const MERGE_LATEST: &str = "
+INSERT INTO box_latest AS known (box_id, last_at, last_arrival, last_sequence, cells)
+SELECT box_id, coalesce(last_at, first_at), last_arrival, last_sequence, cells FROM incoming_latest
+ON CONFLICT (box_id) DO UPDATE SET
+  last_at = greatest(known.last_at, excluded.last_at),
+  last_arrival = greatest(known.last_arrival, excluded.last_arrival),
+  last_sequence = greatest(known.last_sequence, excluded.last_sequence),
+  cells = coalesce(fleet_cells(known.cells, excluded.cells), '{}')";
+
+/// Of two rows of the same place the one that knows more seconds.
+fn merge_means(level: &means::MeanLevel) -> String {
+    let means::MeanLevel { table, row, .. } = level;
+    let newer = "coalesce(s1, -1) >= coalesce(s2, -1)";
+    let column =
+        |letter: char| format!("array_agg(CASE WHEN {newer} THEN {letter}1 ELSE {letter}2 END ORDER BY place)");
+    let columns: Vec<String> = ['m', 'l', 'g', 's'].map(column).into();
+    format!(
+        "INSERT INTO {table} AS known (series_id, box_id, {row}, mean, least, greatest, seconds)
+         SELECT series_id, box_id, start, mean, least, greatest, seconds FROM incoming_means
+         ON CONFLICT (series_id, box_id, {row}) DO UPDATE SET (mean, least, greatest, seconds) = (
+           SELECT {} FROM unnest(excluded.mean, excluded.least, excluded.greatest, excluded.seconds,
+             known.mean, known.least, known.greatest, known.seconds) WITH ORDINALITY AS each (m1, l1, g1, s1, m2, l2, g2, s2, place));
+         DELETE FROM incoming_means;",
+        columns.join(", ")
+    )
+}
+
+/// Copies the items into their table; where some of them are there already, those are left out. The rows that are new.
+async fn put_items(transaction: &mut Transaction<'_>, items: CopyRows) -> Result<u64, DatabaseError> {
+    let count = items.count();
+    let trying = transaction.savepoint("direct").await.map_err(writing)?;
+    match copy_raw(&trying, &format!("items ({ITEM_COLUMNS})"), items.clone()).await {
+        Ok(()) => {
+            trying.commit().await.map_err(writing)?;
+            return Ok(count);
+        }
+        Err(error) if error.code() == Some(&SqlState::UNIQUE_VIOLATION) => trying.rollback().await.map_err(writing)?,
+        Err(error) => return Err(writing(error)),
+    }
+    copy(transaction, &format!("incoming_items ({ITEM_COLUMNS})"), items).await?;
+    let merge =
+        format!("INSERT INTO items ({ITEM_COLUMNS}) SELECT {ITEM_COLUMNS} FROM incoming_items ON CONFLICT DO NOTHING");
+    transaction.execute(&merge, &[]).await.map_err(writing)
+}
+
+async fn copy(transaction: &Transaction<'_>, table: &str, rows: CopyRows) -> Result<(), DatabaseError> {
+    copy_raw(transaction, table, rows).await.map_err(writing)
+}
+
+async fn copy_raw(transaction: &Transaction<'_>, table: &str, rows: CopyRows) -> Result<(), tokio_postgres::Error> {
+    use futures_util::SinkExt;
+    let statement = format!("COPY {table} FROM STDIN BINARY");
+    let mut sink = Box::pin(transaction.copy_in::<_, bytes::Bytes>(&statement).await?);
+    sink.send(rows.finish().into()).await?;
+    sink.close().await
+}

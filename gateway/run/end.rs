@@ -1,0 +1,51 @@
+//! The end of `run`: a signal, or a tick that has ended by itself; then the last commit, which waits for the sinks.
+
+use super::outputs::ConfiguredSinks;
+use super::tick::RunFlags;
+use crate::http::Published;
+use crate::log::{Notice, Severity};
+use crate::signals::{SignalRequest, Signals};
+use std::sync::atomic::Ordering;
+use tokio::sync::watch;
+
+/// Returns when a signal has said stop, or the tick has ended by itself, and the history is closed.
+pub(super) async fn wait_for_end(
+    run_flags: &RunFlags,
+    outputs: Option<&ConfiguredSinks>,
+    live: watch::Receiver<Option<Published>>,
+) {
+    tokio::select! {
+        () = obey(run_flags) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
+        () = until_closed(live.clone()) => {}
+    }
+    run_flags.stop.store(true, Ordering::SeqCst);
+    // The last commit of the history waits for the sinks; who asks twice does not want to wait.
+    tokio::select! {
+        () = obey(run_flags) => outputs.into_iter().for_each(|outputs| outputs.outbox.hurry()),
+        () = until_closed(live.clone()) => {}
+    }
+    until_closed(live).await;
+}
+
+/// Returns when a signal says stop.
+async fn obey(run_flags: &RunFlags) {
+    let mut signals = match Signals::listen() {
+        Ok(signals) => signals,
+        Err(error) => {
+            let text = format!("signals cannot be heard ({error}): stop the box with SIGKILL; nothing stored is lost");
+            Notice::new(Severity::Warning, "no_signals", text).say();
+            return std::future::pending().await;
+        }
+    };
+    loop {
+        match signals.next().await {
+            SignalRequest::Stop => return,
+            SignalRequest::Reload => run_flags.reload.store(true, Ordering::SeqCst),
+        }
+    }
+}
+
+/// Returns when the tick has ended and nothing will be published any more.
+async fn until_closed(mut live: watch::Receiver<Option<Published>>) {
+    while live.changed().await.is_ok() {}
+}

@@ -1,0 +1,274 @@
+//! `mqtt://HOST:PORT/PREFIX` and `mqtts://`: every item on topics under a prefix, in one of three [layouts](Layout).
+//!
+//! The prefix is the box's name where none is written. `PREFIX/online` is retained and says `{"online":true}`, or by the will of the
+//! connection `{"online":false}`. `PREFIX/latest` is retained and holds everything that is known now; it is written at most every
+//! `latest_s`.
+//!
+//! With `allow_requests` the box subscribes `PREFIX/request` and hands what comes to the gate ([`Requests`]); the answer goes to
+//! `PREFIX/request/answer`. Without it nothing is subscribed: a network cannot ask the box for anything this way.
+
+mod discovery;
+mod layout;
+mod request;
+
+pub use layout::Layout;
+
+pub(super) use layout::document;
+
+use super::broker::{BrokerTarget, Link, client_name};
+use super::{Batch, Pending, Requests, Sink, SinkError};
+use crate::control::Reply;
+use crate::history::{Content, Item, Outbox, Record};
+use adapters::address::Keys;
+use adapters::mqtt::{MqttMessage, Outgoing, Qos, Will};
+use request::RequestDocument;
+use serde_json::{Value as Json, json};
+use std::collections::BTreeSet;
+use std::time::Duration;
+use tokio::time::Instant;
+
+/// Where to, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MqttTarget {
+    /// The broker.
+    pub broker: BrokerTarget,
+    /// What every topic begins with; empty: the name of the box.
+    pub prefix: String,
+    /// How hard a message is delivered.
+    pub qos: Qos,
+    /// How items look.
+    pub layout: Layout,
+    /// How often everything that is known is written; zero: never.
+    pub latest: Duration,
+    /// Is every sensor described for Home Assistant?
+    pub discovery: bool,
+}
+
+impl MqttTarget {
+    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, String> {
+        let qos = keys.choice("qos", &[("1", Qos::AtLeastOnce), ("0", Qos::AtMostOnce)]);
+        let layouts = [("items", Layout::Items), ("flat", Layout::Flat), ("topics", Layout::Topics)];
+        let layout = keys.choice("layout", &layouts);
+        let latest = Duration::from_secs_f64(keys.number("latest_s", 2.0, 0.0, 3600.0));
+        let discovery = keys.choice("discovery", &[("none", false), ("homeassistant", true)]);
+        if discovery && layout != Layout::Topics {
+            keys.problem("discovery=homeassistant needs layout=topics beside it".to_owned());
+        }
+        let (broker, prefix) = BrokerTarget::parse(body, keys, secured)?;
+        if prefix.contains(['+', '#']) || prefix.starts_with('$') {
+            return Err(format!("{prefix:?} is no beginning of a topic; leave out + and #, and $ at its beginning"));
+        }
+        Ok(Self { broker, prefix: prefix.to_owned(), qos, layout, latest, discovery })
+    }
+}
+
+/// See the [module](self).
+pub(super) struct MqttSink {
+    target: MqttTarget,
+    name: String,
+    outbox: Outbox,
+    link: Link,
+    requests: Requests,
+    /// A message that has come and is not answered yet.
+    asked: Option<MqttMessage>,
+    /// When everything that is known was written last, and whether something has changed since.
+    told: Option<Instant>,
+    changed: bool,
+    /// Codes of the alarms that stand.
+    alarms: BTreeSet<String>,
+    /// Series that are described.
+    described: BTreeSet<i64>,
+}
+
+impl MqttSink {
+    pub(super) fn new(target: MqttTarget, (name, requests): (&str, Requests), outbox: &Outbox) -> Self {
+        Self {
+            target,
+            name: name.to_owned(),
+            outbox: outbox.clone(),
+            link: Link::default(),
+            requests,
+            asked: None,
+            told: None,
+            changed: false,
+            alarms: BTreeSet::new(),
+            described: BTreeSet::new(),
+        }
+    }
+
+    /// Hands a message to the gate and publishes what became of it.
+    async fn answer(&mut self, message: MqttMessage) -> Result<(), SinkError> {
+        let document = match message.retained {
+            true => Err(request::RETAINED.to_owned()),
+            false => request::document_of(&message.payload),
+        };
+        let id = document.as_ref().map_or(Json::Null, |document| document.id.clone().map_or(Json::Null, Json::from));
+        let change = document.and_then(RequestDocument::change);
+        let Some(Reply { done, text }) = self.requests.ask(change).await else { return Ok(()) };
+        let says = json!({"done": done, "text": text, "id": id});
+        let topic = self.topic("request/answer");
+        let answer = Outgoing { topic, payload: says.to_string().into_bytes(), retain: false };
+        self.publish(vec![answer], Qos::AtMostOnce).await
+    }
+
+    fn prefix(&self) -> String {
+        match self.target.prefix.as_str() {
+            "" => self.outbox.box_id(),
+            prefix => prefix.to_owned(),
+        }
+    }
+
+    fn topic(&self, kind: &str) -> String {
+        format!("{}/{kind}", self.prefix())
+    }
+
+    fn online(&self, online: bool) -> Outgoing {
+        let says = json!({"machine": self.outbox.machine(), "box": self.outbox.box_id(), "online": online});
+        Outgoing { topic: self.topic("online"), payload: says.to_string().into_bytes(), retain: true }
+    }
+
+    async fn publish(&self, messages: Vec<Outgoing>, qos: Qos) -> Result<(), SinkError> {
+        let sent = self.link.publish(messages, qos, &self.target.broker).await;
+        sent.map_err(|(_, failure)| failure.of_item(0))
+    }
+
+    /// When everything that is known is to be written again; `None` while nothing has changed.
+    fn due(&self) -> Option<Instant> {
+        let next = || self.told.map_or_else(Instant::now, |told| told + self.target.latest);
+        (self.changed && !self.target.latest.is_zero()).then(next)
+    }
+
+    /// Writes everything that is known, if it is time.
+    async fn tell_latest(&mut self) -> Result<(), SinkError> {
+        if self.due().is_none_or(|due| Instant::now() < due) {
+            return Ok(());
+        }
+        (self.told, self.changed) = (Some(Instant::now()), false);
+        let message = layout::latest(&self.outbox, &self.prefix(), self.alarms.iter());
+        self.publish(vec![message], Qos::AtLeastOnce).await
+    }
+
+    /// What a subscriber that was there before this connection does not know.
+    async fn greet(&mut self) -> Result<(), SinkError> {
+        let prefix = self.prefix();
+        let mut messages = vec![self.online(true)];
+        if self.target.layout == Layout::Topics {
+            let latest = self.outbox.latest();
+            let provided = latest.iter().filter(|reading| !layout::is_unprovided(reading));
+            messages.extend(provided.map(|reading| layout::value(&prefix, reading)));
+        }
+        (self.told, self.changed) = (None, true);
+        self.publish(messages, Qos::AtLeastOnce).await?;
+        self.describe().await?;
+        self.tell_latest().await
+    }
+
+    /// Describes what is not described yet.
+    async fn describe(&mut self) -> Result<(), SinkError> {
+        if !self.target.discovery {
+            return Ok(());
+        }
+        let (latest, prefix) = (self.outbox.latest(), self.prefix());
+        let fresh: Vec<_> = latest
+            .iter()
+            .filter(|reading| !layout::is_unprovided(reading) && !self.described.contains(&reading.series.id))
+            .collect();
+        let messages: Vec<_> = fresh.iter().map(|reading| discovery::sensor(&self.outbox, &prefix, reading)).collect();
+        if messages.is_empty() {
+            return Ok(());
+        }
+        self.publish(messages, Qos::AtLeastOnce).await?;
+        self.described.extend(fresh.iter().map(|reading| reading.series.id));
+        Ok(())
+    }
+
+    fn remember(&mut self, item: &Item) {
+        let Content::Record(record) = &item.content else { return };
+        match &**record {
+            Record::Alarm(alarm) => drop(self.alarms.insert(alarm.code.clone())),
+            Record::AlarmClear(clear) => drop(self.alarms.remove(&clear.code)),
+            _ => {}
+        }
+    }
+
+    async fn deliver(&mut self, batch: Batch<'_>) -> Result<(), SinkError> {
+        let prefix = self.prefix();
+        let (mut messages, mut owners) = (Vec::new(), Vec::new());
+        for item in batch.items {
+            self.remember(item);
+            let of_item = layout::messages(self.target.layout, &self.outbox, &prefix, item, batch.historical);
+            owners.extend(of_item.iter().map(|_| item.sequence));
+            messages.extend(of_item);
+        }
+        let sent = self.link.publish(messages, self.target.qos, &self.target.broker).await;
+        sent.map_err(|(index, failure)| failure.of_item(owners.get(index).copied().unwrap_or(0)))?;
+        if batch.historical {
+            return Ok(());
+        }
+        self.changed = true;
+        self.describe().await?;
+        self.tell_latest().await
+    }
+}
+
+impl Sink for MqttSink {
+    fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async move {
+            let Outgoing { topic, payload, retain } = self.online(false);
+            let will = Will { topic, payload, qos: Qos::AtLeastOnce, retain, at_leave: false };
+            let name = client_name(&self.outbox.box_id(), &self.name);
+            self.link.connect(&self.target.broker, &name, Some(will)).await?;
+            self.asked = None;
+            self.described.clear();
+            if self.requests.allowed() {
+                let filter = vec![self.topic("request")];
+                self.link.subscribe(filter, Qos::AtLeastOnce, &self.target.broker).await?;
+            }
+            self.greet().await
+        })
+    }
+
+    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+        Box::pin(self.deliver(batch))
+    }
+
+    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        // Without `allow_requests` nothing is subscribed.
+        Box::pin(async move {
+            let due = self.due();
+            let until_due = async {
+                match due {
+                    Some(due) => tokio::time::sleep_until(due).await,
+                    None => std::future::pending().await,
+                }
+            };
+            tokio::select! {
+                message = self.link.next(&self.target.broker) => self.asked = Some(message?),
+                () = until_due => {}
+            }
+            Ok(())
+        })
+    }
+
+    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async move {
+            self.tell_latest().await?;
+            match self.asked.take().filter(|message| message.topic == self.topic("request")) {
+                Some(message) => self.answer(message).await,
+                None => Ok(()),
+            }
+        })
+    }
+
+    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.link.probe(&self.target.broker))
+    }
+
+    fn close(&mut self) -> Pending<'_, ()> {
+        Box::pin(async move {
+            // Where this does not go through, the will says the same.
+            let _told = self.publish(vec![self.online(false)], Qos::AtLeastOnce).await;
+            self.link.leave().await;
+        })
+    }
+}
