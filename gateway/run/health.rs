@@ -6,9 +6,9 @@ use super::history_store::HistoryStore;
 use super::sample_feed::{SampleFeed, SourcePace};
 use super::save::Saver;
 use crate::alignment::{self, Alignment};
-use crate::history::{Audit, Event, ExtraValue, Record};
+use crate::history::{Audit, ExtraValue, Record};
 use crate::log::{Notice, Severity};
-use crate::pipeline::{Pipeline, Store};
+use crate::pipeline::{Pipeline, Store, event_of};
 use crate::status::{HistoryStatus, SourceStatus, StatusProblem};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -87,7 +87,7 @@ impl Health {
     /// Remembers and tells that something happened.
     pub fn event(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
         notice.say();
-        self.history_store.record(stored(at_ns, source, notice).into());
+        self.history_store.record(event_of(at_ns, source, notice).into());
     }
 
     /// Remembers a record that is no event.
@@ -215,7 +215,8 @@ impl Health {
     pub fn close(&mut self, pipeline: &Pipeline, at_ns: TimeNs) {
         self.save(pipeline);
         self.saver.close();
-        self.history_store.record(stored(at_ns, "gateway", &Notice::new(Severity::Info, "stopped", "stopped")).into());
+        let stopped = Notice::new(Severity::Info, "stopped", "stopped");
+        self.history_store.record(event_of(at_ns, "gateway", &stopped).into());
         self.history_store.close();
     }
 
@@ -307,12 +308,6 @@ fn told_pace(SourcePace { name, wanted, kept }: &SourcePace) -> Notice {
     Notice::new(Severity::Warning, "source_pace", text).detail(detail)
 }
 
-/// A notice as a row of the history.
-fn stored(at_ns: TimeNs, source: &str, notice: &Notice) -> Event {
-    let detail = if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
-    Event { at_ns, kind: notice.code.to_owned(), source: source.to_owned(), text: notice.operator.clone(), detail }
-}
-
 /// A length of time in words.
 fn span(ns: i64) -> String {
     let seconds = (ns + SECOND_NS / 2) / SECOND_NS;
@@ -332,5 +327,9 @@ impl Store for Health {
 
     fn record(&mut self, record: Record) {
         self.history_store.record(record);
+    }
+
+    fn notice(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
+        self.event(at_ns, source, notice);
     }
 }

@@ -120,7 +120,6 @@ impl Ticker {
             let inferred = *self.pipeline.infer(&sample);
             self.feed.alignment_mut().told(sample.at_ns, inferred.state);
             self.health.aligned(sample.at_ns, self.feed.alignment_mut());
-            self.wear.tell(&mut self.pipeline, sample.at_ns, &mut self.health);
             if let Some(thermal) = &mut self.thermal {
                 self.pipeline.propose(thermal.step(&sample, &mut self.health));
             }

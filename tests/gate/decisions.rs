@@ -223,6 +223,7 @@ fn the_pace_and_the_band_are_told() {
 
 #[test]
 fn never_above_the_operators_dial_unless_configured() {
+    let pct = |percent: u8| OverridePct::new(percent).expect("an override");
     let decided = |above_dial: bool, dial: Option<f64>| {
         let mut gate = Gate::new(config::GateConfig { above_dial, ..limits(GateMode::Armed) });
         let mut last = None;
@@ -233,9 +234,13 @@ fn never_above_the_operators_dial_unless_configured() {
         }
         last.map(|verdict| (verdict.permitted.percent(), verdict.outcome)).expect("decided")
     };
-    assert_eq!(decided(false, None), (100, GateOutcome::Limited(Bound::Dial)), "nobody knows the dial");
-    assert_eq!(decided(false, Some(110.0)), (110, GateOutcome::Limited(Bound::Dial)));
-    assert_eq!(decided(false, Some(60.0)), (100, GateOutcome::Limited(Bound::Dial)), "the ladder takes the lesser one");
+    assert_eq!(decided(false, None), (100, GateOutcome::Limited(Bound::Dial(pct(100)))), "nobody knows the dial");
+    assert_eq!(decided(false, Some(110.0)), (110, GateOutcome::Limited(Bound::Dial(pct(110)))));
+    assert_eq!(
+        decided(false, Some(60.0)),
+        (100, GateOutcome::Limited(Bound::Dial(pct(100)))),
+        "the ladder takes the lesser one"
+    );
     let asked_60 = |dial: f64| {
         let mut gate = Gate::new(limits(GateMode::Armed));
         let decide = |tick: i64| {

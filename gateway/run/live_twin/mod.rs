@@ -202,6 +202,7 @@ impl Twin {
         // What differed before the restart still does; the history has ended its alarms.
         if !std::mem::replace(&mut self.raised, true) {
             self.mismatches().iter().for_each(|mismatch| self.raise(mismatch, health, now_ns));
+            self.tell_onsets();
         }
         let Some(ActiveModel { live, .. }) = &mut self.active else { return };
         let noticed = live.step(sample, pipeline.estimates().state);
@@ -235,7 +236,7 @@ impl Twin {
     }
 
     fn differs(&mut self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
-        let (en, _) = words::mismatch(mismatch, self.quantity(), self.unit());
+        let (en, _) = words::mismatch_since(mismatch, self.quantity(), self.unit());
         health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "twin_mismatch", en));
         self.raise(mismatch, health, now_ns);
         let onset = mismatch.onset.map(|onset| (words::nanoseconds(onset.at_s), words::nanoseconds(onset.low_s)));
@@ -243,11 +244,19 @@ impl Twin {
         let earliest_ns = self.begun_ns.map_or(now_ns, |begun_ns| begun_ns + APART_NS);
         let at_ns = (at_ns + AFTER_NS).max(now_ns).max(earliest_ns);
         self.due.get_or_insert(Due { at_ns, from_ns: low_ns - BEFORE_NS });
+        self.tell_onsets();
         self.save(health);
     }
 
+    /// A diagnosis is held against what the watch has seen, from the same moment on.
+    fn tell_onsets(&self) {
+        let onset = |it: Mismatch| Some((it.regime, words::nanoseconds(it.onset?.at_s)));
+        let onsets = self.mismatches().into_iter().filter_map(onset).collect();
+        self.worker.iter().for_each(|worker| worker.diagnoses().set_onsets(Vec::clone(&onsets)));
+    }
+
     fn raise(&self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
-        let (en, zh) = words::mismatch(mismatch, self.quantity(), self.unit());
+        let (en, zh) = words::mismatch_since(mismatch, self.quantity(), self.unit());
         let (code, source, severity) = (code(mismatch.regime), SOURCE.to_owned(), "warning".to_owned());
         health.keep(Alarm { at_ns: now_ns, code, source, severity, en, zh }.into());
     }
@@ -259,6 +268,7 @@ impl Twin {
         if self.mismatches().is_empty() && !self.diagnosing {
             self.due = None;
         }
+        self.tell_onsets();
         self.save(health);
     }
 

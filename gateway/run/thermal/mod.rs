@@ -5,6 +5,8 @@
 //! it by bounded steps, and what was learned is kept in `thermal.json` of the data directory. The offset is proposed to the gate
 //! only where the configuration says so; the gate decides, as about every offset.
 
+pub mod outside;
+
 use super::health::Health;
 use crate::cannot_run::CannotRun;
 use crate::config::{self, Config};
@@ -12,6 +14,7 @@ use crate::history::{ExtraSeries, ExtraValue};
 use crate::log::{Notice, Severity};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, ChannelId, Sample};
+use outside::OutsideWatch;
 use rules::estimators::thermal::{
     AxisSituation, Compensator, Corrected, FollowSettings, HoldReason, ThermalFollower, ThermalModel, ThermalPrediction,
 };
@@ -43,6 +46,8 @@ pub struct Thermal {
     last_ns: Option<TimeNs>,
     read_ns: Option<TimeNs>,
     held: Option<HoldReason>,
+    /// Since when the temperatures have been inside the range of identification, and what was told last.
+    outside: OutsideWatch,
     pulses: i64,
     values: [ExtraValue<'static>; COUNT],
     reason: Arc<str>,
@@ -84,6 +89,7 @@ impl Thermal {
             last_ns: None,
             read_ns: None,
             held: None,
+            outside: OutsideWatch::default(),
             pulses: 0,
             values: [ExtraValue::Missing("not_yet"); COUNT],
             reason: "thermal law".into(),
@@ -146,6 +152,10 @@ impl Thermal {
         };
         let dt_s = dt_ns as f64 / SECOND_NS as f64;
         let step = self.compensator.step(dt_s, predicted.as_ref().ok(), AxisSituation::default());
+        let names: Vec<&str> = self.sensors.iter().map(|channel| channel.name()).collect();
+        if let Some(notice) = self.outside.look(sample.at_ns, predicted.as_ref().ok(), &step, &names) {
+            health.event(sample.at_ns, SOURCE, &notice);
+        }
         self.pulses += step.increment_pulses;
         let of = |value: fn(&ThermalPrediction) -> f64| match &predicted {
             Ok(prediction) => ExtraValue::Number(value(prediction)),
