@@ -235,13 +235,7 @@ fn everything_unusable_is_named_at_once() {
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty());
     let said = text(&output.stderr);
-    for wanted in [
-        "did you mean linear?",
-        "bad.csv: 2 of 4 rows refused",
-        "line 3, column force_n",
-        "line 5, column time_s",
-        "gone.csv",
-    ] {
+    for wanted in ["did you mean linear?", "bad.csv: 1 of 4 rows refused", "line 5, column time_s", "gone.csv"] {
         assert!(said.contains(wanted), "{wanted} in:\n{said}");
     }
 }
@@ -258,7 +252,7 @@ fn missing_columns_are_named_with_what_to_record() {
 #[test]
 fn a_few_refused_rows_are_left_out_and_noted() {
     let bench = bench();
-    let broken = read(&bench, "r.csv").replacen("\n0.2,1,", "\n0.2,1,x", 1);
+    let broken = read(&bench, "r.csv").replacen("\n0.2,1,", "\nx0.2,1,", 1);
     write(&bench, "r.csv", &broken);
     let output = gateway(bench.path(), &["diagnose", "--model", "m.toml", "--recording", "r.csv", "--json"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));

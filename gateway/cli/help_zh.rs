@@ -48,7 +48,7 @@ pub(super) fn translate_command(command: Command) -> Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::Arguments;
+    use crate::cli::{Arguments, lang};
     use clap::CommandFactory;
 
     fn collect(command: &Command, lacking: &mut Vec<String>) {
@@ -75,16 +75,8 @@ mod tests {
     #[test]
     fn a_translated_command_takes_the_same_arguments() {
         let command = translate_command(Arguments::command());
-        let found = command.try_get_matches_from([
-            "cnc-gateway",
-            "--lang",
-            "zh",
-            "diagnose",
-            "--model",
-            "m.toml",
-            "--recording",
-            "r.csv",
-        ]);
+        let typed = ["cnc-gateway", "--lang", "zh", "diagnose", "--model", "m.toml", "--recording", "r.csv"];
+        let found = command.try_get_matches_from(lang::move_behind_command(typed.map(Into::into).to_vec()));
         assert!(found.is_ok(), "{found:?}");
     }
 }

@@ -59,6 +59,21 @@ pub(super) fn asked_in(arguments: impl Iterator<Item = std::ffi::OsString>) -> O
     }
 }
 
+/// The arguments without a `--lang` before the command: it belongs to every command, and the options before a command are those of `run`.
+pub(super) fn move_behind_command(arguments: Vec<std::ffi::OsString>) -> Vec<std::ffi::OsString> {
+    let text = |at: usize| arguments.get(at).and_then(|argument| argument.to_str()).unwrap_or_default();
+    let count = match text(1) {
+        "--lang" => 2,
+        one if one.starts_with("--lang=") => 1,
+        _ => return arguments,
+    };
+    if text(1 + count).is_empty() || text(1 + count).starts_with('-') {
+        return arguments;
+    }
+    let (head, rest) = (&arguments[..1], &arguments[1..]);
+    [head, &rest[count..=count], &rest[..count], &rest[count + 1..]].concat()
+}
+
 /// A sentence in the language of this process.
 pub(super) fn say(text: &Bilingual) -> &str {
     pick(&text.en, &text.zh)

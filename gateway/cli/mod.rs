@@ -162,7 +162,7 @@ enum CliCommand {
 #[must_use]
 pub fn main() -> ExitCode {
     let language = lang::asked_in(std::env::args_os()).unwrap_or_else(lang::of_computer);
-    let matches = command(language).get_matches();
+    let matches = command(language).get_matches_from(lang::move_behind_command(std::env::args_os().collect()));
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     lang::choose(arguments.lang);
     let done = dispatch(arguments);

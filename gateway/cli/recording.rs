@@ -1,4 +1,4 @@
-//! `cnc-gateway recording`: how a foreign file is describe_reading, and the map that says it.
+//! `cnc-gateway recording`: how a foreign file is read, and the map that says it.
 
 use super::lang::{pick, say};
 use super::{CannotRun, CommandOutcome, CommandResult, print};
@@ -24,7 +24,7 @@ pub(super) struct RecordingArguments {
 
 #[derive(Debug, Subcommand)]
 enum RecordingCommand {
-    /// Tell how a file is describe_reading, and show its first rows.
+    /// Tell how a file is read, and show its first rows.
     Show(RecordingFile),
     /// Propose the map of a file (map/1), ask where something is unsure, write it beside the file.
     Map {

@@ -188,11 +188,48 @@ impl<'a> PlaceSearch<'a> {
                     best = Some((worth, candidate, narrowed));
                 }
             }
-            let Some((worth, condition, narrowed)) = best.filter(|(worth, ..)| *worth > value + 1e-9) else { break };
+            let Some((_, condition, _)) = best.filter(|(worth, ..)| *worth > value + 1e-9) else { break };
+            let (worth, condition, narrowed) = self.sharpen(condition, &chosen, &inside, energy);
             (value, inside) = (worth, narrowed);
             chosen.push(condition);
         }
         (chosen, value)
+    }
+
+    /// Moves the bounds of a range to the value where it gains most: the thresholds that are tried first stand far apart.
+    fn sharpen(
+        &self,
+        condition: Condition,
+        chosen: &[Condition],
+        inside: &[bool],
+        energy: &[f64],
+    ) -> (f64, Condition, Vec<bool>) {
+        let worth = |candidate: Condition| {
+            let mut narrowed = inside.to_vec();
+            self.narrow(&mut narrowed, &candidate);
+            let gain = self.gain(&narrowed, energy) - price(&[chosen, std::slice::from_ref(&candidate)].concat());
+            (gain, candidate, narrowed)
+        };
+        let sorted = self.sorted_values(condition.column(), inside);
+        let mut best = worth(condition);
+        let mut step = sorted.len().div_ceil(2 * THRESHOLDS);
+        while step > 0 && !sorted.is_empty() {
+            for candidate in moved_bounds(&best.1, &sorted, step) {
+                let other = worth(candidate);
+                if other.0 > best.0 {
+                    best = other;
+                }
+            }
+            step /= 2;
+        }
+        best
+    }
+
+    /// The different values of a column of numbers within, in order.
+    fn sorted_values(&self, column: &str, inside: &[bool]) -> Vec<f64> {
+        let named = |of: &&PlaceColumn<'_>| matches!(of, PlaceColumn::Numbers(name, _) if name == column);
+        let Some(PlaceColumn::Numbers(_, values)) = self.columns.iter().find(named) else { return Vec::new() };
+        sort_values(values, inside)
     }
 
     fn candidates(&self, column: &PlaceColumn<'_>, inside: &[bool], energy: &[f64]) -> Vec<Condition> {
@@ -251,12 +288,34 @@ fn time_in_run(recording: &Recording, rows: &[usize]) -> Vec<Option<f64>> {
     rows.iter().map(|row| Some(recording.time_s[*row] - recording.time_s[start(*row)?])).collect()
 }
 
-/// Pairs of neighbouring values at even shares of the rows that are inside: a threshold lies between both.
-fn thresholds(values: &[Option<f64>], inside: &[bool]) -> Vec<(f64, f64)> {
+/// The different values within, in order.
+fn sort_values(values: &[Option<f64>], inside: &[bool]) -> Vec<f64> {
     let mut sorted: Vec<f64> =
         values.iter().zip(inside).filter(|(_, inside)| **inside).filter_map(|(value, _)| *value).collect();
     sorted.sort_by(f64::total_cmp);
     sorted.dedup();
+    sorted
+}
+
+/// The same range with one bound moved by so many values, up and down; a bound lies between two values.
+fn moved_bounds(condition: &Condition, sorted: &[f64], step: usize) -> Vec<Condition> {
+    let Condition::Range { column, min, max } = condition else { return Vec::new() };
+    let moved = |bound: f64| {
+        let at = sorted.partition_point(|value| *value < bound);
+        [at.saturating_sub(step), (at + step).min(sorted.len() - 1)]
+            .into_iter()
+            .filter(|at| *at > 0)
+            .map(|at| f64::midpoint(sorted[at - 1], sorted[at]))
+    };
+    let range = |min: Option<f64>, max: Option<f64>| Condition::Range { column: column.clone(), min, max };
+    let of_min = min.iter().flat_map(|bound| moved(*bound)).map(|bound| range(Some(bound), *max));
+    let of_max = max.iter().flat_map(|bound| moved(*bound)).map(|bound| range(*min, Some(bound)));
+    of_min.chain(of_max).collect()
+}
+
+/// Pairs of neighbouring values at even shares of the rows that are inside: a threshold lies between both.
+fn thresholds(values: &[Option<f64>], inside: &[bool]) -> Vec<(f64, f64)> {
+    let sorted = sort_values(values, inside);
     if sorted.len() < 2 {
         return Vec::new();
     }

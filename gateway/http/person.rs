@@ -46,9 +46,14 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
         }
         let bytes = axum::body::Bytes::from_request(request, state).await;
         let bytes = bytes.map_err(|error| ApiProblem::request(error.to_string(), "send it again"))?;
-        serde_json::from_slice(&bytes).map(Self).map_err(|error| {
+        let unusable = |error: &dyn std::fmt::Display| {
             ApiProblem::request(format!("the body cannot be used: {error}"), "/openapi.json describes it")
-        })
+        };
+        // A list in the place of an object would fill its fields in their order.
+        if !bytes.trim_ascii_start().starts_with(b"{") {
+            return Err(unusable(&"it is no object"));
+        }
+        serde_json::from_slice(&bytes).map(Self).map_err(|error| unusable(&error))
     }
 }
 

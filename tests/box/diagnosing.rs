@@ -43,7 +43,7 @@ fn a_chosen_time_is_diagnosed_ended_read_and_its_model_taken_over() {
     let press = "(() => { const all = [...document.querySelectorAll('main button')]; all.find((it) => it.textContent === 'last 1 h').click();
                    all.find((it) => it.textContent === 'Diagnose').click(); return all.length; })()";
     browser.value(press);
-    browser.wait_until("document.querySelector('progress') && !document.querySelector('progress').hidden");
+    browser.wait_until("[...document.querySelectorAll('progress')].some((bar) => !bar.hidden)");
     let done = wait_for("the diagnosis", Duration::from_secs(900), || {
         let run = run_of(&address);
         (run["state"] != "running").then_some(run)

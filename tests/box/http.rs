@@ -34,7 +34,11 @@ fn every_described_address_answers_with_what_is_described() {
         }
         let answer = get(
             &address,
-            &path.replace("{file}", "page.js").replace("{chapter}", "page").replace("{subject}", "tool-wear"),
+            &path
+                .replace("{file}", "page.js")
+                .replace("{chapter}", "page")
+                .replace("{subject}", "tool-wear")
+                .replace("{name}", "turning"),
         );
         // What the delivered box has not been given, such as a recipe, is said with a described conflict.
         if answer.status == 409 && item["get"]["responses"]["409"].is_object() {

@@ -66,7 +66,7 @@ pub enum RecordingError {
         reason: Bilingual,
     },
     /// No usable row.
-    #[error("{file}: no usable row{}", first(.problems))]
+    #[error("{file}: no usable row{}; a recording is a line of column names, with time_s or a clock among them, and rows of values", first(.problems))]
     Empty {
         /// The file.
         file: String,
@@ -87,7 +87,9 @@ impl RecordingError {
         match self {
             Self::Header { file, line, reason } => format!("{file}，第{line}行：{}", reason.zh),
             Self::Format { file, reason } => format!("{file}：{}", reason.zh),
-            Self::Empty { file, problems } => format!("{file}：没有可用的行{}", first(problems)),
+            Self::Empty { file, problems } => {
+                format!("{file}：没有可用的行{}；记录由一行列名（含time_s或时刻列）和数据行组成", first(problems))
+            }
             Self::Io { file, error } => format!("{file}：无法读取（{error}）"),
         }
     }

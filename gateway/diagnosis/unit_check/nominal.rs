@@ -15,6 +15,10 @@ const POOR: f64 = 0.4;
 const GOOD: f64 = 0.3;
 /// and by how much it must lower the error.
 const BETTER: f64 = 0.35;
+/// Units whose errors differ by less than this are told together: a batch of material changes a cut by as much.
+const ALIKE: f64 = 0.05;
+/// So many are told at most.
+const TOLD_MAX: usize = 3;
 /// Rows that are simulated; a long recording is thinned.
 const ROWS_MAX: usize = 4000;
 /// Columns that inputs follow from, so that they count as inputs too.
@@ -43,33 +47,48 @@ pub(super) fn find(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
     if given < POOR {
         return Vec::new();
     }
-    let mut best: Option<(f64, String, &'static str, f64)> = None;
+    let mut found: Vec<UnitHypothesis> = Vec::new();
     let columns = INPUTS.iter().copied().filter(|name| thin.numbers(name).is_some()).chain([model.output.as_str()]);
     for column in columns {
         for (unit, factor) in mistakes(column) {
             let Some(under) = error(&scale_column(&thin, column, factor), model) else { continue };
-            if best.as_ref().is_none_or(|(least, ..)| under < *least) {
-                best = Some((under, column.to_owned(), unit, factor));
+            if under < GOOD && under < BETTER * given {
+                found.push(UnitHypothesis { error: under, column: column.to_owned(), unit, factor });
             }
         }
     }
-    let Some((under, column, unit, factor)) = best.filter(|(under, ..)| *under < GOOD && *under < BETTER * given)
-    else {
-        return Vec::new();
-    };
-    let (before, after, factor) = (short(100.0 * given), short(100.0 * under), short(factor));
-    let own = unit_of(&column).unwrap_or("");
-    vec![UnitDoubt::new(
-        &column,
-        format!(
-            "the model as given misses {} by {before} %; with {column} taken as {unit} ({factor} times as many {own}) it misses by {after} %: is {column} in {unit}?",
-            model.output
-        ),
-        format!(
-            "按给定模型，{}的误差为{before} %；若{column}以{unit}为单位（换算为{own}乘以{factor}），误差为{after} %：{column}是否以{unit}为单位？",
-            model.output
-        ),
-    )]
+    found.sort_by(|a, b| a.error.total_cmp(&b.error));
+    let Some(limit) = found.first().map(|best| best.error + ALIKE) else { return Vec::new() };
+    found.retain(|hypothesis| hypothesis.error <= limit);
+    found.truncate(TOLD_MAX);
+    vec![describe(&model.output, given, &found)]
+}
+
+/// A column taken to be in another unit.
+struct UnitHypothesis {
+    /// Error of the model then, over the size of the output.
+    error: f64,
+    column: String,
+    unit: &'static str,
+    /// Turns the numbers into those of the unit that the column's name says.
+    factor: f64,
+}
+
+fn describe(output: &str, given: f64, found: &[UnitHypothesis]) -> UnitDoubt {
+    let (mut en, mut zh, mut ask_en, mut ask_zh) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for UnitHypothesis { error, column, unit, factor } in found {
+        let (after, factor, own) = (short(100.0 * error), short(*factor), unit_of(column).unwrap_or(""));
+        en.push(format!("with {column} taken as {unit} ({factor} times as many {own}) it misses by {after} %"));
+        zh.push(format!("若{column}以{unit}为单位（换算为{own}乘以{factor}），误差为{after} %"));
+        ask_en.push(format!("{column} in {unit}"));
+        ask_zh.push(format!("{column}以{unit}为单位"));
+    }
+    let before = short(100.0 * given);
+    UnitDoubt::new(
+        &found[0].column,
+        format!("the model as given misses {output} by {before} %; {}: is {}?", en.join(", "), ask_en.join(", or ")),
+        format!("按给定模型，{output}的误差为{before} %；{}：是否{}？", zh.join("，"), ask_zh.join("，或")),
+    )
 }
 
 /// Error of the model as given over the size of the output, about its mean where the output has a sign of its own.
