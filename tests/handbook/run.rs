@@ -29,8 +29,11 @@ const ORDER: [&str; 11] = [
 const OTHER_CODES: [(&str, i32, &str); 1] =
     [("commission --config", 1, "parts of the commissioning are still missing, which the code tells")];
 /// Commands that are not run here, and where they are.
-const ELSEWHERE: [(&str, &str); 2] =
-    [("fleet stream", "tests/fleet: needs a NATS server"), ("fleet ingest", "tests/fleet: needs NATS and PostgreSQL")];
+const ELSEWHERE: [(&str, &str); 3] = [
+    ("fleet stream", "tests/fleet: needs a NATS server"),
+    ("fleet ingest", "tests/fleet: needs NATS and PostgreSQL"),
+    ("fleet retain", "tests/fleet: needs PostgreSQL"),
+];
 /// What a command that runs until it is stopped says when it serves; others name the address of their page.
 const SERVES: [(&str, &str); 2] = [("fanuc", "fanuc://"), ("modbus", "modbus-tcp://")];
 
@@ -136,6 +139,16 @@ fn brought(directory: &Path) {
         fs::write(directory.join(rows), &recording).expect("written");
     }
     fs::create_dir(directory.join("edited")).expect("a directory");
+    let workbook = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/foreign/excel_de.xlsx");
+    fs::copy(workbook, directory.join("week.xlsx")).expect("copied");
+    // What a CAM system says of the same cuts: 20 s each, of which 14 s in the material.
+    let mut series = String::from("time_s,Fc_power\n");
+    for row in 0..640_u32 {
+        let speed = [800.0, 1200.0, 1600.0, 2000.0][(row / 20 % 4) as usize];
+        let power = if row % 20 >= 6 { 1.0 * speed } else { 0.0 };
+        series.push_str(&format!("{row},{}\n", 120.0 + 0.25 * speed + power));
+    }
+    fs::write(directory.join("cam.csv"), series).expect("written");
 }
 
 #[test]
