@@ -182,14 +182,13 @@ pub(super) enum BrokerFailure {
 }
 
 impl BrokerFailure {
-    /// The same for an item.
-    pub(super) fn of_item(self, sequence: u64) -> SinkError {
-        match self {
-            Self::Line(error) => error,
-            Self::Message(what) => {
-                let next = "shorten the topic, or raise the size that the broker takes".to_owned();
-                SinkError::Item { sequence, what, next }
-            }
+    /// The same for an item; `None` for a message that the receiver needs and that is no item.
+    pub(super) fn of_item(self, sequence: Option<u64>) -> SinkError {
+        let next = "shorten the topic, or raise the size that the broker takes";
+        match (self, sequence) {
+            (Self::Line(error), _) => error,
+            (Self::Message(what), Some(sequence)) => SinkError::Item { sequence, what, next: next.to_owned() },
+            (Self::Message(what), None) => SinkError::line(what, next),
         }
     }
 }

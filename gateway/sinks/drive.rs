@@ -262,12 +262,13 @@ impl SinkTask {
     }
 
     fn refused(&self, error: &SinkError, from: u64, sequence: u64) {
+        debug_assert!(sequence >= from, "an item that is not of this batch is refused");
         self.outbox.delivered(&self.name, from, sequence);
         self.outbox.delivered(&self.name, sequence, sequence + 1);
         let mut first = false;
         self.board.change(self.index, |progress| {
             progress.refused += 1;
-            progress.delivered += sequence - from;
+            progress.delivered += sequence.saturating_sub(from);
             first = progress.refusal.replace(error.to_string()).is_none();
         });
         if first {

@@ -25,7 +25,7 @@ export const WORDS = {
   gate_armed: ["ARMED by {0} until {1}: the box changes the feed, never above the dial.", "{0} 已允许写入，至 {1}：网关会调整进给，不超过操作面板。"],
   nothing: ["nothing", "无"], because: ["Because", "原因"], back_to_dial: ["Back to the dial", "交还操作面板"], arm: ["Arm …", "允许写入……"],
   arm_title: ["Let the box change the feed?", "允许网关调整进给？"], arm_words: ["For the time you choose the box may lower and raise the feed within its limits. It ends by itself, and at once with “Back to the dial”.", "在所选时间内，网关可在限值内升降进给。到时自动结束，也可随时“交还操作面板”。"], arm_for: ["For how long", "持续时间"],
-  braking: ["the spindle brakes and gives power back", "主轴制动，回馈电能"], finished_count: ["{0} finished", "已完成 {0} 件"], handbook_english: ["The chapters for installing and operating the box are in Chinese, too.", "集成与操作所需章节为中文，其余章节为英文。"], status_link: ["status", "状态"],
+  braking: ["the spindle brakes and gives power back", "主轴制动，回馈电能"], finished_count: ["{0} finished", "已完成 {0} 件"], material: ["Material", "材料"], handbook_english: ["The chapters for installing and operating the box are in Chinese, too.", "集成与操作所需章节为中文，其余章节为英文。"], status_link: ["status", "状态"],
   wear_judged: ["this moment; the lamp judges whole parts", "瞬时值；指示灯按整件判断"],
   machine_power: ["whole machine {0}", "整机 {0}"], strip_label: ["Spindle {0} W: no-load {1} W, cutting {2} W", "主轴 {0} W：空载 {1} W，切削 {2} W"],
   last_ten_minutes: ["Last ten minutes", "最近十分钟"], open_history: ["Open history", "打开历史"],

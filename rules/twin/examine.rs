@@ -209,7 +209,8 @@ mod tests {
             examined(&format!("time_s,spindle_speed_rpm,spindle_power_w,spindle_current_a\n{}\n", rows.join("\n")))
         };
         assert_eq!(of(1.0).unusable, Vec::<String>::new());
-        assert!(of(1.0).notes.iter().any(|note| note.contains("2 of 4 values lie outside 0 to 10000 A")));
+        let outside = |note: &String| note.contains("lie outside");
+        assert!(!of(1.0).notes.iter().any(outside), "noise about zero is no fault");
         let milli = of(1e3).unusable.join("\n");
         assert!(milli.contains("wrong unit? record it in A"), "{milli}");
     }

@@ -92,7 +92,7 @@ fn what_the_broker_will_never_take_is_left_out_and_the_machine_is_read_on() {
     let Some(broker) = Broker::with("allow_anonymous true\nmax_packet_size 600\n", |_| {}) else { return };
     let mut sending = Sending::to(&format!("mqtt://127.0.0.1:{}/works?protocol=5", broker.port), "");
     let status = sending.wait_sink("some are refused", |sink| sink["refused"].as_u64() > Some(1));
-    assert!(status["error"].as_str().is_some_and(|error| error.contains("600")), "{status}");
+    assert!(status["refusal"].as_str().is_some_and(|why| why.contains("600")), "{status}");
     assert_eq!(status["state"], "connected");
     let (before, source) = (sending.status()["tick"]["count"].as_u64(), sending.status()["sources"][0].clone());
     assert_ne!(source["state"], "failing", "{source}");

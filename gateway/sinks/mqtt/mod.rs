@@ -15,10 +15,11 @@ pub use layout::Layout;
 
 pub(super) use layout::document;
 
-use super::broker::{BrokerTarget, Link, client_name};
+use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
 use crate::control::Reply;
 use crate::history::{Content, Item, Outbox, Record};
+use crate::log::{Notice, Severity};
 use adapters::address::Keys;
 use adapters::mqtt::{MqttMessage, Outgoing, Qos, Will};
 use request::RequestDocument;
@@ -78,6 +79,8 @@ pub(super) struct MqttSink {
     alarms: BTreeSet<String>,
     /// Series that are described.
     described: BTreeSet<i64>,
+    /// A message that is no item was left out, which was told.
+    left_out: bool,
 }
 
 impl MqttSink {
@@ -93,6 +96,7 @@ impl MqttSink {
             changed: false,
             alarms: BTreeSet::new(),
             described: BTreeSet::new(),
+            left_out: false,
         }
     }
 
@@ -127,9 +131,19 @@ impl MqttSink {
         Outgoing { topic: self.topic("online"), payload: says.to_string().into_bytes(), retain: true }
     }
 
-    async fn publish(&self, messages: Vec<Outgoing>, qos: Qos) -> Result<(), SinkError> {
-        let sent = self.link.publish(messages, qos, &self.target.broker).await;
-        sent.map_err(|(_, failure)| failure.of_item(0))
+    /// Messages of the box itself, which are no items. One that the broker will never take is left out, which is told once.
+    async fn publish(&mut self, mut messages: Vec<Outgoing>, qos: Qos) -> Result<(), SinkError> {
+        while !messages.is_empty() {
+            let sent = self.link.publish(messages.clone(), qos, &self.target.broker).await;
+            let Err((index, failure)) = sent else { return Ok(()) };
+            let BrokerFailure::Message(what) = failure else { return Err(failure.of_item(None)) };
+            if !std::mem::replace(&mut self.left_out, true) {
+                let text = format!("sink {}: a message beside the items is left out: {what}", self.name);
+                Notice::new(Severity::Warning, "sink_refused", text).say();
+            }
+            messages.drain(..=index);
+        }
+        Ok(())
     }
 
     /// When everything that is known is to be written again; `None` while nothing has changed.
@@ -201,7 +215,7 @@ impl MqttSink {
             messages.extend(of_item);
         }
         let sent = self.link.publish(messages, self.target.qos, &self.target.broker).await;
-        sent.map_err(|(index, failure)| failure.of_item(owners.get(index).copied().unwrap_or(0)))?;
+        sent.map_err(|(index, failure)| failure.of_item(owners.get(index).copied()))?;
         if batch.historical {
             return Ok(());
         }
@@ -267,7 +281,8 @@ impl Sink for MqttSink {
     fn close(&mut self) -> Pending<'_, ()> {
         Box::pin(async move {
             // Where this does not go through, the will says the same.
-            let _told = self.publish(vec![self.online(false)], Qos::AtLeastOnce).await;
+            let gone = vec![self.online(false)];
+            let _told = self.publish(gone, Qos::AtLeastOnce).await;
             self.link.leave().await;
         })
     }

@@ -144,7 +144,7 @@ impl SparkplugSink {
             let Some(Reply { done, text }) = self.requests.ask(change).await else { continue };
             let (at_ms, kind) = (now_ms(), self.data());
             let told = self.message(kind, vec![commands::answer(done, &text, at_ms)], at_ms);
-            self.publish(vec![told]).await.map_err(|(_, failure)| failure.of_item(0))?;
+            self.publish(vec![told]).await.map_err(|(_, failure)| failure.of_item(None))?;
         }
         Ok(())
     }
@@ -172,7 +172,7 @@ impl SparkplugSink {
         } else {
             vec![self.message("NBIRTH", [node, machine].concat(), at_ms)]
         };
-        self.publish(messages).await.map_err(|(_, failure)| failure.of_item(0))
+        self.publish(messages).await.map_err(|(_, failure)| failure.of_item(None))
     }
 
     async fn publish(&self, messages: Vec<Outgoing>) -> Result<(), (usize, BrokerFailure)> {
@@ -234,7 +234,7 @@ impl SparkplugSink {
         }
         self.dead = true;
         let death = self.message("DDEATH", Vec::new(), now_ms());
-        self.publish(vec![death]).await.map_err(|(_, failure)| failure.of_item(0))
+        self.publish(vec![death]).await.map_err(|(_, failure)| failure.of_item(None))
     }
 
     fn no_host(&self) -> SinkError {
@@ -278,7 +278,7 @@ impl SparkplugSink {
         sent.map_err(|(index, failure)| {
             // Those after it did not go out; their numbers are used again.
             self.next = first.wrapping_add(u8::try_from(index % 256).unwrap_or(0));
-            failure.of_item(batch.items.get(index).map_or(0, |item| item.sequence))
+            failure.of_item(batch.items.get(index).map(|item| item.sequence))
         })?;
         // Old data says nothing of now.
         if batch.historical { Ok(()) } else { self.say_device_death().await }
