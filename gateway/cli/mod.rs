@@ -20,6 +20,7 @@ mod gateway_options;
 mod help;
 mod help_zh;
 mod history;
+mod history_upkeep;
 mod identify;
 mod lang;
 mod metrics;

@@ -217,7 +217,7 @@ fn compare(arguments: &BacktestArguments) -> CommandResult {
 }
 
 fn newest(history: &Path) -> Result<i64, CannotRun> {
-    let span = Reader::open(history).and_then(|reader| reader.span());
+    let span = Reader::open(history).and_then(|reader| reader.present());
     let span = span.map_err(|error| CannotRun::new(error.to_string(), "--history names the database"))?;
     span.map(|(_, newest_ns)| newest_ns).ok_or_else(|| {
         CannotRun::new(format!("{} holds no samples yet", history.display()), "let the box run for a while first")

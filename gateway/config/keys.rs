@@ -153,6 +153,13 @@ const CORE: &[ConfigKey] = &[
         "每秒节拍数",
     ),
     key(
+        ("gateway", "clock_confirm_s"),
+        Number(10.0, 86_400.0),
+        Default("7200.0"),
+        "A reading of the computer's clock that has stood for so long is believed; until then nothing goes because of its age, s",
+        "计算机时钟读数稳定多久后才被采信；在此之前不按期限删除任何数据，秒",
+    ),
+    key(
         ("gateway", "language"),
         OneOf(&["auto", "en", "zh"]),
         Default("\"auto\""),

@@ -82,6 +82,8 @@ pub struct GatewayConfig {
     pub name: String,
     /// Ticks per second, 0.1 to 1000.
     pub tick_hz: f64,
+    /// A reading of the wall clock that has stood for so long is believed.
+    pub clock_confirm: Duration,
     /// Language in which the page opens; `None`: that of the browser.
     pub language: Option<Language>,
     /// Directory of everything the gateway writes.

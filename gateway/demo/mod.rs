@@ -8,12 +8,13 @@
 //! next, 11,100 s of the same machine at `--speed max`; the edges then got the names that the machine gives to its first ones. The wear
 //! model counts only for the work material that it was learned with, which the recipe of the demonstration names. Faster than real time the machine works in shifts with short nights.
 
+use crate::clock;
 use crate::config::Config;
 use crate::files::replace;
 use crate::history::{Reader, store_wear_model};
 use crate::log::{Notice, Severity};
 use crate::run::open::MachineSpeed;
-use adapters::clock::{Clock, SECOND_NS, SystemClock};
+use adapters::clock::SECOND_NS;
 use rules::estimators::wear::WearRecord;
 use serde_json::{Value, json};
 use std::ops::Range;
@@ -71,7 +72,7 @@ fn models(data_dir: &Path, history: &Path) -> Result<(), String> {
     let words = |error: std::io::Error| error.to_string();
     std::fs::create_dir_all(data_dir).map_err(words)?;
     let model = data_dir.join("demo-lathe.toml");
-    let now_ns = SystemClock::new().now_ns();
+    let now_ns = clock::now_ns();
     if !model.exists() {
         let ended_s = (now_ns / SECOND_NS - HOUR_S) as f64;
         replace(&data_dir.join("twin.json"), &moved(LEARNED, ended_s)?).map_err(words)?;

@@ -61,6 +61,7 @@ chapters! {
     "mismatch" zh,
     "twin",
     "measured",
+    "survives",
     "not-proven",
     "glossary",
     "inside",

@@ -5,6 +5,7 @@
 //! are read; only the series a statement uses are decoded.
 
 use super::block::Cells;
+use super::damage::REPAIR;
 use super::error::HistoryError;
 use super::options::SeriesKind;
 use super::schema;
@@ -151,6 +152,12 @@ impl Cursor {
         let Some(place) = &mut self.place else { return Ok(()) };
         let walk = place.walk.get_mut();
         place.stretch = walk.next(&self.db).map_err(module_error)?;
+        if let Some(damaged) = walk.damaged.first() {
+            // A statement has no way to tell what was left out of a sum.
+            return Err(Error::ModuleError(format!(
+                "{damaged} were changed by the disk: leave them out with conditions on at_ns; {REPAIR}"
+            )));
+        }
         place.cells.get_mut().clear();
         place.rows = place.stretch.as_ref().map_or(0..0, |stretch| walk.rows_of(stretch));
         Ok(())

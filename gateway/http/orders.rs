@@ -8,7 +8,7 @@ use super::person::{JsonBody, SignedIn};
 use super::plain;
 use super::problem::ApiProblem;
 use super::route::Route;
-use crate::access::{Person, Role, Token};
+use crate::access::{Person, Role, Token, Urgency};
 use crate::control::{Order, Reply};
 use axum::Json;
 use axum::extract::{Extension, State};
@@ -23,7 +23,7 @@ const BYTES_MAX: usize = 1024;
 
 pub(super) const ROUTES: &[Route] = &[
     Route::post(Role::Armer, "/api/v1/arm", BYTES_MAX, || post(arm)),
-    Route::post(Role::Viewer, "/api/v1/disarm", BYTES_MAX, || post(disarm)),
+    Route::post(Role::Viewer, "/api/v1/disarm", BYTES_MAX, || post(disarm)).gives_back(),
     Route::post(Role::Setter, "/api/v1/alarms/acknowledge", BYTES_MAX, || post(acknowledge)),
 ];
 
@@ -45,7 +45,8 @@ async fn arm(
         let hint = "arm at the box with `cnc-gateway arm --by NAME`, or write allow_arming = true under [http]";
         return Err(ApiProblem::forbidden("the gate cannot be armed from the page", hint));
     }
-    let again = shared.access.check(&person.name, &Token::typed(&wanted.token), peer.from, "armed").await;
+    let again =
+        shared.access.check(&person.name, &Token::typed(&wanted.token), peer.from, "armed", Urgency::Waits).await;
     again.map_err(|error| wrong(&error))?;
     let order = Order::Arm { by: signed(&person, &peer), for_s: wanted.for_s };
     answer(shared.post.order(order).await, "look at [gate] in the configuration, and at the problems of /api/v1/status")

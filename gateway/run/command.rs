@@ -331,6 +331,12 @@ impl Commands {
         }
     }
 
+    /// Ends an arming, and accounts for it.
+    pub fn end_arming(&mut self, why: Disarmed, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+        gate.disarm(why);
+        self.follow_arming(gate, sample.at_ns, health);
+    }
+
     /// Gives the machine back and ends.
     pub fn close(&mut self, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         let mut said = Vec::new();

@@ -1,15 +1,16 @@
 //! What may fail while the box goes on: store, sources, clock, memory of the estimators. Each failure is told once, is
 //! remembered as an event, and is shown while it lasts.
 
-use super::clock::{BoxClock, ClockStep};
 use super::history_store::HistoryStore;
+use super::problems::{apart, clock_problem, problems_of_files};
 use super::sample_feed::{SampleFeed, SourcePace};
 use super::save::Saver;
 use crate::alignment::{self, Alignment};
+use crate::clock::{BoxClock, ClockNews};
 use crate::history::{Audit, Event, ExtraValue, Record};
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Pipeline, Store};
-use crate::status::{HistoryStatus, SourceStatus, StatusProblem};
+use crate::status::{ClockStatus, HistoryStatus, SourceStatus, StatusProblem};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::worker::WorkerState;
@@ -36,7 +37,8 @@ pub(super) const WEAR_MEMORY: &str = "wear.json";
 pub struct Health {
     history_store: HistoryStore,
     clock: Option<Arc<BoxClock>>,
-    behind_ns: i64,
+    /// Another reading of the wall clock has stood long enough: the run is to end and to begin again with it.
+    follow: bool,
     port: watch::Receiver<Option<String>>,
     memory: PathBuf,
     sources: Vec<KnownSource>,
@@ -68,7 +70,7 @@ impl Health {
         Self {
             history_store,
             clock,
-            behind_ns: 0,
+            follow: false,
             port,
             memory,
             sources: Vec::new(),
@@ -137,33 +139,65 @@ impl Health {
         self.look_at_clock(now_ns);
         self.look_at_sources(feed, now_ns);
         self.look_at_paces(&feed.paces(now_ns), now_ns);
-        let day = now_ns.div_euclid(DAY_NS);
-        if self.day.replace(day).is_some_and(|before| before != day) {
-            self.history_store.maintain(now_ns);
-        }
+        self.look_at_day(now_ns);
         if self.saved.elapsed() >= SAVE_EVERY {
             self.save(pipeline);
         }
     }
 
+    /// Housekeeping: once a day, and not before the clock is confirmed. A machine that brings its own time is right about it.
+    fn look_at_day(&mut self, now_ns: TimeNs) {
+        let confirmed = self.clock.as_ref().is_none_or(|clock| clock.is_confirmed());
+        let day = now_ns.div_euclid(DAY_NS);
+        if confirmed && self.day.replace(day).is_some_and(|before| before != day) {
+            self.history_store.maintain(now_ns);
+        }
+    }
+
     fn look_at_clock(&mut self, now_ns: TimeNs) {
-        let Some(step) = self.clock.as_ref().and_then(|clock| clock.look()) else { return };
-        self.behind_ns = if let ClockStep::Back(by_ns) = step { by_ns } else { 0 };
-        let notice = match step {
-            ClockStep::Forward(by_ns) => {
-                let text = format!("the wall clock was set forward by {}; the box follows, with a gap", span(by_ns));
-                Notice::new(Severity::Warning, "clock_forward", text)
+        let Some(news) = self.clock.as_ref().and_then(|clock| clock.look()) else { return };
+        let told = |severity, code, text: String| Notice::new(severity, code, text);
+        let notice = match news {
+            ClockNews::Confirmed => {
+                self.history_store.confirm_clock();
+                // What is due by then is done; the next time at the turn of the day.
+                self.history_store.maintain(now_ns);
+                told(
+                    Severity::Info,
+                    "clock_confirmed",
+                    "the clock has been right for long enough to be believed".to_owned(),
+                )
             }
-            ClockStep::Back(by_ns) => {
+            ClockNews::Leapt { ahead_ns } => told(
+                Severity::Warning,
+                "clock_leapt",
+                format!("the wall clock is {} the box now; the box keeps its own time", apart(ahead_ns)),
+            ),
+            ClockNews::Returned => {
+                told(Severity::Info, "clock_right", "the wall clock agrees with the box again".to_owned())
+            }
+            ClockNews::Follow { ahead_ns } => {
+                self.follow = true;
                 let text = format!(
-                    "the wall clock was set back by {}; the box keeps its own time until it is started again",
-                    span(by_ns)
+                    "the wall clock has been {} the box for long enough: the box begins again with it",
+                    apart(ahead_ns)
                 );
-                Notice::new(Severity::Warning, "clock_back", text)
+                told(Severity::Warning, "clock_followed", text)
             }
-            ClockStep::Right => Notice::new(Severity::Info, "clock_right", "the wall clock agrees with the box again"),
         };
-        self.event(now_ns, "gateway", &notice);
+        self.event(now_ns, "clock", &notice.detail(format!("{news:?}")));
+    }
+
+    /// Shall the run end, and begin again with the time of the wall clock?
+    #[must_use]
+    pub fn follows_clock(&self) -> bool {
+        self.follow
+    }
+
+    /// What is thought of the clock.
+    #[must_use]
+    pub fn clock_status(&self) -> Option<ClockStatus> {
+        self.clock.as_ref().map(|clock| clock.status())
     }
 
     fn look_at_sources(&mut self, feed: &SampleFeed, now_ns: TimeNs) {
@@ -202,13 +236,18 @@ impl Health {
             (&wear, pipeline.wear().snapshot()),
         ];
         for (path, snapshot) in all {
-            self.saver.put(path, snapshot.to_string());
+            self.saver.put_learned(path, snapshot.to_string());
         }
     }
 
     /// Puts a file of the box's own on disk, beside the tick.
     pub fn put(&self, path: &Path, text: String) {
         self.saver.put(path, text);
+    }
+
+    /// The same for what was learned: with a checksum, and beside the save before it.
+    pub fn put_learned(&self, path: &Path, state: String) {
+        self.saver.put_learned(path, state);
     }
 
     /// The last tick is over.
@@ -236,10 +275,11 @@ impl Health {
         if let Some(what) = &history.error {
             add(what.clone(), "polling goes on");
         }
-        if self.behind_ns > 0 {
-            let what = format!("the wall clock is {} behind the box", span(self.behind_ns));
-            add(what, "set the clock right, or start the box again when it is right");
+        if let Some((what, next)) = self.clock_status().and_then(clock_problem) {
+            add(what, next);
         }
+        problems.extend(problems_of_files(&self.memory, history));
+        let mut add = |what: String, next: &str| problems.push(StatusProblem { what, next: next.to_owned() });
         for source in &self.sources {
             if let Some(error) = &source.error {
                 add(error.clone(), "the other sources go on");
@@ -311,17 +351,6 @@ fn told_pace(SourcePace { name, wanted, kept }: &SourcePace) -> Notice {
 fn stored(at_ns: TimeNs, source: &str, notice: &Notice) -> Event {
     let detail = if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
     Event { at_ns, kind: notice.code.to_owned(), source: source.to_owned(), text: notice.operator.clone(), detail }
-}
-
-/// A length of time in words.
-fn span(ns: i64) -> String {
-    let seconds = (ns + SECOND_NS / 2) / SECOND_NS;
-    match seconds {
-        0..=119 => format!("{seconds} s"),
-        120..=7199 => format!("{} min", seconds / 60),
-        7200..=172_799 => format!("{} h", seconds / 3600),
-        _ => format!("{} days", seconds / 86_400),
-    }
 }
 
 impl Store for Health {

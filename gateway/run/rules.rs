@@ -4,6 +4,7 @@ use super::health::{Health, SCRIPTS_MEMORY};
 use super::tick::RunFlags;
 use crate::active_scripts;
 use crate::config::Config;
+use crate::learned;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use crate::reload::{Fallback, Reloaded, Reloader, furnish, load_now, load_rest};
@@ -26,7 +27,7 @@ pub fn load(config: &Config) -> (Host, ScriptWatch) {
         told.push(Notice::new(Severity::Warning, "scripts_not_written", text));
     }
     let mut host = Host::new();
-    if let Some(remembered) = remembered(config) {
+    if let Some(remembered) = remembered(config, &mut told) {
         host.restore(&remembered);
     }
     if directory.is_dir() {
@@ -59,9 +60,9 @@ pub fn load(config: &Config) -> (Host, ScriptWatch) {
 }
 
 /// What the scripts remembered when the box last saved it.
-fn remembered(config: &Config) -> Option<serde_json::Value> {
-    let text = std::fs::read_to_string(config.gateway.data_dir.join(SCRIPTS_MEMORY)).ok()?;
-    serde_json::from_str(&text).ok()
+fn remembered(config: &Config, told: &mut Vec<Notice>) -> Option<serde_json::Value> {
+    let state = learned::read(&config.gateway.data_dir.join(SCRIPTS_MEMORY), |notice| told.push(notice))?;
+    serde_json::from_str(&state).ok()
 }
 
 fn refused(problems: &[ScriptProblem], consequence: &str) -> Notice {

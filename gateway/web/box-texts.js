@@ -35,7 +35,7 @@ export const PHRASES = [
   ["the machine did not take the override that was written", "机床未接受写入的倍率"],
   ["the control did not take the offset that was written", "数控系统未接受写入的补偿"],
   ["the machine could not be reached", "无法连接机床"],
-  ["the clock jumped back", "时钟回跳"],
+  ["the clock of the box was set", "系统时钟已校正"],
   ["the history takes nothing, so nothing can be accounted for", "历史记录无法写入，无法留痕"],
   ["no fresh values from the machine for ten seconds", "十秒内无机床新数据"],
   ["the override was changed", "倍率已改变"],

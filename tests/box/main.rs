@@ -3,6 +3,7 @@
 mod backup;
 mod brought;
 mod browser;
+mod clock;
 mod cost;
 mod diagnosing;
 mod editing;

@@ -90,14 +90,31 @@ fn arming_needs_the_configuration_a_person_and_ends_by_itself() {
     assert_eq!(gate.arm("  ", None, 0).err(), Some(ArmError::Nobody));
     gate.arm("fitter", None, 0).expect("allowed");
     let lasts_ns = i64::try_from(limits(GateMode::Armed).armed_for.as_nanos()).expect("hours");
-    let (sample, estimates) = cutting(lasts_ns - 1);
-    assert!(gate.decide(None, &sample, &estimates).armed);
+    for at_ns in (0..lasts_ns).step_by(9_000_000_000).chain([lasts_ns - 1]) {
+        let (sample, estimates) = cutting(at_ns);
+        assert!(gate.decide(None, &sample, &estimates).armed);
+    }
     let (sample, estimates) = cutting(lasts_ns);
     assert!(!gate.decide(None, &sample, &estimates).armed);
     assert_eq!(gate.armed().err(), Some(Disarmed::Expired));
     gate.arm("fitter", None, lasts_ns).expect("again");
     let (sample, estimates) = cutting(5);
     assert!(!gate.decide(None, &sample, &estimates).armed, "a clock that jumps back disarms");
+}
+
+/// A process that was stopped and goes on sees fresh values at once, and has seen none for as long as it stood.
+#[test]
+fn ten_seconds_without_a_tick_end_the_arming_like_ten_seconds_without_values() {
+    for (pause_s, armed) in [(9, true), (10, false), (20, false), (86_400, false)] {
+        let mut gate = Gate::new(limits(GateMode::Armed));
+        gate.arm("fitter", None, 0).expect("allowed");
+        let (sample, estimates) = cutting(TICK_NS);
+        assert!(gate.decide(None, &sample, &estimates).armed);
+        let (sample, estimates) = cutting(TICK_NS + pause_s * 1_000_000_000);
+        assert_eq!(gate.decide(None, &sample, &estimates).armed, armed, "{pause_s} s");
+        let why = if pause_s > 3_600 { Disarmed::Expired } else { Disarmed::Silent };
+        assert_eq!(gate.armed().err(), (!armed).then_some(why), "{pause_s} s");
+    }
 }
 
 #[test]

@@ -76,6 +76,7 @@ fn gateway(reading: &ConfigInput<'_>, base: &Path) -> Option<GatewayConfig> {
     Some(GatewayConfig {
         name: text(reading, "gateway", "name")?,
         tick_hz: number(reading, "gateway", "tick_hz")?,
+        clock_confirm: seconds(reading, "gateway", "clock_confirm_s")?,
         language: match text(reading, "gateway", "language")?.as_str() {
             "en" => Some(Language::En),
             "zh" => Some(Language::Zh),

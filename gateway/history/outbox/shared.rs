@@ -8,6 +8,7 @@ use adapters::clock::TimeNs;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 use tokio::sync::watch;
 
 /// How far the outbox is.
@@ -50,8 +51,18 @@ pub struct DeliveryState {
     pub position: Position,
     /// Items dropped before it had delivered them, since it was first configured.
     pub dropped: u64,
+    /// Connections that were begun, since it was first configured.
+    pub connections: u64,
     /// Is it connected, or about to be for the first time? At the end only such sinks are waited for.
     pub linked: bool,
+}
+
+impl DeliveryState {
+    /// Nothing before `next` is to be delivered any more, and nothing has happened yet.
+    #[must_use]
+    pub fn at(next: u64) -> Self {
+        Self { position: Position::at(next), dropped: 0, connections: 0, linked: false }
+    }
 }
 
 #[derive(Debug)]
@@ -61,6 +72,9 @@ struct SharedOutbox {
     head: watch::Sender<OutboxHead>,
     sinks: Mutex<BTreeMap<String, DeliveryState>>,
     news: AtomicBool,
+    /// Connections that are not noted yet, and how many times they were.
+    connecting: AtomicBool,
+    noted: watch::Sender<u64>,
     hurried: AtomicBool,
     state: Mutex<OutboxState>,
 }
@@ -93,13 +107,15 @@ impl Outbox {
     /// The outbox of a machine for these sinks. Hand it to [`Options::outbox`](crate::history::Options::outbox).
     #[must_use]
     pub fn new(machine: &str, settings: OutboxSettings, sinks: impl IntoIterator<Item = String>) -> Self {
-        let standing = || DeliveryState { position: Position::at(1), dropped: 0, linked: false };
+        let standing = || DeliveryState::at(1);
         let shared = SharedOutbox {
             machine: machine.to_owned(),
             settings,
             head: watch::Sender::new(OutboxHead::default()),
             sinks: Mutex::new(sinks.into_iter().map(|name| (name, standing())).collect()),
             news: AtomicBool::new(false),
+            connecting: AtomicBool::new(false),
+            noted: watch::Sender::new(0),
             hurried: AtomicBool::new(false),
             state: Mutex::new(OutboxState::default()),
         };
@@ -163,6 +179,35 @@ impl Outbox {
         });
     }
 
+    /// Sink `name` begins a connection; gives its number, from 0 over the life of the history. Returns when that is durable, so
+    /// that no later connection can have the same number, or after `limit`.
+    pub async fn begin_connection(&self, name: &str, limit: Duration) -> u64 {
+        let mut noted = self.shared.noted.subscribe();
+        let mut number = 0;
+        self.change(name, |standing| {
+            number = standing.connections;
+            standing.connections += 1;
+        });
+        self.shared.connecting.store(true, Ordering::Release);
+        // One commit may be under way that has not seen it.
+        let twice = *noted.borrow_and_update() + 2;
+        let waiting =
+            async { while self.has_connections() && *noted.borrow() < twice && noted.changed().await.is_ok() {} };
+        // A disk that takes nothing must not keep anybody from sending.
+        let _late = tokio::time::timeout(limit, waiting).await;
+        number
+    }
+
+    /// The writer's side: is there a connection that is not noted yet?
+    pub(super) fn has_connections(&self) -> bool {
+        self.shared.connecting.load(Ordering::Acquire)
+    }
+
+    /// The writer's side: what was known of the sinks when the last transaction began is durable.
+    pub(super) fn connections_noted(&self) {
+        self.shared.noted.send_modify(|times| *times += 1);
+    }
+
     /// Sink `name` goes on with live data; what it has not delivered before the head becomes a gap. See
     /// [`Position::jump`].
     pub fn jump(&self, name: &str) -> bool {
@@ -212,6 +257,7 @@ impl Outbox {
         mut each: impl FnMut(&str, &mut DeliveryState) -> Result<(), HistoryError>,
     ) -> Result<(), HistoryError> {
         self.shared.news.store(false, Ordering::Release);
+        self.shared.connecting.store(false, Ordering::Release);
         let mut sinks = locked(&self.shared.sinks);
         let done = sinks.iter_mut().try_for_each(|(name, standing)| each(name, standing));
         if done.is_err() {

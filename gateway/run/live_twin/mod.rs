@@ -10,6 +10,7 @@ use crate::diagnosis::store::DiagnosisStore;
 use crate::diagnosis::words;
 use crate::diagnosis::worker::{self, Finished, LoadedModel, Worker, WorkerPaths, WorkerReport};
 use crate::history::{self, Alarm, AlarmClear, ExtraSeries, ExtraValue};
+use crate::learned;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -119,7 +120,10 @@ impl Twin {
         let loaded = worker::read(&self.places.model);
         let known = loaded.as_ref().map(|loaded| loaded.toml.clone()).unwrap_or_default();
         match loaded {
-            Ok(loaded) => self.put_in_charge(loaded, recall(&self.memory)),
+            Ok(loaded) => {
+                let remembered = recall(&self.memory, &mut self.told);
+                self.put_in_charge(loaded, remembered);
+            }
             Err(problem) => self.refuse(problem),
         }
         match Worker::start(self.places.clone(), known) {
@@ -325,7 +329,7 @@ impl Twin {
         let Some(ActiveModel { live, loaded }) = &self.active else { return };
         let remembered = Remembered { toml: loaded.toml.clone(), memory: live.memory(), due: self.due };
         match serde_json::to_string(&remembered) {
-            Ok(text) => health.put(&self.memory, text),
+            Ok(text) => health.put_learned(&self.memory, text),
             Err(error) => tracing::warn!("what the twin has learned could not be saved: {error}"),
         }
     }
@@ -341,14 +345,11 @@ fn code(regime: Regime) -> String {
 }
 
 /// What was learned before; nothing where that cannot be read.
-fn recall(path: &Path) -> Remembered {
-    let text = std::fs::read_to_string(path).unwrap_or_default();
-    if text.is_empty() {
-        return Remembered::default();
-    }
-    serde_json::from_str(&text).unwrap_or_else(|error| {
+fn recall(path: &Path, told: &mut Vec<Notice>) -> Remembered {
+    let Some(state) = learned::read(path, |notice| told.push(notice)) else { return Remembered::default() };
+    serde_json::from_str(&state).unwrap_or_else(|error| {
         let text = format!("{}: what the twin had learned cannot be read ({error}); it learns anew", path.display());
-        Notice::new(Severity::Warning, "twin_forgot", text).say();
+        told.push(Notice::new(Severity::Warning, "twin_forgot", text));
         Remembered::default()
     })
 }

@@ -1,8 +1,8 @@
 //! The library: models stored in a history by machine, tool, work material and operation.
 
 use crate::cli::{CannotRun, CommandOutcome, CommandResult, print, print_json};
+use crate::clock;
 use crate::history::{HistoryError, Reader, StoredWearModel, store_wear_model};
-use adapters::clock::{Clock, SystemClock};
 use clap::Args;
 use rules::estimators::wear::{WearKey, WearRecord};
 use serde_json::json;
@@ -54,7 +54,7 @@ impl LibraryArguments {
 /// Stores the model where that was asked for; a line that says so.
 pub(super) fn store(arguments: &LibraryArguments, record: &WearRecord) -> Result<Option<String>, CannotRun> {
     let Some(path) = &arguments.store else { return Ok(None) };
-    let id = store_wear_model(path, SystemClock::new().now_ns(), record).map_err(|error| cannot(&error))?;
+    let id = store_wear_model(path, clock::now_ns(), record).map_err(|error| cannot(&error))?;
     Ok(Some(format!("\nstored as model {id} in {}: {}\n", path.display(), named(&record.key))))
 }
 
