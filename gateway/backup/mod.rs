@@ -11,9 +11,11 @@
 pub mod list;
 mod restore;
 mod restored;
+mod schedule;
 
 pub use restore::{RestoreRequest, restore};
 pub use restored::take as take_restored;
+pub use schedule::{BackupError, BackupSchedule, take_backup};
 
 use crate::archive::ArchivedFile;
 use crate::history::{HistoryError, Reader};

@@ -11,6 +11,7 @@ mod channels;
 mod check_value;
 mod in_force;
 pub mod keys;
+mod keys_of_backup;
 mod keys_of_gate;
 mod keys_of_outputs;
 mod keys_of_thermal;
@@ -69,6 +70,8 @@ pub struct Config {
     pub twin: TwinConfig,
     /// The thermal law.
     pub thermal: ThermalConfig,
+    /// Backups taken by itself; `None`: none are.
+    pub backup: Option<BackupConfig>,
     /// The log.
     pub log: LogConfig,
     /// Every key with its value and where that was written.
@@ -301,6 +304,19 @@ pub struct ThermalConfig {
     pub total_um: f64,
     /// From prediction to offset and pulses.
     pub compensation: CompensationSettings,
+}
+
+/// `[backup]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BackupConfig {
+    /// Where they go.
+    pub directory: PathBuf,
+    /// Time between two.
+    pub every: Duration,
+    /// So many are kept.
+    pub keep: usize,
+    /// Copy the history, too.
+    pub history: bool,
 }
 
 /// `[log]`.

@@ -2,8 +2,10 @@
 //! Contract: sources of the project, section on `doctor`.
 
 mod compare;
+mod computer;
 
 pub use compare::{ChannelDifference, Comparison, compare};
+pub use computer::{ComputerReport, SystemFiles, examine_computer};
 
 use crate::run::open::opened;
 use adapters::clock::{Clock, SystemClock};
@@ -67,6 +69,15 @@ pub struct DoctorReport {
 /// It cannot be opened, in words.
 pub fn examine_address(address: &Address) -> Result<DoctorReport, String> {
     begin_at(address, &SystemClock::new()).map(|(report, _)| report)
+}
+
+/// Examines what somebody has typed.
+///
+/// # Errors
+/// It is no address, or cannot be opened, in words.
+pub fn examine_text(address: &str) -> Result<DoctorReport, String> {
+    let address: Address = address.parse().map_err(|error: adapters::address::AddressError| error.to_string())?;
+    examine_address(&address)
 }
 
 /// The same, and asks for everything that the device offers, mapped to a channel or not.

@@ -43,6 +43,7 @@ macro_rules! chapters {
 }
 
 chapters! {
+    "install",
     "start" zh,
     "configuration" zh,
     "sources" zh,

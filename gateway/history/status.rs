@@ -52,6 +52,8 @@ pub(crate) struct SharedStatus {
     pub(crate) commits: AtomicU64,
     pub(crate) commit_us: AtomicU64,
     pub(crate) short_of_room: AtomicBool,
+    /// Rounds of the thread: it grows unless the thread hangs.
+    pub(crate) rounds: AtomicU64,
     words: Mutex<StatusTexts>,
 }
 
@@ -76,6 +78,7 @@ impl Default for SharedStatus {
             commits: AtomicU64::new(0),
             commit_us: AtomicU64::new(0),
             short_of_room: AtomicBool::new(false),
+            rounds: AtomicU64::new(0),
             words: Mutex::new(StatusTexts::default()),
         }
     }

@@ -63,6 +63,7 @@ impl Thread {
     pub(crate) fn run(mut self) {
         let _guard = StopGuard(self.mailbox.clone());
         loop {
+            self.shared.rounds.fetch_add(1, Ordering::Relaxed);
             let rows_too = self.takes_rows();
             let delivery = self.take(rows_too);
             let closing = delivery.closing && delivery.batches.is_empty();

@@ -144,6 +144,12 @@ impl Writer {
         }
     }
 
+    /// Rounds of the thread. Whoever looks twice sees whether it moves.
+    #[must_use]
+    pub fn count_rounds(&self) -> u64 {
+        self.shared.rounds.load(std::sync::atomic::Ordering::Relaxed)
+    }
+
     /// The database.
     #[must_use]
     pub fn path(&self) -> &Path {

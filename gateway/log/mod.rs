@@ -5,7 +5,10 @@
 //!
 //! Neither stream keeps anybody waiting: a thread of its own writes to each, see `outlet`.
 
+mod crash;
 mod outlet;
+
+pub use crash::{FOLDER as CRASH_FOLDER, keep_crash_reports};
 
 use outlet::Outlet;
 use std::io::Write;

@@ -5,6 +5,7 @@ use super::clock::{BoxClock, ClockStep};
 use super::history_store::HistoryStore;
 use super::sample_feed::{SampleFeed, SourcePace};
 use super::save::Saver;
+use super::service_manager::{ProgressMarks, WatchedService};
 use crate::alignment::{self, Alignment};
 use crate::history::{Audit, Event, ExtraValue, Record};
 use crate::log::{Notice, Severity};
@@ -14,7 +15,7 @@ use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::worker::WorkerState;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
@@ -24,6 +25,8 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 const SAVE_EVERY: Duration = Duration::from_secs(60);
 /// Another pace is told when it differs from the last one by this factor.
 const OTHER_PACE: f64 = 1.3;
+/// So many notices of other threads are taken at one look.
+const HEARD_MAX: usize = 10;
 /// One day of machine time.
 const DAY_NS: i64 = 86_400 * SECOND_NS;
 
@@ -52,18 +55,24 @@ pub struct Health {
     /// Values that are stored after these.
     beside: Option<[ExtraValue<'static>; 2]>,
     thermal: Vec<ExtraValue<'static>>,
+    service: WatchedService,
+    /// What threads beside the tick have to say.
+    heard: Option<mpsc::Receiver<Notice>>,
 }
 
 impl Health {
     /// `clock` is the box's own where machine time is real time, `port` the trouble with the page's port, `memory` the
-    /// file for what the estimators have learned.
+    /// file for what the estimators have learned, `marks` what has moved.
     #[must_use]
     pub fn new(
         history_store: HistoryStore,
         clock: Option<Arc<BoxClock>>,
         port: watch::Receiver<Option<String>>,
         memory: PathBuf,
+        marks: Arc<ProgressMarks>,
     ) -> Self {
+        let data_dir = memory.parent().map(Path::to_owned).unwrap_or_default();
+        let service = WatchedService::new(data_dir, marks);
         let stores = history_store.stores();
         Self {
             history_store,
@@ -81,7 +90,14 @@ impl Health {
             lags: [ExtraValue::Missing("not_yet"); alignment::SERIES],
             beside: None,
             thermal: Vec::new(),
+            service,
+            heard: None,
         }
+    }
+
+    /// From now on these notices become events.
+    pub fn hear(&mut self, notices: mpsc::Receiver<Notice>) {
+        self.heard = Some(notices);
     }
 
     /// Remembers and tells that something happened.
@@ -134,6 +150,9 @@ impl Health {
         self.looked = Some(Instant::now());
         self.history_store.look();
         self.stores = self.history_store.stores();
+        self.service.report(feed.count_steps(), self.history_store.count_rounds());
+        let heard: Vec<Notice> = self.heard.iter().flat_map(mpsc::Receiver::try_iter).take(HEARD_MAX).collect();
+        heard.iter().for_each(|notice| self.event(now_ns, "gateway", notice));
         self.look_at_clock(now_ns);
         self.look_at_sources(feed, now_ns);
         self.look_at_paces(&feed.paces(now_ns), now_ns);
@@ -213,6 +232,7 @@ impl Health {
 
     /// The last tick is over.
     pub fn close(&mut self, pipeline: &Pipeline, at_ns: TimeNs) {
+        self.service.report_stopping();
         self.save(pipeline);
         self.saver.close();
         self.history_store.record(stored(at_ns, "gateway", &Notice::new(Severity::Info, "stopped", "stopped")).into());

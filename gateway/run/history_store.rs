@@ -139,6 +139,12 @@ impl HistoryStore {
         self.writer.as_ref().is_some_and(|writer| writer.status().degraded.is_none())
     }
 
+    /// Rounds of the thread that writes; `None` where the history is not open.
+    #[must_use]
+    pub fn count_rounds(&self) -> Option<u64> {
+        self.writer.as_ref().map(Writer::count_rounds)
+    }
+
     /// Hands in a row of the audit; false when it will not be stored.
     pub fn audit(&mut self, row: Audit) -> bool {
         let stored = self.writer.as_ref().is_some_and(|writer| writer.record(row.clone()).is_some());

@@ -21,6 +21,7 @@ pub mod report;
 pub mod rules;
 pub mod sample_feed;
 pub mod save;
+pub mod service_manager;
 pub mod thermal;
 pub mod tick;
 mod verdict_mailbox;
@@ -28,7 +29,7 @@ pub mod wear;
 
 use crate::access::{self, Access};
 use crate::alignment;
-use crate::backup::take_restored;
+use crate::backup::{BackupPaths, BackupSchedule, take_restored};
 use crate::cannot_run::CannotRun;
 use crate::config::{self, Config, GateMode};
 use crate::control::{self, OrderReceiver};
@@ -50,10 +51,11 @@ use live_twin::Twin;
 use offset_commands::OffsetCommands;
 use open::{MachineSpeed, Sources, Way};
 use outputs::ConfiguredSinks;
+use service_manager::{Part, ProgressMarks};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 use thermal::Thermal;
 use tick::{Identity, RunFlags, Ticker};
 use tokio::net::TcpListener;
@@ -64,6 +66,9 @@ use wear::Wear;
 const BLOCKING_MAX: usize = 6;
 /// Time between two looks at the file of persons.
 const FOLLOW_EVERY: Duration = Duration::from_secs(1);
+
+/// Time between two signs of life of the threads that answer the page.
+const PAGE_BEAT: Duration = Duration::from_secs(1);
 
 /// What the box shall do.
 #[derive(Debug)]
@@ -106,7 +111,11 @@ pub fn run(plan: RunPlan) -> Result<(), CannotRun> {
     let run_flags = Arc::new(RunFlags::default());
     let (report, port) = watch::channel(None);
     let (post, inbox) = control::queue();
-    let (ticker, live) = ticker(&plan, &run_flags, port, inbox, outputs.as_ref())?;
+    let marks = Arc::new(ProgressMarks::new());
+    let (mut ticker, live) = ticker(&plan, &run_flags, (port, marks.clone()), inbox, outputs.as_ref())?;
+    let _backups = schedule_backups(&plan, &mut ticker.health)?;
+    log::keep_crash_reports(&plan.config.gateway.data_dir);
+    runtime.spawn(mark_page(marks));
     let channels = (report, post, ticker.twin.as_ref().and_then(Twin::diagnoses));
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
@@ -116,6 +125,29 @@ pub fn run(plan: RunPlan) -> Result<(), CannotRun> {
     let ended = thread.join();
     runtime.shutdown_timeout(Duration::from_secs(1));
     ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
+}
+
+/// Backups on a thread of their own, where the configuration wants them. They are taken while the box lives.
+fn schedule_backups(plan: &RunPlan, health: &mut Health) -> Result<Option<BackupSchedule>, CannotRun> {
+    let Some(config) = &plan.config.backup else { return Ok(None) };
+    let paths = BackupPaths::of(&plan.config, plan.config_file.as_deref());
+    let (tell, heard) = std::sync::mpsc::channel();
+    health.hear(heard);
+    let now_s = || SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    // Without a tick nobody listens, and the box is about to end.
+    let tell = move |notice: &Notice| drop(tell.send(notice.clone()));
+    BackupSchedule::start(paths, config.clone(), now_s, tell)
+        .map(Some)
+        .map_err(|error| CannotRun::new(format!("no thread for backups: {error}"), ""))
+}
+
+/// The threads that answer the page move as long as this does.
+async fn mark_page(marks: Arc<ProgressMarks>) {
+    let mut beat = tokio::time::interval(PAGE_BEAT);
+    loop {
+        beat.tick().await;
+        marks.mark(Part::Page);
+    }
 }
 
 fn address(plan: &RunPlan) -> Result<Option<SocketAddr>, CannotRun> {
@@ -160,7 +192,7 @@ fn pipeline(plan: &RunPlan, memory: &Path) -> (Pipeline, rules::ScriptWatch) {
 fn ticker(
     plan: &RunPlan,
     run_flags: &Arc<RunFlags>,
-    port: watch::Receiver<Option<String>>,
+    (port, marks): (watch::Receiver<Option<String>>, Arc<ProgressMarks>),
     inbox: OrderReceiver,
     outputs: Option<&ConfiguredSinks>,
 ) -> Result<StartedTicker, CannotRun> {
@@ -197,7 +229,7 @@ fn ticker(
     #[expect(clippy::cast_possible_truncation, reason = "saturates, which is meant")]
     let stop_after_ns = plan.stop_after_s.map(|seconds| (seconds * SECOND_NS as f64) as i64);
     let own = (plan.speed == MachineSpeed::Real).then_some(own);
-    let mut health = Health::new(history_store, own, port, memory);
+    let mut health = Health::new(history_store, own, port, memory, marks);
     if let Some(twin) = twin.as_ref().filter(|twin| !twin.series().is_empty()) {
         health.beside(twin.values());
     }

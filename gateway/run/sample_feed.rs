@@ -108,6 +108,15 @@ impl SampleFeed {
         }
     }
 
+    /// Polls and waits of all threads that are over; `None` without threads. Whoever looks twice sees whether any of them moves.
+    #[must_use]
+    pub fn count_steps(&self) -> Option<u64> {
+        match self {
+            Self::Threads { workers, .. } => Some(workers.iter().map(Worker::count_steps).sum()),
+            Self::Stepped { .. } => None,
+        }
+    }
+
     /// Stops every thread; does not wait for a vendor library that hangs.
     pub fn stop(&self) {
         if let Self::Threads { workers, .. } = self {

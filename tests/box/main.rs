@@ -10,6 +10,7 @@ mod http;
 mod kill;
 mod lives;
 mod operations;
+mod package;
 mod page;
 mod process;
 mod replay;

@@ -1,5 +1,6 @@
 //! From checked values to the configuration, and the rules that concern more than one key.
 
+mod backup;
 mod http;
 mod thermal;
 
@@ -24,6 +25,7 @@ pub(super) fn build(reading: &mut ConfigInput<'_>, base: &Path) -> Option<Config
     check_names(reading);
     check_gate(reading);
     http::check(reading);
+    backup::check_backup(reading);
     let sources = sources.map(|mut sources| {
         let written = reading.sources.clone();
         sources.iter_mut().zip(&written).for_each(|(source, values)| channels::add(reading, source, values));
@@ -48,6 +50,7 @@ pub(super) fn build(reading: &mut ConfigInput<'_>, base: &Path) -> Option<Config
         http: http::http(reading, base)?,
         twin: TwinConfig { model: text(reading, "twin", "model").map(|path| base.join(path)) },
         thermal: thermal::thermal(reading, base)?,
+        backup: backup::read_backup(reading, base)?,
         log: log(reading)?,
         gateway,
         sources: sources?,
