@@ -7,7 +7,7 @@
 //!
 //! Limits: low-voltage supplies of the world are 100 to 400 V against neutral (IEC 60038), with 20 % on either side; 45 to
 //! 65 Hz holds 50 and 60 Hz with 10 %. Powers of phases and their sum are refreshed one after the other by some meters; only what stays
-//! apart for [`LASTS`] answers counts.
+//! apart for `LASTS` answers counts.
 
 use crate::driver::SourceProblem;
 

@@ -8,6 +8,7 @@ use crate::clock::{Clock, SECOND_NS, TimeNs};
 use crate::driver::{Pull, Source, SourceError};
 use crate::reading::{Absence, Reading, Stamp};
 use crate::recording::{Cells, Numbers, Recording, Words};
+use crate::words::canonical;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -208,7 +209,9 @@ fn filled(channel: ChannelId, cells: &Cells) -> Option<(ChannelId, Filled)> {
     let filled = match cells {
         Cells::Numbers(numbers) if !text => Filled::Numbers(numbers.clone()),
         Cells::Words(words) if text => {
-            Filled::Words(words.clone(), words.words().iter().map(|word| Arc::from(word.as_str())).collect())
+            // The gate and the scripts compare letter by letter; a recording may have been written by other hands.
+            let ready = |word: &String| Arc::from(canonical(channel.name(), word).unwrap_or(word));
+            Filled::Words(words.clone(), words.words().iter().map(ready).collect())
         }
         _ => return None,
     };

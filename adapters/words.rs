@@ -37,10 +37,42 @@ pub mod execution {
     pub const ALL: [&str; 6] = [READY, ACTIVE, INTERRUPTED, FEED_HOLD, STOPPED, PROGRAM_COMPLETED];
 }
 
+/// The words that a channel can have; nothing for a channel whose texts are free.
+#[must_use]
+pub fn of_channel(channel: &str) -> Option<&'static [&'static str]> {
+    match channel {
+        "mode" => Some(&mode::ALL),
+        "execution" => Some(&execution::ALL),
+        _ => None,
+    }
+}
+
+/// The word that a recording of other hands means: capitals do not count, and a blank or a hyphen stands for `_`. `None` where
+/// the channel has no such word.
+#[must_use]
+pub fn canonical(channel: &str, text: &str) -> Option<&'static str> {
+    let plain = text.trim().replace([' ', '-'], "_");
+    of_channel(channel)?.iter().copied().find(|word| word.eq_ignore_ascii_case(&plain))
+}
+
 /// Words of the channel `operation` in which the feed follows the spindle and no override may act.
 pub mod operation {
     /// A thread is cut with the spindle and the feed in step.
     pub const THREADING: &str = "threading";
     /// A thread is tapped with the spindle and the feed in step.
     pub const TAPPING: &str = "tapping";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_word_in_other_letters_is_the_same_word() {
+        assert_eq!(canonical("mode", "automatic"), Some(mode::AUTOMATIC));
+        assert_eq!(canonical("mode", " Semi-automatic"), Some(mode::SEMI_AUTOMATIC));
+        assert_eq!(canonical("execution", "feed hold"), Some(execution::FEED_HOLD));
+        assert_eq!(canonical("mode", "MEM"), None);
+        assert_eq!(canonical("program", "automatic"), None);
+    }
 }

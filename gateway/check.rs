@@ -8,6 +8,7 @@ use crate::reload::read_directory;
 use crate::sinks::broker::broker_files;
 use adapters::address::{FanucBackend, NcLinkTarget, Target};
 use adapters::recording::{RecordingError, read_path};
+use adapters::words::{canonical, of_channel};
 use rules::estimators::StateBasis;
 use rules::estimators::thermal::ThermalModel;
 use rules::{script, twin};
@@ -257,6 +258,19 @@ fn check_library(path: &Path, report: &mut CheckReport) {
     }
 }
 
+/// Words that a channel cannot have: the gate holds everything while one stands, and no rule that asks for the right one fires.
+fn unknown_words(name: &str, recording: &adapters::Recording) -> Vec<Problem> {
+    let channels = ["mode", "execution"].into_iter().filter_map(|channel| Some((channel, of_channel(channel)?)));
+    let unknown = channels.flat_map(|(channel, known)| {
+        let words = recording.words(channel).map(|words| words.words().to_vec()).unwrap_or_default();
+        words.into_iter().filter(move |word| canonical(channel, word).is_none()).map(move |word| {
+            let next = format!("write one of {}", known.join(", "));
+            Problem::of(name, format!("{channel} is never {word:?}: the gate holds 100 % while it is"), next)
+        })
+    });
+    unknown.collect()
+}
+
 fn check_recording(path: &Path, report: &mut CheckReport) {
     let name = path.display().to_string();
     let row = |problem: adapters::recording::RowProblem| Problem {
@@ -272,6 +286,7 @@ fn check_recording(path: &Path, report: &mut CheckReport) {
             report.read.push(format!("{name}: {rows} rows, {} refused", read.refused));
             let described = read.problems.len() as u64;
             report.problems.extend(read.problems.into_iter().map(row));
+            report.problems.extend(unknown_words(&name, &read.recording));
             if read.refused > described {
                 let what = format!("{} more rows are refused", read.refused - described);
                 report.problems.push(Problem::of(name, what, "the first of them are told above"));

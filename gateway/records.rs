@@ -110,7 +110,7 @@ fn known(text: &str) -> Option<&str> {
 }
 
 fn states(reader: &Reader, span: RecordSpan) -> Result<Vec<Value>, HistoryError> {
-    let newest_ns = reader.span()?.map_or(span.to_ns, |(_, newest_ns)| newest_ns);
+    let newest_ns = reader.present()?.map_or(span.to_ns, |(_, newest_ns)| newest_ns);
     Ok(reader.states(span)?.iter().map(|interval| state(interval, newest_ns)).collect())
 }
 

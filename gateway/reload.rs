@@ -81,7 +81,7 @@ pub fn read_directory(directory: &Path) -> Result<Vec<ScriptFile>, Vec<ScriptPro
     let mut problems = Vec::new();
     let mut files = Vec::new();
     for path in paths(directory).map_err(|error| vec![unreadable(directory, &error)])? {
-        match read_script(&path) {
+        match stays_in(directory, &path).and_then(|()| read_script(&path)) {
             Ok(file) => files.push(file),
             Err(error) => problems.push(unreadable(&path, &error)),
         }
@@ -108,6 +108,13 @@ fn paths(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
     }
     paths.sort();
     Ok(paths)
+}
+
+/// Scripts are shown to whoever may read the page: a link must not show a file from elsewhere.
+fn stays_in(directory: &Path, path: &Path) -> std::io::Result<()> {
+    let (real, within) = (path.canonicalize()?, directory.canonicalize()?);
+    let what = "it is a link that leads out of the directory; copy the file there instead";
+    if real.starts_with(within) { Ok(()) } else { Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, what)) }
 }
 
 fn read_script(path: &Path) -> std::io::Result<ScriptFile> {

@@ -1,6 +1,6 @@
 //! Stored samples as JSON and CSV: the same for the API and the command line.
 
-use crate::history::{Buckets, Chunk, HistoryError, Overview, Query, Reader, Series};
+use crate::history::{Buckets, Chunk, HistoryError, Overview, Query, Reader, Series, plain_cell};
 use crate::moment;
 use adapters::clock::{SECOND_NS, TimeNs};
 use serde_json::{Value, json};
@@ -135,6 +135,6 @@ fn cells_of(column: &Buckets, row: usize) -> Vec<String> {
             s if s.count == 0 => vec![String::new(), String::new(), String::new(), "0".to_owned()],
             s => vec![s.mean.to_string(), s.min.to_string(), s.max.to_string(), s.count.to_string()],
         },
-        Buckets::Words(words) => vec![words[row].as_deref().unwrap_or_default().to_owned()],
+        Buckets::Words(words) => vec![plain_cell(words[row].as_deref().unwrap_or_default())],
     }
 }

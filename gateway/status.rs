@@ -295,6 +295,20 @@ pub struct HistoryStatus {
     pub lost: u64,
     /// What is wrong and what to do, while it lasts.
     pub error: Option<String>,
+    /// Bytes of the log beside the file.
+    pub log_bytes: u64,
+    /// Histories that the disk has changed and that were therefore set aside.
+    pub set_aside: Vec<String>,
+}
+
+/// The clock of the box.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ClockStatus {
+    /// What is thought of the wall clock: `unset`, `plausible`, `confirmed` or `leapt`. In all but the last two times may
+    /// be corrected later.
+    pub trust: crate::clock::Trust,
+    /// Wall clock minus the time of the box, s; 0 while they agree.
+    pub wall_ahead_s: f64,
 }
 
 /// The tick.
@@ -341,6 +355,8 @@ pub struct Status {
     pub at_ms: i64,
     /// Seconds since the start of the process.
     pub uptime_s: f64,
+    /// What is thought of the clock; `null` where the machine brings its own time.
+    pub clock: Option<ClockStatus>,
     /// The tick.
     pub tick: TickStatus,
     /// What the machine is doing.

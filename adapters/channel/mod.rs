@@ -51,7 +51,7 @@ pub struct Channel {
 
 impl Channel {
     /// Is this a finite number within the physical range? An electrical quantity that begins at zero is judged by its size:
-    /// the noise of a meter about zero, up to [`NOISE`] of the greatest value, is believed as it is.
+    /// the noise of a meter about zero, up to a thousandth of the greatest value, is believed as it is.
     #[must_use]
     pub fn holds(&self, number: f64) -> bool {
         let (least, greatest) = self.range;

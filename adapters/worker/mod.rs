@@ -23,7 +23,7 @@ use crate::reading::Reading;
 use queue::Queue;
 use stats::WorkerCounters;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -74,6 +74,8 @@ pub struct Poll {
 
 struct Shared {
     stop: AtomicBool,
+    /// Polls and short waits that are over: it grows unless the thread hangs.
+    steps: AtomicU64,
     queue: Mutex<Queue>,
     ledger: Mutex<WorkerCounters>,
 }
@@ -100,6 +102,7 @@ impl Worker {
         let ledger = WorkerCounters::new(period, settings.deadline, clock.now_ns());
         let shared = Arc::new(Shared {
             stop: AtomicBool::new(false),
+            steps: AtomicU64::new(0),
             queue: Mutex::new(Queue::new(settings.queue_polls)),
             ledger: Mutex::new(ledger),
         });
@@ -161,6 +164,12 @@ impl Worker {
         locked(&self.shared.ledger).stats(now_ns, dropped)
     }
 
+    /// Polls and short waits between them that are over. Whoever looks twice sees whether the thread moves.
+    #[must_use]
+    pub fn count_steps(&self) -> u64 {
+        self.shared.steps.load(Ordering::Relaxed)
+    }
+
     /// Tells the thread to end after the poll it is in; does not wait for it.
     pub fn stop(&self) {
         self.shared.stop.store(true, Ordering::SeqCst);
@@ -212,6 +221,7 @@ impl Poller {
         while !self.stopping() {
             let readings = locked(&self.shared.queue).spare();
             let (began_ns, poll) = self.poll(readings);
+            self.shared.steps.fetch_add(1, Ordering::Relaxed);
             let ended_ns = poll.ended_ns;
             let error = poll.error.clone();
             self.plausibility.see(&poll.readings);
@@ -299,6 +309,7 @@ impl Poller {
                 return;
             }
             self.clock.sleep_until(until_ns.min(now_ns + STOP_LOOK_NS));
+            self.shared.steps.fetch_add(1, Ordering::Relaxed);
         }
     }
 }

@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `role` | viewer, setter, armer, admin |
 //! | `persons` | the file of persons, and the differences between two readings of it |
-//! | `token` | made, hashed with argon2, known again |
+//! | `token` | made, hashed, known again |
 //! | `sessions` | who is signed in, for how long |
 //! | `tries` | wrong tokens, and who has to wait |
 //! | `account` | rows of the audit, and how many at most |
@@ -23,10 +23,11 @@ mod tries;
 
 pub use persons::{
     FIRST, NAME_MAX, PERSONS_MAX, PersonDifference, PersonEntry, Persons, PersonsError, differences, path,
+    permission_problem,
 };
 pub use role::Role;
 pub use sessions::{SessionKey, key};
-pub use sign_in::{Access, NewSession, Rules, SignInError};
+pub use sign_in::{Access, NewSession, Rules, SignInError, Urgency};
 pub(crate) use token::random;
 pub use token::{Token, TokenError};
 pub use tries::{LOCKED_FOR, TRIES_MAX};

@@ -6,8 +6,10 @@
 use super::role::Role;
 use super::token::{Token, TokenError};
 use crate::files;
+use crate::status::StatusProblem;
 use serde::{Deserialize, Serialize};
 use std::io;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// Name of the file in the data directory.
@@ -78,6 +80,22 @@ pub fn path(data_dir: &Path) -> PathBuf {
     data_dir.join(FILE)
 }
 
+/// What is wrong with the permissions of the file of persons.
+#[must_use]
+pub fn permission_problem(data_dir: &Path) -> Option<StatusProblem> {
+    let file = path(data_dir);
+    let mode = std::fs::metadata(&file).ok()?.permissions().mode();
+    let what = match mode {
+        _ if mode & 0o022 != 0 => "others can change who may do what here",
+        _ if mode & 0o077 != 0 => "others can read who may do what here",
+        _ => return None,
+    };
+    let what = format!("{}: {what} (mode {:03o})", file.display(), mode & 0o777);
+    let next =
+        format!("`chmod 600 {}`, and compare `cnc-gateway person list` with who should be there", file.display());
+    Some(StatusProblem { what, next })
+}
+
 /// The name without blanks around it, if it can be used.
 ///
 /// # Errors
@@ -144,8 +162,10 @@ impl Persons {
     /// An unusable or taken name, too many persons, no token.
     pub fn add(&mut self, name: &str, role: Role, by: &str) -> Result<Token, PersonsError> {
         let name = usable_name(name)?;
-        if self.named(name).is_some() {
-            return Err(PersonsError::Taken(name.to_owned()));
+        // Whoever reads the audit must not take one for the other.
+        let alike = |entry: &PersonEntry| entry.name.to_lowercase() == name.to_lowercase();
+        if let Some(other) = self.persons.iter().find(|entry| alike(entry)) {
+            return Err(PersonsError::Taken(other.name.clone()));
         }
         if self.persons.len() >= PERSONS_MAX {
             return Err(PersonsError::Full);
@@ -238,7 +258,6 @@ pub fn differences(before: &Persons, now: &Persons) -> Vec<PersonDifference> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::fs::PermissionsExt;
 
     #[test]
     fn the_file_holds_hashes_and_belongs_to_one_user() {
@@ -251,6 +270,12 @@ mod tests {
         let text = std::fs::read_to_string(&path).expect("there");
         assert!(text.contains("李伟") && !text.contains(token.text()), "{text}");
         assert_eq!(std::fs::metadata(&path).expect("there").permissions().mode() & 0o777, 0o600);
+        assert_eq!(permission_problem(directory.path()), None);
+        for (mode, part) in [(0o666, "change"), (0o620, "change"), (0o644, "read"), (0o601, "read")] {
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).expect("set");
+            let problem = permission_problem(directory.path()).expect("told");
+            assert!(problem.what.contains(part) && problem.next.contains("chmod 600"), "{problem:?}");
+        }
         let read = Persons::read(&path).expect("readable").expect("there");
         assert!(token.is(&read.named("李伟").expect("known").token_hash));
         std::fs::write(&path, "{\"schema\":\"persons/1\",\"persons\":[{\"name\":\"x\"}]}").expect("written");
@@ -264,7 +289,9 @@ mod tests {
         let before = persons.clone();
         assert!(matches!(persons.remove("admin"), Err(PersonsError::LastAdmin(_))));
         assert!(matches!(persons.give_role("admin", Role::Viewer, "a"), Err(PersonsError::LastAdmin(_))));
-        assert!(matches!(persons.add("admin", Role::Viewer, "a"), Err(PersonsError::Taken(_))));
+        for alike in ["admin", "ADMIN", " Admin "] {
+            assert!(matches!(persons.add(alike, Role::Viewer, "a"), Err(PersonsError::Taken(_))), "{alike}");
+        }
         assert!(matches!(persons.give_token("nobody", "a"), Err(PersonsError::Nobody(_))));
         for wrong in ["", "  ", "a:b", "a\nb", "<b>", &"x".repeat(41)] {
             assert!(matches!(persons.add(wrong, Role::Viewer, "a"), Err(PersonsError::Name(_))), "{wrong:?}");

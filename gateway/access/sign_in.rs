@@ -34,6 +34,15 @@ pub struct Rules {
     pub allow_arming: bool,
 }
 
+/// May somebody be made to wait?
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Urgency {
+    /// Yes, after too many wrong tokens.
+    Waits,
+    /// No: with the right token a person gives the machine back to its dial, whatever others have tried from there.
+    GivesBack,
+}
+
 /// Why somebody could not sign in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SignInError {
@@ -78,8 +87,9 @@ pub struct Access {
     bearers: Mutex<HashMap<SessionKey, Bearer>>,
     /// One change of the file at a time.
     changing: tokio::sync::Mutex<()>,
-    /// One hash at a time: it takes 19 MB and some hundredths of a second.
-    hashing: Semaphore,
+    /// One slow hash of an older version at a time: it takes 19 MB and some hundredths of a second. Whoever gives the machine
+    /// back does not wait for others.
+    hashing: [Semaphore; 2],
     account: Account,
     /// What a name that nobody has is compared with, so that it takes as long as one that somebody has.
     nobody: String,
@@ -113,7 +123,7 @@ impl Access {
             tries: Mutex::default(),
             bearers: Mutex::default(),
             changing: tokio::sync::Mutex::default(),
-            hashing: Semaphore::new(1),
+            hashing: [Semaphore::new(1), Semaphore::new(1)],
             account: Account::new(post),
             nobody,
         };
@@ -191,7 +201,7 @@ impl Access {
     /// Wrong name or token, too many tries, a busy box.
     pub async fn sign_in(&self, name: &str, token: &Token, from: IpAddr) -> Result<NewSession, SignInError> {
         self.follow().await;
-        let person = self.check(name, token, from, "login").await?;
+        let person = self.check(name, token, from, "login", Urgency::Waits).await?;
         let hash = self.hash_of(&person.name).unwrap_or_default();
         let begun = lock(&self.sessions).begin((&person.name, &hash), self.rules.session, Instant::now());
         let cookie = begun.map_err(|_| SignInError::Busy)?;
@@ -199,15 +209,22 @@ impl Access {
         Ok(NewSession { cookie, person })
     }
 
-    /// Is this the token of this name? Wrong ones are counted and accounted for as `kind`.
+    /// Is this the token of this name? Wrong ones are counted and accounted for as `kind`. Too many of them make an address wait,
+    /// unless it is urgent.
     ///
     /// # Errors
     /// Wrong name or token, too many tries, a busy box.
-    pub async fn check(&self, name: &str, token: &Token, from: IpAddr, kind: &str) -> Result<Person, SignInError> {
+    pub async fn check(
+        &self,
+        name: &str,
+        token: &Token,
+        from: IpAddr,
+        kind: &str,
+        urgency: Urgency,
+    ) -> Result<Person, SignInError> {
         let name = name.trim();
-        let place = tokio::time::timeout(HASH_WITHIN, self.hashing.acquire()).await;
-        let Ok(Ok(_place)) = place else { return Err(SignInError::Busy) };
-        if let Some(wait) = lock(&self.tries).wait(from, name, Instant::now()) {
+        let wait = lock(&self.tries).wait(from, name, Instant::now()).filter(|_| urgency == Urgency::Waits);
+        if let Some(wait) = wait {
             self.account.refused(
                 kind,
                 &format!("from {from}: waits after too many wrong tokens"),
@@ -218,8 +235,7 @@ impl Access {
         }
         let entry = lock(&self.known).persons.named(name).cloned();
         let hash = entry.as_ref().map_or(&self.nobody, |entry| &entry.token_hash).clone();
-        let token = token.clone();
-        let right = tokio::task::spawn_blocking(move || token.is(&hash)).await.map_err(|_| SignInError::Busy)?;
+        let right = self.compare(token, hash, urgency).await?;
         match entry.filter(|_| right) {
             Some(entry) => {
                 lock(&self.tries).right(from, name);
@@ -233,6 +249,18 @@ impl Access {
                 Err(SignInError::Wrong(left))
             }
         }
+    }
+
+    /// Is it the token of this hash? Only a hash of an older version takes time.
+    async fn compare(&self, token: &Token, hash: String, urgency: Urgency) -> Result<bool, SignInError> {
+        if !Token::is_slow(&hash) {
+            return Ok(token.is(&hash));
+        }
+        let lane = &self.hashing[usize::from(urgency == Urgency::GivesBack)];
+        let place = tokio::time::timeout(HASH_WITHIN, lane.acquire()).await;
+        let Ok(Ok(_place)) = place else { return Err(SignInError::Busy) };
+        let token = token.clone();
+        tokio::task::spawn_blocking(move || token.is(&hash)).await.map_err(|_| SignInError::Busy)
     }
 
     /// Who holds this cookie.
@@ -255,13 +283,13 @@ impl Access {
     ///
     /// # Errors
     /// Wrong name or token, too many tries, a busy box.
-    pub async fn of_bearer(&self, given: &str, from: IpAddr) -> Result<Person, SignInError> {
+    pub async fn of_bearer(&self, given: &str, from: IpAddr, urgency: Urgency) -> Result<Person, SignInError> {
         let digest = key(given);
         if let Some(person) = self.kept_bearer(&digest) {
             return Ok(person);
         }
         let (name, token) = given.split_once(':').unwrap_or((given, ""));
-        let person = self.check(name, &Token::typed(token), from, "login").await?;
+        let person = self.check(name, &Token::typed(token), from, "login", urgency).await?;
         let (name, until) = (person.name.clone(), Instant::now() + BEARER_KEPT);
         let token_hash = self.hash_of(&name).unwrap_or_default();
         let mut bearers = lock(&self.bearers);

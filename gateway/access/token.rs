@@ -1,10 +1,15 @@
-//! Tokens: what a person types to sign in. Made by the box, never chosen, so that none can be guessed; kept as an argon2 hash
-//! alone, so that nobody can read one from the disk.
+//! Tokens: what a person types to sign in. Made by the box, never chosen, so that none can be guessed; kept as a hash alone, so
+//! that nobody can read one from the disk.
+//!
+//! The hash is a salted SHA-256. A slow hash protects words that people choose; 100 random bits need none, and a slow one is what a
+//! flood of wrong tokens would keep the box busy with while somebody wants the machine back. Older versions wrote argon2 hashes:
+//! they are still known.
 
+use argon2::password_hash::PasswordVerifier;
 use argon2::password_hash::phc::PasswordHash;
-use argon2::password_hash::{PasswordHasher, PasswordVerifier};
 use argon2::{Algorithm, Argon2, Params, Version};
-use std::fmt;
+use sha2::{Digest, Sha256};
+use std::fmt::{self, Write};
 
 /// No letter or digit that can be taken for another: 32 signs, 5 bits each.
 const SIGNS: &[u8; 32] = b"abcdefghjkmnpqrstuvwxyz023456789";
@@ -12,7 +17,11 @@ const SIGNS: &[u8; 32] = b"abcdefghjkmnpqrstuvwxyz023456789";
 const LENGTH: usize = 20;
 /// Signs in a row before a hyphen, for whoever copies it from paper.
 const GROUP: usize = 4;
-/// Memory of one hash, KiB; with [`PASSES`] the least that OWASP's password storage cheat sheet (2023) names for argon2id.
+/// What a hash of today begins with.
+const SALTED: &str = "sha256$";
+/// Bytes of the salt: two hashes of one token are not alike.
+const SALT: usize = 16;
+/// Memory of one hash of an older version, KiB; with [`PASSES`] the least that OWASP's password storage cheat sheet (2023) names for argon2id.
 const MEMORY_KIB: u32 = 19_456;
 const PASSES: u32 = 2;
 
@@ -22,9 +31,6 @@ pub enum TokenError {
     /// The system gives no random numbers.
     #[error("the operating system gives no random numbers, so no token can be made")]
     NoRandomness,
-    /// There is no memory for the hash, or what was to be hashed is no text.
-    #[error("the token could not be hashed: there is too little memory")]
-    NoHash,
 }
 
 /// A token in clear. It is shown once, and never stored.
@@ -59,35 +65,61 @@ impl Token {
         &self.0
     }
 
-    /// Its hash in the form of the PHC (`$argon2id$v=19$m=...`).
+    /// Its hash: `sha256$SALT$DIGEST`, both in hexadecimal digits.
     ///
     /// # Errors
-    /// Too little memory.
+    /// The system gives no random numbers.
     pub fn hash(&self) -> Result<String, TokenError> {
-        let hash: PasswordHash = argon2()?.hash_password(self.0.as_bytes()).map_err(|_| TokenError::NoHash)?;
-        Ok(hash.to_string())
+        let salt = hex(&random::<SALT>()?);
+        Ok(format!("{SALTED}{salt}${}", self.digest(&salt)))
+    }
+
+    fn digest(&self, salt: &str) -> String {
+        hex(&Sha256::digest(format!("{salt}:{}", self.0)))
     }
 
     /// Is it the one that was hashed? Takes the time of a hash in any case.
     #[must_use]
     pub fn is(&self, hash: &str) -> bool {
+        match hash.strip_prefix(SALTED).and_then(|rest| rest.split_once('$')) {
+            Some((salt, digest)) => same(self.digest(salt).as_bytes(), digest.as_bytes()),
+            None => self.is_argon2(hash),
+        }
+    }
+
+    /// Does a look at this hash take some hundredths of a second and 19 MB?
+    #[must_use]
+    pub fn is_slow(hash: &str) -> bool {
+        !hash.starts_with(SALTED)
+    }
+
+    fn is_argon2(&self, hash: &str) -> bool {
         let Ok(parsed) = PasswordHash::new(hash) else { return false };
         // The cost is that of the hash; a hand-written one must not take all memory of the box.
         let modest =
             Params::try_from(&parsed).is_ok_and(|cost| cost.m_cost() <= 16 * MEMORY_KIB && cost.t_cost() <= 16);
-        modest && argon2().is_ok_and(|argon2| argon2.verify_password(self.0.as_bytes(), &parsed).is_ok())
+        let params = Params::new(MEMORY_KIB, PASSES, 1, None);
+        let argon2 = params.map(|params| Argon2::new(Algorithm::Argon2id, Version::V0x13, params));
+        modest && argon2.is_ok_and(|argon2| argon2.verify_password(self.0.as_bytes(), &parsed).is_ok())
     }
+}
+
+/// Takes the same time wherever they differ.
+fn same(a: &[u8], b: &[u8]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).fold(0, |differs, (a, b)| differs | (a ^ b)) == 0
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut hex, byte| {
+        let _infallible = write!(hex, "{byte:02x}");
+        hex
+    })
 }
 
 impl fmt::Debug for Token {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Token(..)")
     }
-}
-
-fn argon2() -> Result<Argon2<'static>, TokenError> {
-    let params = Params::new(MEMORY_KIB, PASSES, 1, None).map_err(|_| TokenError::NoHash)?;
-    Ok(Argon2::new(Algorithm::Argon2id, Version::V0x13, params))
 }
 
 /// Bytes that nobody can foresee.
@@ -109,16 +141,32 @@ mod tests {
         let token = Token::make().expect("random");
         assert_eq!(token.text().len(), LENGTH + LENGTH / GROUP - 1);
         let hash = token.hash().expect("hashed");
-        assert!(hash.starts_with("$argon2id$v=19$m=19456,t=2,p=1$") && !hash.contains(token.text()), "{hash}");
+        assert!(hash.starts_with("sha256$") && !hash.contains(token.text()), "{hash}");
+        assert_ne!(token.hash().expect("hashed"), hash, "salted");
         let typed = token.text().to_uppercase().replace('-', " ");
         assert!(Token::typed(&typed).is(&hash));
         assert_ne!(Token::make().expect("random").text(), token.text());
         let mut wrong = token.text().to_owned();
         wrong.replace_range(0..1, if wrong.starts_with('a') { "b" } else { "a" });
         assert!(!Token::typed(&wrong).is(&hash));
-        for no_hash in ["", "$argon2id$", "plain", "$argon2id$v=19$m=4000000,t=2,p=1$c29tZXNhbHQ$AAAA"] {
+        for no_hash in [
+            "",
+            "sha256$",
+            "sha256$$",
+            "sha256$00$00",
+            "$argon2id$",
+            "plain",
+            "$argon2id$v=19$m=4000000,t=2,p=1$c29tZXNhbHQ$AAAA",
+        ] {
             assert!(!token.is(no_hash), "{no_hash}");
         }
         assert_eq!(format!("{token:?}"), "Token(..)");
+    }
+
+    #[test]
+    fn a_hash_of_an_older_version_is_known() {
+        // Made by argon2-cffi 25.1.0 (the reference implementation in C) of the token abcd-efgh.
+        let hash = "$argon2id$v=19$m=19456,t=2,p=1$c29tZXNhbHQxMjM0NTY3OA$8zgA40/nOzw1xtkEHG+t19TEmu860DE8kzLy9TXt254";
+        assert!(Token::is_slow(hash) && Token::typed("ABCD EFGH").is(hash) && !Token::typed("abcd-efgi").is(hash));
     }
 }

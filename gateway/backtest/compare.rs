@@ -163,7 +163,7 @@ impl Named<'_> {
                     named.extend(over_samples);
                 }
                 // Where both sets have it over the stored samples, these are compared: storage has done the same to both.
-                Some(at) if over_samples.is_none() => found.extend(self.shifted(spell, self.edited[at])),
+                Some(at) if over_samples.is_none() => found.extend(self.find_shift(spell, self.edited[at])),
                 Some(_) => {}
             }
         }
@@ -178,7 +178,7 @@ impl Named<'_> {
 
     fn of_running(&self, spell: &Spell) -> Option<SpellDifference> {
         match self.meeting(spell, &self.edited) {
-            Some(at) => self.shifted(spell, self.edited[at]),
+            Some(at) => self.find_shift(spell, self.edited[at]),
             None => {
                 let raised = self.meeting(spell, &self.recorded).is_some();
                 let evidence = if raised { Evidence::Both } else { Evidence::Samples };
@@ -187,7 +187,7 @@ impl Named<'_> {
         }
     }
 
-    fn shifted(&self, spell: &Spell, edited: &Spell) -> Option<SpellDifference> {
+    fn find_shift(&self, spell: &Spell, edited: &Spell) -> Option<SpellDifference> {
         let far = |a: TimeNs, b: TimeNs| a.abs_diff(b) > self.near_ns.unsigned_abs();
         let shifted = far(spell.from_ns, edited.from_ns) || far(spell.end_ns(), edited.end_ns());
         shifted.then(|| SpellDifference::Shifted(spell.clone(), edited.clone()))

@@ -1,6 +1,6 @@
 //! Both sets side by side, on as many processors as there is work for.
 //!
-//! A script sees samples, estimates and its own memory, and nothing of another script. Scripts that are the same in both sets
+//! A script sees samples, estimates and its own memory. Scripts that are the same in both sets
 //! therefore run once, for both; so do the estimators where both sets want the same settings. Reading, what both have in
 //! common, and what differs are three threads in a row, with a few batches of samples between them: what is in memory does
 //! not grow with the stretch.
@@ -8,8 +8,10 @@
 use super::lane::{self, Lane};
 use super::seconds;
 use crate::history::HistoryError;
+use crate::pipeline::{Channels, CycleFollower};
 use adapters::Sample;
 use adapters::clock::TimeNs;
+use rules::estimators::wear::WearEstimator;
 use rules::estimators::{self, Estimates};
 use rules::script::{Decision, Host, ScriptSet};
 use std::panic::resume_unwind;
@@ -20,9 +22,27 @@ const BATCH: usize = 256;
 /// Batches between two threads.
 const BATCHES_MAX: usize = 3;
 
+/// Everything that is inferred of a sample before scripts decide.
+struct Inferring {
+    estimators: estimators::Inference,
+    wear: WearEstimator,
+    parts: CycleFollower,
+    channels: Channels,
+}
+
+impl Inferring {
+    fn infer(&mut self, sample: &Sample) -> Estimates {
+        let mut estimates = *self.estimators.infer(sample);
+        self.wear.step(sample, &mut estimates);
+        let _finished = self.parts.step(&self.channels, sample, &estimates);
+        estimates.part = self.parts.figures();
+        estimates
+    }
+}
+
 /// Scripts with estimators of their own, or with somebody else's.
 struct Runner {
-    estimators: Option<estimators::Inference>,
+    estimators: Option<Inferring>,
     host: Host,
     generation: u64,
 }
@@ -31,7 +51,12 @@ impl Runner {
     fn new(set: ScriptSet, infers: bool) -> Self {
         let mut host = Host::new();
         host.install(set);
-        let estimators = infers.then(|| estimators::Inference::new(host.settings().clone()));
+        let estimators = infers.then(|| Inferring {
+            estimators: estimators::Inference::new(host.settings().clone()),
+            wear: WearEstimator::default(),
+            parts: CycleFollower::default(),
+            channels: Channels::new(),
+        });
         Self { estimators, generation: host.generation(), host }
     }
 
@@ -43,12 +68,16 @@ impl Runner {
             (Some(estimators), _) => {
                 if self.generation != self.host.generation() {
                     self.generation = self.host.generation();
-                    estimators.reconfigure(self.host.settings().clone());
+                    estimators.estimators.reconfigure(self.host.settings().clone());
                 }
-                *estimators.infer(sample)
+                estimators.infer(sample)
             }
         };
-        (estimates, self.host.tick(sample, &estimates))
+        let decision = self.host.tick(sample, &estimates);
+        if let Some(estimators) = &mut self.estimators {
+            decision.learn_anew.iter().for_each(|program| estimators.estimators.learn_load_anew(program));
+        }
+        (estimates, decision)
     }
 }
 

@@ -71,7 +71,7 @@ impl BacktestReport {
             "to": utc(self.to_ns),
             "rows": self.rows,
             "covered_s": self.covered_s,
-            "recorded": recorded(&self.recorded),
+            "recorded": recorded_to_json(&self.recorded),
             "running": lane(&self.running),
             "edited": lane(&self.edited),
             "failing_trials": self.trials.iter().map(ToString::to_string).collect::<Vec<_>>(),
@@ -94,7 +94,7 @@ impl BacktestReport {
     }
 }
 
-fn recorded(recorded: &Recorded) -> Value {
+fn recorded_to_json(recorded: &Recorded) -> Value {
     let others = recorded
         .others
         .iter()

@@ -28,6 +28,8 @@ const LARGE: &str = "the history is too large for an archive; `cnc-gateway backu
 /// The list. The first row that fits counts.
 pub const LIST: &[Row] = &[
     ("*.writing", Fate::Left("half a file, which its writer was stopped at")),
+    ("*.json.before", Fate::Left("the save before the last one, which is in the backup")),
+    ("*.json.damaged", Fate::Left("the disk has changed it; a person has to look at it, at this box")),
     ("settings.toml", Fate::AtOnce),
     ("annotations.jsonl", Fate::AtOnce),
     ("thermal_model.json", Fate::AtOnce),
@@ -50,6 +52,9 @@ pub const LIST: &[Row] = &[
         Fate::Left("it says what stands in the control now; an older one would take back the wrong amount"),
     ),
     ("offsets.json.unreadable", Fate::Left("a person has to look at it, at this box")),
+    ("crashes/*", Fate::Left("reports of what broke off, for the support bundle")),
+    ("confirmed", Fate::Left("which version of the program is well, at this box")),
+    ("backup-check/*", Fate::Left("a scratch folder, in which a backup is tried")),
     ("diagnoses/*", Fate::Left("reports to read, which decide nothing")),
     ("control.sock", Fate::Left("an entrance of the running process")),
     ("*-before-restore-*.tar.gz", Fate::Left("it is a backup itself")),
@@ -117,6 +122,8 @@ mod tests {
     #[test]
     fn names_are_found_and_unknown_ones_are_not() {
         for (name, wanted) in [
+            ("*.json.before", Fate::Left("the save before the last one, which is in the backup")),
+            ("*.json.damaged", Fate::Left("the disk has changed it; a person has to look at it, at this box")),
             ("settings.toml", Fate::AtOnce),
             ("drafts/a.rhai.json", Fate::AtOnce),
             ("wear.json", Fate::AtStart),

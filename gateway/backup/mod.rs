@@ -11,9 +11,11 @@
 pub mod list;
 mod restore;
 mod restored;
+mod schedule;
 
 pub use restore::{RestoreRequest, restore};
 pub use restored::take as take_restored;
+pub use schedule::{BackupError, BackupSchedule, take_backup};
 
 use crate::archive::ArchivedFile;
 use crate::history::{HistoryError, Reader};
@@ -83,11 +85,11 @@ pub fn archive_name(what: &str, at_s: u64) -> String {
 pub fn collect(places: &BackupPaths) -> Result<Vec<ArchivedFile>, HistoryError> {
     let mut taken = CopiedFiles::default();
     names(&places.scripts).into_iter().filter(|name| is_of_scripts(name)).for_each(|name| {
-        taken.one(&places.scripts.join(&name), format!("scripts/{name}"));
+        taken.own(&places.scripts.join(&name), format!("scripts/{name}"));
     });
     for name in below(&places.data_dir) {
         if matches!(of_name(&name), Some(Fate::AtOnce | Fate::AtStart)) {
-            taken.one(&places.data_dir.join(&name), format!("{DATA}{name}"));
+            taken.own(&places.data_dir.join(&name), format!("{DATA}{name}"));
         }
     }
     // Without a file every setting has its default, which an empty file says as well.
@@ -126,6 +128,13 @@ struct CopiedFiles {
 }
 
 impl CopiedFiles {
+    /// A file of the box itself: a link leads to somebody else's, which is nothing to give away.
+    fn own(&mut self, path: &Path, name: String) {
+        if std::fs::symlink_metadata(path).is_ok_and(|file| file.is_file()) {
+            self.one(path, name);
+        }
+    }
+
     fn one(&mut self, path: &Path, name: String) {
         match std::fs::metadata(path) {
             Ok(file) if file.is_file() && file.len() > FILE_MAX => self.too_long.push(name),

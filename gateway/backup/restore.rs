@@ -116,7 +116,9 @@ impl Found {
             ThermalModel::read(model, &places.machine).map_err(|what| format!("the thermal model {what}"))?;
         }
         for (name, text) in self.later.iter().filter(|(name, _)| name.ends_with(".json")) {
-            serde_json::from_str::<serde_json::Value>(text).map_err(|error| format!("{name} is not JSON: {error}"))?;
+            if crate::learned::state_of(text).is_none() {
+                return Err(format!("{name} is not as it was written: no JSON, or another checksum"));
+            }
         }
         self.check_scripts(places)
     }

@@ -1,10 +1,10 @@
 //! `cnc-gateway annotate`: what only a person can measure, noted beside the history.
 
 use super::{CannotRun, CommandOutcome, CommandResult, configuration, print};
+use crate::clock;
 use crate::commission::annotations::{Quantity, TypedAnnotation, add, annotation};
 use crate::history::Reader;
 use crate::moment;
-use adapters::clock::{Clock, SystemClock};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -39,9 +39,9 @@ pub(super) struct AnnotateArguments {
 
 pub(super) fn run(arguments: AnnotateArguments) -> CommandResult {
     let config = configuration(arguments.config.as_deref())?;
-    let span = Reader::open(&config.history.path).and_then(|reader| reader.span());
+    let span = Reader::open(&config.history.path).and_then(|reader| reader.present());
     // Without a history there is no newest sample yet; then the clock says what now is.
-    let newest_ns = span.ok().flatten().map_or_else(|| SystemClock::new().now_ns(), |(_, newest_ns)| newest_ns);
+    let newest_ns = span.ok().flatten().map_or_else(clock::now_ns, |(_, newest_ns)| newest_ns);
     let AnnotateArguments { quantity, value, unit, at, sd, file, of, .. } = arguments;
     let given = TypedAnnotation { value, unit, at, sd, file, of };
     match annotation(quantity, given, newest_ns) {

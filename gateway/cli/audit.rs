@@ -35,7 +35,7 @@ pub(super) fn answer(arguments: &AuditArguments, reader: &Reader) -> CommandResu
         show_check(&check, arguments.json);
         return Ok(if check.broken.is_none() { CommandOutcome::Fine } else { CommandOutcome::No });
     }
-    let newest_ns = reader.span().map_err(|error| cannot(&error))?.map_or(0, |(_, newest_ns)| newest_ns);
+    let newest_ns = reader.present().map_err(|error| cannot(&error))?.map_or(0, |(_, newest_ns)| newest_ns);
     let moment = |text: &Option<String>, otherwise: i64| {
         let parsed = text.as_ref().map(|text| moment::parse(text, newest_ns)).transpose();
         parsed.map(|ns| ns.unwrap_or(otherwise)).map_err(|what| CannotRun::new(what, ""))
@@ -50,12 +50,16 @@ pub(super) fn answer(arguments: &AuditArguments, reader: &Reader) -> CommandResu
 }
 
 fn show_check(check: &AuditCheck, json: bool) {
-    let AuditCheck { rows, first, last, head, broken } = check;
+    let AuditCheck { rows, first, last, head, removed, broken } = check;
     if json {
         return print_json(&json!({
             "schema": "audit-check/1", "intact": broken.is_none(), "rows": rows, "first": first, "last": last, "head": head,
-            "broken": broken,
+            "removed": removed, "broken": broken,
         }));
+    }
+    if let Some(removed) = removed {
+        let (at, because) = (moment::utc(removed.at_ns), &removed.because);
+        print(&format!("rows 1 to {} are gone: removed, the last of them at {at} ({because})\n", removed.through));
     }
     match broken {
         None => print(&format!("intact: {rows} rows, numbers {first} to {last}, head {head}\n")),

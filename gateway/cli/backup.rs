@@ -4,7 +4,8 @@
 use super::{CannotRun, CommandOutcome, CommandResult, configuration, print};
 use crate::archive::{pack, unpack};
 use crate::backup::{BackupPaths, RestoreRequest, archive_name, collect, copy_history};
-use adapters::clock::{Clock, SECOND_NS, SystemClock};
+use crate::clock;
+use adapters::clock::SECOND_NS;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -36,7 +37,7 @@ pub(super) struct RestoreArguments {
 }
 
 fn now() -> (i64, u64) {
-    let now_ns = SystemClock::new().now_ns();
+    let now_ns = clock::now_ns();
     (now_ns, now_ns.div_euclid(SECOND_NS).unsigned_abs())
 }
 

@@ -1,6 +1,6 @@
 //! `cnc-gateway check`: is everything right that the user wrote?
 
-use super::{CannotRun, CommandOutcome, CommandResult};
+use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::check::check;
 use crate::config::{self, keys};
 use ::rules::script::{Declared, declarations, shipped};
@@ -30,12 +30,12 @@ pub(super) struct CheckArguments {
 /// Checks, or prints a table.
 pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
     if arguments.keys {
-        print!("{}", keys::table());
-        print!("{}", crate::settings::table(&declared(arguments.config.as_deref())?));
+        print(&keys::table());
+        print(&crate::settings::table(&read_declared_settings(arguments.config.as_deref())?));
     } else if arguments.example {
-        print!("{}", keys::example());
+        print(&keys::example());
     } else if arguments.vocabulary {
-        print!("{}", ::rules::script::vocabulary(super::lang::language() == ::rules::physics::explain::Language::Zh));
+        print(&::rules::script::vocabulary(super::lang::language() == ::rules::physics::explain::Language::Zh));
     } else {
         return tell(arguments);
     }
@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
 }
 
 /// The settings that the scripts of a configuration declare, or those that come with the gateway.
-fn declared(config: Option<&Path>) -> Result<Vec<Declared>, CannotRun> {
+fn read_declared_settings(config: Option<&Path>) -> Result<Vec<Declared>, CannotRun> {
     let files = match config {
         Some(_) => super::rules::configured(&super::rules::configuration(config)?)?,
         None => shipped(),
@@ -63,9 +63,9 @@ fn tell(arguments: &CheckArguments) -> CommandResult {
     let report = check(arguments.config.as_deref(), environment);
     if arguments.json {
         let json = serde_json::json!({ "schema": "check/1", "fine": report.fine(), "read": report.read, "problems": report.problems });
-        println!("{json:#}");
+        print_json(&json);
     } else {
-        print!("{report}");
+        print(&report.to_string());
     }
     Ok(if report.fine() { CommandOutcome::Fine } else { CommandOutcome::No })
 }

@@ -1,6 +1,7 @@
 //! `cnc-gateway commission`: what is known of this machine, what is missing, what to do next and why.
 
 use super::{CannotRun, CommandOutcome, CommandResult, configuration, print, print_json};
+use crate::clock;
 use crate::commission::annotations::{self, Annotation};
 use crate::commission::columns::Merged;
 use crate::commission::learn::{Learned, all, prepared};
@@ -11,7 +12,6 @@ use crate::diagnosis::put;
 use crate::history::{Reader, store_wear_model};
 use crate::identified;
 use crate::moment;
-use adapters::clock::{Clock, SystemClock};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -111,7 +111,7 @@ fn span(history: &Path) -> Result<Option<(i64, i64)>, CannotRun> {
     if !history.exists() {
         return Ok(None);
     }
-    Reader::open(history).and_then(|reader| reader.span()).map_err(|error| CannotRun::new(error.to_string(), ""))
+    Reader::open(history).and_then(|reader| reader.present()).map_err(|error| CannotRun::new(error.to_string(), ""))
 }
 
 fn list(which: Which, arguments: &PlanArguments) -> CommandResult {
@@ -164,7 +164,7 @@ fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
         );
     }
     if let Some(record) = &learned.wear {
-        let now_ns = SystemClock::new().now_ns();
+        let now_ns = clock::now_ns();
         let id = store_wear_model(&config.history.path, now_ns, record)
             .map_err(|error| CannotRun::new(error.to_string(), ""))?;
         written.push(format!("wear model {id} in {}", config.history.path.display()));

@@ -1,11 +1,11 @@
 //! `cnc-gateway devices`: the `devices.xml` of this machine for an MTConnect agent.
 
 use super::{CannotRun, CommandOutcome, CommandResult, print};
+use crate::clock;
 use crate::config;
 use crate::history::{Query, Reader, box_id};
 use crate::moment;
 use crate::sinks::shdr::{Described, devices_xml, is_prefix, prefix_of};
-use adapters::clock::{Clock, SystemClock};
 use clap::Args;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -46,8 +46,8 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
             "write a letter, then letters, digits and _",
         ));
     }
-    let delivered = delivered(path);
-    let created = moment::utc(SystemClock::new().now_ns());
+    let delivered = read_delivered_channels(path);
+    let created = moment::utc(clock::now_ns());
     let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));
     let others = arguments.others.iter().map(|file| read(file)).collect::<Result<Vec<_>, _>>()?;
     let described = Described { machine: &config.gateway.name, box_id: &box_id, prefix: &prefix };
@@ -70,9 +70,9 @@ fn read(file: &Path) -> Result<(String, String), CannotRun> {
 }
 
 /// The channels of which the history holds something; `None` before there is one.
-fn delivered(path: &Path) -> Option<BTreeSet<String>> {
+fn read_delivered_channels(path: &Path) -> Option<BTreeSet<String>> {
     let reader = Reader::open(path).ok()?;
-    let (_, newest_ns) = reader.span().ok()??;
+    let (_, newest_ns) = reader.present().ok()??;
     let query = Query { from_ns: Some(newest_ns - 3_600_000_000_000), ..Query::default() };
     let mut names = BTreeSet::new();
     let read = reader.samples(&query, |chunk| {

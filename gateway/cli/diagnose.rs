@@ -4,7 +4,9 @@ use super::lang::{language, pick, say};
 use super::{CannotRun, CommandOutcome, CommandResult};
 use crate::diagnosis::context::DiagnosisContext;
 use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach, series_model};
-use crate::diagnosis::{DiagnosisOutputs, InputRecordings, finish, read_hypotheses, read_model, read_recordings_as};
+use crate::diagnosis::{
+    DiagnosisOutputs, InputRecordings, finish, read_hypotheses, read_model, read_recordings_as, stretch,
+};
 use clap::Args;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
@@ -105,7 +107,14 @@ fn inputs(arguments: &DiagnoseArguments) -> Result<(Model, InputRecordings), Can
     let hypotheses = hypotheses.map_err(|wrong| problems.extend(wrong));
     let given = read_recordings_as(&arguments.recording, arguments.map.as_ref());
     let given = given.map_err(|wrong| problems.extend(wrong.iter().map(|problem| say(problem).to_owned())));
-    let (Ok(model), Ok(hypotheses), Ok(given)) = (model, hypotheses, given) else { return Err(cannot_use(&problems)) };
+    let (Ok(model), Ok(hypotheses), Ok(mut given)) = (model, hypotheses, given) else {
+        return Err(cannot_use(&problems));
+    };
+    if let Some(model) = &model
+        && arguments.recording.iter().all(|source| source.starts_with("history:"))
+    {
+        given.recording = stretch::of_history(given.recording, &model.output);
+    }
     let (model, given) = with_series(arguments, model, given)?;
     Ok((Model { hypotheses, ..model }, given))
 }

@@ -2,7 +2,7 @@
 
 use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::config;
-use crate::doctor::{self, DoctorReport};
+use crate::doctor::{self, DoctorReport, SystemFiles};
 use crate::sinks::{self, SinkAddress};
 use adapters::Address;
 use adapters::address::AddressError;
@@ -15,7 +15,14 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
     /// The address, as in the configuration, for example fanuc://10.0.0.5:8193; with --config the name of a source.
-    address: String,
+    #[arg(required_unless_present = "computer")]
+    address: Option<String>,
+    /// Examine the computer that the gateway runs on instead: disk, clock, temperature, memory, real-time priority.
+    #[arg(id = "computer", long = "box", conflicts_with = "compare")]
+    computer: bool,
+    /// Directory of the data of the box, with --box.
+    #[arg(long, value_name = "DIR", default_value = ".", requires = "computer")]
+    data_dir: PathBuf,
     /// Look the source up in this configuration, by its name or address, and read its own channels too.
     #[arg(long, value_name = "FILE", conflicts_with = "compare")]
     config: Option<PathBuf>,
@@ -33,13 +40,14 @@ pub(super) struct DoctorArguments {
 /// Prints the report. Exit code 0 reachable without problems, 1 with problems, 2 unusable address.
 pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
     let unusable = |text| CannotRun::new(text, "");
-    if SinkAddress::is_one(&arguments.address) {
-        return sink(arguments);
+    let Some(address) = &arguments.address else { return Ok(examine_box(arguments)) };
+    if SinkAddress::is_one(address) {
+        return sink(address, arguments.json);
     }
     let Some(library) = &arguments.compare else {
         let address = match &arguments.config {
-            Some(file) => configured(file, &arguments.address)?,
-            None => arguments.address.parse().map_err(|error: AddressError| unusable(error.to_string()))?,
+            Some(file) => find_configured_address(file, address)?,
+            None => address.parse().map_err(|error: AddressError| unusable(error.to_string()))?,
         };
         let report = if arguments.all { doctor::examine_all(&address) } else { doctor::examine_address(&address) };
         let report = report.map_err(unusable)?;
@@ -50,7 +58,7 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
         }
         return Ok(outcome(report.problems.is_empty()));
     };
-    let comparison = doctor::compare(&arguments.address, library).map_err(unusable)?;
+    let comparison = doctor::compare(address, library).map_err(unusable)?;
     if arguments.json {
         print_json(&comparison.json());
     } else {
@@ -60,13 +68,36 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
     Ok(outcome(comparison.is_well()))
 }
 
+/// The computer itself.
+fn examine_box(arguments: &DoctorArguments) -> CommandOutcome {
+    let report = doctor::examine_computer(&SystemFiles::default(), &arguments.data_dir);
+    if arguments.json {
+        print_json(&report.to_json());
+    } else {
+        let mut text = String::from("this computer\n");
+        for fact in &report.facts {
+            let value = match &fact.value {
+                FactValue::Number(number) => number.to_string(),
+                FactValue::Text(text) => text.clone(),
+            };
+            // Writing to a string does not fail.
+            let _ = writeln!(text, "  {}: {value}", fact.name);
+        }
+        for problem in &report.problems {
+            let _ = writeln!(text, "  problem: {}\n    next: {}", problem.what, problem.next);
+        }
+        print(&text);
+    }
+    outcome(report.problems.is_empty())
+}
+
 /// Tries a receiver.
-fn sink(arguments: &DoctorArguments) -> CommandResult {
-    let address: SinkAddress = arguments.address.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
+fn sink(address: &str, json: bool) -> CommandResult {
+    let address: SinkAddress = address.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let runtime = runtime.map_err(|error| CannotRun::new(format!("no threads: {error}"), ""))?;
     let found = runtime.block_on(sinks::doctor::examine(&address));
-    if arguments.json {
+    if json {
         print_json(&found.json(&address));
     } else {
         print(&found.text(&address));
@@ -75,7 +106,7 @@ fn sink(arguments: &DoctorArguments) -> CommandResult {
 }
 
 /// The address of the source of this name in a configuration.
-fn configured(file: &Path, wanted: &str) -> Result<Address, CannotRun> {
+fn find_configured_address(file: &Path, wanted: &str) -> Result<Address, CannotRun> {
     let config = config::load(Some(file), []).map_err(|problems| {
         let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
         CannotRun::new(lines.join("\n"), "")

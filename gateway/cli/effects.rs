@@ -39,7 +39,7 @@ pub(super) fn effects(arguments: EffectsArguments) -> CommandResult {
         EffectsCommand::List(_) => explain::list(language()),
         EffectsCommand::Show { kind, printing } => show(&kind, &printing)?,
     };
-    print!("{text}");
+    super::print(&text);
     Ok(CommandOutcome::Fine)
 }
 

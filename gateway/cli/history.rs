@@ -1,7 +1,7 @@
 //! `cnc-gateway history`: what the box remembers.
 
 use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
-use crate::history::{DAY_NS, HistoryError, Query, Reader, SqlValue, day_of};
+use crate::history::{DAY_NS, HistoryError, Query, Reader, SqlValue, day_of, plain_cell};
 use crate::moment;
 use crate::records::{RecordKind, RecordQuery, document, records};
 use crate::samples;
@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Arguments of `history`.
 #[derive(Debug, Args)]
@@ -32,6 +33,10 @@ enum Question {
     Partitions(PartitionArguments),
     /// The audit of the gate: every request, refusal, write and arming.
     Audit(super::audit::AuditArguments),
+    /// Save everything that is whole from a damaged history into a new file.
+    Repair(super::history_upkeep::RepairArguments),
+    /// Move rows that are dated after now into a file of their own.
+    SetApart(super::history_upkeep::SetApartArguments),
     /// How much there is, how fast it grows and how long the disk lasts.
     Info {
         /// Print as JSON.
@@ -75,6 +80,9 @@ struct QueryArguments {
     /// One SELECT over the tables, the views and the virtual table `samples`.
     #[arg(long, value_name = "SELECT", conflicts_with_all = ["resolution", "channels"])]
     sql: Option<String>,
+    /// The statement of --sql is given up after so long, seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "60")]
+    limit_s: f64,
     /// Form of the answer.
     #[arg(long, value_enum, default_value_t = OutputFormat::Csv)]
     format: OutputFormat,
@@ -117,7 +125,7 @@ struct PartitionArguments {
 
 impl PartitionArguments {
     fn write(&self, reader: &Reader) -> CommandResult {
-        let span = reader.span().map_err(|error| cannot(&error))?;
+        let span = reader.present().map_err(|error| cannot(&error))?;
         let Some((first_ns, newest_ns)) = span else {
             return Err(CannotRun::new("the history holds no samples", "let the gateway run first"));
         };
@@ -148,18 +156,35 @@ fn seconds(text: &str) -> Result<f64, String> {
 /// Answers.
 pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
     let path = &arguments.history;
-    let reader = Reader::open(path).map_err(|error| cannot(&error))?;
-    match arguments.question {
-        Question::Info { json } => info(&reader, json),
+    let open = || Reader::open(path).map_err(|error| cannot(&error));
+    let reader = match arguments.question {
+        Question::Repair(repair) => return super::history_upkeep::repair(&repair, path),
+        Question::SetApart(apart) => return super::history_upkeep::set_apart(&apart, path),
+        _ => open()?,
+    };
+    let answered = answer(arguments.question, &reader, path)?;
+    let damaged = reader.damaged();
+    for rows in &damaged {
+        eprintln!(
+            "cnc-gateway: {rows} were changed by the disk and are left out; `cnc-gateway history repair NEW` saves the others"
+        );
+    }
+    Ok(if damaged.is_empty() { answered } else { CommandOutcome::No })
+}
+
+fn answer(question: Question, reader: &Reader, path: &Path) -> CommandResult {
+    match question {
+        Question::Repair(_) | Question::SetApart(_) => Ok(CommandOutcome::Fine),
+        Question::Info { json } => info(reader, json),
         Question::Export(export) => {
-            let (query, _) = export.selection.query(&reader)?;
+            let (query, _) = export.selection.query(reader)?;
             let rows = reader.export(&query, &export.file).map_err(|error| cannot(&error))?;
             print(&format!("{rows} rows written to {}\n", export.file.display()));
             Ok(CommandOutcome::Fine)
         }
-        Question::Query(query) => query.answer(&reader, path),
-        Question::Partitions(partitions) => partitions.write(&reader),
-        Question::Audit(audit) => super::audit::answer(&audit, &reader),
+        Question::Query(query) => query.answer(reader, path),
+        Question::Partitions(partitions) => partitions.write(reader),
+        Question::Audit(audit) => super::audit::answer(&audit, reader),
     }
 }
 
@@ -184,7 +209,7 @@ fn info(reader: &Reader, json: bool) -> CommandResult {
 impl Selection {
     /// The question, and its range with both ends named.
     fn query(&self, reader: &Reader) -> Result<(Query, (TimeNs, TimeNs)), CannotRun> {
-        let span = reader.span().map_err(|error| cannot(&error))?;
+        let span = reader.present().map_err(|error| cannot(&error))?;
         let (first_ns, newest_ns) = span.unwrap_or((0, 0));
         let bad = |what: String| CannotRun::new(what, "");
         let moment =
@@ -210,7 +235,7 @@ impl QueryArguments {
         let out = BufWriter::new(std::io::stdout().lock());
         let done = match (&self.records, &self.sql, self.resolution) {
             (Some(kind), ..) => self.answer_records(reader, *kind, range, json, out),
-            (None, Some(sql), _) => answer_sql(reader, sql, json, out),
+            (None, Some(sql), _) => answer_sql(reader, (sql, Duration::from_secs_f64(self.limit_s)), json, out),
             (None, None, Some(resolution_s)) if json => samples::bucketed(reader, &query, resolution_s, usize::MAX)
                 .map(|series| print_json(&samples::document(range, resolution_s, series))),
             (None, None, Some(resolution_s)) => samples::bucketed_csv(reader, &query, resolution_s, out),
@@ -261,19 +286,31 @@ impl<W: Write> CsvTable<W> {
             self.headed = true;
         }
         self.csv.write_record(row.values().map(|value| match value {
-            Value::String(text) => text.clone(),
+            Value::String(text) => plain_cell(text),
             Value::Null => String::new(),
             other => other.to_string(),
         }))
     }
 }
 
-fn answer_sql(reader: &Reader, sql: &str, json: bool, out: impl Write) -> Result<(), HistoryError> {
+/// Rows of one document of JSON, which is made as a whole.
+const JSON_ROWS_MAX: usize = 1_000_000;
+
+fn answer_sql(
+    reader: &Reader,
+    (sql, limit): (&str, Duration),
+    json: bool,
+    out: impl Write,
+) -> Result<(), HistoryError> {
     let mut rows = Vec::new();
     let mut table = CsvTable::new(out);
-    let mut failed = None;
-    reader.sql(sql, |names, values| {
+    let (mut failed, mut too_many) = (None, false);
+    reader.sql(sql, limit, |names, values| {
         let row: Map<String, Value> = names.iter().cloned().zip(values.iter().map(json_of)).collect();
+        if json && rows.len() >= JSON_ROWS_MAX {
+            too_many = true;
+            return ControlFlow::Break(());
+        }
         if json {
             rows.push(Value::Object(row));
         } else if let Err(error) = table.row(&row) {
@@ -282,6 +319,9 @@ fn answer_sql(reader: &Reader, sql: &str, json: bool, out: impl Write) -> Result
         }
         ControlFlow::Continue(())
     })?;
+    if too_many {
+        return Err(HistoryError::Question(format!("more than {JSON_ROWS_MAX} rows: ask for CSV, or for less")));
+    }
     if json {
         print_json(&json!({ "schema": "sql/1", "rows": rows }));
     }

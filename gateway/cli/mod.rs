@@ -20,10 +20,12 @@ mod gateway_options;
 mod help;
 mod help_zh;
 mod history;
+mod history_upkeep;
 mod identify;
 mod lang;
 mod metrics;
 mod model;
+mod package_files;
 mod person;
 mod pulses;
 mod recording;
@@ -31,7 +33,9 @@ mod replay;
 mod rules;
 mod run;
 mod serve;
+mod setup;
 mod simulate;
+mod update;
 mod vendor_child;
 
 pub(crate) use crate::cannot_run::CannotRun;
@@ -148,8 +152,15 @@ enum CliCommand {
     /// Serve the simulated machine over a real protocol, to try clients and scripts without a machine.
     #[command(subcommand)]
     Serve(serve::Served),
+    /// Ask what the box needs to know, try it, and write the configuration.
+    Setup(setup::SetupArguments),
+    /// Install another version of the program, with the way back; at the box, as root.
+    Update(update::UpdateArguments),
     /// Chapters of the handbook, and what a command takes.
     Help(help::HelpArguments),
+    /// Man pages and completions of shells, for whoever makes a package.
+    #[command(hide = true)]
+    PackageFiles(package_files::PackageFilesArguments),
     /// The child process around a vendor's library; started by the gateway itself.
     #[command(hide = true)]
     VendorChild(vendor_child::VendorChildArguments),
@@ -216,10 +227,18 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         #[cfg(feature = "fleet")]
         CliCommand::Fleet(fleet) => fleet::run(fleet),
         CliCommand::Serve(served) => serve::run(&served),
+        CliCommand::Setup(setup) => setup::run(&setup),
+        CliCommand::Update(update) => update::run(&update),
+        CliCommand::PackageFiles(files) => package_files::run(&files),
         CliCommand::Help(topic) => help::help(&topic),
         CliCommand::VendorChild(child) => vendor_child::run(&child),
         CliCommand::DiagnosisChild => diagnosis_child::run(),
     }
+}
+
+/// The command line as a description, for man pages and completions.
+fn command_line() -> clap::Command {
+    Arguments::command()
 }
 
 /// Would this process take these arguments? The first one is the name of the program.

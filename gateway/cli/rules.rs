@@ -105,7 +105,7 @@ pub(super) fn configured(config: &Config) -> Result<Vec<ScriptFile>, CannotRun> 
     if directory.is_dir() { read_directory(directory).map_err(refused) } else { Ok(script::shipped()) }
 }
 
-fn named(files: &[PathBuf]) -> Result<Vec<ScriptFile>, CannotRun> {
+fn read_named_scripts(files: &[PathBuf]) -> Result<Vec<ScriptFile>, CannotRun> {
     let mut found = Vec::new();
     for path in files {
         if path.is_dir() {
@@ -122,9 +122,9 @@ fn test(arguments: &TestArguments) -> CommandResult {
         let config = configuration(arguments.config.as_deref())?;
         (configured(&config)?, settings::read(&settings::path(&config.gateway.data_dir)).map_err(refused)?)
     } else {
-        (named(&arguments.files)?, SettingValues::default())
+        (read_named_scripts(&arguments.files)?, SettingValues::default())
     };
-    let (results, problems) = tried(&files, &values);
+    let (results, problems) = run_trials(&files, &values);
     let fine = problems.is_empty() && results.iter().all(|result| result.problem.is_none());
     if arguments.json {
         print_json(&json!({
@@ -140,7 +140,7 @@ fn test(arguments: &TestArguments) -> CommandResult {
 }
 
 /// Each file by itself, so that one that does not compile leaves the others their trials; then all of them together.
-fn tried(files: &[ScriptFile], values: &SettingValues) -> (Vec<TrialResult>, Vec<ScriptProblem>) {
+fn run_trials(files: &[ScriptFile], values: &SettingValues) -> (Vec<TrialResult>, Vec<ScriptProblem>) {
     let (mut results, mut problems) = (Vec::new(), Vec::new());
     for file in files {
         match script::compile_one(file, files, values) {
@@ -205,7 +205,7 @@ fn compare(arguments: &BacktestArguments) -> CommandResult {
         history,
         every_ns,
         running: running(arguments, &config)?,
-        edited: edited(arguments, &config)?,
+        edited: load_edited_set(arguments, &config)?,
     });
     let report = report.map_err(|error| CannotRun::new(error.to_string(), ""))?;
     if arguments.json {
@@ -217,7 +217,7 @@ fn compare(arguments: &BacktestArguments) -> CommandResult {
 }
 
 fn newest(history: &Path) -> Result<i64, CannotRun> {
-    let span = Reader::open(history).and_then(|reader| reader.span());
+    let span = Reader::open(history).and_then(|reader| reader.present());
     let span = span.map_err(|error| CannotRun::new(error.to_string(), "--history names the database"))?;
     span.map(|(_, newest_ns)| newest_ns).ok_or_else(|| {
         CannotRun::new(format!("{} holds no samples yet", history.display()), "let the box run for a while first")
@@ -240,7 +240,7 @@ fn running(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, 
 }
 
 /// Failing trials do not end it: what a script does to the history may be looked at before they are rewritten. They are told.
-fn edited(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {
+fn load_edited_set(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {
     let files = match &arguments.scripts {
         Some(directory) => read_directory(directory).map_err(refused)?,
         None => configured(config)?,

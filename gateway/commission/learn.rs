@@ -134,18 +134,14 @@ impl Learned {
     }
 
     fn wear(&mut self, recording: &Recording, machine: &str, criterion_mm: f64) {
-        let found = self.separated(recording).and_then(|recording| wear_of(&recording, criterion_mm));
+        let separated = self.separate_power(recording).map_err(WearLack::of_all);
+        let found = separated.and_then(|recording| wear_of(&recording, criterion_mm));
         let known = found.as_ref().map(|learned| {
             format!("{} cuts, {} form, R2 {:.1} %", learned.cuts.len(), learned.model.form(), 100.0 * learned.r2)
         });
-        self.part(
-            "wear",
-            known.map_err(Clone::clone),
-            "make the 27 cuts of the L27 list, 9 with each of three edges: new, half worn, worn past the criterion; read the flank wear of each under the \
-             microscope before and after and give it: `annotate flank-wear 0.05 --unit mm --at now --of EDGE`. \
-             `commission --plan wear-1`, `wear-2`, `wear-3` write the lists",
-            25.0,
-        );
+        let known = known.map_err(|lack| lack.refusal.clone());
+        let (next, minutes) = found.as_ref().err().map_or((String::new(), 0.0), WearLack::next);
+        self.part("wear", known, &next, minutes);
         let Ok(learned) = found else { return };
         self.found.push((TOOL_WEAR, learned.json()));
         let predicted = |cut: &Cut| learned.model.predict(&cut.conditions).power_w;
@@ -162,7 +158,7 @@ impl Learned {
     }
 
     /// The recording with cutting power separated by the coefficients that were just learned.
-    fn separated(&self, recording: &Recording) -> Result<Recording, Refusal> {
+    fn separate_power(&self, recording: &Recording) -> Result<Recording, Refusal> {
         let loss = self.load_loss.as_ref().ok_or_else(|| {
             Refusal::new(
                 RefusalKind::Missing,
@@ -237,12 +233,58 @@ fn inner_rows(recording: &Recording) -> Vec<bool> {
     inner
 }
 
-fn wear_of(recording: &Recording, criterion_mm: f64) -> Result<LearnedWear, Refusal> {
-    let gathered = gather(recording, &CutColumns::default())?;
+/// Minutes that one list of nine cuts takes, with a look through the microscope before and after.
+const LIST_MINUTES: f64 = 8.3;
+
+/// Why there is no wear model, and which of the three lists would bring it.
+struct WearLack {
+    refusal: Refusal,
+    /// Lists that are there already: they are not made again.
+    made: usize,
+    /// Flank wear of the most worn edge, where it is less than the criterion.
+    most_mm: Option<f64>,
+}
+
+impl WearLack {
+    /// Nothing is there.
+    fn of_all(refusal: Refusal) -> Self {
+        Self { refusal, made: 0, most_mm: None }
+    }
+
+    /// What to do next, and how many minutes it takes.
+    fn next(&self) -> (String, f64) {
+        let lists = ["`wear-1`, a new edge", "`wear-2`, a half worn edge", "`wear-3`, an edge worn past the criterion"];
+        let missing = lists.get(self.made..).unwrap_or_default();
+        if missing.is_empty() {
+            return (self.refusal.next.clone(), LIST_MINUTES);
+        }
+        let minutes = LIST_MINUTES * missing.len() as f64;
+        let other_way = self.most_mm.map_or_else(String::new, |most_mm| {
+            let lower_mm = (100.0 * most_mm).floor() / 100.0;
+            format!(
+                ". Where no edge is used so long, `--criterion-mm {lower_mm}` lets an edge count as worn there, and no cut is \
+                 missing"
+            )
+        });
+        let text = format!(
+            "make {} cuts of the L27 list, nine with each edge: {}; read the flank wear of each under the microscope before and \
+             after and give it: `annotate flank-wear 0.05 --unit mm --at now --of EDGE`. `commission --plan` writes each \
+             list{other_way}",
+            9 * missing.len(),
+            missing.join("; ")
+        );
+        (text, minutes)
+    }
+}
+
+fn wear_of(recording: &Recording, criterion_mm: f64) -> Result<LearnedWear, WearLack> {
+    let gathered = gather(recording, &CutColumns::default()).map_err(WearLack::of_all)?;
     let levels = wear_levels(&gathered.cuts);
     if gathered.cuts.len() < 20 || levels < 3 {
         let what = format!("{} cuts at {levels} wears are known; the list has 27 at 3", gathered.cuts.len());
-        return Err(Refusal::new(RefusalKind::TooFew, what, "go on with the list"));
+        let refusal = Refusal::new(RefusalKind::TooFew, what, "go on with the list");
+        let made = levels.min(gathered.cuts.len() / 9).min(2);
+        return Err(WearLack { refusal, made, most_mm: None });
     }
     let most_mm = gathered.cuts.iter().map(|cut| cut.conditions.vector()[0]).fold(0.0, f64::max);
     if most_mm < criterion_mm {
@@ -250,9 +292,11 @@ fn wear_of(recording: &Recording, criterion_mm: f64) -> Result<LearnedWear, Refu
             "the most worn edge had {most_mm:.3} mm, an edge counts as worn at {criterion_mm} mm: the limit would lie outside the model"
         );
         let next = "make wear-3 with an edge that is worn past the criterion, or give a lower --criterion-mm";
-        return Err(Refusal::new(RefusalKind::OutOfRange, what, next));
+        let refusal = Refusal::new(RefusalKind::OutOfRange, what, next);
+        return Err(WearLack { refusal, made: 2, most_mm: Some(most_mm) });
     }
     identify_tool_wear(gathered.cuts, &WearOptions { criterion_mm, ..WearOptions::default() })
+        .map_err(|refusal| WearLack { refusal, made: 3, most_mm: None })
 }
 
 /// Wears that lie apart by more than 0.03 mm: what a microscope in the shop tells apart for certain.

@@ -46,10 +46,10 @@ fn wrong_type(key: &ConfigKey, value: &DeValue<'_>) -> ValueRefusal {
         DeValue::Array(_) => "a list",
         DeValue::Table(_) => "a section",
     };
-    (format!("`{}` is {found}; {} is needed", key.name, needed(key.kind)), example(key))
+    (format!("`{}` is {found}; {} is needed", key.name, describe_kind(key.kind)), example(key))
 }
 
-fn needed(kind: ValueKind) -> &'static str {
+fn describe_kind(kind: ValueKind) -> &'static str {
     match kind {
         ValueKind::Text | ValueKind::Name => "text",
         ValueKind::OneOf(_) => "a word",

@@ -1,6 +1,7 @@
 //! The one table of configuration keys: what is read, refused, suggested, printed by `check --keys` and explained.
 
 use super::channel_keys;
+use super::keys_of_backup::BACKUP;
 use super::keys_of_gate::GATE;
 use super::keys_of_outputs::OUTPUTS;
 use super::keys_of_thermal::THERMAL;
@@ -100,6 +101,7 @@ pub const SECTIONS: &[Section] = &[
     section("http", "the page and the interface on the network"),
     section("twin", "the simulation that the machine is compared with"),
     section("thermal", "the thermal law that the box runs: predicted error, residual, offset, pulses to insert"),
+    section("backup", "backups that the box takes by itself, each restored into a scratch folder before it counts"),
     section("log", "what is written to the standard error output"),
 ];
 
@@ -120,9 +122,11 @@ use ValueKind::{Address, Flag, Listen, Name, Number, OneOf, Path, Text};
 pub static KEYS: &[ConfigKey] = &ALL;
 
 /// The rows of every part of the table, one part behind the other.
-static ALL: [ConfigKey; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + channel_keys::KEYS.len()] = {
-    let mut all = [CORE[0]; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + channel_keys::KEYS.len()];
-    let parts: [&[ConfigKey]; 5] = [CORE, GATE, OUTPUTS, THERMAL, &channel_keys::KEYS];
+static ALL: [ConfigKey;
+    CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + BACKUP.len() + channel_keys::KEYS.len()] = {
+    let mut all =
+        [CORE[0]; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + BACKUP.len() + channel_keys::KEYS.len()];
+    let parts: [&[ConfigKey]; 6] = [CORE, GATE, OUTPUTS, THERMAL, BACKUP, &channel_keys::KEYS];
     let (mut part, mut filled) = (0, 0);
     while part < parts.len() {
         let mut index = 0;
@@ -151,6 +155,13 @@ const CORE: &[ConfigKey] = &[
         Default("10.0"),
         "Ticks per second: merge, infer, decide, store",
         "每秒节拍数",
+    ),
+    key(
+        ("gateway", "clock_confirm_s"),
+        Number(10.0, 86_400.0),
+        Default("7200.0"),
+        "A reading of the computer's clock that has stood for so long is believed; until then nothing goes because of its age, s",
+        "计算机时钟读数稳定多久后才被采信；在此之前不按期限删除任何数据，秒",
     ),
     key(
         ("gateway", "language"),

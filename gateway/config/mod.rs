@@ -11,6 +11,7 @@ mod channels;
 mod check_value;
 mod in_force;
 pub mod keys;
+mod keys_of_backup;
 mod keys_of_gate;
 mod keys_of_outputs;
 mod keys_of_thermal;
@@ -69,6 +70,8 @@ pub struct Config {
     pub twin: TwinConfig,
     /// The thermal law.
     pub thermal: ThermalConfig,
+    /// Backups taken by itself; `None`: none are.
+    pub backup: Option<BackupConfig>,
     /// The log.
     pub log: LogConfig,
     /// Every key with its value and where that was written.
@@ -82,6 +85,8 @@ pub struct GatewayConfig {
     pub name: String,
     /// Ticks per second, 0.1 to 1000.
     pub tick_hz: f64,
+    /// A reading of the wall clock that has stood for so long is believed.
+    pub clock_confirm: Duration,
     /// Language in which the page opens; `None`: that of the browser.
     pub language: Option<Language>,
     /// Directory of everything the gateway writes.
@@ -301,6 +306,19 @@ pub struct ThermalConfig {
     pub total_um: f64,
     /// From prediction to offset and pulses.
     pub compensation: CompensationSettings,
+}
+
+/// `[backup]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BackupConfig {
+    /// Where they go.
+    pub directory: PathBuf,
+    /// Time between two.
+    pub every: Duration,
+    /// So many are kept.
+    pub keep: usize,
+    /// Copy the history, too.
+    pub history: bool,
 }
 
 /// `[log]`.

@@ -107,7 +107,7 @@ impl<'a> ConfigInput<'a> {
             }
             (true, DeValue::Array(items)) => {
                 for item in items.iter() {
-                    self.repeated(section, item);
+                    self.read_repeated_section(section, item);
                 }
             }
             (true, DeValue::Table(_)) => self.problem(
@@ -119,7 +119,7 @@ impl<'a> ConfigInput<'a> {
         }
     }
 
-    fn repeated(&mut self, section: &'static Section, item: &Spanned<DeValue<'_>>) {
+    fn read_repeated_section(&mut self, section: &'static Section, item: &Spanned<DeValue<'_>>) {
         let start = item.span().start;
         match item.get_ref() {
             DeValue::Table(table) => {

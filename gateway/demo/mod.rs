@@ -8,12 +8,13 @@
 //! next, 11,100 s of the same machine at `--speed max`; the edges then got the names that the machine gives to its first ones. The wear
 //! model counts only for the work material that it was learned with, which the recipe of the demonstration names. Faster than real time the machine works in shifts with short nights.
 
+use crate::clock;
 use crate::config::Config;
 use crate::files::replace;
 use crate::history::{Reader, store_wear_model};
 use crate::log::{Notice, Severity};
 use crate::run::open::MachineSpeed;
-use adapters::clock::{Clock, SECOND_NS, SystemClock};
+use adapters::clock::SECOND_NS;
 use rules::estimators::wear::WearRecord;
 use serde_json::{Value, json};
 use std::ops::Range;
@@ -71,13 +72,14 @@ fn models(data_dir: &Path, history: &Path) -> Result<(), String> {
     let words = |error: std::io::Error| error.to_string();
     std::fs::create_dir_all(data_dir).map_err(words)?;
     let model = data_dir.join("demo-lathe.toml");
-    let now_ns = SystemClock::new().now_ns();
+    let now_ns = clock::now_ns();
     if !model.exists() {
         let ended_s = (now_ns / SECOND_NS - HOUR_S) as f64;
-        replace(&data_dir.join("twin.json"), &moved(LEARNED, ended_s)?).map_err(words)?;
-        replace(&data_dir.join("wear.json"), &moved(WORN, ended_s)?).map_err(words)?;
+        replace(&data_dir.join("twin.json"), &shift_times(LEARNED, ended_s)?).map_err(words)?;
+        replace(&data_dir.join("wear.json"), &shift_times(WORN, ended_s)?).map_err(words)?;
         // The state that the estimators remember would otherwise seem to have lasted since then.
-        replace(&data_dir.join("estimators.json"), &moved(ESTIMATED, (now_ns / SECOND_NS) as f64)?).map_err(words)?;
+        replace(&data_dir.join("estimators.json"), &shift_times(ESTIMATED, (now_ns / SECOND_NS) as f64)?)
+            .map_err(words)?;
         replace(&model, MODEL).map_err(words)?;
     }
     let recipe = data_dir.join(RECIPE_FILE);
@@ -93,7 +95,7 @@ fn models(data_dir: &Path, history: &Path) -> Result<(), String> {
 }
 
 /// The same memory with all its times moved so that the newest of them is `newest_s`.
-fn moved(text: &str, newest_s: f64) -> Result<String, String> {
+fn shift_times(text: &str, newest_s: f64) -> Result<String, String> {
     let mut memory: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
     let mut newest: f64 = 0.0;
     each_time(&mut memory, &mut |at_s| {
@@ -152,7 +154,7 @@ mod tests {
     fn times_are_moved_and_nothing_else_is() {
         let text =
             r#"{"at_s":2000000000.5,"due":{"at_ns":2000000001000000000},"watts":850.25,"count":3,"word":"idle"}"#;
-        let memory: Value = serde_json::from_str(&moved(text, 1_700_000_000.0).expect("moved")).expect("JSON");
+        let memory: Value = serde_json::from_str(&shift_times(text, 1_700_000_000.0).expect("moved")).expect("JSON");
         assert_eq!(memory["at_s"], 1_699_999_999.5);
         assert_eq!(memory["due"]["at_ns"], 1_700_000_000_000_000_000_i64);
         assert_eq!((&memory["watts"], &memory["count"], &memory["word"]), (&json!(850.25), &json!(3), &json!("idle")));

@@ -4,6 +4,7 @@
 //! The gateway writes one line, the [`DiagnosisJob`], and holds the pipe open: the child ends when the pipe does, so that nothing is left
 //! behind by a gateway that was killed. The child answers with a line for every stage and one with the outcome, each a [`ChildMessage`].
 
+use super::beside::{BesideModel, Onset, beside_model};
 use super::context::DiagnosisContext;
 use super::recordings::read_recordings_as;
 use super::series::{AlignBy, SimulatedSeries, attach, series_model};
@@ -13,6 +14,7 @@ use crate::history;
 use adapters::Recording;
 use adapters::bilingual::Bilingual;
 use adapters::clock::{SECOND_NS, TimeNs};
+use rules::twin::diagnosis::Verdict;
 use rules::twin::{self, Model, parse_model};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -51,6 +53,8 @@ pub enum JobInput {
         from_ns: TimeNs,
         /// Its end.
         to_ns: TimeNs,
+        /// Since when the watch sees which kinds of work differ.
+        onsets: Vec<Onset>,
     },
     /// A file, read under the map beside it.
     File {
@@ -160,7 +164,7 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
         parse_model(text).map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     };
     match &job.input {
-        JobInput::Stretch { history, from_ns, to_ns } => {
+        JobInput::Stretch { history, from_ns, to_ns, .. } => {
             let model = parsed(&job.toml)?;
             let recording = stretch::read(history, *from_ns, *to_ns, &model.output).map_err(|it| it.to_string())?;
             if recording.rows() == 0 {
@@ -204,18 +208,32 @@ fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Str
     let mut found = twin::compare(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
     let context = super::finish(&mut found, &recording, &model, context);
     tell(Stage::Writing, recording.rows())?;
+    let beside = match &job.input {
+        JobInput::Stretch { onsets, .. } => beside_model(&recording, &model, &found, onsets),
+        JobInput::File { .. } => Vec::new(),
+    };
     let row = history::Diagnosis {
         at_ns: to_ns,
         from_ns,
         to_ns,
         verdict: found.verdict.word().to_owned(),
-        summary: found.summary.clone(),
+        summary: summary(&found, &beside),
         json: outputs::document(&found, &context).to_string(),
     };
     let kept = DiagnosisStore::at(job.kept.clone());
-    kept.keep(&row, &found, &recording, &context)
+    kept.keep(&row, &found, &recording, (&context, beside))
         .map_err(|error| format!("{}: {error}", kept.directory().display()))?;
     Ok((row, found.missing.iter().map(|missing| missing.effect.clone()).collect()))
+}
+
+/// The answer in a sentence. A model that fits only with other parameters does not agree with the machine: what has moved is the
+/// finding, and it is told in the place of "it agrees".
+fn summary(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
+    let moved: Vec<&str> = beside.iter().filter(|one| one.is_of_parameters()).map(|one| one.en.as_str()).collect();
+    if found.verdict != Verdict::NoMismatch || moved.is_empty() {
+        return found.summary.clone();
+    }
+    format!("A parameter of the model has changed: {}. Nothing else is missing.", moved.join("; "))
 }
 
 /// When the stretch that was really examined began: of a long one the beginning is left out.

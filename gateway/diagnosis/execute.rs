@@ -226,7 +226,7 @@ impl<'a> RecordingBuilder<'a> {
                     at(sample.at_ns);
                     self.add(&sample, step);
                 }
-                None if begun && ended(&sample) => break,
+                None if begun && has_ended(&sample) => break,
                 None => {}
             }
             now_ns += period_ns;
@@ -265,8 +265,10 @@ impl<'a> RecordingBuilder<'a> {
                 recording.set_column(id.name(), cells);
             }
         }
-        recording
-            .set_column("engaged", Cells::Numbers(self.samples.iter().map(|(.., sample)| engaged(sample)).collect()));
+        recording.set_column(
+            "engaged",
+            Cells::Numbers(self.samples.iter().map(|(.., sample)| compute_engagement(sample)).collect()),
+        );
         recording
     }
 
@@ -297,12 +299,12 @@ fn step_of(sample: &Sample) -> Option<usize> {
     (program == format!("O{EXPERIMENT_PROGRAM}") && block > 0).then_some(block)
 }
 
-fn ended(sample: &Sample) -> bool {
+fn has_ended(sample: &Sample) -> bool {
     text(sample, "program").is_some_and(|program| program != format!("O{EXPERIMENT_PROGRAM}"))
 }
 
 /// In the cut, as the program says it: a depth is planned and the axis feeds.
-fn engaged(sample: &Sample) -> Option<f64> {
+fn compute_engagement(sample: &Sample) -> Option<f64> {
     let (depth, feed) = (number(sample, "depth_of_cut_mm")?, number(sample, "feed_mm_min")?);
     let rapid = number(sample, "rapid").unwrap_or(0.0) > 0.5;
     Some(f64::from(u8::from(depth > 0.0 && feed > 0.0 && !rapid)))

@@ -154,6 +154,7 @@ impl FileDiagnoses {
             by: Some(by),
             from_ns: at_ns,
             to_ns: at_ns,
+            onsets: Vec::new(),
             file: Some((path, simulated)),
         })
     }

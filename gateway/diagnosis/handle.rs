@@ -1,6 +1,7 @@
 //! The one place where diagnoses are asked for, by the tick and by persons on the page: one at a time, with how far it is, and
 //! ended at any moment.
 
+use super::beside::Onset;
 use super::child::Stage;
 use super::store::{DiagnosisFile, DiagnosisStore};
 use super::worker::{DiagnosisRequest, LoadedModel};
@@ -86,6 +87,8 @@ struct DiagnosisState {
     run: Run,
     child: Option<Child>,
     model: Option<LoadedModel>,
+    /// Since when the watch sees which kinds of work differ.
+    onsets: Vec<Onset>,
     /// Seconds per row of the last one: from these follows about how long the next one takes.
     pace_s: Option<f64>,
 }
@@ -134,6 +137,11 @@ impl DiagnosisHandle {
         self.lock().model = Some(loaded.clone());
     }
 
+    /// Since when the watch sees which kinds of work differ from the model in charge.
+    pub fn set_onsets(&self, onsets: Vec<Onset>) {
+        self.lock().onsets = onsets;
+    }
+
     /// What is being done, and about how long it takes in all, s, where that is known.
     #[must_use]
     pub fn run(&self) -> (Run, Option<f64>) {
@@ -151,8 +159,11 @@ impl DiagnosisHandle {
     pub fn ask(&self, by: Option<String>, from_ns: TimeNs, to_ns: TimeNs) -> Result<(), DiagnosisRefusal> {
         let none =
             || DiagnosisRefusal::new("no model is in charge", "name one under [twin] model in the configuration");
-        let toml = self.lock().model.as_ref().ok_or_else(none)?.toml.clone();
-        self.begin(DiagnosisRequest { toml, by, from_ns, to_ns, file: None })
+        let state = self.lock();
+        let toml = state.model.as_ref().ok_or_else(none)?.toml.clone();
+        let onsets = state.onsets.clone();
+        drop(state);
+        self.begin(DiagnosisRequest { toml, by, from_ns, to_ns, onsets, file: None })
     }
 
     /// Asks for a diagnosis.

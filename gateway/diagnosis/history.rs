@@ -13,7 +13,7 @@ const NOTATION: &str =
 pub(super) fn read(address: &str) -> Result<Recording, String> {
     let (path, conditions) = address.split_once('?').unwrap_or((address, ""));
     let reader = Reader::open(Path::new(path)).map_err(|error| error.to_string())?;
-    let span = reader.span().map_err(|error| error.to_string())?;
+    let span = reader.present().map_err(|error| error.to_string())?;
     let newest_ns = span.map_or(0, |(_, newest_ns)| newest_ns);
     let query = query(conditions, newest_ns).map_err(|problem| format!("history:{address}: {problem}"))?;
     reader.recording(&query).map_err(|error| format!("history:{address}: {error}"))

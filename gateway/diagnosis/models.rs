@@ -9,7 +9,7 @@ use std::path::Path;
 /// Every problem of the file, with its line.
 pub fn read_model(path: &Path) -> Result<Model, Vec<String>> {
     let text = read(path).map_err(|problem| vec![problem])?;
-    parse_model(&text).map_err(|problems| placed(path, &problems))
+    parse_model(&text).map_err(|problems| format_problems(path, &problems))
 }
 
 /// Reads every `.toml` file of a directory, in the order of their names, as hypotheses besides the catalogue.
@@ -28,7 +28,7 @@ pub fn read_hypotheses(directory: &Path) -> Result<Vec<Part>, Vec<String>> {
         match read(path) {
             Ok(text) => match parse_hypotheses(&text) {
                 Ok(more) => parts.extend(more),
-                Err(wrong) => problems.extend(placed(path, &wrong)),
+                Err(wrong) => problems.extend(format_problems(path, &wrong)),
             },
             Err(problem) => problems.push(problem),
         }
@@ -41,6 +41,6 @@ fn read(path: &Path) -> Result<String, String> {
         .map_err(|error| format!("{}: {error}. Check the path; a model is a TOML file (model/1).", path.display()))
 }
 
-fn placed(path: &Path, problems: &[rules::twin::Problem]) -> Vec<String> {
+fn format_problems(path: &Path, problems: &[rules::twin::Problem]) -> Vec<String> {
     problems.iter().map(|problem| format!("{}, {problem}", path.display())).collect()
 }

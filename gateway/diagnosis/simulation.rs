@@ -49,6 +49,12 @@ pub fn run(recording: &Recording, model: &Model) -> Result<Simulation, Vec<Strin
 }
 
 impl Simulation {
+    /// Simulated output row by row; `None` where an input is absent.
+    #[must_use]
+    pub fn total(&self) -> &[Option<f64>] {
+        &self.total
+    }
+
     /// Root mean square of recorded minus simulated, and over how many rows; `None` where the output is not recorded.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]

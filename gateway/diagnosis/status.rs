@@ -62,6 +62,11 @@ pub struct TwinStatus {
     pub output: String,
     /// Unit of all figures.
     pub unit: &'static str,
+    /// The second that the figures are of, milliseconds since 1970.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_ms: Option<i64>,
+    /// Mean recorded output of this second.
+    pub twin_recorded: Option<f64>,
     /// What the model expects at this second.
     pub twin_expected: Option<f64>,
     /// Recorded minus expected.

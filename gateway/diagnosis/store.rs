@@ -2,6 +2,7 @@
 //! the experiment it asks for as a plan and as steps. Files in a folder of the data directory, found by a key that follows from
 //! the row, so that no second list can disagree with the history.
 
+use super::beside::BesideModel;
 use super::context::DiagnosisContext;
 use super::steps::{DiagnosisStep, steps};
 use crate::files::{read_text, replace};
@@ -48,6 +49,9 @@ pub struct DiagnosisTexts {
     pub steps: Vec<DiagnosisStep>,
     /// How long the experiment takes, minutes.
     pub minutes: Option<f64>,
+    /// The diagnosis beside the watch, by kind of work.
+    #[serde(default)]
+    pub beside: Vec<BesideModel>,
     /// Names, statements and experiments of the effects in it, by kind.
     #[serde(default)]
     pub effects: BTreeMap<String, EffectTexts>,
@@ -151,15 +155,16 @@ impl DiagnosisStore {
         row: &history::Diagnosis,
         found: &twin::Diagnosis,
         recording: &Recording,
-        context: &DiagnosisContext,
+        (context, beside): (&DiagnosisContext, Vec<BesideModel>),
     ) -> std::io::Result<()> {
         let key = key(row);
         let put = |part, text: &str| replace(&self.path(&key, part), text);
         for language in [Language::En, Language::Zh] {
             put(DiagnosisFile::Page(language), &page(&PageInput { diagnosis: found, recording, context, language }))?;
         }
+        let summary_zh = summary_zh(found, &beside);
         let mut words =
-            DiagnosisTexts { summary_zh: summary_zh(found), effects: effect_texts(found), ..DiagnosisTexts::default() };
+            DiagnosisTexts { summary_zh, beside, effects: effect_texts(found), ..DiagnosisTexts::default() };
         if let Ok(plan) = plan::plan(found, recording) {
             (words.steps, words.minutes) = (steps(&plan), Some(plan.minutes()));
             for language in [Language::En, Language::Zh] {
@@ -193,7 +198,11 @@ impl DiagnosisStore {
 }
 
 /// The headline of the report in Chinese, without the word of the verdict before it.
-fn summary_zh(found: &twin::Diagnosis) -> String {
+fn summary_zh(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
+    let moved: Vec<&str> = beside.iter().filter(|one| one.is_of_parameters()).map(|one| one.zh.as_str()).collect();
+    if found.verdict == Verdict::NoMismatch && !moved.is_empty() {
+        return format!("模型参数已改变：{}。", moved.join("；"));
+    }
     let report = text::report(found, Language::Zh);
     let headline = report.lines().next().unwrap_or_default();
     headline.split_once('：').map_or(headline, |(_, words)| words).to_owned()

@@ -14,6 +14,8 @@ const ROWS_MAX: usize = 28_800;
 const SETTLED: (usize, usize) = (4, 2);
 /// Relative change of the speed within these seconds that is no steady speed.
 const STEADY_SHARE: f64 = 0.02;
+/// More rows than this in a second are put together.
+const DENSE_PER_S: f64 = 1.5;
 /// Runs that make a part the unit of hold-out; with fewer the recording is cut into stretches.
 const RUNS_MIN: usize = 8;
 
@@ -26,11 +28,21 @@ pub fn read(history: &Path, from_ns: TimeNs, to_ns: TimeNs, output: &str) -> Res
     let names: Vec<String> = reader.series()?.iter().map(|series| series.name.to_string()).collect();
     let channels = names.iter().map(String::as_str).filter(|name| ChannelId::of(name).is_some());
     let recording = reader.recording(&Query::between(from_ns, to_ns).of(channels))?;
-    Ok(settled(complete(per_second(&recording)), output))
+    Ok(select_settled_rows(complete(per_second(&recording, ROWS_MAX)), output))
+}
+
+/// A range of a history as `diagnose --recording history:...` reads it: the same as for the page. What was stored once a second or
+/// less often stands as it is, but for what the machine's own words say without saying it.
+#[must_use]
+pub fn of_history(recording: Recording, output: &str) -> Recording {
+    let span_s = recording.time_s.last().zip(recording.time_s.first()).map_or(0.0, |(last, first)| last - first);
+    #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
+    let dense = recording.rows() as f64 > DENSE_PER_S * (span_s + 1.0);
+    if dense { select_settled_rows(complete(per_second(&recording, usize::MAX)), output) } else { complete(recording) }
 }
 
 /// The output stands only in rows of settled work.
-fn settled(mut recording: Recording, output: &str) -> Recording {
+fn select_settled_rows(mut recording: Recording, output: &str) -> Recording {
     let Some(measured) = recording.numbers(output) else { return recording };
     let kept = |row: usize| measured.get(row).filter(|_| is_settled(&recording, row));
     let kept: Numbers = (0..recording.rows()).map(kept).collect();
@@ -52,11 +64,11 @@ fn is_settled(recording: &Recording, row: usize) -> bool {
     })
 }
 
-/// The mean of every number and the last of every word in each second.
+/// The mean of every number and the last of every word in each second; of more seconds than `rows_max` the beginning is left out.
 #[must_use]
-pub fn per_second(recording: &Recording) -> Recording {
+pub fn per_second(recording: &Recording, rows_max: usize) -> Recording {
     let mut seconds = seconds(recording);
-    let surplus = seconds.len().saturating_sub(ROWS_MAX);
+    let surplus = seconds.len().saturating_sub(rows_max);
     seconds.drain(..surplus);
     let time_s = seconds.iter().map(|rows| recording.time_s[rows.start].floor()).collect();
     let mut thinned = Recording::new(recording.source.clone(), time_s, recording.start_ns);
@@ -149,14 +161,14 @@ mod tests {
         recording.set_column("feed_mm_min", numbers(|_| Some(100.0)));
         recording.set_column("engaged", numbers(|_| None));
         recording.set_column("spindle_power_w_missing", Cells::Words(std::iter::repeat_n("", 40).collect()));
-        let thinned = complete(per_second(&recording));
+        let thinned = complete(per_second(&recording, ROWS_MAX));
         assert_eq!(thinned.time_s, [0.0, 1.0, 2.0, 3.0]);
         let power = thinned.numbers("spindle_power_w").expect("kept").get(0).expect("nine of ten");
         assert!((power - 42.0 / 9.0).abs() < 1e-12, "{power}");
         let engaged: Vec<_> = thinned.numbers("engaged").expect("told by the program").iter().flatten().collect();
         assert_eq!(engaged, [0.0, 0.0, 1.0, 1.0]);
         let settled: Vec<bool> = {
-            let settled = settled(thinned.clone(), "spindle_power_w");
+            let settled = select_settled_rows(thinned.clone(), "spindle_power_w");
             settled.numbers("spindle_power_w").expect("kept").iter().map(|power| power.is_some()).collect()
         };
         assert_eq!(settled, [false; 4], "the cut begins in the middle of four seconds");

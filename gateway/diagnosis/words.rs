@@ -26,18 +26,24 @@ fn beside(at_s: f64, beside_s: f64) -> String {
     }
 }
 
-/// A difference for the operator, English and Chinese. Times are UTC.
+/// A difference for the operator with its beginning, English and Chinese: for the history and the log, whose times are UTC.
+#[must_use]
+pub fn mismatch_since(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String, String) {
+    let ((en, zh), (en_since, zh_since)) = (mismatch(found, quantity, unit), since(found.onset.as_ref()));
+    (format!("{en_since}, {}", lower_first(&en)), format!("{zh_since}，{zh}"))
+}
+
+/// A difference for the operator, English and Chinese, without a time: who shows it has the clock of the reader.
 #[must_use]
 pub fn mismatch(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String, String) {
     let size = format!("{} {unit}", short(found.mean.abs()));
     let percent = found.percent().map_or(String::new(), |percent| format!(" ({} %)", short(percent.abs())));
     let (en_where, zh_where) = found.regime.words();
     let (en_way, zh_way) = if found.mean > 0.0 { ("more", "高") } else { ("less", "低") };
-    let (en_since, zh_since) = since(found.onset.as_ref());
     let (en, zh) = quantity;
     (
-        format!("{en_since}, {} {en_where} is {size}{percent} {en_way} than the simulation says", lower(en)),
-        format!("{zh_since}，{zh_where}{zh}比仿真值{zh_way}{size}{percent}"),
+        format!("{} {en_where} is {size}{percent} {en_way} than the simulation says", short_name(en)),
+        format!("{zh_where}{zh}比仿真值{zh_way}{size}{percent}"),
     )
 }
 
@@ -64,9 +70,9 @@ fn short_name(name: &str) -> &str {
     name.split(',').next().unwrap_or(name)
 }
 
-/// A name within a sentence.
-fn lower(name: &str) -> String {
-    let mut letters = short_name(name).chars();
+/// A sentence within a sentence.
+fn lower_first(name: &str) -> String {
+    let mut letters = name.chars();
     let first = letters.next().map(|letter| letter.to_lowercase().to_string()).unwrap_or_default();
     first + letters.as_str()
 }
@@ -80,7 +86,8 @@ mod tests {
         let onset =
             LevelChange { at_s: 1.8e9, low_s: 1.8e9 - 600.0, high_s: 1.8e9 + 86_400.0, mean: 61.0, expected: 1000.0 };
         let found = Mismatch { regime: Regime::Cutting, onset: Some(onset), mean: 61.0, expected: 1000.0 };
-        let (en, zh) = mismatch(&found, ("Power into the spindle drive, negative when it brakes", "主轴驱动功率"), "W");
+        let (en, zh) =
+            mismatch_since(&found, ("Power into the spindle drive, negative when it brakes", "主轴驱动功率"), "W");
         let expected = "Since 2027-01-15 08:00 UTC (between 07:50 and 2027-01-16 08:00), power into the spindle drive while \
                         cutting is 61 W (6.1 %) more than the simulation says";
         assert_eq!(en, expected);

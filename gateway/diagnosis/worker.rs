@@ -1,6 +1,7 @@
 //! Beside the tick: looks whether the model file has changed, and has diagnoses made in the background, one stretch at a time, in
 //! a process that has only the processor time that nobody else wants.
 
+use super::beside::Onset;
 use super::child::{self, ChildMessage, DiagnosisJob, JobInput, Stage};
 use super::handle::DiagnosisHandle;
 use super::outputs;
@@ -37,6 +38,8 @@ pub struct DiagnosisRequest {
     pub from_ns: TimeNs,
     /// End.
     pub to_ns: TimeNs,
+    /// Since when the watch sees which kinds of work differ.
+    pub onsets: Vec<Onset>,
     /// A file in place of a stretch: its path, and the simulated series beside it.
     pub file: Option<(PathBuf, Option<String>)>,
 }
@@ -173,13 +176,13 @@ impl FileWatch {
 
 fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: &DiagnosisHandle) -> WorkerReport {
     wait_for_samples(&places.history, request.to_ns, diagnoses);
-    let DiagnosisRequest { toml, by, from_ns, to_ns, .. } = request;
-    let input = JobInput::Stretch { history: places.history.clone(), from_ns, to_ns };
+    let DiagnosisRequest { toml, by, from_ns, to_ns, onsets, .. } = request;
+    let input = JobInput::Stretch { history: places.history.clone(), from_ns, to_ns, onsets };
     let job = DiagnosisJob { toml, input, kept: places.kept.directory().to_owned() };
     let found = in_child(&job, diagnoses);
     diagnoses.ended(found.as_ref().map(|(record, _)| store::key(record)).map_err(Clone::clone));
     match found {
-        Ok((record, missing)) => WorkerReport::Diagnosed(Box::new(finished(by, places, record, missing))),
+        Ok((record, missing)) => WorkerReport::Diagnosed(Box::new(finish_diagnosis(by, places, record, missing))),
         Err(problem) => WorkerReport::NotDiagnosed(problem, by),
     }
 }
@@ -210,7 +213,12 @@ pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Resul
     ended_by(diagnoses).map_or_else(|| outcome.unwrap_or_else(|| Err(broken())), Err)
 }
 
-fn finished(by: Option<String>, places: &WorkerPaths, record: history::Diagnosis, missing: Vec<String>) -> Finished {
+fn finish_diagnosis(
+    by: Option<String>,
+    places: &WorkerPaths,
+    record: history::Diagnosis,
+    missing: Vec<String>,
+) -> Finished {
     let model = places.kept.text(&store::key(&record), DiagnosisFile::Model);
     let written = model.map(|model| outputs::put(&places.improved, &model)).and_then(Result::ok);
     Finished { by, record, missing, improved: written.map(|()| places.improved.clone()) }

@@ -2,8 +2,10 @@
 //! Contract: sources of the project, section on `doctor`.
 
 mod compare;
+mod computer;
 
 pub use compare::{ChannelDifference, Comparison, compare};
+pub use computer::{ComputerReport, SystemFiles, examine_computer};
 
 use crate::run::open::opened;
 use adapters::clock::{Clock, SystemClock};
@@ -69,6 +71,15 @@ pub fn examine_address(address: &Address) -> Result<DoctorReport, String> {
     begin_at(address, &SystemClock::new()).map(|(report, _)| report)
 }
 
+/// Examines what somebody has typed.
+///
+/// # Errors
+/// It is no address, or cannot be opened, in words.
+pub fn examine_text(address: &str) -> Result<DoctorReport, String> {
+    let address: Address = address.parse().map_err(|error: adapters::address::AddressError| error.to_string())?;
+    examine_address(&address)
+}
+
 /// The same, and asks for everything that the device offers, mapped to a channel or not.
 ///
 /// # Errors
@@ -80,7 +91,7 @@ pub fn examine_all(address: &Address) -> Result<DoctorReport, String> {
     for source in &mut sources {
         match source.offers(&clock) {
             Ok(found) => offers.extend(found),
-            Err(error) => report.failed(&error),
+            Err(error) => report.record_failure(&error),
         }
     }
     report.offers = Some(offers);
@@ -132,7 +143,7 @@ impl DoctorReport {
                 true
             }
             Err(error) => {
-                self.failed(&error);
+                self.record_failure(&error);
                 false
             }
         }
@@ -142,9 +153,9 @@ impl DoctorReport {
     fn again(&mut self, source: &mut dyn Source, clock: &dyn Clock) {
         let mut readings = Vec::new();
         if let Err(error) = source.read(clock, &mut readings) {
-            self.failed(&error);
+            self.record_failure(&error);
         }
-        self.paced(source);
+        self.check_pace(source);
         let named = source.identity().into_iter().map(|(name, value)| Fact::text(name, value));
         let new = |fact: &Fact| self.identity.iter().all(|known| known.name != fact.name);
         let fresh: Vec<Fact> = named.chain(source.facts()).filter(new).collect();
@@ -183,7 +194,7 @@ impl DoctorReport {
     }
 
     /// A device that answers too slowly for the period that is wanted.
-    fn paced(&mut self, source: &dyn Source) {
+    fn check_pace(&mut self, source: &dyn Source) {
         let (wanted_s, kept_s) = (source.period().as_secs_f64(), source.pace().as_secs_f64());
         if kept_s > wanted_s * SLOW {
             let name = source.name();
@@ -200,7 +211,7 @@ impl DoctorReport {
         }
     }
 
-    fn failed(&mut self, error: &SourceError) {
+    fn record_failure(&mut self, error: &SourceError) {
         // A machine that refuses or answers nonsense is there all the same.
         self.reachable |= matches!(error, SourceError::Refused { .. } | SourceError::Decode { .. });
         self.trouble(trouble(error));

@@ -32,7 +32,7 @@ pub enum Disarmed {
     Offset,
     /// The machine could not be written to or read back.
     Line,
-    /// The clock jumped back.
+    /// The clock of the box was set.
     Clock,
     /// The machine has given no fresh values for ten seconds.
     Silent,
@@ -67,7 +67,7 @@ impl fmt::Display for Disarmed {
             Self::ReadBack => "the machine did not take the override that was written",
             Self::Offset => "the control did not take the offset that was written",
             Self::Line => "the machine could not be reached",
-            Self::Clock => "the clock jumped back",
+            Self::Clock => "the clock of the box was set",
             Self::NoAudit => "the history takes nothing, so nothing can be accounted for",
             Self::Silent => "no fresh values from the machine for ten seconds",
         })
@@ -100,7 +100,8 @@ pub(super) struct Arming {
     mode: GateMode,
     lasts_ns: i64,
     state: Result<Armed, Disarmed>,
-    silent_since_ns: Option<TimeNs>,
+    /// When there were fresh values last, or the gate was armed.
+    fresh_ns: TimeNs,
 }
 
 /// Without fresh values for this long, somebody has to look before the gate writes again.
@@ -109,7 +110,7 @@ const SILENT_NS: i64 = 10 * SECOND_NS;
 impl Arming {
     pub(super) fn new(mode: GateMode, lasts: Duration) -> Self {
         let lasts_ns = i64::try_from(lasts.as_nanos()).unwrap_or(i64::MAX);
-        Self { mode, lasts_ns, state: Err(Disarmed::Start), silent_since_ns: None }
+        Self { mode, lasts_ns, state: Err(Disarmed::Start), fresh_ns: TimeNs::MIN }
     }
 
     pub(super) fn arm(&mut self, by: &str, lasts: Option<Duration>, at_ns: TimeNs) -> Result<&Armed, ArmError> {
@@ -124,6 +125,7 @@ impl Arming {
             return Err(ArmError::Lasts(self.lasts_ns.unsigned_abs() / 1_000_000_000));
         }
         let until_ns = at_ns.saturating_add(lasts_ns);
+        self.fresh_ns = at_ns;
         self.state = Ok(Armed { by: by.trim().to_owned(), since_ns: at_ns, until_ns });
         self.state.as_ref().map_err(|_| ArmError::Nobody)
     }
@@ -143,12 +145,14 @@ impl Arming {
         }
     }
 
-    /// Told at every tick whether fresh values are missing.
+    /// Told at every tick whether fresh values are missing. A tick that comes late counts like values that come late: a process
+    /// that stood still has seen nothing meanwhile, whatever it sees now.
     pub(super) fn silent(&mut self, missing: bool, at_ns: TimeNs) {
-        if !missing {
-            self.silent_since_ns = None;
-        } else if at_ns - *self.silent_since_ns.get_or_insert(at_ns) >= SILENT_NS {
+        if at_ns.saturating_sub(self.fresh_ns) >= SILENT_NS {
             self.disarm(Disarmed::Silent);
+        }
+        if !missing {
+            self.fresh_ns = at_ns;
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::channel;
 use super::thread_cycle::ThreadCycle;
-use adapters::words::{execution, mode, operation};
+use adapters::words::{execution, mode, of_channel, operation};
 use adapters::{Absence, ChannelId, Sample};
 use rules::estimators::{Estimates, State};
 use std::fmt;
@@ -30,6 +30,8 @@ pub enum Hold {
     DryRun,
     /// The controller is in another mode than automatic.
     NotAutomatic,
+    /// The source gives this channel a word that it cannot have: what the machine does is not known.
+    UnknownWord(ChannelId),
     /// Feed hold was pressed.
     FeedHold,
     /// No program runs.
@@ -50,6 +52,10 @@ impl Hold {
     pub fn zh(self) -> String {
         let fixed = match self {
             Self::Missing(channel, absence) => return format!("{} 无有效数据（{absence}）", channel.channel().zh),
+            Self::UnknownWord(channel) => {
+                let words = of_channel(channel.name()).unwrap_or_default().join("、");
+                return format!("{}的文字不是{words}之一", channel.channel().zh);
+            }
             Self::Off => "闸门关闭",
             Self::OnlyEstimated => "主轴功率、电流、负载均无实测值",
             Self::StateUnknown => "机床状态未知",
@@ -74,6 +80,10 @@ impl fmt::Display for Hold {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Missing(channel, absence) => return write!(f, "{channel} has no fresh value ({absence})"),
+            Self::UnknownWord(channel) => {
+                let words = of_channel(channel.name()).unwrap_or_default().join(", ");
+                return write!(f, "{channel} has a word that is none of {words}: what the machine does is not known");
+            }
             Self::Off => "the gate is off",
             Self::OnlyEstimated => "no power, current or load of the spindle is measured",
             Self::StateUnknown => "the state of the machine is unknown",
@@ -196,7 +206,8 @@ impl Interlocks {
             _ if estimates.state == State::Unknown => Some(Hold::StateUnknown),
             word if rests.contains(&word) => None,
             execution::FEED_HOLD => Some(Hold::FeedHold),
-            _ => Some(Hold::Running),
+            word if execution::ALL.contains(&word) => Some(Hold::Running),
+            _ => self.execution.map(Hold::UnknownWord),
         })
     }
 
@@ -211,7 +222,8 @@ impl Interlocks {
             mode::SEMI_AUTOMATIC => Some(Hold::SingleBlock),
             mode::MANUAL_DATA_INPUT => Some(Hold::Mdi),
             mode::MANUAL => Some(Hold::Manual),
-            _ => Some(Hold::NotAutomatic),
+            mode::EDIT => Some(Hold::NotAutomatic),
+            _ => self.mode.map(Hold::UnknownWord),
         }
     }
 
@@ -227,7 +239,8 @@ impl Interlocks {
         match text(self.execution) {
             execution::ACTIVE => None,
             execution::FEED_HOLD => Some(Hold::FeedHold),
-            _ => Some(Hold::NotRunning),
+            word if execution::ALL.contains(&word) => Some(Hold::NotRunning),
+            _ => self.execution.map(Hold::UnknownWord),
         }
     }
 

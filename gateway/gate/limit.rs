@@ -11,8 +11,8 @@ pub enum Bound {
     Least,
     /// Above the greatest override.
     Greatest,
-    /// Above the operator's dial, which the configuration does not allow.
-    Dial,
+    /// Above this: the operator's dial, or 100 %, where the ladder takes the lesser one of dial and override.
+    Dial(OverridePct),
     /// The change would be too fast; it goes on at the next ticks.
     Slew,
     /// Not a number from 0 to 254: a mistake, not a wish. It counts as no request.
@@ -33,7 +33,10 @@ pub(super) fn band(wanted_pct: Option<f64>, min_pct: f64, max_pct: f64) -> (f64,
 
 /// The target below the ceiling that the operator's dial sets.
 pub(super) fn below(ceiling_pct: f64, target_pct: f64, bound: Option<Bound>) -> (f64, Option<Bound>) {
-    if target_pct > ceiling_pct { (ceiling_pct, Some(Bound::Dial)) } else { (target_pct, bound) }
+    if target_pct <= ceiling_pct {
+        return (target_pct, bound);
+    }
+    (ceiling_pct, Some(Bound::Dial(OverridePct::nearest(ceiling_pct).unwrap_or(OverridePct::FULL))))
 }
 
 /// Keeps to a target until another differs by more than the dead band. 100 % is always taken, and what the limits no longer

@@ -70,12 +70,10 @@ impl Verdict {
             GateOutcome::Permitted => "the gate is not armed: recorded, not written".to_owned(),
             GateOutcome::Limited(Bound::Least) => format!("the least override is {}", self.permitted),
             GateOutcome::Limited(Bound::Greatest) => format!("the greatest override is {}", self.permitted),
-            GateOutcome::Limited(Bound::Dial) => {
-                format!(
-                    "never above the operator's dial ({} now); `above_dial` under [gate] would allow it",
-                    self.permitted
-                )
-            }
+            GateOutcome::Limited(Bound::Dial(most)) => format!(
+                "nothing above {most} is asked of the ladder, which takes the lesser of it and the operator's dial; `above_dial` under \
+                 [gate] would allow it"
+            ),
             GateOutcome::Limited(Bound::Slew) => format!("the change is limited; {} now", self.permitted),
             GateOutcome::Limited(Bound::NotPossible) | GateOutcome::Refused => {
                 "a feed override is a number from 0 to 254 %; back to 100 %".to_owned()

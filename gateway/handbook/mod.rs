@@ -43,6 +43,7 @@ macro_rules! chapters {
 }
 
 chapters! {
+    "install",
     "start" zh,
     "configuration" zh,
     "sources" zh,
@@ -61,6 +62,7 @@ chapters! {
     "mismatch" zh,
     "twin",
     "measured",
+    "survives",
     "not-proven",
     "glossary",
     "inside",

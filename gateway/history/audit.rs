@@ -43,8 +43,24 @@ pub struct AuditCheck {
     pub last: i64,
     /// Hash of the newest row: keep it elsewhere to notice a chain that was rewritten as a whole.
     pub head: String,
+    /// What a row of the chain says of those before the oldest.
+    pub removed: Option<AuditRemoval>,
     /// The first place at which the chain is broken.
     pub broken: Option<Break>,
+}
+
+/// Rows that are not there any more, as a row of the chain says.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AuditRemoval {
+    /// Number of the last of them; the first had number 1.
+    pub through: i64,
+    /// When the last of them was removed.
+    pub at_ns: TimeNs,
+    /// Why.
+    pub because: String,
+    /// Hash of the last of them: the oldest row there is has to follow from it.
+    #[serde(skip)]
+    hash: String,
 }
 
 /// The first row that is not as it was written.
@@ -151,15 +167,19 @@ fn entry(row: &Row<'_>) -> Result<AuditEntry, rusqlite::Error> {
 struct AuditChain {
     rows: u64,
     first: i64,
+    /// What the oldest row follows from.
+    from: String,
     last: i64,
     head: String,
+    /// What the rows say of others that were removed.
+    removed: Vec<AuditRemoval>,
 }
 
 impl AuditChain {
     /// The next row, or why it cannot be the next one.
     fn follow(&mut self, entry: &AuditEntry) -> Result<(), Break> {
         let broken = |what: String| Err(Break { number: entry.number, what });
-        if entry.number != self.last + 1 {
+        if self.rows > 0 && entry.number != self.last + 1 {
             return broken(format!("the rows {} to {} before it are missing", self.last + 1, entry.number - 1));
         }
         if self.rows > 0 && entry.previous != self.head || entry.number == 1 && entry.previous != BEGINNING {
@@ -170,13 +190,22 @@ impl AuditChain {
         }
         (self.last, self.head, self.rows) = (entry.number, entry.hash.clone(), self.rows + 1);
         if self.first == 0 {
-            self.first = entry.number;
+            (self.first, self.from) = (entry.number, entry.previous.clone());
         }
+        self.removed.extend(AuditRemoval::of(entry));
         Ok(())
     }
 
-    fn check(self, broken: Option<Break>) -> AuditCheck {
-        AuditCheck { rows: self.rows, first: self.first, last: self.last, head: self.head, broken }
+    fn check(mut self, broken: Option<Break>) -> AuditCheck {
+        let told =
+            self.removed.iter().position(|removed| removed.through == self.first - 1 && removed.hash == self.from);
+        let removed = told.map(|index| self.removed.swap_remove(index));
+        let untold = (self.first > 1 && removed.is_none()).then(|| Break {
+            number: 1,
+            what: format!("the rows 1 to {} are gone, and no row says that they were removed", self.first - 1),
+        });
+        let broken = untold.or(broken);
+        AuditCheck { rows: self.rows, first: self.first, last: self.last, head: self.head, removed, broken }
     }
 }
 
@@ -232,8 +261,8 @@ impl Reader {
     /// # Errors
     /// What `SQLite` says; a chain that is broken is no error but the answer.
     pub fn verify_audit(&self) -> Result<AuditCheck, HistoryError> {
-        let released = self.released().doing("looking where the audit begins")?;
-        let mut chain = AuditChain { rows: 0, first: 0, last: released, head: BEGINNING.to_owned() };
+        let (from, head) = (String::new(), BEGINNING.to_owned());
+        let mut chain = AuditChain { rows: 0, first: 0, from, last: 0, head, removed: Vec::new() };
         if !self.has_audit()? {
             return Ok(chain.check(None));
         }
@@ -242,7 +271,16 @@ impl Reader {
         let mut statement =
             reading.prepare(&format!("SELECT {COLUMNS} FROM audit ORDER BY number")).doing("reading the audit")?;
         let mut rows = statement.query([]).doing("reading the audit")?;
-        while let Some(row) = rows.next().doing("reading the audit")? {
+        loop {
+            let row = match rows.next().doing("reading the audit") {
+                Ok(Some(row)) => row,
+                Ok(None) => break,
+                Err(error) if error.is_damage() => {
+                    let broken = Break { number: chain.last + 1, what: format!("it cannot be read: {error}") };
+                    return Ok(chain.check(Some(broken)));
+                }
+                Err(error) => return Err(error),
+            };
             let number: i64 = row.get(0).doing("reading the audit")?;
             let followed = match entry(row) {
                 Ok(entry) => chain.follow(&entry),
@@ -253,20 +291,12 @@ impl Reader {
             }
         }
         let noted = noted_head(&reading).doing("reading the head of the audit")?;
-        let cut = noted.filter(|(number, hash)| {
-            (*number, hash.as_str()) != (chain.last, chain.head.as_str()) && *number != released
-        });
+        let cut = noted.filter(|(number, hash)| (*number, hash.as_str()) != (chain.last, chain.head.as_str()));
         let broken = cut.map(|(number, _)| Break {
             number: chain.last + 1,
             what: format!("the chain ends before it; its last row was number {number}"),
         });
         Ok(chain.check(broken))
-    }
-
-    /// Number of the last row that retention has taken.
-    fn released(&self) -> Result<i64, rusqlite::Error> {
-        let value = self.db.query_row("SELECT value FROM meta WHERE key = 'audit_released'", [], |row| row.get(0));
-        Ok(value.optional()?.unwrap_or(0))
     }
 }
 
@@ -277,13 +307,71 @@ pub(crate) fn oldest(condition: &str) -> String {
     )
 }
 
-/// Says through which number retention removes rows, in its transaction.
-pub(crate) fn release(db: &Connection, condition: &str) -> Result<(), rusqlite::Error> {
-    db.execute(
+/// What the row that says so is called.
+const REMOVED: &str = "removed";
+
+impl AuditRemoval {
+    /// What this row says of others, if it does.
+    fn of(entry: &AuditEntry) -> Option<Self> {
+        let Audit { kind, after, at_ns, reason, script_version, .. } = &entry.audit;
+        #[expect(clippy::cast_possible_truncation, reason = "numbers of rows, far below 2^53")]
+        let through = after.filter(|_| kind == REMOVED)? as i64;
+        Some(Self { through, at_ns: *at_ns, because: reason.clone(), hash: script_version.clone() })
+    }
+}
+
+/// Removes the rows of this condition, which are those at the beginning of the chain, in the transaction of the caller. A new
+/// row of the chain says so first: which, when (at the time of the newest row where nobody knows) and why.
+pub(crate) fn remove(
+    db: &Connection,
+    condition: &str,
+    at_ns: Option<TimeNs>,
+    because: &str,
+) -> Result<(), rusqlite::Error> {
+    let (first, last, at_newest_ns): (i64, i64, TimeNs) = db.query_row(
         &format!(
-            "INSERT OR REPLACE INTO meta (key, value) SELECT 'audit_released', max(number) FROM audit WHERE {condition}"
+            "SELECT min(number), max(number), (SELECT at_ns FROM audit ORDER BY number DESC LIMIT 1) FROM audit WHERE {condition}"
         ),
         [],
-    )
-    .map(drop)
+        |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)),
+    )?;
+    let hash: String = db.query_row("SELECT hash FROM audit WHERE number = ?1", [last], |row| row.get(0))?;
+    append(db, &removal(first, last, hash, at_ns.unwrap_or(at_newest_ns), because))?;
+    db.execute("INSERT OR REPLACE INTO meta (key, value) VALUES ('audit_released', ?1)", [last])?;
+    db.execute("DELETE FROM audit WHERE number BETWEEN ?1 AND ?2", [first, last]).map(drop)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "numbers of rows, far below 2^53")]
+fn removal(first: i64, last: i64, hash: String, at_ns: TimeNs, because: &str) -> Audit {
+    Audit {
+        at_ns,
+        kind: REMOVED.to_owned(),
+        outcome: "done".to_owned(),
+        before: Some(first as f64),
+        after: Some(last as f64),
+        unit: "row".to_owned(),
+        reason: because.to_owned(),
+        script_version: hash,
+        ..Audit::default()
+    }
+}
+
+/// Older versions removed rows without saying so in the chain: says it once, when such a file gets the newer schema.
+pub(crate) fn account_for_earlier(db: &Connection) -> Result<(), rusqlite::Error> {
+    let has = db.query_row("SELECT 1 FROM sqlite_schema WHERE name = 'audit'", [], |_| Ok(())).optional()?;
+    let released: Option<i64> =
+        db.query_row("SELECT value FROM meta WHERE key = 'audit_released'", [], |row| row.get(0)).optional()?;
+    let Some(last) = released.filter(|_| has.is_some()) else { return Ok(()) };
+    let told = db.query_row("SELECT 1 FROM audit WHERE kind = ?1 AND after = ?2", params![REMOVED, last], |_| Ok(()));
+    if told.optional()?.is_some() {
+        return Ok(());
+    }
+    let oldest: Option<(String, TimeNs)> = db
+        .query_row("SELECT previous, at_ns FROM audit ORDER BY number LIMIT 1", [], |row| {
+            Ok((row.get(0)?, row.get(1)?))
+        })
+        .optional()?;
+    let noted = noted_head(db)?.map(|(_, hash)| (hash, 0));
+    let Some((hash, at_ns)) = oldest.or(noted) else { return Ok(()) };
+    append(db, &removal(1, last, hash, at_ns, "an earlier version removed them and did not say when or why"))
 }

@@ -2,10 +2,11 @@
 
 use super::block::Block;
 use super::error::{Doing, HistoryError};
-use super::minute_buffer::{MinuteBuffer, Segment};
+use super::minute_buffer::MinuteBuffer;
 use super::outbox::Gatherer;
 use super::record_sql;
-use super::{pyramid, tail};
+use super::{pyramid, segments, tail};
+use crate::clock::ClockMark;
 use rusqlite::{Connection, params};
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -55,7 +56,7 @@ impl TailSlots {
     }
 }
 
-/// Makes the oldest of what is in `minute_buffer` durable, or changes nothing. False when blocks are left; with the last of
+/// Makes the oldest of what is in `minute_buffer` durable, dated as `dated` says (origin and clock of new segments), or changes nothing. False when blocks are left; with the last of
 /// them go, if `with_tail`, the rows of the running minute. Records go with their rows: what a kill leaves behind is the
 /// history up to one moment, with everything before it and nothing after it.
 pub(crate) fn commit(
@@ -63,11 +64,11 @@ pub(crate) fn commit(
     minute_buffer: &mut MinuteBuffer,
     slots: &mut TailSlots,
     outbox: &mut Option<Gatherer>,
-    origin: &str,
+    dated: (&str, &ClockMark),
     with_tail: bool,
 ) -> Result<bool, HistoryError> {
     let writing = db.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate).doing("beginning a commit")?;
-    minute_buffer.segments.iter().try_for_each(|segment| insert_segment(&writing, segment, origin))?;
+    minute_buffer.segments.iter().try_for_each(|segment| segments::insert(&writing, segment, dated))?;
     let blocks = minute_buffer.blocks.len().min(BLOCKS_MAX);
     minute_buffer.blocks.iter().take(blocks).try_for_each(|block| insert_block(&writing, block))?;
     let last = blocks == minute_buffer.blocks.len();
@@ -81,8 +82,9 @@ pub(crate) fn commit(
     storing.try_for_each(|posted| record_sql::store(&writing, &posted.record)).doing("storing a record")?;
     let items = outbox.as_ref().map(|outbox| {
         let records = minute_buffer.records.iter().take(records);
-        let stored = minute_buffer.blocks.iter().take(blocks).map(|block| block.start_ns);
-        outbox.put(&writing, records, (minute_buffer.opened_row, end_row), stored)
+        let stored = minute_buffer.blocks.iter().take(blocks).map(|block| block.key.start_ns);
+        let rows = (minute_buffer.opened_row, end_row);
+        outbox.put(&writing, records, rows, (stored, dated.1.is_certain()))
     });
     let items = items.transpose()?;
     writing.commit().doing("making samples durable")?;
@@ -102,7 +104,7 @@ pub(crate) fn commit(
 /// Number of the row after the last one that a commit of the first `blocks` blocks makes durable.
 fn rows_end(minute_buffer: &MinuteBuffer, blocks: usize, with_tail: bool) -> i64 {
     match minute_buffer.blocks.get(blocks) {
-        Some(left) => left.first_row,
+        Some(left) => left.key.first_row,
         None if with_tail => minute_buffer.next_row,
         None => minute_buffer.open_row() + minute_buffer.in_tail as i64,
     }
@@ -135,18 +137,6 @@ fn put_tail(db: &Connection, minute_buffer: &MinuteBuffer, slots: &mut TailSlots
     Ok(())
 }
 
-fn insert_segment(db: &Connection, segment: &Segment, origin: &str) -> Result<(), HistoryError> {
-    db.prepare_cached(
-        "INSERT INTO segments (id, first_row, start_ns, origin, reason, version) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-    )
-    .and_then(|mut insert| {
-        let version = env!("CARGO_PKG_VERSION");
-        insert.execute(params![segment.id, segment.first_row, segment.start_ns, origin, segment.reason, version])
-    })
-    .map(drop)
-    .doing("beginning a segment")
-}
-
 /// Stores a fresh block and its summaries.
 pub(crate) fn insert_block(db: &Connection, block: &Block) -> Result<(), HistoryError> {
     put_block(db, block).and_then(|()| pyramid::add(db, block)).doing("storing a block")
@@ -154,19 +144,12 @@ pub(crate) fn insert_block(db: &Connection, block: &Block) -> Result<(), History
 
 /// Stores a block without touching the summaries.
 pub(crate) fn put_block(db: &Connection, block: &Block) -> Result<(), rusqlite::Error> {
+    let key = &block.key;
     db.prepare_cached(
         "INSERT INTO blocks (first_row, segment, rows, start_ns, end_ns, directory, columns)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
     )?
-    .execute(params![
-        block.first_row,
-        block.segment,
-        block.rows as i64,
-        block.start_ns,
-        block.end_ns,
-        block.directory,
-        block.columns
-    ])
+    .execute(params![key.first_row, key.segment, key.rows, key.start_ns, key.end_ns, block.directory, block.columns])
     .map(drop)
 }
 

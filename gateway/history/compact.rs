@@ -1,13 +1,15 @@
 //! Nightly compaction: the minute blocks of ten minutes become one, compressed harder. A third of the bytes goes.
 
-use super::block::{Block, Cells, Decoder, Directory, Encoder, LEVEL_COMPACT, NumberCells, WordCells};
+use super::block::{
+    BLOCK_COLUMNS, Block, Cells, Decoder, Directory, Encoder, LEVEL_COMPACT, NumberCells, StoredBlock, WordCells,
+};
 use super::commit::put_block;
 use super::error::{Doing, HistoryError};
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
 use super::rows::{Column, SeriesRows, Word};
 use super::schema::known_series;
 use super::series::Series;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::clock::SECOND_NS;
 use rusqlite::{Connection, OptionalExtension, params};
 
 /// Length of a compacted block.
@@ -17,29 +19,22 @@ const ROWS_MAX: i64 = 20_000;
 /// At most this many blocks are looked at in one step.
 const LOOK_AHEAD: i64 = 64;
 
-struct StoredSegment {
-    segment: i64,
-    first_row: i64,
-    rows: i64,
-    start_ns: TimeNs,
-    directory: Vec<u8>,
-    columns: Vec<u8>,
-}
-
 /// Compacts the next ten minutes; false when there is nothing left that is complete.
 pub(crate) fn step(db: &mut Connection) -> Result<bool, HistoryError> {
     let cursor = cursor(db)?;
     let stored = load(db, cursor)?;
     let Some(first) = stored.first() else { return Ok(false) };
+    let first = first.key;
     let mut end_row = first.first_row;
     let mut rows = 0;
-    let belongs = |block: &&StoredSegment| {
-        let follows = block.first_row == end_row && rows + block.rows <= ROWS_MAX.max(block.rows);
-        end_row = block.first_row + block.rows;
-        rows += block.rows;
+    let belongs = |block: &&StoredBlock| {
+        let key = block.key;
+        let follows = key.first_row == end_row && rows + key.rows <= ROWS_MAX.max(key.rows);
+        end_row = key.first_row + key.rows;
+        rows += key.rows;
         follows
-            && block.segment == first.segment
-            && block.start_ns.div_euclid(COMPACT_NS) == first.start_ns.div_euclid(COMPACT_NS)
+            && key.segment == first.segment
+            && key.start_ns.div_euclid(COMPACT_NS) == first.start_ns.div_euclid(COMPACT_NS)
     };
     let together = stored.iter().take_while(belongs).count().max(1);
     if together == stored.len() {
@@ -47,8 +42,9 @@ pub(crate) fn step(db: &mut Connection) -> Result<bool, HistoryError> {
         return Ok(false);
     }
     let group = &stored[..together];
-    let merged = if together > 1 { Some(merge(db, group)?) } else { None };
-    replace(db, group, merged.as_ref(), stored[together].first_row)?;
+    // Blocks that the disk has changed stay as they are, and are told by whoever reads them.
+    let merged = if together > 1 { merge(db, group)? } else { None };
+    replace(db, group, merged.as_ref(), stored[together].key.first_row)?;
     Ok(true)
 }
 
@@ -60,27 +56,18 @@ fn cursor(db: &Connection) -> Result<i64, HistoryError> {
     Ok(cursor.unwrap_or(0))
 }
 
-fn load(db: &Connection, cursor: i64) -> Result<Vec<StoredSegment>, HistoryError> {
+fn load(db: &Connection, cursor: i64) -> Result<Vec<StoredBlock>, HistoryError> {
     let mut statement = db
-        .prepare_cached(
-            "SELECT segment, first_row, rows, start_ns, directory, columns FROM blocks
-             WHERE first_row >= ?1 ORDER BY first_row LIMIT ?2",
-        )
+        .prepare_cached(&format!(
+            "SELECT {BLOCK_COLUMNS} FROM blocks WHERE first_row >= ?1 ORDER BY first_row LIMIT ?2"
+        ))
         .doing("reading blocks")?;
-    let blocks = statement.query_map([cursor, LOOK_AHEAD], |row| {
-        Ok(StoredSegment {
-            segment: row.get(0)?,
-            first_row: row.get(1)?,
-            rows: row.get(2)?,
-            start_ns: row.get(3)?,
-            directory: row.get(4)?,
-            columns: row.get(5)?,
-        })
-    });
+    let blocks = statement.query_map([cursor, LOOK_AHEAD], StoredBlock::of_row);
     blocks.and_then(Iterator::collect).doing("reading blocks")
 }
 
-fn merge(db: &Connection, group: &[StoredSegment]) -> Result<Block, HistoryError> {
+/// The block of all of these; `None` when one of them is damaged.
+fn merge(db: &Connection, group: &[StoredBlock]) -> Result<Option<Block>, HistoryError> {
     let mut series = known_series(db)?;
     // What is stored has been rounded already.
     series.iter_mut().for_each(|series| series.decimals = None);
@@ -89,22 +76,23 @@ fn merge(db: &Connection, group: &[StoredSegment]) -> Result<Block, HistoryError
     let mut reasons = Reasons::default();
     let mut rows = SeriesRows::of(&series);
     for stored in group {
-        let damaged = HistoryError::Damaged { first_row: stored.first_row, what: "the block does not decode" };
-        let more = rows_of(stored, &series, &mut decoder, &mut reasons).ok_or(damaged)?;
+        let Some(more) = rows_of(stored, &series, &mut decoder, &mut reasons) else { return Ok(None) };
         let count = more.len();
         rows.append(&more, 0..count);
     }
     let mut encoder = Encoder::new(LEVEL_COMPACT).map_err(zstd)?;
-    Ok(encoder.encode(&rows, &series, &reasons, group[0].segment, group[0].first_row))
+    let key = group[0].key;
+    Ok(Some(encoder.encode(&rows, &series, &reasons, key.segment, key.first_row)))
 }
 
-fn rows_of(
-    stored: &StoredSegment,
+/// All rows of a block, with the reasons of `reasons`; `None` when it is damaged.
+pub(crate) fn rows_of(
+    stored: &StoredBlock,
     series: &[Series],
     decoder: &mut Decoder,
     reasons: &mut Reasons,
 ) -> Option<SeriesRows> {
-    let directory = Directory::parse(&stored.directory)?;
+    let directory = stored.checked()?;
     let mut rows = SeriesRows::of(series);
     rows.at_ns = decoder.times(&directory, &stored.columns)?;
     let codes = own_codes(&directory, reasons);
@@ -145,15 +133,16 @@ fn column_of(cells: Cells, codes: &[u8; 256]) -> Column {
 
 fn replace(
     db: &mut Connection,
-    group: &[StoredSegment],
+    group: &[StoredBlock],
     merged: Option<&Block>,
     next_row: i64,
 ) -> Result<(), HistoryError> {
     let replacing = db.transaction().doing("beginning to compact")?;
     if let Some(merged) = merged {
-        let last_row = group.last().map_or(merged.first_row, |last| last.first_row);
+        let first_row = merged.key.first_row;
+        let last_row = group.last().map_or(first_row, |last| last.key.first_row);
         replacing
-            .execute("DELETE FROM blocks WHERE first_row BETWEEN ?1 AND ?2", [merged.first_row, last_row])
+            .execute("DELETE FROM blocks WHERE first_row BETWEEN ?1 AND ?2", [first_row, last_row])
             .and_then(|_| put_block(&replacing, merged))
             .doing("replacing blocks by one")?;
     }

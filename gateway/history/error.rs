@@ -1,5 +1,7 @@
 //! What can go wrong with a history, in words that say what to do next.
 
+use super::damage::{REPAIR, is_of_disk};
+use super::pages::damaged_page;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -71,10 +73,18 @@ pub enum HistoryError {
         /// What `SQLite` said.
         error: rusqlite::Error,
     },
+    /// `SQLite` found that the file is not as it was written.
+    #[error("history, while {doing}: the file is not as it was written{}: {error}. {REPAIR}.", told(*page))]
+    NotAsWritten {
+        /// What was being done.
+        doing: &'static str,
+        /// The page, where it is known.
+        page: Option<u32>,
+        /// What `SQLite` said.
+        error: rusqlite::Error,
+    },
     /// A block cannot be decoded.
-    #[error(
-        "history, block at row {first_row}: {what}. The rest of the history is readable; restore this part from a backup."
-    )]
+    #[error("history, block at row {first_row}: {what}. The rest of the history is readable; {REPAIR}.")]
     Damaged {
         /// Number of the block's first row.
         first_row: i64,
@@ -97,6 +107,10 @@ pub enum HistoryError {
     },
 }
 
+fn told(page: Option<u32>) -> String {
+    page.map_or_else(String::new, |page| format!(" (page {page})"))
+}
+
 /// Adds what was being done to an error of `SQLite`.
 pub(crate) trait Doing<T> {
     /// `doing` completes the sentence "history, while ...".
@@ -105,7 +119,10 @@ pub(crate) trait Doing<T> {
 
 impl<T> Doing<T> for Result<T, rusqlite::Error> {
     fn doing(self, doing: &'static str) -> Result<T, HistoryError> {
-        self.map_err(|error| HistoryError::Sqlite { doing, error })
+        self.map_err(|error| match is_of_disk(&error) {
+            true => HistoryError::NotAsWritten { doing, page: damaged_page(), error },
+            false => HistoryError::Sqlite { doing, error },
+        })
     }
 }
 
@@ -123,6 +140,12 @@ impl HistoryError {
             Self::Io { error, .. } => error.kind() == std::io::ErrorKind::StorageFull,
             _ => false,
         }
+    }
+
+    /// Is the file not as it was written?
+    #[must_use]
+    pub fn is_damage(&self) -> bool {
+        matches!(self, Self::Damaged { .. } | Self::NotAsWritten { .. })
     }
 
     /// Does another program hold the file locked?

@@ -114,7 +114,7 @@ impl Reader {
             disk_lasts_days: days(room),
             limit_reached_days: days(left),
             tables: self.tables()?,
-            dropped: self.dropped()?,
+            dropped: self.read_dropped()?,
         })
     }
 
@@ -147,7 +147,7 @@ impl Reader {
         TABLES.iter().map(|table| Ok(TableRows { table, rows: count(table)? })).collect()
     }
 
-    fn dropped(&self) -> Result<Vec<Dropped>, HistoryError> {
+    fn read_dropped(&self) -> Result<Vec<Dropped>, HistoryError> {
         let mut statement = self
             .db
             .prepare("SELECT kind, rows, through_ns, because FROM dropped ORDER BY kind")

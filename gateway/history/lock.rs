@@ -17,7 +17,7 @@ impl Lock {
     pub(crate) fn take(path: &Path) -> Result<Self, HistoryError> {
         let beside = beside(path, ".lock");
         let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&beside);
-        let mut file = opened.map_err(|error| refused(path, &beside, error))?;
+        let mut file = opened.map_err(|error| lock_error(path, &beside, error))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -48,7 +48,7 @@ pub(crate) fn beside(path: &Path, suffix: &str) -> PathBuf {
     name.into()
 }
 
-fn refused(path: &Path, beside: &Path, error: std::io::Error) -> HistoryError {
+fn lock_error(path: &Path, beside: &Path, error: std::io::Error) -> HistoryError {
     use std::io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
     if !matches!(error.kind(), PermissionDenied | ReadOnlyFilesystem) {
         return at(beside)(error);

@@ -21,8 +21,10 @@ const FREE_MAX: usize = 8;
 pub(crate) enum WriterJob {
     /// Make everything handed in so far durable.
     Flush,
-    /// Compact and retire as of this time.
-    Maintain(TimeNs),
+    /// Compact, and retire what is too old at this time; without a time nothing is too old.
+    Maintain(Option<TimeNs>),
+    /// The clock by which the rows since opening are dated is confirmed.
+    ConfirmClock,
 }
 
 /// A record on its way to the disk.

@@ -2,8 +2,10 @@
 
 use super::compact;
 use super::error::{Doing, HistoryError};
+use super::lock::beside;
 use super::options::Retention;
-use super::retention::{remove_aged, remove_oldest, used_bytes};
+use super::retention::{AgeLimits, remove_aged, remove_oldest, used_bytes};
+use super::seal;
 use super::space::{Reserve, disk_room};
 use adapters::clock::TimeNs;
 use rusqlite::Connection;
@@ -31,16 +33,21 @@ pub(crate) struct Maintenance {
     /// While the disk is short of room: the size at which that was noticed.
     ceiling: Option<u64>,
     looked: Option<Instant>,
-    task: Option<(TimeNs, MaintenanceStage)>,
+    task: Option<MaintenanceStage>,
     /// Raw samples removed since opening.
     pub(crate) retired: u64,
+    /// Bytes of the log beside the file, when it was last looked at.
+    pub(crate) log_bytes: u64,
 }
 
 /// The stages of maintenance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 enum MaintenanceStage {
-    Compact,
-    Age,
+    /// Joins blocks; then what is too old at this time goes, where the clock is confirmed.
+    Compact(Option<TimeNs>),
+    Age(AgeLimits),
+    /// Gives blocks of an older version their checksums: so many are left for this run.
+    Seal(u32),
     Shrink,
 }
 
@@ -48,13 +55,26 @@ impl Maintenance {
     pub(crate) fn new(path: &Path, retention: Retention, reserve_bytes: u64) -> Self {
         let mut reserve = Reserve::beside(path, reserve_bytes);
         reserve.keep();
-        Self { path: path.to_owned(), retention, reserve, ceiling: None, looked: None, task: None, retired: 0 }
+        Self {
+            path: path.to_owned(),
+            retention,
+            reserve,
+            ceiling: None,
+            looked: None,
+            task: None,
+            retired: 0,
+            log_bytes: 0,
+        }
     }
 
     /// Keeps the log so short that the reserve has room for all of it when it must be copied back on a full disk.
     pub(crate) fn bound_log(&self, db: &Connection) -> Result<(), HistoryError> {
         let pages = (self.reserve.bytes() / 2 / PAGE_BYTES).clamp(LOG_PAGES_MIN, LOG_PAGES_MAX);
-        db.pragma_update(None, "wal_autocheckpoint", pages as i64).doing("bounding the write-ahead log")
+        db.pragma_update(None, "wal_autocheckpoint", pages as i64).doing("bounding the write-ahead log")?;
+        // What a reader made it grow beyond that is given back to the disk.
+        let bytes = 2 * pages * PAGE_BYTES;
+        db.query_row(&format!("PRAGMA journal_size_limit = {bytes}"), [], |_| Ok(()))
+            .doing("bounding the write-ahead log")
     }
 
     /// After a commit: looks at the disk now and then, and keeps the file below what it may have. Returns its size.
@@ -63,6 +83,7 @@ impl Maintenance {
         if self.looked.is_none_or(|looked| looked.elapsed() >= LOOK_EVERY) {
             self.looked = Some(Instant::now());
             self.look(used);
+            self.log_bytes = std::fs::metadata(beside(&self.path, "-wal")).map_or(0, |file| file.len());
         }
         let because = if self.ceiling.is_some() { "the disk is full" } else { "the size limit" };
         for _ in 0..STEPS_MAX {
@@ -115,31 +136,35 @@ impl Maintenance {
         checkpoint(db)
     }
 
-    /// Begins maintenance as of `now_ns`.
-    pub(crate) fn begin(&mut self, now_ns: TimeNs) {
-        self.task = Some((now_ns, MaintenanceStage::Compact));
+    /// Begins maintenance; what is too old at `now_ns` goes, where that is known.
+    pub(crate) fn begin(&mut self, now_ns: Option<TimeNs>) {
+        self.task = Some(MaintenanceStage::Compact(now_ns));
     }
 
     /// Does a bounded piece of maintenance; false when there is none left.
     pub(crate) fn step(&mut self, db: &mut Connection) -> Result<bool, HistoryError> {
-        let Some((now_ns, task)) = self.task else { return Ok(false) };
+        let Some(task) = &self.task else { return Ok(false) };
         let next = match task {
-            MaintenanceStage::Compact => (!compact::step(db)?).then_some(MaintenanceStage::Age),
-            MaintenanceStage::Age => {
-                let removed = remove_aged(db, &self.retention, now_ns)?;
+            MaintenanceStage::Compact(now_ns) => match (compact::step(db)?, now_ns) {
+                (true, _) => return Ok(true),
+                (false, Some(now_ns)) => Some(MaintenanceStage::Age(AgeLimits::at(db, &self.retention, *now_ns)?)),
+                (false, None) => Some(MaintenanceStage::Seal(seal::BLOCKS_PER_RUN)),
+            },
+            MaintenanceStage::Age(limits) => {
+                let removed = remove_aged(db, limits)?;
                 self.retired += removed.samples;
-                (!removed.any).then_some(MaintenanceStage::Shrink)
-            }
-            MaintenanceStage::Shrink => {
-                if !shrink(db)? {
-                    self.task = None;
+                match removed.any {
+                    true => return Ok(true),
+                    false => Some(MaintenanceStage::Seal(seal::BLOCKS_PER_RUN)),
                 }
-                None
             }
+            MaintenanceStage::Seal(left) => match left.checked_sub(seal::step(db)?).filter(|next| next < left) {
+                Some(left) => Some(MaintenanceStage::Seal(left)),
+                None => Some(MaintenanceStage::Shrink),
+            },
+            MaintenanceStage::Shrink => shrink(db)?.then_some(MaintenanceStage::Shrink),
         };
-        if let Some(next) = next {
-            self.task = Some((now_ns, next));
-        }
+        self.task = next;
         Ok(self.task.is_some())
     }
 

@@ -118,7 +118,7 @@ impl MinuteBuffer {
 
     /// The time of the newest row.
     pub(crate) fn newest_ns(&self) -> Option<TimeNs> {
-        self.open.at_ns.last().copied().or(self.blocks.back().map(|block| block.end_ns)).or(self.last_ns)
+        self.open.at_ns.last().copied().or(self.blocks.back().map(|block| block.key.end_ns)).or(self.last_ns)
     }
 
     /// Right after a commit: the time of the newest durable row, and the number of the row after it.
@@ -193,11 +193,11 @@ impl MinuteBuffer {
         }
         let first_row = self.open_row();
         let block = self.encoder.encode(&self.open, &self.series, &self.reasons, self.segment, first_row);
-        self.sealed_ns = Some(block.end_ns);
+        self.sealed_ns = Some(block.key.end_ns);
         self.open.clear();
         self.in_tail = 0;
         if self.is_full() {
-            self.lost_rows += self.blocks.pop_front().map_or(0, |oldest| oldest.rows as u64);
+            self.lost_rows += self.blocks.pop_front().map_or(0, |oldest| oldest.key.rows.unsigned_abs());
         }
         self.blocks.push_back(block);
     }

@@ -1,6 +1,7 @@
 //! How a history is kept: durability, limits, and the estimates that are stored beside the channels.
 
 use super::outbox::Outbox;
+use crate::clock::ClockMark;
 use adapters::clock::{SECOND_NS, TimeNs};
 use std::time::Duration;
 
@@ -151,6 +152,8 @@ pub struct Options {
     pub extras: Vec<ExtraSeries>,
     /// Why this history is opened, for the segment table: `live`, or the name of the recording that is replayed.
     pub origin: String,
+    /// By which clock the rows are dated.
+    pub clock: ClockMark,
     /// The rows that follow come right after those that the history holds of the same origin: the state that was left
     /// open stays open. For a recording whose replay was broken off; a live machine has moved on in the meantime.
     pub goes_on: bool,
@@ -171,6 +174,7 @@ impl Default for Options {
             retention: Retention::default(),
             extras: Vec::new(),
             origin: "live".to_owned(),
+            clock: ClockMark::stepped(),
             goes_on: false,
             reserve_bytes: 8_192_000,
             outbox: None,

@@ -109,6 +109,7 @@ impl Reader {
                 break;
             }
         }
+        self.note_damage(&walk);
         Ok(())
     }
 

@@ -1,10 +1,17 @@
 //! Reading a history while the gateway writes it: a connection of its own that cannot change anything.
 
+use super::damage::DamagedRows;
 use super::error::{Doing, HistoryError};
+use super::future::{self, FutureRows};
 use super::schema;
+use super::segments;
 use super::series::Series;
+use super::walk::Walk;
+use crate::clock;
 use adapters::clock::TimeNs;
 use rusqlite::Connection;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Reads one history. Cheap to open; one per thread.
@@ -12,6 +19,7 @@ use std::path::{Path, PathBuf};
 pub struct Reader {
     pub(crate) db: Connection,
     pub(crate) path: PathBuf,
+    damaged: RefCell<BTreeMap<i64, DamagedRows>>,
 }
 
 impl Reader {
@@ -21,7 +29,17 @@ impl Reader {
     /// [`HistoryError::Missing`], [`HistoryError::NewerSchema`], [`HistoryError::NotAHistory`], or what `SQLite` says.
     pub fn open(path: &Path) -> Result<Self, HistoryError> {
         let db = schema::open_for_reading(path)?;
-        Ok(Self { db, path: path.to_owned() })
+        Ok(Self { db, path: path.to_owned(), damaged: RefCell::default() })
+    }
+
+    /// What the answers until now have left out because the disk has changed it, in the order of recording.
+    #[must_use]
+    pub fn damaged(&self) -> Vec<DamagedRows> {
+        self.damaged.borrow().values().copied().collect()
+    }
+
+    pub(crate) fn note_damage(&self, walk: &Walk) {
+        self.damaged.borrow_mut().extend(walk.damaged.iter().map(|damaged| (damaged.first_row, *damaged)));
     }
 
     /// The database.
@@ -57,6 +75,37 @@ impl Reader {
             )
             .doing("looking for the first and the last row")?;
         Ok(bounds.0.zip(bounds.1))
+    }
+
+    /// Time of the first row, and the time that `now`, `today` and `-10m` count from: that of the newest row which is not from
+    /// the future. `None` when there are no rows.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn present(&self) -> Result<Option<(TimeNs, TimeNs)>, HistoryError> {
+        let now_ns = clock::now_ns();
+        match self.span()? {
+            Some((first_ns, newest_ns)) if newest_ns > now_ns.saturating_add(future::AHEAD_NS) => {
+                Ok(Some((first_ns, future::present_ns(&self.db, now_ns, newest_ns)?.max(first_ns))))
+            }
+            span => Ok(span),
+        }
+    }
+
+    /// The rows that say they come from after `now_ns`, unless the machine brought its own time. `None` without any.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn future(&self, now_ns: TimeNs) -> Result<Option<FutureRows>, HistoryError> {
+        FutureRows::after(&self.db, now_ns)
+    }
+
+    /// It is certainly later than this: a row was stored then under a confirmed clock. `None` when no clock was confirmed yet.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn certain_ns(&self) -> Result<Option<TimeNs>, HistoryError> {
+        segments::certain_ns(&self.db)
     }
 
     /// A whole copy of the file as it is now, at `to`, where nothing may be yet. The one who writes goes on meanwhile.

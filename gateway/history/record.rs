@@ -273,6 +273,28 @@ impl Record {
     }
 }
 
+impl Record {
+    /// Moves every time of it by so much.
+    pub(crate) fn shift(&mut self, by_ns: i64) {
+        let move_ns = |at_ns: &mut TimeNs| *at_ns = at_ns.saturating_add(by_ns);
+        match self {
+            Self::Event(record) => move_ns(&mut record.at_ns),
+            Self::Alarm(record) => move_ns(&mut record.at_ns),
+            Self::AlarmClear(record) => move_ns(&mut record.at_ns),
+            Self::State(record) => move_ns(&mut record.at_ns),
+            Self::Part(record) => [&mut record.began_ns, &mut record.ended_ns].into_iter().for_each(move_ns),
+            Self::Decision(record) => move_ns(&mut record.at_ns),
+            Self::Command(record) => move_ns(&mut record.at_ns),
+            Self::Model(record) => move_ns(&mut record.at_ns),
+            Self::Diagnosis(record) => {
+                [&mut record.at_ns, &mut record.from_ns, &mut record.to_ns].into_iter().for_each(move_ns);
+            }
+            Self::Audit(record) => move_ns(&mut record.at_ns),
+            Self::Reaction(record) => move_ns(&mut record.at_ns),
+        }
+    }
+}
+
 macro_rules! into_record {
     ($($kind:ident => $variant:ident),*) => {
         $(impl From<$kind> for Record {

@@ -6,6 +6,7 @@ use super::record::{
 };
 use adapters::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, OptionalExtension, Params, params};
+use std::ops::Range;
 
 /// Longest interval that is spread over `state_hours`. One of more than a year began before the clock was set (a box
 /// without a battery wakes in 1970): its hours are nobody's, and are not counted.
@@ -82,10 +83,16 @@ pub(crate) fn close_state(db: &Connection, until_ns: TimeNs, ended_by: &str) -> 
     let Some((id, state, since_ns)) = open else { return Ok(()) };
     let until_ns = until_ns.max(since_ns);
     put(db, "UPDATE states SET until_ns = ?1, ended_by = ?2 WHERE id = ?3", params![until_ns, ended_by, id])?;
-    spread(db, &state, since_ns, until_ns)
+    spread(db, &state, since_ns..until_ns, 1.0)
 }
 
-fn spread(db: &Connection, state: &str, since_ns: TimeNs, until_ns: TimeNs) -> Result<(), rusqlite::Error> {
+/// Adds the time of a state to its hours `times` times; -1 takes it away again.
+pub(crate) fn spread(
+    db: &Connection,
+    state: &str,
+    Range { start: since_ns, end: until_ns }: Range<TimeNs>,
+    times: f64,
+) -> Result<(), rusqlite::Error> {
     let mut add = db.prepare_cached(
         "INSERT INTO state_hours (hour, state, seconds) VALUES (?1, ?2, ?3)
          ON CONFLICT DO UPDATE SET seconds = seconds + excluded.seconds",
@@ -99,7 +106,7 @@ fn spread(db: &Connection, state: &str, since_ns: TimeNs, until_ns: TimeNs) -> R
         let from_ns = since_ns.max(hour.saturating_mul(HOUR_NS));
         let to_ns = until_ns.min((hour + 1).saturating_mul(HOUR_NS));
         if to_ns > from_ns {
-            add.execute(params![hour, state, (to_ns - from_ns) as f64 / SECOND_NS as f64])?;
+            add.execute(params![hour, state, times * (to_ns - from_ns) as f64 / SECOND_NS as f64])?;
         }
     }
     Ok(())

@@ -2,6 +2,7 @@
 
 use super::block::{Encoder, LEVEL_FRESH};
 use super::commit::insert_block;
+use super::damage::DamagedRows;
 use super::error::{Doing, HistoryError};
 use super::minute_buffer::End;
 use super::reason::Reasons;
@@ -55,14 +56,22 @@ pub(crate) struct Unsealed {
     pub(crate) first_row: i64,
     pub(crate) rows: i64,
     pub(crate) start_ns: TimeNs,
+    pub(crate) end_ns: TimeNs,
     pub(crate) body: String,
+}
+
+impl Unsealed {
+    /// Its rows, when its text is none.
+    pub(crate) fn damaged(&self) -> DamagedRows {
+        DamagedRows { first_row: self.first_row, rows: self.rows, span_ns: Some((self.start_ns, self.end_ns)) }
+    }
 }
 
 /// The entries of the crash tail from row `from_row` on, in order.
 pub(crate) fn unsealed(db: &Connection, from_row: i64) -> Result<Vec<Unsealed>, HistoryError> {
     let mut statement = db
         .prepare_cached(
-            "SELECT segment, first_row, rows, start_ns, body FROM tail WHERE first_row >= ?1 ORDER BY first_row",
+            "SELECT segment, first_row, rows, start_ns, end_ns, body FROM tail WHERE first_row >= ?1 ORDER BY first_row",
         )
         .doing("reading the crash tail")?;
     let entries = statement.query_map([from_row], |row| {
@@ -71,7 +80,8 @@ pub(crate) fn unsealed(db: &Connection, from_row: i64) -> Result<Vec<Unsealed>, 
             first_row: row.get(1)?,
             rows: row.get(2)?,
             start_ns: row.get(3)?,
-            body: row.get(4)?,
+            end_ns: row.get(4)?,
+            body: row.get(5)?,
         })
     });
     entries.and_then(Iterator::collect).doing("reading the crash tail")
@@ -95,8 +105,8 @@ fn seal_tail(db: &Connection, mut end: End) -> Result<End, HistoryError> {
         }
         let block = encoder.encode(&rows, &series, &reasons, group[0].segment, group[0].first_row);
         insert_block(db, &block)?;
-        end.next_row = block.first_row + block.rows as i64;
-        end.last_ns = Some(block.end_ns);
+        end.next_row = block.key.first_row + block.key.rows;
+        end.last_ns = Some(block.key.end_ns);
     }
     Ok(end)
 }

@@ -5,7 +5,7 @@ use super::audit;
 use super::error::{Doing, HistoryError};
 use super::options::Retention;
 use adapters::clock::{SECOND_NS, TimeNs};
-use rusqlite::{Connection, params};
+use rusqlite::{Connection, OptionalExtension, params};
 
 /// A kind of row, in the order in which they go.
 struct RowKind {
@@ -98,16 +98,65 @@ pub(crate) fn remove_oldest(db: &mut Connection, because: &str) -> Result<Remove
             )
             .doing("looking for the oldest rows")?;
         if let Some(threshold) = threshold {
-            return remove(db, kind, &format!("{time} <= {threshold}"), because);
+            return remove(db, kind, &format!("{time} <= {threshold}"), None, because);
         }
     }
     Ok(Removed::default())
 }
 
-/// Removes one step's worth of what is older than its age.
-pub(crate) fn remove_aged(db: &mut Connection, retention: &Retention, now_ns: TimeNs) -> Result<Removed, HistoryError> {
-    for kind in &KINDS {
-        let horizon = Retention::horizon_ns((kind.days)(retention), now_ns).div_euclid(kind.unit_ns);
+/// One run of ageing takes at most what lies within so much time of the oldest row of its kind. A box that runs every day needs
+/// one day; one wrong clock, however long it was believed, costs no more.
+const RUN_TAKES_NS: i64 = 3 * 24 * HOUR_NS;
+/// Before a row may go because of its age, samples must have been stored on so many days after it, as a part of that age: a
+/// clock that leaps by years passes through few days.
+const DAYS_STORED_PART: f64 = 0.1;
+
+/// What one run of ageing may take: the times before which each kind may go.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct AgeLimits {
+    now_ns: TimeNs,
+    before_ns: Vec<Option<TimeNs>>,
+}
+
+impl AgeLimits {
+    /// Those of a run that begins at `now_ns`, which a confirmed clock says.
+    pub(crate) fn at(db: &Connection, retention: &Retention, now_ns: TimeNs) -> Result<Self, HistoryError> {
+        let before_ns = KINDS.iter().map(|kind| before_ns(db, kind, (kind.days)(retention), now_ns));
+        Ok(Self { now_ns, before_ns: before_ns.collect::<Result<_, _>>()? })
+    }
+}
+
+/// The time before which rows of this kind may go; `None`: none may.
+fn before_ns(db: &Connection, kind: &RowKind, days: f64, now_ns: TimeNs) -> Result<Option<TimeNs>, HistoryError> {
+    let (time, only, table) = (if kind.table == "blocks" { "start_ns" } else { kind.time }, kind.only, kind.table);
+    let oldest: Option<i64> = db
+        .query_row(&format!("SELECT min({time}) FROM {table} WHERE {only}"), [], |row| row.get(0))
+        .doing("looking for the oldest rows")?;
+    let Some(oldest) = oldest else { return Ok(None) };
+    let horizon_ns = Retention::horizon_ns(days, now_ns);
+    let run_ns = oldest.saturating_mul(kind.unit_ns).saturating_add(RUN_TAKES_NS);
+    Ok(stored_since_ns(db, days)?.map(|stored_ns| horizon_ns.min(run_ns).min(stored_ns)))
+}
+
+/// The beginning of the day since which samples were stored on enough days for an age of `days`.
+fn stored_since_ns(db: &Connection, days: f64) -> Result<Option<TimeNs>, HistoryError> {
+    #[allow(clippy::cast_possible_truncation, reason = "saturates, which is meant")]
+    let needed = (days * DAYS_STORED_PART) as i64;
+    if needed == 0 {
+        return Ok(Some(TimeNs::MAX));
+    }
+    let day: Option<i64> = db
+        .query_row("SELECT DISTINCT day FROM days ORDER BY day DESC LIMIT 1 OFFSET ?1", [needed - 1], |row| row.get(0))
+        .optional()
+        .doing("counting days with samples")?;
+    Ok(day.map(|day| day.saturating_mul(24 * HOUR_NS)))
+}
+
+/// Removes one step's worth of what is older than its age, within the limits of the run.
+pub(crate) fn remove_aged(db: &mut Connection, limits: &AgeLimits) -> Result<Removed, HistoryError> {
+    for (kind, before_ns) in KINDS.iter().zip(&limits.before_ns) {
+        let Some(before_ns) = before_ns else { continue };
+        let horizon = before_ns.div_euclid(kind.unit_ns);
         let RowKind { table, time, only, step, .. } = kind;
         let condition = if *table == "blocks" {
             // Time of a block is not its key; the newest block stays, it says where the history ends.
@@ -121,7 +170,7 @@ pub(crate) fn remove_aged(db: &mut Connection, retention: &Retention, now_ns: Ti
                  (SELECT {time} FROM {table} WHERE {only} AND {time} < {horizon} ORDER BY {time} LIMIT {step}))"
             )
         };
-        let removed = remove(db, kind, &condition, "age")?;
+        let removed = remove(db, kind, &condition, Some(limits.now_ns), "age")?;
         if removed.any {
             return Ok(removed);
         }
@@ -129,7 +178,13 @@ pub(crate) fn remove_aged(db: &mut Connection, retention: &Retention, now_ns: Ti
     Ok(Removed::default())
 }
 
-fn remove(db: &mut Connection, kind: &RowKind, condition: &str, because: &str) -> Result<Removed, HistoryError> {
+fn remove(
+    db: &mut Connection,
+    kind: &RowKind,
+    condition: &str,
+    at_ns: Option<TimeNs>,
+    because: &str,
+) -> Result<Removed, HistoryError> {
     let RowKind { name, table, only, rows, time, unit_ns, .. } = kind;
     let time = if *table == "blocks" { "end_ns" } else { time };
     let condition = &if *table == "audit" { audit::oldest(condition) } else { condition.to_owned() };
@@ -140,10 +195,11 @@ fn remove(db: &mut Connection, kind: &RowKind, condition: &str, because: &str) -
         })
         .doing("counting old rows")?;
     let (Some(count @ 1..), Some(through)) = (count, through) else { return Ok(Removed::default()) };
-    if *table == "audit" {
-        audit::release(&removing, &format!("{only} AND {condition}")).doing("removing old rows")?;
+    match *table {
+        "audit" => audit::remove(&removing, condition, at_ns, because),
+        _ => removing.execute(&format!("DELETE FROM {table} WHERE {only} AND {condition}"), []).map(drop),
     }
-    removing.execute(&format!("DELETE FROM {table} WHERE {only} AND {condition}"), []).doing("removing old rows")?;
+    .doing("removing old rows")?;
     removing
         .execute(
             "INSERT INTO dropped (kind, rows, through_ns, because) VALUES (?1, ?2, ?3, ?4)

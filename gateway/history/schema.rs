@@ -1,27 +1,39 @@
 //! Opening the file: what it must be, and the tables it gets when it is new.
 
+use super::audit;
+use super::damage::{is_of_disk, was_ours};
 use super::error::{Doing, HistoryError};
 use super::lock::beside;
 use super::options::SeriesKind;
+use super::pages;
 use super::series::Series;
 use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
 use std::path::Path;
 
 /// Newest schema this version knows; stored as `user_version`.
-pub(crate) const SCHEMA: i64 = 4;
-/// `cncg`, stored as `application_id`.
-const APPLICATION: i64 = 0x636e_6367;
+pub(crate) const SCHEMA: i64 = 5;
+/// `cncg`, stored as `application_id` of files of older versions, whose pages have no sums.
+pub(crate) const APPLICATION: i64 = 0x636e_6367;
+/// `cncs`, stored as `application_id` of files whose pages have sums ([`pages`]).
+pub(crate) const SEALED_APPLICATION: u32 = 0x636e_6373;
 const TABLES: &str = include_str!("schema.sql");
 /// What each schema adds to the one before, beginning with 2. A new file gets all of it.
-const ADDED: [&str; 3] = [include_str!("schema_2.sql"), include_str!("schema_3.sql"), include_str!("schema_4.sql")];
+const ADDED: [&str; 4] = [
+    include_str!("schema_2.sql"),
+    include_str!("schema_3.sql"),
+    include_str!("schema_4.sql"),
+    include_str!("schema_5.sql"),
+];
 
 /// Opens the file for writing and creates the tables in a new one.
 pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> {
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let db = Connection::open_with_flags(path, flags).map_err(|error| explain(path, error))?;
+    let db = connect(path, path, flags)?;
     db.busy_timeout(std::time::Duration::from_secs(2)).doing("setting the time to wait for locks")?;
     let new = check(path, &db)?;
     if new {
+        // Must be said before the first page is written.
+        pages::reserve_room(&db).map_err(of_code).doing("leaving room for checksums")?;
         // Freed pages go back to the disk in small steps; must be set before the first table.
         db.pragma_update(None, "auto_vacuum", "INCREMENTAL").map_err(|error| explain(path, error))?;
     }
@@ -32,10 +44,29 @@ pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> 
     Ok(db)
 }
 
+/// Opens the file of this name, so that its pages are checked; `path` stands for it in messages.
+fn connect(name: &Path, path: &Path, flags: OpenFlags) -> Result<Connection, HistoryError> {
+    Connection::open_with_flags_and_vfs(name, flags, page_layer()?).map_err(|error| explain(path, error))
+}
+
+/// Name of the layer under `SQLite` that seals pages: a program of this process that changes a history opens it by this layer
+/// (`vfs`), or its changes are taken for damage.
+///
+/// # Errors
+/// What `SQLite` says.
+pub fn page_layer() -> Result<&'static std::ffi::CStr, HistoryError> {
+    pages::register().map_err(of_code).doing("preparing to check pages")?;
+    Ok(pages::VFS)
+}
+
+fn of_code(code: std::ffi::c_int) -> rusqlite::Error {
+    rusqlite::Error::SqliteFailure(rusqlite::ffi::Error::new(code), None)
+}
+
 fn create(db: &Connection) -> Result<(), rusqlite::Error> {
     let added = ADDED.concat();
     db.execute_batch(&format!(
-        "BEGIN IMMEDIATE; {TABLES} {added} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {SCHEMA}; COMMIT;"
+        "BEGIN IMMEDIATE; {TABLES} {added} PRAGMA application_id = {SEALED_APPLICATION}; PRAGMA user_version = {SCHEMA}; COMMIT;"
     ))
 }
 
@@ -48,7 +79,8 @@ fn migrate(db: &Connection) -> Result<(), rusqlite::Error> {
         }
         db.execute_batch("BEGIN IMMEDIATE")?;
         let step = if version(db)? < next { format!("{added} PRAGMA user_version = {next};") } else { String::new() };
-        db.execute_batch(&step).and_then(|()| db.execute_batch("COMMIT")).inspect_err(|_| {
+        let stepped = db.execute_batch(&step).and_then(|()| audit::account_for_earlier(db));
+        stepped.and_then(|()| db.execute_batch("COMMIT")).inspect_err(|_| {
             // The transaction is gone either way; the first error is the one to tell.
             let _rolled_back = db.execute_batch("ROLLBACK");
         })?;
@@ -62,7 +94,7 @@ pub(crate) fn open_for_reading(path: &Path) -> Result<Connection, HistoryError> 
         return Err(HistoryError::Missing { path: path.to_owned() });
     }
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let db = Connection::open_with_flags(path, flags).map_err(|error| explain(path, error))?;
+    let db = connect(path, path, flags)?;
     db.busy_timeout(std::time::Duration::from_secs(5)).doing("setting the time to wait for locks")?;
     if matches!(version(&db), Err(error) if error.sqlite_error_code() == Some(ErrorCode::CannotOpen)) {
         return open_on_read_only_disk(path);
@@ -83,8 +115,7 @@ fn open_on_read_only_disk(path: &Path) -> Result<Connection, HistoryError> {
     }
     let name: String = path.to_string_lossy().replace('%', "%25").replace('?', "%3f").replace('#', "%23");
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let db =
-        Connection::open_with_flags(format!("file:{name}?immutable=1"), flags).map_err(|error| explain(path, error))?;
+    let db = connect(Path::new(&format!("file:{name}?immutable=1")), path, flags)?;
     refuse_empty(path, check(path, &db)?)?;
     Ok(db)
 }
@@ -98,6 +129,11 @@ fn version(db: &Connection) -> Result<i64, rusqlite::Error> {
     db.query_row("PRAGMA user_version", [], |row| row.get(0))
 }
 
+/// Does the file say by which clock its segments were dated? One of an older version that nobody has written since does not.
+pub(crate) fn has_clocks(db: &Connection) -> Result<bool, HistoryError> {
+    version(db).map(|version| version >= 5).doing("reading the version of the file")
+}
+
 /// True for an empty file.
 fn check(path: &Path, db: &Connection) -> Result<bool, HistoryError> {
     let application: i64 =
@@ -106,13 +142,16 @@ fn check(path: &Path, db: &Connection) -> Result<bool, HistoryError> {
     let tables: i64 = db
         .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
         .map_err(|error| explain(path, error))?;
+    let own = [APPLICATION, i64::from(SEALED_APPLICATION)].contains(&application);
     match (application, found, tables) {
         (0, 0, 0) => Ok(true),
-        (APPLICATION, found, _) if found > SCHEMA => {
+        (_, found, _) if own && found > SCHEMA => {
             Err(HistoryError::NewerSchema { path: path.to_owned(), found, known: SCHEMA })
         }
         // Older schemas lack tables that no reader needs to find.
-        (APPLICATION, 1.., _) => Ok(false),
+        (_, 1.., _) if own => Ok(false),
+        // The header of a file whose pages have no sums may be what was changed.
+        _ if was_ours(path) => Err(damaged_header()),
         _ => Err(HistoryError::NotAHistory { path: path.to_owned(), what: "another SQLite database".to_owned() }),
     }
 }
@@ -124,11 +163,22 @@ fn explain(path: &Path, error: rusqlite::Error) -> HistoryError {
         error: error.to_string(),
     };
     match error.sqlite_error_code() {
+        _ if is_of_disk(&error) && was_ours(path) => {
+            HistoryError::NotAsWritten { doing: "opening the file", page: pages::damaged_page(), error }
+        }
         Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied) => read_only(),
         Some(ErrorCode::NotADatabase) => {
             HistoryError::NotAHistory { path: path.to_owned(), what: "not a SQLite database".to_owned() }
         }
         _ => HistoryError::Sqlite { doing: "opening the file", error },
+    }
+}
+
+fn damaged_header() -> HistoryError {
+    HistoryError::NotAsWritten {
+        doing: "opening the file",
+        page: Some(1),
+        error: of_code(rusqlite::ffi::SQLITE_CORRUPT),
     }
 }
 

@@ -32,10 +32,14 @@ pub struct HistoryFigures {
     pub commits: u64,
     /// Duration of the last commit, fsync included, milliseconds.
     pub last_commit_ms: f64,
+    /// Bytes of the log beside the file. It stays below a few megabytes unless somebody reads without an end.
+    pub log_bytes: u64,
     /// The disk is short of room: every new sample takes the place of the oldest raw one.
     pub short_of_room: bool,
     /// Why nothing is becoming durable at the moment, in words; `None` when all is well.
     pub degraded: Option<String>,
+    /// The disk has changed the file, so that nothing more can be written to it: what was found.
+    pub damaged: Option<String>,
     /// The last error, also when it is over.
     pub last_error: Option<String>,
 }
@@ -49,15 +53,19 @@ pub(crate) struct SharedStatus {
     pub(crate) bytes: AtomicU64,
     pub(crate) lost: AtomicU64,
     pub(crate) retired: AtomicU64,
+    pub(crate) log_bytes: AtomicU64,
     pub(crate) commits: AtomicU64,
     pub(crate) commit_us: AtomicU64,
     pub(crate) short_of_room: AtomicBool,
+    /// Rounds of the thread: it grows unless the thread hangs.
+    pub(crate) rounds: AtomicU64,
     words: Mutex<StatusTexts>,
 }
 
 #[derive(Debug, Default)]
 struct StatusTexts {
     degraded: Option<String>,
+    damaged: Option<String>,
     last_error: Option<String>,
 }
 
@@ -73,9 +81,11 @@ impl Default for SharedStatus {
             bytes: AtomicU64::new(0),
             lost: AtomicU64::new(0),
             retired: AtomicU64::new(0),
+            log_bytes: AtomicU64::new(0),
             commits: AtomicU64::new(0),
             commit_us: AtomicU64::new(0),
             short_of_room: AtomicBool::new(false),
+            rounds: AtomicU64::new(0),
             words: Mutex::new(StatusTexts::default()),
         }
     }
@@ -99,6 +109,11 @@ impl SharedStatus {
         words.last_error = Some(error.to_owned());
     }
 
+    /// The file is not as it was written.
+    pub(crate) fn damaged(&self, error: &str) {
+        self.words.lock().unwrap_or_else(PoisonError::into_inner).damaged = Some(error.to_owned());
+    }
+
     /// Everything but the queue.
     pub(crate) fn status(&self) -> HistoryFigures {
         let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
@@ -109,10 +124,12 @@ impl SharedStatus {
             bytes: self.bytes.load(Ordering::Relaxed),
             lost_samples: self.lost.load(Ordering::Relaxed),
             retired_samples: self.retired.load(Ordering::Relaxed),
+            log_bytes: self.log_bytes.load(Ordering::Relaxed),
             commits: self.commits.load(Ordering::Relaxed),
             last_commit_ms: self.commit_us.load(Ordering::Relaxed) as f64 / 1000.0,
             short_of_room: self.short_of_room.load(Ordering::Relaxed),
             degraded: words.degraded.clone(),
+            damaged: words.damaged.clone(),
             last_error: words.last_error.clone(),
             ..HistoryFigures::default()
         }

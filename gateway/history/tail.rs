@@ -1,8 +1,8 @@
 //! The crash tail: the rows of the running minute, one small JSON text per commit, so that any SQLite client can read
 //! them (view `recent_samples`) and the next start can put them into a block.
 //!
-//! Form: `{"t":[times],"s":{"<series>":[cells] or cell}}`; a cell alone holds for every row. A cell is a number, a text,
-//! or `{"m":"reason"}`.
+//! Form: `{"t":[times],"s":{"<series>":[cells] or cell},"c":sum}`; a cell alone holds for every row. A cell is a number, a
+//! text, or `{"m":"reason"}`. The sum is the CRC-32 of the text before its comma; older versions wrote none.
 
 use super::options::SeriesKind;
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
@@ -34,8 +34,19 @@ pub(crate) fn to_text(rows: &SeriesRows, range: Range<usize>, series: &[Series],
             Column::Words(changes) => put_words(&mut out, changes, &range, reasons),
         }
     }
-    out.push_str("}}");
+    out.push('}');
+    let sum = crc32fast::hash(out.as_bytes());
+    let _ = write!(out, "{SUM}{sum}}}");
     out
+}
+
+/// What stands before the checksum.
+const SUM: &str = ",\"c\":";
+
+/// Is the text as it was written, as far as it says?
+fn is_whole(text: &str) -> bool {
+    let Some((summed, sum)) = text.rsplit_once(SUM) else { return true };
+    sum.trim_end().strip_suffix('}').and_then(|sum| sum.parse().ok()) == Some(crc32fast::hash(summed.as_bytes()))
 }
 
 pub(super) fn comma(out: &mut String, index: usize) {
@@ -93,7 +104,7 @@ fn put_words(out: &mut String, changes: &[(u32, Word)], range: &Range<usize>, re
 
 /// Appends the rows of `text` to `rows`; `None`, and nothing appended, when it is not what [`to_text`] writes.
 pub(crate) fn append(text: &str, rows: &mut SeriesRows, series: &[Series], reasons: &mut Reasons) -> Option<()> {
-    let body: Json = serde_json::from_str(text).ok()?;
+    let body: Json = serde_json::from_str(text).ok().filter(|_| is_whole(text))?;
     let times: Vec<i64> = body.get("t")?.as_array()?.iter().map(Json::as_i64).collect::<Option<_>>()?;
     let cells = body.get("s")?.as_object()?;
     let mut more = rows.empty_like();

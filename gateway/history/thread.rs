@@ -9,7 +9,9 @@ use super::minute_buffer::MinuteBuffer;
 use super::options::{Options, WhenFull};
 use super::outbox::Gatherer;
 use super::record_sql::close_state;
+use super::segments;
 use super::status::SharedStatus;
+use crate::clock::Trust;
 use adapters::clock::TimeNs;
 use rusqlite::Connection;
 use std::sync::Arc;
@@ -42,11 +44,13 @@ pub(crate) struct CommitSchedule {
     failures: usize,
     flushing: Option<u64>,
     maintaining: Option<u64>,
+    /// It is still to be noted that the clock is confirmed.
+    confirming: bool,
 }
 
 impl Default for CommitSchedule {
     fn default() -> Self {
-        Self { next_commit: Instant::now(), failures: 0, flushing: None, maintaining: None }
+        Self { next_commit: Instant::now(), failures: 0, flushing: None, maintaining: None, confirming: false }
     }
 }
 
@@ -63,6 +67,7 @@ impl Thread {
     pub(crate) fn run(mut self) {
         let _guard = StopGuard(self.mailbox.clone());
         loop {
+            self.shared.rounds.fetch_add(1, Ordering::Relaxed);
             let rows_too = self.takes_rows();
             let delivery = self.take(rows_too);
             let closing = delivery.closing && delivery.batches.is_empty();
@@ -114,6 +119,11 @@ impl Thread {
                 self.pace.maintaining = Some(number);
                 self.maintenance.begin(now_ns);
             }
+            Some((number, WriterJob::ConfirmClock)) => {
+                self.options.clock.trust = Trust::Confirmed.word();
+                self.pace.confirming = true;
+                self.mailbox.finish(number);
+            }
             None => {}
         }
     }
@@ -144,6 +154,7 @@ impl Thread {
                     self.pace.next_commit = began + wait;
                 }
                 self.shared.recovered();
+                self.note_clock();
                 self.acknowledge();
                 self.tidy();
             }
@@ -151,6 +162,11 @@ impl Thread {
                 self.pace.failures += 1;
                 self.pace.next_commit = Instant::now() + wait.max(RETRY);
                 self.shared.degraded(&degraded_text(&error));
+                if error.is_damage() {
+                    // Trying again changes nothing: whoever holds the writer goes on with another file.
+                    self.pace.failures = LAST_ATTEMPTS;
+                    self.shared.damaged(&error.to_string());
+                }
             }
         }
         self.shared.lost.store(self.minute_buffer.lost_rows, Ordering::Relaxed);
@@ -171,7 +187,8 @@ impl Thread {
 
     fn commit_all(&mut self, with_tail: bool) -> Result<(), HistoryError> {
         let Self { db, minute_buffer, slots, outbox, options, .. } = self;
-        while !commit(db, minute_buffer, slots, outbox, &options.origin, with_tail)? {}
+        let dated = (options.origin.as_str(), &options.clock);
+        while !commit(db, minute_buffer, slots, outbox, dated, with_tail)? {}
         Ok(())
     }
 
@@ -193,12 +210,21 @@ impl Thread {
         }
     }
 
+    /// The rows of the running segment are in the file by now.
+    fn note_clock(&mut self) {
+        if self.pace.confirming {
+            // Where this fails it is tried again after the next commit.
+            self.pace.confirming = segments::confirm(&self.db, &self.options.clock).is_err();
+        }
+    }
+
     fn tidy(&mut self) {
         match self.maintenance.after_commit(&mut self.db) {
             Ok(used) => self.shared.bytes.store(used, Ordering::Relaxed),
             Err(error) => self.shared.degraded(&degraded_text(&error)),
         }
         self.shared.retired.store(self.maintenance.retired, Ordering::Relaxed);
+        self.shared.log_bytes.store(self.maintenance.log_bytes, Ordering::Relaxed);
         self.shared.short_of_room.store(self.maintenance.is_short(), Ordering::Relaxed);
     }
 

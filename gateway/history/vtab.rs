@@ -5,6 +5,7 @@
 //! are read; only the series a statement uses are decoded.
 
 use super::block::Cells;
+use super::damage::REPAIR;
 use super::error::HistoryError;
 use super::options::SeriesKind;
 use super::schema;
@@ -49,10 +50,10 @@ impl Samples {
         let mut columns = vec!["at_ns INTEGER".to_owned(), "time_utc TEXT".to_owned(), "segment INTEGER".to_owned()];
         for series in self.series.iter() {
             let kind = if series.kind == SeriesKind::Text { "TEXT" } else { "REAL" };
-            columns.push(format!("{} {kind}", quoted(&series.name)));
+            columns.push(format!("{} {kind}", quote_name(&series.name)));
         }
         for series in self.series.iter() {
-            columns.push(format!("{} TEXT HIDDEN", quoted(&format!("{}_missing", series.name))));
+            columns.push(format!("{} TEXT HIDDEN", quote_name(&format!("{}_missing", series.name))));
         }
         Ok(CString::new(format!("CREATE TABLE x({})", columns.join(", ")))?)
     }
@@ -84,7 +85,7 @@ impl Samples {
     }
 }
 
-fn quoted(name: &str) -> String {
+fn quote_name(name: &str) -> String {
     format!("\"{}\"", name.replace('"', "\"\""))
 }
 
@@ -151,6 +152,12 @@ impl Cursor {
         let Some(place) = &mut self.place else { return Ok(()) };
         let walk = place.walk.get_mut();
         place.stretch = walk.next(&self.db).map_err(module_error)?;
+        if let Some(damaged) = walk.damaged.first() {
+            // A statement has no way to tell what was left out of a sum.
+            return Err(Error::ModuleError(format!(
+                "{damaged} were changed by the disk: leave them out with conditions on at_ns; {REPAIR}"
+            )));
+        }
         place.cells.get_mut().clear();
         place.rows = place.stretch.as_ref().map_or(0..0, |stretch| walk.rows_of(stretch));
         Ok(())

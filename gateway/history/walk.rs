@@ -1,7 +1,8 @@
 //! Stretch by stretch through a time range: the blocks, then what the crash tail holds beyond them.
 
-use super::block::{Cells, Decoder, Directory, NumberCells, WordCells};
+use super::block::{BLOCK_COLUMNS, Cells, Decoder, Directory, NumberCells, StoredBlock, WordCells};
 use super::compact::{COMPACT_NS, own_codes};
+use super::damage::{DamagedRows, is_of_disk};
 use super::error::{Doing, HistoryError};
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
 use super::recover::unsealed;
@@ -36,6 +37,8 @@ pub(crate) struct Walk {
     series: Arc<[Series]>,
     decoder: Decoder,
     pub(crate) reasons: Reasons,
+    /// What was left out because the disk has changed it.
+    pub(crate) damaged: Vec<DamagedRows>,
 }
 
 /// The keys of the blocks that may have rows in `range`, in the order of recording.
@@ -45,8 +48,9 @@ pub(crate) fn blocks_in(db: &Connection, range: &Range<TimeNs>) -> Result<VecDeq
             "SELECT first_row FROM blocks WHERE start_ns >= ?1 AND start_ns < ?2 AND end_ns >= ?3 ORDER BY first_row",
         )
         .doing("looking for blocks")?;
-    // No block is longer than a compacted one, so an earlier start cannot reach into the range.
-    let earliest_ns = range.start.saturating_sub(COMPACT_NS);
+    // No block is longer than a compacted one and the minute that was the last of its parts, so an earlier start cannot reach
+    // into the range.
+    let earliest_ns = range.start.saturating_sub(2 * COMPACT_NS);
     let keys = statement.query_map(params![earliest_ns, range.end, range.start], |row| row.get(0));
     keys.and_then(Iterator::collect).doing("looking for blocks")
 }
@@ -61,8 +65,25 @@ impl Walk {
             .optional()
             .doing("looking for the last block")?;
         let decoder = Decoder::new().map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
-        let tail_from = Some(sealed.unwrap_or(0));
-        Ok(Self { blocks, tail_from, tail: VecDeque::new(), range, series, decoder, reasons: Reasons::default() })
+        Ok(Self {
+            blocks,
+            tail_from: Some(sealed.unwrap_or(0)),
+            tail: VecDeque::new(),
+            range,
+            series,
+            decoder,
+            reasons: Reasons::default(),
+            damaged: Vec::new(),
+        })
+    }
+
+    /// Through the blocks alone.
+    pub(crate) fn of_blocks(
+        db: &Connection,
+        range: Range<TimeNs>,
+        series: Arc<[Series]>,
+    ) -> Result<Self, HistoryError> {
+        Ok(Self { tail_from: None, ..Self::new(db, range, series)? })
     }
 
     /// Through what no block holds yet.
@@ -71,12 +92,13 @@ impl Walk {
         Ok(Self { range, ..Self::new(db, nothing, series)? })
     }
 
-    /// The next stretch that has a row in the range.
+    /// The next stretch that has a row in the range. What is damaged is passed over, and noted in `damaged`.
     pub(crate) fn next(&mut self, db: &Connection) -> Result<Option<SegmentStretch>, HistoryError> {
         while let Some(first_row) = self.blocks.pop_front() {
-            let stretch = self.load(db, first_row)?;
-            if !self.rows_of(&stretch).is_empty() {
-                return Ok(Some(stretch));
+            match self.load(db, first_row)? {
+                Some(stretch) if !self.rows_of(&stretch).is_empty() => return Ok(Some(stretch)),
+                Some(_) => {}
+                None => self.damaged.push(DamagedRows::of_block(db, first_row)),
             }
         }
         if let Some(from_row) = self.tail_from.take() {
@@ -102,7 +124,7 @@ impl Walk {
         match &stretch.form {
             StretchForm::Block { directory, columns, codes } => {
                 let Some(entry) = directory.entry(series) else { return Ok(None) };
-                let damaged = damaged(stretch.first_row);
+                let damaged = damage_error(stretch.first_row);
                 let mut cells = self.decoder.cells(directory, entry, columns).ok_or(damaged)?;
                 if entry.any_missing && !directory.words.is_empty() {
                     let missing = cells.missing_mut();
@@ -118,17 +140,20 @@ impl Walk {
         }
     }
 
-    fn load(&mut self, db: &Connection, first_row: i64) -> Result<SegmentStretch, HistoryError> {
-        let (segment, directory, columns): (i64, Vec<u8>, Vec<u8>) = db
-            .prepare_cached("SELECT segment, directory, columns FROM blocks WHERE first_row = ?1")
-            .and_then(|mut statement| {
-                statement.query_row([first_row], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
-            })
-            .doing("reading a block")?;
-        let directory = Directory::parse(&directory).ok_or(damaged(first_row))?;
-        let at_ns = self.decoder.times(&directory, &columns).ok_or(damaged(first_row))?;
+    /// The block of this key; `None` when the disk has changed it.
+    fn load(&mut self, db: &Connection, first_row: i64) -> Result<Option<SegmentStretch>, HistoryError> {
+        let stored = db
+            .prepare_cached(&format!("SELECT {BLOCK_COLUMNS} FROM blocks WHERE first_row = ?1"))
+            .and_then(|mut statement| statement.query_row([first_row], StoredBlock::of_row));
+        let stored = match stored {
+            Err(error) if is_of_disk(&error) => return Ok(None),
+            stored => stored.doing("reading a block")?,
+        };
+        let Some(directory) = stored.checked() else { return Ok(None) };
+        let Some(at_ns) = self.decoder.times(&directory, &stored.columns) else { return Ok(None) };
         let codes = Box::new(own_codes(&directory, &mut self.reasons));
-        Ok(SegmentStretch { segment, first_row, at_ns, form: StretchForm::Block { directory, columns, codes } })
+        let (segment, columns) = (stored.key.segment, stored.columns);
+        Ok(Some(SegmentStretch { segment, first_row, at_ns, form: StretchForm::Block { directory, columns, codes } }))
     }
 
     fn load_tail(&mut self, db: &Connection, from_row: i64) -> Result<VecDeque<SegmentStretch>, HistoryError> {
@@ -137,8 +162,9 @@ impl Walk {
         for group in entries.chunk_by(|a, b| a.segment == b.segment && b.first_row == a.first_row + a.rows) {
             let mut rows = SeriesRows::of(&self.series);
             for entry in group {
-                tail::append(&entry.body, &mut rows, &self.series, &mut self.reasons)
-                    .ok_or(damaged(entry.first_row))?;
+                if tail::append(&entry.body, &mut rows, &self.series, &mut self.reasons).is_none() {
+                    self.damaged.push(entry.damaged());
+                }
             }
             let (segment, first_row) = (group[0].segment, group[0].first_row);
             stretches.push_back(SegmentStretch {
@@ -152,8 +178,8 @@ impl Walk {
     }
 }
 
-fn damaged(first_row: i64) -> HistoryError {
-    HistoryError::Damaged { first_row, what: "the block does not decode" }
+fn damage_error(first_row: i64) -> HistoryError {
+    HistoryError::Damaged { first_row, what: "the samples do not decode" }
 }
 
 impl SegmentStretch {

@@ -106,9 +106,15 @@ impl Writer {
         self.await_job(WriterJob::Flush, FLUSH_LIMIT)
     }
 
-    /// Begins compaction and removal by age as of `now_ns`, piece by piece between commits. Call it once a night.
-    pub fn maintain(&self, now_ns: TimeNs) {
+    /// Begins compaction, and removal of what is too old at `now_ns`, piece by piece between commits. Without a time nothing
+    /// is too old: give one only where the clock is confirmed. Call it once a night.
+    pub fn maintain(&self, now_ns: Option<TimeNs>) {
         self.mailbox.ask(WriterJob::Maintain(now_ns));
+    }
+
+    /// The clock of [`Options::clock`] is confirmed: the rows since opening are dated for good.
+    pub fn confirm_clock(&self) {
+        self.mailbox.ask(WriterJob::ConfirmClock);
     }
 
     /// As [`Self::maintain`], and waits at most `limit` for the end of it.
@@ -116,7 +122,7 @@ impl Writer {
     /// # Errors
     /// [`HistoryError::NotDurable`] with the reason.
     pub fn maintain_and_wait(&self, now_ns: TimeNs, limit: Duration) -> Result<(), HistoryError> {
-        self.await_job(WriterJob::Maintain(now_ns), limit)
+        self.await_job(WriterJob::Maintain(Some(now_ns)), limit)
     }
 
     fn await_job(&self, job: WriterJob, limit: Duration) -> Result<(), HistoryError> {
@@ -142,6 +148,12 @@ impl Writer {
             dropped_records: waiting.dropped_records,
             ..self.shared.status()
         }
+    }
+
+    /// Rounds of the thread. Whoever looks twice sees whether it moves.
+    #[must_use]
+    pub fn count_rounds(&self) -> u64 {
+        self.shared.rounds.load(std::sync::atomic::Ordering::Relaxed)
     }
 
     /// The database.

@@ -120,7 +120,7 @@ fn plan(shared: &ServerState, name: &str, asked: &Asked) -> Result<BacktestPlan,
         let all: Vec<String> = found.iter().map(ToString::to_string).collect();
         ApiProblem::request(all.join("\n"), "mend it; `Run trials` marks the line")
     };
-    let newest = Reader::open(&shared.history).and_then(|reader| reader.span());
+    let newest = Reader::open(&shared.history).and_then(|reader| reader.present());
     let newest = newest.map_err(|error| ApiProblem::unavailable(error.to_string(), "look at the history"))?;
     let nothing = || ApiProblem::conflict("the history holds no samples yet", "let the box run for a while first");
     let (_, newest_ns) = newest.ok_or_else(nothing)?;

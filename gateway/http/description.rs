@@ -7,16 +7,17 @@ use serde_json::{Map, Value, json};
 use std::sync::LazyLock;
 
 /// The parts that are written by hand: paths and schemas, by subject.
-const WRITTEN: [&str; 6] = [
+const WRITTEN: [&str; 7] = [
     include_str!("openapi.json"),
     include_str!("openapi_access.json"),
     include_str!("openapi_page.json"),
     include_str!("openapi_maintenance.json"),
     include_str!("openapi_settings.json"),
+    include_str!("openapi_configuration.json"),
     include_str!("openapi_files.json"),
 ];
 
-static DESCRIPTION: LazyLock<String> = LazyLock::new(|| merged().to_string());
+static DESCRIPTION: LazyLock<String> = LazyLock::new(|| build_document().to_string());
 
 /// The whole document as text.
 #[must_use]
@@ -25,7 +26,7 @@ pub fn description() -> &'static str {
 }
 
 /// The whole document.
-fn merged() -> Value {
+fn build_document() -> Value {
     let mut parts = WRITTEN.iter().map(|text| serde_json::from_str::<Value>(text).unwrap_or(Value::Null));
     let mut document = parts.next().unwrap_or(Value::Null);
     for part in parts {

@@ -46,6 +46,7 @@ pub(super) static FILES: &[WebFile] = files! {
     SCRIPT "diagnosis.js" from "views/diagnosis.js",
     SCRIPT "brought.js" from "views/brought.js",
     SCRIPT "system.js" from "views/system.js",
+    SCRIPT "configuration.js" from "views/configuration.js",
     SCRIPT "rules.js" from "views/rules.js",
     SCRIPT "settings.js" from "views/settings.js",
     SCRIPT "audit.js" from "views/audit.js",

@@ -6,12 +6,13 @@ use super::peer::Peer;
 use super::person::{SignedIn, cookie, name_of_cookie};
 use super::problem::ApiProblem;
 use super::route::{Needs, Route};
-use crate::access::{Person, Role, SignInError};
+use crate::access::{Person, Role, SignInError, Token, Urgency};
 use axum::body::{Body, Bytes};
-use axum::extract::{Request, State};
+use axum::extract::{Form, FromRequest, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Redirect, Response};
+use serde::Deserialize;
 use std::time::Duration;
 
 /// A body of the greatest length that any route allows is here within this time, or it is refused.
@@ -55,7 +56,13 @@ async fn admit(Guarded { shared, route }: &Guarded, mut request: Request) -> Res
     let Some(peer) = request.extensions().get::<Peer>().copied() else {
         return Err(refuse(ApiProblem::unavailable("the connection has no address", "connect again")));
     };
-    let person = recognise(shared, request.headers(), &peer).await.map_err(|error| refuse(wrong(&error)))?;
+    let mut person = recognise(shared, route, request.headers(), &peer).await.map_err(|error| refuse(wrong(&error)))?;
+    if person.is_none() && route.urgency() == Urgency::GivesBack {
+        // Whoever sends what names nobody is nobody.
+        let unnamed = |problem| refuse(allowed(shared, route, None).err().unwrap_or(problem));
+        request = with_body(request, route.body_max()).await.map_err(unnamed)?;
+        (request, person) = named(shared, request, &peer).await.map_err(refuse)?;
+    }
     if let Err(problem) = allowed(shared, route, person.as_ref()) {
         let what = format!("{} {} from {}: {}", route.verb().word(), route.path(), peer.from, problem.title);
         // Whoever reads without having signed in is shown where to do so, which a page may ask for again and again.
@@ -103,14 +110,47 @@ async fn answer(Guarded { shared, route }: &Guarded, request: Request, person: O
 }
 
 /// Who asks: by the cookie of a session, or by name and token in the request itself.
-async fn recognise(shared: &ServerState, headers: &HeaderMap, peer: &Peer) -> Result<Option<Person>, SignInError> {
+async fn recognise(
+    shared: &ServerState,
+    route: &Route,
+    headers: &HeaderMap,
+    peer: &Peer,
+) -> Result<Option<Person>, SignInError> {
     let given = headers.get(header::AUTHORIZATION).and_then(|value| std::str::from_utf8(value.as_bytes()).ok());
     if let Some(given) = given.and_then(|text| text.strip_prefix("Bearer ")) {
-        return shared.access.of_bearer(given.trim(), peer.from).await.map(Some);
+        return shared.access.of_bearer(given.trim(), peer.from, route.urgency()).await.map(Some);
     }
     Ok(cookie(headers, name_of_cookie(peer))
         .and_then(|cookie| shared.access.of_cookie(cookie))
         .map(|(person, _)| person))
+}
+
+/// Whoever gives the machine back may say who he is with the request itself, signed in or not: `name` and `token`, as a form or as
+/// JSON.
+async fn named(shared: &ServerState, request: Request, peer: &Peer) -> Result<(Request, Option<Person>), ApiProblem> {
+    let (parts, body) = request.into_parts();
+    let broken = |error: axum::Error| ApiProblem::request(format!("the body broke off: {error}"), "send it again");
+    let bytes = axum::body::to_bytes(body, usize::MAX).await.map_err(broken)?;
+    let again = Request::from_parts(parts.clone(), Body::from(bytes.clone()));
+    let named = match serde_json::from_slice::<NameAndToken>(&bytes) {
+        Ok(named) => Some(named),
+        Err(_) => Form::<NameAndToken>::from_request(again, &()).await.ok().map(|Form(named)| named),
+    };
+    let person = match named {
+        None => None,
+        Some(NameAndToken { name, token }) => {
+            let token = Token::typed(&token);
+            let found = shared.access.check(&name, &token, peer.from, "disarmed", Urgency::GivesBack).await;
+            Some(found.map_err(|error| wrong(&error))?)
+        }
+    };
+    Ok((Request::from_parts(parts, Body::from(bytes)), person))
+}
+
+#[derive(Debug, Deserialize)]
+struct NameAndToken {
+    name: String,
+    token: String,
 }
 
 /// Why nobody was recognised.

@@ -110,19 +110,19 @@ fn now_s(shared: &ServerState) -> Result<u64, ApiProblem> {
     Ok(shared.status()?.at_ms.div_euclid(1000).unsigned_abs())
 }
 
-fn packed(files: &[ArchivedFile], at_s: u64) -> Result<Vec<u8>, ApiProblem> {
+fn pack_archive(files: &[ArchivedFile], at_s: u64) -> Result<Vec<u8>, ApiProblem> {
     pack(files, at_s)
         .map_err(|error| ApiProblem::unavailable(format!("no archive could be made: {error}"), "look at the disk"))
 }
 
-fn collected(places: &BackupPaths) -> Result<Vec<ArchivedFile>, ApiProblem> {
+fn collect_files(places: &BackupPaths) -> Result<Vec<ArchivedFile>, ApiProblem> {
     backup::collect(places).map_err(|error| trouble(&error))
 }
 
 /// `GET /api/v1/backup`
 async fn take(State(shared): State<ServerState>) -> Result<Response, ApiProblem> {
     let at_s = now_s(&shared)?;
-    let bytes = aside(move || packed(&collected(&shared.configured.places())?, at_s)).await?;
+    let bytes = aside(move || pack_archive(&collect_files(&shared.configured.places())?, at_s)).await?;
     Ok(download("application/gzip", &archive_name("backup", at_s), bytes))
 }
 
@@ -138,7 +138,7 @@ async fn restore(
             ApiProblem::request(format!("this is no backup: {error}"), "give the file that `Take a backup` has made")
         })?;
         let places = shared.configured.places();
-        let before = packed(&collected(&places)?, at_s)?;
+        let before = pack_archive(&collect_files(&places)?, at_s)?;
         let cannot =
             |what: String| ApiProblem::request(what, "nothing was changed; take the backup of a box of this version");
         let at_ns = i64::try_from(at_s).unwrap_or_default().saturating_mul(SECOND_NS);
@@ -162,7 +162,7 @@ async fn support(State(shared): State<ServerState>) -> Result<Response, ApiProbl
             files.push((name.to_owned(), text(&found)));
         }
         files.push(("about.txt".to_owned(), about().into_bytes()));
-        packed(&files, at_s)
+        pack_archive(&files, at_s)
     });
     Ok(download("application/gzip", &archive_name("support", at_s), bytes.await?))
 }

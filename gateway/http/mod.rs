@@ -9,6 +9,7 @@
 
 mod backtests;
 mod brought;
+mod configuration_file;
 mod connection;
 mod description;
 mod diagnoses;
@@ -183,6 +184,7 @@ const GROUPS: &[&[Route]] = &[
     diagnoses::ROUTES,
     brought::ROUTES,
     maintenance::ROUTES,
+    configuration_file::ROUTES,
     identified::ROUTES,
     operations::ROUTES,
     series::ROUTES,

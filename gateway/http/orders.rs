@@ -8,7 +8,7 @@ use super::person::{JsonBody, SignedIn};
 use super::plain;
 use super::problem::ApiProblem;
 use super::route::Route;
-use crate::access::{Person, Role, Token};
+use crate::access::{Person, Role, Token, Urgency};
 use crate::control::{Order, Reply};
 use axum::Json;
 use axum::extract::{Extension, State};
@@ -23,7 +23,7 @@ const BYTES_MAX: usize = 1024;
 
 pub(super) const ROUTES: &[Route] = &[
     Route::post(Role::Armer, "/api/v1/arm", BYTES_MAX, || post(arm)),
-    Route::post(Role::Viewer, "/api/v1/disarm", BYTES_MAX, || post(disarm)),
+    Route::post(Role::Viewer, "/api/v1/disarm", BYTES_MAX, || post(disarm)).gives_back(),
     Route::post(Role::Setter, "/api/v1/alarms/acknowledge", BYTES_MAX, || post(acknowledge)),
 ];
 
@@ -45,9 +45,10 @@ async fn arm(
         let hint = "arm at the box with `cnc-gateway arm --by NAME`, or write allow_arming = true under [http]";
         return Err(ApiProblem::forbidden("the gate cannot be armed from the page", hint));
     }
-    let again = shared.access.check(&person.name, &Token::typed(&wanted.token), peer.from, "armed").await;
+    let again =
+        shared.access.check(&person.name, &Token::typed(&wanted.token), peer.from, "armed", Urgency::Waits).await;
     again.map_err(|error| wrong(&error))?;
-    let order = Order::Arm { by: signed(&person, &peer), for_s: wanted.for_s };
+    let order = Order::Arm { by: format_author(&person, &peer), for_s: wanted.for_s };
     answer(shared.post.order(order).await, "look at [gate] in the configuration, and at the problems of /api/v1/status")
 }
 
@@ -58,7 +59,7 @@ async fn disarm(
     SignedIn(person): SignedIn,
     headers: HeaderMap,
 ) -> Result<Response, ApiProblem> {
-    let reply = shared.post.order(Order::Disarm { by: signed(&person, &peer) }).await;
+    let reply = shared.post.order(Order::Disarm { by: format_author(&person, &peer) }).await;
     match plain::wants_page(&headers) {
         true => Ok(Redirect::to("/plain").into_response()),
         false => answer(reply, "press the button at the machine's panel; the dial of the machine always works"),
@@ -79,7 +80,7 @@ async fn acknowledge(
     SignedIn(person): SignedIn,
     JsonBody(wanted): JsonBody<Acknowledge>,
 ) -> Result<Response, ApiProblem> {
-    let by = signed(&person, &peer);
+    let by = format_author(&person, &peer);
     let order = match wanted.code {
         Some(code) => Order::AcknowledgeAlarm { by, code },
         None => Order::Acknowledge { by },
@@ -88,7 +89,7 @@ async fn acknowledge(
 }
 
 /// The name as it stands in the audit.
-fn signed(person: &Person, peer: &Peer) -> String {
+fn format_author(person: &Person, peer: &Peer) -> String {
     format!("{} (from {})", person.name, peer.from)
 }
 

@@ -94,19 +94,37 @@ async fn sign_in(
     Query(asked): Query<LanguageQuery>,
     headers: HeaderMap,
 ) -> Response {
-    form(zh(&shared, &asked.lang, &headers), &asked.next, "")
+    form(zh(&shared, &asked.lang, &headers), &asked.next, "", "")
 }
 
 /// The form once more, with what was wrong.
 pub(super) fn sign_in_again(shared: &ServerState, headers: &HeaderMap, next: &str, problem: &ApiProblem) -> Response {
     let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::UNAUTHORIZED);
     let trouble = format!("{}. {}", problem.title, problem.hint);
-    let mut answer = form(zh(shared, "", headers), next, &trouble);
+    let zh = zh(shared, "", headers);
+    // Nobody is kept from giving the machine back.
+    let back = if status == StatusCode::TOO_MANY_REQUESTS { give_back(zh) } else { String::new() };
+    let mut answer = form(zh, next, &trouble, &back);
     *answer.status_mut() = status;
     answer
 }
 
-fn form(zh: bool, next: &str, trouble: &str) -> Response {
+/// The form by which a person gives the machine back without signing in.
+fn give_back(zh: bool) -> String {
+    let say = |en: &'static str, cn: &'static str| if zh { cn } else { en };
+    format!(
+        "<h2>{back}</h2><p>{hint}</p><form method=\"post\" action=\"/api/v1/disarm\">\
+         <label>{name}<input name=\"name\" autocomplete=\"username\" required></label>\
+         <label>{token}<input name=\"token\" type=\"password\" autocomplete=\"current-password\" required></label>\
+         <button class=\"stop\">{back}</button></form>",
+        back = say("Back to the dial", "恢复面板倍率"),
+        hint = say("This always works with the right token.", "令牌正确时始终有效。"),
+        name = say("Name", "姓名"),
+        token = say("Token", "令牌"),
+    )
+}
+
+fn form(zh: bool, next: &str, trouble: &str, more: &str) -> Response {
     let say = |en: &'static str, cn: &'static str| if zh { cn } else { en };
     let next = escape(if local(next) { next } else { "/" });
     let trouble =
@@ -115,7 +133,7 @@ fn form(zh: bool, next: &str, trouble: &str) -> Response {
         "<h1>{title}</h1>{trouble}<form method=\"post\" action=\"/api/v1/login\"><input type=\"hidden\" name=\"next\" value=\"{next}\">\
          <label>{name}<input name=\"name\" autocomplete=\"username\" required autofocus></label>\
          <label>{token}<input name=\"token\" type=\"password\" autocomplete=\"current-password\" required></label>\
-         <button>{title}</button></form><p>{hint}</p>",
+         <button>{title}</button></form><p>{hint}</p>{more}",
         title = say("Sign in", "登录"),
         name = say("Name", "姓名"),
         token = say("Token", "令牌"),

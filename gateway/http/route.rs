@@ -6,7 +6,7 @@
 //! alone, whatever handler it was given.
 
 use super::ServerState;
-use crate::access::Role;
+use crate::access::{Role, Urgency};
 use axum::http::Method;
 use axum::routing::MethodRouter;
 
@@ -64,48 +64,61 @@ pub struct Route {
     needs: Needs,
     body_max: usize,
     answers: Answers,
+    urgency: Urgency,
 }
 
 impl Route {
     /// `GET` that shows something of the machine or the box.
     #[must_use]
     pub const fn read(path: &'static str, answers: Answers) -> Self {
-        Self { verb: Verb::Get, path, needs: Needs::Reading, body_max: 0, answers }
+        Self { verb: Verb::Get, path, needs: Needs::Reading, body_max: 0, answers, urgency: Urgency::Waits }
     }
 
     /// `GET` that shows something to persons of this role only.
     #[must_use]
     pub const fn read_by(role: Role, path: &'static str, answers: Answers) -> Self {
-        Self { verb: Verb::Get, path, needs: Needs::Role(role), body_max: 0, answers }
+        Self { verb: Verb::Get, path, needs: Needs::Role(role), body_max: 0, answers, urgency: Urgency::Waits }
     }
 
     /// `GET` of something that says nothing of the machine: a file of the page, the health of the box.
     #[must_use]
     pub const fn file(path: &'static str, answers: Answers) -> Self {
-        Self { verb: Verb::Get, path, needs: Needs::Nothing, body_max: 0, answers }
+        Self { verb: Verb::Get, path, needs: Needs::Nothing, body_max: 0, answers, urgency: Urgency::Waits }
     }
 
     /// `POST` by a person of at least this role, with a body of at most so many bytes.
     #[must_use]
     pub const fn post(role: Role, path: &'static str, body_max: usize, answers: Answers) -> Self {
-        Self { verb: Verb::Post, path, needs: Needs::Role(role), body_max, answers }
+        Self { verb: Verb::Post, path, needs: Needs::Role(role), body_max, answers, urgency: Urgency::Waits }
     }
 
     /// `PUT` by a person of at least this role, with a body of at most so many bytes.
     #[must_use]
     pub const fn put(role: Role, path: &'static str, body_max: usize, answers: Answers) -> Self {
-        Self { verb: Verb::Put, path, needs: Needs::Role(role), body_max, answers }
+        Self { verb: Verb::Put, path, needs: Needs::Role(role), body_max, answers, urgency: Urgency::Waits }
     }
 
     /// `DELETE` by a person of at least this role, with a body of at most so many bytes.
     #[must_use]
     pub const fn delete(role: Role, path: &'static str, body_max: usize, answers: Answers) -> Self {
-        Self { verb: Verb::Delete, path, needs: Needs::Role(role), body_max, answers }
+        Self { verb: Verb::Delete, path, needs: Needs::Role(role), body_max, answers, urgency: Urgency::Waits }
     }
 
     /// The one `POST` that nobody can be signed in for: signing in itself.
     pub(super) const fn sign_in(path: &'static str, body_max: usize, answers: Answers) -> Self {
-        Self { verb: Verb::Post, path, needs: Needs::Nothing, body_max, answers }
+        Self { verb: Verb::Post, path, needs: Needs::Nothing, body_max, answers, urgency: Urgency::Waits }
+    }
+
+    /// The same for whoever gives the machine back to its dial: nobody is made to wait.
+    #[must_use]
+    pub const fn gives_back(self) -> Self {
+        Self { urgency: Urgency::GivesBack, ..self }
+    }
+
+    /// May whoever asks be made to wait?
+    #[must_use]
+    pub const fn urgency(&self) -> Urgency {
+        self.urgency
     }
 
     /// The method.

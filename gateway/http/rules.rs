@@ -150,11 +150,11 @@ async fn trials(
     JsonBody(edited): JsonBody<EditedScript>,
 ) -> Result<Json<Value>, ApiProblem> {
     named(&name)?;
-    aside(move || Ok(Json(tried(&shared, &name, &edited.text)))).await
+    aside(move || Ok(Json(trials_to_json(&shared, &name, &edited.text)))).await
 }
 
 /// The trials of one text, as `rules test --json` tells them.
-fn tried(shared: &ServerState, name: &str, text: &str) -> Value {
+fn trials_to_json(shared: &ServerState, name: &str, text: &str) -> Value {
     let file = ScriptFile { name: name.to_owned(), text: text.to_owned() };
     let files = with(on_disk(shared).unwrap_or_default(), name, text);
     let (results, found) = match script::compile_one(&file, &files, &values(shared)) {
@@ -254,7 +254,7 @@ async fn activate(
         still_newest(&drafts, &files, &name, &edited.digest)?;
         let before = files.iter().find(|file| file.name == name).map(|file| file.text.clone());
         if let Err(found) = script::prepare_with(&with(files, &name, &edited.text), &values(&shared)) {
-            return Ok(refused(&shared, &name, &edited.text, &found));
+            return Ok(build_refusal(&shared, &name, &edited.text, &found));
         }
         let (at_ms, by) = (now_ms(&shared), person.name);
         if let Some(text) = before.clone().filter(|_| drafts.versions(&name).is_empty()) {
@@ -271,8 +271,8 @@ async fn activate(
     .await
 }
 
-fn refused(shared: &ServerState, name: &str, text: &str, found: &[ScriptProblem]) -> Response {
-    let mut document = tried(shared, name, text);
+fn build_refusal(shared: &ServerState, name: &str, text: &str, found: &[ScriptProblem]) -> Response {
+    let mut document = trials_to_json(shared, name, text);
     document["status"] = json!(422);
     document["title"] = json!("it does not come into charge: not every trial passes");
     document["hint"] = json!("it stays a draft; the version in charge goes on");

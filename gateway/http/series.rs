@@ -15,7 +15,7 @@ pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/series", || get(serie
 async fn series(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     QueryKeys::of(pairs, &[])?;
     reading(shared, |reader, _| {
-        let span = reader.span().map_err(|error| trouble(&error))?;
+        let span = reader.present().map_err(|error| trouble(&error))?;
         let known = reader.series().map_err(|error| trouble(&error))?;
         let rows: Vec<Value> = known
             .iter()

@@ -47,7 +47,7 @@ struct SettingRequest {
 }
 
 impl SettingRequest {
-    fn wanted(self) -> Result<NewSetting, ApiProblem> {
+    fn into_new_setting(self) -> Result<NewSetting, ApiProblem> {
         let place = match (self.tool, self.operation) {
             (None, None) => DeclarationPlace::Machine,
             (Some(tool), None) => DeclarationPlace::Tool(tool),
@@ -65,7 +65,7 @@ impl SettingRequest {
     }
 }
 
-fn refused(problems: &[ScriptProblem]) -> ApiProblem {
+fn settings_problem(problems: &[ScriptProblem]) -> ApiProblem {
     let what: Vec<&str> = problems.iter().map(|problem| problem.what.as_str()).collect();
     let next = problems.iter().map(|problem| problem.next.as_str()).find(|next| !next.is_empty());
     ApiProblem::request(what.join("; "), next.unwrap_or("GET /api/v1/settings lists every setting with its range"))
@@ -73,7 +73,7 @@ fn refused(problems: &[ScriptProblem]) -> ApiProblem {
 
 fn not_set(why: Refused) -> ApiProblem {
     match why {
-        Refused::Problems(problems) => refused(&problems),
+        Refused::Problems(problems) => settings_problem(&problems),
         Refused::Meanwhile { path, now, by } => {
             let now = if now.is_empty() { "not chosen".to_owned() } else { now };
             let title = format!("{path} was changed meanwhile by {by}: it is {now} now");
@@ -101,7 +101,7 @@ async fn changes(shared: &ServerState) -> Vec<Value> {
 async fn list(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     let changes = changes(&shared).await;
     aside(move || {
-        let declared = declarations(&on_disk(&shared)?).map_err(|problems| refused(&problems))?;
+        let declared = declarations(&on_disk(&shared)?).map_err(|problems| settings_problem(&problems))?;
         Ok(Json(settings::document(declared.iter(), &super::rules::values(&shared), &changes)))
     })
     .await
@@ -113,12 +113,12 @@ async fn change(
     SignedIn(person): SignedIn,
     JsonBody(asked): JsonBody<SettingRequest>,
 ) -> Result<Response, ApiProblem> {
-    let wanted = asked.wanted()?;
+    let wanted = asked.into_new_setting()?;
     let changes = changes(&shared).await;
     aside(move || {
         let files = on_disk(&shared)?;
         let words = settings::set(&shared.data_dir, &files, &wanted, &person.name).map_err(not_set)?;
-        let declared = declarations(&files).map_err(|problems| refused(&problems))?;
+        let declared = declarations(&files).map_err(|problems| settings_problem(&problems))?;
         let answer = settings::document(declared.iter(), &super::rules::values(&shared), &changes);
         Ok(told(Json(answer), words))
     })

@@ -4,6 +4,7 @@ use super::ServerState;
 use super::history::{Answer, HistoryQuery, reading, trouble};
 use super::query::QueryKeys;
 use super::route::Route;
+use crate::diagnosis::beside::BesideModel;
 use crate::diagnosis::store::{self, DiagnosisFile, DiagnosisStore};
 use crate::history::{Diagnosis, RecordSpan};
 use adapters::clock::TimeNs;
@@ -48,8 +49,27 @@ fn diagnosis(found: &Diagnosis, kept: Option<&DiagnosisStore>) -> Value {
         "model": model,
         "key": key,
         "steps": words.as_ref().map(|words| &words.steps),
+        "beside": words.as_ref().map(|words| words.beside.iter().map(beside).collect::<Vec<Value>>()),
         "minutes": words.as_ref().and_then(|words| words.minutes),
         "effects": words.as_ref().map(|words| &words.effects),
         "diagnosis": serde_json::from_str::<Value>(&found.json).unwrap_or(Value::Null),
+    })
+}
+
+/// The diagnosis beside the watch: figures in the unit of the output that add up to the difference.
+fn beside(one: &BesideModel) -> Value {
+    json!({
+        "regime": one.regime.word(),
+        "from_ms": one.from_ns.div_euclid(1_000_000),
+        "seconds": one.seconds,
+        "expected": one.expected,
+        "difference": one.difference,
+        "by_parameters": one.by_parameters,
+        "by_effects": one.by_effects.iter().map(|(effect, share)| json!({ "effect": effect, "difference": share })).collect::<Vec<_>>(),
+        "left": one.left,
+        "differs": one.differs(),
+        "of_parameters": one.is_of_parameters(),
+        "text": one.en,
+        "zh": one.zh,
     })
 }

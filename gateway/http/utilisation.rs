@@ -93,7 +93,7 @@ async fn utilisation(State(shared): State<ServerState>, Pairs(pairs): HistoryQue
     reading(shared, move |reader, newest_ns| {
         let (from_ns, to_ns) = range(&keys, newest_ns)?;
         let hours = hours(reader, from_ns, to_ns, newest_ns)?;
-        let rows = gathered(&hours, &by, offset_min);
+        let rows = group_hours(&hours, &by, offset_min);
         Ok(json!({
             "schema": "utilisation/1",
             "from_ms": from_ns.div_euclid(1_000_000),
@@ -128,7 +128,7 @@ fn seconds(ns: i64) -> f64 {
 }
 
 /// Seconds per state, by beginning.
-fn gathered(hours: &[StateHour], by: &GroupBy, offset_min: i64) -> Vec<Value> {
+fn group_hours(hours: &[StateHour], by: &GroupBy, offset_min: i64) -> Vec<Value> {
     let mut rows: BTreeMap<i64, BTreeMap<&str, f64>> = BTreeMap::new();
     for hour in hours {
         let local = hour.start_ns.div_euclid(MINUTE_NS) + offset_min;
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn hours_are_added_up_by_local_day() {
         let hour = |at: i64, seconds| StateHour { start_ns: at * HOUR_NS, state: "idle".to_owned(), seconds };
-        let rows = gathered(&[hour(15, 100.0), hour(16, 200.0), hour(40, 50.0)], &GroupBy::Day, 8 * 60);
+        let rows = group_hours(&[hour(15, 100.0), hour(16, 200.0), hour(40, 50.0)], &GroupBy::Day, 8 * 60);
         let told: Vec<_> = rows.iter().map(|row| (row["from_ms"].as_i64(), row["total_s"].as_f64())).collect();
         let day_ms = 86_400_000;
         let eight_h_ms = 8 * 3_600_000;

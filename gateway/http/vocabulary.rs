@@ -9,7 +9,7 @@ use rules::estimators::State;
 use serde_json::{Map, Value, json};
 
 /// Quantities that are inferred: name, unit, English, Chinese.
-pub const ESTIMATES: [(&str, &str, &str, &str); 10] = [
+pub const ESTIMATES: [(&str, &str, &str, &str); 15] = [
     ("filtered_power_w", "W", "Spindle power, filtered", "滤波后的主轴功率"),
     ("no_load_power_w", "W", "No-load power at this speed", "空载功率"),
     ("cutting_power_w", "W", "Cutting power", "切削功率"),
@@ -20,10 +20,15 @@ pub const ESTIMATES: [(&str, &str, &str, &str); 10] = [
     ("tool_growth_pct", "%", "Rise of the cutting power by wear", "磨损引起的功率增量"),
     ("tool_worn_probability", "1", "Probability that the edge is worn after the next part", "下一件后刀刃磨损概率"),
     ("tool_parts_left", "1", "Parts until the edge is worn", "剩余可加工件数"),
+    ("material_level_pct", "%", "By how much the material takes more than usual", "材料比平常多耗的功率"),
+    ("tool_limit_parts", "1", "Parts in a row above the limit of the wear model", "连续超过磨损阈值的工件数"),
+    ("tool_life_share", "1", "Cut by this edge over what the edges before it had cut", "切削量与以往刀刃寿命之比"),
+    ("feed_in_force_pct", "%", "Feed in force at the machine, of the programmed feed", "机床生效的进给倍率"),
+    ("learned_power_w", "W", "Cutting power learned at this place of the program", "程序此处的示教切削功率"),
 ];
 
 /// Why an estimate is missing: word, English, Chinese. The full reason stands beside the estimate.
-const NO_ESTIMATES: [(&str, &str, &str); 23] = [
+const NO_ESTIMATES: [(&str, &str, &str); 29] = [
     ("not_yet", "no sample yet", "尚无采样"),
     ("input_missing", "an input is missing", "缺少输入"),
     ("spindle_stopped", "spindle stands still", "主轴静止"),
@@ -37,7 +42,13 @@ const NO_ESTIMATES: [(&str, &str, &str); 23] = [
     ("cut_unknown", "depth or diameter not known", "切削参数未知"),
     ("outside_model", "outside the cuts of the model", "超出模型范围"),
     ("not_observable", "wear cannot be seen in this cut", "此切削中不可观测"),
-    ("no_part_yet", "no part of this edge finished yet", "该刀刃尚未完成一件"),
+    ("no_part_yet", "no part finished yet", "尚未完成一件"),
+    ("feed_unknown", "feed not known", "进给未知"),
+    ("no_target", "no load is aimed at", "未设定目标负荷"),
+    ("load_unknown", "the load is not measured", "负荷未测量"),
+    ("place_not_learned", "not learned at this place yet", "此处尚未示教"),
+    ("nothing_to_change", "the programmed feed is right", "无需调整进给"),
+    ("power_unknown", "no power was measured", "未测得功率"),
     ("not_cutting", "nothing is being cut", "未切削"),
     ("output_missing", "the measured value is missing", "缺少测量值"),
     ("too_few_transients", "too few changes of spindle speed without cutting", "未切削时的主轴变速次数不足"),

@@ -5,7 +5,10 @@
 //!
 //! Neither stream keeps anybody waiting: a thread of its own writes to each, see `outlet`.
 
+mod crash;
 mod outlet;
+
+pub use crash::{FOLDER as CRASH_FOLDER, keep_crash_reports};
 
 use outlet::Outlet;
 use std::io::Write;
@@ -143,9 +146,9 @@ impl Drop for LogLine {
     }
 }
 
-/// The wall clock as `14:03:22Z`.
+/// The time of the box as `14:03:22Z`.
 fn clock_text() -> String {
-    jiff::Timestamp::now().strftime("%H:%M:%SZ").to_string()
+    crate::moment::utc(crate::clock::now_ns()).get(11..19).map_or_else(String::new, |time| format!("{time}Z"))
 }
 
 /// Starts the engineer's log. A second call in one process changes nothing.

@@ -152,7 +152,7 @@ impl Connection {
         Ok(refusal(&document).map_or(Ok(document), Err))
     }
 
-    async fn asked(&mut self, what: &str, request: &Json) -> Result<Json, NatsError> {
+    async fn call_api_or_fail(&mut self, what: &str, request: &Json) -> Result<Json, NatsError> {
         self.api(what, request).await?.map_err(|(code, said)| words::of_jetstream(code, &said))
     }
 
@@ -161,7 +161,7 @@ impl Connection {
     /// # Errors
     /// There is none, JetStream is not there, or the connection is over.
     pub async fn stream_of(&mut self, subject: &str) -> Result<String, NatsError> {
-        let answer = self.asked("STREAM.NAMES", &json!({"subject": subject})).await?;
+        let answer = self.call_api_or_fail("STREAM.NAMES", &json!({"subject": subject})).await?;
         let name = answer["streams"].as_array().and_then(|names| names.first()?.as_str());
         name.map(str::to_owned).ok_or_else(|| words::no_stream(subject))
     }
@@ -183,7 +183,7 @@ impl Connection {
             "duplicate_window": nanoseconds(settings.duplicate_window.min(settings.max_age)),
             "max_msgs": -1, "max_consumers": -1, "max_msg_size": -1,
         });
-        self.asked(&format!("STREAM.CREATE.{name}"), &request).await.map(|_created| true)
+        self.call_api_or_fail(&format!("STREAM.CREATE.{name}"), &request).await.map(|_created| true)
     }
 
     /// Messages and bytes in a stream.
@@ -191,7 +191,7 @@ impl Connection {
     /// # Errors
     /// What JetStream says.
     pub async fn stream_size(&mut self, name: &str) -> Result<(u64, u64), NatsError> {
-        let answer = self.asked(&format!("STREAM.INFO.{name}"), &json!({})).await?;
+        let answer = self.call_api_or_fail(&format!("STREAM.INFO.{name}"), &json!({})).await?;
         let number = |key: &str| answer["state"][key].as_u64().unwrap_or(0);
         Ok((number("messages"), number("bytes")))
     }
@@ -206,7 +206,7 @@ impl Connection {
             "durable_name": name, "ack_policy": "explicit", "deliver_policy": "all", "replay_policy": "instant",
             "ack_wait": nanoseconds(ACKNOWLEDGE_WITHIN), "max_deliver": -1, "max_ack_pending": UNDER_WAY_MAX,
         }});
-        self.asked(&format!("CONSUMER.DURABLE.CREATE.{stream}.{name}"), &request).await.map(drop)
+        self.call_api_or_fail(&format!("CONSUMER.DURABLE.CREATE.{stream}.{name}"), &request).await.map(drop)
     }
 
     /// How far the readers of a consumer are behind.
@@ -214,7 +214,7 @@ impl Connection {
     /// # Errors
     /// What JetStream says.
     pub async fn backlog(&mut self, stream: &str, consumer: &str) -> Result<Backlog, NatsError> {
-        let answer = self.asked(&format!("CONSUMER.INFO.{stream}.{consumer}"), &json!({})).await?;
+        let answer = self.call_api_or_fail(&format!("CONSUMER.INFO.{stream}.{consumer}"), &json!({})).await?;
         let number = |key: &str| answer[key].as_u64().unwrap_or(0);
         Ok(Backlog { pending: number("num_pending"), under_way: number("num_ack_pending") })
     }

@@ -1,18 +1,24 @@
-//! What is stored beside the channels: the state and the estimates worth keeping, each with its uncertainty.
+//! What is stored beside the channels: the state and the estimates worth keeping, each with its uncertainty, and no finer than
+//! that uncertainty makes sense of.
 //!
-//! Filtered power and load loss follow from these and the channels, and are not stored.
+//! An estimate that is known to within watts has no tenths of a watt; a standard deviation is known to within a tenth of itself.
+//! Digits beyond that are noise, which no compression takes away: they were a third of the bytes of a tick.
 
 use crate::history::{ExtraSeries, ExtraValue, STATE_SERIES};
-use rules::estimators::{Estimated, Estimates};
+use rules::estimators::{Estimated, Estimates, NoEstimate};
 use rules::script::Host;
 
 /// How many series there are.
-const COUNT: usize = 13;
+const COUNT: usize = 14;
+/// A deviation or a least visible power is stored anew when it differs by this share from the one that was stored.
+const DEVIATION_STEP: f64 = 0.1;
+/// Numbers that are stored so.
+const DEVIATIONS: usize = 5;
 
-/// The series, in the order of [`values`].
+/// The series, in the order of `StoredEstimates::values`.
 #[must_use]
 pub fn series() -> Vec<ExtraSeries> {
-    let watts = |name, en, zh| ExtraSeries::number(name, "W", en, zh);
+    let watts = |name, en, zh| ExtraSeries { decimals: Some(0), ..ExtraSeries::number(name, "W", en, zh) };
     vec![
         ExtraSeries::text(STATE_SERIES, "Machine state", "机床状态"),
         watts("no_load_power_w", "No-load power at this speed", "空载功率"),
@@ -20,6 +26,7 @@ pub fn series() -> Vec<ExtraSeries> {
         watts("cutting_power_w", "Cutting power", "切削功率"),
         watts("cutting_power_sd_w", "Standard deviation of the cutting power", "切削功率标准差"),
         watts("visible_cutting_power_w", "Least visible cutting power", "最小可见切削功率"),
+        watts("load_loss_w", "Load loss", "负载损耗"),
         watts("wear_limit_w", "Limit of the cutting power for a worn edge", "磨损阈值功率"),
         ExtraSeries::number("tool_wear_mm", "mm", "Flank wear of the edge", "后刀面磨损量"),
         ExtraSeries::number("tool_wear_sd_mm", "mm", "Standard deviation of the flank wear", "磨损量标准差"),
@@ -33,6 +40,54 @@ pub fn series() -> Vec<ExtraSeries> {
         ExtraSeries::number("tool_parts_left", "1", "Parts until the edge is worn", "剩余可加工件数"),
         ExtraSeries::number("tool_parts_left_sd", "1", "Standard deviation of the parts left", "剩余件数标准差"),
     ]
+}
+
+/// What the history was given last, where it is given anew only when it has changed by enough.
+#[derive(Debug, Default)]
+pub(super) struct StoredEstimates {
+    deviations: [f64; DEVIATIONS],
+}
+
+impl StoredEstimates {
+    /// The values of one tick.
+    pub(super) fn values(&mut self, estimates: &Estimates) -> [ExtraValue<'static>; COUNT] {
+        let value = |estimated: Estimated| match estimated {
+            Ok(estimate) => ExtraValue::Number(estimate.value),
+            Err(reason) => ExtraValue::Missing(reason.word()),
+        };
+        let mut stored = self.deviations.iter_mut();
+        let mut coarse = |number: Result<f64, NoEstimate>| match (number, stored.next()) {
+            (Ok(number), Some(stored)) => ExtraValue::Number(step(stored, number)),
+            (Ok(number), None) => ExtraValue::Number(number),
+            (Err(reason), _) => ExtraValue::Missing(reason.word()),
+        };
+        let sd = |estimated: Estimated| estimated.map(|it| it.sd);
+        [
+            ExtraValue::Text(estimates.state.word()),
+            value(estimates.no_load_power_w),
+            coarse(sd(estimates.no_load_power_w)),
+            value(estimates.cutting_power_w),
+            coarse(sd(estimates.cutting_power_w)),
+            coarse(estimates.visible_cutting_power_w.map(|it| it.value)),
+            value(estimates.load_loss_w),
+            value(estimates.wear_limit_w),
+            value(estimates.tool_wear_mm),
+            coarse(sd(estimates.tool_wear_mm)),
+            value(estimates.tool_growth_pct),
+            value(estimates.tool_worn_probability),
+            value(estimates.tool_parts_left),
+            coarse(sd(estimates.tool_parts_left)),
+        ]
+    }
+}
+
+/// The deviation that was stored, until the one in force differs from it by enough; then that one, in two digits.
+fn step(stored: &mut f64, sd: f64) -> f64 {
+    if (sd - *stored).abs() > DEVIATION_STEP * stored.abs() {
+        let unit = 10_f64.powf(sd.abs().max(f64::MIN_POSITIVE).log10().floor() - 1.0);
+        *stored = (sd / unit).round() * unit;
+    }
+    *stored
 }
 
 /// The channels of the scripts' own that are stored: those of the scripts in charge when the box started.
@@ -50,40 +105,21 @@ pub(super) fn own_value(scripts: &Host, name: &str) -> ExtraValue<'static> {
     value.map_or(ExtraValue::Missing("not_published"), ExtraValue::Number)
 }
 
-/// The values of one tick.
-#[must_use]
-pub fn values(estimates: &Estimates) -> [ExtraValue<'static>; COUNT] {
-    let value = |estimated: Estimated| match estimated {
-        Ok(estimate) => ExtraValue::Number(estimate.value),
-        Err(reason) => ExtraValue::Missing(reason.word()),
-    };
-    let sd = |estimated: Estimated| match estimated {
-        Ok(estimate) => ExtraValue::Number(estimate.sd),
-        Err(reason) => ExtraValue::Missing(reason.word()),
-    };
-    [
-        ExtraValue::Text(estimates.state.word()),
-        value(estimates.no_load_power_w),
-        sd(estimates.no_load_power_w),
-        value(estimates.cutting_power_w),
-        sd(estimates.cutting_power_w),
-        value(estimates.visible_cutting_power_w),
-        value(estimates.wear_limit_w),
-        value(estimates.tool_wear_mm),
-        sd(estimates.tool_wear_mm),
-        value(estimates.tool_growth_pct),
-        value(estimates.tool_worn_probability),
-        value(estimates.tool_parts_left),
-        sd(estimates.tool_parts_left),
-    ]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn every_series_has_its_value() {
-        assert_eq!(series().len(), values(&Estimates::none(0)).len());
+        assert_eq!(series().len(), StoredEstimates::default().values(&Estimates::none(0)).len());
+    }
+
+    #[test]
+    fn a_deviation_is_stored_anew_when_it_has_changed_by_a_tenth() {
+        let mut stored = 0.0;
+        let seen = [13.37, 13.9, 14.2, 14.6, 14.4, 0.0, 0.0213].map(|sd| step(&mut stored, sd));
+        for (seen, wanted) in seen.into_iter().zip([13.0, 13.0, 13.0, 15.0, 15.0, 0.0, 0.021]) {
+            assert!((seen - wanted).abs() < 1e-12, "{seen} for {wanted}");
+        }
     }
 }

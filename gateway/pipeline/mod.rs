@@ -10,22 +10,28 @@ mod journal;
 mod part_detail;
 mod parts;
 mod tally;
+mod wear_news;
 
 pub use channels::Channels;
 pub use decide::{Decisions, ShownChange};
-use extras::{own, own_value};
-pub use extras::{series as stored_series, values as stored_values};
+pub use extras::series as stored_series;
+use extras::{StoredEstimates, own, own_value};
 pub use journal::Journal;
 pub use part_detail::{OperationUse, PartDetail, ToolUse};
 pub use parts::CycleFollower;
 pub use tally::Tally;
 
 use crate::gate::{Gate, OffsetVerdict, Verdict, offset};
-use crate::history::{ExtraSeries, ExtraValue, Record};
+use crate::history::{Event, ExtraSeries, ExtraValue, Part, Record};
+use crate::log::Notice;
 use adapters::Sample;
+use adapters::clock::TimeNs;
 use rules::estimators::wear::WearEstimator;
 use rules::estimators::{self, Estimates};
 use rules::script::{Host, OffsetProposal, OverrideRequest};
+
+/// Who writes the events about the wear.
+const WEAR: &str = "wear";
 
 /// Where a tick leaves what is to be remembered.
 pub trait Store {
@@ -34,6 +40,18 @@ pub trait Store {
 
     /// Something that happened at this tick; always after the tick's sample.
     fn record(&mut self, record: Record);
+
+    /// Something to tell; a live box also writes it into its log.
+    fn notice(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
+        self.record(event_of(at_ns, source, notice).into());
+    }
+}
+
+/// A notice as a row of the history.
+#[must_use]
+pub fn event_of(at_ns: TimeNs, source: &str, notice: &Notice) -> Event {
+    let detail = if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
+    Event { at_ns, kind: notice.code.to_owned(), source: source.to_owned(), text: notice.operator.clone(), detail }
 }
 
 /// Remembers nothing.
@@ -56,12 +74,15 @@ pub struct Pipeline {
     /// Channels of the scripts' own that are stored.
     own: Vec<ExtraSeries>,
     extras: Vec<ExtraValue<'static>>,
+    stored: StoredEstimates,
     generation: u64,
     gate: Gate,
     verdict: Option<Verdict>,
     decisions: Decisions,
     journal: Journal,
     parts: CycleFollower,
+    /// The part that this tick has finished.
+    finished: Option<Part>,
     tally: Tally,
     /// What the box itself proposes at this tick.
     proposal: Option<OffsetProposal>,
@@ -81,6 +102,7 @@ impl Pipeline {
             wear: WearEstimator::default(),
             own: own(&scripts),
             extras: Vec::new(),
+            stored: StoredEstimates::default(),
             generation: scripts.generation(),
             scripts,
             gate,
@@ -88,6 +110,7 @@ impl Pipeline {
             decisions: Decisions::default(),
             journal: Journal::default(),
             parts: CycleFollower::default(),
+            finished: None,
             tally: Tally::default(),
             proposal: None,
             request: None,
@@ -133,9 +156,12 @@ impl Pipeline {
 
     /// The second half of a tick: decides.
     pub fn decide(&mut self, sample: &Sample) {
+        self.finished = self.parts.step(&self.channels, sample, &self.estimates);
+        self.estimates.part = self.parts.figures();
         let estimates = self.estimates;
         self.tally.step(sample.at_ns, estimates.state);
-        self.scripts.tick(sample, &estimates);
+        let decision = self.scripts.tick(sample, &estimates);
+        decision.learn_anew.iter().for_each(|program| self.estimators.learn_load_anew(program));
         if let Some(request) = self.request.take() {
             self.scripts.request(request);
         }
@@ -150,12 +176,15 @@ impl Pipeline {
         let Some(verdict) = self.verdict else { return };
         let estimates = self.estimates;
         self.extras.clear();
-        self.extras.extend(stored_values(&estimates));
+        self.extras.extend(self.stored.values(&estimates));
         self.extras.extend(self.own.iter().map(|series| own_value(&self.scripts, &series.name)));
         store.sample(sample, &self.extras);
         self.journal.step(&self.channels, sample, &estimates, |record| store.record(record));
         self.decisions.step(self.scripts.decision(), &verdict, |record| store.record(record));
-        if let Some(part) = self.parts.step(&self.channels, sample, &estimates) {
+        for news in self.wear.take_news() {
+            store.notice(sample.at_ns, WEAR, &wear_news::notice(&news));
+        }
+        if let Some(part) = self.finished.take() {
             store.record(part.into());
         }
     }

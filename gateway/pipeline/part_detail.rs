@@ -172,7 +172,7 @@ impl Gathering {
         let done = std::mem::take(self);
         let named = State::ALL.iter().zip(done.seconds).filter(|(_, seconds)| *seconds > 0.0);
         PartDetail {
-            seconds: named.map(|(state, seconds)| (state.word().to_owned(), rounded(seconds, 1.0))).collect(),
+            seconds: named.map(|(state, seconds)| (state.word().to_owned(), round_value(seconds, 1.0))).collect(),
             peak_power_w: done.peak_power_w,
             tools: done.tools.into_iter().map(ToolUse::of).collect(),
             operations: match &done.operations[..] {
@@ -188,11 +188,11 @@ impl ToolUse {
         Self {
             tool: tool_of(&tool.name).to_owned(),
             edge: if tool_of(&tool.name) == tool.name { String::new() } else { tool.name },
-            cutting_s: rounded(tool.cutting_s, 1.0),
-            cutting_power_w: tool.power.value().map(|watts| rounded(watts, 1.0)),
-            limit_w: tool.limit.value().map(|watts| rounded(watts, 1.0)),
-            wear_mm: tool.wear.value().map(|mm| rounded(mm, 4.0)),
-            wear_uncertainty_mm: tool.wear_uncertainty.value().map(|mm| rounded(mm, 4.0)),
+            cutting_s: round_value(tool.cutting_s, 1.0),
+            cutting_power_w: tool.power.value().map(|watts| round_value(watts, 1.0)),
+            limit_w: tool.limit.value().map(|watts| round_value(watts, 1.0)),
+            wear_mm: tool.wear.value().map(|mm| round_value(mm, 4.0)),
+            wear_uncertainty_mm: tool.wear_uncertainty.value().map(|mm| round_value(mm, 4.0)),
         }
     }
 }
@@ -202,16 +202,16 @@ impl OperationUse {
         let known = operation.power.seconds > 0.0;
         Self {
             operation: operation.name,
-            seconds: rounded(operation.seconds, 1.0),
-            cutting_s: rounded(operation.cutting_s, 1.0),
-            energy_j: known.then(|| rounded(operation.power.sum, 0.0)),
-            mean_power_w: operation.power.value().map(|watts| rounded(watts, 1.0)),
+            seconds: round_value(operation.seconds, 1.0),
+            cutting_s: round_value(operation.cutting_s, 1.0),
+            energy_j: known.then(|| round_value(operation.power.sum, 0.0)),
+            mean_power_w: operation.power.value().map(|watts| round_value(watts, 1.0)),
         }
     }
 }
 
 /// To so many places, for short texts in the history.
-fn rounded(value: f64, places: f64) -> f64 {
+fn round_value(value: f64, places: f64) -> f64 {
     let scale = 10_f64.powf(places);
     (value * scale).round() / scale
 }

@@ -5,7 +5,7 @@ use super::part_detail::Gathering;
 use crate::history::Part;
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
-use rules::estimators::{Estimates, State};
+use rules::estimators::{Estimates, NoEstimate, PartFigures, State};
 use std::sync::Arc;
 
 /// Longer steps between two ticks are pauses in which nothing is integrated.
@@ -24,6 +24,8 @@ pub struct CycleFollower {
     cutting_s: f64,
     energy_j: f64,
     energy_known: bool,
+    cutting_energy_j: f64,
+    idle_s: f64,
     /// The last power, W, and for how long there has been none since, s.
     last_power_w: Option<f64>,
     silent_s: f64,
@@ -31,6 +33,7 @@ pub struct CycleFollower {
     program: Option<Arc<str>>,
     gathering: Gathering,
     finished: u64,
+    last: Option<PartFigures>,
 }
 
 impl CycleFollower {
@@ -38,6 +41,12 @@ impl CycleFollower {
     #[must_use]
     pub fn finished(&self) -> u64 {
         self.finished
+    }
+
+    /// Of the part that was finished last.
+    #[must_use]
+    pub fn figures(&self) -> PartFigures {
+        self.last.unwrap_or(PartFigures::none())
     }
 
     /// Takes one tick; gives the part that it finishes.
@@ -85,6 +94,8 @@ impl CycleFollower {
                 self.program = now.map(Arc::from);
             }
         }
+        self.cutting_energy_j += estimates.cutting_power_w.map_or(0.0, |power| power.value * step_s);
+        self.idle_s += if estimates.state == State::Idle { step_s } else { 0.0 };
         let power = sample.number(channels.total_power).or_else(|_| sample.number(channels.spindle_power));
         let tool = sample.text(channels.tool).unwrap_or_default();
         let operation = sample.text(channels.operation).unwrap_or_default();
@@ -120,7 +131,13 @@ impl CycleFollower {
             detail: serde_json::to_string(&self.gathering.finish()).unwrap_or_default(),
         };
         self.finished += u64::try_from(count).unwrap_or(0);
+        self.last = Some(PartFigures {
+            energy_j: if self.energy_known { Ok(self.energy_j) } else { Err(NoEstimate::PowerUnknown) },
+            cutting_energy_j: Ok(self.cutting_energy_j),
+            idle_s: Ok(self.idle_s),
+        });
         (self.began_ns, self.cutting_s, self.energy_j, self.energy_known) = (Some(sample.at_ns), 0.0, 0.0, false);
+        (self.cutting_energy_j, self.idle_s) = (0.0, 0.0);
         finished
     }
 }

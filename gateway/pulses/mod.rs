@@ -49,21 +49,36 @@ pub struct Proof {
 }
 
 impl Proof {
-    /// Is the position that leaves the one that came in and what was inserted, without an illegal transition and no closer than
-    /// the spacing?
+    /// Is the position that leaves the one that came in and what was asked for, all of it, without an illegal transition and
+    /// no closer than the spacing?
     #[must_use]
     pub fn holds(&self, spacing_ns: u64) -> bool {
         let counted = self.out_edges - self.in_edges == EDGES_PER_PULSE * self.inserted;
-        counted && self.illegal == 0 && self.least_ns.is_none_or(|least| least >= spacing_ns)
+        let spaced = self.least_ns.is_none_or(|least| least >= spacing_ns);
+        counted && spaced && self.illegal == 0 && self.waiting() == 0
+    }
+
+    /// Pulses that were asked for and have not left.
+    #[must_use]
+    pub fn waiting(&self) -> i64 {
+        self.asked - self.inserted
     }
 
     /// In words.
     #[must_use]
     pub fn text(&self, spacing_ns: u64) -> String {
         let least = self.least_ns.map_or_else(|| "-".to_owned(), |least| least.to_string());
+        let proof = match (self.holds(spacing_ns), self.waiting()) {
+            (true, _) => "holds".to_owned(),
+            (false, 0) => "DOES NOT HOLD".to_owned(),
+            (false, waiting) => format!(
+                "DOES NOT HOLD: {waiting} pulses that were asked for have not left; the input is too short for them, or \
+                 the device was bypassed"
+            ),
+        };
         format!(
             "rows in {}, edges out {}\nposition in {} edges, out {} edges, difference {}\npulses asked for {}, inserted {}, \
-             {} edges each\nillegal transitions out {}, closest edges {least} ns (at least {spacing_ns})\nproof: {}\n",
+             {} edges each\nillegal transitions out {}, closest edges {least} ns (at least {spacing_ns})\nproof: {proof}\n",
             self.rows,
             self.edges_out,
             self.in_edges,
@@ -73,7 +88,6 @@ impl Proof {
             self.inserted,
             EDGES_PER_PULSE,
             self.illegal,
-            if self.holds(spacing_ns) { "holds" } else { "DOES NOT HOLD" }
         )
     }
 }
@@ -262,5 +276,11 @@ mod tests {
         assert!(!proof.holds(250) && proof.text(250).contains("DOES NOT HOLD"));
         assert!(!Proof { illegal: 1, ..Proof::default() }.holds(250));
         assert!(!Proof { least_ns: Some(100), ..Proof::default() }.holds(250));
+        // A line stays high: one pulse is inserted with the edge, and the proof says how many still wait.
+        let proof = stream("time_ns,a,b\n1,0,0\n900,1,0\n".as_bytes(), Vec::new(), 250, 0).expect("runs");
+        assert!(proof.holds(250), "{proof:?}");
+        let proof = stream("time_ns,a,b,request\n1,0,0,0\n900,1,0,7\n".as_bytes(), Vec::new(), 250, 0).expect("runs");
+        let text = proof.text(250);
+        assert!(!proof.holds(250) && text.contains("6 pulses that were asked for have not left"), "{text}");
     }
 }

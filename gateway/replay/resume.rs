@@ -1,6 +1,6 @@
 //! What a history already holds of a recording, so that a replay that was broken off stores nothing twice.
 
-use crate::history::{HistoryError, Reader, Record, RecordSpan, SqlValue, StateChange};
+use crate::history::{HistoryError, Reader, Record, RecordSpan, SQL_WITHIN, SqlValue, StateChange};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rules::estimators::Estimates;
@@ -55,7 +55,7 @@ impl Before {
         }
         let reader = Reader::open(path)?;
         let free_ns = reader.span()?.map_or(0, |(_, newest_ns)| newest_ns + PAUSE_NS);
-        let (rows, first_ns, last_ns) = stored(&reader, origin)?;
+        let (rows, first_ns, last_ns) = read_stored_span(&reader, origin)?;
         if rows == 0 {
             return Ok(Self { free_ns, ..Self::default() });
         }
@@ -94,7 +94,7 @@ impl Before {
 }
 
 /// Rows of this origin, the time of the first and of the last one.
-fn stored(reader: &Reader, origin: &str) -> Result<(u64, TimeNs, TimeNs), HistoryError> {
+fn read_stored_span(reader: &Reader, origin: &str) -> Result<(u64, TimeNs, TimeNs), HistoryError> {
     let origin = origin.replace('\'', "''");
     let statement = format!(
         "WITH own AS (SELECT id FROM segments WHERE origin = '{origin}'),
@@ -104,7 +104,7 @@ fn stored(reader: &Reader, origin: &str) -> Result<(u64, TimeNs, TimeNs), Histor
          SELECT coalesce(sum(rows), 0), coalesce(min(start_ns), 0), coalesce(max(end_ns), 0) FROM parts"
     );
     let mut found = (0, 0, 0);
-    reader.sql(&statement, |_, row| {
+    reader.sql(&statement, SQL_WITHIN, |_, row| {
         if let [SqlValue::Integer(rows), SqlValue::Integer(first_ns), SqlValue::Integer(last_ns)] = row {
             found = (rows.unsigned_abs(), *first_ns, *last_ns);
         }
@@ -116,7 +116,7 @@ fn stored(reader: &Reader, origin: &str) -> Result<(u64, TimeNs, TimeNs), Histor
 /// Is there a state that has not ended?
 fn state_open(reader: &Reader) -> Result<bool, HistoryError> {
     let mut open = false;
-    reader.sql("SELECT 1 FROM states WHERE until_ns IS NULL", |_, _| {
+    reader.sql("SELECT 1 FROM states WHERE until_ns IS NULL", SQL_WITHIN, |_, _| {
         open = true;
         ControlFlow::Break(())
     })?;

@@ -117,7 +117,7 @@ pub struct ReplaySummary {
 }
 
 impl ReplaySummary {
-    fn refused(&self) -> u64 {
+    fn count_refused(&self) -> u64 {
         self.files.iter().map(|file| file.refused).sum()
     }
 
@@ -141,7 +141,7 @@ impl ReplaySummary {
             "schema": "replay/1",
             "files": self.files.iter().map(FileSummary::json).collect::<Vec<_>>(),
             "rows": self.counts.rows,
-            "refused_rows": self.refused(),
+            "refused_rows": self.count_refused(),
             "seconds_per_state": seconds,
             "state_changes": self.counts.state_changes,
             "parts": self.parts,
@@ -160,7 +160,7 @@ impl ReplaySummary {
 impl fmt::Display for ReplaySummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (rows, took, rate) = (self.counts.rows, self.took.as_secs_f64(), self.rows_per_s());
-        writeln!(f, "{rows} rows in {took:.2} s ({rate:.0} rows/s), {} refused", self.refused())?;
+        writeln!(f, "{rows} rows in {took:.2} s ({rate:.0} rows/s), {} refused", self.count_refused())?;
         let problems: Vec<&String> = self.files.iter().flat_map(|file| &file.problems).collect();
         problems.iter().take(PROBLEMS_SHOWN).try_for_each(|problem| writeln!(f, "  {problem}"))?;
         for (word, seconds) in self.seconds_per_state.iter().filter(|(_, seconds)| *seconds > 0.0) {

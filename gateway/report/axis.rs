@@ -14,11 +14,11 @@ impl Axis {
     pub(super) fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let start = (f64::INFINITY, f64::NEG_INFINITY);
         let (low, high) = values.filter(|x| x.is_finite()).fold(start, |(low, high), x| (low.min(x), high.max(x)));
-        (low <= high).then(|| Self { low, high }.widened())
+        (low <= high).then(|| Self { low, high }.widen_range())
     }
 
     /// Never empty: a single value gets room on both sides.
-    fn widened(self) -> Self {
+    fn widen_range(self) -> Self {
         if self.high > self.low {
             return self;
         }

@@ -136,7 +136,7 @@ pub(super) fn candidates<'a>(data: &Data<'a>, rows: &[usize], bins: usize) -> Ve
         }
     }
     sources.push(("time_in_run_s".to_owned(), ColumnSource::InRun));
-    sources.into_iter().filter_map(|(name, values)| binned(data, rows, bins, name, values)).collect()
+    sources.into_iter().filter_map(|(name, values)| bin_column(data, rows, bins, name, values)).collect()
 }
 
 fn may_be_axis(data: &Data<'_>, name: &str) -> bool {
@@ -153,7 +153,7 @@ pub(super) fn describes(data: &Data<'_>, name: &str) -> bool {
     data.diagnosis.mismatch.iter().any(|region| region.conditions.iter().any(by))
 }
 
-fn binned<'a>(
+fn bin_column<'a>(
     data: &Data<'a>,
     rows: &[usize],
     bins: usize,

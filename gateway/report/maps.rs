@@ -73,7 +73,7 @@ fn most_telling<'a>(data: &Data<'a>) -> Option<(Binned<'a>, Binned<'a>)> {
             let (a, b) = (&columns[first].1, &columns[second].1);
             let cell = |row: usize| Some(a.bin(data, row)? * b.len() + b.bin(data, row)?);
             let cells = tally(data, &rows, a.len() * b.len(), cell);
-            let score = told(&cells) * filled(&cells) * setting(data, a) * setting(data, b);
+            let score = told(&cells) * compute_fill(&cells) * setting(data, a) * setting(data, b);
             if best.is_none_or(|(best, ..)| score > best + 1e-9) {
                 best = Some((score, first, second));
             }
@@ -107,7 +107,7 @@ fn tally(data: &Data<'_>, rows: &[usize], count: usize, bin: impl Fn(usize) -> O
 }
 
 /// A map of two columns that say the same is a diagonal: little of it is filled, and it tells no more than one column.
-fn filled(cells: &[BinCell]) -> f64 {
+fn compute_fill(cells: &[BinCell]) -> f64 {
     let used = cells.iter().filter(|cell| cell.rows >= ROWS_MIN).count();
     (used as f64 / cells.len().max(1) as f64).powf(0.25)
 }

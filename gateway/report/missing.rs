@@ -48,7 +48,7 @@ fn card(data: &Data<'_>, missing: &Missing) -> String {
         "<dl class=\"facts\">{}{}{}</dl></article>",
         sure(data, missing),
         gain(data, missing),
-        absorbed(data, missing)
+        render_absorption(data, missing)
     );
     html
 }
@@ -69,7 +69,7 @@ fn parameters(data: &Data<'_>, missing: &Missing) -> String {
 }
 
 fn parameter(data: &Data<'_>, effect: &str, e: &ParameterEstimate) -> String {
-    let [value, low, high] = aligned(e);
+    let [value, low, high] = format_estimate(e);
     let meaning = data.tongue.parameter(effect, &e.name);
     let unit = unit_text(&e.unit);
     let unit = if unit.is_empty() { "\u{2013}".to_owned() } else { unit };
@@ -88,7 +88,7 @@ fn parameter(data: &Data<'_>, effect: &str, e: &ParameterEstimate) -> String {
 }
 
 /// Value and interval with the same decimals: two significant digits of the interval's width.
-fn aligned(e: &ParameterEstimate) -> [String; 3] {
+fn format_estimate(e: &ParameterEstimate) -> [String; 3] {
     let numbers = [e.value, e.low, e.high];
     let width = 0.5 * (e.high - e.low);
     let greatest = numbers.iter().fold(0.0_f64, |top, x| top.max(x.abs()));
@@ -163,7 +163,7 @@ fn gain(data: &Data<'_>, missing: &Missing) -> String {
     fact(data.say("What it brings", "带来的改进"), &text)
 }
 
-fn absorbed(data: &Data<'_>, missing: &Missing) -> String {
+fn render_absorption(data: &Data<'_>, missing: &Missing) -> String {
     let share = missing.absorbed_share.clamp(0.0, 1.0);
     let [swallowed, left] = [100.0 * share, 100.0 * (1.0 - share)].map(percent);
     let caution = data.say(

@@ -67,7 +67,7 @@ pub(super) fn shifts(data: &Data<'_>) -> String {
     if shifts.is_empty() {
         return String::new();
     }
-    let rows: String = shifts.iter().map(|shift| shifted(data, shift)).collect();
+    let rows: String = shifts.iter().map(|shift| render_shift(data, shift)).collect();
     let note = data.say(
         "While the effect was missing, fitting had bent these parameters of the simulation to imitate it.",
         "在缺少该效应时，拟合曾扭曲仿真的这些参数来模仿它。",
@@ -82,7 +82,7 @@ pub(super) fn shifts(data: &Data<'_>) -> String {
     listed(data.say("Parameters that had been bent", "曾被扭曲的参数"), note, &heads, &rows)
 }
 
-fn shifted(data: &Data<'_>, shift: &Shift) -> String {
+fn render_shift(data: &Data<'_>, shift: &Shift) -> String {
     let relative = 100.0 * (shift.after / shift.before - 1.0);
     let change = match shift.before > 0.0 && shift.after > 0.0 && relative < 1000.0 {
         true => with_unit(&signed_whole(relative), "%"),

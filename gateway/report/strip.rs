@@ -22,7 +22,7 @@ pub(super) fn strip(data: &Data<'_>) -> String {
     if regions.is_empty() || data.runs.is_empty() {
         return String::new();
     }
-    let coverage: Vec<Vec<Vec<f64>>> = regions.iter().map(|region| covered(data, region)).collect();
+    let coverage: Vec<Vec<Vec<f64>>> = regions.iter().map(|region| compute_coverage(data, region)).collect();
     let body = if data.runs.len() > LANES_MAX { tiles(data, &coverage) } else { lanes(data, &regions, &coverage) };
     format!("<div class=\"strip\">{body}</div>{}", legend(data))
 }
@@ -37,7 +37,7 @@ fn longest_s(data: &Data<'_>) -> f64 {
 }
 
 /// Per run and column of its lane the share of time that is affected. Spans stand in the order of the runs.
-fn covered(data: &Data<'_>, region: &Region) -> Vec<Vec<f64>> {
+fn compute_coverage(data: &Data<'_>, region: &Region) -> Vec<Vec<f64>> {
     let wide = columns(data);
     let tiled = data.runs.len() > LANES_MAX;
     let longest = longest_s(data);

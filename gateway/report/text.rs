@@ -233,10 +233,10 @@ pub(super) fn fixed(x: f64, decimals: i32) -> String {
     let text = format!("{:.places$}", x.abs());
     let (whole, rest) = text.split_once('.').map_or((text.as_str(), String::new()), |(w, r)| (w, format!(".{r}")));
     let minus = if x < 0.0 && text.chars().any(|c| c.is_ascii_digit() && c != '0') { "\u{2212}" } else { "" };
-    format!("{minus}{}{rest}", grouped(whole))
+    format!("{minus}{}{rest}", group_digits(whole))
 }
 
-fn grouped(whole: &str) -> String {
+fn group_digits(whole: &str) -> String {
     if whole.len() < 5 {
         return whole.to_owned();
     }

@@ -183,7 +183,7 @@ fn tiles(data: &Data<'_>, fit: &Fits) -> String {
         html.push_str(&tile(&value, &label));
     }
     if data.added() {
-        html.push_str(&removed(data, before, after, fit.noise_floor));
+        html.push_str(&render_improvement(data, before, after, fit.noise_floor));
     }
     let rows = super::text::fixed(fit.rows as f64, 0);
     let basis = match data.tongue.0 {
@@ -193,7 +193,7 @@ fn tiles(data: &Data<'_>, fit: &Fits) -> String {
     html + tile(&rows, &basis).as_str() + "</dl>"
 }
 
-fn removed(data: &Data<'_>, before: f64, after: f64, floor: f64) -> String {
+fn render_improvement(data: &Data<'_>, before: f64, after: f64, floor: f64) -> String {
     let above = before - floor;
     let value = if above > 0.01 * floor {
         with_unit(&format!("{:.0}", (100.0 * (before - after) / above).clamp(0.0, 100.0)), "%")

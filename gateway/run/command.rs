@@ -254,7 +254,7 @@ impl Commands {
         self.hear(said, sample, gate, health);
     }
 
-    fn moved(&mut self, moved: &Moved, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+    fn record_offset_result(&mut self, moved: &Moved, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         if let Some(row) = self.shifting.row(moved) {
             let command = offset_commands::command(moved, &row, &self.target_of_offsets(gate));
             self.keep(row, gate, health);
@@ -288,7 +288,7 @@ impl Commands {
                 health.keep(ReactionTime { program, block, tool, ..trail::times(&reaction) }.into());
             }
             ActuatorReport::Fault(fault) => self.fail(&fault, sample.at_ns, gate, health),
-            ActuatorReport::Moved(moved) => self.moved(&moved, sample, gate, health),
+            ActuatorReport::Moved(moved) => self.record_offset_result(&moved, sample, gate, health),
             ActuatorReport::Withdrawn(order) => gate.offsets_mut().withdrawn(order),
             ActuatorReport::Asked(ask, failed) => {
                 self.keep(trail::asked(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns), gate, health);
@@ -329,6 +329,12 @@ impl Commands {
             let text = format!("the gate is disarmed: {why}");
             health.event(at_ns, SOURCE, &Notice::new(Severity::Warning, CODE, text));
         }
+    }
+
+    /// Ends an arming, and accounts for it.
+    pub fn end_arming(&mut self, why: Disarmed, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+        gate.disarm(why);
+        self.follow_arming(gate, sample.at_ns, health);
     }
 
     /// Gives the machine back and ends.

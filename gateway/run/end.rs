@@ -11,32 +11,26 @@ use tokio::sync::watch;
 /// Returns when a signal has said stop, or the tick has ended by itself, and the history is closed.
 pub(super) async fn wait_for_end(
     run_flags: &RunFlags,
+    mut signals: Option<&mut Signals>,
     outputs: Option<&ConfiguredSinks>,
     live: watch::Receiver<Option<Published>>,
 ) {
     tokio::select! {
-        () = obey(run_flags) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
+        () = obey(run_flags, signals.as_deref_mut()) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
         () = until_closed(live.clone()) => {}
     }
     run_flags.stop.store(true, Ordering::SeqCst);
     // The last commit of the history waits for the sinks; who asks twice does not want to wait.
     tokio::select! {
-        () = obey(run_flags) => outputs.into_iter().for_each(|outputs| outputs.outbox.hurry()),
+        () = obey(run_flags, signals) => outputs.into_iter().for_each(|outputs| outputs.outbox.hurry()),
         () = until_closed(live.clone()) => {}
     }
     until_closed(live).await;
 }
 
 /// Returns when a signal says stop.
-async fn obey(run_flags: &RunFlags) {
-    let mut signals = match Signals::listen() {
-        Ok(signals) => signals,
-        Err(error) => {
-            let text = format!("signals cannot be heard ({error}): stop the box with SIGKILL; nothing stored is lost");
-            Notice::new(Severity::Warning, "no_signals", text).say();
-            return std::future::pending().await;
-        }
-    };
+async fn obey(run_flags: &RunFlags, signals: Option<&mut Signals>) {
+    let Some(signals) = signals else { return std::future::pending().await };
     loop {
         match signals.next().await {
             SignalRequest::Stop => return,

@@ -1,20 +1,22 @@
 //! What may fail while the box goes on: store, sources, clock, memory of the estimators. Each failure is told once, is
 //! remembered as an event, and is shown while it lasts.
 
-use super::clock::{BoxClock, ClockStep};
 use super::history_store::HistoryStore;
+use super::problems::{apart, clock_problem, problems_of_files};
 use super::sample_feed::{SampleFeed, SourcePace};
 use super::save::Saver;
+use super::service_manager::{ProgressMarks, WatchedService};
 use crate::alignment::{self, Alignment};
-use crate::history::{Audit, Event, ExtraValue, Record};
+use crate::clock::{BoxClock, ClockNews};
+use crate::history::{Audit, ExtraValue, Record};
 use crate::log::{Notice, Severity};
-use crate::pipeline::{Pipeline, Store};
-use crate::status::{HistoryStatus, SourceStatus, StatusProblem};
+use crate::pipeline::{Pipeline, Store, event_of};
+use crate::status::{ClockStatus, HistoryStatus, SourceStatus, StatusProblem};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::worker::WorkerState;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
@@ -24,6 +26,8 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 const SAVE_EVERY: Duration = Duration::from_secs(60);
 /// Another pace is told when it differs from the last one by this factor.
 const OTHER_PACE: f64 = 1.3;
+/// So many notices of other threads are taken at one look.
+const HEARD_MAX: usize = 10;
 /// One day of machine time.
 const DAY_NS: i64 = 86_400 * SECOND_NS;
 
@@ -36,7 +40,8 @@ pub(super) const WEAR_MEMORY: &str = "wear.json";
 pub struct Health {
     history_store: HistoryStore,
     clock: Option<Arc<BoxClock>>,
-    behind_ns: i64,
+    /// Another reading of the wall clock has stood long enough: the run is to end and to begin again with it.
+    follow: bool,
     port: watch::Receiver<Option<String>>,
     memory: PathBuf,
     sources: Vec<KnownSource>,
@@ -52,23 +57,29 @@ pub struct Health {
     /// Values that are stored after these.
     beside: Option<[ExtraValue<'static>; 2]>,
     thermal: Vec<ExtraValue<'static>>,
+    service: WatchedService,
+    /// What threads beside the tick have to say.
+    heard: Option<mpsc::Receiver<Notice>>,
 }
 
 impl Health {
     /// `clock` is the box's own where machine time is real time, `port` the trouble with the page's port, `memory` the
-    /// file for what the estimators have learned.
+    /// file for what the estimators have learned, `marks` what has moved.
     #[must_use]
     pub fn new(
         history_store: HistoryStore,
         clock: Option<Arc<BoxClock>>,
         port: watch::Receiver<Option<String>>,
         memory: PathBuf,
+        marks: Arc<ProgressMarks>,
     ) -> Self {
+        let data_dir = memory.parent().map(Path::to_owned).unwrap_or_default();
+        let service = WatchedService::new(data_dir, marks);
         let stores = history_store.stores();
         Self {
             history_store,
             clock,
-            behind_ns: 0,
+            follow: false,
             port,
             memory,
             sources: Vec::new(),
@@ -81,13 +92,20 @@ impl Health {
             lags: [ExtraValue::Missing("not_yet"); alignment::SERIES],
             beside: None,
             thermal: Vec::new(),
+            service,
+            heard: None,
         }
+    }
+
+    /// From now on these notices become events.
+    pub fn hear(&mut self, notices: mpsc::Receiver<Notice>) {
+        self.heard = Some(notices);
     }
 
     /// Remembers and tells that something happened.
     pub fn event(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
         notice.say();
-        self.history_store.record(stored(at_ns, source, notice).into());
+        self.history_store.record(event_of(at_ns, source, notice).into());
     }
 
     /// Remembers a record that is no event.
@@ -134,36 +152,71 @@ impl Health {
         self.looked = Some(Instant::now());
         self.history_store.look();
         self.stores = self.history_store.stores();
+        self.service.report(feed.count_steps(), self.history_store.count_rounds());
+        let heard: Vec<Notice> = self.heard.iter().flat_map(mpsc::Receiver::try_iter).take(HEARD_MAX).collect();
+        heard.iter().for_each(|notice| self.event(now_ns, "gateway", notice));
         self.look_at_clock(now_ns);
         self.look_at_sources(feed, now_ns);
         self.look_at_paces(&feed.paces(now_ns), now_ns);
-        let day = now_ns.div_euclid(DAY_NS);
-        if self.day.replace(day).is_some_and(|before| before != day) {
-            self.history_store.maintain(now_ns);
-        }
+        self.look_at_day(now_ns);
         if self.saved.elapsed() >= SAVE_EVERY {
             self.save(pipeline);
         }
     }
 
+    /// Housekeeping: once a day, and not before the clock is confirmed. A machine that brings its own time is right about it.
+    fn look_at_day(&mut self, now_ns: TimeNs) {
+        let confirmed = self.clock.as_ref().is_none_or(|clock| clock.is_confirmed());
+        let day = now_ns.div_euclid(DAY_NS);
+        if confirmed && self.day.replace(day).is_some_and(|before| before != day) {
+            self.history_store.maintain(now_ns);
+        }
+    }
+
     fn look_at_clock(&mut self, now_ns: TimeNs) {
-        let Some(step) = self.clock.as_ref().and_then(|clock| clock.look()) else { return };
-        self.behind_ns = if let ClockStep::Back(by_ns) = step { by_ns } else { 0 };
-        let notice = match step {
-            ClockStep::Forward(by_ns) => {
-                let text = format!("the wall clock was set forward by {}; the box follows, with a gap", span(by_ns));
-                Notice::new(Severity::Warning, "clock_forward", text)
+        let Some(news) = self.clock.as_ref().and_then(|clock| clock.look()) else { return };
+        let told = |severity, code, text: String| Notice::new(severity, code, text);
+        let notice = match news {
+            ClockNews::Confirmed => {
+                self.history_store.confirm_clock();
+                // What is due by then is done; the next time at the turn of the day.
+                self.history_store.maintain(now_ns);
+                told(
+                    Severity::Info,
+                    "clock_confirmed",
+                    "the clock has been right for long enough to be believed".to_owned(),
+                )
             }
-            ClockStep::Back(by_ns) => {
+            ClockNews::Leapt { ahead_ns } => told(
+                Severity::Warning,
+                "clock_leapt",
+                format!("the wall clock is {} the box now; the box keeps its own time", apart(ahead_ns)),
+            ),
+            ClockNews::Returned => {
+                told(Severity::Info, "clock_right", "the wall clock agrees with the box again".to_owned())
+            }
+            ClockNews::Follow { ahead_ns } => {
+                self.follow = true;
                 let text = format!(
-                    "the wall clock was set back by {}; the box keeps its own time until it is started again",
-                    span(by_ns)
+                    "the wall clock has been {} the box for long enough: the box begins again with it",
+                    apart(ahead_ns)
                 );
-                Notice::new(Severity::Warning, "clock_back", text)
+                told(Severity::Warning, "clock_followed", text)
             }
-            ClockStep::Right => Notice::new(Severity::Info, "clock_right", "the wall clock agrees with the box again"),
         };
-        self.event(now_ns, "gateway", &notice);
+        self.event(now_ns, "clock", &notice.detail(format!("{news:?}")));
+    }
+
+    /// Shall the run end, and begin again with the time of the wall clock?
+    #[must_use]
+    pub fn follows_clock(&self) -> bool {
+        self.follow
+    }
+
+    /// What is thought of the clock.
+    #[must_use]
+    pub fn clock_status(&self) -> Option<ClockStatus> {
+        self.clock.as_ref().map(|clock| clock.status())
     }
 
     fn look_at_sources(&mut self, feed: &SampleFeed, now_ns: TimeNs) {
@@ -202,7 +255,7 @@ impl Health {
             (&wear, pipeline.wear().snapshot()),
         ];
         for (path, snapshot) in all {
-            self.saver.put(path, snapshot.to_string());
+            self.saver.put_learned(path, snapshot.to_string());
         }
     }
 
@@ -211,11 +264,17 @@ impl Health {
         self.saver.put(path, text);
     }
 
+    /// The same for what was learned: with a checksum, and beside the save before it.
+    pub fn put_learned(&self, path: &Path, state: String) {
+        self.saver.put_learned(path, state);
+    }
+
     /// The last tick is over.
     pub fn close(&mut self, pipeline: &Pipeline, at_ns: TimeNs) {
         self.save(pipeline);
         self.saver.close();
-        self.history_store.record(stored(at_ns, "gateway", &Notice::new(Severity::Info, "stopped", "stopped")).into());
+        let stopped = Notice::new(Severity::Info, "stopped", "stopped");
+        self.history_store.record(event_of(at_ns, "gateway", &stopped).into());
         self.history_store.close();
     }
 
@@ -236,10 +295,11 @@ impl Health {
         if let Some(what) = &history.error {
             add(what.clone(), "polling goes on");
         }
-        if self.behind_ns > 0 {
-            let what = format!("the wall clock is {} behind the box", span(self.behind_ns));
-            add(what, "set the clock right, or start the box again when it is right");
+        if let Some((what, next)) = self.clock_status().and_then(clock_problem) {
+            add(what, next);
         }
+        problems.extend(problems_of_files(&self.memory, history));
+        let mut add = |what: String, next: &str| problems.push(StatusProblem { what, next: next.to_owned() });
         for source in &self.sources {
             if let Some(error) = &source.error {
                 add(error.clone(), "the other sources go on");
@@ -307,23 +367,6 @@ fn told_pace(SourcePace { name, wanted, kept }: &SourcePace) -> Notice {
     Notice::new(Severity::Warning, "source_pace", text).detail(detail)
 }
 
-/// A notice as a row of the history.
-fn stored(at_ns: TimeNs, source: &str, notice: &Notice) -> Event {
-    let detail = if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
-    Event { at_ns, kind: notice.code.to_owned(), source: source.to_owned(), text: notice.operator.clone(), detail }
-}
-
-/// A length of time in words.
-fn span(ns: i64) -> String {
-    let seconds = (ns + SECOND_NS / 2) / SECOND_NS;
-    match seconds {
-        0..=119 => format!("{seconds} s"),
-        120..=7199 => format!("{} min", seconds / 60),
-        7200..=172_799 => format!("{} h", seconds / 3600),
-        _ => format!("{} days", seconds / 86_400),
-    }
-}
-
 impl Store for Health {
     fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
         let beside: &[ExtraValue<'_>] = self.beside.as_ref().map_or(&[], |beside| beside);
@@ -332,5 +375,9 @@ impl Store for Health {
 
     fn record(&mut self, record: Record) {
         self.history_store.record(record);
+    }
+
+    fn notice(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
+        self.event(at_ns, source, notice);
     }
 }

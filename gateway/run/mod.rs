@@ -2,7 +2,7 @@
 
 pub mod acknowledged_alarms;
 pub mod actuator_worker;
-pub mod clock;
+mod clocked;
 pub mod command;
 pub mod deadline;
 mod end;
@@ -15,22 +15,26 @@ pub mod open;
 pub mod outputs;
 pub mod pace;
 pub mod priority;
+mod problems;
 pub mod recent;
 pub mod remembered;
 pub mod report;
 pub mod rules;
 pub mod sample_feed;
 pub mod save;
+pub mod service_manager;
 pub mod thermal;
 pub mod tick;
 mod verdict_mailbox;
+mod way_to_machine;
 pub mod wear;
 
 use crate::access::{self, Access};
 use crate::alignment;
-use crate::backup::take_restored;
+use crate::backup::{BackupPaths, BackupSchedule, take_restored};
 use crate::cannot_run::CannotRun;
-use crate::config::{self, Config, GateMode};
+use crate::clock::of_box;
+use crate::config::Config;
 use crate::control::{self, OrderReceiver};
 use crate::diagnosis::handle::DiagnosisHandle;
 use crate::gate::Gate;
@@ -38,24 +42,22 @@ use crate::http::{Certificate, Configured, Published, Server, ServerParts, Serve
 use crate::log::{self, Notice, Severity};
 use crate::operations::Operations;
 use crate::pipeline::Pipeline;
-use actuator_worker::{ActuatorWorker, Tools};
+use crate::signals::Signals;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
-use adapters::{Actuator, OffsetSink};
-use clock::BoxClock;
-use command::Commands;
+use clocked::ClockStart;
 use deadline::{RUN_MAX, RunLimit};
 use health::Health;
 use history_store::HistoryStore;
 use live_twin::Twin;
-use offset_commands::OffsetCommands;
-use open::{MachineSpeed, Sources, Way};
+use open::{MachineSpeed, Sources};
 use outputs::ConfiguredSinks;
+use service_manager::{ProgressMarks, WatchedPart};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 use thermal::Thermal;
-use tick::{Identity, RunFlags, Ticker};
+use tick::{Identity, RunEnd, RunFlags, Ticker};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 use wear::Wear;
@@ -64,6 +66,9 @@ use wear::Wear;
 const BLOCKING_MAX: usize = 6;
 /// Time between two looks at the file of persons.
 const FOLLOW_EVERY: Duration = Duration::from_secs(1);
+
+/// Time between two signs of life of the threads that answer the page.
+const PAGE_BEAT: Duration = Duration::from_secs(1);
 
 /// What the box shall do.
 #[derive(Debug)]
@@ -84,10 +89,8 @@ pub struct RunPlan {
 /// The tick, ready to go, and what it publishes.
 type StartedTicker = (Ticker, watch::Receiver<Option<Published>>);
 
-/// The ways to the feed override and to the offsets, where they may be written.
-type Ends = (Option<Box<dyn Actuator>>, Option<Box<dyn OffsetSink>>);
-
-/// Runs until told to stop.
+/// Runs until told to stop. Where the clock of the computer turns out to be another than was thought, the run ends as for a
+/// stop and another one begins: see [`crate::clock`].
 ///
 /// # Errors
 /// Everything that makes it impossible to begin.
@@ -101,21 +104,74 @@ pub fn run(plan: RunPlan) -> Result<(), CannotRun> {
         .enable_all()
         .build()
         .map_err(|error| CannotRun::new(format!("no threads to serve with: {error}"), ""))?;
-    let listener = runtime.block_on(listen(&plan))?;
-    let certificate = certificate(&plan)?;
+    // Before anything is opened: from here on a signal ends the box in good order.
+    let mut signals = runtime.block_on(async { Signals::listen() }).map_err(|error| {
+        let text = format!("signals cannot be heard ({error}): stop the box with SIGKILL; nothing stored is lost");
+        Notice::new(Severity::Warning, "no_signals", text).say();
+    });
+    log::keep_crash_reports(&plan.config.gateway.data_dir);
+    let mut follows = false;
+    let ended = loop {
+        match run_once(&plan, &runtime, signals.as_mut().ok(), follows) {
+            Ok(RunEnd::FollowClock) => follows = true,
+            Ok(RunEnd::Over) => break Ok(()),
+            Err(error) => break Err(error),
+        }
+    };
+    service_manager::report_stopping();
+    runtime.shutdown_timeout(Duration::from_secs(1));
+    ended
+}
+
+/// From the start to the end of one run. `follows`: the wall clock has stood long enough to be followed.
+fn run_once(
+    plan: &RunPlan,
+    runtime: &tokio::runtime::Runtime,
+    signals: Option<&mut Signals>,
+    follows: bool,
+) -> Result<RunEnd, CannotRun> {
+    let listener = runtime.block_on(listen(plan))?;
+    let started = ClockStart::of(plan, follows);
+    let outputs = ConfiguredSinks::of(&plan.config);
+    let certificate = certificate(plan)?;
     let run_flags = Arc::new(RunFlags::default());
     let (report, port) = watch::channel(None);
     let (post, inbox) = control::queue();
-    let (ticker, live) = ticker(&plan, &run_flags, port, inbox, outputs.as_ref())?;
+    let marks = Arc::new(ProgressMarks::new());
+    let (mut ticker, live) = ticker(plan, &run_flags, (port, marks.clone()), inbox, (outputs.as_ref(), started))?;
+    let _backups = schedule_backups(plan, &mut ticker.health)?;
+    runtime.spawn(mark_page(marks));
     let channels = (report, post, ticker.twin.as_ref().and_then(Twin::diagnoses));
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    runtime.block_on(serve(&plan, (listener, certificate), live, &run_flags, channels, outputs.as_ref()));
-    let ended = thread.join();
-    runtime.shutdown_timeout(Duration::from_secs(1));
-    ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
+    let serving = serve(plan, (listener, certificate), live, (&run_flags, signals), channels, outputs.as_ref());
+    runtime.block_on(serving);
+    thread.join().map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
+}
+
+/// Backups on a thread of their own, where the configuration wants them. They are taken while the box lives.
+fn schedule_backups(plan: &RunPlan, health: &mut Health) -> Result<Option<BackupSchedule>, CannotRun> {
+    let Some(config) = &plan.config.backup else { return Ok(None) };
+    let paths = BackupPaths::of(&plan.config, plan.config_file.as_deref());
+    let (tell, heard) = std::sync::mpsc::channel();
+    health.hear(heard);
+    let now_s = || SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    // Without a tick nobody listens, and the box is about to end.
+    let tell = move |notice: &Notice| drop(tell.send(notice.clone()));
+    BackupSchedule::start(paths, config.clone(), now_s, tell)
+        .map(Some)
+        .map_err(|error| CannotRun::new(format!("no thread for backups: {error}"), ""))
+}
+
+/// The threads that answer the page move as long as this does.
+async fn mark_page(marks: Arc<ProgressMarks>) {
+    let mut beat = tokio::time::interval(PAGE_BEAT);
+    loop {
+        beat.tick().await;
+        marks.mark(WatchedPart::Page);
+    }
 }
 
 fn address(plan: &RunPlan) -> Result<Option<SocketAddr>, CannotRun> {
@@ -147,46 +203,47 @@ async fn listen(plan: &RunPlan) -> Result<Option<TcpListener>, CannotRun> {
 }
 
 /// The estimators and edges as they were remembered, the scripts in charge and the gate.
-fn pipeline(plan: &RunPlan, memory: &Path) -> (Pipeline, rules::ScriptWatch) {
+fn pipeline(plan: &RunPlan, memory: &Path, told: &mut Vec<Notice>) -> (Pipeline, rules::ScriptWatch) {
     let (mut scripts, watched) = rules::load(&plan.config);
     if plan.speed == MachineSpeed::Real {
         scripts.watch(Arc::new(RunLimit::new(RUN_MAX)));
     }
-    let mut pipeline = Pipeline::new(remembered::estimators(memory), scripts, Gate::new(plan.config.gate.clone()));
-    remembered::edges(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY));
+    let gate = Gate::new(plan.config.gate.clone());
+    let mut pipeline = Pipeline::new(remembered::estimators(memory, told), scripts, gate);
+    remembered::edges(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY), told);
     (pipeline, watched)
 }
 
 fn ticker(
     plan: &RunPlan,
     run_flags: &Arc<RunFlags>,
-    port: watch::Receiver<Option<String>>,
+    (port, marks): (watch::Receiver<Option<String>>, Arc<ProgressMarks>),
     inbox: OrderReceiver,
-    outputs: Option<&ConfiguredSinks>,
+    (outputs, started): (Option<&ConfiguredSinks>, ClockStart),
 ) -> Result<StartedTicker, CannotRun> {
     let config = &plan.config;
     let data_dir = &config.gateway.data_dir;
     // Before anything is read that a restore has laid ready.
-    let restored = take_restored(data_dir);
+    let mut told: Vec<Notice> = take_restored(data_dir).into_iter().collect();
     let twin = Twin::of(config);
     let memory = data_dir.join("estimators.json");
-    let (mut pipeline, watched) = pipeline(plan, &memory);
+    let (mut pipeline, watched) = pipeline(plan, &memory, &mut told);
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
     let mut thermal = Thermal::of(config)?;
     let of_thermal = thermal.as_ref().map(Thermal::series).unwrap_or_default();
     pipeline.leave(&of_thermal);
     let beside = [pipeline.series(), alignment::series(), beside, of_thermal].concat();
     let outbox = outputs.map(|outputs| outputs.outbox.clone());
-    let history_store =
-        HistoryStore::open(&config.history, beside, outbox).map_err(|error| CannotRun::new(error.to_string(), ""))?;
-    let own = Arc::new(BoxClock::new());
+    let history_store = HistoryStore::open(&config.history, beside, outbox, started.mark.clone())
+        .map_err(|error| CannotRun::new(error.to_string(), ""))?;
+    let own = of_box().clone();
     let clock: Arc<dyn Clock> = own.clone();
     let start_ns = start_ns(plan, &history_store, clock.now_ns());
     let opened = open::sources(config, plan.speed, &clock, start_ns);
     let Sources { feed, pace, simulated, ways, machines } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
     let wake = inbox.wake.clone();
-    let commands = commands(plan, ways, inbox, &clock, pipeline.gate_mut())?;
+    let commands = way_to_machine::commands(plan, ways, inbox, &clock, pipeline.gate_mut())?;
     let identity = Identity {
         machine: config.gateway.name.clone(),
         simulated,
@@ -197,7 +254,7 @@ fn ticker(
     #[expect(clippy::cast_possible_truncation, reason = "saturates, which is meant")]
     let stop_after_ns = plan.stop_after_s.map(|seconds| (seconds * SECOND_NS as f64) as i64);
     let own = (plan.speed == MachineSpeed::Real).then_some(own);
-    let mut health = Health::new(history_store, own, port, memory);
+    let mut health = Health::new(history_store, own, port, memory, marks);
     if let Some(twin) = twin.as_ref().filter(|twin| !twin.series().is_empty()) {
         health.beside(twin.values());
     }
@@ -206,7 +263,8 @@ fn ticker(
     }
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
     health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
-    restored.iter().for_each(|notice| health.event(start_ns, "gateway", notice));
+    told.iter().for_each(|notice| health.event(start_ns, "gateway", notice));
+    started.news.iter().for_each(|notice| health.event(start_ns, "clock", notice));
     let run_flags = run_flags.clone();
     let operations = config.operations.path.as_deref().map(Operations::begin);
     let wear = Wear::of(config);
@@ -234,67 +292,13 @@ fn ticker(
     ))
 }
 
-/// The way to the machine. Unless the configuration allows arming there is no actuator in the process at all, and no sink
-/// of offsets.
-fn commands(
-    plan: &RunPlan,
-    mut ways: Vec<Way>,
-    inbox: OrderReceiver,
-    clock: &Arc<dyn Clock>,
-    gate: &mut Gate,
-) -> Result<Commands, CannotRun> {
-    let limits: &config::GateConfig = &plan.config.gate;
-    let data_dir = &plan.config.gateway.data_dir;
-    let target = limits.source.clone().unwrap_or_default();
-    if limits.greatest_mode() != GateMode::Armed {
-        return Ok(Commands::new(ActuatorWorker::None, OffsetCommands::idle(data_dir), target, inbox));
-    }
-    let (actuator, sink) = tools(limits, &mut ways)?;
-    let (shifting, offsets) = match sink {
-        Some(sink) => {
-            OffsetCommands::resume(data_dir, sink, gate).map(|(shifting, account)| (shifting, Some(account)))?
-        }
-        None => (OffsetCommands::idle(data_dir), None),
-    };
-    let tools = Tools { actuator, offsets };
-    let actuator_worker = match plan.speed {
-        MachineSpeed::Real => ActuatorWorker::start(tools, limits, clock.clone(), open::period(&plan.config))
-            .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,
-        MachineSpeed::Times(_) | MachineSpeed::Max => ActuatorWorker::inline(tools, limits),
-    };
-    Ok(Commands::new(actuator_worker, shifting, target, inbox))
-}
-
-/// What may be written, and nothing else.
-fn tools(limits: &config::GateConfig, ways: &mut [Way]) -> Result<Ends, CannotRun> {
-    let (mut actuator, mut sink) = (None, None);
-    if limits.mode == GateMode::Armed {
-        let target = limits.source.as_deref().unwrap_or_default();
-        let way = ways.iter_mut().find(|way| way.name == target).and_then(|way| way.actuator.take());
-        let what = format!("[gate] source = {target:?} has no feed override that could be written");
-        actuator =
-            Some(way.ok_or_else(|| CannotRun::new(what, "name the controller there, or write mode = \"shadow\""))?);
-    }
-    if limits.offset.mode == GateMode::Armed {
-        let target = limits.offset.source.as_deref().unwrap_or_default();
-        let way = ways.iter_mut().find(|way| way.name == target).and_then(|way| way.offsets.take());
-        let what = format!("[gate.offset] source = {target:?} has no external offset that could be written");
-        let next = "name the controller there (fanuc:// needs allow=EXT, nclink:// and hncnet:// need offset=), or write mode = \"shadow\"";
-        sink = Some(way.ok_or_else(|| CannotRun::new(what, next))?);
-    }
-    Ok((actuator, sink))
-}
-
 /// Now; an accelerated machine begins after everything that the history already holds.
 fn start_ns(plan: &RunPlan, history_store: &HistoryStore, now_ns: TimeNs) -> TimeNs {
-    let Some(newest_ns) = history_store.newest_ns().filter(|newest_ns| *newest_ns >= now_ns) else { return now_ns };
     if plan.speed == MachineSpeed::Real {
-        let text = "the history holds samples from the future (an accelerated run, or a clock that was wrong); \
-                    new ones are stored with the time of this clock";
-        Notice::new(Severity::Warning, "history_ahead", text).detail(format!("{} ns", newest_ns - now_ns)).say();
         return now_ns;
     }
-    newest_ns + SECOND_NS
+    let newest_ns = history_store.newest_ns().filter(|newest_ns| *newest_ns >= now_ns);
+    newest_ns.map_or(now_ns, |newest_ns| newest_ns + SECOND_NS)
 }
 
 /// Serves until a signal says stop, or the tick has ended by itself.
@@ -302,7 +306,7 @@ async fn serve(
     plan: &RunPlan,
     (listener, certificate): (Option<TcpListener>, Option<Certificate>),
     live: watch::Receiver<Option<Published>>,
-    run_flags: &Arc<RunFlags>,
+    (run_flags, signals): (&Arc<RunFlags>, Option<&mut Signals>),
     (report, post, diagnoses): (watch::Sender<Option<String>>, control::OrderSender, Option<DiagnosisHandle>),
     outputs: Option<&ConfiguredSinks>,
 ) {
@@ -333,7 +337,7 @@ async fn serve(
         }
         _ => None,
     };
-    end::wait_for_end(run_flags, outputs, live).await;
+    end::wait_for_end(run_flags, signals, outputs, live).await;
     if let Some(sinks) = sinks {
         sinks.stop().await;
     }

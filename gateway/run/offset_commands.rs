@@ -110,13 +110,14 @@ impl OffsetCommands {
             what: format!("{}: what an earlier run has left in the control cannot be read", path.display()),
             next: "look at the external offsets at the control, set them right there, and delete the file".to_owned(),
         });
-        let own = self.abandoned(|target, axis| self.is_own(target) && !self.follows(axis, gate)).map(|shifts| {
-            StatusProblem {
-                what: format!("the external offset in the control is still shifted: {shifts}"),
-                next: "arm the gate again, or set the offset back at the control".to_owned(),
-            }
-        });
-        let others = self.abandoned(|target, _| !self.is_own(target)).map(|shifts| StatusProblem {
+        let own =
+            self.describe_abandoned(|target, axis| self.is_own(target) && !self.follows(axis, gate)).map(|shifts| {
+                StatusProblem {
+                    what: format!("the external offset in the control is still shifted: {shifts}"),
+                    next: "arm the gate again, or set the offset back at the control".to_owned(),
+                }
+            });
+        let others = self.describe_abandoned(|target, _| !self.is_own(target)).map(|shifts| StatusProblem {
             what: format!("the external offset is still shifted in a control that is no longer written to: {shifts}"),
             next: "name that control again as `source` under [gate.offset], or set the offset back there".to_owned(),
         });
@@ -134,7 +135,7 @@ impl OffsetCommands {
         self.target.is_some() && (limits.restore || (gate.armed().is_ok() && limits.axes.contains(&axis)))
     }
 
-    fn abandoned(&self, counts: impl Fn(&str, Axis) -> bool) -> Option<String> {
+    fn describe_abandoned(&self, counts: impl Fn(&str, Axis) -> bool) -> Option<String> {
         let of = |(target, axis, left): &(String, Axis, Left)| {
             let place = if self.is_own(target) { String::new() } else { format!("{target} ") };
             format!("{place}{} by {:+.0} um, to {:.0} um", axis.word(), left.shift_um(), left.written_um)

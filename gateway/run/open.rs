@@ -73,7 +73,7 @@ pub fn sources(
 ) -> Result<Sources, Vec<String>> {
     match speed {
         MachineSpeed::Real => live(config, clock),
-        MachineSpeed::Times(_) | MachineSpeed::Max => stepped(config, speed, start_ns),
+        MachineSpeed::Times(_) | MachineSpeed::Max => open_stepped_sources(config, speed, start_ns),
     }
 }
 
@@ -82,7 +82,7 @@ pub(super) fn period(config: &Config) -> Duration {
     Duration::from_secs_f64(1.0 / config.gateway.tick_hz)
 }
 
-fn simulated(config: &Config) -> bool {
+fn is_simulated(config: &Config) -> bool {
     config.sources.iter().all(|source| matches!(source.address.target(), Target::Simulated(_)))
 }
 
@@ -108,7 +108,7 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     let feed =
         threads(found, clock, &config.alignment).map_err(|error| vec![format!("no thread for a source: {error}")])?;
     let pace = TickSchedule::on_clock(clock.clone(), period(config));
-    Ok(Sources { feed, pace, ways, machines, simulated: simulated(config) })
+    Ok(Sources { feed, pace, ways, machines, simulated: is_simulated(config) })
 }
 
 /// As [`open`], and streams that only become a channel in the box.
@@ -135,7 +135,7 @@ fn threads(
     Ok(SampleFeed::Threads { workers, merge, alignment: Alignment::of(&plans, alignment, Patience::GoesOn) })
 }
 
-fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
+fn open_stepped_sources(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
     let (mut found, mut ways, mut problems) = (Vec::<Box<dyn Pull>>::new(), Vec::new(), Vec::new());
     let mut machines = Vec::new();
     for source in &config.sources {
@@ -146,7 +146,7 @@ fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sou
                 ways.push(Way { name, actuator, offsets });
                 machines.extend(opened.simulated);
             }
-            Err(error) => problems.push(accelerated(&error)),
+            Err(error) => problems.push(describe_speed_error(&error)),
         }
     }
     if !problems.is_empty() {
@@ -157,9 +157,9 @@ fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sou
     let alignment = Alignment::of(&plans, &config.alignment, Patience::Waits);
     let feed = SampleFeed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
     let pace = TickSchedule::stepped(speed.factor(), start_ns, period(config));
-    Ok(Sources { feed, pace, ways, machines, simulated: simulated(config) })
+    Ok(Sources { feed, pace, ways, machines, simulated: is_simulated(config) })
 }
 
-fn accelerated(error: &OpenError) -> String {
+fn describe_speed_error(error: &OpenError) -> String {
     format!("{error} (with --speed only simulated machines and recordings can be read)")
 }

@@ -130,7 +130,7 @@ pub fn recover(history: &Path, writer: &Writer) -> usize {
 /// Rows of the file from after the newest sample that the history lacks; nothing where the history cannot be read.
 fn missing(history: &Path) -> Option<Vec<Audit>> {
     let reader = Reader::open(history).ok()?;
-    let newest = reader.span().ok()?;
+    let newest = reader.present().ok()?;
     let from_ns = newest.map_or(TimeNs::MIN, |(_, newest_ns)| newest_ns.saturating_sub(LOOK_BACK_NS));
     let stored = reader.audit(from_ns, TimeNs::MAX, u32::MAX).ok()?;
     let rows = lines(&path(history)).into_iter().filter_map(|line| serde_json::from_str::<Audit>(&line).ok());

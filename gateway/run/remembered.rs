@@ -1,28 +1,29 @@
 //! What the estimators knew before the box was last stopped: read from files of the data directory, told where one cannot be used.
 
+use crate::learned;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use ::rules::estimators;
 use std::path::Path;
 
 /// The wear of the edges, as it was known before.
-pub(super) fn edges(pipeline: &mut Pipeline, memory: &Path) {
-    let Ok(text) = std::fs::read_to_string(memory) else { return };
-    let snapshot = serde_json::from_str(&text).unwrap_or(serde_json::Value::Null);
+pub(super) fn edges(pipeline: &mut Pipeline, memory: &Path, told: &mut Vec<Notice>) {
+    let Some(state) = learned::read(memory, |notice| told.push(notice)) else { return };
+    let snapshot = serde_json::from_str(&state).unwrap_or(serde_json::Value::Null);
     if !pipeline.wear_mut().restore(snapshot) {
         let text = format!("{} cannot be used: the wear of the edges is followed anew", memory.display());
-        Notice::new(Severity::Warning, "wear_forgotten", text).say();
+        told.push(Notice::new(Severity::Warning, "wear_forgotten", text));
     }
 }
 
 /// The estimators, with what they had learned before.
-pub(super) fn estimators(memory: &Path) -> estimators::Inference {
+pub(super) fn estimators(memory: &Path, told: &mut Vec<Notice>) -> estimators::Inference {
     let settings = estimators::Settings::default();
     let fresh = || estimators::Inference::new(settings.clone());
-    let Ok(text) = std::fs::read_to_string(memory) else { return fresh() };
-    let snapshot = serde_json::from_str(&text).unwrap_or(serde_json::Value::Null);
+    let Some(state) = learned::read(memory, |notice| told.push(notice)) else { return fresh() };
+    let snapshot = serde_json::from_str(&state).unwrap_or(serde_json::Value::Null);
     estimators::Inference::restore(settings.clone(), snapshot).unwrap_or_else(|error| {
-        Notice::new(Severity::Warning, "nothing_learned", error.to_string()).say();
+        told.push(Notice::new(Severity::Warning, "nothing_learned", error.to_string()));
         fresh()
     })
 }

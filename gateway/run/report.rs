@@ -2,6 +2,7 @@
 
 use crate::config::GateMode;
 use crate::gate::{Gate, GateOutcome, Verdict};
+use crate::http::ESTIMATES;
 use crate::pipeline::Pipeline;
 use crate::status::{
     AlarmStatus, AxisShift, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, NumberOrWord, OffsetStatus,
@@ -9,7 +10,7 @@ use crate::status::{
 };
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Axis, Sample, Slot, Value};
-use rules::estimators::{Estimated, Estimates};
+use rules::estimators::{Estimated, Estimates, NoEstimate};
 
 /// Half the 95 % interval of a normal distribution, in standard deviations.
 const HALF_INTERVAL: f64 = 1.96;
@@ -41,10 +42,33 @@ fn channel(name: &'static str, unit: &'static str, slot: &Slot) -> ChannelStatus
     ChannelStatus { name, value, unit, age_s, missing }
 }
 
+/// Figures without a standard deviation that are shown: of the load, and the witnesses of the wear.
+const FIGURES: [&str; 4] = ["tool_limit_parts", "tool_life_share", "feed_in_force_pct", "learned_power_w"];
+
 /// Everything inferred.
 #[must_use]
 pub fn estimates(estimates: &Estimates) -> Vec<EstimateStatus> {
-    estimates.quantities().into_iter().map(|(name, estimated)| estimate(name, estimated)).collect()
+    let mut all: Vec<EstimateStatus> =
+        estimates.quantities().into_iter().map(|(name, estimated)| estimate(name, estimated)).collect();
+    let mut own = *estimates;
+    let figure = |name: &'static str| {
+        let figure = own.figure_mut(name).copied()?;
+        let (value, missing) = (figure.ok(), figure.err());
+        Some(EstimateStatus {
+            name,
+            value,
+            uncertainty: None,
+            unit: unit_of(name),
+            missing: missing.map(NoEstimate::word),
+            why: missing.map(|reason| reason.to_string()),
+        })
+    };
+    all.extend(FIGURES.into_iter().filter_map(figure));
+    all
+}
+
+fn unit_of(name: &str) -> &'static str {
+    ESTIMATES.iter().find(|row| row.0 == name).map_or("", |row| row.1)
 }
 
 fn estimate(name: &'static str, estimated: Estimated) -> EstimateStatus {
@@ -53,8 +77,8 @@ fn estimate(name: &'static str, estimated: Estimated) -> EstimateStatus {
         name,
         value: value.map(|estimate| estimate.value),
         uncertainty: value.map(|estimate| HALF_INTERVAL * estimate.sd),
-        unit: if name.ends_with("_mm") { "mm" } else { "W" },
-        missing: missing.map(rules::estimators::NoEstimate::word),
+        unit: unit_of(name),
+        missing: missing.map(NoEstimate::word),
         why: missing.map(|reason| reason.to_string()),
     }
 }

@@ -4,6 +4,7 @@ use super::health::{Health, SCRIPTS_MEMORY};
 use super::tick::RunFlags;
 use crate::active_scripts;
 use crate::config::Config;
+use crate::learned;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use crate::reload::{Fallback, Reloaded, Reloader, furnish, load_now, load_rest};
@@ -26,7 +27,7 @@ pub fn load(config: &Config) -> (Host, ScriptWatch) {
         told.push(Notice::new(Severity::Warning, "scripts_not_written", text));
     }
     let mut host = Host::new();
-    if let Some(remembered) = remembered(config) {
+    if let Some(remembered) = read_memory(config, &mut told) {
         host.restore(&remembered);
     }
     if directory.is_dir() {
@@ -38,7 +39,7 @@ pub fn load(config: &Config) -> (Host, ScriptWatch) {
                 Fallback::Others(count) => format!("the other {count} are in charge"),
                 Fallback::Shipped => "the shipped scripts are in charge as delivered".to_owned(),
             };
-            told.push(refused(&problems, &consequence));
+            told.push(build_refusal_notice(&problems, &consequence));
         }
     } else if host.load(&shipped()).is_ok() {
         told.push(Notice::new(
@@ -59,12 +60,12 @@ pub fn load(config: &Config) -> (Host, ScriptWatch) {
 }
 
 /// What the scripts remembered when the box last saved it.
-fn remembered(config: &Config) -> Option<serde_json::Value> {
-    let text = std::fs::read_to_string(config.gateway.data_dir.join(SCRIPTS_MEMORY)).ok()?;
-    serde_json::from_str(&text).ok()
+fn read_memory(config: &Config, told: &mut Vec<Notice>) -> Option<serde_json::Value> {
+    let state = learned::read(&config.gateway.data_dir.join(SCRIPTS_MEMORY), |notice| told.push(notice))?;
+    serde_json::from_str(&state).ok()
 }
 
-fn refused(problems: &[ScriptProblem], consequence: &str) -> Notice {
+fn build_refusal_notice(problems: &[ScriptProblem], consequence: &str) -> Notice {
     let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
     let text = format!("scripts refused, {consequence}:\n  {}", lines.join("\n").replace('\n', "\n  "));
     Notice::new(Severity::Warning, "scripts_refused", text)
@@ -146,7 +147,7 @@ impl ScriptWatch {
                 let text = format!("{count} scripts are in charge as they are on disk");
                 Notice::new(Severity::Info, "scripts_reloaded", text)
             }
-            Some(Err(problems)) => refused(&problems, "the ones before stay in charge"),
+            Some(Err(problems)) => build_refusal_notice(&problems, "the ones before stay in charge"),
         };
         health.event(now_ns, "scripts", &notice);
     }

@@ -108,6 +108,15 @@ impl SampleFeed {
         }
     }
 
+    /// Polls and waits of all threads that are over; `None` without threads. Whoever looks twice sees whether any of them moves.
+    #[must_use]
+    pub fn count_steps(&self) -> Option<u64> {
+        match self {
+            Self::Threads { workers, .. } => Some(workers.iter().map(Worker::count_steps).sum()),
+            Self::Stepped { .. } => None,
+        }
+    }
+
     /// Stops every thread; does not wait for a vendor library that hangs.
     pub fn stop(&self) {
         if let Self::Threads { workers, .. } = self {
@@ -120,7 +129,7 @@ fn milliseconds(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e3
 }
 
-fn dropped(counts: MergeCounts) -> u64 {
+fn count_dropped(counts: MergeCounts) -> u64 {
     counts.too_late + counts.clock_steps + counts.unannounced
 }
 
@@ -142,7 +151,7 @@ fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStat
         readings: counts.readings,
         failures: stats.failures,
         missed: stats.missed,
-        dropped: dropped(counts) + stats.dropped,
+        dropped: count_dropped(counts) + stats.dropped,
         facts: stats.facts.iter().map(shown).collect(),
         problems: stats.problems.iter().map(problem).collect(),
     }
@@ -182,7 +191,7 @@ fn of_step(name: &str, period: Duration, error: Option<&SourceError>, counts: Me
         readings: counts.readings,
         failures: counts.failures,
         missed: 0,
-        dropped: dropped(counts),
+        dropped: count_dropped(counts),
         facts: Vec::new(),
         problems: Vec::new(),
     }

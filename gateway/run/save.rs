@@ -1,17 +1,36 @@
 //! What the box has learned goes to disk beside the tick, so that a slow disk never delays a write to the machine.
 
 use crate::files::replace;
+use crate::learned;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
 /// Files that wait for the disk; what does not fit is saved at the next turn.
 const WAITING_MAX: usize = 8;
 
+/// A file on its way to the disk.
+#[derive(Debug)]
+struct SaveJob {
+    path: PathBuf,
+    text: String,
+    /// What was learned has a checksum, and the save before it beside it.
+    learned: bool,
+}
+
+impl SaveJob {
+    fn put(&self) {
+        let saved = if self.learned { learned::save(&self.path, &self.text) } else { replace(&self.path, &self.text) };
+        if let Err(error) = saved {
+            tracing::warn!("{} could not be saved: {error}", self.path.display());
+        }
+    }
+}
+
 /// See the [module](self).
 #[derive(Debug)]
 pub struct Saver {
-    jobs: Option<SyncSender<(PathBuf, String)>>,
+    jobs: Option<SyncSender<SaveJob>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -19,17 +38,27 @@ impl Saver {
     /// Starts the thread. Without one, files are written at once.
     #[must_use]
     pub fn start() -> Self {
-        let (send, jobs) = sync_channel::<(PathBuf, String)>(WAITING_MAX);
-        let work = move || jobs.iter().for_each(|(path, text)| put(&path, &text));
+        let (send, jobs) = sync_channel::<SaveJob>(WAITING_MAX);
+        let work = move || jobs.iter().for_each(|job| job.put());
         let thread = std::thread::Builder::new().name("save".to_owned()).spawn(work).ok();
         Self { jobs: thread.is_some().then_some(send), thread }
     }
 
     /// Writes this file, a new one in the place of the old one, as soon as the disk has time.
     pub fn put(&self, path: &Path, text: String) {
-        let Some(jobs) = &self.jobs else { return put(path, &text) };
-        if jobs.try_send((path.to_owned(), text)).is_err() {
-            tracing::warn!("{} was not saved: the disk has not taken what came before", path.display());
+        self.send(SaveJob { path: path.to_owned(), text, learned: false });
+    }
+
+    /// The same for what was learned: see [`learned`].
+    pub fn put_learned(&self, path: &Path, state: String) {
+        self.send(SaveJob { path: path.to_owned(), text: state, learned: true });
+    }
+
+    fn send(&self, job: SaveJob) {
+        let Some(jobs) = &self.jobs else { return job.put() };
+        if let Err(refused) = jobs.try_send(job) {
+            let (TrySendError::Full(job) | TrySendError::Disconnected(job)) = refused;
+            tracing::warn!("{} was not saved: the disk has not taken what came before", job.path.display());
         }
     }
 
@@ -49,12 +78,6 @@ impl Drop for Saver {
     }
 }
 
-fn put(path: &Path, text: &str) {
-    if let Err(error) = replace(path, text) {
-        tracing::warn!("what was learned could not be saved in {}: {error}", path.display());
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -70,5 +93,7 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&path).expect("written"), "2");
         saver.put(&path, "3".to_owned());
         assert_eq!(std::fs::read_to_string(&path).expect("written"), "3", "afterwards at once");
+        saver.put_learned(&path, "4".to_owned());
+        assert_eq!(learned::read(&path, |_| {}).as_deref(), Some("4"));
     }
 }

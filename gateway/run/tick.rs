@@ -12,7 +12,7 @@ use super::thermal::Thermal;
 use super::wear::{self, Wear};
 use crate::config::GateMode;
 use crate::control::Wake;
-use crate::gate::ScriptRequest;
+use crate::gate::{Disarmed, ScriptRequest};
 use crate::http::Published;
 use crate::log::{Notice, Severity};
 use crate::operations::{Operations, SOURCE};
@@ -40,6 +40,15 @@ pub struct RunFlags {
     pub stop: AtomicBool,
     /// Read scripts again.
     pub reload: AtomicBool,
+}
+
+/// How a run has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RunEnd {
+    /// It was told to stop, or there is nothing more to do.
+    Over,
+    /// It is to begin again, with the time that the wall clock says.
+    FollowClock,
 }
 
 /// What does not change while the box runs.
@@ -94,8 +103,8 @@ pub struct Ticker {
 }
 
 impl Ticker {
-    /// Runs until it is told to stop, the time is over, or every source has come to its end.
-    pub fn run(mut self) {
+    /// Runs until it is told to stop, the time is over, every source has come to its end, or another clock is to be followed.
+    pub fn run(mut self) -> RunEnd {
         let started = Instant::now();
         let mut published = None;
         let mut sample = Sample::empty(0);
@@ -120,7 +129,6 @@ impl Ticker {
             let inferred = *self.pipeline.infer(&sample);
             self.feed.alignment_mut().told(sample.at_ns, inferred.state);
             self.health.aligned(sample.at_ns, self.feed.alignment_mut());
-            self.wear.tell(&mut self.pipeline, sample.at_ns, &mut self.health);
             if let Some(thermal) = &mut self.thermal {
                 self.pipeline.propose(thermal.step(&sample, &mut self.health));
             }
@@ -136,7 +144,9 @@ impl Ticker {
                 twin.step(&sample, &self.pipeline, &mut self.health);
             }
             self.health.look(&self.pipeline, &self.feed, now_ns);
-            let over = !alive || self.stop_after_ns.is_some_and(|limit_ns| now_ns - began_ns >= limit_ns);
+            let over = !alive
+                || self.health.follows_clock()
+                || self.stop_after_ns.is_some_and(|limit_ns| now_ns - began_ns >= limit_ns);
             if over || published.is_none_or(|at: Instant| at.elapsed() >= PUBLISH_EVERY) {
                 published = Some(Instant::now());
                 self.send(&sample, now_ns, started);
@@ -144,6 +154,9 @@ impl Ticker {
             if over {
                 break;
             }
+        }
+        if self.health.follows_clock() {
+            self.commands.end_arming(Disarmed::Clock, &sample, self.pipeline.gate_mut(), &mut self.health);
         }
         self.commands.close(&sample, self.pipeline.gate_mut(), &mut self.health);
         self.tell_writes(sample.at_ns);
@@ -153,6 +166,7 @@ impl Ticker {
         }
         self.health.close(&self.pipeline, sample.at_ns);
         self.run_flags.stop.store(true, Ordering::SeqCst);
+        if self.health.follows_clock() { RunEnd::FollowClock } else { RunEnd::Over }
     }
 
     /// Waits for the next tick. Orders that come meanwhile are carried out at once: whoever disarms does not wait for it.
@@ -205,6 +219,7 @@ impl Ticker {
             speed,
             at_ms: report::milliseconds(sample.at_ns),
             uptime_s: started.elapsed().as_secs_f64(),
+            clock: self.health.clock_status(),
             tick: TickStatus {
                 rate_hz,
                 count,

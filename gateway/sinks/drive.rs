@@ -1,7 +1,9 @@
 //! The task of a sink: connects, sends live data first and old data between, tries again with growing pauses.
 
 use super::board::{Board, seconds};
+use super::isolation::{Isolation, Turn};
 use super::{Batch, Requests, Sink, SinkError, open};
+use crate::clock;
 use crate::config;
 use crate::control::OrderSender;
 use crate::history::{Outbox, OutboxHead, OutboxReader, OutboxStretch};
@@ -62,6 +64,7 @@ pub fn start_with(sinks: Vec<(String, Box<dyn Sink>)>, outbox: &Outbox, board: &
             path: path.to_owned(),
             stopping: stopping.clone(),
             feed: None,
+            isolation: Isolation::default(),
         };
         tokio::spawn(task.run(sink))
     };
@@ -88,7 +91,9 @@ struct SinkTask {
     board: Board,
     path: PathBuf,
     stopping: watch::Receiver<bool>,
-    feed: Option<OutboxReader>,
+    /// With the name of the history that it reads.
+    feed: Option<(String, OutboxReader)>,
+    isolation: Isolation,
 }
 
 /// Why a connection was left.
@@ -208,20 +213,29 @@ impl SinkTask {
     }
 
     async fn batch(&mut self, sink: &mut dyn Sink, (from, to): (u64, u64), historical: bool) -> Result<(), Left> {
-        let stretch = self.read(from, to, sink.items_max().max(1)).await?;
-        if stretch.items.is_empty() {
-            self.outbox.delivered(&self.name, from, stretch.to.max(from + 1));
+        let (turn, stretch) = self.next_items(from, to, sink.items_max().max(1)).await?;
+        let begin = if let Turn::Past(item) = turn { item + 1 } else { from };
+        let Some(last) = stretch.items.last().map(|item| item.sequence) else {
+            self.outbox.delivered(&self.name, begin, stretch.to.max(begin + 1));
             return Ok(());
-        }
+        };
         let items = &stretch.items;
         let sent = timeout(DEADLINE, sink.send(Batch { items, historical })).await;
-        match sent.unwrap_or_else(|_| Err(too_slow("sending"))) {
-            Ok(()) => self.delivered(&stretch, from, historical),
-            Err(SinkError::Item { sequence, what, next }) => {
-                let error = SinkError::Item { sequence, what, next };
-                self.refused(&error, from, sequence);
+        let sent = sent.unwrap_or_else(|_| Err(too_slow("sending")));
+        if let (Turn::Past(item), Ok(()) | Err(SinkError::Item { .. })) = (turn, &sent) {
+            self.isolation.decide();
+            self.refused(&breaks_line(item), from, item);
+        }
+        match sent {
+            Ok(()) => {
+                self.isolation.arrived(begin, last);
+                self.delivered(&stretch, begin, historical);
             }
-            Err(error) => return Err(error.into()),
+            Err(error @ SinkError::Item { sequence, .. }) => self.refused(&error, begin, sequence),
+            Err(error) => {
+                self.isolation.broke(turn, from, last);
+                return Err(error.into());
+            }
         }
         // What the receiver wants is looked at between two batches as well.
         match timeout(Duration::ZERO, sink.idle()).await {
@@ -230,16 +244,34 @@ impl SinkTask {
         }
     }
 
+    /// What is to be sent of the items `from..to`.
+    async fn next_items(&mut self, from: u64, to: u64, items_max: usize) -> Result<(Turn, OutboxStretch), Left> {
+        let turn = self.isolation.turn(from);
+        if let Turn::Past(item) = turn {
+            // At the end of a gap the next one has been delivered before: it decides by arriving once more.
+            let newest = self.outbox.head().borrow().next_sequence;
+            let stretch = self.read(item + 1, newest, 1).await?;
+            if !stretch.items.is_empty() {
+                return Ok((turn, stretch));
+            }
+        }
+        // Nothing comes after the newest item yet: it is tried again.
+        let (turn, items_max) = if turn == Turn::Many { (turn, items_max) } else { (Turn::Alone, 1) };
+        Ok((turn, self.read(from, to, items_max).await?))
+    }
+
     async fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<OutboxStretch, Left> {
-        let (feed, path) = (self.feed.take(), self.path.clone());
+        // Another history lies there when the one before was damaged or removed.
+        let box_id = self.outbox.box_id();
+        let (feed, path) = (self.feed.take().filter(|(of, _)| *of == box_id), self.path.clone());
         let reading = tokio::task::spawn_blocking(move || {
-            let mut feed = feed.map_or_else(|| OutboxReader::open(&path), Ok)?;
+            let mut feed = feed.map_or_else(|| OutboxReader::open(&path), |(_, feed)| Ok(feed))?;
             feed.read(from, to, items_max).map(|stretch| (feed, stretch))
         });
         let failed = |text: String| Left::Failed(SinkError::line(format!("the outbox cannot be read: {text}"), ""));
         let read = reading.await.map_err(|error| failed(error.to_string()))?;
         let (feed, stretch) = read.map_err(|error| failed(error.to_string()))?;
-        self.feed = Some(feed);
+        self.feed = Some((box_id, feed));
         Ok(stretch)
     }
 
@@ -248,7 +280,7 @@ impl SinkTask {
         let reached_ns = stretch.items.iter().rev().find(|item| item.is_live()).map(|item| item.at_ns);
         let gap = self.outbox.standing(&self.name).is_some_and(|standing| standing.position.oldest_gap().is_some());
         // A record may have no time; an accelerated machine is ahead of the clock.
-        let delay_s = reached_ns.filter(|at_ns| *at_ns > 0).map(|at_ns| seconds(now_ns() - at_ns).max(0.0));
+        let delay_s = reached_ns.filter(|at_ns| *at_ns > 0).map(|at_ns| seconds(clock::now_ns() - at_ns).max(0.0));
         self.board.change(self.index, |progress| {
             progress.delivered += stretch.items.len() as u64;
             if historical || !gap {
@@ -277,15 +309,17 @@ impl SinkTask {
     }
 }
 
+/// A receiver hangs up at this item, and not at the one after it.
+fn breaks_line(sequence: u64) -> SinkError {
+    let what = "the receiver ended the connection whenever it was sent, and not at the one after it".to_owned();
+    let next = "raise the greatest message that the receiver takes; with protocol=5 a broker says why".to_owned();
+    SinkError::Item { sequence, what, next }
+}
+
 /// The receiver wants something, or the connection is over.
 async fn attend(sink: &mut dyn Sink, wanted: Result<(), SinkError>) -> Result<(), Left> {
     wanted?;
     timeout(DEADLINE, sink.attend()).await.unwrap_or_else(|_| Err(too_slow("answering"))).map_err(Left::Failed)
-}
-
-fn now_ns() -> i64 {
-    use adapters::clock::Clock;
-    adapters::clock::SystemClock::new().now_ns()
 }
 
 fn too_slow(doing: &str) -> SinkError {

@@ -19,6 +19,7 @@ mod board;
 pub mod broker;
 pub mod doctor;
 pub mod drive;
+mod isolation;
 mod listen;
 pub mod mqtt;
 pub mod nats;

@@ -3,9 +3,9 @@
 //! A sink hands every message that looks like a request to [`Requests::ask`], whether it is allowed or not: the tick writes
 //! all of them into the audit, carries out what is allowed, and says what became of it.
 
+use crate::clock;
 use crate::control::{NetworkRequest, OrderSender, Reply, RequestedChange};
 use crate::gate::trail::RowRate;
-use adapters::clock::{Clock, SystemClock};
 
 /// Requests per second on average, and at once. A plant's system asks a few times an hour and repeats once in half a minute;
 /// whoever sends more fills the audit and holds up data: each waits for the tick, at most a tenth of a second. What is beyond is
@@ -43,14 +43,14 @@ impl Requests {
 
     /// Asks, and gives what became of it; `None` for what came too fast, which is not answered.
     pub async fn ask(&mut self, change: Result<RequestedChange, String>) -> Option<Reply> {
-        let left_out = self.rate.may_pass(SystemClock::new().now_ns())?;
+        let left_out = self.rate.may_pass(clock::now_ns())?;
         let Some(post) = &self.post else { return Some(Reply::refused("there is no gate here")) };
-        let change = if self.allowed { change } else { Err(refused(&self.sink, change)) };
+        let change = if self.allowed { change } else { Err(describe_refusal(&self.sink, change)) };
         Some(post.request(NetworkRequest { sink: self.sink.clone(), change, left_out }).await)
     }
 }
 
-fn refused(sink: &str, change: Result<RequestedChange, String>) -> String {
+fn describe_refusal(sink: &str, change: Result<RequestedChange, String>) -> String {
     let what = change.map_or_else(|_| "a message that is no request".to_owned(), |change| change.to_string());
     format!(
         "{what}: the sink {sink} takes no requests; write allow_requests = true under its [[sink]] to let them reach the gate"

@@ -41,7 +41,7 @@ fn nclink(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenError>
     let (waiting, sink) = queue();
     let current = SampledCurrent::new(Some(target.spindle_axis.unwrap_or(SPINDLE_AXIS)), 1.0);
     let opened = adapters::nclink::open_sampled(address, target, Some(sink))?;
-    Ok(joined(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened))
+    Ok(join_sources(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened))
 }
 
 fn hnc(address: &Address, target: &HncNetTarget, scale_a: f64) -> Opened {
@@ -49,11 +49,11 @@ fn hnc(address: &Address, target: &HncNetTarget, scale_a: f64) -> Opened {
     // The driver lets the spindle be the first of the load currents.
     let current = SampledCurrent::new(None, scale_a);
     let opened = adapters::hnc::open_sampled(address, target, Some(sink));
-    joined(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened)
+    join_sources(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened)
 }
 
 /// What is sampled goes before what is polled.
-fn joined(samples: ControllerSamples, mut opened: Opened) -> Opened {
+fn join_sources(samples: ControllerSamples, mut opened: Opened) -> Opened {
     opened.sources.insert(0, Box::new(samples));
     opened
 }

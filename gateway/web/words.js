@@ -20,13 +20,17 @@ export function t(key, ...values) {
 /** Is there such a text? */
 export const has = (key) => key in WORDS;
 
+/** A moment that the box has written in UTC, by the clock of the reader: two kinds of time on one page are read as one. */
+const MOMENT = /(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d(?::\d\d)?)(?:\.\d+)?(?:Z| UTC)/g;
+export const localTimes = (text) => text?.replace(MOMENT, (_, day, time) => new Date(`${day}T${time}Z`).toLocaleString(chosen === "zh" ? "zh-CN" : "en-GB", { year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit" })) ?? "";
+
 /** The text of something that carries `en` and `zh` itself. */
-export const own = (thing) => thing?.[chosen] ?? thing?.en ?? "";
+export const own = (thing) => localTimes(thing?.[chosen] ?? thing?.en ?? "");
 
 /** What the box says in English, in Chinese where that is read: the sentences of the gate are put together from known phrases. */
 export function box(text) {
-  if (chosen !== "zh" || !text) return text ?? "";
-  return PHRASES.reduce((done, [en, zh]) => done.split(en).join(zh), text);
+  if (chosen !== "zh" || !text) return localTimes(text);
+  return PHRASES.reduce((done, [en, zh]) => done.split(en).join(zh), localTimes(text));
 }
 
 export function setLanguage(next) {

@@ -1,6 +1,8 @@
 //! What one tick yields: every quantity with its uncertainty, or the reason why there is none.
 
 use super::basis::StateBasis;
+use super::loads::{Figure, Loads};
+use super::part::PartFigures;
 use super::state::State;
 use adapters::clock::TimeNs;
 use adapters::{Absence, ChannelId};
@@ -60,15 +62,55 @@ pub enum NoEstimate {
     OutsideModel,
     /// The wear cannot be seen in the power of this cut.
     NotObservable,
-    /// No part of this edge has been finished yet.
+    /// No part, or none of this edge, has been finished yet.
     NoPartYet,
     /// Nothing is being cut.
     NotCutting,
     /// The power lies below the no-load power by more than the uncertainty: braking, or the no-load power is outdated.
     BelowNoLoad,
+    /// Neither the feed nor its override is known.
+    FeedUnknown,
+    /// No load is aimed at.
+    NoTarget,
+    /// The load that is aimed at is not measured.
+    LoadUnknown,
+    /// This place of the program has not been watched for enough parts.
+    PlaceNotLearned,
+    /// The programmed feed is right.
+    NothingToChange,
+    /// No power was measured.
+    PowerUnknown,
 }
 
 impl NoEstimate {
+    /// Every word of [`NoEstimate::word`].
+    pub const WORDS: [&'static str; 24] = [
+        "not_yet",
+        "input_missing",
+        "machine_off",
+        "spindle_stopped",
+        "speed_changing",
+        "contradiction",
+        "not_settled",
+        "not_learned",
+        "extrapolated",
+        "imbalance",
+        "no_load_measured",
+        "no_model",
+        "cut_unknown",
+        "outside_model",
+        "not_observable",
+        "no_part_yet",
+        "not_cutting",
+        "below_no_load",
+        "feed_unknown",
+        "no_target",
+        "load_unknown",
+        "place_not_learned",
+        "nothing_to_change",
+        "power_unknown",
+    ];
+
     /// The word used in `<quantity>_missing` columns, JSON and SQL.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -91,6 +133,12 @@ impl NoEstimate {
             Self::NoPartYet => "no_part_yet",
             Self::NotCutting => "not_cutting",
             Self::BelowNoLoad => "below_no_load",
+            Self::FeedUnknown => "feed_unknown",
+            Self::NoTarget => "no_target",
+            Self::LoadUnknown => "load_unknown",
+            Self::PlaceNotLearned => "place_not_learned",
+            Self::NothingToChange => "nothing_to_change",
+            Self::PowerUnknown => "power_unknown",
         }
     }
 }
@@ -127,9 +175,17 @@ impl fmt::Display for NoEstimate {
             }
             Self::OutsideModel => f.write_str("the cut lies outside those that the model was fitted on"),
             Self::NotObservable => f.write_str("the wear cannot be seen in the power of this cut"),
-            Self::NoPartYet => f.write_str("no part of this edge has been finished yet"),
+            Self::NoPartYet => f.write_str("no part has been finished yet"),
             Self::NotCutting => f.write_str("nothing is being cut"),
             Self::BelowNoLoad => f.write_str("power is below no-load power: braking, or no-load power is outdated"),
+            Self::FeedUnknown => f.write_str("neither the feed nor its override is known"),
+            Self::NoTarget => f.write_str("no load is aimed at"),
+            Self::LoadUnknown => f.write_str("the load that is aimed at is not measured"),
+            Self::PlaceNotLearned => {
+                f.write_str("this place of the program has not been watched for enough parts; the part counter must count them")
+            }
+            Self::NothingToChange => f.write_str("the programmed feed is right"),
+            Self::PowerUnknown => f.write_str("no power was measured"),
         }
     }
 }
@@ -152,6 +208,9 @@ pub enum NoLoadOrigin {
 }
 
 impl NoLoadOrigin {
+    /// Every origin.
+    pub const ALL: [Self; 5] = [Self::None, Self::Measured, Self::Interpolated, Self::Extrapolated, Self::UpperBound];
+
     /// The word used in SQL, scripts, JSON and CSV.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -180,6 +239,9 @@ pub enum Visibility {
 }
 
 impl Visibility {
+    /// Every answer.
+    pub const ALL: [Self; 4] = [Self::NotAsked, Self::Visible, Self::BelowVisibility, Self::NoReference];
+
     /// The word used in SQL, scripts, JSON and CSV.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -227,6 +289,12 @@ pub struct Estimates {
     pub tool_worn_probability: Estimated,
     /// Parts until the edge in use passes its criterion.
     pub tool_parts_left: Estimated,
+    /// By how much the material takes more than usual, %: what all tools have in common.
+    pub material_level_pct: Estimated,
+    /// Parts in a row in which the edge in use took more than its limit in every operation that has one.
+    pub tool_limit_parts: Figure,
+    /// What the edge in use has cut over what the edges before it had cut when they were changed.
+    pub tool_life_share: Figure,
     /// Where the no-load power comes from.
     pub no_load_origin: NoLoadOrigin,
     /// By how much the interpolation amplifies the noise of the learned powers; 0 where there is no no-load power.
@@ -235,6 +303,10 @@ pub struct Estimates {
     pub visibility: Visibility,
     /// Gear stage in force.
     pub gear_stage: u8,
+    /// The load beside its target and beside what was learned.
+    pub loads: Loads,
+    /// The part that was finished last.
+    pub part: PartFigures,
 }
 
 impl Estimates {
@@ -258,15 +330,20 @@ impl Estimates {
             tool_growth_pct: Err(NoEstimate::NoPartYet),
             tool_worn_probability: Err(NoEstimate::NoPartYet),
             tool_parts_left: Err(NoEstimate::NoPartYet),
+            material_level_pct: Err(NoEstimate::NoPartYet),
+            tool_limit_parts: Err(NoEstimate::NoModel),
+            tool_life_share: Err(NoEstimate::NoPartYet),
             no_load_origin: NoLoadOrigin::None,
             noise_gain: 0.0,
             visibility: Visibility::NotAsked,
             gear_stage: 0,
+            loads: Loads::none(NoEstimate::NotYet),
+            part: PartFigures::none(),
         }
     }
 
     /// Every quantity with its name (which ends in the unit), for scripts, storage and HTTP.
-    pub fn quantities(&self) -> [(&'static str, Estimated); 10] {
+    pub fn quantities(&self) -> [(&'static str, Estimated); 11] {
         [
             ("filtered_power_w", self.filtered_power_w),
             ("no_load_power_w", self.no_load_power_w),
@@ -278,7 +355,20 @@ impl Estimates {
             ("tool_growth_pct", self.tool_growth_pct),
             ("tool_worn_probability", self.tool_worn_probability),
             ("tool_parts_left", self.tool_parts_left),
+            ("material_level_pct", self.material_level_pct),
         ]
+    }
+
+    /// The figure of this name, to be set: of the load, and of the part that was finished last.
+    pub fn figure_mut(&mut self, name: &str) -> Option<&mut Figure> {
+        match name {
+            "tool_limit_parts" => Some(&mut self.tool_limit_parts),
+            "tool_life_share" => Some(&mut self.tool_life_share),
+            "part_energy_j" => Some(&mut self.part.energy_j),
+            "part_cutting_energy_j" => Some(&mut self.part.cutting_energy_j),
+            "part_idle_s" => Some(&mut self.part.idle_s),
+            _ => self.loads.figure_mut(name),
+        }
     }
 
     /// Is the no-load power extrapolated beyond the learned speeds?

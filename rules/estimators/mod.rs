@@ -5,7 +5,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `settings` | the one table of tolerances and lengths |
+//! | `settings`, `place_settings` | the one table of tolerances and lengths, and values for one tool or operation |
 //! | `state`, `estimate` | the words and numbers that come out |
 //! | `filter` | anti-pulse moving average |
 //! | `basis` | what stands for spindle power where nobody measures it |
@@ -16,6 +16,8 @@
 //! | `no_load`, `interpolation`, `learning` | no-load power over speed, per gear stage, learned from idle |
 //! | `supply` | no-load power over supply voltage, its exponent learned |
 //! | `visibility` | over a whole recording: could cutting be seen at all |
+//! | `part` | what is known of the part that was finished last |
+//! | `loads` | the load beside its target and beside what was learned, and the feed override between them |
 //! | `cutting` | power balance: cutting power and load loss |
 //! | `power_separation` | no-load power and load loss from recordings |
 //! | `alignment` | lag, drift and averaging window between controller and meter |
@@ -35,8 +37,11 @@ mod inference;
 mod inputs;
 mod interpolation;
 mod learning;
+pub mod loads;
 mod no_load;
 mod noise;
+mod part;
+mod place_settings;
 pub mod power_separation;
 pub mod regression;
 mod settings;
@@ -60,6 +65,7 @@ pub use filter::AntiPulse;
 pub use inference::{Inference, RestoreError};
 pub use interpolation::{lagrange, noise_gain, triple};
 pub use no_load::{NoLoad, NoLoadPoint, NoLoadTable};
+pub use part::PartFigures;
 pub use settings::{SETTINGS, SPEEDS_PER_STAGE, STAGES, Setting, SettingError, Settings};
 pub use state::State;
 pub use visibility::{VisibilityTally, VisibilityVerdict};

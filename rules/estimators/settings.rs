@@ -1,9 +1,12 @@
 //! Every tolerance and length the estimators use: one table that scripts, configuration and documentation read.
 
 use super::cutting::LoadLossLaw;
+use super::loads::LoadCurves;
 use super::no_load::NoLoadPoint;
+use super::place_settings::PlaceValues;
 use adapters::channel::nearest;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Gear stages are numbered 0 to 7; a machine without a gear box runs in stage 0.
@@ -28,7 +31,7 @@ pub struct Setting {
     /// What it does, in English.
     pub en: &'static str,
     get: fn(&Settings) -> f64,
-    set: fn(&mut Settings, f64),
+    pub(super) set: fn(&mut Settings, f64),
 }
 
 /// Why a setting was not accepted. The text is what the integrator reads.
@@ -74,6 +77,10 @@ macro_rules! settings {
             pub(super) stage_load_loss_quadratic_per_w: [Option<f64>; STAGES],
             pub(super) stage_load_loss_speed_rpm: [Option<f64>; STAGES],
             pub(super) no_load_table: Vec<NoLoadPoint>,
+            #[serde(skip)]
+            pub(super) load_curves: Option<Arc<LoadCurves>>,
+            #[serde(skip)]
+            pub(super) places: Vec<PlaceValues>,
         }
 
         impl Default for Settings {
@@ -84,6 +91,8 @@ macro_rules! settings {
                     stage_load_loss_quadratic_per_w: [None; STAGES],
                     stage_load_loss_speed_rpm: [None; STAGES],
                     no_load_table: Vec::new(),
+                    load_curves: None,
+                    places: Vec::new(),
                 }
             }
         }
@@ -159,6 +168,40 @@ settings! {
     "Spindle speed at which a1 is as given, and goes with 1/n^2 elsewhere (copper losses); 0 = a1 is the same at every speed; for gear stages without a value of their own"
     load_loss_sd "1" 0.0 0.5 0.05 false
     "Uncertainty of a0, one standard deviation"
+    constant_load_target_w "W" 0.0 50000.0 0.0 false
+    "Constant load: power to aim at, cutting power or with curves the power they are of; 0 = the spindle load is aimed at"
+    constant_load_target_a "A" 0.0 500.0 0.0 false
+    "Constant load: spindle current to aim at, with curves of the current"
+    constant_load_target_pct "%" 0.0 150.0 0.0 false
+    "Constant load: spindle load to aim at, as the controller shows it; 0 = nothing is aimed at"
+    constant_load_exponent "1" 0.3 1.5 0.75 false
+    "Constant load: power of the feed with which the load grows (0.75 for steel); smaller answers more strongly"
+    constant_load_min_pct "%" 1.0 100.0 60.0 false
+    "Constant load: least feed override that is asked for"
+    constant_load_max_pct "%" 100.0 254.0 100.0 false
+    "Constant load: greatest feed override that is asked for; 100 = the feed is never raised"
+    constant_load_dead_band_pct "%" 0.0 20.0 2.0 false
+    "Constant load and learned load: a correction smaller than this changes nothing"
+    constant_load_entry_s "s" 0.0 10.0 0.5 false
+    "Constant load: at entry the load is not yet that of the cut; for so long nothing is asked for"
+    constant_load_steady_s "s" 0.5 20.0 1.5 false
+    "Constant load and learned load: the feed rises only after the load has been steady for so long"
+    constant_load_air_share "1" 0.01 0.9 0.1 false
+    "Constant load: less than this share of the target is air or a bare touch, and no reason to raise the feed"
+    learned_parts "1" 1.0 1000.0 3.0 true
+    "Learned load: parts from which the power of each place of a program is learned"
+    learned_entry_s "s" 0.0 10.0 0.5 false
+    "Learned load: at entry the power is not yet that of the cut; for so long nothing is learned or asked for"
+    learned_exponent "1" 0.3 1.5 0.75 false
+    "Learned load: power of the feed with which the cutting power grows"
+    learned_low_share "1" 0.0 1.0 0.0 false
+    "Learned load: below this share of what was learned the feed may rise; 0 = never"
+    learned_high_share "1" 1.0 10.0 2.0 false
+    "Learned load: above this share of what was learned the feed is lowered"
+    learned_min_pct "%" 1.0 100.0 60.0 false
+    "Learned load: least feed override that is asked for"
+    learned_max_pct "%" 100.0 254.0 100.0 false
+    "Learned load: greatest feed override that is asked for"
 }
 
 impl Settings {
@@ -216,6 +259,11 @@ impl Settings {
         Ok(())
     }
 
+    /// The curves that constant load follows.
+    pub fn set_load_curves(&mut self, curves: LoadCurves) {
+        self.load_curves = Some(Arc::new(curves));
+    }
+
     /// Everything that contradicts something else; empty when the settings can be used as they are.
     #[must_use]
     pub fn contradictions(&self) -> Vec<SettingError> {
@@ -242,7 +290,7 @@ impl Settings {
 }
 
 impl Setting {
-    fn check(&self, name: &str, value: f64) -> Result<(), SettingError> {
+    pub(super) fn check(&self, name: &str, value: f64) -> Result<(), SettingError> {
         let (least, greatest) = self.range;
         if value >= least && value <= greatest && !(self.whole && value.fract() != 0.0) {
             return Ok(());
@@ -251,7 +299,7 @@ impl Setting {
     }
 }
 
-fn row(name: &str) -> Option<&'static Setting> {
+pub(super) fn row(name: &str) -> Option<&'static Setting> {
     SETTINGS.iter().find(|setting| setting.name == name)
 }
 
@@ -261,7 +309,7 @@ fn staged(name: &str) -> Option<(&str, usize)> {
     stage.parse().ok().filter(|stage| *stage < STAGES).map(|stage| (base, stage))
 }
 
-fn unknown(name: &str) -> SettingError {
+pub(super) fn unknown(name: &str) -> SettingError {
     let nearest = nearest(name, SETTINGS.iter().map(|setting| setting.name));
     SettingError::Unknown { name: name.to_owned(), nearest }
 }

@@ -38,8 +38,9 @@ fn takes(method: &Method) -> String {
 /// The same as JSON, with the texts in both languages.
 #[must_use]
 pub fn api_json() -> Value {
-    let words =
-        words().iter().map(|word| json!({ "name": word.name, "unit": word.unit, "en": word.en, "zh": word.zh }));
+    let words = words().iter().map(
+        |word| json!({ "name": word.name, "unit": word.unit, "one_of": word.one_of, "en": word.en, "zh": word.zh }),
+    );
     let functions = FUNCTIONS.iter().map(|it| json!({ "signature": it.signature, "en": it.en, "zh": it.zh }));
     let settings = SETTINGS.iter().map(|row| {
         json!({ "name": row.name, "unit": row.unit, "default": row.default, "range": [row.range.0, row.range.1],

@@ -75,6 +75,12 @@ pub const FUNCTIONS: &[Function] = &[
         "请求进给倍率（由闸门决定）",
     ),
     function(
+        "follow_feed_override(name, reason)",
+        "Ask at every tick, also between two runs of this script, for the feed override that the estimate of this name gives; without a value \
+         nothing is asked for",
+        "逐周期请求该估计量给出的进给倍率（无值时不请求）",
+    ),
+    function(
         "request_feed_hold(reason)",
         "Ask the gate to hold the feed; passed on once, then only after the request has ended",
         "请求进给保持（由闸门决定）",
@@ -101,6 +107,11 @@ pub const FUNCTIONS: &[Function] = &[
     ),
     function("recall(name)", "The number put away under this name, or no value", "取出已保存的数值"),
     function("remembered()", "How many numbers are put away, of at most 2048", "已保存数值的个数"),
+    function(
+        "learn_anew(program)",
+        "What the estimators have learned of the load of this program is learned anew",
+        "重新学习该程序的负荷",
+    ),
     function("forget(beginning)", "Forgets every number whose name begins so", "删除以此开头的已保存数值"),
     function(
         "held_s(name, condition)",

@@ -2,6 +2,7 @@
 
 use super::decision::{Axis, Stop};
 use super::timers::{AlarmText, NAMES_MAX, Timers, too_many};
+use super::vocabulary::Word;
 use adapters::clock::TimeNs;
 use rhai::{Dynamic, EvalAltResult, ImmutableString};
 use std::sync::Arc;
@@ -23,6 +24,10 @@ pub(super) struct RunOutput {
     pub(super) now_ns: TimeNs,
     pub(super) timers: Timers,
     pub(super) request: Option<Asked>,
+    /// The word whose value is asked for at every tick, and why.
+    pub(super) follows: Option<(&'static Word, ImmutableString)>,
+    /// Programs whose load is to be learned anew.
+    pub(super) learn_anew: Vec<ImmutableString>,
     pub(super) stops: Vec<(Stop, ImmutableString)>,
     pub(super) offsets: Vec<(Axis, Asked)>,
     pub(super) alarms: Vec<(ImmutableString, AlarmText)>,
@@ -39,6 +44,8 @@ impl RunOutput {
     pub(super) fn begin(&mut self, now_ns: TimeNs) {
         self.now_ns = now_ns;
         self.request = None;
+        self.follows = None;
+        self.learn_anew.clear();
         self.stops.clear();
         self.offsets.clear();
         self.alarms.clear();
@@ -102,6 +109,15 @@ impl RunOutput {
     ) -> ScriptResult<()> {
         let stands = self.timers.alarm_turning(&name, wanted, hold_s, self.now_ns)?;
         if stands { self.alarm(name, text) } else { Ok(()) }
+    }
+
+    /// What was learned of the load of this program is learned anew.
+    pub(super) fn learn_anew(&mut self, program: ImmutableString) -> ScriptResult<()> {
+        if self.learn_anew.len() >= FORGET_MAX {
+            return Err(format!("learn_anew was called more than {FORGET_MAX} times in one run").into());
+        }
+        self.learn_anew.push(program);
+        Ok(())
     }
 
     /// The last reason given for each kind counts.

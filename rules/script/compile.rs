@@ -1,7 +1,7 @@
 //! From texts to a set of scripts that can run, or everything that is wrong with them.
 
 use super::compiled::{Script, ScriptSet};
-use super::declared::{self, DeclarationPlace as Where, Declared, Force, FoundDeclaration, SettingValues};
+use super::declared::{self, DeclarationPlace as Where, Declared, Force, FoundDeclaration, LiveValues, SettingValues};
 use super::engine::{self, OPERATIONS_MAX, Shared, TEXT_MAX};
 use super::examine::{Findings, ScriptPlace, Walk};
 use super::handlers::{Called, called};
@@ -10,8 +10,9 @@ use super::problem::{self, ScriptProblem};
 use super::settings::{ChosenSetting, merge, read_choices};
 use super::trials::prove;
 use super::variables::{self, ScriptBody};
+use super::vocabulary::find;
 use adapters::clock::SECOND_NS;
-use rhai::{AST, CallFnOptions, Dynamic, Engine, ImmutableString, Map, Position, Scope};
+use rhai::{AST, Dynamic, Engine, ImmutableString, Map, Position, Scope};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -129,6 +130,7 @@ pub fn prepare_with(files: &[ScriptFile], values: &SettingValues) -> Result<Scri
 }
 
 struct Compiler {
+    shared: Shared,
     checking: Engine,
     running: Engine,
     callable: Vec<(String, usize)>,
@@ -141,7 +143,8 @@ impl Compiler {
         let shared = Shared::default();
         let checking = engine::engine(&shared, false);
         let callable = engine::callable(&checking);
-        Self { running: engine::engine(&shared, true), checking, callable, channels: PublishedChannels::of(files) }
+        let running = engine::engine(&shared, true);
+        Self { shared, running, checking, callable, channels: PublishedChannels::of(files) }
     }
 
     fn script(
@@ -169,8 +172,12 @@ impl Compiler {
         let mut problems = Vec::new();
         let called = called(&filled, &plain, &self.checking, &mut problems);
         let live: Vec<&str> = force.live.constants.iter().map(|(name, _)| name.as_str()).collect();
-        let mut found =
-            self.examine(name, &plain, &called, constants.iter().map(|(name, _)| name.as_str()).chain(live));
+        let mut found = self.examine(
+            (name, &filled.text),
+            &plain,
+            &called,
+            constants.iter().map(|(name, _)| name.as_str()).chain(live),
+        );
         found.problems.append(&mut problems);
         let every_ns = every_ns(&filled, &plain).unwrap_or_else(|problem| {
             found.problems.push(problem);
@@ -180,7 +187,10 @@ impl Compiler {
             return Err(found.problems);
         }
         let ast = parse(&self.running, &filled.text)?;
-        let choices = self.choices(&filled, &ast)?;
+        let choices = match &called.settings {
+            Some(settings) => self.choices(&filled, (settings, &ast), &constants, &force.live)?,
+            None => Vec::new(),
+        };
         let names = variables::names(&found, &constants, &force.live);
         let body = ScriptBody::compile(&self.running, &filled.text, &names)
             .map_err(|error| vec![problem::of_parse(name, &error)])?;
@@ -212,12 +222,12 @@ impl Compiler {
 
     fn examine<'c>(
         &self,
-        file: &str,
+        (file, text): (&str, &str),
         plain: &AST,
         called: &Called,
         constants: impl Iterator<Item = &'c str>,
     ) -> Findings {
-        let mut walk = Walk::new(file, plain, &self.callable, &self.channels);
+        let mut walk = Walk::new((file, text), plain, &self.callable, &self.channels);
         let mut body = plain.clone();
         body.clear_functions();
         walk.read(&body, ScriptPlace::Body);
@@ -225,7 +235,13 @@ impl Compiler {
         let constants: Vec<ImmutableString> = constants.map(ImmutableString::from).collect();
         for handler in &called.handlers {
             let seen: Vec<ImmutableString> = handler.parameters.iter().chain(&constants).cloned().collect();
-            walk.read(&handler.plain, ScriptPlace::Handler(&seen));
+            let like = find(handler.kind.like());
+            let like: Vec<(&str, _)> =
+                like.iter().flat_map(|word| handler.parameters.iter().map(|name| (name.as_str(), *word))).collect();
+            walk.read(&handler.plain, ScriptPlace::Handler(&seen, &like));
+        }
+        if let Some(settings) = &called.settings {
+            walk.read(settings, ScriptPlace::Settings(&constants));
         }
         for trial in &called.trials {
             walk.read(&trial.plain, ScriptPlace::Trial(&constants));
@@ -233,17 +249,39 @@ impl Compiler {
         walk.finish()
     }
 
-    /// Calls `fn settings()` once.
-    fn choices(&self, file: &ScriptFile, ast: &AST) -> Result<Vec<ChosenSetting>, Vec<ScriptProblem>> {
-        if !ast.iter_functions().any(|it| it.name == "settings" && it.params.is_empty()) {
-            return Ok(Vec::new());
+    /// Runs `fn settings()` once, and once more for each tool and operation with values of its own.
+    fn choices(
+        &self,
+        file: &ScriptFile,
+        (settings, functions): (&AST, &AST),
+        constants: &[(String, Dynamic)],
+        live: &LiveValues,
+    ) -> Result<Vec<ChosenSetting>, Vec<ScriptProblem>> {
+        let one = |place: &Where| {
+            let values = live.of(place);
+            let mut scope = Scope::new();
+            for (name, value) in constants {
+                scope.push_constant_dynamic(name.clone(), value.clone());
+            }
+            for (name, index) in &live.constants {
+                scope.push_constant_dynamic(name.clone(), values.get(*index).cloned().unwrap_or_default());
+            }
+            self.shared.lock().live = Some(values);
+            let mut whole = functions.clone();
+            whole.clear_statements();
+            let ast = whole.merge(settings);
+            let result = self.running.eval_ast_with_scope::<Map>(&mut scope, &ast);
+            let map = result.map_err(|error| vec![problem::of_run(&file.name, &error, OPERATIONS_MAX)])?;
+            read_choices(file, &map, place)
+        };
+        let mut choices = one(&Where::Machine)?;
+        for place in live.places() {
+            let special = one(place)?;
+            let same = |it: &ChosenSetting| choices.iter().any(|known| known.says_the_same(it));
+            let special: Vec<ChosenSetting> = special.into_iter().filter(|it| !same(it)).collect();
+            choices.extend(special);
         }
-        let options = CallFnOptions::new().eval_ast(false);
-        let result = self.running.call_fn_with_options::<Map>(options, &mut Scope::new(), ast, "settings", ());
-        match result {
-            Ok(map) => read_choices(file, &map),
-            Err(error) => Err(vec![problem::of_run(&file.name, &error, OPERATIONS_MAX)]),
-        }
+        Ok(choices)
     }
 }
 

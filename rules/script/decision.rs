@@ -24,6 +24,8 @@ pub struct Decision {
     pub notes: Vec<Note>,
     /// Scripts that failed at this tick.
     pub problems: Vec<ScriptProblem>,
+    /// Programs whose load is to be learned anew.
+    pub learn_anew: Vec<Arc<str>>,
 }
 
 /// A request to the gate. Nothing has been checked: the number may be anything, NaN included.

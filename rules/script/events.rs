@@ -20,6 +20,19 @@ pub(super) enum EventKind {
     Alarm,
 }
 
+impl EventKind {
+    /// The word of the vocabulary whose values the parameters of the handler have.
+    pub(super) fn like(self) -> &'static str {
+        match self {
+            Self::State => "state",
+            Self::Part => "part_count",
+            Self::Program => "program",
+            Self::Tool => "tool",
+            Self::Alarm => "alarm",
+        }
+    }
+}
+
 /// A function of a script that is called when something happens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Handler {

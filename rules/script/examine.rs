@@ -4,6 +4,8 @@
 
 use super::callable::{FUNCTIONS, Function};
 use super::fields::{self, Field, Record};
+use super::kinds::calls::AlarmNames;
+use super::kinds::{self, KindMistake, LikeWords};
 use super::order::PublishedChannels;
 use super::problem::ScriptProblem;
 use super::trials::TRIAL_FUNCTIONS;
@@ -14,17 +16,14 @@ use rhai::{AST, ASTNode, BinaryExpr, Expr, FnCallExpr, ImmutableString, Position
 /// Longest name of a channel of a script's own.
 const CHANNEL_NAME_MAX: usize = 48;
 /// What lasts for one run of the body and would end at once in a handler.
-const OF_THE_BODY: [&str; 6] =
-    ["request_feed_override", "propose_offset_um", "alarm", "alarm_when", "alarm_above", "alarm_below"];
-
-/// Functions that take numbers, and at which places.
-const NUMBERS: [(&str, &[usize]); 6] = [
-    ("request_feed_override", &[0]),
-    ("propose_offset_um", &[1]),
-    ("publish", &[1]),
-    ("alarm_when", &[2]),
-    ("alarm_above", &[1, 2, 3, 4]),
-    ("alarm_below", &[1, 2, 3, 4]),
+const OF_THE_BODY: [&str; 7] = [
+    "request_feed_override",
+    "follow_feed_override",
+    "propose_offset_um",
+    "alarm",
+    "alarm_when",
+    "alarm_above",
+    "alarm_below",
 ];
 
 /// What is known of a script before it runs.
@@ -43,14 +42,16 @@ pub(super) struct Findings {
 }
 
 /// Where a piece of a script stands, which decides what it sees.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) enum ScriptPlace<'a> {
     /// The body: variables of the vocabulary, and its own.
     Body,
-    /// A handler: variables of the vocabulary, its parameters, the constants of the script.
-    Handler(&'a [ImmutableString]),
+    /// A handler: variables of the vocabulary, its parameters, the constants of the script. Its parameters are like words of the vocabulary.
+    Handler(&'a [ImmutableString], LikeWords<'a>),
     /// A trial: the constants of the script, and the functions of trials.
     Trial(&'a [ImmutableString]),
+    /// `fn settings()`: the constants of the script.
+    Settings(&'a [ImmutableString]),
     /// Another function: nothing but what is handed over.
     Function,
 }
@@ -58,6 +59,8 @@ pub(super) enum ScriptPlace<'a> {
 /// Reads the pieces of one file. `callable` is sorted; ASTs are compiled without optimization.
 pub(super) struct Walk<'a> {
     file: &'a str,
+    text: &'a str,
+    alarms: AlarmNames,
     callable: &'a [(String, usize)],
     own: Vec<(String, usize)>,
     channels: &'a PublishedChannels,
@@ -67,13 +70,13 @@ pub(super) struct Walk<'a> {
 impl<'a> Walk<'a> {
     /// `whole` is the whole file.
     pub(super) fn new(
-        file: &'a str,
+        (file, text): (&'a str, &'a str),
         whole: &AST,
         callable: &'a [(String, usize)],
         channels: &'a PublishedChannels,
     ) -> Self {
         let own = whole.iter_functions().map(|it| (it.name.to_owned(), it.params.len())).collect();
-        Self { file, callable, own, channels, found: Findings::default() }
+        Self { file, text, alarms: AlarmNames::default(), callable, own, channels, found: Findings::default() }
     }
 
     /// Looks through everything that stands in this place.
@@ -83,6 +86,8 @@ impl<'a> Walk<'a> {
 
     /// Everything that was found, in the order of the text.
     pub(super) fn finish(mut self) -> Findings {
+        let mistakes = self.alarms.mistakes();
+        self.mistakes(mistakes);
         self.found.problems.sort_by_key(|problem| (problem.line, problem.column));
         self.found.problems.dedup();
         self.found
@@ -103,7 +108,36 @@ impl<'a> Walk<'a> {
             Some(ASTNode::Stmt(Stmt::Assignment(assignment))) => self.assigned(&assignment.1.lhs),
             _ => {}
         }
+        if let Some(node) = path.last() {
+            self.values(node, place);
+        }
         true
+    }
+
+    /// Values that can never be what they are compared with, or handed over as.
+    fn values(&mut self, node: &ASTNode<'_>, place: ScriptPlace<'_>) {
+        let like = if let ScriptPlace::Handler(_, like) = place { like } else { &[] };
+        let conditions = |all: &[Expr]| all.iter().filter_map(|expr| kinds::compare::condition(expr, like)).collect();
+        let found: Vec<KindMistake> = match node {
+            ASTNode::Expr(Expr::FnCall(call, at)) | ASTNode::Stmt(Stmt::FnCall(call, at)) => {
+                self.alarms.add(call);
+                let compared = kinds::compare::operator(call, *at, like);
+                compared.into_iter().chain(kinds::calls::arguments(call, like)).collect()
+            }
+            ASTNode::Expr(Expr::And(all, _) | Expr::Or(all, _)) => conditions(all),
+            ASTNode::Stmt(Stmt::If(flow, _) | Stmt::While(flow, _) | Stmt::Do(flow, ..)) => {
+                kinds::compare::condition(&flow.expr, like).into_iter().collect()
+            }
+            ASTNode::Stmt(Stmt::Switch(switch, _)) => kinds::switch::cases(self.text, &switch.0, like),
+            _ => Vec::new(),
+        };
+        self.mistakes(found);
+    }
+
+    fn mistakes(&mut self, found: Vec<KindMistake>) {
+        for (at, what, next) in found {
+            self.problem(at, what, next);
+        }
     }
 
     fn is_own(&self, name: &str) -> bool {
@@ -119,11 +153,10 @@ impl<'a> Walk<'a> {
         if name == "publish" && call.args.len() == 3 {
             self.publishes(&call.args[0], &call.args[2], at);
         }
-        if matches!(place, ScriptPlace::Handler(_)) && OF_THE_BODY.contains(&name) {
+        if matches!(place, ScriptPlace::Handler(..)) && OF_THE_BODY.contains(&name) {
             let next = "raise_alarm and clear_alarm work here; or set memory.x here and ask for it in the body";
             self.problem(at, format!("`{name}` lasts for one run of the body and does nothing in a handler"), next);
         }
-        self.wrong_literal(call);
         let known = |(known, count): &(String, usize)| known == name && *count == arguments;
         if let Some(function) = of_trials(name) {
             return self.trial_call(function, arguments, at, place);
@@ -149,17 +182,6 @@ impl<'a> Walk<'a> {
         self.problem(at, format!("there is no function `{name}`"), next);
     }
 
-    /// A text where a function takes a number: found here, and not when that branch is first taken.
-    fn wrong_literal(&mut self, call: &FnCallExpr) {
-        let Some((name, places)) = NUMBERS.iter().find(|(name, _)| *name == call.name) else { return };
-        for place in *places {
-            if let Some(Expr::StringConstant(text, at)) = call.args.get(*place) {
-                let next = "write the number without quotes and without its unit";
-                self.problem(*at, format!("`{name}` needs a number here, not the text \"{text}\""), next);
-            }
-        }
-    }
-
     fn trial_call(&mut self, function: &Function, arguments: usize, at: Position, place: ScriptPlace<'_>) {
         let wanted = parameters(function.signature);
         let name = function.name().unwrap_or_default();
@@ -174,7 +196,7 @@ impl<'a> Walk<'a> {
 
     fn global(&mut self, name: &str, at: Position, place: ScriptPlace<'_>) {
         let names = match place {
-            ScriptPlace::Handler(names) | ScriptPlace::Trial(names) => names,
+            ScriptPlace::Handler(names, _) | ScriptPlace::Trial(names) | ScriptPlace::Settings(names) => names,
             ScriptPlace::Body | ScriptPlace::Function => &[],
         };
         let known = names.iter().any(|known| *known == *name);
@@ -192,12 +214,17 @@ impl<'a> Walk<'a> {
                 format!("a trial does not see `{name}`"),
                 format!("it sets what the script sees: given(#{{ {name}: ... }})"),
             ),
+            (Some(_), ScriptPlace::Settings(_)) => self.problem(
+                at,
+                format!("`settings` does not see `{name}`"),
+                "it is called once, when the file is loaded, and sees the constants of the script only",
+            ),
             (Some(word), _) => self.reads(word),
             (None, ScriptPlace::Function) => {
                 let next = "a function sees its own arguments and variables only; hand over what it needs";
                 self.problem(at, format!("there is no variable `{name}`"), next);
             }
-            (None, ScriptPlace::Trial(_)) => self.no_variable(name, at),
+            (None, ScriptPlace::Trial(_) | ScriptPlace::Settings(_)) => self.no_variable(name, at),
             (None, _) => match self.channels.publisher(name) {
                 Some(publisher) if publisher != self.file => self.reads_of_others(name),
                 Some(_) => {
@@ -237,7 +264,7 @@ impl<'a> Walk<'a> {
             let next = format!("write {}, with the channel that is meant", record.example);
             return self.problem(at, format!("`{name}` is used as a whole"), next);
         };
-        if matches!(place, ScriptPlace::Function | ScriptPlace::Trial(_)) {
+        if matches!(place, ScriptPlace::Function | ScriptPlace::Trial(_) | ScriptPlace::Settings(_)) {
             let what = format!("`{name}` is not visible inside a function");
             return self.problem(at, what, format!("hand the value over: f({name}.{field})"));
         }

@@ -5,6 +5,8 @@
 //! the file is loaded, and one that nobody reads costs nothing.
 
 use super::vocabulary::{View, Word, WordSource, WordValue, find, words};
+use crate::estimators::NoEstimate;
+use adapters::Absence;
 use adapters::channel::nearest;
 use adapters::clock::SECOND_NS;
 
@@ -84,6 +86,18 @@ impl Field {
             Tells::Absence => absence(self.word, view),
         }
     }
+
+    /// The words that it can be, where it is the reason of an absence.
+    pub(super) fn reasons(&self) -> Option<Vec<&'static str>> {
+        let of_channel = matches!(self.word.source, WordSource::Channel(_) | WordSource::Tool(_));
+        let words = || if of_channel { Absence::ALL.map(Absence::word).to_vec() } else { NoEstimate::WORDS.to_vec() };
+        (self.record.tells == Tells::Absence).then(words)
+    }
+
+    /// Is it the age of a value?
+    pub(super) fn is_age(&self) -> bool {
+        self.record.tells == Tells::Age
+    }
 }
 
 fn age<'a>(word: &Word, view: &View<'a>) -> WordValue<'a> {
@@ -100,6 +114,7 @@ fn absence<'a>(word: &Word, view: &View<'a>) -> WordValue<'a> {
         WordSource::Quantity(read) | WordSource::Deviation(read) => {
             read(view.estimates).err().map(|reason| reason.word())
         }
+        WordSource::Figure(read) => read(view.estimates).err().map(|reason| reason.word()),
         _ => None,
     };
     reason.map_or(WordValue::Absent, WordValue::Text)
@@ -108,7 +123,8 @@ fn absence<'a>(word: &Word, view: &View<'a>) -> WordValue<'a> {
 impl Record {
     fn holds(&self, word: &Word) -> bool {
         let channel = matches!(word.source, WordSource::Channel(_) | WordSource::Tool(_));
-        let quantity = matches!(word.source, WordSource::Quantity(_) | WordSource::Deviation(_));
+        let quantity =
+            matches!(word.source, WordSource::Quantity(_) | WordSource::Deviation(_) | WordSource::Figure(_));
         match self.tells {
             Tells::Channel | Tells::Age => channel,
             Tells::Estimate => !channel && !["memory", "now_s", "dt_s"].contains(&word.name),
@@ -138,7 +154,7 @@ impl Record {
 mod tests {
     use super::*;
     use crate::estimators::Estimates;
-    use adapters::{Absence, ChannelId, Sample, Slot, Value};
+    use adapters::{ChannelId, Sample, Slot, Value};
 
     fn field(record_name: &str, name: &str) -> Result<Field, String> {
         record(record_name).expect("a record").field(name)

@@ -1,5 +1,5 @@
-//! Handlers and trials: functions that the host calls, whose body runs as a piece of the script, so that a handler sees the
-//! same variables and `memory`.
+//! Handlers, trials and `fn settings()`: functions that the host calls, whose body runs as a piece of the script, so that a handler
+//! sees the same variables and `memory`, and the settings see the constants.
 //!
 //! A function of the language sees nothing but its arguments. So the body of a handler is compiled by itself: the text of the
 //! file with everything else blanked out, which keeps line and column of every message.
@@ -11,6 +11,9 @@ use super::trials::{self, Trial};
 use super::variables::ScriptBody;
 use rhai::{AST, Engine, ImmutableString, ParseError, Position, ScriptFuncDef};
 
+/// The function that the host calls once, when the file is loaded.
+pub(super) const SETTINGS_FUNCTION: &str = "settings";
+
 /// A handler, ready to run.
 pub(super) struct Handling {
     pub(super) kind: EventKind,
@@ -20,7 +23,7 @@ pub(super) struct Handling {
 
 /// A handler as it stands in a file.
 pub(super) struct Written {
-    kind: EventKind,
+    pub(super) kind: EventKind,
     name: ImmutableString,
     pub(super) parameters: Vec<ImmutableString>,
     text: String,
@@ -33,6 +36,8 @@ pub(super) struct Written {
 pub(super) struct Called {
     pub(super) handlers: Vec<Written>,
     pub(super) trials: Vec<Trial>,
+    /// The body of `fn settings()`.
+    pub(super) settings: Option<AST>,
 }
 
 /// Every handler and every trial of a file; `whole` is the file, compiled without optimization.
@@ -53,7 +58,8 @@ impl Called {
         let (name, parameters) = (function.name.clone(), function.params.to_vec());
         let trial = name.starts_with(trials::PREFIX);
         let kind = handled(&file.name, &name, parameters.len(), begin)?;
-        if !trial && kind.is_none() {
+        let settings = name == SETTINGS_FUNCTION && parameters.is_empty();
+        if !trial && kind.is_none() && !settings {
             return Ok(());
         }
         if trial && !parameters.is_empty() {
@@ -62,6 +68,10 @@ impl Called {
         }
         let text = only(&file.text, begin, end);
         let plain = checking.compile(&text).map_err(|error| problem::of_parse(&file.name, &error))?;
+        if settings {
+            self.settings = Some(plain);
+            return Ok(());
+        }
         match kind {
             Some(kind) => self.handlers.push(Written { kind, name, parameters, text, plain }),
             // Compiled as written, so that an error is told at its very place.
@@ -82,7 +92,10 @@ impl Called {
     }
 
     fn has(&self, name: &str) -> bool {
-        self.handlers.iter().any(|handler| handler.name == name) || self.trials.iter().any(|trial| trial.name == name)
+        let settings = self.settings.is_some() && name == SETTINGS_FUNCTION;
+        settings
+            || self.handlers.iter().any(|handler| handler.name == name)
+            || self.trials.iter().any(|trial| trial.name == name)
     }
 
     /// The functions of the file that are the script's own.
@@ -94,7 +107,7 @@ impl Called {
 }
 
 /// The text between two positions, everything else blank; lines and columns stay.
-fn only(text: &str, begin: Position, end: Position) -> String {
+pub(super) fn only(text: &str, begin: Position, end: Position) -> String {
     let key = |at: Position| (at.line().unwrap_or(usize::MAX), at.position().unwrap_or(0));
     let (begin, end, mut line, mut column) = (key(begin), key(end), 1, 0);
     let keep = |c: char| {

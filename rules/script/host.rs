@@ -186,6 +186,7 @@ impl Host {
         decision.alarms.clear();
         decision.notes.clear();
         decision.problems.clear();
+        decision.learn_anew.clear();
         decision.alarms.append(&mut self.pending);
         let mut outputs = Outputs { alarms: &mut self.alarms, decision };
         let events = self.happenings.step(sample, estimates);
@@ -210,7 +211,7 @@ impl Host {
     /// What the scripts ask for now.
     fn gather(&mut self) {
         let Decision { request, stops, offsets, .. } = &mut self.decision;
-        *request = OverrideRequest::least(self.slots.iter().filter_map(Slot::request)).cloned();
+        *request = OverrideRequest::least(self.slots.iter().flat_map(Slot::requests)).cloned();
         stops.clear();
         offsets.clear();
         for slot in &self.slots {

@@ -17,13 +17,13 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `vocabulary`, `fields`, `events`, `callable` | what a script sees, handles and can call |
+//! | `vocabulary`, `quantities`, `fields`, `events`, `callable` | what a script sees, handles and can call |
 //! | `engine`, `deadline` | the interpreter and its limits |
 //! | `outcomes` | the functions through which a script leaves its effects |
 //! | `functions` | the methods that scripts call by name, one table per subject |
 //! | `api` | everything of it as a document |
 //! | `declared` | the settings that scripts declare, and their values |
-//! | `compile`, `compiled`, `examine`, `handlers`, `settings` | from text to a script, and everything that is wrong with it |
+//! | `compile`, `compiled`, `examine`, `kinds`, `handlers`, `settings` | from text to a script, and everything that is wrong with it |
 //! | `order` | channels that one script reads of another, and the order of running |
 //! | `host`, `slot`, `variables`, `running`, `collect`, `notes` | running |
 //! | `timers`, `script_memory` | what a script remembers |
@@ -46,10 +46,12 @@ mod fields;
 pub mod functions;
 mod handlers;
 mod host;
+mod kinds;
 mod notes;
 mod order;
 mod outcomes;
 mod problem;
+mod quantities;
 mod recipes;
 mod running;
 mod script_memory;

@@ -6,6 +6,7 @@ use super::decision::{AlarmLevel, Axis, Stop};
 use super::engine::Shared;
 use super::problem::spoken;
 use super::timers::AlarmText;
+use super::vocabulary::{WordKind, find};
 use rhai::{Dynamic, Engine, EvalAltResult, ImmutableString, Position};
 
 type Text = ImmutableString;
@@ -58,6 +59,8 @@ fn memory(engine: &mut Engine, shared: &Shared) {
     let to = shared.clone();
     engine.register_fn("remembered", move || to.lock().timers.remembered());
     let to = shared.clone();
+    engine.register_fn("learn_anew", move |program: Text| to.lock().learn_anew(program));
+    let to = shared.clone();
     engine.register_fn("forget", move |beginning: Text| to.lock().forget(&beginning));
 }
 
@@ -66,6 +69,13 @@ fn requests(engine: &mut Engine, shared: &Shared) {
     engine.register_fn("request_feed_override", move |pct: Dynamic, reason: Text| -> ScriptResult<()> {
         let pct = number("request_feed_override", &pct)?;
         to.lock().request = Some((pct, reason));
+        Ok(())
+    });
+    let to = shared.clone();
+    engine.register_fn("follow_feed_override", move |name: Text, reason: Text| -> ScriptResult<()> {
+        let word = find(&name).filter(|word| word.kind == WordKind::Number);
+        let word = word.ok_or_else(|| format!("`{name}` is no number that could be followed"))?;
+        to.lock().follows = Some((word, reason));
         Ok(())
     });
     for (function, stop) in [("request_feed_hold", Stop::FeedHold), ("request_tool_change", Stop::ToolChange)] {

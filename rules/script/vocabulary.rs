@@ -3,11 +3,15 @@
 use super::callable::FUNCTIONS;
 use super::events::HANDLERS;
 use super::fields::RECORDS;
+use super::quantities::{FIGURES, QUANTITIES};
 use super::trials::TRIAL_FUNCTIONS;
+use crate::estimators::loads::Figure;
 use crate::estimators::wear::tool_of;
-use crate::estimators::{Estimated, Estimates, SETTINGS};
+use crate::estimators::{Estimated, Estimates, NoLoadOrigin, SETTINGS, State, Visibility};
 use adapters::clock::SECOND_NS;
+use adapters::words::of_channel;
 use adapters::{ChannelId, Sample};
+use std::collections::HashMap;
 use std::sync::LazyLock;
 
 /// What kind of value a word has.
@@ -30,6 +34,8 @@ pub struct Word {
     pub unit: &'static str,
     /// Number, text or map.
     pub kind: WordKind,
+    /// The words that a text can be; empty where it can be any.
+    pub one_of: &'static [&'static str],
     /// What it is, in English.
     pub en: &'static str,
     /// What it is, in Chinese.
@@ -45,6 +51,7 @@ pub(super) enum WordSource {
     Tool(ChannelId),
     Quantity(fn(&Estimates) -> Estimated),
     Deviation(fn(&Estimates) -> Estimated),
+    Figure(fn(&Estimates) -> Figure),
     Number(fn(&View<'_>) -> f64),
     Text(fn(&Estimates) -> &'static str),
     Memory,
@@ -79,6 +86,7 @@ impl Word {
             WordSource::Deviation(read) => {
                 read(view.estimates).map_or(WordValue::Absent, |it| WordValue::Number(it.sd))
             }
+            WordSource::Figure(read) => read(view.estimates).map_or(WordValue::Absent, WordValue::Number),
             WordSource::Number(read) => WordValue::Number(read(view)),
             WordSource::Text(read) => WordValue::Text(read(view.estimates)),
             WordSource::Memory => WordValue::Absent,
@@ -94,8 +102,14 @@ impl Word {
             WordSource::Quantity(read) | WordSource::Deviation(read) => {
                 read(view.estimates).err().map(|why| why.to_string())
             }
+            WordSource::Figure(read) => read(view.estimates).err().map(|why| why.to_string()),
             WordSource::Number(_) | WordSource::Text(_) | WordSource::Memory => None,
         }
+    }
+
+    /// Is it a figure without a standard deviation?
+    pub(super) fn is_figure(&self) -> bool {
+        matches!(self.source, WordSource::Figure(_))
     }
 
     /// May a script write to it?
@@ -115,87 +129,6 @@ fn channel(sample: &Sample, id: ChannelId) -> WordValue<'_> {
     }
 }
 
-type QuantityRow = (&'static str, &'static str, &'static str, &'static str, &'static str, fn(&Estimates) -> Estimated);
-
-/// The estimated quantities: name, name of the standard deviation, unit, texts, value.
-const QUANTITIES: [QuantityRow; 10] = [
-    (
-        "filtered_power_w",
-        "filtered_power_sd_w",
-        "W",
-        "Spindle power after the anti-pulse moving average",
-        "滤波后的主轴功率",
-        |it| it.filtered_power_w,
-    ),
-    (
-        "no_load_power_w",
-        "no_load_power_sd_w",
-        "W",
-        "Power the spindle would take at this speed without cutting",
-        "当前转速下的空载功率",
-        |it| it.no_load_power_w,
-    ),
-    ("cutting_power_w", "cutting_power_sd_w", "W", "Power that removes material", "切削功率", |it| {
-        it.cutting_power_w
-    }),
-    (
-        "load_loss_w",
-        "load_loss_sd_w",
-        "W",
-        "Additional loss that exists only under load",
-        "附加载荷损耗功率",
-        |it| it.load_loss_w,
-    ),
-    (
-        "visible_cutting_power_w",
-        "visible_cutting_power_sd_w",
-        "W",
-        "Least cutting power that stands out of no-load power and noise",
-        "可分辨的最小切削功率",
-        |it| it.visible_cutting_power_w,
-    ),
-    (
-        "wear_limit_w",
-        "wear_limit_sd_w",
-        "W",
-        "Cutting power at which the edge in use would be worn in this cut, from the library of wear models",
-        "当前切削参数下的磨损阈值功率",
-        |it| it.wear_limit_w,
-    ),
-    (
-        "tool_wear_mm",
-        "tool_wear_sd_mm",
-        "mm",
-        "Flank wear of the edge in use after its last part; with a learned model of the wear only",
-        "当前刀刃的后刀面磨损量（需磨损模型）",
-        |it| it.tool_wear_mm,
-    ),
-    (
-        "tool_growth_pct",
-        "tool_growth_sd_pct",
-        "%",
-        "Rise of the cutting power by the wear of the edge in use, at a feed of 0.2 mm/rev; also without a model",
-        "磨损引起的切削功率增量（进给量 0.2 mm/r）",
-        |it| it.tool_growth_pct,
-    ),
-    (
-        "tool_worn_probability",
-        "tool_worn_probability_sd",
-        "1",
-        "Probability that the edge in use passes its criterion by the end of the next part",
-        "当前刀刃在下一件结束前超过磨损标准的概率",
-        |it| it.tool_worn_probability,
-    ),
-    (
-        "tool_parts_left",
-        "tool_parts_left_sd",
-        "1",
-        "Parts until the edge in use passes its criterion",
-        "当前刀刃剩余可加工件数",
-        |it| it.tool_parts_left,
-    ),
-];
-
 const fn word(
     name: &'static str,
     unit: &'static str,
@@ -203,21 +136,15 @@ const fn word(
     texts: (&'static str, &'static str),
     source: WordSource,
 ) -> Word {
-    Word { name, unit, kind, en: texts.0, zh: texts.1, source }
+    Word { name, unit, kind, one_of: &[], en: texts.0, zh: texts.1, source }
 }
 
 /// The channel that names tool and edge.
 const TOOL: &str = "tool";
 
 /// Words that are neither channels nor quantities.
-const OWN: [Word; 7] = [
-    word(
-        "state",
-        "",
-        WordKind::Text,
-        ("State of the machine: off, standby, spindle_start, idle, cutting, speed_change, rapid, unknown", "机床状态"),
-        WordSource::Text(|it| it.state.word()),
-    ),
+const OWN: [Word; 8] = [
+    word("state", "", WordKind::Text, ("State of the machine", "机床状态"), WordSource::Text(|it| it.state.word())),
     word(
         "state_s",
         "s",
@@ -229,18 +156,22 @@ const OWN: [Word; 7] = [
         "visibility",
         "",
         WordKind::Text,
-        ("Can cutting be seen in the power: not_asked, visible, below_visibility, no_reference", "切削是否可分辨"),
+        ("Can cutting be seen in the power?", "切削是否可分辨"),
         WordSource::Text(|it| it.visibility.word()),
     ),
     word(
         "no_load_origin",
         "",
         WordKind::Text,
-        (
-            "Where the no-load power comes from: none, measured, interpolated, extrapolated, upper_bound",
-            "空载功率的来源",
-        ),
+        ("Where the no-load power comes from", "空载功率的来源"),
         WordSource::Text(|it| it.no_load_origin.word()),
+    ),
+    word(
+        "load_held",
+        "",
+        WordKind::Text,
+        ("Why constant load does not raise the feed; empty where nothing is in the way", "恒负荷不提高进给的原因"),
+        WordSource::Text(|it| it.loads.load_held),
     ),
     word(
         "now_s",
@@ -272,12 +203,29 @@ fn since_s(now_ns: i64, then_ns: i64) -> f64 {
     now_ns.saturating_sub(then_ns) as f64 / SECOND_NS as f64
 }
 
+static STATES: LazyLock<Vec<&str>> = LazyLock::new(|| State::ALL.map(State::word).to_vec());
+static VISIBILITIES: LazyLock<Vec<&str>> = LazyLock::new(|| Visibility::ALL.map(Visibility::word).to_vec());
+static ORIGINS: LazyLock<Vec<&str>> = LazyLock::new(|| NoLoadOrigin::ALL.map(NoLoadOrigin::word).to_vec());
+
+/// The words that a text of this name can be; empty where it can be any.
+fn one_of(name: &str) -> &'static [&'static str] {
+    match name {
+        "state" => &STATES,
+        "visibility" => &VISIBILITIES,
+        "no_load_origin" => &ORIGINS,
+        _ => of_channel(name).unwrap_or_default(),
+    }
+}
+
 static WORDS: LazyLock<Vec<Word>> = LazyLock::new(|| {
     let mut words = OWN.to_vec();
     for (name, deviation, unit, en, zh, read) in QUANTITIES {
         words.push(word(name, unit, WordKind::Number, (en, zh), WordSource::Quantity(read)));
         let texts = ("One standard deviation of the quantity of this name", "标准不确定度");
         words.push(word(deviation, unit, WordKind::Number, texts, WordSource::Deviation(read)));
+    }
+    for (name, unit, en, zh, read) in FIGURES {
+        words.push(word(name, unit, WordKind::Number, (en, zh), WordSource::Figure(read)));
     }
     for id in ChannelId::all() {
         let row = id.channel();
@@ -291,6 +239,7 @@ static WORDS: LazyLock<Vec<Word>> = LazyLock::new(|| {
         let texts = ("Edge in use, as the controller names it: T1-2 is the second edge of T1", "刀刃（控制器名称）");
         words.push(word("edge", "", kind, texts, WordSource::Channel(id)));
     }
+    words.iter_mut().for_each(|word| word.one_of = one_of(word.name));
     words
 });
 
@@ -300,9 +249,12 @@ pub fn words() -> &'static [Word] {
     &WORDS
 }
 
+static PLACES: LazyLock<HashMap<&str, usize>> =
+    LazyLock::new(|| WORDS.iter().enumerate().map(|(at, word)| (word.name, at)).collect());
+
 /// The word of this name.
 pub(super) fn find(name: &str) -> Option<&'static Word> {
-    WORDS.iter().find(|word| word.name == name)
+    PLACES.get(name).and_then(|at| WORDS.get(*at))
 }
 
 fn table(first: &str, second: &str, rows: impl Iterator<Item = (&'static str, &'static str)>) -> String {
@@ -316,7 +268,8 @@ pub fn vocabulary(chinese: bool) -> String {
     let pick = |en: &'static str, zh: &'static str| if chinese { zh } else { en };
     let mut text = String::from("## Variables\n\n| name | unit | what |\n|---|---|---|\n");
     for word in words() {
-        text += &format!("| `{}` | {} | {} |\n", word.name, word.unit, pick(word.en, word.zh));
+        let one_of = if word.one_of.is_empty() { String::new() } else { format!(": {}", word.one_of.join(", ")) };
+        text += &format!("| `{}` | {} | {}{one_of} |\n", word.name, word.unit, pick(word.en, word.zh));
     }
     text += "\n## Records\n\n";
     text += &table("name", "what", RECORDS.iter().map(|it| (it.example, pick(it.en, it.zh))));
@@ -348,7 +301,8 @@ mod tests {
 
     #[test]
     fn every_quantity_of_the_estimates_is_a_word() {
-        let estimates = Estimates::none(0);
+        let mut estimates = Estimates::none(0);
+        assert!(FIGURES.iter().all(|row| estimates.figure_mut(row.0).is_some()));
         let names: Vec<&str> = QUANTITIES.iter().map(|quantity| quantity.0).collect();
         let expected: Vec<&str> = estimates.quantities().iter().map(|quantity| quantity.0).collect();
         assert_eq!(names, expected);
@@ -359,6 +313,6 @@ mod tests {
         let names: BTreeSet<_> = words().iter().map(|word| word.name).collect();
         assert_eq!(names.len(), words().len());
         assert!(words().iter().all(|word| !word.en.is_empty() && !word.zh.is_empty()));
-        assert_eq!(words().len(), ChannelId::count() + 1 + OWN.len() + 2 * QUANTITIES.len());
+        assert_eq!(words().len(), ChannelId::count() + 1 + OWN.len() + 2 * QUANTITIES.len() + FIGURES.len());
     }
 }

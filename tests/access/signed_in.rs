@@ -11,7 +11,7 @@ fn a_first_token_signs_in_and_persons_come_and_go() {
     let mut testbed = testbed("session_s = 12.0\n");
     let file = testbed.directory.path().join("data/persons.json");
     let kept = std::fs::read_to_string(&file).expect("persons");
-    assert!(kept.contains("$argon2id$") && !kept.contains(&testbed.token), "{kept}");
+    assert!(kept.contains("sha256$") && !kept.contains(&testbed.token), "{kept}");
     assert_eq!(std::fs::metadata(&file).expect("there").permissions().mode() & 0o777, 0o600);
     let mut admin = testbed.client();
     assert_eq!(admin.get("/api/v1/session").json()["person"], Value::Null);
@@ -86,6 +86,32 @@ fn five_wrong_tokens_and_the_sixth_is_not_even_tried() {
     );
     let (code, said) = testbed.command(&["disarm", "--by", "foreman"]);
     assert_eq!(code, Some(0), "orders at the box go on: {said}");
+    // Giving the machine back is never locked out: with the token in the head, in the body, or in the form that is shown.
+    let form = "Content-Type: application/x-www-form-urlencoded\r\nAccept: text/html\r\n";
+    let refused = client.send("POST", "/api/v1/login", form, "name=admin&token=aaaa");
+    assert!(refused.status == 429 && refused.body.contains("action=\"/api/v1/disarm\""), "{}", refused.body);
+    for (wrong, code) in [
+        (json!({ "name": "admin", "token": "aaaa" }), 429),
+        (json!({ "name": "admin", "token": "" }), 429),
+        (json!({}), 401),
+    ] {
+        assert_eq!(testbed.client().json("POST", "/api/v1/disarm", &wrong).status, code, "{wrong}");
+    }
+    let bearer = format!("Authorization: Bearer admin:{}\r\n", testbed.token);
+    let began = Instant::now();
+    let given = testbed.client().send("POST", "/api/v1/disarm", &bearer, "");
+    println!("disarm while locked out: {:?}", began.elapsed());
+    assert_eq!(given.status, 200, "{}", given.body);
+    for _ in 0..5 {
+        client.sign_in("admin", "aaaa-bbbb");
+    }
+    let named = json!({ "name": "admin", "token": testbed.token });
+    assert_eq!(testbed.client().json("POST", "/api/v1/disarm", &named).status, 200, "locked out again, by JSON");
+    for _ in 0..5 {
+        client.sign_in("admin", "aaaa-bbbb");
+    }
+    let body = format!("name=admin&token={}", testbed.token);
+    assert_eq!(testbed.client().send("POST", "/api/v1/disarm", form, &body).status, 303, "by the form");
     assert_eq!(testbed.client().get("/api/v1/status").status, 200, "and so does reading");
     testbed.gateway.stop();
 }

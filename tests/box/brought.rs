@@ -21,7 +21,7 @@ fn drop_file(browser: &mut Browser, path: &Path, name: &str) {
 fn finished(address: &str) -> Value {
     wait_for("the diagnosis of the file", Duration::from_secs(900), || {
         let run = get(address, "/api/v1/files-diagnosis").json();
-        (run["state"] != "running").then_some(run)
+        (!["none", "running"].contains(&run["state"].as_str().unwrap_or_default())).then_some(run)
     })
 }
 

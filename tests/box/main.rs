@@ -3,6 +3,7 @@
 mod backup;
 mod brought;
 mod browser;
+mod clock;
 mod cost;
 mod diagnosing;
 mod editing;
@@ -10,6 +11,7 @@ mod http;
 mod kill;
 mod lives;
 mod operations;
+mod package;
 mod page;
 mod process;
 mod replay;

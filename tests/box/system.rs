@@ -97,7 +97,7 @@ fn recipe(browser: &mut Browser, file: &Path) {
 fn archives(browser: &mut Browser, place: &Path) {
     let backup = unpacked(browser, "/api/v1/backup");
     assert!(backup.starts_with("200 ") && backup.contains("scripts/mine.rhai") && backup.contains("name = \"Seven\""));
-    assert!(!backup.contains("argon2"), "no hash of a token");
+    assert!(!backup.contains("sha256$"), "no hash of a token");
     let scripts = place.join("data/scripts");
     std::fs::write(scripts.join("mine.rhai"), "// lost").expect("written");
     std::fs::write(scripts.join("other.rhai"), "// of later").expect("written");
@@ -114,7 +114,7 @@ fn archives(browser: &mut Browser, place: &Path) {
     assert_eq!(nonsense.0, 400, "{}", nonsense.1);
     let support = unpacked(browser, "/api/v1/support");
     assert!(support.starts_with("200 ") && support.contains("status.json") && support.contains("configuration/1"));
-    for secret in ["argon2", "PRIVATE KEY", "request_feed_override("] {
+    for secret in ["sha256$", "PRIVATE KEY", "request_feed_override("] {
         assert!(!support.contains(secret), "the archive for support holds {secret}");
     }
 }

@@ -57,7 +57,10 @@ fn alarms(criterion_mm: f64, seconds: &str) -> String {
 #[test]
 fn a_worn_edge_is_told_and_a_sharp_one_is_not() {
     let worn = alarms(0.15, "14400");
-    assert!(worn.contains("\"tool_worn\"") && worn.contains("probably pass its wear criterion"), "{worn}");
+    let witness = ["probably pass its wear criterion", "more than the limit of the wear model"]
+        .iter()
+        .any(|it| worn.contains(it));
+    assert!(worn.contains("\"tool_worn\"") && witness, "{worn}");
     let sharp = alarms(0.5, "1800");
     assert!(!sharp.contains("tool_worn"), "{sharp}");
 }

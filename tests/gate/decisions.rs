@@ -90,14 +90,31 @@ fn arming_needs_the_configuration_a_person_and_ends_by_itself() {
     assert_eq!(gate.arm("  ", None, 0).err(), Some(ArmError::Nobody));
     gate.arm("fitter", None, 0).expect("allowed");
     let lasts_ns = i64::try_from(limits(GateMode::Armed).armed_for.as_nanos()).expect("hours");
-    let (sample, estimates) = cutting(lasts_ns - 1);
-    assert!(gate.decide(None, &sample, &estimates).armed);
+    for at_ns in (0..lasts_ns).step_by(9_000_000_000).chain([lasts_ns - 1]) {
+        let (sample, estimates) = cutting(at_ns);
+        assert!(gate.decide(None, &sample, &estimates).armed);
+    }
     let (sample, estimates) = cutting(lasts_ns);
     assert!(!gate.decide(None, &sample, &estimates).armed);
     assert_eq!(gate.armed().err(), Some(Disarmed::Expired));
     gate.arm("fitter", None, lasts_ns).expect("again");
     let (sample, estimates) = cutting(5);
     assert!(!gate.decide(None, &sample, &estimates).armed, "a clock that jumps back disarms");
+}
+
+/// A process that was stopped and goes on sees fresh values at once, and has seen none for as long as it stood.
+#[test]
+fn ten_seconds_without_a_tick_end_the_arming_like_ten_seconds_without_values() {
+    for (pause_s, armed) in [(9, true), (10, false), (20, false), (86_400, false)] {
+        let mut gate = Gate::new(limits(GateMode::Armed));
+        gate.arm("fitter", None, 0).expect("allowed");
+        let (sample, estimates) = cutting(TICK_NS);
+        assert!(gate.decide(None, &sample, &estimates).armed);
+        let (sample, estimates) = cutting(TICK_NS + pause_s * 1_000_000_000);
+        assert_eq!(gate.decide(None, &sample, &estimates).armed, armed, "{pause_s} s");
+        let why = if pause_s > 3_600 { Disarmed::Expired } else { Disarmed::Silent };
+        assert_eq!(gate.armed().err(), (!armed).then_some(why), "{pause_s} s");
+    }
 }
 
 #[test]
@@ -223,6 +240,7 @@ fn the_pace_and_the_band_are_told() {
 
 #[test]
 fn never_above_the_operators_dial_unless_configured() {
+    let pct = |percent: u8| OverridePct::new(percent).expect("an override");
     let decided = |above_dial: bool, dial: Option<f64>| {
         let mut gate = Gate::new(config::GateConfig { above_dial, ..limits(GateMode::Armed) });
         let mut last = None;
@@ -233,9 +251,13 @@ fn never_above_the_operators_dial_unless_configured() {
         }
         last.map(|verdict| (verdict.permitted.percent(), verdict.outcome)).expect("decided")
     };
-    assert_eq!(decided(false, None), (100, GateOutcome::Limited(Bound::Dial)), "nobody knows the dial");
-    assert_eq!(decided(false, Some(110.0)), (110, GateOutcome::Limited(Bound::Dial)));
-    assert_eq!(decided(false, Some(60.0)), (100, GateOutcome::Limited(Bound::Dial)), "the ladder takes the lesser one");
+    assert_eq!(decided(false, None), (100, GateOutcome::Limited(Bound::Dial(pct(100)))), "nobody knows the dial");
+    assert_eq!(decided(false, Some(110.0)), (110, GateOutcome::Limited(Bound::Dial(pct(110)))));
+    assert_eq!(
+        decided(false, Some(60.0)),
+        (100, GateOutcome::Limited(Bound::Dial(pct(100)))),
+        "the ladder takes the lesser one"
+    );
     let asked_60 = |dial: f64| {
         let mut gate = Gate::new(limits(GateMode::Armed));
         let decide = |tick: i64| {

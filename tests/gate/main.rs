@@ -16,6 +16,8 @@ mod port;
 #[allow(dead_code, reason = "the suite of the box uses more of it")]
 mod process;
 mod running;
+#[path = "../support/sealed.rs"]
+mod sealed;
 #[path = "../support/served.rs"]
 #[allow(dead_code, reason = "the suite of FANUC uses more of it")]
 mod served;

@@ -8,7 +8,8 @@ use gateway::config::GateMode;
 use gateway::gate::{Gate, GateOutcome, OverrideWriter};
 use rules::script::{Host, ScriptFile};
 
-/// Asks for what the channel `temperature_1_c` says: numbers of every kind, and everything that is no number.
+/// Asks for what the channel `temperature_1_c` says: numbers of every kind, and everything that is no number. What can never be a
+/// request is refused when it is written down as such, so it stands in variables.
 const SCRIPT: &str = r#"
 let kind = temperature_1_c ?? 0.0;
 let value = temperature_2_c ?? 0.0;
@@ -16,13 +17,13 @@ if kind == 0.0 { request_feed_override(value, "a number"); }
 if kind == 1.0 { request_feed_override(0.0 / 0.0, "not a number"); }
 if kind == 2.0 { request_feed_override(1.0 / 0.0, "infinite"); }
 if kind == 3.0 { request_feed_override(-1.0 / 0.0, "infinite the other way"); }
-if kind == 4.0 { request_feed_override(-1, "minus one"); }
-if kind == 5.0 { request_feed_override(300, "three hundred"); }
+if kind == 4.0 { let pct = -1; request_feed_override(pct, "minus one"); }
+if kind == 5.0 { let pct = 300; request_feed_override(pct, "three hundred"); }
 if kind == 6.0 { let words = "80"; request_feed_override(words, "a string"); }
 if kind == 7.0 { request_feed_override(#{ pct: 80 }, "a map"); }
 if kind == 8.0 { request_feed_override([80], "an array"); }
 if kind == 9.0 { request_feed_override((), "nothing"); }
-if kind == 10.0 { request_feed_override(true, "a truth"); }
+if kind == 10.0 { let pct = true; request_feed_override(pct, "a truth"); }
 if kind == 11.0 { request_feed_override(value * 1e300 * 1e300, "too large"); }
 if kind == 12.0 { throw "gives up"; }
 if kind == 13.0 { loop { } }

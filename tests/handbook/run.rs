@@ -29,10 +29,13 @@ const ORDER: [&str; 11] = [
 const OTHER_CODES: [(&str, i32, &str); 1] =
     [("commission --config", 1, "parts of the commissioning are still missing, which the code tells")];
 /// Commands that are not run here, and where they are.
-const ELSEWHERE: [(&str, &str); 3] = [
+const ELSEWHERE: [(&str, &str); 6] = [
     ("fleet stream", "tests/fleet: needs a NATS server"),
     ("fleet ingest", "tests/fleet: needs NATS and PostgreSQL"),
     ("fleet retain", "tests/fleet: needs PostgreSQL"),
+    ("setup", "tests/box: writes where a service is configured"),
+    ("update", "tests/box: needs the folders of the package"),
+    ("doctor --box", "gateway/doctor/computer.rs: its answer is that of the computer"),
 ];
 /// What a command that runs until it is stopped says when it serves; others name the address of their page.
 const SERVES: [(&str, &str); 2] = [("fanuc", "fanuc://"), ("modbus", "modbus-tcp://")];

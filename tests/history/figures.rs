@@ -291,7 +291,7 @@ fn count(reader: &Reader, query: &Query) -> usize {
 fn first_row(reader: &Reader, select: &str) -> Vec<SqlValue> {
     let mut found = Vec::new();
     reader
-        .sql(select, |_, row| {
+        .sql(select, std::time::Duration::from_secs(600), |_, row| {
             found = row.to_vec();
             ControlFlow::Break(())
         })

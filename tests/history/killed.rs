@@ -159,7 +159,7 @@ fn a_newer_or_foreign_file_is_left_alone() {
     let dir = tempfile::tempdir().expect("a directory");
     let path = dir.path().join("h.db");
     drop(Writer::open(&path, options()).expect("opens"));
-    rusqlite::Connection::open(&path).and_then(|db| db.pragma_update(None, "user_version", 99)).expect("changes");
+    crate::sealed::connect(&path).pragma_update(None, "user_version", 99).expect("changes");
     let before = std::fs::read(&path).expect("reads");
     for error in [
         Writer::open(&path, options()).expect_err("refused").to_string(),

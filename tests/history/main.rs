@@ -1,9 +1,13 @@
 //! The history of the box: what goes in comes out, whatever happens in between.
 
+mod clock;
+mod damage;
 mod figures;
 mod full;
 mod killed;
 mod machine;
 mod questions;
 mod round_trip;
+#[path = "../support/sealed.rs"]
+mod sealed;
 mod wear_models;

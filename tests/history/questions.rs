@@ -9,6 +9,9 @@ use gateway::history::{
 };
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::{Duration, Instant};
+
+const LIMIT: Duration = Duration::from_secs(60);
 
 /// Two and a half hours, the last seconds in the crash tail.
 fn history(path: &Path) -> (Writer, Machine) {
@@ -86,7 +89,7 @@ fn filters_choose_rows() {
 fn one_value(reader: &Reader, statement: &str) -> SqlValue {
     let mut found = None;
     reader
-        .sql(statement, |_, row| {
+        .sql(statement, LIMIT, |_, row| {
             found = row.first().cloned();
             ControlFlow::Break(())
         })
@@ -114,8 +117,13 @@ fn sql_sees_every_sample() {
     let statement = "SELECT count(*) FROM samples a JOIN samples b USING (at_ns) WHERE a.at_ns < 1767571201000000000";
     assert_eq!(one_value(&reader, statement), SqlValue::Integer(10));
     for bad in ["DELETE FROM blocks", "SELEC 1", "SELECT * FROM nothing", "ATTACH 'x.db' AS x"] {
-        assert!(reader.sql(bad, |_, _| ControlFlow::Continue(())).is_err(), "{bad}");
+        assert!(reader.sql(bad, LIMIT, |_, _| ControlFlow::Continue(())).is_err(), "{bad}");
     }
+    let endless = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT count(*) FROM c";
+    let began = Instant::now();
+    let error = reader.sql(endless, Duration::from_secs(1), |_, _| ControlFlow::Continue(())).expect_err("given up");
+    assert!(error.to_string().contains("not ended within 1 s"), "{error}");
+    assert!(began.elapsed() < Duration::from_secs(5), "{:?}", began.elapsed());
 }
 
 #[test]

@@ -34,11 +34,13 @@ fn models_come_back_and_the_newest_of_a_key_is_in_force() {
 /// A file as the version before wrote it.
 fn older(path: &Path) {
     drop(Writer::open(path, options()).expect("opens"));
-    let db = rusqlite::Connection::open(path).expect("opens");
+    let db = crate::sealed::connect(path);
     db.execute_batch(
         "DROP VIEW wear_model_list; DROP TABLE wear_models;
         DROP VIEW audit_list; DROP TABLE audit; DROP VIEW reaction_list; DROP TABLE reactions;
-        DROP INDEX events_kind; PRAGMA user_version = 1;",
+        ALTER TABLE segments DROP COLUMN clock; ALTER TABLE segments DROP COLUMN boot;
+         ALTER TABLE segments DROP COLUMN anchor_ns; ALTER TABLE segments DROP COLUMN marks;
+         DROP INDEX events_kind; PRAGMA user_version = 1;",
     )
     .expect("older");
 }
@@ -55,7 +57,7 @@ fn an_older_file_is_read_as_it_is_and_gets_the_table_when_it_is_written() {
     let version: i64 = rusqlite::Connection::open(&path)
         .and_then(|db| db.query_row("PRAGMA user_version", [], |row| row.get(0)))
         .expect("a number");
-    assert_eq!(version, 4);
+    assert_eq!(version, 5);
     let plan: String = rusqlite::Connection::open(&path)
         .and_then(|db| {
             let question = "EXPLAIN QUERY PLAN SELECT at_ns FROM events WHERE kind = 'x' AND at_ns >= 0 ORDER BY at_ns DESC, id DESC";

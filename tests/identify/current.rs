@@ -172,6 +172,16 @@ fn the_lathe_gives_a_family_and_a_script_that_runs() {
     assert_eq!(json["learned"]["curves"].as_array().map(Vec::len), Some(2), "{json:#}");
     let text = std::fs::read_to_string(directory.path().join("load.rhai")).expect("written");
     Host::new().load(&[ScriptFile { name: "load.rhai".to_owned(), text }]).expect("a script that compiles");
+    // What the script holds is said with the one who chose it.
+    let told = |more: &[&str]| {
+        let told = gateway(directory.path(), &[&["identify", "feed-curve", "--recording", "cuts.csv"], more].concat());
+        String::from_utf8_lossy(&told.stdout).into_owned()
+    };
+    assert!(told(&[]).contains("the mean of these cuts"), "{}", told(&[]));
+    let given = told(&["--target", "7.5", "--out", "given.rhai"]);
+    assert!(given.contains("7.5 A, as given"), "{given}");
+    let text = std::fs::read_to_string(directory.path().join("given.rhai")).expect("written");
+    assert!(text.contains("setting(\"target_a\", 7.5,"), "{text}");
     let learned = identify_feed_curve(&recorded.recording, "feed_mm_min", "spindle_current_a").expect("curves");
     let family = learned.family(900.0).expect("two curves that do not cross");
     let truth = |at_s: f64| recorded.mean(at_s - 1.0, at_s + 1.0, |truth| truth.spindle_power_w);

@@ -69,6 +69,24 @@ fn power_that_is_none_gives_no_numbers() {
     }
 }
 
+#[test]
+fn two_levels_at_one_speed_are_told_and_not_averaged() {
+    let ladder: Vec<ExperimentStep> =
+        [300.0, 600.0, 300.0, 600.0, 300.0, 600.0, 300.0, 900.0, 900.0].iter().map(|rpm| idle(40.0, *rpm, 1)).collect();
+    let mut recording = record(lathe(1), &ladder, 5.0).recording;
+    // From the middle on the other gear stage, and no column that says so.
+    let half_s = 3.5 * 40.0;
+    let columns = recording.numbers("spindle_power_w").expect("there").iter().zip(recording.time_s.iter());
+    let powers = columns.map(|(power, time_s)| power.map(|it| if *time_s > half_s { 1.4 * it } else { it }));
+    let powers = powers.collect::<Numbers>();
+    recording.set_column("spindle_power_w", Cells::Numbers(powers));
+    let learned = identify_no_load(&recording).expect("900 rpm is of one level");
+    let speeds: Vec<f64> = learned.speeds.iter().map(|it| it.speed_rpm.round()).collect();
+    assert!(!speeds.contains(&300.0) && speeds.contains(&900.0), "{speeds:?}");
+    let told = learned.notes.iter().find(|note| note.contains("two levels at one speed")).expect("told");
+    assert!(told.contains("300 rpm") && told.contains("gear_stage"), "{told}");
+}
+
 /// The level of one visit against the true mean over the same time.
 fn levels(repetitions: u64) {
     let mut coverage = Coverage::new("level of one idle visit, W");

@@ -59,6 +59,25 @@ fn name_material(sample: &mut Sample, material: &Arc<str>) {
     sample.set(channel, Slot { value: Ok(Value::Text(material.clone())), age_ns: 0 });
 }
 
+/// The mains of a hall in which others start and stop: two slow waves.
+fn wander(sample: &mut Sample, share: f64, no_load_w: f64) {
+    let at_s = sample.at_ns as f64 / SECOND_NS as f64;
+    let wave = 0.6 * (at_s / 97.0).sin() + 0.4 * (at_s / 613.0).cos();
+    let factor = 1.0 + share * wave;
+    let by_mains_w = 0.3 * no_load_w * (factor * factor - 1.0);
+    let mut change = |name: &str, of: &dyn Fn(f64) -> f64| {
+        let id = ChannelId::of(name).expect("a channel");
+        if let Ok(value) = sample.number(id) {
+            let age_ns = sample.slot(id).age_ns;
+            sample.set(id, Slot { value: Ok(Value::Number(of(value))), age_ns });
+        }
+    };
+    change("supply_voltage_v", &|volts| volts * factor);
+    for name in ["spindle_power_w", "total_power_w"] {
+        change(name, &|watts| watts + by_mains_w);
+    }
+}
+
 /// A machine, and the gateway beside it.
 pub(crate) struct Bench {
     pub(crate) machine: Simulated,
@@ -69,6 +88,8 @@ pub(crate) struct Bench {
     now_ns: TimeNs,
     /// What the recipe of the shop names as work material.
     pub(crate) work_material: Option<Arc<str>>,
+    /// The mains wanders by so much, as a share: the supply voltage, and with its square three tenths of the no-load power.
+    pub(crate) mains: f64,
     /// Time between two ticks.
     pub(crate) period_ns: i64,
     /// Steps seen in force.
@@ -118,6 +139,7 @@ impl Bench {
             sample: Sample::empty(0),
             now_ns: 0,
             work_material: None,
+            mains: 0.0,
             period_ns: TICK_NS,
             reactions: Vec::new(),
             moves: Vec::new(),
@@ -137,6 +159,13 @@ impl Bench {
         self.lockstep.sample_into(&mut self.sample, self.now_ns);
         if let Some(material) = &self.work_material {
             name_material(&mut self.sample, material);
+        }
+        if self.mains > 0.0 {
+            wander(
+                &mut self.sample,
+                self.mains,
+                self.pipeline.estimates().no_load_power_w.map_or(0.0, |power| power.value),
+            );
         }
         let mut finished = Finished::default();
         self.pipeline.step(&self.sample, &mut finished);

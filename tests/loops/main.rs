@@ -3,6 +3,7 @@
 
 mod bench;
 mod constant_load;
+mod healthy;
 mod recipe;
 mod steps;
 mod stops;

@@ -3,7 +3,7 @@
 
 use super::bench::{Bench, limits};
 use adapters::address::SimulatedMachine;
-use adapters::simulated::{DaySettings, SimulatedSettings};
+use adapters::simulated::{DaySettings, LaterChange, SimulatedSettings};
 use rules::estimators::State;
 use rules::estimators::wear::{Cut, CutConditions, WearKey, WearModel, WearRecord, fit_physical};
 use rules::script::shipped;
@@ -22,6 +22,8 @@ struct Edge {
     wear_mm: f64,
     alarm: Option<(f64, u32)>,
     changed_at: Option<u32>,
+    /// What the box last believed of it: rise of the power and probability of being worn, or why there is none.
+    believed: String,
 }
 
 /// What happened to the edges of one shift.
@@ -31,12 +33,33 @@ struct Shift {
     edges: Vec<Edge>,
     /// How often the request for a tool change began.
     requests: usize,
+    /// Alarms that the limit of the model raised, and not the filter.
+    by_limit: usize,
 }
 
-fn shift(machine: SimulatedMachine, seed: u64, hours: f64, models: &[WearRecord]) -> Shift {
+/// A machine and what is known of its wear.
+struct Run {
+    name: &'static str,
+    machine: SimulatedMachine,
+    hours: f64,
+    models: Vec<WearRecord>,
+    /// Material of the second half over that of the first, beside the lots of every day.
+    lot: f64,
+}
+
+impl Run {
+    fn of(name: &'static str, machine: SimulatedMachine, hours: f64, models: Vec<WearRecord>) -> Self {
+        Self { name, machine, hours, models, lot: 1.0 }
+    }
+}
+
+fn shift(run: &Run, seed: u64) -> Shift {
+    let Run { machine, hours, models, .. } = run;
+    let (machine, hours) = (*machine, *hours);
     let scripts: Vec<_> = shipped().into_iter().filter(|file| file.name == "tool_wear.rhai").collect();
     let day = DaySettings { shift_s: hours * 3600.0, ..DaySettings::default() };
-    let settings = SimulatedSettings { machine, seed, day, ..SimulatedSettings::default() };
+    let change = LaterChange { after_s: 0.5 * hours * 3600.0, cut: run.lot, friction: 1.0 };
+    let settings = SimulatedSettings { machine, seed, day, change, ..SimulatedSettings::default() };
     let mut bench = Bench::at_work(settings, &scripts, &limits(50.0, 120.0));
     bench.pipeline.wear_mut().set_models("", models.iter().cloned().map(Arc::new).collect());
     bench.work_material = (!models.is_empty()).then(|| MATERIAL.into());
@@ -58,9 +81,18 @@ fn shift(machine: SimulatedMachine, seed: u64, hours: f64, models: &[WearRecord]
             edge.name.clone_from(&name);
         }
         edge.wear_mm = moment.truth.flank_wear_mm;
+        if bench.now_s().fract() < 0.05 {
+            let known = bench.pipeline.estimates();
+            let growth = known.tool_growth_pct.map(|it| format!("{:.1} +- {:.1} %", it.value, it.sd));
+            let growth = growth.unwrap_or_else(|reason| reason.word().to_owned());
+            let probability = known.tool_worn_probability.map(|it| format!("{:.2}", it.value));
+            edge.believed = format!("{growth}, {}", probability.unwrap_or_else(|reason| reason.word().to_owned()));
+        }
         let stops = &bench.pipeline.scripts().decision().stops;
         shift.requests += usize::from(!asked && !stops.is_empty());
         asked = !stops.is_empty();
+        let raised = bench.pipeline.scripts().decision().alarms.iter().filter(|alarm| alarm.raised);
+        shift.by_limit += raised.filter(|alarm| alarm.en.contains("limit of the wear model")).count();
         let reasons: Vec<String> = stops.iter().map(|stop| stop.reason.to_string()).collect();
         for edge in in_use.values_mut().filter(|edge| edge.alarm.is_none() && !edge.name.is_empty()) {
             let worn = |reason: &String| reason.split([' ', ',']).any(|word| word == edge.name);
@@ -93,10 +125,11 @@ fn score(name: &str, shifts: &[Shift]) -> usize {
     let false_alarms = alarms.iter().filter(|wear| **wear < FALSE_BELOW_MM).count();
     let near = alarms.iter().filter(|wear| (**wear / CRITERION_MM - 1.0).abs() <= 0.08).count();
     println!(
-        "{name}: {} shifts, {} requests, {false_alarms} false; of {} edges used up {warned} were announced, {} parts before; true \
+        "{name}: {} shifts, {} requests, {} by the limit, {false_alarms} false; of {} edges used up {warned} were announced, {} parts before; true \
          wear at the alarm, first edges: {}; later edges: {}; {near} of {} within 8 % of {CRITERION_MM} mm",
         shifts.len(),
         shifts.iter().map(|shift| shift.requests).sum::<usize>(),
+        shifts.iter().map(|shift| shift.by_limit).sum::<usize>(),
         changed.len(),
         told(parts),
         told(of(&first)),
@@ -108,12 +141,16 @@ fn score(name: &str, shifts: &[Shift]) -> usize {
             if let Some((wear_mm, part)) = edge.alarm.filter(|(wear, _)| *wear < FALSE_BELOW_MM) {
                 println!("  false: seed {}, edge {}, {wear_mm:.3} mm, part {part}", shift.seed, edge.name);
             }
+            if edge.alarm.is_none() && edge.changed_at.is_some() {
+                let (seed, name, wear_mm) = (shift.seed, &edge.name, edge.wear_mm);
+                println!("  not announced: seed {seed}, edge {name}, {wear_mm:.3} mm, believed {}", edge.believed);
+            }
         }
     }
     false_alarms
 }
 
-fn record() -> WearRecord {
+pub(crate) fn record() -> WearRecord {
     let model = WearModel::Physical(super::wear::model());
     let key = WearKey { work_material: MATERIAL.to_owned(), ..WearKey::default() };
     WearRecord::new(key, CRITERION_MM, ("test".to_owned(), 36, 1.0), model)
@@ -126,7 +163,7 @@ const FIRST_LOT_S: f64 = 1800.0;
 
 /// What a shop learns on the mill: for each tool a model of the cut that it makes, from the first lots of four days with edges of
 /// known wear. Speed, feed and depth are held, because production never changes them.
-fn mill_records() -> Vec<WearRecord> {
+pub(crate) fn mill_records() -> Vec<WearRecord> {
     let mut cuts = BTreeMap::<u8, Vec<Cut>>::new();
     for (day, wear_mm) in [0.02, 0.10, 0.19, 0.27].into_iter().enumerate() {
         let seed = 1000 + day as u64;
@@ -183,11 +220,9 @@ fn mill_records() -> Vec<WearRecord> {
 const MILL_CUTS: [(f64, f64); 3] = [(1200.0, 720.0), (3600.0, 1150.0), (5500.0, 900.0)];
 
 /// Runs so many seeds on both cores.
-fn shifts(machine: SimulatedMachine, seeds: u64, hours: f64, model: &[WearRecord]) -> Vec<Shift> {
+fn shifts(run: &Run, seeds: u64) -> Vec<Shift> {
     std::thread::scope(|scope| {
-        let lane = |from: u64| {
-            move || (from..=seeds).step_by(2).map(|seed| shift(machine, seed, hours, model)).collect::<Vec<_>>()
-        };
+        let lane = |from: u64| move || (from..=seeds).step_by(2).map(|seed| shift(run, seed)).collect::<Vec<_>>();
         let lanes = [scope.spawn(lane(1)), scope.spawn(lane(2))];
         lanes.into_iter().flat_map(|lane| lane.join().expect("a shift")).collect()
     })
@@ -195,7 +230,7 @@ fn shifts(machine: SimulatedMachine, seeds: u64, hours: f64, model: &[WearRecord
 
 #[test]
 fn new_edges_raise_no_alarm() {
-    let first = shifts(SimulatedMachine::Lathe, 1, 0.75, &[]);
+    let first = shifts(&Run::of("lathe", SimulatedMachine::Lathe, 0.75, Vec::new()), 1);
     assert_eq!((score("lathe, 45 minutes", &first), first[0].requests), (0, 0));
 }
 
@@ -205,30 +240,35 @@ fn campaign(seeds: u64) {
         record.key.work_material.clear();
         record
     };
-    let runs: [(&str, SimulatedMachine, f64, Vec<WearRecord>); 6] = [
-        ("lathe, no model", lathe, 8.0, Vec::new()),
-        ("mill, no model", mill, 8.0, Vec::new()),
-        ("mill, no model, three shifts on end", mill, 24.0, Vec::new()),
-        ("lathe, learned model of any material", lathe, 8.0, vec![unnamed(record())]),
-        ("lathe, learned model of its material", lathe, 8.0, vec![record()]),
-        ("mill, learned models of its operations", mill, 8.0, mill_records()),
+    let learned = || vec![record()];
+    let runs = [
+        Run::of("lathe, no model", lathe, 8.0, Vec::new()),
+        Run::of("mill, no model", mill, 8.0, Vec::new()),
+        Run::of("mill, no model, three shifts on end", mill, 24.0, Vec::new()),
+        Run::of("lathe, learned model of any material", lathe, 8.0, vec![unnamed(record())]),
+        Run::of("lathe, learned model of its material", lathe, 8.0, learned()),
+        Run { lot: 0.94, ..Run::of("lathe, learned model, later 6 % softer", lathe, 8.0, learned()) },
+        Run { lot: 0.97, ..Run::of("lathe, learned model, later 3 % softer", lathe, 8.0, learned()) },
+        Run { lot: 1.03, ..Run::of("lathe, learned model, later 3 % harder", lathe, 8.0, learned()) },
+        Run { lot: 1.06, ..Run::of("lathe, learned model, later 6 % harder", lathe, 8.0, learned()) },
+        Run::of("mill, learned models of its operations", mill, 8.0, mill_records()),
     ];
     let chosen = std::env::var("WEAR_RUNS").unwrap_or_default();
-    for (name, machine, hours, models) in runs.into_iter().filter(|run| run.0.contains(&chosen)) {
-        assert_eq!(score(name, &shifts(machine, seeds, hours, &models)), 0, "{name}: a false alarm");
-    }
+    let false_alarms: usize =
+        runs.iter().filter(|run| run.name.contains(&chosen)).map(|run| score(run.name, &shifts(run, seeds))).sum();
+    assert_eq!(false_alarms, 0, "false alarms");
 }
 
 /// `cargo test --release --test loops fifty_shifts -- --ignored --nocapture`
 #[test]
-#[ignore = "200 minutes: false wear alarms and true wear at the alarm in 400 shifts"]
+#[ignore = "5 hours: false wear alarms and true wear at the alarm in 600 shifts"]
 fn fifty_shifts() {
     campaign(50);
 }
 
 /// `cargo test --release --test loops three_shifts -- --ignored --nocapture`
 #[test]
-#[ignore = "12 minutes: the same in 24 shifts"]
+#[ignore = "20 minutes: the same in 36 shifts"]
 fn three_shifts() {
     campaign(3);
 }

@@ -150,8 +150,8 @@ fn what_one_script_publishes_another_reads_in_the_same_tick_and_circles_are_refu
     let other = file("a.rhai", "publish(\"twice_w\", half_w, \"W\");");
     let told_of = told(&compile(&[circle, other]).err().expect("a circle"));
     assert!(told_of.contains("a.rhai reads half_w of z.rhai, z.rhai reads twice_w of a.rhai"), "{told_of}");
-    let alone = told(&compile(&[file("b.rhai", "note(`${learned_power_w}`);")]).err().expect("nobody publishes it"));
-    assert!(alone.contains("teach.rhai, which comes with the gateway, publishes it"), "{alone}");
+    let alone = told(&compile(&[file("b.rhai", "note(`${part_energy_kwh}`);")]).err().expect("nobody publishes it"));
+    assert!(alone.contains("energy.rhai, which comes with the gateway, publishes it"), "{alone}");
 }
 
 #[test]

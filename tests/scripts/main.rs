@@ -4,6 +4,7 @@ mod backtest;
 mod deciding;
 mod declared;
 mod failing;
+mod kinds;
 mod mad;
 mod methods;
 mod recipes;
@@ -15,6 +16,7 @@ mod wear;
 
 use adapters::clock::SECOND_NS;
 use adapters::{ChannelId, Sample, Slot, Value};
+use rules::estimators::loads::LoadEstimator;
 use rules::estimators::{Estimate, Estimates, State};
 use rules::script::{Host, ScriptCondition, ScriptFile, ScriptProblem, compile};
 
@@ -72,4 +74,15 @@ fn alarms(host: &mut Host, channel: &str, values: &[f64]) -> Vec<String> {
 
 fn request(host: &mut Host, at_s: f64, values: &[(&str, f64)]) -> Option<f64> {
     host.tick(&sample(at_s, values), &cutting(at_s, 100.0)).request.as_ref().map(|request| request.pct)
+}
+
+/// The same where the estimators see the load too.
+fn request_with_loads(
+    (host, loads): (&mut Host, &mut LoadEstimator),
+    at_s: f64,
+    values: &[(&str, f64)],
+) -> Option<f64> {
+    let (sample, mut estimates) = (sample(at_s, values), cutting(at_s, 100.0));
+    loads.step(&sample, &mut estimates, host.settings());
+    host.tick(&sample, &estimates).request.as_ref().map(|request| request.pct)
 }

@@ -1,6 +1,7 @@
 //! The scripts that come with the gateway.
 
 use super::*;
+use gateway::pipeline::{Channels, CycleFollower};
 use rules::estimators::wear::WearEstimator;
 use rules::script::{shipped, words};
 
@@ -26,13 +27,16 @@ fn the_shipped_scripts_compile_and_run_with_and_without_values() {
 
 #[test]
 fn the_shipped_constant_load_slows_a_heavy_cut_and_lets_go_afterwards() {
-    let mut host = Host::new();
+    let (mut host, mut loads) = (Host::new(), LoadEstimator::default());
     host.load(&shipped()).expect("they compile");
     let cut = [("spindle_load_pct", 95.0), ("feed_mm_min", 200.0), ("feed_programmed_mm_min", 200.0)];
-    let heavy: Vec<Option<f64>> = (10..110).map(|tick| request(&mut host, f64::from(tick) / 10.0, &cut)).collect();
+    let at = |tick: i32| f64::from(tick) / 10.0;
+    let heavy: Vec<Option<f64>> =
+        (10..110).map(|tick| request_with_loads((&mut host, &mut loads), at(tick), &cut)).collect();
     let last = heavy.last().copied().flatten().expect("a heavy cut is slowed down");
     assert!(last < 90.0, "{last}");
-    assert_eq!(request(&mut host, 11.1, &cut[1..]), None, "without the load nothing is asked for");
+    let without = request_with_loads((&mut host, &mut loads), 11.1, &cut[1..]);
+    assert_eq!(without, None, "without the load nothing is asked for, at this very tick");
 }
 
 /// Parts of 100 s: a light cut, a heavy one, and a second tool. From the fifth part on the first tool takes as much more as the
@@ -78,14 +82,17 @@ fn the_shipped_tool_wear_tells_a_worn_edge() {
 
 #[test]
 fn the_shipped_energy_counts_what_it_should() {
-    let mut host = Host::new();
+    let (mut host, mut parts, channels) = (Host::new(), CycleFollower::default(), Channels::new());
     host.load(&shipped()).expect("they compile");
     let mut notes = Vec::new();
     for tick in 0..=36_000_u32 {
         let at_s = f64::from(tick) / 10.0;
         let part = f64::from(tick / 36_000);
-        let values = [("total_power_w", 2000.0), ("part_count", part)];
-        let decision = host.tick(&sample(at_s, &values), &cutting(at_s, 500.0));
+        let (sample, mut estimates) =
+            (sample(at_s, &[("total_power_w", 2000.0), ("part_count", part)]), cutting(at_s, 500.0));
+        let _finished = parts.step(&channels, &sample, &estimates);
+        estimates.part = parts.figures();
+        let decision = host.tick(&sample, &estimates);
         notes.extend(
             decision.notes.iter().filter(|note| &*note.script == "energy.rhai").map(|note| note.text.to_string()),
         );
@@ -104,7 +111,7 @@ fn every_word_can_be_read() {
 #[test]
 fn the_same_samples_give_the_same_decisions() {
     let run = || {
-        let mut host = Host::new();
+        let (mut host, mut loads) = (Host::new(), LoadEstimator::default());
         host.load(&shipped()).expect("they compile");
         let mut text = String::new();
         let mut seed = 1_u64;
@@ -121,7 +128,9 @@ fn the_same_samples_give_the_same_decisions() {
                 ("feed_programmed_mm_min", 200.0),
             ];
             let provided = if seed.is_multiple_of(7) { &values[1..] } else { &values[..] };
-            text += &format!("{:?}\n", host.tick(&sample(at_s, provided), &cutting(at_s, 900.0 * random)));
+            let (sample, mut estimates) = (sample(at_s, provided), cutting(at_s, 900.0 * random));
+            loads.step(&sample, &mut estimates, host.settings());
+            text += &format!("{:?}\n", host.tick(&sample, &estimates));
         }
         text
     };

@@ -129,17 +129,18 @@ fn stops_and_offsets_are_asked_for_as_long_as_the_script_asks() {
     let decision = host.tick(&sample(0.1, &[("spindle_load_pct", 5.0)]), &cutting(0.1, 1.0));
     assert!(decision.stops.is_empty() && decision.offsets.len() == 1);
     assert!(refused("publish(\"Bad Name\", 1.0, \"W\");").contains("cannot be the name"));
-    let mut wrong = self::host("propose_offset_um(\"q\", 1.0, \"\");");
+    assert!(refused("propose_offset_um(\"q\", 1.0, \"\");").contains("there is no axis"));
+    let mut wrong = self::host("let axis = \"q\"; propose_offset_um(axis, 1.0, \"\");");
     let decision = wrong.tick(&sample(0.0, &[]), &cutting(0.0, 1.0));
     assert!(decision.problems[0].what.contains("there is no axis"), "{}", decision.problems[0]);
 }
 
 #[test]
 fn a_channel_of_its_own_is_known_before_it_has_a_value() {
-    let mut host = host("if has(spindle_load_pct) { publish(\"load_share\", spindle_load_pct / 100.0, \"1\") }");
+    let mut host = host("if has(spindle_load_pct) { publish(\"heavy_share\", spindle_load_pct / 100.0, \"1\") }");
     let seen =
         |host: &Host| host.published().map(|it| (it.name.to_owned(), it.unit.to_owned(), it.value)).collect::<Vec<_>>();
-    assert_eq!(seen(&host), [("load_share".to_owned(), "1".to_owned(), None)]);
+    assert_eq!(seen(&host), [("heavy_share".to_owned(), "1".to_owned(), None)]);
     host.tick(&sample(0.0, &[("spindle_load_pct", 50.0)]), &cutting(0.0, 1.0));
     assert_eq!(seen(&host)[0].2, Some(0.5));
     assert!(refused("publish(\"tool\", 1.0, \"1\");").contains("a channel or an estimate already"));

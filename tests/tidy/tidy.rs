@@ -1,6 +1,8 @@
 //! Rules of the code base as an ordinary test: what stands where, how long a file may be, where `unsafe` may stand, which
 //! names are refused, what the program may depend on.
 
+#[path = "advisories.rs"]
+mod advisories;
 #[path = "functions.rs"]
 mod functions;
 #[path = "names.rs"]

@@ -25,7 +25,7 @@ pub struct ColumnPreview {
     pub is_time: bool,
 }
 
-/// See the [module](self).
+/// How a file is understood.
 #[derive(Debug)]
 pub struct Preview {
     /// The columns in the order of the file.

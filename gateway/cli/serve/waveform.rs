@@ -40,11 +40,11 @@ impl WaveformArguments {
             let next =
                 "enable channels in scan_elements, set sampling_frequency, and see that nobody else has the device";
             let opened = Iio::open(&sysfs, &node, self.a_per_v, clock);
-            return opened.map(boxed).map_err(|error| CannotRun::new(format!("{name}: {error}"), next));
+            return opened.map(box_sampler).map_err(|error| CannotRun::new(format!("{name}: {error}"), next));
         }
         if let Some(file) = &self.file {
             let opened = Recorded::open(file, self.rate_hz, self.peak_a, clock);
-            return opened.map(boxed).map_err(|error| CannotRun::new(format!("{}: {error}", file.display()), ""));
+            return opened.map(box_sampler).map_err(|error| CannotRun::new(format!("{}: {error}", file.display()), ""));
         }
         if !(10.0..=100_000.0).contains(&self.rate_hz) {
             return Err(CannotRun::new(format!("{} samples per second", self.rate_hz), "give 10 to 100000"));
@@ -52,11 +52,11 @@ impl WaveformArguments {
         let running = self.common.machine()?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 2000")]
         let block = (self.rate_hz / 50.0).ceil() as u16;
-        Ok(boxed(SimulatedCurrent::new(&running.machine, running.clock.clone(), self.rate_hz, block)))
+        Ok(box_sampler(SimulatedCurrent::new(&running.machine, running.clock.clone(), self.rate_hz, block)))
     }
 }
 
-fn boxed<S: Sampler + 'static>(sampler: S) -> Box<dyn Sampler> {
+fn box_sampler<S: Sampler + 'static>(sampler: S) -> Box<dyn Sampler> {
     Box::new(sampler)
 }
 

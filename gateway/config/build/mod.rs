@@ -1,5 +1,6 @@
 //! From checked values to the configuration, and the rules that concern more than one key.
 
+mod backup;
 mod http;
 mod thermal;
 
@@ -24,6 +25,7 @@ pub(super) fn build(reading: &mut ConfigInput<'_>, base: &Path) -> Option<Config
     check_names(reading);
     check_gate(reading);
     http::check(reading);
+    backup::check_backup(reading);
     let sources = sources.map(|mut sources| {
         let written = reading.sources.clone();
         sources.iter_mut().zip(&written).for_each(|(source, values)| channels::add(reading, source, values));
@@ -48,6 +50,7 @@ pub(super) fn build(reading: &mut ConfigInput<'_>, base: &Path) -> Option<Config
         http: http::http(reading, base)?,
         twin: TwinConfig { model: text(reading, "twin", "model").map(|path| base.join(path)) },
         thermal: thermal::thermal(reading, base)?,
+        backup: backup::read_backup(reading, base)?,
         log: log(reading)?,
         gateway,
         sources: sources?,
@@ -76,6 +79,7 @@ fn gateway(reading: &ConfigInput<'_>, base: &Path) -> Option<GatewayConfig> {
     Some(GatewayConfig {
         name: text(reading, "gateway", "name")?,
         tick_hz: number(reading, "gateway", "tick_hz")?,
+        clock_confirm: seconds(reading, "gateway", "clock_confirm_s")?,
         language: match text(reading, "gateway", "language")?.as_str() {
             "en" => Some(Language::En),
             "zh" => Some(Language::Zh),
@@ -194,7 +198,8 @@ fn check_gate(reading: &mut ConfigInput<'_>) {
     let names: Vec<String> = reading.sources.iter().filter_map(source_name).collect();
     match text(reading, "gate", "source") {
         None if armed => {
-            let (at, next) = (origin("mode"), format!("write source = ... under [gate]; there is {}", quoted(&names)));
+            let (at, next) =
+                (origin("mode"), format!("write source = ... under [gate]; there is {}", quote_names(&names)));
             reading.problem(&at, "the gate may be armed, but `source` does not say what it writes to", next);
         }
         Some(name) => {
@@ -234,7 +239,7 @@ fn check_source(reading: &mut ConfigInput<'_>, names: &[String], name: &str, at:
     }
     let next = match nearest(name, names.iter().map(String::as_str)) {
         Some(near) => format!("did you mean {near:?}?"),
-        None => format!("there is {}", quoted(names)),
+        None => format!("there is {}", quote_names(names)),
     };
     reading.problem(at, format!("no source is named {name:?}"), next);
 }
@@ -263,12 +268,12 @@ fn check_offsets(reading: &mut ConfigInput<'_>) {
     if let Some(name) = text(reading, SECTION, "source") {
         check_source(reading, &names, &name, &at);
     } else if text(reading, SECTION, "mode").as_deref() == Some("armed") && text(reading, "gate", "source").is_none() {
-        let next = format!("write source = ... under [gate.offset]; there is {}", quoted(&names));
+        let next = format!("write source = ... under [gate.offset]; there is {}", quote_names(&names));
         reading.problem(&at_mode, "offsets may be written, but `source` does not say where to", next);
     }
 }
 
-fn quoted(names: &[String]) -> String {
+fn quote_names(names: &[String]) -> String {
     names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ")
 }
 

@@ -75,14 +75,14 @@ impl OffsetAccount {
         self.ledgers[axis.index()].intend(base_um, before_um, asked_um);
         if let Err(error) = self.book.keep(axis, self.left(axis)) {
             self.ledgers[axis.index()] = settled;
-            return Err(self.unaccounted(axis, &error));
+            return Err(self.accounting_error(axis, &error));
         }
         let after_um = self.sink.write(clock, axis, before_um, asked_um)?;
         self.ledgers[axis.index()].note(base_um, after_um);
         Ok(after_um)
     }
 
-    fn unaccounted(&self, axis: Axis, error: &std::io::Error) -> SourceError {
+    fn accounting_error(&self, axis: Axis, error: &std::io::Error) -> SourceError {
         SourceError::Refused {
             source_name: self.sink.name().to_owned(),
             request: format!("the external offset of {}", axis.word()),

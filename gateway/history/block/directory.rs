@@ -6,8 +6,9 @@ use super::super::rounding::{TEN, nearest};
 use super::cells::{Encoding, ValueSummary};
 use super::varint::{Bytes, put, put_text, unzigzag, zigzag};
 
-/// Version of the block format, the first byte.
-const VERSION: u8 = 1;
+/// Version of the block format, the first byte. From 2 on checksums follow the directory: see [`checksum`](super::checksum).
+const VERSION: u8 = 2;
+const VERSION_UNSEALED: u8 = 1;
 /// No block has more rows: refuses a damaged count before memory is claimed.
 const ROWS_MAX: usize = 1 << 20;
 const PLANES: u8 = 0x40;
@@ -63,10 +64,10 @@ impl Directory {
         out
     }
 
-    /// The directory in `bytes`; `None` when it is of another version or damaged.
+    /// The directory in `bytes`, without its checksums; `None` when it is of another version or damaged.
     pub(crate) fn parse(bytes: &[u8]) -> Option<Self> {
         let mut bytes = Bytes(bytes);
-        if bytes.byte()? != VERSION {
+        if ![VERSION, VERSION_UNSEALED].contains(&bytes.byte()?) {
             return None;
         }
         let rows = bytes.count().filter(|rows| *rows <= ROWS_MAX)?;
@@ -88,6 +89,12 @@ impl Directory {
         let used = (0..=u8::MAX).filter(|code| codes[usize::from(*code)] && Reasons::is_own(*code));
         self.words = used.filter_map(|code| Some((code, reasons.word(code)?.to_owned()))).collect();
     }
+}
+
+/// Do checksums follow this directory? Any first byte but that of the older version counts as sealed: a version that was
+/// damaged must not switch the check off.
+pub(crate) fn is_sealed(bytes: &[u8]) -> bool {
+    bytes.first().is_some_and(|version| *version != VERSION_UNSEALED)
 }
 
 fn put_span(out: &mut Vec<u8>, span: ByteSpan) {

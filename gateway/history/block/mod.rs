@@ -7,13 +7,17 @@
 //! it asks for and an overview reads no samples at all.
 
 mod cells;
+mod checksum;
 mod directory;
 mod integers;
+mod stored;
 mod varint;
 
 pub(crate) use cells::Encoding;
 pub use cells::{Cells, NumberCells, ValueSummary, WordCells};
+pub(crate) use checksum::BlockKey;
 pub(crate) use directory::{ByteSpan, Directory, SeriesEntry};
+pub(crate) use stored::{BLOCK_COLUMNS, StoredBlock};
 
 use super::reason::{PRESENT, Reasons};
 use super::rows::{Column, SeriesRows, Word};
@@ -35,11 +39,8 @@ pub(crate) const LEVEL_COMPACT: i32 = 9;
 /// A block as it goes into the database.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Block {
-    pub(crate) segment: i64,
-    pub(crate) first_row: i64,
-    pub(crate) rows: usize,
-    pub(crate) start_ns: TimeNs,
-    pub(crate) end_ns: TimeNs,
+    pub(crate) key: BlockKey,
+    /// With its checksums.
     pub(crate) directory: Vec<u8>,
     pub(crate) columns: Vec<u8>,
     /// Series number and summary of every quantity that has a value.
@@ -78,13 +79,9 @@ impl Encoder {
         first_row: i64,
     ) -> Block {
         let mut directory = Directory { rows: rows.len(), ..Directory::default() };
-        let mut columns = Vec::new();
+        let mut columns;
         let mut summaries = Vec::new();
-        self.plain.clear();
-        self.integers.clear();
-        self.integers.extend_from_slice(&rows.at_ns);
-        integers::encode(&self.integers, &mut self.plain);
-        directory.times = self.pack(&mut columns);
+        (directory.times, columns) = self.times(&rows.at_ns);
         for (series, column) in series.iter().zip(&rows.columns).filter(|(_, column)| !column.is_unused()) {
             self.plain.clear();
             let written = cells::encode(column, rows.len(), series.decimals, &mut self.scratch, &mut self.plain);
@@ -96,16 +93,26 @@ impl Encoder {
             directory.entries.push(SeriesEntry { series: series.id, encoding, any_missing, summary, span });
         }
         directory.note_words(&codes_in(rows), reasons);
-        Block {
+        let key = BlockKey {
             segment,
             first_row,
-            rows: rows.len(),
+            rows: rows.len() as i64,
             start_ns: rows.at_ns.first().copied().unwrap_or_default(),
             end_ns: rows.at_ns.last().copied().unwrap_or_default(),
-            directory: directory.to_bytes(),
-            columns,
-            summaries,
-        }
+        };
+        let mut directory = directory.to_bytes();
+        key.seal(&mut directory, &columns);
+        Block { key, directory, columns, summaries }
+    }
+
+    /// The first stream of a block: the times of its rows.
+    pub(crate) fn times(&mut self, at_ns: &[TimeNs]) -> (ByteSpan, Vec<u8>) {
+        self.plain.clear();
+        self.integers.clear();
+        self.integers.extend_from_slice(at_ns);
+        integers::encode(&self.integers, &mut self.plain);
+        let mut columns = Vec::new();
+        (self.pack(&mut columns), columns)
     }
 
     /// Appends `plain` to `columns`, compressed when that is shorter.

@@ -53,6 +53,14 @@ pub(super) fn write(
     }
 }
 
+/// Text of somebody else as a cell: a spreadsheet takes one that begins like a formula for a formula and runs it. An apostrophe
+/// before it is the usual remedy (OWASP, *CSV Injection*).
+#[must_use]
+pub fn plain_cell(text: &str) -> String {
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠']);
+    if formula { format!("'{text}") } else { text.to_owned() }
+}
+
 fn header(plan: &ColumnPlan) -> Vec<String> {
     let mut names = vec![if plan.monotone { "time_utc" } else { "time_s" }.to_owned()];
     if !plan.monotone && !plan.has_run() {
@@ -76,7 +84,7 @@ fn cells(plan: &ColumnPlan, chunk: &Chunk<'_>, row: usize) -> Vec<String> {
     for (index, (series, missing)) in plan.series.iter().enumerate() {
         let column = &chunk.columns[index];
         let number = column.number(row).map(|number| number.to_string());
-        let text = number.or_else(|| column.word(row).map(str::to_owned));
+        let text = number.or_else(|| column.word(row).map(plain_cell));
         let run = !plan.monotone && &*series.name == RUN;
         cells.push(if run { run_text(chunk.segment, text.as_deref()) } else { text.unwrap_or_default() });
         if *missing {

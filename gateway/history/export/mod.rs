@@ -8,6 +8,7 @@ mod parquet;
 mod partitions;
 mod recording;
 
+pub use csv::plain_cell;
 pub use partitions::{DayWritten, day_of};
 
 use super::error::{Doing, HistoryError, at};

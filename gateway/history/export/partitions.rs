@@ -34,7 +34,7 @@ pub fn day_of(at_ns: TimeNs) -> TimeNs {
 }
 
 /// Letters, digits, `-`, `_` and `.` stay; every other byte is escaped with `%`, as Hive does.
-fn escaped(name: &str) -> String {
+fn escape_name(name: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
     name.bytes().map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") }).collect()
 }
@@ -43,9 +43,9 @@ fn escaped(name: &str) -> String {
 fn day_file(root: &Path, kind: &str, (machine, box_id): (&str, &str), day_ns: TimeNs) -> PathBuf {
     let date: String = crate::moment::utc(day_ns).chars().take(10).collect();
     root.join(kind)
-        .join(format!("machine={}", escaped(machine)))
+        .join(format!("machine={}", escape_name(machine)))
         .join(format!("date={date}"))
-        .join(format!("{}.parquet", escaped(box_id)))
+        .join(format!("{}.parquet", escape_name(box_id)))
 }
 
 impl Reader {

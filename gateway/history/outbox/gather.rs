@@ -25,8 +25,10 @@ use std::time::{Duration, Instant};
 const WAITING_BYTES_MAX: usize = 16_000_000;
 
 /// What the sinks have delivered is noted, and removed, this often: each time costs two pages of the disk (flash wears), and
-/// what is not noted is sent again after a kill.
+/// what is not noted is sent again after a kill. The first time comes with the first delivery, and each time after it twice as long
+/// after the one before: a box that lives for seconds only repeats no more than half of what it had sent.
 const TIDY_EVERY: Duration = Duration::from_secs(5);
+const TIDY_FIRST: Duration = Duration::from_millis(250);
 
 /// Ticks that are further apart than this, and than three ticks, have a gap between them. Shorter: a tick that was late would end
 /// every value; longer: a value is carried so far into a time of which nothing is known.
@@ -55,6 +57,8 @@ pub(crate) struct Gatherer {
     lost: u64,
     stored: OutboxContents,
     tidied: Instant,
+    /// Time until the next note.
+    tidy_after: Duration,
     /// Time of the newest tick, of an earlier run too; with why there may be a gap after it.
     last: Option<(TimeNs, &'static str)>,
     means: MeanSchedule,
@@ -91,6 +95,7 @@ impl Gatherer {
             lost: 0,
             stored,
             tidied: Instant::now(),
+            tidy_after: Duration::ZERO,
             last: newest_ns.map(|newest_ns| (newest_ns, "not_running")),
             means: MeanSchedule::new(newest_ns),
             outbox,
@@ -140,7 +145,12 @@ impl Gatherer {
 
     /// Would a commit change anything here?
     pub(crate) fn is_dirty(&self) -> bool {
-        self.outbox.has_news() && self.tidied.elapsed() >= TIDY_EVERY
+        self.outbox.has_news() && self.is_due()
+    }
+
+    /// Is it time to note what the sinks have delivered? A new connection is noted at once.
+    fn is_due(&self) -> bool {
+        self.tidied.elapsed() >= self.tidy_after || self.outbox.has_connections()
     }
 
     /// At the end: tells that nothing comes any more, waits for the sinks within the time that the settings allow, and notes what
@@ -164,7 +174,7 @@ impl Gatherer {
             means::lines(&ending, &running, tick)?.into_iter().map(|(at_ns, text)| (at_ns, text.into())).collect();
         let from_ns = last_ns.saturating_add(i64::try_from(tick.as_nanos()).unwrap_or(0));
         lines.push((from_ns, line::of_gap(from_ns, None, "stopped").into()));
-        let put = store::put(&ending, &self.outbox, &self.stored, &lines, false)?;
+        let put = store::put(&ending, &self.outbox, &self.stored, &lines, (false, false))?;
         ending.commit().doing("ending the outbox")?;
         self.stored = put.stored;
         self.outbox.noted(&put.dropped);
@@ -174,13 +184,14 @@ impl Gatherer {
 
     /// Puts into the running transaction the items of the ticks before row `end_row` and of these records, which belong
     /// after as many rows from `opened_row` on as they say, and the means that the stored blocks complete, which begin at these
-    /// times; then drops what the bounds do not allow, and now and then notes what the sinks have delivered.
+    /// times; then drops what the bounds do not allow (`ages`: the bound of age too, which only a certain clock can tell), and now
+    /// and then notes what the sinks have delivered.
     pub(crate) fn put<'a>(
         &self,
         db: &Connection,
         records: impl Iterator<Item = &'a QueuedRecord>,
         (opened_row, end_row): (i64, i64),
-        blocks: impl Iterator<Item = TimeNs>,
+        (blocks, ages): (impl Iterator<Item = TimeNs>, bool),
     ) -> Result<TransactionWork, HistoryError> {
         let mut lines: Vec<(TimeNs, Cow<'_, str>)> = Vec::new();
         let mut ticks = self.waiting.iter().take_while(|line| line.row < end_row).peekable();
@@ -197,8 +208,8 @@ impl Gatherer {
         let told = means::lines(db, &due, self.outbox.settings().tick)?;
         lines.extend(told.into_iter().map(|(at_ns, text)| (at_ns, text.into())));
         let ticks = self.waiting.iter().take_while(|line| line.row < end_row).count();
-        let tidy = self.tidied.elapsed() >= TIDY_EVERY;
-        let put = store::put(db, &self.outbox, &self.stored, &lines, tidy)?;
+        let tidy = self.outbox.has_news() && self.is_due();
+        let put = store::put(db, &self.outbox, &self.stored, &lines, (tidy, ages))?;
         Ok(TransactionWork { ticks, put, tidy, means })
     }
 
@@ -212,6 +223,8 @@ impl Gatherer {
         self.outbox.noted(&taken.put.dropped);
         if taken.tidy {
             self.tidied = Instant::now();
+            self.tidy_after = (2 * self.tidy_after).clamp(TIDY_FIRST, TIDY_EVERY);
+            self.outbox.connections_noted();
         }
         self.tell(reasons);
     }

@@ -77,6 +77,20 @@ pub(super) fn of_record(record: &Record) -> String {
     json!({ "t": record.at_ns(), "r": record }).to_string()
 }
 
+/// The same line, so much later; one that this version cannot read stays as it is. Gaps and means of a wrong time are of other
+/// minutes than those of the right one: they become an empty line, which keeps its number and is passed over.
+pub(super) fn moved(text: &str, by_ns: i64) -> String {
+    let Some(Parsed(line)) = parse(text) else { return text.to_owned() };
+    match (line.s, line.r) {
+        (_, Some(mut record)) => {
+            record.shift(by_ns);
+            of_record(&record)
+        }
+        (Some(cells), None) => json!({ "t": line.t.saturating_add(by_ns), "s": cells }).to_string(),
+        (None, None) => String::new(),
+    }
+}
+
 /// Series by their numbers.
 pub(super) type SeriesByNumber = HashMap<i64, Arc<SeriesInfo>>;
 

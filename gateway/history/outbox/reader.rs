@@ -115,7 +115,8 @@ struct OutboxRow {
     body: Vec<u8>,
 }
 
-fn unpacked(body: &[u8]) -> Option<String> {
+/// The lines of a row; `None` when they are not as they were written.
+pub(super) fn unpacked(body: &[u8]) -> Option<String> {
     let bytes = zstd::stream::decode_all(body).ok().filter(|bytes| bytes.len() <= BODY_BYTES_MAX)?;
     String::from_utf8(bytes).ok()
 }

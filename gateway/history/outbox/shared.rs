@@ -8,6 +8,7 @@ use adapters::clock::TimeNs;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 use tokio::sync::watch;
 
 /// How far the outbox is.
@@ -50,8 +51,18 @@ pub struct DeliveryState {
     pub position: Position,
     /// Items dropped before it had delivered them, since it was first configured.
     pub dropped: u64,
+    /// Connections that were begun, since it was first configured.
+    pub connections: u64,
     /// Is it connected, or about to be for the first time? At the end only such sinks are waited for.
     pub linked: bool,
+}
+
+impl DeliveryState {
+    /// Nothing before `next` is to be delivered any more, and nothing has happened yet.
+    #[must_use]
+    pub fn at(next: u64) -> Self {
+        Self { position: Position::at(next), dropped: 0, connections: 0, linked: false }
+    }
 }
 
 #[derive(Debug)]
@@ -61,6 +72,9 @@ struct SharedOutbox {
     head: watch::Sender<OutboxHead>,
     sinks: Mutex<BTreeMap<String, DeliveryState>>,
     news: AtomicBool,
+    /// Connections that are not noted yet, and how many times they were.
+    connecting: AtomicBool,
+    noted: watch::Sender<u64>,
     hurried: AtomicBool,
     state: Mutex<OutboxState>,
 }
@@ -84,7 +98,7 @@ impl PartialEq for Outbox {
     }
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+fn lock_mutex<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // Everything in there is complete whenever the lock is free.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -93,13 +107,15 @@ impl Outbox {
     /// The outbox of a machine for these sinks. Hand it to [`Options::outbox`](crate::history::Options::outbox).
     #[must_use]
     pub fn new(machine: &str, settings: OutboxSettings, sinks: impl IntoIterator<Item = String>) -> Self {
-        let standing = || DeliveryState { position: Position::at(1), dropped: 0, linked: false };
+        let standing = || DeliveryState::at(1);
         let shared = SharedOutbox {
             machine: machine.to_owned(),
             settings,
             head: watch::Sender::new(OutboxHead::default()),
             sinks: Mutex::new(sinks.into_iter().map(|name| (name, standing())).collect()),
             news: AtomicBool::new(false),
+            connecting: AtomicBool::new(false),
+            noted: watch::Sender::new(0),
             hurried: AtomicBool::new(false),
             state: Mutex::new(OutboxState::default()),
         };
@@ -116,7 +132,7 @@ impl Outbox {
     /// were made with the outbox. `<box>-<sequence>` names an item everywhere and for ever. Empty until the history is open.
     #[must_use]
     pub fn box_id(&self) -> String {
-        locked(&self.shared.state).box_id.clone()
+        lock_mutex(&self.shared.state).box_id.clone()
     }
 
     /// What is gathered and how much of it is kept.
@@ -134,20 +150,20 @@ impl Outbox {
     /// How full it is.
     #[must_use]
     pub fn figures(&self) -> OutboxFigures {
-        locked(&self.shared.state).figures
+        lock_mutex(&self.shared.state).figures
     }
 
     /// Every series with what a receiver of all items knows by now; empty until the history is open. All values are
     /// missing until the first commit.
     #[must_use]
     pub fn latest(&self) -> Arc<Vec<Reading>> {
-        locked(&self.shared.state).latest.clone()
+        lock_mutex(&self.shared.state).latest.clone()
     }
 
     /// What sink `name` has delivered; `None` for a name that is not configured.
     #[must_use]
     pub fn standing(&self, name: &str) -> Option<DeliveryState> {
-        locked(&self.shared.sinks).get(name).cloned()
+        lock_mutex(&self.shared.sinks).get(name).cloned()
     }
 
     /// Sink `name` has delivered the items `from..to`. Becomes durable with the next commit.
@@ -163,6 +179,35 @@ impl Outbox {
         });
     }
 
+    /// Sink `name` begins a connection; gives its number, from 0 over the life of the history. Returns when that is durable, so
+    /// that no later connection can have the same number, or after `limit`.
+    pub async fn begin_connection(&self, name: &str, limit: Duration) -> u64 {
+        let mut noted = self.shared.noted.subscribe();
+        let mut number = 0;
+        self.change(name, |standing| {
+            number = standing.connections;
+            standing.connections += 1;
+        });
+        self.shared.connecting.store(true, Ordering::Release);
+        // One commit may be under way that has not seen it.
+        let twice = *noted.borrow_and_update() + 2;
+        let waiting =
+            async { while self.has_connections() && *noted.borrow() < twice && noted.changed().await.is_ok() {} };
+        // A disk that takes nothing must not keep anybody from sending.
+        let _late = tokio::time::timeout(limit, waiting).await;
+        number
+    }
+
+    /// The writer's side: is there a connection that is not noted yet?
+    pub(super) fn has_connections(&self) -> bool {
+        self.shared.connecting.load(Ordering::Acquire)
+    }
+
+    /// The writer's side: what was known of the sinks when the last transaction began is durable.
+    pub(super) fn connections_noted(&self) {
+        self.shared.noted.send_modify(|times| *times += 1);
+    }
+
     /// Sink `name` goes on with live data; what it has not delivered before the head becomes a gap. See
     /// [`Position::jump`].
     pub fn jump(&self, name: &str) -> bool {
@@ -174,7 +219,7 @@ impl Outbox {
 
     /// Sink `name` is connected, or is not.
     pub fn set_linked(&self, name: &str, linked: bool) {
-        if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
+        if let Some(standing) = lock_mutex(&self.shared.sinks).get_mut(name) {
             standing.linked = linked;
         }
     }
@@ -185,7 +230,7 @@ impl Outbox {
     }
 
     fn change(&self, name: &str, change: impl FnOnce(&mut DeliveryState)) {
-        if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
+        if let Some(standing) = lock_mutex(&self.shared.sinks).get_mut(name) {
             change(standing);
             self.shared.news.store(true, Ordering::Release);
         }
@@ -198,12 +243,12 @@ impl Outbox {
 
     /// The writer's side: the names of the sinks.
     pub(super) fn names(&self) -> Vec<String> {
-        locked(&self.shared.sinks).keys().cloned().collect()
+        lock_mutex(&self.shared.sinks).keys().cloned().collect()
     }
 
     /// The writer's side: the lowest number that some sink has not delivered.
     pub(super) fn lowest(&self) -> u64 {
-        locked(&self.shared.sinks).values().map(|standing| standing.position.lowest()).min().unwrap_or(u64::MAX)
+        lock_mutex(&self.shared.sinks).values().map(|standing| standing.position.lowest()).min().unwrap_or(u64::MAX)
     }
 
     /// The writer's side: looks at every sink, and may change it. What has been delivered until here is noted.
@@ -212,7 +257,8 @@ impl Outbox {
         mut each: impl FnMut(&str, &mut DeliveryState) -> Result<(), HistoryError>,
     ) -> Result<(), HistoryError> {
         self.shared.news.store(false, Ordering::Release);
-        let mut sinks = locked(&self.shared.sinks);
+        self.shared.connecting.store(false, Ordering::Release);
+        let mut sinks = lock_mutex(&self.shared.sinks);
         let done = sinks.iter_mut().try_for_each(|(name, standing)| each(name, standing));
         if done.is_err() {
             self.shared.news.store(true, Ordering::Release);
@@ -225,7 +271,7 @@ impl Outbox {
         if dropped.is_empty() {
             return;
         }
-        for standing in locked(&self.shared.sinks).values_mut() {
+        for standing in lock_mutex(&self.shared.sinks).values_mut() {
             for (from, to) in dropped {
                 standing.dropped += standing.position.within(*from, *to);
                 standing.position.done(*from, *to);
@@ -235,20 +281,20 @@ impl Outbox {
 
     /// The writer's side: the name of this box.
     pub(super) fn name_box(&self, name: String) {
-        locked(&self.shared.state).box_id = name;
+        lock_mutex(&self.shared.state).box_id = name;
     }
 
     /// The writer's side: has every sink that is connected delivered everything before `next`, or is it not to be waited for?
     pub(super) fn is_drained(&self, next: u64) -> bool {
         self.shared.hurried.load(Ordering::Acquire)
-            || locked(&self.shared.sinks)
+            || lock_mutex(&self.shared.sinks)
                 .values()
                 .all(|standing| !standing.linked || standing.position.waiting(next) == 0)
     }
 
     /// The writer's side: what is durable now.
     pub(super) fn publish(&self, head: OutboxHead, figures: OutboxFigures, latest: Vec<Reading>) {
-        let mut state = locked(&self.shared.state);
+        let mut state = lock_mutex(&self.shared.state);
         state.figures = figures;
         state.latest = Arc::new(latest);
         drop(state);

@@ -22,11 +22,12 @@ CREATE TABLE IF NOT EXISTS outbox (
 CREATE TABLE IF NOT EXISTS outbox_sinks (
   name TEXT PRIMARY KEY,
   position TEXT NOT NULL,         -- JSON: what it has not delivered, as gaps and the number from which on nothing is
-  dropped INTEGER NOT NULL        -- items that were dropped before it had delivered them
+  dropped INTEGER NOT NULL,       -- items that were dropped before it had delivered them
+  connections INTEGER NOT NULL DEFAULT 0  -- connections that were begun
 ) WITHOUT ROWID;";
 
 /// zstd level: higher ones gain little on bodies of a kilobyte.
-const LEVEL: i32 = 3;
+pub(super) const LEVEL: i32 = 3;
 /// Rows beyond the bounds that are removed in one commit, so that a commit stays short; one commit adds one row.
 const ROWS_REMOVED_MAX: usize = 64;
 /// Delivered rows that are removed at a time, about two megabytes. A sink that makes up for an outage delivers up to some
@@ -56,11 +57,11 @@ impl OutboxContents {
     }
 }
 
-fn unsigned(number: i64) -> u64 {
+fn to_unsigned(number: i64) -> u64 {
     u64::try_from(number).unwrap_or(0)
 }
 
-fn signed(number: u64) -> i64 {
+fn to_signed(number: u64) -> i64 {
     i64::try_from(number).unwrap_or(i64::MAX)
 }
 
@@ -68,6 +69,11 @@ fn signed(number: u64) -> i64 {
 pub(super) fn open(db: &mut Connection, outbox: &Outbox) -> Result<OutboxContents, HistoryError> {
     let opening = db.transaction().doing("opening the outbox")?;
     opening.execute_batch(TABLES).doing("creating the outbox")?;
+    if opening.prepare("SELECT connections FROM outbox_sinks").is_err() {
+        opening
+            .execute_batch("ALTER TABLE outbox_sinks ADD COLUMN connections INTEGER NOT NULL DEFAULT 0")
+            .doing("extending the outbox")?;
+    }
     outbox.name_box(box_name(&opening, outbox.machine())?);
     let next = next_sequence(&opening)?;
     outbox.for_each_sink(|name, standing| load(&opening, name, next, standing))?;
@@ -85,10 +91,13 @@ pub(super) fn open(db: &mut Connection, outbox: &Outbox) -> Result<OutboxContent
 }
 
 fn measure(db: &Connection, next_sequence: u64) -> Result<OutboxContents, HistoryError> {
-    db.query_row("SELECT coalesce(sum(bytes), 0), min(start_ns), max(end_ns) FROM outbox", [], |row| {
+    // The newest is the last that was stored: an earlier one may be dated by a clock that was ahead.
+    let newest = "SELECT end_ns FROM outbox ORDER BY first_sequence DESC LIMIT 1";
+    let select = format!("SELECT coalesce(sum(bytes), 0), min(start_ns), ({newest}) FROM outbox");
+    db.query_row(&select, [], |row| {
         Ok(OutboxContents {
             next_sequence,
-            bytes: unsigned(row.get(0)?),
+            bytes: to_unsigned(row.get(0)?),
             oldest_ns: row.get(1)?,
             newest_ns: row.get(2)?,
             added_bytes: 0,
@@ -100,8 +109,26 @@ fn measure(db: &Connection, next_sequence: u64) -> Result<OutboxContents, Histor
 
 /// The newest row is never removed: the numbering goes on from it.
 fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
-    db.query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| row.get(0).map(unsigned))
+    db.query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| row.get(0).map(to_unsigned))
         .doing("numbering the outbox")
+}
+
+/// The number of the next item; 0 where there is no outbox.
+pub(crate) fn next_sequence_of(db: &Connection) -> Result<u64, HistoryError> {
+    if exists(db)? { next_sequence(db) } else { Ok(0) }
+}
+
+/// Creates the tables in `to` where `from` has them.
+pub(crate) fn create_like(from: &Connection, to: &Connection) -> Result<(), HistoryError> {
+    if exists(from)? { to.execute_batch(TABLES).doing("creating the outbox") } else { Ok(()) }
+}
+
+/// Does the file have the tables?
+pub(super) fn exists(db: &Connection) -> Result<bool, HistoryError> {
+    db.query_row("SELECT 1 FROM sqlite_schema WHERE name = 'outbox_sinks'", [], |_| Ok(()))
+        .optional()
+        .map(|found| found.is_some())
+        .doing("looking for the outbox")
 }
 
 /// The name of this box, made once: a machine that is renamed stays the same box. The digits tell boxes apart whose machines
@@ -157,20 +184,21 @@ fn letters_of(machine: &str) -> String {
 
 /// A sink that is new begins with what is made from now on.
 fn load(db: &Connection, name: &str, next: u64, standing: &mut DeliveryState) -> Result<(), HistoryError> {
-    let found: Option<(String, i64)> = db
-        .query_row("SELECT position, dropped FROM outbox_sinks WHERE name = ?1", [name], |row| {
-            Ok((row.get(0)?, row.get(1)?))
+    let found: Option<(String, i64, i64)> = db
+        .query_row("SELECT position, dropped, connections FROM outbox_sinks WHERE name = ?1", [name], |row| {
+            Ok((row.get(0)?, row.get(1)?, row.get(2)?))
         })
         .optional()
         .doing("reading what a sink has delivered")?;
     match found {
-        Some((text, dropped)) => {
+        Some((text, dropped, connections)) => {
             // A text that this version cannot read begins anew rather than sending everything twice.
             standing.position = serde_json::from_str(&text).unwrap_or(Position::at(next));
-            standing.dropped = unsigned(dropped);
+            standing.dropped = to_unsigned(dropped);
+            standing.connections = to_unsigned(connections);
         }
         None => {
-            standing.position = Position::at(next);
+            *standing = DeliveryState { linked: standing.linked, ..DeliveryState::at(next) };
             save(db, name, standing)?;
         }
     }
@@ -179,10 +207,14 @@ fn load(db: &Connection, name: &str, next: u64, standing: &mut DeliveryState) ->
 
 fn save(db: &Connection, name: &str, standing: &DeliveryState) -> Result<(), HistoryError> {
     let position = serde_json::to_string(&standing.position).unwrap_or_default();
-    db.prepare_cached("INSERT OR REPLACE INTO outbox_sinks (name, position, dropped) VALUES (?1, ?2, ?3)")
-        .and_then(|mut save| save.execute(params![name, position, signed(standing.dropped)]))
-        .map(drop)
-        .doing("noting what a sink has delivered")
+    db.prepare_cached(
+        "INSERT OR REPLACE INTO outbox_sinks (name, position, dropped, connections) VALUES (?1, ?2, ?3, ?4)",
+    )
+    .and_then(|mut save| {
+        save.execute(params![name, position, to_signed(standing.dropped), to_signed(standing.connections)])
+    })
+    .map(drop)
+    .doing("noting what a sink has delivered")
 }
 
 /// What a transaction did to the outbox.
@@ -192,20 +224,20 @@ pub(super) struct Put {
     pub(super) dropped: Vec<(u64, u64)>,
 }
 
-/// Adds these lines and removes what is beyond the bounds; `tidy`, it removes what is delivered too, and notes what each
+/// Adds these lines and removes what is beyond the bounds, `ages` by its age too; `tidy`, it removes what is delivered too, and notes what each
 /// sink has delivered.
 pub(super) fn put(
     db: &Connection,
     outbox: &Outbox,
     before: &OutboxContents,
     lines: &[(TimeNs, Cow<'_, str>)],
-    tidy: bool,
+    (tidy, ages): (bool, bool),
 ) -> Result<Put, HistoryError> {
     let mut stored = *before;
     if !lines.is_empty() {
         add(db, &mut stored, lines)?;
     }
-    let dropped = remove(db, outbox, &mut stored, tidy)?;
+    let dropped = remove(db, outbox, &mut stored, (tidy, ages))?;
     if tidy || !dropped.is_empty() {
         note(db, outbox, &dropped)?;
     }
@@ -235,8 +267,8 @@ fn add(db: &Connection, stored: &mut OutboxContents, lines: &[(TimeNs, Cow<'_, s
         "INSERT INTO outbox (first_sequence, items, start_ns, end_ns, bytes, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
     )
     .and_then(|mut insert| {
-        let first = signed(stored.next_sequence);
-        insert.execute(params![first, lines.len() as i64, start_ns, end_ns, signed(bytes), body])
+        let first = to_signed(stored.next_sequence);
+        insert.execute(params![first, lines.len() as i64, start_ns, end_ns, to_signed(bytes), body])
     })
     .doing("storing the outbox")?;
     stored.next_sequence += lines.len() as u64;
@@ -255,11 +287,12 @@ fn remove(
     db: &Connection,
     outbox: &Outbox,
     stored: &mut OutboxContents,
-    tidy: bool,
+    (tidy, ages): (bool, bool),
 ) -> Result<Vec<(u64, u64)>, HistoryError> {
     let (settings, lowest) = (outbox.settings(), outbox.lowest().min(stored.next_sequence));
     let max_age_ns = i64::try_from(settings.max_age.as_nanos()).unwrap_or(i64::MAX);
-    let horizon_ns = stored.newest_ns.map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(max_age_ns));
+    let horizon_ns =
+        stored.newest_ns.filter(|_| ages).map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(max_age_ns));
     if tidy {
         remove_delivered(db, lowest, stored)?;
     }
@@ -277,7 +310,7 @@ fn remove(
             break;
         }
         db.prepare_cached("DELETE FROM outbox WHERE first_sequence = ?1")
-            .and_then(|mut delete| delete.execute([signed(first)]))
+            .and_then(|mut delete| delete.execute([to_signed(first)]))
             .doing("shortening the outbox")?;
         stored.bytes = stored.bytes.saturating_sub(bytes);
         if !delivered {
@@ -289,7 +322,7 @@ fn remove(
 
 /// Removes the oldest rows whose items are all below `lowest`, but never the newest row.
 fn remove_delivered(db: &Connection, lowest: u64, stored: &mut OutboxContents) -> Result<(), HistoryError> {
-    let end = signed(lowest.min(stored.next_sequence.saturating_sub(1)));
+    let end = to_signed(lowest.min(stored.next_sequence.saturating_sub(1)));
     let (last, bytes): (Option<i64>, i64) = db
         .prepare_cached(
             "SELECT max(first_sequence), coalesce(sum(bytes), 0) FROM (
@@ -302,7 +335,7 @@ fn remove_delivered(db: &Connection, lowest: u64, stored: &mut OutboxContents) -
     db.prepare_cached("DELETE FROM outbox WHERE first_sequence <= ?1")
         .and_then(|mut delete| delete.execute([last]))
         .doing("shortening the outbox")?;
-    stored.bytes = stored.bytes.saturating_sub(unsigned(bytes));
+    stored.bytes = stored.bytes.saturating_sub(to_unsigned(bytes));
     Ok(())
 }
 
@@ -311,7 +344,7 @@ fn oldest(db: &Connection) -> Result<Option<(u64, u64, TimeNs, u64)>, HistoryErr
     db.prepare_cached("SELECT first_sequence, items, end_ns, bytes FROM outbox ORDER BY first_sequence LIMIT 1")
         .and_then(|mut select| {
             let row = |row: &rusqlite::Row<'_>| {
-                Ok((unsigned(row.get(0)?), unsigned(row.get(1)?), row.get(2)?, unsigned(row.get(3)?)))
+                Ok((to_unsigned(row.get(0)?), to_unsigned(row.get(1)?), row.get(2)?, to_unsigned(row.get(3)?)))
             };
             select.query_row([], row).optional()
         })

@@ -4,7 +4,9 @@
 //! fingerprint that is told at every start is what to compare then. It lasts for 825 days, the longest that every browser
 //! takes, and is made anew at a start in its last 60 days.
 
+use crate::clock::{self, Trust};
 use crate::files;
+use adapters::clock::{Clock, TimeNs};
 use rcgen::{CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, KeyPair, date_time_ymd};
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
@@ -13,10 +15,12 @@ use std::fmt::Write;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, SystemTime};
+use std::time::UNIX_EPOCH;
 use tokio_rustls::{TlsAcceptor, rustls};
 
-const DAY: Duration = Duration::from_secs(86_400);
+const DAY_NS: i64 = 86_400 * adapters::clock::SECOND_NS;
+/// When the certificate was made, nanoseconds since 1970; the date of a file is that of a clock nobody has judged.
+const MADE: &str = "made";
 /// Apple's limit for certificates of servers, 2019; the others allow as much or more for those that a user trusts himself.
 const LASTS_DAYS: u32 = 825;
 /// Made anew so long before the end.
@@ -80,11 +84,14 @@ impl Certificate {
     /// It cannot be made, written or read.
     pub fn own(directory: &Path, listen: SocketAddr, names: &[String]) -> Result<Self, CertificateError> {
         let (certificate, key) = (directory.join("certificate.pem"), directory.join("key.pem"));
-        if !lasts(&certificate, SystemTime::now()) || !key.is_file() {
-            let (chain, secret) = make(listen, names)?;
+        let made = directory.join(MADE);
+        let now = CertificateTimes::of_box();
+        if !certificate.is_file() || !key.is_file() || now.asks_for_another(made_ns(&made, &certificate)) {
+            let (chain, secret) = make(listen, names, now.now_ns)?;
             let trouble = |error: std::io::Error| CertificateError::Make(format!("{}: {error}", directory.display()));
             files::replace_privately(&key, &secret).map_err(trouble)?;
             files::replace_durably(&certificate, &chain).map_err(trouble)?;
+            files::replace_durably(&made, &now.now_ns.to_string()).map_err(trouble)?;
         }
         Self::read(&certificate, &key)
     }
@@ -94,14 +101,41 @@ impl Certificate {
     }
 }
 
-/// Was the file written so lately that its certificate goes on lasting?
-fn lasts(certificate: &Path, now: SystemTime) -> bool {
-    let written = std::fs::metadata(certificate).and_then(|metadata| metadata.modified());
-    let age = written.ok().map(|written| now.duration_since(written).unwrap_or_default());
-    age.is_some_and(|age| age < DAY * (LASTS_DAYS - RENEWED_DAYS))
+/// What is known of time where a certificate is judged: whoever has trusted it must not be asked again because of a clock that
+/// was wrong for a moment.
+#[derive(Debug, Clone, Copy)]
+struct CertificateTimes {
+    now_ns: TimeNs,
+    /// It is certainly later than this.
+    at_least_ns: TimeNs,
+    unset: bool,
 }
 
-fn make(listen: SocketAddr, names: &[String]) -> Result<(String, String), CertificateError> {
+impl CertificateTimes {
+    fn of_box() -> Self {
+        let clock = clock::of_box();
+        Self { now_ns: clock.now_ns(), at_least_ns: clock.at_least_ns(), unset: clock.trust() == Trust::Unset }
+    }
+
+    /// Does one that was made then certainly end soon, or has it not begun?
+    fn asks_for_another(&self, made_ns: TimeNs) -> bool {
+        let lasts_ns = i64::from(LASTS_DAYS - RENEWED_DAYS).saturating_mul(DAY_NS);
+        let ends_soon = self.at_least_ns.saturating_sub(made_ns) >= lasts_ns;
+        ends_soon || (!self.unset && made_ns.saturating_sub(self.now_ns) > DAY_NS)
+    }
+}
+
+/// When the certificate was made: as noted, or by the date of its file, for one of an older version.
+fn made_ns(noted: &Path, certificate: &Path) -> TimeNs {
+    let noted = std::fs::read_to_string(noted).ok().and_then(|text| text.trim().parse().ok());
+    let of_file = || {
+        let written = std::fs::metadata(certificate).and_then(|metadata| metadata.modified()).ok()?;
+        i64::try_from(written.duration_since(UNIX_EPOCH).ok()?.as_nanos()).ok()
+    };
+    noted.or_else(of_file).unwrap_or(0)
+}
+
+fn make(listen: SocketAddr, names: &[String], now_ns: TimeNs) -> Result<(String, String), CertificateError> {
     let bad = |error: rcgen::Error| CertificateError::Make(error.to_string());
     let mut all = vec!["localhost".to_owned(), "127.0.0.1".to_owned()];
     all.extend(addresses(listen).iter().map(IpAddr::to_string));
@@ -115,16 +149,16 @@ fn make(listen: SocketAddr, names: &[String]) -> Result<(String, String), Certif
     params.distinguished_name.push(DnType::CommonName, "cnc-gateway");
     params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth];
     let at = |(year, month, day)| date_time_ymd(year, month, day);
-    (params.not_before, params.not_after) = (at(day(-1)), at(day(i64::from(LASTS_DAYS) - 1)));
+    (params.not_before, params.not_after) = (at(day(now_ns, -1)), at(day(now_ns, i64::from(LASTS_DAYS) - 1)));
     let key = KeyPair::generate().map_err(bad)?;
     let certificate = params.self_signed(&key).map_err(bad)?;
     Ok((certificate.pem(), key.serialize_pem()))
 }
 
-/// Year, month and day of the day that lies so many days after today.
-fn day(from_today: i64) -> (i32, u8, u8) {
-    let span = jiff::SignedDuration::from_hours(24 * from_today);
-    let date = jiff::Timestamp::now().saturating_add(span).map(|at| at.to_zoned(jiff::tz::TimeZone::UTC).date());
+/// Year, month and day of the day that lies so many days after this time.
+fn day(now_ns: TimeNs, days: i64) -> (i32, u8, u8) {
+    let at = jiff::Timestamp::from_nanosecond(i128::from(now_ns.saturating_add(days.saturating_mul(DAY_NS))));
+    let date = at.map(|at| at.to_zoned(jiff::tz::TimeZone::UTC).date());
     date.map_or((2000, 1, 1), |date| (date.year().into(), date.month().unsigned_abs(), date.day().unsigned_abs()))
 }
 
@@ -167,7 +201,14 @@ mod tests {
         let mode = std::fs::metadata(directory.path().join("key.pem")).expect("there").permissions().mode();
         assert_eq!(mode & 0o777, 0o600);
         let file = directory.path().join("certificate.pem");
-        assert!(lasts(&file, SystemTime::now()) && !lasts(&file, SystemTime::now() + DAY * 800));
+        let made_ns = made_ns(&directory.path().join(MADE), &file);
+        let asks = |now_days: i64, at_least_days: i64, unset: bool| {
+            let at = |days: i64| made_ns + days * DAY_NS;
+            CertificateTimes { now_ns: at(now_days), at_least_ns: at(at_least_days), unset }.asks_for_another(made_ns)
+        };
+        assert!(!asks(0, 0, false) && !asks(4000, 0, false), "a clock in the wrong year renews nothing");
+        assert!(asks(800, 800, false), "it certainly ends soon");
+        assert!(asks(-400, -500, false) && !asks(-400, -500, true), "it was made by a clock that was ahead");
         let other = tempfile::tempdir().expect("a directory");
         Certificate::own(other.path(), listen, &names).expect("made");
         let mixed = Certificate::read(&file, &other.path().join("key.pem"));

@@ -10,6 +10,7 @@ use crate::diagnosis::store::DiagnosisStore;
 use crate::diagnosis::words;
 use crate::diagnosis::worker::{self, Finished, LoadedModel, Worker, WorkerPaths, WorkerReport};
 use crate::history::{self, Alarm, AlarmClear, ExtraSeries, ExtraValue};
+use crate::learned;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -119,7 +120,10 @@ impl Twin {
         let loaded = worker::read(&self.places.model);
         let known = loaded.as_ref().map(|loaded| loaded.toml.clone()).unwrap_or_default();
         match loaded {
-            Ok(loaded) => self.put_in_charge(loaded, recall(&self.memory)),
+            Ok(loaded) => {
+                let remembered = recall(&self.memory, &mut self.told);
+                self.put_in_charge(loaded, remembered);
+            }
             Err(problem) => self.refuse(problem),
         }
         match Worker::start(self.places.clone(), known) {
@@ -202,6 +206,7 @@ impl Twin {
         // What differed before the restart still does; the history has ended its alarms.
         if !std::mem::replace(&mut self.raised, true) {
             self.mismatches().iter().for_each(|mismatch| self.raise(mismatch, health, now_ns));
+            self.tell_onsets();
         }
         let Some(ActiveModel { live, .. }) = &mut self.active else { return };
         let noticed = live.step(sample, pipeline.estimates().state);
@@ -235,7 +240,7 @@ impl Twin {
     }
 
     fn differs(&mut self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
-        let (en, _) = words::mismatch(mismatch, self.quantity(), self.unit());
+        let (en, _) = words::mismatch_since(mismatch, self.quantity(), self.unit());
         health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "twin_mismatch", en));
         self.raise(mismatch, health, now_ns);
         let onset = mismatch.onset.map(|onset| (words::nanoseconds(onset.at_s), words::nanoseconds(onset.low_s)));
@@ -243,11 +248,19 @@ impl Twin {
         let earliest_ns = self.begun_ns.map_or(now_ns, |begun_ns| begun_ns + APART_NS);
         let at_ns = (at_ns + AFTER_NS).max(now_ns).max(earliest_ns);
         self.due.get_or_insert(Due { at_ns, from_ns: low_ns - BEFORE_NS });
+        self.tell_onsets();
         self.save(health);
     }
 
+    /// A diagnosis is held against what the watch has seen, from the same moment on.
+    fn tell_onsets(&self) {
+        let onset = |it: Mismatch| Some((it.regime, words::nanoseconds(it.onset?.at_s)));
+        let onsets = self.mismatches().into_iter().filter_map(onset).collect();
+        self.worker.iter().for_each(|worker| worker.diagnoses().set_onsets(Vec::clone(&onsets)));
+    }
+
     fn raise(&self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
-        let (en, zh) = words::mismatch(mismatch, self.quantity(), self.unit());
+        let (en, zh) = words::mismatch_since(mismatch, self.quantity(), self.unit());
         let (code, source, severity) = (code(mismatch.regime), SOURCE.to_owned(), "warning".to_owned());
         health.keep(Alarm { at_ns: now_ns, code, source, severity, en, zh }.into());
     }
@@ -259,6 +272,7 @@ impl Twin {
         if self.mismatches().is_empty() && !self.diagnosing {
             self.due = None;
         }
+        self.tell_onsets();
         self.save(health);
     }
 
@@ -325,7 +339,7 @@ impl Twin {
         let Some(ActiveModel { live, loaded }) = &self.active else { return };
         let remembered = Remembered { toml: loaded.toml.clone(), memory: live.memory(), due: self.due };
         match serde_json::to_string(&remembered) {
-            Ok(text) => health.put(&self.memory, text),
+            Ok(text) => health.put_learned(&self.memory, text),
             Err(error) => tracing::warn!("what the twin has learned could not be saved: {error}"),
         }
     }
@@ -341,14 +355,11 @@ fn code(regime: Regime) -> String {
 }
 
 /// What was learned before; nothing where that cannot be read.
-fn recall(path: &Path) -> Remembered {
-    let text = std::fs::read_to_string(path).unwrap_or_default();
-    if text.is_empty() {
-        return Remembered::default();
-    }
-    serde_json::from_str(&text).unwrap_or_else(|error| {
+fn recall(path: &Path, told: &mut Vec<Notice>) -> Remembered {
+    let Some(state) = learned::read(path, |notice| told.push(notice)) else { return Remembered::default() };
+    serde_json::from_str(&state).unwrap_or_else(|error| {
         let text = format!("{}: what the twin had learned cannot be read ({error}); it learns anew", path.display());
-        Notice::new(Severity::Warning, "twin_forgot", text).say();
+        told.push(Notice::new(Severity::Warning, "twin_forgot", text));
         Remembered::default()
     })
 }

@@ -49,6 +49,9 @@ impl Twin {
             file: self.places.model.display().to_string(),
             output: active.map(|active| active.loaded.model.output.clone()).unwrap_or_default(),
             unit: self.unit(),
+            second_ms: active.and_then(|active| active.live.compared_at_ns()).map(|ns| ns.div_euclid(1_000_000)),
+            // Of the same second, so that recorded less expected is the residual.
+            twin_recorded: compared.expected.ok().zip(compared.residual.ok()).map(|(expected, rest)| expected + rest),
             twin_expected: compared.expected.ok(),
             twin_residual: compared.residual.ok(),
             missing: reason.map(live::NoTwin::word),

@@ -6,12 +6,12 @@ mod library;
 
 use super::health::Health;
 use crate::config::Config;
-use crate::log::{Notice, Severity};
+use crate::log::Notice;
 use crate::pipeline::Pipeline;
 use crate::status::WearStatus;
 use adapters::clock::TimeNs;
 use library::Library;
-use rules::estimators::wear::{Observability, WearNews, WorkReference};
+use rules::estimators::wear::{Observability, WorkReference};
 
 /// Who writes the events.
 const SOURCE: &str = "wear";
@@ -43,31 +43,6 @@ impl Wear {
             health.event(at_ns, SOURCE, &problem);
         }
     }
-
-    /// Tells what the follower says once; after the tick.
-    pub fn tell(&self, pipeline: &mut Pipeline, at_ns: TimeNs, health: &mut Health) {
-        for news in pipeline.wear_mut().take_news() {
-            health.event(at_ns, SOURCE, &notice(&news));
-        }
-    }
-}
-
-fn notice(news: &WearNews) -> Notice {
-    let (kind, text) = match news {
-        WearNews::NotObservable { edge } => (
-            "wear_not_observable",
-            format!(
-                "the wear of edge {edge} is not known well enough to be acted upon; further parts, a new edge or a wear model for \
-                 these cuts (identify tool-wear) make it known again"
-            ),
-        ),
-        WearNews::Observable { edge } => ("wear_observable", format!("the wear of edge {edge} is known well enough")),
-        WearNews::NewEdge { tool } => (
-            "wear_new_edge",
-            format!("the cutting power of tool {tool} fell as with a new edge: its wear is counted from there"),
-        ),
-    };
-    Notice::new(Severity::Info, kind, text)
 }
 
 /// What the page shows of the edge in use; `None` without a model for its cut. What is known without one stands with the estimates.

@@ -15,7 +15,7 @@ use adapters::clock::TimeNs;
 use adapters::mqtt::Outgoing;
 use serde_json::{Map, Value as Json, json};
 
-/// See the [module](self).
+/// How items look on their topics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layout {
     /// The document of each item.

@@ -83,7 +83,7 @@ pub(super) fn build(
         let namespace = if matches!(form, Form::State(_)) { 0 } else { numbers.machine_tool };
         let variable = VariableBuilder::new(&node, QualifiedName::new(namespace, name), name)
             .component_of(NodeId::new(numbers.own, object));
-        typed(space, numbers, variable, &reading.series, Some(form));
+        insert_typed_variable(space, numbers, variable, &reading.series, Some(form));
         shown.add(&reading.series.name, node, Some(form));
     }
     for (variable, name, channel, form) in layout::PROPERTIES {
@@ -91,7 +91,7 @@ pub(super) fn build(
         let node = NodeId::new(numbers.own, format!("{variable}/{name}"));
         let property = VariableBuilder::new(&node, QualifiedName::new(0, name), name)
             .property_of(NodeId::new(numbers.own, variable));
-        typed(space, numbers, property, &reading.series, Some(form));
+        insert_typed_variable(space, numbers, property, &reading.series, Some(form));
         shown.add(&reading.series.name, node, Some(form));
     }
     values(space, numbers, series, &mut shown);
@@ -111,13 +111,13 @@ fn values(space: &mut AddressSpace, numbers: Numbers, series: &[Reading], shown:
         let variable = VariableBuilder::new(&node, QualifiedName::new(numbers.own, &**name), &**name)
             .description(LocalizedText::new("en", &reading.series.en))
             .component_of(folder.clone());
-        typed(space, numbers, variable, &reading.series, None);
+        insert_typed_variable(space, numbers, variable, &reading.series, None);
         shown.add(name, node, None);
     }
 }
 
 /// Inserts a variable with the type of its value, and unit and range where it has them.
-fn typed(
+fn insert_typed_variable(
     space: &mut AddressSpace,
     numbers: Numbers,
     variable: VariableBuilder,

@@ -148,7 +148,7 @@ fn device(described: Described<'_>, delivered: impl Fn(&str) -> bool) -> String 
     let items = ITEMS.iter().filter(|item| delivered(item.channel)).collect();
     let mut tree = Tree { out: String::new(), prefix, items };
     tree.put(4, &format!("<Device id=\"{prefix}machine\" name=\"{box_id}\" uuid=\"{box_id}\">"));
-    tree.put(6, &format!("<Description>{}</Description>", escaped(machine)));
+    tree.put(6, &format!("<Description>{}</Description>", escape_text(machine)));
     tree.put(6, "<DataItems>");
     let availability = format!("id=\"{prefix}{AVAILABILITY}\" name=\"{AVAILABILITY}\" category=\"EVENT\"");
     tree.put(8, &format!("<DataItem {availability} type=\"AVAILABILITY\"/>"));
@@ -195,6 +195,6 @@ pub fn is_prefix(text: &str) -> bool {
         && text.chars().all(|letter| letter.is_ascii_alphanumeric() || "-_.".contains(letter))
 }
 
-fn escaped(text: &str) -> String {
+fn escape_text(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

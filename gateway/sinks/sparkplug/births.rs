@@ -71,7 +71,7 @@ pub(super) fn machine(latest: &[Reading], known: &mut BTreeSet<i64>, at_ms: u64)
     let provided = |reading: &&Reading| known.contains(&reading.series.id) || !is_unprovided(&reading.value);
     let readings: Vec<&Reading> = latest.iter().filter(provided).collect();
     known.extend(readings.iter().map(|reading| reading.series.id));
-    let of_series = readings.into_iter().map(|reading| described(reading, at_ms));
+    let of_series = readings.into_iter().map(|reading| build_birth_metric(reading, at_ms));
     std::iter::once(of_item).chain(RECORDS.iter().map(of_record)).chain(of_series).collect()
 }
 
@@ -80,9 +80,9 @@ fn is_unprovided(value: &Cell) -> bool {
 }
 
 /// A metric as a birth has it: name, alias, type, what it is, and the value.
-fn described(reading: &Reading, at_ms: u64) -> Metric {
+fn build_birth_metric(reading: &Reading, at_ms: u64) -> Metric {
     let SeriesInfo { name, unit, range, en, zh, estimated, .. } = &*reading.series;
-    let mut metric = valued(reading, at_ms);
+    let mut metric = build_data_metric(reading, at_ms);
     metric.datatype = Some(kind(&reading.series));
     metric.name = Some(name.to_string());
     let mut properties = PropertySet::default();
@@ -127,7 +127,7 @@ fn numeric(series: &SeriesInfo, number: f64) -> MetricValue {
 }
 
 /// A metric as data has it: alias and value. Its type stands in the birth.
-fn valued(reading: &Reading, at_ms: u64) -> Metric {
+fn build_data_metric(reading: &Reading, at_ms: u64) -> Metric {
     let mut metric = Metric { alias: Some(alias(&reading.series)), timestamp: Some(at_ms), ..Metric::default() };
     match &reading.value {
         Cell::Number(number) => metric.value = Some(numeric(&reading.series, *number)),
@@ -157,7 +157,7 @@ pub(super) fn data(item: &Item, historical: bool) -> Vec<Metric> {
     };
     let mut metrics = vec![sequence];
     match &item.content {
-        Content::Sample(readings) => metrics.extend(readings.iter().map(|reading| valued(reading, at_ms))),
+        Content::Sample(readings) => metrics.extend(readings.iter().map(|reading| build_data_metric(reading, at_ms))),
         Content::Record(_) => metrics.extend(record(item, at_ms)),
         // Sparkplug has no word for them; the number of the item tells that nothing is missing.
         Content::Gap(_) | Content::Means { .. } => {}

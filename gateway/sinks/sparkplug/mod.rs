@@ -27,10 +27,10 @@ mod payload;
 
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
+use crate::clock;
 use crate::control::{Reply, RequestedChange};
 use crate::history::{Cell, Outbox};
 use adapters::address::Keys;
-use adapters::clock::{Clock, SystemClock};
 use adapters::mqtt::{Outgoing, Qos, Will};
 use host::PrimaryHost;
 use payload::Payload;
@@ -40,6 +40,9 @@ use std::time::Duration;
 
 /// A birth waits at most this long for the first values.
 const FIRST_VALUES: Duration = Duration::from_secs(3);
+
+/// The number of a connection is durable within this time, or it is used all the same.
+const NOTED_WITHIN: Duration = Duration::from_secs(3);
 
 /// A primary host that is not there within this is waited for with the usual pauses between two connections.
 const HOST_WITHIN: Duration = Duration::from_secs(10);
@@ -108,14 +111,12 @@ pub(super) struct SparkplugSink {
 
 impl SparkplugSink {
     pub(super) fn new(target: SparkplugTarget, (name, requests): (&str, Requests), outbox: &Outbox) -> Self {
-        // A box that starts again quickly must not have the number of its last connection, whose death may still come.
-        let number = u8::try_from(now_ms() / 1000 % 256).unwrap_or(0);
         Self {
             target,
             name: name.to_owned(),
             outbox: outbox.clone(),
             link: Link::default(),
-            number,
+            number: 0,
             next: 0,
             known: BTreeSet::new(),
             rebirth: false,
@@ -245,7 +246,9 @@ impl SparkplugSink {
 
     async fn begin(&mut self) -> Result<(), SinkError> {
         self.first_values().await;
-        self.number = self.number.wrapping_add(1);
+        // Kept over restarts (specification, 6.4.19): the death of a connection before must not match this birth.
+        let number = self.outbox.begin_connection(&self.name, NOTED_WITHIN).await;
+        self.number = u8::try_from(number % 256).unwrap_or(0);
         let payload = births::death(self.number, now_ms()).encode_to_vec();
         let will =
             Will { topic: self.target.topic("NDEATH"), payload, qos: Qos::AtLeastOnce, retain: false, at_leave: true };
@@ -293,7 +296,7 @@ fn series_of(item: &crate::history::Item) -> Vec<i64> {
 }
 
 fn now_ms() -> u64 {
-    births::milliseconds(SystemClock::new().now_ns())
+    births::milliseconds(clock::now_ns())
 }
 
 impl Sink for SparkplugSink {

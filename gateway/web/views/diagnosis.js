@@ -10,6 +10,9 @@ const STAGES = ["waiting", "reading", "comparing", "writing"];
 const LONGEST_H = 8;
 
 export const summaryOf = (found) => own({ en: found.summary, zh: found.summary_zh ?? found.summary });
+/** A model that fits only with other parameters does not agree: the word says so. */
+const moved = (found) => found.verdict === "no_mismatch" && found.beside?.some((one) => one.of_parameters);
+const verdictOf = (found) => t(moved(found) ? "verdict_parameter" : `verdict_${found.verdict}`);
 const report = (found) => `${found.page}?lang=${language()}`;
 const local = (ms) => new Date(ms - new Date(ms).getTimezoneOffset() * 60000).toISOString().slice(0, 16);
 
@@ -87,7 +90,7 @@ export function drawDiagnoses(latest, past, diagnoses, context, done) {
   const newest = diagnoses[0];
   fill(latest, newest ? [told(newest, context, done)] : [make("p", "empty", t("no_diagnosis"))]);
   const link = (d) => ({ text: d.page ? make("a", "", t("open_report"), { href: report(d), target: "_blank", rel: "noopener" }) : "–" });
-  const rows = diagnoses.slice(1).map((d) => [dateTime(d.at_ms), t(`verdict_${d.verdict}`), summaryOf(d), `${dateTime(d.from_ms)} – ${dateTime(d.to_ms)}`, link(d)]);
+  const rows = diagnoses.slice(1).map((d) => [dateTime(d.at_ms), verdictOf(d), summaryOf(d), `${dateTime(d.from_ms)} – ${dateTime(d.to_ms)}`, link(d)]);
   fill(past, rows.length ? [table([t("time"), t("verdict"), t("what"), t("examined"), t("report")], rows, { caption: t("past_diagnoses") })] : [make("p", "empty", t("no_past_diagnosis"))]);
 }
 
@@ -97,12 +100,24 @@ function effectText(found, kind, which, otherwise) {
   return texts ? own(texts) : kind?.startsWith("unknown") ? t("unknown_effect") : otherwise ?? kind;
 }
 
+/** Errors before and after; where no run was left out, those of the fitted rows, and named so. */
+function fitWords({ fit, unit }) {
+  const held = fit.before.held_out_rmse ?? null;
+  const of = (quality) => (held === null ? quality?.rmse : quality?.held_out_rmse) ?? (held === null ? fit.before.rmse : held);
+  return t(held === null ? "fit_words_all" : "fit_words", quantity(of(fit.before), unit), quantity(of(fit.after), unit), quantity(fit.noise_floor, unit));
+}
+
 function told(found, context, done) {
   const d = found.diagnosis ?? {};
-  const parts = [make("p", "summary", summaryOf(found)), make("p", "note", `${t(`verdict_${found.verdict}`)} · ${t("examined")} ${dateTime(found.from_ms)} – ${dateTime(found.to_ms)} · ${dateTime(found.at_ms)}`)];
+  const parts = [make("p", "summary", summaryOf(found)), make("p", "note", `${verdictOf(found)} · ${t("examined")} ${dateTime(found.from_ms)} – ${dateTime(found.to_ms)} · ${dateTime(found.at_ms)}`)];
   for (const doubt of d.unit_doubts ?? []) parts.push(make("p", "warn-text", own(doubt)));
   if (d.simulated) parts.push(make("p", "", t("series_words", quantity(d.simulated.as_given_rmse, d.unit), quantity(d.simulated.refitted_rmse, d.unit), number(d.simulated.gain), quantity(d.simulated.offset, d.unit))));
-  if (d.fit?.before) parts.push(make("p", "", t("fit_words", quantity(d.fit.before.held_out_rmse, d.unit), quantity(d.fit.after?.held_out_rmse ?? d.fit.before.held_out_rmse, d.unit), quantity(d.fit.noise_floor, d.unit))));
+  if (d.fit?.before) parts.push(make("p", "", fitWords(d)));
+  if (found.beside?.length) {
+    const amount = (v) => `${v > 0 ? "+" : ""}${quantity(v, d.unit ?? "")}`;
+    const effects = (one) => one.by_effects.reduce((sum, it) => sum + it.difference, 0);
+    parts.push(make("h3", "", t("beside_watch")), ...found.beside.map((one) => row(t(`regime_${one.regime}`), amount(one.difference), `${own({ en: one.text, zh: one.zh })} · ${t("beside_of", amount(one.by_parameters), amount(effects(one)), amount(one.left))}`, { dot: one.differs ? "bad" : "good" })));
+  }
   for (const it of d.missing ?? []) {
     const numbers = (it.parameters ?? []).map((p) => `${p.name} = ${number(p.value)}${p.low == null ? "" : ` (${number(p.low)} … ${number(p.high)})`} ${p.unit ?? ""}`);
     const name = effectText(found, it.effect, "name");

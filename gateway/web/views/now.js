@@ -1,7 +1,7 @@
 // Now: what a machinist reads in three seconds. Everything is built once; only texts change, so nothing jumps.
 import { ask, card, fill, make, row, say, send } from "/web/parts.js";
 import { clock, duration, number, plainName, quantity as shown, unitName, when } from "/web/format.js";
-import { box, language, t } from "/web/words.js";
+import { box, language, localTimes, t } from "/web/words.js";
 import { TimePlot, drawnFrom } from "/web/plot.js";
 import { StateRibbon } from "/web/ribbon.js";
 
@@ -86,7 +86,7 @@ function troubleLine(problem) {
 
 function alarmLine(alarm, status, context) {
   const line = make("div", `alarm ${alarm.severity}`);
-  const words = language() === "zh" && alarm.zh ? alarm.zh : alarm.text;
+  const words = localTimes(language() === "zh" && alarm.zh ? alarm.zh : alarm.text);
   line.append(make("strong", "", words), make("span", "more", `${t(`severity_${alarm.severity}`)} · ${t("since_clock", alarm.since_ms ? when(alarm.since_ms, status.at_ms) : "–")}`));
   const seen = status.acknowledged?.find((it) => it.code === alarm.code)?.by;
   if (seen) line.append(make("span", "more", t("seen_by", seen)));
@@ -136,9 +136,11 @@ function feedCard(context) {
   const force = make("span", "value", "–", { "data-quantity": "feed_override_pct" });
   const percent = make("span", "unit", "%");
   const armed = make("p", "armed-words", " ");
-  const facts = ["dial", "asked", "let_through", "in_force"];
+  const facts = ["in_force", "dial", "asked", "let_through"];
   const cells = Object.fromEntries(facts.map((key) => [key, make("dd", "", "–")]));
-  const list = make("dl", "facts", facts.map((key) => make("div", "", [make("dt", "", t(`override_${key}`)), cells[key]])));
+  const names = Object.fromEntries(facts.map((key) => [key, make("dt", "", t(`override_${key}`))]));
+  const lines = Object.fromEntries(facts.map((key) => [key, make("div", "", [names[key], cells[key]])]));
+  const list = make("dl", "facts", facts.map((key) => lines[key]));
   const why = make("p", "note why", " ");
   const actions = make("div", "buttons");
   const section = make("section", "card feed ages", [make("h2", "", t("short_feed_override_pct")), make("div", "feed-body", [make("p", "reading", [force, percent]), list]), armed, why, actions]);
@@ -156,13 +158,22 @@ function feedCard(context) {
     say(cells.asked, pct(gate.wanted_pct));
     say(cells.let_through, gate.wanted_pct === null ? "–" : pct(gate.permitted_pct));
     say(cells.in_force, found && !found.missing ? pct(found.value) : "–");
-    const words = gate.mode === "armed" ? t("gate_armed", gate.armed_by, gate.armed_until_ms ? clock(gate.armed_until_ms) : "–")
+    // Where nothing is written, what rules and gate would do is no order: it is named so, and only shown where it differs.
+    const writes = gate.mode === "armed";
+    say(names.asked, t(writes ? "override_asked" : "override_would_ask"));
+    say(names.let_through, t(writes ? "override_let_through" : "override_would_pass"));
+    for (const key of ["asked", "let_through"]) {
+      lines[key].classList.toggle("would", !writes);
+      lines[key].hidden = !writes && gate.wanted_pct === null;
+    }
+    const words = writes ? t("gate_armed", gate.armed_by, gate.armed_until_ms ? clock(gate.armed_until_ms) : "–")
       : t(gate.mode === "off" ? "gate_off" : "gate_shadow");
     say(armed, words);
-    armed.classList.toggle("warn-text", gate.mode === "armed");
-    say(why, gate.reason ? `${t("because")}: ${box(gate.reason)}${gate.held ? ` · ${box(gate.held)}` : ""}` : " ");
-    back.hidden = gate.mode !== "armed";
-    arm.hidden = gate.mode === "armed" || !(context.session?.arming_allowed && context.session?.may?.arm);
+    armed.classList.toggle("warn-text", writes);
+    const reason = gate.reason ? `${t("because")}: ${box(gate.reason)}${gate.held ? ` · ${box(gate.held)}` : ""}` : "";
+    say(why, writes ? reason || " " : [gate.reason ? t("override_nothing_written") : "", reason].filter(Boolean).join(" ") || " ");
+    back.hidden = !writes;
+    arm.hidden = writes || !(context.session?.arming_allowed && context.session?.may?.arm);
   };
   return { box: section, update };
 }

@@ -4,6 +4,7 @@ import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
 import { duration, quantity } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { sourceName } from "/web/now.js";
+import { configurationFileCard } from "/web/configuration.js";
 
 const RECIPE = [["program", "text"], ["blocks", "text"], ["name", "text"], ["depth_of_cut_mm", "number"], ["width_of_cut_mm", "number"], ["diameter_mm", "number"], ["teeth", "number"], ["tool", "text"], ["work_material", "text"]];
 
@@ -13,11 +14,12 @@ export function systemView(context) {
   const recipe = recipeCard(context);
   const configuration = configurationCard();
   const care = careCard(context);
+  const setUp = configurationFileCard(context);
   const known = ask("/api/v1/configuration").then((it) => { configuration.give(it); doctor.give(it); recipe.give(it); }).catch((error) => configuration.fail(error));
   return {
-    parts: [make("div", "columns", [doctor.box, sinks.box, care.box]), recipe.box, configuration.box],
+    parts: [make("div", "columns", [doctor.box, sinks.box, care.box]), recipe.box, setUp.box, configuration.box],
     update(status) { sinks.update(status); },
-    session() { known.then(() => { doctor.may(); recipe.may(); care.may(); }); },
+    session() { known.then(() => { doctor.may(); recipe.may(); care.may(); setUp.may(); }); },
   };
 }
 

@@ -1,6 +1,6 @@
 // Twin: the machine beside its simulation. What is watched, what differs, what the latest diagnosis says, what to try next.
 import { ask, card, fill, make, row, say } from "/web/parts.js";
-import { clock, number, quantity } from "/web/format.js";
+import { clock, number, quantity, when } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { TimePlot, drawnFrom } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
@@ -36,7 +36,8 @@ export function mount(root, context) {
     try {
       const known = (await ask("/api/v1/series")).series.map((s) => s.name);
       const suffix = status.twin.output.split("_").at(-1);
-      const names = [status.twin.output, `twin_expected_${suffix}`, `twin_residual_${suffix}`].filter((n) => known.includes(n));
+      const names = [`twin_expected_${suffix}`, `twin_residual_${suffix}`];
+      if (!names.every((name) => known.includes(name))) return;
       const [from, to] = [status.at_ms / 1000 - state.span, status.at_ms / 1000];
       const utc = (s) => new Date(s * 1000).toISOString();
       const resolution = state.span > 50000 ? 600 : state.span > 10000 ? 60 : 4;
@@ -45,7 +46,10 @@ export function mount(root, context) {
       const unit = status.twin.unit;
       const both = new TimePlot(figure, { height: 230, low: 0, sync: "twin", label: t("twin_figure"), series: [{ label: t("recorded_value"), unit, line: "line-a" }, { label: t("simulated_value"), unit, line: "line-c" }] });
       const rest = new TimePlot(left, { height: 150, sync: "twin", label: t("twin_residual"), series: [{ label: t("twin_residual"), unit, line: "line-d" }] });
-      const [pair, difference] = [columns(found.series, names.slice(0, 2)), columns(found.series, names.slice(2))];
+      // What is compared is the mean of a second: recorded is simulated plus difference, so that the three add up at every point.
+      const [simulated, difference] = [columns(found.series, names.slice(0, 1)), columns(found.series, names.slice(1))];
+      const sum = (a, b) => a.map((v, at) => (v === null || b[at] === null || b[at] === undefined ? null : v + b[at]));
+      const pair = [simulated[0], sum(simulated[1], difference[1]), simulated[2].map(() => null), simulated[3].map(() => null), ...simulated.slice(1)];
       const shown = drawnFrom(pair, from, to);
       both.give(pair); both.show(shown, to);
       rest.give(difference); rest.show(shown, to);
@@ -79,15 +83,16 @@ function drawNow(verdict, facts, regimes, status, context) {
   const tone = differing.length ? "bad" : learning.length || !twin.regimes.length ? "" : "good";
   verdict.dataset.tone = tone;
   say(verdict, t(differing.length ? "twin_differs" : learning.length || !twin.regimes.length ? "twin_learning" : "twin_agrees"));
-  const value = (v) => (v === null ? "–" : quantity(v, twin.unit));
-  const recorded = context.quantity(twin.output);
-  fill(facts, [row(t("recorded_value"), recorded && !recorded.missing ? quantity(recorded.value, recorded.unit) : "–"), row(t("simulated_value"), value(twin.twin_expected)),
-    row(t("twin_residual"), value(twin.twin_residual), twin.missing ? context.reason(twin.missing) : null), row(t("model"), twin.model, twin.file),
+  const value = (v) => (v === null || v === undefined ? "–" : quantity(v, twin.unit));
+  const second = twin.second_ms ? t("of_second", clock(twin.second_ms)) : null;
+  fill(facts, [row(t("recorded_value"), value(twin.twin_recorded)), row(t("simulated_value"), value(twin.twin_expected)),
+    row(t("twin_residual"), value(twin.twin_residual), twin.missing ? context.reason(twin.missing) : second), row(t("model"), twin.model, twin.file),
     twin.problem ? row(t("model_refused"), "", box(twin.problem), { dot: "bad", tone: "bad" }) : null,
     twin.diagnosing_since_ms ? row(t("diagnosing"), t("since_clock", clock(twin.diagnosing_since_ms)), null, { dot: "warn" }) : null]);
   const line = (r) => {
     const share = r.learned ? t("learned_of", r.learned[0], r.learned[1]) : r.stage === "differing" ? `${value(r.difference)}${r.difference_pct == null ? "" : ` (${number(r.difference_pct, "%")} %)`}` : `± ${value(r.usual)}`;
-    return row(t(`regime_${r.regime}`), share, r.text ? own({ en: r.text, zh: r.zh ?? r.text }) : t(`stage_${r.stage}`), { dot: { watching: "good", differing: "bad" }[r.stage] ?? "" });
+    const since = r.since_ms ? t("twin_differs_since", when(r.since_ms[0], status.at_ms), when(r.since_ms[1], status.at_ms), when(r.since_ms[2], status.at_ms)) : t("twin_differs_always");
+    return row(t(`regime_${r.regime}`), share, r.text ? `${own({ en: r.text, zh: r.zh ?? r.text })}, ${since}` : t(`stage_${r.stage}`), { dot: { watching: "good", differing: "bad" }[r.stage] ?? "" });
   };
   fill(regimes, twin.regimes.length ? twin.regimes.map(line) : [make("p", "empty", t("twin_nothing_yet"))]);
 }

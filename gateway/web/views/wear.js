@@ -3,10 +3,12 @@
 import uPlot from "/web/uplot.js";
 import { ask, card, colour, fill, make, row, say, table } from "/web/parts.js";
 import { dateTime, folder, number, quantity } from "/web/format.js";
-import { box, t } from "/web/words.js";
+import { box, own, t } from "/web/words.js";
 
 const PARTS = 400;
 const READ_EVERY_MS = 15000;
+/** Parts above the limit that make an alarm, as the script has it unless somebody has set it otherwise. */
+const LIMIT_PARTS = 3;
 /** The box counts no further. */
 const PARTS_MOST = 9999;
 const parts = (count) => (count >= PARTS_MOST ? t("many") : number(Math.round(count)));
@@ -55,11 +57,14 @@ function drawEdge(lamp, facts, status, context) {
   const tool = context.quantity("tool");
   const name = tool && !tool.missing ? tool.value : "–";
   // The alarm of a script names edges in its text: another one may be worn than the one in use.
+  const standing = (code) => status.alarms.filter((a) => a.code === code || a.code.startsWith(`${code} `));
   const named = (text) => text.split(/[^\w-]+/).includes(name);
-  const about = (code) => status.alarms.some((a) => a.code === `${code} ${name}` || (a.code.startsWith(`${code} (`) && named(a.text)));
-  const [worn, look] = [about("tool_worn"), about("tool_wear")];
-  lamp.dataset.tone = worn ? "bad" : look ? "warn" : wear?.flank_wear_mm != null ? "good" : "";
-  say(lamp, `${name}: ${t(worn ? "lamp_worn" : look ? "lamp_look" : wear?.flank_wear_mm != null ? "lamp_good" : "lamp_unknown")}`);
+  const [worn, look] = [standing("tool_worn"), standing("tool_wear")];
+  const own_ = worn.some((a) => named(a.text));
+  // A lamp that is grey beside a standing alarm is read as a fault: it is red for whichever edge is meant, and says which.
+  lamp.dataset.tone = worn.length ? "bad" : look.length ? "warn" : wear?.flank_wear_mm != null ? "good" : "";
+  const word = t(own_ ? "lamp_worn" : look.some((a) => named(a.text)) ? "lamp_look" : wear?.flank_wear_mm != null ? "lamp_good" : "lamp_unknown");
+  say(lamp, worn.length && !own_ ? `${t("other_edges")}: ${own({ en: worn[0].text, zh: worn[0].zh || worn[0].text })}` : `${name}: ${word}`);
   const left = wear?.parts_left ?? null;
   const rows = wear ? [
     row(t("flank_wear"), wear.flank_wear_mm === null ? "–" : `${number(wear.flank_wear_mm, "mm")} ± ${quantity(wear.flank_wear_uncertainty_mm, "mm")}`, wear.why ? box(wear.why) : t("criterion", quantity(wear.criterion_mm, "mm"))),
@@ -68,6 +73,15 @@ function drawEdge(lamp, facts, status, context) {
   const cutting = context.quantity("cutting_power_w");
   rows.unshift(row(t("short_cutting_power_w"), cutting && !cutting.missing ? quantity(cutting.value, "W") : context.reason(cutting?.missing ?? "not_provided"), t("wear_judged")));
   rows.push(row(t("remaining_parts"), left === null ? "–" : parts(left[0]), left === null ? t("remaining_unknown") : t("remaining_words", parts(left[1]), parts(left[2]))));
+  const found = (key) => { const it = context.quantity(key); return it && !it.missing ? it : null; };
+  const [probability, limit, life, material] = ["tool_worn_probability", "tool_limit_parts", "tool_life_share", "material_level_pct"].map(found);
+  const why = (key) => context.reason(context.quantity(key)?.missing ?? "no_part_yet");
+  const pct = (share) => `${number(100 * share)} %`;
+  rows.push(make("h3", "", t("witnesses")),
+    row(t("witness_filter"), probability ? pct(probability.value) : "–", probability ? null : why("tool_worn_probability"), { dot: !probability ? "" : probability.value >= 0.5 ? "bad" : "good" }),
+    row(t("witness_limit"), limit ? number(limit.value) : "–", limit ? t("witness_limit_words", LIMIT_PARTS) : why("tool_limit_parts"), { dot: !limit ? "" : limit.value >= LIMIT_PARTS ? "bad" : limit.value > 0 ? "warn" : "good" }),
+    row(t("witness_time"), life ? pct(life.value) : "–", life ? t("witness_time_words") : why("tool_life_share"), { dot: !life ? "" : life.value >= 1 ? "warn" : "good" }),
+    row(t("material_level"), material ? `${material.value > 0 ? "+" : ""}${number(material.value)} ± ${number(material.uncertainty)} %` : "–", t("material_words")));
   fill(facts, rows);
 }
 

@@ -9,7 +9,9 @@ use super::detector::{Detected, Detector};
 use super::estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
 use super::inputs::{InputChannels, TickInputs};
 use super::learning::{IdleTick, Learner};
+use super::loads::{LoadEstimator, Loads};
 use super::no_load::{NoLoad, NoLoadPoint, NoLoadTable};
+use super::part::PartFigures;
 use super::settings::Settings;
 use super::signals::{Feed, Pace, Signals};
 use super::situation::{Tick, visible_excess_w};
@@ -55,6 +57,9 @@ struct InferenceState {
     /// How no-load power goes with the supply voltage.
     #[serde(default)]
     supply: Supply,
+    /// The load of each place, learned from the first parts.
+    #[serde(default)]
+    loads: LoadEstimator,
 }
 
 impl InferenceState {
@@ -62,6 +67,7 @@ impl InferenceState {
         Self {
             basis: String::new(),
             supply: Supply::default(),
+            loads: LoadEstimator::default(),
             signals: Signals::new(settings),
             no_load: NoLoadTable::new(settings),
             learner: Learner::new(settings),
@@ -108,6 +114,7 @@ impl Inference {
         }
         self.follow(&inputs, filtered_w, no_load, &verdict);
         self.estimates = self.estimate(&inputs, filtered_w, no_load, &verdict);
+        self.memory.loads.step(sample, &mut self.estimates, &self.settings);
         &self.estimates
     }
 
@@ -278,10 +285,15 @@ impl Inference {
             tool_growth_pct: Err(NoEstimate::NoPartYet),
             tool_worn_probability: Err(NoEstimate::NoPartYet),
             tool_parts_left: Err(NoEstimate::NoPartYet),
+            material_level_pct: Err(NoEstimate::NoPartYet),
+            tool_limit_parts: Err(NoEstimate::NoModel),
+            tool_life_share: Err(NoEstimate::NoPartYet),
             no_load_origin: reference.map_or(NoLoadOrigin::None, |known| known.origin),
             noise_gain: reference.map_or(0.0, |known| known.noise_gain),
             visibility: self.visibility(inputs, no_load, verdict),
             gear_stage: u8::try_from(self.memory.signals.stage()).unwrap_or(0),
+            loads: Loads::none(NoEstimate::NotYet),
+            part: PartFigures::none(),
         };
         if inputs.basis.in_watts() { estimates } else { self.without_watts(estimates) }
     }

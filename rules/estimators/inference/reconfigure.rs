@@ -22,6 +22,12 @@ impl Inference {
             self.memory.no_load = NoLoadTable::new(&settings);
         }
         self.settings = settings;
+        self.memory.loads.reconfigure();
+    }
+
+    /// Everything that was learned of the load of this program is learned anew.
+    pub fn learn_load_anew(&mut self, program: &str) {
+        self.memory.loads.learn_anew(program);
     }
 
     /// Forgets the learned no-load powers, as after work on the spindle; those of the settings stay.

@@ -16,6 +16,12 @@ const OWN_VISITS: usize = 5;
 /// A visit in which the power drifts by more than this share is one of a spindle that warms up.
 const WARM_UP: f64 = 0.02;
 
+/// Visits of one speed that fall into two levels this far apart, as a share of their mean, are not of one condition. Friction
+/// differs by 10 to 30 % between a cold and a warm spindle, step by step; two gear stages differ more and in one jump.
+const TWO_LEVELS_SHARE: f64 = 0.1;
+/// ... and the jump is so many times what either level scatters.
+const TWO_LEVELS_SCATTER: f64 = 3.0;
+
 /// No-load power at one speed of one gear stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpeedLearned {
@@ -67,11 +73,13 @@ pub fn identify_no_load(recording: &Recording) -> Result<NoLoadLearned, Refusal>
     }
     let mut speeds: Vec<SpeedLearned> = Vec::new();
     let (groups, left_out) = without_warm_up(grouped(&stretches));
+    let (groups, refused) = of_one_level(groups)?;
     let between = Between::of(&groups);
     for visits in &groups {
         speeds.push(pooled(visits, between.as_ref())?);
     }
     let mut notes = notes(&speeds, &groups);
+    notes.extend(refused.iter().map(|refusal| format!("left out: {refusal}")));
     if left_out > 0 {
         notes.push(format!("{left_out} visits in which the power drifted by more than 2 % are left out: warming up"));
     }
@@ -109,6 +117,44 @@ fn without_warm_up(mut groups: Vec<Vec<&Stretch>>) -> (Vec<Vec<&Stretch>>, usize
         }
     }
     (groups, left_out)
+}
+
+/// Where the visits of a speed fall into two levels: the greatest power of the lower and the least of the upper one, W.
+fn two_levels(visits: &[&Stretch]) -> Option<(f64, f64)> {
+    let mut levels: Vec<f64> = visits.iter().map(|visit| visit.level.mean).collect();
+    levels.sort_by(f64::total_cmp);
+    let jump = |at: &usize| levels[*at] - levels[*at - 1];
+    let at = (1..levels.len()).max_by(|a, b| jump(a).total_cmp(&jump(b)))?;
+    let (lower, upper) = levels.split_at(at);
+    // One visit of its own is a cold start or a disturbance, no level.
+    if lower.len() < 2 || upper.len() < 2 {
+        return None;
+    }
+    let range = (lower[at - 1] - lower[0]).max(upper[upper.len() - 1] - upper[0]);
+    let apart = jump(&at) > (TWO_LEVELS_SHARE * mean(visits).abs()).max(TWO_LEVELS_SCATTER * range);
+    apart.then(|| (lower[at - 1], upper[0]))
+}
+
+/// The speeds whose visits are of one level, and why the others are left out: a mean between two levels holds for neither.
+///
+/// # Errors
+/// A [`Refusal`] where no speed is of one level.
+fn of_one_level(groups: Vec<Vec<&Stretch>>) -> Result<(Vec<Vec<&Stretch>>, Vec<Refusal>), Refusal> {
+    let (mut kept, mut refused) = (Vec::new(), Vec::new());
+    for visits in groups {
+        let Some((lower_w, upper_w)) = two_levels(&visits) else {
+            kept.push(visits);
+            continue;
+        };
+        let what = format!("two levels at one speed, {lower_w:.0} W and {upper_w:.0} W");
+        let next = "two gear stages or two directions lie in one column: record gear_stage, or identify each by itself";
+        let place = format!("gear stage {}, {:.0} rpm", visits[0].stage, visits[0].speed_rpm);
+        refused.push(Refusal::new(RefusalKind::Ambiguous, what, next).at(place));
+    }
+    match refused.first() {
+        Some(first) if kept.is_empty() => Err(first.clone()),
+        _ => Ok((kept, refused)),
+    }
 }
 
 /// How much no-load power differs from visit to visit, over all speeds that were visited again. Warmth acts in proportion

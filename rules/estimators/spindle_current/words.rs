@@ -12,18 +12,18 @@ const CURVES: &str = "const CURVES = ";
 
 impl FeedCurves {
     /// The shipped script of constant load with these curves in it, and with the quantity, unit, speed, tool and material that
-    /// they hold for; it asks only, the gate decides. One speed: that with the most curves. The target is the mean of the
-    /// recording.
+    /// they hold for; it asks only, the gate decides. One speed: that with the most curves. `target`: what it holds, in the
+    /// unit of the feature; without one the mean of the recording.
     ///
     /// `None` where no speed has a usable family.
     #[must_use]
-    pub fn script(&self) -> Option<String> {
+    pub fn script(&self, target: Option<f64>) -> Option<String> {
         let usable = self.speeds_rpm().into_iter().filter_map(|speed| Some((speed, self.family(speed).ok()?)));
         let (speed_rpm, family) = usable.max_by_key(|(_, family)| family.curves().len())?;
         let begin = LAW.find(CURVES)?;
         let end = begin + LAW[begin..].find(";\n")?;
         let text = format!("{}{CURVES}{}{}", &LAW[..begin], self.map(speed_rpm, &family), &LAW[end..]);
-        Some(self.with_target(&text))
+        Some(self.with_target(&text, target))
     }
 
     /// The curves of a speed as the map that the script holds.
@@ -46,14 +46,36 @@ impl FeedCurves {
             self.feature,
             unit(&self.feature),
             self.feed,
-            float(speed_rpm),
+            // A mean of measured speeds; a tenth of a turn is finer than any of them.
+            float((10.0 * speed_rpm).round() / 10.0),
         )
     }
 
-    /// The mean of the recording as the default of the target in the unit of the curves.
-    fn with_target(&self, text: &str) -> String {
+    /// What the script holds where nobody says: the mean of the recorded cuts, in the unit of the feature.
+    #[must_use]
+    pub fn mean_level(&self) -> f64 {
         let levels = self.plateaus.iter().map(|plateau| plateau.level.mean);
-        let wanted = levels.clone().sum::<f64>() / crate::statistics::count(levels.count().max(1));
+        levels.clone().sum::<f64>() / crate::statistics::count(levels.count().max(1))
+    }
+
+    /// What the script holds, and who chose it.
+    #[must_use]
+    pub fn target_text(&self, target: Option<f64>) -> String {
+        let unit = unit(&self.feature);
+        match target {
+            Some(target) => format!("target of the script: {target} {unit}, as given\n"),
+            None => format!(
+                "target of the script: {:.1} {unit}, the mean of these cuts; what this machine and this tool should hold is \
+                 for a person to say: --target {:.1}\n",
+                self.mean_level(),
+                self.mean_level()
+            ),
+        }
+    }
+
+    /// A target as the default of the setting in the unit of the curves.
+    fn with_target(&self, text: &str, target: Option<f64>) -> String {
+        let wanted = target.unwrap_or_else(|| self.mean_level());
         let (setting, default) = match unit(&self.feature) {
             "W" => ("target_w", "0.0"),
             "A" => ("target_a", "0.0"),

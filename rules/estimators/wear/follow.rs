@@ -30,17 +30,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WearFollower {
-    joint: Gaussian,
-    hardness: usize,
+    pub(super) joint: Gaussian,
+    pub(super) hardness: usize,
     level: usize,
-    edges: Vec<CuttingEdge>,
+    pub(super) edges: Vec<CuttingEdge>,
     groups: Vec<OperationGroup>,
     program: String,
     work_material: String,
     last_s: f64,
     parts: u64,
     /// The controller names edges: a new one is announced.
-    edges_named: bool,
+    pub(super) edges_named: bool,
 }
 
 impl Default for WearFollower {
@@ -86,8 +86,8 @@ impl WearFollower {
         let measured: Vec<EdgeMeasurement> =
             works.iter().filter(|work| leads(work, &works)).filter_map(|work| self.measured(work)).collect();
         self.between(&measured, &mut news);
-        for one in &measured {
-            self.take(one);
+        for at in &wearing {
+            self.hold_against_limit(*at, &works, &mut news);
         }
         for at in wearing {
             self.tell(at, &mut news);
@@ -169,12 +169,15 @@ impl WearFollower {
             blind: false,
             odd: 0,
             rates: Vec::new(),
+            limit_parts: None,
+            material_parts: 0,
+            lives_m: Vec::new(),
         });
         Some(self.edges.len() - 1)
     }
 
     /// The edge at this place is a new one; the rate of the one before counts for it.
-    fn renew(&mut self, at: usize) {
+    pub(super) fn renew(&mut self, at: usize) {
         let edge = &mut self.edges[at];
         let grown = self.joint.mean(edge.wear) - NEW_MM.0;
         if edge.parts >= PARTS_OF_A_LIFE && edge.slide_m > 0.0 && grown > 0.0 {
@@ -182,7 +185,13 @@ impl WearFollower {
             let surplus = edge.rates.len().saturating_sub(RATES_MAX);
             edge.rates.drain(..surplus);
         }
+        if edge.parts >= PARTS_OF_A_LIFE && edge.slide_m > 0.0 {
+            edge.lives_m.push(edge.slide_m);
+            let surplus = edge.lives_m.len().saturating_sub(RATES_MAX);
+            edge.lives_m.drain(..surplus);
+        }
         (edge.number, edge.slide_m, edge.parts, edge.blind) = (edge.number + 1, 0.0, 0, false);
+        (edge.limit_parts, edge.material_parts) = (None, 0);
         let (mean, sd) = pooled(&edge.rates);
         self.joint.reset(edge.wear, NEW_MM.0, NEW_MM.1.powi(2));
         self.joint.reset(edge.rate, mean, sd * sd);
@@ -248,51 +257,8 @@ impl WearFollower {
         (oldest, true)
     }
 
-    /// What happened between the parts: the likeliest of nothing, another hardness, and a new edge of one tool.
-    fn between(&mut self, measured: &[EdgeMeasurement], news: &mut Vec<WearNews>) {
-        let nothing = self.likelihood(measured);
-        let mut harder = self.clone();
-        harder.joint.reset(harder.hardness, 0.0, HARDNESS_SD.powi(2));
-        let mut best = (nothing + OTHER_HARDNESS, None);
-        let found = harder.likelihood(measured);
-        if found > best.0 {
-            best = (found, Some((harder, None)));
-        }
-        let mut tools: Vec<usize> = measured.iter().map(|one| one.edge).collect();
-        tools.dedup();
-        for at in tools.into_iter().filter(|_| !self.edges_named) {
-            let mut renewed = self.clone();
-            renewed.renew(at);
-            renewed.edges[at].parts = 1;
-            let likely = renewed.likelihood(measured) - UNANNOUNCED_EDGE + OTHER_HARDNESS;
-            if likely > best.0 {
-                let tool = self.edges[at].tool.clone();
-                best = (likely, Some((renewed, Some(tool))));
-            }
-        }
-        if let Some((other, tool)) = best.1 {
-            *self = other;
-            news.extend(tool.map(|tool| WearNews::NewEdge { tool }));
-        }
-    }
-
-    /// Logarithm of how likely the measurements are, one after the other; nothing that leaves one of them odd explains them.
-    fn likelihood(&self, measured: &[EdgeMeasurement]) -> f64 {
-        let mut trial = self.clone();
-        let mut sum = 0.0;
-        for one in measured {
-            let (gradient, above) = trial.expected(one);
-            if trial.is_odd(&gradient, above, one) {
-                return f64::NEG_INFINITY;
-            }
-            sum += trial.joint.log_likelihood(&gradient, above, one.variance);
-            trial.joint.observe(&gradient, above, one.variance);
-        }
-        sum
-    }
-
     /// The slope over the states, and how far the measurement lies above the estimate. The mean of a part is that of its middle.
-    fn expected(&self, one: &EdgeMeasurement) -> (Vec<(usize, f64)>, f64) {
+    pub(super) fn expected(&self, one: &EdgeMeasurement) -> (Vec<(usize, f64)>, f64) {
         let edge = &self.edges[one.edge];
         let wear = (self.joint.mean(edge.wear) - one.half_m * self.joint.mean(edge.rate)).max(0.0);
         let slope = one.rise / (1.0 + one.rise * wear);
@@ -306,11 +272,11 @@ impl WearFollower {
         (gradient, one.excess - expected)
     }
 
-    fn is_odd(&self, gradient: &[(usize, f64)], above: f64, one: &EdgeMeasurement) -> bool {
+    pub(super) fn is_odd(&self, gradient: &[(usize, f64)], above: f64, one: &EdgeMeasurement) -> bool {
         above.abs() > OUTLIER_SD * self.joint.variance_of(gradient, one.variance).sqrt()
     }
 
-    fn take(&mut self, one: &EdgeMeasurement) {
+    pub(super) fn take(&mut self, one: &EdgeMeasurement) {
         let (gradient, above) = self.expected(one);
         let odd = self.is_odd(&gradient, above, one);
         let edge = &mut self.edges[one.edge];
@@ -368,6 +334,21 @@ impl WearFollower {
         Some((self.edges[at].reference, self.outlook_at(at)?))
     }
 
+    /// What the other two witnesses say of the edge of this name: parts in a row above its limit, and the share of the life of the
+    /// edges before it.
+    #[must_use]
+    pub fn witnesses(&self, edge: &str) -> (Option<u32>, Option<f64>) {
+        let found = self.edges.iter().find(|known| known.name == edge);
+        (found.and_then(|edge| edge.limit_parts), found.and_then(CuttingEdge::life_share))
+    }
+
+    /// By how much the material takes more than usual, as a share, with its standard deviation; `None` before the first part.
+    #[must_use]
+    pub fn material_level(&self) -> Option<(f64, f64)> {
+        let sd = self.joint.covariance(self.hardness, self.hardness).max(0.0).sqrt();
+        (self.parts > 0).then(|| (self.joint.mean(self.hardness).exp_m1(), sd))
+    }
+
     /// The number of the edge of this tool that is in use, from 1.
     #[must_use]
     pub fn edge_number(&self, tool: &str) -> Option<u32> {
@@ -377,7 +358,7 @@ impl WearFollower {
 
 /// Is this what most of its operation is compared with? The rest of the operation are entries, exits and corners that the model does
 /// not cover; their mixture differs from part to part.
-fn leads(work: &EdgeWork, works: &[&EdgeWork]) -> bool {
+pub(super) fn leads(work: &EdgeWork, works: &[&EdgeWork]) -> bool {
     works
         .iter()
         .filter(|other| other.key.is_of_the_same_operation(&work.key))

@@ -21,6 +21,22 @@ pub enum WearNews {
         /// The tool.
         tool: String,
     },
+    /// All tools take more or less than before: another lot of material. What was taken for it might have been wear.
+    OtherMaterial {
+        /// By how much the material takes more than before, as a share.
+        change: f64,
+        /// Edges in use with their wear before and after, mm.
+        edges: Vec<(String, f64, f64)>,
+    },
+    /// An edge has taken more than its limit in several parts, and is believed to have far less wear than the criterion.
+    LimitByMaterial {
+        /// The edge.
+        edge: String,
+        /// Its wear as believed, mm.
+        wear_mm: f64,
+        /// By how much the material takes more than usual, as a share.
+        material: f64,
+    },
 }
 
 /// The edge of a tool that is in use. `wear` and `rate` are numbers of states.
@@ -42,6 +58,29 @@ pub(super) struct CuttingEdge {
     /// Measurements in a row that no wear of before explains.
     pub(super) odd: u32,
     pub(super) rates: Vec<f64>,
+    /// Parts in a row in which it took more than its limit in every operation that has one, with enough wear for it; `None`: no operation
+    /// has one.
+    #[serde(default)]
+    pub(super) limit_parts: Option<u32>,
+    /// Parts in a row in which it took more although it is believed to have far less wear.
+    #[serde(default)]
+    pub(super) material_parts: u32,
+    /// What slid along the edges of this tool until they were changed, m, the newest last.
+    #[serde(default)]
+    pub(super) lives_m: Vec<f64>,
+}
+
+impl CuttingEdge {
+    /// What has slid along it over what slid along the edges before it until they were changed; `None` without two of them.
+    pub(super) fn life_share(&self) -> Option<f64> {
+        if self.lives_m.len() < 2 {
+            return None;
+        }
+        let mut lives = self.lives_m.clone();
+        lives.sort_by(f64::total_cmp);
+        let middle = lives[lives.len() / 2].min(0.5 * (lives[(lives.len() - 1) / 2] + lives[lives.len() / 2]));
+        (middle > 0.0).then(|| self.slide_m / middle)
+    }
 }
 
 /// An operation of a tool in a program; `at` is the number of its constant.

@@ -79,6 +79,21 @@ impl Gaussian {
         self.grow(at, at, factor - 1.0);
     }
 
+    /// Becomes the mixture of itself and another one of the same states, which has this weight: its mean and covariance.
+    pub(super) fn mix(&mut self, other: &Self, weight: f64) {
+        if other.mean.len() != self.mean.len() || !(0.0..=1.0).contains(&weight) {
+            return;
+        }
+        let apart: Vec<f64> = other.mean.iter().zip(&self.mean).map(|(theirs, own)| theirs - own).collect();
+        for (at, row) in self.covariance.iter_mut().enumerate() {
+            for (to, cell) in row.iter_mut().enumerate() {
+                let theirs = other.covariance(at, to);
+                *cell += weight * (theirs - *cell) + weight * (1.0 - weight) * apart[at] * apart[to];
+            }
+        }
+        self.mean.iter_mut().zip(&apart).for_each(|(mean, apart)| *mean += weight * apart);
+    }
+
     /// No less than this: a wear or a rate is not negative.
     pub(super) fn at_least(&mut self, at: usize, least: f64) {
         if let Some(mean) = self.mean.get_mut(at) {
@@ -129,6 +144,15 @@ mod tests {
         assert!((joint.mean(a) - 1.0).abs() < 1e-12 && (joint.covariance(a, b) + 0.5).abs() < 1e-12, "{joint:?}");
         joint.observe(&[(a, 1.0)], -1.0, 1e-9);
         assert!((joint.mean(b) - 2.0).abs() < 1e-6, "what one has less the other has more: {joint:?}");
+    }
+
+    #[test]
+    fn a_mixture_has_the_mean_and_the_spread_of_both() {
+        let (mut one, mut other) = (Gaussian::default(), Gaussian::default());
+        one.add(0.0, 1.0);
+        other.add(4.0, 3.0);
+        one.mix(&other, 0.25);
+        assert!((one.mean(0) - 1.0).abs() < 1e-12 && (one.covariance(0, 0) - (1.5 + 3.0)).abs() < 1e-12, "{one:?}");
     }
 
     #[test]

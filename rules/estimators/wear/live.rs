@@ -271,6 +271,11 @@ impl WearEstimator {
         };
         (estimates.tool_wear_mm, estimates.tool_growth_pct) = (wear, growth);
         (estimates.tool_worn_probability, estimates.tool_parts_left) = (probability, parts);
+        let (limit_parts, life_share) = self.memory.follower.witnesses(&self.texts[0]);
+        estimates.tool_limit_parts = limit_parts.map(f64::from).ok_or(NoEstimate::NoModel);
+        estimates.tool_life_share = life_share.ok_or(NoEstimate::NoPartYet);
+        let material = self.memory.follower.material_level().ok_or(NoEstimate::NoPartYet);
+        estimates.material_level_pct = material.map(|(share, sd)| Estimate { value: 100.0 * share, sd: 100.0 * sd });
     }
 
     fn limit_of(&mut self, moment: Option<&CutMoment>, at_ns: TimeNs) -> Estimated {

@@ -21,6 +21,7 @@
 //! | `choose` | the model of a library for a cut |
 //! | `work` | what an edge did in one part, against what a sharp one takes |
 //! | `gaussian`, `followed`, `follow` | the wear of every edge, followed by a Kalman filter |
+//! | `hypotheses` | what may have happened between two parts: another material, a new edge; the limit beside the filter |
 //! | `prior` | what the filter believes beforehand |
 //! | `outlook` | probability of passing the criterion, parts left |
 //! | `live` | all of it beside the running machine |
@@ -36,6 +37,7 @@ mod follow;
 mod followed;
 mod gather;
 mod gaussian;
+mod hypotheses;
 mod identify;
 mod live;
 mod model;

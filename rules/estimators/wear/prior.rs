@@ -53,6 +53,18 @@ pub(super) const UNANNOUNCED_EDGE: f64 = 7.0;
 /// In 50 shifts of the lathe with a learned model, of seeds that took no part in choosing it, 15 of 146 alarms were false without it
 /// and 1 of 130 with it.
 pub(super) const OTHER_CONSTANT: f64 = 2.3;
+/// A change of the material by less than this is not told, as a share.
+pub(super) const MATERIAL_TOLD: f64 = 0.015;
+/// An edge is changed by somebody when it has this share of its criterion: below, a fall of the power is no new edge. Higher: edges that
+/// were changed early are missed; lower: softer lots pass for new edges.
+pub(super) const CHANGED_SHARE: f64 = 0.4;
+/// Power above the limit counts against an edge that the filter believes to have this share of its criterion. A lot of +-6 % is worth
+/// 0.09 mm of 0.30 mm: by so much the filter may be wrong, and a new edge in hard material passes the limit too. Higher: wear that was
+/// taken for a softer lot is told late; lower: with 0, 25 of 55 alarms of twelve shifts of a lathe with a learned model came below
+/// 0.15 mm, all of them by the limit.
+pub(super) const MAY_BE_WORN_SHARE: f64 = 2.0 / 3.0;
+/// After so many parts above the limit, with too little wear for it, that is told.
+pub(super) const LIMIT_PARTS_TOLD: u32 = 2;
 /// A measurement so many standard deviations off is none.
 pub(super) const OUTLIER_SD: f64 = 5.0;
 /// So many in a row are an edge that has suddenly changed.

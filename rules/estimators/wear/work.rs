@@ -214,6 +214,12 @@ impl EdgeWork {
         (ratio > 0.0 && ratio.is_finite()).then(|| ratio.ln())
     }
 
+    /// Energy over that of an edge at its criterion; only where a learned model says what that is.
+    pub(super) fn of_limit(&self) -> Option<f64> {
+        let limit_j = self.expected_j.0 + self.criterion_mm * self.expected_j.1;
+        (self.key.reference == WorkReference::Model && limit_j > 0.0).then(|| self.energy_j.0 / limit_j)
+    }
+
     /// Rise of the power by a millimetre of wear, over that of a sharp edge.
     pub(super) fn rise_per_mm(&self) -> f64 {
         self.expected_j.1 / self.expected_j.0

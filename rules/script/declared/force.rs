@@ -1,6 +1,7 @@
 //! The values in force for one script: which stand in its text, and which are looked up by tool and operation.
 
 use super::{DeclarationPlace, Declared, FoundDeclaration, SettingValue, SettingValues};
+use crate::estimators::wear::tool_of;
 use adapters::{ChannelId, Sample};
 use rhai::Dynamic;
 use std::collections::BTreeMap;
@@ -95,11 +96,26 @@ impl LiveValues {
         self.special.is_empty()
     }
 
-    /// The values for this tool and this operation; the operation goes before the tool.
+    /// Every tool and operation with values of its own.
+    pub(in crate::script) fn places(&self) -> impl Iterator<Item = &DeclarationPlace> {
+        self.special.keys()
+    }
+
+    /// The values for one place.
+    pub(in crate::script) fn of(&self, place: &DeclarationPlace) -> Arc<[Dynamic]> {
+        match place {
+            DeclarationPlace::Machine => self.values(None, None),
+            DeclarationPlace::Tool(tool) => self.values(Some(tool), None),
+            DeclarationPlace::Operation(operation) => self.values(None, Some(operation)),
+        }
+    }
+
+    /// The values for this tool, or the tool of this edge, and this operation; the operation goes before the tool.
     fn values(&self, tool: Option<&str>, operation: Option<&str>) -> Arc<[Dynamic]> {
         let mut values = self.machine.clone();
         let places = [
-            tool.map(|tool| DeclarationPlace::Tool(tool.to_owned())),
+            tool.map(|edge| DeclarationPlace::Tool(tool_of(edge).to_owned())),
+            tool.map(|edge| DeclarationPlace::Tool(edge.to_owned())),
             operation.map(|it| DeclarationPlace::Operation(it.to_owned())),
         ];
         for (index, value) in places.iter().flatten().filter_map(|place| self.special.get(place)).flatten() {

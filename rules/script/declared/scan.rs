@@ -71,7 +71,7 @@ fn closing(text: &str, open: usize) -> Option<usize> {
 }
 
 /// The end of the text or comment that begins here; `at` itself where none does.
-fn skipped(text: &str, at: usize) -> usize {
+pub(in crate::script) fn skipped(text: &str, at: usize) -> usize {
     let rest = &text[at..];
     let to = |found: Option<usize>, more: usize| found.map_or(text.len(), |found| at + found + more);
     if rest.starts_with("//") {

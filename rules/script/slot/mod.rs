@@ -2,6 +2,7 @@
 
 mod alarms;
 mod failure;
+mod follows;
 
 use super::collect::{RunOutput, ScriptResult};
 use super::compiled::Script;
@@ -21,6 +22,7 @@ use super::vocabulary::View;
 use crate::estimators::Estimates;
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
+use follows::Follows;
 use rhai::{Engine, EvalAltResult, ImmutableString, Scope};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -62,6 +64,7 @@ pub(super) struct Slot {
     now: Now,
     condition: ScriptCondition,
     request: Option<OverrideRequest>,
+    follows: Follows,
     reason: (ImmutableString, Arc<str>),
     stops: Vec<StopRequest>,
     offsets: Vec<OffsetProposal>,
@@ -107,6 +110,7 @@ impl Slot {
             now: Now::default(),
             condition: ScriptCondition::Running,
             request: None,
+            follows: Follows::default(),
             reason: (ImmutableString::new(), Arc::from("")),
             stops: Vec::new(),
             offsets: Vec::new(),
@@ -136,8 +140,8 @@ impl Slot {
         &self.script
     }
 
-    pub(super) fn request(&self) -> Option<&OverrideRequest> {
-        self.request.as_ref()
+    pub(super) fn requests(&self) -> impl Iterator<Item = &OverrideRequest> {
+        self.request.iter().chain(self.follows.request())
     }
 
     pub(super) fn stops(&self) -> &[StopRequest] {
@@ -172,6 +176,7 @@ impl Slot {
     /// Nothing is asked for any more.
     pub(super) fn withdraw(&mut self) {
         self.request = None;
+        self.follows.end();
         self.stops.clear();
         self.offsets.clear();
     }
@@ -181,8 +186,8 @@ impl Slot {
         name != SCRIPT_STOPPED || !matches!(self.condition, ScriptCondition::Running | ScriptCondition::Waiting(_))
     }
 
-    /// Runs the handlers of what has happened, and the script when it is due. True when an older version has come into
-    /// charge.
+    /// Runs the handlers of what has happened, and the script when it is due; asks for what it follows. True when an older version
+    /// has come into charge.
     pub(super) fn tick(
         &mut self,
         engine: &Engine,
@@ -190,6 +195,12 @@ impl Slot {
         moment: &Moment<'_>,
         outputs: &mut Outputs<'_>,
     ) -> bool {
+        let replaced = self.run_due(engine, shared, moment, outputs);
+        self.follows.look(&View { sample: moment.sample, estimates: moment.estimates, dt_s: 0.0 }, &self.script);
+        replaced
+    }
+
+    fn run_due(&mut self, engine: &Engine, shared: &Shared, moment: &Moment<'_>, outputs: &mut Outputs<'_>) -> bool {
         let at_ns = moment.sample.at_ns;
         let due = !self.script.passive && self.due(at_ns);
         let heard = moment.events.iter().any(|event| self.script.hears(event));
@@ -276,6 +287,7 @@ impl Slot {
             self.named.append(&mut collected.alarms);
         }
         self.ask_to_stop(collected, due);
+        outputs.decision.learn_anew.extend(collected.learn_anew.drain(..).map(|program| Arc::from(program.as_str())));
         self.alarms(collected.now_ns, outputs);
         self.publish(collected);
         for text in collected.notes.drain(..) {
@@ -287,6 +299,7 @@ impl Slot {
 
     fn ask(&mut self, collected: &mut RunOutput) {
         self.propose(collected);
+        self.follows.take(collected.follows.take());
         let Some((pct, reason)) = collected.request.take() else {
             self.request = None;
             return;

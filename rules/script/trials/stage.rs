@@ -1,5 +1,6 @@
 //! What a trial is played on: one script, what it sees, and a clock of its own.
 
+use crate::estimators::loads::{Figure, LoadEstimator};
 use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use crate::script::compiled::{Script, ScriptSet};
 use crate::script::decision::{Alarm, Axis, Decision, Stop};
@@ -46,6 +47,9 @@ pub(super) struct TrialContext {
     host: Host,
     sample: Sample,
     estimates: Estimates,
+    loads: LoadEstimator,
+    /// Figures that the trial gives, in the place of those that the estimators would find.
+    given: Vec<(&'static str, Figure)>,
     now_ns: TimeNs,
     step_ns: i64,
     ticks: u64,
@@ -64,6 +68,8 @@ impl Default for TrialContext {
             host: Host::new(),
             sample: Sample::empty(BEGIN_NS),
             estimates: Estimates::none(BEGIN_NS),
+            loads: LoadEstimator::default(),
+            given: Vec::new(),
             now_ns: BEGIN_NS,
             step_ns: STEP_NS,
             ticks: 0,
@@ -98,6 +104,9 @@ impl TrialContext {
         if let Some(id) = ChannelId::of(name) {
             return self.give_channel(id, value);
         }
+        if let Some(word) = words().iter().find(|word| word.name == name && word.is_figure()) {
+            return self.give_figure(word.name, value);
+        }
         let deviation = name.strip_suffix("_sd_w").map(|stem| format!("{stem}_w"));
         let deviation = deviation.or_else(|| name.strip_suffix("_sd_mm").map(|stem| format!("{stem}_mm")));
         match deviation {
@@ -121,6 +130,17 @@ impl TrialContext {
                 };
             }
         }
+        Ok(())
+    }
+
+    fn give_figure(&mut self, name: &'static str, value: &Dynamic) -> Result<(), String> {
+        let figure = match number(value) {
+            Some(number) => Ok(number),
+            None if value.is_unit() => Err(NoEstimate::NotCutting),
+            None => return Err(format!("{name} needs a number, or () for no value")),
+        };
+        self.given.retain(|(known, _)| *known != name);
+        self.given.push((name, figure));
         Ok(())
     }
 
@@ -180,6 +200,10 @@ impl TrialContext {
 
     fn tick(&mut self) -> Result<(), String> {
         (self.sample.at_ns, self.estimates.at_ns) = (self.now_ns, self.now_ns);
+        self.loads.step(&self.sample, &mut self.estimates, self.host.settings());
+        for (name, given) in &self.given {
+            self.estimates.figure_mut(name).into_iter().for_each(|figure| *figure = *given);
+        }
         let decision = self.host.tick(&self.sample, &self.estimates);
         self.stops.extend(decision.stops.iter().map(|request| request.stop));
         self.notes.extend(decision.notes.iter().map(|note| note.text.clone()));
@@ -277,6 +301,7 @@ fn quantity_of<'a>(estimates: &'a mut Estimates, name: &str) -> Option<&'a mut E
         "tool_growth_pct" => Some(&mut estimates.tool_growth_pct),
         "tool_worn_probability" => Some(&mut estimates.tool_worn_probability),
         "tool_parts_left" => Some(&mut estimates.tool_parts_left),
+        "material_level_pct" => Some(&mut estimates.material_level_pct),
         _ => None,
     }
 }

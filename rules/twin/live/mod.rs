@@ -101,6 +101,12 @@ impl Live {
         self.compared
     }
 
+    /// Begin of that second, ns since 1970; `None` before the first one.
+    #[must_use]
+    pub fn compared_at_ns(&self) -> Option<TimeNs> {
+        self.last_ns
+    }
+
     /// Every regime that has been seen, with its stage.
     pub fn stages(&self) -> impl Iterator<Item = (Regime, RegimeStage)> {
         self.watch.stages()

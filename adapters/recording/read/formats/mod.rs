@@ -44,6 +44,19 @@ const REFUSED: &[RefusedFormat] = &[
     (b"\x28\xb5\x2f\xfd", "a file packed by zstd", "unpack it first, or pack it with gzip", "请先解压，或用gzip压缩"),
 ];
 
+/// Reads by a library of others. A damaged file may break off inside it, which is an answer about the file and not the end of
+/// this program (calamine 0.38 indexes into what an xls file says of itself).
+fn hold<T>(input: &Input, read: impl FnOnce() -> Result<T, RecordingError>) -> Result<T, RecordingError> {
+    let damaged = |_| {
+        Err(RecordingError::format(
+            &input.file,
+            "the file is damaged: its parts do not fit together; save it anew, or as CSV",
+            "文件已损坏：内部结构不一致；请重新保存，或另存为CSV",
+        ))
+    };
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(read)).unwrap_or_else(damaged)
+}
+
 /// Opens a file as a table.
 pub(super) fn open(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, RecordingError> {
     let head = input.head(1024)?;
@@ -55,10 +68,11 @@ pub(super) fn open(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, Re
         ));
     }
     if head.starts_with(b"PAR1") {
-        return Ok(Box::new(parquet::open(&input)?));
+        return Ok(Box::new(hold(&input, || parquet::open(&input))?));
     }
     if head.starts_with(b"PK\x03\x04") || head.starts_with(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1") {
-        return Ok(Box::new(workbook::open(&input, mapping.sheet.as_deref())?));
+        let table = hold(&input, || workbook::open(&input, mapping.sheet.as_deref()))?;
+        return Ok(Box::new(table));
     }
     if head.starts_with(b"TDSm") {
         return Ok(Box::new(tdms::open(&input, mapping.sheet.as_deref())?));

@@ -1,8 +1,8 @@
 //! The library: models stored in a history by machine, tool, work material and operation.
 
 use crate::cli::{CannotRun, CommandOutcome, CommandResult, print, print_json};
+use crate::clock;
 use crate::history::{HistoryError, Reader, StoredWearModel, store_wear_model};
-use adapters::clock::{Clock, SystemClock};
 use clap::Args;
 use rules::estimators::wear::{WearKey, WearRecord};
 use serde_json::json;
@@ -54,11 +54,11 @@ impl LibraryArguments {
 /// Stores the model where that was asked for; a line that says so.
 pub(super) fn store(arguments: &LibraryArguments, record: &WearRecord) -> Result<Option<String>, CannotRun> {
     let Some(path) = &arguments.store else { return Ok(None) };
-    let id = store_wear_model(path, SystemClock::new().now_ns(), record).map_err(|error| cannot(&error))?;
-    Ok(Some(format!("\nstored as model {id} in {}: {}\n", path.display(), named(&record.key))))
+    let id = store_wear_model(path, clock::now_ns(), record).map_err(|error| cannot(&error))?;
+    Ok(Some(format!("\nstored as model {id} in {}: {}\n", path.display(), format_key(&record.key))))
 }
 
-fn named(key: &WearKey) -> String {
+fn format_key(key: &WearKey) -> String {
     let texts = [
         ("machine", &key.machine),
         ("tool", &key.tool),
@@ -97,7 +97,7 @@ fn line(model: &StoredWearModel) -> String {
         record.criterion_mm,
         record.cuts,
         100.0 * record.r2,
-        named(&record.key),
+        format_key(&record.key),
         record.origin
     )
 }

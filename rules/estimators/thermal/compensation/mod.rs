@@ -6,9 +6,10 @@
 //! away from the value in force. Source: pulse insertion, N = E / pulse equivalent; that increments are sent and a
 //! remainder carried is what the source leaves open.
 //!
-//! Without a prediction the value in force stands: heat does not jump. After `hold_s` without one, in bypass, or where
-//! the prediction is an extrapolation, nothing new is believed; bypass and a long absence lead back to zero at the slew
-//! limit. After a reference return the controller has forgotten every inserted pulse, and the value is sent anew.
+//! Without a prediction the value in force stands: heat does not jump. In bypass, and after `hold_s` without a prediction, it goes
+//! back to zero at the slew limit. Temperatures outside those of the identification are no reason to withhold the compensation: the
+//! law is followed with a wider deviation, far outside at the value of the edge, and where the deviation is as great as what would be
+//! compensated the value in force stands. After a reference return the controller has forgotten every inserted pulse, and the value is sent anew.
 
 use super::predictor::ThermalPrediction;
 use serde::{Deserialize, Serialize};
@@ -91,9 +92,13 @@ pub enum Standing {
     DeadBand,
     /// There is no prediction: the value stands.
     NoPrediction,
-    /// The temperatures lie outside the range of identification: the value stands.
+    /// The temperatures lie outside the range of identification: it follows, with a wider deviation.
     Extrapolated,
-    /// There has been no prediction to believe for longer than `hold_s`: back to zero.
+    /// They lie far outside: the value is that of the edge up to which the law goes on.
+    AtTheEdge,
+    /// The deviation of the prediction is as great as the error that it predicts: the value stands.
+    Doubted,
+    /// There has been no prediction for longer than `hold_s`: back to zero.
     HeldTooLong,
     /// Switched off: back to zero.
     Bypass,
@@ -110,6 +115,8 @@ impl Standing {
             Self::DeadBand => "dead_band",
             Self::NoPrediction => "no_prediction",
             Self::Extrapolated => "extrapolated",
+            Self::AtTheEdge => "at_the_edge",
+            Self::Doubted => "doubted",
             Self::HeldTooLong => "held_too_long",
             Self::Bypass => "bypass",
             Self::ReferenceReturn => "reference_return",
@@ -191,17 +198,27 @@ impl Compensator {
         if bypass {
             return self.go_home(Standing::Bypass);
         }
-        let believed = prediction.filter(|it| it.is_inside_range() && it.error_um.value.is_finite());
-        let Some(prediction) = believed else {
+        let Some(prediction) = prediction.filter(|it| it.safe_um.is_finite()) else {
             self.without_s += dt_s;
             if self.without_s > self.settings.hold_s {
                 return self.go_home(Standing::HeldTooLong);
             }
             self.target_um = self.value_um;
-            return if prediction.is_some() { Standing::Extrapolated } else { Standing::NoPrediction };
+            return Standing::NoPrediction;
         };
         self.without_s = 0.0;
-        self.follow(prediction.error_um.value)
+        if prediction.outside.is_some()
+            && prediction.error_um.sd > prediction.safe_um.abs().max(self.settings.dead_band_um)
+        {
+            self.target_um = self.value_um;
+            return Standing::Doubted;
+        }
+        let followed = self.follow(prediction.safe_um);
+        match prediction.outside {
+            Some(_) if prediction.is_at_the_edge() => Standing::AtTheEdge,
+            Some(_) => Standing::Extrapolated,
+            None => followed,
+        }
     }
 
     fn follow(&mut self, error_um: f64) -> Standing {

@@ -6,7 +6,12 @@ use crate::estimators::thermal::predictor::Outside;
 use proptest::prelude::*;
 
 fn predicted(error_um: f64) -> ThermalPrediction {
-    ThermalPrediction { error_um: Estimate { value: error_um, sd: 1.0 }, law_sd_um: 0.1, outside: None }
+    ThermalPrediction {
+        error_um: Estimate { value: error_um, sd: 1.0 },
+        law_sd_um: 0.1,
+        safe_um: error_um,
+        outside: None,
+    }
 }
 
 fn settings() -> CompensationSettings {
@@ -57,13 +62,28 @@ fn without_a_prediction_the_value_stands_then_goes_home() {
     settle(&mut compensator, 20.0);
     let step = compensator.step(0.1, None, RUNNING);
     assert_eq!((step.increment_pulses, step.value_um, step.standing), (0, -20.0, Standing::NoPrediction));
-    let beyond = ThermalPrediction { outside: Some(Outside::Combination), ..predicted(90.0) };
-    assert_eq!(compensator.step(0.1, Some(&beyond), RUNNING).standing, Standing::Extrapolated);
     assert_eq!(compensator.step(0.1, Some(&predicted(f64::NAN)), RUNNING).value_um, -20.0);
     let gone = compensator.step(700.0, None, RUNNING);
     assert_eq!(gone.standing, Standing::HeldTooLong);
     let home = (0..200).map(|_| compensator.step(0.1, None, RUNNING)).last().expect("steps");
     assert_eq!((home.value_um, home.sent_um), (0.0, 0.0));
+}
+
+#[test]
+fn outside_the_range_it_follows_and_far_outside_it_holds_the_edge() {
+    let mut compensator = Compensator::new(settings()).expect("settings");
+    let settle = |compensator: &mut Compensator, prediction: ThermalPrediction| {
+        (0..400).map(|_| compensator.step(0.1, Some(&prediction), RUNNING)).last().expect("steps")
+    };
+    let beyond = ThermalPrediction { outside: Some(Outside::Combination), ..predicted(30.0) };
+    let step = settle(&mut compensator, beyond);
+    assert_eq!((step.value_um, step.standing), (-30.0, Standing::Extrapolated));
+    let far = ThermalPrediction { safe_um: 40.0, ..ThermalPrediction { outside: beyond.outside, ..predicted(49.0) } };
+    let step = settle(&mut compensator, far);
+    assert_eq!((step.value_um, step.standing), (-40.0, Standing::AtTheEdge));
+    let unsure = Estimate { value: -20.0, sd: 25.0 };
+    let step = settle(&mut compensator, ThermalPrediction { error_um: unsure, safe_um: -20.0, ..beyond });
+    assert_eq!((step.value_um, step.standing), (-40.0, Standing::Doubted), "the last value that was safe stands");
 }
 
 #[test]

@@ -11,6 +11,11 @@ const KELVIN_FROM_C: f64 = 200.0;
 /// A temperature may leave the range of identification by this share of it, and at least by this much.
 const MARGIN_SHARE: f64 = 0.05;
 const MARGIN_K: f64 = 0.5;
+/// The law goes on beyond the range of a sensor for this share of the range. Farther out it is held at that point: a straight line that
+/// was seen over 20 K is no worse at 8 K more than nothing at all, at 40 K it may be.
+const FAR_SHARE: f64 = 0.5;
+/// Beyond its range a coefficient may be another one by this share, one standard deviation: heat transfer is not linear.
+const SLOPE_DOUBT: f64 = 0.25;
 /// The law's own deviation may exceed the greatest during identification by this factor.
 const LAW_SD_FACTOR: f64 = 1.5;
 /// A residual beyond this many standard deviations contradicts the law.
@@ -82,7 +87,9 @@ pub struct ThermalPrediction {
     pub error_um: Estimate,
     /// Standard deviation of the law itself at this point, from the intervals of its coefficients, um.
     pub law_sd_um: f64,
-    /// Set where this is an extrapolation.
+    /// The error that may be compensated, um: that of the law, but not farther outside of its range than the law goes on.
+    pub safe_um: f64,
+    /// Set where this is an extrapolation; the deviation of `error_um` is wider then.
     pub outside: Option<Outside>,
 }
 
@@ -91,6 +98,12 @@ impl ThermalPrediction {
     #[must_use]
     pub fn is_inside_range(&self) -> bool {
         self.outside.is_none()
+    }
+
+    /// Farther outside than the law goes on: `safe_um` is that of the edge.
+    #[must_use]
+    pub fn is_at_the_edge(&self) -> bool {
+        self.safe_um != self.error_um.value
     }
 
     /// Measured and residual beside this prediction.
@@ -225,13 +238,29 @@ impl Predictor {
         let start_sd_um = self.unsettled * slope * self.law.lag_spread_k;
         // What blocks left out showed holds the law's own deviation already, at points that the law knows as well.
         let beyond = (law_sd_um / self.law.law_sd_max_um.max(f64::MIN_POSITIVE)).max(1.0);
-        let sd = (beyond * self.law.residual_sd_um).hypot(start_sd_um);
+        let (safe, outside_sd_um) = self.held_near(point);
+        let sd = (beyond * self.law.residual_sd_um).hypot(start_sd_um).hypot(outside_sd_um);
         let together = beyond > LAW_SD_FACTOR;
         ThermalPrediction {
             error_um: Estimate { value: self.law.error_um(point), sd },
             law_sd_um,
+            safe_um: self.law.error_um(&safe[..point.len()]),
             outside: outside.or(together.then_some(Outside::Combination)),
         }
+    }
+
+    /// The point, no farther outside of the range of identification than the law goes on; and what the way out adds to the deviation.
+    fn held_near(&self, point: &[f64]) -> ([f64; TERMS_MAX + 1], f64) {
+        let mut safe = [1.0; TERMS_MAX + 1];
+        let mut variance = 0.0;
+        for ((safe, value), term) in safe.iter_mut().skip(1).zip(&point[1..]).zip(&self.law.terms) {
+            let (least, greatest) = term.range_c;
+            let far_k = FAR_SHARE * (greatest - least);
+            *safe = value.clamp(least - far_k, greatest + far_k);
+            let beyond_k = (least - value).max(value - greatest).max(0.0);
+            variance += (SLOPE_DOUBT * term.um_per_k * beyond_k).powi(2);
+        }
+        (safe, variance.sqrt())
     }
 
     fn outside(&self, temperatures_c: &[f64]) -> Option<Outside> {

@@ -72,6 +72,15 @@ fn temperatures_outside_the_range_are_flagged_alone_and_together() {
     temperatures[1] = Ok(45.0);
     let outside = far.predict(0, &temperatures).expect("a number, flagged").outside;
     assert_eq!(outside, Some(Outside::Sensor { sensor: 1, temperature_c: 45.0, range_c: (20.0, 40.0) }));
+    let near = far.predict(0, &temperatures).expect("a number");
+    assert!(
+        !near.is_at_the_edge() && near.error_um.sd > 2.5,
+        "five kelvin at 2 um/K, a quarter of that in doubt: {near:?}"
+    );
+    temperatures[1] = Ok(70.0);
+    let edge = far.predict(0, &temperatures).expect("a number");
+    let at_edge_um = near.error_um.value + 2.0 * (50.0 - 45.0);
+    assert!(edge.is_at_the_edge() && (edge.safe_um - at_edge_um).abs() < 1e-9 && edge.error_um.sd > 10.0, "{edge:?}");
     // Two sensors that always rose together, one hot and one cold: each inside, together never seen.
     let mut pair = law(2, Path::Direct);
     pair.covariance = vec![vec![0.1, 0.0, 0.0], vec![0.0, 1.0, -0.999], vec![0.0, -0.999, 1.0]];

@@ -1,6 +1,9 @@
 //! The history of a running box: opened at the start, or again and again while the disk does not let it.
 
+pub(super) mod upkeep;
+
 use super::recent::{self, Recent};
+use crate::clock::{ClockMark, Trust};
 use crate::config;
 use crate::history::{
     self, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Outbox, Reader, Record, RecordSpan,
@@ -11,6 +14,7 @@ use crate::pipeline::Store;
 use crate::status::HistoryStatus;
 use adapters::Sample;
 use adapters::clock::TimeNs;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -43,12 +47,27 @@ pub struct HistoryStore {
     first_ns: Option<TimeNs>,
     last_ns: TimeNs,
     lost: u64,
+    /// Samples handed to the writer since it was opened.
+    handed: u64,
     told: Option<String>,
+    /// The file that the writer has open.
+    file: Option<FileIdentity>,
+    /// The log beside it has been told to be long.
+    long_log: bool,
+    set_aside: Vec<String>,
+}
+
+/// Which file lies under a name: device and number on it.
+type FileIdentity = (u64, u64);
+
+fn identity(path: &Path) -> Option<FileIdentity> {
+    std::fs::metadata(path).ok().map(|file| (file.dev(), file.ino()))
 }
 
 impl HistoryStore {
     /// Opens the history of the configuration, or goes on without it where the disk does not let it. `beside` is stored
-    /// beside the channels, `outbox` is what leaves the box.
+    /// beside the channels, `outbox` is what leaves the box, `clock` what its
+    /// rows are dated by.
     ///
     /// # Errors
     /// A history that belongs to somebody else: another gateway, a newer version, another program.
@@ -56,10 +75,11 @@ impl HistoryStore {
         config: &config::HistoryConfig,
         beside: Vec<ExtraSeries>,
         outbox: Option<Outbox>,
+        clock: ClockMark,
     ) -> Result<Self, HistoryError> {
         let mut history_store = Self {
             path: config.path.clone(),
-            options: options(config, beside, outbox),
+            options: Options { clock, ..options(config, beside, outbox) },
             writer: None,
             recent: None,
             closed: None,
@@ -68,19 +88,27 @@ impl HistoryStore {
             first_ns: None,
             last_ns: 0,
             lost: 0,
+            handed: 0,
             told: None,
+            file: None,
+            long_log: false,
+            set_aside: Vec::new(),
         };
+        recent::forget_without(&history_store.path);
         match history_store.try_open() {
             Ok(()) => {}
+            Err(error) if error.is_damage() => history_store.begin_anew(&error),
             Err(error) if foreign(&error) => return Err(error),
             Err(error) => history_store.put_off(&error),
         }
+        history_store.set_aside = history::damaged_files(&history_store.path);
         Ok(history_store)
     }
 
     fn try_open(&mut self) -> Result<(), HistoryError> {
-        recent::forget_without(&self.path);
         let writer = Writer::open(&self.path, self.options.clone())?;
+        self.file = identity(&self.path);
+        self.handed = 0;
         let rows = recent::recover(&self.path, &writer);
         if rows > 0 {
             let text = format!("{rows} rows of the audit that the last end had cut off are in the history now");
@@ -123,6 +151,9 @@ impl HistoryStore {
                 Err(error) => self.put_off(&error),
             }
         }
+        self.look_at_file();
+        self.look_at_damage();
+        self.look_at_log();
         let trouble = self.writer.as_ref().and_then(|writer| trouble(&writer.status()));
         if trouble != self.told {
             match &trouble {
@@ -139,6 +170,12 @@ impl HistoryStore {
         self.writer.as_ref().is_some_and(|writer| writer.status().degraded.is_none())
     }
 
+    /// Rounds of the thread that writes; `None` where the history is not open.
+    #[must_use]
+    pub fn count_rounds(&self) -> Option<u64> {
+        self.writer.as_ref().map(Writer::count_rounds)
+    }
+
     /// Hands in a row of the audit; false when it will not be stored.
     pub fn audit(&mut self, row: Audit) -> bool {
         let stored = self.writer.as_ref().is_some_and(|writer| writer.record(row.clone()).is_some());
@@ -148,10 +185,18 @@ impl HistoryStore {
         stored
     }
 
-    /// Compacts and removes what is too old, in the background.
+    /// Compacts and removes what is too old at this time, which a confirmed clock says, in the background.
     pub fn maintain(&self, now_ns: TimeNs) {
         if let Some(writer) = &self.writer {
-            writer.maintain(now_ns);
+            writer.maintain(Some(now_ns));
+        }
+    }
+
+    /// The clock of the rows since opening is confirmed.
+    pub fn confirm_clock(&mut self) {
+        self.options.clock.trust = Trust::Confirmed.word();
+        if let Some(writer) = &self.writer {
+            writer.confirm_clock();
         }
     }
 
@@ -185,6 +230,8 @@ impl HistoryStore {
             lasts_days: self.lasts_days(writer.bytes),
             lost: self.lost + writer.dropped_samples + writer.lost_samples,
             error: closed.or_else(|| trouble(&writer)),
+            log_bytes: writer.log_bytes,
+            set_aside: self.set_aside.clone(),
         }
     }
 
@@ -203,7 +250,10 @@ impl Store for HistoryStore {
         self.first_ns.get_or_insert(sample.at_ns);
         self.last_ns = sample.at_ns;
         match &self.writer {
-            Some(writer) => drop(writer.sample(sample, extras)),
+            Some(writer) => {
+                self.handed += 1;
+                writer.sample(sample, extras);
+            }
             None => self.lost += 1,
         }
     }
@@ -224,7 +274,7 @@ fn trouble(status: &history::HistoryFigures) -> Option<String> {
 /// Alarms that stood when the box stopped end then; what still holds is raised again.
 fn end_alarms(path: &Path, writer: &Writer) {
     let Ok(reader) = Reader::open(path) else { return };
-    let Ok(Some((_, newest_ns))) = reader.span() else { return };
+    let Ok(Some((_, newest_ns))) = reader.present() else { return };
     for alarm in reader.alarms(RecordSpan::newest(ALARMS_MAX)).unwrap_or_default() {
         if alarm.cleared_ns.is_none() {
             writer.record(AlarmClear { at_ns: newest_ns, code: alarm.code, source: alarm.source });

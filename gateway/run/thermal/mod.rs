@@ -5,13 +5,17 @@
 //! it by bounded steps, and what was learned is kept in `thermal.json` of the data directory. The offset is proposed to the gate
 //! only where the configuration says so; the gate decides, as about every offset.
 
+pub mod outside;
+
 use super::health::Health;
 use crate::cannot_run::CannotRun;
 use crate::config::{self, Config};
 use crate::history::{ExtraSeries, ExtraValue};
+use crate::learned;
 use crate::log::{Notice, Severity};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, ChannelId, Sample};
+use outside::OutsideWatch;
 use rules::estimators::thermal::{
     AxisSituation, Compensator, Corrected, FollowSettings, HoldReason, ThermalFollower, ThermalModel, ThermalPrediction,
 };
@@ -39,10 +43,12 @@ pub struct Thermal {
     temperatures_c: Vec<Result<f64, Absence>>,
     error: ChannelId,
     memory: PathBuf,
-    told: Option<Notice>,
+    told: Vec<Notice>,
     last_ns: Option<TimeNs>,
     read_ns: Option<TimeNs>,
     held: Option<HoldReason>,
+    /// Since when the temperatures have been inside the range of identification, and what was told last.
+    outside: OutsideWatch,
     pulses: i64,
     values: [ExtraValue<'static>; COUNT],
     reason: Arc<str>,
@@ -84,6 +90,7 @@ impl Thermal {
             last_ns: None,
             read_ns: None,
             held: None,
+            outside: OutsideWatch::default(),
             pulses: 0,
             values: [ExtraValue::Missing("not_yet"); COUNT],
             reason: "thermal law".into(),
@@ -112,7 +119,7 @@ impl Thermal {
 
     /// What is to be said at the start.
     pub fn begin(&mut self, health: &mut Health, at_ns: TimeNs) {
-        if let Some(notice) = self.told.take() {
+        for notice in self.told.drain(..) {
             health.event(at_ns, SOURCE, &notice);
         }
         health.thermal(&self.values);
@@ -146,6 +153,10 @@ impl Thermal {
         };
         let dt_s = dt_ns as f64 / SECOND_NS as f64;
         let step = self.compensator.step(dt_s, predicted.as_ref().ok(), AxisSituation::default());
+        let names: Vec<&str> = self.sensors.iter().map(|channel| channel.name()).collect();
+        if let Some(notice) = self.outside.look(sample.at_ns, predicted.as_ref().ok(), &step, &names) {
+            health.event(sample.at_ns, SOURCE, &notice);
+        }
         self.pulses += step.increment_pulses;
         let of = |value: fn(&ThermalPrediction) -> f64| match &predicted {
             Ok(prediction) => ExtraValue::Number(value(prediction)),
@@ -180,7 +191,7 @@ impl Thermal {
             self.read_ns = Some(sample.at_ns);
             let correction = self.follower.take(prediction, measured_um);
             if let Ok(text) = serde_json::to_string(&self.follower.corrected()) {
-                health.put(&self.memory, text);
+                health.put_learned(&self.memory, text);
             }
             if correction.held != self.held && correction.held == Some(HoldReason::Total) {
                 let text = format!(
@@ -196,19 +207,21 @@ impl Thermal {
 }
 
 /// What readings have taught the law before, if it is still the same law.
-fn remembered(memory: &Path, model: &ThermalModel) -> (Corrected, Option<Notice>) {
+fn remembered(memory: &Path, model: &ThermalModel) -> (Corrected, Vec<Notice>) {
+    let mut told = Vec::new();
     let fresh = || Corrected { identified: model.law.clone(), law: model.law.clone(), readings: 0 };
-    let Ok(text) = std::fs::read_to_string(memory) else { return (fresh(), None) };
-    match serde_json::from_str::<Corrected>(&text) {
-        Ok(corrected) if corrected.identified == model.law => (corrected, None),
+    let Some(state) = learned::read(memory, |notice| told.push(notice)) else { return (fresh(), told) };
+    match serde_json::from_str::<Corrected>(&state) {
+        Ok(corrected) if corrected.identified == model.law => return (corrected, told),
         Ok(_) => {
             let text = "the thermal law is another one than before: corrections of the old one are dropped";
-            (fresh(), Some(Notice::new(Severity::Info, "thermal_law_new", text)))
+            told.push(Notice::new(Severity::Info, "thermal_law_new", text));
         }
         Err(error) => {
             let text =
                 format!("{} cannot be read ({error}): the thermal law begins as it was identified", memory.display());
-            (fresh(), Some(Notice::new(Severity::Warning, "thermal_law_forgotten", text)))
+            told.push(Notice::new(Severity::Warning, "thermal_law_forgotten", text));
         }
     }
+    (fresh(), told)
 }

@@ -1,0 +1,292 @@
+//! `cnc-gateway setup`: the questions that a box needs answered, each tried at once, and the configuration from the answers.
+
+use super::{CannotRun, CommandOutcome, CommandResult, lang, print};
+use crate::access::{self, Persons, Role};
+use crate::doctor;
+use crate::setup::{AddressRange, SetupAnswers, scan_for_controls};
+use ::rules::physics::explain::Language;
+use clap::Args;
+use std::io::{BufRead, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `setup`. What is not given is asked for, where there is a terminal.
+#[derive(Debug, Args)]
+pub(super) struct SetupArguments {
+    /// The configuration to write.
+    #[arg(long, value_name = "FILE", default_value = "/etc/cnc-gateway/cnc-gateway.toml")]
+    out: PathBuf,
+    /// Directory of the data of the box.
+    #[arg(long, value_name = "DIR", default_value = "/var/lib/cnc-gateway")]
+    data_dir: PathBuf,
+    /// Name of the machine.
+    #[arg(long)]
+    name: Option<String>,
+    /// Address of the control, for example fanuc://192.168.1.10:8193, or none.
+    #[arg(long, value_name = "ADDRESS")]
+    control: Option<String>,
+    /// Address of a meter, for example "modbus-tcp://192.168.1.20?profile=sdm630"; several times, or none.
+    #[arg(long, value_name = "ADDRESS")]
+    meter: Vec<String>,
+    /// Other computers may open the page: over TLS, with a token.
+    #[arg(long)]
+    page_from_network: bool,
+    /// Name of the person who may change everything.
+    #[arg(long, value_name = "NAME")]
+    admin: Option<String>,
+    /// Ask nothing: what is not given has its default.
+    #[arg(long)]
+    yes: bool,
+    /// Look for controls in this range first, for example 192.168.1.0/24.
+    #[arg(long, value_name = "RANGE")]
+    scan: Option<AddressRange>,
+}
+
+/// A text in both languages.
+type Words = (&'static str, &'static str);
+
+/// Asks on the terminal, in one language.
+struct Dialogue {
+    zh: bool,
+    asks: bool,
+}
+
+impl Dialogue {
+    fn text(&self, words: Words) -> &'static str {
+        if self.zh { words.1 } else { words.0 }
+    }
+
+    fn say(&self, words: Words) {
+        print(&format!("{}\n", self.text(words)));
+    }
+
+    /// The answer; empty where nothing is asked or nothing was typed.
+    fn ask(&self, words: Words, default: &str) -> Result<String, CannotRun> {
+        if !self.asks {
+            return Ok(default.to_owned());
+        }
+        let shown = if default.is_empty() { String::new() } else { format!(" [{default}]") };
+        print(&format!("{}{shown}: ", self.text(words)));
+        let _shown = std::io::stdout().flush();
+        let mut line = String::new();
+        let read = std::io::stdin().lock().read_line(&mut line);
+        match read {
+            Ok(0) | Err(_) => Err(CannotRun::new("the answers ended before the last question", "nothing was written")),
+            Ok(_) if line.trim().is_empty() => Ok(default.to_owned()),
+            Ok(_) => Ok(line.trim().to_owned()),
+        }
+    }
+
+    fn confirm(&self, words: Words, default: bool) -> Result<bool, CannotRun> {
+        let answer = self.ask(words, if default { "y" } else { "n" })?.to_lowercase();
+        Ok(["y", "yes", "j", "是", "1"].contains(&answer.as_str()))
+    }
+}
+
+/// Asks, tries, writes.
+pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
+    let asks = !arguments.yes && std::io::stdin().is_terminal();
+    let zh = lang::language() == Language::Zh;
+    let dialogue = Dialogue { zh, asks };
+    // Otherwise the page opens in the language of the browser.
+    let language = zh.then_some(Language::Zh);
+    let machine = match &arguments.name {
+        Some(name) => name.clone(),
+        None => dialogue.ask(("Name of the machine", "机床名称"), &host_name())?,
+    };
+    if let Some(range) = arguments.scan {
+        list_controls(&dialogue, range);
+    }
+    let control = choose_control(&dialogue, arguments.control.as_deref())?;
+    let meters = choose_meters(&dialogue, &arguments.meter)?;
+    let page_from_network = arguments.page_from_network
+        || dialogue.confirm(
+            (
+                "May other computers open the page (over TLS, with a token)?",
+                "允许其他电脑打开页面吗(TLS 加密,需要令牌)?",
+            ),
+            false,
+        )?;
+    if control.is_none() && meters.is_empty() {
+        let next = "give --control ADDRESS or --meter ADDRESS; simulated://lathe is a machine to try with";
+        return Err(CannotRun::new("a box needs a control or a meter", next));
+    }
+    let answers = SetupAnswers { machine, language, control, meters, page_from_network };
+    write_configuration(&dialogue, arguments, &answers)?;
+    add_administrator(&dialogue, arguments)?;
+    dialogue.say((
+        "Now: systemctl enable --now cnc-gateway, and open the page. Everything can be changed later, on the page or in the file.",
+        "下一步:systemctl enable --now cnc-gateway,然后打开页面。以后都可以在页面或文件中修改。",
+    ));
+    Ok(CommandOutcome::Fine)
+}
+
+fn host_name() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    if name.trim().is_empty() { "machine".to_owned() } else { name.trim().to_owned() }
+}
+
+fn list_controls(dialogue: &Dialogue, range: AddressRange) {
+    let found = scan_for_controls(range);
+    if found.is_empty() {
+        dialogue.say(("Nothing in this range listens where a control would.", "该范围内没有发现数控系统。"));
+    }
+    for control in found {
+        print(&format!("  {}\n", control.address));
+    }
+}
+
+/// What one look at an address says.
+enum LookedAt {
+    /// It is no address, or cannot be opened.
+    Unusable,
+    /// It can be used, with problems.
+    Doubtful,
+    Good,
+}
+
+/// Opens the address once and shows what it says.
+fn show_address(dialogue: &Dialogue, address: &str) -> LookedAt {
+    let report = match doctor::examine_text(address) {
+        Ok(report) => report,
+        Err(what) => {
+            print(&format!("  {what}\n"));
+            return LookedAt::Unusable;
+        }
+    };
+    let known = report.readings.iter().filter(|(_, value)| value.is_ok()).count();
+    let answers = if report.reachable { ("answers", "有应答") } else { ("does not answer", "无应答") };
+    print(&format!("  {address}: {}, {known} / {}\n", dialogue.text(answers), report.readings.len()));
+    for problem in &report.problems {
+        print(&format!("  ! {}\n    {}\n", problem.what, problem.next));
+    }
+    if report.problems.is_empty() { LookedAt::Good } else { LookedAt::Doubtful }
+}
+
+/// Shows what an address says, and asks where there is a doubt. True when it may be used.
+fn try_address(dialogue: &Dialogue, address: &str) -> Result<bool, CannotRun> {
+    match show_address(dialogue, address) {
+        LookedAt::Unusable => Ok(false),
+        LookedAt::Good => Ok(true),
+        LookedAt::Doubtful => dialogue.confirm(("Use it all the same?", "仍然使用吗?"), false),
+    }
+}
+
+fn choose_control(dialogue: &Dialogue, given: Option<&str>) -> Result<Option<String>, CannotRun> {
+    if let Some(given) = given {
+        let address = complete_address(given, "fanuc");
+        // A control that is off today is written all the same: whoever gave the address means it.
+        if let Some(address) = &address {
+            show_address(dialogue, address);
+        }
+        return Ok(address);
+    }
+    let question = (
+        "Control: an address such as fanuc://192.168.1.10, nclink://BROKER/SERIAL, simulated://lathe, \"scan 192.168.1.0/24\", or none",
+        "数控系统:地址如 fanuc://192.168.1.10、nclink://BROKER/SERIAL、simulated://lathe,或 \"scan 192.168.1.0/24\",或 none",
+    );
+    loop {
+        let answer = dialogue.ask(question, "none")?;
+        if let Some(range) = answer.strip_prefix("scan ") {
+            match range.trim().parse() {
+                Ok(range) => list_controls(dialogue, range),
+                Err(error) => print(&format!("  {error}\n")),
+            }
+            continue;
+        }
+        match complete_address(&answer, "fanuc") {
+            None => return Ok(None),
+            Some(address) if try_address(dialogue, &address)? => return Ok(Some(address)),
+            Some(_) => {}
+        }
+    }
+}
+
+fn choose_meters(dialogue: &Dialogue, given: &[String]) -> Result<Vec<String>, CannotRun> {
+    if !given.is_empty() {
+        let meters: Vec<String> = given.iter().filter_map(|given| complete_address(given, "modbus-tcp")).collect();
+        for meter in &meters {
+            show_address(dialogue, meter);
+        }
+        return Ok(meters);
+    }
+    let question = (
+        "Power meter: an address such as modbus-tcp://192.168.1.20?profile=sdm630 or modbus-rtu:///dev/ttyUSB0?profile=sdm630&unit=1, or none",
+        "电能表:地址如 modbus-tcp://192.168.1.20?profile=sdm630 或 modbus-rtu:///dev/ttyUSB0?profile=sdm630&unit=1,或 none",
+    );
+    let mut meters = Vec::new();
+    loop {
+        match complete_address(&dialogue.ask(question, "none")?, "modbus-tcp") {
+            None => return Ok(meters),
+            Some(address) => {
+                if try_address(dialogue, &address)? {
+                    meters.push(address);
+                }
+            }
+        }
+    }
+}
+
+/// `None` for "none"; a bare host gets the scheme.
+fn complete_address(answer: &str, scheme: &str) -> Option<String> {
+    match answer.trim() {
+        "" | "none" | "无" => None,
+        address if address.contains("://") => Some(address.to_owned()),
+        host => Some(format!("{scheme}://{host}")),
+    }
+}
+
+/// Writes the file when `check` passes it. What was there before is kept beside it.
+fn write_configuration(
+    dialogue: &Dialogue,
+    arguments: &SetupArguments,
+    answers: &SetupAnswers,
+) -> Result<(), CannotRun> {
+    let (out, text) = (&arguments.out, answers.render_configuration());
+    let base = out.parent().unwrap_or(Path::new(""));
+    crate::config::parse(&out.display().to_string(), &text, base, []).map_err(|problems| {
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        CannotRun::new(lines.join("\n"), "nothing was written")
+    })?;
+    let cannot = |error: std::io::Error| {
+        CannotRun::new(format!("{}: {error}", out.display()), "run it as root, or name another file with --out")
+    };
+    if out.exists() {
+        let before = out.with_extension("before.toml");
+        std::fs::copy(out, &before).map_err(cannot)?;
+        print(&format!("{}: {}\n", dialogue.text(("what was there before", "原来的配置")), before.display()));
+    }
+    crate::files::replace_durably(out, &text).map_err(cannot)?;
+    print(&format!("{}: {}\n", dialogue.text(("written", "已写入")), out.display()));
+    Ok(())
+}
+
+/// The first person, whose token is shown once.
+fn add_administrator(dialogue: &Dialogue, arguments: &SetupArguments) -> Result<(), CannotRun> {
+    let path = access::path(&arguments.data_dir);
+    let cannot =
+        |error: access::PersonsError| CannotRun::new(error.to_string(), "cnc-gateway person add NAME --role admin");
+    let mut persons = Persons::read(&path).map_err(cannot)?.unwrap_or_default();
+    if !persons.all().is_empty() && arguments.admin.is_none() {
+        return Ok(());
+    }
+    let name = match &arguments.admin {
+        Some(name) => name.clone(),
+        None => dialogue
+            .ask(("Your name (you may change everything on the page)", "您的姓名(可在页面上修改全部内容)"), "admin")?,
+    };
+    let token = persons.add(&name, Role::Admin, "setup").map_err(cannot)?;
+    persons.write(&path).map_err(cannot)?;
+    give_to_owner_of_directory(&path);
+    print(&format!("{} {name}: {}\n", dialogue.text(("token, shown only now, of", "令牌(仅显示一次):")), token.text()));
+    Ok(())
+}
+
+/// A file that root wrote belongs to the user of the service, who owns the directory.
+fn give_to_owner_of_directory(path: &Path) {
+    use std::os::unix::fs::MetadataExt;
+    let owner = path.parent().and_then(|parent| std::fs::metadata(parent).ok());
+    if let Some(owner) = owner {
+        // Not root: the file belongs to whoever runs this, as the directory does.
+        let _not_root = std::os::unix::fs::chown(path, Some(owner.uid()), Some(owner.gid()));
+    }
+}

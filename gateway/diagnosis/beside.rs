@@ -1,0 +1,240 @@
+//! A diagnosis beside the watch: what the machine takes more or less than the model in charge says, by kind of work, and how much of
+//! that the diagnosis lays to parameters that it has moved, to effects that it has added, and to nothing.
+//!
+//! A diagnosis refits the model before it looks for what is missing. "It agrees" may therefore mean that it agrees only with another
+//! parameter, and an effect may have the other sign than the difference that the watch sees. Here both stand on the same ground: the
+//! model in charge as it is, seconds of settled work, and the kinds of work of the watch.
+
+use super::simulation;
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::{ChannelId, Recording};
+use rules::twin::live::{Regime, regime, second::Row};
+use rules::twin::text::short;
+use rules::twin::{Diagnosis, Model};
+use serde::{Deserialize, Serialize};
+
+/// A share of the difference below this is none, and a difference below this share of the simulated output is not told.
+const TOLD_SHARE: f64 = 0.02;
+/// Parameters that have moved by less than this share of themselves are not named.
+const MOVED_SHARE: f64 = 0.01;
+/// Rows of a kind of work below which nothing is said.
+const ROWS_MIN: usize = 60;
+/// Parameters named in a sentence.
+const NAMED_MAX: usize = 3;
+
+/// One kind of work, all figures in the unit of the output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BesideModel {
+    /// The kind of work.
+    pub regime: Regime,
+    /// From when on, ns since 1970: since the watch has seen a difference, or the whole stretch.
+    pub from_ns: TimeNs,
+    /// Seconds of it.
+    pub seconds: usize,
+    /// Mean output that the model in charge says.
+    pub expected: f64,
+    /// Recorded less that.
+    pub difference: f64,
+    /// How much of it comes of parameters that the diagnosis has moved.
+    pub by_parameters: f64,
+    /// How much of it comes of each effect that it has added.
+    pub by_effects: Vec<(String, f64)>,
+    /// What nothing accounts for.
+    pub left: f64,
+    /// In plain words.
+    pub en: String,
+    /// The same in Chinese.
+    pub zh: String,
+}
+
+/// A parameter of the model in charge that the diagnosis has moved.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MovedParameter {
+    /// Part and parameter.
+    pub name: String,
+    /// In the model in charge.
+    pub before: f64,
+    /// As refitted.
+    pub after: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// When the watch has seen a kind of work begin to differ.
+pub type Onset = (Regime, TimeNs);
+
+/// Every kind of work that the stretch holds enough of.
+#[must_use]
+pub fn beside_model(recording: &Recording, model: &Model, found: &Diagnosis, onsets: &[Onset]) -> Vec<BesideModel> {
+    let Ok(simulated) = simulation::run(recording, model) else { return Vec::new() };
+    let rows = rows(recording, &found.output, simulated.total(), found);
+    let moved = moved_parameters(model, found);
+    let start_ns = recording.start_ns.unwrap_or(0);
+    let of = |regime: Regime| {
+        let onset_ns = onsets.iter().find(|(its, _)| *its == regime).map(|(_, onset_ns)| *onset_ns);
+        let from_ns = onset_ns.unwrap_or(start_ns);
+        let here: Vec<&ComparedRow> = rows.iter().filter(|row| row.regime == regime && row.at_ns >= from_ns).collect();
+        (here.len() >= ROWS_MIN).then(|| summed(regime, from_ns.max(start_ns), &here, found, &moved))
+    };
+    Regime::ALL.into_iter().filter_map(of).collect()
+}
+
+/// The parameters of the model in charge that stand at other values in the refitted one.
+#[must_use]
+pub fn moved_parameters(model: &Model, found: &Diagnosis) -> Vec<MovedParameter> {
+    let mut moved: Vec<(f64, MovedParameter)> = Vec::new();
+    for (part, fitted) in model.parts.iter().zip(&found.model.parts).filter(|(part, fitted)| part.kind == fitted.kind) {
+        for (before, after) in part.parameters.iter().zip(&fitted.parameters) {
+            let share = (after.value - before.value).abs() / before.value.abs().max(after.value.abs()).max(1e-12);
+            if share > MOVED_SHARE {
+                let unit = if before.unit == "output" { found.unit.clone() } else { before.unit.clone() };
+                let name = format!("{}.{}", part.label(), before.name);
+                moved.push((share, MovedParameter { name, before: before.value, after: after.value, unit }));
+            }
+        }
+    }
+    moved.sort_by(|a, b| b.0.total_cmp(&a.0));
+    moved.into_iter().map(|(_, moved)| moved).collect()
+}
+
+/// A second that everything is known of.
+struct ComparedRow {
+    at_ns: TimeNs,
+    regime: Regime,
+    row: usize,
+    recorded: f64,
+    expected: f64,
+    after: f64,
+}
+
+fn rows(recording: &Recording, output: &str, expected: &[Option<f64>], found: &Diagnosis) -> Vec<ComparedRow> {
+    let Some(recorded) = recording.numbers(output) else { return Vec::new() };
+    let start_ns = recording.start_ns.unwrap_or(0);
+    let one = |row: usize| {
+        let (regime, _) = regime::of(&second_of(recording, row))?;
+        #[expect(clippy::cast_possible_truncation, reason = "seconds of a stretch of some hours")]
+        let at_ns = start_ns + (recording.time_s[row] * SECOND_NS as f64) as i64;
+        Some(ComparedRow {
+            at_ns,
+            regime,
+            row,
+            recorded: recorded.get(row)?,
+            expected: (*expected.get(row)?)?,
+            after: (*found.rows.simulated_after.get(row)?)?,
+        })
+    };
+    (0..recording.rows()).filter_map(one).collect()
+}
+
+/// The row as the watch sees it.
+fn second_of(recording: &Recording, row: usize) -> Row {
+    let number = |id: ChannelId| recording.numbers(id.name()).and_then(|numbers| numbers.get(row));
+    Row { numbers: ChannelId::all().map(number).collect(), ..Row::default() }
+}
+
+fn summed(
+    regime: Regime,
+    from_ns: TimeNs,
+    rows: &[&ComparedRow],
+    found: &Diagnosis,
+    moved: &[MovedParameter],
+) -> BesideModel {
+    #[expect(clippy::cast_precision_loss, reason = "rows of some hours")]
+    let count = rows.len() as f64;
+    let mean = |of: &dyn Fn(&ComparedRow) -> f64| rows.iter().map(|row| of(row)).sum::<f64>() / count;
+    let expected = mean(&|row| row.expected);
+    let effects = found.rows.effects.iter();
+    let by_effects: Vec<(String, f64)> = effects
+        .map(|(kind, values)| (kind.clone(), mean(&|row| values.get(row.row).copied().unwrap_or(0.0))))
+        .filter(|(_, share)| share.abs() > TOLD_SHARE * expected.abs().max(1e-9) * 0.1)
+        .collect();
+    let mut one = BesideModel {
+        regime,
+        from_ns,
+        seconds: rows.len(),
+        expected,
+        difference: mean(&|row| row.recorded - row.expected),
+        // What is neither an effect nor left over is the refitted baseline.
+        by_parameters: mean(&|row| row.after - row.expected) - by_effects.iter().map(|(_, share)| share).sum::<f64>(),
+        by_effects,
+        left: mean(&|row| row.recorded - row.after),
+        en: String::new(),
+        zh: String::new(),
+    };
+    (one.en, one.zh) = words(&one, &found.unit, moved);
+    one
+}
+
+impl BesideModel {
+    /// Is the difference worth telling?
+    #[must_use]
+    pub fn differs(&self) -> bool {
+        self.difference.abs() > TOLD_SHARE * self.expected.abs()
+    }
+
+    /// Is it mostly a parameter of the model in charge that has become another one?
+    #[must_use]
+    pub fn is_of_parameters(&self) -> bool {
+        self.differs()
+            && self.by_parameters * self.difference > 0.0
+            && self.by_parameters.abs() > 0.5 * self.difference.abs()
+    }
+}
+
+fn words(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (String, String) {
+    let (en_where, zh_where) = one.regime.words();
+    let amount = |value: f64| format!("{} {unit}", short(value));
+    if !one.differs() {
+        return (
+            format!(
+                "{en_where} the machine takes what the model in charge says ({:+} {unit})",
+                rounded(one.difference)
+            ),
+            format!("{zh_where}与当前模型一致（{:+} {unit}）", rounded(one.difference)),
+        );
+    }
+    let share = 100.0 * one.difference.abs() / one.expected.abs().max(1e-9);
+    let (en_way, zh_way) = if one.difference > 0.0 { ("more", "高") } else { ("less", "低") };
+    let mut en: Vec<String> = Vec::new();
+    let mut zh: Vec<String> = Vec::new();
+    let told = |value: f64| value.abs() > 0.05 * one.difference.abs();
+    if told(one.by_parameters) {
+        let of = |it: &MovedParameter| format!("{} {} → {} {}", it.name, short(it.before), short(it.after), it.unit);
+        let names: Vec<String> = moved.iter().take(NAMED_MAX).map(of).collect();
+        let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
+        en.push(format!(
+            "{:+} {unit} because parameters of the model are other ones now{names}",
+            rounded(one.by_parameters)
+        ));
+        zh.push(format!("模型参数变化{:+} {unit}{names}", rounded(one.by_parameters)));
+    }
+    for (kind, share) in one.by_effects.iter().filter(|(_, share)| told(*share)) {
+        en.push(format!("{:+} {unit} by {kind}", rounded(*share)));
+        zh.push(format!("{kind} {:+} {unit}", rounded(*share)));
+    }
+    if told(one.left) || en.is_empty() {
+        en.push(format!("{:+} {unit} by nothing that was found", rounded(one.left)));
+        zh.push(format!("未找到原因{:+} {unit}", rounded(one.left)));
+    }
+    (
+        format!(
+            "{en_where} the machine takes {} ({} %) {en_way} than the model in charge says: {}",
+            amount(one.difference.abs()),
+            short(share),
+            en.join(", ")
+        ),
+        format!(
+            "{zh_where}比当前模型{zh_way}{}（{} %）：{}",
+            amount(one.difference.abs()),
+            short(share),
+            zh.join("，")
+        ),
+    )
+}
+
+/// For a sum that can be checked on the page.
+fn rounded(value: f64) -> f64 {
+    let digits = if value.abs() >= 10.0 { 0 } else { 1 };
+    let scale = 10_f64.powi(digits);
+    (value * scale).round() / scale
+}

@@ -1,0 +1,104 @@
+//! Rows from the future go into a file of their own: the history begins where it should, and nothing is lost.
+
+use super::error::{Doing, HistoryError};
+use super::lock::Lock;
+use super::outbox;
+use super::pyramid::{self, MINUTE_NS};
+use super::recover::recover;
+use super::schema;
+use super::segments::RECORD_TABLES;
+use adapters::clock::TimeNs;
+use rusqlite::{Connection, params};
+use serde::Serialize;
+use std::path::Path;
+
+/// What was set apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct SetApart {
+    /// Samples.
+    pub samples: i64,
+    /// Events, states, parts and the like.
+    pub records: usize,
+}
+
+/// Summaries, and how many minutes each of their keys is long.
+const SUMMARIES: [(&str, &str, i64); 3] = [("minutes", "minute", 1), ("hours", "hour", 60), ("days", "day", 1_440)];
+
+/// Moves every sample and record that is dated after `after_ns` from the history at `path`, which nobody may be writing, into a new
+/// one at `to`. Rows of the audit stay: they are a chain. Samples that the machine brought its own time for stay, too.
+///
+/// # Errors
+/// Somebody writes the history, there is something at `to`, or a file cannot be written.
+pub fn set_apart(path: &Path, to: &Path, after_ns: TimeNs) -> Result<SetApart, HistoryError> {
+    if to.exists() {
+        return Err(HistoryError::Question(format!("{} is there already; name another file", to.display())));
+    }
+    let _lock = Lock::take(path)?;
+    let mut db = schema::open_for_writing(path)?;
+    recover(&mut db, None)?;
+    let new = schema::open_for_writing(to)?;
+    outbox::create_like(&db, &new)?;
+    drop(new);
+    db.execute("ATTACH ?1 AS apart", [to.to_string_lossy()]).doing("opening the new file")?;
+    let copying = db.transaction().doing("copying rows")?;
+    copy(&copying, after_ns)?;
+    copying.commit().doing("copying rows")?;
+    // Only what is in the new file is removed here.
+    let removing = db.transaction().doing("removing rows")?;
+    let apart = remove(&removing, after_ns, &to.display().to_string())?;
+    removing.commit().doing("removing rows")?;
+    Ok(apart)
+}
+
+/// Blocks that are dated after the first parameter by a clock of the computer.
+const BLOCKS: &str = "start_ns > ?1 AND segment NOT IN (SELECT id FROM main.segments WHERE clock = 'stepped')";
+
+fn copy(db: &Connection, after_ns: TimeNs) -> Result<(), HistoryError> {
+    let put = |sql: &str| db.execute(sql, [after_ns]).map(drop).doing("copying rows");
+    db.execute_batch(
+        "INSERT OR REPLACE INTO apart.meta SELECT * FROM main.meta WHERE key NOT LIKE 'audit%' AND key NOT LIKE 'outbox%';
+         INSERT INTO apart.series SELECT * FROM main.series; INSERT INTO apart.segments SELECT * FROM main.segments;",
+    )
+    .doing("copying rows")?;
+    put(&format!("INSERT INTO apart.blocks SELECT * FROM main.blocks WHERE {BLOCKS}"))?;
+    for (table, key, minutes) in SUMMARIES {
+        put(&format!(
+            "INSERT INTO apart.{table} SELECT * FROM main.{table} WHERE {key} * {} > ?1",
+            minutes * MINUTE_NS
+        ))?;
+    }
+    for (table, times) in RECORD_TABLES {
+        put(&format!("INSERT INTO apart.{table} SELECT * FROM main.{table} WHERE {} > ?1", times[0]))?;
+    }
+    Ok(())
+}
+
+fn remove(db: &Connection, after_ns: TimeNs, to: &str) -> Result<SetApart, HistoryError> {
+    let gone = |sql: &str| db.execute(sql, [after_ns]).doing("removing rows");
+    let (samples, last_ns): (Option<i64>, Option<TimeNs>) = db
+        .query_row(&format!("SELECT sum(rows), max(end_ns) FROM main.blocks WHERE {BLOCKS}"), [after_ns], |row| {
+            Ok((row.get(0)?, row.get(1)?))
+        })
+        .doing("counting rows")?;
+    gone(&format!("DELETE FROM main.blocks WHERE {BLOCKS}"))?;
+    gone(&format!("DELETE FROM main.tail WHERE {BLOCKS}"))?;
+    for (table, key, minutes) in SUMMARIES {
+        gone(&format!("DELETE FROM main.{table} WHERE {key} * {} > ?1", minutes * MINUTE_NS))?;
+    }
+    let minute = after_ns.div_euclid(MINUTE_NS);
+    pyramid::renew(db, pyramid::with_blocks(db, minute..minute + 1)?)?;
+    let mut records = 0;
+    for (table, times) in RECORD_TABLES {
+        records += gone(&format!("DELETE FROM main.{table} WHERE {} > ?1", times[0]))?;
+    }
+    db.execute("DELETE FROM main.state_hours WHERE hour * ?2 > ?1", params![after_ns, 60 * MINUTE_NS])
+        .doing("removing rows")?;
+    if let (Some(samples), Some(last_ns)) = (samples, last_ns) {
+        db.execute(
+            "INSERT OR REPLACE INTO dropped (kind, rows, through_ns, because) VALUES ('samples set apart', ?1, ?2, ?3)",
+            params![samples, last_ns, format!("dated after they were stored; they are in {to}")],
+        )
+        .doing("noting what was set apart")?;
+    }
+    Ok(SetApart { samples: samples.unwrap_or(0), records })
+}

@@ -1,0 +1,62 @@
+//! A panic leaves a report: what broke off, where, and in which version. Names of functions come from the symbols that the
+//! package keeps in a file of its own; without them the report holds addresses, which that file translates.
+
+use std::backtrace::Backtrace;
+use std::fs;
+use std::panic::PanicHookInfo;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// Reports that are kept; a box that breaks off at every start must not fill its disk.
+const REPORTS_MAX: usize = 20;
+/// Folder in the data directory.
+pub const FOLDER: &str = "crashes";
+
+/// From now on a panic of any thread writes a report into this data directory, besides what is printed.
+pub fn keep_crash_reports(data_dir: &Path) {
+    let folder = data_dir.join(FOLDER);
+    let before = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        before(info);
+        // There is nobody left to tell when not even this can be written.
+        let _not_written = write_report(&folder, info);
+    }));
+}
+
+fn write_report(folder: &Path, info: &PanicHookInfo<'_>) -> std::io::Result<()> {
+    fs::create_dir_all(folder)?;
+    remove_oldest(folder)?;
+    let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    let thread = std::thread::current().name().unwrap_or("without a name").to_owned();
+    let text = format!(
+        "cnc-gateway {}\nseconds since 1970: {}\nthread: {thread}\n{info}\n\n{}\n",
+        env!("CARGO_PKG_VERSION"),
+        since_1970.as_secs(),
+        Backtrace::force_capture()
+    );
+    fs::write(folder.join(format!("crash-{}.txt", since_1970.as_millis())), text)
+}
+
+fn remove_oldest(folder: &Path) -> std::io::Result<()> {
+    let mut reports: Vec<PathBuf> = fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
+    reports.sort();
+    let surplus = (reports.len() + 1).saturating_sub(REPORTS_MAX);
+    reports.iter().take(surplus).try_for_each(fs::remove_file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_oldest_reports_go() {
+        let folder = tempfile::tempdir().expect("a directory");
+        for number in 0..REPORTS_MAX + 5 {
+            fs::write(folder.path().join(format!("crash-{number:03}.txt")), "x").expect("written");
+        }
+        remove_oldest(folder.path()).expect("removed");
+        let left = fs::read_dir(folder.path()).expect("read").count();
+        assert_eq!(left, REPORTS_MAX - 1);
+        assert!(!folder.path().join("crash-000.txt").exists());
+    }
+}

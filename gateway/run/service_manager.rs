@@ -1,0 +1,188 @@
+//! What the service manager (systemd) is told: ready, alive, stopping. Without one, nothing.
+//!
+//! The sign of life stands for the box as a whole. It is given from the tick, and only while each of these has moved within
+//! [`STILL_MAX`]: the tick, at least one poll, the thread that writes the history, and the threads that answer the page. A full disk or a control
+//! that is off do not stop them: those are told, and starting again would not mend them. A thread that hangs does; then the
+//! service manager ends the process after its own limit (`WatchdogSec`) and starts it again.
+
+use crate::log::{Notice, Severity};
+use crate::update::{WELL_FOR, confirm_running_version};
+use sd_notify::NotifyState;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Longer than anything healthy lasts (a commit on a worn card takes seconds), and short enough that the box is back
+/// within a minute.
+pub const STILL_MAX: Duration = Duration::from_secs(20);
+
+/// A part of the box that must keep moving.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WatchedPart {
+    /// The thread of the tick.
+    Tick,
+    /// The threads that poll.
+    Poll,
+    /// The thread that writes the history.
+    History,
+    /// The threads that answer the page.
+    Page,
+}
+
+/// All parts, in the order of their marks.
+const PARTS: [WatchedPart; 4] = [WatchedPart::Tick, WatchedPart::Poll, WatchedPart::History, WatchedPart::Page];
+
+impl WatchedPart {
+    /// The word in messages.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Tick => "tick",
+            Self::Poll => "poll",
+            Self::History => "history",
+            Self::Page => "page",
+        }
+    }
+}
+
+/// When each part last moved. Shared between the threads; nobody waits for anybody.
+#[derive(Debug)]
+pub struct ProgressMarks {
+    began: Instant,
+    /// Milliseconds since `began`, in the order of [`PARTS`].
+    moved_ms: [AtomicU64; PARTS.len()],
+}
+
+impl ProgressMarks {
+    /// Everything moves at this moment.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { began: Instant::now(), moved_ms: [const { AtomicU64::new(0) }; PARTS.len()] }
+    }
+
+    /// This part has moved.
+    pub fn mark(&self, part: WatchedPart) {
+        let now_ms = u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX);
+        self.moved_ms[part as usize].store(now_ms, Ordering::Relaxed);
+    }
+
+    /// Parts that have stood still for longer than `limit`.
+    #[must_use]
+    pub fn still(&self, limit: Duration) -> Vec<WatchedPart> {
+        let since = |part: &WatchedPart| Duration::from_millis(self.moved_ms[*part as usize].load(Ordering::Relaxed));
+        let now = self.began.elapsed();
+        PARTS.into_iter().filter(|part| now.saturating_sub(since(part)) > limit).collect()
+    }
+}
+
+impl Default for ProgressMarks {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The way to the service manager.
+#[derive(Debug)]
+pub struct ServiceManager {
+    data_dir: PathBuf,
+    ready_since: Option<Instant>,
+    confirmed: bool,
+}
+
+impl ServiceManager {
+    /// `data_dir` is where a version on trial is confirmed.
+    #[must_use]
+    pub fn new(data_dir: PathBuf) -> Self {
+        Self { data_dir, ready_since: None, confirmed: false }
+    }
+
+    /// Called about once a second. The first time everything moves it says that the box is ready; a version that has been
+    /// well for [`WELL_FOR`] is confirmed.
+    ///
+    /// # Errors
+    /// The confirmation cannot be written; it is tried again at the next call.
+    pub fn report_progress(&mut self, marks: &ProgressMarks) -> std::io::Result<()> {
+        let still = marks.still(STILL_MAX);
+        if !still.is_empty() {
+            self.ready_since = None;
+            let words: Vec<&str> = still.iter().map(|part| part.word()).collect();
+            send(&[NotifyState::Status(&format!("stands still: {}", words.join(", ")))]);
+            return Ok(());
+        }
+        let since = *self.ready_since.get_or_insert_with(|| {
+            send(&[NotifyState::Ready, NotifyState::Status("polling")]);
+            Instant::now()
+        });
+        send(&[NotifyState::Watchdog]);
+        if !self.confirmed && since.elapsed() >= WELL_FOR {
+            confirm_running_version(&self.data_dir)?;
+            self.confirmed = true;
+        }
+        Ok(())
+    }
+}
+
+/// What the service manager hears, and what was last seen of the threads that it does not see itself.
+#[derive(Debug)]
+pub struct WatchedService {
+    manager: ServiceManager,
+    marks: Arc<ProgressMarks>,
+    /// Steps of the polling threads, and rounds of the thread that writes the history.
+    seen: (Option<u64>, Option<u64>),
+    /// The confirmation of a new version could not be written, which was told.
+    told: bool,
+}
+
+impl WatchedService {
+    /// `data_dir` is where a version on trial is confirmed.
+    #[must_use]
+    pub fn new(data_dir: PathBuf, marks: Arc<ProgressMarks>) -> Self {
+        Self { manager: ServiceManager::new(data_dir), marks, seen: (None, None), told: false }
+    }
+
+    /// Marks what has moved since the last look, and reports it. A history that is not open has no thread that could hang.
+    pub fn report(&mut self, steps: Option<u64>, rounds: Option<u64>) {
+        self.marks.mark(WatchedPart::Tick);
+        for (part, now, seen) in [(WatchedPart::Poll, steps, self.seen.0), (WatchedPart::History, rounds, self.seen.1)]
+        {
+            if now.is_none() || now != seen {
+                self.marks.mark(part);
+            }
+        }
+        self.seen = (steps, rounds);
+        let Err(error) = self.manager.report_progress(&self.marks) else { return };
+        if !std::mem::replace(&mut self.told, true) {
+            let text = format!(
+                "that this version is well cannot be written down ({error}); an update goes back to the version before"
+            );
+            Notice::new(Severity::Warning, "not_confirmed", text).say();
+        }
+    }
+}
+
+/// The box is being closed.
+pub fn report_stopping() {
+    send(&[NotifyState::Stopping]);
+}
+
+/// Without a service manager this does nothing; one that has gone away is not this program's trouble.
+fn send(states: &[NotifyState<'_>]) {
+    let _no_manager = sd_notify::notify(states);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_that_stands_still_is_named() {
+        let marks = ProgressMarks::new();
+        std::thread::sleep(Duration::from_millis(30));
+        marks.mark(WatchedPart::Tick);
+        marks.mark(WatchedPart::Poll);
+        marks.mark(WatchedPart::Page);
+        assert_eq!(marks.still(Duration::from_millis(20)), [WatchedPart::History]);
+        assert!(marks.still(Duration::from_secs(5)).is_empty());
+    }
+}

@@ -1,0 +1,68 @@
+//! The way to the machine: what may be written, and who writes it.
+
+use super::RunPlan;
+use super::actuator_worker::{ActuatorWorker, Tools};
+use super::command::Commands;
+use super::offset_commands::OffsetCommands;
+use super::open::{self, MachineSpeed, Way};
+use crate::cannot_run::CannotRun;
+use crate::config::{self, GateMode};
+use crate::control::OrderReceiver;
+use crate::gate::Gate;
+use adapters::clock::Clock;
+use adapters::{Actuator, OffsetSink};
+use std::sync::Arc;
+
+/// The ways to the feed override and to the offsets, where they may be written.
+type Ends = (Option<Box<dyn Actuator>>, Option<Box<dyn OffsetSink>>);
+
+/// The way to the machine. Unless the configuration allows arming there is no actuator in the process at all, and no sink
+/// of offsets.
+pub(super) fn commands(
+    plan: &RunPlan,
+    mut ways: Vec<Way>,
+    inbox: OrderReceiver,
+    clock: &Arc<dyn Clock>,
+    gate: &mut Gate,
+) -> Result<Commands, CannotRun> {
+    let limits: &config::GateConfig = &plan.config.gate;
+    let data_dir = &plan.config.gateway.data_dir;
+    let target = limits.source.clone().unwrap_or_default();
+    if limits.greatest_mode() != GateMode::Armed {
+        return Ok(Commands::new(ActuatorWorker::None, OffsetCommands::idle(data_dir), target, inbox));
+    }
+    let (actuator, sink) = tools(limits, &mut ways)?;
+    let (shifting, offsets) = match sink {
+        Some(sink) => {
+            OffsetCommands::resume(data_dir, sink, gate).map(|(shifting, account)| (shifting, Some(account)))?
+        }
+        None => (OffsetCommands::idle(data_dir), None),
+    };
+    let tools = Tools { actuator, offsets };
+    let actuator_worker = match plan.speed {
+        MachineSpeed::Real => ActuatorWorker::start(tools, limits, clock.clone(), open::period(&plan.config))
+            .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,
+        MachineSpeed::Times(_) | MachineSpeed::Max => ActuatorWorker::inline(tools, limits),
+    };
+    Ok(Commands::new(actuator_worker, shifting, target, inbox))
+}
+
+/// What may be written, and nothing else.
+fn tools(limits: &config::GateConfig, ways: &mut [Way]) -> Result<Ends, CannotRun> {
+    let (mut actuator, mut sink) = (None, None);
+    if limits.mode == GateMode::Armed {
+        let target = limits.source.as_deref().unwrap_or_default();
+        let way = ways.iter_mut().find(|way| way.name == target).and_then(|way| way.actuator.take());
+        let what = format!("[gate] source = {target:?} has no feed override that could be written");
+        actuator =
+            Some(way.ok_or_else(|| CannotRun::new(what, "name the controller there, or write mode = \"shadow\""))?);
+    }
+    if limits.offset.mode == GateMode::Armed {
+        let target = limits.offset.source.as_deref().unwrap_or_default();
+        let way = ways.iter_mut().find(|way| way.name == target).and_then(|way| way.offsets.take());
+        let what = format!("[gate.offset] source = {target:?} has no external offset that could be written");
+        let next = "name the controller there (fanuc:// needs allow=EXT, nclink:// and hncnet:// need offset=), or write mode = \"shadow\"";
+        sink = Some(way.ok_or_else(|| CannotRun::new(what, next))?);
+    }
+    Ok((actuator, sink))
+}

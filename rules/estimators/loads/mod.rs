@@ -1,0 +1,133 @@
+//! The load of a cut beside what it should be: a target (constant load), or what this place of the program took in the first
+//! parts (learned load); and the feed override that would bring the one to the other.
+//!
+//! What counts is what is in force at the machine. A load is compared at the feed that the axes have, and "at the least feed" means
+//! that the machine goes at the least feed, not that somebody has asked for it.
+//!
+//! | file | what |
+//! |---|---|
+//! | `in_force` | the channels, and the feed override in force |
+//! | `follower` | from a load to an override: down at once, up only from a steady load |
+//! | `limits` | the settings of a law |
+//! | `curves` | learned curves of the load over the feed, and what they are of |
+//! | `constant` | constant load |
+//! | `place`, `learned` | the load of each place of a program, learned from the first parts |
+
+mod constant;
+mod curves;
+mod follower;
+mod in_force;
+mod learned;
+mod limits;
+mod place;
+
+#[cfg(test)]
+mod tests;
+
+pub use curves::LoadCurves;
+pub use learned::PLACES_MAX;
+
+use super::estimate::{Estimates, NoEstimate};
+use super::settings::Settings;
+use adapters::Sample;
+use adapters::clock::TimeNs;
+use constant::ConstantLoad;
+use in_force::LoadChannels;
+use learned::LearnedLoad;
+use limits::LoadSettings;
+use serde::{Deserialize, Serialize};
+
+/// A number, or why there is none.
+pub type Figure = Result<f64, NoEstimate>;
+
+/// What is known of the load at one tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Loads {
+    /// Feed override in force at the machine, percent of the programmed feed.
+    pub feed_in_force_pct: Figure,
+    /// Load over the target of constant load, as it is.
+    pub load_share: Figure,
+    /// Feed override that brings the load to the target; only in a cut, and only where it is another one than 100 %.
+    pub load_override_pct: Figure,
+    /// Why constant load does not raise the feed; empty where nothing is in the way.
+    pub load_held: &'static str,
+    /// Cutting power that this place of the program took in the first parts, at the feed in force, W.
+    pub learned_power_w: Figure,
+    /// Half width of the band in which unchanged parts vary about it, W.
+    pub learned_band_w: Figure,
+    /// Greatest cutting power of the first parts at this place, W.
+    pub learned_peak_w: Figure,
+    /// Feed override that brings the power back into the learned band; only in a cut, and only where it is outside.
+    pub learned_override_pct: Figure,
+}
+
+impl Loads {
+    /// Nothing is known, for this reason.
+    #[must_use]
+    pub fn none(reason: NoEstimate) -> Self {
+        Self {
+            feed_in_force_pct: Err(reason),
+            load_share: Err(reason),
+            load_override_pct: Err(reason),
+            load_held: "",
+            learned_power_w: Err(reason),
+            learned_band_w: Err(reason),
+            learned_peak_w: Err(reason),
+            learned_override_pct: Err(reason),
+        }
+    }
+
+    /// The figure of this name, to be set.
+    pub fn figure_mut(&mut self, name: &str) -> Option<&mut Figure> {
+        match name {
+            "feed_in_force_pct" => Some(&mut self.feed_in_force_pct),
+            "load_share" => Some(&mut self.load_share),
+            "load_override_pct" => Some(&mut self.load_override_pct),
+            "learned_power_w" => Some(&mut self.learned_power_w),
+            "learned_band_w" => Some(&mut self.learned_band_w),
+            "learned_peak_w" => Some(&mut self.learned_peak_w),
+            "learned_override_pct" => Some(&mut self.learned_override_pct),
+            _ => None,
+        }
+    }
+}
+
+/// Follows the load. What it has learned of the places outlives the process; everything else begins anew with the next cut.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LoadEstimator {
+    learned: LearnedLoad,
+    #[serde(skip)]
+    constant: ConstantLoad,
+    #[serde(skip)]
+    channels: LoadChannels,
+    #[serde(skip)]
+    in_force: Option<LoadSettings>,
+    #[serde(skip)]
+    last_ns: Option<TimeNs>,
+}
+
+impl LoadEstimator {
+    /// Other settings are in force.
+    pub fn reconfigure(&mut self) {
+        self.in_force = None;
+    }
+
+    /// Everything that was learned of this program is learned anew.
+    pub fn learn_anew(&mut self, program: &str) {
+        self.learned.forget(program);
+    }
+
+    /// Takes one tick: after state and cutting power are known, fills in what is known of the load.
+    pub fn step(&mut self, sample: &Sample, estimates: &mut Estimates, settings: &Settings) {
+        let moment = self.channels.moment(sample, estimates, self.last_ns.replace(sample.at_ns));
+        let known = self.in_force.take().filter(|known| known.holds(sample, &self.channels));
+        let limits = known.unwrap_or_else(|| LoadSettings::of(settings, sample, &self.channels));
+        let mut loads = Loads::none(NoEstimate::NotCutting);
+        loads.feed_in_force_pct = moment.in_force_pct.ok_or(NoEstimate::FeedUnknown);
+        self.constant.step(&moment, &limits.constant, &mut loads);
+        self.learned.step(&moment, sample, &self.channels, &limits.learned, &mut loads);
+        self.in_force = Some(limits);
+        estimates.loads = loads;
+    }
+}

@@ -1,0 +1,182 @@
+//! What a package adds to the program: the guard before every start, the service manager, an update with its signature and its way back.
+//!
+//! The update under `tests/data/update` was signed with minisign itself; its program is a script that answers as version 9.9.9.
+
+use super::process::{Gateway, get, program, run, stderr, stdout, text, wait_for};
+use std::fs;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+const GUARD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/gateway/package/guard");
+const UPDATES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/update");
+
+/// A folder of versions as the package lays it out, with one version that runs.
+fn versions(place: &Path) -> PathBuf {
+    let home = place.join("home");
+    write_program(&home.join("versions/package/cnc-gateway"), "exit 0");
+    symlink("versions/package", home.join("current")).expect("a link");
+    home
+}
+
+fn write_program(path: &Path, body: &str) {
+    fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+    fs::write(path, format!("#!/bin/sh\n{body}\n")).expect("written");
+    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("executable");
+}
+
+fn current(home: &Path) -> String {
+    fs::read_link(home.join("current")).expect("a link").to_string_lossy().into_owned()
+}
+
+/// What the service manager does before every start.
+fn start_guard(home: &Path, state: &Path) {
+    let status = Command::new("sh").arg(GUARD).arg(home).arg(state).status().expect("sh");
+    assert!(status.success());
+}
+
+#[test]
+fn a_version_that_nobody_confirms_is_taken_back_at_the_fourth_start() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let (home, state) = (versions(directory.path()), directory.path().join("state"));
+    fs::create_dir_all(&state).expect("a folder");
+    write_program(&home.join("versions/9.9.9/cnc-gateway"), "exit 1");
+    let begin = || {
+        fs::write(home.join("trial"), "package 9.9.9 0\n").expect("written");
+        fs::remove_file(home.join("current")).expect("removed");
+        symlink("versions/9.9.9", home.join("current")).expect("a link");
+    };
+    begin();
+    for _ in 0..3 {
+        start_guard(&home, &state);
+        assert_eq!(current(&home), "versions/9.9.9");
+    }
+    start_guard(&home, &state);
+    assert_eq!(current(&home), "versions/package");
+    assert!(!home.join("trial").exists());
+    assert!(fs::read_to_string(home.join("rolled-back")).expect("told").contains("9.9.9"));
+
+    begin();
+    fs::write(state.join("confirmed"), "9.9.9").expect("written");
+    (0..5).for_each(|_| start_guard(&home, &state));
+    assert_eq!(current(&home), "versions/9.9.9", "a version that is well stays");
+
+    // The power failed while the trial was written: half a line, another name, a name that leads elsewhere.
+    for half in ["", "package", "package 9.9", "package ../../tmp 0\n", "nothing 9.9.9 0\n"] {
+        fs::write(home.join("trial"), half).expect("written");
+        start_guard(&home, &state);
+        assert_eq!(current(&home), "versions/9.9.9", "{half:?}");
+    }
+}
+
+/// `cnc-gateway update` with a `systemctl` that does what the body says when the service is started anew.
+fn update(place: &Path, systemctl: &str, arguments: &[&str]) -> Output {
+    write_program(&place.join("bin/systemctl"), systemctl);
+    let path = format!("{}:{}", place.join("bin").display(), std::env::var("PATH").unwrap_or_default());
+    let mut command = program();
+    command.env("PATH", path).arg("update").args(arguments);
+    command.args(["--home", text(&place.join("home")), "--data-dir", text(&place.join("data"))]);
+    command.output().expect("started")
+}
+
+#[test]
+fn an_update_is_verified_tried_and_kept() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let place = directory.path();
+    let home = versions(place);
+    fs::create_dir_all(place.join("data")).expect("a folder");
+    let key = format!("{UPDATES}/minisign.pub");
+    let copy = place.join("cnc-gateway-9.9.9.tar.gz");
+    let signature = place.join("cnc-gateway-9.9.9.tar.gz.minisig");
+    fs::copy(format!("{UPDATES}/cnc-gateway-9.9.9.tar.gz"), &copy).expect("copied");
+
+    let refused = |output: &Output, part: &str| {
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(output));
+        assert!(stderr(output).contains(part), "{}", stderr(output));
+        assert_eq!(current(&home), "versions/package");
+        assert!(!home.join("trial").exists());
+    };
+    refused(&update(place, "exit 0", &[text(&copy)]), "signature");
+    refused(&update(place, "exit 0", &[text(&copy), "--verify", &key]), "signature");
+    fs::copy(format!("{UPDATES}/cnc-gateway-9.9.9.tar.gz.minisig"), &signature).expect("copied");
+    let other_key = "RWQf6LRCGA9i53mlYecO4IzT51TGPpvWucNSCh1CBM0QTaLn73Y7GFO3";
+    refused(&update(place, "exit 0", &[text(&copy), "--verify", other_key]), "signature");
+    let good = fs::read(&copy).expect("read");
+    let mut altered = good.clone();
+    altered[good.len() / 2] ^= 1;
+    fs::write(&copy, altered).expect("written");
+    refused(&update(place, "exit 0", &[text(&copy), "--verify", &key]), "signature");
+    fs::write(&copy, good).expect("written");
+    refused(&update(place, "exit 1", &[text(&copy), "--verify", &key]), "");
+
+    let confirm = format!("printf 9.9.9 > {}", place.join("data/confirmed").display());
+    let output = update(place, &confirm, &[text(&copy), "--verify", &key]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(current(&home), "versions/9.9.9");
+    assert!(stdout(&output).contains("not armed"), "{}", stdout(&output));
+    let told = update(place, "exit 0", &[]);
+    assert!(stdout(&told).contains("runs: 9.9.9"), "{}", stdout(&told));
+}
+
+#[test]
+fn a_box_is_set_up_with_one_command() {
+    let mut control = program();
+    control.args(["serve", "fanuc", "--machine", "lathe", "--listen", "127.0.0.1:0"]);
+    let mut control = Gateway::spawn(control);
+    let line = control.wait_said("fanuc://");
+    let control_address = line.split_whitespace().next().expect("an address");
+    let directory = tempfile::tempdir().expect("a directory");
+    let (config, data) = (directory.path().join("box.toml"), directory.path().join("data"));
+    let command = ["setup", "--yes", "--name", "CK6136", "--admin", "Li Wei", "--control", control_address];
+    let files = ["--out", text(&config), "--data-dir", text(&data)];
+    let output = run(&[&command[..], &files[..]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let said = stdout(&output);
+    assert!(said.contains("answers") && said.contains("token, shown only now, of Li Wei"), "{said}");
+    let checked = run(&["check", "--config", text(&config)]);
+    assert_eq!(checked.status.code(), Some(0), "{}", stdout(&checked));
+    let mut gateway = Gateway::start(&data, &["--config", text(&config)]);
+    let address = gateway.address();
+    wait_for("a value of the control", Duration::from_secs(30), || {
+        let status = get(&address, "/api/v1/status").json();
+        let channels = status["channels"].as_array()?.clone();
+        channels.iter().any(|row| row["name"] == "program" && row["value"].is_string()).then_some(())
+    });
+    gateway.stop();
+}
+
+#[test]
+fn the_service_manager_hears_of_the_start_of_life_and_of_the_end() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let socket_path = directory.path().join("notify");
+    let socket = UnixDatagram::bind(&socket_path).expect("a socket");
+    socket.set_read_timeout(Some(Duration::from_millis(200))).expect("a limit");
+    let mut command = program();
+    command.args(["run", "--data-dir", text(&directory.path().join("data")), "--listen", "127.0.0.1:0"]);
+    command.env("NOTIFY_SOCKET", &socket_path);
+    let began = Instant::now();
+    let mut gateway = Gateway::spawn(command);
+    let hear = |word: &str| {
+        wait_for(word, Duration::from_secs(30), || {
+            let mut bytes = [0; 4096];
+            let length = socket.recv(&mut bytes).ok()?;
+            String::from_utf8_lossy(&bytes[..length]).lines().any(|line| line.starts_with(word)).then_some(())
+        });
+    };
+    hear("READY=1");
+    println!("ready after {:.2} s", began.elapsed().as_secs_f64());
+    (0..3).for_each(|_| hear("WATCHDOG=1"));
+    // Stopped as a whole it gives no sign of life, and goes on when it may.
+    gateway.signal("STOP");
+    std::thread::sleep(Duration::from_secs(1));
+    let mut bytes = [0; 4096];
+    while socket.recv(&mut bytes).is_ok() {}
+    assert!(socket.recv(&mut bytes).is_err(), "a sign of life of a process that stands still");
+    gateway.signal("CONT");
+    hear("WATCHDOG=1");
+    gateway.signal("TERM");
+    hear("STOPPING=1");
+    assert!(gateway.wait().success());
+}
