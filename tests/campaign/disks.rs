@@ -138,7 +138,6 @@ pub(crate) fn endless_reader(_: &Scale) -> Row {
     wait_for("a short log", Duration::from_secs(120), || (log() < 9_000_000).then_some(()));
     row.recovered(began.elapsed());
     row.n = 1;
-    row.lost = Some(0);
     row.note = format!(
         "told at {:.1} MB after {:.0} s; afterwards {:.1} MB",
         longest as f64 / 1e6,
