@@ -130,7 +130,10 @@ fn refuse_widened(before: &Config, path: &Path, after: &Config) -> Result<(), Ap
     match widened.is_empty() {
         true => Ok(()),
         false => {
-            let hint = format!("what may write to the machine is changed at the box: edit {} there", path.display());
+            let hint = format!(
+                "what may write to the machine, and which files are loaded or sent, is changed at the box: edit {} there",
+                path.display()
+            );
             Err(ApiProblem::request(widened.join("; "), hint))
         }
     }
