@@ -22,6 +22,29 @@ pub fn mark(path: &Path) -> Mark {
     (path.to_owned(), metadata.map(|metadata| (metadata.modified().ok(), metadata.len())))
 }
 
+/// Files of a directory whose names are `ours`, in the order of their names.
+///
+/// # Errors
+/// The directory cannot be read.
+pub fn list_named(directory: &Path, ours: impl Fn(&str) -> bool) -> std::io::Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(directory)?.flatten();
+    let mut found: Vec<PathBuf> =
+        entries.filter(|entry| ours(&entry.file_name().to_string_lossy())).map(|entry| entry.path()).collect();
+    found.sort();
+    Ok(found)
+}
+
+/// Removes all of them but the last `keep`. One that cannot be removed keeps no other.
+///
+/// # Errors
+/// The directory cannot be read, or the first file that could not be removed.
+pub fn keep_last(directory: &Path, keep: usize, ours: impl Fn(&str) -> bool) -> std::io::Result<()> {
+    let all = list_named(directory, ours)?;
+    let surplus = all.len().saturating_sub(keep);
+    let removed: Vec<std::io::Result<()>> = all[..surplus].iter().map(std::fs::remove_file).collect();
+    removed.into_iter().collect()
+}
+
 /// Tells when marks that change have come to rest.
 #[derive(Debug)]
 pub struct Rest<M> {

@@ -210,13 +210,6 @@ impl Unit {
         (self.dimension == other.dimension)
             .then(|| (self.factor / other.factor, (self.offset - other.offset) / other.factor))
     }
-
-    /// The symbol of this unit: its first spelling.
-    #[must_use]
-    pub fn symbol(self) -> &'static str {
-        let known = EXACT.iter().chain(SPELLINGS);
-        known.clone().find(|(_, unit)| *unit == self).map_or("", |(spellings, _)| spellings[0])
-    }
 }
 
 /// Every unit of a dimension with its symbol, the base first.

@@ -162,7 +162,7 @@ impl PositionUnit {
 pub struct Alarm {
     /// Number within its type.
     pub number: i32,
-    /// Type; what it means depends on the generation: see [`states`](super::states).
+    /// Type; what it means depends on the generation: see [`alarms`](super::alarms).
     pub kind: i32,
     /// Axis from 1; 0 none.
     pub axis: i32,

@@ -23,8 +23,9 @@ pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Focas>, FocasError> + Send>
 const STARTING_NS: i64 = 180 * crate::clock::SECOND_NS;
 
 /// The control may be owed this much rest before anybody waits: what one answer that takes long costs is paid by the pauses
-/// after it, and does not delay the next poll by as much again.
-const OWED_NS: i64 = crate::clock::SECOND_NS;
+/// after it, and does not delay the next poll by as much again. As much as one answer costs that comes just within a usual deadline, 3 s
+/// at a duty of 50 %: with less, a single long answer made two polls late, which looks like a control that has become slow.
+const OWED_NS: i64 = 3 * crate::clock::SECOND_NS;
 
 /// Next step where something listens and has never opened a session: perhaps it is no controller.
 const NEVER_OPENED: &str = "Something listens there and opens no session: is it the FOCAS2 port (8193 unless changed), and \

@@ -38,7 +38,7 @@ struct PollGroup {
 impl PollGroup {
     /// An answer that takes much longer is believed when the next one does too: one hiccup changes no period. A much shorter
     /// one is believed at once: a control that has recovered is read as was wanted from its first quick answer on. What a
-    /// wrong belief costs is bounded by the line, which keeps the duty over a second.
+    /// wrong belief costs is bounded by the line, which keeps the duty over some seconds.
     fn took(&mut self, busy_s: f64) {
         let known_s = self.busy_s.unwrap_or(busy_s);
         let before_s = self.longer_s.take();

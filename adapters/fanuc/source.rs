@@ -156,7 +156,7 @@ impl Source for FanucSource {
         }
         let alarms = self.alarms(clock, &asked)?;
         self.pace.took(busy(&asked) + alarms.as_ref().map_or(Duration::ZERO, busy));
-        self.warning = readings::warning(&asked, self.line.path());
+        self.warning = readings::warning(&asked, asked.path);
         for (manner, columns) in &self.paths {
             readings::fast(columns, &asked, alarms.as_ref(), *manner, out);
         }

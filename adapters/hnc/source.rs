@@ -164,8 +164,12 @@ impl HncSource {
         for (_, number) in &self.layout.axes {
             items.extend(AXIS.map(|(_, kind, width)| HncItem::Axis(kind, *number, width)));
         }
-        let own: Vec<HncItem> = self.own.iter().map(|own| own.item.item).filter(|item| !items.contains(item)).collect();
-        items.extend(own);
+        // Two bits of one register ask for it once.
+        for item in self.own.iter().map(|own| own.item.item) {
+            if !items.contains(&item) {
+                items.push(item);
+            }
+        }
         items
     }
 

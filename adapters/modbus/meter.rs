@@ -108,11 +108,14 @@ impl ModbusMeter {
 
     fn own_reading(&self, own: &Own<OwnRegister>, places: &Range<usize>) -> Reading {
         let registers = self.registers.get(places.clone()).unwrap_or_default();
-        let parts: Vec<(&MeterRegister, Result<&[u16], Absence>)> = registers
-            .iter()
-            .map(|register| (register, self.poll.registers(register).map(|(found, _)| found).map_err(|(why, _)| why)))
-            .collect();
-        own.reading(self.poll.all().1, own.found(&parts))
+        let mut stamp = self.poll.all().1;
+        let mut parts: Vec<(&MeterRegister, Result<&[u16], Absence>)> = Vec::with_capacity(registers.len());
+        for register in registers {
+            let found = self.poll.registers(register);
+            stamp = found.as_ref().map_or_else(|(_, at)| *at, |(_, at)| *at);
+            parts.push((register, found.map(|(found, _)| found).map_err(|(why, _)| why)));
+        }
+        own.reading(stamp, own.found(&parts))
     }
 
     /// Tries a profile on this meter: what it would give, or why it does not fit.

@@ -70,21 +70,16 @@ impl PollBlocks {
     pub(super) fn split(&mut self, at: usize) {
         let Some(block) = self.blocks.get(at).copied() else { return };
         let (from, to) = (u32::from(block.start), u32::from(block.start) + u32::from(block.count));
-        let inside: Vec<NumberSpan> = self
-            .spans
-            .iter()
-            .filter(|span| span.table == block.table && span.from >= from && span.to <= to)
-            .copied()
-            .collect();
-        let without_gaps = join_spans(&inside, block.count, 0);
-        let parts = match (without_gaps.len(), inside.len()) {
-            (_, 0 | 1) => Vec::new(),
-            (1, count) => {
-                let (first, second) = inside.split_at(count / 2);
-                [join_spans(first, block.count, 0), join_spans(second, block.count, 0)].concat()
-            }
-            _ => without_gaps,
-        };
+        // A number that takes the whole block is refused with it; others may share registers with it.
+        let whole = NumberSpan { table: block.table, from, to };
+        let is_part =
+            |span: &&NumberSpan| span.table == block.table && span.from >= from && span.to <= to && **span != whole;
+        let inside: Vec<NumberSpan> = self.spans.iter().filter(is_part).copied().collect();
+        let join = |spans: &[NumberSpan]| join_spans(spans, block.count, 0);
+        let (first, second) = inside.split_at(inside.len() / 2);
+        let ways = [join(&inside), [join(first), join(second)].concat(), inside.chunks(1).flat_map(join).collect()];
+        // Every part is smaller than the block, so that splitting ends.
+        let parts = ways.into_iter().find(|parts| !parts.contains(&block)).unwrap_or_default();
         self.blocks.splice(at..=at, parts);
     }
 
@@ -169,6 +164,22 @@ mod tests {
         assert_eq!(blocks(&plan), [(0, 8), (8, 10)], "a single number is not there");
         while !plan.blocks.is_empty() {
             plan.split(0);
+        }
+    }
+
+    #[test]
+    fn numbers_that_share_registers_are_split_until_nothing_is_left() {
+        let span = |from, to| NumberSpan { table: RegisterTable::Holding, from, to };
+        for spans in [
+            vec![span(100, 101), span(100, 102)],
+            vec![span(100, 102), span(101, 102)],
+            vec![span(100, 102), span(101, 103), span(102, 104)],
+        ] {
+            let mut plan = PollBlocks { blocks: join_spans(&spans, 125, 0), spans };
+            for _ in 0..20 {
+                plan.split(0);
+            }
+            assert!(plan.blocks.is_empty(), "{plan:?}");
         }
     }
 

@@ -24,6 +24,9 @@ const STRAY_MAX: u64 = 4;
 /// A request has at least so long to leave, however late the connection was made.
 const WRITE_LEAST: Duration = Duration::from_millis(10);
 
+/// Behind the last byte of a late answer, as carried by a network.
+const SILENCE: Duration = Duration::from_millis(20);
+
 /// How a frame looks on a TCP connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TcpFraming {
@@ -42,6 +45,8 @@ struct TcpPort {
     stream: Option<TcpStream>,
     transaction: u16,
     stray: u64,
+    /// Until then the answer to a request that was given up may still come.
+    quiet_until: Option<Instant>,
 }
 
 /// A connection that several sources share.
@@ -59,7 +64,7 @@ fn open_shared_port(at: &Endpoint, framing: TcpFraming) -> Result<SharedPort, St
     ports.retain(|_, port| port.strong_count() > 0);
     let key = (at.host.clone(), at.port);
     let Some(port) = ports.get(&key).and_then(Weak::upgrade) else {
-        let new = TcpPort { at: at.clone(), framing, stream: None, transaction: 0, stray: 0 };
+        let new = TcpPort { at: at.clone(), framing, stream: None, transaction: 0, stray: 0, quiet_until: None };
         let port = Arc::new(Mutex::new(new));
         ports.insert(key, Arc::downgrade(&port));
         return Ok(port);
@@ -99,6 +104,19 @@ impl TcpPort {
         .map_err(|attempt| match attempt {
             Attempt::ClosedIdle(error) | Attempt::Failed(error) => error,
         })
+    }
+
+    /// RTU frames have no number that tells the late answer to one request from that to the next. As on a serial line, it is waited
+    /// for and thrown away.
+    fn settle(&mut self, deadline: Duration) {
+        let Some(quiet_until) = self.quiet_until.take().filter(|until| *until > Instant::now()) else { return };
+        let Ok(mut stream) = connect(&self.at, Instant::now() + deadline) else { return };
+        let (mut late, mut until) = (Vec::new(), quiet_until);
+        while late.len() < rtu::BYTES_MAX && stream::some(&mut stream, &mut late, until).is_ok() {
+            until = Instant::now() + SILENCE;
+        }
+        self.stray += u64::from(!late.is_empty());
+        self.stream = Some(stream);
     }
 
     fn attempt(&mut self, clock: &dyn Clock, asked: TcpRequest<'_>) -> Result<ModbusResponse, Attempt> {
@@ -173,7 +191,9 @@ fn in_rtu(stream: &mut TcpStream, asked: TcpRequest<'_>) -> Result<Vec<u8>, Atte
         match stream::some(stream, &mut bytes, asked.until) {
             Ok(()) => {}
             Err(Short::Silent) if !bytes.is_empty() => break,
-            Err(Short::Closed) if bytes.is_empty() => return Err(Attempt::ClosedIdle(short(Short::Closed))),
+            Err(why @ (Short::Closed | Short::Broken(_))) if bytes.is_empty() => {
+                return Err(Attempt::ClosedIdle(short(why)));
+            }
             Err(other) => return Err(Attempt::Failed(short(other))),
         }
         if let Some(found) = wanted.find(&bytes) {
@@ -200,9 +220,14 @@ impl ModbusLine for TcpLine {
         answer_bytes: usize,
     ) -> Result<ModbusResponse, ModbusError> {
         let mut port = self.port.lock().unwrap_or_else(PoisonError::into_inner);
+        port.settle(self.deadline);
         // Others may have been served before; the deadline is for this request alone.
         let until = Instant::now() + self.deadline;
         let answer = port.exchange(clock, TcpRequest { unit, request, answer_bytes, until });
+        let is_out = matches!(answer, Err(ModbusError::Timeout { .. } | ModbusError::Garbled(_)));
+        if port.framing == TcpFraming::Rtu && is_out {
+            port.quiet_until = Some(Instant::now() + 2 * self.deadline);
+        }
         self.stray = port.stray;
         answer
     }
@@ -297,6 +322,37 @@ fn short(why: Short) -> ModbusError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The frame that a unit answers to `[3, 0, 0, 0, 1]`.
+    fn register(value: u8) -> Vec<u8> {
+        rtu::frame(1, &[3, 2, 0, value])
+    }
+
+    #[test]
+    fn a_late_answer_is_not_taken_for_that_to_the_next_request() {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+        let port = listener.local_addr().expect("bound").port();
+        let serving = std::thread::spawn(move || {
+            let mut request = [0; 8];
+            let (mut first, _) = listener.accept().expect("connects");
+            std::io::Read::read_exact(&mut first, &mut request).expect("asks");
+            // Silent until it is given up; the serial side answers all the same, onto the new connection.
+            let (mut second, _) = listener.accept().expect("connects again");
+            std::thread::sleep(Duration::from_millis(50));
+            second.write_all(&register(1)).expect("late");
+            std::io::Read::read_exact(&mut second, &mut request).expect("asks");
+            second.write_all(&register(2)).expect("answers");
+            std::thread::sleep(Duration::from_millis(300));
+        });
+        let at = Endpoint { host: "127.0.0.1".to_owned(), port };
+        let mut line = TcpLine::new(&at, TcpFraming::Rtu, Duration::from_millis(150)).expect("a line");
+        let clock = crate::clock::SystemClock::new();
+        let mut ask = || line.ask(&clock, 1, &[3, 0, 0, 0, 1], 4).map(|response| response.pdu);
+        assert!(matches!(ask(), Err(ModbusError::Timeout { .. })));
+        assert_eq!(ask().expect("an answer"), [3, 2, 0, 2]);
+        drop(line);
+        serving.join().expect("no panic");
+    }
 
     #[test]
     fn the_header_of_the_guide() {

@@ -4,7 +4,7 @@ use super::list::{Fate, of_name};
 use super::restored;
 use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, is_of_scripts, named, names};
 use crate::archive::ArchivedFile;
-use crate::files::{replace, replace_durably};
+use crate::files::{keep_last, replace, replace_durably};
 use crate::history::{Reader, store_wear_model};
 use crate::reload::read_directory;
 use crate::settings;
@@ -189,10 +189,7 @@ fn keep_before(data_dir: &Path, (archive, name): (&[u8], &str)) -> Result<(), St
     let say = |error: std::io::Error| format!("what is there now could not be kept: {error}");
     std::fs::create_dir_all(data_dir).map_err(say)?;
     std::fs::write(data_dir.join(name), archive).map_err(say)?;
-    let mut kept = names(data_dir);
-    kept.retain(|it| it.contains("-before-restore-") && it.ends_with(".tar.gz"));
-    let surplus = kept.len().saturating_sub(BEFORE_MAX);
-    kept[..surplus].iter().try_for_each(|name| std::fs::remove_file(data_dir.join(name))).map_err(say)
+    keep_last(data_dir, BEFORE_MAX, |name| name.contains("-before-restore-") && name.ends_with(".tar.gz")).map_err(say)
 }
 
 /// The scripts of the backup and no others: one that is not in it would still decide.

@@ -4,6 +4,7 @@
 use super::{BackupPaths, RestoreRequest, archive_name, collect, copy_history, restore};
 use crate::archive::{pack, unpack};
 use crate::config::BackupConfig;
+use crate::files::{keep_last, list_named};
 use crate::log::{Notice, Severity};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,17 +62,31 @@ pub fn take_backup(paths: &BackupPaths, config: &BackupConfig, at_s: u64) -> Res
     let archive = pack(&files, at_s).map_err(file(directory))?;
     let path = directory.join(archive_name("backup", at_s));
     let writing = path.with_extension("writing");
-    fs::write(&writing, &archive).map_err(file(&writing))?;
-    fs::File::open(&writing).and_then(|file| file.sync_all()).map_err(file(&writing))?;
-    verify_backup(paths, &writing, at_s)?;
-    fs::rename(&writing, &path).map_err(file(&path))?;
-    if config.history {
-        let copy = directory.join(archive_name("history", at_s)).with_extension("").with_extension("db");
-        copy_history(&paths.history, &copy).map_err(|error| BackupError::History(error.to_string()))?;
+    let written = fs::write(&writing, &archive)
+        .and_then(|()| fs::File::open(&writing)?.sync_all())
+        .map_err(file(&writing))
+        .and_then(|()| verify_backup(paths, &writing, at_s))
+        .and_then(|()| copy_history_beside(paths, config, at_s));
+    if let Err(error) = written {
+        // A failure every quarter of an hour must not fill the stick.
+        let _half = fs::remove_file(&writing);
+        return Err(error);
     }
-    remove_oldest(directory, ARCHIVE, config.keep);
-    remove_oldest(directory, HISTORY, config.keep);
+    fs::rename(&writing, &path).map_err(file(&path))?;
+    for kind in [ARCHIVE, HISTORY] {
+        // One that cannot be removed costs space only; the next backup tries again.
+        let _left = keep_last(directory, config.keep, |name| is_of_kind(kind, name));
+    }
     Ok(path)
+}
+
+/// Where the configuration wants it, the history too.
+fn copy_history_beside(paths: &BackupPaths, config: &BackupConfig, at_s: u64) -> Result<(), BackupError> {
+    if !config.history {
+        return Ok(());
+    }
+    let copy = config.directory.join(archive_name("history", at_s)).with_extension("").with_extension("db");
+    copy_history(&paths.history, &copy).map(drop).map_err(|error| BackupError::History(error.to_string()))
 }
 
 /// Reads the archive back from where it was written and restores it into a scratch folder.
@@ -101,29 +116,15 @@ fn verify_backup(paths: &BackupPaths, archive: &Path, at_s: u64) -> Result<(), B
     outcome
 }
 
-/// Archives of this kind in a directory, the oldest first: their names hold the time.
-fn list_archives(directory: &Path, (begin, end): (&str, &str)) -> Vec<PathBuf> {
-    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
-    let fits = |name: &str| name.starts_with(begin) && name.ends_with(end);
-    let mut found: Vec<PathBuf> =
-        entries.filter(|entry| fits(&entry.file_name().to_string_lossy())).map(|entry| entry.path()).collect();
-    found.sort();
-    found
-}
-
-fn remove_oldest(directory: &Path, kind: (&str, &str), keep: usize) {
-    let all = list_archives(directory, kind);
-    let surplus = all.len().saturating_sub(keep);
-    for path in &all[..surplus] {
-        // One that cannot be removed costs space only; the next backup tries again.
-        let _left = fs::remove_file(path);
-    }
+/// Is this the name of an archive of this kind? Their names hold the time, so that they sort by it.
+fn is_of_kind((begin, end): (&str, &str), name: &str) -> bool {
+    name.starts_with(begin) && name.ends_with(end)
 }
 
 /// Time since the newest archive was written; `None` where there is none, or where its time lies in the future: then the clock was
 /// wrong when it was written, or is wrong now.
 fn newest_age(directory: &Path) -> Option<Duration> {
-    let newest = list_archives(directory, ARCHIVE).pop()?;
+    let newest = list_named(directory, |name| is_of_kind(ARCHIVE, name)).ok()?.pop()?;
     let written = fs::metadata(newest).and_then(|file| file.modified()).ok()?;
     written.elapsed().ok()
 }
@@ -198,8 +199,9 @@ mod tests {
             fs::write(directory.path().join(name), "x").expect("written");
         }
         fs::write(directory.path().join("something else"), "x").expect("written");
-        remove_oldest(directory.path(), ARCHIVE, 2);
-        let left = list_archives(directory.path(), ARCHIVE);
+        let ours = |name: &str| is_of_kind(ARCHIVE, name);
+        keep_last(directory.path(), 2, ours).expect("removed");
+        let left = list_named(directory.path(), ours).expect("read");
         let hours: Vec<bool> = left.iter().map(|path| path.to_string_lossy().contains("T1")).collect();
         assert_eq!((left.len(), hours), (2, vec![true, true]));
         assert!(left[1].to_string_lossy().contains("T14") && directory.path().join("something else").exists());

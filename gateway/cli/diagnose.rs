@@ -3,7 +3,7 @@
 use super::lang::{language, pick, say};
 use super::{CannotRun, CommandOutcome, CommandResult};
 use crate::diagnosis::context::DiagnosisContext;
-use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach, series_model};
+use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach, recorded_output, series_model};
 use crate::diagnosis::{
     DiagnosisOutputs, InputRecordings, finish, read_hypotheses, read_model, read_recordings_as, stretch,
 };
@@ -115,7 +115,8 @@ fn with_series(
             .ok_or_else(|| CannotRun::new("no model", "give --model or --simulated"));
     };
     let series = SimulatedSeries::of(text, arguments.align);
-    let output = model.as_ref().map(|model| model.output.clone()).or_else(|| output_of(&given.recording, &series));
+    let output =
+        model.as_ref().map(|model| model.output.clone()).or_else(|| recorded_output(&given.recording, &series));
     let Some(output) = output else {
         let en = "which recorded quantity does the series simulate? Give --model with an output, or record spindle_power_w, axis_current_a or such";
         return Err(CannotRun::new(
@@ -131,23 +132,6 @@ fn with_series(
         None => series_model(&output).map_err(|wrong| cannot_use(&wrong))?,
     };
     Ok((model, given))
-}
-
-/// The recorded quantity of the same name as the series, else the first that is measured of a machine's drives.
-fn output_of(recording: &adapters::Recording, series: &SimulatedSeries) -> Option<String> {
-    let has = |name: &str| recording.numbers(name).is_some_and(|numbers| numbers.count_present() > 0);
-    let own = series.column.as_deref().filter(|name| has(name)).map(str::to_owned);
-    let usual = [
-        "spindle_power_w",
-        "axis_current_a",
-        "cutting_force_n",
-        "total_power_w",
-        "spindle_current_a",
-        "thermal_error_um",
-        "torque_nm",
-        "force_n",
-    ];
-    own.or_else(|| usual.into_iter().find(|name| has(name)).map(str::to_owned))
 }
 
 pub(super) fn cannot_use(problems: &[String]) -> CannotRun {

@@ -2,6 +2,7 @@
 
 use super::diagnose::cannot_use_as;
 use super::lang::{language, pick, say};
+use super::recording::line;
 use super::{CannotRun, CommandOutcome, CommandResult, print};
 use crate::diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
 use crate::diagnosis::{put, read_model, read_recordings_as, simulation, unit_check};
@@ -10,7 +11,7 @@ use rules::physics::explain::Language;
 use rules::twin::diagnosis::unit_of;
 use rules::twin::text::short;
 use rules::twin::{self};
-use std::io::{BufRead, IsTerminal};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `model`.
@@ -118,12 +119,6 @@ fn ask_material() -> Option<String> {
     let list = names.join(", ");
     print(pick(&format!("material ({list}; Enter: C45)?\n"), &format!("工件材料（{list}；回车：C45）？\n")));
     line().filter(|text| !text.is_empty())
-}
-
-fn line() -> Option<String> {
-    let mut text = String::new();
-    std::io::stdin().lock().read_line(&mut text).ok().filter(|length| *length > 0)?;
-    Some(text.trim().to_owned())
 }
 
 fn check(path: &Path, recordings: &[String], map: Option<&PathBuf>) -> CommandResult {

@@ -86,6 +86,11 @@ fn tell(found: &Preview, path: &Path) -> Result<(), CannotRun> {
 }
 
 fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
+    let beside = Mapping::beside(&file.file);
+    let out = out.unwrap_or(&beside);
+    if out.is_file() {
+        return keep_map(file, out);
+    }
     let (found, _) = look(file)?;
     let mut proposal = MapProposal::of(&found);
     let asks = !yes && std::io::stdin().is_terminal();
@@ -96,8 +101,6 @@ fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
     let name = file.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let text = proposal.toml(&statement, &name);
     Mapping::parse(&text, "map").map_err(|wrong| CannotRun::new(wrong.to_string(), ""))?;
-    let beside = Mapping::beside(&file.file);
-    let out = out.unwrap_or(&beside);
     put(out, &text).map_err(|problem| CannotRun::new(problem, ""))?;
     if out.as_os_str() == "-" {
         return Ok(CommandOutcome::Fine);
@@ -111,6 +114,17 @@ fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
     let (after, _) = look(&RecordingFile { file: file.file.clone(), map: Some(out.to_owned()) })?;
     tell(&after, &file.file)?;
     print(pick(&format!("written: {path}\n"), &format!("已写入：{path}\n")));
+    Ok(CommandOutcome::Fine)
+}
+
+/// A map that is there already may hold what a person has written: a unit, a factor, a zone. It stays, and is shown.
+fn keep_map(file: &RecordingFile, map: &Path) -> CommandResult {
+    show(&RecordingFile { file: file.file.clone(), map: Some(map.to_owned()) })?;
+    let path = map.display();
+    print(pick(
+        &format!("kept: {path}; edit it, remove it first, or name another with --out\n"),
+        &format!("保留：{path}；请编辑它、先删除它，或用--out指定其他文件\n"),
+    ));
     Ok(CommandOutcome::Fine)
 }
 
@@ -169,7 +183,8 @@ fn choice(options: &[String]) -> Option<usize> {
     line()?.parse::<usize>().ok()?.checked_sub(1).filter(|index| *index < options.len())
 }
 
-fn line() -> Option<String> {
+/// What was typed; `None` at the end of the input.
+pub(super) fn line() -> Option<String> {
     let mut text = String::new();
     std::io::stdin().lock().read_line(&mut text).ok().filter(|length| *length > 0)?;
     Some(text.trim().to_owned())

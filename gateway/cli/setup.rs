@@ -114,8 +114,8 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
     write_configuration(&dialogue, arguments, &answers)?;
     add_administrator(&dialogue, arguments)?;
     dialogue.say((
-        "Now: systemctl enable --now cnc-gateway, and open the page. Everything can be changed later, on the page or in the file.",
-        "下一步:systemctl enable --now cnc-gateway,然后打开页面。以后都可以在页面或文件中修改。",
+        "Now: systemctl restart cnc-gateway, and open the page. Everything can be changed later, on the page or in the file.",
+        "下一步:systemctl restart cnc-gateway,然后打开页面。以后都可以在页面或文件中修改。",
     ));
     Ok(CommandOutcome::Fine)
 }
@@ -253,9 +253,11 @@ fn write_configuration(
     if out.exists() {
         let before = out.with_extension("before.toml");
         std::fs::copy(out, &before).map_err(cannot)?;
+        give_to_owner_of_directory(&before);
         print(&format!("{}: {}\n", dialogue.text(("what was there before", "原来的配置")), before.display()));
     }
     crate::files::replace_durably(out, &text).map_err(cannot)?;
+    give_to_owner_of_directory(out);
     print(&format!("{}: {}\n", dialogue.text(("written", "已写入")), out.display()));
     Ok(())
 }

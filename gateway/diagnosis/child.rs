@@ -7,7 +7,7 @@
 use super::beside::{BesideModel, Onset, beside_model};
 use super::context::DiagnosisContext;
 use super::recordings::read_recordings_as;
-use super::series::{AlignBy, SimulatedSeries, attach, series_model};
+use super::series::{AlignBy, SimulatedSeries, attach, recorded_output, series_model};
 use super::store::DiagnosisStore;
 use super::{outputs, stretch};
 use crate::history;
@@ -180,9 +180,13 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
             let given = read_recordings_as(&[path.display().to_string()], None).map_err(together)?;
             let (mut recording, mut reading) = (given.recording, given.warnings);
             if let Some(text) = simulated {
-                let output = model.as_ref().map_or_else(|| "spindle_power_w".to_owned(), |model| model.output.clone());
-                let found =
-                    attach(&recording, &output, &SimulatedSeries::of(text, AlignBy::Auto), None).map_err(together)?;
+                let series = SimulatedSeries::of(text, AlignBy::Auto);
+                let output = model
+                    .as_ref()
+                    .map(|model| model.output.clone())
+                    .or_else(|| recorded_output(&recording, &series))
+                    .ok_or_else(|| "which recorded quantity does the series simulate? choose a model".to_owned())?;
+                let found = attach(&recording, &output, &series, None).map_err(together)?;
                 recording = found.recording;
                 reading.extend(found.told);
                 model = Some(model.map_or_else(|| series_model(&output).map_err(|wrong| wrong.join("; ")), Ok)?);

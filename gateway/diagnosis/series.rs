@@ -1,6 +1,6 @@
 //! The simulation that somebody already has, as a series: another program's output, a result of an FMU, the force or power of a CAM system.
 //! It is laid beside the recording by clock time, by its course (the lag at which both agree best), by position, or by program block, and becomes a
-//! column. A model of that column alone is `SERIES_MODEL`: gain and offset are refitted, and the error as given stands beside that.
+//! column. A model of that column alone is that of `series_model`: gain and offset are refitted, and the error as given stands beside that.
 
 use super::recordings::describe_reading;
 use super::series_alignment::align_series;
@@ -10,7 +10,7 @@ use adapters::channel::quantity::{Quantity, unit_of};
 use adapters::channel::unit::Unit;
 use adapters::recording::{Cells, Mapping, Numbers, read_path, read_path_as};
 use rules::twin::text::short;
-use rules::twin::{Model, parse_model};
+use rules::twin::{Model, parse_model, toml_text};
 use std::path::Path;
 
 /// How a series is laid beside a recording.
@@ -44,13 +44,34 @@ impl SimulatedSeries {
     /// From `FILE` or `FILE:COLUMN`.
     #[must_use]
     pub fn of(text: &str, by: AlignBy) -> Self {
-        match text.rsplit_once(':') {
+        // A column may have a colon in its name: the file is what is there.
+        let mut split = text.match_indices(':').map(|(at, _)| (&text[..at], &text[at + 1..]));
+        let split = split.find(|(file, _)| Path::new(file).is_file()).or_else(|| text.rsplit_once(':'));
+        match split {
             Some((file, column)) if !Path::new(text).exists() && !file.is_empty() => {
                 Self { file: file.to_owned(), column: Some(column.to_owned()).filter(|column| !column.is_empty()), by }
             }
             _ => Self { file: text.to_owned(), column: None, by },
         }
     }
+}
+
+/// The recorded quantity of the same name as the series, else the first that is measured of a machine's drives.
+#[must_use]
+pub fn recorded_output(recording: &Recording, series: &SimulatedSeries) -> Option<String> {
+    let has = |name: &str| recording.numbers(name).is_some_and(|numbers| numbers.count_present() > 0);
+    let own = series.column.as_deref().filter(|name| has(name)).map(str::to_owned);
+    let usual = [
+        "spindle_power_w",
+        "axis_current_a",
+        "cutting_force_n",
+        "total_power_w",
+        "spindle_current_a",
+        "thermal_error_um",
+        "torque_nm",
+        "force_n",
+    ];
+    own.or_else(|| usual.into_iter().find(|name| has(name)).map(str::to_owned))
 }
 
 /// The series beside the recording.
@@ -130,8 +151,9 @@ pub fn series_model(output: &str) -> Result<Model, Vec<String>> {
 pub fn series_model_text(output: &str) -> String {
     let column = series_column(output);
     format!(
-        "schema = \"model/1\"\nname = \"the simulated series\"\noutput = {output:?}\n\n# gain and offset of the series; 1 and 0: as it was given\n\
-         [[effect]]\nkind = \"linear\"\ncolumns = {{ {column} = 1.0, one = 0.0 }}\n"
+        "schema = \"model/1\"\nname = \"the simulated series\"\noutput = {}\n\n# gain and offset of the series; 1 and 0: as it was given\n\
+         [[effect]]\nkind = \"linear\"\ncolumns = {{ {column} = 1.0, one = 0.0 }}\n",
+        toml_text(output)
     )
 }
 

@@ -143,7 +143,7 @@ fn renew_level(db: &Connection, fine: &Level, coarse: &Level, range: &Range<i64>
              SELECT {of} / {per}, series, sum(count), min(min), max(max), sum(mean * count) / sum(count) FROM {from}
              WHERE {of} >= ?1 AND {of} < ?2 GROUP BY {of} / {per}, series"
         ),
-        [range.start * per, range.end * per],
+        [range.start.saturating_mul(per), range.end.saturating_mul(per)],
     )
     .map(drop)
 }

@@ -3,7 +3,7 @@
 use super::error::{Doing, HistoryError};
 use super::lock::Lock;
 use super::outbox;
-use super::pyramid::{self, MINUTE_NS};
+use super::pyramid::{self, LEVELS, Level, MINUTE_NS};
 use super::recover::recover;
 use super::schema;
 use super::segments::RECORD_TABLES;
@@ -20,9 +20,6 @@ pub struct SetApart {
     /// Events, states, parts and the like.
     pub records: usize,
 }
-
-/// Summaries, and how many minutes each of their keys is long.
-const SUMMARIES: [(&str, &str, i64); 3] = [("minutes", "minute", 1), ("hours", "hour", 60), ("days", "day", 1_440)];
 
 /// Moves every sample and record that is dated after `after_ns` from the history at `path`, which nobody may be writing, into a new
 /// one at `to`. Rows of the audit stay: they are a chain. Samples that the machine brought its own time for stay, too.
@@ -61,11 +58,8 @@ fn copy(db: &Connection, after_ns: TimeNs) -> Result<(), HistoryError> {
     )
     .doing("copying rows")?;
     put(&format!("INSERT INTO apart.blocks SELECT * FROM main.blocks WHERE {BLOCKS}"))?;
-    for (table, key, minutes) in SUMMARIES {
-        put(&format!(
-            "INSERT INTO apart.{table} SELECT * FROM main.{table} WHERE {key} * {} > ?1",
-            minutes * MINUTE_NS
-        ))?;
+    for Level { table, key, width_ns, .. } in &LEVELS {
+        put(&format!("INSERT INTO apart.{table} SELECT * FROM main.{table} WHERE {key} * {width_ns} > ?1"))?;
     }
     for (table, times) in RECORD_TABLES {
         put(&format!("INSERT INTO apart.{table} SELECT * FROM main.{table} WHERE {} > ?1", times[0]))?;
@@ -82,11 +76,14 @@ fn remove(db: &Connection, after_ns: TimeNs, to: &str) -> Result<SetApart, Histo
         .doing("counting rows")?;
     gone(&format!("DELETE FROM main.blocks WHERE {BLOCKS}"))?;
     gone(&format!("DELETE FROM main.tail WHERE {BLOCKS}"))?;
-    for (table, key, minutes) in SUMMARIES {
-        gone(&format!("DELETE FROM main.{table} WHERE {key} * {} > ?1", minutes * MINUTE_NS))?;
+    let last_minute: Option<i64> =
+        db.query_row("SELECT max(minute) FROM main.minutes", [], |row| row.get(0)).doing("removing rows")?;
+    for Level { table, key, width_ns, .. } in &LEVELS {
+        gone(&format!("DELETE FROM main.{table} WHERE {key} * {width_ns} > ?1"))?;
     }
+    // Of the minute that was cut, and of samples that stay.
     let minute = after_ns.div_euclid(MINUTE_NS);
-    pyramid::renew(db, pyramid::with_blocks(db, minute..minute + 1)?)?;
+    pyramid::renew(db, pyramid::with_blocks(db, minute..last_minute.unwrap_or(minute).max(minute) + 1)?)?;
     let mut records = 0;
     for (table, times) in RECORD_TABLES {
         records += gone(&format!("DELETE FROM main.{table} WHERE {} > ?1", times[0]))?;

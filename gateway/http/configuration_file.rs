@@ -4,7 +4,8 @@
 //! A new source is tried before it is written: [`examine`] opens any address that an administrator names.
 //!
 //! What decides whether the box may write to the machine is changed at the box only, not from the page ([`find_widened`]): the gate, the
-//! right to arm from the page, what sinks may ask for, and the parts of an address that name a way of writing or a library to load.
+//! right to arm from the page, what sinks may ask for, and the parts of an address that name a way of writing, a library to load, or a
+//! file whose content is sent as a password: who may edit the page may not read every file of the box.
 
 use super::ServerState;
 use super::guard::told;
@@ -70,14 +71,18 @@ fn read_limited(path: &Path) -> Result<String, ApiProblem> {
         .map_err(|error| ApiProblem::unavailable(format!("{}: {error}", path.display()), advice(&error)))
 }
 
-/// Everything that `check` would refuse.
-fn find_problems(path: &Path, text: &str) -> Vec<Problem> {
+/// The configuration of a text, or everything that `check` would refuse.
+fn parse_text(path: &Path, text: &str) -> Result<Config, Vec<Problem>> {
     let base = path.parent().unwrap_or(Path::new(""));
-    config::parse(&path.display().to_string(), text, base, []).err().unwrap_or_default()
+    config::parse(&path.display().to_string(), text, base, [])
 }
 
-/// Parts of an address that open a way to write, or name a file to load into a process.
-const PARTS_AT_THE_BOX: [&str; 4] = ["write=", "allow=", "offset=", "library="];
+fn find_problems(path: &Path, text: &str) -> Vec<Problem> {
+    parse_text(path, text).err().unwrap_or_default()
+}
+
+/// Parts of an address that open a way to write, or name a file to load into a process or to send to a receiver.
+const PARTS_AT_THE_BOX: [&str; 6] = ["write=", "allow=", "offset=", "library=", "password_file=", "token_file="];
 
 fn needs_the_box(address: &str) -> Option<&'static str> {
     PARTS_AT_THE_BOX.into_iter().find(|part| address.contains(part))
@@ -98,13 +103,19 @@ fn find_widened(before: &Config, after: &Config) -> Vec<String> {
             widened.push(format!("allow_requests of sink {} is set", sink.name));
         }
     }
-    for source in &after.sources {
-        let is_known = before.sources.iter().any(|it| it.address == source.address);
-        if let Some(part) = needs_the_box(source.address.text()).filter(|_| !is_known) {
-            widened.push(format!("the address of source {} has {part}", source.name));
+    let known: Vec<&str> = addresses_of(before).map(|(_, _, address)| address).collect();
+    for (kind, name, address) in addresses_of(after) {
+        if let Some(part) = needs_the_box(address).filter(|_| !known.contains(&address)) {
+            widened.push(format!("the address of {kind} {name} has {part}"));
         }
     }
     widened
+}
+
+/// What the box connects to: "source" or "sink", its name, its address.
+fn addresses_of(config: &Config) -> impl Iterator<Item = (&'static str, &str, &str)> {
+    let sources = config.sources.iter().map(|it| ("source", it.name.as_str(), it.address.text()));
+    sources.chain(config.sinks.iter().map(|it| ("sink", it.name.as_str(), it.address.text())))
 }
 
 fn problems_json(problems: &[Problem]) -> Value {
@@ -114,14 +125,15 @@ fn problems_json(problems: &[Problem]) -> Value {
     Value::Array(rows.collect())
 }
 
-fn refuse_widened(before: &Config, path: &Path, text: &str) -> Result<(), ApiProblem> {
-    let base = path.parent().unwrap_or(Path::new(""));
-    let Ok(after) = config::parse(&path.display().to_string(), text, base, []) else { return Ok(()) };
-    let widened = find_widened(before, &after);
+fn refuse_widened(before: &Config, path: &Path, after: &Config) -> Result<(), ApiProblem> {
+    let widened = find_widened(before, after);
     match widened.is_empty() {
         true => Ok(()),
         false => {
-            let hint = format!("what may write to the machine is changed at the box: edit {} there", path.display());
+            let hint = format!(
+                "what may write to the machine, and which files are loaded or sent, is changed at the box: edit {} there",
+                path.display()
+            );
             Err(ApiProblem::request(widened.join("; "), hint))
         }
     }
@@ -170,12 +182,11 @@ async fn replace_file(
                 "nothing of yours was stored and nothing of theirs is lost: load it again, then make your change";
             return Err(ApiProblem::conflict("somebody else has changed the configuration meanwhile", hint));
         }
-        let problems = find_problems(&path, &edited.text);
-        if !problems.is_empty() {
+        let after = parse_text(&path, &edited.text).map_err(|problems| {
             let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
-            return Err(ApiProblem::request(lines.join("\n"), "mend it; the configuration in force stays"));
-        }
-        refuse_widened(&shared.configured.config, &path, &edited.text)?;
+            ApiProblem::request(lines.join("\n"), "mend it; the configuration in force stays")
+        })?;
+        refuse_widened(&shared.configured.config, &path, &after)?;
         let write = |path: &Path, text: &str| {
             replace_durably(path, text)
                 .map_err(|error| ApiProblem::unavailable(format!("{}: {error}", path.display()), advice(&error)))
@@ -241,7 +252,10 @@ mod tests {
         let arming = format!("{plain}[http]\nallow_arming = true\n");
         let library =
             "[[source]]\naddress = \"fanuc://10.0.0.5?backend=vendor&library=/tmp/a.so\"\nname = \"control\"\n";
-        for text in [armed.as_str(), arming.as_str(), library] {
+        let reading = format!(
+            "{plain}[[sink]]\nname = \"own\"\naddress = \"mqtts://a.example/p?user=u&password_file=/etc/shadow\"\n"
+        );
+        for text in [armed.as_str(), arming.as_str(), library, reading.as_str()] {
             assert_eq!(find_widened(&before, &parsed(text)).len(), 1, "{text}");
         }
         let own = parsed(library);

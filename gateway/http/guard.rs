@@ -58,7 +58,9 @@ async fn admit(Guarded { shared, route }: &Guarded, mut request: Request) -> Res
     };
     let mut person = recognise(shared, route, request.headers(), &peer).await.map_err(|error| refuse(wrong(&error)))?;
     if person.is_none() && route.urgency() == Urgency::GivesBack {
-        request = with_body(request, route.body_max()).await.map_err(refuse)?;
+        // Whoever sends what names nobody is nobody.
+        let unnamed = |problem| refuse(allowed(shared, route, None).err().unwrap_or(problem));
+        request = with_body(request, route.body_max()).await.map_err(unnamed)?;
         (request, person) = named(shared, request, &peer).await.map_err(refuse)?;
     }
     if let Err(problem) = allowed(shared, route, person.as_ref()) {

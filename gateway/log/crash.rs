@@ -1,16 +1,19 @@
 //! A panic leaves a report: what broke off, where, and in which version. Names of functions come from the symbols that the
 //! package keeps in a file of its own; without them the report holds addresses, which that file translates.
 
+use crate::files::keep_last;
 use std::backtrace::Backtrace;
 use std::fs;
 use std::panic::PanicHookInfo;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::SystemTime;
 
 /// Reports that are kept; a box that breaks off at every start must not fill its disk.
 const REPORTS_MAX: usize = 20;
 /// Folder in the data directory.
-pub const FOLDER: &str = "crashes";
+const FOLDER: &str = "crashes";
+/// What the names of reports begin with; what else lies there stays.
+const REPORT: &str = "crash-";
 
 /// From now on a panic of any thread writes a report into this data directory, besides what is printed.
 pub fn keep_crash_reports(data_dir: &Path) {
@@ -25,7 +28,9 @@ pub fn keep_crash_reports(data_dir: &Path) {
 
 fn write_report(folder: &Path, info: &PanicHookInfo<'_>) -> std::io::Result<()> {
     fs::create_dir_all(folder)?;
-    remove_oldest(folder)?;
+    // A full folder must not keep this report from being written.
+    let _full = remove_oldest(folder);
+    // Not the box's clock: whoever breaks off may hold its lock.
     let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let thread = std::thread::current().name().unwrap_or("without a name").to_owned();
     let text = format!(
@@ -34,14 +39,12 @@ fn write_report(folder: &Path, info: &PanicHookInfo<'_>) -> std::io::Result<()> 
         since_1970.as_secs(),
         Backtrace::force_capture()
     );
-    fs::write(folder.join(format!("crash-{}.txt", since_1970.as_millis())), text)
+    fs::write(folder.join(format!("{REPORT}{:013}.txt", since_1970.as_millis())), text)
 }
 
+/// Makes room for one more.
 fn remove_oldest(folder: &Path) -> std::io::Result<()> {
-    let mut reports: Vec<PathBuf> = fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
-    reports.sort();
-    let surplus = (reports.len() + 1).saturating_sub(REPORTS_MAX);
-    reports.iter().take(surplus).try_for_each(fs::remove_file)
+    keep_last(folder, REPORTS_MAX - 1, |name| name.starts_with(REPORT))
 }
 
 #[cfg(test)]

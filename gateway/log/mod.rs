@@ -8,7 +8,7 @@
 mod crash;
 mod outlet;
 
-pub use crash::{FOLDER as CRASH_FOLDER, keep_crash_reports};
+pub use crash::keep_crash_reports;
 
 use outlet::Outlet;
 use std::io::Write;

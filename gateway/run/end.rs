@@ -22,7 +22,7 @@ pub(super) async fn wait_for_end(
     run_flags.stop.store(true, Ordering::SeqCst);
     // The last commit of the history waits for the sinks; who asks twice does not want to wait.
     tokio::select! {
-        () = obey(run_flags, signals) => outputs.into_iter().for_each(|outputs| outputs.outbox.hurry()),
+        () = obey(run_flags, signals) => outputs.into_iter().for_each(|outputs| outputs.outbox.set_hurried(true)),
         () = until_closed(live.clone()) => {}
     }
     until_closed(live).await;

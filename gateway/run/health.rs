@@ -2,7 +2,7 @@
 //! remembered as an event, and is shown while it lasts.
 
 use super::history_store::HistoryStore;
-use super::problems::{apart, clock_problem, problems_of_files};
+use super::problems::{apart, clock_problem, problems_of_disk, problems_of_history};
 use super::sample_feed::{SampleFeed, SourcePace};
 use super::save::Saver;
 use super::service_manager::{ProgressMarks, WatchedService};
@@ -58,6 +58,8 @@ pub struct Health {
     beside: Option<[ExtraValue<'static>; 2]>,
     thermal: Vec<ExtraValue<'static>>,
     service: WatchedService,
+    /// What is wrong with files in the data directory, as of the last look: the status asks for it several times a second.
+    of_disk: Vec<StatusProblem>,
     /// What threads beside the tick have to say.
     heard: Option<mpsc::Receiver<Notice>>,
 }
@@ -93,6 +95,7 @@ impl Health {
             beside: None,
             thermal: Vec::new(),
             service,
+            of_disk: Vec::new(),
             heard: None,
         }
     }
@@ -151,6 +154,7 @@ impl Health {
         }
         self.looked = Some(Instant::now());
         self.history_store.look();
+        self.of_disk = problems_of_disk(&self.memory);
         self.stores = self.history_store.stores();
         self.service.report(feed.count_steps(), self.history_store.count_rounds());
         let heard: Vec<Notice> = self.heard.iter().flat_map(mpsc::Receiver::try_iter).take(HEARD_MAX).collect();
@@ -298,7 +302,8 @@ impl Health {
         if let Some((what, next)) = self.clock_status().and_then(clock_problem) {
             add(what, next);
         }
-        problems.extend(problems_of_files(&self.memory, history));
+        problems.extend(self.of_disk.iter().cloned());
+        problems.extend(problems_of_history(history));
         let mut add = |what: String, next: &str| problems.push(StatusProblem { what, next: next.to_owned() });
         for source in &self.sources {
             if let Some(error) = &source.error {

@@ -33,7 +33,7 @@ use crate::access::{self, Access};
 use crate::alignment;
 use crate::backup::{BackupPaths, BackupSchedule, take_restored};
 use crate::cannot_run::CannotRun;
-use crate::clock::of_box;
+use crate::clock::{self, of_box};
 use crate::config::Config;
 use crate::control::{self, OrderReceiver};
 use crate::diagnosis::handle::DiagnosisHandle;
@@ -51,15 +51,16 @@ use history_store::HistoryStore;
 use live_twin::Twin;
 use open::{MachineSpeed, Sources};
 use outputs::ConfiguredSinks;
-use service_manager::{ProgressMarks, WatchedPart};
+use service_manager::{OpeningReport, ProgressMarks, WatchedPart};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 use thermal::Thermal;
 use tick::{Identity, RunEnd, RunFlags, Ticker};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
+use tokio::task::JoinSet;
 use wear::Wear;
 
 /// Questions about the history, hashes of tokens and the like, at the same time.
@@ -131,6 +132,7 @@ fn run_once(
     follows: bool,
 ) -> Result<RunEnd, CannotRun> {
     let listener = runtime.block_on(listen(plan))?;
+    let opening = OpeningReport::start();
     let started = ClockStart::of(plan, follows);
     let outputs = ConfiguredSinks::of(&plan.config);
     let certificate = certificate(plan)?;
@@ -139,8 +141,9 @@ fn run_once(
     let (post, inbox) = control::queue();
     let marks = Arc::new(ProgressMarks::new());
     let (mut ticker, live) = ticker(plan, &run_flags, (port, marks.clone()), inbox, (outputs.as_ref(), started))?;
+    drop(opening);
     let _backups = schedule_backups(plan, &mut ticker.health)?;
-    runtime.spawn(mark_page(marks));
+    let beat = runtime.spawn(mark_page(marks));
     let channels = (report, post, ticker.twin.as_ref().and_then(Twin::diagnoses));
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
@@ -148,6 +151,7 @@ fn run_once(
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
     let serving = serve(plan, (listener, certificate), live, (&run_flags, signals), channels, outputs.as_ref());
     runtime.block_on(serving);
+    beat.abort();
     thread.join().map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
 }
 
@@ -157,7 +161,7 @@ fn schedule_backups(plan: &RunPlan, health: &mut Health) -> Result<Option<Backup
     let paths = BackupPaths::of(&plan.config, plan.config_file.as_deref());
     let (tell, heard) = std::sync::mpsc::channel();
     health.hear(heard);
-    let now_s = || SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let now_s = || u64::try_from(clock::now_ns() / SECOND_NS).unwrap_or(0);
     // Without a tick nobody listens, and the box is about to end.
     let tell = move |notice: &Notice| drop(tell.send(notice.clone()));
     BackupSchedule::start(paths, config.clone(), now_s, tell)
@@ -310,12 +314,14 @@ async fn serve(
     (report, post, diagnoses): (watch::Sender<Option<String>>, control::OrderSender, Option<DiagnosisHandle>),
     outputs: Option<&ConfiguredSinks>,
 ) {
+    // What runs beside ends with this run.
+    let mut beside = JoinSet::new();
     let sinks = outputs.map(|outputs| outputs.start(&post));
     let _listening = control::listen(&plan.config.gateway.data_dir, post.clone());
     let server = match address(plan) {
         Ok(Some(address)) => {
             let access = Arc::new(open_access(&plan.config, post.clone()));
-            tokio::spawn(follow(access.clone()));
+            beside.spawn(follow(access.clone()));
             let (history, language) = (plan.config.history.path.clone(), plan.config.gateway.language);
             let hosts = plan.config.http.allow_hosts.clone();
             let (scripts, data_dir) = (plan.config.scripts.directory.clone(), plan.config.gateway.data_dir.clone());

@@ -8,10 +8,17 @@ use crate::status::{ClockStatus, HistoryStatus, StatusProblem};
 use adapters::clock::SECOND_NS;
 use std::path::Path;
 
-/// What the disk has changed, and nobody has looked at yet.
-pub(super) fn problems_of_files(memory: &Path, history: &HistoryStatus) -> Vec<StatusProblem> {
-    let mut problems = learned::damaged(memory.parent().unwrap_or(Path::new(".")));
-    problems.extend(access::permission_problem(memory.parent().unwrap_or(Path::new("."))));
+/// What the disk has changed, and nobody has looked at yet. Reads the directory.
+pub(super) fn problems_of_disk(memory: &Path) -> Vec<StatusProblem> {
+    let directory = memory.parent().unwrap_or(Path::new("."));
+    let mut problems = learned::damaged(directory);
+    problems.extend(access::permission_problem(directory));
+    problems
+}
+
+/// What is wrong with the files of the history.
+pub(super) fn problems_of_history(history: &HistoryStatus) -> Vec<StatusProblem> {
+    let mut problems = Vec::new();
     if history.log_bytes >= LOG_TOLD_BYTES {
         let next =
             "end the transaction, or the program that holds it: `lsof` names those that have the file open".to_owned();

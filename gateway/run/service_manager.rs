@@ -161,6 +161,44 @@ impl WatchedService {
     }
 }
 
+/// How often a box that opens its files says that it lives; a third of `WatchdogSec`.
+const OPENING_EVERY: Duration = Duration::from_secs(10);
+/// What it asks for each time, longer than [`OPENING_EVERY`].
+const OPENING_EXTENDS: Duration = Duration::from_secs(30);
+/// No opening takes longer: a history of ten gigabytes is brought to another version in some minutes. A box that hangs here is ended
+/// and started again after this time.
+const OPENING_MAX: Duration = Duration::from_secs(1_200);
+
+/// While it lives, the service manager hears that the box opens its files: that may take minutes (a new version of a large history,
+/// rows of days to be dated anew), in which nothing else gives a sign of life.
+#[derive(Debug)]
+pub struct OpeningReport {
+    _end: std::sync::mpsc::Sender<()>,
+}
+
+impl OpeningReport {
+    /// Begins to tell. Without a thread nothing is told, and the usual limits hold.
+    #[must_use]
+    pub fn start() -> Self {
+        let (end, ended) = std::sync::mpsc::channel();
+        let tell = move || {
+            let until = Instant::now() + OPENING_MAX;
+            while Instant::now() < until
+                && ended.recv_timeout(OPENING_EVERY) == Err(std::sync::mpsc::RecvTimeoutError::Timeout)
+            {
+                let micros = u32::try_from(OPENING_EXTENDS.as_micros()).unwrap_or(u32::MAX);
+                send(&[
+                    NotifyState::Watchdog,
+                    NotifyState::ExtendTimeoutUsec(micros),
+                    NotifyState::Status("opening the history"),
+                ]);
+            }
+        };
+        let _no_thread = std::thread::Builder::new().name("opening".to_owned()).spawn(tell);
+        Self { _end: end }
+    }
+}
+
 /// The box is being closed.
 pub fn report_stopping() {
     send(&[NotifyState::Stopping]);

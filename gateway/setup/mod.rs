@@ -6,7 +6,7 @@ mod scan;
 pub use scan::{AddressRange, FoundControl, RangeError, scan_for_controls};
 
 use rules::physics::explain::Language;
-use toml::Value;
+use rules::twin::toml_text;
 
 /// What the box has to know to begin.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,11 +23,6 @@ pub struct SetupAnswers {
     pub page_from_network: bool,
 }
 
-/// A text as TOML writes it, with quotation marks.
-fn quoted(text: &str) -> String {
-    Value::String(text.to_owned()).to_string()
-}
-
 impl SetupAnswers {
     /// The configuration file. Only what differs from the defaults stands in it, so that it can be read at one look.
     #[must_use]
@@ -35,9 +30,9 @@ impl SetupAnswers {
         let mut text = String::from(
             "# Written by `cnc-gateway setup`. `cnc-gateway check --keys` explains every key; what is not written has its default.\n\n[gateway]\n",
         );
-        text += &format!("name = {}\n", quoted(&self.machine));
+        text += &format!("name = {}\n", toml_text(&self.machine));
         if let Some(language) = self.language {
-            text += &format!("language = {}\n", quoted(language_word(language)));
+            text += &format!("language = {}\n", toml_text(language_word(language)));
         }
         if let Some(control) = &self.control {
             text += &render_source(control, "control");
@@ -56,7 +51,7 @@ impl SetupAnswers {
 }
 
 fn render_source(address: &str, name: &str) -> String {
-    format!("\n[[source]]\naddress = {}\nname = {}\n", quoted(address), quoted(name))
+    format!("\n[[source]]\naddress = {}\nname = {}\n", toml_text(address), toml_text(name))
 }
 
 fn language_word(language: Language) -> &'static str {

@@ -6,7 +6,7 @@ use super::{Batch, Requests, Sink, SinkError, open};
 use crate::clock;
 use crate::config;
 use crate::control::OrderSender;
-use crate::history::{Outbox, OutboxHead, OutboxReader, OutboxStretch};
+use crate::history::{Item, Outbox, OutboxHead, OutboxReader, OutboxStretch};
 use crate::log::{Notice, Severity};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -214,26 +214,25 @@ impl SinkTask {
 
     async fn batch(&mut self, sink: &mut dyn Sink, (from, to): (u64, u64), historical: bool) -> Result<(), Left> {
         let (turn, stretch) = self.next_items(from, to, sink.items_max().max(1)).await?;
-        let begin = if let Turn::Past(item) = turn { item + 1 } else { from };
         let Some(last) = stretch.items.last().map(|item| item.sequence) else {
-            self.outbox.delivered(&self.name, begin, stretch.to.max(begin + 1));
+            self.outbox.delivered(&self.name, from, stretch.to.max(from + 1));
             return Ok(());
         };
         let items = &stretch.items;
+        let from = self.skip_missing(turn, from, items);
         let sent = timeout(DEADLINE, sink.send(Batch { items, historical })).await;
-        let sent = sent.unwrap_or_else(|_| Err(too_slow("sending")));
-        if let (Turn::Past(item), Ok(()) | Err(SinkError::Item { .. })) = (turn, &sent) {
-            self.isolation.decide();
-            self.refused(&breaks_line(item), from, item);
-        }
-        match sent {
-            Ok(()) => {
-                self.isolation.arrived(begin, last);
-                self.delivered(&stretch, begin, historical);
+        match (turn, sent.unwrap_or_else(|_| Err(too_slow("sending")))) {
+            // It is sent once more when it is its turn.
+            (Turn::Past(_), Ok(()) | Err(SinkError::Item { .. })) => self.isolation.carried_next(),
+            (_, Ok(())) => {
+                self.isolation.arrived(from, last);
+                self.delivered(&stretch, from, historical);
             }
-            Err(error @ SinkError::Item { sequence, .. }) => self.refused(&error, begin, sequence),
-            Err(error) => {
-                self.isolation.broke(turn, from, last);
+            (_, Err(error @ SinkError::Item { sequence, .. })) => self.refused(&error, from, sequence),
+            (turn, Err(error)) => {
+                if self.isolation.broke(turn, from, last) {
+                    self.refused(&breaks_line(from), from, from);
+                }
                 return Err(error.into());
             }
         }
@@ -244,11 +243,22 @@ impl SinkTask {
         }
     }
 
+    /// Numbers before the first item that is there were dropped; the number from which there is something to deliver.
+    fn skip_missing(&self, turn: Turn, from: u64, items: &[Item]) -> u64 {
+        match items.first() {
+            Some(first) if first.sequence > from && !matches!(turn, Turn::Past(_)) => {
+                self.outbox.delivered(&self.name, from, first.sequence);
+                first.sequence
+            }
+            _ => from,
+        }
+    }
+
     /// What is to be sent of the items `from..to`.
     async fn next_items(&mut self, from: u64, to: u64, items_max: usize) -> Result<(Turn, OutboxStretch), Left> {
         let turn = self.isolation.turn(from);
         if let Turn::Past(item) = turn {
-            // At the end of a gap the next one has been delivered before: it decides by arriving once more.
+            // At the end of a gap the next one has been delivered before: it is sent once more.
             let newest = self.outbox.head().borrow().next_sequence;
             let stretch = self.read(item + 1, newest, 1).await?;
             if !stretch.items.is_empty() {

@@ -11,7 +11,7 @@
 //!
 //! An update verifies the signature before it unpacks anything, writes the new version beside the old one, asks it whether it
 //! accepts the configuration, notes the trial, and only then moves the link, in one step. A power cut at any point leaves
-//! either the old version, or the new one on trial. The service itself confirms a version after a minute of good health
+//! either the old version, or the new one on trial. The service itself confirms a version after [`WELL_FOR`] of good health
 //! ([`crate::run`] writes the file `confirmed` in the data directory). The script `guard` of the package runs as root before every start: at the
 //! fourth start of a version that nobody has confirmed it moves the link back. So a version that crashes, that hangs (the
 //! watchdog ends it), or that cannot even be executed does not stay.

@@ -3,6 +3,7 @@
 //! directory, the oldest go.
 
 use super::nanoseconds;
+use crate::files::keep_last;
 use crate::log::{Notice, Severity};
 use adapters::clock::TimeNs;
 use adapters::waveform::{Block, WaveformHeader};
@@ -97,15 +98,7 @@ impl ExcerptWriter {
     }
 
     fn forget_oldest(&self) -> std::io::Result<()> {
-        let ours = |path: &PathBuf| {
-            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            name.starts_with("waveform-") && name.ends_with(".csv")
-        };
-        let mut files: Vec<PathBuf> =
-            std::fs::read_dir(&self.directory)?.filter_map(|entry| Some(entry.ok()?.path())).filter(ours).collect();
-        files.sort();
-        let surplus = files.len().saturating_sub(FILES_MAX);
-        files.iter().take(surplus).try_for_each(std::fs::remove_file)
+        keep_last(&self.directory, FILES_MAX, |name| name.starts_with("waveform-") && name.ends_with(".csv"))
     }
 }
 

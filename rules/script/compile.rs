@@ -257,6 +257,9 @@ impl Compiler {
         constants: &[(String, Dynamic)],
         live: &LiveValues,
     ) -> Result<Vec<ChosenSetting>, Vec<ScriptProblem>> {
+        let mut whole = functions.clone();
+        whole.clear_statements();
+        let ast = whole.merge(settings);
         let one = |place: &Where| {
             let values = live.of(place);
             let mut scope = Scope::new();
@@ -267,18 +270,16 @@ impl Compiler {
                 scope.push_constant_dynamic(name.clone(), values.get(*index).cloned().unwrap_or_default());
             }
             self.shared.lock().live = Some(values);
-            let mut whole = functions.clone();
-            whole.clear_statements();
-            let ast = whole.merge(settings);
             let result = self.running.eval_ast_with_scope::<Map>(&mut scope, &ast);
             let map = result.map_err(|error| vec![problem::of_run(&file.name, &error, OPERATIONS_MAX)])?;
             read_choices(file, &map, place)
         };
         let mut choices = one(&Where::Machine)?;
+        let of_machine = choices.len();
         for place in live.places() {
-            let special = one(place)?;
-            let same = |it: &ChosenSetting| choices.iter().any(|known| known.says_the_same(it));
-            let special: Vec<ChosenSetting> = special.into_iter().filter(|it| !same(it)).collect();
+            let mut special = one(place)?;
+            // What a place says otherwise than the machine; two tools may say the same.
+            special.retain(|it| !choices[..of_machine].iter().any(|known| known.says_the_same(it)));
             choices.extend(special);
         }
         Ok(choices)

@@ -44,4 +44,4 @@ pub use diagnosis::Diagnosis;
 pub use evidence::diagnose;
 pub use examine::{Examination, examine};
 pub use model::{Model, Parameter, Part, PartFunction, Simulated, simulate};
-pub use model_file::{Problem, parse_hypotheses, parse_model, write_model};
+pub use model_file::{Problem, parse_hypotheses, parse_model, toml_text, write_model};

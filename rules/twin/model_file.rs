@@ -377,27 +377,27 @@ fn suggestion<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
 #[must_use]
 pub fn write_model(model: &Model) -> String {
     let mut text =
-        format!("schema = \"model/1\"\nname   = {}\noutput = {}\n", quoted(&model.name), quoted(&model.output));
+        format!("schema = \"model/1\"\nname   = {}\noutput = {}\n", toml_text(&model.name), toml_text(&model.output));
     for part in &model.parts {
         text.push_str(&write_part(part));
     }
     if !model.roles.is_empty() {
         text.push_str("\n[roles]\n");
         for (role, column) in &model.roles {
-            text.push_str(&format!("{} = {}\n", role.name(), quoted(column)));
+            text.push_str(&format!("{} = {}\n", role.name(), toml_text(column)));
         }
     }
     if !model.exclude.is_empty() {
-        let kinds: Vec<String> = model.exclude.iter().map(|kind| quoted(kind)).collect();
+        let kinds: Vec<String> = model.exclude.iter().map(|kind| toml_text(kind)).collect();
         text.push_str(&format!("\n[candidates]\nexclude = [{}]\n", kinds.join(", ")));
     }
     text
 }
 
 fn write_part(part: &Part) -> String {
-    let mut text = format!("\n[[effect]]\nkind = {}\n", quoted(&part.kind));
+    let mut text = format!("\n[[effect]]\nkind = {}\n", toml_text(&part.kind));
     if let Some(name) = &part.name {
-        text.push_str(&format!("name = {}\n", quoted(name)));
+        text.push_str(&format!("name = {}\n", toml_text(name)));
     }
     let numbers: Vec<String> = part
         .parameters
@@ -409,21 +409,25 @@ fn write_part(part: &Part) -> String {
         PartFunction::Linear(_) => text.push_str(&format!("columns = {{ {numbers} }}\n")),
         PartFunction::Table(table) => text.push_str(&write_table(part, table)),
         PartFunction::Expression(expression) => {
-            text.push_str(&format!("expression = {}\nparameters = {{ {numbers} }}\n", quoted(expression.text())));
+            text.push_str(&format!("expression = {}\nparameters = {{ {numbers} }}\n", toml_text(expression.text())));
         }
         PartFunction::Effect(_, form) => {
             text.push_str(&format!("parameters = {{ {numbers} }}\n"));
             if !form.name.is_empty() {
                 let key = if part.kind == "cutting_power" { "process" } else { "form" };
-                text.push_str(&format!("{key} = {}\n", quoted(form.name)));
+                text.push_str(&format!("{key} = {}\n", toml_text(form.name)));
             }
             if let Some((column, word)) = &form.place {
-                text.push_str(&format!("place = {{ column = {}, equals = {} }}\n", quoted(column), quoted(word)));
+                text.push_str(&format!("place = {{ column = {}, equals = {} }}\n", toml_text(column), toml_text(word)));
             }
         }
     }
-    let fixed: Vec<String> =
-        part.parameters.iter().filter(|parameter| parameter.fixed).map(|parameter| quoted(&parameter.name)).collect();
+    let fixed: Vec<String> = part
+        .parameters
+        .iter()
+        .filter(|parameter| parameter.fixed)
+        .map(|parameter| toml_text(&parameter.name))
+        .collect();
     if !fixed.is_empty() {
         text.push_str(&format!("fixed = [{}]\n", fixed.join(", ")));
     }
@@ -444,10 +448,12 @@ fn float(value: f64) -> String {
 
 fn key(name: &str) -> String {
     let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
-    if bare { name.to_owned() } else { quoted(name) }
+    if bare { name.to_owned() } else { toml_text(name) }
 }
 
-fn quoted(text: &str) -> String {
+/// A text as TOML writes it, with quotation marks. What Rust prints for debugging has escapes that TOML does not know.
+#[must_use]
+pub fn toml_text(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 

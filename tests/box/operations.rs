@@ -92,5 +92,5 @@ fn a_recipe_fills_in_what_no_controller_says_and_is_edited_while_the_box_runs() 
     let arguments = ["history", "query", "--history", text(&database), "--json", "--records", "events"];
     let events = stdout(&run(&arguments));
     assert!(events.contains("recipe_in_force") && events.contains("recipe_refused"), "{events}");
-    assert!(events.contains("depth_of_cut_mm = 2.5"), "the text of every version is kept");
+    assert!(events.contains("depth_of_cut_mm = 2.5"), "the text of every version is kept: {events}");
 }

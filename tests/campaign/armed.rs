@@ -258,9 +258,10 @@ pub(crate) fn control_dies(scale: &Scale) -> Row {
         wait_for("the end of the arming", Duration::from_secs(40), || (!is_armed(&held.address)).then_some(()));
         row.recovered(began.elapsed());
         row.note = format!("disarmed: {}", disarmed_because(&held.address));
+        row.out_of_band = Some(row.out_of_band.unwrap_or(0) + machine.outside.load(Ordering::SeqCst));
         row.n += 1;
     }
-    row.out_of_band = Some(0);
+    row.must(row.out_of_band == Some(0), "something else was in force");
     row
 }
 

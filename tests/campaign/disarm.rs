@@ -119,6 +119,7 @@ pub(crate) fn disarm(scale: &Scale) -> Row {
     let at_machine = at_machine.as_millis();
     row.note = format!("greatest: {what}; dial in force {at_machine} ms after the order; flood of {sent} requests");
     row.out_of_band = Some(machine.outside.load(Ordering::SeqCst));
+    row.must(row.out_of_band == Some(0), "something else was in force");
     row
 }
 

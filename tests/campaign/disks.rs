@@ -98,19 +98,22 @@ pub(crate) fn replaced(scale: &Scale) -> Row {
     row
 }
 
-/// The file is noise but for its header: found when it is next read, at the latest at the next start.
+/// The file is noise but for its header, after what stood in the log has been copied into it: found at the next start.
 pub(crate) fn damaged(scale: &Scale) -> Row {
     let mut row = Row::new(
-        "every page of the file but the first overwritten with noise, then SIGKILL and a start; the damaged file is kept, a new one is begun",
+        "SIGKILL, every page of the file but the first overwritten with noise, and a start; the damaged file is kept, a new one is begun",
     );
     for _ in 0..scale.of(5, 1) {
         let Running { _directory, database, gateway, .. } = Running::start();
+        gateway.kill();
+        let log = rusqlite::Connection::open(&database).expect("opens");
+        log.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).expect("copied");
+        drop(log);
         let mut file = OpenOptions::new().write(true).open(&database).expect("opens");
         let length = file.metadata().expect("there").len();
         file.seek(SeekFrom::Start(4096)).expect("seeks");
         file.write_all(&vec![0x5a; usize::try_from(length).unwrap_or(0).saturating_sub(4096)]).expect("written");
         drop(file);
-        gateway.kill();
         let began = Instant::now();
         let mut gateway = Gateway::start(database.parent().expect("a directory"), &["--speed", "60"]);
         let address = gateway.address();
@@ -138,7 +141,6 @@ pub(crate) fn endless_reader(_: &Scale) -> Row {
     wait_for("a short log", Duration::from_secs(120), || (log() < 9_000_000).then_some(()));
     row.recovered(began.elapsed());
     row.n = 1;
-    row.lost = Some(0);
     row.note = format!(
         "told at {:.1} MB after {:.0} s; afterwards {:.1} MB",
         longest as f64 / 1e6,
@@ -207,11 +209,12 @@ pub(crate) fn full(scale: &Scale) -> Row {
     }
     row.must(told > 0, "nothing was told of a full disk");
     let (acknowledged, refused) = (rows(), history()["lost"].as_u64().unwrap_or(0));
-    gateway.signal("KILL");
+    // The disk ends with the process: what a SIGKILL leaves is copied while it stands still.
+    gateway.signal("STOP");
     let copy = tempfile::tempdir().expect("a directory");
-    for name in ["history.db", "history.db-wal"] {
-        let _no_log = fs::copy(disk.join(name), copy.path().join(name));
-    }
+    fs::copy(disk.join("history.db"), copy.path().join("history.db")).expect("copied");
+    let _no_log = fs::copy(disk.join("history.db-wal"), copy.path().join("history.db-wal"));
+    gateway.signal("KILL");
     gateway.wait();
     let reader = Reader::open(&copy.path().join("history.db")).expect("a history");
     let findings = reader.check().unwrap_or_else(|error| vec![error.to_string()]);

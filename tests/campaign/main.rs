@@ -90,8 +90,9 @@ fn campaign() {
 fn the_worst_of_it_in_short() {
     let scale = Scale::short();
     let mut table = Table::default();
-    let short: [Fault; 4] = [
+    let short: [Fault; 5] = [
         ("kill", kills::at_random),
+        ("power cut", power::cuts),
         ("power cut, pages out of order", power::reordered),
         ("file removed while running", disks::removed),
         ("lives of a few seconds", partners::short_lives),

@@ -104,8 +104,9 @@ pub(crate) fn cuts(scale: &Scale) -> Row {
     let (mut random, mut lost, mut wrong, count) = (random(), 0, 0, scale.of(200, 12));
     for step in 0..count {
         let Some((before, after)) = pairs.get(random.random_range(0..pairs.len().max(1))) else { break };
-        let goes_on = after.log.starts_with(&before.log);
-        let synced = if goes_on { before.log.len() } else { 0 };
+        // Frames of before that are there after it have been synced. A log that was begun anew has none: what it held is in the file.
+        // Behind its end lie frames of an earlier round, which a commit writes over.
+        let synced = before.log.iter().zip(&after.log).take_while(|(before, after)| before == after).count();
         let unit = [512, 1, FRAME][step % 3];
         let cut = (synced + unit * random.random_range(0..=(after.log.len() - synced) / unit)).min(after.log.len());
         let mut log = after.log[..cut].to_vec();

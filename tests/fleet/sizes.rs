@@ -87,7 +87,7 @@ fn rows_a_second_beside_plain_copy() {
     }
     // The file lies where the server can write it.
     let file = plant.postgres.sql("SHOW data_directory") + "/rows.copy";
-    plant.postgres.sql(&format!("COPY items TO '{file}'"));
+    plant.postgres.sql(&format!("COPY (SELECT * FROM items) TO '{file}'"));
     let mut rates = Vec::new();
     for _ in 0..3 {
         plant.postgres.sql("TRUNCATE plain");
@@ -134,9 +134,9 @@ fn fill(postgres: &Postgres, machines: u64, days: u64) {
         FROM working, boxes, pool AS mean, pool AS least
         WHERE mean.n = (box_id * 31 + extract(epoch FROM hour)::bigint / 3600) % 1000 AND least.n = mean.n ORDER BY hour, box_id");
     sql("a year of hours", "
-        INSERT INTO hour_means SELECT series_id, box_id, day, pool.day, pool.day, pool.day, array_fill(3600::real, ARRAY[24])
+        INSERT INTO hour_means SELECT series_id, box_id, days.day, pool.day, pool.day, pool.day, array_fill(3600::real, ARRAY[24])
         FROM (SELECT DISTINCT date_trunc('day', hour) AS day FROM working) AS days, boxes, series, pool
-        WHERE unit <> '' AND pool.n = (box_id * 31 + series_id * 7 + extract(epoch FROM days.day)::bigint / 86400) % 1000 ORDER BY day, box_id");
+        WHERE unit <> '' AND pool.n = (box_id * 31 + series_id * 7 + extract(epoch FROM days.day)::bigint / 86400) % 1000 ORDER BY days.day, box_id");
     sql("a year of parts", "
         INSERT INTO part_list SELECT row_number() OVER (), hour, hour + n * interval '20 minutes' + interval '19 minutes', box_id, '', 'O' || (box_id % 50), 1, 900, 100000 + random() * 1e6, NULL
         FROM working, boxes, generate_series(0, 1) AS n ORDER BY hour");

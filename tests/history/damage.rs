@@ -206,6 +206,7 @@ fn pages_that_changed_places_are_told() {
         tally.compare(&format!("pages {a} and {b}"), &expected, &path);
     }
     assert!(tally.wrong.is_empty(), "{:?}", tally.wrong);
+    assert!(tally.told > 0, "no page that changed places was told");
 }
 
 #[test]

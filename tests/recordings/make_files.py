@@ -115,6 +115,30 @@ for r in ROWS:
 book.save(f"{OUT}/excel_numbers_as_text.xlsx")
 truth("excel_numbers_as_text.xlsx")
 
+book = openpyxl.Workbook()
+sheet = book.active
+sheet.append(["Datum", "Uhrzeit"] + DE[1:])
+for r in ROWS:
+    sheet.append([stamp(r).date(), stamp(r).time()] + cells(r, True))
+book.save(f"{OUT}/excel_date_and_time.xlsx")
+truth("excel_date_and_time.xlsx")
+
+book = openpyxl.Workbook()
+sheet = book.active
+sheet.append(["Uhrzeit"] + DE[1:])
+for r in ROWS:
+    sheet.append([stamp(r).time()] + cells(r, True))
+book.save(f"{OUT}/excel_time_of_day.xlsx")
+truth("excel_time_of_day.xlsx", start=False)
+
+book = openpyxl.Workbook()
+sheet = book.active
+sheet.append(["Zeit"] + DE[1:])
+for r in ROWS:
+    sheet.append([dt.timedelta(seconds=r["t"])] + cells(r, True))
+book.save(f"{OUT}/excel_duration.xlsx")
+truth("excel_duration.xlsx", start=False)
+
 import xlwt
 
 book = xlwt.Workbook(encoding="gbk")

@@ -133,6 +133,21 @@ fn the_tool_in_use_decides_where_it_has_a_value_of_its_own() {
 }
 
 #[test]
+fn two_tools_may_have_the_same_value() {
+    let settings = |text: &str| {
+        let values = values(&format!("[constant_load]\ntarget_w = 1000\n{text}")).expect("fine");
+        let set = prepare_with(&shipped(), &values).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+        set.settings().clone()
+    };
+    let (first, second) = ("[constant_load.tool.T1]\ntarget_w = 800\n", "[constant_load.tool.T2]\ntarget_w = 800\n");
+    let both = settings(&format!("{first}{second}"));
+    assert_ne!(both, settings(first), "the second tool has a value of its own, too");
+    assert_ne!(both, settings(second));
+    let as_machine = settings("[constant_load.tool.T1]\ntarget_w = 1000\n");
+    assert_eq!(as_machine, settings(""), "what a tool says as the machine does is nothing of its own");
+}
+
+#[test]
 fn what_one_script_publishes_another_reads_in_the_same_tick_and_circles_are_refused() {
     let publish = file("z.rhai", "publish(\"half_w\", 0.5 * (cutting_power_w ?? 0.0), \"W\");");
     let read = file(

@@ -247,7 +247,6 @@ impl NcLinkPoll {
         }
         for (entry, answer) in self.entries.iter().zip(answers) {
             let reading = match entry.how {
-                _ if entry.own.is_some() || entry.conversion.is_none() => entry.number(answer, stamp),
                 How::Tapping => continue,
                 How::ChannelWord => {
                     entry.text(answer, stamp, |value| Some(ChannelWord(integer(value)?).mode().to_owned()))

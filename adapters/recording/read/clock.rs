@@ -51,9 +51,8 @@ impl ForeignColumns<'_> {
 
     /// Holds dates only, or moments at midnight only.
     fn has_dates_only(&self, index: usize) -> bool {
-        self.has_moments(index)
-            && self.surveys[index].dates == self.surveys[index].moments
-            && self.surveys[index].moments > 0
+        let survey = &self.surveys[index];
+        self.has_moments(index) && survey.dates == survey.moments + survey.instants + survey.locals
     }
 
     fn position(&self, name: &str) -> Option<usize> {

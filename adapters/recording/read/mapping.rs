@@ -1,5 +1,6 @@
 //! The map of a foreign file (`map/1`): how it is written, and which of its columns is which of ours. Whatever it says is not guessed.
 
+use super::text::Separator;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -89,6 +90,9 @@ impl Mapping {
         }
         if let Some(decimal) = mapping.decimal.filter(|decimal| !['.', ','].contains(decimal)) {
             return Err(wrong(format!("decimal = {decimal:?}: it is \".\" or \",\"")));
+        }
+        if let Some(sign) = mapping.separator.as_deref().filter(|sign| Separator::named(sign).is_none()) {
+            return Err(wrong(format!("separator = {sign:?}: it is one sign, \"tab\" or \"space\"")));
         }
         for (name, value, known) in [
             ("order", &mapping.time.order, &["dmy", "mdy"][..]),

@@ -5,6 +5,7 @@ use super::error::RecordingError;
 use super::head::Head;
 use super::moment::{OrderEvidence, written_moment};
 use super::table::{Row, Table, VisitStep};
+use crate::clock::SECOND_NS;
 
 /// Examples kept of each strange kind.
 const EXAMPLES: usize = 5;
@@ -88,7 +89,10 @@ impl ColumnSurvey {
                 self.see_pair(1);
             }
             Cell::Instant(_) => self.instants += 1,
-            Cell::Local(_) => self.locals += 1,
+            Cell::Local(at_ns) => {
+                self.locals += 1;
+                self.dates += u64::from(at_ns.rem_euclid(86_400 * SECOND_NS) == 0);
+            }
             Cell::Text(text) => self.see_text(line, text),
         }
     }

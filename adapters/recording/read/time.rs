@@ -26,7 +26,7 @@ pub(super) struct Timed {
     /// Seconds as given, or since the first row where the day is known.
     pub(super) time_s: Vec<f64>,
     pub(super) start_ns: Option<TimeNs>,
-    /// Rows whose time fits among those of the others; the reason where it does not.
+    /// Rows whose time does not fit among those of the others, with the reason.
     pub(super) out_of_order: Vec<(usize, String)>,
 }
 

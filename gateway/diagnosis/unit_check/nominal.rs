@@ -91,7 +91,7 @@ fn describe(output: &str, given: f64, found: &[UnitHypothesis]) -> UnitDoubt {
     )
 }
 
-/// Error of the model as given over the size of the output, about its mean where the output has a sign of its own.
+/// Error of the model as given over the size of the output, its root mean square.
 fn error(recording: &Recording, model: &Model) -> Option<f64> {
     let simulation = simulation::run(recording, model).ok()?;
     let (rmse, _) = simulation.rmse()?;

@@ -9,7 +9,7 @@ use rules::twin::text::short;
 type Size = (&'static str, (f64, f64), &'static str, &'static str);
 
 /// From the smallest to the greatest machine tools of the catalogues: a watchmaker's lathe to a vertical lathe of 10 m, micro milling to gantry mills.
-const SIZES: [Size; 26] = [
+const SIZES: [Size; 27] = [
     ("spindle_speed_rpm", (90.0, 2e5), "1/s, rad/s or 1000/min", "deg/s"),
     ("spindle_programmed_rpm", (90.0, 2e5), "1/s, rad/s or 1000/min", "deg/s"),
     ("feed_mm_min", (4.0, 6e4), "m/min or mm/rev", "um/min"),
@@ -31,6 +31,7 @@ const SIZES: [Size; 26] = [
     ("thermal_error_um", (0.6, 3000.0), "mm or inch", "nm"),
     ("axis_velocity_mm_min", (5.0, 1.5e5), "m/min, mm/s or m/s", "um/min"),
     ("x_axis_velocity_mm_min", (5.0, 1.5e5), "m/min, mm/s or m/s", "um/min"),
+    ("y_axis_velocity_mm_min", (5.0, 1.5e5), "m/min, mm/s or m/s", "um/min"),
     ("z_axis_velocity_mm_min", (5.0, 1.5e5), "m/min, mm/s or m/s", "um/min"),
     ("axis_position_mm", (2.0, 3e4), "m or inch", "um"),
     ("velocity_m_s", (1e-3, 6.0), "km/h", "mm/s or mm/min"),

@@ -183,16 +183,16 @@ impl Outbox {
     /// that no later connection can have the same number, or after `limit`.
     pub async fn begin_connection(&self, name: &str, limit: Duration) -> u64 {
         let mut noted = self.shared.noted.subscribe();
+        let twice = *noted.borrow() + 2;
         let mut number = 0;
         self.change(name, |standing| {
             number = standing.connections;
             standing.connections += 1;
         });
         self.shared.connecting.store(true, Ordering::Release);
-        // One commit may be under way that has not seen it.
-        let twice = *noted.borrow_and_update() + 2;
+        // A commit may be under way that has not seen it; one that has seen it is not durable before it is noted.
         let waiting =
-            async { while self.has_connections() && *noted.borrow() < twice && noted.changed().await.is_ok() {} };
+            async { while noted.changed().await.is_ok() && self.has_connections() && *noted.borrow() < twice {} };
         // A disk that takes nothing must not keep anybody from sending.
         let _late = tokio::time::timeout(limit, waiting).await;
         number
@@ -224,9 +224,9 @@ impl Outbox {
         }
     }
 
-    /// At the end the sinks are not waited for any longer.
-    pub fn hurry(&self) {
-        self.shared.hurried.store(true, Ordering::Release);
+    /// At the end the sinks are not waited for any longer; with `false` they are again.
+    pub fn set_hurried(&self, hurried: bool) {
+        self.shared.hurried.store(hurried, Ordering::Release);
     }
 
     fn change(&self, name: &str, change: impl FnOnce(&mut DeliveryState)) {

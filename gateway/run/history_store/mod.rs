@@ -97,9 +97,8 @@ impl HistoryStore {
         recent::forget_without(&history_store.path);
         match history_store.try_open() {
             Ok(()) => {}
-            Err(error) if error.is_damage() => history_store.begin_anew(&error),
             Err(error) if foreign(&error) => return Err(error),
-            Err(error) => history_store.put_off(&error),
+            Err(error) => history_store.opening_failed(&error),
         }
         history_store.set_aside = history::damaged_files(&history_store.path);
         Ok(history_store)
@@ -121,6 +120,11 @@ impl HistoryStore {
         self.writer = Some(writer);
         self.closed = None;
         Ok(())
+    }
+
+    /// A damaged file is set aside; anything else is tried again later.
+    fn opening_failed(&mut self, error: &HistoryError) {
+        if error.is_damage() { self.begin_anew(error) } else { self.put_off(error) }
     }
 
     fn put_off(&mut self, error: &HistoryError) {
@@ -148,7 +152,7 @@ impl HistoryStore {
                         format!("storing again in {}; {} samples were not stored", self.path.display(), self.lost);
                     Notice::new(Severity::Info, "history_open", text).say();
                 }
-                Err(error) => self.put_off(&error),
+                Err(error) => self.opening_failed(&error),
             }
         }
         self.look_at_file();

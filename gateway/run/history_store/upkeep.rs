@@ -67,8 +67,7 @@ impl HistoryStore {
         self.lost += stored;
         match self.try_open() {
             Ok(()) => self.remember(&notice),
-            Err(error) if error.is_damage() => self.begin_anew(&error),
-            Err(error) => self.put_off(&error),
+            Err(error) => self.opening_failed(&error),
         }
     }
 
@@ -99,10 +98,14 @@ impl HistoryStore {
         self.begin_anew(&HistoryError::Question(why));
     }
 
-    /// Ends the writer; gives how many samples it had made durable.
+    /// Ends the writer; gives how many samples it had made durable. This is the thread of the tick: the sinks are not waited for.
     pub(super) fn leave(&mut self) -> u64 {
         let Some(writer) = self.writer.take() else { return 0 };
         self.recent = None;
-        writer.close().rows
+        let set_hurried = |hurried| self.options.outbox.iter().for_each(|outbox| outbox.set_hurried(hurried));
+        set_hurried(true);
+        let stored = writer.close().rows;
+        set_hurried(false);
+        stored
     }
 }

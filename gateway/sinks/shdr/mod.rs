@@ -17,9 +17,10 @@ pub use devices::{Described, devices_xml, is_prefix, prefix_of};
 
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
+use crate::clock;
 use crate::history::Outbox;
 use adapters::address::{Endpoint, Keys, endpoint};
-use adapters::clock::{Clock, SystemClock, TimeNs};
+use adapters::clock::TimeNs;
 use lines::{Line, Machine, stamped};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -121,7 +122,7 @@ async fn serve(stream: TcpStream, shared: Arc<AgentContext>) -> std::io::Result<
     let (reading, mut writing) = stream.into_split();
     let (greeting, mut lines) = {
         let machine = shared.machine.lock().unwrap_or_else(PoisonError::into_inner);
-        (machine.greeting(SystemClock::new().now_ns()), shared.lines.subscribe())
+        (machine.greeting(clock::now_ns()), shared.lines.subscribe())
     };
     let mut least_ns = TimeNs::MIN;
     put(&mut writing, &stamped(&greeting, &mut least_ns)).await?;

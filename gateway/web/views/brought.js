@@ -9,8 +9,8 @@ const STAGES = ["waiting", "reading", "comparing", "writing"];
 const AXES = ["", "x", "y", "z"];
 
 export class Brought {
-  constructor(context, done) {
-    Object.assign(this, { context, done, file: null, run: null, known: null });
+  constructor(context) {
+    Object.assign(this, { context, file: null, run: null, known: null });
     this.note = make("p", "note", " ", { role: "status" });
     this.bar = make("progress", "progress", null, { max: "1", hidden: true, "aria-label": t("diagnosing") });
     this.input = make("input", "", null, { type: "file", hidden: true, onchange: () => this.take(this.input.files[0]) });
@@ -130,9 +130,9 @@ export class Brought {
     const hint = (column) => (column.is_time ? t("is_time") : column.asked ? t("may_be", column.candidates.slice(0, 3).join(", ")) : "");
     const rows = this.choices.map(({ column, to, unit }) => [column.from, column.is_time ? t("time") : { text: to }, column.is_time ? column.unit ?? "" : { text: unit }, hint(column)]);
     this.time = make("select", "", ["", ...file.columns.map((column) => column.from)].map((name) => make("option", "", name || t("as_found"), { value: name })), { "aria-label": t("time_column") });
-    this.zone = input(t("time_zone"), "", { placeholder: "Europe/Berlin", size: "16" });
+    this.timeZone = input(t("time_zone"), "", { placeholder: "Europe/Berlin", size: "16" });
     const use = make("button", "", t("use_map"), { type: "button", "data-changes": "yes", onclick: () => this.act(() => this.map()) });
-    const fields = [make("label", "field", [t("time_column"), this.time]), make("label", "field", [t("time_zone"), this.zone]), use];
+    const fields = [make("label", "field", [t("time_column"), this.time]), make("label", "field", [t("time_zone"), this.timeZone]), use];
     const details = make("details", "", [make("summary", "", t("columns_as_understood")), list, table([t("in_file"), t("becomes"), t("unit"), ""], rows, { caption: t("columns_as_understood") }), make("div", "buttons", fields)]);
     details.open = file.columns.some((column) => column.asked) || Boolean(file.error);
     return details;
@@ -141,7 +141,7 @@ export class Brought {
   async map() {
     const columns = this.choices.filter(({ column }) => !column.is_time && column.from !== this.time.value)
       .map(({ column, to, unit }) => ({ from: column.from, to: to.value.trim(), unit: unit.value.trim() === (column.unit ?? "") ? "" : unit.value.trim() }));
-    this.show(await send(`/api/v1/files/${this.file.key}/map`, { columns, time: this.time.value, zone: this.zone.value.trim() }, "PUT"));
+    this.show(await send(`/api/v1/files/${this.file.key}/map`, { columns, time: this.time.value, zone: this.timeZone.value.trim() }, "PUT"));
   }
 
   /** What the file is compared with. */
@@ -195,7 +195,6 @@ export class Brought {
     } else if (before?.state === "running") {
       say(this.note, run.state === "failed" ? t("diagnosis_failed", run.what) : run.state === "cancelled" ? t("diagnosis_ended", run.by) : t("file_diagnosis_done", duration(run.seconds)));
       await this.reload();
-      this.done();
     }
     this.update();
   }

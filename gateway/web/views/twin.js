@@ -23,7 +23,7 @@ export function mount(root, context) {
   const press = () => { for (const b of ranges.children) b.setAttribute("aria-pressed", String(Number(b.dataset.span) === state.span)); };
   press();
   const asking = new Asking(context, () => setTimeout(() => read(), 1500));
-  const brought = new Brought(context, () => {});
+  const brought = new Brought(context);
   root.append(make("div", "columns", [card(t("twin_now"), [verdict, facts], "ages"), card(t("twin_watched"), regimes, "ages")]), card("", [make("div", "head", [make("h2", "", t("twin_figure")), ranges]), make("div", "legend", [["line-a", "recorded_value"], ["line-c", "simulated_value"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); })), figure, make("h3", "", t("twin_residual")), left, note]), card(t("latest_diagnosis"), latest), brought.box, asking.box, card(t("past_diagnoses"), past));
   const read = async () => {
     const status = context.status();

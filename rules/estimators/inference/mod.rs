@@ -9,9 +9,8 @@ use super::detector::{Detected, Detector};
 use super::estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
 use super::inputs::{InputChannels, TickInputs};
 use super::learning::{IdleTick, Learner};
-use super::loads::{LoadEstimator, Loads};
+use super::loads::LoadEstimator;
 use super::no_load::{NoLoad, NoLoadPoint, NoLoadTable};
-use super::part::PartFigures;
 use super::settings::Settings;
 use super::signals::{Feed, Pace, Signals};
 use super::situation::{Tick, visible_excess_w};
@@ -280,20 +279,11 @@ impl Inference {
             cutting_power_w,
             load_loss_w,
             visible_cutting_power_w: self.least_visible(reference.and(no_load), speed_rpm),
-            wear_limit_w: Err(NoEstimate::NoModel),
-            tool_wear_mm: Err(NoEstimate::NoPartYet),
-            tool_growth_pct: Err(NoEstimate::NoPartYet),
-            tool_worn_probability: Err(NoEstimate::NoPartYet),
-            tool_parts_left: Err(NoEstimate::NoPartYet),
-            material_level_pct: Err(NoEstimate::NoPartYet),
-            tool_limit_parts: Err(NoEstimate::NoModel),
-            tool_life_share: Err(NoEstimate::NoPartYet),
             no_load_origin: reference.map_or(NoLoadOrigin::None, |known| known.origin),
             noise_gain: reference.map_or(0.0, |known| known.noise_gain),
             visibility: self.visibility(inputs, no_load, verdict),
             gear_stage: u8::try_from(self.memory.signals.stage()).unwrap_or(0),
-            loads: Loads::none(NoEstimate::NotYet),
-            part: PartFigures::none(),
+            ..Estimates::none(inputs.at_ns)
         };
         if inputs.basis.in_watts() { estimates } else { self.without_watts(estimates) }
     }

@@ -45,7 +45,14 @@ impl ConstantLoad {
         let Some(((load, (feed, programmed)), step_s)) = known.filter(|_| in_cut) else {
             self.follower.rest();
             self.loaded = false;
-            return Err(if now.cutting && target <= 0.0 { NoEstimate::NoTarget } else { NoEstimate::NotCutting });
+            return Err(match (load, feeds) {
+                _ if !now.cutting => NoEstimate::NotCutting,
+                _ if target <= 0.0 => NoEstimate::NoTarget,
+                (None, _) => NoEstimate::LoadUnknown,
+                (_, None) => NoEstimate::FeedUnknown,
+                // At the entry, and at the first tick after a pause.
+                _ => NoEstimate::NotCutting,
+            });
         };
         let share = load / target;
         self.loaded = share > if self.loaded { AIR_BACK * limits.air_share } else { limits.air_share };

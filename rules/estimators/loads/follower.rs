@@ -28,8 +28,8 @@ const CLEAR: f64 = 4.0;
 const HALVES_SHARE: f64 = 0.04;
 /// Greatest less least value of a steady stretch, as a share of its mean.
 const RANGE_SHARE: f64 = 0.3;
-/// Samples of one stretch; a box that ticks faster judges a shorter time, with more of them.
-const SAMPLES_MAX: usize = 512;
+/// Samples of one stretch; a box that ticks faster keeps fewer of them, so that the stretch stays whole.
+const SAMPLES_MAX: i64 = 512;
 
 /// What a law may ask for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -175,8 +175,11 @@ fn span_ns(span_s: f64) -> i64 {
 
 /// Keeps one sample beyond the span, so that a whole span is seen as one.
 fn push(samples: &mut VecDeque<(TimeNs, f64)>, sample: (TimeNs, f64), span_ns: i64) {
+    if samples.back().is_some_and(|(at_ns, _)| sample.0 - at_ns < span_ns / SAMPLES_MAX) {
+        return;
+    }
     samples.push_back(sample);
-    while samples.len() > SAMPLES_MAX || samples.get(1).is_some_and(|(at_ns, _)| sample.0 - at_ns >= span_ns) {
+    while samples.get(1).is_some_and(|(at_ns, _)| sample.0 - at_ns >= span_ns) {
         samples.pop_front();
     }
 }

@@ -1,5 +1,6 @@
 //! What is needed of a sample: the loads, the feed and the feed override in force.
 
+use crate::estimators::signals::seconds;
 use crate::estimators::{Estimates, State};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
@@ -87,15 +88,14 @@ impl LoadChannels {
         last_ns: Option<TimeNs>,
     ) -> LoadMoment<'a> {
         let number = |channel| sample.number(channel).ok();
-        let step_ns =
-            last_ns.map(|last_ns| sample.at_ns - last_ns).filter(|step_ns| (1..=STEP_MAX_NS).contains(step_ns));
+        let last_ns = last_ns.filter(|last_ns| (1..=STEP_MAX_NS).contains(&(sample.at_ns - last_ns)));
         let (feed, programmed) = (number(self.feed), number(self.programmed));
         let by_feed = feed.zip(programmed.filter(|programmed| *programmed > 0.0)).map(|(feed, of)| 100.0 * feed / of);
         LoadMoment {
             at_ns: sample.at_ns,
-            step_s: step_ns.map(seconds),
+            step_s: last_ns.map(|last_ns| seconds(last_ns, sample.at_ns)),
             cutting: estimates.state == State::Cutting,
-            state_s: seconds(sample.at_ns.saturating_sub(estimates.since_ns)),
+            state_s: seconds(estimates.since_ns, sample.at_ns),
             cutting_power_w: estimates.cutting_power_w.ok().map(|it| (it.value, it.sd)),
             spindle_power_w: number(self.spindle_power),
             spindle_current_a: number(self.current),
@@ -118,11 +118,6 @@ fn in_force_pct(said: Option<f64>, by_feed: Option<f64>) -> Option<f64> {
         (Some(said), None) => Some(said),
         (None, by_feed) => by_feed.filter(|pct| *pct <= OVERRIDE_MAX_PCT),
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a duration in nanoseconds; microseconds suffice beyond 104 days")]
-fn seconds(ns: i64) -> f64 {
-    ns as f64 / SECOND_NS as f64
 }
 
 #[cfg(test)]

@@ -222,7 +222,7 @@ fn what_was_learned_is_held_and_wear_and_lots_are_not() {
         taught(&mut machine, 3, 1000.0);
         machine
     };
-    for (share, asks) in [(1.0, false), (1.3, false), (1.45, false), (1.9, true)] {
+    for (share, asks) in [(1.0, false), (1.3, false), (1.45, false), (1.9, false), (2.4, true)] {
         let mut machine = learned();
         let least = (0..100).map(|_| machine.tick(share * 1000.0, true)).fold(f64::INFINITY, f64::min);
         assert_eq!(least < 99.0, asks, "{share}: {least}");

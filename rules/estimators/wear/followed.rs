@@ -1,5 +1,6 @@
 //! What the filter keeps of edges and operations, and what it tells.
 
+use super::prior::RATES_MAX;
 use super::work::{WorkKey, WorkReference};
 use serde::{Deserialize, Serialize};
 
@@ -73,12 +74,16 @@ pub(super) struct CuttingEdge {
 impl CuttingEdge {
     /// What has slid along it over what slid along the edges before it until they were changed; `None` without two of them.
     pub(super) fn life_share(&self) -> Option<f64> {
-        if self.lives_m.len() < 2 {
+        // Asked at every tick: on the stack, and there are no more of them.
+        let count = self.lives_m.len().min(RATES_MAX);
+        if count < 2 {
             return None;
         }
-        let mut lives = self.lives_m.clone();
-        lives.sort_by(f64::total_cmp);
-        let middle = lives[lives.len() / 2].min(0.5 * (lives[(lives.len() - 1) / 2] + lives[lives.len() / 2]));
+        let mut lives = [0.0; RATES_MAX];
+        let lives = &mut lives[..count];
+        lives.copy_from_slice(&self.lives_m[self.lives_m.len() - count..]);
+        lives.sort_unstable_by(f64::total_cmp);
+        let middle = 0.5 * (lives[(count - 1) / 2] + lives[count / 2]);
         (middle > 0.0).then(|| self.slide_m / middle)
     }
 }

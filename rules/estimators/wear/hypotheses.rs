@@ -24,12 +24,10 @@ impl WearFollower {
         self.take_all(measured);
         if weight > 0.0 {
             harder.take_all(measured);
-            let joint = std::mem::take(&mut self.joint);
-            if weight > 0.5 {
-                self.edges = harder.edges.clone();
-            }
-            self.joint = joint;
             self.joint.mix(&harder.joint, weight);
+            if weight > 0.5 {
+                self.edges = harder.edges;
+            }
         }
         if weight > 0.5 {
             self.tell_material(&before, news);

@@ -5,9 +5,10 @@ use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use crate::script::compiled::{Script, ScriptSet};
 use crate::script::decision::{Alarm, Axis, Decision, Stop};
 use crate::script::problem::ScriptProblem;
+use crate::script::quantities::QUANTITIES;
 use crate::script::settings::merge;
 use crate::script::status::ScriptCondition;
-use crate::script::vocabulary::words;
+use crate::script::vocabulary::{find, words};
 use crate::script::{Host, WordKind};
 use adapters::channel::nearest;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -104,16 +105,14 @@ impl TrialContext {
         if let Some(id) = ChannelId::of(name) {
             return self.give_channel(id, value);
         }
-        if let Some(word) = words().iter().find(|word| word.name == name && word.is_figure()) {
+        if let Some(word) = find(name).filter(|word| word.is_figure()) {
             return self.give_figure(word.name, value);
         }
-        let deviation = name.strip_suffix("_sd_w").map(|stem| format!("{stem}_w"));
-        let deviation = deviation.or_else(|| name.strip_suffix("_sd_mm").map(|stem| format!("{stem}_mm")));
-        match deviation {
+        match QUANTITIES.iter().find(|row| row.1 == name).map(|row| row.0) {
             Some(quantity) => {
                 let sd =
                     number(value).filter(|sd| *sd >= 0.0).ok_or_else(|| format!("{name} needs a number from 0 on"))?;
-                let place = quantity_of(&mut self.estimates, &quantity).ok_or_else(|| unknown(name))?;
+                let place = quantity_of(&mut self.estimates, quantity).ok_or_else(|| unknown(name))?;
                 if let Ok(estimate) = place {
                     estimate.sd = sd;
                 }

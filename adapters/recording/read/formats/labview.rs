@@ -18,7 +18,7 @@ const END: &str = "***End_of_Header***";
 /// What the heads say.
 #[derive(Debug, Default)]
 struct LvmHead {
-    ends: u8,
+    ends: u64,
     units: Vec<String>,
     delta_s: Option<f64>,
     x0_s: f64,

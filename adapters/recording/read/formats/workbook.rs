@@ -96,16 +96,21 @@ fn cell(data: &Data) -> OwnedCell {
     }
 }
 
-/// A day with a time is a moment on the wall; a time alone stays a share of a day.
+/// A day with a time is a moment on the wall, a time alone a time of day, and a duration a number of seconds.
 fn moment(at: ExcelDateTime) -> OwnedCell {
     let days = at.as_f64();
-    if at.is_duration() || days < 1.0 {
-        return OwnedCell::Number(days);
+    if at.is_duration() {
+        return OwnedCell::Number(days * 86_400.0);
     }
     // A workbook counts in days; milliseconds are what its digits hold.
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-    let ms = ((days - EPOCH_DAYS) * 86_400e3).round() as i64;
-    OwnedCell::Local(ms.saturating_mul(SECOND_NS / 1000))
+    let milliseconds = |days: f64| (days * 86_400e3).round() as i64;
+    if (0.0..1.0).contains(&days) {
+        let ms = milliseconds(days).min(86_400_000 - 1);
+        let (s, m, h) = (ms / 1000, ms / 60_000, ms / 3_600_000);
+        return OwnedCell::text(&format!("{h:02}:{:02}:{:02}.{:03}", m % 60, s % 60, ms % 1000));
+    }
+    OwnedCell::Local(milliseconds(days - EPOCH_DAYS).saturating_mul(SECOND_NS / 1000))
 }
 
 /// Counts what the parts of the archive really come to: what they claim may be a lie.
