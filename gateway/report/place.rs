@@ -4,7 +4,7 @@ use super::data::Data;
 use super::strip::{REGIONS_MAX, strip};
 use super::text::{fixed, number, signed, with_unit};
 use rules::physics::explain::Language;
-use rules::twin::locate::{OnsetInterval, Region, active_rows};
+use rules::twin::locate::{OnsetInterval, Region, active_rows, usual_size};
 
 /// Mean, as a share of the typical size, below which an effect counts as one of both signs.
 const MEAN_TELLS: f64 = 0.3;
@@ -99,7 +99,7 @@ fn since(data: &Data<'_>, onset: &OnsetInterval) -> String {
 /// Root mean square of an effect over the rows where it acts: an effect of both signs has a mean that tells little.
 fn size(data: &Data<'_>, effect: &str) -> Option<f64> {
     let (_, values) = data.diagnosis.rows.effects.iter().find(|(name, _)| name == effect)?;
-    let active = active_rows(values);
+    let active = active_rows(values, usual_size(values));
     let inside = values.iter().zip(active).filter(|(_, active)| *active);
     let (sum, count) = inside.fold((0.0, 0_u32), |(sum, count), (x, _)| (sum + x * x, count.saturating_add(1)));
     (count > 0).then(|| (sum / f64::from(count)).sqrt())

@@ -1,10 +1,13 @@
 //! Where: the region of time and of operating space in which a missing effect acts.
 
 use crate::physics::{Role, Scene};
-use crate::statistics::count;
+use crate::statistics::{count, quantile};
 
-/// Share of the greatest contribution above which a row counts as affected.
-const ACTIVE_SHARE: f64 = 0.1;
+/// Share of the usual greatest size above which a row counts as affected: a fifth is a change that is seen beside it. Lower: noise
+/// of the estimate and the tails of a curve are called affected; higher: only the peak is.
+const ACTIVE_SHARE: f64 = 0.2;
+/// Share of the rows that are smaller than the usual greatest size: single rows say nothing of a size.
+const USUAL: f64 = 0.99;
 /// Conditions that describe a region, at most.
 const CONDITIONS_MAX: usize = 3;
 /// What a condition must add to the agreement between region and description.
@@ -89,27 +92,16 @@ pub struct Region {
     pub onset: Option<OnsetInterval>,
 }
 
-/// Rows in which a contribution is noticeable.
+/// The usual greatest size of a contribution.
 #[must_use]
-pub fn active_rows(contribution: &[f64]) -> Vec<bool> {
-    let top = contribution.iter().fold(0.0_f64, |top, x| top.max(x.abs()));
-    contribution.iter().map(|x| x.abs() > ACTIVE_SHARE * top && top > 0.0).collect()
+pub fn usual_size(contribution: &[f64]) -> f64 {
+    quantile(contribution.iter().map(|x| x.abs()), USUAL).unwrap_or(0.0)
 }
 
-/// The region of one effect's contribution; `all_squares` is the sum of squares of all of them.
+/// Rows in which a contribution is noticeable beside this size.
 #[must_use]
-pub fn region(scene: &Scene, effect: &str, contribution: &[f64], all_squares: f64) -> Region {
-    let active = active_rows(contribution);
-    let inside = || contribution.iter().zip(&active).filter(|(_, active)| **active).map(|(x, _)| *x);
-    let rows = inside().count().max(1);
-    Region {
-        effect: effect.to_owned(),
-        share: inside().map(|x| x * x).sum::<f64>() / all_squares.max(f64::MIN_POSITIVE),
-        mean: inside().sum::<f64>() / count(rows),
-        conditions: conditions(scene, &active),
-        spans: spans(scene, &active),
-        onset: None,
-    }
+pub fn active_rows(contribution: &[f64], size: f64) -> Vec<bool> {
+    contribution.iter().map(|x| x.abs() > ACTIVE_SHARE * size && size > 0.0).collect()
 }
 
 /// Every stretch of affected rows, run by run; gaps of one row are bridged.

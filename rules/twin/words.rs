@@ -97,13 +97,13 @@ pub(super) fn withdrawn(found: &[String], among_fitted: bool, errors: Option<(f6
     });
     Bilingual::new(
         format!(
-            "Cannot tell: {} fits the runs it was fitted to, but the error on {} does not fall{}.",
+            "Cannot tell: {} fits the runs it was fitted to, but the error on {} does not fall by more than chance{}.",
             listed(&names, |name| &name.en, " and "),
             runs.en,
             errors.en
         ),
         format!(
-            "{}与参与拟合的批次吻合，但{}的误差没有下降{}。",
+            "{}与参与拟合的批次吻合，但{}的误差下降不超过偶然{}。",
             listed(&names, |name| &name.zh, "和"),
             runs.zh,
             errors.zh

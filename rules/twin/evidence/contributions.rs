@@ -4,6 +4,7 @@ use super::algebra::{CholeskyFactor, add_gram, mirror};
 use super::answer::Named;
 use super::bank::Since;
 use super::follow::Follower;
+use super::inner::unbroken;
 use super::judge::Judge;
 use super::means::PosteriorMeans;
 use super::noise::NoiseModel;
@@ -11,7 +12,6 @@ use super::posterior::Explanation;
 use crate::statistics::{count, rms};
 use crate::twin::diagnosis::UNKNOWN;
 use ndarray::{Array1, Array2, ShapeBuilder, s};
-use std::ops::Range;
 
 /// Squared deviations gained from which a step is taken to have begun in a held-out run.
 const BEGUN: f64 = 12.0;
@@ -119,14 +119,7 @@ impl Judge<'_> {
         after: &mut [f64],
         all: &mut [Named],
     ) {
-        let mut blocks: Vec<Range<usize>> = Vec::new();
-        for at in 0..rows.len() {
-            let goes_on = at > 0 && self.inputs.block[rows[at]] == self.inputs.block[rows[at - 1]];
-            match blocks.last_mut() {
-                Some(last) if goes_on => last.end = at + 1,
-                _ => blocks.push(at..at + 1),
-            }
-        }
+        let blocks = unbroken(self.inputs, rows);
         let white = |value: &dyn Fn(usize) -> f64| {
             let mut white: Vec<f64> = rows.iter().map(|row| value(*row)).collect();
             noise.whiten(&mut white, &blocks);

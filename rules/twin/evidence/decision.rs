@@ -9,8 +9,9 @@
 //! | `chance_max` | one recording in a hundred with nothing missing passes the test of existence | higher: false reports; lower: silence about weak effects | recordings with nothing hidden |
 //! | `nothing_max`, `nothing_sure` | one in five and one in twenty: an average over resamples has a floor, since some of them leave out what shows the effect | the same | the same |
 //! | `inner_gain` | less than one deviation of a paired sum: it only refuses what does not carry over at all | higher: silence; lower: forms that fit one unit only | recordings with nothing hidden, real placebos |
+//! | `predicted` | the normal deviation that chance exceeds once in twenty, asked after a test of one in a hundred: states that were read from the recording are not asked in that test, and noise that follows the load passes it | higher: silence about effects of few stretches; lower: false reports | recordings with nothing hidden |
 //! | `member_loss` | a third of a deviation: chance moves a useless member by more than that half of the time | higher: true names lost beside others; lower: forms that fit one unit stay | concealed pairs |
-//! | `alone` | the second name holds at most 15 % | higher: classes where one is sure; lower: sure wrong names | concealed pairs and classes |
+//! | `alone` | what is told as sure is right nine times of ten by its own probability | higher: classes where one is sure; lower: sure wrong names | concealed pairs and classes |
 //! | `name_share` | a tenth of a curve is noise at usual sizes, another tenth is form | higher: `unknown` for known laws; lower: names for unlisted physics | laws left out of the catalogue |
 //! | `pair_more`, `pair_gain` | two laws with five columns make 12 % of a smooth curve by chance | lower: pairs of names for one unlisted law | the same |
 //! | `pair_whole` | noise alone leaves 3 % of a curve in large effects only; there a second law is a level, not chance | lower: second names for a form error | drives |
@@ -19,6 +20,8 @@
 //! | `rival_share` | a tenth of the energy is a form error of a third of the size | higher: one of a class told as sure; lower: classes everywhere | concealed classes |
 //! | `class_nats` | odds of 7 to 1 | higher: classes everywhere; lower: one of a class told as sure | concealed classes |
 //! | `rival_nats` | odds of 400 to 1 for the form of the textbook, which departs by 15 %: of laws that are known to be confused, the second was the true one as often as that says | higher: classes everywhere; lower: one of a class told as sure | copper loss and load loss |
+//! | `form_freedom` | a slope and a bend over speed, load and time, the departures of the second stage | higher: one of a class told as sure; lower: classes everywhere | friction laws and gear stages |
+//! | `form_noise` | noise of the usual size leaves a fiftieth of a curve | lower: a rival that makes 98 % instead of 99 % is lost; higher: classes for laws that fit perfectly | the same |
 //! | `unknown_share` | a third of the energy without a name is more than a form error of 15 % in three directions | higher: names beside unknown physics | unlisted beside listed effects |
 //! | `name_energy`, `size_noise`, `size_output` | below what a user would act on: a class 0.5 meter is wrong by as much | higher: lost small effects; lower: clutter | concealed pairs |
 //! | `textbook_share` | a law whose form is wrong by a third in size brings less; any value from 0.5 to 0.7 gave the same names on 256 concealed cases | lower: names for curves that only resemble a law; higher: `unknown` for known laws | laws left out of the catalogue |
@@ -35,6 +38,8 @@ pub(super) struct Thresholds {
     /// Least paired deviation (mean over deviation of the mean, by stretches of 15 s) by which what is reported lowers the
     /// error in inner parts of the fitted rows that took no part in its sizes.
     pub(super) inner_gain: f64,
+    /// The same of inner parts and of rows held out together, below which what is found is withdrawn.
+    pub(super) predicted: f64,
     /// Paired deviation below which a member of a set does not carry over to such parts, so that sets without it are tried.
     pub(super) member_loss: f64,
     /// Probability from which one name stands alone.
@@ -56,6 +61,10 @@ pub(super) struct Thresholds {
     pub(super) class_nats: f64,
     /// The same of a law that the catalogue knows it is confused with.
     pub(super) rival_nats: f64,
+    /// Directions in which the law of a machine departs from that of the textbook.
+    pub(super) form_freedom: f64,
+    /// Share of a contribution that noise leaves of any law.
+    pub(super) form_noise: f64,
     /// Share of the energy from which a nameless part makes the whole unexplained.
     pub(super) unknown_share: f64,
     /// Share of the energy below which a name is dropped.
@@ -77,8 +86,9 @@ pub(super) const THRESHOLDS: Thresholds = Thresholds {
     nothing_max: 0.2,
     nothing_sure: 0.05,
     inner_gain: 0.8,
+    predicted: 1.645,
     member_loss: -0.3,
-    alone: 0.75,
+    alone: 0.9,
     name_share: 0.8,
     pair_more: 0.05,
     pair_gain: 0.12,
@@ -88,6 +98,8 @@ pub(super) const THRESHOLDS: Thresholds = Thresholds {
     rival_share: 0.95,
     class_nats: 2.0,
     rival_nats: 6.0,
+    form_freedom: 6.0,
+    form_noise: 0.02,
     unknown_share: 0.35,
     name_energy: 0.02,
     size_noise: 0.3,

@@ -12,6 +12,7 @@ use super::posterior::NoiseSetting;
 use crate::statistics::count;
 use ndarray::{Array1, Array2, Axis, ShapeBuilder, s};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Stretches over which errors are paired, s, and rows of one at least.
 const PAIRED_S: f64 = 15.0;
@@ -32,7 +33,7 @@ pub(super) struct Inner<'a> {
     /// Deviation of an innovation.
     deviation: f64,
     /// Columns of each member, and those that every hypothesis has.
-    members: Vec<std::ops::Range<usize>>,
+    members: Vec<Range<usize>>,
     fixed: usize,
 }
 
@@ -76,25 +77,16 @@ impl<'a> Inner<'a> {
     /// Gain of these members over those: in deviations of it, and in squares.
     pub(super) fn gain(&self, with: &[usize], without: &[usize]) -> (f64, f64) {
         let whole = self.grams.iter().skip(1).fold(self.grams[0].clone(), |sum, gram| sum + gram);
-        let stretch = (PAIRED_S / self.inputs.period_s).round().max(PAIRED_ROWS);
-        let mut gained: BTreeMap<usize, f64> = BTreeMap::new();
+        let mut gained: Vec<(usize, f64)> = Vec::new();
         for (part, gram) in self.parts.iter().zip(&self.grams) {
             let others = &whole - gram;
             let after = self.errors(part, &others, &whole, with);
             let before = self.errors(part, &others, &whole, without);
             for ((at, after), before) in part.iter().zip(after).zip(before) {
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "a share of a count of rows"
-                )]
-                let number = (count(self.comparison.rows[*at]) / stretch) as usize;
-                *gained.entry(number).or_default() += before * before - after * after;
+                gained.push((self.comparison.rows[*at], before * before - after * after));
             }
         }
-        let sum: f64 = gained.values().sum();
-        let squares: f64 = gained.values().map(|x| x * x).sum();
-        (sum / (squares.sqrt() + 1e-30), sum)
+        paired(self.inputs.period_s, gained)
     }
 
     /// Errors in the rows of a part, sizes from the others; columns that act in this part only are followed through it.
@@ -130,6 +122,33 @@ impl<'a> Inner<'a> {
         all.iter().zip(&solved).for_each(|(index, x)| w[*index] = *x);
         w
     }
+}
+
+/// The sum of what is gained in rows, in deviations of it by stretches, and as it is.
+pub(super) fn paired(period_s: f64, rows: impl IntoIterator<Item = (usize, f64)>) -> (f64, f64) {
+    let stretch = (PAIRED_S / period_s).round().max(PAIRED_ROWS);
+    let mut gained: BTreeMap<usize, f64> = BTreeMap::new();
+    for (row, gain) in rows {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count of rows")]
+        let number = (count(row) / stretch) as usize;
+        *gained.entry(number).or_default() += gain;
+    }
+    let sum: f64 = gained.values().sum();
+    let squares: f64 = gained.values().map(|x| x * x).sum();
+    (sum / (squares.sqrt() + 1e-30), sum)
+}
+
+/// Stretches of unbroken noise among some rows, as places among them.
+pub(super) fn unbroken(inputs: &RecordingInputs<'_>, rows: &[usize]) -> Vec<Range<usize>> {
+    let mut blocks: Vec<Range<usize>> = Vec::new();
+    for at in 0..rows.len() {
+        let goes_on = at > 0 && inputs.block[rows[at]] == inputs.block[rows[at - 1]];
+        match blocks.last_mut() {
+            Some(last) if goes_on => last.end = at + 1,
+            _ => blocks.push(at..at + 1),
+        }
+    }
+    blocks
 }
 
 /// Places of the rows of each part: the fitted units in turn.

@@ -4,7 +4,7 @@ use super::answer::{EvidenceAnswer, Withdrawn, sum_of};
 use super::decision::THRESHOLDS;
 use super::existence::ExistenceTest;
 use super::gram::{Comparison, Gram};
-use super::inner::Inner;
+use super::inner::{Inner, paired, unbroken};
 use super::inputs::RecordingInputs;
 use super::naming::Naming;
 use super::posterior::{Explanation, Group, NoiseSetting, grouped};
@@ -27,12 +27,21 @@ pub(super) struct Judge<'a> {
     pub(super) recorded: &'a [f64],
     /// Tangents of the baseline, full length.
     pub(super) tangents: &'a [Vec<f64>],
+    /// Noise of each row relative to the ordinary one.
+    pub(super) scale: &'a [f64],
     /// Deviation of the ordinary noise.
     pub(super) ordinary: f64,
     /// The first-stage comparison, whose laws stand in for one another, with the Gram matrix of the likeliest noise.
     pub(super) first: (&'a Comparison<'a>, &'a Gram),
     /// Whether anything is there.
     pub(super) test: ExistenceTest,
+}
+
+/// What an explanation gains in rows that took no part in its sizes, in deviations of the gain.
+struct Prediction {
+    among_fitted: f64,
+    held_out: f64,
+    together: f64,
 }
 
 impl Judge<'_> {
@@ -71,6 +80,8 @@ impl Judge<'_> {
                     return self.told(answer, &best, &groups, lost);
                 }
                 Err(withdrawn) => {
+                    let told = self.predicts(&self.less(of, &kept));
+                    answer.debug.push_str(&format!("\npredicts {:.2} held out {:.2}", told.together, told.held_out));
                     answer.debug.push_str(&self.held_out_errors(&self.less(of, &kept)));
                     answer.withdrawn = Some(withdrawn);
                 }
@@ -136,7 +147,7 @@ impl Judge<'_> {
         }
         let found = names_of(&best);
         let mut left = after(&best);
-        while left >= before {
+        while left >= before || self.predicts(&best).together < THRESHOLDS.predicted {
             let size = best.members.len();
             let without = |gone: usize| {
                 let kept: Vec<usize> = (0..size).filter(|member| *member != gone).collect();
@@ -152,6 +163,32 @@ impl Judge<'_> {
             (left, best) = fewer;
         }
         Ok(best)
+    }
+
+    /// Does an explanation predict rows that took no part in its sizes better than chance does: those of the inner parts and
+    /// those held out together, each in deviations of its own gain (Stouffer's sum)?
+    fn predicts(&self, of: &Explanation) -> Prediction {
+        let inner = Inner::new(self.inputs, self.comparison, &self.settings[of.noise], &of.members);
+        let all: Vec<usize> = (0..of.members.len()).collect();
+        let among_fitted = inner.gain(&all, &[]).0;
+        let held_out = self.held_out_gain(of);
+        Prediction { among_fitted, held_out, together: (among_fitted + held_out) / std::f64::consts::SQRT_2 }
+    }
+
+    /// Paired deviation of what an explanation gains in rows that are held out, in the metric of the noise.
+    fn held_out_gain(&self, of: &Explanation) -> f64 {
+        let rows: Vec<usize> = self.inputs.left_out().collect();
+        let blocks = unbroken(self.inputs, &rows);
+        let noise = self.comparison.row_by_row(self.settings[of.noise].gram.noise);
+        let white = |total: &[f64]| {
+            let mut left: Vec<f64> =
+                rows.iter().map(|row| (self.recorded[*row] - total[*row]) / self.scale[*row]).collect();
+            noise.whiten(&mut left, &blocks);
+            left
+        };
+        let (before, after) = (white(&self.inputs.simulated), white(&self.contributions(of).0));
+        let gains = before.iter().zip(&after).map(|(before, after)| before * before - after * after);
+        paired(self.inputs.period_s, rows.iter().copied().zip(gains)).0
     }
 
     fn held_out_square(&self, total: &[f64]) -> f64 {

@@ -193,6 +193,7 @@ fn answer(
         naming: &naming,
         recorded: &outliers.recorded,
         tangents: &baseline.tangents,
+        scale: &outliers.scale,
         ordinary: outliers.ordinary,
         first: (first, metric),
         test,

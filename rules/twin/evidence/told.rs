@@ -20,7 +20,7 @@ use crate::twin::fit::{Fit, Metric, fit};
 use crate::twin::inputs::rows_with_inputs;
 use crate::twin::intervals::FittedRows;
 use crate::twin::linear::least_squares;
-use crate::twin::locate::{Region, conditions, spans};
+use crate::twin::locate::{Region, active_rows, conditions, spans, usual_size};
 use crate::twin::model::{Model, Parameter, Part};
 use crate::twin::next_step::{alternative, of_effects, over_channel};
 use crate::twin::words;
@@ -297,21 +297,22 @@ impl EvidenceReport<'_, '_> {
     fn regions(&self) -> Vec<Region> {
         let rows = self.inputs.rows;
         let whole: f64 = sum_of(&self.answer.remaining, rows).iter().map(|x| x * x).sum();
+        let size = usual_size(&sum_of(&self.answer.contributions, rows));
         let mut all: Vec<Region> = Vec::new();
         for (name, left) in &self.answer.remaining {
             if !self.answer.names.contains(name) {
                 continue;
             }
-            let own = self.answer.contributions.iter().find(|(known, _)| known == name).map(|(_, x)| x);
+            let own = self.answer.contributions.iter().find(|(known, _)| known == name).map_or(left, |(_, x)| x);
             let squares: Vec<f64> = left.iter().map(|x| x * x).collect();
-            let mean = crate::statistics::mean(&squares);
-            let active: Vec<bool> = squares.iter().map(|square| *square > mean && mean > 0.0).collect();
+            let of_all = active_rows(own, size);
+            let active = if of_all.contains(&true) { of_all } else { active_rows(own, usual_size(own)) };
             let inside = active.iter().filter(|active| **active).count();
             let over = |x: &[f64]| x.iter().zip(&active).filter(|(_, active)| **active).map(|(x, _)| *x).sum::<f64>();
             all.push(Region {
                 effect: name.clone(),
                 share: over(&squares) / whole.max(f64::MIN_POSITIVE),
-                mean: over(own.unwrap_or(left)) / count(inside.max(1)),
+                mean: over(own) / count(inside.max(1)),
                 conditions: conditions(self.inputs.scene, &active),
                 spans: spans(self.inputs.scene, &active),
                 onset: None,

@@ -129,14 +129,16 @@ impl Judge<'_> {
             let (along, square) = self.naming.products(comparison, gram, contribution);
             let all = self.naming.stand_ins(&along, square, nats);
             answer.debug.push_str(&nearest_stand_ins(name, &all));
-            let own = all.iter().find(|other| other.kind == *name).map_or(0.0, |own| own.nats.min(1.0));
+            let itself = all.iter().find(|other| other.kind == *name);
+            let own = itself.map_or(0.0, |own| own.nats.min(1.0));
+            let own_share = itself.map_or(0.0, |own| own.share);
             // The form of a curve that got its name by projection is not known better than to a tenth.
             let claimed = answer.claimed.contains(name);
             let near = |other: &StandIn| {
                 let makes_curve = claimed && other.share >= THRESHOLDS.rival_share;
                 let confused = are_confused(name, &other.kind);
                 let nats = if confused { THRESHOLDS.rival_nats } else { THRESHOLDS.class_nats };
-                other.nats < own + nats || makes_curve
+                other.nats < own + nats || makes_curve || is_of_like_form(own_share, other.share)
             };
             let others = all.into_iter().filter(|other| !answer.names.contains(&other.kind) && near(other));
             class.extend(others.map(|other| Rival {
@@ -148,6 +150,17 @@ impl Judge<'_> {
         class.sort_by(|a, b| a.nats.total_cmp(&b.nats).then_with(|| a.name.cmp(&b.name)));
         class
     }
+}
+
+/// Does another law make about as much of a contribution as the law that gave it its name?
+///
+/// However many rows there are, they tell no more of a form than its freedom: what a law leaves of a curve is a departure of the
+/// machine from the textbook in so many directions, of a deviation that is not known, so that the odds of two laws are the ratio of
+/// what they leave to half that power.
+fn is_of_like_form(own: f64, other: f64) -> bool {
+    let left = |share: f64| (1.0 - share).max(0.0) + THRESHOLDS.form_noise;
+    let nats = 0.5 * THRESHOLDS.form_freedom * (left(other) / left(own)).ln();
+    other >= THRESHOLDS.of_each && nats < THRESHOLDS.class_nats
 }
 
 /// Does the catalogue say of one of two laws that it is confused with the other?

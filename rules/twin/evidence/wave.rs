@@ -13,6 +13,9 @@ const SEGMENT_ROWS: usize = 64;
 const SEGMENTS_MIN: usize = 6;
 /// How many times the mean a line stands above it: of 32 bins averaged over six segments chance brings 3.
 const PEAK_MIN: f64 = 3.0;
+/// Bins beside a line from which and to which its neighbourhood reaches: a tapered line is three bins wide, while noise that rings
+/// stands on a wide foot. A narrower neighbourhood would be the line itself; a wider one lets ringing noise pass for a line.
+const BESIDE: std::ops::RangeInclusive<usize> = 2..=5;
 /// Lowest bin that is a line and no drift.
 const FIRST_BIN: usize = 3;
 /// Steps of a bin in which the frequency of a line is refined.
@@ -39,14 +42,21 @@ pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel)
     let bins: Vec<f64> = (FIRST_BIN..SEGMENT_ROWS / 2).map(|bin| count(bin) / count(SEGMENT_ROWS)).collect();
     let powers: Vec<f64> = bins.iter().map(|frequency| power(*frequency)).collect();
     let mean = crate::statistics::mean(&powers);
-    let (best, most) = bins.iter().zip(&powers).max_by(|a, b| a.1.total_cmp(b.1))?;
-    if *most < PEAK_MIN * mean {
+    let (at, most) = powers.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    if *most < PEAK_MIN * mean.max(neighbourhood(&powers, at)) {
         return None;
     }
+    let best = bins[at];
     let width = 1.0 / count(SEGMENT_ROWS);
     let near = (0..=REFINED).map(|k| best + width * (2.0 * count(k) / count(REFINED) - 1.0));
     let refined = near.map(|frequency| (power(frequency), frequency)).max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(SpectralLine { frequency: refined.1 / count(comparison.group), ln_choices: count(bins.len()).ln() })
+}
+
+/// Mean power of the bins beside one.
+fn neighbourhood(powers: &[f64], at: usize) -> f64 {
+    let beside = (0..powers.len()).filter(|bin| BESIDE.contains(&bin.abs_diff(at))).map(|bin| powers[bin]);
+    crate::statistics::mean(&beside.collect::<Vec<_>>())
 }
 
 /// Angle of a line in every row, rad: by the clock, so that gaps do not shift it.
