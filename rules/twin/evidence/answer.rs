@@ -91,7 +91,13 @@ impl EvidenceAnswer {
             }
         }
         if self.names.is_empty() || unknown > THRESHOLDS.unknown_share * whole {
-            self.unname(Vec::new());
+            self.unname(refused.iter().map(|name| (name.clone(), 0.0)).collect());
+        } else if let Some(first) = self.names.first() {
+            // A part that has lost its name keeps the whole from being sure.
+            self.verdict = Verdict::Ambiguous;
+            let beside = |name: &String| Rival { name: name.clone(), instead_of: first.clone(), nats: 0.0 };
+            let rivals: Vec<Rival> = refused.iter().map(beside).collect();
+            self.rivals.extend(rivals);
         }
     }
 

@@ -39,7 +39,6 @@ pub(super) struct Judge<'a> {
 
 /// What an explanation gains in rows that took no part in its sizes, in deviations of the gain.
 struct Prediction {
-    among_fitted: f64,
     held_out: f64,
     together: f64,
 }
@@ -172,7 +171,7 @@ impl Judge<'_> {
         let all: Vec<usize> = (0..of.members.len()).collect();
         let among_fitted = inner.gain(&all, &[]).0;
         let held_out = self.held_out_gain(of);
-        Prediction { among_fitted, held_out, together: (among_fitted + held_out) / std::f64::consts::SQRT_2 }
+        Prediction { held_out, together: (among_fitted + held_out) / std::f64::consts::SQRT_2 }
     }
 
     /// Paired deviation of what an explanation gains in rows that are held out, in the metric of the noise.

@@ -131,14 +131,14 @@ impl Judge<'_> {
             answer.debug.push_str(&nearest_stand_ins(name, &all));
             let itself = all.iter().find(|other| other.kind == *name);
             let own = itself.map_or(0.0, |own| own.nats.min(1.0));
-            let own_share = itself.map_or(0.0, |own| own.share);
+            let left = itself.map(|own| own.nats);
             // The form of a curve that got its name by projection is not known better than to a tenth.
             let claimed = answer.claimed.contains(name);
             let near = |other: &StandIn| {
                 let makes_curve = claimed && other.share >= THRESHOLDS.rival_share;
                 let confused = are_confused(name, &other.kind);
                 let nats = if confused { THRESHOLDS.rival_nats } else { THRESHOLDS.class_nats };
-                other.nats < own + nats || makes_curve || is_of_like_form(own_share, other.share)
+                other.nats < own + nats || makes_curve || left.is_some_and(|left| is_of_like_form(left, other))
             };
             let others = all.into_iter().filter(|other| !answer.names.contains(&other.kind) && near(other));
             class.extend(others.map(|other| Rival {
@@ -152,15 +152,15 @@ impl Judge<'_> {
     }
 }
 
-/// Does another law make about as much of a contribution as the law that gave it its name?
+/// Does another law make nearly as much of a contribution as the law that gave it its name, which leaves so many nats of it?
 ///
 /// However many rows there are, they tell no more of a form than its freedom: what a law leaves of a curve is a departure of the
-/// machine from the textbook in so many directions, of a deviation that is not known, so that the odds of two laws are the ratio of
-/// what they leave to half that power.
-fn is_of_like_form(own: f64, other: f64) -> bool {
-    let left = |share: f64| (1.0 - share).max(0.0) + THRESHOLDS.form_noise;
-    let nats = 0.5 * THRESHOLDS.form_freedom * (left(other) / left(own)).ln();
-    other >= THRESHOLDS.of_each && nats < THRESHOLDS.class_nats
+/// machine from the textbook in so many directions, of a deviation that is not known. Summed over all deviations the odds of two
+/// laws are the ratio of what they leave, half a nat of noise for each direction with it, to half the power of their number.
+fn is_of_like_form(left: f64, other: &StandIn) -> bool {
+    let half = 0.5 * THRESHOLDS.form_freedom;
+    let nats = half * ((other.nats + half) / (left + half)).ln();
+    other.share >= THRESHOLDS.of_each && nats < THRESHOLDS.class_nats
 }
 
 /// Does the catalogue say of one of two laws that it is confused with the other?
