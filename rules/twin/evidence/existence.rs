@@ -22,7 +22,6 @@ const SEED: u64 = 2;
 /// What the test found.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ExistenceTest {
-
     /// Chance that noise alone does as well.
     pub(super) chance: f64,
     /// How many independent rows the fitted rows are worth.
