@@ -15,6 +15,8 @@ mod package;
 mod page;
 mod process;
 mod replay;
+#[path = "../support/sealed.rs"]
+mod sealed;
 mod settings;
 mod system;
 mod twin;

@@ -7,7 +7,7 @@ use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 const GUARD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/gateway/package/guard");
@@ -118,6 +118,105 @@ fn an_update_is_verified_tried_and_kept() {
     assert!(stdout(&output).contains("not armed"), "{}", stdout(&output));
     let told = update(place, "exit 0", &[]);
     assert!(stdout(&told).contains("runs: 9.9.9"), "{}", stdout(&told));
+}
+
+/// A place in which the package and the update's way to confirm are laid out.
+fn box_for_update() -> (tempfile::TempDir, String) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let place = directory.path();
+    versions(place);
+    fs::create_dir_all(place.join("data")).expect("a folder");
+    let confirm = format!("printf 9.9.9 > {}", place.join("data/confirmed").display());
+    write_program(&place.join("bin/systemctl"), &confirm);
+    (directory, confirm)
+}
+
+/// `update` in that place, under another program where one is given.
+fn update_in(place: &Path, under: &[&str]) -> Command {
+    let path = format!("{}:{}", place.join("bin").display(), std::env::var("PATH").unwrap_or_default());
+    let words = [under, &[env!("CARGO_BIN_EXE_cnc-gateway"), "update"]].concat();
+    let mut command = Command::new(words[0]);
+    command.args(&words[1..]).env("PATH", path).arg(format!("{UPDATES}/cnc-gateway-9.9.9.tar.gz"));
+    command.args(["--verify", &format!("{UPDATES}/minisign.pub"), "--home", text(&place.join("home"))]);
+    command.args(["--data-dir", text(&place.join("data"))]).stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+/// How many cuts left which version.
+#[derive(Debug, Default)]
+struct Cuts {
+    before: usize,
+    on_trial: usize,
+}
+
+impl Cuts {
+    /// After a cut: a whole version runs, also after every start; the trial has an end; the next update works.
+    fn check(&mut self, place: &Path, confirm: &str, what: &str) {
+        let (home, data) = (place.join("home"), place.join("data"));
+        let program = |slot: &str| fs::read(home.join("versions").join(slot).join("cnc-gateway"));
+        let whole = [program("package").expect("read"), new_program()];
+        let runs = || fs::read(home.join("current/cnc-gateway")).is_ok_and(|program| whole.contains(&program));
+        assert!(runs(), "{what}: nothing runs");
+        let confirmed = data.join("confirmed").exists();
+        *if current(&home) == "versions/package" { &mut self.before } else { &mut self.on_trial } += 1;
+        for _ in 0..5 {
+            start_guard(&home, &data);
+            assert!(runs(), "{what}: nothing runs after a start");
+        }
+        assert!(!home.join("trial").exists(), "{what}: the trial has no end");
+        assert!(confirmed || current(&home) == "versions/package", "{what}: kept, and nobody confirmed it");
+        let (archive, key) = (format!("{UPDATES}/cnc-gateway-9.9.9.tar.gz"), format!("{UPDATES}/minisign.pub"));
+        let again = update(place, confirm, &[&archive, "--verify", &key]);
+        let over = again.status.success() || stderr(&again).contains("is not newer");
+        assert!(over && current(&home) == "versions/9.9.9", "{what}: {}", stderr(&again));
+    }
+}
+
+/// The program that the update brings.
+fn new_program() -> Vec<u8> {
+    let (place, _) = box_for_update();
+    assert!(update_in(place.path(), &[]).status().expect("started").success());
+    fs::read(place.path().join("home/versions/9.9.9/cnc-gateway")).expect("read")
+}
+
+#[test]
+fn an_update_that_is_killed_at_twenty_moments_leaves_a_version_that_runs() {
+    let (place, _) = box_for_update();
+    let began = Instant::now();
+    assert!(update_in(place.path(), &[]).status().expect("started").success());
+    let (whole, mut cuts) = (began.elapsed(), Cuts::default());
+    for step in 1..=20 {
+        let (place, confirm) = box_for_update();
+        let mut child = update_in(place.path(), &[]).spawn().expect("started");
+        std::thread::sleep(whole * step / 21);
+        let _ended_before = child.kill();
+        child.wait().expect("a child");
+        cuts.check(place.path(), &confirm, &format!("after {step}/21"));
+    }
+    println!("20 cuts of {whole:?}: {cuts:?}");
+}
+
+/// The same at every call of the system that changes a file.
+#[test]
+#[ignore = "5 minutes; needs strace and the right to trace"]
+fn an_update_that_is_cut_at_any_call_leaves_a_version_that_runs() {
+    let calls =
+        ["mkdir", "write", "fsync", "fdatasync", "rename", "renameat2", "symlink", "symlinkat", "unlink", "unlinkat"];
+    let (mut cuts, mut count) = (Cuts::default(), 0);
+    for call in calls {
+        for number in 1.. {
+            let (place, confirm) = box_for_update();
+            let (trace, inject) = (format!("trace={call}"), format!("inject={call}:signal=KILL:when={number}"));
+            let strace = ["strace", "-f", "-qq", "-o", "/dev/null", "-e", &trace, "-e", &inject];
+            if update_in(place.path(), &strace).status().expect("strace runs").success() {
+                break;
+            }
+            cuts.check(place.path(), &confirm, &format!("{call} {number}"));
+            count += 1;
+        }
+    }
+    println!("{count} cuts: {cuts:?}");
+    assert!(count >= 20 && cuts.on_trial > 0, "{count} cuts: {cuts:?}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Nothing lost and nothing twice while the leader of the stream, the reader and the box are killed.
+//! Nothing lost and nothing twice while the leader of the stream, the reader, the box and the database are killed.
 //!
 //! `FLEET_ROWS=20000 FLEET_KILLS=2 cargo test --test fleet killed -- --nocapture`
 
@@ -21,10 +21,15 @@ pub(crate) fn ingest(address: &str, database: &str) -> Gateway {
     Gateway::spawn(command)
 }
 
+/// Rows in the database; 0 while it is away.
+fn count(postgres: &Postgres) -> u64 {
+    postgres.number("SELECT count(*) FROM items")
+}
+
 #[test]
-fn every_row_is_there_once_although_leader_reader_and_box_are_killed() {
+fn every_row_is_there_once_although_leader_reader_box_and_database_are_killed() {
     let Some(mut cluster) = Cluster::start(3) else { return };
-    let Some(postgres) = Postgres::start() else { return };
+    let Some(mut postgres) = Postgres::start() else { return };
     let (rows, kills) = (setting("FLEET_ROWS", 2500), setting("FLEET_KILLS", 1));
     let address = format!("{}/cnc", cluster.address());
     wait_for("the stream", PATIENCE, || {
@@ -37,11 +42,10 @@ fn every_row_is_there_once_although_leader_reader_and_box_are_killed() {
     let mut readers = vec![ingest(&address, &postgres.address()), ingest(&address, &postgres.address())];
     let began = Instant::now();
     let mut sending = Sending::at_speed("40", &address, "");
-    let count = || postgres.number("SELECT count(*) FROM items");
-    for kill in 0..3 * kills {
-        let due = rows * (kill + 1) / (3 * kills + 1);
-        wait_for(&format!("{due} rows before kill {kill}"), PATIENCE, || (count() >= due).then_some(()));
-        match kill % 3 {
+    for kill in 0..4 * kills {
+        let due = rows * (kill + 1) / (4 * kills + 1);
+        wait_for(&format!("{due} rows before kill {kill}"), PATIENCE, || (count(&postgres) >= due).then_some(()));
+        match kill % 4 {
             0 => {
                 let (leader, _) = wait_for("a leader", PATIENCE, || cluster.stream());
                 cluster.kill(leader);
@@ -54,14 +58,20 @@ fn every_row_is_there_once_although_leader_reader_and_box_are_killed() {
                 readers.push(ingest(&address, &postgres.address()));
                 println!("{:.1} s: a reader killed at {due} rows", began.elapsed().as_secs_f64());
             }
-            _ => {
+            2 => {
                 sending.kill();
                 sending.start();
                 println!("{:.1} s: the box killed at {due} rows", began.elapsed().as_secs_f64());
             }
+            _ => {
+                postgres.crash();
+                std::thread::sleep(Duration::from_secs(2));
+                postgres.run();
+                println!("{:.1} s: the database killed at {due} rows", began.elapsed().as_secs_f64());
+            }
         }
     }
-    wait_for(&format!("{rows} rows"), PATIENCE, || (count() >= rows).then_some(()));
+    wait_for(&format!("{rows} rows"), PATIENCE, || (count(&postgres) >= rows).then_some(()));
     sending.wait_sink("the gap is closed", |sink| sink["behind_items"].as_u64() < Some(100));
     let sink = sending.sink();
     sending.stop();
@@ -69,7 +79,7 @@ fn every_row_is_there_once_although_leader_reader_and_box_are_killed() {
     let rest = run(&["fleet", "ingest", &address, "--database", &postgres.address(), "--once"]);
     assert!(rest.status.success(), "{}", stderr(&rest));
     let highest = postgres.number("SELECT max(sequence) FROM items");
-    let (there, different) = (count(), postgres.number("SELECT count(DISTINCT sequence) FROM items"));
+    let (there, different) = (count(&postgres), postgres.number("SELECT count(DISTINCT sequence) FROM items"));
     let missing = postgres.sql(
         "SELECT number FROM generate_series(1, (SELECT max(sequence) FROM items)) number
          WHERE NOT EXISTS (SELECT 1 FROM items WHERE sequence = number) LIMIT 20",

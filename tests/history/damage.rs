@@ -6,7 +6,7 @@ use crate::round_trip::{options, verify, write};
 use flate2::read::GzDecoder;
 use gateway::history::{
     Alarm, Audit, Buckets, Command, Decision, Diagnosis, Event, Model, Options, Outbox, OutboxReader, OutboxSettings,
-    Part, Query, ReactionTime, Reader, RecordSpan, StateChange, Writer, repair,
+    Part, Query, ReactionTime, Reader, RecordSpan, StateChange, Writer, go_back, remove_old_copies, repair,
 };
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -339,4 +339,40 @@ fn another_program_that_only_reads_damages_nothing() {
     writer.flush().expect("durable");
     drop(writer);
     assert_eq!(verify(&copy, &machine, 0), 2_000);
+}
+
+/// The file as it was, byte for byte, beside the one with newer tables; and the way back to it.
+#[test]
+fn a_copy_is_kept_before_the_tables_change_and_an_older_version_goes_back_to_it() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (path, copy) = (dir.path().join("h.db"), dir.path().join("h.db.schema-4"));
+    older(&path);
+    let before = fs::read(&path).expect("reads");
+    drop(Writer::open(&path, Options::default()).expect("gets the newer schema"));
+    assert_eq!(fs::read(&copy).expect("kept"), before);
+    let told = Reader::open(&path).and_then(|reader| reader.events(RecordSpan::newest(10))).expect("reads");
+    let told: Vec<&str> =
+        told.iter().filter(|event| event.kind == "history_schema").map(|event| &*event.text).collect();
+    assert!(told.len() == 1 && told[0].contains("h.db.schema-4"), "{told:?}");
+    drop(Writer::open(&path, Options::default()).expect("opens"));
+    let again = Reader::open(&path).and_then(|reader| reader.events(RecordSpan::newest(10))).expect("reads");
+    assert_eq!(again.iter().filter(|event| event.kind == "history_schema").count(), 1, "only once");
+
+    // A week later it is gone, not a day earlier.
+    let now_ns = gateway::clock::now_ns();
+    let day_ns = 86_400_000_000_000;
+    remove_old_copies(&path, now_ns + 6 * day_ns);
+    assert!(copy.is_file());
+    remove_old_copies(&path, now_ns + 8 * day_ns);
+    assert!(!copy.exists());
+
+    // What a newer version has made of it, and the copy that it kept.
+    assert_eq!(go_back(&path).expect("nothing to do"), None, "without a copy nothing is changed");
+    let mine = fs::read(&path).expect("reads");
+    fs::copy(&path, dir.path().join("h.db.schema-5")).expect("copies");
+    crate::sealed::connect(&path).pragma_update(None, "user_version", 99).expect("changes");
+    let newer = go_back(&path).expect("renames").expect("there is a copy");
+    assert!(newer.is_file() && newer.to_string_lossy().contains("h.db.newer-"), "{newer:?}");
+    assert_eq!(fs::read(&path).expect("reads"), mine);
+    assert!(!dir.path().join("h.db.schema-5").exists());
 }
