@@ -281,3 +281,61 @@ fn the_service_manager_hears_of_the_start_of_life_and_of_the_end() {
     hear("STOPPING=1");
     assert!(gateway.wait().success());
 }
+
+/// How long a thread that hangs goes unnoticed: all its calls of the system are held up by strace. Ended by the service manager it is
+/// `WatchdogSec` (30 s) later.
+#[test]
+#[ignore = "2 minutes; needs strace and the right to trace"]
+fn a_thread_that_hangs_ends_the_sign_of_life() {
+    for (thread, part) in [("source", "poll"), ("history", "history"), ("serve", "page"), ("tick", "")] {
+        let directory = tempfile::tempdir().expect("a directory");
+        let socket_path = directory.path().join("notify");
+        let socket = UnixDatagram::bind(&socket_path).expect("a socket");
+        socket.set_read_timeout(Some(Duration::from_millis(200))).expect("a limit");
+        let mut command = program();
+        command.args(["run", "--data-dir", text(&directory.path().join("data")), "--listen", "127.0.0.1:0"]);
+        command.env("NOTIFY_SOCKET", &socket_path);
+        let mut gateway = Gateway::spawn(command);
+        let hear = || {
+            let mut bytes = [0; 4096];
+            socket
+                .recv(&mut bytes)
+                .map_or_else(|_| String::new(), |length| String::from_utf8_lossy(&bytes[..length]).into_owned())
+        };
+        wait_for("ready", Duration::from_secs(30), || hear().contains("READY=1").then_some(()));
+        gateway.address();
+        let mut holding = hold_threads(gateway.pid(), thread);
+        let (began, mut last_sign, mut told) = (Instant::now(), Duration::ZERO, String::new());
+        while began.elapsed() < Duration::from_secs(26) {
+            let heard = hear();
+            if heard.contains("WATCHDOG=1") {
+                last_sign = began.elapsed();
+            }
+            if heard.contains("stands still") {
+                told = heard;
+            }
+        }
+        println!("{thread}: last sign of life after {:.1} s; told: {}", last_sign.as_secs_f64(), told.trim());
+        assert!(last_sign < Duration::from_secs(23), "{thread}: a sign of life after {last_sign:?}");
+        assert!(part.is_empty() || told.contains(part), "{thread}: told {told:?}");
+        let _ended = (holding.kill(), holding.wait());
+        gateway.kill();
+    }
+}
+
+/// strace at every thread of this name; each of its calls waits for five minutes.
+fn hold_threads(pid: u32, name: &str) -> std::process::Child {
+    let mut strace = Command::new("strace");
+    strace.args(["-qq", "-o", "/dev/null", "-e", "trace=all", "-e", "inject=all:delay_enter=300000000"]);
+    let threads = fs::read_dir(format!("/proc/{pid}/task")).expect("it runs").flatten();
+    let mut count = 0;
+    for thread in threads {
+        let named = fs::read_to_string(thread.path().join("comm")).is_ok_and(|found| found.trim() == name);
+        if named {
+            strace.arg("-p").arg(thread.file_name());
+            count += 1;
+        }
+    }
+    assert!(count > 0, "no thread {name}");
+    strace.stderr(Stdio::null()).spawn().expect("strace runs")
+}
