@@ -124,7 +124,7 @@ fn windows(machine: &str, count: i64, tally: &mut Tally) {
     let client = worked.setter();
     let (_, to_ms) = worked.span_ms(HOURS);
     let since_ms = since_ms(&worked, to_ms);
-    let length_ms = HOUR_MS.min(to_ms - since_ms);
+    let length_ms = HOUR_MS.min((to_ms - since_ms) / 2);
     println!("{machine}, from {} on:", utc(since_ms));
     for number in 0..count {
         let end_ms = to_ms - number * (to_ms - since_ms - length_ms) / count;
