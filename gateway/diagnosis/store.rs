@@ -2,7 +2,7 @@
 //! the experiment it asks for as a plan and as steps. Files in a folder of the data directory, found by a key that follows from
 //! the row, so that no second list can disagree with the history.
 
-use super::beside::BesideModel;
+use super::beside::{BesideModel, headline};
 use super::context::DiagnosisContext;
 use super::steps::{DiagnosisStep, steps};
 use crate::files::{read_text, replace};
@@ -204,8 +204,8 @@ fn summary_zh(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
         return format!("模型参数已改变：{}。", moved.join("；"));
     }
     let report = text::report(found, Language::Zh);
-    let headline = report.lines().next().unwrap_or_default();
-    headline.split_once('：').map_or(headline, |(_, words)| words).to_owned()
+    let first = report.lines().next().unwrap_or_default();
+    headline(beside, &found.unit, ("", first.split_once('：').map_or(first, |(_, words)| words))).1
 }
 
 #[cfg(test)]
