@@ -99,8 +99,10 @@ fn read_page(address: &str, stop: &Arc<AtomicBool>, answers: &Arc<AtomicU64>) {
                     read_stream(&address, &stop);
                 } else {
                     let path = ["/", "/api/v1/status", "/metrics", "/api/v1/events"][reader as usize % 4];
-                    assert_eq!(get(&address, path).status, 200, "{path}");
-                    answers.fetch_add(1, Ordering::SeqCst);
+                    // 503: the box is asked for more at once than it answers, and says so.
+                    let answer = get(&address, path).status;
+                    assert!([200, 503].contains(&answer), "{path}: {answer}");
+                    answers.fetch_add(u64::from(answer == 200), Ordering::SeqCst);
                     std::thread::sleep(Duration::from_millis(200));
                 }
             }
