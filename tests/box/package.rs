@@ -198,7 +198,7 @@ fn an_update_that_is_killed_at_twenty_moments_leaves_a_version_that_runs() {
 
 /// The same at every call of the system that changes a file.
 #[test]
-#[ignore = "5 minutes; needs strace and the right to trace"]
+#[ignore = "1 minute: an update killed at each call that changes a file; needs strace and the right to trace"]
 fn an_update_that_is_cut_at_any_call_leaves_a_version_that_runs() {
     let calls =
         ["mkdir", "write", "fsync", "fdatasync", "rename", "renameat2", "symlink", "symlinkat", "unlink", "unlinkat"];
@@ -285,7 +285,7 @@ fn the_service_manager_hears_of_the_start_of_life_and_of_the_end() {
 /// How long a thread that hangs goes unnoticed: all its calls of the system are held up by strace. Ended by the service manager it is
 /// `WatchdogSec` (30 s) later.
 #[test]
-#[ignore = "2 minutes; needs strace and the right to trace"]
+#[ignore = "2 minutes: how long a thread that hangs goes unnoticed; needs strace and the right to trace"]
 fn a_thread_that_hangs_ends_the_sign_of_life() {
     for (thread, part) in [("source", "poll"), ("history", "history"), ("serve", "page"), ("tick", "")] {
         let directory = tempfile::tempdir().expect("a directory");
