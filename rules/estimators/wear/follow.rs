@@ -34,7 +34,7 @@ pub struct WearFollower {
     pub(super) hardness: usize,
     level: usize,
     pub(super) edges: Vec<CuttingEdge>,
-    pub(super) groups: Vec<OperationGroup>,
+    groups: Vec<OperationGroup>,
     program: String,
     work_material: String,
     last_s: f64,

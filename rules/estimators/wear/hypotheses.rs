@@ -89,34 +89,25 @@ impl WearFollower {
         sum
     }
 
-    /// The rule of the source: the power has passed the limit. It counts where every operation that has one says so, against the limit that
-    /// holds there: what an operation has always taken beside the model is no wear.
+    /// The rule of the source: the power has passed the limit. It counts where every operation that has one says so.
     pub(super) fn hold_against_limit(&mut self, at: usize, works: &[&EdgeWork], news: &mut Vec<WearNews>) {
         let edge = &self.edges[at];
         let of_edge = works.iter().filter(|work| work.edge == edge.name && leads(work, works));
-        let shares: Vec<(f64, f64)> =
-            of_edge.filter_map(|work| Some((work.of_limit()?, self.taken_beside(work)))).collect();
+        let shares: Vec<f64> = of_edge.filter_map(|work| work.of_limit()).collect();
         let (limit_before, material_before) = (edge.limit_parts, edge.material_parts);
-        let is_above = !shares.is_empty() && shares.iter().all(|(share, _)| *share > 1.0);
-        let counts = is_above && shares.iter().all(|(share, beside)| *share > *beside);
+        let is_above = !shares.is_empty() && shares.iter().all(|share| *share > 1.0);
         // The filter may have lost some wear to a softer lot. What it holds for much less than the criterion is an edge in harder
         // material, or in a cut that takes more than the model says; that is told in place of an alarm.
         let may_be_worn = self.joint.mean(edge.wear) >= MAY_BE_WORN_SHARE * edge.criterion_mm;
         let (wear_mm, name) = (self.joint.mean(edge.wear), edge.name.clone());
         let edge = &mut self.edges[at];
         edge.limit_parts =
-            (!shares.is_empty()).then(|| if counts && may_be_worn { limit_before.unwrap_or(0) + 1 } else { 0 });
-        edge.material_parts = if is_above && !(counts && may_be_worn) { material_before + 1 } else { 0 };
+            (!shares.is_empty()).then(|| if is_above && may_be_worn { limit_before.unwrap_or(0) + 1 } else { 0 });
+        edge.material_parts = if is_above && !may_be_worn { material_before + 1 } else { 0 };
         if edge.material_parts == LIMIT_PARTS_TOLD {
             let material = self.joint.mean(self.hardness).exp_m1();
             news.push(WearNews::LimitByMaterial { edge: name, wear_mm, material });
         }
-    }
-
-    /// By how many times this operation takes what the model says, whatever the edge and the material.
-    fn taken_beside(&self, work: &EdgeWork) -> f64 {
-        let group = self.groups.iter().find(|group| group.key == work.key);
-        group.map_or(1.0, |group| self.joint.mean(group.at).exp())
     }
 }
 
