@@ -13,9 +13,9 @@ use rules::twin::text::short;
 use rules::twin::{Diagnosis, Model};
 use serde::{Deserialize, Serialize};
 
-/// A difference below this share of the simulated output is none; so is one below the noise of a second. At standstill, where nothing is
-/// simulated, only the noise counts. Lower: every kind of work differs a little from every model; higher: what the watch finds, from 2 %
-/// on, is not told here.
+/// A difference below this share of the simulated output is none. At standstill, where less is simulated than the noise of a second,
+/// it is one below that noise. Lower: every kind of work differs a little from every model; higher: what the watch finds, from 2 % on, is
+/// not told here.
 const TOLD_SHARE: f64 = 0.02;
 /// Parameters that have moved by less than this share of themselves are not named.
 const MOVED_SHARE: f64 = 0.01;
@@ -174,7 +174,7 @@ fn summed(
 impl BesideModel {
     /// A difference up to this is none.
     fn negligible(&self) -> f64 {
-        (TOLD_SHARE * self.expected.abs()).max(self.noise)
+        if self.expected.abs() > self.noise { TOLD_SHARE * self.expected.abs() } else { self.noise }
     }
 
     /// Is the difference worth telling?

@@ -92,7 +92,7 @@ mod writer;
 pub use audit::{AuditCheck, AuditEntry, AuditRemoval, Break, audit_document};
 pub use block::{Cells, NumberCells, ValueSummary, WordCells};
 pub use damage::{Aside, DamagedRows, damaged_files, set_aside};
-pub use earlier::{go_back, remove_old_copies};
+pub use earlier::{COPYING, go_back, is_going_back, remove_old_copies};
 pub use error::HistoryError;
 pub use export::{DayWritten, Format, day_of, plain_cell};
 pub use future::FutureRows;

@@ -17,6 +17,10 @@ trap 'rm -rf "$work"' EXIT
 # `extract` unpacks and runs no script of any package.
 mmdebstrap --quiet --variant=extract --include=libc6,libgcc-s1,ca-certificates,tzdata,curl,coreutils,dash,base-files \
   bookworm "$work/root.tar" ${mirror:+"$mirror"}
+if [ -e "$out" ] && [ ! -f "$out/oci-layout" ]; then
+  echo "$out is there and is no image; name another folder" >&2
+  exit 2
+fi
 rm -rf "$out"
 umoci init --layout "$out"
 umoci new --image "$out:latest"

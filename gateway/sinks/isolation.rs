@@ -7,7 +7,7 @@
 //! an outage, however long, costs no item, nor do three of them one after another.
 //!
 //! The witness is the next item at first. Where the line breaks at it as well, it may be of the same kind: the next witness is 2, 4, ..
-//! 64 items further, and then the next item again. So up to 63 such items in a row are told from a line that is down.
+//! 64 items further, and then the next item again. So up to 64 such items in a row are told from a line that is down.
 
 /// Breaks before the items are sent one by one, and before one of them is under suspicion.
 const BREAKS: u32 = 3;
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn items_in_a_row_that_break_the_line_are_left_out_and_no_other() {
-        for poison in [5..7_u64, 1..4, 20..36, 28..39, 1..64] {
+        for poison in [5..7_u64, 1..4, 20..36, 28..39, 1..65] {
             let poison: Vec<u64> = poison.collect();
             let (arrived, left_out, _) = send(100, &poison, |_| false);
             assert_eq!(left_out, poison);

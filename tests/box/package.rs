@@ -202,6 +202,8 @@ fn an_update_that_is_killed_at_twenty_moments_leaves_a_version_that_runs() {
 fn an_update_that_is_cut_at_any_call_leaves_a_version_that_runs() {
     let calls =
         ["mkdir", "write", "fsync", "fdatasync", "rename", "renameat2", "symlink", "symlinkat", "unlink", "unlinkat"];
+    let there = Command::new("strace").args(["-o", "/dev/null", "true"]).status();
+    assert!(there.is_ok_and(|status| status.success()), "strace is not installed or may not trace");
     let (mut cuts, mut count) = (Cuts::default(), 0);
     for call in calls {
         for number in 1.. {

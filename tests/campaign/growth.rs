@@ -11,6 +11,7 @@ use std::net::TcpStream;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Machine hours that pass in the time of one: 72 h in 20 minutes.
@@ -93,12 +94,12 @@ fn judge(name: &str, held: &[Held], row: &mut Row) {
 }
 
 /// Readers of the page as a shop has them: streams of live values that are left open and begun again, and questions.
-fn read_page(address: &str, stop: &Arc<AtomicBool>, answers: &Arc<AtomicU64>) {
-    for reader in 0..12_u32 {
+fn read_page(address: &str, stop: &Arc<AtomicBool>, answers: &Arc<AtomicU64>) -> Vec<JoinHandle<()>> {
+    let begin = |reader: u32| {
         let (address, stop, answers) = (address.to_owned(), stop.clone(), answers.clone());
         std::thread::spawn(move || {
             while !stop.load(Ordering::SeqCst) {
-                if reader % 3 == 0 {
+                if reader.is_multiple_of(3) {
                     read_stream(&address, &stop);
                 } else {
                     let path = ["/", "/api/v1/status", "/metrics", "/api/v1/events"][reader as usize % 4];
@@ -109,8 +110,9 @@ fn read_page(address: &str, stop: &Arc<AtomicBool>, answers: &Arc<AtomicU64>) {
                     std::thread::sleep(Duration::from_millis(200));
                 }
             }
-        });
-    }
+        })
+    };
+    (0..12).map(begin).collect()
 }
 
 /// Ten seconds of a stream of live values, then the reader goes without a word.
@@ -136,7 +138,7 @@ pub(crate) fn long_runs(scale: &Scale) -> Row {
     let mut quick = Sending::at_speed(PACE, &address("quick"), "");
     let mut read = Sending::at_speed("1", &address("read"), "");
     let (stop, answers) = (Arc::<AtomicBool>::default(), Arc::<AtomicU64>::default());
-    read_page(read.page(), &stop, &answers);
+    let readers = read_page(read.page(), &stop, &answers);
     let time = scale.time(Duration::from_secs(1200), Duration::from_secs(60));
     let due_ticks = HOURS * TICKS_PER_H * time.as_secs_f64() / 1200.0;
     let (began, mut of_quick, mut of_read) = (Instant::now(), Vec::new(), Vec::new());
@@ -152,6 +154,8 @@ pub(crate) fn long_runs(scale: &Scale) -> Row {
         of_read.extend(Held::by(&read, read.page()));
     }
     stop.store(true, Ordering::SeqCst);
+    let ended = readers.into_iter().filter_map(|reader| reader.join().err()).count();
+    row.must(ended == 0, format!("{ended} of 12 readers got something else than an answer"));
     row.n = LOOKS;
     row.must(of_quick.len() == LOOKS && of_read.len() == LOOKS, "a box did not answer");
     judge("quick", &of_quick, &mut row);

@@ -94,6 +94,7 @@ impl HistoryStore {
             long_log: false,
             set_aside: Vec::new(),
         };
+        history_store.finish_going_back();
         recent::forget_without(&history_store.path);
         match history_store.try_open() {
             Ok(()) => {}

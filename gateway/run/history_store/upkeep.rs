@@ -48,9 +48,27 @@ impl HistoryStore {
         );
         let notice = Notice::new(Severity::Warning, "history_went_back", text).detail(error.to_string());
         notice.say();
-        self.try_open()?;
-        self.remember(&notice);
+        match self.try_open() {
+            Ok(()) => self.remember(&notice),
+            Err(error) => self.opening_failed(&error),
+        }
         Ok(())
+    }
+
+    /// The power failed while an older version went back to the copy of before: now it does.
+    pub(super) fn finish_going_back(&self) {
+        if !history::is_going_back(&self.path) {
+            return;
+        }
+        let (severity, text) = match history::go_back(&self.path) {
+            Ok(_) => {
+                (Severity::Warning, "the history was missing; the copy of before is in its place again".to_owned())
+            }
+            Err(error) => {
+                (Severity::Error, format!("the copy of before cannot take the place of the history: {error}"))
+            }
+        };
+        Notice::new(severity, "history_went_back", text).say();
     }
 
     /// As an event of the history, and as a row of its audit: the chain before is in another file.
