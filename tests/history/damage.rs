@@ -6,8 +6,7 @@ use crate::round_trip::{options, verify, write};
 use flate2::read::GzDecoder;
 use gateway::history::{
     Alarm, Audit, Buckets, Command, Decision, Diagnosis, Event, Model, Options, Outbox, OutboxReader, OutboxSettings,
-    Part, Query, ReactionTime, Reader, RecordSpan, StateChange, Writer, go_back, is_going_back, remove_old_copies,
-    repair,
+    Part, Query, ReactionTime, Reader, RecordSpan, StateChange, Writer, repair,
 };
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -272,7 +271,7 @@ fn a_wrong_header_is_put_right_by_a_repair() {
 }
 
 /// Written by a version whose blocks and pages had no checksums.
-fn older(path: &Path) {
+pub(crate) fn older(path: &Path) {
     let packed =
         fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/history/schema_4.db.gz")).expect("there");
     let mut bytes = Vec::new();
@@ -281,9 +280,9 @@ fn older(path: &Path) {
 }
 
 /// Digest of what the version that wrote it exported.
-const OLDER_EXPORT: &str = "36a66393bc6e8a07c4081e65003b0f0b47415d804576fee7fc144e0631d5b344";
+pub(crate) const OLDER_EXPORT: &str = "36a66393bc6e8a07c4081e65003b0f0b47415d804576fee7fc144e0631d5b344";
 
-fn export(path: &Path) -> String {
+pub(crate) fn export(path: &Path) -> String {
     let mut text = Vec::new();
     Reader::open(path).and_then(|reader| reader.export_csv(&Query::default(), &mut text, path)).expect("reads");
     Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect()
@@ -340,71 +339,4 @@ fn another_program_that_only_reads_damages_nothing() {
     writer.flush().expect("durable");
     drop(writer);
     assert_eq!(verify(&copy, &machine, 0), 2_000);
-}
-
-/// The history as it was, beside the one with newer tables; and the way back to it.
-#[test]
-fn a_copy_is_kept_before_the_tables_change_and_an_older_version_goes_back_to_it() {
-    let dir = tempfile::tempdir().expect("a directory");
-    let (path, copy) = (dir.path().join("h.db"), dir.path().join("h.db.schema-4"));
-    older(&path);
-    // Somebody who reads keeps the log from being emptied.
-    let reading = rusqlite::Connection::open(&path).expect("opens");
-    reading.execute_batch("BEGIN; SELECT count(*) FROM segments").expect("reads");
-    drop(Writer::open(&path, Options::default()).expect("gets the newer schema"));
-    drop(reading);
-    assert_eq!(export(&copy), OLDER_EXPORT, "the copy");
-    let schema: i64 = rusqlite::Connection::open(&copy)
-        .and_then(|db| db.query_row("PRAGMA user_version", [], |row| row.get(0)))
-        .expect("reads");
-    assert_eq!(schema, 4);
-    let told = Reader::open(&path).and_then(|reader| reader.events(RecordSpan::newest(10))).expect("reads");
-    let told: Vec<&str> =
-        told.iter().filter(|event| event.kind == "history_schema").map(|event| &*event.text).collect();
-    assert!(told.len() == 1 && told[0].contains("h.db.schema-4"), "{told:?}");
-    drop(Writer::open(&path, Options::default()).expect("opens"));
-    let again = Reader::open(&path).and_then(|reader| reader.events(RecordSpan::newest(10))).expect("reads");
-    assert_eq!(again.iter().filter(|event| event.kind == "history_schema").count(), 1, "only once");
-
-    // A week after a confirmed clock has met it first it is gone, not a day earlier.
-    let now_ns = gateway::clock::now_ns() + 3_000 * 86_400_000_000_000;
-    let day_ns = 86_400_000_000_000;
-    remove_old_copies(&path, now_ns);
-    remove_old_copies(&path, now_ns + 6 * day_ns);
-    assert!(copy.is_file());
-    remove_old_copies(&path, now_ns + 8 * day_ns);
-    assert!(!copy.exists());
-
-    assert_eq!(go_back(&path).expect("nothing to do"), None, "without a copy nothing is changed");
-}
-
-/// A newer version has changed the tables, has sent items, and was taken back.
-#[test]
-fn an_older_version_goes_on_with_the_copy_and_uses_no_number_twice() {
-    let dir = tempfile::tempdir().expect("a directory");
-    let (path, copy) = (dir.path().join("h.db"), dir.path().join("h.db.schema-5"));
-    let outbox = || Outbox::new("lathe", OutboxSettings::default(), ["plant".to_owned()]);
-    let next_number = |lines: std::ops::Range<i64>| {
-        let outbox = outbox();
-        let writer = Writer::open(&path, Options { outbox: Some(outbox.clone()), ..options() }).expect("opens");
-        write(&writer, &Machine::new(), lines);
-        writer.flush().expect("durable");
-        drop(writer);
-        outbox.head().borrow().next_sequence
-    };
-    let kept = next_number(0..500);
-    fs::copy(&path, &copy).expect("copies");
-    let sent = next_number(500..1_500);
-    assert!(sent > kept, "{sent}");
-    crate::sealed::connect(&path).pragma_update(None, "user_version", 99).expect("changes");
-    let newer = go_back(&path).expect("renames").expect("there is a copy");
-    assert!(newer.is_file() && newer.to_string_lossy().contains("h.db.newer-"), "{newer:?}");
-    assert!(!copy.exists());
-    assert!(next_number(500..600) > kept + 90_000_000, "numbers that were sent are used again");
-
-    // The power fails between the two names.
-    fs::rename(&path, &copy).expect("renamed");
-    assert!(is_going_back(&path));
-    assert!(go_back(&path).expect("renames").is_some() && path.is_file() && !copy.exists());
-    assert!(!is_going_back(&path));
 }
