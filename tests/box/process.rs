@@ -173,7 +173,12 @@ impl Answer {
 
 /// `GET path` at `address`.
 pub(crate) fn get(address: &str, path: &str) -> Answer {
-    request(address, &format!("GET {path} HTTP/1.0\r\nHost: {address}\r\n\r\n"))
+    try_get(address, path).expect("it listens and answers")
+}
+
+/// The same of a box that may be starting again at this moment.
+pub(crate) fn try_get(address: &str, path: &str) -> std::io::Result<Answer> {
+    try_request(address, &format!("GET {path} HTTP/1.0\r\nHost: {address}\r\n\r\n"))
 }
 
 /// Sends a request as it is and reads until the server closes.
@@ -181,8 +186,7 @@ pub(crate) fn request(address: &str, text: &str) -> Answer {
     try_request(address, text).expect("it listens and answers")
 }
 
-/// The same of a box that may be starting again at this moment.
-pub(crate) fn try_request(address: &str, text: &str) -> std::io::Result<Answer> {
+fn try_request(address: &str, text: &str) -> std::io::Result<Answer> {
     let mut stream = TcpStream::connect(address)?;
     stream.set_read_timeout(Some(Duration::from_secs(20)))?;
     stream.write_all(text.as_bytes())?;
