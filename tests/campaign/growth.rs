@@ -5,6 +5,7 @@ use crate::box_under_test::Sending;
 use crate::broker::Broker;
 use crate::kills::status;
 use crate::process::{get, wait_for};
+use crate::process_status::status_figure;
 use crate::table::{Row, Scale};
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -44,11 +45,7 @@ struct Held {
 impl Held {
     fn by(sending: &Sending, address: &str) -> Option<Self> {
         let pid = sending.gateway.as_ref()?.pid();
-        let text = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-        let number = |name: &str| {
-            let line = text.lines().find_map(|line| line.strip_prefix(name))?;
-            line.trim().split(' ').next()?.parse::<f64>().ok()
-        };
+        let number = |name: &str| status_figure(&pid.to_string(), name);
         let database = sending.database();
         let size_mb = |path: &Path| std::fs::metadata(path).map_or(0.0, |file| file.len() as f64 / 1e6);
         Some(Self {
