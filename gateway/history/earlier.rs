@@ -9,7 +9,7 @@ use super::error::{HistoryError, at};
 use super::lock::beside;
 use super::outbox::skip_numbers;
 use super::record::Event;
-use super::schema::SCHEMA;
+use super::schema::{SCHEMA, copy_whole};
 use super::space::disk_room;
 use crate::{clock, files};
 use adapters::clock::TimeNs;
@@ -73,7 +73,7 @@ fn copy(path: &Path, db: &Connection, schema: i64) -> Result<PathBuf, String> {
 
 /// With what still stands in the log, also while somebody reads.
 fn write_copy(db: &Connection, fresh: &Path) -> Result<(), String> {
-    db.execute("VACUUM INTO ?1", [fresh.to_string_lossy()]).map_err(|error| error.to_string())?;
+    copy_whole(db, fresh).map_err(|error| error.to_string())?;
     let file = fs::OpenOptions::new().write(true).open(fresh).map_err(|error| error.to_string())?;
     // Not dated yet: the clock of this moment may be wrong.
     let undated = file.set_modified(SystemTime::UNIX_EPOCH);

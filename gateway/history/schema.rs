@@ -49,6 +49,11 @@ fn connect(name: &Path, path: &Path, flags: OpenFlags) -> Result<Connection, His
     Connection::open_with_flags_and_vfs(name, flags, page_layer()?).map_err(|error| explain(path, error))
 }
 
+/// A whole copy of the file as it is now, with what still stands in its log, at `to`, where nothing may be yet.
+pub(crate) fn copy_whole(db: &Connection, to: &Path) -> Result<(), rusqlite::Error> {
+    db.execute("VACUUM INTO ?1", [to.to_string_lossy()]).map(drop)
+}
+
 /// Name of the layer under `SQLite` that seals pages: a program of this process that changes a history opens it by this layer
 /// (`vfs`), or its changes are taken for damage.
 ///

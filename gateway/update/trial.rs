@@ -91,9 +91,10 @@ pub fn run_trial(
 
 /// `None` when the version was confirmed; otherwise why not.
 fn wait_for_confirmation(slots: &VersionSlots, new: &str, confirmed: &Path, within: Duration) -> Option<String> {
-    let (begun, mut began) = (Instant::now(), Instant::now());
+    let started = Instant::now();
+    let mut waits_since = started;
     let copying = confirmed.with_file_name(format!("history.db{}", crate::history::COPYING));
-    while began.elapsed() < within {
+    while waits_since.elapsed() < within {
         if fs::read_to_string(confirmed).is_ok_and(|text| text == new) {
             return None;
         }
@@ -101,8 +102,8 @@ fn wait_for_confirmation(slots: &VersionSlots, new: &str, confirmed: &Path, with
             return Some("it was started several times and was not well".to_owned());
         }
         // A large history is copied before its tables change; that is no bad health.
-        if copying.exists() && begun.elapsed() < COPY_WITHIN {
-            began = Instant::now();
+        if copying.exists() && started.elapsed() < COPY_WITHIN {
+            waits_since = Instant::now();
         }
         std::thread::sleep(Duration::from_millis(250));
     }

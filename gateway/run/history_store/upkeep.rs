@@ -38,7 +38,7 @@ impl HistoryStore {
     /// A newer version of the program has changed the file, and this one goes back to the copy of before, where there is one.
     ///
     /// # Errors
-    /// The error as it was, where there is no copy or it cannot be used.
+    /// The error as it was, where there is no copy; a file that cannot be renamed or written.
     pub(super) fn go_back(&mut self, error: HistoryError) -> Result<(), HistoryError> {
         let Some(newer) = history::go_back(&self.path)? else { return Err(error) };
         let text = format!(
