@@ -13,7 +13,9 @@ use rules::twin::text::short;
 use rules::twin::{Diagnosis, Model};
 use serde::{Deserialize, Serialize};
 
-/// A share of the difference below this is none, and a difference below this share of the simulated output is not told.
+/// A difference below this share of the simulated output is none. At standstill, where less is simulated than the noise of a second,
+/// it is one below that noise. Lower: every kind of work differs a little from every model; higher: what the watch finds, from 2 % on, is
+/// not told here.
 const TOLD_SHARE: f64 = 0.02;
 /// Parameters that have moved by less than this share of themselves are not named.
 const MOVED_SHARE: f64 = 0.01;
@@ -33,6 +35,9 @@ pub struct BesideModel {
     pub seconds: usize,
     /// Mean output that the model in charge says.
     pub expected: f64,
+    /// Noise of a second.
+    #[serde(default)]
+    pub noise: f64,
     /// Recorded less that.
     pub difference: f64,
     /// How much of it comes of parameters that the diagnosis has moved.
@@ -153,6 +158,7 @@ fn summed(
         from_ns,
         seconds: rows.len(),
         expected,
+        noise: found.fit.as_ref().map_or(0.0, |fit| fit.noise_floor),
         difference: mean(&|row| row.recorded - row.expected),
         // What is neither an effect nor left over is the refitted baseline.
         by_parameters: mean(&|row| row.after - row.expected) - by_effects.iter().map(|(_, share)| share).sum::<f64>(),
@@ -166,10 +172,31 @@ fn summed(
 }
 
 impl BesideModel {
+    /// A difference up to this is none.
+    fn negligible(&self) -> f64 {
+        if self.expected.abs() > self.noise { TOLD_SHARE * self.expected.abs() } else { self.noise }
+    }
+
     /// Is the difference worth telling?
     #[must_use]
     pub fn differs(&self) -> bool {
-        self.difference.abs() > TOLD_SHARE * self.expected.abs()
+        self.difference.abs() > self.negligible()
+    }
+
+    /// How far the machine is from the model in charge, English and Chinese.
+    fn difference_words(&self, unit: &str) -> (String, String) {
+        let (en_where, zh_where) = self.regime.words();
+        let amount = format!("{} {unit}", short(self.difference.abs()));
+        // A share of nothing is no figure.
+        let share = (self.expected.abs() > self.negligible())
+            .then(|| short(100.0 * self.difference.abs() / self.expected.abs()));
+        let en_share = share.as_ref().map_or(String::new(), |share| format!(" ({share} %)"));
+        let zh_share = share.map_or(String::new(), |share| format!("（{share} %）"));
+        let (en_way, zh_way) = if self.difference > 0.0 { ("more", "高") } else { ("less", "低") };
+        (
+            format!("{en_where} the machine takes {amount}{en_share} {en_way} than the model in charge says"),
+            format!("{zh_where}比当前模型{zh_way}{amount}{zh_share}"),
+        )
     }
 
     /// Is it mostly a parameter of the model in charge that has become another one?
@@ -181,9 +208,22 @@ impl BesideModel {
     }
 }
 
+/// Before what a diagnosis makes of it stands how far the machine is from the model in charge: a diagnosis refits the model, and what it
+/// then adds may have the other sign.
+#[must_use]
+pub fn headline(beside: &[BesideModel], unit: &str, (en, zh): (&str, &str)) -> (String, String) {
+    let (first, second): (Vec<String>, Vec<String>) =
+        beside.iter().filter(|one| one.differs()).map(|one| one.difference_words(unit)).unzip();
+    if first.is_empty() {
+        return (en.to_owned(), zh.to_owned());
+    }
+    let begin = first.join("; ");
+    let begin = begin[..1].to_uppercase() + &begin[1..];
+    (format!("{begin}. With its parameters fitted anew: {en}"), format!("{}。重新拟合参数后：{zh}", second.join("；")))
+}
+
 fn words(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (String, String) {
     let (en_where, zh_where) = one.regime.words();
-    let amount = |value: f64| format!("{} {unit}", short(value));
     if !one.differs() {
         return (
             format!(
@@ -193,8 +233,6 @@ fn words(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (String, St
             format!("{zh_where}与当前模型一致（{:+} {unit}）", rounded(one.difference)),
         );
     }
-    let share = 100.0 * one.difference.abs() / one.expected.abs().max(1e-9);
-    let (en_way, zh_way) = if one.difference > 0.0 { ("more", "高") } else { ("less", "低") };
     let mut en: Vec<String> = Vec::new();
     let mut zh: Vec<String> = Vec::new();
     let told = |value: f64| value.abs() > 0.05 * one.difference.abs();
@@ -216,20 +254,8 @@ fn words(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (String, St
         en.push(format!("{:+} {unit} by nothing that was found", rounded(one.left)));
         zh.push(format!("未找到原因{:+} {unit}", rounded(one.left)));
     }
-    (
-        format!(
-            "{en_where} the machine takes {} ({} %) {en_way} than the model in charge says: {}",
-            amount(one.difference.abs()),
-            short(share),
-            en.join(", ")
-        ),
-        format!(
-            "{zh_where}比当前模型{zh_way}{}（{} %）：{}",
-            amount(one.difference.abs()),
-            short(share),
-            zh.join("，")
-        ),
-    )
+    let (en_difference, zh_difference) = one.difference_words(unit);
+    (format!("{en_difference}: {}", en.join(", ")), format!("{zh_difference}：{}", zh.join("，")))
 }
 
 /// For a sum that can be checked on the page.
@@ -237,4 +263,51 @@ fn rounded(value: f64) -> f64 {
     let digits = if value.abs() >= 10.0 { 0 } else { 1 };
     let scale = 10_f64.powi(digits);
     (value * scale).round() / scale
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(regime: Regime, expected: f64, difference: f64) -> BesideModel {
+        let mut one = BesideModel {
+            regime,
+            from_ns: 0,
+            seconds: 100,
+            expected,
+            noise: 10.0,
+            difference,
+            by_parameters: 0.0,
+            by_effects: vec![("gear_stage".to_owned(), -70.0)],
+            left: difference + 70.0,
+            en: String::new(),
+            zh: String::new(),
+        };
+        (one.en, one.zh) = words(&one, "W", &[]);
+        one
+    }
+
+    #[test]
+    fn below_the_noise_of_a_second_nothing_differs_and_of_nothing_there_is_no_share() {
+        assert!(!one(Regime::Standby, 0.0, 0.3).differs());
+        assert!(!one(Regime::Cutting, 2000.0, 39.0).differs() && one(Regime::Cutting, 2000.0, 41.0).differs());
+        let standby = one(Regime::Standby, 0.0, -120.0);
+        assert!(standby.differs() && !standby.en.contains('%') && !standby.zh.contains('%'), "{}", standby.en);
+    }
+
+    #[test]
+    fn the_answer_begins_with_what_the_watch_sees() {
+        let beside = [one(Regime::Standby, 0.0, 0.3), one(Regime::Cutting, 1772.0, 251.0)];
+        let (en, zh) = headline(&beside, "W", ("The model lacks gear stage.", "模型缺少换挡。"));
+        assert_eq!(
+            en,
+            "While cutting the machine takes 251 W (14.16 %) more than the model in charge says. With its parameters fitted anew: The \
+             model lacks gear stage."
+        );
+        assert_eq!(zh, "切削时比当前模型高251 W（14.16 %）。重新拟合参数后：模型缺少换挡。");
+        assert_eq!(
+            headline(&beside[..1], "W", ("It agrees.", "一致。")),
+            ("It agrees.".to_owned(), "一致。".to_owned())
+        );
+    }
 }

@@ -4,7 +4,7 @@
 //! The gateway writes one line, the [`DiagnosisJob`], and holds the pipe open: the child ends when the pipe does, so that nothing is left
 //! behind by a gateway that was killed. The child answers with a line for every stage and one with the outcome, each a [`ChildMessage`].
 
-use super::beside::{BesideModel, Onset, beside_model};
+use super::beside::{BesideModel, Onset, beside_model, headline};
 use super::context::DiagnosisContext;
 use super::recordings::read_recordings_as;
 use super::series::{AlignBy, SimulatedSeries, attach, recorded_output, series_model};
@@ -235,7 +235,7 @@ fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Str
 fn summary(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
     let moved: Vec<&str> = beside.iter().filter(|one| one.is_of_parameters()).map(|one| one.en.as_str()).collect();
     if found.verdict != Verdict::NoMismatch || moved.is_empty() {
-        return found.summary.en.clone();
+        return headline(beside, &found.unit, (&found.summary.en, "")).0;
     }
     format!("A parameter of the model has changed: {}. Nothing else is missing.", moved.join("; "))
 }

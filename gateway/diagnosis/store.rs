@@ -2,7 +2,7 @@
 //! the experiment it asks for as a plan and as steps. Files in a folder of the data directory, found by a key that follows from
 //! the row, so that no second list can disagree with the history.
 
-use super::beside::BesideModel;
+use super::beside::{BesideModel, headline};
 use super::context::DiagnosisContext;
 use super::steps::{DiagnosisStep, steps};
 use crate::files::{read_text, replace};
@@ -203,7 +203,7 @@ fn summary_zh(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
     if found.verdict == Verdict::NoMismatch && !moved.is_empty() {
         return format!("模型参数已改变：{}。", moved.join("；"));
     }
-    found.summary.zh.clone()
+    headline(beside, &found.unit, ("", &found.summary.zh)).1
 }
 
 #[cfg(test)]

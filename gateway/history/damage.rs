@@ -64,13 +64,32 @@ const COMPANIONS: [&str; 2] = ["-wal", "-shm"];
 /// What stands between the name of a history and the time at which it was set aside.
 const DAMAGED: &str = ".damaged-";
 
-/// Gives a damaged history another name, with what belongs to it; returns that.
+/// Why a history gets another name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aside {
+    /// The disk has changed it.
+    Damaged,
+    /// A newer version of the program has changed its tables.
+    Newer,
+}
+
+impl Aside {
+    /// What stands between the name of the history and the time.
+    fn word(self) -> &'static str {
+        match self {
+            Self::Damaged => DAMAGED,
+            Self::Newer => ".newer-",
+        }
+    }
+}
+
+/// Gives a history another name, with what belongs to it; returns that.
 ///
 /// # Errors
 /// It cannot be renamed.
-pub fn set_aside(path: &Path) -> Result<PathBuf, HistoryError> {
+pub fn set_aside(path: &Path, why: Aside) -> Result<PathBuf, HistoryError> {
     let time: String = moment::utc(clock::now_ns()).chars().filter(char::is_ascii_alphanumeric).collect();
-    let aside = beside(path, &format!("{DAMAGED}{time}"));
+    let aside = beside(path, &format!("{}{time}", why.word()));
     std::fs::rename(path, &aside).map_err(at(path))?;
     for companion in COMPANIONS {
         // Where there is none, nothing belongs to it.

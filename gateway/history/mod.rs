@@ -47,6 +47,7 @@ mod block;
 mod commit;
 mod compact;
 mod damage;
+mod earlier;
 mod error;
 mod export;
 mod ffi;
@@ -90,7 +91,8 @@ mod writer;
 
 pub use audit::{AuditCheck, AuditEntry, AuditRemoval, Break, audit_document};
 pub use block::{Cells, NumberCells, ValueSummary, WordCells};
-pub use damage::{DamagedRows, damaged_files, set_aside};
+pub use damage::{Aside, DamagedRows, damaged_files, set_aside};
+pub use earlier::{COPYING, go_back, is_going_back, remove_old_copies};
 pub use error::HistoryError;
 pub use export::{DayWritten, Format, day_of, plain_cell};
 pub use future::FutureRows;

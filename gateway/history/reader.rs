@@ -116,8 +116,7 @@ impl Reader {
         if to.exists() {
             return Err(HistoryError::Question(format!("{} is there already; name another file", to.display())));
         }
-        let name = to.to_string_lossy();
-        self.db.execute("VACUUM INTO ?1", [&*name]).doing("copying the history").map(drop)
+        schema::copy_whole(&self.db, to).doing("copying the history")
     }
 
     /// Does the file pass `SQLite`'s own check? The findings otherwise.

@@ -1,12 +1,12 @@
 //! Opening the file: what it must be, and the tables it gets when it is new.
 
-use super::audit;
 use super::damage::{is_of_disk, was_ours};
 use super::error::{Doing, HistoryError};
 use super::lock::beside;
 use super::options::SeriesKind;
 use super::pages;
 use super::series::Series;
+use super::{audit, earlier, record_sql};
 use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
 use std::path::Path;
 
@@ -39,7 +39,7 @@ pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> 
     }
     db.pragma_update(None, "journal_mode", "WAL").map_err(|error| explain(path, error))?;
     db.pragma_update(None, "synchronous", "FULL").doing("choosing durable commits")?;
-    let ready = if new { create(&db) } else { migrate(&db) };
+    let ready = if new { create(&db) } else { change_tables(path, &db) };
     ready.map_err(|error| explain(path, error))?;
     Ok(db)
 }
@@ -47,6 +47,11 @@ pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> 
 /// Opens the file of this name, so that its pages are checked; `path` stands for it in messages.
 fn connect(name: &Path, path: &Path, flags: OpenFlags) -> Result<Connection, HistoryError> {
     Connection::open_with_flags_and_vfs(name, flags, page_layer()?).map_err(|error| explain(path, error))
+}
+
+/// A whole copy of the file as it is now, with what still stands in its log, at `to`, where nothing may be yet.
+pub(crate) fn copy_whole(db: &Connection, to: &Path) -> Result<(), rusqlite::Error> {
+    db.execute("VACUUM INTO ?1", [to.to_string_lossy()]).map(drop)
 }
 
 /// Name of the layer under `SQLite` that seals pages: a program of this process that changes a history opens it by this layer
@@ -68,6 +73,17 @@ fn create(db: &Connection) -> Result<(), rusqlite::Error> {
     db.execute_batch(&format!(
         "BEGIN IMMEDIATE; {TABLES} {added} PRAGMA application_id = {SEALED_APPLICATION}; PRAGMA user_version = {SCHEMA}; COMMIT;"
     ))
+}
+
+/// Brings a file of an older version to the newest schema, and keeps a copy of it as it was.
+fn change_tables(path: &Path, db: &Connection) -> Result<(), rusqlite::Error> {
+    let found = version(db)?;
+    if found >= SCHEMA {
+        return Ok(());
+    }
+    let told = earlier::copy_before_change(path, db, found);
+    migrate(db)?;
+    record_sql::store(db, &told.into())
 }
 
 /// Brings a file of an older version to the newest schema, one version after the other, each in one transaction. A second

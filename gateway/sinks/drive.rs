@@ -223,7 +223,7 @@ impl SinkTask {
         let sent = timeout(DEADLINE, sink.send(Batch { items, historical })).await;
         match (turn, sent.unwrap_or_else(|_| Err(too_slow("sending")))) {
             // It is sent once more when it is its turn.
-            (Turn::Past(_), Ok(()) | Err(SinkError::Item { .. })) => self.isolation.carried_next(),
+            (Turn::Past(_), Ok(()) | Err(SinkError::Item { .. })) => self.isolation.carried_witness(),
             (_, Ok(())) => {
                 self.isolation.arrived(from, last);
                 self.delivered(&stretch, from, historical);
@@ -258,12 +258,13 @@ impl SinkTask {
     async fn next_items(&mut self, from: u64, to: u64, items_max: usize) -> Result<(Turn, OutboxStretch), Left> {
         let turn = self.isolation.turn(from);
         if let Turn::Past(item) = turn {
-            // At the end of a gap the next one has been delivered before: it is sent once more.
+            // At the end of a gap the witness has been delivered before: it is sent once more.
             let newest = self.outbox.head().borrow().next_sequence;
             let stretch = self.read(item + 1, newest, 1).await?;
             if !stretch.items.is_empty() {
                 return Ok((turn, stretch));
             }
+            self.isolation.without_witness();
         }
         // Nothing comes after the newest item yet: it is tried again.
         let (turn, items_max) = if turn == Turn::Many { (turn, items_max) } else { (Turn::Alone, 1) };
@@ -319,9 +320,9 @@ impl SinkTask {
     }
 }
 
-/// A receiver hangs up at this item, and not at the one after it.
+/// A receiver hangs up at this item, and not at a later one.
 fn breaks_line(sequence: u64) -> SinkError {
-    let what = "the receiver ended the connection whenever it was sent, and not at the one after it".to_owned();
+    let what = "the receiver ended the connection whenever it was sent, and not at a later one".to_owned();
     let next = "raise the greatest message that the receiver takes; with protocol=5 a broker says why".to_owned();
     SinkError::Item { sequence, what, next }
 }

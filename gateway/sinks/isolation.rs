@@ -2,15 +2,20 @@
 //! again. Pure.
 //!
 //! A connection that breaks three times while the same items are sent has them sent one by one. An item at which it breaks three
-//! times alone is under suspicion. Then the one after it and the item take turns: only where the line carries the one and breaks
-//! at the other, three times in a row, is the item to blame and left out. A line that was down and stands again carries both: an
-//! outage, however long, costs no item, nor do three of them one after another.
+//! times alone is under suspicion. Then a later item, the witness, and the item take turns: only where the line carries the witness and
+//! breaks at the item, three times in a row, is the item to blame and left out. A line that was down and stands again carries both:
+//! an outage, however long, costs no item, nor do three of them one after another.
+//!
+//! The witness is the next item at first. Where the line breaks at it as well, it may be of the same kind: the next witness is 2, 4, ..
+//! 64 items further, and then the next item again. So up to 64 such items in a row are told from a line that is down.
 
 /// Breaks before the items are sent one by one, and before one of them is under suspicion.
 const BREAKS: u32 = 3;
-/// How often in a row the line must carry the item after it and break at the item. A line that breaks at random at every second try
+/// How often in a row the line must carry the witness and break at the item. A line that breaks at random at every second try
 /// does that once in 64 times; each costs a connection.
 const PROOFS: u32 = 3;
+/// The furthest witness, in items after the one that follows the suspected item. A receiver that refuses more in a row refuses all.
+const REACH_MAX: u64 = 63;
 
 /// What is to be sent next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +24,7 @@ pub(super) enum Turn {
     Many,
     /// One.
     Alone,
-    /// The one after this item, alone: it tells whether the line stands.
+    /// The one after this number, alone: it tells whether the line stands.
     Past(u64),
 }
 
@@ -29,9 +34,11 @@ pub(super) struct Isolation {
     /// The first of the items at which the connection broke last, and how often in a row.
     first: Option<u64>,
     breaks: u32,
-    /// Has the line carried the item after it since it broke last, and how often did it then break at the item?
+    /// Has the line carried the witness since it broke last, and how often did it then break at the item?
     stands: bool,
     proofs: u32,
+    /// Items between the suspected one and the witness.
+    reach: u64,
     /// Before this number items are sent one by one.
     alone_until: u64,
 }
@@ -41,7 +48,7 @@ impl Isolation {
     pub(super) fn turn(&self, from: u64) -> Turn {
         let suspected = self.breaks >= BREAKS && !self.stands;
         match self.first {
-            Some(first) if first == from && from < self.alone_until && suspected => Turn::Past(first),
+            Some(first) if first == from && from < self.alone_until && suspected => Turn::Past(first + self.reach),
             _ if from < self.alone_until => Turn::Alone,
             _ => Turn::Many,
         }
@@ -51,8 +58,9 @@ impl Isolation {
     /// to blame: it is to be left out.
     pub(super) fn broke(&mut self, turn: Turn, first: u64, last: u64) -> bool {
         if let Turn::Past(_) = turn {
-            // The one after it breaks the line as well: nothing is proved.
+            // The witness breaks the line as well: nothing is proved, and the next witness is another.
             (self.breaks, self.proofs) = (0, 0);
+            self.reach = if self.reach < REACH_MAX { 2 * self.reach + 1 } else { 0 };
             return false;
         }
         if self.first != Some(first) {
@@ -71,9 +79,14 @@ impl Isolation {
         proved
     }
 
-    /// The item after the suspected one has arrived, or was refused with a word: the line stands.
-    pub(super) fn carried_next(&mut self) {
+    /// The witness has arrived, or was refused with a word: the line stands.
+    pub(super) fn carried_witness(&mut self) {
         self.stands = true;
+    }
+
+    /// There is no item so far after the suspected one.
+    pub(super) fn without_witness(&mut self) {
+        self.reach = 0;
     }
 
     /// The items from `first` to `last` have arrived. Live data that arrive between two tries of a gap say nothing about its item.
@@ -104,7 +117,10 @@ mod tests {
             tries += 1;
             // After the last item nothing comes yet: it is tried again.
             let turn = match isolation.turn(next) {
-                Turn::Past(item) if item == count => Turn::Alone,
+                Turn::Past(item) if item >= count => {
+                    isolation.without_witness();
+                    Turn::Alone
+                }
                 turn => turn,
             };
             let (from, to) = match turn {
@@ -121,8 +137,8 @@ mod tests {
                 continue;
             }
             arrived.extend(from..=to);
-            if turn == Turn::Past(next) {
-                isolation.carried_next();
+            if let Turn::Past(_) = turn {
+                isolation.carried_witness();
                 continue;
             }
             isolation.arrived(from, to);
@@ -142,6 +158,19 @@ mod tests {
     }
 
     #[test]
+    fn items_in_a_row_that_break_the_line_are_left_out_and_no_other() {
+        for poison in [5..7_u64, 1..4, 20..36, 28..39, 1..65] {
+            let poison: Vec<u64> = poison.collect();
+            let (arrived, left_out, _) = send(100, &poison, |_| false);
+            assert_eq!(left_out, poison);
+            assert_eq!(arrived.len(), 100 - poison.len());
+        }
+        // All of them: no item tells that the line stands.
+        let (arrived, left_out, _) = send(100, &(1..=100).collect::<Vec<_>>(), |_| false);
+        assert_eq!((arrived.len(), left_out), (0, vec![]));
+    }
+
+    #[test]
     fn live_data_between_do_not_hide_the_item_of_a_gap() {
         let (mut isolation, mut live, mut breaks) = (Isolation::default(), 1_000, 0);
         loop {
@@ -149,7 +178,7 @@ mod tests {
             isolation.arrived(live, live);
             live += 1;
             match isolation.turn(5) {
-                Turn::Past(5) => isolation.carried_next(),
+                Turn::Past(5) => isolation.carried_witness(),
                 turn if isolation.broke(turn, 5, 14) => break,
                 _ => breaks += 1,
             }

@@ -1,15 +1,14 @@
 //! What the default run costs. `cargo test --release --test box cost -- --ignored --nocapture` takes ten minutes.
 
 use super::process::{Gateway, get};
+use super::process_status::status_figure;
 use std::fs;
 use std::thread;
 use std::time::{Duration, Instant};
 
 /// Resident memory in MB and processor seconds of a process.
 fn usage(pid: u32) -> (f64, f64) {
-    let status = fs::read_to_string(format!("/proc/{pid}/status")).expect("running");
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("listed");
-    let kilobytes: f64 = line.trim().split(' ').next().and_then(|text| text.parse().ok()).expect("a number");
+    let kilobytes = status_figure(&pid.to_string(), "VmRSS:").expect("running");
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).expect("running");
     let mut fields = stat.rsplit_once(')').expect("a name").1.split_whitespace().skip(11);
     let mut ticks = || fields.next().and_then(|text| text.parse::<f64>().ok()).expect("a number");

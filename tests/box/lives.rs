@@ -88,6 +88,32 @@ fn a_signal_stops_it_cleanly_and_the_next_start_goes_on() {
     }
 }
 
+/// The box after an update that changed the tables and was taken back.
+#[test]
+fn a_history_of_a_newer_version_is_kept_and_the_copy_of_before_goes_on() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let data = directory.path().to_owned();
+    let database = data.join("history.db");
+    let live =
+        |more: &[&str]| run(&[&["run", "--data-dir", data.to_str().expect("a path"), "--for", "30"], more].concat());
+    let quick = ["--speed", "max", "--listen", "127.0.0.1:0"];
+    assert!(live(&quick).status.success());
+    let before = rows(&database);
+    fs::copy(&database, data.join("kept")).expect("copied");
+    crate::sealed::connect(&database).pragma_update(None, "user_version", 99).expect("changed");
+    let refused = live(&quick);
+    assert!(!refused.status.success() && stderr(&refused).contains("schema 99"), "{}", stderr(&refused));
+    fs::rename(data.join("kept"), data.join("history.db.schema-5")).expect("the copy of before");
+    let told = live(&quick);
+    assert!(told.status.success(), "{}", stderr(&told));
+    assert!(stdout(&told).contains("goes on with the copy of before"), "{}", stdout(&told));
+    assert!(rows(&database) > before, "nothing was stored");
+    let events = query(&database, &["--sql", "SELECT count(*) AS n FROM events WHERE kind = 'history_went_back'"]);
+    assert_eq!(events["rows"][0]["n"], 1);
+    let kept = fs::read_dir(&data).expect("there").flatten();
+    assert!(kept.into_iter().any(|file| file.file_name().to_string_lossy().starts_with("history.db.newer-")));
+}
+
 #[test]
 fn a_named_port_in_use_is_refused_with_a_hint() {
     let taken = TcpListener::bind("127.0.0.1:0").expect("a free port");

@@ -14,7 +14,11 @@ mod operations;
 mod package;
 mod page;
 mod process;
+#[path = "../support/process_status.rs"]
+mod process_status;
 mod replay;
+#[path = "../support/sealed.rs"]
+mod sealed;
 mod settings;
 mod system;
 mod twin;

@@ -173,20 +173,29 @@ impl Answer {
 
 /// `GET path` at `address`.
 pub(crate) fn get(address: &str, path: &str) -> Answer {
-    request(address, &format!("GET {path} HTTP/1.0\r\nHost: {address}\r\n\r\n"))
+    try_get(address, path).expect("it listens and answers")
+}
+
+/// The same of a box that may be starting again at this moment.
+pub(crate) fn try_get(address: &str, path: &str) -> std::io::Result<Answer> {
+    try_request(address, &format!("GET {path} HTTP/1.0\r\nHost: {address}\r\n\r\n"))
 }
 
 /// Sends a request as it is and reads until the server closes.
 pub(crate) fn request(address: &str, text: &str) -> Answer {
-    let mut stream = TcpStream::connect(address).expect("it listens");
-    stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a limit");
-    stream.write_all(text.as_bytes()).expect("sent");
+    try_request(address, text).expect("it listens and answers")
+}
+
+fn try_request(address: &str, text: &str) -> std::io::Result<Answer> {
+    let mut stream = TcpStream::connect(address)?;
+    stream.set_read_timeout(Some(Duration::from_secs(20)))?;
+    stream.write_all(text.as_bytes())?;
     let mut answer = Vec::new();
-    stream.read_to_end(&mut answer).expect("answered");
+    stream.read_to_end(&mut answer)?;
     let answer = String::from_utf8_lossy(&answer).into_owned();
     let (head, body) = answer.split_once("\r\n\r\n").unwrap_or((&answer, ""));
     let status = head.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
-    Answer { status, head: head.to_owned(), body: body.to_owned() }
+    Ok(Answer { status, head: head.to_owned(), body: body.to_owned() })
 }
 
 /// The real recordings beside the checkout, or by `CNC_GATEWAY_SHARED`; says so when they are absent.

@@ -18,6 +18,7 @@ pub(crate) struct Clocked {
     pub(crate) directory: tempfile::TempDir,
     offset: PathBuf,
     zone: &'static str,
+    confirm: Duration,
 }
 
 impl Clocked {
@@ -33,7 +34,7 @@ impl Clocked {
             "[gateway]\ndata_dir = \"data\"\nclock_confirm_s = {confirm_s:.1}\n[http]\nlisten = \"127.0.0.1:0\"\n{more}"
         );
         fs::write(directory.path().join("box.toml"), config).expect("written");
-        let clocked = Self { directory, offset, zone: "UTC" };
+        let clocked = Self { directory, offset, zone: "UTC", confirm: Duration::from_secs_f64(confirm_s) };
         clocked.set("+0s");
         Some(clocked)
     }
@@ -58,9 +59,9 @@ impl Clocked {
         (gateway, address)
     }
 
-    /// The page of the box that has begun again: of its `count`th run.
+    /// The page of the box that has begun again, of its `count`th run. A reading is followed when it has stood for `confirm_s`.
     pub(crate) fn again(&self, gateway: &Gateway, count: usize) -> String {
-        wait_for("the page again", Duration::from_secs(60), || page(gateway, count))
+        wait_for("the page again", self.confirm + Duration::from_secs(60), || page(gateway, count))
     }
 
     pub(crate) fn query(&self, sql: &str) -> Value {

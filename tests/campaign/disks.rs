@@ -237,7 +237,7 @@ pub(crate) fn full(scale: &Scale) -> Row {
 /// Every fsync fails for a while: nothing is acknowledged, and afterwards all that was acknowledged is there.
 pub(crate) fn fsync_fails(scale: &Scale) -> Row {
     let mut row =
-        Row::new("strace answers fdatasync with EIO from the 10th, 20th... call on; acknowledged rows after SIGKILL");
+        Row::new("strace answers fdatasync with EIO from the 2nd, 4th... call on; acknowledged rows after SIGKILL");
     if !strace() {
         return Row::skipped(row.how);
     }
@@ -246,8 +246,9 @@ pub(crate) fn fsync_fails(scale: &Scale) -> Row {
         let directory = tempfile::tempdir().expect("a directory");
         let data = directory.path().join("data");
         let mut command = Command::new("strace");
-        command.args(["-f", "-q", "-o", "/dev/null", "-e", "trace=fdatasync,fsync", "-D", "-e"]);
-        command.arg(format!("inject=fdatasync,fsync:error=EIO:when={}+", step * 10));
+        let calls = directory.path().join("calls");
+        command.args(["-f", "-q", "-o"]).arg(&calls).args(["-e", "trace=fdatasync,fsync", "-D", "-e"]);
+        command.arg(format!("inject=fdatasync,fsync:error=EIO:when={}+", step * 2));
         command
             .arg(env!("CARGO_BIN_EXE_cnc-gateway"))
             .args(["run", "--listen", "127.0.0.1:0", "--speed", "60", "--data-dir"])
@@ -256,11 +257,14 @@ pub(crate) fn fsync_fails(scale: &Scale) -> Row {
         let address = gateway.address();
         let history = || status(&address).map(|status| status["history"].clone()).unwrap_or_default();
         let mut acknowledged = 0;
-        let until = Instant::now() + Duration::from_secs(40);
+        // A thread that writes every two seconds comes to its twentieth call after 40 s.
+        let until = Instant::now() + Duration::from_secs(80);
         while Instant::now() < until && !history()["error"].is_string() {
             acknowledged = history()["rows"].as_u64().unwrap_or(0).max(acknowledged);
             std::thread::sleep(Duration::from_millis(20));
         }
+        let failed = std::fs::read_to_string(&calls).is_ok_and(|calls| calls.contains("INJECTED"));
+        row.must(failed, "no call failed");
         row.must(history()["error"].is_string(), "nothing was told of a disk that fails");
         row.must(!gateway.has_ended(), "the box ended");
         gateway.kill();

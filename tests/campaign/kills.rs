@@ -1,6 +1,6 @@
 //! SIGKILL and SIGTERM at random moments of a running box.
 
-use crate::process::{Gateway, get, program, run, stderr, stdout, text, wait_for};
+use crate::process::{Gateway, program, run, stderr, stdout, text, try_get, wait_for};
 use crate::table::{Row, Scale};
 use gateway::history::Reader;
 use rand::{Rng, SeedableRng};
@@ -15,8 +15,7 @@ pub(crate) fn random() -> rand_pcg::Pcg64Mcg {
 
 /// What the box says of itself, while it does.
 pub(crate) fn status(address: &str) -> Option<Value> {
-    std::net::TcpStream::connect(address).ok()?;
-    let answer = get(address, "/api/v1/status");
+    let answer = try_get(address, "/api/v1/status").ok()?;
     (answer.status == 200).then(|| serde_json::from_str(&answer.body).ok()).flatten()
 }
 

@@ -1,4 +1,4 @@
-//! Nothing lost and nothing twice while the leader of the stream, the reader and the box are killed.
+//! Nothing lost and nothing twice while the leader of the stream, the reader, the box and the database are killed.
 //!
 //! `FLEET_ROWS=20000 FLEET_KILLS=2 cargo test --test fleet killed -- --nocapture`
 
@@ -21,9 +21,54 @@ pub(crate) fn ingest(address: &str, database: &str) -> Gateway {
     Gateway::spawn(command)
 }
 
+/// Rows in the database; 0 while it is away.
+fn count(postgres: &Postgres) -> u64 {
+    postgres.number("SELECT count(*) FROM items")
+}
+
+/// Everything between a machine and the tables.
+struct Plant {
+    cluster: Cluster,
+    postgres: Postgres,
+    readers: Vec<Gateway>,
+    sending: Sending,
+}
+
+impl Plant {
+    /// Kills one after the other, and starts it again. Gives what it was.
+    fn kill(&mut self, number: u64) -> String {
+        let away = Duration::from_secs(2);
+        match number % 4 {
+            0 => {
+                let (leader, _) = wait_for("a leader", PATIENCE, || self.cluster.stream());
+                self.cluster.kill(leader);
+                std::thread::sleep(away);
+                self.cluster.run(leader);
+                format!("leader n{leader}")
+            }
+            1 => {
+                self.readers.remove(0).kill();
+                self.readers.push(ingest(&format!("{}/cnc", self.cluster.address()), &self.postgres.address()));
+                "a reader".to_owned()
+            }
+            2 => {
+                self.sending.kill();
+                self.sending.start();
+                "the box".to_owned()
+            }
+            _ => {
+                self.postgres.crash();
+                std::thread::sleep(away);
+                self.postgres.run();
+                "the database".to_owned()
+            }
+        }
+    }
+}
+
 #[test]
-fn every_row_is_there_once_although_leader_reader_and_box_are_killed() {
-    let Some(mut cluster) = Cluster::start(3) else { return };
+fn every_row_is_there_once_although_leader_reader_box_and_database_are_killed() {
+    let Some(cluster) = Cluster::start(3) else { return };
     let Some(postgres) = Postgres::start() else { return };
     let (rows, kills) = (setting("FLEET_ROWS", 2500), setting("FLEET_KILLS", 1));
     let address = format!("{}/cnc", cluster.address());
@@ -34,34 +79,18 @@ fn every_row_is_there_once_although_leader_reader_and_box_are_killed() {
             None
         })
     });
-    let mut readers = vec![ingest(&address, &postgres.address()), ingest(&address, &postgres.address())];
+    let readers = vec![ingest(&address, &postgres.address()), ingest(&address, &postgres.address())];
     let began = Instant::now();
-    let mut sending = Sending::at_speed("40", &address, "");
-    let count = || postgres.number("SELECT count(*) FROM items");
-    for kill in 0..3 * kills {
-        let due = rows * (kill + 1) / (3 * kills + 1);
-        wait_for(&format!("{due} rows before kill {kill}"), PATIENCE, || (count() >= due).then_some(()));
-        match kill % 3 {
-            0 => {
-                let (leader, _) = wait_for("a leader", PATIENCE, || cluster.stream());
-                cluster.kill(leader);
-                std::thread::sleep(Duration::from_secs(2));
-                cluster.run(leader);
-                println!("{:.1} s: leader n{leader} killed at {due} rows", began.elapsed().as_secs_f64());
-            }
-            1 => {
-                readers.remove(0).kill();
-                readers.push(ingest(&address, &postgres.address()));
-                println!("{:.1} s: a reader killed at {due} rows", began.elapsed().as_secs_f64());
-            }
-            _ => {
-                sending.kill();
-                sending.start();
-                println!("{:.1} s: the box killed at {due} rows", began.elapsed().as_secs_f64());
-            }
-        }
+    let sending = Sending::at_speed("40", &address, "");
+    let mut plant = Plant { cluster, postgres, readers, sending };
+    for kill in 0..4 * kills {
+        let due = rows * (kill + 1) / (4 * kills + 1);
+        wait_for(&format!("{due} rows before kill {kill}"), PATIENCE, || (count(&plant.postgres) >= due).then_some(()));
+        let what = plant.kill(kill);
+        println!("{:.1} s: {what} killed at {due} rows", began.elapsed().as_secs_f64());
     }
-    wait_for(&format!("{rows} rows"), PATIENCE, || (count() >= rows).then_some(()));
+    let Plant { cluster, postgres, mut sending, .. } = plant;
+    wait_for(&format!("{rows} rows"), PATIENCE, || (count(&postgres) >= rows).then_some(()));
     sending.wait_sink("the gap is closed", |sink| sink["behind_items"].as_u64() < Some(100));
     let sink = sending.sink();
     sending.stop();
@@ -69,7 +98,7 @@ fn every_row_is_there_once_although_leader_reader_and_box_are_killed() {
     let rest = run(&["fleet", "ingest", &address, "--database", &postgres.address(), "--once"]);
     assert!(rest.status.success(), "{}", stderr(&rest));
     let highest = postgres.number("SELECT max(sequence) FROM items");
-    let (there, different) = (count(), postgres.number("SELECT count(DISTINCT sequence) FROM items"));
+    let (there, different) = (count(&postgres), postgres.number("SELECT count(DISTINCT sequence) FROM items"));
     let missing = postgres.sql(
         "SELECT number FROM generate_series(1, (SELECT max(sequence) FROM items)) number
          WHERE NOT EXISTS (SELECT 1 FROM items WHERE sequence = number) LIMIT 20",

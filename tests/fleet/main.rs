@@ -17,6 +17,8 @@ mod port;
 #[path = "../box/process.rs"]
 #[expect(dead_code, reason = "the tests of the box use the rest of it")]
 mod process;
+#[path = "../support/process_status.rs"]
+mod process_status;
 
 mod boxes;
 mod cluster;

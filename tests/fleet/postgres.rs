@@ -12,6 +12,7 @@ pub(crate) struct Postgres {
     directory: tempfile::TempDir,
     port: u16,
     bin: PathBuf,
+    settings: Vec<String>,
 }
 
 /// Where Debian keeps the programs of the server.
@@ -64,7 +65,8 @@ impl Postgres {
             let owned = Command::new("chown").arg("postgres").arg(directory.path()).status();
             assert!(owned.expect("chown runs").success());
         }
-        let mut postgres = Self { child: None, directory, port: free_port(), bin };
+        let settings = settings.iter().map(|setting| (*setting).to_owned()).collect();
+        let mut postgres = Self { child: None, directory, port: free_port(), bin, settings };
         let data = postgres.directory.path().join("data");
         let mut init = as_ordinary_user(&postgres.bin.join("initdb"));
         init.args(["--auth=trust", "--username=postgres", "--encoding=UTF8", "--no-sync", "-D"]).arg(&data);
@@ -74,16 +76,29 @@ impl Postgres {
         for (from, name) in files {
             place(from, &data.join(name));
         }
-        let mut server = as_ordinary_user(&postgres.bin.join("postgres"));
-        server.arg("-D").arg(&data).args(["-p", &postgres.port.to_string(), "-c", "listen_addresses=127.0.0.1"]);
-        server.arg("-c").arg(format!("unix_socket_directories={}", postgres.directory.path().display()));
-        settings.iter().for_each(|setting| {
-            server.args(["-c", setting]);
-        });
-        server.current_dir("/").stdout(Stdio::null()).stderr(Stdio::null());
-        postgres.child = Some(server.spawn().expect("it starts"));
-        wait_for("PostgreSQL", Duration::from_secs(30), || postgres.try_sql("SELECT 1").ok());
+        postgres.run();
         Some(postgres)
+    }
+
+    /// Starts the server, again after [`Postgres::crash`].
+    pub(crate) fn run(&mut self) {
+        let mut server = as_ordinary_user(&self.bin.join("postgres"));
+        server.arg("-D").arg(self.directory.path().join("data"));
+        server.args(["-p", &self.port.to_string(), "-c", "listen_addresses=127.0.0.1"]);
+        server.arg("-c").arg(format!("unix_socket_directories={}", self.directory.path().display()));
+        for setting in &self.settings {
+            server.args(["-c", setting]);
+        }
+        server.current_dir("/").stdout(Stdio::null()).stderr(Stdio::null());
+        self.child = Some(server.spawn().expect("it starts"));
+        wait_for("PostgreSQL", Duration::from_secs(60), || self.try_sql("SELECT 1").ok());
+    }
+
+    /// SIGQUIT: the server ends its own children at once and writes nothing more, so that the next start recovers from its log.
+    pub(crate) fn crash(&mut self) {
+        let Some(mut child) = self.child.take() else { return };
+        let _told = Command::new("kill").args(["-QUIT", &child.id().to_string()]).status();
+        let _ended = child.wait();
     }
 
     /// Its address with this user and host, and these keys at the end.
@@ -134,9 +149,6 @@ impl Postgres {
 
 impl Drop for Postgres {
     fn drop(&mut self) {
-        let Some(mut child) = self.child.take() else { return };
-        // SIGQUIT: the server ends its own children at once.
-        let _told = Command::new("kill").args(["-QUIT", &child.id().to_string()]).status();
-        let _ended = child.wait();
+        self.crash();
     }
 }

@@ -5,6 +5,7 @@
 use crate::pipeline::Plant;
 use crate::postgres::Postgres;
 use crate::process::{Gateway, program, run, stdout};
+use crate::process_status::status_figure;
 use gateway::fleet::cluster;
 use gateway::nats::{Connection, Outgoing};
 use rand::{Rng, SeedableRng};
@@ -50,9 +51,7 @@ async fn publish(address: &str, items: u64) {
 
 /// The greatest memory of a process so far, MB.
 fn peak_mb(pid: u32) -> f64 {
-    let text = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
-    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
+    status_figure(&pid.to_string(), "VmHWM:").unwrap_or(0.0) / 1024.0
 }
 
 #[test]

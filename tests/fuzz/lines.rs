@@ -6,6 +6,7 @@ use crate::line::{Fault, Line};
 use crate::mutate;
 use crate::port::free_port;
 use crate::process::{Gateway, get, program, text, wait_for};
+use crate::process_status::status_figure;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use std::fs;
@@ -27,9 +28,7 @@ fn served(arguments: &[&str], scheme: &str) -> (Gateway, Line) {
 }
 
 fn resident_mb(pid: u32) -> f64 {
-    let told = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
-    let line = told.lines().find(|line| line.starts_with("VmRSS:")).unwrap_or_default();
-    line.split_whitespace().nth(1).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
+    status_figure(&pid.to_string(), "VmRSS:").unwrap_or(0.0) / 1024.0
 }
 
 /// Requests that are nearly right, each on a connection of its own; how many.

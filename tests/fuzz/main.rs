@@ -19,12 +19,15 @@ mod port;
 #[path = "../box/process.rs"]
 #[expect(dead_code, reason = "the tests of the box use the rest of it")]
 mod process;
+#[path = "../support/process_status.rs"]
+mod process_status;
 
 mod lines;
 mod mutate;
 mod parsers;
 
 use parsers::Parser;
+use process_status::status_figure;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use std::fs;
@@ -75,10 +78,9 @@ fn findings_again(parser: &Parser) -> Vec<String> {
 }
 
 /// Greatest memory of this process until now, bytes.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number of kilobytes")]
 fn memory_max() -> u64 {
-    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap_or_default();
-    line.split_whitespace().nth(1).and_then(|kilobytes| kilobytes.parse::<u64>().ok()).unwrap_or(0) * 1024
+    status_figure("self", "VmHWM:").unwrap_or(0.0) as u64 * 1024
 }
 
 /// Runs one parser for so long; gives how many inputs it had, and what was found.

@@ -271,7 +271,7 @@ fn a_wrong_header_is_put_right_by_a_repair() {
 }
 
 /// Written by a version whose blocks and pages had no checksums.
-fn older(path: &Path) {
+pub(crate) fn older(path: &Path) {
     let packed =
         fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/history/schema_4.db.gz")).expect("there");
     let mut bytes = Vec::new();
@@ -280,9 +280,9 @@ fn older(path: &Path) {
 }
 
 /// Digest of what the version that wrote it exported.
-const OLDER_EXPORT: &str = "36a66393bc6e8a07c4081e65003b0f0b47415d804576fee7fc144e0631d5b344";
+pub(crate) const OLDER_EXPORT: &str = "36a66393bc6e8a07c4081e65003b0f0b47415d804576fee7fc144e0631d5b344";
 
-fn export(path: &Path) -> String {
+pub(crate) fn export(path: &Path) -> String {
     let mut text = Vec::new();
     Reader::open(path).and_then(|reader| reader.export_csv(&Query::default(), &mut text, path)).expect("reads");
     Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect()

@@ -2,6 +2,7 @@
 
 mod clock;
 mod damage;
+mod earlier;
 mod figures;
 mod full;
 mod killed;

@@ -6,6 +6,8 @@
 #[path = "../box/process.rs"]
 #[expect(dead_code, reason = "the tests of the box use the rest of it")]
 mod process;
+#[path = "../support/process_status.rs"]
+mod process_status;
 
 #[path = "../huazhong/broker.rs"]
 mod broker;

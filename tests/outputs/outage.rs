@@ -6,6 +6,7 @@
 //! waits for the disk (6 ms on the computer where this was written), and 72 hours have 518,400 of them: the file therefore lies
 //! in memory (`/dev/shm`) where there is such a place. Its size is the same; `CNC_GATEWAY_OUTAGE_DIR` names another one.
 
+use crate::process_status::status_figure;
 use adapters::{ChannelId, Sample, Slot, Value};
 use gateway::history::{Options, Outbox, OutboxSettings, WhenFull, Writer};
 use gateway::sinks::{Batch, Board, Pending, Sink, SinkError, drive};
@@ -25,9 +26,7 @@ const GROUP_COMMIT: Duration = Duration::from_millis(500);
 
 /// Resident memory of this process, MB.
 fn resident_mb() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").expect("Linux");
-    let line = status.lines().find(|line| line.starts_with("VmRSS")).expect("there");
-    line.split_whitespace().nth(1).and_then(|kb| kb.parse::<f64>().ok()).expect("a number") / 1024.0
+    status_figure("self", "VmRSS:").expect("Linux") / 1024.0
 }
 
 /// A tick with noise as meters have it, in their digits.

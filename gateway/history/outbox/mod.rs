@@ -42,4 +42,4 @@ pub(crate) use redate::redate;
 pub use report::OutboxSettings;
 pub use shared::{DeliveryState, Outbox, OutboxFigures, OutboxHead};
 pub use store::box_id;
-pub(crate) use store::{create_like, known_box_id, next_sequence_of};
+pub(crate) use store::{create_like, known_box_id, next_sequence_of, skip_numbers};

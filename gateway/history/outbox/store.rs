@@ -107,10 +107,34 @@ fn measure(db: &Connection, next_sequence: u64) -> Result<OutboxContents, Histor
     .doing("measuring the outbox")
 }
 
+/// Items that a box makes in a week at most: a hundred a second.
+const SKIPPED: u64 = 100_000_000;
+/// From which number on the numbering goes, in `meta`.
+const NUMBERS_FROM: &str = "outbox_numbers_from";
+
 /// The newest row is never removed: the numbering goes on from it.
 fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
-    db.query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| row.get(0).map(to_unsigned))
+    let stored: u64 = db
+        .query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| row.get(0).map(to_unsigned))
+        .doing("numbering the outbox")?;
+    let from = property(db, NUMBERS_FROM)?.and_then(|text| text.parse().ok()).unwrap_or(1);
+    Ok(stored.max(from))
+}
+
+/// An older copy of the history at `path` is to be used again: its numbers may have been given to other items since, so they go on far
+/// above. A receiver sees numbers that are missing, and none that comes twice.
+///
+/// # Errors
+/// The file cannot be opened or written.
+pub(crate) fn skip_numbers(path: &Path) -> Result<(), HistoryError> {
+    let db = open_for_writing(path)?;
+    if !exists(&db)? {
+        return Ok(());
+    }
+    let from = next_sequence(&db)?.saturating_add(SKIPPED).to_string();
+    db.execute("INSERT OR REPLACE INTO meta (key, value) VALUES (?1, ?2)", [NUMBERS_FROM, &from])
         .doing("numbering the outbox")
+        .map(drop)
 }
 
 /// The number of the next item; 0 where there is no outbox.

@@ -94,9 +94,11 @@ impl HistoryStore {
             long_log: false,
             set_aside: Vec::new(),
         };
+        history_store.finish_going_back();
         recent::forget_without(&history_store.path);
         match history_store.try_open() {
             Ok(()) => {}
+            Err(error @ HistoryError::NewerSchema { .. }) => history_store.go_back(error)?,
             Err(error) if foreign(&error) => return Err(error),
             Err(error) => history_store.opening_failed(&error),
         }
@@ -194,6 +196,7 @@ impl HistoryStore {
         if let Some(writer) = &self.writer {
             writer.maintain(Some(now_ns));
         }
+        history::remove_old_copies(&self.path, now_ns);
     }
 
     /// The clock of the rows since opening is confirmed.

@@ -2,7 +2,7 @@
 
 use super::{HistoryStore, identity};
 use crate::clock;
-use crate::history::{self, Audit, Event, HistoryError};
+use crate::history::{self, Aside, Audit, Event, HistoryError};
 use crate::log::{Notice, Severity};
 
 /// A log of this length is told: three times what it has otherwise.
@@ -20,7 +20,7 @@ pub(in crate::run) fn long_log(bytes: u64) -> String {
 impl HistoryStore {
     /// The disk has changed the file: it is kept under another name, and storing goes on in a new one.
     pub(super) fn begin_anew(&mut self, why: &HistoryError) {
-        let aside = match history::set_aside(&self.path) {
+        let aside = match history::set_aside(&self.path, Aside::Damaged) {
             Ok(aside) => aside,
             Err(error) => return self.put_off(&error),
         };
@@ -33,6 +33,42 @@ impl HistoryStore {
             Err(error) => self.put_off(&error),
         }
         self.set_aside = history::damaged_files(&self.path);
+    }
+
+    /// A newer version of the program has changed the file, and this one goes back to the copy of before, where there is one.
+    ///
+    /// # Errors
+    /// The error as it was, where there is no copy; a file that cannot be renamed or written.
+    pub(super) fn go_back(&mut self, error: HistoryError) -> Result<(), HistoryError> {
+        let Some(newer) = history::go_back(&self.path)? else { return Err(error) };
+        let text = format!(
+            "a newer version of the program has changed the history; this one goes on with the copy of before. What was stored \
+             since is in {}, which the newer version reads",
+            newer.display()
+        );
+        let notice = Notice::new(Severity::Warning, "history_went_back", text).detail(error.to_string());
+        notice.say();
+        match self.try_open() {
+            Ok(()) => self.remember(&notice),
+            Err(error) => self.opening_failed(&error),
+        }
+        Ok(())
+    }
+
+    /// The power failed while an older version went back to the copy of before: now it does.
+    pub(super) fn finish_going_back(&self) {
+        if !history::is_going_back(&self.path) {
+            return;
+        }
+        let (severity, text) = match history::go_back(&self.path) {
+            Ok(_) => {
+                (Severity::Warning, "the history was missing; the copy of before is in its place again".to_owned())
+            }
+            Err(error) => {
+                (Severity::Error, format!("the copy of before cannot take the place of the history: {error}"))
+            }
+        };
+        Notice::new(severity, "history_went_back", text).say();
     }
 
     /// As an event of the history, and as a row of its audit: the chain before is in another file.

@@ -183,7 +183,8 @@ impl Twin {
         ]
     }
 
-    /// The newest values of [`Twin::series`].
+    /// The newest values of [`Twin::series`]: both, or neither. A mean over a minute of which the meter was silent for a part would
+    /// otherwise be one over other seconds for the simulation than for the difference, and what was recorded would not be their sum.
     #[must_use]
     pub fn values(&self) -> [ExtraValue<'static>; 2] {
         let same_unit = |loaded: &LoadedModel| loaded.model.output.ends_with(&self.suffix);
@@ -191,7 +192,8 @@ impl Twin {
             Some(ActiveModel { live, loaded }) if same_unit(loaded) => live.compared(),
             _ => ComparedSecond::none(live::NoTwin::NotYet),
         };
-        [compared.expected, compared.residual].map(|value| value.map_err(live::NoTwin::word).into())
+        let expected = compared.residual.and(compared.expected);
+        [expected, compared.residual].map(|value| value.map_err(live::NoTwin::word).into())
     }
 
     /// Takes one tick, after the pipeline has.

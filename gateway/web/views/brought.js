@@ -32,6 +32,8 @@ export class Brought {
     this.box = card(t("brought_title"), [words, this.zone, this.kept, this.understood, this.bar, this.note, this.latest, this.past,
       make("h3", "", t("gallery")), make("p", "note", t("gallery_words")), this.examples]);
     this.timer = setInterval(() => this.look(), 2000);
+    // Until it is known who is signed in, nothing can be brought.
+    this.update();
     this.reload();
     this.look();
   }

@@ -21,6 +21,9 @@ const DEEPEST_MM: f64 = 2.6;
 const DEPTHS_MM: [f64; 5] = [1.0, 1.4, 1.8, 2.3, 2.8];
 const MAX_PCT: f64 = 200.0;
 const MIN_PCT: f64 = 50.0;
+/// The shipped script raises the feed once in `steady_s` = 1.5 s at most: 40 times a minute. More decisions than that are chatter; when it
+/// answered every tick it took 378 a minute at a light cut. Lower: a part with many steps of depth fails; higher: chatter passes.
+const SHIPPED_DECISIONS_PER_MIN: f64 = 40.0;
 /// Cutting power of the deepest cut at the programmed feed, W.
 const ALLOWED_W: f64 = 2400.0;
 
@@ -62,6 +65,8 @@ struct Outcome {
     reactions_ms: Vec<f64>,
     least_pct: u8,
     greatest_pct: u8,
+    /// How often another feed was asked for, in whole percent.
+    decisions: u32,
     /// Furthest from 100 % while the meter had been silent for a second, and how long it was.
     silent_pct: u8,
     silent_s: f64,
@@ -76,6 +81,10 @@ impl Outcome {
         })
     }
 
+    fn decisions_per_min(&self) -> f64 {
+        f64::from(self.decisions) * 60.0 / self.program_s
+    }
+
     fn greatest(&self) -> f64 {
         self.power_w.iter().copied().fold(0.0, f64::max)
     }
@@ -84,14 +93,16 @@ impl Outcome {
         let [whole, settled] = self.spread().map(|share| 100.0 * share);
         format!(
             "{name}: program {:.1} s, in the cut {:.1} s; cutting power {:.0} W, standard deviation {whole:.1} % ({settled:.1} % from \
-             2 s after each entry), greatest {:.0} W, at most {:.1} s above 1.15 times what is allowed; override {} to {} %",
+             2 s after each entry), greatest {:.0} W, at most {:.1} s above 1.15 times what is allowed; override {} to {} %; {:.1} \
+             decisions a minute",
             self.program_s,
             self.cutting_s,
             mean(&self.power_w),
             self.greatest(),
             self.over_s,
             self.least_pct,
-            self.greatest_pct
+            self.greatest_pct,
+            self.decisions_per_min()
         )
     }
 }
@@ -105,9 +116,13 @@ fn run(settings: SimulatedSettings, steps: &[ExperimentStep], scripts: &[ScriptF
     let mut bench = Bench::new(settings, steps, scripts, &limits(MIN_PCT, MAX_PCT));
     let mut outcome = Outcome { least_pct: 100, greatest_pct: 100, ..Outcome::default() };
     let (mut begun, mut engaged_s, mut over_s, mut silent_s) = (false, 0.0, 0.0, 0.0);
+    let mut asked = None;
     let power = ChannelId::of("spindle_power_w").expect("a channel");
     while !over(&bench) {
         silent_s = if bench.tick().number(power).is_err() && bench.now_s() > 30.0 { silent_s + 0.1 } else { 0.0 };
+        let asks = bench.pipeline.scripts().decision().request.as_ref().map(|request| request.pct.round());
+        outcome.decisions += u32::from(asked != asks);
+        asked = asks;
         if armed && !begun && bench.now_s() > 30.0 {
             bench.arm();
             begun = true;
@@ -157,6 +172,7 @@ fn a_part_with_varying_depth_takes_an_even_power_and_less_time() {
     for (name, script) in shipped {
         let outcome = run(settings(1), &part(), &[script], true);
         println!("{}", outcome.told(name));
+        assert!(outcome.decisions_per_min() <= SHIPPED_DECISIONS_PER_MIN, "{name}: {}", outcome.decisions_per_min());
         let [spread, settled_spread] = outcome.spread();
         let [plain_spread, plain_settled] = plain.spread();
         assert!(spread < 0.85 * plain_spread && settled_spread < 0.6 * plain_settled, "{name}: {spread}");

@@ -2,7 +2,7 @@
 //! shipped script by its exponent and by learned curves, and the law of this module.
 
 use super::law::{by_curves, by_exponent, curves, law};
-use super::{ALLOWED_W, DEEPEST_MM, FEED_MM_MIN, Outcome, run, settings};
+use super::{ALLOWED_W, DEEPEST_MM, FEED_MM_MIN, Outcome, SHIPPED_DECISIONS_PER_MIN, run, settings};
 use crate::steps::{SPEED_RPM, air, air_cut, cut, onward};
 use adapters::simulated::{ExperimentStep, LaterChange, SimulatedSettings};
 
@@ -48,12 +48,13 @@ fn scenarios() -> Vec<Scenario> {
 fn row(scenario: &str, law: &str, outcome: &Outcome) -> String {
     let [spread, settled] = outcome.spread().map(|share| 100.0 * share);
     format!(
-        "| {scenario:13} | {law:17} | {:5.1} | {:4.1} | {:+4.0} | {spread:4.1} | {settled:4.1} | {:3} to {:3} |",
+        "| {scenario:13} | {law:17} | {:5.1} | {:4.1} | {:+4.0} | {spread:4.1} | {settled:4.1} | {:3} to {:3} | {:4.0} |",
         outcome.program_s,
         outcome.over_s,
         100.0 * (outcome.greatest() / (1.15 * ALLOWED_W) - 1.0),
         outcome.least_pct,
-        outcome.greatest_pct
+        outcome.greatest_pct,
+        outcome.decisions_per_min()
     )
 }
 
@@ -68,12 +69,18 @@ fn every_situation_in_which_a_constant_load_is_known_to_fail() {
         ("shipped, curves", by_curves(&learned, target_w), true),
         ("law of the module", law(&learned, target_w), true),
     ];
-    println!("| situation | law | time s | above 1.15 x allowed s | deepest % | spread % | settled % | override % |");
+    println!(
+        "| situation | law | time s | above 1.15 x allowed s | deepest % | spread % | settled % | override % | decisions/min |"
+    );
     for scenario in scenarios() {
         for (name, script, armed) in &laws {
             let outcome = run(scenario.settings, &scenario.steps, std::slice::from_ref(script), *armed);
             println!("{}", row(scenario.name, name, &outcome));
             let place = format!("{}, {name}", scenario.name);
+            if name.starts_with("shipped") {
+                let decisions = outcome.decisions_per_min();
+                assert!(decisions <= SHIPPED_DECISIONS_PER_MIN, "{place}: {decisions} decisions a minute");
+            }
             if *armed {
                 assert!(outcome.over_s <= scenario.over_max_s, "{place}: {} s above", outcome.over_s);
             }
