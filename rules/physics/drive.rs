@@ -5,6 +5,8 @@ use super::{OutputKind, Role, Scene};
 use adapters::channel::quantity::{is_of_spindle, unit_of};
 use std::f64::consts::PI;
 
+/// Greatest moment of inertia of a spindle with its work: a blank of 20 t and 2 m on a vertical lathe has 10,000 kg m2.
+pub(crate) const INERTIA_KG_M2_MAX: f64 = 20_000.0;
 /// Radians per second of one revolution per minute.
 pub(crate) const RAD_PER_S_OF_RPM: f64 = PI / 30.0;
 

@@ -70,7 +70,7 @@ impl Effect for MeterWindow {
         let late = late_windows.iter().flat_map(|window_s| LATE_SHARES.map(|share| (*window_s, share * window_s)));
         let late = late.map(|(window_s, delay_s)| {
             let shape = [("window_s", window_s), ("delay_s", delay_s)];
-            Form { name: LATE, ..Form::of(&shape) }
+            Form { name: LATE, ..Form::of(&shape) }.whole()
         });
         windows.iter().map(form("lag")).chain(windows.iter().map(form("mean"))).chain(late).collect()
     }

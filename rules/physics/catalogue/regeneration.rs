@@ -1,6 +1,6 @@
 //! Braking power does not come back: it is burnt in a resistor, or the meter does not count it.
 
-use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
+use crate::physics::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
 use crate::physics::excitation::visits;
 use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -16,7 +16,7 @@ static DOC: EffectDoc = EffectDoc {
         ParameterDoc::linear(
             "braking_kg_m2",
             "kg m2",
-            (0.0, 50.0),
+            (0.0, INERTIA_KG_M2_MAX),
             "inertia times the share of braking power that is lost",
             "惯量乘以损失的制动功率比例",
         ),

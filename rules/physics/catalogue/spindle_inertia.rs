@@ -1,6 +1,6 @@
 //! Power and torque that accelerate spindle, chuck and work.
 
-use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
+use crate::physics::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
 use crate::physics::excitation::{greatest, visits};
 use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -16,7 +16,7 @@ static DOC: EffectDoc = EffectDoc {
         ParameterDoc::linear(
             "inertia_kg_m2",
             "kg m2",
-            (0.0, 50.0),
+            (0.0, INERTIA_KG_M2_MAX),
             "moment of inertia of spindle, chuck and work that the simulation lacks",
             "仿真中缺少的主轴、卡盘和工件转动惯量",
         ),

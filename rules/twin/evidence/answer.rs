@@ -101,6 +101,16 @@ impl EvidenceAnswer {
         }
     }
 
+    /// Sets something without a name beside some names: their curves are theirs, their textbook laws are not.
+    pub(super) fn doubt(&mut self, doubted: &[String]) {
+        if self.verdict == Verdict::Unexplained {
+            return;
+        }
+        self.verdict = Verdict::Ambiguous;
+        let beside = |name: &String| Rival { name: UNKNOWN.to_owned(), instead_of: name.clone(), nats: 0.0 };
+        self.rivals.extend(doubted.iter().map(beside));
+    }
+
     /// Takes the names back: they and these others stand beside something without a name.
     pub(super) fn unname(&mut self, others: Vec<(String, f64)>) {
         let names = std::mem::take(&mut self.names).into_iter().map(|name| (name, 0.0));

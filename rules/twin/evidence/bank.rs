@@ -8,6 +8,8 @@ use super::inputs::RecordingInputs;
 use std::borrow::Cow;
 use std::ops::Range;
 
+/// Share of its largest value that a column must reach in rows which are to tell its size.
+const SEEN: f64 = 1e-3;
 /// Share of a column's greatest value from which a row counts as acted upon.
 const ACTING: f64 = 0.03;
 
@@ -333,10 +335,13 @@ impl Making<'_> {
     }
 }
 
+/// The largest value of a column in some rows; `None` where it never acts there, or next to nothing beside what it does in
+/// others: a law that was seen at a thousandth of its size says nothing of its whole size.
 fn largest_of(column: &[f64], rows: impl Iterator<Item = usize>) -> Option<f64> {
     let finite = column.iter().all(|x| x.is_finite());
+    let whole = column.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
     let largest = rows.map(|row| column[row].abs()).fold(0.0, f64::max);
-    (finite && largest > 0.0).then_some(largest)
+    (finite && largest > SEEN * whole).then_some(largest)
 }
 
 /// Root mean square over the rows where a column acts: so that the prior deviation means the size there.

@@ -3,13 +3,16 @@
 //! What the best explanation leaves is cut into pieces that are longer than the memory of the noise, and the signs of whole
 //! pieces are drawn anew (wild bootstrap: Wu, Annals of Statistics 14, 1986). In each such recording nothing is missing, and
 //! it keeps whatever dependence the rows of a piece have. Everything that was asked of the recording is asked of it again:
-//! the evidence of every variant of every family, summed. The share of these recordings in which as much is found is the
-//! chance that noise alone does as well.
+//! the evidence of every variant of every family, summed; and where only several together are more than that, the evidence of
+//! the best set that the same search finds. The share of these recordings in which as much is found is the chance that noise
+//! alone does as well.
 
 use super::algebra::{CholeskyFactor, block};
 use super::bag::pieces;
+use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
-use super::marginal::{Saturated, ln_sum};
+use super::marginal::{Ground, Saturated, ln_sum};
+use super::search::SetSearch;
 use crate::statistics::count;
 use crate::twin::units::Random;
 use ndarray::{Array1, Array2, Axis, s};
@@ -18,6 +21,8 @@ use ndarray::{Array1, Array2, Axis, s};
 const DRAWS: usize = 199;
 /// Seed of the signs.
 const SEED: u64 = 2;
+/// Sets that are followed where a drawn recording is searched for sets.
+const BEAM: usize = 3;
 
 /// What the test found.
 #[derive(Debug, Clone, Copy)]
@@ -60,23 +65,46 @@ pub(super) fn existence(
             asked.iter().zip(priors).map(|(variant, prior)| prior + comparison.answer(&ground, variant, along, square)),
         )
     };
-    let observed = evidence_of(&ground.along_output(), ground.square()).max(evidence);
+    let singles = evidence_of(&ground.along_output(), ground.square());
     let square: f64 = innovations.dot(&innovations);
     let mut random = Random::new(SEED);
-    let mut as_much = 0;
-    for _ in 0..DRAWS {
-        let signs = Array1::from_iter((0..pieces.len()).map(|_| if random.draw() < 0.5 { 1.0 } else { -1.0 }));
-        let mut drawn = along.dot(&signs);
-        let baseline = drawn.slice(s![..comparison.first()]).to_owned();
-        let coefficients = factor.solve(&baseline);
-        drawn -= &reach.t().dot(&coefficients);
-        let kept = (square - baseline.dot(&coefficients)).max(f64::MIN_POSITIVE);
-        as_much += usize::from(evidence_of(&drawn, kept) >= observed);
+    let draws: Vec<(Array1<f64>, f64)> = (0..DRAWS)
+        .map(|_| {
+            let signs = Array1::from_iter((0..pieces.len()).map(|_| if random.draw() < 0.5 { 1.0 } else { -1.0 }));
+            let mut drawn = along.dot(&signs);
+            let baseline = drawn.slice(s![..comparison.first()]).to_owned();
+            let coefficients = factor.solve(&baseline);
+            drawn -= &reach.t().dot(&coefficients);
+            let kept = (square - baseline.dot(&coefficients)).max(f64::MIN_POSITIVE);
+            (drawn, kept)
+        })
+        .collect();
+    let of_draws: Vec<f64> = draws.iter().map(|(along, square)| evidence_of(along, *square)).collect();
+    let reaching = |observed: f64| of_draws.iter().filter(|drawn| **drawn >= observed).count();
+    let mut chance = chance_of(reaching(singles.max(evidence)));
+    if chance <= THRESHOLDS.chance_max && chance_of(reaching(singles)) > THRESHOLDS.chance_max {
+        let search = SetSearch { comparison, priors, beam: BEAM };
+        chance = chance_of(sets_reaching(&search, &ground, &draws, evidence));
     }
-    ExistenceTest {
-        chance: count(as_much + 1) / count(DRAWS + 1),
-        effective_rows: effective_rows(comparison, noise.inflation(), &pieces, &innovations),
+    ExistenceTest { chance, effective_rows: effective_rows(comparison, noise.inflation(), &pieces, &innovations) }
+}
+
+/// The chance that so many of the draws stand for.
+fn chance_of(reaching: usize) -> f64 {
+    count(reaching + 1) / count(DRAWS + 1)
+}
+
+/// In how many of these recordings a search finds a set of so much evidence; it ends as soon as they are too many.
+fn sets_reaching(search: &SetSearch<'_>, ground: &Ground, draws: &[(Array1<f64>, f64)], evidence: f64) -> usize {
+    let mut reaching = 0;
+    for (along, square) in draws {
+        let best = search.run(&ground.with_output(along, *square), 0.0).into_values().fold(f64::NEG_INFINITY, f64::max);
+        reaching += usize::from(best >= evidence);
+        if chance_of(reaching) > THRESHOLDS.chance_max {
+            break;
+        }
     }
+    reaching
 }
 
 /// Rows over what their dependence takes: that which the noise knows, and that which the sums of whole pieces show beyond it.

@@ -79,6 +79,16 @@ impl Ground {
         self.gram[[last, last]].max(f64::MIN_POSITIVE)
     }
 
+    /// The same of another output, given its inner products with every column and its sum of squares.
+    pub(super) fn with_output(&self, along: &Array1<f64>, square: f64) -> Self {
+        let mut gram = self.gram.clone();
+        let last = gram.nrows() - 1;
+        gram.slice_mut(s![..last, last]).assign(along);
+        gram.slice_mut(s![last, ..last]).assign(along);
+        gram[[last, last]] = square;
+        Self { gram, hidden: self.hidden.clone(), starts: self.starts.clone(), variance: self.variance }
+    }
+
     /// The part that holds some variants only.
     pub(super) fn of(&self, variants: impl Iterator<Item = usize>, columns: impl Fn(usize) -> usize) -> Self {
         let mut all = Vec::new();

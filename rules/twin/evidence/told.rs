@@ -26,7 +26,7 @@ use crate::twin::next_step::{alternative, of_effects, over_channel};
 use crate::twin::words;
 use adapters::bilingual::Bilingual;
 
-/// Share of the range of a shape within which it stands at its end.
+/// Share of the end of a range within which a value stands at it.
 const AT_END: f64 = 1e-6;
 
 /// Share of the greatest contribution from which a row counts as acted upon.
@@ -59,11 +59,16 @@ impl EvidenceReport<'_, '_> {
     /// The diagnosis.
     pub(super) fn diagnosis(mut self) -> Diagnosis {
         let fits = self.fits();
-        let mut textbook = self.textbook();
+        let mut textbook = self.textbook(&[]);
         let refused = self.refused(&textbook);
         if !refused.is_empty() {
             self.answer.refuse(&refused, |x| self.inputs.taken(false).map(|row| x[row] * x[row]).sum());
-            textbook = self.textbook();
+            textbook = self.textbook(&[]);
+        }
+        let doubted = self.doubted(&textbook);
+        if !doubted.is_empty() {
+            self.answer.doubt(&doubted);
+            textbook = self.textbook(&doubted);
         }
         let missing = self.missing(&fits, &textbook);
         let alternatives: Vec<Alternative> = self.alternatives();
@@ -119,12 +124,12 @@ impl EvidenceReport<'_, '_> {
         }
     }
 
-    /// The nearest law of the catalogue for each name, and all of them refitted with the baseline.
-    fn textbook(&mut self) -> Textbook {
+    /// The nearest law of the catalogue for each name but some, and all of them refitted with the baseline.
+    fn textbook(&mut self, without: &[String]) -> Textbook {
         let mut parts = self.baseline.parts.clone();
         let mut laws = Vec::new();
         for name in &self.answer.names {
-            let own = self.answer.contributions.iter().find(|(known, _)| known == name);
+            let own = self.answer.contributions.iter().find(|(known, _)| known == name && !without.contains(known));
             let law = own.and_then(|(_, x)| self.nearest(name, x));
             laws.push(law.as_ref().map(|(_, share)| (parts.len(), *share)));
             parts.extend(law.map(|(part, _)| part));
@@ -155,24 +160,33 @@ impl EvidenceReport<'_, '_> {
         fit(&mut self.case.scene, parts, &Metric { recorded: self.recorded, weigh: &weigh, bounded: true })
     }
 
-    /// Names that are taken back: impossible sizes, and curves that got a name whose textbook law makes little of them.
+    /// Names that are taken back: their sizes are impossible.
     fn refused(&mut self, textbook: &Textbook) -> Vec<String> {
         let mut refused = Vec::new();
         for (name, law) in self.answer.names.iter().zip(&textbook.laws) {
             let Some((place, share)) = law else { continue };
             let part = textbook.fit.as_ref().map(|fit| &fit.parts[*place]);
             let own = self.answer.contributions.iter().find(|(known, _)| known == name);
-            let is_claimed = self.answer.claimed.contains(name) && *share < THRESHOLDS.textbook_share;
             let why = match (part, own) {
                 (Some(part), _) if is_impossible(part) => "a size at the end of its range",
                 (_, Some((_, x))) if self.is_too_large(name, x) => "larger than the machine allows",
-                _ if is_claimed => "its textbook law makes little of it",
                 _ => continue,
             };
-            self.answer.debug.push_str(&format!("\n{name} refused: {why} ({share:.2})"));
+            let sizes = part.map_or_else(String::new, sizes_of);
+            self.answer.debug.push_str(&format!("\n{name} refused: {why} ({share:.2}){sizes}"));
             refused.push(name.clone());
         }
         refused
+    }
+
+    /// Names of curves of which the textbook law makes little: they stand beside "unknown", without its parameters.
+    fn doubted(&mut self, textbook: &Textbook) -> Vec<String> {
+        let makes_little = |law: &Option<(usize, f64)>| law.is_some_and(|(_, share)| share < THRESHOLDS.textbook_share);
+        let names = self.answer.names.iter().zip(&textbook.laws);
+        let doubted = names.filter(|(name, law)| self.answer.claimed.contains(name) && makes_little(law));
+        let doubted: Vec<String> = doubted.map(|(name, _)| name.clone()).collect();
+        doubted.iter().for_each(|name| self.answer.debug.push_str(&format!("\n{name} doubted")));
+        doubted
     }
 
     /// Is a contribution larger than its effect can be beside what the machine takes anyway?
@@ -217,7 +231,10 @@ impl EvidenceReport<'_, '_> {
                 best = Some((solution.rss, part));
             }
         }
-        best.map(|(left, part)| (part, 1.0 - left / whole.max(f64::MIN_POSITIVE)))
+        let share = |left: f64| 1.0 - left / whole.max(f64::MIN_POSITIVE);
+        // A state that was read from the recording is not the law of a recorded column.
+        let is_law = |left: f64| !effect.has_hidden_state() || share(left) >= THRESHOLDS.textbook_share;
+        best.filter(|(left, _)| is_law(*left)).map(|(left, part)| (part, share(left)))
     }
 
     fn missing(&mut self, fits: &Fits, textbook: &Textbook) -> Vec<Missing> {
@@ -351,14 +368,21 @@ impl EvidenceReport<'_, '_> {
 
 /// Does a value stand at an end of its range?
 fn is_at_end(value: f64, (low, high): (f64, f64)) -> bool {
-    let near = if low.is_finite() && high.is_finite() { AT_END * (high - low) } else { 0.0 };
-    value <= low + near || value >= high - near
+    let near = |end: f64| if end.is_finite() { AT_END * end.abs() } else { 0.0 };
+    value <= low + near(low) || value >= high - near(high)
 }
 
-/// Is every size of a part at an end of its range? A share of one is a whole, and no end.
+/// Parameters of a part with their ranges, for engineers.
+fn sizes_of(part: &Part) -> String {
+    let of = |p: &Parameter| format!(" {} {:.4} in {:?}", p.name, p.value, p.range);
+    part.parameters.iter().map(of).collect()
+}
+
+/// Is every size of a part at an end of its range? A share of one, of either sign, is a whole, and no end.
 fn is_impossible(part: &Part) -> bool {
     let own = || part.parameters.iter().filter(|p| p.entry == Entry::Linear && !p.fixed);
-    let is_whole = |p: &Parameter| p.range == (0.0, 1.0) && p.value > 0.5;
+    let is_share = |p: &Parameter| p.range.0 >= -1.0 && p.range.1 <= 1.0;
+    let is_whole = |p: &Parameter| is_share(p) && p.value.abs() > 0.5;
     own().count() > 0 && own().all(|p| is_at_end(p.value, p.range) && !is_whole(p))
 }
 

@@ -89,17 +89,31 @@ impl Judge<'_> {
         let sure_of_something = answer.existence.probability_of_nothing < THRESHOLDS.nothing_sure;
         let sure = sure_of_something && answer.names.iter().all(alone);
         answer.verdict = if sure { Verdict::Explained } else { Verdict::Ambiguous };
-        if answer.verdict == Verdict::Explained {
+        let mut unnamed: Vec<Rival> = Vec::new();
+        if sure {
             beside.retain(|(name, _)| mass(name) > 0.1);
         } else if beside.is_empty() {
-            let sure: Vec<String> =
+            // Nothing but a curve without a name, or nothing at all, stands where a name is not sure.
+            let kept: Vec<String> =
                 answer.names.iter().filter(|name| sure_of_something && alone(name)).cloned().collect();
-            if sure.is_empty() {
+            let says_more = |g: &&Group<'_>| g.names.iter().any(|n| n.as_ref().is_none_or(|name| !kept.contains(name)));
+            let more = groups.iter().filter(says_more).map(|g| g.ln.exp()).sum::<f64>();
+            let unsure = || answer.names.iter().filter(|name| !kept.contains(name));
+            let likely = unsure().all(|name| mass(name) > 0.5);
+            if likely && more >= 1.0 - THRESHOLDS.nothing_max {
+                let beside = |name: &String| Rival {
+                    name: UNKNOWN.to_owned(),
+                    instead_of: name.clone(),
+                    nats: (mass(name) / (1.0 - mass(name)).max(1e-12)).ln(),
+                };
+                unnamed = unsure().map(beside).collect();
+            } else if kept.is_empty() {
                 answer.leave_unnamed(groups, ln);
                 return;
+            } else {
+                answer.names = kept;
+                answer.verdict = Verdict::Explained;
             }
-            answer.names = sure;
-            answer.verdict = Verdict::Explained;
         }
         let class = self.class(answer, best);
         if !class.is_empty() {
@@ -109,7 +123,7 @@ impl Judge<'_> {
             let unsure = answer.names.iter().find(|name| !alone(name)).or(answer.names.first()).cloned();
             let instead_of = unsure.unwrap_or_default();
             let rival = |(name, nats)| Rival { name, instead_of: instead_of.clone(), nats };
-            answer.rivals = beside.into_iter().map(rival).collect();
+            answer.rivals = beside.into_iter().map(rival).chain(unnamed).collect();
             for other in class {
                 if !answer.rivals.iter().any(|known| known.name == other.name) {
                     answer.rivals.push(other);
@@ -136,9 +150,10 @@ impl Judge<'_> {
             let claimed = answer.claimed.contains(name);
             let near = |other: &StandIn| {
                 let makes_curve = claimed && other.share >= THRESHOLDS.rival_share;
-                let confused = are_confused(name, &other.kind);
-                let nats = if confused { THRESHOLDS.rival_nats } else { THRESHOLDS.class_nats };
-                other.nats < own + nats || makes_curve || left.is_some_and(|left| is_of_like_form(left, other))
+                let is_confused =
+                    are_confused(name, &other.kind) && other.nats < left.unwrap_or(own) + THRESHOLDS.rival_nats;
+                let is_near = other.nats < own + THRESHOLDS.class_nats || is_confused;
+                is_near || makes_curve || left.is_some_and(|left| is_of_like_form(left, other))
             };
             let others = all.into_iter().filter(|other| !answer.names.contains(&other.kind) && near(other));
             class.extend(others.map(|other| Rival {
