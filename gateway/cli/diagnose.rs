@@ -4,9 +4,7 @@ use super::lang::{language, pick, say};
 use super::{CannotRun, CommandOutcome, CommandResult};
 use crate::diagnosis::context::DiagnosisContext;
 use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach, recorded_output, series_model};
-use crate::diagnosis::{
-    DiagnosisOutputs, InputRecordings, finish, read_hypotheses, read_model, read_recordings_as, stretch,
-};
+use crate::diagnosis::{DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings_as, stretch};
 use clap::Args;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
@@ -74,7 +72,7 @@ pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
     let found = twin::diagnose(&given.recording, &model, arguments.seed);
     let mut diagnosis = found.map_err(|all| cannot_use(&all))?;
     note_refusals(&mut diagnosis, &given);
-    let context = finish(&mut diagnosis, &given.recording, &model, context);
+    let context = context.after(&model, &diagnosis);
     if arguments.search {
         eprintln!("{}", diagnosis.debug);
     }

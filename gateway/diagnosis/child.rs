@@ -209,8 +209,8 @@ fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Str
         let doubts = context.doubts.iter().map(|doubt| doubt.text.en.clone());
         return Err(examination.unusable.into_iter().chain(doubts).collect::<Vec<_>>().join("; "));
     }
-    let mut found = twin::diagnose(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
-    let context = super::finish(&mut found, &recording, &model, context);
+    let found = twin::diagnose(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
+    let context = context.after(&model, &found);
     tell(Stage::Writing, recording.rows())?;
     let beside = match &job.input {
         JobInput::Stretch { onsets, .. } => beside_model(&recording, &model, &found, onsets),

@@ -13,7 +13,6 @@ pub mod map_file;
 pub mod model_new;
 mod models;
 mod outputs;
-pub mod place;
 mod recordings;
 pub mod series;
 mod series_alignment;
@@ -30,21 +29,3 @@ pub use join::join;
 pub use models::{read_hypotheses, read_model};
 pub use outputs::{DiagnosisOutputs, put};
 pub use recordings::{InputRecordings, describe_reading, read_recordings, read_recordings_as};
-
-use adapters::Recording;
-use rules::twin::{Diagnosis, Model, words as engine_words};
-
-/// What is done with every diagnosis before it is written: the place in the fewest words, and what the fitted parameters say of the units.
-pub fn finish(
-    diagnosis: &mut Diagnosis,
-    recording: &Recording,
-    nominal: &Model,
-    context: context::DiagnosisContext,
-) -> context::DiagnosisContext {
-    let before: Vec<_> = diagnosis.mismatch.iter().map(|region| region.conditions.clone()).collect();
-    place::refine(diagnosis, recording);
-    if diagnosis.mismatch.iter().map(|region| &region.conditions).ne(before.iter()) {
-        diagnosis.summary = engine_words::summary(diagnosis);
-    }
-    context.after(nominal, diagnosis)
-}

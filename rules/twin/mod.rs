@@ -30,6 +30,7 @@ pub mod locate;
 pub mod model;
 pub mod model_file;
 mod next_step;
+mod place;
 pub mod plan;
 pub mod quality;
 pub mod report;

@@ -98,6 +98,7 @@ pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagn
     let first = Comparison::new(&inputs, &bank, &compared, ROWS_MAX);
     let (answer, noise) = answer(&inputs, &first, &compared, &baseline, &outliers);
     let report = told::EvidenceReport {
+        recording,
         case: &mut case,
         inputs: &inputs,
         baseline: &baseline,

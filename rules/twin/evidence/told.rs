@@ -20,10 +20,12 @@ use crate::twin::fit::{Fit, Metric, fit};
 use crate::twin::inputs::rows_with_inputs;
 use crate::twin::intervals::FittedRows;
 use crate::twin::linear::least_squares;
-use crate::twin::locate::{Region, active_rows, conditions, spans, usual_size};
+use crate::twin::locate::{Region, active_rows, spans, usual_size};
 use crate::twin::model::{Model, Parameter, Part};
 use crate::twin::next_step::{alternative, of_effects, over_channel};
+use crate::twin::place::PlaceSearch;
 use crate::twin::words;
+use adapters::Recording;
 use adapters::bilingual::Bilingual;
 
 /// Share of the end of a range within which a value stands at it.
@@ -34,6 +36,7 @@ const ACTING: f64 = 0.1;
 
 /// Everything that is told.
 pub(super) struct EvidenceReport<'a, 'm> {
+    pub(super) recording: &'a Recording,
     pub(super) case: &'a mut Case<'m>,
     pub(super) inputs: &'a RecordingInputs<'a>,
     pub(super) baseline: &'a Fit,
@@ -315,6 +318,7 @@ impl EvidenceReport<'_, '_> {
         let rows = self.inputs.rows;
         let whole: f64 = sum_of(&self.answer.remaining, rows).iter().map(|x| x * x).sum();
         let size = usual_size(&sum_of(&self.answer.contributions, rows));
+        let places = PlaceSearch::new(self.recording, &self.case.model.output);
         let mut all: Vec<Region> = Vec::new();
         for (name, left) in &self.answer.remaining {
             if !self.answer.names.contains(name) {
@@ -330,7 +334,7 @@ impl EvidenceReport<'_, '_> {
                 effect: name.clone(),
                 share: over(&squares) / whole.max(f64::MIN_POSITIVE),
                 mean: over(own) / count(inside.max(1)),
-                conditions: conditions(self.inputs.scene, &active),
+                conditions: places.conditions(&active),
                 spans: spans(self.inputs.scene, &active),
                 onset: None,
             });

@@ -150,8 +150,9 @@ impl Judge<'_> {
             let claimed = answer.claimed.contains(name);
             let near = |other: &StandIn| {
                 let makes_curve = claimed && other.share >= THRESHOLDS.rival_share;
-                let is_confused =
-                    are_confused(name, &other.kind) && other.nats < left.unwrap_or(own) + THRESHOLDS.rival_nats;
+                // A law that makes less than half of the contribution is no rival, however badly its own law fits.
+                let own_nats = left.filter(|_| other.share >= THRESHOLDS.of_each).unwrap_or(own);
+                let is_confused = are_confused(name, &other.kind) && other.nats < own_nats + THRESHOLDS.rival_nats;
                 let is_near = other.nats < own + THRESHOLDS.class_nats || is_confused;
                 is_near || makes_curve || left.is_some_and(|left| is_of_like_form(left, other))
             };

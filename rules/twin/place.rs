@@ -2,11 +2,10 @@
 //! the clock), found by what they cover of the rows in which it acts, less the share of the rows that they take in, less a price for each condition and each
 //! word of a list. So a threshold is told in place of a list of runs.
 
+use super::locate::Condition;
 use adapters::Recording;
 use adapters::channel::quantity::Quantity;
 use adapters::recording::{Words, derived};
-use rules::twin::Diagnosis;
-use rules::twin::locate::Condition;
 
 /// Price of one condition, in shares of what is covered,
 const CONDITION_PRICE: f64 = 0.03;
@@ -20,16 +19,13 @@ const THRESHOLDS: usize = 24;
 const WORDS_MAX: usize = 4;
 /// Rows that are looked at; a long recording is thinned.
 const ROWS_MAX: usize = 6000;
-/// What another description must be better by, to take the place of that of the engine.
-const BETTER: f64 = 0.01;
-
 /// How well a description covers an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coverage {
-    /// Share of the effect's energy within.
-    pub energy: f64,
-    /// Share of the rows within.
-    pub rows: f64,
+struct Coverage {
+    /// Share of the affected rows within.
+    affected: f64,
+    /// Share of all rows within.
+    rows: f64,
 }
 
 /// A column as the search sees it.
@@ -39,42 +35,14 @@ enum PlaceColumn<'a> {
 }
 
 /// The search over one recording.
-struct PlaceSearch<'a> {
+pub(super) struct PlaceSearch<'a> {
     rows: Vec<usize>,
     columns: Vec<PlaceColumn<'a>>,
 }
 
-/// Replaces the conditions of each region where fewer or better ones are found.
-pub fn refine(diagnosis: &mut Diagnosis, recording: &Recording) {
-    let search = PlaceSearch::new(recording, &diagnosis.output);
-    let regions: Vec<(usize, Vec<f64>)> = diagnosis
-        .mismatch
-        .iter()
-        .enumerate()
-        .filter_map(|(index, region)| {
-            let (_, values) = diagnosis.rows.effects.iter().find(|(name, _)| *name == region.effect)?;
-            (values.len() == recording.rows()).then(|| (index, values.clone()))
-        })
-        .collect();
-    for (index, values) in regions {
-        let energy = search.weights(&values);
-        let known = diagnosis.mismatch[index].conditions.clone();
-        let (found, value) = search.best(&energy);
-        if value > search.value(&known, &energy) + BETTER {
-            diagnosis.mismatch[index].conditions = found;
-        }
-    }
-}
-
-/// What these conditions cover of a contribution.
-#[must_use]
-pub fn coverage(recording: &Recording, output: &str, conditions: &[Condition], contribution: &[f64]) -> Coverage {
-    let search = PlaceSearch::new(recording, output);
-    search.coverage(&search.inside(conditions), &search.energy(contribution))
-}
-
 impl<'a> PlaceSearch<'a> {
-    fn new(recording: &'a Recording, output: &str) -> Self {
+    /// Over what can be told of a recording of this output.
+    pub(super) fn new(recording: &'a Recording, output: &str) -> Self {
         let every = recording.rows().div_ceil(ROWS_MAX).max(1);
         let rows: Vec<usize> = (0..recording.rows()).step_by(every).collect();
         let mut columns = Vec::new();
@@ -109,45 +77,24 @@ impl<'a> PlaceSearch<'a> {
         Self { rows, columns }
     }
 
-    fn energy(&self, contribution: &[f64]) -> Vec<f64> {
-        self.rows.iter().map(|row| contribution.get(*row).map_or(0.0, |x| x * x)).collect()
-    }
-
-    /// How much the effect acts in each row: fully from the lower quarter of its sizes on, so that neither one great row nor slow growth decides where it
-    /// is said to act.
-    fn weights(&self, contribution: &[f64]) -> Vec<f64> {
-        let sizes: Vec<f64> = self.rows.iter().map(|row| contribution.get(*row).map_or(0.0, |x| x.abs())).collect();
-        let mut acting: Vec<f64> = sizes.iter().copied().filter(|size| *size > 0.0).collect();
-        acting.sort_by(f64::total_cmp);
-        let usual = acting.get(acting.len() / 2).copied().unwrap_or(0.0);
-        let acting: Vec<f64> = acting.into_iter().filter(|size| *size > 0.1 * usual).collect();
-        let full = acting.get(acting.len() / 4).copied().unwrap_or(f64::MIN_POSITIVE);
-        sizes.into_iter().map(|size| (size / full).min(1.0)).collect()
+    /// Conditions that together describe the affected rows; none where nothing describes them.
+    pub(super) fn conditions(&self, active: &[bool]) -> Vec<Condition> {
+        let at = |row: &usize| f64::from(u8::from(active.get(*row).copied().unwrap_or(false)));
+        self.best(&self.rows.iter().map(at).collect::<Vec<f64>>()).0
     }
 
     #[expect(clippy::cast_precision_loss, reason = "some thousand rows")]
-    fn coverage(&self, inside: &[bool], energy: &[f64]) -> Coverage {
-        let all: f64 = energy.iter().sum();
-        let within: f64 = energy.iter().zip(inside).filter(|(_, inside)| **inside).map(|(energy, _)| energy).sum();
+    fn coverage(&self, inside: &[bool], affected: &[f64]) -> Coverage {
+        let all: f64 = affected.iter().sum();
+        let within: f64 =
+            affected.iter().zip(inside).filter(|(_, inside)| **inside).map(|(affected, _)| affected).sum();
         let rows = inside.iter().filter(|inside| **inside).count();
-        Coverage { energy: within / all.max(f64::MIN_POSITIVE), rows: rows as f64 / self.rows.len().max(1) as f64 }
+        Coverage { affected: within / all.max(f64::MIN_POSITIVE), rows: rows as f64 / self.rows.len().max(1) as f64 }
     }
 
-    fn gain(&self, inside: &[bool], energy: &[f64]) -> f64 {
-        let found = self.coverage(inside, energy);
-        found.energy - found.rows
-    }
-
-    fn value(&self, conditions: &[Condition], energy: &[f64]) -> f64 {
-        self.gain(&self.inside(conditions), energy) - price(conditions)
-    }
-
-    fn inside(&self, conditions: &[Condition]) -> Vec<bool> {
-        let mut inside = vec![true; self.rows.len()];
-        for condition in conditions {
-            self.narrow(&mut inside, condition);
-        }
-        inside
+    fn gain(&self, inside: &[bool], affected: &[f64]) -> f64 {
+        let found = self.coverage(inside, affected);
+        found.affected - found.rows
     }
 
     fn narrow(&self, inside: &mut [bool], condition: &Condition) {
@@ -170,12 +117,12 @@ impl<'a> PlaceSearch<'a> {
     }
 
     /// One condition after the other, each the one that gains most.
-    fn best(&self, energy: &[f64]) -> (Vec<Condition>, f64) {
+    fn best(&self, affected: &[f64]) -> (Vec<Condition>, f64) {
         let (mut chosen, mut value): (Vec<Condition>, f64) = (Vec::new(), 0.0);
         let mut inside = vec![true; self.rows.len()];
         while chosen.len() < CONDITIONS_MAX {
             let mut best: Option<(f64, Condition, Vec<bool>)> = None;
-            for candidate in self.columns.iter().flat_map(|column| self.candidates(column, &inside, energy)) {
+            for candidate in self.columns.iter().flat_map(|column| self.candidates(column, &inside, affected)) {
                 if chosen.iter().any(|known| known.column() == candidate.column()) {
                     continue;
                 }
@@ -183,13 +130,13 @@ impl<'a> PlaceSearch<'a> {
                 self.narrow(&mut narrowed, &candidate);
                 let mut all = chosen.clone();
                 all.push(candidate.clone());
-                let worth = self.gain(&narrowed, energy) - price(&all);
+                let worth = self.gain(&narrowed, affected) - price(&all);
                 if best.as_ref().is_none_or(|(most, ..)| worth > *most) {
                     best = Some((worth, candidate, narrowed));
                 }
             }
             let Some((_, condition, _)) = best.filter(|(worth, ..)| *worth > value + 1e-9) else { break };
-            let (worth, condition, narrowed) = self.sharpen(condition, &chosen, &inside, energy);
+            let (worth, condition, narrowed) = self.sharpen(condition, &chosen, &inside, affected);
             (value, inside) = (worth, narrowed);
             chosen.push(condition);
         }
@@ -202,12 +149,12 @@ impl<'a> PlaceSearch<'a> {
         condition: Condition,
         chosen: &[Condition],
         inside: &[bool],
-        energy: &[f64],
+        affected: &[f64],
     ) -> (f64, Condition, Vec<bool>) {
         let worth = |candidate: Condition| {
             let mut narrowed = inside.to_vec();
             self.narrow(&mut narrowed, &candidate);
-            let gain = self.gain(&narrowed, energy) - price(&[chosen, std::slice::from_ref(&candidate)].concat());
+            let gain = self.gain(&narrowed, affected) - price(&[chosen, std::slice::from_ref(&candidate)].concat());
             (gain, candidate, narrowed)
         };
         let sorted = self.sorted_values(condition.column(), inside);
@@ -232,21 +179,21 @@ impl<'a> PlaceSearch<'a> {
         sort_values(values, inside)
     }
 
-    fn candidates(&self, column: &PlaceColumn<'_>, inside: &[bool], energy: &[f64]) -> Vec<Condition> {
+    fn candidates(&self, column: &PlaceColumn<'_>, inside: &[bool], affected: &[f64]) -> Vec<Condition> {
         match column {
             PlaceColumn::Numbers(name, values) => {
                 thresholds(values, inside).into_iter().flat_map(|(low, high)| ranges(name, low, high)).collect()
             }
-            PlaceColumn::Words(name, words) => self.lists(name, words, inside, energy),
+            PlaceColumn::Words(name, words) => self.lists(name, words, inside, affected),
         }
     }
 
-    /// The words that hold most of the energy for their rows: the first one, the first two, and so on.
-    fn lists(&self, name: &str, words: &Words, inside: &[bool], energy: &[f64]) -> Vec<Condition> {
+    /// The words that hold most of the affected for their rows: the first one, the first two, and so on.
+    fn lists(&self, name: &str, words: &Words, inside: &[bool], affected: &[f64]) -> Vec<Condition> {
         let mut sums = vec![(0.0, 0.0); words.words().len()];
-        for ((row, inside), energy) in self.rows.iter().zip(inside).zip(energy) {
+        for ((row, inside), affected) in self.rows.iter().zip(inside).zip(affected) {
             if let Some(code) = words.code(*row).filter(|_| *inside) {
-                sums[code as usize].0 += energy;
+                sums[code as usize].0 += affected;
                 sums[code as usize].1 += 1.0;
             }
         }
@@ -365,18 +312,17 @@ mod tests {
     fn a_threshold_is_told_and_not_a_list_of_runs() {
         let (recording, effect) = recording();
         let search = PlaceSearch::new(&recording, "spindle_power_w");
-        let (found, _) = search.best(&search.weights(&effect));
+        let active: Vec<bool> = effect.iter().map(|x| *x > 0.0).collect();
+        let found = search.conditions(&active);
         let [Condition::Range { column, min: Some(min), max: None }] = &found[..] else { panic!("{found:?}") };
         assert_eq!(column, "cutting_time_min");
         assert!((min - 1.0).abs() < 0.1, "{min}");
-        let covered = coverage(&recording, "spindle_power_w", &found, &effect);
-        assert!(covered.energy > 0.99 && covered.rows < 0.7, "{covered:?}");
     }
 
     #[test]
     fn what_acts_everywhere_needs_no_words() {
         let (recording, _) = recording();
         let search = PlaceSearch::new(&recording, "spindle_power_w");
-        assert!(search.best(&search.weights(&vec![5.0; recording.rows()])).0.is_empty());
+        assert!(search.conditions(&vec![true; recording.rows()]).is_empty());
     }
 }
