@@ -7,18 +7,20 @@ use adapters::Recording;
 use adapters::channel::quantity::Quantity;
 use adapters::recording::{Words, derived};
 
-/// Price of one condition, in shares of what is covered,
+/// Price of one condition, in shares of what is covered: a reader takes it in for a thirtieth. Lower: words that cover noise;
+/// higher: one condition where two are needed.
 const CONDITION_PRICE: f64 = 0.03;
-/// and of each further word of a list.
+/// Price of each further word of a list: less than a condition of its own.
 const WORD_PRICE: f64 = 0.02;
-/// Conditions that hold together, at most.
+/// Conditions that hold together, at most: more are not kept in mind.
 const CONDITIONS_MAX: usize = 3;
-/// Thresholds that are tried for each column.
+/// Thresholds that are tried for each column before the best is moved: the cost of a search grows with their square.
 const THRESHOLDS: usize = 24;
-/// Words of a list, at most.
+/// Words of a list, at most: a longer one is a condition on something else.
 const WORDS_MAX: usize = 4;
-/// Rows that are looked at; a long recording is thinned.
+/// Rows that are looked at; a long recording is thinned: a place is known to less than a thousandth of it.
 const ROWS_MAX: usize = 6000;
+
 /// How well a description covers an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Coverage {

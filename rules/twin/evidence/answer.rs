@@ -71,6 +71,30 @@ impl EvidenceAnswer {
         self.unname(near);
     }
 
+    /// Takes some names back: what they contribute goes to the nearest law beside each.
+    pub(super) fn replace(&mut self, refused: &[String]) -> Vec<String> {
+        let mut unnamed = Vec::new();
+        for name in refused {
+            let may_stand = |rival: &&Rival| rival.instead_of == *name && rival.name != UNKNOWN;
+            let nearest = self.rivals.iter().filter(may_stand).min_by(|a, b| a.nats.total_cmp(&b.nats));
+            let Some(next) = nearest.map(|rival| rival.name.clone()).filter(|next| !self.names.contains(next)) else {
+                unnamed.push(name.clone());
+                continue;
+            };
+            self.rivals.retain(|rival| rival.name != next);
+            for named in [&mut self.contributions, &mut self.remaining] {
+                named.iter_mut().filter(|(known, _)| known == name).for_each(|(known, _)| next.clone_into(known));
+            }
+            self.names.iter_mut().filter(|known| *known == name).for_each(|known| next.clone_into(known));
+            self.rivals.iter_mut().filter(|r| r.instead_of == *name).for_each(|r| next.clone_into(&mut r.instead_of));
+            if !self.rivals.iter().any(|rival| rival.instead_of == next) {
+                self.rivals.push(Rival { name: UNKNOWN.to_owned(), instead_of: next, nats: 0.0 });
+            }
+            self.verdict = Verdict::Ambiguous;
+        }
+        unnamed
+    }
+
     /// Takes some names back: what they contribute has no name. Where little is left under names, or none, all are taken back.
     pub(super) fn refuse(&mut self, refused: &[String], energy: impl Fn(&[f64]) -> f64) {
         for all in [&mut self.contributions, &mut self.remaining] {

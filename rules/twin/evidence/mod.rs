@@ -38,6 +38,7 @@ mod second;
 mod settings;
 mod states;
 mod step;
+mod textbook;
 mod told;
 mod verdict;
 mod wave;

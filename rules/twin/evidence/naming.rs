@@ -41,6 +41,8 @@ pub(super) struct StandIn {
     pub(super) nats: f64,
     /// Share of the contribution that it makes, the price of its columns taken off.
     pub(super) share: f64,
+    /// Directions beyond the first in which its columns may bend.
+    pub(super) bends: f64,
 }
 
 /// Projects curves on named laws.
@@ -256,8 +258,13 @@ impl<'a> Naming<'a> {
             let nats = nats * left + 0.7 * size - of.ln_prior.min(0.0);
             let kind = of.kind().unwrap_or_default().to_owned();
             match all.iter_mut().find(|known| known.kind == kind) {
-                Some(known) => (known.nats, known.share) = (known.nats.min(nats), known.share.max(fit.share)),
-                None => all.push(StandIn { kind, nats, share: fit.share }),
+                Some(known) => {
+                    if nats < known.nats {
+                        (known.nats, known.bends) = (nats, size);
+                    }
+                    known.share = known.share.max(fit.share);
+                }
+                None => all.push(StandIn { kind, nats, share: fit.share, bends: size }),
             }
         }
         all

@@ -91,7 +91,8 @@ impl Judge<'_> {
         answer.verdict = if sure { Verdict::Explained } else { Verdict::Ambiguous };
         let mut unnamed: Vec<Rival> = Vec::new();
         if sure {
-            beside.retain(|(name, _)| mass(name) > 0.1);
+            // What stands in other sets beside these names replaces none of them.
+            beside.clear();
         } else if beside.is_empty() {
             // Nothing but a curve without a name, or nothing at all, stands where a name is not sure.
             let kept: Vec<String> =
@@ -146,19 +147,21 @@ impl Judge<'_> {
             let itself = all.iter().find(|other| other.kind == *name);
             let own = itself.map_or(0.0, |own| own.nats.min(1.0));
             let left = itself.map(|own| own.nats);
+            let is_like_itself = |other: &StandIn| itself.is_some_and(|itself| is_of_like_form(itself, other));
             // The form of a curve that got its name by projection is not known better than to a tenth.
             let claimed = answer.claimed.contains(name);
             let near = |other: &StandIn| {
                 let makes_curve = claimed && other.share >= THRESHOLDS.rival_share;
-                // A law that makes less than half of the contribution is no rival, however badly its own law fits.
+                // What a law leaves of its own curve for its form is forgiven its rival too, up to the same odds.
                 let own_nats = left.filter(|_| other.share >= THRESHOLDS.of_each).unwrap_or(own);
+                let own_nats = own_nats.min(THRESHOLDS.rival_nats);
                 let is_confused = are_confused(name, &other.kind) && other.nats < own_nats + THRESHOLDS.rival_nats;
                 let is_near = other.nats < own + THRESHOLDS.class_nats || is_confused;
-                is_near || makes_curve || left.is_some_and(|left| is_of_like_form(left, other))
+                is_near || makes_curve || is_like_itself(other)
             };
-            let others = all.into_iter().filter(|other| !answer.names.contains(&other.kind) && near(other));
+            let others = all.iter().filter(|other| !answer.names.contains(&other.kind) && near(other));
             class.extend(others.map(|other| Rival {
-                name: other.kind,
+                name: other.kind.clone(),
                 instead_of: name.clone(),
                 nats: (other.nats - own).max(0.0),
             }));
@@ -168,14 +171,16 @@ impl Judge<'_> {
     }
 }
 
-/// Does another law make nearly as much of a contribution as the law that gave it its name, which leaves so many nats of it?
+/// Does another law make nearly as much of a contribution as the law that gave it its name?
 ///
 /// However many rows there are, they tell no more of a form than its freedom: what a law leaves of a curve is a departure of the
-/// machine from the textbook in so many directions, of a deviation that is not known. Summed over all deviations the odds of two
-/// laws are the ratio of what they leave, half a nat of noise for each direction with it, to half the power of their number.
-fn is_of_like_form(left: f64, other: &StandIn) -> bool {
+/// machine from the textbook in so many directions, of a deviation that is not known; the law's own bends take directions away.
+/// Summed over all deviations the odds of two laws are the ratio of what they leave for each direction, half a nat of noise for
+/// each with it, to half the power of their number.
+fn is_of_like_form(named: &StandIn, other: &StandIn) -> bool {
     let half = 0.5 * THRESHOLDS.form_freedom;
-    let nats = half * ((other.nats + half) / (left + half)).ln();
+    let of_each = |law: &StandIn| (law.nats + half) / (THRESHOLDS.form_freedom - law.bends).max(1.0);
+    let nats = half * (of_each(other) / of_each(named)).ln();
     other.share >= THRESHOLDS.of_each && nats < THRESHOLDS.class_nats
 }
 

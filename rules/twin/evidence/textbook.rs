@@ -1,0 +1,179 @@
+//! The textbook law that comes nearest to what was found, refitted together with the baseline: its parameters mean what the
+//! catalogue says, and the extended model can be simulated.
+
+use super::decision::THRESHOLDS;
+use super::told::EvidenceReport;
+use crate::physics::{Bound, Effect, Entry, Form, Scene, effect};
+use crate::twin::fit::{Fit, Metric, fit};
+use crate::twin::linear::least_squares;
+use crate::twin::model::{Parameter, Part};
+
+/// Share of the end of a range within which a value stands at it.
+const AT_END: f64 = 1e-6;
+
+/// Share of the greatest contribution from which a row counts as acted upon.
+const ACTING: f64 = 0.1;
+
+/// Textbook laws of what was found.
+pub(super) struct Textbook {
+    /// The part of each name, and the share of its contribution that the textbook law makes; `None` of one without a law.
+    pub(super) laws: Vec<Option<(usize, f64)>>,
+    /// Those parts beside the model's, refitted; `None` where nothing was found.
+    pub(super) fit: Option<Fit>,
+}
+
+impl EvidenceReport<'_, '_> {
+    /// The nearest law of the catalogue for each name but some, and all of them refitted with the baseline.
+    pub(super) fn textbook(&mut self, without: &[String]) -> Textbook {
+        let mut parts = self.baseline.parts.clone();
+        let mut laws = Vec::new();
+        for name in &self.answer.names {
+            let own = self.answer.contributions.iter().find(|(known, _)| known == name && !without.contains(known));
+            let law = own.and_then(|(_, x)| self.nearest(name, x));
+            laws.push(law.as_ref().map(|(_, share)| (parts.len(), *share)));
+            parts.extend(law.map(|(part, _)| part));
+        }
+        let fit = if self.answer.names.is_empty() { None } else { self.refit(&parts) };
+        Textbook { laws, fit }
+    }
+
+    /// The parts refitted in the metric of the likeliest noise; a shape that runs to the end of its range says nothing, and
+    /// stays as it was.
+    fn refit(&mut self, parts: &[Part]) -> Option<Fit> {
+        let fitted = self.fit(parts)?;
+        let mut held = parts.to_vec();
+        let mut ran_away = false;
+        for (part, fitted) in held.iter_mut().zip(&fitted.parts).skip(self.baseline.parts.len()) {
+            for (parameter, fitted) in part.parameters.iter_mut().zip(&fitted.parameters) {
+                if !parameter.fixed && parameter.entry == Entry::Shape && is_at_end(fitted.value, fitted.range) {
+                    parameter.fixed = true;
+                    ran_away = true;
+                }
+            }
+        }
+        if ran_away { self.fit(&held) } else { Some(fitted) }
+    }
+
+    fn fit(&mut self, parts: &[Part]) -> Option<Fit> {
+        let weigh = |column: &[f64]| self.comparison.whitened(column, self.noise);
+        fit(&mut self.case.scene, parts, &Metric { recorded: self.recorded, weigh: &weigh, bounded: true })
+    }
+
+    /// Names that are taken back: their sizes are impossible.
+    pub(super) fn refused(&mut self, textbook: &Textbook) -> Vec<String> {
+        let mut refused = Vec::new();
+        for (name, law) in self.answer.names.iter().zip(&textbook.laws) {
+            let Some((place, share)) = law else { continue };
+            let part = textbook.fit.as_ref().map(|fit| &fit.parts[*place]);
+            let own = self.answer.contributions.iter().find(|(known, _)| known == name);
+            let why = match (part, own) {
+                (Some(part), _) if is_impossible(part) => "a size at the end of its range",
+                (_, Some((_, x))) if self.is_too_large(name, x) => "larger than the machine allows",
+                _ => continue,
+            };
+            let sizes = part.map_or_else(String::new, sizes_of);
+            self.answer.debug.push_str(&format!("\n{name} refused: {why} ({share:.2}){sizes}"));
+            refused.push(name.clone());
+        }
+        refused
+    }
+
+    /// Names of curves of which the textbook law makes little: they stand beside "unknown", without its parameters.
+    pub(super) fn doubted(&mut self, textbook: &Textbook) -> Vec<String> {
+        let makes_little = |law: &Option<(usize, f64)>| law.is_some_and(|(_, share)| share < THRESHOLDS.textbook_share);
+        let names = self.answer.names.iter().zip(&textbook.laws);
+        let doubted = names.filter(|(name, law)| self.answer.claimed.contains(name) && makes_little(law));
+        let doubted: Vec<String> = doubted.map(|(name, _)| name.clone()).collect();
+        doubted.iter().for_each(|name| self.answer.debug.push_str(&format!("\n{name} doubted")));
+        doubted
+    }
+
+    /// Is a contribution larger than its effect can be beside what the machine takes anyway?
+    fn is_too_large(&self, name: &str, contribution: &[f64]) -> bool {
+        let cut = self.inputs.cut.as_deref().filter(|_| self.inputs.knows_cut);
+        let load = |row: usize| cut.map_or(0.0, |cut| cut[row].abs());
+        let bound = effect(name).map_or(Bound::Any, Effect::bound);
+        let (times, basis): (f64, &dyn Fn(usize) -> f64) = match (bound, cut) {
+            (Bound::NoLoad(times), _) => (times, &|row| (self.answer.after[row] - load(row)).abs()),
+            (Bound::Cut(times), Some(_)) => (times, &load),
+            _ => return false,
+        };
+        let top = self.inputs.taken(false).map(|row| contribution[row].abs()).fold(0.0, f64::max);
+        let acting = || self.inputs.taken(false).filter(|row| contribution[*row].abs() > ACTING * top);
+        let square = |of: &dyn Fn(usize) -> f64| acting().map(|row| of(row).powi(2)).sum::<f64>();
+        square(&|row| contribution[row]) > times * times * square(basis)
+    }
+
+    /// The form of a kind whose law, the baseline beside it, comes nearest to a contribution.
+    fn nearest(&self, kind: &str, contribution: &[f64]) -> Option<(Part, f64)> {
+        let hypothesis = self.case.model.hypotheses.iter().find(|part| part.label() == kind);
+        if let Some(part) = hypothesis {
+            return Some((part.clone(), 1.0));
+        }
+        let effect = effect(kind)?;
+        let scene = self.inputs.scene;
+        let rows: Vec<usize> = self.inputs.taken(false).collect();
+        let over = |column: &[f64]| rows.iter().map(|row| column[*row]).collect::<Vec<f64>>();
+        let wanted = over(contribution);
+        let tangents: Vec<Vec<f64>> = self.baseline.tangents.iter().map(|tangent| over(tangent)).collect();
+        let whole = least_squares(&tangents, &wanted).rss;
+        let mut best: Option<(f64, Part)> = None;
+        for form in effect.forms(scene) {
+            let Some(laws) = effect.columns(scene, &form) else { continue };
+            let mut columns: Vec<Vec<f64>> = laws.iter().map(|(_, law)| over(law)).collect();
+            let own = columns.len();
+            columns.extend_from_slice(&tangents);
+            let solution = least_squares(&columns, &wanted);
+            if best.as_ref().is_none_or(|(left, _)| solution.rss < *left) {
+                let names: Vec<&'static str> = laws.iter().map(|(name, _)| *name).collect();
+                let part = with_values(effect, scene, &form, (&names, &solution.coefficients[..own]));
+                best = Some((solution.rss, part));
+            }
+        }
+        let share = |left: f64| 1.0 - left / whole.max(f64::MIN_POSITIVE);
+        // A state that was read from the recording is not the law of a recorded column.
+        let is_law = |left: f64| !effect.has_hidden_state() || share(left) >= THRESHOLDS.textbook_share;
+        best.filter(|(left, _)| is_law(*left)).map(|(left, part)| (part, share(left)))
+    }
+}
+
+/// Does a value stand at an end of its range?
+fn is_at_end(value: f64, (low, high): (f64, f64)) -> bool {
+    let near = |end: f64| if end.is_finite() { AT_END * end.abs() } else { 0.0 };
+    value <= low + near(low) || value >= high - near(high)
+}
+
+/// Parameters of a part with their ranges, for engineers.
+fn sizes_of(part: &Part) -> String {
+    let of = |p: &Parameter| format!(" {} {:.4} in {:?}", p.name, p.value, p.range);
+    part.parameters.iter().map(of).collect()
+}
+
+/// Is every size of a part at an end of its range? A share of one, of either sign, is a whole, and no end.
+fn is_impossible(part: &Part) -> bool {
+    let own = || part.parameters.iter().filter(|p| p.entry == Entry::Linear && !p.fixed);
+    let is_share = |p: &Parameter| p.range.0 >= -1.0 && p.range.1 <= 1.0;
+    let is_whole = |p: &Parameter| is_share(p) && p.value.abs() > 0.5;
+    own().count() > 0 && own().all(|p| is_at_end(p.value, p.range) && !is_whole(p))
+}
+
+/// A candidate with these values of its linear parameters, within what is possible.
+fn with_values(
+    effect: &'static dyn Effect,
+    scene: &Scene,
+    form: &Form,
+    (names, values): (&[&'static str], &[f64]),
+) -> Part {
+    let mut part = Part::candidate(effect, form, names);
+    for parameter in &mut part.parameters {
+        if let Some(doc) = effect.doc().parameter(&parameter.name) {
+            parameter.range = effect.range(scene, doc);
+        }
+    }
+    for (name, value) in names.iter().zip(values) {
+        if let Some(parameter) = part.parameters.iter_mut().find(|p| p.name == *name && !p.fixed) {
+            parameter.value = value.clamp(parameter.range.0, parameter.range.1);
+        }
+    }
+    part
+}
