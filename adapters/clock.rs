@@ -107,14 +107,14 @@ pub struct ManualClock {
 impl ManualClock {
     /// A clock standing at `now_ns`.
     #[must_use]
-    pub fn at(now_ns: TimeNs) -> Self {
+    pub fn with_time(now_ns: TimeNs) -> Self {
         let clock = Self::default();
-        clock.set(now_ns);
+        clock.set_time(now_ns);
         clock
     }
 
     /// Moves the clock to `now_ns` and wakes every sleeper whose time has come. Moving backwards is ignored.
-    pub fn set(&self, now_ns: TimeNs) {
+    pub fn set_time(&self, now_ns: TimeNs) {
         self.now.fetch_max(now_ns, Ordering::SeqCst);
         let _held = self.moved.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         self.moved.1.notify_all();
@@ -157,10 +157,10 @@ mod tests {
 
     #[test]
     fn a_sleeper_wakes_when_the_manual_clock_moves() {
-        let clock = ManualClock::at(0);
+        let clock = ManualClock::with_time(0);
         let sleeper = clock.clone();
         let thread = std::thread::spawn(move || sleeper.sleep_until(5));
-        clock.set(10);
+        clock.set_time(10);
         thread.join().expect("the sleeper ends");
     }
 }

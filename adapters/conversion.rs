@@ -19,7 +19,7 @@ impl Conversion {
 
     /// The number in the other unit.
     #[must_use]
-    pub fn of(self, number: f64) -> f64 {
+    pub fn convert_number(self, number: f64) -> f64 {
         number * self.scale + self.offset
     }
 }
@@ -27,15 +27,15 @@ impl Conversion {
 /// From one unit to another; `None` where one is not known or they measure different things. Upper and lower case count where
 /// they make a difference (mW, MW), and else do not.
 #[must_use]
-pub fn between(from: &str, to: &str) -> Option<Conversion> {
-    let (scale, offset) = Unit::of(from)?.to(Unit::of(to)?)?;
+pub fn find_conversion(from: &str, to: &str) -> Option<Conversion> {
+    let (scale, offset) = Unit::from_symbol(from)?.compute_conversion(Unit::from_symbol(to)?)?;
     Some(Conversion { scale, offset })
 }
 
 /// Is this a unit that is known?
 #[must_use]
 pub fn is_known(unit: &str) -> bool {
-    Unit::of(unit).is_some()
+    Unit::from_symbol(unit).is_some()
 }
 
 #[cfg(test)]
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     fn converted(number: f64, from: &str, to: &str) -> Option<f64> {
-        between(from, to).map(|conversion| (conversion.of(number) * 1e9).round() / 1e9)
+        find_conversion(from, to).map(|conversion| (conversion.convert_number(number) * 1e9).round() / 1e9)
     }
 
     #[test]
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn what_is_not_known_or_measures_something_else_is_not_converted() {
         for (from, to) in [("furlong", "mm"), ("mm", "A"), ("", "mm"), ("mm/min", "mm"), ("VA", "W")] {
-            assert_eq!(between(from, to), None, "{from} {to}");
+            assert_eq!(find_conversion(from, to), None, "{from} {to}");
         }
     }
 }

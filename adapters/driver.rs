@@ -75,7 +75,7 @@ pub enum SourceError {
 impl SourceError {
     /// The reason that every channel of the source gets while this lasts.
     #[must_use]
-    pub fn absence(&self) -> Absence {
+    pub fn to_absence(&self) -> Absence {
         match self {
             Self::Line { .. } | Self::End { .. } => Absence::Disconnected,
             Self::Timeout { .. } => Absence::Timeout,
@@ -108,13 +108,13 @@ pub enum FactValue {
 impl Fact {
     /// A number; its name ends in the unit.
     #[must_use]
-    pub fn number(name: impl Into<String>, number: f64) -> Self {
+    pub fn from_number(name: impl Into<String>, number: f64) -> Self {
         Self { name: name.into(), value: FactValue::Number(number) }
     }
 
     /// A name or a sentence.
     #[must_use]
-    pub fn text(name: impl Into<String>, text: impl Into<String>) -> Self {
+    pub fn from_text(name: impl Into<String>, text: impl Into<String>) -> Self {
         Self { name: name.into(), value: FactValue::Text(text.into()) }
     }
 }
@@ -152,13 +152,13 @@ pub trait Source: Send {
 
     /// The pace that the device can keep, asked for after every read: at least [`Source::period`], longer where the device
     /// takes its time. What is older than two of these counts as stale.
-    fn pace(&self) -> Duration {
+    fn achievable_period(&self) -> Duration {
         self.period()
     }
 
     /// Who answers, as far as it is known after a successful read: pairs of a word and a text. May ask the device; for
-    /// what is shown all the time there are [`Source::facts`].
-    fn identity(&self) -> Vec<(&'static str, String)> {
+    /// what is shown all the time there are [`Source::collect_facts`].
+    fn query_identity(&self) -> Vec<(&'static str, String)> {
         Vec::new()
     }
 
@@ -170,13 +170,13 @@ pub trait Source: Send {
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError>;
 
     /// What it has found out about itself so far. Asked for about once a second; does not talk to the device.
-    fn facts(&self) -> Vec<Fact> {
+    fn collect_facts(&self) -> Vec<Fact> {
         Vec::new()
     }
 
     /// What is wrong although it answers, as of the last read. Asked for after every read; does not talk to the device. The
     /// same trouble has the same words as long as it lasts.
-    fn problems(&self) -> Vec<SourceProblem> {
+    fn list_problems(&self) -> Vec<SourceProblem> {
         Vec::new()
     }
 
@@ -185,7 +185,7 @@ pub trait Source: Send {
     ///
     /// # Errors
     /// See [`SourceError`].
-    fn offers(&mut self, _clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
+    fn list_offers(&mut self, _clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
         Ok(Vec::new())
     }
 }
@@ -208,7 +208,7 @@ pub trait Pull: Send {
     ///
     /// # Errors
     /// See [`SourceError`]. After a failure [`Pull::next_ns`] has moved on; a source whose time stands still is given up.
-    fn pull(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError>;
+    fn pull_readings(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError>;
 }
 
 /// How the ladder makes one override of the operator's dial and the gateway's.
@@ -227,7 +227,7 @@ pub enum LadderRule {
 impl LadderRule {
     /// What is in force with this dial and this override in the mailbox.
     #[must_use]
-    pub fn combine(self, dial: OverridePct, mail: OverridePct) -> OverridePct {
+    pub fn combine_overrides(self, dial: OverridePct, mail: OverridePct) -> OverridePct {
         match self {
             Self::Least => dial.min(mail),
             Self::Replace => mail,
@@ -255,7 +255,7 @@ impl LadderRequest {
 
     /// The word in the history and in scripts.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::FeedHold => "feed_hold",
             Self::Stop => "stop",
@@ -292,7 +292,7 @@ pub trait Actuator: Send {
     ///
     /// # Errors
     /// See [`SourceError`].
-    fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+    fn release_override(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
         self.write_feed_override(clock, OverridePct::FULL)
     }
 
@@ -309,10 +309,10 @@ pub trait Actuator: Send {
     ///
     /// # Errors
     /// See [`SourceError`]; a driver that has no way to ask refuses.
-    fn ask(&mut self, _clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+    fn ask_ladder(&mut self, _clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
         Err(SourceError::Refused {
             source_name: self.name().to_owned(),
-            request: request.word().to_owned(),
+            request: request.as_word().to_owned(),
             what: "this driver has no way to ask the ladder for it".to_owned(),
             next: "raise an alarm instead, and let the operator stop the machine".to_owned(),
         })
@@ -341,16 +341,16 @@ impl<A: Actuator + ?Sized> Actuator for Box<A> {
         (**self).read_dial(clock)
     }
 
-    fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
-        (**self).release(clock)
+    fn release_override(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        (**self).release_override(clock)
     }
 
     fn withdraw_leftover(&mut self, clock: &dyn Clock) -> Result<bool, SourceError> {
         (**self).withdraw_leftover(clock)
     }
 
-    fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
-        (**self).ask(clock, request)
+    fn ask_ladder(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        (**self).ask_ladder(clock, request)
     }
 
     fn settles_within(&self) -> Duration {

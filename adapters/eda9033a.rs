@@ -54,32 +54,42 @@ impl Eda9033a {
             Circuit::Machine => &["total_power_w", "supply_voltage_v"],
             Circuit::Spindle => &["spindle_power_w", "supply_voltage_v", "spindle_current_a"],
         };
-        let channels = names.iter().filter_map(|name| ChannelId::of(name)).collect();
+        let channels = names.iter().filter_map(|name| ChannelId::from_name(name)).collect();
         let (check, doubts) = (SupplyCheck::default(), Doubts::default());
-        Ok(Self { name: name.to_owned(), bus: Bus::of(line)?, address, ct, deadline, channels, late: 0, check, doubts })
+        Ok(Self {
+            name: name.to_owned(),
+            bus: Bus::from_target(line)?,
+            address,
+            ct,
+            deadline,
+            channels,
+            late: 0,
+            check,
+            doubts,
+        })
     }
 
-    fn ask(&mut self, clock: &dyn Clock) -> Result<(Values, Stamp), ModbusError> {
+    fn read_values(&mut self, clock: &dyn Clock) -> Result<(Values, Stamp), ModbusError> {
         let mut bus = self.bus.lock().unwrap_or_else(PoisonError::into_inner);
-        let answer = exchange(&mut bus, clock, self.address, self.deadline);
+        let answer = exchange_frames(&mut bus, clock, self.address, self.deadline);
         if matches!(answer, Err(ModbusError::Timeout { .. } | ModbusError::Garbled(_))) {
             bus.keep_quiet(2 * self.deadline);
         }
         self.late = bus.late_answers();
-        answer.map(|(frame, stamp)| (Values::of(&frame, self.ct), stamp))
+        answer.map(|(frame, stamp)| (Values::from_frame(&frame, self.ct), stamp))
     }
 }
 
-fn check(bytes: &[u8]) -> u8 {
+fn compute_checksum(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |sum: u8, byte| sum.wrapping_add(*byte))
 }
 
-fn request(address: u8) -> [u8; REQUEST_BYTES] {
-    let check = check(&[address, COMMAND[0], COMMAND[1]]);
+fn build_request(address: u8) -> [u8; REQUEST_BYTES] {
+    let check = compute_checksum(&[address, COMMAND[0], COMMAND[1]]);
     [HEAD[0], HEAD[1], address, COMMAND[0], COMMAND[1], check, END]
 }
 
-fn exchange(
+fn exchange_frames(
     bus: &mut Bus,
     clock: &dyn Clock,
     address: u8,
@@ -87,11 +97,11 @@ fn exchange(
 ) -> Result<([u8; ANSWER_BYTES], Stamp), ModbusError> {
     let target = bus.target().clone();
     let failed = |error| serial_fault(&error, &target);
-    bus.send(&request(address)).map_err(failed)?;
+    bus.send_request(&build_request(address)).map_err(failed)?;
     let (began_ns, until) = (clock.now_ns(), Instant::now() + deadline);
     let mut bytes = Vec::new();
-    while bytes.len() < BYTES_MAX && bus.receive(until, &mut bytes).map_err(failed)? {
-        if let Some(frame) = find(&bytes, address) {
+    while bytes.len() < BYTES_MAX && bus.receive_bytes(until, &mut bytes).map_err(failed)? {
+        if let Some(frame) = find_answer(&bytes, address) {
             let wire = wire_time(&target, REQUEST_BYTES + ANSWER_BYTES);
             let wire_ns = i64::try_from(wire.as_nanos()).unwrap_or(0);
             let ended_ns = clock.now_ns();
@@ -109,11 +119,11 @@ fn no_frame(bytes: &[u8]) -> ModbusError {
 }
 
 /// The answer among the bytes, wherever it begins: two-wire adapters return our own request first.
-fn find(bytes: &[u8], address: u8) -> Option<[u8; ANSWER_BYTES]> {
+fn find_answer(bytes: &[u8], address: u8) -> Option<[u8; ANSWER_BYTES]> {
     let head = [HEAD[0], HEAD[1], address, COMMAND[0], COMMAND[1]];
     bytes.windows(ANSWER_BYTES).find_map(|window| {
         let frame: &[u8; ANSWER_BYTES] = window.first_chunk()?;
-        let whole = frame[..5] == head && frame[44] == END && check(&frame[2..43]) == frame[43];
+        let whole = frame[..5] == head && frame[44] == END && compute_checksum(&frame[2..43]) == frame[43];
         whole.then_some(*frame)
     })
 }
@@ -127,11 +137,11 @@ struct Values {
 }
 
 impl Values {
-    fn of(frame: &[u8; ANSWER_BYTES], ct: f64) -> Self {
+    fn from_frame(frame: &[u8; ANSWER_BYTES], ct: f64) -> Self {
         let word = |at: usize| u16::from_be_bytes([frame[at], frame[at + 1]]);
         let share = |at: usize| f64::from(word(at)) / COUNTS;
         Self {
-            power_w: signed(word(17)) / COUNTS * 3.0 * NOMINAL_V * NOMINAL_A * ct,
+            power_w: decode_signed(word(17)) / COUNTS * 3.0 * NOMINAL_V * NOMINAL_A * ct,
             phases_v: [5, 9, 13].map(|at| NOMINAL_V * share(at)),
             current_a: NOMINAL_A * ct * [7, 11, 15].map(share).iter().sum::<f64>() / 3.0,
         }
@@ -141,13 +151,13 @@ impl Values {
         3.0_f64.sqrt() * self.phases_v.iter().sum::<f64>() / 3.0
     }
 
-    fn supply(&self) -> SupplyValues {
+    fn collect_supply_values(&self) -> SupplyValues {
         SupplyValues { power: Some(self.power_w), voltage: self.phases_v.map(Some), ..SupplyValues::default() }
     }
 }
 
 /// Fifteen bits and a sign.
-fn signed(word: u16) -> f64 {
+fn decode_signed(word: u16) -> f64 {
     let size = f64::from(word & 0x7FFF);
     if word & 0x8000 == 0 { size } else { -size }
 }
@@ -163,37 +173,37 @@ impl Source for Eda9033a {
 
     fn period(&self) -> Duration {
         let target = self.bus.lock().unwrap_or_else(PoisonError::into_inner).target().clone();
-        let wire = wire_time(&target, REQUEST_BYTES + ANSWER_BYTES) + 2 * crate::serial::silence(&target);
+        let wire = wire_time(&target, REQUEST_BYTES + ANSWER_BYTES) + 2 * crate::serial::compute_silence(&target);
         (wire * 5 / 4).max(Duration::from_millis(100))
     }
 
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
-        let asked = self.ask(clock);
+        let asked = self.read_values(clock);
         let (values, stamp) =
             asked.map_err(|fault| fault.of_source(&self.name, "all values".to_owned(), self.deadline))?;
-        self.doubts = self.check.see(&values.supply());
+        self.doubts = self.check.judge_values(&values.collect_supply_values());
         let all = self.doubts.everything;
         let numbers =
             [(values.power_w, all), (values.between_phases_v(), all || self.doubts.voltage), (values.current_a, all)];
         out.extend(self.channels.iter().zip(numbers).map(|(channel, (number, is_doubted))| match is_doubted {
-            true => Reading::implausible(*channel, stamp, number),
-            false => Reading::number(*channel, stamp, number),
+            true => Reading::from_implausible(*channel, stamp, number),
+            false => Reading::from_number(*channel, stamp, number),
         }));
         Ok(())
     }
 
-    fn facts(&self) -> Vec<Fact> {
+    fn collect_facts(&self) -> Vec<Fact> {
         let resolution_w = 3.0 * NOMINAL_V * NOMINAL_A * self.ct / COUNTS;
         #[expect(clippy::cast_precision_loss, reason = "a count of late answers stays far below 2^53")]
         let late = self.late as f64;
         vec![
-            Fact::text("meter", "EDA9033A, native protocol"),
-            Fact::number("power_resolution_w", resolution_w),
-            Fact::number("late_answers", late),
+            Fact::from_text("meter", "EDA9033A, native protocol"),
+            Fact::from_number("power_resolution_w", resolution_w),
+            Fact::from_number("late_answers", late),
         ]
     }
 
-    fn problems(&self) -> Vec<SourceProblem> {
+    fn list_problems(&self) -> Vec<SourceProblem> {
         self.doubts.problems.clone()
     }
 }
@@ -208,20 +218,20 @@ mod tests {
             frame.extend(word.to_be_bytes());
         }
         frame.resize(43, 0);
-        frame.push(check(&frame[2..]));
+        frame.push(compute_checksum(&frame[2..]));
         frame.push(END);
         frame
     }
 
     #[test]
     fn the_request_is_that_of_the_source() {
-        assert_eq!(request(1), [0x4C, 0x57, 0x01, 0x30, 0x0E, 0x3F, 0x0D]);
+        assert_eq!(build_request(1), [0x4C, 0x57, 0x01, 0x30, 0x0E, 0x3F, 0x0D]);
     }
 
     #[test]
     fn braking_is_negative_and_transformers_count() {
-        let bytes = [&[0xFF, 0x00][..], &request(1), &answer(0x8000 | 400)].concat();
-        let values = Values::of(&find(&bytes, 1).expect("behind noise and echo"), 20.0);
+        let bytes = [&[0xFF, 0x00][..], &build_request(1), &answer(0x8000 | 400)].concat();
+        let values = Values::from_frame(&find_answer(&bytes, 1).expect("behind noise and echo"), 20.0);
         // One count is 0.375 W times the ratio.
         assert!((values.power_w + 400.0 * 0.375 * 20.0).abs() < 1e-9, "{values:?}");
         assert!((values.between_phases_v() - 3.0_f64.sqrt() * 230.0).abs() < 1e-9);
@@ -230,10 +240,10 @@ mod tests {
 
     #[test]
     fn another_address_or_a_broken_frame_is_no_answer() {
-        assert_eq!(find(&answer(1), 2), None);
+        assert_eq!(find_answer(&answer(1), 2), None);
         let mut broken = answer(1);
         broken[20] ^= 1;
-        assert_eq!(find(&broken, 1), None);
-        assert_eq!(find(&answer(1)[..44], 1), None);
+        assert_eq!(find_answer(&broken, 1), None);
+        assert_eq!(find_answer(&answer(1)[..44], 1), None);
     }
 }

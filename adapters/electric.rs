@@ -70,25 +70,25 @@ pub struct SupplyCheck {
 const WRONG_MAP: &str = "Compare with the meter's own display: is this the profile of this very model, with its word order? doctor --all tries \
                          the shipped profiles";
 
-fn within(number: f64, (least, greatest): (f64, f64)) -> bool {
+fn is_within_range(number: f64, (least, greatest): (f64, f64)) -> bool {
     number >= least && number <= greatest
 }
 
 impl SupplyCheck {
     /// What is not believed of this answer.
-    pub fn see(&mut self, values: &SupplyValues) -> Doubts {
+    pub fn judge_values(&mut self, values: &SupplyValues) -> Doubts {
         let mut doubts = Doubts::default();
-        voltages(values, &mut doubts);
-        self.powers(values, &mut doubts);
-        if let Some(hz) = values.frequency.filter(|hz| !within(*hz, SUPPLY_HZ)) {
+        judge_voltages(values, &mut doubts);
+        self.judge_powers(values, &mut doubts);
+        if let Some(hz) = values.frequency.filter(|hz| !is_within_range(*hz, SUPPLY_HZ)) {
             let what = format!("the meter says {hz:.4e} Hz, which is no frequency of a supply");
             doubts.add(what, WRONG_MAP, |doubts| doubts.frequency = true);
         }
-        zeros(values, &mut doubts);
+        judge_zeros(values, &mut doubts);
         doubts
     }
 
-    fn powers(&mut self, values: &SupplyValues, doubts: &mut Doubts) {
+    fn judge_powers(&mut self, values: &SupplyValues, doubts: &mut Doubts) {
         let phases: Vec<f64> = values.phase_power.iter().flatten().copied().collect();
         let sum: f64 = phases.iter().sum();
         let apart = |total: f64| {
@@ -121,10 +121,10 @@ impl SupplyCheck {
     }
 }
 
-fn voltages(values: &SupplyValues, doubts: &mut Doubts) {
+fn judge_voltages(values: &SupplyValues, doubts: &mut Doubts) {
     let phases: Vec<(usize, f64)> = (1..).zip(values.voltage).filter_map(|(at, volts)| Some((at, volts?))).collect();
-    let bad: Vec<&(usize, f64)> = phases.iter().filter(|(_, volts)| !within(*volts, PHASE_V)).collect();
-    let line_bad = values.line_voltage.filter(|volts| !within(*volts, LINE_V));
+    let bad: Vec<&(usize, f64)> = phases.iter().filter(|(_, volts)| !is_within_range(*volts, PHASE_V)).collect();
+    let line_bad = values.line_voltage.filter(|volts| !is_within_range(*volts, LINE_V));
     let some_good = bad.len() < phases.len() || (values.line_voltage.is_some() && line_bad.is_none());
     let told = |(at, volts): &(usize, f64)| format!("phase {at} {volts:.4e} V");
     let mut all: Vec<String> = bad.iter().map(|phase| told(phase)).collect();
@@ -144,7 +144,7 @@ fn voltages(values: &SupplyValues, doubts: &mut Doubts) {
 }
 
 /// A meter without voltage and frequency that says nothing but zero: perhaps nothing flows.
-fn zeros(values: &SupplyValues, doubts: &mut Doubts) {
+fn judge_zeros(values: &SupplyValues, doubts: &mut Doubts) {
     let said = [values.power, values.power_factor, values.apparent_power];
     let mut said: Vec<f64> = said.into_iter().chain(values.phase_power).chain(values.current).flatten().collect();
     let witness = values.voltage.iter().any(Option::is_some) || values.line_voltage.or(values.frequency).is_some();
@@ -191,18 +191,18 @@ mod tests {
             SupplyValues { voltage: [Some(120.0); 3], ..well() },
             SupplyValues { voltage: [None; 3], line_voltage: Some(400.0), ..well() },
         ] {
-            assert_eq!(check.see(&values), Doubts::default(), "{values:?}");
+            assert_eq!(check.judge_values(&values), Doubts::default(), "{values:?}");
         }
     }
 
     #[test]
     fn what_no_supply_has_costs_everything() {
         for volts in [0.0, 4e-35, 2.3, 23_000.0, -230.0] {
-            let doubts = SupplyCheck::default().see(&SupplyValues { voltage: [Some(volts); 3], ..well() });
+            let doubts = SupplyCheck::default().judge_values(&SupplyValues { voltage: [Some(volts); 3], ..well() });
             assert!(doubts.everything && doubts.problems.len() == 1, "{volts}: {doubts:?}");
         }
-        let one =
-            SupplyCheck::default().see(&SupplyValues { voltage: [Some(230.0), Some(0.0), Some(230.0)], ..well() });
+        let one = SupplyCheck::default()
+            .judge_values(&SupplyValues { voltage: [Some(230.0), Some(0.0), Some(230.0)], ..well() });
         assert!(!one.everything && one.voltage && one.problems[0].what.contains("phase 2"), "{one:?}");
     }
 
@@ -210,20 +210,20 @@ mod tests {
     fn powers_that_contradict_each_other_are_not_believed_when_they_stay_apart() {
         let wrong = SupplyValues { power: Some(9000.0), ..well() };
         let mut check = SupplyCheck::default();
-        assert!(!check.see(&wrong).power, "a meter may refresh them one after the other");
-        assert!(check.see(&wrong).power);
-        assert!(!check.see(&well()).power);
+        assert!(!check.judge_values(&wrong).power, "a meter may refresh them one after the other");
+        assert!(check.judge_values(&wrong).power);
+        assert!(!check.judge_values(&well()).power);
         let apparent = SupplyValues { apparent_power: Some(1000.0), ..well() };
-        check.see(&apparent);
-        assert!(check.see(&apparent).power);
-        assert!(check.see(&SupplyValues { power_factor: Some(90.0), ..well() }).power);
-        assert!(check.see(&SupplyValues { frequency: Some(0.05), ..well() }).frequency);
+        check.judge_values(&apparent);
+        assert!(check.judge_values(&apparent).power);
+        assert!(check.judge_values(&SupplyValues { power_factor: Some(90.0), ..well() }).power);
+        assert!(check.judge_values(&SupplyValues { frequency: Some(0.05), ..well() }).frequency);
     }
 
     #[test]
     fn nothing_but_zero_is_told() {
         let zero = SupplyValues { power: Some(0.0), current: [Some(0.0); 3], ..SupplyValues::default() };
-        let doubts = SupplyCheck::default().see(&zero);
+        let doubts = SupplyCheck::default().judge_values(&zero);
         assert!(!doubts.everything && doubts.problems.len() == 1, "{doubts:?}");
     }
 }

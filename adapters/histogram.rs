@@ -30,7 +30,7 @@ impl Histogram {
     }
 
     /// For each class its upper end, s, and how many durations were at most that.
-    pub fn cumulative(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
+    pub fn cumulative_counts(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         CLASSES_S.iter().zip(&self.counts).scan(0, |below, (end_s, count)| {
             *below += count;
             Some((*end_s, *below))
@@ -58,7 +58,7 @@ mod tests {
     fn durations_are_counted_from_below() {
         let mut histogram = Histogram::default();
         [0.0001, 0.003, 0.003, -1.0, 60.0].into_iter().for_each(|duration_s| histogram.add_s(duration_s));
-        let at = |end_s: f64| histogram.cumulative().find(|(end, _)| *end == end_s).map(|(_, count)| count);
+        let at = |end_s: f64| histogram.cumulative_counts().find(|(end, _)| *end == end_s).map(|(_, count)| count);
         assert_eq!((at(0.0001), at(0.002), at(0.005), at(10.0)), (Some(2), Some(2), Some(4), Some(4)));
         assert_eq!((histogram.count(), histogram.sum_s()), (5, 60.0061));
         assert!(CLASSES_S.is_sorted());

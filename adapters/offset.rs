@@ -26,7 +26,7 @@ impl Axis {
 
     /// The letter, in lower case.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::X => "x",
             Self::Y => "y",
@@ -36,8 +36,8 @@ impl Axis {
 
     /// The axis of this letter, upper or lower case.
     #[must_use]
-    pub fn of(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|axis| axis.word().eq_ignore_ascii_case(word))
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|axis| axis.as_word().eq_ignore_ascii_case(word))
     }
 
     /// Its place in [`Axis::ALL`].
@@ -73,7 +73,7 @@ pub trait OffsetSink: Send {
     fn name(&self) -> &str;
 
     /// What the offset is called at this control: `the external work offset`.
-    fn called(&self) -> &'static str;
+    fn offset_name(&self) -> &'static str;
 
     /// The offset in force, um, where it may be moved now.
     ///
@@ -89,10 +89,10 @@ pub trait OffsetSink: Send {
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError>;
 
     /// The offset of this axis is not read or written, and why.
-    fn refused(&self, axis: Axis, what: &str, next: &str) -> SourceError {
+    fn build_refusal(&self, axis: Axis, what: &str, next: &str) -> SourceError {
         SourceError::Refused {
             source_name: self.name().to_owned(),
-            request: format!("{} of {}", self.called(), axis.word()),
+            request: format!("{} of {}", self.offset_name(), axis.as_word()),
             what: what.to_owned(),
             next: next.to_owned(),
         }
@@ -103,11 +103,11 @@ pub trait OffsetSink: Send {
     ///
     /// # Errors
     /// [`SourceError::Refused`] while a program runs, or where nobody knows.
-    fn movable(&self, axis: Axis, at_rest: Option<bool>) -> Result<(), SourceError> {
+    fn check_movable(&self, axis: Axis, at_rest: Option<bool>) -> Result<(), SourceError> {
         match at_rest {
             Some(true) => Ok(()),
-            Some(false) => Err(self.refused(axis, "a program runs", "It is done between two programs")),
-            None => Err(self.refused(axis, "the state of the control is unknown", SEE_DOCTOR)),
+            Some(false) => Err(self.build_refusal(axis, "a program runs", "It is done between two programs")),
+            None => Err(self.build_refusal(axis, "the state of the control is unknown", SEE_DOCTOR)),
         }
     }
 
@@ -115,11 +115,11 @@ pub trait OffsetSink: Send {
     ///
     /// # Errors
     /// [`SourceError::Refused`] where somebody has set another one in between.
-    fn unchanged(&self, axis: Axis, now_um: f64, found_um: f64) -> Result<(), SourceError> {
+    fn check_unchanged(&self, axis: Axis, now_um: f64, found_um: f64) -> Result<(), SourceError> {
         if now_um == found_um {
             return Ok(());
         }
-        Err(self.refused(axis, "somebody has just changed it", "It is looked at again"))
+        Err(self.build_refusal(axis, "somebody has just changed it", "It is looked at again"))
     }
 }
 
@@ -149,39 +149,39 @@ impl OffsetShares {
 
     /// What is left in the control, by this account; nothing where it is the operator's alone.
     #[must_use]
-    pub fn left(&self) -> Option<Left> {
+    pub fn leftover_offset(&self) -> Option<Left> {
         self.0
     }
 
     /// This offset is found: the account agrees with it from now on. Gives what the operator has set, and what has become of
     /// the last write.
-    pub fn settle(&mut self, found_um: f64) -> (f64, LastWrite) {
+    pub fn reconcile_offset(&mut self, found_um: f64) -> (f64, LastWrite) {
         let Some(Left { base_um, written_um, intended_um }) = self.0 else { return (found_um, LastWrite::InForce) };
         let (base_um, last) = match intended_um {
-            Some(intended_um) if same(intended_um, found_um) => (base_um, LastWrite::Taken),
-            Some(_) if same(written_um, found_um) => (base_um, LastWrite::NotTaken),
-            None if same(written_um, found_um) => (base_um, LastWrite::InForce),
+            Some(intended_um) if is_same_offset(intended_um, found_um) => (base_um, LastWrite::Taken),
+            Some(_) if is_same_offset(written_um, found_um) => (base_um, LastWrite::NotTaken),
+            None if is_same_offset(written_um, found_um) => (base_um, LastWrite::InForce),
             _ => (found_um, LastWrite::Replaced),
         };
-        self.note(base_um, found_um);
+        self.record_offset(base_um, found_um);
         (base_um, last)
     }
 
     /// This is about to be written in the place of what is there.
-    pub fn intend(&mut self, base_um: f64, found_um: f64, wanted_um: f64) {
+    pub fn record_intended_write(&mut self, base_um: f64, found_um: f64, wanted_um: f64) {
         self.0 = Some(Left { base_um, written_um: found_um, intended_um: Some(wanted_um) });
     }
 
     /// This is in force on that base.
-    pub fn note(&mut self, base_um: f64, found_um: f64) {
+    pub fn record_offset(&mut self, base_um: f64, found_um: f64) {
         let left = Left { base_um, written_um: found_um, intended_um: None };
-        self.0 = (!same(base_um, found_um)).then_some(left);
+        self.0 = (!is_same_offset(base_um, found_um)).then_some(left);
     }
 }
 
 /// Are these offsets the same to a control? Controls count in tenths of a micrometre at the finest.
 #[must_use]
-pub fn same(a_um: f64, b_um: f64) -> bool {
+pub fn is_same_offset(a_um: f64, b_um: f64) -> bool {
     (a_um - b_um).abs() < 0.05
 }
 
@@ -192,12 +192,12 @@ mod tests {
     #[test]
     fn what_somebody_else_has_set_is_the_new_beginning() {
         let mut ledger = OffsetShares::default();
-        assert_eq!((ledger.settle(40.0), ledger.left()), ((40.0, LastWrite::InForce), None));
-        ledger.note(40.0, 45.0);
-        assert_eq!(ledger.settle(45.0), (40.0, LastWrite::InForce));
-        assert_eq!((ledger.settle(100.0), ledger.left()), ((100.0, LastWrite::Replaced), None));
-        ledger.note(40.0, 40.0);
-        assert_eq!(ledger.left(), None, "given back");
+        assert_eq!((ledger.reconcile_offset(40.0), ledger.leftover_offset()), ((40.0, LastWrite::InForce), None));
+        ledger.record_offset(40.0, 45.0);
+        assert_eq!(ledger.reconcile_offset(45.0), (40.0, LastWrite::InForce));
+        assert_eq!((ledger.reconcile_offset(100.0), ledger.leftover_offset()), ((100.0, LastWrite::Replaced), None));
+        ledger.record_offset(40.0, 40.0);
+        assert_eq!(ledger.leftover_offset(), None, "given back");
     }
 
     #[test]
@@ -206,11 +206,11 @@ mod tests {
             [(48.0, LastWrite::Taken, 8.0), (45.0, LastWrite::NotTaken, 5.0), (7.0, LastWrite::Replaced, 0.0)]
         {
             let mut ledger = OffsetShares::default();
-            ledger.intend(40.0, 45.0, 48.0);
-            let (base_um, found) = ledger.settle(found_um);
-            let left = ledger.left().map_or(0.0, |left| left.shift_um());
+            ledger.record_intended_write(40.0, 45.0, 48.0);
+            let (base_um, found) = ledger.reconcile_offset(found_um);
+            let left = ledger.leftover_offset().map_or(0.0, |left| left.shift_um());
             assert_eq!((found, left, found_um - base_um), (last, shift_um, shift_um));
-            assert!(ledger.left().is_none_or(|left| left.intended_um.is_none()));
+            assert!(ledger.leftover_offset().is_none_or(|left| left.intended_um.is_none()));
         }
     }
 }

@@ -90,15 +90,15 @@ pub struct Refused {
 ///
 /// # Errors
 /// See [`OpenError`]; a recording at `speed=max` cannot live by a clock.
-pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
+pub fn open_address(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
     match address.target() {
-        Target::Simulated(target) => Ok(simulated(address, target, now_ns)),
-        Target::Replay(target) => replay(address, target, now_ns),
+        Target::Simulated(target) => Ok(open_simulated(address, target, now_ns)),
+        Target::Replay(target) => open_replay(address, target, now_ns),
         Target::Fanuc { at, path, backend, options } => {
             let opened = match backend {
-                FanucBackend::Native => crate::fanuc::open::native(address.text(), at, *path, options),
+                FanucBackend::Native => crate::fanuc::open::open_native(address.text(), at, *path, options),
                 FanucBackend::Vendor(library) => {
-                    crate::fanuc::open::vendor(address.text(), library, at, *path, options)
+                    crate::fanuc::open::open_vendor(address.text(), library, at, *path, options)
                 }
             };
             if let Some(what) = opened.refused {
@@ -107,10 +107,10 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
             let (sources, actuator, offsets) = (opened.sources, opened.actuator, opened.offsets);
             Ok(Opened { sources, actuator, offsets, simulated: None, refused: Refused::default() })
         }
-        Target::NcLink(target) => crate::nclink::open(address, target),
-        Target::HncNet(target) => Ok(crate::hnc::open(address, target)),
-        Target::ModbusTcp { at, meter } => read_only(address, ModbusMeter::tcp(address, at, meter)),
-        Target::ModbusRtu { line, meter } => read_only(address, ModbusMeter::rtu(address, line, meter)),
+        Target::NcLink(target) => crate::nclink::open_address(address, target),
+        Target::HncNet(target) => Ok(crate::hnc::open_address(address, target)),
+        Target::ModbusTcp { at, meter } => read_only(address, ModbusMeter::with_tcp_line(address, at, meter)),
+        Target::ModbusRtu { line, meter } => read_only(address, ModbusMeter::with_rtu_line(address, line, meter)),
         Target::Eda9033a { line, meter } => read_only(address, Eda9033a::new(address.text(), line, meter)),
         Target::Temperature { file, sys } => read_only(address, Temperatures::open(address.text(), file, sys)),
         other => Err(not_built(address, other)),
@@ -134,7 +134,8 @@ pub fn open_pull(address: &Address, origin_ns: TimeNs) -> Result<OpenedPull, Ope
         Target::Simulated(target) => Ok(simulated_pull(address, target, origin_ns)),
         Target::Replay(target) => {
             let (replay, refused) = read(address, target, origin_ns)?;
-            let (rows, ignored) = (u64::try_from(replay.rows()).unwrap_or(u64::MAX), replay.ignored().to_vec());
+            let (rows, ignored) =
+                (u64::try_from(replay.count_rows()).unwrap_or(u64::MAX), replay.ignored_columns().to_vec());
             let sources: Vec<Box<dyn Pull>> = vec![Box::new(replay)];
             Ok(OpenedPull { sources, actuator: None, offsets: None, simulated: None, refused, rows, ignored })
         }
@@ -142,8 +143,9 @@ pub fn open_pull(address: &Address, origin_ns: TimeNs) -> Result<OpenedPull, Ope
     }
 }
 
-fn simulated(address: &Address, target: &SimulatedTarget, now_ns: TimeNs) -> Opened {
-    let machine = Simulated::new(address.text(), SimulatedSettings::of(target), begun(target, now_ns));
+fn open_simulated(address: &Address, target: &SimulatedTarget, now_ns: TimeNs) -> Opened {
+    let machine =
+        Simulated::new(address.text(), SimulatedSettings::from_target(target), compute_day_start_ns(target, now_ns));
     let mut sources: Vec<Box<dyn Source>> = Vec::new();
     if target.device != SimulatedDevice::Meter {
         sources.push(Box::new(machine.controller()));
@@ -151,19 +153,20 @@ fn simulated(address: &Address, target: &SimulatedTarget, now_ns: TimeNs) -> Ope
     if target.device != SimulatedDevice::Controller {
         sources.push(Box::new(machine.meter()));
     }
-    let (actuator, offsets) = (actuator(&machine, target), offsets(&machine, target));
+    let (actuator, offsets) = (build_actuator(&machine, target), build_offset_sink(&machine, target));
     Opened { sources, actuator, offsets, simulated: Some(machine), refused: Refused::default() }
 }
 
 /// When the machine's day began.
-pub fn begun(target: &SimulatedTarget, now_ns: TimeNs) -> TimeNs {
+pub fn compute_day_start_ns(target: &SimulatedTarget, now_ns: TimeNs) -> TimeNs {
     #[expect(clippy::cast_possible_truncation, reason = "at most a day")]
     let begun_ns = (target.begun_s * 1e9) as i64;
     now_ns.saturating_sub(begun_ns)
 }
 
 fn simulated_pull(address: &Address, target: &SimulatedTarget, origin_ns: TimeNs) -> OpenedPull {
-    let machine = Simulated::new(address.text(), SimulatedSettings::of(target), begun(target, origin_ns));
+    let machine =
+        Simulated::new(address.text(), SimulatedSettings::from_target(target), compute_day_start_ns(target, origin_ns));
     let mut sources: Vec<Box<dyn Pull>> = Vec::new();
     if target.device != SimulatedDevice::Meter {
         sources.push(Box::new(machine.controller()));
@@ -173,8 +176,8 @@ fn simulated_pull(address: &Address, target: &SimulatedTarget, origin_ns: TimeNs
     }
     OpenedPull {
         sources,
-        actuator: actuator(&machine, target),
-        offsets: offsets(&machine, target),
+        actuator: build_actuator(&machine, target),
+        offsets: build_offset_sink(&machine, target),
         simulated: Some(machine),
         refused: Refused::default(),
         rows: 0,
@@ -182,15 +185,15 @@ fn simulated_pull(address: &Address, target: &SimulatedTarget, origin_ns: TimeNs
     }
 }
 
-fn actuator(machine: &Simulated, target: &SimulatedTarget) -> Option<Box<dyn Actuator>> {
+fn build_actuator(machine: &Simulated, target: &SimulatedTarget) -> Option<Box<dyn Actuator>> {
     (target.device != SimulatedDevice::Meter).then(|| Box::new(machine.feed_override()) as Box<dyn Actuator>)
 }
 
-fn offsets(machine: &Simulated, target: &SimulatedTarget) -> Option<Box<dyn OffsetSink>> {
+fn build_offset_sink(machine: &Simulated, target: &SimulatedTarget) -> Option<Box<dyn OffsetSink>> {
     (target.device != SimulatedDevice::Meter).then(|| Box::new(machine.offsets()) as Box<dyn OffsetSink>)
 }
 
-fn replay(address: &Address, target: &ReplayTarget, now_ns: TimeNs) -> Result<Opened, OpenError> {
+fn open_replay(address: &Address, target: &ReplayTarget, now_ns: TimeNs) -> Result<Opened, OpenError> {
     let Speed::Times(speed) = target.speed else {
         let what = "speed=max needs the replay command; give a factor here, for example speed=10";
         return Err(OpenError::Unsuitable { address: address.text().to_owned(), what });
@@ -232,7 +235,7 @@ mod tests {
 
     #[test]
     fn the_simulated_machine_opens_as_two_sources_and_an_actuator() {
-        let opened = open(&address("simulated://mill?seed=3"), 0).expect("opens");
+        let opened = open_address(&address("simulated://mill?seed=3"), 0).expect("opens");
         let names: Vec<&str> = opened.sources.iter().map(|source| source.name()).collect();
         assert_eq!(names, ["simulated://mill?seed=3&device=controller", "simulated://mill?seed=3&device=meter"]);
         assert!(opened.actuator.is_some() && opened.simulated.is_some());
@@ -246,15 +249,18 @@ mod tests {
         let address = address(&format!("replay:{}?speed=max", file.path().display()));
         let opened = open_pull(&address, 0).expect("opens");
         assert_eq!((opened.rows, opened.refused.rows, opened.ignored), (2, 1, vec!["odd_v".to_owned()]));
-        assert!(open(&address, 0).is_err_and(|error| error.to_string().contains("speed=10")));
+        assert!(open_address(&address, 0).is_err_and(|error| error.to_string().contains("speed=10")));
     }
 
     #[test]
     fn what_cannot_be_opened_says_why() {
-        let of = |text: &str| open(&address(text), 0).err().map(|error| error.to_string()).unwrap_or_default();
+        let of = |text: &str| open_address(&address(text), 0).err().map(|error| error.to_string()).unwrap_or_default();
         let stream = of("waveform://cnc:5000");
         assert!(stream.contains("waveform://cnc") && stream.contains("doctor"), "{stream}");
-        assert!(open(&address("nclinks://broker:8883/SIM0001"), 0).is_ok(), "a broker over TLS is connected to later");
+        assert!(
+            open_address(&address("nclinks://broker:8883/SIM0001"), 0).is_ok(),
+            "a broker over TLS is connected to later"
+        );
         assert!(open_pull(&address("replay:/does/not/exist.csv"), 0).is_err());
     }
 }

@@ -11,7 +11,7 @@
 //! A name of the table of channels may be given to what a source has and does not deliver by itself; it keeps the unit and the
 //! range of the table.
 
-use crate::channel::{CHANNELS, ChannelId, DeclareError, Kind, NewChannel, declare};
+use crate::channel::{CHANNELS, ChannelId, DeclareError, Kind, NewChannel, declare_channel};
 use crate::reading::{Absence, Reading, Stamp, Value};
 use crate::text::TextEncoding;
 use std::fmt;
@@ -92,7 +92,7 @@ impl<T: OwnRead> Own<T> {
     ///
     /// # Errors
     /// The first one that cannot be added.
-    pub fn all(channels: Vec<OwnChannel>, delivered: &[ChannelId]) -> Result<Vec<Self>, OwnChannelError> {
+    pub fn declare_all(channels: Vec<OwnChannel>, delivered: &[ChannelId]) -> Result<Vec<Self>, OwnChannelError> {
         channels.into_iter().map(|channel| Self::new(channel, delivered)).collect()
     }
 
@@ -105,7 +105,7 @@ impl<T: OwnRead> Own<T> {
                 if !as_text { "a text is read: write unit = \"text\"" } else { "a number is read: give its unit" };
             return Err(refused("unit", what.to_owned()));
         }
-        let id = channel.place(delivered).map_err(|error| refused("name", error.to_string()))?;
+        let id = channel.resolve_channel(delivered).map_err(|error| refused("name", error.to_string()))?;
         if id.channel().unit != channel.new.unit {
             let unit = id.channel().unit;
             return Err(refused(
@@ -118,17 +118,17 @@ impl<T: OwnRead> Own<T> {
 }
 
 impl OwnChannel {
-    fn place(&self, delivered: &[ChannelId]) -> Result<ChannelId, DeclareError> {
+    fn resolve_channel(&self, delivered: &[ChannelId]) -> Result<ChannelId, DeclareError> {
         let known = CHANNELS.iter().any(|known| known.name == self.new.name);
-        match ChannelId::of(&self.new.name).filter(|id| known && !delivered.contains(id)) {
+        match ChannelId::from_name(&self.new.name).filter(|id| known && !delivered.contains(id)) {
             Some(id) => Ok(id),
-            None => declare(&self.new),
+            None => declare_channel(&self.new),
         }
     }
 
     /// The value of a number that was read.
     #[must_use]
-    pub fn value(&self, raw: f64) -> f64 {
+    pub fn scale_value(&self, raw: f64) -> f64 {
         raw * self.scale + self.offset
     }
 }
@@ -136,13 +136,13 @@ impl OwnChannel {
 impl<T> Own<T> {
     /// The reading of what was read.
     #[must_use]
-    pub fn reading(&self, stamp: Stamp, found: Result<Value, Absence>) -> Reading {
+    pub fn to_reading(&self, stamp: Stamp, found: Result<Value, Absence>) -> Reading {
         let is_text = self.channel.new.kind == Kind::Text;
         match found {
-            Ok(Value::Number(raw)) if !is_text => Reading::number(self.id, stamp, self.channel.value(raw)),
-            Ok(Value::Text(text)) if is_text => Reading::text(self.id, stamp, Arc::clone(&text)),
-            Ok(_) => Reading::absent(self.id, stamp, Absence::OutOfRange),
-            Err(reason) => Reading::absent(self.id, stamp, reason),
+            Ok(Value::Number(raw)) if !is_text => Reading::from_number(self.id, stamp, self.channel.scale_value(raw)),
+            Ok(Value::Text(text)) if is_text => Reading::from_text(self.id, stamp, Arc::clone(&text)),
+            Ok(_) => Reading::from_absence(self.id, stamp, Absence::OutOfRange),
+            Err(reason) => Reading::from_absence(self.id, stamp, reason),
         }
     }
 }

@@ -1,8 +1,8 @@
 //! What is not believed, counted and told: the step between a driver and the merge.
 //!
-//! The limits stand in the table of channels and nowhere else; [`Reading::number`](crate::Reading::number) holds every number
+//! The limits stand in the table of channels and nowhere else; [`Reading::from_number`](crate::Reading::number) holds every number
 //! against them, so that no driver can go around it. A driver that knows more (a meter without any supply voltage, phases that do
-//! not make the sum) gives [`Reading::implausible`](crate::Reading::implausible). Either way the channel has no value, and what the device
+//! not make the sum) gives [`Reading::from_implausible`](crate::Reading::implausible). Either way the channel has no value, and what the device
 //! said is counted here and told while it lasts. Nothing is ever cut off to fit.
 
 use crate::channel::ChannelId;
@@ -27,7 +27,7 @@ pub struct Plausibility {
 
 impl Plausibility {
     /// Takes the readings of a poll.
-    pub fn see(&mut self, readings: &[Reading]) {
+    pub fn record_readings(&mut self, readings: &[Reading]) {
         for reading in readings {
             match (reading.implausible, self.doubts.get_mut(&reading.channel)) {
                 (Some(number), Some(doubt)) => {
@@ -45,26 +45,30 @@ impl Plausibility {
 
     /// Readings that were not believed since the start.
     #[must_use]
-    pub fn count(&self) -> u64 {
+    pub fn count_implausible(&self) -> u64 {
         self.doubts.values().map(|doubt| doubt.count).sum()
     }
 
     /// The count as a fact of the source, once there is one.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a count that is shown")]
-    pub fn fact(&self) -> Option<Fact> {
-        (self.count() > 0).then(|| Fact::number("implausible_readings", self.count() as f64))
+    pub fn build_fact(&self) -> Option<Fact> {
+        (self.count_implausible() > 0)
+            .then(|| Fact::from_number("implausible_readings", self.count_implausible() as f64))
     }
 
     /// What is not believed at the moment, one sentence per channel whose range tells against it.
     #[must_use]
-    pub fn problems(&self) -> Vec<SourceProblem> {
+    pub fn list_problems(&self) -> Vec<SourceProblem> {
         let standing = self.doubts.iter().filter_map(|(channel, doubt)| Some((channel, doubt.standing?)));
-        standing.filter(|(channel, number)| !channel.channel().holds(*number)).map(told).collect()
+        standing
+            .filter(|(channel, number)| !channel.channel().accepts_number(*number))
+            .map(describe_implausible)
+            .collect()
     }
 }
 
-fn told((id, number): (&ChannelId, f64)) -> SourceProblem {
+fn describe_implausible((id, number): (&ChannelId, f64)) -> SourceProblem {
     let channel = id.channel();
     let (least, greatest) = channel.range;
     SourceProblem {
@@ -84,7 +88,11 @@ mod tests {
     use crate::reading::{Absence, Stamp};
 
     fn reading(volts: f64) -> Reading {
-        Reading::number(ChannelId::of("supply_voltage_v").expect("in the table"), Stamp::exact(0), volts)
+        Reading::from_number(
+            ChannelId::from_name("supply_voltage_v").expect("in the table"),
+            Stamp::from_exact_time(0),
+            volts,
+        )
     }
 
     #[test]
@@ -92,20 +100,25 @@ mod tests {
         let mut plausibility = Plausibility::default();
         let wrong = reading(4.3e8);
         assert_eq!((&wrong.value, wrong.implausible), (&Err(Absence::OutOfRange), Some(4.3e8)));
-        plausibility.see(&[reading(400.0), wrong]);
-        plausibility.see(&[reading(4.4e8)]);
-        let told = plausibility.problems();
+        plausibility.record_readings(&[reading(400.0), wrong]);
+        plausibility.record_readings(&[reading(4.4e8)]);
+        let told = plausibility.list_problems();
         assert!(told.len() == 1 && told[0].what.contains("4.3") && told[0].what.contains("0 to 1000 V"), "{told:?}");
-        assert_eq!(plausibility.count(), 2);
-        plausibility.see(&[reading(401.0)]);
-        assert!(plausibility.problems().is_empty() && plausibility.count() == 2, "counted, and over");
+        assert_eq!(plausibility.count_implausible(), 2);
+        plausibility.record_readings(&[reading(401.0)]);
+        assert!(plausibility.list_problems().is_empty() && plausibility.count_implausible() == 2, "counted, and over");
     }
 
     #[test]
     fn noise_about_zero_is_believed_where_a_quantity_begins_there() {
-        let current = ChannelId::of("spindle_current_a").expect("in the table").channel();
-        assert!(current.holds(-0.04) && current.holds(12.0) && !current.holds(-50.0) && !current.holds(f64::NAN));
-        let count = ChannelId::of("part_count").expect("in the table").channel();
-        assert!(!count.holds(-0.04), "a counter has no noise");
+        let current = ChannelId::from_name("spindle_current_a").expect("in the table").channel();
+        assert!(
+            current.accepts_number(-0.04)
+                && current.accepts_number(12.0)
+                && !current.accepts_number(-50.0)
+                && !current.accepts_number(f64::NAN)
+        );
+        let count = ChannelId::from_name("part_count").expect("in the table").channel();
+        assert!(!count.accepts_number(-0.04), "a counter has no noise");
     }
 }

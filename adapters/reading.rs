@@ -50,7 +50,7 @@ impl Absence {
 
     /// The word used in `<channel>_missing` columns, JSON and SQL.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::NotProvided => "not_provided",
             Self::NotYetRead => "not_yet_read",
@@ -69,12 +69,12 @@ impl Absence {
     /// The reason written as `word`, if there is one.
     #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|absence| absence.word() == word)
+        Self::ALL.into_iter().find(|absence| absence.as_word() == word)
     }
 
     /// A small stable number for compact storage.
     #[must_use]
-    pub fn code(self) -> u8 {
+    pub fn as_code(self) -> u8 {
         self as u8
     }
 
@@ -87,7 +87,7 @@ impl Absence {
 
 impl fmt::Display for Absence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.word())
+        f.write_str(self.as_word())
     }
 }
 
@@ -105,7 +105,7 @@ impl Value {
     ///
     /// # Errors
     /// [`Absence::OutOfRange`] for a number that is not finite.
-    pub fn number(number: f64) -> Result<Self, Absence> {
+    pub fn from_number(number: f64) -> Result<Self, Absence> {
         if number.is_finite() { Ok(Self::Number(number)) } else { Err(Absence::OutOfRange) }
     }
 
@@ -147,7 +147,7 @@ impl Stamp {
 
     /// A stamp known exactly, as in a recording.
     #[must_use]
-    pub fn exact(mid_ns: TimeNs) -> Self {
+    pub fn from_exact_time(mid_ns: TimeNs) -> Self {
         Self { mid_ns, half_width_ns: 0 }
     }
 }
@@ -169,28 +169,28 @@ impl Reading {
     /// A number that is believed if the channel can have it. What is not believed is [`Absence::OutOfRange`], never a value
     /// that was cut off; what the device said stays beside it, to be counted and told by [`crate::plausibility`].
     #[must_use]
-    pub fn number(channel: ChannelId, stamp: Stamp, number: f64) -> Self {
-        if channel.channel().holds(number) {
-            return Self { channel, stamp, value: Value::number(number), implausible: None };
+    pub fn from_number(channel: ChannelId, stamp: Stamp, number: f64) -> Self {
+        if channel.channel().accepts_number(number) {
+            return Self { channel, stamp, value: Value::from_number(number), implausible: None };
         }
-        Self::implausible(channel, stamp, number)
+        Self::from_implausible(channel, stamp, number)
     }
 
     /// A number that is not believed: the channel cannot have it, or something beside it in the same answer tells against it.
     #[must_use]
-    pub fn implausible(channel: ChannelId, stamp: Stamp, number: f64) -> Self {
+    pub fn from_implausible(channel: ChannelId, stamp: Stamp, number: f64) -> Self {
         Self { channel, stamp, value: Err(Absence::OutOfRange), implausible: Some(number) }
     }
 
     /// A state word.
     #[must_use]
-    pub fn text(channel: ChannelId, stamp: Stamp, text: Arc<str>) -> Self {
+    pub fn from_text(channel: ChannelId, stamp: Stamp, text: Arc<str>) -> Self {
         Self { channel, stamp, value: Ok(Value::Text(text)), implausible: None }
     }
 
     /// No value, with the reason.
     #[must_use]
-    pub fn absent(channel: ChannelId, stamp: Stamp, reason: Absence) -> Self {
+    pub fn from_absence(channel: ChannelId, stamp: Stamp, reason: Absence) -> Self {
         Self { channel, stamp, value: Err(reason), implausible: None }
     }
 }
@@ -202,15 +202,15 @@ mod tests {
     #[test]
     fn every_absence_survives_its_word_and_its_code() {
         for absence in Absence::ALL {
-            assert_eq!(Absence::from_word(absence.word()), Some(absence));
-            assert_eq!(Absence::from_code(absence.code()), Some(absence));
+            assert_eq!(Absence::from_word(absence.as_word()), Some(absence));
+            assert_eq!(Absence::from_code(absence.as_code()), Some(absence));
         }
     }
 
     #[test]
     fn a_number_that_is_none_becomes_an_absence() {
-        let channel = ChannelId::of("spindle_speed_rpm").expect("in the table");
-        let reading = Reading::number(channel, Stamp::exact(0), f64::NAN);
+        let channel = ChannelId::from_name("spindle_speed_rpm").expect("in the table");
+        let reading = Reading::from_number(channel, Stamp::from_exact_time(0), f64::NAN);
         assert_eq!(reading.value, Err(Absence::OutOfRange));
     }
 

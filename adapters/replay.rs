@@ -8,7 +8,7 @@ use crate::clock::{Clock, SECOND_NS, TimeNs};
 use crate::driver::{Pull, Source, SourceError};
 use crate::reading::{Absence, Reading, Stamp};
 use crate::recording::{Cells, Numbers, Recording, Words};
-use crate::words::canonical;
+use crate::words::find_canonical_word;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -45,8 +45,8 @@ impl Replay {
     #[must_use]
     pub fn new(name: impl Into<String>, recording: &Recording, origin_ns: TimeNs) -> Self {
         let origin_ns = recording.start_ns.unwrap_or(origin_ns);
-        let times_ns = times(recording, origin_ns);
-        let (columns, ignored) = split(recording);
+        let times_ns = compute_times_ns(recording, origin_ns);
+        let (columns, ignored) = split_columns(recording);
         let channels = columns.iter().map(|column| column.channel).collect();
         let period = median_period(&times_ns);
         Self { name: name.into(), channels, ignored, columns, times_ns, period, row: 0 }
@@ -54,19 +54,19 @@ impl Replay {
 
     /// Columns of the recording that are no channel of the gateway and are therefore not replayed.
     #[must_use]
-    pub fn ignored(&self) -> &[String] {
+    pub fn ignored_columns(&self) -> &[String] {
         &self.ignored
     }
 
     /// How many rows there are.
     #[must_use]
-    pub fn rows(&self) -> usize {
+    pub fn count_rows(&self) -> usize {
         self.times_ns.len()
     }
 
     /// How many rows have been read.
     #[must_use]
-    pub fn row(&self) -> usize {
+    pub fn rows_read(&self) -> usize {
         self.row
     }
 
@@ -78,12 +78,12 @@ impl Replay {
 
     /// Appends the next row, stamped `at_ns`.
     fn take_row(&mut self, at_ns: TimeNs, out: &mut Vec<Reading>) {
-        let (row, stamp) = (self.row, Stamp::exact(at_ns));
-        out.extend(self.columns.iter().map(|column| column.reading(row, stamp)));
+        let (row, stamp) = (self.row, Stamp::from_exact_time(at_ns));
+        out.extend(self.columns.iter().map(|column| column.build_reading(row, stamp)));
         self.row += 1;
     }
 
-    fn end(&self) -> SourceError {
+    fn build_end_error(&self) -> SourceError {
         SourceError::End { source_name: self.name.clone() }
     }
 }
@@ -105,8 +105,8 @@ impl Pull for Replay {
         self.time_ns(self.row)
     }
 
-    fn pull(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
-        let at_ns = self.next_ns().ok_or_else(|| self.end())?;
+    fn pull_readings(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        let at_ns = self.next_ns().ok_or_else(|| self.build_end_error())?;
         self.take_row(at_ns, out);
         Ok(())
     }
@@ -155,7 +155,7 @@ impl Source for LiveReplay {
 
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let now_ns = clock.now_ns();
-        let first_ns = self.replay.next_ns().ok_or_else(|| self.replay.end())?;
+        let first_ns = self.replay.next_ns().ok_or_else(|| self.replay.build_end_error())?;
         let anchor = *self.anchor.get_or_insert((now_ns, first_ns));
         while let Some(row_ns) = self.replay.next_ns() {
             let due_ns = self.due_ns(row_ns, anchor);
@@ -169,31 +169,33 @@ impl Source for LiveReplay {
 }
 
 impl ReplayedColumn {
-    fn reading(&self, row: usize, stamp: Stamp) -> Reading {
+    fn build_reading(&self, row: usize, stamp: Stamp) -> Reading {
         let value = match &self.cells {
-            Filled::Numbers(numbers) => numbers.get(row).map(|number| Reading::number(self.channel, stamp, number)),
+            Filled::Numbers(numbers) => {
+                numbers.get(row).map(|number| Reading::from_number(self.channel, stamp, number))
+            }
             Filled::Words(words, ready) => {
-                let word = words.code(row).and_then(|code| ready.get(usize::try_from(code).ok()?));
-                word.map(|word| Reading::text(self.channel, stamp, word.clone()))
+                let word = words.find_code(row).and_then(|code| ready.get(usize::try_from(code).ok()?));
+                word.map(|word| Reading::from_text(self.channel, stamp, word.clone()))
             }
         };
-        value.unwrap_or_else(|| Reading::absent(self.channel, stamp, self.reason(row)))
+        value.unwrap_or_else(|| Reading::from_absence(self.channel, stamp, self.find_absence(row)))
     }
 
-    fn reason(&self, row: usize) -> Absence {
+    fn find_absence(&self, row: usize) -> Absence {
         let word = self.missing.as_ref().and_then(|missing| missing.get(row));
         word.and_then(Absence::from_word).unwrap_or(Absence::NotRecorded)
     }
 }
 
-fn split(recording: &Recording) -> (Vec<ReplayedColumn>, Vec<String>) {
+fn split_columns(recording: &Recording) -> (Vec<ReplayedColumn>, Vec<String>) {
     let mut columns = Vec::new();
     let mut ignored = Vec::new();
     for column in recording.columns() {
-        let missing = column.name.strip_suffix("_missing").and_then(ChannelId::of).is_some();
-        match ChannelId::of(&column.name).and_then(|channel| filled(channel, &column.cells)) {
+        let missing = column.name.strip_suffix("_missing").and_then(ChannelId::from_name).is_some();
+        match ChannelId::from_name(&column.name).and_then(|channel| convert_cells(channel, &column.cells)) {
             Some((channel, cells)) => {
-                let missing = recording.words(&format!("{}_missing", column.name)).cloned();
+                let missing = recording.find_words(&format!("{}_missing", column.name)).cloned();
                 columns.push(ReplayedColumn { channel, cells, missing });
             }
             None if missing => {}
@@ -204,13 +206,13 @@ fn split(recording: &Recording) -> (Vec<ReplayedColumn>, Vec<String>) {
 }
 
 /// The cells, if they are of the channel's kind.
-fn filled(channel: ChannelId, cells: &Cells) -> Option<(ChannelId, Filled)> {
+fn convert_cells(channel: ChannelId, cells: &Cells) -> Option<(ChannelId, Filled)> {
     let text = channel.channel().kind == crate::channel::Kind::Text;
     let filled = match cells {
         Cells::Numbers(numbers) if !text => Filled::Numbers(numbers.clone()),
         Cells::Words(words) if text => {
             // The gate and the scripts compare letter by letter; a recording may have been written by other hands.
-            let ready = |word: &String| Arc::from(canonical(channel.name(), word).unwrap_or(word));
+            let ready = |word: &String| Arc::from(find_canonical_word(channel.name(), word).unwrap_or(word));
             Filled::Words(words.clone(), words.words().iter().map(ready).collect())
         }
         _ => return None,
@@ -219,7 +221,7 @@ fn filled(channel: ChannelId, cells: &Cells) -> Option<(ChannelId, Filled)> {
 }
 
 /// `time_s` onto an increasing clock.
-fn times(recording: &Recording, origin_ns: TimeNs) -> Vec<TimeNs> {
+fn compute_times_ns(recording: &Recording, origin_ns: TimeNs) -> Vec<TimeNs> {
     let mut shift_s = -recording.time_s.first().copied().unwrap_or(0.0).min(f64::MAX);
     if recording.start_ns.is_some() {
         shift_s = 0.0;
@@ -261,7 +263,7 @@ mod tests {
     use crate::sample::Sample;
 
     fn value_of(readings: &[Reading], name: &str) -> Option<Result<Value, Absence>> {
-        let channel = ChannelId::of(name)?;
+        let channel = ChannelId::from_name(name)?;
         readings.iter().find(|reading| reading.channel == channel).map(|reading| reading.value.clone())
     }
 
@@ -273,19 +275,19 @@ mod tests {
     fn every_row_comes_with_its_own_time_and_then_the_end() {
         let text = "time_s,spindle_speed_rpm,program,odd_v\n10,800,O1,1\n10.5,,O1,2\n11,810,,3\n";
         let mut replay = Replay::new("replay:test.csv", &recording(text), 1_000);
-        assert_eq!(replay.ignored(), ["odd_v"]);
+        assert_eq!(replay.ignored_columns(), ["odd_v"]);
         assert_eq!(Pull::period(&replay), Duration::from_millis(500));
         let mut out = Vec::new();
         assert_eq!(replay.next_ns(), Some(1_000));
-        replay.pull(&mut out).expect("first row");
+        replay.pull_readings(&mut out).expect("first row");
         assert_eq!(value_of(&out, "spindle_speed_rpm"), Some(Ok(Value::Number(800.0))));
         out.clear();
         assert_eq!(replay.next_ns(), Some(500_001_000));
-        replay.pull(&mut out).expect("second row");
+        replay.pull_readings(&mut out).expect("second row");
         assert_eq!(value_of(&out, "spindle_speed_rpm"), Some(Err(Absence::NotRecorded)));
-        replay.pull(&mut out).expect("third row");
+        replay.pull_readings(&mut out).expect("third row");
         assert_eq!(replay.next_ns(), None);
-        assert!(matches!(replay.pull(&mut out), Err(SourceError::End { .. })));
+        assert!(matches!(replay.pull_readings(&mut out), Err(SourceError::End { .. })));
     }
 
     #[test]
@@ -293,9 +295,9 @@ mod tests {
         let text = "time_s,spindle_speed_rpm,spindle_speed_rpm_missing\n0,1,\n1,,timeout\n";
         let mut replay = Replay::new("replay:test.csv", &recording(text), 0);
         let mut out = Vec::new();
-        replay.pull(&mut out).and_then(|()| replay.pull(&mut out)).expect("two rows");
+        replay.pull_readings(&mut out).and_then(|()| replay.pull_readings(&mut out)).expect("two rows");
         assert_eq!(out[1].value, Err(Absence::Timeout));
-        assert!(replay.ignored().is_empty());
+        assert!(replay.ignored_columns().is_empty());
     }
 
     #[test]
@@ -322,19 +324,19 @@ mod tests {
         let replay = Replay::new("replay:milling", &recording, 0);
         let channels = Pull::channels(&replay).to_vec();
         let mut lockstep = Lockstep::new(vec![Box::new(replay)], Delay::Fixed(Duration::ZERO));
-        let (mut sample, mut row) = (Sample::empty(0), 0);
+        let (mut sample, mut row) = (Sample::new_empty(0), 0);
         while let Some(at_ns) = lockstep.next_ns() {
             lockstep.sample_into(&mut sample, at_ns);
             for channel in &channels {
-                let recorded = recording.numbers(channel.name()).and_then(|numbers| numbers.get(row));
+                let recorded = recording.find_numbers(channel.name()).and_then(|numbers| numbers.get(row));
                 assert_eq!(sample.number(*channel).ok(), recorded, "{channel} in row {row}");
-                let word = recording.words(channel.name()).and_then(|words| words.get(row));
+                let word = recording.find_words(channel.name()).and_then(|words| words.get(row));
                 assert_eq!(sample.text(*channel), word, "{channel} in row {row}");
                 assert_eq!(sample.slot(*channel).age_ns, 0);
             }
             row += 1;
         }
-        assert_eq!((row, recording.rows()), (13_757, 13_757));
+        assert_eq!((row, recording.count_rows()), (13_757, 13_757));
     }
 
     #[test]
@@ -349,11 +351,11 @@ mod tests {
     fn a_live_replay_gives_what_is_due() {
         let replay = Replay::new("r", &recording("time_s,engaged\n0,1\n1,0\n2,1\n"), 0);
         let mut live = LiveReplay::new(replay, 2.0);
-        let clock = ManualClock::at(100);
+        let clock = ManualClock::with_time(100);
         let mut out = Vec::new();
         live.read(&clock, &mut out).expect("first row");
         assert_eq!(out.len(), 1);
-        clock.set(100 + SECOND_NS);
+        clock.set_time(100 + SECOND_NS);
         live.read(&clock, &mut out).expect("the rest");
         let stamps: Vec<_> = out.iter().map(|reading| reading.stamp.mid_ns).collect();
         assert_eq!(stamps, [100, 100 + SECOND_NS / 2, 100 + SECOND_NS]);

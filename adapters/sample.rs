@@ -16,7 +16,7 @@ pub struct Slot {
 impl Slot {
     /// A channel that has no value for this reason.
     #[must_use]
-    pub fn absent(reason: Absence) -> Self {
+    pub fn from_absence(reason: Absence) -> Self {
         Self { value: Err(reason), age_ns: 0 }
     }
 }
@@ -35,8 +35,8 @@ pub struct Sample {
 impl Sample {
     /// A sample in which no channel is provided.
     #[must_use]
-    pub fn empty(at_ns: TimeNs) -> Self {
-        Self { at_ns, slots: vec![Slot::absent(Absence::NotProvided); ChannelId::count()] }
+    pub fn new_empty(at_ns: TimeNs) -> Self {
+        Self { at_ns, slots: vec![Slot::from_absence(Absence::NotProvided); ChannelId::count_channels()] }
     }
 
     /// What is known of `channel`.
@@ -46,7 +46,7 @@ impl Sample {
     }
 
     /// Replaces what is known of `channel`.
-    pub fn set(&mut self, channel: ChannelId, slot: Slot) {
+    pub fn set_slot(&mut self, channel: ChannelId, slot: Slot) {
         if channel.index() >= self.slots.len() {
             self.slots.resize(channel.index() + 1, NOT_PROVIDED.clone());
         }
@@ -71,7 +71,7 @@ impl Sample {
     }
 
     /// Every channel that a source provides, with its slot.
-    pub fn provided(&self) -> impl Iterator<Item = (ChannelId, &Slot)> {
-        ChannelId::all().zip(&self.slots).filter(|(_, slot)| slot.value != Err(Absence::NotProvided))
+    pub fn provided_slots(&self) -> impl Iterator<Item = (ChannelId, &Slot)> {
+        ChannelId::list_all().zip(&self.slots).filter(|(_, slot)| slot.value != Err(Absence::NotProvided))
     }
 }

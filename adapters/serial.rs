@@ -1,6 +1,6 @@
 //! A serial line: opened raw, read against a deadline, shared by every device that hangs on it.
 //!
-//! RS-485 is a party line: two meters on one cable are two sources and one line. [`Bus::of`] gives every address that
+//! RS-485 is a party line: two meters on one cable are two sources and one line. [`Bus::from_target`] gives every address that
 //! names the same device file the same [`Bus`]; one exchange at a time holds it. After a request that got no answer, or
 //! half of one, the line is kept quiet until the late answer has come or can hardly come any more: on a line without
 //! transaction numbers that is the only way not to take an old answer for a new one.
@@ -34,7 +34,7 @@ pub fn wire_time(target: &SerialTarget, characters: usize) -> Duration {
 
 /// The silence that ends a frame: 3.5 characters, 1.75 ms at least.
 #[must_use]
-pub fn silence(target: &SerialTarget) -> Duration {
+pub fn compute_silence(target: &SerialTarget) -> Duration {
     (wire_time(target, 7) / 2).max(SILENCE_MIN)
 }
 
@@ -45,7 +45,7 @@ struct OpenPort {
     last_byte: Instant,
 }
 
-fn open(target: &SerialTarget) -> io::Result<OpenPort> {
+fn open_port(target: &SerialTarget) -> io::Result<OpenPort> {
     // Without NONBLOCK the open itself waits for a modem's carrier.
     let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits();
     let mut options = OpenOptions::new();
@@ -85,7 +85,7 @@ pub type SharedBus = Arc<Mutex<Bus>>;
 
 static LINES: Mutex<Option<HashMap<PathBuf, Weak<Mutex<Bus>>>>> = Mutex::new(None);
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+fn lock_mutex<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -94,8 +94,8 @@ impl Bus {
     ///
     /// # Errors
     /// When another address uses the same line at another speed or parity.
-    pub fn of(target: &SerialTarget) -> Result<SharedBus, String> {
-        let mut lines = locked(&LINES);
+    pub fn from_target(target: &SerialTarget) -> Result<SharedBus, String> {
+        let mut lines = lock_mutex(&LINES);
         let lines = lines.get_or_insert_with(HashMap::new);
         lines.retain(|_, line| line.strong_count() > 0);
         let Some(shared) = lines.get(&target.port).and_then(Weak::upgrade) else {
@@ -104,7 +104,7 @@ impl Bus {
             lines.insert(target.port.clone(), Arc::downgrade(&shared));
             return Ok(shared);
         };
-        if locked(&shared).target != *target {
+        if lock_mutex(&shared).target != *target {
             let port = target.port.display();
             return Err(format!("two addresses use {port} with different baud or parity; one line has one of each"));
         }
@@ -127,10 +127,10 @@ impl Bus {
     ///
     /// # Errors
     /// When the line cannot be opened or written.
-    pub fn send(&mut self, request: &[u8]) -> io::Result<()> {
-        self.settle()?;
-        let gap = silence(&self.target);
-        let sent = self.line().and_then(|line| {
+    pub fn send_request(&mut self, request: &[u8]) -> io::Result<()> {
+        self.discard_late_answer()?;
+        let gap = compute_silence(&self.target);
+        let sent = self.open_line().and_then(|line| {
             std::thread::sleep(gap.saturating_sub(line.last_byte.elapsed()));
             tcflush(&line.file, QueueSelector::IFlush)?;
             line.file.write_all(request)
@@ -145,8 +145,8 @@ impl Bus {
     ///
     /// # Errors
     /// When the line fails; it is then opened anew by the next request.
-    pub fn receive(&mut self, until: Instant, into: &mut Vec<u8>) -> io::Result<bool> {
-        let received = self.line().and_then(|line| receive(line, until, into));
+    pub fn receive_bytes(&mut self, until: Instant, into: &mut Vec<u8>) -> io::Result<bool> {
+        let received = self.open_line().and_then(|line| read_port(line, until, into));
         if received.is_err() {
             self.open = None;
         }
@@ -158,29 +158,30 @@ impl Bus {
         self.quiet_until = Some(Instant::now() + wait);
     }
 
-    fn line(&mut self) -> io::Result<&mut OpenPort> {
+    fn open_line(&mut self) -> io::Result<&mut OpenPort> {
         if self.open.is_none() {
-            self.open = Some(open(&self.target)?);
+            self.open = Some(open_port(&self.target)?);
         }
         self.open.as_mut().ok_or_else(|| io::Error::other("the line is not open"))
     }
 
     /// Waits for the answer that is still out, and throws it away.
-    fn settle(&mut self) -> io::Result<()> {
+    fn discard_late_answer(&mut self) -> io::Result<()> {
         let Some(until) = self.quiet_until.take() else { return Ok(()) };
-        let gap = silence(&self.target);
+        let gap = compute_silence(&self.target);
         let mut late = Vec::new();
-        if !self.receive(until, &mut late)? {
+        if !self.receive_bytes(until, &mut late)? {
             return Ok(());
         }
         self.late_answers += 1;
         // The rest of it, up to the silence behind it; a line that never falls silent is given up with its buffer full.
-        while late.len() < 4096 && self.receive(Instant::now() + gap.max(Duration::from_millis(20)), &mut late)? {}
+        while late.len() < 4096 && self.receive_bytes(Instant::now() + gap.max(Duration::from_millis(20)), &mut late)? {
+        }
         Ok(())
     }
 }
 
-fn receive(line: &mut OpenPort, until: Instant, into: &mut Vec<u8>) -> io::Result<bool> {
+fn read_port(line: &mut OpenPort, until: Instant, into: &mut Vec<u8>) -> io::Result<bool> {
     let mut buffer = [0_u8; 512];
     loop {
         match line.file.read(&mut buffer) {
@@ -215,24 +216,24 @@ mod tests {
 
     #[test]
     fn the_silence_is_three_and_a_half_characters() {
-        assert!((silence(&target(9600)).as_secs_f64() - 3.5 * 10.0 / 9600.0).abs() < 1e-6);
-        assert_eq!(silence(&target(115_200)), SILENCE_MIN);
+        assert!((compute_silence(&target(9600)).as_secs_f64() - 3.5 * 10.0 / 9600.0).abs() < 1e-6);
+        assert_eq!(compute_silence(&target(115_200)), SILENCE_MIN);
     }
 
     #[test]
     fn one_line_has_one_speed() {
-        let first = Bus::of(&target(9600)).expect("the first one");
-        let second = Bus::of(&target(9600)).expect("the same");
+        let first = Bus::from_target(&target(9600)).expect("the first one");
+        let second = Bus::from_target(&target(9600)).expect("the same");
         assert!(Arc::ptr_eq(&first, &second));
-        assert!(Bus::of(&target(19200)).is_err());
+        assert!(Bus::from_target(&target(19200)).is_err());
         drop((first, second));
-        assert!(Bus::of(&target(19200)).is_ok());
+        assert!(Bus::from_target(&target(19200)).is_ok());
     }
 
     #[test]
     fn a_line_that_is_not_there_is_an_error() {
         let line = SerialTarget { port: PathBuf::from("/dev/no-such-line-2"), ..target(9600) };
-        let bus = Bus::of(&line).expect("a bus");
-        assert!(locked(&bus).send(&[1]).is_err());
+        let bus = Bus::from_target(&line).expect("a bus");
+        assert!(lock_mutex(&bus).send_request(&[1]).is_err());
     }
 }

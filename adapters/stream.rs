@@ -14,7 +14,7 @@ const LEAST: Duration = Duration::from_millis(1);
 ///
 /// # Errors
 /// The name is not known.
-pub(crate) fn addresses(at: &Endpoint) -> io::Result<Vec<SocketAddr>> {
+pub(crate) fn resolve_addresses(at: &Endpoint) -> io::Result<Vec<SocketAddr>> {
     let found: Vec<SocketAddr> = (at.host.as_str(), at.port).to_socket_addrs()?.take(ADDRESSES_MAX).collect();
     match found.is_empty() {
         true => Err(io::Error::new(ErrorKind::NotFound, "the name has no address")),
@@ -26,8 +26,8 @@ pub(crate) fn addresses(at: &Endpoint) -> io::Result<Vec<SocketAddr>> {
 ///
 /// # Errors
 /// As there, or the name is not known.
-pub(crate) fn connect(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
-    connect_any(&addresses(at)?, until)
+pub(crate) fn connect_host(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
+    connect_any(&resolve_addresses(at)?, until)
 }
 
 /// The first address that answers, tried one after the other until `until` (a millisecond each when that has passed).
@@ -62,7 +62,7 @@ pub(crate) enum Short {
 ///
 /// # Errors
 /// Why it could not.
-pub(crate) fn fill(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), Short> {
+pub(crate) fn fill_buffer(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), Short> {
     fill_counting(stream, into, until).map_err(|(_, short)| short)
 }
 
@@ -93,7 +93,7 @@ pub(crate) fn fill_counting(stream: &mut TcpStream, into: &mut [u8], until: Inst
 ///
 /// # Errors
 /// Why nothing came.
-pub(crate) fn some(stream: &mut TcpStream, into: &mut Vec<u8>, until: Instant) -> Result<(), Short> {
+pub(crate) fn append_available(stream: &mut TcpStream, into: &mut Vec<u8>, until: Instant) -> Result<(), Short> {
     let mut buffer = [0_u8; 512];
     loop {
         let left = until.saturating_duration_since(Instant::now());

@@ -113,7 +113,7 @@ impl Temperatures {
         }
         let mut points: Vec<ProbeChannel> = Vec::new();
         for (index, raw) in raw.point.iter().enumerate() {
-            match point(raw) {
+            match parse_point(raw) {
                 Ok(point) if points.iter().any(|other| other.channel == point.channel) => {
                     problems.push(format!("point {}: {} is given twice", index + 1, raw.channel));
                 }
@@ -130,10 +130,10 @@ impl Temperatures {
     }
 }
 
-fn point(raw: &RawPoint) -> Result<ProbeChannel, String> {
-    let channel = ChannelId::of(&raw.channel).filter(|id| id.channel().unit == "°C").ok_or_else(|| {
+fn parse_point(raw: &RawPoint) -> Result<ProbeChannel, String> {
+    let channel = ChannelId::from_name(&raw.channel).filter(|id| id.channel().unit == "°C").ok_or_else(|| {
         let names = channel::CHANNELS.iter().filter(|known| known.unit == "°C").map(|known| known.name);
-        let hint = channel::nearest(&raw.channel, names).map(|near| format!("; did you mean {near}?"));
+        let hint = channel::find_nearest_name(&raw.channel, names).map(|near| format!("; did you mean {near}?"));
         format!("no temperature channel {:?}{}", raw.channel, hint.unwrap_or_default())
     })?;
     let plain = |part: &str| !part.is_empty() && !part.contains('/') && !part.starts_with('.');
@@ -166,13 +166,13 @@ impl Sensor {
                 if !found.as_deref().is_some_and(|directory| is_chip(directory, chip)) {
                     *found = chip_of(sys, chip);
                 }
-                hwmon(found.as_deref().ok_or(Absence::Disconnected)?, input)
+                read_hwmon(found.as_deref().ok_or(Absence::Disconnected)?, input)
             }
             Self::OneWire(id) => one_wire(sys, id),
         }
     }
 
-    fn told(&self) -> String {
+    fn describe_location(&self) -> String {
         match self {
             Self::Hwmon { chip, input, .. } => format!("hwmon {chip}/{input}"),
             Self::OneWire(id) => format!("1-wire {id}"),
@@ -190,27 +190,28 @@ fn is_chip(directory: &Path, chip: &str) -> bool {
     text_of(&directory.join("name"), SENSOR_MAX).is_ok_and(|name| name.trim() == chip)
 }
 
-fn hwmon(directory: &Path, input: &str) -> Result<f64, Absence> {
-    let text = text_of(&directory.join(format!("{input}_input")), SENSOR_MAX).map_err(|error| absence(&error))?;
-    thousandths(&text)
+fn read_hwmon(directory: &Path, input: &str) -> Result<f64, Absence> {
+    let text =
+        text_of(&directory.join(format!("{input}_input")), SENSOR_MAX).map_err(|error| classify_io_error(&error))?;
+    parse_thousandths(&text)
 }
 
 fn one_wire(sys: &Path, id: &str) -> Result<f64, Absence> {
     let file = sys.join("bus/w1/devices").join(id).join("w1_slave");
-    let text = text_of(&file, SENSOR_MAX).map_err(|error| absence(&error))?;
+    let text = text_of(&file, SENSOR_MAX).map_err(|error| classify_io_error(&error))?;
     let (first, second) = text.trim_end().split_once('\n').ok_or(Absence::OutOfRange)?;
     if !first.trim_end().ends_with("YES") {
         return Err(Absence::OutOfRange);
     }
-    let number = thousandths(second.rsplit_once("t=").map(|(_, number)| number).ok_or(Absence::OutOfRange)?)?;
+    let number = parse_thousandths(second.rsplit_once("t=").map(|(_, number)| number).ok_or(Absence::OutOfRange)?)?;
     if (number - POWER_ON_C).abs() < 1e-9 { Err(Absence::NotYetRead) } else { Ok(number) }
 }
 
-fn thousandths(text: &str) -> Result<f64, Absence> {
+fn parse_thousandths(text: &str) -> Result<f64, Absence> {
     text.trim().parse::<i32>().map(|number| f64::from(number) / 1000.0).map_err(|_| Absence::OutOfRange)
 }
 
-fn absence(error: &io::Error) -> Absence {
+fn classify_io_error(error: &io::Error) -> Absence {
     match error.kind() {
         ErrorKind::NotFound => Absence::Disconnected,
         ErrorKind::PermissionDenied => Absence::Refused,
@@ -238,8 +239,8 @@ impl Source for Temperatures {
             let read = point.sensor.read(&self.sys);
             let stamp = Stamp::of_request(began_ns, clock.now_ns());
             out.push(match read {
-                Ok(number) => Reading::number(point.channel, stamp, number + point.offset_c),
-                Err(reason) => Reading::absent(point.channel, stamp, reason),
+                Ok(number) => Reading::from_number(point.channel, stamp, number + point.offset_c),
+                Err(reason) => Reading::from_absence(point.channel, stamp, reason),
             });
         }
         if out[begin..].iter().any(|reading| reading.value.is_ok()) {
@@ -253,9 +254,9 @@ impl Source for Temperatures {
         })
     }
 
-    fn facts(&self) -> Vec<Fact> {
+    fn collect_facts(&self) -> Vec<Fact> {
         let told = |point: &ProbeChannel| {
-            Fact::text(point.channel.name(), format!("{} ({})", point.name, point.sensor.told()))
+            Fact::from_text(point.channel.name(), format!("{} ({})", point.name, point.sensor.describe_location()))
         };
         self.points.iter().map(told).collect()
     }
@@ -290,7 +291,7 @@ mod tests {
         let mut source = Temperatures::open("temperature:x", &file, &sys).expect("a good file");
         let mut read = || {
             let mut out = Vec::new();
-            source.read(&ManualClock::at(5), &mut out).map(|()| out)
+            source.read(&ManualClock::with_time(5), &mut out).map(|()| out)
         };
         let values: Vec<_> = read().expect("some answer").iter().map(|reading| reading.value.clone()).collect();
         let number = |number| Ok(crate::reading::Value::Number(number));
@@ -299,7 +300,7 @@ mod tests {
         assert_eq!(read().expect("one answers")[0].value, Err(Absence::OutOfRange));
         std::fs::remove_dir_all(&sys).expect("gone");
         assert!(read().expect_err("nothing answers").to_string().contains("driver of the sensor"));
-        assert!(format!("{:?}", source.facts()).contains("front (1-wire 28-01)"));
+        assert!(format!("{:?}", source.collect_facts()).contains("front (1-wire 28-01)"));
     }
 
     #[test]

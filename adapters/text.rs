@@ -32,29 +32,29 @@ impl TextEncoding {
 
     /// The text up to the first NUL, without the blanks around it.
     #[must_use]
-    pub fn text(self, bytes: &[u8]) -> String {
+    pub fn decode_trimmed(self, bytes: &[u8]) -> String {
         let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-        self.decode(&bytes[..end]).trim().to_owned()
+        self.decode_all(&bytes[..end]).trim().to_owned()
     }
 
     /// All of the bytes as text; what is none in this set as marks.
     #[must_use]
-    pub fn decode(self, bytes: &[u8]) -> String {
-        self.whole(bytes).map_or_else(|| mark_bytes(bytes), Cow::into_owned)
+    pub fn decode_all(self, bytes: &[u8]) -> String {
+        self.decode_strictly(bytes).map_or_else(|| mark_bytes(bytes), Cow::into_owned)
     }
 
     /// JSON in this set. Where a text in it does not fit the set, that text has marks and the rest is read.
     ///
     /// # Errors
     /// It is no JSON.
-    pub fn json(self, bytes: &[u8]) -> Result<serde_json::Value, serde_json::Error> {
-        match self.whole(bytes) {
+    pub fn parse_json(self, bytes: &[u8]) -> Result<serde_json::Value, serde_json::Error> {
+        match self.decode_strictly(bytes) {
             Some(text) => serde_json::from_str(&text),
             None => serde_json::from_str(&marked_within(bytes)),
         }
     }
 
-    fn whole(self, bytes: &[u8]) -> Option<Cow<'_, str>> {
+    fn decode_strictly(self, bytes: &[u8]) -> Option<Cow<'_, str>> {
         let sets: &[&'static Encoding] = match &self {
             Self::Found => &[UTF_8, GB18030],
             Self::Named(set) => &[UTF_8, set],
@@ -115,29 +115,29 @@ mod tests {
     fn the_set_is_found_or_named() {
         // 急停 in GBK, UTF-8 and Shift JIS, by hand.
         let (gbk, utf8, sjis) = (b"\xBC\xB1\xCD\xA3 1\0rest", "急停 1".as_bytes(), b"\x8B\x7D\x92\xE2 1");
-        assert_eq!(of("auto").text(gbk), "急停 1");
-        assert_eq!(of("auto").text(utf8), "急停 1");
-        assert_eq!(of("gbk").text(gbk), "急停 1");
-        assert_eq!(of("shift_jis").text(sjis), "急停 1");
-        assert_eq!(of("auto").text(b"  SERVO ALARM \0"), "SERVO ALARM");
+        assert_eq!(of("auto").decode_trimmed(gbk), "急停 1");
+        assert_eq!(of("auto").decode_trimmed(utf8), "急停 1");
+        assert_eq!(of("gbk").decode_trimmed(gbk), "急停 1");
+        assert_eq!(of("shift_jis").decode_trimmed(sjis), "急停 1");
+        assert_eq!(of("auto").decode_trimmed(b"  SERVO ALARM \0"), "SERVO ALARM");
         assert_eq!(TextEncoding::of_label("klingon"), None);
     }
 
     #[test]
     fn bytes_that_fit_no_set_are_kept() {
-        assert_eq!(of("utf-8").text(b"a\\\xB5\xFF b"), "a\\x5C\\xB5\\xFF b");
-        assert_eq!(of("auto").text(&[0xFF, 0xFF]), "\\xFF\\xFF");
+        assert_eq!(of("utf-8").decode_trimmed(b"a\\\xB5\xFF b"), "a\\x5C\\xB5\\xFF b");
+        assert_eq!(of("auto").decode_trimmed(&[0xFF, 0xFF]), "\\xFF\\xFF");
     }
 
     #[test]
     fn one_text_that_fits_no_set_costs_itself_and_no_other() {
         let gbk = [&b"{\"a\":1,\"t\":\""[..], b"\xBC\xB1\xCD\xA3", b"\"}"].concat();
-        let read = of("auto").json(&gbk).expect("JSON");
+        let read = of("auto").parse_json(&gbk).expect("JSON");
         assert_eq!((&read["a"], &read["t"]), (&serde_json::json!(1), &serde_json::json!("急停")));
         let broken = [&b"{\"a\":1,\"t\":\"x"[..], b"\xFF\xFE", b"\"}"].concat();
-        let read = of("auto").json(&broken).expect("JSON");
+        let read = of("auto").parse_json(&broken).expect("JSON");
         assert_eq!((&read["a"], &read["t"]), (&serde_json::json!(1), &serde_json::json!("x\\xFF\\xFE")));
-        assert!(of("auto").json(b"no JSON").is_err());
+        assert!(of("auto").parse_json(b"no JSON").is_err());
     }
 
     #[test]

@@ -67,7 +67,7 @@ unit!(/// A share in percent, 100 is the whole.
 impl Rpm {
     /// The same speed as an angular velocity: `2 pi n / 60`.
     #[must_use]
-    pub fn angular(self) -> RadiansPerSecond {
+    pub fn to_radians_per_second(self) -> RadiansPerSecond {
         RadiansPerSecond(self.0 * std::f64::consts::TAU / 60.0)
     }
 }
@@ -113,7 +113,7 @@ impl OverridePct {
 
     /// The whole percent nearest to a number; `None` when it is none from 0 to 254.
     #[must_use]
-    pub fn nearest(percent: f64) -> Option<Self> {
+    pub fn from_nearest_percent(percent: f64) -> Option<Self> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 254")]
         (0.0..=254.0).contains(&percent).then(|| Self(percent.round() as u8))
     }
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn torque_times_speed_is_power() {
-        let power = NewtonMetres(9.43) * Rpm(800.0).angular();
+        let power = NewtonMetres(9.43) * Rpm(800.0).to_radians_per_second();
         assert!((power.0 - 790.0).abs() < 0.5, "{power}");
     }
 
@@ -147,9 +147,9 @@ mod tests {
             assert_eq!(OverridePct::new(percent).map(OverridePct::percent), Some(percent));
         }
         assert_eq!(OverridePct::new(255), None);
-        assert_eq!(OverridePct::nearest(99.6), Some(OverridePct::FULL));
+        assert_eq!(OverridePct::from_nearest_percent(99.6), Some(OverridePct::FULL));
         for none in [-0.5, 254.4, f64::NAN, f64::INFINITY] {
-            assert_eq!(OverridePct::nearest(none), None, "{none}");
+            assert_eq!(OverridePct::from_nearest_percent(none), None, "{none}");
         }
     }
 }

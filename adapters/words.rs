@@ -50,7 +50,7 @@ pub fn of_channel(channel: &str) -> Option<&'static [&'static str]> {
 /// The word that a recording of other hands means: capitals do not count, and a blank or a hyphen stands for `_`. `None` where
 /// the channel has no such word.
 #[must_use]
-pub fn canonical(channel: &str, text: &str) -> Option<&'static str> {
+pub fn find_canonical_word(channel: &str, text: &str) -> Option<&'static str> {
     let plain = text.trim().replace([' ', '-'], "_");
     of_channel(channel)?.iter().copied().find(|word| word.eq_ignore_ascii_case(&plain))
 }
@@ -69,10 +69,10 @@ mod tests {
 
     #[test]
     fn a_word_in_other_letters_is_the_same_word() {
-        assert_eq!(canonical("mode", "automatic"), Some(mode::AUTOMATIC));
-        assert_eq!(canonical("mode", " Semi-automatic"), Some(mode::SEMI_AUTOMATIC));
-        assert_eq!(canonical("execution", "feed hold"), Some(execution::FEED_HOLD));
-        assert_eq!(canonical("mode", "MEM"), None);
-        assert_eq!(canonical("program", "automatic"), None);
+        assert_eq!(find_canonical_word("mode", "automatic"), Some(mode::AUTOMATIC));
+        assert_eq!(find_canonical_word("mode", " Semi-automatic"), Some(mode::SEMI_AUTOMATIC));
+        assert_eq!(find_canonical_word("execution", "feed hold"), Some(execution::FEED_HOLD));
+        assert_eq!(find_canonical_word("mode", "MEM"), None);
+        assert_eq!(find_canonical_word("program", "automatic"), None);
     }
 }

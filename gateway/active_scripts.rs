@@ -2,10 +2,10 @@
 //! what comes into charge again after a start at which the directory holds something broken.
 
 use crate::history::Event;
-use crate::reload::prepared;
+use crate::reload::prepare_with_settings;
 use crate::settings;
 use adapters::clock::TimeNs;
-use rules::script::{Host, ScriptFile, ScriptProblem, ScriptSet, prepare};
+use rules::script::{Host, ScriptFile, ScriptProblem, ScriptSet, prepare_scripts};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ pub type Versions = BTreeMap<String, u64>;
 
 /// Where they are kept.
 #[must_use]
-pub fn path(data_dir: &Path) -> PathBuf {
+pub fn file_path(data_dir: &Path) -> PathBuf {
     data_dir.join(FILE)
 }
 
@@ -28,21 +28,21 @@ pub fn path(data_dir: &Path) -> PathBuf {
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn keep(data_dir: &Path, files: &[ScriptFile]) -> std::io::Result<()> {
-    crate::files::replace(&path(data_dir), &text(files))
+pub fn save_texts(data_dir: &Path, files: &[ScriptFile]) -> std::io::Result<()> {
+    crate::files::replace_file(&file_path(data_dir), &format_texts(files))
 }
 
 /// What the file says of this set.
 #[must_use]
-pub fn text(files: &[ScriptFile]) -> String {
+pub fn format_texts(files: &[ScriptFile]) -> String {
     let scripts: Map<String, Value> = files.iter().map(|file| (file.name.clone(), json!(file.text))).collect();
     json!({ "schema": "scripts_in_charge/1", "scripts": scripts }).to_string()
 }
 
 /// The texts that were kept; `None` where there are none.
 #[must_use]
-pub fn kept(data_dir: &Path) -> Option<Vec<ScriptFile>> {
-    let text = std::fs::read_to_string(path(data_dir)).ok()?;
+pub fn read_texts(data_dir: &Path) -> Option<Vec<ScriptFile>> {
+    let text = std::fs::read_to_string(file_path(data_dir)).ok()?;
     let document: Value = serde_json::from_str(&text).ok()?;
     let file =
         |(name, text): (&String, &Value)| Some(ScriptFile { name: name.clone(), text: text.as_str()?.to_owned() });
@@ -54,13 +54,15 @@ pub fn kept(data_dir: &Path) -> Option<Vec<ScriptFile>> {
 ///
 /// # Errors
 /// A newer program may find something wrong with it.
-pub fn last(data_dir: &Path) -> Option<Result<ScriptSet, Vec<ScriptProblem>>> {
-    kept(data_dir).map(|files| prepared(&files, Some(&settings::path(data_dir))).or_else(|_| prepare(&files)))
+pub fn prepare_last_set(data_dir: &Path) -> Option<Result<ScriptSet, Vec<ScriptProblem>>> {
+    read_texts(data_dir).map(|files| {
+        prepare_with_settings(&files, Some(&settings::values_path(data_dir))).or_else(|_| prepare_scripts(&files))
+    })
 }
 
 /// From `at_ns` on these scripts decide: what tells a backtest whose alarms the history holds.
 #[must_use]
-pub fn event(host: &Host, at_ns: TimeNs) -> Event {
+pub fn build_event(host: &Host, at_ns: TimeNs) -> Event {
     let words = |(file, version): (&str, u64)| (file.to_owned(), json!(format!("{version:016x}")));
     let scripts: Map<String, Value> = host.versions().map(words).collect();
     Event {
@@ -74,7 +76,7 @@ pub fn event(host: &Host, at_ns: TimeNs) -> Event {
 
 /// What such an event says; `None` when it cannot be read.
 #[must_use]
-pub fn versions(event: &Event) -> Option<Versions> {
+pub fn parse_versions(event: &Event) -> Option<Versions> {
     let document: Value = serde_json::from_str(&event.detail).ok()?;
     let version =
         |(file, version): (&String, &Value)| Some((file.clone(), u64::from_str_radix(version.as_str()?, 16).ok()?));
@@ -88,24 +90,29 @@ mod tests {
     #[test]
     fn the_history_is_told_the_versions() {
         let mut host = Host::new();
-        assert_eq!(versions(&event(&host, 7)), Some(Versions::new()));
-        host.load(&[ScriptFile { name: "a.rhai".to_owned(), text: "note(\"a\");\n".to_owned() }]).expect("compiles");
-        let told = versions(&event(&host, 7)).expect("readable");
+        assert_eq!(parse_versions(&build_event(&host, 7)), Some(Versions::new()));
+        host.load_scripts(&[ScriptFile { name: "a.rhai".to_owned(), text: "note(\"a\");\n".to_owned() }])
+            .expect("compiles");
+        let told = parse_versions(&build_event(&host, 7)).expect("readable");
         assert_eq!(
             told.into_iter().collect::<Vec<_>>(),
             [("a.rhai".to_owned(), host.versions().next().expect("one").1)]
         );
-        assert_eq!(versions(&Event { detail: "{".to_owned(), ..event(&host, 7) }), None, "half an event says nothing");
+        assert_eq!(
+            parse_versions(&Event { detail: "{".to_owned(), ..build_event(&host, 7) }),
+            None,
+            "half an event says nothing"
+        );
     }
 
     #[test]
     fn what_was_kept_comes_back() {
         let directory = tempfile::tempdir().expect("a directory");
-        assert_eq!(kept(directory.path()), None);
+        assert_eq!(read_texts(directory.path()), None);
         let files = vec![ScriptFile { name: "a.rhai".to_owned(), text: "note(\"报警\");\n".to_owned() }];
-        keep(directory.path(), &files).expect("written");
-        assert_eq!(kept(directory.path()), Some(files));
-        std::fs::write(path(directory.path()), "{").expect("written");
-        assert!(last(directory.path()).is_none(), "half a file is none");
+        save_texts(directory.path(), &files).expect("written");
+        assert_eq!(read_texts(directory.path()), Some(files));
+        std::fs::write(file_path(directory.path()), "{").expect("written");
+        assert!(prepare_last_set(directory.path()).is_none(), "half a file is none");
     }
 }

@@ -13,7 +13,7 @@ use adapters::merge::{Delay, Merge, SourceId, SourcePlan};
 use adapters::open::open_pull;
 use adapters::{Address, ChannelId, Pull, Reading, Sample};
 use rules::estimators;
-use rules::script::{Host, ScriptFile, shipped};
+use rules::script::{Host, ScriptFile, list_shipped_scripts};
 use serde_json::{Value, json};
 use std::fmt;
 use std::path::Path;
@@ -57,12 +57,12 @@ impl Course {
     ///
     /// # Errors
     /// [`BenchError::SetUp`].
-    pub fn simulated() -> Result<Self, BenchError> {
+    pub fn from_simulated_lathe() -> Result<Self, BenchError> {
         let bad = |error: &dyn fmt::Display| BenchError::SetUp(error.to_string());
         let address: Address = "simulated://lathe?seed=1".parse().map_err(|error| bad(&error))?;
         let mut sources = open_pull(&address, 0).map_err(|error| bad(&error))?.sources;
         let announced = sources.iter().flat_map(|source| source.channels().to_vec());
-        let chosen = choose(announced.collect());
+        let chosen = choose_channels(announced.collect());
         let kept = |plan: SourcePlan| {
             let channels = plan.channels.iter().copied().filter(|channel| chosen.contains(channel)).collect();
             SourcePlan { channels, ..plan }
@@ -77,9 +77,9 @@ impl Course {
     }
 
     /// Ticks `count` times, handing each sample to `each`.
-    fn go(&self, count: u64, mut each: impl FnMut(&Sample)) {
+    fn play_ticks(&self, count: u64, mut each: impl FnMut(&Sample)) {
         let mut merge = Merge::new(&self.plans, Delay::SlowestPeriod);
-        let mut sample = Sample::empty(0);
+        let mut sample = Sample::new_empty(0);
         let (mut next, mut shift_ns, mut now_ns) = (0, 0, WARM_UP_NS);
         for _ in 0..count {
             now_ns += TICK_NS;
@@ -97,9 +97,9 @@ impl Course {
 }
 
 /// The channels that the box itself looks at, then others until there are enough.
-fn choose(announced: Vec<ChannelId>) -> Vec<ChannelId> {
+fn choose_channels(announced: Vec<ChannelId>) -> Vec<ChannelId> {
     let first = ["spindle_speed_rpm", "feed_mm_min", "spindle_power_w", "total_power_w", "spindle_load_pct", "rapid"];
-    let mut chosen: Vec<ChannelId> = first.into_iter().filter_map(ChannelId::of).collect();
+    let mut chosen: Vec<ChannelId> = first.into_iter().filter_map(ChannelId::from_name).collect();
     for channel in announced {
         if chosen.len() < CHANNELS && !chosen.contains(&channel) {
             chosen.push(channel);
@@ -112,7 +112,7 @@ fn polls_of(source: SourceId, pull: &mut dyn Pull, chosen: &[ChannelId]) -> Vec<
     let mut polls = Vec::new();
     while let Some(arrived_ns) = pull.next_ns().filter(|at_ns| *at_ns < WARM_UP_NS + STRETCH_NS) {
         let mut readings = Vec::new();
-        let read = pull.pull(&mut readings).is_ok();
+        let read = pull.pull_readings(&mut readings).is_ok();
         readings.retain(|reading| chosen.contains(&reading.channel));
         if read && arrived_ns >= WARM_UP_NS {
             polls.push(Poll { source, arrived_ns, readings });
@@ -168,13 +168,13 @@ struct BenchRun<'a> {
 
 impl BenchRun<'_> {
     #[expect(clippy::cast_precision_loss, reason = "rates")]
-    fn run(&mut self, through: &'static str, mut each: impl FnMut(&Sample)) {
+    fn measure_stage(&mut self, through: &'static str, mut each: impl FnMut(&Sample)) {
         // A tenth beforehand: rings and tables have their size, scripts have run.
-        self.course.go(self.ticks / 10, &mut each);
+        self.course.play_ticks(self.ticks / 10, &mut each);
         let count = |allocations: Allocations| allocations.map(|count| count());
         let before = count(self.allocations);
         let (began, cpu) = (Instant::now(), usage::thread_cpu());
-        self.course.go(self.ticks, &mut each);
+        self.course.play_ticks(self.ticks, &mut each);
         let took = began.elapsed();
         let cpu = usage::thread_cpu().zip(cpu).map_or(took, |(after, before)| after - before);
         let after = count(self.allocations);
@@ -188,12 +188,12 @@ impl BenchRun<'_> {
 struct BenchHistory(Writer);
 
 impl Store for BenchHistory {
-    fn sample(&mut self, sample: &Sample, extras: &[crate::history::ExtraValue<'_>]) {
-        self.0.sample(sample, extras);
+    fn store_sample(&mut self, sample: &Sample, extras: &[crate::history::ExtraValue<'_>]) {
+        self.0.queue_sample(sample, extras);
     }
 
-    fn record(&mut self, record: crate::history::Record) {
-        self.0.record(record);
+    fn store_record(&mut self, record: crate::history::Record) {
+        self.0.queue_record(record);
     }
 }
 
@@ -201,28 +201,28 @@ impl Store for BenchHistory {
 ///
 /// # Errors
 /// See [`BenchError`].
-pub fn run(ticks: u64, directory: &Path, allocations: Allocations) -> Result<BenchFigures, BenchError> {
-    let course = Course::simulated()?;
+pub fn measure_ticks(ticks: u64, directory: &Path, allocations: Allocations) -> Result<BenchFigures, BenchError> {
+    let course = Course::from_simulated_lathe()?;
     let mut bench = BenchRun { course: &course, ticks, allocations, runs: Vec::new() };
-    bench.run("merge", |sample| {
+    bench.measure_stage("merge", |sample| {
         std::hint::black_box(sample);
     });
     let mut inferring = estimators::Inference::new(estimators::Settings::default());
-    bench.run("estimators", |sample| {
-        std::hint::black_box(inferring.infer(sample));
+    bench.measure_stage("estimators", |sample| {
+        std::hint::black_box(inferring.update_with_sample(sample));
     });
-    let (mut inferring, mut host) = (estimators::Inference::new(estimators::Settings::default()), host()?);
-    bench.run("scripts", |sample| {
-        let estimates = *inferring.infer(sample);
-        std::hint::black_box(host.tick(sample, &estimates));
+    let (mut inferring, mut host) = (estimators::Inference::new(estimators::Settings::default()), build_host()?);
+    bench.measure_stage("scripts", |sample| {
+        let estimates = *inferring.update_with_sample(sample);
+        std::hint::black_box(host.run_due_scripts(sample, &estimates));
     });
-    let scripts = alone(&course, ticks)?;
-    let mut whole = pipeline()?;
-    bench.run("gate and records", |sample| whole.step(sample, &mut NoStore));
-    let options = Options { when_full: WhenFull::Wait, extras: pipeline()?.series(), ..Options::default() };
+    let scripts = measure_scripts(&course, ticks)?;
+    let mut whole = build_pipeline()?;
+    bench.measure_stage("gate and records", |sample| whole.run_tick(sample, &mut NoStore));
+    let options = Options { when_full: WhenFull::Wait, extras: build_pipeline()?.extra_series(), ..Options::default() };
     let path = directory.join("bench.db");
-    let (mut whole, mut store) = (pipeline()?, BenchHistory(Writer::open(&path, options)?));
-    bench.run("history", |sample| whole.step(sample, &mut store));
+    let (mut whole, mut store) = (build_pipeline()?, BenchHistory(Writer::open(&path, options)?));
+    bench.measure_stage("history", |sample| whole.run_tick(sample, &mut store));
     store.0.flush()?;
     let status = store.0.close();
     #[expect(clippy::cast_precision_loss, reason = "a rate")]
@@ -231,36 +231,36 @@ pub fn run(ticks: u64, directory: &Path, allocations: Allocations) -> Result<Ben
 }
 
 /// Every shipped script by itself, against a host without scripts. A tenth of the ticks of the other runs is enough.
-fn alone(course: &Course, ticks: u64) -> Result<Vec<(String, f64)>, BenchError> {
+fn measure_scripts(course: &Course, ticks: u64) -> Result<Vec<(String, f64)>, BenchError> {
     let ticks = (ticks / 10).max(TICKS_MIN);
     let cost = |files: &[ScriptFile]| -> Result<f64, BenchError> {
         let mut bench = BenchRun { course, ticks, allocations: None, runs: Vec::new() };
         let (mut inferring, mut host) = (estimators::Inference::new(estimators::Settings::default()), host_of(files)?);
-        bench.run("script", |sample| {
-            let estimates = *inferring.infer(sample);
-            std::hint::black_box(host.tick(sample, &estimates));
+        bench.measure_stage("script", |sample| {
+            let estimates = *inferring.update_with_sample(sample);
+            std::hint::black_box(host.run_due_scripts(sample, &estimates));
         });
         Ok(bench.runs.first().map_or(0.0, |run| run.cpu_us_per_tick))
     };
     let without = cost(&[])?;
-    let files = shipped().into_iter();
+    let files = list_shipped_scripts().into_iter();
     files.map(|file| Ok((file.name.clone(), (cost(std::slice::from_ref(&file))? - without).max(0.0)))).collect()
 }
 
-fn host() -> Result<Host, BenchError> {
-    host_of(&shipped())
+fn build_host() -> Result<Host, BenchError> {
+    host_of(&list_shipped_scripts())
 }
 
 fn host_of(files: &[ScriptFile]) -> Result<Host, BenchError> {
     let mut host = Host::new();
-    host.load(files).map_err(|problems| BenchError::SetUp(format!("{problems:?}")))?;
+    host.load_scripts(files).map_err(|problems| BenchError::SetUp(format!("{problems:?}")))?;
     Ok(host)
 }
 
-fn pipeline() -> Result<Pipeline, BenchError> {
+fn build_pipeline() -> Result<Pipeline, BenchError> {
     let config = config::load(None, []).map_err(|problems| BenchError::SetUp(format!("{problems:?}")))?;
     let fresh = estimators::Inference::new(estimators::Settings::default());
-    Ok(Pipeline::new(fresh, host()?, Gate::new(config.gate)))
+    Ok(Pipeline::new(fresh, build_host()?, Gate::new(config.gate)))
 }
 
 impl BenchFigures {
@@ -277,16 +277,16 @@ impl BenchFigures {
     }
 
     /// Each stage with the processor time it adds to a tick, us.
-    fn stages(&self) -> impl Iterator<Item = (&'static str, f64)> {
+    fn compute_stage_costs(&self) -> impl Iterator<Item = (&'static str, f64)> {
         let before = std::iter::once(0.0).chain(self.runs.iter().map(|run| run.cpu_us_per_tick));
         self.runs.iter().zip(before).map(|(run, before)| (run.through, run.cpu_us_per_tick - before))
     }
 
     /// The figures as JSON (`bench/1`).
     #[must_use]
-    pub fn json(&self) -> Value {
+    pub fn to_json(&self) -> Value {
         let whole = self.runs.last();
-        let stages = self.stages().map(|(stage, us)| {
+        let stages = self.compute_stage_costs().map(|(stage, us)| {
             json!({ "stage": stage, "cpu_us_per_tick": us, "share": us / whole.map_or(1.0, |whole| whole.cpu_us_per_tick) })
         });
         let scripts = self.scripts.iter().map(|(file, us)| json!({ "script": file, "cpu_us_per_tick": us }));
@@ -313,7 +313,7 @@ impl fmt::Display for BenchFigures {
             self.ticks
         )?;
         let whole = self.runs.last().map_or(1.0, |whole| whole.cpu_us_per_tick);
-        for ((stage, us), run) in self.stages().zip(&self.runs) {
+        for ((stage, us), run) in self.compute_stage_costs().zip(&self.runs) {
             write!(f, "  {stage:<18} {us:>7.2} us {:>5.1} %", 100.0 * us / whole)?;
             match run.allocations_per_tick {
                 Some(count) => writeln!(f, "   {count:.3} allocations per tick up to here")?,

@@ -8,7 +8,7 @@ use crate::reload::read_directory;
 use crate::sinks::broker::broker_files;
 use adapters::address::{FanucBackend, NcLinkTarget, Target};
 use adapters::recording::{RecordingError, read_path};
-use adapters::words::{canonical, of_channel};
+use adapters::words::{find_canonical_word, of_channel};
 use rules::estimators::StateBasis;
 use rules::estimators::thermal::ThermalModel;
 use rules::{script, twin};
@@ -28,7 +28,7 @@ pub struct CheckReport {
 impl CheckReport {
     /// Nothing is wrong.
     #[must_use]
-    pub fn fine(&self) -> bool {
+    pub fn is_fine(&self) -> bool {
         self.problems.is_empty()
     }
 }
@@ -58,13 +58,16 @@ impl From<script::ScriptProblem> for Problem {
 
 /// Checks the file, or without one the built-in configuration, and everything it names.
 #[must_use]
-pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String, String)>) -> CheckReport {
+pub fn check_configuration(
+    file: Option<&Path>,
+    environment: impl IntoIterator<Item = (String, String)>,
+) -> CheckReport {
     let mut report = CheckReport::default();
     match config::load(file, environment) {
         Ok(config) => {
             let name = file.map_or_else(|| config::BUILT_IN.to_owned(), |file| file.display().to_string());
-            report.read.push(summary(&name, &config));
-            report.read.extend(reach(&config));
+            report.read.push(describe_config(&name, &config));
+            report.read.extend(describe_reach(&config));
             check_certificate(&config, &mut report);
             check_scripts(&config, &mut report);
             check_operations(&config, &mut report);
@@ -79,7 +82,7 @@ pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String,
     report
 }
 
-fn summary(name: &str, config: &Config) -> String {
+fn describe_config(name: &str, config: &Config) -> String {
     let sources: Vec<&str> = config.sources.iter().map(|source| source.name.as_str()).collect();
     let gate = match config.gate.mode {
         config::GateMode::Off => "the gate is off",
@@ -103,14 +106,14 @@ fn state_basis(name: &str, config: &Config) -> Option<String> {
         if matches!(source.address.target(), Target::Waveform { .. }) {
             return None;
         }
-        let opened = adapters::open::open(&source.address, 0).ok()?;
+        let opened = adapters::open::open_address(&source.address, 0).ok()?;
         channels.extend(opened.sources.iter().flat_map(|source| source.channels().to_vec()));
     }
     Some(format!("{name}: {}", StateBasis::of_channels(|id| channels.contains(&id))))
 }
 
 /// What a page does that other computers can reach.
-fn reach(config: &Config) -> Option<String> {
+fn describe_reach(config: &Config) -> Option<String> {
     let http = &config.http;
     let arming = if http.allow_arming { "; the gate may be armed from it" } else { "" };
     // The configuration is refused where such a page would be open to all.
@@ -123,7 +126,7 @@ fn check_certificate(config: &Config, report: &mut CheckReport) {
     let Some((certificate, key)) = config.http.certificate.as_ref().filter(|_| config.http.tls) else { return };
     match Certificate::read(certificate, key) {
         Ok(read) => report.read.push(format!("{}: SHA-256 {}", certificate.display(), read.fingerprint)),
-        Err(error) => report.problems.push(Problem::of(certificate.display().to_string(), error.to_string(), "")),
+        Err(error) => report.problems.push(Problem::in_file(certificate.display().to_string(), error.to_string(), "")),
     }
 }
 
@@ -134,24 +137,24 @@ fn check_scripts(config: &Config, report: &mut CheckReport) {
         read_directory(directory)
     } else {
         report.read.push(format!("{shown}: not there yet; the first start writes the shipped scripts into it"));
-        Ok(script::shipped())
+        Ok(script::list_shipped_scripts())
     };
-    let values = crate::settings::path(&config.gateway.data_dir);
-    match files.and_then(|files| crate::reload::prepared(&files, Some(&values))) {
+    let values = crate::settings::values_path(&config.gateway.data_dir);
+    match files.and_then(|files| crate::reload::prepare_with_settings(&files, Some(&values))) {
         Ok(set) => {
-            let trials = script::trials(&set).len();
+            let trials = script::run_trials(&set).len();
             report.read.push(format!("{shown}: {} scripts, {trials} trials passed", set.len()));
-            let chosen = set.values().all().count();
+            let chosen = set.values().list_values().count();
             if chosen > 0 {
                 report.read.push(format!("{}: {chosen} settings chosen", values.display()));
             }
         }
-        Err(problems) => report.problems.extend(problems.into_iter().map(|problem| below(directory, problem))),
+        Err(problems) => report.problems.extend(problems.into_iter().map(|problem| with_full_path(directory, problem))),
     }
 }
 
 /// The name of the file as the user can open it.
-fn below(directory: &Path, problem: script::ScriptProblem) -> Problem {
+fn with_full_path(directory: &Path, problem: script::ScriptProblem) -> Problem {
     let mut problem = Problem::from(problem);
     if directory.join(&problem.file).is_file() {
         problem.file = directory.join(&problem.file).display().to_string();
@@ -177,7 +180,7 @@ fn check_model(config: &Config, report: &mut CheckReport) {
         Ok(text) => text,
         Err(error) => {
             let next = "`model` under [twin] names it; `identify` writes one";
-            return report.problems.push(Problem::of(name, format!("the model cannot be read: {error}"), next));
+            return report.problems.push(Problem::in_file(name, format!("the model cannot be read: {error}"), next));
         }
     };
     match twin::parse_model(&text) {
@@ -202,7 +205,7 @@ fn check_thermal(config: &Config, report: &mut CheckReport) {
         Ok(model) => report.read.push(format!("{name}: a thermal law of {} terms", model.law.terms.len())),
         Err(what) => {
             let next = "`model` under [thermal] names it; `identify thermal --model` writes one";
-            report.problems.push(Problem::of(name, what, next));
+            report.problems.push(Problem::in_file(name, what, next));
         }
     }
 }
@@ -210,7 +213,7 @@ fn check_thermal(config: &Config, report: &mut CheckReport) {
 /// The files that the addresses of the sinks name.
 fn check_sinks(name: &str, config: &Config, report: &mut CheckReport) {
     for sink in &config.sinks {
-        let problems = sink.address.check();
+        let problems = sink.address.find_file_problems();
         if problems.is_empty() {
             report
                 .read
@@ -226,7 +229,7 @@ fn check_sinks(name: &str, config: &Config, report: &mut CheckReport) {
                 sink.name
             ));
         }
-        let problem = |(what, next)| Problem::of(name, format!("sink {}: {what}", sink.name), next);
+        let problem = |(what, next)| Problem::in_file(name, format!("sink {}: {what}", sink.name), next);
         report.problems.extend(problems.into_iter().map(problem));
     }
 }
@@ -234,7 +237,7 @@ fn check_sinks(name: &str, config: &Config, report: &mut CheckReport) {
 /// The files that the address of a broker names.
 fn check_broker(name: &str, source: &str, target: &NcLinkTarget, report: &mut CheckReport) {
     for (what, next) in broker_files(target.tls.as_ref(), &target.login) {
-        report.problems.push(Problem::of(name, format!("source {source}: {what}"), next));
+        report.problems.push(Problem::in_file(name, format!("source {source}: {what}"), next));
     }
 }
 
@@ -254,7 +257,7 @@ fn check_library(path: &Path, report: &mut CheckReport) {
     if !path.is_file() {
         let next =
             "`library=` in the address names it; the machine's maker delivers it, it cannot come with the gateway";
-        report.problems.push(Problem::of(path.display().to_string(), "the vendor library is not there", next));
+        report.problems.push(Problem::in_file(path.display().to_string(), "the vendor library is not there", next));
     }
 }
 
@@ -262,10 +265,10 @@ fn check_library(path: &Path, report: &mut CheckReport) {
 fn unknown_words(name: &str, recording: &adapters::Recording) -> Vec<Problem> {
     let channels = ["mode", "execution"].into_iter().filter_map(|channel| Some((channel, of_channel(channel)?)));
     let unknown = channels.flat_map(|(channel, known)| {
-        let words = recording.words(channel).map(|words| words.words().to_vec()).unwrap_or_default();
-        words.into_iter().filter(move |word| canonical(channel, word).is_none()).map(move |word| {
+        let words = recording.find_words(channel).map(|words| words.words().to_vec()).unwrap_or_default();
+        words.into_iter().filter(move |word| find_canonical_word(channel, word).is_none()).map(move |word| {
             let next = format!("write one of {}", known.join(", "));
-            Problem::of(name, format!("{channel} is never {word:?}: the gate holds 100 % while it is"), next)
+            Problem::in_file(name, format!("{channel} is never {word:?}: the gate holds 100 % while it is"), next)
         })
     });
     unknown.collect()
@@ -282,18 +285,18 @@ fn check_recording(path: &Path, report: &mut CheckReport) {
     };
     match read_path(path) {
         Ok(read) => {
-            let rows = read.recording.rows();
+            let rows = read.recording.count_rows();
             report.read.push(format!("{name}: {rows} rows, {} refused", read.refused));
             let described = read.problems.len() as u64;
             report.problems.extend(read.problems.into_iter().map(row));
             report.problems.extend(unknown_words(&name, &read.recording));
             if read.refused > described {
                 let what = format!("{} more rows are refused", read.refused - described);
-                report.problems.push(Problem::of(name, what, "the first of them are told above"));
+                report.problems.push(Problem::in_file(name, what, "the first of them are told above"));
             }
         }
         Err(RecordingError::Io { error, .. }) => {
-            report.problems.push(Problem::of(
+            report.problems.push(Problem::in_file(
                 name,
                 format!("the recording cannot be read: {error}"),
                 "look at the path",
@@ -301,11 +304,13 @@ fn check_recording(path: &Path, report: &mut CheckReport) {
         }
         Err(RecordingError::Header { line, reason, .. }) => {
             let line = usize::try_from(line).ok();
-            report.problems.push(Problem { line, ..Problem::of(name.clone(), reason.en, "") });
+            report.problems.push(Problem { line, ..Problem::in_file(name.clone(), reason.en, "") });
         }
-        Err(RecordingError::Format { reason, .. }) => report.problems.push(Problem::of(name.clone(), reason.en, "")),
+        Err(RecordingError::Format { reason, .. }) => {
+            report.problems.push(Problem::in_file(name.clone(), reason.en, ""))
+        }
         Err(RecordingError::Empty { problems, .. }) => {
-            report.problems.push(Problem::of(name.clone(), "the recording has no usable row", ""));
+            report.problems.push(Problem::in_file(name.clone(), "the recording has no usable row", ""));
             report.problems.extend(problems.into_iter().map(row));
         }
     }

@@ -4,8 +4,8 @@
 //! A draft counts for nothing until it is put in charge. Two persons may have the same script open: whoever saves second is told,
 //! because each save names the text that it began from.
 
-use crate::files::{read_text, replace};
-use crate::reload::digest;
+use crate::files::{read_text, replace_file};
+use crate::reload::compute_digest;
 use rules::script::TEXT_MAX;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -42,7 +42,7 @@ pub struct Version {
 /// What tells one text from another.
 #[must_use]
 pub fn digest_of(text: &str) -> String {
-    format!("{:016x}", digest(text.as_bytes()))
+    format!("{:016x}", compute_digest(text.as_bytes()))
 }
 
 /// May a script be called this? Lower-case letters, digits and `_`, ending in `.rhai`: never a path.
@@ -62,29 +62,29 @@ pub struct Drafts {
 impl Drafts {
     /// Those of the box that keeps everything here.
     #[must_use]
-    pub fn of(data_dir: &Path) -> Self {
+    pub fn from_data_dir(data_dir: &Path) -> Self {
         Self { data_dir: data_dir.to_owned() }
     }
 
-    fn path(&self, folder: &str, name: &str) -> PathBuf {
+    fn file_path(&self, folder: &str, name: &str) -> PathBuf {
         self.data_dir.join(folder).join(format!("{name}.json"))
     }
 
     fn write(&self, folder: &str, name: &str, text: &str) -> std::io::Result<()> {
         std::fs::create_dir_all(self.data_dir.join(folder))?;
-        replace(&self.path(folder, name), text)
+        replace_file(&self.file_path(folder, name), text)
     }
 
     /// The draft of this script; `None` where there is none.
     #[must_use]
-    pub fn draft(&self, name: &str) -> Option<Draft> {
-        let text = read_text(&self.path("drafts", name), 2 * TEXT_MAX + 4096).ok()?;
+    pub fn read_draft(&self, name: &str) -> Option<Draft> {
+        let text = read_text(&self.file_path("drafts", name), 2 * TEXT_MAX + 4096).ok()?;
         serde_json::from_str(&text).ok()
     }
 
     /// The scripts that have a draft.
     #[must_use]
-    pub fn names(&self) -> Vec<String> {
+    pub fn list_names(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.data_dir.join("drafts")).into_iter().flatten().flatten();
         let names =
             entries.filter_map(|entry| Some(entry.file_name().into_string().ok()?.strip_suffix(".json")?.to_owned()));
@@ -97,7 +97,7 @@ impl Drafts {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn save(&self, name: &str, draft: &Draft) -> std::io::Result<()> {
+    pub fn save_draft(&self, name: &str, draft: &Draft) -> std::io::Result<()> {
         self.write("drafts", name, &serde_json::to_string(draft)?)
     }
 
@@ -105,8 +105,8 @@ impl Drafts {
     ///
     /// # Errors
     /// The file cannot be removed.
-    pub fn discard(&self, name: &str) -> std::io::Result<()> {
-        match std::fs::remove_file(self.path("drafts", name)) {
+    pub fn remove_draft(&self, name: &str) -> std::io::Result<()> {
+        match std::fs::remove_file(self.file_path("drafts", name)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error),
             _ => Ok(()),
         }
@@ -114,8 +114,8 @@ impl Drafts {
 
     /// What was in charge before, the newest first.
     #[must_use]
-    pub fn versions(&self, name: &str) -> Vec<Version> {
-        let text = read_text(&self.path("versions", name), FILE_MAX).unwrap_or_default();
+    pub fn read_versions(&self, name: &str) -> Vec<Version> {
+        let text = read_text(&self.file_path("versions", name), FILE_MAX).unwrap_or_default();
         serde_json::from_str(&text).unwrap_or_default()
     }
 
@@ -123,8 +123,8 @@ impl Drafts {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn keep(&self, name: &str, version: Version) -> std::io::Result<()> {
-        let mut versions = self.versions(name);
+    pub fn keep_version(&self, name: &str, version: Version) -> std::io::Result<()> {
+        let mut versions = self.read_versions(name);
         if versions.first().is_some_and(|newest| newest.text == version.text) {
             return Ok(());
         }
@@ -155,22 +155,22 @@ mod tests {
     #[test]
     fn drafts_and_versions_come_back_and_the_oldest_go() {
         let directory = tempfile::tempdir().expect("a directory");
-        let drafts = Drafts::of(directory.path());
-        assert_eq!((drafts.draft("a.rhai"), drafts.versions("a.rhai")), (None, Vec::new()));
+        let drafts = Drafts::from_data_dir(directory.path());
+        assert_eq!((drafts.read_draft("a.rhai"), drafts.read_versions("a.rhai")), (None, Vec::new()));
         let draft = Draft { text: "let x = 1;".to_owned(), by: "Li".to_owned(), at_ms: 5 };
-        drafts.save("a.rhai", &draft).expect("written");
-        assert_eq!(drafts.draft("a.rhai"), Some(draft));
-        drafts.discard("a.rhai").expect("removed");
-        drafts.discard("a.rhai").expect("nothing to remove");
-        assert_eq!(drafts.draft("a.rhai"), None);
+        drafts.save_draft("a.rhai", &draft).expect("written");
+        assert_eq!(drafts.read_draft("a.rhai"), Some(draft));
+        drafts.remove_draft("a.rhai").expect("removed");
+        drafts.remove_draft("a.rhai").expect("nothing to remove");
+        assert_eq!(drafts.read_draft("a.rhai"), None);
         for at in 0..150 {
-            drafts.keep("a.rhai", version(&format!("{}", at / 2), at)).expect("written");
+            drafts.keep_version("a.rhai", version(&format!("{}", at / 2), at)).expect("written");
         }
-        let kept = drafts.versions("a.rhai");
+        let kept = drafts.read_versions("a.rhai");
         assert_eq!((kept.len(), kept[0].text.as_str(), kept[74].text.as_str()), (75, "74", "0"));
         for at in 150..400 {
-            drafts.keep("a.rhai", version(&format!("{at}"), at)).expect("written");
+            drafts.keep_version("a.rhai", version(&format!("{at}"), at)).expect("written");
         }
-        assert_eq!(drafts.versions("a.rhai").len(), VERSIONS_MAX);
+        assert_eq!(drafts.read_versions("a.rhai").len(), VERSIONS_MAX);
     }
 }

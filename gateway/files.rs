@@ -17,7 +17,7 @@ pub type Mark = (PathBuf, Option<(Option<SystemTime>, u64)>);
 
 /// The mark of this file as it is now.
 #[must_use]
-pub fn mark(path: &Path) -> Mark {
+pub fn read_mark(path: &Path) -> Mark {
     let metadata = std::fs::metadata(path).ok();
     (path.to_owned(), metadata.map(|metadata| (metadata.modified().ok(), metadata.len())))
 }
@@ -61,13 +61,13 @@ impl<M: PartialEq + Clone> Rest<M> {
 
     /// What is like this has been read already.
     #[must_use]
-    pub fn known(mark: M) -> Self {
+    pub fn from_known_mark(mark: M) -> Self {
         Self { seen: Some(mark.clone()), taken: Some(mark) }
     }
 
     /// Is what is marked so to be read now? When it has changed and is as it was at the look before; when `asked`, as soon as
     /// it has changed.
-    pub fn look(&mut self, now: M, asked: bool) -> bool {
+    pub fn should_read(&mut self, now: M, asked: bool) -> bool {
         let still = self.seen.replace(now.clone()).is_none_or(|before| before == now);
         if self.taken.as_ref() == Some(&now) || !(still || asked) {
             return false;
@@ -104,7 +104,7 @@ impl<T: Send + 'static> Lookout<T> {
         let (send, newest) = sync_channel(1);
         let (asked, asks) = sync_channel(1);
         let work = move || {
-            while let Some(asked) = wait(&asks, poll) {
+            while let Some(asked) = wait_for_look(&asks, poll) {
                 if look(asked).is_some_and(|found| send.send(found).is_err()) {
                     return;
                 }
@@ -115,19 +115,19 @@ impl<T: Send + 'static> Lookout<T> {
     }
 
     /// Makes it look now. Returns at once.
-    pub fn ask(&self) {
+    pub fn request_look(&self) {
         // A full queue means that it has been asked already.
         let _asked_before = self.asked.try_send(());
     }
 
     /// What was found since the last call, if anything was.
-    pub fn take(&self) -> Option<T> {
+    pub fn take_newest(&self) -> Option<T> {
         self.newest.try_recv().ok()
     }
 }
 
 /// Waits for the next look; tells whether somebody asked for it. `None` when nobody is there any more.
-fn wait(asks: &Receiver<()>, poll: bool) -> Option<bool> {
+fn wait_for_look(asks: &Receiver<()>, poll: bool) -> Option<bool> {
     loop {
         match asks.recv_timeout(LOOK_EVERY) {
             Ok(()) => return Some(true),
@@ -150,7 +150,7 @@ pub fn read_text(path: &Path, limit: usize) -> std::io::Result<String> {
 
 /// What to do about a file that is there and cannot be read.
 #[must_use]
-pub fn advice(error: &std::io::Error) -> &'static str {
+pub fn advise_on_read_error(error: &std::io::Error) -> &'static str {
     match error.kind() {
         std::io::ErrorKind::InvalidData => "save the file as UTF-8",
         _ => "look at the permissions",
@@ -161,9 +161,9 @@ pub fn advice(error: &std::io::Error) -> &'static str {
 ///
 /// # Errors
 /// The file or its directory cannot be written; what was there before stays.
-pub fn replace(path: &Path, text: &str) -> std::io::Result<()> {
+pub fn replace_file(path: &Path, text: &str) -> std::io::Result<()> {
     path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-    let fresh = fresh(path);
+    let fresh = temporary_path(path);
     std::fs::write(&fresh, text)?;
     std::fs::rename(&fresh, path)
 }
@@ -171,11 +171,11 @@ pub fn replace(path: &Path, text: &str) -> std::io::Result<()> {
 /// The same, and returns only when it would survive a power cut.
 ///
 /// # Errors
-/// As for [`replace`].
+/// As for [`replace_file`].
 pub fn replace_durably(path: &Path, text: &str) -> std::io::Result<()> {
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(directory)?;
-    let fresh = fresh(path);
+    let fresh = temporary_path(path);
     let mut file = std::fs::File::create(&fresh)?;
     file.write_all(text.as_bytes())?;
     file.sync_all()?;
@@ -186,12 +186,12 @@ pub fn replace_durably(path: &Path, text: &str) -> std::io::Result<()> {
 /// The same as [`replace_durably`], for a file that nobody but this user may read (mode 600).
 ///
 /// # Errors
-/// As for [`replace`].
+/// As for [`replace_file`].
 pub fn replace_privately(path: &Path, text: &str) -> std::io::Result<()> {
     use std::os::unix::fs::OpenOptionsExt;
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(directory)?;
-    let fresh = fresh(path);
+    let fresh = temporary_path(path);
     // One that was left behind may have another mode, or be a link to somewhere else.
     let _none_left = std::fs::remove_file(&fresh);
     let mut file = std::fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&fresh)?;
@@ -202,7 +202,7 @@ pub fn replace_privately(path: &Path, text: &str) -> std::io::Result<()> {
 }
 
 /// Where a file is written before it takes its place.
-fn fresh(path: &Path) -> PathBuf {
+fn temporary_path(path: &Path) -> PathBuf {
     let mut fresh = path.as_os_str().to_owned();
     fresh.push(".writing");
     fresh.into()
@@ -214,21 +214,21 @@ mod tests {
 
     #[test]
     fn a_change_is_taken_once_when_it_has_come_to_rest() {
-        let mut rest = Rest::known(1);
-        assert!(!rest.look(1, false) && !rest.look(1, true), "known");
-        assert!(!rest.look(2, false) && !rest.look(3, false), "still being written");
-        assert!(rest.look(3, false) && !rest.look(3, false));
-        assert!(rest.look(4, true) && !rest.look(4, false), "asked, it does not wait");
-        assert!(Rest::new().look(1, false), "the first look finds everything at rest");
+        let mut rest = Rest::from_known_mark(1);
+        assert!(!rest.should_read(1, false) && !rest.should_read(1, true), "known");
+        assert!(!rest.should_read(2, false) && !rest.should_read(3, false), "still being written");
+        assert!(rest.should_read(3, false) && !rest.should_read(3, false));
+        assert!(rest.should_read(4, true) && !rest.should_read(4, false), "asked, it does not wait");
+        assert!(Rest::new().should_read(1, false), "the first look finds everything at rest");
     }
 
     #[test]
     fn a_file_is_replaced_as_a_whole_and_read_no_further_than_the_limit() {
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("deeper").join("file.toml");
-        let before = mark(&path);
-        replace(&path, "12345").expect("written");
-        assert_ne!(mark(&path), before);
+        let before = read_mark(&path);
+        replace_file(&path, "12345").expect("written");
+        assert_ne!(read_mark(&path), before);
         assert_eq!(read_text(&path, 3).expect("read"), "1234");
         assert_eq!(std::fs::read_dir(directory.path().join("deeper")).expect("there").count(), 1, "nothing is left");
     }

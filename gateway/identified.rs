@@ -4,7 +4,7 @@
 //! and why, stand in this answer alone. `identify` and `commission --write` keep it in `identified/SUBJECT.json` of the data
 //! directory; `GET /api/v1/identified/SUBJECT` hands it to the page.
 
-use crate::files::replace;
+use crate::files::replace_file;
 use rules::estimators::thermal::{LeftOut, ThermalLearned};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -20,13 +20,13 @@ const DIRECTORY: &str = "identified";
 
 /// Where the answer on this subject stands.
 #[must_use]
-pub fn path(data_dir: &Path, subject: &str) -> PathBuf {
+pub fn answer_path(data_dir: &Path, subject: &str) -> PathBuf {
     data_dir.join(DIRECTORY).join(format!("{subject}.json"))
 }
 
 /// The answer (identify/1) that `--json` prints as well.
 #[must_use]
-pub fn answer(subject: &str, learned: &Value) -> Value {
+pub fn build_answer(subject: &str, learned: &Value) -> Value {
     json!({ "schema": "identify/1", "what": subject, "refused": null, "learned": learned })
 }
 
@@ -35,8 +35,8 @@ pub fn answer(subject: &str, learned: &Value) -> Value {
 pub fn of_thermal(learned: &ThermalLearned, left_out: &LeftOut) -> Value {
     let mut document = json!(learned);
     document["left_out"] = json!(left_out);
-    document["law"] = json!(learned.best().fit.law);
-    document["coefficients"] = json!(learned.best().fit.coefficients);
+    document["law"] = json!(learned.best_candidate().fit.law);
+    document["coefficients"] = json!(learned.best_candidate().fit.coefficients);
     document
 }
 
@@ -44,9 +44,9 @@ pub fn of_thermal(learned: &ThermalLearned, left_out: &LeftOut) -> Value {
 ///
 /// # Errors
 /// The file cannot be written: which, and why.
-pub fn keep(data_dir: &Path, subject: &str, learned: &Value) -> Result<PathBuf, String> {
-    let path = path(data_dir, subject);
-    let text = format!("{:#}\n", answer(subject, learned));
-    let made = std::fs::create_dir_all(data_dir.join(DIRECTORY)).and_then(|()| replace(&path, &text));
+pub fn save_answer(data_dir: &Path, subject: &str, learned: &Value) -> Result<PathBuf, String> {
+    let path = answer_path(data_dir, subject);
+    let text = format!("{:#}\n", build_answer(subject, learned));
+    let made = std::fs::create_dir_all(data_dir.join(DIRECTORY)).and_then(|()| replace_file(&path, &text));
     made.map(|()| path.clone()).map_err(|error| format!("{}: {error}", path.display()))
 }

@@ -6,7 +6,7 @@
 //! covers the text of the state. A file of an older version is the state alone, without a sum: it has neither that beginning nor
 //! that end.
 
-use crate::files::replace;
+use crate::files::replace_file;
 use crate::log::{Notice, Severity};
 use crate::status::StatusProblem;
 use std::io::{self, ErrorKind};
@@ -19,14 +19,14 @@ const HEAD: &str = "{\"schema\":\"learned/1\",\"crc32\":\"";
 const STATE: &str = "\",\"state\":";
 const END: &str = ",\"sealed\":true}";
 
-fn beside(path: &Path, end: &str) -> PathBuf {
+fn add_suffix(path: &Path, end: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(end);
     name.into()
 }
 
 /// The file of a state, which is a text of JSON.
-fn sealed(state: &str) -> String {
+fn format_with_checksum(state: &str) -> String {
     format!("{HEAD}{:08x}{STATE}{state}{END}", crc32fast::hash(state.as_bytes()))
 }
 
@@ -45,10 +45,10 @@ pub fn state_of(text: &str) -> Option<&str> {
 ///
 /// # Errors
 /// The file cannot be written; what was there is there still, under one of its names.
-pub fn save(path: &Path, state: &str) -> io::Result<()> {
-    match std::fs::rename(path, beside(path, BEFORE)) {
+pub fn save_state(path: &Path, state: &str) -> io::Result<()> {
+    match std::fs::rename(path, add_suffix(path, BEFORE)) {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
-        _ => replace(path, &sealed(state)),
+        _ => replace_file(path, &format_with_checksum(state)),
     }
 }
 
@@ -58,7 +58,7 @@ pub fn read(path: &Path, mut tell: impl FnMut(Notice)) -> Option<String> {
     let text = match std::fs::read(path) {
         Ok(bytes) => String::from_utf8(bytes).unwrap_or_default(),
         // Killed between the two steps of a save.
-        Err(error) if error.kind() == ErrorKind::NotFound => return before(path),
+        Err(error) if error.kind() == ErrorKind::NotFound => return read_previous(path),
         Err(error) => {
             let text = format!("{}: what was learned cannot be read: {error}", path.display());
             tell(Notice::new(Severity::Error, "learned_unreadable", text));
@@ -68,26 +68,26 @@ pub fn read(path: &Path, mut tell: impl FnMut(Notice)) -> Option<String> {
     if let Some(state) = state_of(&text) {
         return Some(state.to_owned());
     }
-    let aside = beside(path, DAMAGED);
+    let aside = add_suffix(path, DAMAGED);
     let kept = match std::fs::rename(path, &aside) {
         Ok(()) => format!("it is kept as {}", aside.display()),
         Err(error) => format!("it could not be set aside ({error})"),
     };
-    let before = before(path);
+    let before = read_previous(path);
     let then = if before.is_some() { "the save before it is in force" } else { "it is learned anew" };
     let text = format!("{}: the disk has changed what was learned; {kept}, and {then}", path.display());
     tell(Notice::new(Severity::Error, "learned_damaged", text));
     before
 }
 
-fn before(path: &Path) -> Option<String> {
-    let text = std::fs::read_to_string(beside(path, BEFORE)).ok()?;
+fn read_previous(path: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(add_suffix(path, BEFORE)).ok()?;
     state_of(&text).map(str::to_owned)
 }
 
 /// Damaged files of this directory that nobody has looked at yet.
 #[must_use]
-pub fn damaged(directory: &Path) -> Vec<StatusProblem> {
+pub fn list_damaged(directory: &Path) -> Vec<StatusProblem> {
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
     let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
     let mut names: Vec<String> = names.filter(|name| name.ends_with(&format!(".json{DAMAGED}"))).collect();
@@ -117,8 +117,8 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("wear.json");
         assert_eq!(found(&path), (None, Vec::new()), "a first start");
-        save(&path, "{\"edges\":1.25}").expect("written");
-        save(&path, "{\"edges\":2.5}").expect("written");
+        save_state(&path, "{\"edges\":1.25}").expect("written");
+        save_state(&path, "{\"edges\":2.5}").expect("written");
         let whole = std::fs::read(&path).expect("there");
         for index in 0..whole.len() {
             for bit in 0..8 {
@@ -131,7 +131,7 @@ mod tests {
                 assert_eq!(std::fs::read(directory.path().join("wear.json.damaged")).expect("kept"), bytes);
             }
         }
-        assert_eq!(damaged(directory.path()).len(), 1);
+        assert_eq!(list_damaged(directory.path()).len(), 1);
         std::fs::write(&path, &whole).expect("written");
         assert_eq!(found(&path), (Some("{\"edges\":2.5}".to_owned()), Vec::new()));
         std::fs::remove_file(&path).expect("removed");

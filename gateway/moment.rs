@@ -23,16 +23,16 @@ pub fn parse(text: &str, newest_ns: TimeNs) -> Result<TimeNs, String> {
         return Ok(newest_ns);
     }
     if let Some(back) = text.strip_prefix('-') {
-        let span_ns = span(back).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
+        let span_ns = parse_span(back).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
         return Ok(newest_ns.saturating_sub(span_ns));
     }
     let stamp =
-        stamp(text, &TimeZone::system(), newest_ns).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
+        parse_stamp(text, &TimeZone::system(), newest_ns).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
     i64::try_from(stamp.as_nanosecond()).map_err(|_| format!("{text} is outside the years 1678 to 2261"))
 }
 
 /// With a zone as it says; without one in the zone of the box. The first of two moments where a clock is set back.
-fn stamp(text: &str, zone: &TimeZone, newest_ns: TimeNs) -> Option<Timestamp> {
+fn parse_stamp(text: &str, zone: &TimeZone, newest_ns: TimeNs) -> Option<Timestamp> {
     if let Ok(stamp) = text.parse::<Timestamp>() {
         return Some(stamp);
     }
@@ -44,13 +44,13 @@ fn stamp(text: &str, zone: &TimeZone, newest_ns: TimeNs) -> Option<Timestamp> {
     };
     let moment = match day {
         Some(day) => day.at(0, 0, 0, 0),
-        None => written(text)?,
+        None => parse_date_time(text)?,
     };
     Some(moment.to_zoned(zone.clone()).ok()?.timestamp())
 }
 
 /// `2026-11-24 20:00`, with or without seconds, with a blank or a `T`.
-fn written(text: &str) -> Option<DateTime> {
+fn parse_date_time(text: &str) -> Option<DateTime> {
     let (date, time) = text.split_once([' ', 'T'])?;
     let time = time.trim_start();
     let whole = if time.matches(':').count() == 1 { format!("{time}:00") } else { time.to_owned() };
@@ -58,7 +58,7 @@ fn written(text: &str) -> Option<DateTime> {
 }
 
 /// `90s`, `10m`, `8h`, `7d` in nanoseconds.
-fn span(text: &str) -> Option<i64> {
+fn parse_span(text: &str) -> Option<i64> {
     let unit = text.chars().last()?;
     let seconds = match unit {
         's' => 1.0,
@@ -75,7 +75,7 @@ fn span(text: &str) -> Option<i64> {
 
 /// RFC 3339 with milliseconds, in UTC.
 #[must_use]
-pub fn utc(at_ns: TimeNs) -> String {
+pub fn format_utc(at_ns: TimeNs) -> String {
     let stamp = jiff::Timestamp::from_nanosecond(i128::from(at_ns)).unwrap_or(jiff::Timestamp::UNIX_EPOCH);
     format!("{stamp:.3}")
 }
@@ -111,13 +111,13 @@ mod tests {
         );
         assert!(parse("today", newest) > parse("yesterday", newest) && parse("today", newest) <= Ok(newest));
         assert_eq!(parse("1970-01-01T00:00:01.5+00:00", newest), Ok(SECOND_NS * 3 / 2));
-        assert_eq!(utc(SECOND_NS * 3 / 2), "1970-01-01T00:00:01.500Z");
+        assert_eq!(format_utc(SECOND_NS * 3 / 2), "1970-01-01T00:00:01.500Z");
     }
 
     #[test]
     fn a_time_of_the_wall_is_that_of_the_zone() {
         let shanghai = TimeZone::fixed(jiff::tz::offset(8));
-        let stamp = |text: &str| stamp(text, &shanghai, 0).map(|stamp| utc(stamp.as_second() * SECOND_NS));
+        let stamp = |text: &str| parse_stamp(text, &shanghai, 0).map(|stamp| format_utc(stamp.as_second() * SECOND_NS));
         assert_eq!(stamp("2026-11-24 20:00").as_deref(), Some("2026-11-24T12:00:00.000Z"));
         assert_eq!(stamp("2026-11-24 20:00:30").as_deref(), Some("2026-11-24T12:00:30.000Z"));
         assert_eq!(stamp("2026-11-24").as_deref(), Some("2026-11-23T16:00:00.000Z"));

@@ -66,17 +66,17 @@ pub struct Records {
 ///
 /// # Errors
 /// What `SQLite` says.
-pub fn records(reader: &Reader, kind: RecordKind, query: &RecordQuery) -> Result<Records, HistoryError> {
+pub fn read_records(reader: &Reader, kind: RecordKind, query: &RecordQuery) -> Result<Records, HistoryError> {
     let filtered = query.state.is_some();
     let limit = if filtered { FILTERED_MAX } else { query.limit.saturating_add(1) };
     let span = RecordSpan::between(query.from_ns, query.to_ns, limit);
     let mut rows: Vec<Value> = match kind {
-        RecordKind::States => states(reader, span)?,
-        RecordKind::Alarms => reader.alarms(span)?.iter().map(alarm).collect(),
-        RecordKind::Decisions => reader.decisions(span)?.iter().map(decision).collect(),
-        RecordKind::Commands => reader.commands(span)?.iter().map(command).collect(),
-        RecordKind::Events => reader.events(span)?.iter().map(event).collect(),
-        RecordKind::Parts => reader.parts(span)?.iter().map(part).collect(),
+        RecordKind::States => read_states(reader, span)?,
+        RecordKind::Alarms => reader.read_alarms(span)?.iter().map(build_alarm_row).collect(),
+        RecordKind::Decisions => reader.read_decisions(span)?.iter().map(build_decision_row).collect(),
+        RecordKind::Commands => reader.read_commands(span)?.iter().map(build_command_row).collect(),
+        RecordKind::Events => reader.read_events(span)?.iter().map(build_event_row).collect(),
+        RecordKind::Parts => reader.read_parts(span)?.iter().map(build_part_row).collect(),
     };
     let mut truncated = rows.len() >= limit as usize;
     if let Some(state) = &query.state {
@@ -90,56 +90,56 @@ pub fn records(reader: &Reader, kind: RecordKind, query: &RecordQuery) -> Result
 
 /// The answer as a document.
 #[must_use]
-pub fn document(kind: RecordKind, query: &RecordQuery, found: Records) -> Value {
+pub fn build_document(kind: RecordKind, query: &RecordQuery, found: Records) -> Value {
     json!({
         "schema": format!("{}/1", kind.name()),
-        "from_ms": ms(query.from_ns),
-        "to_ms": ms(query.to_ns),
+        "from_ms": to_milliseconds(query.from_ns),
+        "to_ms": to_milliseconds(query.to_ns),
         "truncated": found.truncated,
         "rows": found.rows,
     })
 }
 
-fn ms(at_ns: TimeNs) -> i64 {
+fn to_milliseconds(at_ns: TimeNs) -> i64 {
     at_ns.div_euclid(1_000_000)
 }
 
 /// Text that may be unknown.
-fn known(text: &str) -> Option<&str> {
+fn non_empty_text(text: &str) -> Option<&str> {
     (!text.is_empty()).then_some(text)
 }
 
-fn states(reader: &Reader, span: RecordSpan) -> Result<Vec<Value>, HistoryError> {
-    let newest_ns = reader.present()?.map_or(span.to_ns, |(_, newest_ns)| newest_ns);
-    Ok(reader.states(span)?.iter().map(|interval| state(interval, newest_ns)).collect())
+fn read_states(reader: &Reader, span: RecordSpan) -> Result<Vec<Value>, HistoryError> {
+    let newest_ns = reader.read_present_span()?.map_or(span.to_ns, |(_, newest_ns)| newest_ns);
+    Ok(reader.read_states(span)?.iter().map(|interval| build_state_row(interval, newest_ns)).collect())
 }
 
-fn state(interval: &StateInterval, newest_ns: TimeNs) -> Value {
+fn build_state_row(interval: &StateInterval, newest_ns: TimeNs) -> Value {
     let until_ns = interval.until_ns.unwrap_or(newest_ns).max(interval.since_ns);
     #[expect(clippy::cast_precision_loss, reason = "microseconds suffice beyond a hundred days")]
     let seconds = (until_ns - interval.since_ns) as f64 / 1e9;
     json!({
         "state": interval.state,
-        "from_ms": ms(interval.since_ns),
-        "to_ms": interval.until_ns.map(ms),
+        "from_ms": to_milliseconds(interval.since_ns),
+        "to_ms": interval.until_ns.map(to_milliseconds),
         "seconds": seconds,
-        "program": known(&interval.program),
-        "tool": known(&interval.tool),
-        "ended_by": known(&interval.ended_by),
+        "program": non_empty_text(&interval.program),
+        "tool": non_empty_text(&interval.tool),
+        "ended_by": non_empty_text(&interval.ended_by),
     })
 }
 
-fn alarm(alarm: &AlarmEntry) -> Value {
+fn build_alarm_row(alarm: &AlarmEntry) -> Value {
     let AlarmEntry { code, source, severity, raised_ns, cleared_ns, count, en, zh } = alarm;
     json!({
-        "code": code, "source": source, "severity": severity, "raised_ms": ms(*raised_ns),
-        "cleared_ms": cleared_ns.map(ms), "count": count, "en": en, "zh": zh,
+        "code": code, "source": source, "severity": severity, "raised_ms": to_milliseconds(*raised_ns),
+        "cleared_ms": cleared_ns.map(to_milliseconds), "count": count, "en": en, "zh": zh,
     })
 }
 
-fn decision(decision: &Decision) -> Value {
+fn build_decision_row(decision: &Decision) -> Value {
     json!({
-        "at_ms": ms(decision.at_ns),
+        "at_ms": to_milliseconds(decision.at_ns),
         "script": decision.script,
         "script_version": decision.script_version,
         "wanted": decision.wanted,
@@ -151,9 +151,9 @@ fn decision(decision: &Decision) -> Value {
     })
 }
 
-fn command(command: &Command) -> Value {
+fn build_command_row(command: &Command) -> Value {
     json!({
-        "at_ms": ms(command.at_ns),
+        "at_ms": to_milliseconds(command.at_ns),
         "command": command.command,
         "target": command.target,
         "before": command.before,
@@ -162,24 +162,24 @@ fn command(command: &Command) -> Value {
         "unit": command.unit,
         "outcome": command.outcome,
         "reason": command.reason,
-        "script": known(&command.script),
-        "script_version": known(&command.script_version),
+        "script": non_empty_text(&command.script),
+        "script_version": non_empty_text(&command.script_version),
     })
 }
 
-fn event(event: &Event) -> Value {
+fn build_event_row(event: &Event) -> Value {
     let Event { at_ns, kind, source, text, detail } = event;
-    json!({ "at_ms": ms(*at_ns), "kind": kind, "source": source, "text": text, "detail": known(detail) })
+    json!({ "at_ms": to_milliseconds(*at_ns), "kind": kind, "source": source, "text": text, "detail": non_empty_text(detail) })
 }
 
 /// Parts of an older version carry no detail.
-fn part(part: &Part) -> Value {
+fn build_part_row(part: &Part) -> Value {
     let detail: Option<PartDetail> = serde_json::from_str(&part.detail).ok();
     json!({
-        "from_ms": ms(part.began_ns),
-        "to_ms": ms(part.ended_ns),
-        "part": known(&part.part),
-        "program": known(&part.program),
+        "from_ms": to_milliseconds(part.began_ns),
+        "to_ms": to_milliseconds(part.ended_ns),
+        "part": non_empty_text(&part.part),
+        "program": non_empty_text(&part.program),
         "count": part.count,
         "cutting_s": part.cutting_s,
         "energy_j": part.energy_j,

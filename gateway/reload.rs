@@ -1,11 +1,12 @@
 //! The scripts on disk: written there on the first start, watched, compiled and tried beside the tick, swapped only when all
 //! of them compile and all their trials pass.
 
-use crate::files::{Lookout, Mark, Rest, advice, mark, read_text, replace};
+use crate::files::{Lookout, Mark, Rest, advise_on_read_error, read_mark, read_text, replace_file};
 use crate::settings;
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use rules::script::{
-    Host, ScriptFile, ScriptProblem, ScriptSet, SettingValues, TEXT_MAX, prepare, prepare_with, shipped,
+    Host, ScriptFile, ScriptProblem, ScriptSet, SettingValues, TEXT_MAX, list_shipped_scripts, prepare_scripts,
+    prepare_with,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,15 +28,15 @@ pub struct Furnished {
 ///
 /// # Errors
 /// The directory or a file in it cannot be written; what is there already can still be read.
-pub fn furnish(directory: &Path) -> std::io::Result<Furnished> {
+pub fn write_shipped_scripts(directory: &Path) -> std::io::Result<Furnished> {
     std::fs::create_dir_all(directory)?;
     let list = directory.join(DELIVERED);
     let mut delivered = read_list(&list);
     let before = delivered.clone();
     let mut furnished = Furnished::default();
-    for file in shipped() {
-        let (digest, path) = (digest(file.text.as_bytes()), directory.join(&file.name));
-        let present = std::fs::read(&path).ok().map(|bytes| self::digest(&bytes));
+    for file in list_shipped_scripts() {
+        let (digest, path) = (compute_digest(file.text.as_bytes()), directory.join(&file.name));
+        let present = std::fs::read(&path).ok().map(|bytes| self::compute_digest(&bytes));
         match (delivered.insert(file.name.clone(), digest), present) {
             (Some(old), _) if old == digest => {}
             (_, Some(there)) if there == digest => {}
@@ -53,7 +54,7 @@ pub fn furnish(directory: &Path) -> std::io::Result<Furnished> {
 }
 
 fn write(path: &Path, file: &ScriptFile, done: &mut Vec<String>) -> std::io::Result<()> {
-    replace(path, &file.text)?;
+    replace_file(path, &file.text)?;
     done.push(path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default());
     Ok(())
 }
@@ -69,7 +70,7 @@ fn read_list(path: &Path) -> BTreeMap<String, u64> {
 
 /// FNV-1a: tells one text from another, keeps no secret.
 #[must_use]
-pub fn digest(bytes: &[u8]) -> u64 {
+pub fn compute_digest(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
 }
 
@@ -80,10 +81,10 @@ pub fn digest(bytes: &[u8]) -> u64 {
 pub fn read_directory(directory: &Path) -> Result<Vec<ScriptFile>, Vec<ScriptProblem>> {
     let mut problems = Vec::new();
     let mut files = Vec::new();
-    for path in paths(directory).map_err(|error| vec![unreadable(directory, &error)])? {
+    for path in list_paths(directory).map_err(|error| vec![describe_unreadable(directory, &error)])? {
         match stays_in(directory, &path).and_then(|()| read_script(&path)) {
             Ok(file) => files.push(file),
-            Err(error) => problems.push(unreadable(&path, &error)),
+            Err(error) => problems.push(describe_unreadable(&path, &error)),
         }
     }
     if problems.is_empty() { Ok(files) } else { Err(problems) }
@@ -94,10 +95,10 @@ pub fn read_directory(directory: &Path) -> Result<Vec<ScriptFile>, Vec<ScriptPro
 /// # Errors
 /// It cannot be read.
 pub fn read_file(path: &Path) -> Result<ScriptFile, ScriptProblem> {
-    read_script(path).map_err(|error| unreadable(path, &error))
+    read_script(path).map_err(|error| describe_unreadable(path, &error))
 }
 
-fn paths(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
+fn list_paths(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for entry in std::fs::read_dir(directory)? {
         let path = entry?.path();
@@ -122,10 +123,10 @@ fn read_script(path: &Path) -> std::io::Result<ScriptFile> {
     Ok(ScriptFile { name, text: read_text(path, TEXT_MAX)? })
 }
 
-fn unreadable(path: &Path, error: &std::io::Error) -> ScriptProblem {
+fn describe_unreadable(path: &Path, error: &std::io::Error) -> ScriptProblem {
     let next = match error.kind() {
-        std::io::ErrorKind::NotFound => misspelt(path),
-        _ => advice(error).to_owned(),
+        std::io::ErrorKind::NotFound => suggest_directory(path),
+        _ => advise_on_read_error(error).to_owned(),
     };
     ScriptProblem {
         file: path.display().to_string(),
@@ -137,11 +138,11 @@ fn unreadable(path: &Path, error: &std::io::Error) -> ScriptProblem {
 }
 
 /// A directory of nearly this name beside it, if there is one.
-fn misspelt(path: &Path) -> String {
+fn suggest_directory(path: &Path) -> String {
     let beside = path.parent().and_then(|parent| std::fs::read_dir(parent).ok()).into_iter().flatten().flatten();
     let names: Vec<String> = beside.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
     let wanted = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    match nearest(&wanted, names.iter().map(String::as_str)) {
+    match find_nearest_name(&wanted, names.iter().map(String::as_str)) {
         Some(near) => format!("did you mean {near:?}?"),
         None => "create it, or name another one as `directory` under [scripts]".to_owned(),
     }
@@ -173,20 +174,20 @@ impl Watch {
 
     /// The same, and the file with the values of the settings, where there is one.
     #[must_use]
-    pub fn beside(directory: &Path, settings: Option<&Path>) -> Self {
+    pub fn with_settings(directory: &Path, settings: Option<&Path>) -> Self {
         Self { settings: settings.map(Path::to_owned), ..Self::new(directory) }
     }
 
     /// Everything, when it has changed and then stood still since the look before; at the first look, and with `now`,
     /// at once and whether it has changed or not.
-    pub fn look(&mut self, now: bool) -> Option<&Result<Vec<ScriptFile>, Vec<ScriptProblem>>> {
-        let paths = paths(&self.directory).unwrap_or_default();
-        let marks = paths.iter().chain(&self.settings).map(|path| mark(path)).collect();
-        if !(self.rest.look(marks, now) || now) {
+    pub fn look_for_changes(&mut self, now: bool) -> Option<&Result<Vec<ScriptFile>, Vec<ScriptProblem>>> {
+        let paths = list_paths(&self.directory).unwrap_or_default();
+        let marks = paths.iter().chain(&self.settings).map(|path| read_mark(path)).collect();
+        if !(self.rest.should_read(marks, now) || now) {
             return None;
         }
         let content = read_directory(&self.directory);
-        let values = self.settings.as_deref().map_or_else(|| Ok(String::new()), settings::text);
+        let values = self.settings.as_deref().map_or_else(|| Ok(String::new()), settings::read_values_text);
         let same = self.content.as_ref() == Some(&content) && self.values == values;
         self.values = values;
         let content = self.content.insert(content);
@@ -194,10 +195,10 @@ impl Watch {
     }
 
     /// The scripts and the values of the last look, compiled and tried, with the name of whoever wrote the values.
-    fn prepared(&self, files: &[ScriptFile]) -> Result<Fresh, Vec<ScriptProblem>> {
+    fn prepare_fresh(&self, files: &[ScriptFile]) -> Result<Fresh, Vec<ScriptProblem>> {
         let text = self.values.as_ref().map_err(Clone::clone)?;
         let values = SettingValues::parse(settings::FILE, text)?;
-        Ok(Fresh { set: prepare_with(files, &values)?, by: settings::author(text) })
+        Ok(Fresh { set: prepare_with(files, &values)?, by: settings::find_author(text) })
     }
 }
 
@@ -223,29 +224,29 @@ pub struct Reloaded {
 pub struct Reloader(Lookout<Result<Fresh, Vec<ScriptProblem>>>);
 
 impl Reloader {
-    /// Starts to watch. Without `poll` only [`Reloader::ask`] makes it look. The first look is not repeated: load the
+    /// Starts to watch. Without `poll` only [`Reloader::request_look`] makes it look. The first look is not repeated: load the
     /// scripts with [`load_now`] before.
     ///
     /// # Errors
     /// No thread could be started.
     pub fn start(directory: &Path, settings: Option<&Path>, poll: bool) -> std::io::Result<Self> {
-        let mut watch = Watch::beside(directory, settings);
-        watch.look(false);
+        let mut watch = Watch::with_settings(directory, settings);
+        watch.look_for_changes(false);
         let look = move |asked| {
-            let found = watch.look(asked).cloned()?;
-            Some(found.and_then(|files| watch.prepared(&files)))
+            let found = watch.look_for_changes(asked).cloned()?;
+            Some(found.and_then(|files| watch.prepare_fresh(&files)))
         };
         Lookout::start("scripts", poll, look).map(Self)
     }
 
     /// Looks now, and compiles even when nothing has changed. Returns at once.
-    pub fn ask(&self) {
-        self.0.ask();
+    pub fn request_look(&self) {
+        self.0.request_look();
     }
 
     /// Puts newly found scripts in charge, or lets the host say why they are refused. Tells what happened, if anything.
-    pub fn step(&self, host: &mut Host) -> Option<Result<Reloaded, Vec<ScriptProblem>>> {
-        let (loaded, by) = match self.0.take()? {
+    pub fn apply_found_scripts(&self, host: &mut Host) -> Option<Result<Reloaded, Vec<ScriptProblem>>> {
+        let (loaded, by) = match self.0.take_newest()? {
             Ok(Fresh { set, by }) => (Ok(set), by),
             Err(problems) => (Err(problems), String::new()),
         };
@@ -258,14 +259,14 @@ impl Reloader {
 /// # Errors
 /// Everything that is wrong; the host says so too, and whatever was in charge stays.
 pub fn load_now(directory: &Path, settings: Option<&Path>, host: &mut Host) -> Result<usize, Vec<ScriptProblem>> {
-    put_in_charge(read_directory(directory).and_then(|files| prepared(&files, settings)), host)
+    put_in_charge(read_directory(directory).and_then(|files| prepare_with_settings(&files, settings)), host)
 }
 
 /// These scripts with the values of this file, compiled and tried.
 ///
 /// # Errors
 /// Everything that is wrong with the scripts or with the values.
-pub fn prepared(files: &[ScriptFile], settings: Option<&Path>) -> LoadedScripts {
+pub fn prepare_with_settings(files: &[ScriptFile], settings: Option<&Path>) -> LoadedScripts {
     let values = settings.map_or_else(|| Ok(SettingValues::default()), settings::read)?;
     prepare_with(files, &values)
 }
@@ -291,33 +292,33 @@ pub fn load_rest(
 ) -> Fallback {
     if let Some(set) = last.filter(|set| !set.is_empty()) {
         let count = set.len();
-        host.install(set);
-        host.refuse(problems.to_vec());
+        host.install_set(set);
+        host.record_refusal(problems.to_vec());
         return Fallback::Last(count);
     }
-    let fallback = match right(directory, settings, problems) {
+    let fallback = match prepare_usable_scripts(directory, settings, problems) {
         Ok(set) if !set.is_empty() => {
             let count = set.len();
-            host.install(set);
+            host.install_set(set);
             Fallback::Others(count)
         }
         _ => {
             // The shipped scripts compile, which is tested; if they did not, the box would go on without any.
-            let _none_in_charge = host.load(&shipped());
+            let _none_in_charge = host.load_scripts(&list_shipped_scripts());
             Fallback::Shipped
         }
     };
-    host.refuse(problems.to_vec());
+    host.record_refusal(problems.to_vec());
     fallback
 }
 
 /// The scripts that can be read and have no problems. Where a file could not be read, nobody has looked at the others yet:
 /// those that are not right by themselves are left out too.
-fn right(directory: &Path, settings: Option<&Path>, problems: &[ScriptProblem]) -> LoadedScripts {
+fn prepare_usable_scripts(directory: &Path, settings: Option<&Path>, problems: &[ScriptProblem]) -> LoadedScripts {
     // Values that cannot be used leave every setting at its default.
-    let prepare = |files: &[ScriptFile]| prepared(files, settings).or_else(|_| prepare(files));
+    let prepare = |files: &[ScriptFile]| prepare_with_settings(files, settings).or_else(|_| prepare_scripts(files));
     let bad = |file: &ScriptFile| problems.iter().any(|problem| problem.file == file.name);
-    let readable = paths(directory).unwrap_or_default().into_iter().filter_map(|path| read_script(&path).ok());
+    let readable = list_paths(directory).unwrap_or_default().into_iter().filter_map(|path| read_script(&path).ok());
     let mut files: Vec<ScriptFile> = readable.filter(|file| !bad(file)).collect();
     prepare(&files).or_else(|_| {
         files.retain(|file| prepare(std::slice::from_ref(file)).is_ok());
@@ -329,11 +330,11 @@ fn put_in_charge(loaded: LoadedScripts, host: &mut Host) -> Result<usize, Vec<Sc
     match loaded {
         Ok(set) => {
             let count = set.len();
-            host.install(set);
+            host.install_set(set);
             Ok(count)
         }
         Err(problems) => {
-            host.refuse(problems.clone());
+            host.record_refusal(problems.clone());
             Err(problems)
         }
     }

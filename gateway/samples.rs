@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 
 /// The answer as a document (`samples/1`).
 #[must_use]
-pub fn document((from_ns, to_ns): (TimeNs, TimeNs), resolution_s: f64, series: Value) -> Value {
+pub fn build_document((from_ns, to_ns): (TimeNs, TimeNs), resolution_s: f64, series: Value) -> Value {
     json!({
         "schema": "samples/1",
         "from_ms": from_ns.div_euclid(1_000_000),
@@ -37,19 +37,24 @@ fn width_ns(resolution_s: f64) -> i64 {
 ///
 /// # Errors
 /// More than `points_max` points, or what the history says.
-pub fn bucketed(reader: &Reader, query: &Query, resolution_s: f64, points_max: usize) -> Result<Value, HistoryError> {
+pub fn read_bucketed(
+    reader: &Reader,
+    query: &Query,
+    resolution_s: f64,
+    points_max: usize,
+) -> Result<Value, HistoryError> {
     let width_ns = width_ns(resolution_s);
     let length_ns = query.to_ns.unwrap_or(0).saturating_sub(query.from_ns.unwrap_or(0));
     let buckets = usize::try_from((length_ns / width_ns).unsigned_abs()).unwrap_or(usize::MAX);
     if buckets.saturating_mul(query.series.len()) > points_max {
         return Err(too_many(points_max));
     }
-    let overview = reader.overview(query, width_ns)?;
+    let overview = reader.read_overview(query, width_ns)?;
     let each = overview.series.iter().zip(&overview.columns);
-    Ok(each.map(|(series, column)| one(&series.name, &series.unit, points_of(&overview, column))).collect())
+    Ok(each.map(|(series, column)| build_series(&series.name, &series.unit, points_of(&overview, column))).collect())
 }
 
-fn one(channel: &str, unit: &str, points: Vec<Value>) -> Value {
+fn build_series(channel: &str, unit: &str, points: Vec<Value>) -> Value {
     json!({ "channel": channel, "unit": unit, "points": points })
 }
 
@@ -68,32 +73,32 @@ fn points_of(overview: &Overview, column: &Buckets) -> Vec<Value> {
 ///
 /// # Errors
 /// More than `points_max` points, or what the history says.
-pub fn raw(reader: &Reader, query: &Query, points_max: usize) -> Result<Value, HistoryError> {
+pub fn read_raw(reader: &Reader, query: &Query, points_max: usize) -> Result<Value, HistoryError> {
     let mut list: Vec<(Series, Vec<Value>)> = Vec::new();
     let mut points = 0;
-    reader.samples(query, |chunk| {
+    reader.for_each_chunk(query, |chunk| {
         points += chunk.at_ns.len() * chunk.columns.len();
         if points > points_max {
             return ControlFlow::Break(());
         }
-        append(&mut list, chunk);
+        append_chunk(&mut list, chunk);
         ControlFlow::Continue(())
     })?;
     if points > points_max {
         return Err(too_many(points_max));
     }
-    Ok(list.into_iter().map(|(series, points)| one(&series.name, &series.unit, points)).collect())
+    Ok(list.into_iter().map(|(series, points)| build_series(&series.name, &series.unit, points)).collect())
 }
 
-fn append(list: &mut Vec<(Series, Vec<Value>)>, chunk: &Chunk<'_>) {
+fn append_chunk(list: &mut Vec<(Series, Vec<Value>)>, chunk: &Chunk<'_>) {
     if list.is_empty() {
         list.extend(chunk.series.iter().map(|series| (series.clone(), Vec::new())));
     }
     for (column, (cells, (_, points))) in chunk.columns.iter().zip(list).enumerate() {
         for (row, at_ns) in chunk.at_ns.iter().enumerate() {
             let at = at_ns.div_euclid(1_000_000);
-            let value = cells.number(row).map(Value::from).or_else(|| cells.word(row).map(Value::from));
-            let missing = || json!([at, null, chunk.missing(column, row)]);
+            let value = cells.number_at(row).map(Value::from).or_else(|| cells.word_at(row).map(Value::from));
+            let missing = || json!([at, null, chunk.missing_reason(column, row)]);
             points.push(value.map_or_else(missing, |value| json!([at, value])));
         }
     }
@@ -104,7 +109,7 @@ fn append(list: &mut Vec<(Series, Vec<Value>)>, chunk: &Chunk<'_>) {
 /// # Errors
 /// What the history or the output says.
 pub fn bucketed_csv(reader: &Reader, query: &Query, resolution_s: f64, out: impl Write) -> Result<(), HistoryError> {
-    let overview = reader.overview(query, width_ns(resolution_s))?;
+    let overview = reader.read_overview(query, width_ns(resolution_s))?;
     let written = write_csv(&overview, out);
     written.map_err(|error| HistoryError::Io { path: "the output".into(), error: std::io::Error::other(error) })
 }
@@ -122,7 +127,7 @@ fn write_csv(overview: &Overview, out: impl Write) -> Result<(), csv::Error> {
     }
     csv.write_record(&header)?;
     for (row, start_ns) in overview.start_ns.iter().enumerate() {
-        let mut cells = vec![moment::utc(*start_ns)];
+        let mut cells = vec![moment::format_utc(*start_ns)];
         overview.columns.iter().for_each(|column| cells.extend(cells_of(column, row)));
         csv.write_record(&cells)?;
     }

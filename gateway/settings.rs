@@ -1,14 +1,14 @@
 //! The settings of the scripts: what they declare, what is in force on this machine, who has changed it.
 //!
 //! The values stand in `settings.toml` in the data directory. A person may edit it; the box reads it again within a second. The page
-//! and the interface change it through [`set`], which tries every script with the new values first and writes the name of the person
+//! and the interface change it through [`change_setting`], which tries every script with the new values first and writes the name of the person
 //! into the first line, with a digest of the rest: a file that somebody has edited by hand afterwards is not taken for theirs.
 //!
 //! Two persons may change one setting: each change names the value that it began from, and who comes second is told ([`Refused`]).
 
-use crate::files::{read_text, replace};
+use crate::files::{read_text, replace_file};
 use crate::history::Event;
-use crate::reload::digest;
+use crate::reload::compute_digest;
 use rules::script::{
     DeclarationPlace, Declared, SETTINGS_TEXT_MAX, ScriptFile, ScriptProblem, SettingValue, SettingValues, prepare_with,
 };
@@ -31,7 +31,7 @@ static CHANGING: Mutex<()> = Mutex::new(());
 
 /// Where the values stand.
 #[must_use]
-pub fn path(data_dir: &Path) -> PathBuf {
+pub fn values_path(data_dir: &Path) -> PathBuf {
     data_dir.join(FILE)
 }
 
@@ -39,7 +39,7 @@ pub fn path(data_dir: &Path) -> PathBuf {
 ///
 /// # Errors
 /// It is there and cannot be read.
-pub fn text(path: &Path) -> Result<String, Vec<ScriptProblem>> {
+pub fn read_values_text(path: &Path) -> Result<String, Vec<ScriptProblem>> {
     match read_text(path, SETTINGS_TEXT_MAX) {
         Ok(text) => Ok(text),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
@@ -56,7 +56,7 @@ pub fn text(path: &Path) -> Result<String, Vec<ScriptProblem>> {
 /// # Errors
 /// Everything in it that is no value.
 pub fn read(path: &Path) -> Result<SettingValues, Vec<ScriptProblem>> {
-    SettingValues::parse(FILE, &text(path)?)
+    SettingValues::parse(FILE, &read_values_text(path)?)
 }
 
 /// One setting that is to have another value.
@@ -97,7 +97,7 @@ impl From<Vec<ScriptProblem>> for Refused {
 }
 
 /// A value as the file has it; empty where it has none.
-fn written(value: Option<&SettingValue>) -> String {
+fn format_value(value: Option<&SettingValue>) -> String {
     value.map(ToString::to_string).unwrap_or_default()
 }
 
@@ -105,25 +105,29 @@ fn written(value: Option<&SettingValue>) -> String {
 ///
 /// # Errors
 /// Why the value cannot be used, or that somebody else was quicker; nothing has been changed then.
-pub fn set(data_dir: &Path, files: &[ScriptFile], wanted: &NewSetting, by: &str) -> Result<String, Refused> {
+pub fn change_setting(data_dir: &Path, files: &[ScriptFile], wanted: &NewSetting, by: &str) -> Result<String, Refused> {
     let _one_at_a_time = CHANGING.lock().unwrap_or_else(PoisonError::into_inner);
-    let path = path(data_dir);
-    let before_text = text(&path)?;
+    let path = values_path(data_dir);
+    let before_text = read_values_text(&path)?;
     let before = SettingValues::parse(FILE, &before_text)?;
     let mut after = before.clone();
     let NewSetting { script, name, place, value, began_from } = wanted;
-    let now = written(before.of(script, name, place));
+    let now = format_value(before.find_value(script, name, place));
     if began_from.as_ref().is_some_and(|began| *began != now) {
-        return Err(Refused::Meanwhile { path: format!("{script}.{name}"), now, by: author(&before_text) });
+        return Err(Refused::Meanwhile { path: format!("{script}.{name}"), now, by: find_author(&before_text) });
     }
-    after.put(script, name, place, value.clone());
+    after.set_value(script, name, place, value.clone());
     // Read again, so that a message names the line on which the value would stand.
-    let body = after.text();
+    let body = after.to_toml_text();
     let after = SettingValues::parse(FILE, &body)?;
     let set = prepare_with(files, &after)?;
-    let declared: Vec<&Declared> = set.declared().collect();
-    let words = changes(&before, &after, &declared).iter().map(SettingChange::words).collect::<Vec<_>>().join(", ");
-    replace(&path, &signed(&body, by)).map_err(|error| {
+    let declared: Vec<&Declared> = set.declared_settings().collect();
+    let words = list_changes(&before, &after, &declared)
+        .iter()
+        .map(SettingChange::describe_change)
+        .collect::<Vec<_>>()
+        .join(", ");
+    replace_file(&path, &sign_text(&body, by)).map_err(|error| {
         let (file, what) = (path.display().to_string(), format!("the settings cannot be written: {error}"));
         vec![ScriptProblem { file, line: None, column: None, what, next: "look at the data directory".to_owned() }]
     })?;
@@ -132,19 +136,19 @@ pub fn set(data_dir: &Path, files: &[ScriptFile], wanted: &NewSetting, by: &str)
 
 /// The text of the file with the name of whoever has written it, in the place of any other name.
 #[must_use]
-pub fn signed(text: &str, by: &str) -> String {
+pub fn sign_text(text: &str, by: &str) -> String {
     let body = text.split_once('\n').filter(|(first, _)| first.starts_with("# set by ")).map_or(text, |(_, body)| body);
-    let digest = digest(body.as_bytes());
+    let digest = compute_digest(body.as_bytes());
     format!("# set by {by:?} {digest:016x}\n{body}")
 }
 
 /// Who has written this text: the person whom the first line names, where the rest is still what that person has left.
 #[must_use]
-pub fn author(text: &str) -> String {
+pub fn find_author(text: &str) -> String {
     let named = || {
         let (first, body) = text.split_once('\n')?;
         let (by, its) = first.strip_prefix("# set by \"")?.rsplit_once("\" ")?;
-        (its == format!("{:016x}", digest(body.as_bytes()))).then(|| by.to_owned())
+        (its == format!("{:016x}", compute_digest(body.as_bytes()))).then(|| by.to_owned())
     };
     named().unwrap_or_else(|| BY_HAND.to_owned())
 }
@@ -167,7 +171,7 @@ pub struct SettingChange {
 impl SettingChange {
     /// In words, for the audit and the history.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub fn describe_change(&self) -> String {
         let Self { path, place, unit, before, after } = self;
         let place = if *place == DeclarationPlace::Machine { String::new() } else { format!(" for {place}") };
         format!("{path}{place}: {before} -> {after} {unit}").trim_end().to_owned()
@@ -175,7 +179,7 @@ impl SettingChange {
 
     /// The detail of its event.
     #[must_use]
-    pub fn detail(&self, by: &str) -> Value {
+    pub fn build_detail(&self, by: &str) -> Value {
         json!({ "setting": self.path, "place": self.place.to_string(), "unit": self.unit, "before": self.before,
             "after": self.after, "by": by })
     }
@@ -183,15 +187,15 @@ impl SettingChange {
 
 /// Every setting that has another value.
 #[must_use]
-pub fn changes(before: &SettingValues, after: &SettingValues, declared: &[&Declared]) -> Vec<SettingChange> {
+pub fn list_changes(before: &SettingValues, after: &SettingValues, declared: &[&Declared]) -> Vec<SettingChange> {
     let mut found = Vec::new();
     for it in declared {
         let mut places = vec![DeclarationPlace::Machine];
-        places.extend(before.places(it.section()).into_iter().chain(after.places(it.section())));
+        places.extend(before.list_places(it.section()).into_iter().chain(after.list_places(it.section())));
         places.sort();
         places.dedup();
         for place in places {
-            let of = |values: &SettingValues| values.of(it.section(), &it.name, &place).cloned();
+            let of = |values: &SettingValues| values.find_value(it.section(), &it.name, &place).cloned();
             let (old, new) = (of(before), of(after));
             if old == new {
                 continue;
@@ -223,8 +227,12 @@ pub fn told_changes(events: &[Event]) -> Vec<Value> {
 
 /// Every declared setting with what is in force, and who changed it last: `settings/1`. `told` is of [`told_changes`].
 #[must_use]
-pub fn document<'a>(declared: impl Iterator<Item = &'a Declared>, values: &SettingValues, told: &[Value]) -> Value {
-    let rows: Vec<Value> = declared.map(|it| row(it, values, told)).collect();
+pub fn build_document<'a>(
+    declared: impl Iterator<Item = &'a Declared>,
+    values: &SettingValues,
+    told: &[Value],
+) -> Value {
+    let rows: Vec<Value> = declared.map(|it| build_row(it, values, told)).collect();
     json!({ "schema": "settings/1", "settings": rows })
 }
 
@@ -235,34 +243,34 @@ fn json_of(value: &SettingValue) -> Value {
     }
 }
 
-fn row(it: &Declared, values: &SettingValues, told: &[Value]) -> Value {
+fn build_row(it: &Declared, values: &SettingValues, told: &[Value]) -> Value {
     let path = it.path();
     let changes: Vec<&Value> = told.iter().filter(|change| change["setting"] == path).take(CHANGES_MAX).collect();
-    let of = |place: &DeclarationPlace| values.of(it.section(), &it.name, place);
+    let of = |place: &DeclarationPlace| values.find_value(it.section(), &it.name, place);
     let special: Vec<Value> = values
-        .places(it.section())
+        .list_places(it.section())
         .iter()
         .filter_map(|place| {
             let mut row = Map::new();
-            row.insert(place.per()?.word().to_owned(), json!(place.name()));
+            row.insert(place.per()?.as_word().to_owned(), json!(place.name()));
             row.insert("value".to_owned(), json_of(of(place)?));
-            row.insert("written".to_owned(), json!(written(of(place))));
+            row.insert("written".to_owned(), json!(format_value(of(place))));
             Some(Value::Object(row))
         })
         .collect();
     json!({
         "script": it.section(), "name": it.name, "value": json_of(of(&DeclarationPlace::Machine).unwrap_or(&it.default)),
-        "chosen": of(&DeclarationPlace::Machine).is_some(), "written": written(of(&DeclarationPlace::Machine)),
+        "chosen": of(&DeclarationPlace::Machine).is_some(), "written": format_value(of(&DeclarationPlace::Machine)),
         "default": json_of(&it.default), "unit": it.unit,
         "least": it.range.map(|range| range.0), "greatest": it.range.map(|range| range.1), "whole": it.whole,
-        "one_of": it.one_of, "per": it.per.iter().map(|per| per.word()).collect::<Vec<_>>(), "special": special,
+        "one_of": it.one_of, "per": it.per.iter().map(|per| per.as_word()).collect::<Vec<_>>(), "special": special,
         "en": it.en, "zh": it.zh, "changes": changes,
     })
 }
 
 /// The settings as a table, as `check --keys` prints it.
 #[must_use]
-pub fn table(declared: &[Declared]) -> String {
+pub fn format_table(declared: &[Declared]) -> String {
     let mut text = String::from("\nSettings of the scripts: settings.toml in the data directory\n");
     let mut section = "";
     for it in declared {
@@ -270,9 +278,9 @@ pub fn table(declared: &[Declared]) -> String {
             section = it.section();
             text += &format!("\n[{section}]\n");
         }
-        let per: Vec<&str> = it.per.iter().map(|per| per.word()).collect();
+        let per: Vec<&str> = it.per.iter().map(|per| per.as_word()).collect();
         let per = if per.is_empty() { String::new() } else { format!("; also per {}", per.join(" and ")) };
-        text += &format!("{} = {}\n    {}{per}. {}\n", it.name, it.default, it.takes(), it.en);
+        text += &format!("{} = {}\n    {}{per}. {}\n", it.name, it.default, it.describe_range(), it.en);
     }
     text
 }
@@ -295,26 +303,30 @@ mod tests {
             value: Some(SettingValue::Number(7.0)),
             began_from: Some(String::new()),
         };
-        assert_eq!(set(directory.path(), &files, &wanted, "Li").as_deref(), Ok("one.x_w: 5.0 -> 7.0 W"));
-        let written = std::fs::read_to_string(path(directory.path())).expect("written");
-        assert_eq!(author(&written), "Li", "{written}");
-        assert_eq!(author(&written.replace("7.0", "8.0")), BY_HAND);
+        assert_eq!(change_setting(directory.path(), &files, &wanted, "Li").as_deref(), Ok("one.x_w: 5.0 -> 7.0 W"));
+        let written = std::fs::read_to_string(values_path(directory.path())).expect("written");
+        assert_eq!(find_author(&written), "Li", "{written}");
+        assert_eq!(find_author(&written.replace("7.0", "8.0")), BY_HAND);
         wanted.value = Some(SettingValue::Number(6.0));
         let meanwhile = Refused::Meanwhile { path: "one.x_w".to_owned(), now: "7.0".to_owned(), by: "Li".to_owned() };
-        assert_eq!(set(directory.path(), &files, &wanted, "Wu"), Err(meanwhile), "Wu began before Li was done");
-        assert_eq!(std::fs::read_to_string(path(directory.path())).expect("kept"), written, "nothing is lost");
+        assert_eq!(
+            change_setting(directory.path(), &files, &wanted, "Wu"),
+            Err(meanwhile),
+            "Wu began before Li was done"
+        );
+        assert_eq!(std::fs::read_to_string(values_path(directory.path())).expect("kept"), written, "nothing is lost");
         (wanted.value, wanted.began_from) = (Some(SettingValue::Number(7.0)), None);
         wanted.place = DeclarationPlace::Tool("T 1".to_owned());
         assert_eq!(
-            set(directory.path(), &files, &wanted, "Wu").as_deref(),
+            change_setting(directory.path(), &files, &wanted, "Wu").as_deref(),
             Ok("one.x_w for tool T 1: as the machine -> 7.0 W")
         );
         wanted.value = Some(SettingValue::Number(11.0));
-        let refused = set(directory.path(), &files, &wanted, "Wu").expect_err("out of range");
+        let refused = change_setting(directory.path(), &files, &wanted, "Wu").expect_err("out of range");
         let Refused::Problems(refused) = refused else { panic!("{refused:?}") };
         assert!(refused[0].what.contains("outside 0 to 10 W"), "{refused:?}");
-        let values = read(&path(directory.path())).expect("readable");
-        let declared = rules::script::declarations(&files).expect("readable");
+        let values = read(&values_path(directory.path())).expect("readable");
+        let declared = rules::script::list_declarations(&files).expect("readable");
         let told = |at_ns, after: &str| Event {
             at_ns,
             kind: KIND.to_owned(),
@@ -327,7 +339,7 @@ mod tests {
             .to_string(),
         };
         let changes = told_changes(&[told(1_000_000, "6.0"), told(2_000_000, "7.0")]);
-        let document = document(declared.iter(), &values, &changes);
+        let document = build_document(declared.iter(), &values, &changes);
         assert_eq!(document["settings"][0]["changes"][0]["after"], "7.0", "the newest first");
         assert_eq!(document["settings"][0]["written"], "7.0");
         assert_eq!(document["settings"][0]["special"][0]["tool"], "T 1");

@@ -2,7 +2,7 @@
 
 /// A count as a number.
 #[must_use]
-pub(crate) fn count(n: usize) -> f64 {
+pub(crate) fn count_to_f64(n: usize) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "counts of rows stay far below 2^52")]
     let n = n as f64;
     n
@@ -11,7 +11,7 @@ pub(crate) fn count(n: usize) -> f64 {
 /// The mean; zero for no values.
 #[must_use]
 pub(crate) fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / count(values.len().max(1))
+    values.iter().sum::<f64>() / count_to_f64(values.len().max(1))
 }
 
 /// The median of finite values, the upper of two; `None` for none.
@@ -30,7 +30,7 @@ pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Opt
     let mut values: Vec<f64> = values.into_iter().collect();
     let last = values.len().checked_sub(1)?;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count lies within it")]
-    let at = (count(last) * share).round() as usize;
+    let at = (count_to_f64(last) * share).round() as usize;
     (at <= last).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
@@ -44,12 +44,12 @@ pub(crate) fn robust_deviation(values: impl IntoIterator<Item = f64>) -> Option<
 /// The root of the mean square; zero for no values.
 #[must_use]
 pub(crate) fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / count(values.len().max(1))).sqrt()
+    (values.iter().map(|value| value * value).sum::<f64>() / count_to_f64(values.len().max(1))).sqrt()
 }
 
 /// Correlation of pairs in one pass, and how many there were; 0 where one side is constant.
 #[must_use]
-pub(crate) fn correlation(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+pub(crate) fn correlate_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     let (mut n, mut sx, mut sy, mut sxx, mut syy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (x, y) in pairs {
         (n, sx, sy) = (n + 1.0, sx + x, sy + y);

@@ -79,19 +79,19 @@ fn spindle_history(path: &Path) {
     let writer = Writer::open(path, Options { when_full: WhenFull::Wait, ..Options::default() }).expect("a history");
     let mut noise = Noise::new(3);
     for row in 0..900_i64 {
-        let mut sample = Sample::empty(1_800_000_000_000_000_000 + row * 1_000_000_000);
+        let mut sample = Sample::new_empty(1_800_000_000_000_000_000 + row * 1_000_000_000);
         let coolant = f64::from(u8::from(row / 37 % 3 == 1));
         let speed = 400.0 + 200.0 * ((row / 60 % 5) as f64);
         let power = 80.0 + 0.3 * speed + 30.0 * coolant + noise.normal();
         let mut set = |name, value| {
-            let channel = ChannelId::of(name).expect("a channel");
-            sample.set(channel, Slot { value: Ok(value), age_ns: 0 });
+            let channel = ChannelId::from_name(name).expect("a channel");
+            sample.set_slot(channel, Slot { value: Ok(value), age_ns: 0 });
         };
         set("spindle_speed_rpm", Value::Number(speed));
         set("spindle_power_w", Value::Number((power * 100.0).round() / 100.0));
         set("coolant_on", Value::Number(coolant));
         set("run", Value::Text(format!("{}", row / 150).into()));
-        writer.sample(&sample, &[]);
+        writer.queue_sample(&sample, &[]);
     }
     writer.flush().expect("durable");
     drop(writer);
@@ -103,7 +103,7 @@ fn a_history_and_its_exports_say_the_same() {
     spindle_history(&bench.path().join("h.db"));
     let reader = Reader::open(&bench.path().join("h.db")).expect("readable");
     for name in ["h.csv", "h.parquet"] {
-        reader.export(&Query::default(), &bench.path().join(name)).expect("exported");
+        reader.export_to_file(&Query::default(), &bench.path().join(name)).expect("exported");
     }
     let model = "schema = \"model/1\"\noutput = \"spindle_power_w\"\n[[effect]]\nkind = \"no_load_power\"\n\
                  parameters = { p0_w = 80.0, p1_w_per_rpm = 0.3, p2_w_per_rpm2 = 0.0 }\n";

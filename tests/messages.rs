@@ -6,7 +6,7 @@
 use adapters::Sample;
 use gateway::config::{self, Problem};
 use rules::estimators::Estimates;
-use rules::script::{self, Host, ScriptFile, compile};
+use rules::script::{self, Host, ScriptFile, compile_scripts};
 use std::path::{Path, PathBuf};
 
 fn data(name: &str) -> PathBuf {
@@ -65,13 +65,13 @@ fn variables_are_checked_like_the_file() {
 
 #[test]
 fn the_table_of_keys_and_the_example_are_the_stored_ones() {
-    golden("keys.md", &config::keys::table());
-    golden("example.toml", &config::keys::example());
+    golden("keys.md", &config::keys::format_table());
+    golden("example.toml", &config::keys::format_example());
 }
 
 #[test]
 fn the_example_file_and_the_built_in_configuration_are_accepted() {
-    let example = parse(&config::keys::example(), &[]).expect("every default is accepted");
+    let example = parse(&config::keys::format_example(), &[]).expect("every default is accepted");
     let built_in = parse(config::BUILT_IN_TEXT, &[]).expect("what is built in is accepted");
     assert_eq!(example.gate, built_in.gate);
     assert_eq!(built_in.gate.mode, config::GateMode::Shadow, "by default nothing is written to a machine");
@@ -132,7 +132,7 @@ fn script(name: &str) -> ScriptFile {
 fn a_set_of_scripts_is_refused_with_everything_that_is_wrong() {
     let names = ["broken.rhai", "misspelt.rhai", "print.rhai", "settings.rhai", "settings2.rhai", "unclosed.rhai"];
     let files: Vec<ScriptFile> = names.into_iter().map(script).collect();
-    let Err(problems) = compile(&files) else { panic!("it compiles") };
+    let Err(problems) = compile_scripts(&files) else { panic!("it compiles") };
     golden("scripts.txt", &problems.iter().map(|problem| format!("{problem}\n")).collect::<String>());
 }
 
@@ -156,25 +156,25 @@ fn a_script_that_fails_while_it_runs_says_where_and_what_to_do() {
     for source in failing {
         let mut host = Host::new();
         let file = ScriptFile { name: "rule.rhai".to_owned(), text: source.to_owned() };
-        if let Err(problems) = host.load(&[file]) {
+        if let Err(problems) = host.load_scripts(&[file]) {
             let problems: Vec<String> = problems.iter().map(ToString::to_string).collect();
             text += &format!("{source}\n=> not taken: {}\n\n", problems.join("\n"));
             continue;
         }
-        host.tick(&Sample::empty(0), &Estimates::none(0));
+        host.run_due_scripts(&Sample::new_empty(0), &Estimates::without_samples(0));
         let status = host.status();
         let problem = status.scripts[0].condition.problem().expect(source);
-        text += &format!("{source}\n=> {}: {problem}\n\n", status.scripts[0].condition.word());
+        text += &format!("{source}\n=> {}: {problem}\n\n", status.scripts[0].condition.as_word());
     }
     golden("running.txt", &text);
 }
 
 #[test]
 fn the_vocabulary_lists_every_word_function_and_setting() {
-    let (english, chinese) = (script::vocabulary(false), script::vocabulary(true));
+    let (english, chinese) = (script::format_vocabulary(false), script::format_vocabulary(true));
     let settings = rules::estimators::SETTINGS.iter().map(|setting| setting.name);
     let functions = script::FUNCTIONS.iter().map(|function| function.signature);
-    for name in script::words().iter().map(|word| word.name).chain(functions).chain(settings) {
+    for name in script::list_words().iter().map(|word| word.name).chain(functions).chain(settings) {
         assert!(english.contains(&format!("| `{name}` |")), "{name}");
         assert!(chinese.contains(&format!("| `{name}` |")), "{name}");
     }

@@ -84,38 +84,38 @@ pub struct FanucOptions {
 
 impl Default for FanucOptions {
     fn default() -> Self {
-        Self::read(&mut Keys::of(""))
+        Self::read(&mut Keys::from_query(""))
     }
 }
 
 impl FanucOptions {
     pub(super) fn read(keys: &mut Keys) -> Self {
         let ms = |keys: &mut Keys, key, default, least, greatest| {
-            Duration::from_millis(keys.number(key, default, least, greatest))
+            Duration::from_millis(keys.take_number(key, default, least, greatest))
         };
-        let allow = keys.text("allow").map(|text| text.split(',').map(|one| one.trim().to_owned()).collect());
+        let allow = keys.take_text("allow").map(|text| text.split(',').map(|one| one.trim().to_owned()).collect());
         let allow: Vec<String> = allow.unwrap_or_default();
         for text in allow.iter().filter(|text| crate::fanuc::allow::Allowed::read(text).is_none()) {
-            keys.problem(format!("allow={text}: write addresses like R900-R904, #500-#509 or EXT"));
+            keys.add_problem(format!("allow={text}: write addresses like R900-R904, #500-#509 or EXT"));
         }
         let write = write(keys);
-        let (axes, positions) = axes(keys);
+        let (axes, positions) = parse_axes(keys);
         Self {
             axes,
             positions,
-            spindles: keys.number("spindles", 1, 1, 8),
-            details: keys.choice("details", &[("yes", true), ("no", false)]),
+            spindles: keys.take_number("spindles", 1, 1, 8),
+            details: keys.take_choice("details", &[("yes", true), ("no", false)]),
             own: Vec::new(),
-            encoding: super::keys::encoding(keys),
+            encoding: super::keys::parse_encoding(keys),
             further: Vec::new(),
             period: ms(keys, "period_ms", 100, 20, 60_000),
             slow: ms(keys, "slow_ms", 1000, 100, 600_000),
-            duty_pct: keys.number("duty_pct", 50, 1, 100),
+            duty_pct: keys.take_number("duty_pct", 50, 1, 100),
             timeout: ms(keys, "timeout_ms", 2000, 50, 30_000),
             settle: ms(keys, "settle_ms", 50, 0, 2000),
-            power_diagnosis: Some(keys.number("power_diagnosis", 0, 0, 9999)).filter(|number| *number > 0),
-            request: keys.text("request").and_then(|text| place(keys, "request", &text)),
-            dial: dial(keys, write),
+            power_diagnosis: Some(keys.take_number("power_diagnosis", 0, 0, 9999)).filter(|number| *number > 0),
+            request: keys.take_text("request").and_then(|text| parse_ladder_byte(keys, "request", &text)),
+            dial: parse_dial(keys, write),
             write,
             allow,
         }
@@ -123,32 +123,34 @@ impl FanucOptions {
 }
 
 /// `axes=X1,C1,B` and `positions=absolute,relative,to_go`.
-fn axes(keys: &mut Keys) -> (Vec<AxisName>, Vec<Position>) {
+fn parse_axes(keys: &mut Keys) -> (Vec<AxisName>, Vec<Position>) {
     let words = [("absolute", Position::Absolute), ("relative", Position::Relative), ("to_go", Position::ToGo)];
     let mut axes = Vec::new();
-    for text in keys.text("axes").iter().flat_map(|text| text.split(',')).map(str::trim) {
+    for text in keys.take_text("axes").iter().flat_map(|text| text.split(',')).map(str::trim) {
         match AxisName::read(text) {
             Some(axis) if axes.len() < AXES_MAX => axes.push(axis),
-            Some(_) => keys.problem(format!("axes=: at most {AXES_MAX} axes have channels")),
-            None => keys.problem(format!("axes={text}: name axes as on the control, for example axes=X1,Z1,C1,W:deg")),
+            Some(_) => keys.add_problem(format!("axes=: at most {AXES_MAX} axes have channels")),
+            None => {
+                keys.add_problem(format!("axes={text}: name axes as on the control, for example axes=X1,Z1,C1,W:deg"))
+            }
         }
     }
     let mut positions = Vec::new();
-    for text in keys.text("positions").iter().flat_map(|text| text.split(',')).map(str::trim) {
+    for text in keys.take_text("positions").iter().flat_map(|text| text.split(',')).map(str::trim) {
         match words.iter().find(|(word, _)| *word == text) {
             Some((_, position)) => positions.push(*position),
-            None => keys.problem(format!("positions={text}: write absolute, relative or to_go, one or several")),
+            None => keys.add_problem(format!("positions={text}: write absolute, relative or to_go, one or several")),
         }
     }
     if axes.is_empty() && !positions.is_empty() {
-        keys.problem("positions= is about the axes that axes= names; name them".to_owned());
+        keys.add_problem("positions= is about the axes that axes= names; name them".to_owned());
     }
     (axes, positions)
 }
 
 /// `paths=2,1`: the first has the plain channel names and is the one that is written to, the others have a prefix.
-pub(super) fn paths(keys: &mut Keys) -> Option<(u8, Vec<u8>)> {
-    let text = keys.text("paths")?;
+pub(super) fn parse_paths(keys: &mut Keys) -> Option<(u8, Vec<u8>)> {
+    let text = keys.take_text("paths")?;
     let paths: Option<Vec<u8>> = text.split(',').map(|path| path.trim().parse().ok()).collect();
     let once = |paths: &[u8]| paths.iter().enumerate().all(|(at, path)| !paths[..at].contains(path));
     match paths.as_deref() {
@@ -156,7 +158,7 @@ pub(super) fn paths(keys: &mut Keys) -> Option<(u8, Vec<u8>)> {
             Some((*own, further.to_vec()))
         }
         _ => {
-            keys.problem(format!(
+            keys.add_problem(format!(
                 "paths={text}: name paths up to {} once each, the one that is written to first, for example paths=1,2",
                 PATHS.end()
             ));
@@ -182,7 +184,7 @@ fn write(keys: &mut Keys) -> WriteMethod {
         ("macro", AddressWord::Macro),
         ("direct", AddressWord::Direct),
     ];
-    match keys.choice("write", &words) {
+    match keys.take_choice("write", &words) {
         AddressWord::None => WriteMethod::None,
         AddressWord::Mailbox => {
             let (area, at) = place_or(keys, "mailbox", (Area::R, 900));
@@ -192,37 +194,37 @@ fn write(keys: &mut Keys) -> WriteMethod {
             let (area, at) = place_or(keys, "second_override", (Area::R, 910));
             WriteMethod::SecondOverride { area, at }
         }
-        AddressWord::Macro => WriteMethod::Macro { variable: keys.number("macro", 500, 100, 999) },
+        AddressWord::Macro => WriteMethod::Macro { variable: keys.take_number("macro", 500, 100, 999) },
         AddressWord::Direct => WriteMethod::Direct,
     }
 }
 
 /// A byte that may be left out.
 fn place_or(keys: &mut Keys, key: &'static str, default: (Area, u16)) -> (Area, u16) {
-    keys.text(key).and_then(|text| place(keys, key, &text)).unwrap_or(default)
+    keys.take_text(key).and_then(|text| parse_ladder_byte(keys, key, &text)).unwrap_or(default)
 }
 
 /// `R900`: a byte of an area that belongs to the ladder's data.
-fn place(keys: &mut Keys, key: &str, text: &str) -> Option<(Area, u16)> {
+fn parse_ladder_byte(keys: &mut Keys, key: &str, text: &str) -> Option<(Area, u16)> {
     let mut letters = text.chars();
     let area = letters.next().and_then(Area::of_letter).filter(|area| matches!(area, Area::R | Area::D | Area::E));
     let found = area.zip(letters.as_str().parse::<u16>().ok()).filter(|(_, at)| *at < 60_000);
     if found.is_none() {
-        keys.problem(format!("{key}={text}: give a byte of R, D or E, for example R900"));
+        keys.add_problem(format!("{key}={text}: give a byte of R, D or E, for example R900"));
     }
     found
 }
 
 /// The dial; with a mailbox or a direct write G012 does not show it.
-fn dial(keys: &mut Keys, write: WriteMethod) -> Option<Dial> {
-    let text = keys.text("dial")?;
-    let Some(dial) = Dial::of(&text) else {
-        keys.problem(format!("dial={text}: give the byte with the operator's dial, for example R907 or G12"));
+fn parse_dial(keys: &mut Keys, write: WriteMethod) -> Option<Dial> {
+    let text = keys.take_text("dial")?;
+    let Some(dial) = Dial::from_text(&text) else {
+        keys.add_problem(format!("dial={text}: give the byte with the operator's dial, for example R907 or G12"));
         return None;
     };
     let shared = matches!(write, WriteMethod::Mailbox { .. } | WriteMethod::Direct);
     if shared && dial.area == Area::G && dial.at % 1000 == feed_override::AT {
-        keys.problem(format!(
+        keys.add_problem(format!(
             "dial={text}: with this way of writing G12 is what the ladder makes of dial and gateway; let the ladder \
              leave the dial alone in another byte, for example R907"
         ));

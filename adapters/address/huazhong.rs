@@ -3,7 +3,7 @@
 use super::keys::{self, Keys};
 use super::meter::{self, WaveformKeep};
 use super::secured::{Login, tls_files};
-use super::target::{Endpoint, Target, endpoint, library};
+use super::target::{Endpoint, Target, parse_endpoint, parse_library};
 use crate::hnc::OwnValue;
 use crate::nclink::OwnPath;
 use crate::nclink::mailbox::{ControllerRegister, Mailbox};
@@ -86,22 +86,22 @@ pub enum HncOffset {
     },
 }
 
-pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, String> {
-    let (login, files) = (Login::of(keys), tls_files(keys, tls));
-    let period_ms = keys.number("period_ms", 100, 10, 60_000);
-    let f_channel = keys.number("f_channel", 2560, 0, 65_535);
-    let spindle_axis = keys.optional("spindle_axis", 0, 63);
-    let mailbox = mailbox(keys);
-    let offset = keys.text("offset").and_then(|text| registers(keys, &text, mailbox));
-    let sample = keys.choice("sample", &[("no", false), ("yes", true)]);
-    let keep = kept(keys, sample, "sample=yes")?;
-    let encoding = keys::encoding(keys);
+pub(super) fn parse_nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, String> {
+    let (login, files) = (Login::from_keys(keys), tls_files(keys, tls));
+    let period_ms = keys.take_number("period_ms", 100, 10, 60_000);
+    let f_channel = keys.take_number("f_channel", 2560, 0, 65_535);
+    let spindle_axis = keys.take_optional_number("spindle_axis", 0, 63);
+    let mailbox = parse_mailbox(keys);
+    let offset = keys.take_text("offset").and_then(|text| parse_offset_register(keys, &text, mailbox));
+    let sample = keys.take_choice("sample", &[("no", false), ("yes", true)]);
+    let keep = parse_sampled_keep(keys, sample, "sample=yes")?;
+    let encoding = keys::parse_encoding(keys);
     let rest = body.strip_prefix("//").unwrap_or(body);
     let (broker, serial) = rest.split_once('/').unwrap_or((rest, ""));
     if serial.is_empty() || serial.contains(['+', '#']) {
         return Err("no serial number; write nclink://BROKER:1883/SERIAL".to_owned());
     }
-    let at = endpoint(broker, Some(if tls { 8883 } else { 1883 }))?;
+    let at = parse_endpoint(broker, Some(if tls { 8883 } else { 1883 }))?;
     let serial = serial.to_owned();
     Ok(Target::NcLink(NcLinkTarget {
         at,
@@ -120,28 +120,28 @@ pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, S
     }))
 }
 
-pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
-    let vendor_library = library(keys);
-    let (local_host, local_port) = (keys.text("local_host"), keys.number("local_port", 10001, 1, u16::MAX));
-    let long_bytes = match keys.text("long_bytes").as_deref() {
+pub(super) fn parse_hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
+    let vendor_library = parse_library(keys);
+    let (local_host, local_port) = (keys.take_text("local_host"), keys.take_number("local_port", 10001, 1, u16::MAX));
+    let long_bytes = match keys.take_text("long_bytes").as_deref() {
         None => size_of::<std::ffi::c_long>(),
         Some("4") => 4,
         Some("8") => 8,
         Some(other) => {
-            keys.problem(format!("long_bytes={other}: give 4 or 8"));
+            keys.add_problem(format!("long_bytes={other}: give 4 or 8"));
             4
         }
     };
-    let period_ms = keys.number("period_ms", 100, 10, 60_000);
-    let sample = keys.choice("sample", &[("no", false), ("yes", true)]);
-    let sample_scale_a = keys.optional("sample_scale_a", 1e-9, 1e3);
+    let period_ms = keys.take_number("period_ms", 100, 10, 60_000);
+    let sample = keys.take_choice("sample", &[("no", false), ("yes", true)]);
+    let sample_scale_a = keys.take_optional_number("sample_scale_a", 1e-9, 1e3);
     if sample_scale_a.is_some() && !sample {
-        keys.problem("sample_scale_a counts only with sample=yes".to_owned());
+        keys.add_problem("sample_scale_a counts only with sample=yes".to_owned());
     }
-    let keep = kept(keys, sample_scale_a.is_some(), "sample=yes&sample_scale_a=A")?;
-    let mailbox = mailbox(keys);
+    let keep = parse_sampled_keep(keys, sample_scale_a.is_some(), "sample=yes&sample_scale_a=A")?;
+    let mailbox = parse_mailbox(keys);
     let offset = hnc_offset(keys, mailbox);
-    let (at, vendor_library) = (endpoint(body, Some(10001))?, vendor_library?);
+    let (at, vendor_library) = (parse_endpoint(body, Some(10001))?, vendor_library?);
     Ok(Target::HncNet(HncNetTarget {
         at,
         vendor_library,
@@ -160,26 +160,33 @@ pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
 
 /// `offset=D110`, or `offset=zero` with what a count is.
 fn hnc_offset(keys: &mut Keys, mailbox: Option<ControllerRegister>) -> Option<HncOffset> {
-    let text = keys.text("offset");
-    let unit_um = keys.optional("offset_unit_um", 1e-4, 100.0);
+    let text = keys.take_text("offset");
+    let unit_um = keys.take_optional_number("offset_unit_um", 1e-4, 100.0);
     match (text.as_deref(), unit_um) {
         (Some("zero"), Some(unit_um)) => return Some(HncOffset::Zero { unit_um }),
         (Some("zero"), None) => {
             let next = "say what a count of the external zero offset is, after comparing one shift at the panel";
-            keys.problem(format!("offset=zero needs offset_unit_um= (0.01 on most controls): {next}"));
+            keys.add_problem(format!("offset=zero needs offset_unit_um= (0.01 on most controls): {next}"));
         }
-        (Some(text), None) => return registers(keys, text, mailbox).map(HncOffset::Registers),
-        (_, Some(_)) => keys.problem("offset_unit_um= counts only with offset=zero".to_owned()),
+        (Some(text), None) => return parse_offset_register(keys, text, mailbox).map(HncOffset::Registers),
+        (_, Some(_)) => keys.add_problem("offset_unit_um= counts only with offset=zero".to_owned()),
         (None, None) => {}
     }
     None
 }
 
 /// Where the mailbox for offsets begins; it must not lie over the one for the feed override.
-fn registers(keys: &mut Keys, text: &str, mailbox: Option<ControllerRegister>) -> Option<ControllerRegister> {
-    let first = text.parse::<ControllerRegister>().map_err(|problem| keys.problem(format!("offset={problem}"))).ok()?;
+fn parse_offset_register(
+    keys: &mut Keys,
+    text: &str,
+    mailbox: Option<ControllerRegister>,
+) -> Option<ControllerRegister> {
+    let first =
+        text.parse::<ControllerRegister>().map_err(|problem| keys.add_problem(format!("offset={problem}"))).ok()?;
     if !OffsetMailbox::may_begin(first) {
-        keys.problem(format!("offset={first}: name a W or D register; others are too short or keep their contents"));
+        keys.add_problem(format!(
+            "offset={first}: name a W or D register; others are too short or keep their contents"
+        ));
         return None;
     }
     let overlaps = |other: &ControllerRegister| {
@@ -187,41 +194,41 @@ fn registers(keys: &mut Keys, text: &str, mailbox: Option<ControllerRegister>) -
         other.kind == first.kind && !apart
     };
     if let Some(other) = mailbox.filter(overlaps) {
-        keys.problem(format!("offset={first} lies over the mailbox at {other}: name eight registers of their own"));
+        keys.add_problem(format!("offset={first} lies over the mailbox at {other}: name eight registers of their own"));
         return None;
     }
     Some(first)
 }
 
 /// `keep=` and `keep_above_a=`, where there are samples to be kept.
-fn kept(keys: &mut Keys, sampled: bool, next: &str) -> Result<Option<WaveformKeep>, String> {
-    let keep = meter::keep(keys)?;
+fn parse_sampled_keep(keys: &mut Keys, sampled: bool, next: &str) -> Result<Option<WaveformKeep>, String> {
+    let keep = meter::parse_waveform_keep(keys)?;
     if keep.is_some() && !sampled {
-        keys.problem(format!("keep needs samples: write {next} as well"));
+        keys.add_problem(format!("keep needs samples: write {next} as well"));
     }
     Ok(keep)
 }
 
 /// `write=mailbox`, and where it begins.
-fn mailbox(keys: &mut Keys) -> Option<ControllerRegister> {
-    let wanted = keys.choice("write", &[("none", false), ("mailbox", true)]);
-    let text = keys.text("mailbox");
+fn parse_mailbox(keys: &mut Keys) -> Option<ControllerRegister> {
+    let wanted = keys.take_choice("write", &[("none", false), ("mailbox", true)]);
+    let text = keys.take_text("mailbox");
     if !wanted {
         if text.is_some() {
-            keys.problem("mailbox= counts only with write=mailbox".to_owned());
+            keys.add_problem("mailbox= counts only with write=mailbox".to_owned());
         }
         return None;
     }
     match text.as_deref().unwrap_or("D100").parse::<ControllerRegister>() {
         Ok(first) if Mailbox::may_begin(first) => Some(first),
         Ok(first) => {
-            keys.problem(format!(
+            keys.add_problem(format!(
                 "mailbox={first}: name an R, W or D register; others are not free or keep their contents"
             ));
             None
         }
         Err(problem) => {
-            keys.problem(format!("mailbox={problem}"));
+            keys.add_problem(format!("mailbox={problem}"));
             None
         }
     }

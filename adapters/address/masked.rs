@@ -14,7 +14,7 @@ pub(super) fn names_somebody(body: &str) -> bool {
 
 /// The text with stars in the place of what stands before `@`, and of what a key of a secret holds. Names of files stay.
 #[must_use]
-pub fn masked(text: &str) -> String {
+pub fn mask_secrets(text: &str) -> String {
     let (before, query) = text.split_once('?').unwrap_or((text, ""));
     let mut told = without_user(before);
     let hidden = |pair: &str| match pair.split_once('=') {
@@ -48,15 +48,15 @@ mod tests {
     #[test]
     fn what_could_be_a_secret_is_masked() {
         assert_eq!(
-            masked("mqtt://user:wo/rd@broker:1883/plant?password=x/y&qos=1"),
+            mask_secrets("mqtt://user:wo/rd@broker:1883/plant?password=x/y&qos=1"),
             "mqtt://***@broker:1883/plant?password=***&qos=1"
         );
-        assert_eq!(masked("modbus-tcp:b:word@meter"), "modbus-tcp:***@meter");
+        assert_eq!(mask_secrets("modbus-tcp:b:word@meter"), "modbus-tcp:***@meter");
         assert_eq!(
-            masked("nclinks://broker/S?password_file=/etc/pw&key=/etc/box.key"),
+            mask_secrets("nclinks://broker/S?password_file=/etc/pw&key=/etc/box.key"),
             "nclinks://broker/S?password_file=/etc/pw&key=/etc/box.key"
         );
-        assert_eq!(masked("replay:/data/a@b.csv"), "replay:/data/a@b.csv");
-        assert_eq!(masked("127.0.0.1:8080"), "127.0.0.1:8080");
+        assert_eq!(mask_secrets("replay:/data/a@b.csv"), "replay:/data/a@b.csv");
+        assert_eq!(mask_secrets("127.0.0.1:8080"), "127.0.0.1:8080");
     }
 }

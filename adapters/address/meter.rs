@@ -61,41 +61,41 @@ pub struct WaveformKeep {
 }
 
 /// The keys of a Modbus meter.
-pub(super) fn modbus(keys: &mut Keys, least_unit: u8) -> Result<MeterTarget, String> {
-    let unit = keys.number("unit", 1, least_unit, 247);
-    let profile = keys.text("profile");
-    let profiles = keys.text("profiles").map(PathBuf::from);
-    let circuit = circuit(keys);
-    let (ct, pt) = (keys.number("ct", 1.0, 0.001, 100_000.0), keys.number("pt", 1.0, 0.001, 100_000.0));
-    let timeout = timeout(keys);
+pub(super) fn parse_modbus(keys: &mut Keys, least_unit: u8) -> Result<MeterTarget, String> {
+    let unit = keys.take_number("unit", 1, least_unit, 247);
+    let profile = keys.take_text("profile");
+    let profiles = keys.take_text("profiles").map(PathBuf::from);
+    let circuit = parse_circuit(keys);
+    let (ct, pt) = (keys.take_number("ct", 1.0, 0.001, 100_000.0), keys.take_number("pt", 1.0, 0.001, 100_000.0));
+    let timeout = parse_timeout(keys);
     let profile = profile.ok_or_else(|| "name the meter's registers with profile=NAME".to_owned())?;
     let framing = TcpFraming::default();
     Ok(MeterTarget { unit, profile, profiles, circuit, ct, pt, timeout, framing, own: Vec::new() })
 }
 
 /// `framing=rtu`: frames of a serial line, as a transparent converter carries them.
-pub(super) fn framing(keys: &mut Keys) -> TcpFraming {
-    keys.choice("framing", &[("tcp", TcpFraming::Tcp), ("rtu", TcpFraming::Rtu)])
+pub(super) fn parse_framing(keys: &mut Keys) -> TcpFraming {
+    keys.take_choice("framing", &[("tcp", TcpFraming::Tcp), ("rtu", TcpFraming::Rtu)])
 }
 
-fn timeout(keys: &mut Keys) -> Duration {
-    Duration::from_millis(keys.number("timeout_ms", 500, 10, 60_000))
+fn parse_timeout(keys: &mut Keys) -> Duration {
+    Duration::from_millis(keys.take_number("timeout_ms", 500, 10, 60_000))
 }
 
-fn circuit(keys: &mut Keys) -> Circuit {
-    keys.choice("circuit", &[("machine", Circuit::Machine), ("spindle", Circuit::Spindle)])
+fn parse_circuit(keys: &mut Keys) -> Circuit {
+    keys.take_choice("circuit", &[("machine", Circuit::Machine), ("spindle", Circuit::Spindle)])
 }
 
 /// The keys of an EDA9033A.
-pub(super) fn eda(keys: &mut Keys) -> EdaTarget {
-    let (address, ct) = (keys.number("address", 1, 0, 255), keys.number("ct", 1.0, 0.001, 10_000.0));
-    EdaTarget { address, ct, circuit: circuit(keys), timeout: timeout(keys) }
+pub(super) fn parse_eda9033a(keys: &mut Keys) -> EdaTarget {
+    let (address, ct) = (keys.take_number("address", 1, 0, 255), keys.take_number("ct", 1.0, 0.001, 10_000.0));
+    EdaTarget { address, ct, circuit: parse_circuit(keys), timeout: parse_timeout(keys) }
 }
 
 /// The keys of a waveform whose raw samples stay.
-pub(super) fn keep(keys: &mut Keys) -> Result<Option<WaveformKeep>, String> {
-    let directory = keys.text("keep").map(PathBuf::from);
-    let above_a = keys.number("keep_above_a", 0.0, 0.0, 100_000.0);
+pub(super) fn parse_waveform_keep(keys: &mut Keys) -> Result<Option<WaveformKeep>, String> {
+    let directory = keys.take_text("keep").map(PathBuf::from);
+    let above_a = keys.take_number("keep_above_a", 0.0, 0.0, 100_000.0);
     match directory {
         Some(directory) if above_a > 0.0 => Ok(Some(WaveformKeep { directory, above_a })),
         Some(_) => Err("keep needs a limit: write keep_above_a=40 as well".to_owned()),

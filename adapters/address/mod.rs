@@ -11,12 +11,12 @@ mod target;
 pub use fanuc::{FanucOptions, WriteMethod};
 pub use huazhong::{HncNetTarget, HncOffset, NcLinkTarget};
 pub use keys::Keys;
-pub use masked::{NO_SECRETS, masked};
+pub use masked::{NO_SECRETS, mask_secrets};
 pub use meter::{Circuit, EdaTarget, MeterTarget, WaveformKeep};
 pub use secured::{Login, tls_files};
 pub use target::{
     Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDay, SimulatedDevice, SimulatedMachine,
-    SimulatedTarget, Speed, Target, endpoint,
+    SimulatedTarget, Speed, Target, parse_endpoint,
 };
 
 use crate::own::{Own, OwnChannel, OwnChannelError};
@@ -71,17 +71,19 @@ impl Address {
     pub fn with_channels(mut self, own: Vec<OwnChannel>) -> Result<Self, OwnChannelError> {
         match &mut self.target {
             Target::Fanuc { path, options, .. } => {
-                options.own = Own::all(own, &crate::fanuc::source::delivered(options))?;
-                crate::fanuc::extra::declared(options, *path).map_err(|(channel, error)| OwnChannelError {
+                options.own = Own::declare_all(own, &crate::fanuc::source::list_delivered(options))?;
+                crate::fanuc::extra::declare_channels(options, *path).map_err(|(channel, error)| OwnChannelError {
                     channel,
                     key: "name",
                     what: error.to_string(),
                 })?;
             }
             // What stands where in a model differs between makers: here every channel can be told its place.
-            Target::NcLink(target) => target.own = Own::all(own, &[])?,
-            Target::HncNet(target) => target.own = Own::all(own, &crate::hnc::delivered())?,
-            Target::ModbusTcp { meter, .. } | Target::ModbusRtu { meter, .. } => meter.own = Own::all(own, &[])?,
+            Target::NcLink(target) => target.own = Own::declare_all(own, &[])?,
+            Target::HncNet(target) => target.own = Own::declare_all(own, &crate::hnc::delivered())?,
+            Target::ModbusTcp { meter, .. } | Target::ModbusRtu { meter, .. } => {
+                meter.own = Own::declare_all(own, &[])?
+            }
             _ => none_here(own)?,
         }
         Ok(self)
@@ -128,15 +130,15 @@ pub fn parse<T>(
     no_scheme: impl Fn(&str) -> String,
     target: impl Fn(&str, &str, &mut Keys) -> Result<T, String>,
 ) -> Result<T, AddressError> {
-    let fail = |problems| AddressError { address: masked(text), problems };
+    let fail = |problems| AddressError { address: mask_secrets(text), problems };
     let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme(text)]))?;
     let (body, query) = rest.rsplit_once('?').unwrap_or((rest, ""));
     if masked::names_somebody(body) {
         return Err(fail(vec![NO_SECRETS.to_owned()]));
     }
-    let mut keys = Keys::of(query);
+    let mut keys = Keys::from_query(query);
     let target = target(scheme, body, &mut keys);
-    let problems = keys.finish();
+    let problems = keys.into_problems();
     match target {
         Ok(target) if problems.is_empty() => Ok(target),
         Ok(_) => Err(fail(problems)),

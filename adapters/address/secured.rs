@@ -15,10 +15,11 @@ pub struct Login {
 
 impl Login {
     /// The keys `user` and `password_file`.
-    pub fn of(keys: &mut Keys) -> Self {
-        let login = Self { user: keys.text("user"), password_file: keys.text("password_file").map(PathBuf::from) };
+    pub fn from_keys(keys: &mut Keys) -> Self {
+        let login =
+            Self { user: keys.take_text("user"), password_file: keys.take_text("password_file").map(PathBuf::from) };
         if login.user.is_none() && login.password_file.is_some() {
-            keys.problem("password_file counts only with user=".to_owned());
+            keys.add_problem("password_file counts only with user=".to_owned());
         }
         login
     }
@@ -42,16 +43,16 @@ pub fn tls_files(keys: &mut Keys, secured: bool) -> Option<TlsFiles> {
     if !secured {
         return None;
     }
-    let mut path = |key| keys.text(key).map(PathBuf::from);
+    let mut path = |key| keys.take_text(key).map(PathBuf::from);
     let files = TlsFiles { ca: path("ca"), certificate: path("cert"), key: path("key") };
     match (&files.certificate, &files.key) {
-        (Some(certificate), None) => keys.problem(needs("cert", certificate, "key")),
-        (None, Some(key)) => keys.problem(needs("key", key, "cert")),
+        (Some(certificate), None) => keys.add_problem(describe_missing_file("cert", certificate, "key")),
+        (None, Some(key)) => keys.add_problem(describe_missing_file("key", key, "cert")),
         _ => {}
     }
     Some(files)
 }
 
-fn needs(given: &str, file: &Path, missing: &str) -> String {
+fn describe_missing_file(given: &str, file: &Path, missing: &str) -> String {
     format!("{given}={} needs {missing}=FILE beside it", file.display())
 }

@@ -2,10 +2,10 @@
 
 use super::SCHEMES;
 use super::fanuc::{self, FanucOptions};
-use super::huazhong::{HncNetTarget, NcLinkTarget, hncnet, nclink};
+use super::huazhong::{HncNetTarget, NcLinkTarget, parse_hncnet, parse_nclink};
 use super::keys::Keys;
 use super::meter::{self, EdaTarget, MeterTarget, WaveformKeep};
-use crate::channel::nearest;
+use crate::channel::find_nearest_name;
 use crate::driver::LadderRule;
 use std::path::PathBuf;
 
@@ -200,27 +200,27 @@ pub enum Target {
 
 pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target, String> {
     match scheme {
-        "simulated" => simulated(body, keys),
-        "replay" => replay(body, keys),
-        "fanuc" => fanuc(body, keys),
-        "nclink" => nclink(body, keys, false),
-        "nclinks" => nclink(body, keys, true),
-        "hncnet" => hncnet(body, keys),
+        "simulated" => parse_simulated(body, keys),
+        "replay" => parse_replay(body, keys),
+        "fanuc" => parse_fanuc(body, keys),
+        "nclink" => parse_nclink(body, keys, false),
+        "nclinks" => parse_nclink(body, keys, true),
+        "hncnet" => parse_hncnet(body, keys),
         "modbus-tcp" => {
-            let (meter, framing) = (meter::modbus(keys, 0), meter::framing(keys));
+            let (meter, framing) = (meter::parse_modbus(keys, 0), meter::parse_framing(keys));
             let meter = meter.map(|meter| MeterTarget { framing, ..meter });
-            Ok(Target::ModbusTcp { at: endpoint(body, Some(502))?, meter: meter? })
+            Ok(Target::ModbusTcp { at: parse_endpoint(body, Some(502))?, meter: meter? })
         }
         "modbus-rtu" => {
-            let (line, meter) = (serial(body, keys), meter::modbus(keys, 1));
+            let (line, meter) = (parse_serial(body, keys), meter::parse_modbus(keys, 1));
             Ok(Target::ModbusRtu { line: line?, meter: meter? })
         }
         "eda9033a" => {
-            let (line, meter) = (serial(body, keys), meter::eda(keys));
+            let (line, meter) = (parse_serial(body, keys), meter::parse_eda9033a(keys));
             Ok(Target::Eda9033a { line: line?, meter })
         }
         "temperature" => {
-            let sys = keys.text("sys").map_or_else(|| PathBuf::from("/sys"), PathBuf::from);
+            let sys = keys.take_text("sys").map_or_else(|| PathBuf::from("/sys"), PathBuf::from);
             let file = body.strip_prefix("//").unwrap_or(body);
             let named = !file.is_empty();
             named
@@ -228,43 +228,43 @@ pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target,
                 .ok_or_else(|| "no file; write temperature:FILE".to_owned())
         }
         "waveform" => {
-            let keep = meter::keep(keys);
-            Ok(Target::Waveform { at: endpoint(body, None)?, keep: keep? })
+            let keep = meter::parse_waveform_keep(keys);
+            Ok(Target::Waveform { at: parse_endpoint(body, None)?, keep: keep? })
         }
         other => Err(unknown_scheme(other)),
     }
 }
 
 fn unknown_scheme(scheme: &str) -> String {
-    let hint = nearest(scheme, SCHEMES)
+    let hint = find_nearest_name(scheme, SCHEMES)
         .map_or_else(|| format!("the schemes are {}", SCHEMES.join(", ")), |near| format!("did you mean {near}?"));
     format!("unknown scheme {scheme}; {hint}")
 }
 
-fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
+fn parse_simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
     use SimulatedDevice::{Both, Controller, Meter};
     let target = SimulatedTarget {
         machine: SimulatedMachine::Lathe,
-        device: keys.choice("device", &[("both", Both), ("controller", Controller), ("meter", Meter)]),
-        seed: keys.number("seed", 1, 0, u64::MAX),
-        speed: speed(keys),
-        tau_s: keys.number("tau_s", 0.6, 0.05, 10.0),
-        cut_pct: keys.number("cut_pct", 100.0, 0.0, 300.0),
-        noise_pct: keys.number("noise_pct", 1.0, 0.0, 50.0),
-        meter_lag_ms: keys.number("meter_lag_ms", 78.0, 50.0, 1500.0),
-        dropouts_per_h: keys.number("dropouts_per_h", 1.0, 0.0, 3600.0),
-        speed_changes: keys.choice("speed_changes", &[("no", false), ("yes", true)]),
-        annotations: keys.choice("annotations", &[("yes", true), ("no", false)]),
-        wear_mm: keys.number("wear_mm", 0.005, 0.0, 0.29),
-        change_h: keys.number("change_h", f64::INFINITY, 0.0, 1e5),
-        change_cut_pct: keys.number("change_cut_pct", 100.0, 10.0, 300.0),
-        change_friction_pct: keys.number("change_friction_pct", 100.0, 10.0, 300.0),
-        begun_s: keys.number("begun_s", 0.0, 0.0, 86_400.0),
-        day: keys.choice(
+        device: keys.take_choice("device", &[("both", Both), ("controller", Controller), ("meter", Meter)]),
+        seed: keys.take_number("seed", 1, 0, u64::MAX),
+        speed: parse_speed(keys),
+        tau_s: keys.take_number("tau_s", 0.6, 0.05, 10.0),
+        cut_pct: keys.take_number("cut_pct", 100.0, 0.0, 300.0),
+        noise_pct: keys.take_number("noise_pct", 1.0, 0.0, 50.0),
+        meter_lag_ms: keys.take_number("meter_lag_ms", 78.0, 50.0, 1500.0),
+        dropouts_per_h: keys.take_number("dropouts_per_h", 1.0, 0.0, 3600.0),
+        speed_changes: keys.take_choice("speed_changes", &[("no", false), ("yes", true)]),
+        annotations: keys.take_choice("annotations", &[("yes", true), ("no", false)]),
+        wear_mm: keys.take_number("wear_mm", 0.005, 0.0, 0.29),
+        change_h: keys.take_number("change_h", f64::INFINITY, 0.0, 1e5),
+        change_cut_pct: keys.take_number("change_cut_pct", 100.0, 10.0, 300.0),
+        change_friction_pct: keys.take_number("change_friction_pct", 100.0, 10.0, 300.0),
+        begun_s: keys.take_number("begun_s", 0.0, 0.0, 86_400.0),
+        day: keys.take_choice(
             "day",
             &[("work", SimulatedDay::Work), ("shifts", SimulatedDay::Shifts), ("short", SimulatedDay::Short)],
         ),
-        ladder: keys.choice(
+        ladder: keys.take_choice(
             "ladder",
             &[("least", LadderRule::Least), ("product", LadderRule::Product), ("replace", LadderRule::Replace)],
         ),
@@ -276,8 +276,8 @@ fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
     }
 }
 
-fn replay(body: &str, keys: &mut Keys) -> Result<Target, String> {
-    let speed = speed(keys);
+fn parse_replay(body: &str, keys: &mut Keys) -> Result<Target, String> {
+    let speed = parse_speed(keys);
     let file = body.strip_prefix("//").unwrap_or(body);
     if file.is_empty() {
         return Err("no file; write replay:FILE".to_owned());
@@ -285,45 +285,45 @@ fn replay(body: &str, keys: &mut Keys) -> Result<Target, String> {
     Ok(Target::Replay(ReplayTarget { file: PathBuf::from(file), speed }))
 }
 
-fn speed(keys: &mut Keys) -> Speed {
-    let Some(text) = keys.text("speed") else { return Speed::Times(1.0) };
+fn parse_speed(keys: &mut Keys) -> Speed {
+    let Some(text) = keys.take_text("speed") else { return Speed::Times(1.0) };
     if text == "max" {
         return Speed::Max;
     }
     match text.parse::<f64>() {
         Ok(times) if (0.001..=100_000.0).contains(&times) => Speed::Times(times),
         _ => {
-            keys.problem(format!("speed={text}: give max or a factor from 0.001 to 100000"));
+            keys.add_problem(format!("speed={text}: give max or a factor from 0.001 to 100000"));
             Speed::Times(1.0)
         }
     }
 }
 
-fn fanuc(body: &str, keys: &mut Keys) -> Result<Target, String> {
-    let named = keys.optional("path", 1, 10);
-    let vendor = keys.choice("backend", &[("native", false), ("vendor", true)]);
-    let backend = if vendor { library(keys).map(FanucBackend::Vendor) } else { Ok(FanucBackend::Native) };
+fn parse_fanuc(body: &str, keys: &mut Keys) -> Result<Target, String> {
+    let named = keys.take_optional_number("path", 1, 10);
+    let vendor = keys.take_choice("backend", &[("native", false), ("vendor", true)]);
+    let backend = if vendor { parse_library(keys).map(FanucBackend::Vendor) } else { Ok(FanucBackend::Native) };
     let mut options = Box::new(FanucOptions::read(keys));
-    let path = match fanuc::paths(keys) {
+    let path = match fanuc::parse_paths(keys) {
         Some((own, further)) => {
             if named.is_some() {
-                keys.problem("give either path=, for one path under the plain channel names, or paths=".to_owned());
+                keys.add_problem("give either path=, for one path under the plain channel names, or paths=".to_owned());
             }
             options.further = further;
             own
         }
         None => named.unwrap_or(1),
     };
-    Ok(Target::Fanuc { at: endpoint(body, Some(8193))?, path, backend: backend?, options })
+    Ok(Target::Fanuc { at: parse_endpoint(body, Some(8193))?, path, backend: backend?, options })
 }
 
-pub(super) fn library(keys: &mut Keys) -> Result<PathBuf, String> {
-    keys.text("library").map(PathBuf::from).ok_or_else(|| "name the vendor's library with library=FILE".to_owned())
+pub(super) fn parse_library(keys: &mut Keys) -> Result<PathBuf, String> {
+    keys.take_text("library").map(PathBuf::from).ok_or_else(|| "name the vendor's library with library=FILE".to_owned())
 }
 
-fn serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
-    let baud = keys.number("baud", 9600, 300, 4_000_000);
-    let parity = keys.choice("parity", &[("none", Parity::None), ("even", Parity::Even), ("odd", Parity::Odd)]);
+fn parse_serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
+    let baud = keys.take_number("baud", 9600, 300, 4_000_000);
+    let parity = keys.take_choice("parity", &[("none", Parity::None), ("even", Parity::Even), ("odd", Parity::Odd)]);
     let port = body.strip_prefix("//").unwrap_or(body);
     if port.is_empty() {
         return Err("no serial port; write it like :///dev/ttyUSB0".to_owned());
@@ -335,7 +335,7 @@ fn serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
 ///
 /// # Errors
 /// What is wrong, in words.
-pub fn endpoint(body: &str, default_port: Option<u16>) -> Result<Endpoint, String> {
+pub fn parse_endpoint(body: &str, default_port: Option<u16>) -> Result<Endpoint, String> {
     let text = body.strip_prefix("//").unwrap_or(body).trim_end_matches('/');
     if text.contains('@') {
         return Err(super::NO_SECRETS.to_owned());

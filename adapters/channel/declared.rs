@@ -55,17 +55,17 @@ pub enum DeclareError {
 }
 
 /// How many channels have been declared.
-pub(super) fn count() -> usize {
+pub(super) fn count_declared() -> usize {
     DECLARED.iter().take_while(|place| place.get().is_some()).count()
 }
 
 /// The declared channel at this place behind the table.
-pub(super) fn at(index: usize) -> Option<&'static Channel> {
+pub(super) fn find_by_index(index: usize) -> Option<&'static Channel> {
     DECLARED.get(index)?.get()
 }
 
 /// The place of the declared channel of this name.
-pub(super) fn find(name: &str) -> Option<usize> {
+pub(super) fn find_by_name(name: &str) -> Option<usize> {
     let known = |place: &OnceLock<Channel>| place.get().map(|channel| channel.name == name);
     DECLARED.iter().map_while(known).position(|is_it| is_it)
 }
@@ -81,7 +81,7 @@ fn is_name(name: &str) -> bool {
 ///
 /// # Errors
 /// See [`DeclareError`].
-pub fn declare(new: &NewChannel) -> Result<ChannelId, DeclareError> {
+pub fn declare_channel(new: &NewChannel) -> Result<ChannelId, DeclareError> {
     if !is_name(&new.name) {
         return Err(DeclareError::Name);
     }
@@ -89,21 +89,21 @@ pub fn declare(new: &NewChannel) -> Result<ChannelId, DeclareError> {
         return Err(DeclareError::Known);
     }
     let _guard = TAKING.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(place) = find(&new.name) {
-        let same =
-            at(place).is_some_and(|known| known.unit == new.unit && known.kind == new.kind && known.range == new.range);
+    if let Some(place) = find_by_name(&new.name) {
+        let same = find_by_index(place)
+            .is_some_and(|known| known.unit == new.unit && known.kind == new.kind && known.range == new.range);
         return if same {
-            ChannelId::at(CHANNELS.len() + place).ok_or(DeclareError::Full)
+            ChannelId::from_index(CHANNELS.len() + place).ok_or(DeclareError::Full)
         } else {
             Err(DeclareError::Differs)
         };
     }
-    let place = count();
+    let place = count_declared();
     let text = |text: &str| -> &'static str { String::leak(text.to_owned()) };
     let (name, unit, en, zh) = (text(&new.name), text(&new.unit), text(&new.en), text(&new.zh));
     let channel = Channel { name, unit, range: new.range, kind: new.kind, form: Form::Real, en, zh };
     DECLARED.get(place).ok_or(DeclareError::Full)?.get_or_init(|| channel);
-    ChannelId::at(CHANNELS.len() + place).ok_or(DeclareError::Full)
+    ChannelId::from_index(CHANNELS.len() + place).ok_or(DeclareError::Full)
 }
 
 #[cfg(test)]
@@ -117,20 +117,20 @@ mod tests {
 
     #[test]
     fn a_declared_channel_is_like_every_other() {
-        let id = declare(&new("test_clamping_pressure_bar")).expect("a place");
-        assert_eq!(ChannelId::of("test_clamping_pressure_bar"), Some(id));
+        let id = declare_channel(&new("test_clamping_pressure_bar")).expect("a place");
+        assert_eq!(ChannelId::from_name("test_clamping_pressure_bar"), Some(id));
         assert_eq!((id.name(), id.channel().unit), ("test_clamping_pressure_bar", "bar"));
-        assert!(ChannelId::all().any(|known| known == id) && id.index() < ChannelId::count());
-        assert_eq!(declare(&new("test_clamping_pressure_bar")), Ok(id), "once more is the same");
+        assert!(ChannelId::list_all().any(|known| known == id) && id.index() < ChannelId::count_channels());
+        assert_eq!(declare_channel(&new("test_clamping_pressure_bar")), Ok(id), "once more is the same");
         let other = NewChannel { unit: "MPa".to_owned(), ..new("test_clamping_pressure_bar") };
-        assert_eq!(declare(&other), Err(DeclareError::Differs));
+        assert_eq!(declare_channel(&other), Err(DeclareError::Differs));
     }
 
     #[test]
     fn what_cannot_be_declared() {
-        assert_eq!(declare(&new("spindle_speed_rpm")), Err(DeclareError::Known));
+        assert_eq!(declare_channel(&new("spindle_speed_rpm")), Err(DeclareError::Known));
         for name in ["", "Pressure_bar", "1st_bar", "pressure-bar", "druck_bär", &"x".repeat(61)] {
-            assert_eq!(declare(&new(name)), Err(DeclareError::Name), "{name}");
+            assert_eq!(declare_channel(&new(name)), Err(DeclareError::Name), "{name}");
         }
     }
 }

@@ -9,7 +9,7 @@ mod paths;
 pub mod quantity;
 pub mod unit;
 
-pub use declared::{DECLARED_MAX, DeclareError, NewChannel, declare};
+pub use declared::{DECLARED_MAX, DeclareError, NewChannel, declare_channel};
 pub use form::Form;
 pub use paths::{PATHS, on_path};
 
@@ -53,7 +53,7 @@ impl Channel {
     /// Is this a finite number within the physical range? An electrical quantity that begins at zero is judged by its size:
     /// the noise of a meter about zero, up to a thousandth of the greatest value, is believed as it is.
     #[must_use]
-    pub fn holds(&self, number: f64) -> bool {
+    pub fn accepts_number(&self, number: f64) -> bool {
         let (least, greatest) = self.range;
         let noise = if self.is_electric() && least == 0.0 { NOISE * greatest } else { 0.0 };
         number.is_finite() && number >= least - noise && number <= greatest
@@ -307,27 +307,27 @@ impl ChannelId {
     /// How many channels there are. It grows while a configuration is read; whoever keeps something per channel looks
     /// once, and meets a later channel as one that is not there.
     #[must_use]
-    pub fn count() -> usize {
-        CHANNELS.len() + declared::count()
+    pub fn count_channels() -> usize {
+        CHANNELS.len() + declared::count_declared()
     }
 
     /// The channel of this name. A linear search: look names up once, not in a loop.
     #[must_use]
-    pub fn of(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         let known = CHANNELS.iter().position(|channel| channel.name == name);
-        let index = known.or_else(|| declared::find(name).map(|place| CHANNELS.len() + place))?;
+        let index = known.or_else(|| declared::find_by_name(name).map(|place| CHANNELS.len() + place))?;
         u16::try_from(index).ok().map(Self)
     }
 
     /// The channel at this position of the table.
     #[must_use]
-    pub fn at(index: usize) -> Option<Self> {
-        (index < Self::count()).then_some(index).and_then(|index| u16::try_from(index).ok()).map(Self)
+    pub fn from_index(index: usize) -> Option<Self> {
+        (index < Self::count_channels()).then_some(index).and_then(|index| u16::try_from(index).ok()).map(Self)
     }
 
     /// Every channel, in the order of the table.
-    pub fn all() -> impl Iterator<Item = Self> {
-        (0..Self::count()).filter_map(|index| u16::try_from(index).ok().map(Self))
+    pub fn list_all() -> impl Iterator<Item = Self> {
+        (0..Self::count_channels()).filter_map(|index| u16::try_from(index).ok().map(Self))
     }
 
     /// Position in the table.
@@ -341,7 +341,7 @@ impl ChannelId {
     pub fn channel(self) -> &'static Channel {
         let index = usize::from(self.0);
         // An id is only made of a row that is there, and no row is ever taken away.
-        CHANNELS.get(index).or_else(|| declared::at(index - CHANNELS.len())).unwrap_or(&CHANNELS[0])
+        CHANNELS.get(index).or_else(|| declared::find_by_index(index - CHANNELS.len())).unwrap_or(&CHANNELS[0])
     }
 
     /// Name, as everywhere.
@@ -359,7 +359,7 @@ impl fmt::Display for ChannelId {
 
 /// The name of the table nearest to `name`, for "did you mean".
 #[must_use]
-pub fn nearest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn find_nearest_name<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let limit = (name.len() / 3).max(2);
     names
         .into_iter()
@@ -378,14 +378,14 @@ mod tests {
     fn names_are_unique_and_found() {
         let names: BTreeSet<_> = CHANNELS.iter().map(|channel| channel.name).collect();
         assert_eq!(names.len(), CHANNELS.len());
-        for id in ChannelId::all() {
-            assert_eq!(ChannelId::of(id.name()), Some(id));
+        for id in ChannelId::list_all() {
+            assert_eq!(ChannelId::from_name(id.name()), Some(id));
         }
     }
 
     #[test]
     fn a_misspelt_name_finds_its_neighbour() {
         let names = CHANNELS.iter().map(|channel| channel.name);
-        assert_eq!(nearest("spindel_speed_rpm", names), Some("spindle_speed_rpm"));
+        assert_eq!(find_nearest_name("spindel_speed_rpm", names), Some("spindle_speed_rpm"));
     }
 }

@@ -88,7 +88,7 @@ mod tests {
             for row in rows {
                 let plain = row.name.split_once('_').map(|(_, plain)| plain).expect("a prefix");
                 assert_eq!(on_path(plain, path), row.name);
-                let first = ChannelId::of(plain).expect("the plain names have it").channel();
+                let first = ChannelId::from_name(plain).expect("the plain names have it").channel();
                 assert_eq!((row.unit, row.range, row.kind), (first.unit, first.range, first.kind), "{}", row.name);
             }
         }

@@ -61,7 +61,7 @@ pub const LIMITS: [(&str, &str, (f64, f64)); 12] = [
 /// The unit of a column: from the table of channels, else by the end of its name; `None` where neither tells.
 #[must_use]
 pub fn unit_of(name: &str) -> Option<&'static str> {
-    let in_table = ChannelId::of(name).map(|id| id.channel().unit).filter(|unit| !unit.is_empty());
+    let in_table = ChannelId::from_name(name).map(|id| id.channel().unit).filter(|unit| !unit.is_empty());
     in_table.or_else(|| ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit))
 }
 
@@ -97,7 +97,7 @@ pub enum Quantity {
 impl Quantity {
     /// By the unit of the column; where that is not enough, by its words.
     #[must_use]
-    pub fn of(name: &str) -> Self {
+    pub fn from_column_name(name: &str) -> Self {
         match unit_of(name) {
             Some("W" | "kW") => Self::Power,
             Some("A") => Self::Current,
@@ -164,7 +164,7 @@ mod tests {
             ("feed_override_pct", Quantity::Other),
             ("workload", Quantity::Other),
         ] {
-            assert_eq!(Quantity::of(name), quantity, "{name}");
+            assert_eq!(Quantity::from_column_name(name), quantity, "{name}");
         }
     }
 }

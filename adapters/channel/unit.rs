@@ -60,7 +60,7 @@ pub struct Unit {
     pub offset: f64,
 }
 
-const fn unit(dimension: Dimension, factor: f64) -> Unit {
+const fn define_unit(dimension: Dimension, factor: f64) -> Unit {
     Unit { dimension, factor, offset: 0.0 }
 }
 
@@ -76,45 +76,45 @@ use Dimension::{
 
 /// Spellings, without spaces, in lower case where case says nothing; then the unit. Those in which it does stand first, as written.
 const EXACT: &[(&[&str], Unit)] = &[
-    (&["mW"], unit(Power, 1e-3)),
-    (&["MW"], unit(Power, 1e6)),
-    (&["mV"], unit(Voltage, 1e-3)),
-    (&["mA"], unit(Current, 1e-3)),
-    (&["mN"], unit(Force, 1e-3)),
-    (&["MN"], unit(Force, 1e6)),
+    (&["mW"], define_unit(Power, 1e-3)),
+    (&["MW"], define_unit(Power, 1e6)),
+    (&["mV"], define_unit(Voltage, 1e-3)),
+    (&["mA"], define_unit(Current, 1e-3)),
+    (&["mN"], define_unit(Force, 1e-3)),
+    (&["MN"], define_unit(Force, 1e6)),
     (&["K"], Unit { dimension: Temperature, factor: 1.0, offset: -273.15 }),
-    (&["M/min"], unit(Velocity, 1e3)),
-    (&["MWh"], unit(Energy, 1e6)),
-    (&["MJ"], unit(Energy, 1e6 / 3600.0)),
-    (&["mHz"], unit(Rotation, 60e-3)),
+    (&["M/min"], define_unit(Velocity, 1e3)),
+    (&["MWh"], define_unit(Energy, 1e6)),
+    (&["MJ"], define_unit(Energy, 1e6 / 3600.0)),
+    (&["mHz"], define_unit(Rotation, 60e-3)),
 ];
 
 const SPELLINGS: &[(&[&str], Unit)] = &[
-    (&["s", "sec", "secs", "second", "seconds", "sek", "sekunden", "秒"], unit(Time, 1.0)),
-    (&["ms", "msec", "millisecond", "milliseconds", "毫秒"], unit(Time, 1e-3)),
-    (&["us", "µs", "μs", "usec", "microseconds", "微秒"], unit(Time, 1e-6)),
-    (&["ns", "nsec", "nanoseconds"], unit(Time, 1e-9)),
-    (&["min", "minute", "minutes", "minuten", "分", "分钟"], unit(Time, 60.0)),
-    (&["h", "hr", "hour", "hours", "std", "stunden", "小时"], unit(Time, 3600.0)),
-    (&["d", "day", "days", "tage", "天"], unit(Time, 86_400.0)),
-    (&["mm", "毫米", "millimeter", "millimetre"], unit(Length, 1.0)),
-    (&["um", "µm", "μm", "micron", "microns", "微米"], unit(Length, 1e-3)),
-    (&["nm_length"], unit(Length, 1e-6)),
-    (&["cm"], unit(Length, 10.0)),
-    (&["m", "meter", "米"], unit(Length, 1e3)),
-    (&["in", "inch", "inches", "\"", "zoll", "英寸"], unit(Length, INCH_MM)),
-    (&["mil", "thou"], unit(Length, INCH_MM / 1e3)),
-    (&["mm/min", "mm/m", "mm/minute", "毫米/分", "毫米/分钟"], unit(Velocity, 1.0)),
-    (&["m/min", "米/分", "米/分钟"], unit(Velocity, 1e3)),
-    (&["mm/s", "mm/sec", "毫米/秒", "millimeter/second"], unit(Velocity, 60.0)),
-    (&["m/s", "m/sec", "米/秒"], unit(Velocity, 60e3)),
-    (&["um/min", "µm/min"], unit(Velocity, 1e-3)),
-    (&["cm/min"], unit(Velocity, 10.0)),
-    (&["in/min", "inch/min", "ipm", "英寸/分"], unit(Velocity, INCH_MM)),
-    (&["in/s", "inch/s", "ips"], unit(Velocity, 60.0 * INCH_MM)),
-    (&["ft/min", "sfm"], unit(Velocity, 12.0 * INCH_MM)),
-    (&["m/s2", "m/s^2", "m/s²"], unit(Acceleration, 1.0)),
-    (&["mm/s2", "mm/s^2", "mm/s²"], unit(Acceleration, 1e-3)),
+    (&["s", "sec", "secs", "second", "seconds", "sek", "sekunden", "秒"], define_unit(Time, 1.0)),
+    (&["ms", "msec", "millisecond", "milliseconds", "毫秒"], define_unit(Time, 1e-3)),
+    (&["us", "µs", "μs", "usec", "microseconds", "微秒"], define_unit(Time, 1e-6)),
+    (&["ns", "nsec", "nanoseconds"], define_unit(Time, 1e-9)),
+    (&["min", "minute", "minutes", "minuten", "分", "分钟"], define_unit(Time, 60.0)),
+    (&["h", "hr", "hour", "hours", "std", "stunden", "小时"], define_unit(Time, 3600.0)),
+    (&["d", "day", "days", "tage", "天"], define_unit(Time, 86_400.0)),
+    (&["mm", "毫米", "millimeter", "millimetre"], define_unit(Length, 1.0)),
+    (&["um", "µm", "μm", "micron", "microns", "微米"], define_unit(Length, 1e-3)),
+    (&["nm_length"], define_unit(Length, 1e-6)),
+    (&["cm"], define_unit(Length, 10.0)),
+    (&["m", "meter", "米"], define_unit(Length, 1e3)),
+    (&["in", "inch", "inches", "\"", "zoll", "英寸"], define_unit(Length, INCH_MM)),
+    (&["mil", "thou"], define_unit(Length, INCH_MM / 1e3)),
+    (&["mm/min", "mm/m", "mm/minute", "毫米/分", "毫米/分钟"], define_unit(Velocity, 1.0)),
+    (&["m/min", "米/分", "米/分钟"], define_unit(Velocity, 1e3)),
+    (&["mm/s", "mm/sec", "毫米/秒", "millimeter/second"], define_unit(Velocity, 60.0)),
+    (&["m/s", "m/sec", "米/秒"], define_unit(Velocity, 60e3)),
+    (&["um/min", "µm/min"], define_unit(Velocity, 1e-3)),
+    (&["cm/min"], define_unit(Velocity, 10.0)),
+    (&["in/min", "inch/min", "ipm", "英寸/分"], define_unit(Velocity, INCH_MM)),
+    (&["in/s", "inch/s", "ips"], define_unit(Velocity, 60.0 * INCH_MM)),
+    (&["ft/min", "sfm"], define_unit(Velocity, 12.0 * INCH_MM)),
+    (&["m/s2", "m/s^2", "m/s²"], define_unit(Acceleration, 1.0)),
+    (&["mm/s2", "mm/s^2", "mm/s²"], define_unit(Acceleration, 1e-3)),
     (
         &[
             "rpm",
@@ -132,70 +132,70 @@ const SPELLINGS: &[(&[&str], Unit)] = &[
             "转/min",
             "revolution/minute",
         ],
-        unit(Rotation, 1.0),
+        define_unit(Rotation, 1.0),
     ),
-    (&["1/s", "s-1", "s^-1", "s⁻¹", "hz", "赫兹", "rps", "r/s", "rev/s", "u/s", "转/秒"], unit(Rotation, 60.0)),
-    (&["khz"], unit(Rotation, 60e3)),
-    (&["krpm", "1000/min", "x1000rpm"], unit(Rotation, 1e3)),
-    (&["rad/s"], unit(Rotation, RAD_RPM)),
-    (&["deg/s", "°/s", "grad/s"], unit(Rotation, 1.0 / 6.0)),
-    (&["rpm/s"], unit(RotationRate, 1.0)),
-    (&["rad/s2", "rad/s^2", "rad/s²"], unit(RotationRate, RAD_RPM)),
-    (&["mm/rev", "mm/u", "mm/r", "mm/umdr", "mm/转"], unit(FeedPerRevolution, 1.0)),
-    (&["um/rev", "µm/rev", "µm/u"], unit(FeedPerRevolution, 1e-3)),
-    (&["in/rev", "ipr"], unit(FeedPerRevolution, INCH_MM)),
-    (&["cm3/min", "cm^3/min", "cm³/min", "ccm/min"], unit(RemovalRate, 1.0)),
-    (&["mm3/min", "mm^3/min", "mm³/min"], unit(RemovalRate, 1e-3)),
-    (&["mm3/s", "mm^3/s", "mm³/s"], unit(RemovalRate, 0.06)),
-    (&["in3/min", "in^3/min", "in³/min"], unit(RemovalRate, 16.387_064)),
-    (&["w", "watt", "watts", "瓦", "瓦特"], unit(Power, 1.0)),
-    (&["kw", "kilowatt", "千瓦"], unit(Power, 1e3)),
-    (&["hp"], unit(Power, 745.699_871_582_270_2)),
-    (&["ps", "马力"], unit(Power, 735.498_75)),
-    (&["a", "amp", "amps", "ampere", "arms", "aeff", "安", "安培"], unit(Current, 1.0)),
-    (&["毫安"], unit(Current, 1e-3)),
-    (&["ka"], unit(Current, 1e3)),
-    (&["v", "volt", "vrms", "veff", "伏", "伏特"], unit(Voltage, 1.0)),
-    (&["kv"], unit(Voltage, 1e3)),
-    (&["n", "newton", "牛"], unit(Force, 1.0)),
-    (&["kn", "千牛"], unit(Force, 1e3)),
-    (&["dan"], unit(Force, 10.0)),
-    (&["lbf"], unit(Force, POUND_N)),
-    (&["nm", "n·m", "n*m", "n.m", "n-m", "牛米"], unit(Torque, 1.0)),
-    (&["ncm"], unit(Torque, 1e-2)),
-    (&["nmm", "n·mm"], unit(Torque, 1e-3)),
-    (&["knm"], unit(Torque, 1e3)),
-    (&["ft-lb", "ftlb", "lbft", "lbf·ft"], unit(Torque, POUND_N * 0.3048)),
-    (&["°c", "degc", "c", "celsius", "grad", "℃", "摄氏度"], unit(Temperature, 1.0)),
+    (&["1/s", "s-1", "s^-1", "s⁻¹", "hz", "赫兹", "rps", "r/s", "rev/s", "u/s", "转/秒"], define_unit(Rotation, 60.0)),
+    (&["khz"], define_unit(Rotation, 60e3)),
+    (&["krpm", "1000/min", "x1000rpm"], define_unit(Rotation, 1e3)),
+    (&["rad/s"], define_unit(Rotation, RAD_RPM)),
+    (&["deg/s", "°/s", "grad/s"], define_unit(Rotation, 1.0 / 6.0)),
+    (&["rpm/s"], define_unit(RotationRate, 1.0)),
+    (&["rad/s2", "rad/s^2", "rad/s²"], define_unit(RotationRate, RAD_RPM)),
+    (&["mm/rev", "mm/u", "mm/r", "mm/umdr", "mm/转"], define_unit(FeedPerRevolution, 1.0)),
+    (&["um/rev", "µm/rev", "µm/u"], define_unit(FeedPerRevolution, 1e-3)),
+    (&["in/rev", "ipr"], define_unit(FeedPerRevolution, INCH_MM)),
+    (&["cm3/min", "cm^3/min", "cm³/min", "ccm/min"], define_unit(RemovalRate, 1.0)),
+    (&["mm3/min", "mm^3/min", "mm³/min"], define_unit(RemovalRate, 1e-3)),
+    (&["mm3/s", "mm^3/s", "mm³/s"], define_unit(RemovalRate, 0.06)),
+    (&["in3/min", "in^3/min", "in³/min"], define_unit(RemovalRate, 16.387_064)),
+    (&["w", "watt", "watts", "瓦", "瓦特"], define_unit(Power, 1.0)),
+    (&["kw", "kilowatt", "千瓦"], define_unit(Power, 1e3)),
+    (&["hp"], define_unit(Power, 745.699_871_582_270_2)),
+    (&["ps", "马力"], define_unit(Power, 735.498_75)),
+    (&["a", "amp", "amps", "ampere", "arms", "aeff", "安", "安培"], define_unit(Current, 1.0)),
+    (&["毫安"], define_unit(Current, 1e-3)),
+    (&["ka"], define_unit(Current, 1e3)),
+    (&["v", "volt", "vrms", "veff", "伏", "伏特"], define_unit(Voltage, 1.0)),
+    (&["kv"], define_unit(Voltage, 1e3)),
+    (&["n", "newton", "牛"], define_unit(Force, 1.0)),
+    (&["kn", "千牛"], define_unit(Force, 1e3)),
+    (&["dan"], define_unit(Force, 10.0)),
+    (&["lbf"], define_unit(Force, POUND_N)),
+    (&["nm", "n·m", "n*m", "n.m", "n-m", "牛米"], define_unit(Torque, 1.0)),
+    (&["ncm"], define_unit(Torque, 1e-2)),
+    (&["nmm", "n·mm"], define_unit(Torque, 1e-3)),
+    (&["knm"], define_unit(Torque, 1e3)),
+    (&["ft-lb", "ftlb", "lbft", "lbf·ft"], define_unit(Torque, POUND_N * 0.3048)),
+    (&["°c", "degc", "c", "celsius", "grad", "℃", "摄氏度"], define_unit(Temperature, 1.0)),
     (&["kelvin"], Unit { dimension: Temperature, factor: 1.0, offset: -273.15 }),
     (&["°f", "degf", "f", "fahrenheit", "℉"], Unit { dimension: Temperature, factor: 5.0 / 9.0, offset: -160.0 / 9.0 }),
-    (&["%", "pct", "percent", "prozent", "百分比"], unit(Share, 1.0)),
-    (&["‰"], unit(Share, 0.1)),
-    (&["l/min", "lpm", "升/分"], unit(Flow, 1.0)),
-    (&["m3/h", "m³/h"], unit(Flow, 1000.0 / 60.0)),
-    (&["bar", "巴"], unit(Pressure, 1.0)),
-    (&["mbar"], unit(Pressure, 1e-3)),
-    (&["kpa"], unit(Pressure, 0.01)),
-    (&["mpa", "兆帕"], unit(Pressure, 10.0)),
-    (&["psi"], unit(Pressure, 0.068_947_572_931_68)),
-    (&["pa"], unit(Pressure, 1e-5)),
-    (&["wh"], unit(Energy, 1.0)),
-    (&["kwh", "kw·h", "千瓦时", "度电"], unit(Energy, 1e3)),
-    (&["j"], unit(Energy, 1.0 / 3600.0)),
-    (&["va"], unit(ApparentPower, 1.0)),
-    (&["kva"], unit(ApparentPower, 1e3)),
-    (&["°", "deg", "degree", "degrees", "度"], unit(Angle, 1.0)),
-    (&["rad"], unit(Angle, 360.0 / std::f64::consts::TAU)),
+    (&["%", "pct", "percent", "prozent", "百分比"], define_unit(Share, 1.0)),
+    (&["‰"], define_unit(Share, 0.1)),
+    (&["l/min", "lpm", "升/分"], define_unit(Flow, 1.0)),
+    (&["m3/h", "m³/h"], define_unit(Flow, 1000.0 / 60.0)),
+    (&["bar", "巴"], define_unit(Pressure, 1.0)),
+    (&["mbar"], define_unit(Pressure, 1e-3)),
+    (&["kpa"], define_unit(Pressure, 0.01)),
+    (&["mpa", "兆帕"], define_unit(Pressure, 10.0)),
+    (&["psi"], define_unit(Pressure, 0.068_947_572_931_68)),
+    (&["pa"], define_unit(Pressure, 1e-5)),
+    (&["wh"], define_unit(Energy, 1.0)),
+    (&["kwh", "kw·h", "千瓦时", "度电"], define_unit(Energy, 1e3)),
+    (&["j"], define_unit(Energy, 1.0 / 3600.0)),
+    (&["va"], define_unit(ApparentPower, 1.0)),
+    (&["kva"], define_unit(ApparentPower, 1e3)),
+    (&["°", "deg", "degree", "degrees", "度"], define_unit(Angle, 1.0)),
+    (&["rad"], define_unit(Angle, 360.0 / std::f64::consts::TAU)),
     (
         &["1", "-", "–", "bool", "0/1", "dimensionless", "unitless", "count", "counts", "pcs", "无", "件", "个"],
-        unit(Number, 1.0),
+        define_unit(Number, 1.0),
     ),
 ];
 
 impl Unit {
     /// The unit of a symbol as people write it; `None` where it is none that is known.
     #[must_use]
-    pub fn of(symbol: &str) -> Option<Self> {
+    pub fn from_symbol(symbol: &str) -> Option<Self> {
         let plain: String = symbol.chars().filter(|c| !c.is_whitespace()).collect();
         if let Some((_, unit)) = EXACT.iter().find(|(spellings, _)| spellings.contains(&plain.as_str())) {
             return Some(*unit);
@@ -206,7 +206,7 @@ impl Unit {
 
     /// What turns a number of this unit into one of the other: factor and offset; `None` where they measure different things.
     #[must_use]
-    pub fn to(self, other: Self) -> Option<(f64, f64)> {
+    pub fn compute_conversion(self, other: Self) -> Option<(f64, f64)> {
         (self.dimension == other.dimension)
             .then(|| (self.factor / other.factor, (self.offset - other.offset) / other.factor))
     }
@@ -224,7 +224,10 @@ mod tests {
     use super::*;
 
     fn convert(x: f64, from: &str, to: &str) -> f64 {
-        let (factor, offset) = Unit::of(from).expect("known").to(Unit::of(to).expect("known")).expect("alike");
+        let (factor, offset) = Unit::from_symbol(from)
+            .expect("known")
+            .compute_conversion(Unit::from_symbol(to).expect("known"))
+            .expect("alike");
         factor * x + offset
     }
 
@@ -245,8 +248,8 @@ mod tests {
             let got = convert(x, from, to);
             assert!((got - y).abs() < 1e-9 * y.abs().max(1.0), "{x} {from} = {got} {to}, not {y}");
         }
-        assert_eq!(Unit::of("kW").and_then(|unit| unit.to(Unit::of("A")?)), None);
-        assert_eq!(Unit::of("Zeit"), None);
+        assert_eq!(Unit::from_symbol("kW").and_then(|unit| unit.compute_conversion(Unit::from_symbol("A")?)), None);
+        assert_eq!(Unit::from_symbol("Zeit"), None);
     }
 
     #[test]
@@ -261,7 +264,7 @@ mod tests {
     #[test]
     fn every_unit_of_the_channels_is_known() {
         for channel in CHANNELS.iter().filter(|channel| channel.kind != Kind::Text) {
-            assert!(Unit::of(channel.unit).is_some(), "{}: {}", channel.name, channel.unit);
+            assert!(Unit::from_symbol(channel.unit).is_some(), "{}: {}", channel.name, channel.unit);
         }
     }
 }

@@ -52,16 +52,16 @@ impl<Q: Copy + Eq + Hash> ChildClient<Q> {
     }
 
     /// Ends the child; the next question starts another one at once.
-    pub fn end(&mut self) {
-        self.child.end();
+    pub fn end_child(&mut self) {
+        self.child.end_child();
     }
 
     /// Asks and waits for the answer.
     ///
     /// # Errors
     /// See [`ChildError`].
-    pub fn told<Ask: Serialize, Tell: DeserializeOwned>(&mut self, ask: &Ask) -> Result<Tell, ChildError> {
-        let answer = self.child.request(&serde_json::to_vec(ask).map_err(no_answer)?)?;
+    pub fn request_answer<Ask: Serialize, Tell: DeserializeOwned>(&mut self, ask: &Ask) -> Result<Tell, ChildError> {
+        let answer = self.child.request_answer(&serde_json::to_vec(ask).map_err(no_answer)?)?;
         serde_json::from_slice(&answer).map_err(no_answer)
     }
 
@@ -90,11 +90,11 @@ impl<Q: Copy + Eq + Hash> ChildClient<Q> {
         };
         let at = |index: usize| *questions.get(index).unwrap_or(last);
         match asked.and(outcome) {
-            Ok(Taken::Suspect) => self.blame(at(taken - 1)),
+            Ok(Taken::Suspect) => self.record_death(at(taken - 1)),
             Ok(_) => {}
             Err(error) => {
                 let fatal = at(taken);
-                self.blame(fatal);
+                self.record_death(fatal);
                 return Err((fatal, error));
             }
         }
@@ -103,7 +103,7 @@ impl<Q: Copy + Eq + Hash> ChildClient<Q> {
 
     /// How many of these, from the first on, the child has survived so far.
     #[must_use]
-    pub fn survived(&self, questions: &[Q]) -> usize {
+    pub fn count_survived(&self, questions: &[Q]) -> usize {
         questions.iter().take_while(|question| !self.is_left_alone(**question)).count()
     }
 
@@ -115,9 +115,9 @@ impl<Q: Copy + Eq + Hash> ChildClient<Q> {
 
     /// The library died of this question, or wrote beyond its structures: it has hurt nothing outside its margin, but
     /// is not trusted any further.
-    pub fn blame(&mut self, question: Q) {
+    pub fn record_death(&mut self, question: Q) {
         *self.deaths.entry(question).or_default() += 1;
-        self.end();
+        self.end_child();
     }
 }
 

@@ -18,7 +18,7 @@ pub struct Missing(pub &'static str);
 
 /// Why the library in this file cannot be loaded, in the system's own words where it has some.
 #[must_use]
-pub fn reason(error: &libloading::Error, file: &Path) -> String {
+pub fn describe_load_error(error: &libloading::Error, file: &Path) -> String {
     let words = std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string);
     words.strip_prefix(&format!("{}: ", file.display())).map_or(words.clone(), str::to_owned)
 }
@@ -103,7 +103,7 @@ macro_rules! vendor_functions {
                 // SAFETY: loading runs the library's initialisers. This happens only in a child process that holds
                 // nothing but its line to the parent, and the user named the file.
                 let library = unsafe { libloading::Library::new(path) };
-                let library = library.map_err(|error| $crate::child::reason(&error, path))?;
+                let library = library.map_err(|error| $crate::child::describe_load_error(&error, path))?;
                 $(
                     // SAFETY: the signature is that of the vendor's header, as the one who listed it says; the pointer
                     // is kept beside the library and not used after it.

@@ -51,7 +51,7 @@ impl Guarded {
     ///
     /// # Errors
     /// It is not.
-    pub fn bytes(&self) -> Result<Vec<u8>, Overrun> {
+    pub fn read_bytes(&self) -> Result<Vec<u8>, Overrun> {
         let whole = u64::from_ne_bytes([PATTERN; 8]);
         let (first, margin) = self.words.split_at(self.length.div_ceil(8));
         // Most of the margin is looked at by words and never copied.
@@ -68,7 +68,7 @@ impl Guarded {
     }
 
     /// Puts bytes at the beginning of the structure; what does not fit is left out.
-    pub fn put(&mut self, bytes: &[u8]) {
+    pub fn write_bytes(&mut self, bytes: &[u8]) {
         let bytes = &bytes[..bytes.len().min(self.length)];
         for (index, byte) in bytes.iter().enumerate() {
             let mut word = self.words[index / 8].to_ne_bytes();
@@ -86,13 +86,13 @@ mod tests {
     fn the_margin_shows_an_overrun_of_one_byte() {
         for length in [1, 8, 18, 44, 260] {
             let mut guarded = Guarded::new(length);
-            assert_eq!(guarded.bytes(), Ok(vec![0; length]));
-            guarded.put(&vec![7; length + 100]);
-            assert_eq!(guarded.bytes(), Ok(vec![7; length]), "put stays within");
+            assert_eq!(guarded.read_bytes(), Ok(vec![0; length]));
+            guarded.write_bytes(&vec![7; length + 100]);
+            assert_eq!(guarded.read_bytes(), Ok(vec![7; length]), "put stays within");
             let mut word = guarded.words[length / 8].to_ne_bytes();
             word[length % 8] = 1;
             guarded.words[length / 8] = u64::from_ne_bytes(word);
-            assert_eq!(guarded.bytes(), Err(Overrun { length, beyond: 1 }));
+            assert_eq!(guarded.read_bytes(), Err(Overrun { length, beyond: 1 }));
         }
     }
 }

@@ -27,7 +27,7 @@ const HEAD_LEN: usize = 8;
 ///
 /// # Errors
 /// It is no head, or announces too much.
-fn length(head: [u8; HEAD_LEN]) -> Result<usize> {
+fn parse_length(head: [u8; HEAD_LEN]) -> Result<usize> {
     let [a, b, c, d, length @ ..] = head;
     let length = usize::try_from(u32::from_le_bytes(length)).unwrap_or(usize::MAX);
     match [a, b, c, d] == MARK && length <= MESSAGE_MAX {
@@ -40,9 +40,9 @@ fn length(head: [u8; HEAD_LEN]) -> Result<usize> {
 ///
 /// # Errors
 /// What has arrived is no message.
-pub(super) fn first(arrived: &[u8]) -> Result<Option<(&[u8], usize)>> {
+pub(super) fn split_first_message(arrived: &[u8]) -> Result<Option<(&[u8], usize)>> {
     let Some(head) = arrived.first_chunk::<HEAD_LEN>() else { return Ok(None) };
-    let end = HEAD_LEN + length(*head)?;
+    let end = HEAD_LEN + parse_length(*head)?;
     Ok(arrived.get(HEAD_LEN..end).map(|bytes| (bytes, end)))
 }
 
@@ -53,7 +53,7 @@ pub(super) fn first(arrived: &[u8]) -> Result<Option<(&[u8], usize)>> {
 pub(super) fn receive(stream: &mut impl Read) -> Result<Vec<u8>> {
     let mut head = [0; HEAD_LEN];
     stream.read_exact(&mut head)?;
-    let mut bytes = vec![0; length(head)?];
+    let mut bytes = vec![0; parse_length(head)?];
     stream.read_exact(&mut bytes)?;
     Ok(bytes)
 }

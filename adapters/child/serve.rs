@@ -15,11 +15,11 @@ pub const SUBCOMMAND: &str = "vendor-child";
 ///
 /// # Errors
 /// Standard input is no socket of a parent, or the line failed in another way than by the parent's going.
-pub fn serve(mut handler: impl FnMut(&[u8], &mut dyn FnMut(&[u8]))) -> std::io::Result<()> {
+pub fn serve_requests(mut handler: impl FnMut(&[u8], &mut dyn FnMut(&[u8]))) -> std::io::Result<()> {
     let mut stream = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
     loop {
         let request = match message::receive(&mut stream) {
-            Err(error) if gone(error.kind()) => return Ok(()),
+            Err(error) if is_disconnect(error.kind()) => return Ok(()),
             other => other?,
         };
         let mut sent = Ok(());
@@ -29,7 +29,7 @@ pub fn serve(mut handler: impl FnMut(&[u8], &mut dyn FnMut(&[u8]))) -> std::io::
             }
         });
         match sent {
-            Err(error) if gone(error.kind()) => return Ok(()),
+            Err(error) if is_disconnect(error.kind()) => return Ok(()),
             other => other?,
         }
     }
@@ -39,17 +39,17 @@ pub fn serve(mut handler: impl FnMut(&[u8], &mut dyn FnMut(&[u8]))) -> std::io::
 /// reason.
 ///
 /// # Errors
-/// As [`serve`].
+/// As [`serve_requests`].
 pub fn serve_words<Ask: DeserializeOwned, Tell: Serialize>(
     mut handler: impl FnMut(Result<Ask, String>, &mut dyn FnMut(&Tell)),
 ) -> std::io::Result<()> {
-    serve(|request, give| {
+    serve_requests(|request, give| {
         handler(serde_json::from_slice(request).map_err(|error| error.to_string()), &mut |told| {
             give(&serde_json::to_vec(told).unwrap_or_default());
         });
     })
 }
 
-fn gone(kind: ErrorKind) -> bool {
+fn is_disconnect(kind: ErrorKind) -> bool {
     matches!(kind, ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset)
 }

@@ -88,21 +88,21 @@ struct Running {
 
 impl Running {
     /// Waits for one answer and shows it.
-    fn answer(&mut self, deadline: Instant, take: &mut impl FnMut(&[u8]) -> bool) -> std::io::Result<bool> {
+    fn wait_for_answer(&mut self, deadline: Instant, take: &mut impl FnMut(&[u8]) -> bool) -> std::io::Result<bool> {
         loop {
-            if let Some((bytes, end)) = message::first(&self.arrived)? {
+            if let Some((bytes, end)) = message::split_first_message(&self.arrived)? {
                 let more = take(bytes);
                 self.arrived.drain(..end);
                 return Ok(more);
             }
-            self.more(deadline)?;
+            self.receive_more(deadline)?;
         }
     }
 
     /// What has come, or comes before the deadline.
-    fn more(&mut self, deadline: Instant) -> std::io::Result<()> {
+    fn receive_more(&mut self, deadline: Instant) -> std::io::Result<()> {
         let mut chunk = [0; 16 * 1024];
-        self.stream.set_read_timeout(Some(left(deadline)?))?;
+        self.stream.set_read_timeout(Some(compute_remaining_time(deadline)?))?;
         match self.stream.read(&mut chunk) {
             Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
             Ok(count) => {
@@ -115,7 +115,7 @@ impl Running {
     }
 
     /// Ends the child, whatever it does, and waits until the system has let go of it.
-    fn end(mut self) -> Option<ExitStatus> {
+    fn kill_child(mut self) -> Option<ExitStatus> {
         let _ended_already = self.child.kill();
         self.child.wait().ok()
     }
@@ -163,7 +163,7 @@ impl Supervised {
     ///
     /// # Errors
     /// See [`ChildError`]; afterwards there is no child, until the next request starts one.
-    pub fn request(&mut self, bytes: &[u8]) -> Result<Vec<u8>, ChildError> {
+    pub fn request_answer(&mut self, bytes: &[u8]) -> Result<Vec<u8>, ChildError> {
         let mut answer = Vec::new();
         self.request_each(bytes, 1, |bytes| {
             answer = bytes.to_vec();
@@ -177,7 +177,7 @@ impl Supervised {
     /// survive.
     ///
     /// # Errors
-    /// As [`Supervised::request`].
+    /// As [`Supervised::request_answer`].
     pub fn request_each(
         &mut self,
         bytes: &[u8],
@@ -186,7 +186,7 @@ impl Supervised {
     ) -> Result<(), ChildError> {
         let mut running = match self.running.take() {
             Some(running) => running,
-            None => self.start()?,
+            None => self.start_child()?,
         };
         let patience = self.settings.deadline;
         self.counts.requests += 1;
@@ -195,7 +195,7 @@ impl Supervised {
             running.stream.set_write_timeout(Some(patience))?;
             message::send(&mut running.stream, bytes)?;
             while taken < answers {
-                let more = running.answer(Instant::now() + patience, &mut take)?;
+                let more = running.wait_for_answer(Instant::now() + patience, &mut take)?;
                 taken += 1;
                 if !more {
                     break;
@@ -218,19 +218,19 @@ impl Supervised {
     }
 
     /// Ends the child; the next request starts another one at once.
-    pub fn end(&mut self) {
-        self.running.take().map(Running::end);
+    pub fn end_child(&mut self) {
+        self.running.take().map(Running::kill_child);
         self.not_before = None;
     }
 
-    fn start(&mut self) -> Result<Running, ChildError> {
+    fn start_child(&mut self) -> Result<Running, ChildError> {
         if let Some(left) = self.not_before.map(|at| at.saturating_duration_since(Instant::now()))
             && !left.is_zero()
         {
             return Err(ChildError::Pausing(left));
         }
-        let running = spawn(&self.settings).map_err(|error| {
-            self.pause();
+        let running = spawn_child(&self.settings).map_err(|error| {
+            self.schedule_pause();
             ChildError::Start(error.to_string())
         })?;
         self.counts.starts += 1;
@@ -238,7 +238,7 @@ impl Supervised {
         Ok(running)
     }
 
-    fn pause(&mut self) {
+    fn schedule_pause(&mut self) {
         let doublings = self.deaths.min(16);
         self.deaths = self.deaths.saturating_add(1);
         let pause = (self.settings.pause_min * (1 << doublings)).min(self.settings.pause_max);
@@ -246,10 +246,10 @@ impl Supervised {
     }
 
     fn give_up(&mut self, running: Running, error: &std::io::Error) -> ChildError {
-        self.pause();
+        self.schedule_pause();
         match error.kind() {
             ErrorKind::WouldBlock | ErrorKind::TimedOut => {
-                running.end();
+                running.kill_child();
                 self.counts.hung += 1;
                 ChildError::Hung(self.settings.deadline)
             }
@@ -258,7 +258,7 @@ impl Supervised {
                 ChildError::Died(last_words(running))
             }
             _ => {
-                running.end();
+                running.kill_child();
                 self.counts.no_answer += 1;
                 ChildError::NoAnswer(error.to_string())
             }
@@ -268,7 +268,7 @@ impl Supervised {
 
 impl Drop for Supervised {
     fn drop(&mut self) {
-        self.end();
+        self.end_child();
     }
 }
 
@@ -281,10 +281,10 @@ fn last_words(mut running: Running) -> String {
             Err(error) => return error.to_string(),
         }
     }
-    running.end().map_or_else(|| "unknown".to_owned(), |status| status.to_string())
+    running.kill_child().map_or_else(|| "unknown".to_owned(), |status| status.to_string())
 }
 
-fn spawn(settings: &ChildSettings) -> std::io::Result<Running> {
+fn spawn_child(settings: &ChildSettings) -> std::io::Result<Running> {
     let (stream, theirs) = UnixStream::pair()?;
     let program = settings.program.clone().map_or_else(own_program, Ok)?;
     let child = Command::new(program)
@@ -304,7 +304,7 @@ fn own_program() -> std::io::Result<PathBuf> {
     if running.exists() { Ok(running) } else { std::env::current_exe() }
 }
 
-fn left(deadline: Instant) -> std::io::Result<Duration> {
+fn compute_remaining_time(deadline: Instant) -> std::io::Result<Duration> {
     let left = deadline.saturating_duration_since(Instant::now());
     if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { Ok(left) }
 }

@@ -20,7 +20,7 @@ use super::dial::Dial;
 use super::feed_override;
 use super::item::{Area, FocasItem, Stretch, Write};
 use super::line::{Asked, FanucLine};
-use super::poll::signal;
+use super::poll::find_signal_address;
 use super::server::ladder::ENABLED;
 use crate::address::{FanucOptions, WriteMethod};
 use crate::clock::{Clock, TimeNs};
@@ -67,11 +67,11 @@ impl FanucActuator {
         (method != WriteMethod::None).then_some(actuator)
     }
 
-    fn request(&mut self, wanted: OverridePct) -> Result<Write, SourceError> {
+    fn build_write(&mut self, wanted: OverridePct) -> Result<Write, SourceError> {
         let percent = i32::from(wanted.percent());
         let bytes = |area, at, values: Vec<i32>| {
             let count = u16::try_from(values.len()).unwrap_or(0);
-            Write::Pmc { stretch: Stretch::bytes(area, at, count), values }
+            Write::Pmc { stretch: Stretch::from_byte_range(area, at, count), values }
         };
         Ok(match self.method {
             WriteMethod::Mailbox { area, at } => {
@@ -81,28 +81,32 @@ impl FanucActuator {
             WriteMethod::SecondOverride { area, at } if percent > 0 => bytes(area, at, vec![percent]),
             WriteMethod::SecondOverride { .. } => {
                 let what = "0 % cannot be asked for: 0 in this byte means no request";
-                return Err(self.refused(what, "Stop the feed with feed hold, on the machine"));
+                return Err(self.build_refusal(what, "Stop the feed with feed hold, on the machine"));
             }
             WriteMethod::Macro { variable } => Write::Macro { number: variable, mantissa: percent, places: 0 },
-            WriteMethod::Direct => {
-                bytes(Area::G, signal(feed_override::AT, self.path), vec![i32::from(feed_override::encode(wanted))])
+            WriteMethod::Direct => bytes(
+                Area::G,
+                find_signal_address(feed_override::AT, self.path),
+                vec![i32::from(feed_override::encode(wanted))],
+            ),
+            WriteMethod::None => {
+                return Err(self.build_refusal("no way of writing", "Write write=mailbox in the address"));
             }
-            WriteMethod::None => return Err(self.refused("no way of writing", "Write write=mailbox in the address")),
         })
     }
 
-    fn item(&self) -> FocasItem {
+    fn build_read_item(&self) -> FocasItem {
         match self.method {
-            WriteMethod::Mailbox { area, at } => FocasItem::Pmc(Stretch::bytes(area, at, 5)),
-            WriteMethod::SecondOverride { .. } => self.signal(feed_override::SECOND_AT),
+            WriteMethod::Mailbox { area, at } => FocasItem::Pmc(Stretch::from_byte_range(area, at, 5)),
+            WriteMethod::SecondOverride { .. } => self.build_signal_item(feed_override::SECOND_AT),
             WriteMethod::Macro { variable } => FocasItem::Macro(variable),
-            WriteMethod::Direct | WriteMethod::None => self.signal(feed_override::AT),
+            WriteMethod::Direct | WriteMethod::None => self.build_signal_item(feed_override::AT),
         }
     }
 
     /// A byte of override signals of this path.
-    fn signal(&self, at: u16) -> FocasItem {
-        FocasItem::Pmc(Stretch::bytes(Area::G, signal(at, self.path), 1))
+    fn build_signal_item(&self, at: u16) -> FocasItem {
+        FocasItem::Pmc(Stretch::from_byte_range(Area::G, find_signal_address(at, self.path), 1))
     }
 
     fn give_back(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
@@ -110,14 +114,14 @@ impl FanucActuator {
             WriteMethod::Mailbox { area, at } => {
                 self.heartbeat = self.heartbeat.wrapping_add(1);
                 let values = vec![0, i32::from(OverridePct::FULL.percent()), i32::from(self.heartbeat)];
-                Write::Pmc { stretch: Stretch::bytes(area, at, 3), values }
+                Write::Pmc { stretch: Stretch::from_byte_range(area, at, 3), values }
             }
             WriteMethod::SecondOverride { area, at } => {
-                Write::Pmc { stretch: Stretch::bytes(area, at, 1), values: vec![0] }
+                Write::Pmc { stretch: Stretch::from_byte_range(area, at, 1), values: vec![0] }
             }
             // Where the ladder writes G012 in every scan this changes nothing; elsewhere it is where the dial was.
-            WriteMethod::Direct => self.request(self.before.unwrap_or(OverridePct::FULL))?,
-            WriteMethod::Macro { .. } | WriteMethod::None => self.request(OverridePct::FULL)?,
+            WriteMethod::Direct => self.build_write(self.before.unwrap_or(OverridePct::FULL))?,
+            WriteMethod::Macro { .. } | WriteMethod::None => self.build_write(OverridePct::FULL)?,
         };
         self.line.write(clock, &write)?;
         self.written = None;
@@ -125,60 +129,60 @@ impl FanucActuator {
     }
 
     /// The byte that an earlier run may have left on, and what it holds then.
-    fn leftover(&self) -> Option<(FocasItem, IsLeftOn)> {
+    fn find_leftover(&self) -> Option<(FocasItem, IsLeftOn)> {
         match self.method {
             WriteMethod::Mailbox { area, at } => {
-                Some((FocasItem::Pmc(Stretch::bytes(area, at, 1)), |byte| byte == i32::from(ENABLED)))
+                Some((FocasItem::Pmc(Stretch::from_byte_range(area, at, 1)), |byte| byte == i32::from(ENABLED)))
             }
             WriteMethod::SecondOverride { area, at } => {
-                Some((FocasItem::Pmc(Stretch::bytes(area, at, 1)), |byte| byte != 0))
+                Some((FocasItem::Pmc(Stretch::from_byte_range(area, at, 1)), |byte| byte != 0))
             }
             WriteMethod::Macro { .. } | WriteMethod::Direct | WriteMethod::None => None,
         }
     }
 
     /// What the way of writing itself says.
-    fn told(&self, asked: &Asked, item: FocasItem) -> Result<OverridePct, SourceError> {
-        match (asked.of(item), self.method) {
+    fn decode_override(&self, asked: &Asked, item: FocasItem) -> Result<OverridePct, SourceError> {
+        match (asked.find_item_result(item), self.method) {
             (Some(Ok(FocasAnswer::Memory(bytes))), WriteMethod::Mailbox { .. }) => self.of_mailbox(bytes),
             (Some(Ok(FocasAnswer::Memory(_))), WriteMethod::SecondOverride { .. }) => self.override_of(asked, item),
             (Some(Ok(FocasAnswer::Memory(bytes))), _) => self.of_direct(bytes.first().copied().unwrap_or(-1)),
             // A vacant variable asks for nothing.
             (Some(Ok(FocasAnswer::Number(None))), _) => Ok(OverridePct::FULL),
-            (Some(Ok(FocasAnswer::Number(Some(value)))), _) => self.percent(*value),
-            (other, _) => Err(self.unread(other)),
+            (Some(Ok(FocasAnswer::Number(Some(value)))), _) => self.convert_percent(*value),
+            (other, _) => Err(self.build_unread_error(other)),
         }
     }
 
-    fn bytes<'a>(&self, asked: &'a Asked, item: FocasItem) -> Result<&'a [i32], SourceError> {
-        match asked.of(item) {
+    fn find_bytes<'a>(&self, asked: &'a Asked, item: FocasItem) -> Result<&'a [i32], SourceError> {
+        match asked.find_item_result(item) {
             Some(Ok(FocasAnswer::Memory(bytes))) => Ok(bytes),
-            other => Err(self.unread(other)),
+            other => Err(self.build_unread_error(other)),
         }
     }
 
     /// It was asked for, and this came.
-    fn unread(&self, found: Option<&FocasItemResult>) -> SourceError {
+    fn build_unread_error(&self, found: Option<&FocasItemResult>) -> SourceError {
         match found {
-            Some(Err(error)) => self.refused(&format!("it cannot be read back: {error}"), error.next()),
-            _ => self.decode("another kind of answer"),
+            Some(Err(error)) => self.build_refusal(&format!("it cannot be read back: {error}"), error.next()),
+            _ => self.build_decode_error("another kind of answer"),
         }
     }
 
     /// The dial, where it was asked for.
     fn dial_of(&self, asked: &Asked) -> Result<OverridePct, SourceError> {
-        let none = || self.decode("the byte of the dial is no override");
+        let none = || self.build_decode_error("the byte of the dial is no override");
         let dial = self.dial.ok_or_else(none)?;
-        dial.read(self.bytes(asked, FocasItem::Pmc(dial.stretch()))?).ok_or_else(none)
+        dial.read(self.find_bytes(asked, FocasItem::Pmc(dial.to_stretch()))?).ok_or_else(none)
     }
 
     /// An inverted byte.
     fn override_of(&self, asked: &Asked, item: FocasItem) -> Result<OverridePct, SourceError> {
-        let byte = self.bytes(asked, item)?.first().and_then(|byte| u8::try_from(*byte).ok());
-        byte.map(feed_override::decode).ok_or_else(|| self.decode("an override signal is a byte"))
+        let byte = self.find_bytes(asked, item)?.first().and_then(|byte| u8::try_from(*byte).ok());
+        byte.map(feed_override::decode).ok_or_else(|| self.build_decode_error("an override signal is a byte"))
     }
 
-    fn refused(&self, what: &str, next: &str) -> SourceError {
+    fn build_refusal(&self, what: &str, next: &str) -> SourceError {
         SourceError::Refused {
             source_name: self.name.clone(),
             request: "the feed override".to_owned(),
@@ -187,7 +191,7 @@ impl FanucActuator {
         }
     }
 
-    fn decode(&self, what: &str) -> SourceError {
+    fn build_decode_error(&self, what: &str) -> SourceError {
         SourceError::Decode {
             source_name: self.name.clone(),
             request: "the feed override".to_owned(),
@@ -197,38 +201,41 @@ impl FanucActuator {
 
     /// The override that the ladder says it has taken.
     fn of_mailbox(&self, bytes: &[i32]) -> Result<OverridePct, SourceError> {
-        let [enabled, _, _, taken, state] = *bytes else { return Err(self.decode("the mailbox has five bytes")) };
+        let [enabled, _, _, taken, state] = *bytes else {
+            return Err(self.build_decode_error("the mailbox has five bytes"));
+        };
         let asked = enabled == i32::from(ENABLED) && self.written.is_some();
         if asked && state == HEARTBEAT_LOST {
             let what = "not held: the ladder misses the heartbeat";
-            return Err(self.refused(what, "The gateway writes too seldom; look at the load of box and network"));
+            return Err(self.build_refusal(what, "The gateway writes too seldom; look at the load of box and network"));
         }
         if asked && !TAKEN.contains(&state) {
             let what = "not held: no ladder reads the mailbox";
             let next = "Let the machine's maker add the rungs, or compare the mailbox's address with the ladder";
-            return Err(self.refused(what, next));
+            return Err(self.build_refusal(what, next));
         }
         let taken = u8::try_from(taken).ok().and_then(OverridePct::new);
         if !asked && state == 0 {
             return Ok(OverridePct::FULL);
         }
-        taken.ok_or_else(|| self.decode("the ladder's byte is no override"))
+        taken.ok_or_else(|| self.build_decode_error("the ladder's byte is no override"))
     }
 
     fn of_direct(&self, byte: i32) -> Result<OverridePct, SourceError> {
-        let byte = u8::try_from(byte).map_err(|_| self.decode("G012 is a byte"))?;
+        let byte = u8::try_from(byte).map_err(|_| self.build_decode_error("G012 is a byte"))?;
         let found = feed_override::decode(byte);
         match self.written {
             Some((asked, _)) if asked != found => {
                 let what = format!("not held: {asked} was written to G012 and the ladder made it {found}");
-                Err(self.refused(&what, "Write through a mailbox (write=mailbox); the ladder owns G012"))
+                Err(self.build_refusal(&what, "Write through a mailbox (write=mailbox); the ladder owns G012"))
             }
             _ => Ok(found),
         }
     }
 
-    fn percent(&self, value: f64) -> Result<OverridePct, SourceError> {
-        OverridePct::nearest(value).ok_or_else(|| self.decode(&format!("{value} is no override")))
+    fn convert_percent(&self, value: f64) -> Result<OverridePct, SourceError> {
+        OverridePct::from_nearest_percent(value)
+            .ok_or_else(|| self.build_decode_error(&format!("{value} is no override")))
     }
 }
 
@@ -238,7 +245,7 @@ impl Actuator for FanucActuator {
     }
 
     fn write_feed_override(&mut self, clock: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
-        let write = self.request(wanted)?;
+        let write = self.build_write(wanted)?;
         self.line.write(clock, &write)?;
         self.written = Some((wanted, clock.now_ns()));
         Ok(())
@@ -248,11 +255,11 @@ impl Actuator for FanucActuator {
         if let Some((_, at_ns)) = self.written {
             clock.sleep_until(at_ns.saturating_add(self.settle_ns));
         }
-        let (own, obeyed) = (self.item(), self.signal(feed_override::AT));
-        let dial = self.dial.map(|dial| FocasItem::Pmc(dial.stretch()));
+        let (own, obeyed) = (self.build_read_item(), self.build_signal_item(feed_override::AT));
+        let dial = self.dial.map(|dial| FocasItem::Pmc(dial.to_stretch()));
         let items: Vec<FocasItem> = [own].into_iter().chain(dial.into_iter().flat_map(|dial| [obeyed, dial])).collect();
-        let asked = self.line.ask(clock, &items)?;
-        let told = self.told(&asked, own)?;
+        let asked = self.line.ask_items(clock, &items)?;
+        let told = self.decode_override(&asked, own)?;
         if self.written.is_none() {
             self.before = Some(told);
         }
@@ -261,7 +268,7 @@ impl Actuator for FanucActuator {
             (None, _) | (Some(_), WriteMethod::Direct | WriteMethod::None) => Ok(told),
             (Some(_), WriteMethod::Mailbox { .. }) => self.override_of(&asked, obeyed),
             (Some(_), WriteMethod::SecondOverride { .. } | WriteMethod::Macro { .. }) => {
-                Ok(LadderRule::Product.combine(self.override_of(&asked, obeyed)?, told))
+                Ok(LadderRule::Product.combine_overrides(self.override_of(&asked, obeyed)?, told))
             }
         }
     }
@@ -273,16 +280,16 @@ impl Actuator for FanucActuator {
         {
             return Ok(Some(beside));
         }
-        let asked = self.line.ask(clock, &[FocasItem::Pmc(dial.stretch())])?;
+        let asked = self.line.ask_items(clock, &[FocasItem::Pmc(dial.to_stretch())])?;
         self.dial_of(&asked).map(Some)
     }
 
-    fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+    fn ask_ladder(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
         match &mut self.asking {
-            Some(asking) => asking.ask(clock, request),
+            Some(asking) => asking.ask_ladder(clock, request),
             None => Err(SourceError::Refused {
                 source_name: self.name.clone(),
-                request: request.word().to_owned(),
+                request: request.as_word().to_owned(),
                 what: "the address names no byte for it".to_owned(),
                 next: "Let the machine's maker add the rungs and write request=R905 in the address".to_owned(),
             }),
@@ -290,16 +297,16 @@ impl Actuator for FanucActuator {
     }
 
     /// The mailbox says that nobody asks, the second override's byte that there is no request; the others get 100 %.
-    fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+    fn release_override(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
         let released = self.give_back(clock);
-        let withdrawn = self.asking.as_mut().map_or(Ok(()), |asking| asking.withdraw(clock));
+        let withdrawn = self.asking.as_mut().map_or(Ok(()), |asking| asking.withdraw_request(clock));
         released.and(withdrawn)
     }
 
     fn withdraw_leftover(&mut self, clock: &dyn Clock) -> Result<bool, SourceError> {
-        let Some((item, is_left)) = self.leftover() else { return Ok(false) };
-        let asked = self.line.ask(clock, &[item])?;
-        let left = self.bytes(&asked, item)?.first().copied().is_some_and(is_left);
+        let Some((item, is_left)) = self.find_leftover() else { return Ok(false) };
+        let asked = self.line.ask_items(clock, &[item])?;
+        let left = self.find_bytes(&asked, item)?.first().copied().is_some_and(is_left);
         if left {
             self.give_back(clock)?;
         }

@@ -40,7 +40,7 @@ const ALARMS_SHOWN: usize = 4;
 
 /// The warning of the status word, with what to do: `None` without one.
 #[must_use]
-pub fn warning(status: &Status) -> Option<(String, &'static str)> {
+pub fn describe_warning(status: &Status) -> Option<(String, &'static str)> {
     let place = usize::try_from(status.alarm - 2).ok()?;
     Some(match WARNINGS.get(place) {
         Some((en, zh, next)) => (format!("{en} {zh}"), next),
@@ -50,19 +50,19 @@ pub fn warning(status: &Status) -> Option<(String, &'static str)> {
 
 /// Does the status say that there is an alarm? A low battery (2 and more) is none.
 #[must_use]
-pub fn alarmed(status: &Status) -> bool {
+pub fn has_alarm(status: &Status) -> bool {
     status.alarm == 1
 }
 
 /// The text of the channel `alarm`: empty without one. `alarms` are those that could be read.
 #[must_use]
-pub fn text(status: &Status, alarms: &[Alarm], axes: &[String], table: AlarmTable) -> String {
+pub fn format_alarms(status: &Status, alarms: &[Alarm], axes: &[String], table: AlarmTable) -> String {
     let mut texts = Vec::new();
     if status.emergency == 1 {
         texts.push("EMERGENCY STOP".to_owned());
     }
-    if alarmed(status) {
-        texts.extend(alarms.iter().take(ALARMS_SHOWN).map(|alarm| one(alarm, axes, table)));
+    if has_alarm(status) {
+        texts.extend(alarms.iter().take(ALARMS_SHOWN).map(|alarm| format_alarm(alarm, axes, table)));
         if alarms.len() > ALARMS_SHOWN {
             texts.push(format!("and {} more", alarms.len() - ALARMS_SHOWN));
         }
@@ -73,7 +73,7 @@ pub fn text(status: &Status, alarms: &[Alarm], axes: &[String], table: AlarmTabl
     texts.join("; ")
 }
 
-pub(super) fn one(alarm: &Alarm, axes: &[String], table: AlarmTable) -> String {
+pub(super) fn format_alarm(alarm: &Alarm, axes: &[String], table: AlarmTable) -> String {
     let place = usize::try_from(alarm.kind).ok();
     let of = |kinds: &'static [&'static str]| place.and_then(|kind| kinds.get(kind)).copied().unwrap_or("");
     let name = match table {
@@ -98,7 +98,7 @@ mod tests {
         let axes = ["X".to_owned(), "Y".to_owned()];
         let alarms = vec![Alarm { number: 417, kind: 6, axis: 2, text: "SERVO ALARM".to_owned() }; 6];
         let on = Status { alarm: 1, ..status(1, 0) };
-        let alarm = |status: &Status, alarms: &[Alarm]| super::text(status, alarms, &axes, AlarmTable::Newer);
+        let alarm = |status: &Status, alarms: &[Alarm]| super::format_alarms(status, alarms, &axes, AlarmTable::Newer);
         assert_eq!(alarm(&on, &alarms[..1]), "SV0417 (Y) SERVO ALARM");
         assert!(alarm(&on, &alarms).ends_with("and 2 more"));
         assert_eq!(alarm(&on, &[]), "ALARM");
@@ -109,7 +109,8 @@ mod tests {
 
     #[test]
     fn the_type_of_an_alarm_is_named_by_the_generation() {
-        let named = |kind, number, table| one(&Alarm { number, kind, axis: 0, text: "X".to_owned() }, &[], table);
+        let named =
+            |kind, number, table| format_alarm(&Alarm { number, kind, axis: 0, text: "X".to_owned() }, &[], table);
         let older = |kind, number| named(kind, number, AlarmTable::Older);
         assert_eq!(
             (older(1, 0), older(0, 100), older(10, 5010)),
@@ -126,10 +127,10 @@ mod tests {
 
     #[test]
     fn warnings_of_the_status_word_are_told_apart_from_alarms() {
-        let warning = |alarm| super::warning(&Status { alarm, ..Status::default() }).map(|(text, _)| text);
+        let warning = |alarm| super::describe_warning(&Status { alarm, ..Status::default() }).map(|(text, _)| text);
         assert_eq!((warning(0), warning(1)), (None, None));
         assert_eq!((warning(2), warning(3)), (Some("BATTERY LOW 电池电压低".into()), Some("FAN 风扇异常".into())));
         assert_eq!(warning(99).as_deref(), Some("WARNING 99"));
-        assert!(!alarmed(&Status { alarm: 3, ..Status::default() }));
+        assert!(!has_alarm(&Status { alarm: 3, ..Status::default() }));
     }
 }

@@ -50,15 +50,15 @@ impl Allowed {
 
     /// These bytes.
     #[must_use]
-    pub fn bytes(area: Area, from: u16, count: u16) -> Self {
-        let Stretch { from, to, .. } = Stretch::bytes(area, from, count);
+    pub fn from_byte_range(area: Area, from: u16, count: u16) -> Self {
+        let Stretch { from, to, .. } = Stretch::from_byte_range(area, from, count);
         Self::Memory { area, from, to }
     }
 
-    fn holds(self, write: &Write) -> bool {
+    fn covers_write(self, write: &Write) -> bool {
         match (self, write) {
             (Self::Memory { area, from, to }, Write::Pmc { stretch, values }) => {
-                let whole = values.len() * usize::from(stretch.width.bytes()) == stretch.len();
+                let whole = values.len() * usize::from(stretch.width.byte_count()) == stretch.len();
                 area == stretch.area && whole && from <= stretch.from && stretch.to <= to && !stretch.is_empty()
             }
             (Self::Macros { from, to }, Write::Macro { number, .. }) => (from..=to).contains(number),
@@ -77,17 +77,17 @@ impl AllowList {
     ///
     /// # Errors
     /// [`FocasError::NotAllowed`] with the address.
-    pub fn permit(&self, write: &Write) -> Result<(), FocasError> {
-        if self.0.iter().any(|allowed| allowed.holds(write)) {
+    pub fn check_write(&self, write: &Write) -> Result<(), FocasError> {
+        if self.0.iter().any(|allowed| allowed.covers_write(write)) {
             return Ok(());
         }
-        Err(FocasError::NotAllowed(format!("{} is not among the addresses that may be written", address(write))))
+        Err(FocasError::NotAllowed(format!("{} is not among the addresses that may be written", format_address(write))))
     }
 }
 
 /// The address of a write, as a person writes it.
 #[must_use]
-pub fn address(write: &Write) -> String {
+pub fn format_address(write: &Write) -> String {
     match write {
         Write::Macro { number, .. } => format!("#{number}"),
         Write::Pmc { stretch: Stretch { area, from, to, .. }, .. } if from == to => {
@@ -108,13 +108,13 @@ mod tests {
     use super::*;
 
     fn pmc(area: Area, from: u16, count: u16) -> Write {
-        Write::Pmc { stretch: Stretch::bytes(area, from, count), values: vec![0; usize::from(count)] }
+        Write::Pmc { stretch: Stretch::from_byte_range(area, from, count), values: vec![0; usize::from(count)] }
     }
 
     #[test]
     fn addresses_are_read_as_people_write_them() {
-        assert_eq!(Allowed::read("R900-R904"), Some(Allowed::bytes(Area::R, 900, 5)));
-        assert_eq!(Allowed::read("D10-12"), Some(Allowed::bytes(Area::D, 10, 3)));
+        assert_eq!(Allowed::read("R900-R904"), Some(Allowed::from_byte_range(Area::R, 900, 5)));
+        assert_eq!(Allowed::read("D10-12"), Some(Allowed::from_byte_range(Area::D, 10, 3)));
         assert_eq!(Allowed::read("#500-#509"), Some(Allowed::Macros { from: 500, to: 509 }));
         assert_eq!(Allowed::read("EXT"), Some(Allowed::ExternalOffset));
         for wrong in ["", "G12", "X1", "F0", "R9-R8", "#5", "R", "R70000", "Ä1"] {
@@ -124,8 +124,8 @@ mod tests {
 
     #[test]
     fn only_what_is_listed_may_be_written_and_no_byte_beside_it() {
-        let list = AllowList(vec![Allowed::bytes(Area::R, 900, 3), Allowed::Macros { from: 500, to: 500 }]);
-        assert!(list.permit(&pmc(Area::R, 900, 3)).is_ok() && list.permit(&pmc(Area::R, 901, 1)).is_ok());
+        let list = AllowList(vec![Allowed::from_byte_range(Area::R, 900, 3), Allowed::Macros { from: 500, to: 500 }]);
+        assert!(list.check_write(&pmc(Area::R, 900, 3)).is_ok() && list.check_write(&pmc(Area::R, 901, 1)).is_ok());
         let refused = [
             pmc(Area::R, 899, 2),
             pmc(Area::R, 902, 2),
@@ -134,12 +134,12 @@ mod tests {
             pmc(Area::R, 900, 0),
         ];
         for write in refused {
-            assert!(list.permit(&write).is_err(), "{}", address(&write));
+            assert!(list.check_write(&write).is_err(), "{}", format_address(&write));
         }
-        assert!(list.permit(&Write::Macro { number: 500, mantissa: 1, places: 0 }).is_ok());
-        assert!(list.permit(&Write::Macro { number: 501, mantissa: 1, places: 0 }).is_err());
-        assert!(list.permit(&Write::WorkOffset { number: 0, axis: 1, value: 1 }).is_err());
-        let error = list.permit(&pmc(Area::G, 12, 1)).expect_err("refused");
+        assert!(list.check_write(&Write::Macro { number: 500, mantissa: 1, places: 0 }).is_ok());
+        assert!(list.check_write(&Write::Macro { number: 501, mantissa: 1, places: 0 }).is_err());
+        assert!(list.check_write(&Write::WorkOffset { number: 0, axis: 1, value: 1 }).is_err());
+        let error = list.check_write(&pmc(Area::G, 12, 1)).expect_err("refused");
         assert!(error.to_string().contains("G12") && error.next().contains("allow="));
     }
 

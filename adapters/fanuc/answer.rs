@@ -307,7 +307,7 @@ impl fmt::Display for FocasItemError {
 impl FocasItemError {
     /// The reason that a reading without this item has.
     #[must_use]
-    pub fn absence(&self) -> Absence {
+    pub fn to_absence(&self) -> Absence {
         match self {
             Self::Refused(refusal) if refusal.code == FocasReturnCode::PATH => Absence::Refused,
             Self::Refused(refusal) => match refusal.code.consequence() {

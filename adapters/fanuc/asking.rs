@@ -34,35 +34,35 @@ impl Asking {
     ///
     /// # Errors
     /// The line, or a ladder that does not latch it.
-    pub(super) fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+    pub(super) fn ask_ladder(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
         let bit = i32::from(request_bit(request));
-        let (on, latched) = self.look(clock, request)?;
+        let (on, latched) = self.read_request_bytes(clock, request)?;
         if latched & bit != 0 {
-            return self.withdraw(clock);
+            return self.withdraw_request(clock);
         }
         if on != 0 {
             // Left over from before: a bit has to come on to count.
-            self.put(clock, 0)?;
-            self.settle(clock);
+            self.write_request_bits(clock, 0)?;
+            self.wait_for_scans(clock);
         }
-        self.put(clock, bit)?;
+        self.write_request_bits(clock, bit)?;
         let taken = self.is_taken(clock, request, bit);
-        self.withdraw(clock)?;
-        if taken? { Ok(()) } else { Err(self.silent(request)) }
+        self.withdraw_request(clock)?;
+        if taken? { Ok(()) } else { Err(self.build_silence_error(request)) }
     }
 
     /// Switches off what may still be on.
     ///
     /// # Errors
     /// The line.
-    pub(super) fn withdraw(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
-        if self.is_on { self.put(clock, 0) } else { Ok(()) }
+    pub(super) fn withdraw_request(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        if self.is_on { self.write_request_bits(clock, 0) } else { Ok(()) }
     }
 
     fn is_taken(&self, clock: &dyn Clock, request: LadderRequest, bit: i32) -> Result<bool, SourceError> {
         for _ in 0..LOOKS {
-            self.settle(clock);
-            if self.look(clock, request)?.1 & bit != 0 {
+            self.wait_for_scans(clock);
+            if self.read_request_bytes(clock, request)?.1 & bit != 0 {
                 return Ok(true);
             }
         }
@@ -70,38 +70,47 @@ impl Asking {
     }
 
     /// Several scans of the ladder.
-    fn settle(&self, clock: &dyn Clock) {
+    fn wait_for_scans(&self, clock: &dyn Clock) {
         clock.sleep_until(clock.now_ns().saturating_add(self.settle_ns));
     }
 
     /// The gateway's byte and the ladder's.
-    fn look(&self, clock: &dyn Clock, request: LadderRequest) -> Result<(i32, i32), SourceError> {
-        let item = FocasItem::Pmc(Stretch::bytes(self.at.0, self.at.1, 2));
-        match self.line.ask(clock, &[item])?.of(item) {
+    fn read_request_bytes(&self, clock: &dyn Clock, request: LadderRequest) -> Result<(i32, i32), SourceError> {
+        let item = FocasItem::Pmc(Stretch::from_byte_range(self.at.0, self.at.1, 2));
+        match self.line.ask_items(clock, &[item])?.find_item_result(item) {
             Some(Ok(FocasAnswer::Memory(bytes))) if bytes.len() == 2 => Ok((bytes[0], bytes[1])),
-            Some(Err(error)) => Err(self.refused(request, format!("its bytes cannot be read: {error}"), error.next())),
-            _ => Err(self.refused(request, "its bytes cannot be read: another kind of answer".to_owned(), SEE_DOCTOR)),
+            Some(Err(error)) => {
+                Err(self.build_refusal(request, format!("its bytes cannot be read: {error}"), error.next()))
+            }
+            _ => Err(self.build_refusal(
+                request,
+                "its bytes cannot be read: another kind of answer".to_owned(),
+                SEE_DOCTOR,
+            )),
         }
     }
 
-    fn put(&mut self, clock: &dyn Clock, bits: i32) -> Result<(), SourceError> {
+    fn write_request_bits(&mut self, clock: &dyn Clock, bits: i32) -> Result<(), SourceError> {
         // Unknown until the answer is there.
         self.is_on = true;
-        self.line.write(clock, &Write::Pmc { stretch: Stretch::bytes(self.at.0, self.at.1, 1), values: vec![bits] })?;
+        self.line.write(
+            clock,
+            &Write::Pmc { stretch: Stretch::from_byte_range(self.at.0, self.at.1, 1), values: vec![bits] },
+        )?;
         self.is_on = bits != 0;
         Ok(())
     }
 
-    fn silent(&self, request: LadderRequest) -> SourceError {
+    fn build_silence_error(&self, request: LadderRequest) -> SourceError {
         let (area, at) = (self.at.0.letter(), self.at.1);
         let what = format!("no rung latches the bit of {area}{at} in {area}{}", at.saturating_add(1));
-        self.refused(request, what, "Let the machine's maker add the rungs, or compare request= with the ladder")
+        self.build_refusal(request, what, "Let the machine's maker add the rungs, or compare request= with the ladder")
     }
 
-    fn refused(&self, request: LadderRequest, what: String, next: &str) -> SourceError {
+    fn build_refusal(&self, request: LadderRequest, what: String, next: &str) -> SourceError {
         SourceError::Refused {
             source_name: self.name.clone(),
-            request: request.word().to_owned(),
+            request: request.as_word().to_owned(),
             what,
             next: next.to_owned(),
         }

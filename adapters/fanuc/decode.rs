@@ -31,124 +31,146 @@ impl From<Generation> for Dialect {
 ///
 /// # Errors
 /// The length does not fit the item.
-pub fn answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) -> Result<FocasAnswer, WireError> {
+pub fn read_answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) -> Result<FocasAnswer, WireError> {
     let Dialect { generation, encoding } = dialect.into();
-    let text = |bytes: &[u8]| encoding.text(bytes);
+    let text = |bytes: &[u8]| encoding.decode_trimmed(bytes);
     let mut cursor = Cursor::new("data of an answer", data);
     let answer = match item {
-        FocasItem::System => FocasAnswer::System(system(&mut cursor)?),
-        FocasItem::Status => FocasAnswer::Status(status(&mut cursor)?),
+        FocasItem::System => FocasAnswer::System(read_system(&mut cursor)?),
+        FocasItem::Status => FocasAnswer::Status(read_status(&mut cursor)?),
         FocasItem::StatusLong => {
-            let status = status(&mut cursor)?;
-            cursor.bytes(8)?;
+            let status = read_status(&mut cursor)?;
+            cursor.read_bytes(8)?;
             FocasAnswer::Status(status)
         }
         FocasItem::Feed | FocasItem::SpindleSpeed | FocasItem::Position(_, 1..) => {
-            FocasAnswer::Number(number(&mut cursor)?.measured())
+            FocasAnswer::Number(read_number(&mut cursor)?.measured_value())
         }
-        FocasItem::Macro(_) => FocasAnswer::Number(number(&mut cursor)?.value()),
-        FocasItem::ToolOffset(..) | FocasItem::WorkOffset(..) => FocasAnswer::Number(number(&mut cursor)?.measured()),
+        FocasItem::Macro(_) => FocasAnswer::Number(read_number(&mut cursor)?.value()),
+        FocasItem::ToolOffset(..) | FocasItem::WorkOffset(..) => {
+            FocasAnswer::Number(read_number(&mut cursor)?.measured_value())
+        }
         FocasItem::Spindles(Spindle::PlainLoad | Spindle::MaxSpeed | Spindle::Gear) => {
-            FocasAnswer::Numbers(each(&mut cursor, Number::LEN, |c| Ok(Some(f64::from(low_half(number(c)?)))))?)
+            FocasAnswer::Numbers(read_records(&mut cursor, Number::LEN, |c| {
+                Ok(Some(f64::from(low_half(read_number(c)?))))
+            })?)
         }
         FocasItem::Spindles(_) | FocasItem::Servos(_) | FocasItem::Position(..) => {
-            FocasAnswer::Numbers(each(&mut cursor, Number::LEN, |cursor| Ok(number(cursor)?.measured()))?)
+            FocasAnswer::Numbers(read_records(&mut cursor, Number::LEN, |cursor| {
+                Ok(read_number(cursor)?.measured_value())
+            })?)
         }
-        FocasItem::FeedUnit => FocasAnswer::Unit(unit(generation, cursor.i16()?)),
-        FocasItem::PositionUnit(frame) => FocasAnswer::Units(each(&mut cursor, 4, |c| position_unit(c, frame))?),
+        FocasItem::FeedUnit => FocasAnswer::Unit(decode_speed_unit(generation, cursor.read_i16()?)),
+        FocasItem::PositionUnit(frame) => {
+            FocasAnswer::Units(read_records(&mut cursor, 4, |c| position_unit(c, frame))?)
+        }
         FocasItem::SpindleUnit => {
             // The library says rpm whatever the number is.
-            cursor.i16()?;
+            cursor.read_i16()?;
             FocasAnswer::Unit(SpeedUnit::Rpm)
         }
         FocasItem::HandleRetrace | FocasItem::ToolMode | FocasItem::Count(_) | FocasItem::TuningMode => {
-            FocasAnswer::Whole(i32::from(cursor.i16()?))
+            FocasAnswer::Whole(i32::from(cursor.read_i16()?))
         }
-        FocasItem::Sequence | FocasItem::BlockCount | FocasItem::AlarmBits => FocasAnswer::Whole(cursor.i32()?),
-        FocasItem::AxisNames | FocasItem::SpindleNames(_) => FocasAnswer::Names(each(&mut cursor, 4, name)?),
-        FocasItem::Program => FocasAnswer::Program { running: cursor.i32()?, main: cursor.i32()? },
-        FocasItem::ProgramName => FocasAnswer::Named { number: cursor.i32()?, name: text(rest(&mut cursor)?) },
-        FocasItem::ProgramPath | FocasItem::MainProgram => FocasAnswer::Text(text(rest(&mut cursor)?)),
+        FocasItem::Sequence | FocasItem::BlockCount | FocasItem::AlarmBits => FocasAnswer::Whole(cursor.read_i32()?),
+        FocasItem::AxisNames | FocasItem::SpindleNames(_) => {
+            FocasAnswer::Names(read_records(&mut cursor, 4, read_name)?)
+        }
+        FocasItem::Program => FocasAnswer::Program { running: cursor.read_i32()?, main: cursor.read_i32()? },
+        FocasItem::ProgramName => {
+            FocasAnswer::Named { number: cursor.read_i32()?, name: text(read_rest(&mut cursor)?) }
+        }
+        FocasItem::ProgramPath | FocasItem::MainProgram => FocasAnswer::Text(text(read_rest(&mut cursor)?)),
         FocasItem::Alarms(_) => {
             let length = 16 + super::request::ALARM_TEXT_LEN;
-            FocasAnswer::Alarms(each(&mut cursor, length, |cursor| alarm(cursor, encoding))?)
+            FocasAnswer::Alarms(read_records(&mut cursor, length, |cursor| read_alarm(cursor, encoding))?)
         }
-        FocasItem::ModalGroup(_) => FocasAnswer::Groups(each(&mut cursor, 2, |cursor| Ok(cursor.bytes(2)?[0]))?),
+        FocasItem::ModalGroup(_) => {
+            FocasAnswer::Groups(read_records(&mut cursor, 2, |cursor| Ok(cursor.read_bytes(2)?[0]))?)
+        }
         FocasItem::ModalWord(_) => modal_word(&mut cursor)?,
-        FocasItem::Parameter(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, REAL)?,
-        FocasItem::Diagnosis(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, DIAGNOSIS_REAL)?,
+        FocasItem::Parameter(wanted, axis) => read_parameter(&mut cursor, generation, wanted, axis, REAL)?,
+        FocasItem::Diagnosis(wanted, axis) => read_parameter(&mut cursor, generation, wanted, axis, DIAGNOSIS_REAL)?,
         FocasItem::Pmc(stretch) => {
             if data.len() != stretch.len() {
-                return Err(mismatch("bytes of PMC memory", stretch.len(), data.len()));
+                return Err(build_mismatch("bytes of PMC memory", stretch.len(), data.len()));
             }
-            FocasAnswer::Memory(each(&mut cursor, usize::from(stretch.width.bytes()), |c| element(c, stretch.width))?)
+            FocasAnswer::Memory(read_records(&mut cursor, usize::from(stretch.width.byte_count()), |c| {
+                read_element(c, stretch.width)
+            })?)
         }
-        FocasItem::ExecutedText(_) => FocasAnswer::Named { number: cursor.i32()?, name: text(rest(&mut cursor)?) },
-        FocasItem::Timer(_) => FocasAnswer::Time { minutes: cursor.i32()?, milliseconds: cursor.i32()? },
-        FocasItem::PanelSignals(_) => FocasAnswer::Signals(each(&mut cursor, 2, |cursor| cursor.i16())?),
+        FocasItem::ExecutedText(_) => {
+            FocasAnswer::Named { number: cursor.read_i32()?, name: text(read_rest(&mut cursor)?) }
+        }
+        FocasItem::Timer(_) => FocasAnswer::Time { minutes: cursor.read_i32()?, milliseconds: cursor.read_i32()? },
+        FocasItem::PanelSignals(_) => FocasAnswer::Signals(read_records(&mut cursor, 2, |cursor| cursor.read_i16())?),
         FocasItem::CncId => FocasAnswer::Text(super::records::cnc_id(&mut cursor)?),
         FocasItem::Messages(_) => {
             let length = 12 + MESSAGE_TEXT_LEN;
-            FocasAnswer::Messages(each(&mut cursor, length, |cursor| super::records::message(cursor, encoding))?)
+            FocasAnswer::Messages(read_records(&mut cursor, length, |cursor| {
+                super::records::read_message(cursor, encoding)
+            })?)
         }
-        FocasItem::HistoryCount => FocasAnswer::Whole(cursor.i32()?),
+        FocasItem::HistoryCount => FocasAnswer::Whole(cursor.read_i32()?),
         FocasItem::AlarmHistory(..) => {
             let length = 28 + HISTORY_TEXT_LEN;
-            FocasAnswer::History(each(&mut cursor, length, |cursor| super::records::past_alarm(cursor, encoding))?)
+            FocasAnswer::History(read_records(&mut cursor, length, |cursor| {
+                super::records::past_alarm(cursor, encoding)
+            })?)
         }
-        FocasItem::GCodes => FocasAnswer::Names(each(&mut cursor, 12, super::records::g_code)?),
+        FocasItem::GCodes => FocasAnswer::Names(read_records(&mut cursor, 12, super::records::g_code)?),
         FocasItem::ToolGroup => tool_group(&mut cursor)?,
-        FocasItem::ToolLife(group) => super::records::life(&mut cursor, group)?,
+        FocasItem::ToolLife(group) => super::records::read_tool_life(&mut cursor, group)?,
     };
-    cursor.end()?;
+    cursor.check_end()?;
     Ok(answer)
 }
 
 /// Which byte is which: what `libfwlib32` 1.0.5 makes of `000000fa 01020304` is flag 2 and 4 places.
 fn modal_word(cursor: &mut Cursor<'_>) -> Result<FocasAnswer, WireError> {
-    let value = cursor.i32()?;
-    let [_, flag, _, places] = [cursor.u8()?, cursor.u8()?, cursor.u8()?, cursor.u8()?];
+    let value = cursor.read_i32()?;
+    let [_, flag, _, places] = [cursor.read_u8()?, cursor.read_u8()?, cursor.read_u8()?, cursor.read_u8()?];
     Ok(FocasAnswer::Modal { value, flag, places })
 }
 
 fn position_unit(cursor: &mut Cursor<'_>, frame: PositionFrame) -> Result<i16, WireError> {
-    let [of_work, of_machine] = [cursor.i16()?, cursor.i16()?];
+    let [of_work, of_machine] = [cursor.read_i16()?, cursor.read_i16()?];
     Ok(if frame == PositionFrame::Machine { of_machine } else { of_work })
 }
 
 fn tool_group(cursor: &mut Cursor<'_>) -> Result<FocasAnswer, WireError> {
-    let [_next, in_use, _selected] = [cursor.i32()?, cursor.i32()?, cursor.i32()?];
-    cursor.bytes(cursor.left())?;
+    let [_next, in_use, _selected] = [cursor.read_i32()?, cursor.read_i32()?, cursor.read_i32()?];
+    cursor.read_bytes(cursor.bytes_left())?;
     Ok(FocasAnswer::Whole(in_use))
 }
 
-fn unit(generation: Generation, number: i16) -> SpeedUnit {
+fn decode_speed_unit(generation: Generation, number: i16) -> SpeedUnit {
     match generation {
         Generation::Newer(_) => SpeedUnit::of_newer(number),
         Generation::Older(_) => SpeedUnit::of_older(number),
     }
 }
 
-fn mismatch(what: &'static str, expected: usize, found: usize) -> WireError {
+fn build_mismatch(what: &'static str, expected: usize, found: usize) -> WireError {
     let signed = |length| i64::try_from(length).unwrap_or(i64::MAX);
     WireError::Mismatch { what, expected: signed(expected), found: signed(found) }
 }
 
-fn number(cursor: &mut Cursor<'_>) -> Result<Number, WireError> {
+fn read_number(cursor: &mut Cursor<'_>) -> Result<Number, WireError> {
     Number::read(cursor)
 }
 
-fn rest<'a>(cursor: &mut Cursor<'a>) -> Result<&'a [u8], WireError> {
-    cursor.bytes(cursor.left())
+fn read_rest<'a>(cursor: &mut Cursor<'a>) -> Result<&'a [u8], WireError> {
+    cursor.read_bytes(cursor.bytes_left())
 }
 
 /// As many records as there are bytes for; a broken one at the end is an error.
-fn each<T>(
+fn read_records<T>(
     cursor: &mut Cursor<'_>,
     len: usize,
     read: impl Fn(&mut Cursor<'_>) -> Result<T, WireError>,
 ) -> Result<Vec<T>, WireError> {
-    (0..cursor.left() / len).map(|_| read(cursor)).collect()
+    (0..cursor.bytes_left() / len).map(|_| read(cursor)).collect()
 }
 
 /// The second half of the mantissa: what `libfwlib32` 1.0.5 takes of these quantities, whatever stands in the first half.
@@ -158,74 +180,76 @@ fn low_half(number: Number) -> i16 {
 }
 
 /// One or two characters; the bytes behind them may be anything.
-fn name(cursor: &mut Cursor<'_>) -> Result<String, WireError> {
-    let bytes = cursor.bytes(4)?;
+fn read_name(cursor: &mut Cursor<'_>) -> Result<String, WireError> {
+    let bytes = cursor.read_bytes(4)?;
     let letters = bytes.iter().take(2).take_while(|byte| byte.is_ascii_alphanumeric());
     Ok(letters.map(|byte| char::from(*byte)).collect())
 }
 
-fn system(cursor: &mut Cursor<'_>) -> Result<System, WireError> {
-    let text = |bytes: &[u8]| TextEncoding::default().text(bytes);
-    let (additional, axes_max) = (cursor.i16()?, cursor.i16()?);
+fn read_system(cursor: &mut Cursor<'_>) -> Result<System, WireError> {
+    let text = |bytes: &[u8]| TextEncoding::default().decode_trimmed(bytes);
+    let (additional, axes_max) = (cursor.read_i16()?, cursor.read_i16()?);
     Ok(System {
         additional,
         axes_max,
-        kind: text(cursor.bytes(2)?),
-        machine: text(cursor.bytes(2)?),
-        series: text(cursor.bytes(4)?),
-        version: text(cursor.bytes(4)?),
-        axes: text(cursor.bytes(2)?),
+        kind: text(cursor.read_bytes(2)?),
+        machine: text(cursor.read_bytes(2)?),
+        series: text(cursor.read_bytes(4)?),
+        version: text(cursor.read_bytes(4)?),
+        axes: text(cursor.read_bytes(2)?),
     })
 }
 
-fn status(cursor: &mut Cursor<'_>) -> Result<Status, WireError> {
+fn read_status(cursor: &mut Cursor<'_>) -> Result<Status, WireError> {
     Ok(Status {
-        automatic: cursor.i16()?,
-        run: cursor.i16()?,
-        motion: cursor.i16()?,
-        auxiliary: cursor.i16()?,
-        emergency: cursor.i16()?,
-        alarm: cursor.i16()?,
-        edit: cursor.i16()?,
+        automatic: cursor.read_i16()?,
+        run: cursor.read_i16()?,
+        motion: cursor.read_i16()?,
+        auxiliary: cursor.read_i16()?,
+        emergency: cursor.read_i16()?,
+        alarm: cursor.read_i16()?,
+        edit: cursor.read_i16()?,
     })
 }
 
-fn alarm(cursor: &mut Cursor<'_>, encoding: TextEncoding) -> Result<Alarm, WireError> {
-    let (number, kind, axis, length) = (cursor.i32()?, cursor.i32()?, cursor.i32()?, cursor.i32()?);
-    let bytes = cursor.bytes(super::request::ALARM_TEXT_LEN)?;
+fn read_alarm(cursor: &mut Cursor<'_>, encoding: TextEncoding) -> Result<Alarm, WireError> {
+    let (number, kind, axis, length) = (cursor.read_i32()?, cursor.read_i32()?, cursor.read_i32()?, cursor.read_i32()?);
+    let bytes = cursor.read_bytes(super::request::ALARM_TEXT_LEN)?;
     let length = usize::try_from(length).unwrap_or(0).min(bytes.len());
-    Ok(Alarm { number, kind, axis, text: encoding.text(&bytes[..length]) })
+    Ok(Alarm { number, kind, axis, text: encoding.decode_trimmed(&bytes[..length]) })
 }
 
-fn element(cursor: &mut Cursor<'_>, width: PmcWidth) -> Result<i32, WireError> {
+fn read_element(cursor: &mut Cursor<'_>, width: PmcWidth) -> Result<i32, WireError> {
     match width {
-        PmcWidth::Byte => cursor.u8().map(i32::from),
-        PmcWidth::Word => cursor.i16().map(i32::from),
-        PmcWidth::Long => cursor.i32(),
+        PmcWidth::Byte => cursor.read_u8().map(i32::from),
+        PmcWidth::Word => cursor.read_i16().map(i32::from),
+        PmcWidth::Long => cursor.read_i32(),
     }
 }
 
 /// A parameter or diagnosis: number, axis, kind, and places for every axis the controller could have. Asked for no
 /// axis or for one, the first place holds the value.
-fn parameter(
+fn read_parameter(
     cursor: &mut Cursor<'_>,
     generation: Generation,
     wanted: u16,
     axis: i16,
     real: i16,
 ) -> Result<FocasAnswer, WireError> {
-    let (found, _axis, kind) = (cursor.i32()?, cursor.i16()?, cursor.i16()?);
+    let (found, _axis, kind) = (cursor.read_i32()?, cursor.read_i16()?, cursor.read_i16()?);
     if found != i32::from(wanted) {
         let what = "number of a parameter";
         return Err(WireError::Mismatch { what, expected: i64::from(wanted), found: i64::from(found) });
     }
     let mut values = match generation {
-        Generation::Newer(_) => each(cursor, Number::LEN, |cursor| {
-            let number = number(cursor)?;
-            Ok(if kind == real { number.measured() } else { Some(f64::from(number.mantissa)) })
+        Generation::Newer(_) => read_records(cursor, Number::LEN, |cursor| {
+            let number = read_number(cursor)?;
+            Ok(if kind == real { number.measured_value() } else { Some(f64::from(number.mantissa)) })
         })?,
-        Generation::Older(_) if kind == real => each(cursor, Number::LEN, |cursor| Ok(number(cursor)?.measured()))?,
-        Generation::Older(_) => each(cursor, 4, |cursor| Ok(Some(f64::from(cursor.i32()?))))?,
+        Generation::Older(_) if kind == real => {
+            read_records(cursor, Number::LEN, |cursor| Ok(read_number(cursor)?.measured_value()))?
+        }
+        Generation::Older(_) => read_records(cursor, 4, |cursor| Ok(Some(f64::from(cursor.read_i32()?))))?,
     };
     if axis >= 0 {
         values.truncate(1);

@@ -8,9 +8,9 @@ use super::alarms;
 use super::answer::{FocasAnswer, OperatorMessage, PastAlarm};
 use super::item::{BlockWord, FocasItem, Question, Spindle, Timer};
 use super::line::Asked;
-use super::readings::reading;
+use super::readings::build_reading;
 use super::states::OrAbsence;
-use super::view::{View, number, text};
+use super::view::{View, to_number_value, to_text_value};
 use crate::channel::ChannelId;
 use crate::reading::{Absence, Reading, Stamp, Value};
 
@@ -38,7 +38,7 @@ const TIMES: [(&str, FocasItem); 4] = [
     ("cycle_time_s", FocasItem::Timer(Timer::Cycle)),
 ];
 
-/// The others, in the order of [`others`].
+/// The others, in the order of [`find_other_values`].
 const OTHERS: [&str; 8] = [
     "block_text",
     "operator_message",
@@ -51,13 +51,13 @@ const OTHERS: [&str; 8] = [
 ];
 
 /// Channels of the group; without details the first two only.
-pub(super) fn channels(details: bool) -> Vec<ChannelId> {
+pub(super) fn list_channels(details: bool) -> Vec<ChannelId> {
     let names = NUMBERS.iter().chain(&TIMES).map(|(name, _)| *name).chain(OTHERS);
-    names.take(if details { usize::MAX } else { 2 }).filter_map(ChannelId::of).collect()
+    names.take(if details { usize::MAX } else { 2 }).filter_map(ChannelId::from_name).collect()
 }
 
 /// What is asked for.
-pub(super) fn questions(path: u8, details: bool) -> Vec<Question> {
+pub(super) fn list_questions(path: u8, details: bool) -> Vec<Question> {
     let others = [
         BLOCK,
         MESSAGES,
@@ -68,39 +68,39 @@ pub(super) fn questions(path: u8, details: bool) -> Vec<Question> {
         FocasItem::ToolGroup,
     ];
     let items = NUMBERS.iter().chain(&TIMES).map(|(_, item)| *item).chain(others);
-    items.take(if details { usize::MAX } else { 2 }).map(|item| item.on(path)).collect()
+    items.take(if details { usize::MAX } else { 2 }).map(|item| item.to_question(path)).collect()
 }
 
 /// What has to be asked for besides, which follows from the first answers: the last alarms, the life of the tools in use, and
 /// the path of a main program that has no number.
-pub(super) fn further(asked: &Asked) -> Vec<Question> {
+pub(super) fn list_further_questions(asked: &Asked) -> Vec<Question> {
     let view = View { asked, path: asked.path };
-    let whole = |item| match view.answer(item) {
+    let whole = |item| match view.find_answer(item) {
         Ok(FocasAnswer::Whole(whole)) => u16::try_from(*whole).ok().filter(|whole| *whole > 0),
         _ => None,
     };
     let first = |last: u16| last.saturating_sub(ALARMS_SHOWN - 1).max(1);
     let history = whole(FocasItem::HistoryCount).map(|last| FocasItem::AlarmHistory(first(last), last));
     let life = whole(FocasItem::ToolGroup).map(FocasItem::ToolLife);
-    let is_named = matches!(view.answer(FocasItem::Program), Ok(FocasAnswer::Program { main: 0, .. }));
+    let is_named = matches!(view.find_answer(FocasItem::Program), Ok(FocasAnswer::Program { main: 0, .. }));
     let main = is_named.then_some(FocasItem::MainProgram);
-    history.into_iter().chain(life).chain(main).map(|item| item.on(asked.path)).collect()
+    history.into_iter().chain(life).chain(main).map(|item| item.to_question(asked.path)).collect()
 }
 
 /// The readings of the group. `further` are the results of what was asked for besides.
-pub(super) fn readings(asked: &Asked, further: Option<&Asked>, details: bool, out: &mut Vec<Reading>) {
+pub(super) fn append_readings(asked: &Asked, further: Option<&Asked>, details: bool, out: &mut Vec<Reading>) {
     let view = View { asked, path: asked.path };
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
-    let numbers = NUMBERS.iter().map(|(name, item)| (*name, number(view.number(*item))));
-    let times = TIMES.iter().map(|(name, item)| (*name, number(seconds(&view, *item))));
-    let others = OTHERS.into_iter().zip(others(&view, further));
+    let numbers = NUMBERS.iter().map(|(name, item)| (*name, to_number_value(view.find_number(*item))));
+    let times = TIMES.iter().map(|(name, item)| (*name, to_number_value(find_seconds(&view, *item))));
+    let others = OTHERS.into_iter().zip(find_other_values(&view, further));
     let all = numbers.chain(times).chain(others).take(if details { usize::MAX } else { 2 });
-    let named = all.filter_map(|(name, value)| ChannelId::of(name).map(|channel| (channel, value)));
-    out.extend(named.map(|(channel, value)| reading(channel, stamp, value)));
+    let named = all.filter_map(|(name, value)| ChannelId::from_name(name).map(|channel| (channel, value)));
+    out.extend(named.map(|(channel, value)| build_reading(channel, stamp, value)));
 }
 
-fn seconds(view: &View<'_>, item: FocasItem) -> OrAbsence<f64> {
-    match view.answer(item)? {
+fn find_seconds(view: &View<'_>, item: FocasItem) -> OrAbsence<f64> {
+    match view.find_answer(item)? {
         FocasAnswer::Time { minutes, milliseconds } => {
             Ok(f64::from(*minutes) * 60.0 + f64::from(*milliseconds) / 1000.0)
         }
@@ -108,24 +108,24 @@ fn seconds(view: &View<'_>, item: FocasItem) -> OrAbsence<f64> {
     }
 }
 
-fn others(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<Value>; 8] {
-    let block = match view.answer(BLOCK) {
+fn find_other_values(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<Value>; 8] {
+    let block = match view.find_answer(BLOCK) {
         Ok(FocasAnswer::Named { name, .. }) => Ok(name.lines().next().unwrap_or_default().trim().to_owned()),
         other => other.and(Err(Absence::OutOfRange)),
     };
-    let messages = match view.answer(MESSAGES) {
+    let messages = match view.find_answer(MESSAGES) {
         Ok(FocasAnswer::Messages(messages)) => Ok(join_messages(messages)),
         other => other.and(Err(Absence::OutOfRange)),
     };
-    let codes = match view.answer(FocasItem::GCodes) {
+    let codes = match view.find_answer(FocasItem::GCodes) {
         Ok(FocasAnswer::Names(codes)) => Ok(codes.join(" ")),
         other => other.and(Err(Absence::OutOfRange)),
     };
-    let m_code = view.number(FocasItem::ModalWord(BlockWord::M)).map(|code| format!("M{code}"));
-    let [life, used] = life(view, further);
-    let texts = [block, messages, codes, m_code, main_program(view, further), history(view, further)];
-    let [block, messages, codes, m_code, main, history] = texts.map(text);
-    [block, messages, codes, m_code, main, history, number(life), number(used)]
+    let m_code = view.find_number(FocasItem::ModalWord(BlockWord::M)).map(|code| format!("M{code}"));
+    let [life, used] = find_tool_life(view, further);
+    let texts = [block, messages, codes, m_code, main_program(view, further), describe_history(view, further)];
+    let [block, messages, codes, m_code, main, history] = texts.map(to_text_value);
+    [block, messages, codes, m_code, main, history, to_number_value(life), to_number_value(used)]
 }
 
 /// Number and text of every message; a control without one sends a number that is none.
@@ -135,8 +135,8 @@ fn join_messages(messages: &[OperatorMessage]) -> String {
 }
 
 /// The last alarms, the newest first.
-fn history(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
-    let count = view.number(FocasItem::HistoryCount)?;
+fn describe_history(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
+    let count = view.find_number(FocasItem::HistoryCount)?;
     if count < 1.0 {
         return Ok(String::new());
     }
@@ -151,13 +151,13 @@ fn history(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
                 let year = i32::from(*year);
                 // Older controls give two digits.
                 let year = if year < 100 { 2000 + year } else { year };
-                let text = alarms::one(alarm, axes, view.asked.facts.alarm_table());
+                let text = alarms::format_alarm(alarm, axes, view.asked.facts.alarm_table());
                 format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02} {text}")
             };
             Ok(past.iter().rev().map(one).collect::<Vec<_>>().join("; "))
         }
         Some(Ok(_)) => Err(Absence::OutOfRange),
-        Some(Err(error)) => Err(error.absence()),
+        Some(Err(error)) => Err(error.to_absence()),
         None => Err(Absence::NotSupported),
     }
 }
@@ -165,21 +165,21 @@ fn history(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
 /// Number of the main program, or the end of its path where it has none. Source: FOCAS2 manual, `cnc_rdprgnum`, which gives 0 for a
 /// program whose name is no number.
 fn main_program(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
-    match view.answer(FocasItem::Program)? {
+    match view.find_answer(FocasItem::Program)? {
         FocasAnswer::Program { main: 0, .. } => {}
         FocasAnswer::Program { main, .. } => return Ok(format!("O{main}")),
         _ => return Err(Absence::OutOfRange),
     }
-    match further.and_then(|further| further.of(FocasItem::MainProgram)) {
+    match further.and_then(|further| further.find_item_result(FocasItem::MainProgram)) {
         Some(Ok(FocasAnswer::Text(path))) => Ok(crate::nclink::last_part(path).to_owned()),
-        Some(Err(error)) => Err(error.absence()),
+        Some(Err(error)) => Err(error.to_absence()),
         _ => Err(Absence::NotSupported),
     }
 }
 
 /// Life and use of the tools in use.
-fn life(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<f64>; 2] {
-    if let Err(reason) = view.answer(FocasItem::ToolGroup) {
+fn find_tool_life(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<f64>; 2] {
+    if let Err(reason) = view.find_answer(FocasItem::ToolGroup) {
         return [Err(reason); 2];
     }
     let found = further.and_then(|further| {
@@ -189,7 +189,7 @@ fn life(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<f64>; 2] {
     match found {
         Some(Ok(FocasAnswer::Life { life, count, .. })) => [Ok(f64::from(*life)), Ok(f64::from(*count))],
         Some(Ok(_)) => [Err(Absence::OutOfRange); 2],
-        Some(Err(error)) => [Err(error.absence()); 2],
+        Some(Err(error)) => [Err(error.to_absence()); 2],
         // No group is in use.
         None => [Err(Absence::NotSupported); 2],
     }

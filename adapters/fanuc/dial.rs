@@ -20,7 +20,7 @@ pub struct Dial {
 impl Dial {
     /// `R907` or `G12`: the ladder's data, or an override signal.
     #[must_use]
-    pub fn of(text: &str) -> Option<Self> {
+    pub fn from_text(text: &str) -> Option<Self> {
         let mut letters = text.chars();
         let area = Area::of_letter(letters.next()?)?;
         let at = letters.as_str().parse().ok().filter(|at| *at < 60_000)?;
@@ -29,8 +29,8 @@ impl Dial {
 
     /// What has to be read.
     #[must_use]
-    pub fn stretch(self) -> Stretch {
-        Stretch::bytes(self.area, self.at, 1)
+    pub fn to_stretch(self) -> Stretch {
+        Stretch::from_byte_range(self.area, self.at, 1)
     }
 
     /// The dial from what was read; `None` when the byte is no override.
@@ -47,13 +47,13 @@ mod tests {
 
     #[test]
     fn the_coding_follows_the_area() {
-        let read = |text: &str, byte| Dial::of(text).expect("usable").read(&[byte]).map(OverridePct::percent);
+        let read = |text: &str, byte| Dial::from_text(text).expect("usable").read(&[byte]).map(OverridePct::percent);
         assert_eq!(read("R907", 80), Some(80));
         assert_eq!(read("G12", 0xAF), Some(80));
         assert_eq!(read("d20", 255), None, "no percent");
         assert_eq!(Dial { area: Area::R, at: 1 }.read(&[]), None);
         for wrong in ["", "R", "X10", "F12", "G-1", "R70000", "12"] {
-            assert_eq!(Dial::of(wrong), None, "{wrong}");
+            assert_eq!(Dial::from_text(wrong), None, "{wrong}");
         }
     }
 }

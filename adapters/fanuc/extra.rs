@@ -5,11 +5,11 @@ use super::answer::FocasAnswer;
 use super::item::{FocasItem, Position, Question, Servo, Spindle};
 use super::line::Asked;
 use super::own::OwnItem;
-use super::readings::reading;
+use super::readings::build_reading;
 use super::states::OrAbsence;
-use super::view::{View, number};
+use super::view::{View, to_number_value};
 use crate::address::FanucOptions;
-use crate::channel::{ChannelId, DeclareError, Kind, NewChannel, declare};
+use crate::channel::{ChannelId, DeclareError, Kind, NewChannel, declare_channel};
 use crate::own::{Own, ReadWith};
 use crate::reading::{Absence, Reading, Stamp, Value};
 use crate::text::TextEncoding;
@@ -88,7 +88,7 @@ const TEMPERATURES: (f64, f64) = (-50.0, 300.0);
 const SPEEDS: (f64, f64) = (-100_000.0, 100_000.0);
 
 impl Of {
-    fn item(self) -> FocasItem {
+    fn to_item(self) -> FocasItem {
         match self {
             Self::Position(which) => FocasItem::Position(which, -1),
             Self::Load => FocasItem::Servos(Servo::Load),
@@ -98,12 +98,12 @@ impl Of {
         }
     }
 
-    fn pace(self) -> ReadWith {
+    fn choose_pace(self) -> ReadWith {
         if matches!(self, Self::MotorTemperature | Self::EncoderTemperature) { ReadWith::Slow } else { ReadWith::Fast }
     }
 
     /// Ending of the name, unit, range, and what it is in English and Chinese.
-    fn words(self, rotary: bool) -> (String, &'static str, (f64, f64), &'static str, &'static str) {
+    fn describe_channel(self, rotary: bool) -> (String, &'static str, (f64, f64), &'static str, &'static str) {
         let (ending, unit) = if rotary { ("deg", "°") } else { ("mm", "mm") };
         let place = |which: &str| format!("{which}_{ending}");
         match self {
@@ -129,20 +129,23 @@ impl Of {
 ///
 /// # Errors
 /// The name of the channel and why it cannot be added.
-pub fn declared(options: &FanucOptions, path: u8) -> Result<Vec<(ReadWith, Extra)>, (String, DeclareError)> {
+pub fn declare_channels(options: &FanucOptions, path: u8) -> Result<Vec<(ReadWith, Extra)>, (String, DeclareError)> {
     let mut extras = Vec::new();
     for axis in &options.axes {
-        for of in quantities(options) {
-            let (ending, unit, range, en, zh) = of.words(axis.rotary);
+        for of in list_quantities(options) {
+            let (ending, unit, range, en, zh) = of.describe_channel(axis.rotary);
             let name = format!("{}_axis_{ending}", axis.name.to_lowercase());
             if crate::channel::CHANNELS.iter().any(|known| known.name == name) {
                 // X, Y and Z have it already.
                 continue;
             }
-            let kind = if of.pace() == ReadWith::Slow { Kind::Held } else { Kind::Continuous };
+            let kind = if of.choose_pace() == ReadWith::Slow { Kind::Held } else { Kind::Continuous };
             let (en, zh) = (format!("{} axis {en}", axis.name), format!("{}{zh}", axis.name));
             let new = NewChannel { name, unit: unit.to_owned(), range, kind, en, zh };
-            extras.push((of.pace(), put(&new, axis.path.unwrap_or(path), From::Axis(axis.clone(), of))?));
+            extras.push((
+                of.choose_pace(),
+                declare_extra(&new, axis.path.unwrap_or(path), From::Axis(axis.clone(), of))?,
+            ));
         }
     }
     for number in 2..=options.spindles {
@@ -153,7 +156,7 @@ pub fn declared(options: &FanucOptions, path: u8) -> Result<Vec<(ReadWith, Extra
             let name = format!("spindle{number}_{ending}");
             let (en, zh) = (format!("Spindle {number}: {en}"), format!("主轴{number}{zh}"));
             let new = NewChannel { name, unit: unit.to_owned(), range, kind: Kind::Continuous, en, zh };
-            extras.push((ReadWith::Fast, put(&new, path, From::Spindle(usize::from(number) - 1, what))?));
+            extras.push((ReadWith::Fast, declare_extra(&new, path, From::Spindle(usize::from(number) - 1, what))?));
         }
     }
     for own in &options.own {
@@ -163,54 +166,58 @@ pub fn declared(options: &FanucOptions, path: u8) -> Result<Vec<(ReadWith, Extra
     Ok(extras)
 }
 
-fn quantities(options: &FanucOptions) -> Vec<Of> {
+fn list_quantities(options: &FanucOptions) -> Vec<Of> {
     let positions = [Position::Machine].into_iter().chain(options.positions.iter().copied()).map(Of::Position);
     positions.chain([Of::Load, Of::Current, Of::MotorTemperature, Of::EncoderTemperature]).collect()
 }
 
-fn put(new: &NewChannel, path: u8, from: From) -> Result<Extra, (String, DeclareError)> {
-    let channel = declare(new).map_err(|error| (new.name.clone(), error))?;
+fn declare_extra(new: &NewChannel, path: u8, from: From) -> Result<Extra, (String, DeclareError)> {
+    let channel = declare_channel(new).map_err(|error| (new.name.clone(), error))?;
     Ok(Extra { channel, path, from })
 }
 
 impl Extra {
     /// What has to be asked for: its item, and the unit of a position.
-    pub fn questions(&self) -> impl Iterator<Item = Question> {
+    pub fn list_questions(&self) -> impl Iterator<Item = Question> {
         let (item, unit) = match &self.from {
-            From::Axis(_, of @ Of::Position(which)) => (of.item(), Some(FocasItem::PositionUnit(which.frame()))),
-            From::Axis(_, of) => (of.item(), None),
+            From::Axis(_, of @ Of::Position(which)) => (of.to_item(), Some(FocasItem::PositionUnit(which.frame()))),
+            From::Axis(_, of) => (of.to_item(), None),
             From::Spindle(_, what) => (FocasItem::Spindles(*what), None),
             From::Own(own) => (own.item.item, None),
         };
         let path = self.path;
-        std::iter::once(item).chain(unit).map(move |item| item.on(path))
+        std::iter::once(item).chain(unit).map(move |item| item.to_question(path))
     }
 
     /// The channel's reading of what was answered. `encoding` is the character set of the source.
-    pub(super) fn reading(&self, asked: &Asked, stamp: Stamp, encoding: TextEncoding) -> Reading {
+    pub(super) fn to_reading(&self, asked: &Asked, stamp: Stamp, encoding: TextEncoding) -> Reading {
         let view = View { asked, path: self.path };
         if let From::Own(own) = &self.from {
-            let found = view.answer(own.item.item).and_then(|answer| own.found(answer, encoding));
-            return own.reading(stamp, found);
+            let found = view.find_answer(own.item.item).and_then(|answer| own.extract_value(answer, encoding));
+            return own.to_reading(stamp, found);
         }
-        reading(self.channel, stamp, self.read(&view))
+        build_reading(self.channel, stamp, self.read(&view))
     }
 
     fn read(&self, view: &View<'_>) -> OrAbsence<Value> {
         match &self.from {
-            From::Axis(axis, Of::Position(which)) => number(view.position(*which, &axis.name, axis.rotary)),
-            From::Axis(axis, Of::Load) => number(view.axis_load(&axis.name)),
-            From::Axis(axis, of @ Of::Current) => number(view.axis(of.item(), &axis.name)),
-            From::Axis(axis, of) => number(place(view, of.item(), view.place(&axis.name)?)),
-            From::Spindle(at, what) => number(place(view, FocasItem::Spindles(*what), *at)),
+            From::Axis(axis, Of::Position(which)) => {
+                to_number_value(view.find_position(*which, &axis.name, axis.rotary))
+            }
+            From::Axis(axis, Of::Load) => to_number_value(view.axis_load(&axis.name)),
+            From::Axis(axis, of @ Of::Current) => to_number_value(view.find_axis_value(of.to_item(), &axis.name)),
+            From::Axis(axis, of) => {
+                to_number_value(find_value_at(view, of.to_item(), view.find_axis_place(&axis.name)?))
+            }
+            From::Spindle(at, what) => to_number_value(find_value_at(view, FocasItem::Spindles(*what), *at)),
             From::Own(_) => Err(Absence::NotSupported),
         }
     }
 }
 
 /// The value at a place of an answer that has one per axis or spindle.
-fn place(view: &View<'_>, item: FocasItem, place: usize) -> OrAbsence<f64> {
-    match view.answer(item)? {
+fn find_value_at(view: &View<'_>, item: FocasItem, place: usize) -> OrAbsence<f64> {
+    match view.find_answer(item)? {
         FocasAnswer::Numbers(values) | FocasAnswer::Data { values, .. } => {
             values.get(place).copied().flatten().ok_or(Absence::NotSupported)
         }

@@ -56,14 +56,15 @@ struct PathFacts {
 impl Facts {
     /// Nothing is known yet. `paths` are those that are read, the one that is written to first.
     #[must_use]
-    pub fn unknown(opening: Opening, paths: &[u8]) -> Self {
+    pub fn from_opening(opening: Opening, paths: &[u8]) -> Self {
         let none =
             |path: &u8| PathFacts { path: *path, axes: Err(Absence::NotYetRead), rotary: Err(Absence::NotYetRead) };
         let older = matches!(opening.generation, Generation::Older(_));
         let own = paths.first().copied().unwrap_or(1);
-        let mut questions = vec![FocasItem::System.on(own), INCH_MACHINE.on(own)];
-        questions.extend(older.then(|| FEED_SHOWN.on(own)));
-        questions.extend(paths.iter().flat_map(|path| [FocasItem::AxisNames, ROTARY].map(|item| item.on(*path))));
+        let mut questions = vec![FocasItem::System.to_question(own), INCH_MACHINE.to_question(own)];
+        questions.extend(older.then(|| FEED_SHOWN.to_question(own)));
+        questions
+            .extend(paths.iter().flat_map(|path| [FocasItem::AxisNames, ROTARY].map(|item| item.to_question(*path))));
         Self {
             opening,
             system: None,
@@ -74,7 +75,7 @@ impl Facts {
         }
     }
 
-    fn path(&self, path: u8) -> Option<&PathFacts> {
+    fn find_path(&self, path: u8) -> Option<&PathFacts> {
         self.paths.iter().find(|facts| facts.path == path)
     }
 
@@ -83,12 +84,12 @@ impl Facts {
     /// # Errors
     /// Why they are not known.
     pub fn axes_of(&self, path: u8) -> KnownFact<&[String]> {
-        let facts = self.path(path).ok_or(Absence::NotSupported)?;
+        let facts = self.find_path(path).ok_or(Absence::NotSupported)?;
         facts.axes.as_deref().map_err(|reason| *reason)
     }
 
     /// Every path with the names of its axes, the one that is written to first.
-    pub fn axes(&self) -> impl Iterator<Item = (u8, KnownFact<&[String]>)> {
+    pub fn list_axes(&self) -> impl Iterator<Item = (u8, KnownFact<&[String]>)> {
         self.paths.iter().map(|facts| (facts.path, facts.axes.as_deref().map_err(|reason| *reason)))
     }
 
@@ -111,7 +112,7 @@ impl Facts {
     /// # Errors
     /// Why it is not known.
     pub fn is_rotary(&self, path: u8, axis: usize) -> KnownFact<bool> {
-        let facts = self.path(path).ok_or(Absence::NotSupported)?;
+        let facts = self.find_path(path).ok_or(Absence::NotSupported)?;
         match &facts.rotary {
             Ok(rotary) => Ok(rotary.get(axis).copied().unwrap_or(false)),
             Err(reason) => Err(*reason),
@@ -119,23 +120,23 @@ impl Facts {
     }
 
     /// Takes the answer to one of the open questions.
-    pub fn take(&mut self, question: Question, result: &FocasItemResult) {
+    pub fn record_result(&mut self, question: Question, result: &FocasItemResult) {
         let settled = match result {
-            Ok(answer) => self.answered(question, answer),
-            Err(error) => is_final(error) && self.refused(question),
+            Ok(answer) => self.record_answer(question, answer),
+            Err(error) => is_final(error) && self.record_refusal(question),
         };
         self.open.retain(|(open, _)| *open != question);
         if !settled {
             let (why, reason) = match result {
                 Ok(_) => ("another kind of answer".to_owned(), Absence::OutOfRange),
-                Err(error) => (error.to_string(), error.absence()),
+                Err(error) => (error.to_string(), error.to_absence()),
             };
-            self.missing(question, reason);
+            self.record_missing(question, reason);
             self.open.push((question, why));
         }
     }
 
-    fn answered(&mut self, question: Question, answer: &FocasAnswer) -> bool {
+    fn record_answer(&mut self, question: Question, answer: &FocasAnswer) -> bool {
         let bits = |value: &Option<f64>| value.unwrap_or(0.0).rem_euclid(256.0) as u8;
         match (question.item, answer) {
             (FocasItem::System, FocasAnswer::System(system)) => self.system = Some(system.clone()),
@@ -144,11 +145,11 @@ impl Facts {
                 self.feed_follows_mode = Ok(values.first().map_or(0, bits) >> FEED_SHOWN_BIT & 1 == 1);
             }
             (FocasItem::AxisNames, FocasAnswer::Names(names)) => {
-                self.set(question.path, |facts| facts.axes = Ok(names.clone()))
+                self.update_path(question.path, |facts| facts.axes = Ok(names.clone()))
             }
             (ROTARY, FocasAnswer::Data { values, .. }) => {
                 let rotary = values.iter().map(|value| bits(value) & 1 == 1).collect();
-                self.set(question.path, |facts| facts.rotary = Ok(rotary));
+                self.update_path(question.path, |facts| facts.rotary = Ok(rotary));
             }
             _ => return false,
         }
@@ -156,28 +157,28 @@ impl Facts {
     }
 
     /// The control does not have it and never will: what that means.
-    fn refused(&mut self, question: Question) -> bool {
+    fn record_refusal(&mut self, question: Question) -> bool {
         match question.item {
             INCH_MACHINE => self.inch = Ok(false),
             FEED_SHOWN => self.feed_follows_mode = Ok(false),
-            FocasItem::AxisNames => self.set(question.path, |facts| facts.axes = Err(Absence::NotSupported)),
-            ROTARY => self.set(question.path, |facts| facts.rotary = Ok(Vec::new())),
+            FocasItem::AxisNames => self.update_path(question.path, |facts| facts.axes = Err(Absence::NotSupported)),
+            ROTARY => self.update_path(question.path, |facts| facts.rotary = Ok(Vec::new())),
             _ => {}
         }
         true
     }
 
-    fn missing(&mut self, question: Question, reason: Absence) {
+    fn record_missing(&mut self, question: Question, reason: Absence) {
         match question.item {
             INCH_MACHINE => self.inch = Err(reason),
             FEED_SHOWN => self.feed_follows_mode = Err(reason),
-            FocasItem::AxisNames => self.set(question.path, |facts| facts.axes = Err(reason)),
-            ROTARY => self.set(question.path, |facts| facts.rotary = Err(reason)),
+            FocasItem::AxisNames => self.update_path(question.path, |facts| facts.axes = Err(reason)),
+            ROTARY => self.update_path(question.path, |facts| facts.rotary = Err(reason)),
             _ => {}
         }
     }
 
-    fn set(&mut self, path: u8, change: impl FnOnce(&mut PathFacts)) {
+    fn update_path(&mut self, path: u8, change: impl FnOnce(&mut PathFacts)) {
         if let Some(facts) = self.paths.iter_mut().find(|facts| facts.path == path) {
             change(facts);
         }
@@ -202,9 +203,9 @@ mod tests {
     use crate::fanuc::answer::Refusal;
 
     fn facts(version: u16) -> Facts {
-        let generation = Generation::of(version);
+        let generation = Generation::from_version(version);
         let opening = Opening { generation, family: 5, axes_max: 8, spindles_max: 4, paths: 2, axes: 2, spindles: 1 };
-        Facts::unknown(opening, &[1, 2])
+        Facts::from_opening(opening, &[1, 2])
     }
 
     fn refusal(code: i16) -> FocasItemResult {
@@ -216,9 +217,12 @@ mod tests {
         for code in [-1, -2, 7, 10, 11, 13] {
             let mut facts = facts(4);
             let open = facts.open.len();
-            facts.take(INCH_MACHINE.on(1), &refusal(code));
+            facts.record_result(INCH_MACHINE.to_question(1), &refusal(code));
             assert_eq!((facts.inch, facts.open.len()), (Err(Absence::Refused), open), "code {code}");
-            facts.take(INCH_MACHINE.on(1), &Ok(FocasAnswer::Data { kind: 0, values: vec![Some(1.0)] }));
+            facts.record_result(
+                INCH_MACHINE.to_question(1),
+                &Ok(FocasAnswer::Data { kind: 0, values: vec![Some(1.0)] }),
+            );
             assert_eq!((facts.inch, facts.open.len()), (Ok(true), open - 1));
         }
     }
@@ -228,7 +232,7 @@ mod tests {
         for code in [1, 3, 6] {
             let mut facts = facts(2);
             for (question, _) in facts.open.clone() {
-                facts.take(question, &refusal(code));
+                facts.record_result(question, &refusal(code));
             }
             assert!(facts.open.is_empty(), "{:?}", facts.open);
             assert_eq!((facts.inch, facts.feed_follows_mode), (Ok(false), Ok(false)));
@@ -239,9 +243,12 @@ mod tests {
     #[test]
     fn bits_of_parameters() {
         let mut facts = facts(2);
-        facts.take(FEED_SHOWN.on(1), &Ok(FocasAnswer::Data { kind: 0, values: vec![Some(8.0)] }));
+        facts.record_result(FEED_SHOWN.to_question(1), &Ok(FocasAnswer::Data { kind: 0, values: vec![Some(8.0)] }));
         assert_eq!(facts.feed_follows_mode, Ok(true));
-        facts.take(ROTARY.on(2), &Ok(FocasAnswer::Data { kind: 0, values: vec![Some(0.0), Some(5.0)] }));
+        facts.record_result(
+            ROTARY.to_question(2),
+            &Ok(FocasAnswer::Data { kind: 0, values: vec![Some(0.0), Some(5.0)] }),
+        );
         assert_eq!((facts.is_rotary(2, 0), facts.is_rotary(2, 1)), (Ok(false), Ok(true)));
         assert_eq!(facts.is_rotary(1, 0), Err(Absence::NotYetRead));
     }

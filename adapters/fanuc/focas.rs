@@ -17,13 +17,13 @@ pub trait Focas: Send {
     ///
     /// # Errors
     /// The connection as a whole failed; it is not usable any more and `out` holds nothing new.
-    fn ask(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError>;
+    fn ask_questions(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError>;
 
     /// Writes, on the path that the connection was made for.
     ///
     /// # Errors
     /// [`FocasError::Refused`] when the controller says no, after which the connection is still good; any other error
-    /// as in [`Focas::ask`].
+    /// as in [`Focas::ask_questions`].
     fn write(&mut self, write: &Write) -> Result<(), FocasError>;
 }
 

@@ -23,8 +23,8 @@ impl Position {
 
     /// Its number on the wire.
     #[must_use]
-    pub fn number(self) -> i32 {
-        numbered(&Self::ALL, self)
+    pub fn wire_number(self) -> i32 {
+        find_wire_number(&Self::ALL, self)
     }
 }
 
@@ -75,8 +75,8 @@ impl Spindle {
 
     /// Its number on the wire.
     #[must_use]
-    pub fn number(self) -> i32 {
-        numbered(&Self::ALL, self)
+    pub fn wire_number(self) -> i32 {
+        find_wire_number(&Self::ALL, self)
     }
 }
 
@@ -97,13 +97,13 @@ impl Servo {
 
     /// Its number on the wire.
     #[must_use]
-    pub fn number(self) -> i32 {
-        numbered(&Self::ALL, self)
+    pub fn wire_number(self) -> i32 {
+        find_wire_number(&Self::ALL, self)
     }
 }
 
 /// The number that stands beside a value in its table.
-fn numbered<T: PartialEq>(table: &[(T, i32)], wanted: T) -> i32 {
+fn find_wire_number<T: PartialEq>(table: &[(T, i32)], wanted: T) -> i32 {
     table.iter().find(|(known, _)| *known == wanted).map_or(0, |(_, number)| *number)
 }
 
@@ -126,8 +126,8 @@ impl Timer {
 
     /// Its number on the wire and in the library.
     #[must_use]
-    pub fn number(self) -> i32 {
-        numbered(&Self::ALL, self)
+    pub fn wire_number(self) -> i32 {
+        find_wire_number(&Self::ALL, self)
     }
 }
 
@@ -234,7 +234,7 @@ pub struct Question {
 impl FocasItem {
     /// The question for it on a path from 1.
     #[must_use]
-    pub fn on(self, path: u8) -> Question {
+    pub fn to_question(self, path: u8) -> Question {
         Question { path, item: self }
     }
 }

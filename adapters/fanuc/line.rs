@@ -88,13 +88,13 @@ pub struct Asked {
 impl Asked {
     /// What became of an item of the line's own path.
     #[must_use]
-    pub fn of(&self, item: FocasItem) -> Option<&FocasItemResult> {
-        self.on(item.on(self.path))
+    pub fn find_item_result(&self, item: FocasItem) -> Option<&FocasItemResult> {
+        self.find_question_result(item.to_question(self.path))
     }
 
     /// What became of a question.
     #[must_use]
-    pub fn on(&self, question: Question) -> Option<&FocasItemResult> {
+    pub fn find_question_result(&self, question: Question) -> Option<&FocasItemResult> {
         let at = self.questions.iter().position(|asked| *asked == question)?;
         self.results.get(at)
     }
@@ -123,7 +123,7 @@ impl FanucLine {
         Self { inner: Arc::new(Mutex::new(inner)) }
     }
 
-    fn locked<T>(&self, act: impl FnOnce(&mut FanucConnection) -> T) -> T {
+    fn with_connection<T>(&self, act: impl FnOnce(&mut FanucConnection) -> T) -> T {
         act(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
@@ -131,10 +131,10 @@ impl FanucLine {
     ///
     /// # Errors
     /// As there.
-    pub fn ask(&self, clock: &dyn Clock, items: &[FocasItem]) -> Result<Asked, SourceError> {
-        self.locked(|inner| {
+    pub fn ask_items(&self, clock: &dyn Clock, items: &[FocasItem]) -> Result<Asked, SourceError> {
+        self.with_connection(|inner| {
             let path = inner.paths.0;
-            inner.ask(clock, items.iter().map(|item| item.on(path)).collect())
+            inner.ask_questions(clock, items.iter().map(|item| item.to_question(path)).collect())
         })
     }
 
@@ -143,7 +143,7 @@ impl FanucLine {
     /// # Errors
     /// The poll as a whole failed; the next one opens a new connection.
     pub fn ask_on(&self, clock: &dyn Clock, questions: &[Question]) -> Result<Asked, SourceError> {
-        self.locked(|inner| inner.ask(clock, questions.to_vec()))
+        self.with_connection(|inner| inner.ask_questions(clock, questions.to_vec()))
     }
 
     /// Writes, if the address is allowed.
@@ -151,46 +151,46 @@ impl FanucLine {
     /// # Errors
     /// It is not, the controller refused, or the line failed.
     pub fn write(&self, clock: &dyn Clock, write: &Write) -> Result<(), SourceError> {
-        self.locked(|inner| inner.write(clock, write))
+        self.with_connection(|inner| inner.write(clock, write))
     }
 
     /// The path that is meant when none is named.
     #[must_use]
     pub fn path(&self) -> u8 {
-        self.locked(|inner| inner.paths.0)
+        self.with_connection(|inner| inner.paths.0)
     }
 
     /// How the line has been doing.
     #[must_use]
     pub fn counts(&self) -> LineCounts {
-        self.locked(|inner| inner.counts)
+        self.with_connection(|inner| inner.counts)
     }
 
     /// Which of these questions were refused when they were last asked.
     #[must_use]
-    pub fn refusals(&self, questions: &[Question]) -> Vec<(Question, Refusal)> {
+    pub fn list_refusals(&self, questions: &[Question]) -> Vec<(Question, Refusal)> {
         let of = |inner: &FanucConnection, question: &Question| Some((*question, *inner.refusals.get(question)?));
-        self.locked(|inner| questions.iter().filter_map(|question| of(inner, question)).collect())
+        self.with_connection(|inner| questions.iter().filter_map(|question| of(inner, question)).collect())
     }
 
     /// What this control does not have.
     #[must_use]
-    pub fn unsupported(&self) -> Vec<Question> {
-        self.locked(|inner| inner.unsupported.iter().copied().collect())
+    pub fn list_unsupported(&self) -> Vec<Question> {
+        self.with_connection(|inner| inner.unsupported.iter().copied().collect())
     }
 }
 
 impl FanucConnection {
-    fn ask(&mut self, clock: &dyn Clock, questions: Vec<Question>) -> Result<Asked, SourceError> {
-        let facts = self.connected(clock)?;
+    fn ask_questions(&mut self, clock: &dyn Clock, questions: Vec<Question>) -> Result<Asked, SourceError> {
+        let facts = self.ensure_connection(clock)?;
         let known = |question: &Question| !self.unsupported.contains(question);
         let wanted: Vec<Question> = questions.iter().copied().filter(known).collect();
         // What the control has not told of itself yet travels with every round until it has.
         let open: Vec<Question> = facts.open.iter().map(|(question, _)| *question).collect();
         let both = [wanted.as_slice(), &open].concat();
-        let (began_ns, mut found) = self.round(clock, &both)?;
+        let (began_ns, mut found) = self.ask_round(clock, &both)?;
         let facts = self.learn_facts(&open, &found.split_off(wanted.len()), facts);
-        self.learn(&wanted, &found);
+        self.update_support(&wanted, &found);
         let mut found = wanted.iter().zip(found).peekable();
         let answer = |question: &Question| {
             let own = found.next_if(|(asked, _)| *asked == question);
@@ -206,38 +206,42 @@ impl FanucConnection {
             return facts;
         }
         let mut learnt = Facts::clone(&facts);
-        open.iter().zip(found).for_each(|(question, result)| learnt.take(*question, result));
+        open.iter().zip(found).for_each(|(question, result)| learnt.record_result(*question, result));
         let learnt = Arc::new(learnt);
         self.facts = Some(learnt.clone());
         learnt
     }
 
     /// One round of questions on an open connection, not before the duty cycle allows it.
-    fn round(
+    fn ask_round(
         &mut self,
         clock: &dyn Clock,
         questions: &[Question],
     ) -> Result<(TimeNs, Vec<FocasItemResult>), SourceError> {
-        self.rest(clock);
+        self.wait_for_rest(clock);
         let began_ns = clock.now_ns();
         let mut found = Vec::with_capacity(questions.len());
         let outcome = match &mut self.focas {
-            Some(focas) => focas.ask(questions, &mut found),
+            Some(focas) => focas.ask_questions(questions, &mut found),
             None => Err(FocasError::Broken("there is no connection".to_owned())),
         };
-        self.busy(began_ns, clock.now_ns());
+        self.record_busy_time(began_ns, clock.now_ns());
         if let Err(error) = outcome {
-            return Err(self.lost(&error, "the values", clock.now_ns()));
+            return Err(self.drop_connection(&error, "the values", clock.now_ns()));
         }
         let dead = |result: &FocasItemResult| matches!(result, Err(FocasItemError::Refused(refusal)) if refusal.code.consequence() == Consequence::Reconnect);
         if let Some(Err(FocasItemError::Refused(refusal))) = found.iter().find(|result| dead(result)) {
-            return Err(self.lost(&FocasError::Broken(refusal.code.to_string()), "the values", clock.now_ns()));
+            return Err(self.drop_connection(
+                &FocasError::Broken(refusal.code.to_string()),
+                "the values",
+                clock.now_ns(),
+            ));
         }
         Ok((began_ns, found))
     }
 
     /// Waits while the control is owed more rest than [`OWED_NS`].
-    fn rest(&self, clock: &dyn Clock) {
+    fn wait_for_rest(&self, clock: &dyn Clock) {
         let until_ns = self.rested_ns.saturating_sub(OWED_NS);
         if clock.now_ns() < until_ns {
             clock.sleep_until(until_ns);
@@ -245,13 +249,13 @@ impl FanucConnection {
     }
 
     /// An answer of so long wants a rest of `(100 - duty) / duty` times as long, after what is still owed.
-    fn busy(&mut self, began_ns: TimeNs, ended_ns: TimeNs) {
+    fn record_busy_time(&mut self, began_ns: TimeNs, ended_ns: TimeNs) {
         let (took_ns, duty) = ((ended_ns - began_ns).max(0), i64::from(self.duty_pct));
         let owed_ns = (self.rested_ns.saturating_sub(began_ns)).clamp(0, OWED_NS);
         self.rested_ns = ended_ns + owed_ns + took_ns.min(60 * crate::clock::SECOND_NS) * (100 - duty) / duty;
     }
 
-    fn learn(&mut self, questions: &[Question], results: &[FocasItemResult]) {
+    fn update_support(&mut self, questions: &[Question], results: &[FocasItemResult]) {
         let missing = |result: &FocasItemResult| match result {
             Err(FocasItemError::Refused(refusal)) => refusal.code.consequence() == Consequence::NotSupported,
             Err(FocasItemError::NotOffered) => true,
@@ -267,7 +271,7 @@ impl FanucConnection {
         self.unsupported.extend(absent.map(|(question, _)| *question));
     }
 
-    fn connected(&mut self, clock: &dyn Clock) -> Result<Arc<Facts>, SourceError> {
+    fn ensure_connection(&mut self, clock: &dyn Clock) -> Result<Arc<Facts>, SourceError> {
         if let (Some(_), Some(facts)) = (&self.focas, &self.facts) {
             return Ok(facts.clone());
         }
@@ -279,9 +283,9 @@ impl FanucConnection {
         self.refusals.clear();
         let (own, further) = self.paths.clone();
         let paths: Vec<u8> = std::iter::once(own).chain(further).collect();
-        let facts = Arc::new(Facts::unknown(opening, &paths));
+        let facts = Arc::new(Facts::from_opening(opening, &paths));
         let open: Vec<Question> = facts.open.iter().map(|(question, _)| *question).collect();
-        let (_, found) = self.round(clock, &open)?;
+        let (_, found) = self.ask_round(clock, &open)?;
         let facts = self.learn_facts(&open, &found, facts);
         self.counts.connections += 1;
         self.lost_ns = None;
@@ -304,33 +308,33 @@ impl FanucConnection {
     }
 
     fn write(&mut self, clock: &dyn Clock, write: &Write) -> Result<(), SourceError> {
-        let what = super::allow::address(write);
-        if let Err(error) = self.allow.permit(write) {
-            return Err(self.error(&error, &what));
+        let what = super::allow::format_address(write);
+        if let Err(error) = self.allow.check_write(write) {
+            return Err(self.build_error(&error, &what));
         }
-        self.connected(clock)?;
+        self.ensure_connection(clock)?;
         let began_ns = clock.now_ns();
         let outcome = match &mut self.focas {
             Some(focas) => focas.write(write),
             None => Err(FocasError::Broken("there is no connection".to_owned())),
         };
-        self.busy(began_ns, clock.now_ns());
+        self.record_busy_time(began_ns, clock.now_ns());
         match outcome {
             Ok(()) => Ok(()),
             Err(error @ FocasError::Refused(refusal)) if refusal.code.consequence() != Consequence::Reconnect => {
-                Err(self.error(&error, &format!("writing {what}")))
+                Err(self.build_error(&error, &format!("writing {what}")))
             }
-            Err(error) => Err(self.lost(&error, &format!("writing {what}"), clock.now_ns())),
+            Err(error) => Err(self.drop_connection(&error, &format!("writing {what}"), clock.now_ns())),
         }
     }
 
     /// The connection is of no use any more.
-    fn lost(&mut self, error: &FocasError, request: &str, now_ns: TimeNs) -> SourceError {
+    fn drop_connection(&mut self, error: &FocasError, request: &str, now_ns: TimeNs) -> SourceError {
         self.focas = None;
         self.facts = None;
         self.counts.broken += 1;
         self.lost_ns.get_or_insert(now_ns);
-        self.error(error, request)
+        self.build_error(error, request)
     }
 
     /// No connection could be opened.
@@ -350,10 +354,10 @@ impl FanucConnection {
             FocasError::Timeout(_) | FocasError::Broken(_) if !self.known => NEVER_OPENED.to_owned(),
             _ => error.next(),
         };
-        told(&self.name, error, "the opening of a connection", next)
+        build_source_error(&self.name, error, "the opening of a connection", next)
     }
 
-    fn error(&self, error: &FocasError, request: &str) -> SourceError {
+    fn build_error(&self, error: &FocasError, request: &str) -> SourceError {
         source_error(&self.name, error, request)
     }
 }
@@ -361,10 +365,10 @@ impl FanucConnection {
 /// A failure in the words of every driver.
 #[must_use]
 pub fn source_error(name: &str, error: &FocasError, request: &str) -> SourceError {
-    told(name, error, request, error.next())
+    build_source_error(name, error, request, error.next())
 }
 
-fn told(name: &str, error: &FocasError, request: &str, next: String) -> SourceError {
+fn build_source_error(name: &str, error: &FocasError, request: &str, next: String) -> SourceError {
     let (source_name, request, what) = (name.to_owned(), request.to_owned(), error.to_string());
     match error {
         FocasError::Timeout(waited) => SourceError::Timeout {

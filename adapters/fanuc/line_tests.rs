@@ -28,7 +28,7 @@ struct Told {
 }
 
 /// What the mock answers unless it is told otherwise.
-fn usual(item: FocasItem) -> FocasItemResult {
+fn build_usual_answer(item: FocasItem) -> FocasItemResult {
     Ok(match item {
         FocasItem::System => FocasAnswer::System(System {
             additional: 0,
@@ -52,7 +52,7 @@ impl Focas for Mock {
         &self.1
     }
 
-    fn ask(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError> {
+    fn ask_questions(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError> {
         self.0.now_ns.fetch_add(self.0.takes_ns.load(Ordering::SeqCst), Ordering::SeqCst);
         self.0.asked.fetch_add(questions.len() as u64, Ordering::SeqCst);
         if let Some(error) = self.0.fail.lock().expect("sound").take() {
@@ -60,7 +60,9 @@ impl Focas for Mock {
         }
         let results = self.0.results.lock().expect("sound");
         out.extend(
-            questions.iter().map(|question| results.get(&question.item).cloned().unwrap_or(usual(question.item))),
+            questions
+                .iter()
+                .map(|question| results.get(&question.item).cloned().unwrap_or(build_usual_answer(question.item))),
         );
         Ok(())
     }
@@ -83,11 +85,11 @@ impl Clock for Standing {
     }
 }
 
-fn line(duty_pct: u8) -> (FanucLine, Arc<Told>, Standing) {
+fn build_line(duty_pct: u8) -> (FanucLine, Arc<Told>, Standing) {
     let told = Arc::new(Told::default());
     let own = told.clone();
     let opening = Opening {
-        generation: Generation::of(4),
+        generation: Generation::from_version(4),
         family: 5,
         axes_max: 32,
         spindles_max: 8,
@@ -106,15 +108,15 @@ fn line(duty_pct: u8) -> (FanucLine, Arc<Told>, Standing) {
     )
 }
 
-fn refused(code: i16) -> FocasItemResult {
+fn build_refusal(code: i16) -> FocasItemResult {
     Err(FocasItemError::Refused(Refusal { code: FocasReturnCode(code), detail: 0 }))
 }
 
 #[test]
 fn the_controller_has_its_share_of_the_time_for_itself() {
-    let (line, told, clock) = line(25);
+    let (line, told, clock) = build_line(25);
     told.takes_ns.store(20_000_000, Ordering::SeqCst);
-    let asked: Vec<_> = (0..200).map(|_| line.ask(&clock, &[FocasItem::Feed]).expect("well")).collect();
+    let asked: Vec<_> = (0..200).map(|_| line.ask_items(&clock, &[FocasItem::Feed]).expect("well")).collect();
     let (first, last) = (&asked[0], &asked[199]);
     // 200 answers of 20 ms want 16 s at 25 %; three seconds of rest may be owed.
     assert!(last.ended_ns - first.began_ns > 12_900_000_000, "{}", last.ended_ns - first.began_ns);
@@ -122,118 +124,122 @@ fn the_controller_has_its_share_of_the_time_for_itself() {
 
 #[test]
 fn one_answer_that_takes_long_delays_no_poll_and_many_do() {
-    let (line, told, clock) = line(50);
+    let (line, told, clock) = build_line(50);
     told.takes_ns.store(5_000_000, Ordering::SeqCst);
-    line.ask(&clock, &[FocasItem::Feed]).expect("well");
+    line.ask_items(&clock, &[FocasItem::Feed]).expect("well");
     told.now_ns.fetch_add(100_000_000, Ordering::SeqCst);
     told.takes_ns.store(1_500_000_000, Ordering::SeqCst);
-    let hiccup = line.ask(&clock, &[FocasItem::Feed]).expect("well");
-    let next = line.ask(&clock, &[FocasItem::Feed]).expect("well");
+    let hiccup = line.ask_items(&clock, &[FocasItem::Feed]).expect("well");
+    let next = line.ask_items(&clock, &[FocasItem::Feed]).expect("well");
     assert_eq!(next.began_ns - hiccup.ended_ns, 0, "its rest stays owed, and is paid by the pauses after it");
-    let third = line.ask(&clock, &[FocasItem::Feed]).expect("well");
-    let fourth = line.ask(&clock, &[FocasItem::Feed]).expect("well");
+    let third = line.ask_items(&clock, &[FocasItem::Feed]).expect("well");
+    let fourth = line.ask_items(&clock, &[FocasItem::Feed]).expect("well");
     assert_eq!((fourth.began_ns - third.ended_ns) / 1_000_000, 1_500, "a slow control has its share");
 }
 
 #[test]
 fn what_is_missing_is_asked_once_per_connection() {
-    let (line, told, clock) = line(100);
-    told.results.lock().expect("sound").insert(FocasItem::Feed, refused(6));
+    let (line, told, clock) = build_line(100);
+    told.results.lock().expect("sound").insert(FocasItem::Feed, build_refusal(6));
     let items = [FocasItem::Sequence, FocasItem::Feed, FocasItem::BlockCount];
-    let asked = line.ask(&clock, &items).expect("well");
-    assert_eq!(asked.of(FocasItem::Feed), Some(&refused(6)));
-    assert_eq!(line.unsupported(), [FocasItem::Feed.on(1)]);
+    let asked = line.ask_items(&clock, &items).expect("well");
+    assert_eq!(asked.find_item_result(FocasItem::Feed), Some(&build_refusal(6)));
+    assert_eq!(line.list_unsupported(), [FocasItem::Feed.to_question(1)]);
     let before = told.asked.load(Ordering::SeqCst);
-    let asked = line.ask(&clock, &items).expect("well");
+    let asked = line.ask_items(&clock, &items).expect("well");
     assert_eq!(told.asked.load(Ordering::SeqCst) - before, 2);
-    assert_eq!(asked.of(FocasItem::Feed), Some(&Err(FocasItemError::NotOffered)));
+    assert_eq!(asked.find_item_result(FocasItem::Feed), Some(&Err(FocasItemError::NotOffered)));
     assert_eq!(
-        asked.of(FocasItem::BlockCount),
+        asked.find_item_result(FocasItem::BlockCount),
         Some(&Ok(FocasAnswer::Whole(1))),
         "the answers stay with their questions"
     );
     *told.fail.lock().expect("sound") = Some(FocasError::Broken("reset".into()));
-    assert!(line.ask(&clock, &items).is_err());
+    assert!(line.ask_items(&clock, &items).is_err());
     told.results.lock().expect("sound").clear();
-    let asked = line.ask(&clock, &items).expect("a new connection");
-    assert_eq!(asked.of(FocasItem::Feed), Some(&Ok(FocasAnswer::Whole(1))), "the control may have got the option");
+    let asked = line.ask_items(&clock, &items).expect("a new connection");
+    assert_eq!(
+        asked.find_item_result(FocasItem::Feed),
+        Some(&Ok(FocasAnswer::Whole(1))),
+        "the control may have got the option"
+    );
 }
 
 #[test]
 fn a_code_that_says_the_connection_is_dead_ends_it() {
-    let (line, told, clock) = line(100);
-    line.ask(&clock, &[FocasItem::Feed]).expect("well");
-    told.results.lock().expect("sound").insert(FocasItem::Feed, refused(-16));
-    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })));
+    let (line, told, clock) = build_line(100);
+    line.ask_items(&clock, &[FocasItem::Feed]).expect("well");
+    told.results.lock().expect("sound").insert(FocasItem::Feed, build_refusal(-16));
+    assert!(matches!(line.ask_items(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })));
     told.results.lock().expect("sound").clear();
-    line.ask(&clock, &[FocasItem::Feed]).expect("well again");
+    line.ask_items(&clock, &[FocasItem::Feed]).expect("well again");
     assert_eq!((line.counts().connections, line.counts().broken), (2, 1));
 }
 
 #[test]
 fn off_is_what_was_on_before() {
-    let (line, told, clock) = line(100);
+    let (line, told, clock) = build_line(100);
     let nobody = || Some(FocasError::NobodyThere("refused".into()));
     *told.connect.lock().expect("sound") = nobody();
     assert!(
-        matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })),
+        matches!(line.ask_items(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })),
         "it may be the wrong address"
     );
     *told.connect.lock().expect("sound") = None;
-    line.ask(&clock, &[FocasItem::Feed]).expect("on");
+    line.ask_items(&clock, &[FocasItem::Feed]).expect("on");
     *told.fail.lock().expect("sound") = Some(FocasError::Broken("reset".into()));
-    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })));
+    assert!(matches!(line.ask_items(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })));
     *told.connect.lock().expect("sound") = nobody();
-    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Off { .. })), "starting, or off");
+    assert!(matches!(line.ask_items(&clock, &[FocasItem::Feed]), Err(SourceError::Off { .. })), "starting, or off");
     told.now_ns.fetch_add(200 * SECOND_NS, Ordering::SeqCst);
-    let error = line.ask(&clock, &[FocasItem::Feed]).expect_err("too long for a start");
+    let error = line.ask_items(&clock, &[FocasItem::Feed]).expect_err("too long for a start");
     assert!(matches!(error, SourceError::Line { .. }), "the host lives and nobody listens: {error}");
     *told.connect.lock().expect("sound") = Some(FocasError::Unreachable("no route".into()));
-    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Off { .. })), "however long");
+    assert!(matches!(line.ask_items(&clock, &[FocasItem::Feed]), Err(SourceError::Off { .. })), "however long");
 }
 
 #[test]
 fn silence_and_a_closed_door_are_no_machine_that_is_off() {
-    let (line, told, clock) = line(100);
-    line.ask(&clock, &[FocasItem::Feed]).expect("on");
+    let (line, told, clock) = build_line(100);
+    line.ask_items(&clock, &[FocasItem::Feed]).expect("on");
     *told.fail.lock().expect("sound") = Some(FocasError::Timeout(Duration::from_secs(2)));
-    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Timeout { .. })));
+    assert!(matches!(line.ask_items(&clock, &[FocasItem::Feed]), Err(SourceError::Timeout { .. })));
     *told.connect.lock().expect("sound") = Some(FocasError::Timeout(Duration::from_secs(2)));
-    let error = line.ask(&clock, &[FocasItem::Feed]).expect_err("it accepts and is silent");
-    assert_eq!(error.absence(), Absence::Timeout, "{error}");
+    let error = line.ask_items(&clock, &[FocasItem::Feed]).expect_err("it accepts and is silent");
+    assert_eq!(error.to_absence(), Absence::Timeout, "{error}");
     *told.connect.lock().expect("sound") = Some(FocasError::Broken("closed".into()));
-    let error = line.ask(&clock, &[FocasItem::Feed]).expect_err("it accepts and closes");
-    assert_eq!(error.absence(), Absence::Disconnected, "{error}");
+    let error = line.ask_items(&clock, &[FocasItem::Feed]).expect_err("it accepts and closes");
+    assert_eq!(error.to_absence(), Absence::Disconnected, "{error}");
 }
 
 #[test]
 fn facts_that_are_refused_for_now_are_asked_for_again_with_every_round() {
     for code in [-1, 7, 11] {
-        let (line, told, clock) = line(100);
+        let (line, told, clock) = build_line(100);
         let questions = [FocasItem::AxisNames, INCH_MACHINE];
-        questions.iter().for_each(|item| drop(told.results.lock().expect("sound").insert(*item, refused(code))));
-        let asked = line.ask(&clock, &[FocasItem::Feed]).expect("well");
+        questions.iter().for_each(|item| drop(told.results.lock().expect("sound").insert(*item, build_refusal(code))));
+        let asked = line.ask_items(&clock, &[FocasItem::Feed]).expect("well");
         assert_eq!(asked.facts.inch, Err(Absence::Refused), "no guess while the control says {code}");
         assert_eq!(asked.facts.axes_of(1), Err(Absence::Refused));
         told.results.lock().expect("sound").clear();
-        let asked = line.ask(&clock, &[FocasItem::Feed]).expect("well");
+        let asked = line.ask_items(&clock, &[FocasItem::Feed]).expect("well");
         assert_eq!((asked.facts.inch, asked.facts.axes_of(1).map(<[String]>::len)), (Ok(false), Ok(2)));
         assert_eq!(line.counts().connections, 1, "on the same connection");
         let before = told.asked.load(Ordering::SeqCst);
-        line.ask(&clock, &[FocasItem::Feed]).expect("well");
+        line.ask_items(&clock, &[FocasItem::Feed]).expect("well");
         assert_eq!(told.asked.load(Ordering::SeqCst) - before, 1, "nothing is asked twice once it is known");
     }
 }
 
 #[test]
 fn an_answer_that_was_cut_off_is_no_machine_that_is_off() {
-    let (line, told, clock) = line(100);
-    line.ask(&clock, &[FocasItem::Feed]).expect("on");
+    let (line, told, clock) = build_line(100);
+    line.ask_items(&clock, &[FocasItem::Feed]).expect("on");
     *told.fail.lock().expect("sound") = Some(FocasError::Cut { got: 20, waited: None });
-    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })));
+    assert!(matches!(line.ask_items(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })));
     for waited in [None, Some(Duration::from_secs(2))] {
         *told.connect.lock().expect("sound") = Some(FocasError::Cut { got: 20, waited });
-        let error = line.ask(&clock, &[FocasItem::Feed]).expect_err("an opening that was cut off");
+        let error = line.ask_items(&clock, &[FocasItem::Feed]).expect_err("an opening that was cut off");
         assert!(!matches!(error, SourceError::Off { .. }), "{error}");
         assert!(error.to_string().contains("20 bytes"), "{error}");
     }
@@ -241,8 +247,8 @@ fn an_answer_that_was_cut_off_is_no_machine_that_is_off() {
 
 #[test]
 fn nothing_is_written_that_is_not_allowed() {
-    let (line, _, clock) = line(100);
-    let write = Write::Pmc { stretch: Stretch::bytes(super::item::Area::G, 12, 1), values: vec![0] };
+    let (line, _, clock) = build_line(100);
+    let write = Write::Pmc { stretch: Stretch::from_byte_range(super::item::Area::G, 12, 1), values: vec![0] };
     assert!(matches!(line.write(&clock, &write), Err(SourceError::Refused { .. })));
     assert_eq!(line.counts().connections, 0, "not even a connection was opened for it");
 }

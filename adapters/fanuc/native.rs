@@ -14,7 +14,8 @@ use super::opening::{Generation, Opening};
 use super::request;
 use super::statistics::Statistics;
 use super::wire::{
-    FocasFrame, FocasHeader, FrameKind, HEADER_LEN, Reply, Request, WireError, frame, replies, request_body,
+    FocasFrame, FocasHeader, FrameKind, HEADER_LEN, Reply, Request, WireError, encode_frame, parse_replies,
+    request_body,
 };
 use crate::address::Endpoint;
 use crate::stream::{self, Short};
@@ -61,15 +62,17 @@ impl Native {
     /// See [`FocasError`].
     pub fn connect(settings: NativeSettings) -> Result<Self, FocasError> {
         let deadline = Instant::now() + settings.timeout;
-        let mut stream = tcp(&settings.at, deadline)?;
-        send(&mut stream, &frame(CLIENT, FrameKind::Open, &FOR_QUESTIONS), settings.timeout)?;
-        let answer = receive(&mut stream, deadline, settings.timeout)?;
+        let mut stream = connect_tcp(&settings.at, deadline)?;
+        send_bytes(&mut stream, &encode_frame(CLIENT, FrameKind::Open, &FOR_QUESTIONS), settings.timeout)?;
+        let answer = receive_frame(&mut stream, deadline, settings.timeout)?;
         let opening = match answer.kind {
-            FrameKind::Opened => Opening::read(Generation::of(answer.version), &answer.body, u16::from(settings.path)),
+            FrameKind::Opened => {
+                Opening::read(Generation::from_version(answer.version), &answer.body, u16::from(settings.path))
+            }
             FrameKind::OpenRefused => return Err(FocasError::NoSession),
             other => return Err(FocasError::Protocol(format!("{other:?} in answer to the opening"))),
         };
-        let opening = opening.map_err(|error| protocol(&error))?;
+        let opening = opening.map_err(|error| build_protocol_error(&error))?;
         if u16::from(settings.path) > opening.paths.max(1) {
             return Err(FocasError::Refused(Refusal { code: FocasReturnCode::PATH, detail: 0 }));
         }
@@ -83,20 +86,24 @@ impl Native {
     }
 
     /// One frame there and one back; shows every answer to `take`.
-    fn exchange(&mut self, requests: &[Request], mut take: impl FnMut(usize, &Reply<'_>)) -> Result<(), FocasError> {
+    fn exchange_frame(
+        &mut self,
+        requests: &[Request],
+        mut take: impl FnMut(usize, &Reply<'_>),
+    ) -> Result<(), FocasError> {
         let began = Instant::now();
-        let bytes = frame(CLIENT, FrameKind::Request, &request_body(requests));
-        send(&mut self.stream, &bytes, self.settings.timeout)?;
-        let answer = receive(&mut self.stream, began + self.settings.timeout, self.settings.timeout)?;
-        self.statistics.frame(requests.len(), bytes.len(), HEADER_LEN + answer.body.len(), began.elapsed());
-        checked(&answer, self.opening.generation, requests, &mut take)
+        let bytes = encode_frame(CLIENT, FrameKind::Request, &request_body(requests));
+        send_bytes(&mut self.stream, &bytes, self.settings.timeout)?;
+        let answer = receive_frame(&mut self.stream, began + self.settings.timeout, self.settings.timeout)?;
+        self.statistics.count_frame(requests.len(), bytes.len(), HEADER_LEN + answer.body.len(), began.elapsed());
+        check_answer(&answer, self.opening.generation, requests, &mut take)
     }
 
     /// How many of the questions fit into one frame in both directions; at least one.
-    fn fitting(&self, questions: &[Question]) -> usize {
+    fn count_fitting(&self, questions: &[Question]) -> usize {
         let (mut asked, mut answered) = (2, 2);
         let fits = |question: &&Question| {
-            asked += request::reading(question.item, self.opening.generation).wire_len();
+            asked += request::build_read_request(question.item, self.opening.generation).wire_len();
             answered += request::answer_len(question.item, &self.opening);
             asked <= REQUEST_MAX && answered <= self.opening.generation.answer_max()
         };
@@ -104,16 +111,16 @@ impl Native {
     }
 
     /// Every block carries its own path, so that one frame asks several.
-    fn blocks(&self, questions: &[Question]) -> Vec<Request> {
+    fn build_requests(&self, questions: &[Question]) -> Vec<Request> {
         let block = |question: &Question| {
-            request::reading(question.item, self.opening.generation).on_path(u16::from(question.path))
+            request::build_read_request(question.item, self.opening.generation).on_path(u16::from(question.path))
         };
         questions.iter().map(block).collect()
     }
 }
 
 /// Is the frame the answer to these questions? Shows each answer to `take`, or none.
-fn checked(
+fn check_answer(
     answer: &FocasFrame,
     generation: Generation,
     requests: &[Request],
@@ -126,12 +133,12 @@ fn checked(
     if answer.version != generation.version() {
         return differs(format!("version word {} where {} was before", answer.version, generation.version()));
     }
-    let found = replies(&answer.body).map_err(|error| protocol(&error))?;
+    let found = parse_replies(&answer.body).map_err(|error| build_protocol_error(&error))?;
     if found.len() != requests.len() {
         return differs(format!("{} answers to {} questions", found.len(), requests.len()));
     }
     for (reply, request) in found.iter().zip(requests) {
-        reply.answers(request).map_err(|error| protocol(&error))?;
+        reply.check_request(request).map_err(|error| build_protocol_error(&error))?;
     }
     found.iter().enumerate().for_each(|(index, reply)| take(index, reply));
     Ok(())
@@ -142,14 +149,15 @@ impl Focas for Native {
         &self.opening
     }
 
-    fn ask(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError> {
+    fn ask_questions(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError> {
         let before = out.len();
         let mut rest = questions;
         while !rest.is_empty() {
-            let (now, later) = rest.split_at(self.fitting(rest));
+            let (now, later) = rest.split_at(self.count_fitting(rest));
             let dialect = Dialect { generation: self.opening.generation, encoding: self.settings.encoding };
-            let requests = self.blocks(now);
-            let asked = self.exchange(&requests, |index, reply| out.push(result(now[index].item, dialect, reply)));
+            let requests = self.build_requests(now);
+            let asked =
+                self.exchange_frame(&requests, |index, reply| out.push(decode_result(now[index].item, dialect, reply)));
             asked.inspect_err(|_| out.truncate(before))?;
             rest = later;
         }
@@ -157,36 +165,39 @@ impl Focas for Native {
     }
 
     fn write(&mut self, write: &Write) -> Result<(), FocasError> {
-        let request = request::writing(write, self.opening.generation).on_path(u16::from(self.settings.path));
+        let request =
+            request::build_write_request(write, self.opening.generation).on_path(u16::from(self.settings.path));
         let mut refusal = None;
-        self.exchange(std::slice::from_ref(&request), |_, reply| refusal = refused(reply))?;
+        self.exchange_frame(std::slice::from_ref(&request), |_, reply| refusal = find_refusal(reply))?;
         refusal.map_or(Ok(()), |refusal| Err(FocasError::Refused(refusal)))
     }
 }
 
 impl Drop for Native {
     fn drop(&mut self) {
-        let _gone_already = self.stream.write_all(&frame(CLIENT, FrameKind::Close, &[]));
+        let _gone_already = self.stream.write_all(&encode_frame(CLIENT, FrameKind::Close, &[]));
     }
 }
 
-fn refused(reply: &Reply<'_>) -> Option<Refusal> {
+fn find_refusal(reply: &Reply<'_>) -> Option<Refusal> {
     (reply.code != 0).then_some(Refusal { code: FocasReturnCode(reply.code), detail: reply.detail })
 }
 
-fn result(item: FocasItem, dialect: Dialect, reply: &Reply<'_>) -> FocasItemResult {
-    match refused(reply) {
+fn decode_result(item: FocasItem, dialect: Dialect, reply: &Reply<'_>) -> FocasItemResult {
+    match find_refusal(reply) {
         Some(refusal) => Err(FocasItemError::Refused(refusal)),
-        None => decode::answer(item, dialect, reply.data).map_err(|error| FocasItemError::Malformed(error.to_string())),
+        None => {
+            decode::read_answer(item, dialect, reply.data).map_err(|error| FocasItemError::Malformed(error.to_string()))
+        }
     }
 }
 
-fn protocol(error: &WireError) -> FocasError {
+fn build_protocol_error(error: &WireError) -> FocasError {
     FocasError::Protocol(error.to_string())
 }
 
-fn tcp(at: &Endpoint, until: Instant) -> Result<TcpStream, FocasError> {
-    let addresses = stream::addresses(at).map_err(|error| FocasError::Name(error.to_string()))?;
+fn connect_tcp(at: &Endpoint, until: Instant) -> Result<TcpStream, FocasError> {
+    let addresses = stream::resolve_addresses(at).map_err(|error| FocasError::Name(error.to_string()))?;
     stream::connect_any(&addresses, until).map_err(|error| match error.kind() {
         ErrorKind::ConnectionRefused => FocasError::NobodyThere(error.to_string()),
         _ => FocasError::Unreachable(error.to_string()),
@@ -197,23 +208,23 @@ fn io_error(error: &std::io::Error, timeout: Duration) -> FocasError {
     if stream::is_silence(error) { FocasError::Timeout(timeout) } else { FocasError::Broken(error.to_string()) }
 }
 
-fn send(stream: &mut TcpStream, bytes: &[u8], timeout: Duration) -> Result<(), FocasError> {
+fn send_bytes(stream: &mut TcpStream, bytes: &[u8], timeout: Duration) -> Result<(), FocasError> {
     let line = |error| io_error(&error, timeout);
     stream.set_write_timeout(Some(timeout)).map_err(line)?;
     stream.write_all(bytes).map_err(line)
 }
 
-fn receive(stream: &mut TcpStream, deadline: Instant, timeout: Duration) -> Result<FocasFrame, FocasError> {
+fn receive_frame(stream: &mut TcpStream, deadline: Instant, timeout: Duration) -> Result<FocasFrame, FocasError> {
     let mut head = [0; HEADER_LEN];
-    fill(stream, &mut head, deadline, 0, timeout)?;
-    let header = FocasHeader::of(&head).map_err(|error| protocol(&error))?;
+    fill_from_stream(stream, &mut head, deadline, 0, timeout)?;
+    let header = FocasHeader::from_bytes(&head).map_err(|error| build_protocol_error(&error))?;
     let mut body = vec![0; header.body_len];
-    fill(stream, &mut body, deadline, HEADER_LEN, timeout)?;
+    fill_from_stream(stream, &mut body, deadline, HEADER_LEN, timeout)?;
     Ok(FocasFrame { version: header.version, kind: header.kind, body })
 }
 
 /// Reads until the buffer is full or the deadline is over; `before` bytes of the same answer have come already.
-fn fill(
+fn fill_from_stream(
     stream: &mut TcpStream,
     buffer: &mut [u8],
     deadline: Instant,

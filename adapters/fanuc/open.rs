@@ -35,15 +35,15 @@ pub struct OpenedFanuc {
 
 /// Opens a controller that we talk to ourselves. Nothing is sent before the first poll.
 #[must_use]
-pub fn native(name: &str, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
+pub fn open_native(name: &str, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
     let settings = NativeSettings { at: at.clone(), path, timeout: options.timeout, encoding: options.encoding };
     let connect: Connect = Box::new(move || Ok(Box::new(Native::connect(settings.clone())?)));
-    opened(name, connect, path, options)
+    open_controller(name, connect, path, options)
 }
 
 /// Opens a controller through the vendor's library, in a child process. Nothing is loaded before the first poll.
 #[must_use]
-pub fn vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
+pub fn open_vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
     let settings = VendorSettings {
         vendor_library: library.to_owned(),
         at: at.clone(),
@@ -55,13 +55,19 @@ pub fn vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &Fan
         environment: Vec::new(),
     };
     let connect: Connect = Box::new(move || Ok(Box::new(Vendor::connect(settings.clone())?)));
-    opened(name, connect, path, options)
+    open_controller(name, connect, path, options)
 }
 
 /// Opens a controller through any way of talking to it.
 #[must_use]
-pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) -> OpenedFanuc {
-    let line = FanucLine::new(name, connect, (path, options.further.clone()), allowed(options, path), options.duty_pct);
+pub fn open_controller(name: &str, connect: Connect, path: u8, options: &FanucOptions) -> OpenedFanuc {
+    let line = FanucLine::new(
+        name,
+        connect,
+        (path, options.further.clone()),
+        build_allow_list(options, path),
+        options.duty_pct,
+    );
     let manner = Manner {
         path,
         second_override: matches!(options.write, WriteMethod::SecondOverride { .. }),
@@ -69,14 +75,14 @@ pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) ->
         dial: options.dial,
     };
     let pace = SharedPace::new(options.duty_pct);
-    let (extras, refused) = match extra::declared(options, path) {
+    let (extras, refused) = match extra::declare_channels(options, path) {
         Ok(extras) => (extras, None),
         Err((channel, error)) => (Vec::new(), Some(format!("channel {channel}: {error}"))),
     };
     let of = |pace| extras.iter().filter(move |(own, _)| *own == pace).map(|(_, extra)| extra.clone()).collect();
     let sources: Vec<Box<dyn Source>> = vec![
-        Box::new(FanucSource::fast(name, line.clone(), manner, options, &pace, of(ReadWith::Fast))),
-        Box::new(FanucSource::slow(name, line.clone(), manner, options, &pace, of(ReadWith::Slow))),
+        Box::new(FanucSource::with_fast_group(name, line.clone(), manner, options, &pace, of(ReadWith::Fast))),
+        Box::new(FanucSource::with_slow_group(name, line.clone(), manner, options, &pace, of(ReadWith::Slow))),
     ];
     let actuator = FanucActuator::new(name, line.clone(), path, options);
     let actuator = actuator.map(|actuator| Box::new(actuator) as Box<dyn Actuator>);
@@ -87,18 +93,20 @@ pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) ->
 
 /// What the way of writing needs, and what the address allows besides. Without a way of writing the feed override there is
 /// nothing but the external offset.
-fn allowed(options: &FanucOptions, path: u8) -> AllowList {
+fn build_allow_list(options: &FanucOptions, path: u8) -> AllowList {
     let own = match options.write {
-        WriteMethod::None => return AllowList(extra(options).filter(|it| *it == Allowed::ExternalOffset).collect()),
-        WriteMethod::Mailbox { area, at } => Allowed::bytes(area, at, 3),
-        WriteMethod::SecondOverride { area, at } => Allowed::bytes(area, at, 1),
+        WriteMethod::None => {
+            return AllowList(parse_allowed(options).filter(|it| *it == Allowed::ExternalOffset).collect());
+        }
+        WriteMethod::Mailbox { area, at } => Allowed::from_byte_range(area, at, 3),
+        WriteMethod::SecondOverride { area, at } => Allowed::from_byte_range(area, at, 1),
         WriteMethod::Macro { variable } => Allowed::Macros { from: variable, to: variable },
-        WriteMethod::Direct => Allowed::bytes(Area::G, poll::signal(feed_override::AT, path), 1),
+        WriteMethod::Direct => Allowed::from_byte_range(Area::G, poll::find_signal_address(feed_override::AT, path), 1),
     };
-    let request = options.request.map(|(area, at)| Allowed::bytes(area, at, 1));
-    AllowList(std::iter::once(own).chain(request).chain(extra(options)).collect())
+    let request = options.request.map(|(area, at)| Allowed::from_byte_range(area, at, 1));
+    AllowList(std::iter::once(own).chain(request).chain(parse_allowed(options)).collect())
 }
 
-fn extra(options: &FanucOptions) -> impl Iterator<Item = Allowed> {
+fn parse_allowed(options: &FanucOptions) -> impl Iterator<Item = Allowed> {
     options.allow.iter().filter_map(|text| Allowed::read(text))
 }

@@ -15,7 +15,7 @@ pub enum Generation {
 impl Generation {
     /// The generation of this version word.
     #[must_use]
-    pub fn of(version: u16) -> Self {
+    pub fn from_version(version: u16) -> Self {
         if version <= 2 { Self::Older(version) } else { Self::Newer(version) }
     }
 
@@ -69,13 +69,13 @@ impl Opening {
     pub fn read(generation: Generation, body: &[u8], path: u16) -> Result<Self, WireError> {
         let mut cursor = Cursor::new("answer to the opening", body);
         let heads = if matches!(generation, Generation::Older(_)) { 8 } else { 20 };
-        let head = words(&mut cursor, heads)?;
+        let head = read_words(&mut cursor, heads)?;
         let (axes_max, spindles_max, paths, shape, records) = match generation {
             Generation::Older(_) => (head[2], head[3], head[5], OLDER, head[4]),
             Generation::Newer(_) => (head[3], head[4], head[11], NEWER, 10),
         };
-        let records = (0..records.min(64)).map(|_| words(&mut cursor, shape.0)).collect::<Result<Vec<_>, _>>()?;
-        cursor.end()?;
+        let records = (0..records.min(64)).map(|_| read_words(&mut cursor, shape.0)).collect::<Result<Vec<_>, _>>()?;
+        cursor.check_end()?;
         let own = records.get(usize::from(path).saturating_sub(1));
         let at = |index: usize| own.map_or(0, |record| record[index]);
         let (axes, spindles) = (at(shape.1), at(shape.2));
@@ -84,7 +84,7 @@ impl Opening {
 
     /// The body of the answer for a controller whose paths all have as many axes and spindles.
     #[must_use]
-    pub fn body(&self) -> Vec<u8> {
+    pub fn encode_body(&self) -> Vec<u8> {
         self.body_with(|_| (self.axes, self.spindles))
     }
 
@@ -92,19 +92,19 @@ impl Opening {
     #[must_use]
     pub fn body_with(&self, of: impl Fn(u16) -> (u16, u16)) -> Vec<u8> {
         let words = match self.generation {
-            Generation::Older(_) => self.older(of),
-            Generation::Newer(_) => self.newer(of),
+            Generation::Older(_) => self.encode_older(of),
+            Generation::Newer(_) => self.encode_newer(of),
         };
         words.iter().flat_map(|word| word.to_be_bytes()).collect()
     }
 
-    fn older(&self, of: impl Fn(u16) -> (u16, u16)) -> Vec<u16> {
+    fn encode_older(&self, of: impl Fn(u16) -> (u16, u16)) -> Vec<u16> {
         let mut words = vec![7, self.family, self.axes_max, self.spindles_max, self.paths, self.paths, 0, 0];
         (1..=self.paths).for_each(|path| words.extend([SYSTEM, path, of(path).0, of(path).1]));
         words
     }
 
-    fn newer(&self, of: impl Fn(u16) -> (u16, u16)) -> Vec<u16> {
+    fn encode_newer(&self, of: impl Fn(u16) -> (u16, u16)) -> Vec<u16> {
         let mut words = vec![0; 20 + 10 * 16];
         let head = [6, self.family, 1, self.axes_max, self.spindles_max, 10, 3, 3, self.axes, self.axes];
         words[..10].copy_from_slice(&head);
@@ -121,8 +121,8 @@ impl Opening {
 /// " M": a milling system.
 const SYSTEM: u16 = 0x204D;
 
-fn words(cursor: &mut Cursor<'_>, count: usize) -> Result<Vec<u16>, WireError> {
-    (0..count).map(|_| cursor.u16()).collect()
+fn read_words(cursor: &mut Cursor<'_>, count: usize) -> Result<Vec<u16>, WireError> {
+    (0..count).map(|_| cursor.read_u16()).collect()
 }
 
 #[cfg(test)]
@@ -138,8 +138,8 @@ mod tests {
     #[test]
     fn both_forms_are_read_as_they_are_written() {
         for version in [2, 3, 4] {
-            let opening = opening(Generation::of(version));
-            let body = opening.body();
+            let opening = opening(Generation::from_version(version));
+            let body = opening.encode_body();
             assert_eq!(body.len(), if version == 2 { 24 } else { 360 });
             assert_eq!(Opening::read(opening.generation, &body, 1), Ok(opening));
             assert!(Opening::read(opening.generation, &body[1..], 1).is_err());
@@ -148,8 +148,8 @@ mod tests {
 
     #[test]
     fn a_path_that_is_not_there_has_no_axes() {
-        let opening = opening(Generation::of(2));
-        let other = Opening::read(opening.generation, &opening.body(), 2).expect("readable");
+        let opening = opening(Generation::from_version(2));
+        let other = Opening::read(opening.generation, &opening.encode_body(), 2).expect("readable");
         assert_eq!((other.axes, other.spindles), (0, 0));
     }
 }

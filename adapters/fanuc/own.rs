@@ -32,31 +32,31 @@ impl OwnRead for OwnItem {
     fn read(text: &str) -> Result<Self, String> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let found = match words.as_slice() {
-            ["macro", number] => whole(number, 1, 65_535).map(FocasItem::Macro).map(Self::plain),
+            ["macro", number] => parse_whole(number, 1, 65_535).map(FocasItem::Macro).map(Self::from_item),
             ["parameter", number] => {
-                whole(number, 0, 32_767).map(|number| FocasItem::Parameter(number, 0)).map(Self::plain)
+                parse_whole(number, 0, 32_767).map(|number| FocasItem::Parameter(number, 0)).map(Self::from_item)
             }
-            ["parameter", number, "axis", axis] => {
-                numbered(number, axis).map(|(number, axis)| FocasItem::Parameter(number, axis)).map(Self::plain)
-            }
+            ["parameter", number, "axis", axis] => parse_number_and_axis(number, axis)
+                .map(|(number, axis)| FocasItem::Parameter(number, axis))
+                .map(Self::from_item),
             ["diagnosis", number] => {
-                whole(number, 0, 32_767).map(|number| FocasItem::Diagnosis(number, 0)).map(Self::plain)
+                parse_whole(number, 0, 32_767).map(|number| FocasItem::Diagnosis(number, 0)).map(Self::from_item)
             }
-            ["diagnosis", number, "axis", axis] => {
-                numbered(number, axis).map(|(number, axis)| FocasItem::Diagnosis(number, axis)).map(Self::plain)
-            }
-            ["pmc", place] => pmc(place, PmcWidth::Byte),
-            ["pmc", place, "byte"] => pmc(place, PmcWidth::Byte),
-            ["pmc", place, "word"] => pmc(place, PmcWidth::Word),
-            ["pmc", place, "long"] => pmc(place, PmcWidth::Long),
-            ["pmc", place, "text", bytes] => whole(bytes, 1, TEXT_MAX).and_then(|bytes| pmc_text(place, bytes)),
-            ["tool_offset", number, "type", kind] => whole(number, 1, 9999)
-                .zip(whole(kind, 0, 15))
+            ["diagnosis", number, "axis", axis] => parse_number_and_axis(number, axis)
+                .map(|(number, axis)| FocasItem::Diagnosis(number, axis))
+                .map(Self::from_item),
+            ["pmc", place] => parse_pmc(place, PmcWidth::Byte),
+            ["pmc", place, "byte"] => parse_pmc(place, PmcWidth::Byte),
+            ["pmc", place, "word"] => parse_pmc(place, PmcWidth::Word),
+            ["pmc", place, "long"] => parse_pmc(place, PmcWidth::Long),
+            ["pmc", place, "text", bytes] => parse_whole(bytes, 1, TEXT_MAX).and_then(|bytes| pmc_text(place, bytes)),
+            ["tool_offset", number, "type", kind] => parse_whole(number, 1, 9999)
+                .zip(parse_whole(kind, 0, 15))
                 .map(|(number, kind)| FocasItem::ToolOffset(number, kind))
-                .map(Self::plain),
-            ["work_offset", number, "axis", axis] => {
-                numbered(number, axis).map(|(number, axis)| FocasItem::WorkOffset(number, axis)).map(Self::plain)
-            }
+                .map(Self::from_item),
+            ["work_offset", number, "axis", axis] => parse_number_and_axis(number, axis)
+                .map(|(number, axis)| FocasItem::WorkOffset(number, axis))
+                .map(Self::from_item),
             _ => None,
         };
         found.ok_or_else(|| {
@@ -74,7 +74,7 @@ impl OwnRead for OwnItem {
 }
 
 impl OwnItem {
-    fn plain(item: FocasItem) -> Self {
+    fn from_item(item: FocasItem) -> Self {
         Self { item, bit: None, text: false }
     }
 }
@@ -84,34 +84,36 @@ const TEXT_MAX: u16 = 128;
 
 /// Bytes of PMC memory from this one on.
 fn pmc_text(place: &str, bytes: u16) -> Option<OwnItem> {
-    let OwnItem { item: FocasItem::Pmc(stretch), bit: None, .. } = pmc(place, PmcWidth::Byte)? else { return None };
-    let item = FocasItem::Pmc(Stretch::bytes(stretch.area, stretch.from, bytes));
+    let OwnItem { item: FocasItem::Pmc(stretch), bit: None, .. } = parse_pmc(place, PmcWidth::Byte)? else {
+        return None;
+    };
+    let item = FocasItem::Pmc(Stretch::from_byte_range(stretch.area, stretch.from, bytes));
     Some(OwnItem { item, bit: None, text: true })
 }
 
-fn whole(text: &str, least: u16, greatest: u16) -> Option<u16> {
+fn parse_whole(text: &str, least: u16, greatest: u16) -> Option<u16> {
     text.parse().ok().filter(|number| (least..=greatest).contains(number))
 }
 
 /// A number and an axis from 1.
-fn numbered(number: &str, axis: &str) -> Option<(u16, i16)> {
-    let axis = whole(axis, 1, 32).and_then(|axis| i16::try_from(axis).ok());
-    whole(number, 0, 32_767).zip(axis)
+fn parse_number_and_axis(number: &str, axis: &str) -> Option<(u16, i16)> {
+    let axis = parse_whole(axis, 1, 32).and_then(|axis| i16::try_from(axis).ok());
+    parse_whole(number, 0, 32_767).zip(axis)
 }
 
 /// `R100` or `R100.3`.
-fn pmc(place: &str, width: PmcWidth) -> Option<OwnItem> {
+fn parse_pmc(place: &str, width: PmcWidth) -> Option<OwnItem> {
     let (byte, bit) = place.split_once('.').map_or((place, None), |(byte, bit)| (byte, Some(bit)));
     let mut letters = byte.chars();
     let area = Area::of_letter(letters.next()?)?;
-    let from = whole(letters.as_str(), 0, 60_000)?;
+    let from = parse_whole(letters.as_str(), 0, 60_000)?;
     let bit = match bit {
         None => None,
         Some(bit) if width == PmcWidth::Byte => Some(bit.parse::<u8>().ok().filter(|bit| *bit < 8)?),
         Some(_) => return None,
     };
     Some(OwnItem {
-        item: FocasItem::Pmc(Stretch { area, from, to: from + width.bytes() - 1, width }),
+        item: FocasItem::Pmc(Stretch { area, from, to: from + width.byte_count() - 1, width }),
         bit,
         text: false,
     })
@@ -122,11 +124,11 @@ impl Own<OwnItem> {
     ///
     /// # Errors
     /// The answer holds no value: a vacant variable, or another kind of answer.
-    pub fn found(&self, answer: &FocasAnswer, encoding: TextEncoding) -> OrAbsence<Value> {
+    pub fn extract_value(&self, answer: &FocasAnswer, encoding: TextEncoding) -> OrAbsence<Value> {
         let number = match (answer, self.item.bit) {
             (FocasAnswer::Memory(elements), _) if self.item.text => {
                 let bytes: Vec<u8> = elements.iter().filter_map(|byte| u8::try_from(*byte).ok()).collect();
-                let text = self.channel.encoding.unwrap_or(encoding).text(&bytes);
+                let text = self.channel.encoding.unwrap_or(encoding).decode_trimmed(&bytes);
                 return Ok(Value::Text(Arc::from(text)));
             }
             (FocasAnswer::Memory(elements), Some(bit)) => {
@@ -139,7 +141,7 @@ impl Own<OwnItem> {
             (FocasAnswer::Whole(whole), _) => f64::from(*whole),
             _ => return Err(Absence::OutOfRange),
         };
-        Value::number(number)
+        Value::from_number(number)
     }
 }
 
@@ -163,9 +165,12 @@ mod tests {
         assert_eq!(item("tool_offset 1 type 3"), FocasItem::ToolOffset(1, 3));
         assert_eq!(item("work_offset 0 axis 1"), FocasItem::WorkOffset(0, 1));
         let bit = OwnItem::read("pmc r100.3").expect("readable");
-        assert_eq!((bit.item, bit.bit), (FocasItem::Pmc(Stretch::bytes(Area::R, 100, 1)), Some(3)));
+        assert_eq!((bit.item, bit.bit), (FocasItem::Pmc(Stretch::from_byte_range(Area::R, 100, 1)), Some(3)));
         let text = OwnItem::read("pmc D100 text 20").expect("readable");
-        assert_eq!((text.item, text.is_text()), (FocasItem::Pmc(Stretch::bytes(Area::D, 100, 20)), Some(true)));
+        assert_eq!(
+            (text.item, text.is_text()),
+            (FocasItem::Pmc(Stretch::from_byte_range(Area::D, 100, 20)), Some(true))
+        );
         for wrong in [
             "",
             "pmc D100 text 0",

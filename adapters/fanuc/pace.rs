@@ -39,7 +39,7 @@ impl PollGroup {
     /// An answer that takes much longer is believed when the next one does too: one hiccup changes no period. A much shorter
     /// one is believed at once: a control that has recovered is read as was wanted from its first quick answer on. What a
     /// wrong belief costs is bounded by the line, which keeps the duty over some seconds.
-    fn took(&mut self, busy_s: f64) {
+    fn record_busy_time(&mut self, busy_s: f64) {
         let known_s = self.busy_s.unwrap_or(busy_s);
         let before_s = self.longer_s.take();
         self.busy_s = Some(match before_s {
@@ -54,7 +54,7 @@ impl PollGroup {
     }
 
     /// Share of the control's time that it takes at the period that is wanted.
-    fn share(&self) -> f64 {
+    fn compute_share(&self) -> f64 {
         self.busy_s.unwrap_or(0.0) / self.wanted_s
     }
 }
@@ -82,13 +82,13 @@ impl SharedPace {
 
     /// Adds a group; the first one is the quick one.
     #[must_use]
-    pub fn group(&self, wanted: Duration) -> GroupPace {
-        let mut groups = self.lock();
+    pub fn add_group(&self, wanted: Duration) -> GroupPace {
+        let mut groups = self.lock_groups();
         groups.push(PollGroup { wanted_s: wanted.as_secs_f64().max(1e-3), busy_s: None, longer_s: None });
         GroupPace { shared: self.clone(), at: groups.len() - 1 }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Vec<PollGroup>> {
+    fn lock_groups(&self) -> MutexGuard<'_, Vec<PollGroup>> {
         // Each group is complete whenever the lock is free.
         self.groups.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -96,33 +96,33 @@ impl SharedPace {
 
 impl GroupPace {
     /// The control took so long to answer this group.
-    pub fn took(&self, busy: Duration) {
-        let mut groups = self.shared.lock();
+    pub fn record_busy_time(&self, busy: Duration) {
+        let mut groups = self.shared.lock_groups();
         let Some(group) = groups.get_mut(self.at) else { return };
-        group.took(busy.as_secs_f64());
+        group.record_busy_time(busy.as_secs_f64());
     }
 
     /// How long the control takes to answer this group; `None` before the first answer.
     #[must_use]
-    pub fn busy(&self) -> Option<Duration> {
-        self.shared.lock().get(self.at)?.busy_s.map(Duration::from_secs_f64)
+    pub fn busy_time(&self) -> Option<Duration> {
+        self.shared.lock_groups().get(self.at)?.busy_s.map(Duration::from_secs_f64)
     }
 
     /// The period that is wanted.
     #[must_use]
-    pub fn wanted(&self) -> Duration {
-        self.shared.lock().get(self.at).map_or(PERIOD_MAX, |group| Duration::from_secs_f64(group.wanted_s))
+    pub fn wanted_period(&self) -> Duration {
+        self.shared.lock_groups().get(self.at).map_or(PERIOD_MAX, |group| Duration::from_secs_f64(group.wanted_s))
     }
 
     /// The period that the control can keep; at least the one that is wanted.
     #[must_use]
     pub fn period(&self) -> Duration {
-        let groups = self.shared.lock();
+        let groups = self.shared.lock_groups();
         let (Some(first), Some(own)) = (groups.first(), groups.get(self.at)) else { return PERIOD_MAX };
         let planned = self.shared.planned;
-        let slow: f64 = groups.iter().skip(1).map(PollGroup::share).sum();
+        let slow: f64 = groups.iter().skip(1).map(PollGroup::compute_share).sum();
         // What the slow groups may take: what the first one leaves, and never less than their quarter.
-        let left = (planned - first.share()).max(SLOW_SHARE * planned);
+        let left = (planned - first.compute_share()).max(SLOW_SHARE * planned);
         let stretch = (slow / left).max(1.0);
         let period_s = if self.at == 0 {
             let share = planned - slow / stretch;
@@ -140,10 +140,10 @@ mod tests {
 
     fn paces(duty_pct: u8, fast_ms: u64, slow_ms: u64) -> (f64, f64) {
         let shared = SharedPace::new(duty_pct);
-        let fast = shared.group(Duration::from_millis(100));
-        let slow = shared.group(Duration::from_secs(1));
-        fast.took(Duration::from_millis(fast_ms));
-        slow.took(Duration::from_millis(slow_ms));
+        let fast = shared.add_group(Duration::from_millis(100));
+        let slow = shared.add_group(Duration::from_secs(1));
+        fast.record_busy_time(Duration::from_millis(fast_ms));
+        slow.record_busy_time(Duration::from_millis(slow_ms));
         (fast.period().as_secs_f64(), slow.period().as_secs_f64())
     }
 
@@ -172,12 +172,12 @@ mod tests {
     #[test]
     fn a_hiccup_changes_no_period_and_a_slow_spell_ends_with_its_first_quick_answer() {
         let shared = SharedPace::new(50);
-        let fast = shared.group(Duration::from_millis(100));
+        let fast = shared.add_group(Duration::from_millis(100));
         let took = |ms: u64| {
-            fast.took(Duration::from_millis(ms));
+            fast.record_busy_time(Duration::from_millis(ms));
             fast.period()
         };
-        assert_eq!((fast.busy(), fast.period()), (None, Duration::from_millis(100)));
+        assert_eq!((fast.busy_time(), fast.period()), (None, Duration::from_millis(100)));
         assert_eq!([took(5), took(1500), took(5)], [Duration::from_millis(100); 3], "one hiccup");
         took(1500);
         assert!(took(1500) > Duration::from_secs(3), "twice is a slow control");
@@ -192,8 +192,8 @@ mod tests {
     #[test]
     fn noise_about_the_usual_time_moves_the_period_little() {
         let shared = SharedPace::new(50);
-        let fast = shared.group(Duration::from_millis(100));
-        (0..40).for_each(|n| fast.took(Duration::from_millis(150 + 100 * (n % 2))));
+        let fast = shared.add_group(Duration::from_millis(100));
+        (0..40).for_each(|n| fast.record_busy_time(Duration::from_millis(150 + 100 * (n % 2))));
         let period_s = fast.period().as_secs_f64();
         assert!((period_s - 0.2 / 0.45).abs() < 0.05, "{period_s}");
     }

@@ -47,7 +47,7 @@ impl Area {
 
     /// Its number on the wire and in the library.
     #[must_use]
-    pub fn number(self) -> i32 {
+    pub fn wire_number(self) -> i32 {
         Self::ALL.iter().find(|(area, ..)| *area == self).map_or(0, |(.., number)| *number)
     }
 
@@ -84,7 +84,7 @@ pub enum PmcWidth {
 impl PmcWidth {
     /// Number of bytes.
     #[must_use]
-    pub fn bytes(self) -> u16 {
+    pub fn byte_count(self) -> u16 {
         match self {
             Self::Byte => 1,
             Self::Word => 2,
@@ -94,7 +94,7 @@ impl PmcWidth {
 
     /// Its number on the wire.
     #[must_use]
-    pub fn number(self) -> i32 {
+    pub fn wire_number(self) -> i32 {
         match self {
             Self::Byte => 0,
             Self::Word => 1,
@@ -105,7 +105,7 @@ impl PmcWidth {
     /// The width with this number.
     #[must_use]
     pub fn of_number(number: i32) -> Option<Self> {
-        [Self::Byte, Self::Word, Self::Long].into_iter().find(|width| width.number() == number)
+        [Self::Byte, Self::Word, Self::Long].into_iter().find(|width| width.wire_number() == number)
     }
 }
 
@@ -125,7 +125,7 @@ pub struct Stretch {
 impl Stretch {
     /// So many single bytes.
     #[must_use]
-    pub fn bytes(area: Area, from: u16, count: u16) -> Self {
+    pub fn from_byte_range(area: Area, from: u16, count: u16) -> Self {
         Self { area, from, to: from.saturating_add(count.saturating_sub(1)), width: PmcWidth::Byte }
     }
 

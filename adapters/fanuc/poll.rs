@@ -8,20 +8,20 @@ const PATH_STEP: u16 = 1000;
 
 /// Where a signal of path 1 stands for another path: G012 is G1012 for path 2.
 #[must_use]
-pub fn signal(at: u16, path: u8) -> u16 {
+pub fn find_signal_address(at: u16, path: u8) -> u16 {
     at + PATH_STEP * u16::from(path.clamp(1, 10) - 1)
 }
 
 /// From the control to the ladder: F000 to F004.
 #[must_use]
 pub fn control_signals(path: u8) -> Stretch {
-    Stretch::bytes(Area::F, signal(0, path), 5)
+    Stretch::from_byte_range(Area::F, find_signal_address(0, path), 5)
 }
 
 /// From the ladder to the control: G006 to G030, with the overrides.
 #[must_use]
 pub fn ladder_signals(path: u8) -> Stretch {
-    Stretch::bytes(Area::G, signal(FIRST_LADDER_BYTE, path), 25)
+    Stretch::from_byte_range(Area::G, find_signal_address(FIRST_LADDER_BYTE, path), 25)
 }
 
 /// Where [`ladder_signals`] begins.
@@ -44,7 +44,7 @@ pub const PER_REVOLUTION: u8 = 1;
 pub const ALARMS: FocasItem = FocasItem::Alarms(8);
 
 /// What changes quickly on every path.
-fn quick(path: u8) -> [FocasItem; 17] {
+fn list_quick_items(path: u8) -> [FocasItem; 17] {
     [
         FocasItem::Status,
         // Before what the vendor's call for the positions answers besides.
@@ -69,15 +69,15 @@ fn quick(path: u8) -> [FocasItem; 17] {
 
 /// What changes quickly: one frame.
 #[must_use]
-pub fn fast(path: u8) -> Vec<Question> {
+pub fn list_fast_questions(path: u8) -> Vec<Question> {
     let own = [FocasItem::Servos(Servo::Current), MOTOR_TEMPERATURE];
-    quick(path).into_iter().chain(own).map(|item| item.on(path)).collect()
+    list_quick_items(path).into_iter().chain(own).map(|item| item.to_question(path)).collect()
 }
 
 /// The same of a path that is read besides.
 #[must_use]
-pub fn further(path: u8) -> Vec<Question> {
-    quick(path).map(|item| item.on(path)).to_vec()
+pub fn list_further_questions(path: u8) -> Vec<Question> {
+    list_quick_items(path).map(|item| item.to_question(path)).to_vec()
 }
 
 /// Temperature of the winding of the spindle motor, °C.
@@ -85,12 +85,12 @@ pub const MOTOR_TEMPERATURE: FocasItem = FocasItem::Diagnosis(403, 1);
 
 /// Power of the spindle drive, W, in this diagnosis number.
 #[must_use]
-pub fn power(diagnosis: u16) -> FocasItem {
+pub fn build_power_item(diagnosis: u16) -> FocasItem {
     FocasItem::Diagnosis(diagnosis, 1)
 }
 
 /// What changes slowly: parts and gear stage, without the details that a source asks for besides.
 #[must_use]
-pub fn slow(path: u8) -> Vec<Question> {
-    super::details::questions(path, false)
+pub fn list_slow_questions(path: u8) -> Vec<Question> {
+    super::details::list_questions(path, false)
 }

@@ -8,13 +8,13 @@ use super::item::{FocasItem, Position, Servo, Spindle};
 use super::line::Asked;
 use super::poll;
 use super::states::{self, OrAbsence};
-use super::view::{View, flag, number, text, word};
+use super::view::{View, to_flag_value, to_number_value, to_text_value, to_word_value};
 use crate::channel::{ChannelId, on_path};
 use crate::reading::{Absence, Reading, Stamp, Value};
 use crate::text::TextEncoding;
 use std::sync::Arc;
 
-/// Channels of the quick group, in the order of [`fast`]. A further path has those of them that the table of channels
+/// Channels of the quick group, in the order of [`append_fast_readings`]. A further path has those of them that the table of channels
 /// has for it.
 pub const FAST: [&str; 33] = [
     "spindle_programmed_rpm",
@@ -60,29 +60,31 @@ pub const POWER: &str = "spindle_power_w";
 
 /// The ids of channels by their names.
 #[must_use]
-pub fn ids<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<ChannelId> {
-    names.into_iter().filter_map(ChannelId::of).collect()
+pub fn find_channel_ids<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<ChannelId> {
+    names.into_iter().filter_map(ChannelId::from_name).collect()
 }
 
-/// Channels at their places in [`fast`], under the plain names or those of a further path; `None` where the table has
+/// Channels at their places in [`append_fast_readings`], under the plain names or those of a further path; `None` where the table has
 /// none. `names` come besides [`FAST`].
 #[must_use]
-pub fn columns<'a>(further: Option<u8>, names: impl IntoIterator<Item = &'a str>) -> Vec<Option<ChannelId>> {
-    let named = |name: &str| further.map_or_else(|| ChannelId::of(name), |path| ChannelId::of(&on_path(name, path)));
+pub fn list_columns<'a>(further: Option<u8>, names: impl IntoIterator<Item = &'a str>) -> Vec<Option<ChannelId>> {
+    let named = |name: &str| {
+        further.map_or_else(|| ChannelId::from_name(name), |path| ChannelId::from_name(&on_path(name, path)))
+    };
     FAST.into_iter().chain([OPERATION]).chain(names).map(named).collect()
 }
 
 /// Does the answer say that alarms of this path have to be asked for?
 #[must_use]
-pub fn alarmed(asked: &Asked, path: u8) -> bool {
-    matches!(asked.on(FocasItem::Status.on(path)), Some(Ok(FocasAnswer::Status(status))) if alarms::alarmed(status))
+pub fn has_alarm(asked: &Asked, path: u8) -> bool {
+    matches!(asked.find_question_result(FocasItem::Status.to_question(path)), Some(Ok(FocasAnswer::Status(status))) if alarms::has_alarm(status))
 }
 
 /// The warning of a path, with what to do; `None` without one.
 #[must_use]
-pub fn warning(asked: &Asked, path: u8) -> Option<(String, &'static str)> {
-    match asked.on(FocasItem::Status.on(path)) {
-        Some(Ok(FocasAnswer::Status(status))) => alarms::warning(status),
+pub fn describe_warning(asked: &Asked, path: u8) -> Option<(String, &'static str)> {
+    match asked.find_question_result(FocasItem::Status.to_question(path)) {
+        Some(Ok(FocasAnswer::Status(status))) => alarms::describe_warning(status),
         _ => None,
     }
 }
@@ -109,9 +111,9 @@ impl Manner {
     }
 }
 
-/// The readings of the quick group of one path, at the places of [`columns`]. `alarms` are the results of asking for
+/// The readings of the quick group of one path, at the places of [`list_columns`]. `alarms` are the results of asking for
 /// alarms, when they were.
-pub fn fast(
+pub fn append_fast_readings(
     columns: &[Option<ChannelId>],
     asked: &Asked,
     alarms: Option<&Asked>,
@@ -119,70 +121,74 @@ pub fn fast(
     out: &mut Vec<Reading>,
 ) {
     let view = View { asked, path: manner.path };
-    let signals = view.signals();
+    let signals = view.find_signals();
     let pct = signals.feed_override(manner.second_override);
-    let status = view.status();
+    let status = view.find_status();
     let axes = ["X", "Y", "Z"];
-    let position = axes.map(|letter| number(view.position(Position::Machine, letter, false)));
-    let load = axes.map(|letter| number(view.axis_load(letter)));
-    let current = axes.map(|letter| number(view.axis(FocasItem::Servos(Servo::Current), letter)));
+    let position = axes.map(|letter| to_number_value(view.find_position(Position::Machine, letter, false)));
+    let load = axes.map(|letter| to_number_value(view.axis_load(letter)));
+    let current = axes.map(|letter| to_number_value(view.find_axis_value(FocasItem::Servos(Servo::Current), letter)));
     let single_block = signals.single_block() == Ok(true);
     let values = [
-        number(view.number(poll::MODAL_S)),
-        number(view.feed_mm_min(poll::MODAL_F, view.programmed_unit(&signals))),
-        number(view.number(FocasItem::SpindleSpeed)),
-        number(view.feed_mm_min(FocasItem::Feed, view.feed_unit(&signals))),
-        number(pct),
-        number(signals.spindle_override()),
-        number(view.number(FocasItem::Spindles(Spindle::Load))),
+        to_number_value(view.find_number(poll::MODAL_S)),
+        to_number_value(view.feed_mm_min(poll::MODAL_F, view.programmed_unit(&signals))),
+        to_number_value(view.find_number(FocasItem::SpindleSpeed)),
+        to_number_value(view.feed_mm_min(FocasItem::Feed, view.feed_unit(&signals))),
+        to_number_value(pct),
+        to_number_value(signals.spindle_override()),
+        to_number_value(view.find_number(FocasItem::Spindles(Spindle::Load))),
     ];
     let words = [
-        flag(signals.rapid()),
-        flag(signals.drives_ready()),
-        word(status.map(|status| states::mode(&status, single_block))),
-        word(status.map(|status| states::execution(&status, pct.ok()))),
-        text(view.program()),
-        text(view.number(FocasItem::Sequence).map(|number| format!("N{number}"))),
-        text(view.number(poll::MODAL_T).map(|number| format!("T{number}"))),
-        text(status.map(|status| alarm_text(&status, &view, alarms))),
-        flag(status.map(|status| status.emergency == 1)),
-        word(status.map(|status| states::motion(&status))),
-        number(view.number(poll::MOTOR_TEMPERATURE)),
-        flag(signals.single_block()),
-        flag(signals.dry_run()),
-        number(view.dial(manner.dial)),
-        text(status.map(|status| alarms::warning(&status).map(|(warning, _)| warning).unwrap_or_default())),
-        number(signals.rapid_override()),
-        number(signals.jog_override()),
+        to_flag_value(signals.is_rapid()),
+        to_flag_value(signals.drives_ready()),
+        to_word_value(status.map(|status| states::name_mode(&status, single_block))),
+        to_word_value(status.map(|status| states::name_execution(&status, pct.ok()))),
+        to_text_value(view.find_program_name()),
+        to_text_value(view.find_number(FocasItem::Sequence).map(|number| format!("N{number}"))),
+        to_text_value(view.find_number(poll::MODAL_T).map(|number| format!("T{number}"))),
+        to_text_value(status.map(|status| alarm_text(&status, &view, alarms))),
+        to_flag_value(status.map(|status| status.emergency == 1)),
+        to_word_value(status.map(|status| states::name_motion(&status))),
+        to_number_value(view.find_number(poll::MOTOR_TEMPERATURE)),
+        to_flag_value(signals.single_block()),
+        to_flag_value(signals.dry_run()),
+        to_number_value(view.find_dial_pct(manner.dial)),
+        to_text_value(
+            status.map(|status| alarms::describe_warning(&status).map(|(warning, _)| warning).unwrap_or_default()),
+        ),
+        to_number_value(signals.rapid_override()),
+        to_number_value(signals.jog_override()),
     ];
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
     let all = values.into_iter().chain(position).chain(load).chain(current).chain(words);
-    let operation = signals.operation().map(Arc::from).map(Value::Text);
-    let power = number(manner.power_diagnosis.ok_or(Absence::NotSupported).and_then(|at| view.number(poll::power(at))));
+    let operation = signals.find_operation().map(Arc::from).map(Value::Text);
+    let power = to_number_value(
+        manner.power_diagnosis.ok_or(Absence::NotSupported).and_then(|at| view.find_number(poll::build_power_item(at))),
+    );
     let named = columns.iter().zip(all.chain([operation, power]));
-    out.extend(named.filter_map(|(channel, value)| channel.map(|channel| reading(channel, stamp, value))));
+    out.extend(named.filter_map(|(channel, value)| channel.map(|channel| build_reading(channel, stamp, value))));
 }
 
 fn alarm_text(status: &Status, view: &View<'_>, alarms: Option<&Asked>) -> String {
-    let found = alarms.and_then(|alarms| alarms.on(poll::ALARMS.on(view.path)));
+    let found = alarms.and_then(|alarms| alarms.find_question_result(poll::ALARMS.to_question(view.path)));
     let alarms = match found {
         Some(Ok(FocasAnswer::Alarms(alarms))) => alarms.as_slice(),
         _ => &[],
     };
     let facts = &view.asked.facts;
-    alarms::text(status, alarms, facts.axes_of(view.path).unwrap_or_default(), facts.alarm_table())
+    alarms::format_alarms(status, alarms, facts.axes_of(view.path).unwrap_or_default(), facts.alarm_table())
 }
 
 /// The readings of channels that an address or a configuration adds.
-pub(super) fn extra(extras: &[Extra], asked: &Asked, encoding: TextEncoding, out: &mut Vec<Reading>) {
+pub(super) fn append_extra_readings(extras: &[Extra], asked: &Asked, encoding: TextEncoding, out: &mut Vec<Reading>) {
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
-    out.extend(extras.iter().map(|extra| extra.reading(asked, stamp, encoding)));
+    out.extend(extras.iter().map(|extra| extra.to_reading(asked, stamp, encoding)));
 }
 
-pub(super) fn reading(channel: ChannelId, stamp: Stamp, value: OrAbsence<Value>) -> Reading {
+pub(super) fn build_reading(channel: ChannelId, stamp: Stamp, value: OrAbsence<Value>) -> Reading {
     match value {
-        Ok(Value::Number(value)) => Reading::number(channel, stamp, value),
-        Ok(Value::Text(text)) => Reading::text(channel, stamp, text),
-        Err(reason) => Reading::absent(channel, stamp, reason),
+        Ok(Value::Number(value)) => Reading::from_number(channel, stamp, value),
+        Ok(Value::Text(text)) => Reading::from_text(channel, stamp, text),
+        Err(reason) => Reading::from_absence(channel, stamp, reason),
     }
 }

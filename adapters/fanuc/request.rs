@@ -32,124 +32,127 @@ fn by_generation(generation: Generation, newer: u16, older: u16) -> u16 {
 
 /// The block that asks for an item.
 #[must_use]
-pub fn reading(item: FocasItem, generation: Generation) -> Request {
+pub fn build_read_request(item: FocasItem, generation: Generation) -> Request {
     use function as f;
     let number = i32::from;
     match item {
-        FocasItem::System => Request::cnc(f::SYSTEM, &[]),
-        FocasItem::Status => Request::cnc(f::STATUS, &[]),
-        FocasItem::StatusLong => Request::cnc(f::STATUS_LONG, &[]),
-        FocasItem::HandleRetrace => Request::cnc(f::HANDLE_RETRACE, &[]),
-        FocasItem::ToolMode => Request::cnc(f::TOOL_MODE, &[]),
-        FocasItem::Feed => Request::cnc(f::FEED, &[]),
-        FocasItem::SpindleSpeed => Request::cnc(f::SPINDLE_SPEED, &[]),
-        FocasItem::Spindles(what) => Request::cnc(f::SPINDLES, &[what.number(), -1]),
-        FocasItem::Servos(what) => Request::cnc(f::SERVOS, &[what.number()]),
-        FocasItem::Count(what) => Request::cnc(f::COUNT, &[number(what)]),
-        FocasItem::AxisNames => Request::cnc(f::AXIS_NAMES, &[]),
-        FocasItem::SpindleNames(which) => Request::cnc(f::SPINDLE_NAMES, &[number(which)]),
-        FocasItem::FeedUnit => {
-            Request::cnc(f::SPEED_UNIT, &[if matches!(generation, Generation::Newer(_)) { UNIT_OF_FEED } else { 0 }])
-        }
-        FocasItem::SpindleUnit => Request::cnc(f::SPEED_UNIT, &[UNIT_OF_SPINDLE]),
+        FocasItem::System => Request::new_cnc(f::SYSTEM, &[]),
+        FocasItem::Status => Request::new_cnc(f::STATUS, &[]),
+        FocasItem::StatusLong => Request::new_cnc(f::STATUS_LONG, &[]),
+        FocasItem::HandleRetrace => Request::new_cnc(f::HANDLE_RETRACE, &[]),
+        FocasItem::ToolMode => Request::new_cnc(f::TOOL_MODE, &[]),
+        FocasItem::Feed => Request::new_cnc(f::FEED, &[]),
+        FocasItem::SpindleSpeed => Request::new_cnc(f::SPINDLE_SPEED, &[]),
+        FocasItem::Spindles(what) => Request::new_cnc(f::SPINDLES, &[what.wire_number(), -1]),
+        FocasItem::Servos(what) => Request::new_cnc(f::SERVOS, &[what.wire_number()]),
+        FocasItem::Count(what) => Request::new_cnc(f::COUNT, &[number(what)]),
+        FocasItem::AxisNames => Request::new_cnc(f::AXIS_NAMES, &[]),
+        FocasItem::SpindleNames(which) => Request::new_cnc(f::SPINDLE_NAMES, &[number(which)]),
+        FocasItem::FeedUnit => Request::new_cnc(
+            f::SPEED_UNIT,
+            &[if matches!(generation, Generation::Newer(_)) { UNIT_OF_FEED } else { 0 }],
+        ),
+        FocasItem::SpindleUnit => Request::new_cnc(f::SPEED_UNIT, &[UNIT_OF_SPINDLE]),
         FocasItem::PositionUnit(frame) => {
             let of_work = frame == PositionFrame::Work && matches!(generation, Generation::Newer(_));
-            Request::cnc(f::SPEED_UNIT, &[if of_work { UNIT_OF_WORK } else { UNIT_OF_POSITIONS }])
+            Request::new_cnc(f::SPEED_UNIT, &[if of_work { UNIT_OF_WORK } else { UNIT_OF_POSITIONS }])
         }
-        FocasItem::Program => Request::cnc(f::PROGRAM, &[]),
-        FocasItem::ProgramName => Request::cnc(f::PROGRAM_NAME, &[]),
-        FocasItem::ProgramPath => Request::cnc(f::PROGRAM_PATH, &[]),
-        FocasItem::MainProgram => Request::cnc(f::MAIN_PROGRAM, &[]),
-        FocasItem::Sequence => Request::cnc(f::SEQUENCE, &[]),
-        FocasItem::BlockCount => Request::cnc(f::BLOCK_COUNT, &[]),
-        FocasItem::AlarmBits => Request::cnc(f::ALARM_BITS, &[]),
-        FocasItem::Alarms(most) => Request::cnc(f::ALARMS, &[-1, i32::from(most), 2, signed(ALARM_TEXT_LEN)]),
-        FocasItem::ModalGroup(group) => Request::cnc(f::MODAL_GROUP, &[number(group)]),
-        FocasItem::ModalWord(word) => Request::cnc(f::MODAL_WORD, &[word.number()]),
-        FocasItem::Position(what, axis) => Request::cnc(f::POSITION, &[what.number(), number(axis)]),
-        FocasItem::Macro(variable) => Request::cnc(f::MACRO, &twice(variable)),
+        FocasItem::Program => Request::new_cnc(f::PROGRAM, &[]),
+        FocasItem::ProgramName => Request::new_cnc(f::PROGRAM_NAME, &[]),
+        FocasItem::ProgramPath => Request::new_cnc(f::PROGRAM_PATH, &[]),
+        FocasItem::MainProgram => Request::new_cnc(f::MAIN_PROGRAM, &[]),
+        FocasItem::Sequence => Request::new_cnc(f::SEQUENCE, &[]),
+        FocasItem::BlockCount => Request::new_cnc(f::BLOCK_COUNT, &[]),
+        FocasItem::AlarmBits => Request::new_cnc(f::ALARM_BITS, &[]),
+        FocasItem::Alarms(most) => Request::new_cnc(f::ALARMS, &[-1, i32::from(most), 2, clamp_to_i32(ALARM_TEXT_LEN)]),
+        FocasItem::ModalGroup(group) => Request::new_cnc(f::MODAL_GROUP, &[number(group)]),
+        FocasItem::ModalWord(word) => Request::new_cnc(f::MODAL_WORD, &[word.wire_number()]),
+        FocasItem::Position(what, axis) => Request::new_cnc(f::POSITION, &[what.wire_number(), number(axis)]),
+        FocasItem::Macro(variable) => Request::new_cnc(f::MACRO, &repeat_number(variable)),
         FocasItem::Parameter(parameter, axis) => {
-            let [first, last] = twice(parameter);
-            Request::cnc(by_generation(generation, f::PARAMETER, f::PARAMETER_OLDER), &[first, last, number(axis)])
+            let [first, last] = repeat_number(parameter);
+            Request::new_cnc(by_generation(generation, f::PARAMETER, f::PARAMETER_OLDER), &[first, last, number(axis)])
         }
         FocasItem::Diagnosis(diagnosis, axis) => {
-            let [first, last] = twice(diagnosis);
-            Request::cnc(by_generation(generation, f::DIAGNOSIS, f::DIAGNOSIS_OLDER), &[first, last, number(axis)])
+            let [first, last] = repeat_number(diagnosis);
+            Request::new_cnc(by_generation(generation, f::DIAGNOSIS, f::DIAGNOSIS_OLDER), &[first, last, number(axis)])
         }
-        FocasItem::Pmc(stretch) => Request::pmc(f::PMC_READ, &pmc(stretch)),
-        FocasItem::ToolOffset(offset, kind) => Request::cnc(f::TOOL_OFFSET, &tool(offset, kind)),
-        FocasItem::WorkOffset(offset, axis) => Request::cnc(f::WORK_OFFSET, &work(offset, axis)),
-        FocasItem::ExecutedText(most) => Request::cnc(f::EXECUTED_TEXT, &[i32::from(most)]),
-        FocasItem::Timer(timer) => Request::cnc(f::TIMER, &[timer.number()]),
-        FocasItem::TuningMode => Request::cnc(f::TUNING_MODE, &[]),
-        FocasItem::PanelSignals(mask) => Request::cnc(f::PANEL_SIGNALS, &[i32::from(mask)]),
-        FocasItem::CncId => Request::cnc(f::CNC_ID, &[]),
+        FocasItem::Pmc(stretch) => Request::new_pmc(f::PMC_READ, &encode_stretch(stretch)),
+        FocasItem::ToolOffset(offset, kind) => Request::new_cnc(f::TOOL_OFFSET, &encode_tool_offset(offset, kind)),
+        FocasItem::WorkOffset(offset, axis) => Request::new_cnc(f::WORK_OFFSET, &encode_work_offset(offset, axis)),
+        FocasItem::ExecutedText(most) => Request::new_cnc(f::EXECUTED_TEXT, &[i32::from(most)]),
+        FocasItem::Timer(timer) => Request::new_cnc(f::TIMER, &[timer.wire_number()]),
+        FocasItem::TuningMode => Request::new_cnc(f::TUNING_MODE, &[]),
+        FocasItem::PanelSignals(mask) => Request::new_cnc(f::PANEL_SIGNALS, &[i32::from(mask)]),
+        FocasItem::CncId => Request::new_cnc(f::CNC_ID, &[]),
         FocasItem::Messages(most) => match generation {
-            Generation::Newer(_) => Request::cnc(f::MESSAGES, &[0, -1, i32::from(most)]),
-            Generation::Older(_) => Request::cnc(f::MESSAGES_OLDER, &[-1]),
+            Generation::Newer(_) => Request::new_cnc(f::MESSAGES, &[0, -1, i32::from(most)]),
+            Generation::Older(_) => Request::new_cnc(f::MESSAGES_OLDER, &[-1]),
         },
-        FocasItem::HistoryCount => Request::cnc(f::ALARM_HISTORY_COUNT, &[]),
-        FocasItem::AlarmHistory(first, last) => Request::cnc(f::ALARM_HISTORY, &[first.into(), last.into(), 1]),
-        FocasItem::GCodes => Request::cnc(f::G_CODES, &[-1, 0]),
-        FocasItem::ToolGroup => Request::cnc(f::TOOL_GROUP, &[]),
-        FocasItem::ToolLife(group) => Request::cnc(f::TOOL_LIFE, &twice(group)),
+        FocasItem::HistoryCount => Request::new_cnc(f::ALARM_HISTORY_COUNT, &[]),
+        FocasItem::AlarmHistory(first, last) => Request::new_cnc(f::ALARM_HISTORY, &[first.into(), last.into(), 1]),
+        FocasItem::GCodes => Request::new_cnc(f::G_CODES, &[-1, 0]),
+        FocasItem::ToolGroup => Request::new_cnc(f::TOOL_GROUP, &[]),
+        FocasItem::ToolLife(group) => Request::new_cnc(f::TOOL_LIFE, &repeat_number(group)),
     }
 }
 
-fn signed(length: usize) -> i32 {
+fn clamp_to_i32(length: usize) -> i32 {
     i32::try_from(length).unwrap_or(i32::MAX)
 }
 
-fn twice(number: u16) -> [i32; 2] {
+fn repeat_number(number: u16) -> [i32; 2] {
     [i32::from(number); 2]
 }
 
-fn pmc(stretch: super::item::Stretch) -> [i32; 4] {
-    [i32::from(stretch.from), i32::from(stretch.to), stretch.area.number(), stretch.width.number()]
+fn encode_stretch(stretch: super::item::Stretch) -> [i32; 4] {
+    [i32::from(stretch.from), i32::from(stretch.to), stretch.area.wire_number(), stretch.width.wire_number()]
 }
 
-fn tool(offset: u16, kind: u16) -> [i32; 3] {
+fn encode_tool_offset(offset: u16, kind: u16) -> [i32; 3] {
     [i32::from(offset), i32::from(offset), 1000 + i32::from(kind)]
 }
 
-fn work(offset: u16, axis: i16) -> [i32; 3] {
+fn encode_work_offset(offset: u16, axis: i16) -> [i32; 3] {
     [i32::from(offset), i32::from(offset), i32::from(axis)]
 }
 
 /// The block that writes.
 #[must_use]
-pub fn writing(write: &Write, generation: Generation) -> Request {
+pub fn build_write_request(write: &Write, generation: Generation) -> Request {
     use function as f;
     match write {
         Write::Macro { number, mantissa, places } => {
             let value = match generation {
                 _ if *places < 0 => Number::VACANT,
-                Generation::Newer(_) => Number::decimal(*mantissa, *places),
-                Generation::Older(_) => Number::binary(*mantissa, *places),
+                Generation::Newer(_) => Number::from_decimal(*mantissa, *places),
+                Generation::Older(_) => Number::from_decimal_as_binary(*mantissa, *places),
             };
-            Request::cnc(f::MACRO_WRITE, &twice(*number)).writing(value.bytes().to_vec())
+            Request::new_cnc(f::MACRO_WRITE, &repeat_number(*number)).with_data(value.to_bytes().to_vec())
         }
         Write::Pmc { stretch, values } => {
-            let bytes = usize::from(stretch.width.bytes());
+            let bytes = usize::from(stretch.width.byte_count());
             let data = values.iter().flat_map(|value| value.to_be_bytes()[4 - bytes..].to_vec()).collect();
-            Request::pmc(f::PMC_WRITE, &pmc(*stretch)).writing(data)
+            Request::new_pmc(f::PMC_WRITE, &encode_stretch(*stretch)).with_data(data)
         }
         Write::WorkOffset { number, axis, value } => {
-            Request::cnc(f::WORK_OFFSET_WRITE, &work(*number, *axis)).writing(increments(*value))
+            Request::new_cnc(f::WORK_OFFSET_WRITE, &encode_work_offset(*number, *axis))
+                .with_data(encode_increments(*value))
         }
         Write::ToolOffset { number, kind, value } => {
-            Request::cnc(f::TOOL_OFFSET_WRITE, &tool(*number, *kind)).writing(increments(*value))
+            Request::new_cnc(f::TOOL_OFFSET_WRITE, &encode_tool_offset(*number, *kind))
+                .with_data(encode_increments(*value))
         }
         Write::PanelSignals { mask, signals } => {
             let data = signals.iter().flat_map(|signal| signal.to_be_bytes()).collect();
-            Request::cnc(f::PANEL_SIGNALS_WRITE, &[i32::from(*mask)]).writing(data)
+            Request::new_cnc(f::PANEL_SIGNALS_WRITE, &[i32::from(*mask)]).with_data(data)
         }
     }
 }
 
 /// An offset in least input increments: no base, exponent -1.
-fn increments(value: i32) -> Vec<u8> {
-    Number { mantissa: value, base: 0, exponent: -1 }.bytes().to_vec()
+fn encode_increments(value: i32) -> Vec<u8> {
+    Number { mantissa: value, base: 0, exponent: -1 }.to_bytes().to_vec()
 }
 
 /// About how many bytes the answer to an item takes, its head included, for a frame that the controller can send.

@@ -22,14 +22,14 @@ impl Signals {
     /// From the two stretches, where they could be read.
     #[must_use]
     pub fn new(control: OrAbsence<&[i32]>, ladder: OrAbsence<&[i32]>) -> Self {
-        Self { control: control.and_then(bytes), ladder: ladder.and_then(bytes) }
+        Self { control: control.and_then(convert_bytes), ladder: ladder.and_then(convert_bytes) }
     }
 
-    fn f(&self, byte: usize, bit: u8) -> OrAbsence<bool> {
+    fn read_control_bit(&self, byte: usize, bit: u8) -> OrAbsence<bool> {
         self.control.map(|bytes| bytes[byte] >> bit & 1 == 1)
     }
 
-    fn g(&self, byte: usize) -> OrAbsence<u8> {
+    fn read_ladder_byte(&self, byte: usize) -> OrAbsence<u8> {
         self.ladder.map(|bytes| bytes[byte - 6])
     }
 
@@ -38,31 +38,31 @@ impl Signals {
     /// # Errors
     /// Why it is not known, here and below.
     pub fn drives_ready(&self) -> OrAbsence<bool> {
-        self.f(0, 6)
+        self.read_control_bit(0, 6)
     }
 
     /// F001.5 TAP: tapping.
     ///
     /// # Errors
     /// As above.
-    pub fn tapping(&self) -> OrAbsence<bool> {
-        self.f(1, 5)
+    pub fn is_tapping(&self) -> OrAbsence<bool> {
+        self.read_control_bit(1, 5)
     }
 
     /// F002.0 INCH: the program is in inches.
     ///
     /// # Errors
     /// As above.
-    pub fn inch(&self) -> OrAbsence<bool> {
-        self.f(2, 0)
+    pub fn is_inch(&self) -> OrAbsence<bool> {
+        self.read_control_bit(2, 0)
     }
 
     /// F002.1 RPDO: rapid traverse.
     ///
     /// # Errors
     /// As above.
-    pub fn rapid(&self) -> OrAbsence<bool> {
-        self.f(2, 1)
+    pub fn is_rapid(&self) -> OrAbsence<bool> {
+        self.read_control_bit(2, 1)
     }
 
     /// F002.7 MDRN: dry run is on.
@@ -70,15 +70,15 @@ impl Signals {
     /// # Errors
     /// As above.
     pub fn dry_run(&self) -> OrAbsence<bool> {
-        self.f(2, 7)
+        self.read_control_bit(2, 7)
     }
 
     /// F002.3 THRD: a thread is cut.
     ///
     /// # Errors
     /// As above.
-    pub fn threading(&self) -> OrAbsence<bool> {
-        self.f(2, 3)
+    pub fn is_threading(&self) -> OrAbsence<bool> {
+        self.read_control_bit(2, 3)
     }
 
     /// F004.3 MSBK: single block is on.
@@ -86,7 +86,7 @@ impl Signals {
     /// # Errors
     /// As above.
     pub fn single_block(&self) -> OrAbsence<bool> {
-        self.f(4, 3)
+        self.read_control_bit(4, 3)
     }
 
     /// G006.4 OVC: overrides are cancelled.
@@ -94,7 +94,7 @@ impl Signals {
     /// # Errors
     /// As above.
     pub fn override_cancelled(&self) -> OrAbsence<bool> {
-        self.g(6).map(|byte| byte >> 4 & 1 == 1)
+        self.read_ladder_byte(6).map(|byte| byte >> 4 & 1 == 1)
     }
 
     /// The feed override in force, %: G012, and G013 where the machine has the second one; 100 where the control takes
@@ -103,12 +103,12 @@ impl Signals {
     /// # Errors
     /// As above.
     pub fn feed_override(&self, second: bool) -> OrAbsence<f64> {
-        let first = self.g(12)?;
-        if self.override_cancelled() == Ok(true) || self.tapping() == Ok(true) || self.threading() == Ok(true) {
+        let first = self.read_ladder_byte(12)?;
+        if self.override_cancelled() == Ok(true) || self.is_tapping() == Ok(true) || self.is_threading() == Ok(true) {
             return Ok(100.0);
         }
         let percent = |byte| f64::from(feed_override::decode(byte).percent());
-        let second = if second { percent(self.g(13)?) } else { 100.0 };
+        let second = if second { percent(self.read_ladder_byte(13)?) } else { 100.0 };
         Ok((percent(first) * second / 100.0).min(f64::from(u8::MAX - 1)))
     }
 
@@ -117,7 +117,7 @@ impl Signals {
     /// # Errors
     /// As above.
     pub fn spindle_override(&self) -> OrAbsence<f64> {
-        let pct = OverridePct::new(self.g(30)?).ok_or(Absence::OutOfRange)?;
+        let pct = OverridePct::new(self.read_ladder_byte(30)?).ok_or(Absence::OutOfRange)?;
         Ok(f64::from(pct.percent()))
     }
 
@@ -127,7 +127,7 @@ impl Signals {
     /// # Errors
     /// As above.
     pub fn rapid_override(&self) -> OrAbsence<f64> {
-        match self.g(14)? & 0b11 {
+        match self.read_ladder_byte(14)? & 0b11 {
             0b00 => Ok(100.0),
             0b01 => Ok(50.0),
             0b10 => Ok(25.0),
@@ -141,7 +141,7 @@ impl Signals {
     /// # Errors
     /// As above.
     pub fn jog_override(&self) -> OrAbsence<f64> {
-        let hundredths = !u16::from_le_bytes([self.g(10)?, self.g(11)?]);
+        let hundredths = !u16::from_le_bytes([self.read_ladder_byte(10)?, self.read_ladder_byte(11)?]);
         Ok(if hundredths == u16::MAX { 0.0 } else { f64::from(hundredths) / 100.0 })
     }
 
@@ -149,8 +149,8 @@ impl Signals {
     ///
     /// # Errors
     /// As above; nothing of the kind is *not supported*.
-    pub fn operation(&self) -> OrAbsence<&'static str> {
-        match (self.threading()?, self.tapping()?) {
+    pub fn find_operation(&self) -> OrAbsence<&'static str> {
+        match (self.is_threading()?, self.is_tapping()?) {
             (_, true) => Ok(operation::TAPPING),
             (true, _) => Ok(operation::THREADING),
             _ => Err(Absence::NotSupported),
@@ -158,14 +158,14 @@ impl Signals {
     }
 }
 
-fn bytes<const N: usize>(values: &[i32]) -> OrAbsence<[u8; N]> {
+fn convert_bytes<const N: usize>(values: &[i32]) -> OrAbsence<[u8; N]> {
     let bytes: Vec<u8> = values.iter().filter_map(|value| u8::try_from(*value).ok()).collect();
     bytes.try_into().map_err(|_| Absence::OutOfRange)
 }
 
 /// The word of the channel `mode`; `None` when the control shows none.
 #[must_use]
-pub fn mode(status: &Status, single_block: bool) -> Option<&'static str> {
+pub fn name_mode(status: &Status, single_block: bool) -> Option<&'static str> {
     match status.automatic {
         1 | 10 if single_block => Some(mode::SEMI_AUTOMATIC),
         1 | 10 => Some(mode::AUTOMATIC),
@@ -178,7 +178,7 @@ pub fn mode(status: &Status, single_block: bool) -> Option<&'static str> {
 
 /// The word of the channel `execution`.
 #[must_use]
-pub fn execution(status: &Status, feed_override_pct: Option<f64>) -> Option<&'static str> {
+pub fn name_execution(status: &Status, feed_override_pct: Option<f64>) -> Option<&'static str> {
     if status.emergency != 0 {
         return Some(execution::STOPPED);
     }
@@ -194,7 +194,7 @@ pub fn execution(status: &Status, feed_override_pct: Option<f64>) -> Option<&'st
 
 /// The word of the channel `motion`.
 #[must_use]
-pub fn motion(status: &Status) -> Option<&'static str> {
+pub fn name_motion(status: &Status) -> Option<&'static str> {
     match status.motion {
         0 => Some("NONE"),
         1 => Some("MOTION"),
@@ -224,22 +224,22 @@ mod tests {
 
     #[test]
     fn every_mode_word_has_a_state() {
-        let words: Vec<_> = (0..=10).map(|word| mode(&status(word, 0), false)).collect();
+        let words: Vec<_> = (0..=10).map(|word| name_mode(&status(word, 0), false)).collect();
         let manual = Some("MANUAL");
         let expected = [Some("MANUAL_DATA_INPUT"), Some("AUTOMATIC"), None, Some("EDIT")];
         assert_eq!(words[..4], expected);
         assert_eq!(words[4..10], [manual; 6]);
         assert_eq!(words[10], Some("AUTOMATIC"));
-        assert_eq!(mode(&status(1, 0), true), Some("SEMI_AUTOMATIC"));
-        assert_eq!(mode(&status(77, 0), false), None);
+        assert_eq!(name_mode(&status(1, 0), true), Some("SEMI_AUTOMATIC"));
+        assert_eq!(name_mode(&status(77, 0), false), None);
     }
 
     #[test]
     fn every_run_word_has_a_state() {
-        let words: Vec<_> = (0..=5).map(|word| execution(&status(1, word), Some(100.0))).collect();
+        let words: Vec<_> = (0..=5).map(|word| name_execution(&status(1, word), Some(100.0))).collect();
         assert_eq!(words, [Some("READY"), Some("STOPPED"), Some("FEED_HOLD"), Some("ACTIVE"), Some("ACTIVE"), None]);
-        assert_eq!(execution(&status(1, 3), Some(0.0)), Some("INTERRUPTED"));
-        assert_eq!(execution(&Status { emergency: 1, ..status(1, 3) }, None), Some("STOPPED"));
+        assert_eq!(name_execution(&status(1, 3), Some(0.0)), Some("INTERRUPTED"));
+        assert_eq!(name_execution(&Status { emergency: 1, ..status(1, 3) }, None), Some("STOPPED"));
     }
 
     #[test]
@@ -260,11 +260,11 @@ mod tests {
 
     #[test]
     fn threads_and_single_block_are_told_by_signals() {
-        assert_eq!(signals(&[('F', 1, 0x20)]).operation(), Ok("tapping"));
-        assert_eq!(signals(&[('F', 2, 0x08)]).operation(), Ok("threading"));
-        assert_eq!(signals(&[]).operation(), Err(Absence::NotSupported));
+        assert_eq!(signals(&[('F', 1, 0x20)]).find_operation(), Ok("tapping"));
+        assert_eq!(signals(&[('F', 2, 0x08)]).find_operation(), Ok("threading"));
+        assert_eq!(signals(&[]).find_operation(), Err(Absence::NotSupported));
         assert_eq!(signals(&[('F', 4, 0x08)]).single_block(), Ok(true));
-        assert_eq!(signals(&[('F', 2, 0x02)]).rapid(), Ok(true));
+        assert_eq!(signals(&[('F', 2, 0x02)]).is_rapid(), Ok(true));
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub struct Statistics {
 
 impl Statistics {
     /// Counts one frame.
-    pub fn frame(&mut self, blocks: usize, sent: usize, received: usize, took: Duration) {
+    pub fn count_frame(&mut self, blocks: usize, sent: usize, received: usize, took: Duration) {
         let wide = |count: usize| u64::try_from(count).unwrap_or(u64::MAX);
         self.frames += 1;
         self.blocks += wide(blocks);
@@ -64,7 +64,7 @@ mod tests {
         let mut statistics = Statistics::default();
         assert_eq!(statistics.percentile(50), Duration::ZERO);
         for us in 1..=100 {
-            statistics.frame(3, 10, 20, Duration::from_micros(us * 10));
+            statistics.count_frame(3, 10, 20, Duration::from_micros(us * 10));
         }
         assert_eq!(statistics.percentile(50), Duration::from_micros(500));
         assert_eq!(statistics.percentile(99), Duration::from_micros(1000));

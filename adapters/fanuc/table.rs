@@ -7,7 +7,7 @@
 //! server; `(D)` a document; `(-)` nobody. No real control was there: what one sends in these places was seen by nobody.
 //!
 //! Numbers within a function (which position, which meter, which word) stand beside the item that they belong to, in
-//! [`item`](super::item) and [`word`](super::item::BlockWord). What was confirmed by the vendor's own library or by captured
+//! [`item`](super::item) and [`as_word`](super::item::BlockWord). What was confirmed by the vendor's own library or by captured
 //! frames is tested with values written by hand, which do not come from this table.
 
 /// Which controls have a function.
@@ -22,7 +22,7 @@ pub enum Era {
 }
 
 impl Era {
-    fn word(self) -> &'static str {
+    fn as_word(self) -> &'static str {
         match self {
             Self::All => "all",
             Self::Newer => "newer",
@@ -41,7 +41,7 @@ pub enum RowOrigin {
 }
 
 impl RowOrigin {
-    fn word(self) -> &'static str {
+    fn as_word(self) -> &'static str {
         match self {
             Self::Library => "library 1.0.5",
             Self::Client => "pyfanuc",
@@ -161,7 +161,7 @@ table! {
 
 /// The table for the handbook. Integers are big-endian; a *number* is a mantissa i32, a base and an exponent i16.
 #[must_use]
-pub fn markdown() -> String {
+pub fn format_markdown() -> String {
     let head = "| function | controls | arguments | answer | library | asked by |\n|---|---|---|---|---|---|\n";
     let row = |row: &TableRow| {
         format!(
@@ -169,11 +169,11 @@ pub fn markdown() -> String {
             row.device,
             row.function,
             row.name.to_lowercase().replace('_', " "),
-            row.era.word(),
+            row.era.as_word(),
             row.arguments,
             row.answer,
             row.calls,
-            row.known.word()
+            row.known.as_word()
         )
     };
     head.to_owned() + &TABLE.iter().map(row).collect::<String>()

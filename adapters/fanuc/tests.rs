@@ -2,7 +2,7 @@
 
 use super::item::Area;
 use super::line::FanucLine;
-use super::open::{OpenedFanuc, native};
+use super::open::{OpenedFanuc, open_native};
 use super::server::{Controller, ServedControl, Server, ServerSettings, SimulatedControl};
 use super::work_offset::ExternalOffsets;
 use crate::address::{Address, Target};
@@ -45,7 +45,7 @@ fn dial_at(percent: u8) -> impl FnOnce(SimulatedControl) -> SimulatedControl {
 fn opened(server: &Server, keys: &str) -> OpenedFanuc {
     let address: Address = format!("fanuc://{}?{keys}", server.address()).parse().expect("usable");
     match address.target() {
-        Target::Fanuc { at, path, options, .. } => native(address.text(), at, *path, options),
+        Target::Fanuc { at, path, options, .. } => open_native(address.text(), at, *path, options),
         other => panic!("{other:?}"),
     }
 }
@@ -77,9 +77,9 @@ fn the_ladder_takes_what_comes_through_the_mailbox() {
     assert_eq!(write(actuator.as_mut(), 90), Ok(pct(90)));
     assert_eq!(write(actuator.as_mut(), 80), Ok(pct(80)));
     assert_eq!(write(actuator.as_mut(), 20), Ok(pct(50)), "the ladder has limits of its own");
-    let g12 = || server.with(|control| control.map(|control| control.memory.byte(Area::G, 12)));
+    let g12 = || server.with(|control| control.map(|control| control.memory.read_byte(Area::G, 12)));
     assert_eq!(g12(), Some(super::feed_override::encode(pct(50))));
-    actuator.release(&SystemClock::new()).expect("given back");
+    actuator.release_override(&SystemClock::new()).expect("given back");
     std::thread::sleep(std::time::Duration::from_millis(30));
     assert_eq!(g12(), Some(super::feed_override::encode(OverridePct::FULL)));
 }
@@ -92,12 +92,12 @@ fn a_known_dial_is_told_apart_from_what_is_in_force() {
     assert_eq!(actuator.read_feed_override(&clock), Ok(pct(80)), "the dial alone");
     assert_eq!(actuator.read_dial(&clock), Ok(Some(pct(80))));
     assert_eq!(write(actuator.as_mut(), 110), Ok(pct(80)), "never above the dial");
-    let before = server.frames();
+    let before = server.count_frames();
     actuator.read_feed_override(&clock).expect("answers");
-    assert_eq!((actuator.read_dial(&clock), server.frames() - before), (Ok(Some(pct(80))), 1), "in one frame");
+    assert_eq!((actuator.read_dial(&clock), server.count_frames() - before), (Ok(Some(pct(80))), 1), "in one frame");
     assert_eq!(write(actuator.as_mut(), 60), Ok(pct(60)));
     assert_eq!(actuator.read_dial(&clock), Ok(Some(pct(80))), "nobody has turned it");
-    actuator.release(&clock).expect("given back");
+    actuator.release_override(&clock).expect("given back");
     std::thread::sleep(std::time::Duration::from_millis(30));
     assert_eq!(actuator.read_feed_override(&clock), Ok(pct(80)));
 }
@@ -107,7 +107,7 @@ fn a_product_goes_above_the_dial_where_the_maker_lets_it() {
     let (server, _) = lathe_with(4.0, |control| dial_at(80)(control.with_rule(crate::LadderRule::Product)));
     let mut mailbox = actuator(&server, "write=mailbox&dial=R907");
     assert_eq!(write(mailbox.as_mut(), 120), Ok(pct(96)));
-    mailbox.release(&SystemClock::new()).expect("given back");
+    mailbox.release_override(&SystemClock::new()).expect("given back");
     let mut second = actuator(&server, "write=second_override&dial=G12");
     assert_eq!(write(second.as_mut(), 50), Ok(pct(40)), "80 % of the dial and 50 % of the gateway");
     assert_eq!(second.read_dial(&SystemClock::new()), Ok(Some(pct(80))));
@@ -118,9 +118,9 @@ fn a_feed_hold_is_asked_once_and_the_operator_ends_it() {
     let (server, machine) = lathe_with(60.0, |control| control);
     let clock = SystemClock::new();
     let mut actuator = actuator(&server, "write=mailbox&request=R905");
-    let byte = |area, at| server.with(|control| control.expect("on").memory.byte(area, at));
+    let byte = |area, at| server.with(|control| control.expect("on").memory.read_byte(area, at));
     for _ in 0..3 {
-        actuator.ask(&clock, LadderRequest::FeedHold).expect("latched");
+        actuator.ask_ladder(&clock, LadderRequest::FeedHold).expect("latched");
     }
     assert_eq!((byte(Area::R, 905), byte(Area::R, 906), byte(Area::G, 8) & 0x20), (0, 1, 0), "*SP is off");
     let run = || server.with(|control| control.expect("on").status.run);
@@ -128,7 +128,7 @@ fn a_feed_hold_is_asked_once_and_the_operator_ends_it() {
     assert_eq!(machine.written().feed_holds, 1, "asked three times, told once");
     wait_for("the operator has acknowledged", || byte(Area::R, 906) == 0);
     assert_eq!(byte(Area::G, 8) & 0x20, 0x20);
-    actuator.ask(&clock, LadderRequest::FeedHold).expect("latched again");
+    actuator.ask_ladder(&clock, LadderRequest::FeedHold).expect("latched again");
     wait_for("the axes stand again", || run() == 2 && machine.written().feed_holds == 2);
 }
 
@@ -136,7 +136,7 @@ fn a_feed_hold_is_asked_once_and_the_operator_ends_it() {
 fn a_stop_lets_the_part_end() {
     let (server, machine) = lathe_with(60.0, |control| control);
     let mut actuator = actuator(&server, "write=mailbox&request=R905");
-    actuator.ask(&SystemClock::new(), LadderRequest::Stop).expect("latched");
+    actuator.ask_ladder(&SystemClock::new(), LadderRequest::Stop).expect("latched");
     let (run, parts) = (
         || server.with(|control| control.expect("on").status.run),
         || server.with(|control| control.expect("on").parameters[&6711].values[0].mantissa),
@@ -152,10 +152,11 @@ fn a_stop_lets_the_part_end() {
 fn a_request_that_no_rung_latches_is_refused_and_withdrawn() {
     let server = serve(Box::new(Controller::new(4, &['X'])));
     let mut silent = actuator(&server, "write=mailbox&request=D20");
-    let error = silent.ask(&SystemClock::new(), LadderRequest::Stop).expect_err("nobody there").to_string();
+    let error = silent.ask_ladder(&SystemClock::new(), LadderRequest::Stop).expect_err("nobody there").to_string();
     assert!(error.contains("no rung latches the bit of D20 in D21"), "{error}");
-    assert_eq!(server.with(|control| control.expect("on").memory.byte(Area::D, 20)), 0, "nothing is left on");
-    let error = actuator(&server, "write=mailbox").ask(&SystemClock::new(), LadderRequest::Stop).expect_err("no byte");
+    assert_eq!(server.with(|control| control.expect("on").memory.read_byte(Area::D, 20)), 0, "nothing is left on");
+    let error =
+        actuator(&server, "write=mailbox").ask_ladder(&SystemClock::new(), LadderRequest::Stop).expect_err("no byte");
     assert!(error.to_string().contains("request=R905"), "{error}");
 }
 
@@ -173,10 +174,10 @@ fn the_second_override_has_a_byte_of_its_own() {
     let server = lathe();
     let mut actuator = actuator(&server, "write=second_override");
     assert_eq!(write(actuator.as_mut(), 70), Ok(pct(70)));
-    let g12 = server.with(|control| control.map(|control| control.memory.byte(Area::G, 12)));
+    let g12 = server.with(|control| control.map(|control| control.memory.read_byte(Area::G, 12)));
     assert_eq!(g12, Some(0x9B), "the operator's dial is untouched");
     assert!(matches!(write(actuator.as_mut(), 0), Err(SourceError::Refused { .. })));
-    actuator.release(&SystemClock::new()).expect("given back");
+    actuator.release_override(&SystemClock::new()).expect("given back");
     std::thread::sleep(std::time::Duration::from_millis(30));
     assert_eq!(actuator.read_feed_override(&SystemClock::new()), Ok(OverridePct::FULL));
 }
@@ -243,14 +244,14 @@ fn the_path_that_is_named_first_is_written_to_on_the_one_connection() {
     assert_eq!(write(actuator.as_mut(), 70), Ok(pct(70)));
     assert_eq!(actuator.read_dial(&clock), Ok(Some(pct(90))));
     let overrides = || {
-        let byte = |at| move |control: &mut Controller| control.memory.byte(Area::G, at);
+        let byte = |at| move |control: &mut Controller| control.memory.read_byte(Area::G, at);
         [12, 1012].map(|at| server.with(|control| control.map(byte(at))).map(super::feed_override::decode))
     };
     assert_eq!(overrides(), [Some(pct(90)), Some(pct(70))], "path 1 keeps its dial");
-    actuator.release(&clock).expect("given back");
+    actuator.release_override(&clock).expect("given back");
     std::thread::sleep(std::time::Duration::from_millis(30));
     assert_eq!(overrides(), [Some(pct(90)); 2]);
-    assert_eq!(server.opened(), 1, "connections");
+    assert_eq!(server.count_opened(), 1, "connections");
     let mut direct = self::actuator(&server, "paths=2,1&write=direct");
     let error = write(direct.as_mut(), 60).expect_err("the ladder of path 2 fights").to_string();
     assert!(error.contains("not held: 60 %"), "{error}");

@@ -76,7 +76,7 @@ impl BlockWord {
 
     /// Its number on the wire.
     #[must_use]
-    pub fn number(self) -> i32 {
+    pub fn wire_number(self) -> i32 {
         self as i32
     }
 
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn the_words_stand_in_the_order_of_their_numbers() {
         for (number, (word, _)) in (0..).zip(BlockWord::ALL) {
-            assert_eq!((word.number(), BlockWord::of_number(number)), (number, Some(word)));
+            assert_eq!((word.wire_number(), BlockWord::of_number(number)), (number, Some(word)));
         }
         // By hand from the reference: cnc_modal(103), (106), (107), (108) and (109) ask for 5, 11, 21, 22 and 20.
         let asked = [
@@ -111,7 +111,7 @@ mod tests {
             (BlockWord::R, 20, 109),
         ];
         for (word, wire, library) in asked {
-            assert_eq!((word.number(), word.number_in_library()), (wire, Some(library)), "{word:?}");
+            assert_eq!((word.wire_number(), word.number_in_library()), (wire, Some(library)), "{word:?}");
         }
         assert_eq!(BlockWord::of_number(29), None);
     }

@@ -29,27 +29,31 @@ impl ExternalOffsets {
     }
 
     /// The number of this axis, which the control tells by the order of its names.
-    fn number(&mut self, clock: &dyn Clock, axis: Axis) -> Result<i16, SourceError> {
+    fn find_axis_number(&mut self, clock: &dyn Clock, axis: Axis) -> Result<i16, SourceError> {
         if let Some(number) = self.numbers[axis.index()] {
             return Ok(number);
         }
-        let facts = self.line.ask(clock, &[FocasItem::Status])?.facts;
-        let not_told = |_| self.refused(axis, "the control has not told the names of its axes", SEE_DOCTOR);
+        let facts = self.line.ask_items(clock, &[FocasItem::Status])?.facts;
+        let not_told = |_| self.build_refusal(axis, "the control has not told the names of its axes", SEE_DOCTOR);
         let axes = facts.axes_of(self.line.path()).map_err(not_told)?;
-        let place = axes.iter().position(|name| name.eq_ignore_ascii_case(axis.word()));
+        let place = axes.iter().position(|name| name.eq_ignore_ascii_case(axis.as_word()));
         let number = place.and_then(|place| i16::try_from(place + 1).ok());
         let next = format!("Its axes are {}; correct `axes` under [gate.offset]", axes.join(", "));
         self.numbers[axis.index()] = number;
-        number.ok_or_else(|| self.refused(axis, "the control has no axis of this name", &next))
+        number.ok_or_else(|| self.build_refusal(axis, "the control has no axis of this name", &next))
     }
 
     fn offset_um(&self, axis: Axis, item: FocasItem, asked: &Asked) -> Result<f64, SourceError> {
-        let Some(Ok(FocasAnswer::Number(Some(mm)))) = asked.of(item) else {
-            return Err(self.refused(axis, "the external offset cannot be read", SEE_DOCTOR));
+        let Some(Ok(FocasAnswer::Number(Some(mm)))) = asked.find_item_result(item) else {
+            return Err(self.build_refusal(axis, "the external offset cannot be read", SEE_DOCTOR));
         };
         let um = mm * 1000.0;
         if (um - um.round()).abs() > 1e-6 {
-            return Err(self.refused(axis, "the least increment is not 1 µm", "Only increment system IS-B is shifted"));
+            return Err(self.build_refusal(
+                axis,
+                "the least increment is not 1 µm",
+                "Only increment system IS-B is shifted",
+            ));
         }
         Ok(um.round())
     }
@@ -60,36 +64,36 @@ impl OffsetSink for ExternalOffsets {
         &self.name
     }
 
-    fn called(&self) -> &'static str {
+    fn offset_name(&self) -> &'static str {
         "the external work offset"
     }
 
     fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
-        let item = FocasItem::WorkOffset(0, self.number(clock, axis)?);
-        let asked = self.line.ask(clock, &[FocasItem::Status, item])?;
+        let item = FocasItem::WorkOffset(0, self.find_axis_number(clock, axis)?);
+        let asked = self.line.ask_items(clock, &[FocasItem::Status, item])?;
         let unit = match asked.facts.inch {
             Ok(false) => Ok(()),
             Ok(true) => Err(("the machine measures in inches", "Only machines in millimetres are shifted")),
             Err(_) => Err(("the control has not told whether it measures in inches", "It is asked again by itself")),
         };
-        unit.map_err(|(what, next)| self.refused(axis, what, next))?;
-        let at_rest = match asked.of(FocasItem::Status) {
+        unit.map_err(|(what, next)| self.build_refusal(axis, what, next))?;
+        let at_rest = match asked.find_item_result(FocasItem::Status) {
             Some(Ok(FocasAnswer::Status(Status { run, .. }))) => Some(*run == 0),
             _ => None,
         };
-        self.movable(axis, at_rest)?;
+        self.check_movable(axis, at_rest)?;
         self.offset_um(axis, item, &asked)
     }
 
     /// Looks once more before it writes: a program may have been started, and the operator may have set something else.
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
         let now_um = self.at_rest(clock, axis)?;
-        self.unchanged(axis, now_um, found_um)?;
-        let number = self.number(clock, axis)?;
+        self.check_unchanged(axis, now_um, found_um)?;
+        let number = self.find_axis_number(clock, axis)?;
         #[expect(clippy::cast_possible_truncation, reason = "saturates; an increment is a micrometre")]
         let value = wanted_um.round() as i32;
         self.line.write(clock, &Write::WorkOffset { number: 0, axis: number, value })?;
         let item = FocasItem::WorkOffset(0, number);
-        self.offset_um(axis, item, &self.line.ask(clock, &[item])?)
+        self.offset_um(axis, item, &self.line.ask_items(clock, &[item])?)
     }
 }

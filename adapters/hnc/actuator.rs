@@ -1,7 +1,7 @@
 //! The feed override through four registers that the ladder reads, and the override in force read back.
 
-use super::decode::number;
-use super::item::{channel, flag};
+use super::decode::extract_number;
+use super::item::{channel, define_whole_item};
 use super::line::HncLine;
 use crate::clock::Clock;
 use crate::driver::{Actuator, LadderRequest, SourceError};
@@ -30,20 +30,20 @@ impl Actuator for HncActuator {
 
     fn write_feed_override(&mut self, _: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
         self.last = MailboxRequest::Override(wanted);
-        self.line.write(&self.mailbox.post(self.last, None))
+        self.line.write(&self.mailbox.build_letter(self.last, None))
     }
 
-    fn release(&mut self, _: &dyn Clock) -> Result<(), SourceError> {
+    fn release_override(&mut self, _: &dyn Clock) -> Result<(), SourceError> {
         self.last = MailboxRequest::Release;
-        self.line.write(&self.mailbox.post(self.last, None))
+        self.line.write(&self.mailbox.build_letter(self.last, None))
     }
 
-    fn ask(&mut self, _: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
-        self.line.write(&self.mailbox.post(self.last, Some(request)))
+    fn ask_ladder(&mut self, _: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        self.line.write(&self.mailbox.build_letter(self.last, Some(request)))
     }
 
     fn read_feed_override(&mut self, _: &dyn Clock) -> Result<OverridePct, SourceError> {
-        let found = number(&self.line.read(flag(channel::FEED_OVERRIDE))?);
+        let found = extract_number(&self.line.read(define_whole_item(channel::FEED_OVERRIDE))?);
         crate::nclink::mailbox::in_force(self.line.name(), found)
     }
 }

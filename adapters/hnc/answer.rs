@@ -35,7 +35,7 @@ pub enum HncItemError {
 impl HncItemError {
     /// The reason for the channel.
     #[must_use]
-    pub fn absence(&self) -> Absence {
+    pub fn to_absence(&self) -> Absence {
         match self {
             Self::NotYet => Absence::NotYetRead,
             Self::Refused(-2) | Self::NotOffered => Absence::NotSupported,

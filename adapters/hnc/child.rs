@@ -30,16 +30,16 @@ const LEVEL_ERROR: i32 = 0;
 ///
 /// # Errors
 /// The line to the parent failed.
-pub fn child() -> std::io::Result<()> {
+pub fn serve_parent() -> std::io::Result<()> {
     let mut session: Option<HncSession> = None;
     serve_words(|ask: Result<HncRequest, String>, tell| match (ask, &session) {
         (Ok(HncRequest::Read(items)), Some(session)) => session.read_each(&items, tell),
-        (Ok(ask), _) => tell(&answer(&mut session, ask)),
+        (Ok(ask), _) => tell(&answer_request(&mut session, ask)),
         (Err(confused), _) => tell(&HncReply::Confused(confused)),
     })
 }
 
-fn answer(session: &mut Option<HncSession>, ask: HncRequest) -> HncReply {
+fn answer_request(session: &mut Option<HncSession>, ask: HncRequest) -> HncReply {
     if let HncRequest::Open { vendor_library, local_host, local_port, host, port, long_bytes } = ask {
         // The library's own connections are global: an old session goes before a new one.
         *session = None;
@@ -54,11 +54,11 @@ fn answer(session: &mut Option<HncSession>, ask: HncRequest) -> HncReply {
     }
     let Some(session) = session else { return HncReply::Confused("there is no connection".to_owned()) };
     match ask {
-        HncRequest::Alive => session.alive(),
+        HncRequest::Alive => session.report_connection(),
         HncRequest::Write(kind, index, value) => session.write(kind, index, value),
         HncRequest::WriteZero(axis, counts) => session.write_zero(axis, counts),
-        HncRequest::Sample(items) => session.sample(&items),
-        HncRequest::Sampled => session.sampled(),
+        HncRequest::Sample(items) => session.start_sampling(&items),
+        HncRequest::Sampled => session.read_samples(),
         HncRequest::Open { .. } | HncRequest::Read(_) => HncReply::Confused("not on this connection".to_owned()),
     }
 }
@@ -77,11 +77,11 @@ impl Drop for HncSession {
         if self.columns > 0 {
             let _without = self.functions.HNC_SamplTriggerOff(self.client);
         }
-        self.functions.exit();
+        self.functions.end_connections();
     }
 }
 
-fn checked(code: Result<i32, Missing>) -> Result<(), HncItemError> {
+fn check_code(code: Result<i32, Missing>) -> Result<(), HncItemError> {
     match code.map_err(|_| HncItemError::NotOffered)? {
         0 => Ok(()),
         1 => Err(HncItemError::NotYet),
@@ -90,19 +90,19 @@ fn checked(code: Result<i32, Missing>) -> Result<(), HncItemError> {
 }
 
 /// A value that a call fills in; on any code but 0 nothing of it is looked at.
-fn filled(length: usize, call: impl FnOnce(&mut Guarded) -> Result<i32, Missing>) -> Result<Vec<u8>, HncItemError> {
+fn fill_value(length: usize, call: impl FnOnce(&mut Guarded) -> Result<i32, Missing>) -> Result<Vec<u8>, HncItemError> {
     let mut buffer = Guarded::new(length);
-    checked(call(&mut buffer))?;
-    buffer.bytes().map_err(|overrun| HncItemError::Malformed(overrun.to_string()))
+    check_code(call(&mut buffer))?;
+    buffer.read_bytes().map_err(|overrun| HncItemError::Malformed(overrun.to_string()))
 }
 
-fn whole(bytes: &[u8]) -> i32 {
+fn decode_whole(bytes: &[u8]) -> i32 {
     bytes.first_chunk::<4>().map_or(0, |low| i32::from_le_bytes(*low))
 }
 
-fn value(bytes: &[u8], width: HncWidth) -> HncItemResult {
+fn decode_value(bytes: &[u8], width: HncWidth) -> HncItemResult {
     match width {
-        HncWidth::Whole => Ok(HncAnswer::Whole(whole(bytes))),
+        HncWidth::Whole => Ok(HncAnswer::Whole(decode_whole(bytes))),
         HncWidth::Text => Ok(HncAnswer::Text(text_of(bytes))),
         HncWidth::Real => {
             let real = bytes.first_chunk::<8>().map_or(f64::NAN, |bytes| f64::from_le_bytes(*bytes));
@@ -116,9 +116,9 @@ fn value(bytes: &[u8], width: HncWidth) -> HncItemResult {
 }
 
 /// Sets a value that lies in eight bytes with its sign: right however many of them the library takes.
-fn written(name: &str, value: i64, set: impl FnOnce(&mut Guarded) -> Result<i32, Missing>) -> HncReply {
+fn write_value(name: &str, value: i64, set: impl FnOnce(&mut Guarded) -> Result<i32, Missing>) -> HncReply {
     let mut buffer = Guarded::new(8);
-    buffer.put(&value.to_le_bytes());
+    buffer.write_bytes(&value.to_le_bytes());
     match set(&mut buffer) {
         Ok(0) => HncReply::Done,
         Ok(code) => HncReply::Code(name.to_owned(), HncReturnCode(code)),
@@ -144,8 +144,8 @@ impl HncSession {
         Ok(session)
     }
 
-    fn alive(&mut self) -> HncReply {
-        self.events();
+    fn report_connection(&mut self) -> HncReply {
+        self.count_events();
         match self.functions.HNC_NetIsConnect(self.client) {
             Ok(code) => HncReply::Alive { code: i32::from(code), connected: self.connected, lost: self.lost },
             Err(Missing(name)) => HncReply::Confused(format!("the library has no {name}")),
@@ -153,9 +153,9 @@ impl HncSession {
     }
 
     /// Events about the connection; others are not for us.
-    fn events(&mut self) {
+    fn count_events(&mut self) {
         for _ in 0..EVENTS_MAX {
-            let Ok(bytes) = filled(EVENT_LEN, |out| self.functions.HNC_EventGetSysEv(out)) else { return };
+            let Ok(bytes) = fill_value(EVENT_LEN, |out| self.functions.HNC_EventGetSysEv(out)) else { return };
             let word = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
             let (net, up, down) = NET_EVENT;
             self.connected += u64::from((word(0), word(2)) == (net, up));
@@ -182,33 +182,38 @@ impl HncSession {
     fn read(&self, item: HncItem) -> HncItemResult {
         let (f, c) = (&self.functions, self.client);
         match item {
-            HncItem::System(kind, width) => value(&filled(VALUE_LEN, |out| f.HNC_SystemGetValue(kind, out, c))?, width),
+            HncItem::System(kind, width) => {
+                decode_value(&fill_value(VALUE_LEN, |out| f.HNC_SystemGetValue(kind, out, c))?, width)
+            }
             HncItem::Channel(kind, index, width) => {
-                value(&filled(VALUE_LEN, |out| f.HNC_ChannelGetValue(kind, 0, index, out, c))?, width)
+                decode_value(&fill_value(VALUE_LEN, |out| f.HNC_ChannelGetValue(kind, 0, index, out, c))?, width)
             }
             HncItem::Axis(kind, axis, width) => {
-                value(&filled(VALUE_LEN, |out| f.HNC_AxisGetValue(kind, axis, out, c))?, width)
+                decode_value(&fill_value(VALUE_LEN, |out| f.HNC_AxisGetValue(kind, axis, out, c))?, width)
             }
             HncItem::Register(kind, index) => {
-                value(&filled(VALUE_LEN, |out| f.HNC_RegGetValue(kind, index, out, c))?, HncWidth::Whole)
+                decode_value(&fill_value(VALUE_LEN, |out| f.HNC_RegGetValue(kind, index, out, c))?, HncWidth::Whole)
             }
-            HncItem::ExternalZero(axis) => {
-                value(&filled(VALUE_LEN, |out| f.HNC_CrdsGetValue(EXTERNAL_ZERO, axis, out, 0, 0, c))?, HncWidth::Whole)
+            HncItem::ExternalZero(axis) => decode_value(
+                &fill_value(VALUE_LEN, |out| f.HNC_CrdsGetValue(EXTERNAL_ZERO, axis, out, 0, 0, c))?,
+                HncWidth::Whole,
+            ),
+            HncItem::Program => {
+                decode_value(&fill_value(VALUE_LEN, |out| f.HNC_FprogGetFullName(0, out, c))?, HncWidth::Text)
             }
-            HncItem::Program => value(&filled(VALUE_LEN, |out| f.HNC_FprogGetFullName(0, out, c))?, HncWidth::Text),
-            HncItem::Alarms => self.alarms(),
+            HncItem::Alarms => self.read_alarms(),
         }
     }
 
-    fn alarms(&self) -> HncItemResult {
+    fn read_alarms(&self) -> HncItemResult {
         let (f, c) = (&self.functions, self.client);
-        let count = whole(&filled(VALUE_LEN, |out| f.HNC_AlarmGetNum(ALARM_ALL, LEVEL_ERROR, out, c))?);
+        let count = decode_whole(&fill_value(VALUE_LEN, |out| f.HNC_AlarmGetNum(ALARM_ALL, LEVEL_ERROR, out, c))?);
         let alarm = |index| {
             let mut number = Guarded::new(8);
             let call = |text: &mut Guarded| f.HNC_AlarmGetData(ALARM_ALL, LEVEL_ERROR, index, &mut number, text, c);
-            let text = filled(VALUE_LEN, call)?;
-            let number = number.bytes().map_err(|overrun| HncItemError::Malformed(overrun.to_string()))?;
-            Ok((whole(&number), text_of(&text)))
+            let text = fill_value(VALUE_LEN, call)?;
+            let number = number.read_bytes().map_err(|overrun| HncItemError::Malformed(overrun.to_string()))?;
+            Ok((decode_whole(&number), text_of(&text)))
         };
         let alarms: Result<Vec<_>, HncItemError> = (0..count.clamp(0, ALARMS_MAX)).map(alarm).collect();
         alarms.map(HncAnswer::Alarms)
@@ -216,33 +221,33 @@ impl HncSession {
 
     fn write(&self, kind: i32, index: i32, value: i64) -> HncReply {
         let set = |value: &mut Guarded| self.functions.HNC_RegSetValue(kind, index, value, self.client);
-        written("HNC_RegSetValue", value, set)
+        write_value("HNC_RegSetValue", value, set)
     }
 
     fn write_zero(&self, axis: i32, counts: i32) -> HncReply {
         let set = |value: &mut Guarded| self.functions.HNC_CrdsSetValue(EXTERNAL_ZERO, axis, value, 0, 0, self.client);
-        written("HNC_CrdsSetValue", i64::from(counts), set)
+        write_value("HNC_CrdsSetValue", i64::from(counts), set)
     }
 
     /// Configures and starts the sampling channels, one millisecond each, without end.
-    fn sample(&mut self, items: &[SampledItem]) -> HncReply {
+    fn start_sampling(&mut self, items: &[SampledItem]) -> HncReply {
         let (f, c) = (&self.functions, self.client);
         let items = &items[..items.len().min(SAMPLED_MAX)];
         let count = i32::try_from(items.len()).unwrap_or(0);
         let configure = || -> Result<(), HncItemError> {
-            checked(f.HNC_SamplReset(c))?;
-            checked(f.HNC_SamplSetChannel(count, c))?;
+            check_code(f.HNC_SamplReset(c))?;
+            check_code(f.HNC_SamplSetChannel(count, c))?;
             for (channel, item) in (0..).zip(items) {
-                checked(match *item {
+                check_code(match *item {
                     SampledItem::OfAxis { kind, axis } => f.HNC_SamplSetPropertyType(channel, kind, axis, c),
                     SampledItem::OfRegister { kind, offset, length } => {
                         f.HNC_SamplSetRegType(channel, kind, offset, length, c)
                     }
                 })?;
-                checked(f.HNC_SamplSetPeriod(channel, 1, c))?;
-                checked(f.HNC_SamplSetLmt(channel, 0, 0, c))?;
+                check_code(f.HNC_SamplSetPeriod(channel, 1, c))?;
+                check_code(f.HNC_SamplSetLmt(channel, 0, 0, c))?;
             }
-            checked(f.HNC_SamplTriggerOn(c))
+            check_code(f.HNC_SamplTriggerOn(c))
         };
         // Channels that run already belong to somebody's oscilloscope at the panel: they are left alone.
         if matches!(f.HNC_SamplGetStat(c), Ok(1)) && self.columns == 0 {
@@ -260,10 +265,10 @@ impl HncSession {
         }
     }
 
-    fn sampled(&self) -> HncReply {
+    fn read_samples(&self) -> HncReply {
         let mut columns = Vec::new();
         for channel in 0..self.columns {
-            match self.column(channel) {
+            match self.read_column(channel) {
                 Ok(values) => columns.push(values),
                 Err(HncItemError::NotYet) => return HncReply::Sampled(Columns::default()),
                 Err(HncItemError::Refused(code)) => {
@@ -276,15 +281,15 @@ impl HncSession {
     }
 
     /// The values of one sampling channel. A count beyond what was asked for is an answer without sense.
-    fn column(&self, channel: i32) -> Result<Vec<i32>, HncItemError> {
+    fn read_column(&self, channel: i32) -> Result<Vec<i32>, HncItemError> {
         let wanted = i32::try_from(POINTS_MAX).unwrap_or(i32::MAX);
         let mut count = Guarded::new(8);
-        count.put(&i64::from(wanted).to_le_bytes());
+        count.write_bytes(&i64::from(wanted).to_le_bytes());
         let call = |out: &mut Guarded| self.functions.HNC_SamplGetData(channel, &mut count, out, self.client);
-        let bytes = filled(POINTS_MAX * self.long_bytes, call)?;
-        let count = count.bytes().map_err(|overrun| HncItemError::Malformed(overrun.to_string()))?;
-        let found = usize::try_from(whole(&count)).ok().filter(|found| *found <= POINTS_MAX);
-        let found = found.ok_or_else(|| HncItemError::Malformed(format!("{} points", whole(&count))))?;
-        Ok(bytes.chunks_exact(self.long_bytes).take(found).map(whole).collect())
+        let bytes = fill_value(POINTS_MAX * self.long_bytes, call)?;
+        let count = count.read_bytes().map_err(|overrun| HncItemError::Malformed(overrun.to_string()))?;
+        let found = usize::try_from(decode_whole(&count)).ok().filter(|found| *found <= POINTS_MAX);
+        let found = found.ok_or_else(|| HncItemError::Malformed(format!("{} points", decode_whole(&count))))?;
+        Ok(bytes.chunks_exact(self.long_bytes).take(found).map(decode_whole).collect())
     }
 }

@@ -1,76 +1,76 @@
 //! Values to words and text.
 
 use super::answer::{HncAnswer, HncItemError, HncItemResult};
-use super::item::{HncItem, channel, flag};
+use super::item::{HncItem, channel, define_whole_item};
 use crate::reading::Absence;
 use crate::text::TextEncoding;
 use crate::words::{execution, mode, operation};
 
 /// Text up to the first zero, out of GBK; bytes that are none stay as marks.
 pub(super) fn text_of(bytes: &[u8]) -> String {
-    TextEncoding::Named(encoding_rs::GBK).text(bytes)
+    TextEncoding::Named(encoding_rs::GBK).decode_trimmed(bytes)
 }
 
 /// The whole number of an answer.
-pub(super) fn whole(result: &HncItemResult) -> Result<i32, Absence> {
+pub(super) fn extract_whole(result: &HncItemResult) -> Result<i32, Absence> {
     match result {
         Ok(HncAnswer::Whole(number)) => Ok(*number),
         Ok(_) => Err(Absence::OutOfRange),
-        Err(error) => Err(error.absence()),
+        Err(error) => Err(error.to_absence()),
     }
 }
 
 /// The number of an answer.
-pub(super) fn number(result: &HncItemResult) -> Result<f64, Absence> {
+pub(super) fn extract_number(result: &HncItemResult) -> Result<f64, Absence> {
     match result {
         Ok(HncAnswer::Real(number)) => Ok(*number),
-        other => whole(other).map(f64::from),
+        other => extract_whole(other).map(f64::from),
     }
 }
 
 /// The text of an answer.
-pub(super) fn text(result: &HncItemResult) -> Result<&str, Absence> {
+pub(super) fn extract_text(result: &HncItemResult) -> Result<&str, Absence> {
     match result {
         Ok(HncAnswer::Text(text)) => Ok(text),
         Ok(_) => Err(Absence::OutOfRange),
-        Err(error) => Err(error.absence()),
+        Err(error) => Err(error.to_absence()),
     }
 }
 
 /// The alarms as one text, empty without any.
-pub(super) fn alarms(result: &HncItemResult) -> Result<String, Absence> {
+pub(super) fn format_alarms(result: &HncItemResult) -> Result<String, Absence> {
     match result {
         Ok(HncAnswer::Alarms(alarms)) => {
             let each: Vec<String> = alarms.iter().map(|(number, text)| format!("{number} {text}")).collect();
             Ok(each.join("; "))
         }
         Ok(_) => Err(Absence::OutOfRange),
-        Err(error) => Err(error.absence()),
+        Err(error) => Err(error.to_absence()),
     }
 }
 
 /// Answers by item; what was not asked for is not offered.
 pub(super) trait Answers {
     /// The answer to an item.
-    fn of(&self, item: HncItem) -> HncItemResult;
+    fn find_answer(&self, item: HncItem) -> HncItemResult;
 
     /// A whole number of the channel.
-    fn flag(&self, kind: i32) -> Result<i32, Absence> {
-        whole(&self.of(flag(kind)))
+    fn find_number(&self, kind: i32) -> Result<i32, Absence> {
+        extract_whole(&self.find_answer(define_whole_item(kind)))
     }
 
     /// Is a flag set? A flag that the controller does not have is not.
-    fn set(&self, kind: i32) -> Result<bool, Absence> {
-        match self.of(flag(kind)) {
+    fn is_flag_set(&self, kind: i32) -> Result<bool, Absence> {
+        match self.find_answer(define_whole_item(kind)) {
             Err(HncItemError::NotOffered | HncItemError::Refused(-2)) => Ok(false),
-            other => whole(&other).map(|flag| flag != 0),
+            other => extract_whole(&other).map(|flag| flag != 0),
         }
     }
 
     /// The word of the channel `mode`.
-    fn mode(&self) -> Result<&'static str, Absence> {
-        Ok(match self.flag(channel::MODE)? {
-            _ if self.set(channel::IS_MDI)? => mode::MANUAL_DATA_INPUT,
+    fn find_mode(&self) -> Result<&'static str, Absence> {
+        Ok(match self.find_number(channel::MODE)? {
+            _ if self.is_flag_set(channel::IS_MDI)? => mode::MANUAL_DATA_INPUT,
             1 => mode::AUTOMATIC,
             7 => mode::SEMI_AUTOMATIC,
             _ => mode::MANUAL,
@@ -78,24 +78,26 @@ pub(super) trait Answers {
     }
 
     /// The word of the channel `execution`.
-    fn execution(&self) -> Result<&'static str, Absence> {
-        let cycle = self.flag(channel::CYCLE)? != 0;
-        let hold = self.flag(channel::HOLD)? != 0;
+    fn find_execution(&self) -> Result<&'static str, Absence> {
+        let cycle = self.find_number(channel::CYCLE)? != 0;
+        let hold = self.find_number(channel::HOLD)? != 0;
         Ok(match () {
-            () if self.set(channel::IS_ESTOP)? || self.set(channel::IS_RESETTING)? => execution::STOPPED,
+            () if self.is_flag_set(channel::IS_ESTOP)? || self.is_flag_set(channel::IS_RESETTING)? => {
+                execution::STOPPED
+            }
             () if hold => execution::FEED_HOLD,
-            () if cycle && self.set(channel::VERIFY)? => execution::READY,
+            () if cycle && self.is_flag_set(channel::VERIFY)? => execution::READY,
             () if cycle => execution::ACTIVE,
             () => execution::READY,
         })
     }
 
     /// Does the feed follow the spindle? The controller does not name operations otherwise.
-    fn operation(&self) -> Result<&'static str, Absence> {
-        if self.set(channel::IS_THREADING)? {
+    fn find_operation(&self) -> Result<&'static str, Absence> {
+        if self.is_flag_set(channel::IS_THREADING)? {
             return Ok(operation::THREADING);
         }
-        if self.set(channel::IS_RIGID)? { Ok(operation::TAPPING) } else { Err(Absence::NotSupported) }
+        if self.is_flag_set(channel::IS_RIGID)? { Ok(operation::TAPPING) } else { Err(Absence::NotSupported) }
     }
 }
 
@@ -105,7 +107,7 @@ mod tests {
     use std::collections::HashMap;
 
     impl Answers for HashMap<i32, i32> {
-        fn of(&self, item: HncItem) -> HncItemResult {
+        fn find_answer(&self, item: HncItem) -> HncItemResult {
             let HncItem::Channel(kind, ..) = item else { return Err(HncItemError::NotOffered) };
             self.get(&kind).map(|value| HncAnswer::Whole(*value)).ok_or(HncItemError::NotOffered)
         }
@@ -120,7 +122,7 @@ mod tests {
     fn flags_become_words() {
         let words = |flags: &[(i32, i32)]| {
             let machine = machine(flags);
-            (machine.mode().expect("known"), machine.execution().expect("known"))
+            (machine.find_mode().expect("known"), machine.find_execution().expect("known"))
         };
         assert_eq!(words(&[]), (mode::AUTOMATIC, execution::ACTIVE));
         assert_eq!(words(&[(channel::HOLD, 1)]), (mode::AUTOMATIC, execution::FEED_HOLD));
@@ -129,9 +131,9 @@ mod tests {
         assert_eq!(words(&[(channel::IS_ESTOP, 1)]).1, execution::STOPPED);
         assert_eq!(words(&[(channel::MODE, 7), (channel::IS_MDI, 1)]).0, mode::MANUAL_DATA_INPUT);
         assert_eq!(words(&[(channel::MODE, 7)]).0, mode::SEMI_AUTOMATIC);
-        assert_eq!(machine(&[(channel::IS_RIGID, 1)]).operation(), Ok(operation::TAPPING));
-        assert_eq!(machine(&[]).operation(), Err(Absence::NotSupported));
-        assert_eq!(HashMap::new().mode(), Err(Absence::NotSupported));
+        assert_eq!(machine(&[(channel::IS_RIGID, 1)]).find_operation(), Ok(operation::TAPPING));
+        assert_eq!(machine(&[]).find_operation(), Err(Absence::NotSupported));
+        assert_eq!(HashMap::new().find_mode(), Err(Absence::NotSupported));
     }
 
     #[test]
@@ -143,9 +145,12 @@ mod tests {
 
     #[test]
     fn not_yet_is_no_zero() {
-        assert_eq!(number(&Err(HncItemError::NotYet)), Err(Absence::NotYetRead));
-        assert_eq!(number(&Err(HncItemError::Refused(-1))), Err(Absence::Refused));
-        assert_eq!(number(&Ok(HncAnswer::Real(2.5))), Ok(2.5));
-        assert_eq!(alarms(&Ok(HncAnswer::Alarms(vec![(7, "a".into()), (8, "b".into())]))), Ok("7 a; 8 b".to_owned()));
+        assert_eq!(extract_number(&Err(HncItemError::NotYet)), Err(Absence::NotYetRead));
+        assert_eq!(extract_number(&Err(HncItemError::Refused(-1))), Err(Absence::Refused));
+        assert_eq!(extract_number(&Ok(HncAnswer::Real(2.5))), Ok(2.5));
+        assert_eq!(
+            format_alarms(&Ok(HncAnswer::Alarms(vec![(7, "a".into()), (8, "b".into())]))),
+            Ok("7 a; 8 b".to_owned())
+        );
     }
 }

@@ -47,7 +47,7 @@ functions! {
 /// `HNC_NetExit` returns nothing and is looked up when it is needed.
 impl Functions {
     /// Ends every connection of the library.
-    pub(super) fn exit(&self) {
+    pub(super) fn end_connections(&self) {
         // SAFETY: the symbol is a function without arguments and result in the vendor's header.
         let symbol = unsafe { self._library.get::<unsafe extern "C" fn()>(b"HNC_NetExit\0") };
         if let Ok(exit) = symbol {

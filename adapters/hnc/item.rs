@@ -42,13 +42,13 @@ pub const MOVE_UNIT: HncItem = HncItem::System(1, HncWidth::Whole);
 
 /// A whole number of channel 0.
 #[must_use]
-pub const fn flag(kind: i32) -> HncItem {
+pub const fn define_whole_item(kind: i32) -> HncItem {
     HncItem::Channel(kind, 0, HncWidth::Whole)
 }
 
 /// A real number of channel 0.
 #[must_use]
-pub const fn real(kind: i32) -> HncItem {
+pub const fn define_real_item(kind: i32) -> HncItem {
     HncItem::Channel(kind, 0, HncWidth::Real)
 }
 

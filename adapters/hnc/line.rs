@@ -84,16 +84,16 @@ impl HncLine {
     /// How the child has been doing.
     #[must_use]
     pub fn counts(&self) -> ChildCounts {
-        self.locked().child.counts()
+        self.lock_connection().child.counts()
     }
 
     /// Loads and connects if need be, and tells whether the controller is there.
     ///
     /// # Errors
     /// [`SourceError::Line`] while it is not, with what the library says.
-    pub fn alive(&self) -> Result<Alive, SourceError> {
-        let mut inner = self.locked();
-        match inner.ask(&HncRequest::Alive, "its connection")? {
+    pub fn query_connection(&self) -> Result<Alive, SourceError> {
+        let mut inner = self.lock_connection();
+        match inner.ask_child(&HncRequest::Alive, "its connection")? {
             HncReply::Alive { code: 0, connected, lost } => {
                 Ok(Alive { connected, lost, generation: inner.child.child().generation() })
             }
@@ -101,7 +101,7 @@ impl HncLine {
                 format!("the controller is not connected ({})", HncReturnCode(code)),
                 "The library connects again by itself; check that the machine is on and the cable is in.",
             )),
-            other => Err(inner.nonsense("its connection", &other)),
+            other => Err(inner.build_decode_error("its connection", &other)),
         }
     }
 
@@ -119,10 +119,10 @@ impl HncLine {
     /// # Errors
     /// [`SourceError::Timeout`] on a dead link, [`SourceError::Line`] when the library cannot be loaded or connected.
     pub fn read_each(&self, items: &[HncItem]) -> Result<Vec<HncItemResult>, SourceError> {
-        let mut inner = self.locked();
+        let mut inner = self.lock_connection();
         let mut results = Vec::with_capacity(items.len());
         while let Some(rest) = items.get(results.len()..).filter(|rest| !rest.is_empty()) {
-            match inner.child.survived(rest) {
+            match inner.child.count_survived(rest) {
                 0 => results.push(Err(HncItemError::NotOffered)),
                 count => inner.read_some(&rest[..count], &mut results)?,
             }
@@ -135,14 +135,14 @@ impl HncLine {
     /// # Errors
     /// The first that is refused, or the line.
     pub fn write(&self, words: &[(ControllerRegister, i64)]) -> Result<(), SourceError> {
-        let mut inner = self.locked();
+        let mut inner = self.lock_connection();
         for (at, value) in words {
             let request = format!("writing {at}");
             let Some(kind) = register_type(*at) else {
-                return Err(inner.refused(&request, "there is no such register".to_owned()));
+                return Err(inner.build_refusal(&request, "there is no such register".to_owned()));
             };
             let index = i32::try_from(at.index).unwrap_or(i32::MAX);
-            inner.done(&HncRequest::Write(kind, index, *value), &request)?;
+            inner.request_action(&HncRequest::Write(kind, index, *value), &request)?;
         }
         Ok(())
     }
@@ -152,20 +152,20 @@ impl HncLine {
     /// # Errors
     /// It is refused, or the line failed.
     pub fn write_zero(&self, axis: i32, counts: i32) -> Result<(), SourceError> {
-        self.locked().done(&HncRequest::WriteZero(axis, counts), "writing the external zero offset")
+        self.lock_connection().request_action(&HncRequest::WriteZero(axis, counts), "writing the external zero offset")
     }
 
     /// Begins to sample.
     ///
     /// # Errors
     /// Refused where the library or the controller cannot, or somebody else samples.
-    pub fn sample(&self, items: &[SampledItem]) -> Result<(), SourceError> {
-        let mut inner = self.locked();
-        match inner.ask(&HncRequest::Sample(items.to_vec()), "sampling")? {
+    pub fn start_sampling(&self, items: &[SampledItem]) -> Result<(), SourceError> {
+        let mut inner = self.lock_connection();
+        match inner.ask_child(&HncRequest::Sample(items.to_vec()), "sampling")? {
             HncReply::Done => Ok(()),
-            HncReply::Code(function, code) => Err(inner.refused("sampling", format!("{function}: {code}"))),
-            HncReply::Confused(what) => Err(inner.refused("sampling", what)),
-            other => Err(inner.nonsense("sampling", &other)),
+            HncReply::Code(function, code) => Err(inner.build_refusal("sampling", format!("{function}: {code}"))),
+            HncReply::Confused(what) => Err(inner.build_refusal("sampling", what)),
+            other => Err(inner.build_decode_error("sampling", &other)),
         }
     }
 
@@ -173,21 +173,21 @@ impl HncLine {
     ///
     /// # Errors
     /// See [`SourceError`].
-    pub fn sampled(&self) -> Result<Columns, SourceError> {
-        let mut inner = self.locked();
-        match inner.ask(&HncRequest::Sampled, "the samples")? {
+    pub fn read_samples(&self) -> Result<Columns, SourceError> {
+        let mut inner = self.lock_connection();
+        match inner.ask_child(&HncRequest::Sampled, "the samples")? {
             HncReply::Sampled(columns) => Ok(columns),
-            HncReply::Code(function, code) => Err(inner.refused("the samples", format!("{function}: {code}"))),
-            other => Err(inner.nonsense("the samples", &other)),
+            HncReply::Code(function, code) => Err(inner.build_refusal("the samples", format!("{function}: {code}"))),
+            other => Err(inner.build_decode_error("the samples", &other)),
         }
     }
 
     /// Ends the child; the next question starts another one.
-    pub fn end(&self) {
-        self.locked().child.end();
+    pub fn end_child(&self) {
+        self.lock_connection().child.end_child();
     }
 
-    fn locked(&self) -> MutexGuard<'_, HncConnection> {
+    fn lock_connection(&self) -> MutexGuard<'_, HncConnection> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -195,7 +195,7 @@ impl HncLine {
 impl HncConnection {
     /// Reads as many as one child survives, at least one.
     fn read_some(&mut self, items: &[HncItem], results: &mut Vec<HncItemResult>) -> Result<(), SourceError> {
-        self.open()?;
+        self.open_connection()?;
         let mut dead = None;
         let take = |told| match told {
             HncReply::Read(result) => {
@@ -223,25 +223,25 @@ impl HncConnection {
     }
 
     /// A question whose failure ends the poll.
-    fn ask(&mut self, ask: &HncRequest, request: &str) -> Result<HncReply, SourceError> {
-        self.open()?;
+    fn ask_child(&mut self, ask: &HncRequest, request: &str) -> Result<HncReply, SourceError> {
+        self.open_connection()?;
         let began = Instant::now();
-        let told = self.child.told(ask).map_err(|error| self.child_failed(&error, request))?;
+        let told = self.child.request_answer(ask).map_err(|error| self.child_failed(&error, request))?;
         if began.elapsed() > DEAD_LINK { Err(self.dead_link(began.elapsed())) } else { Ok(told) }
     }
 
     /// Something to be done that is done or refused.
-    fn done(&mut self, ask: &HncRequest, request: &str) -> Result<(), SourceError> {
-        match self.ask(ask, request)? {
+    fn request_action(&mut self, ask: &HncRequest, request: &str) -> Result<(), SourceError> {
+        match self.ask_child(ask, request)? {
             HncReply::Done => Ok(()),
-            HncReply::Code(_, code) => Err(self.refused(request, code.to_string())),
-            HncReply::Confused(what) => Err(self.refused(request, what)),
-            other => Err(self.nonsense(request, &other)),
+            HncReply::Code(_, code) => Err(self.build_refusal(request, code.to_string())),
+            HncReply::Confused(what) => Err(self.build_refusal(request, what)),
+            other => Err(self.build_decode_error(request, &other)),
         }
     }
 
     /// A child in which the connection is open.
-    fn open(&mut self) -> Result<(), SourceError> {
+    fn open_connection(&mut self) -> Result<(), SourceError> {
         if self.child.is_running() {
             return Ok(());
         }
@@ -254,7 +254,7 @@ impl HncConnection {
             port: settings.at.port,
             long_bytes: settings.long_bytes,
         };
-        let told = self.child.told(&ask).map_err(|error| self.child_failed(&error, "opening"));
+        let told = self.child.request_answer(&ask).map_err(|error| self.child_failed(&error, "opening"));
         let failed = match told? {
             HncReply::Opened => return Ok(()),
             HncReply::Unloadable(what) => self.line_failed(
@@ -269,9 +269,9 @@ impl HncConnection {
                 format!("the controller does not answer: {code}"),
                 "Check that the machine is on, and its network number and port.",
             ),
-            other => self.nonsense("opening", &other),
+            other => self.build_decode_error("opening", &other),
         };
-        self.child.end();
+        self.child.end_child();
         Err(failed)
     }
 
@@ -300,7 +300,7 @@ impl HncConnection {
         }
     }
 
-    fn refused(&self, request: &str, what: String) -> SourceError {
+    fn build_refusal(&self, request: &str, what: String) -> SourceError {
         SourceError::Refused {
             source_name: self.settings.name.clone(),
             request: request.to_owned(),
@@ -309,7 +309,7 @@ impl HncConnection {
         }
     }
 
-    fn nonsense(&self, request: &str, told: &HncReply) -> SourceError {
+    fn build_decode_error(&self, request: &str, told: &HncReply) -> SourceError {
         let what = match told {
             HncReply::Confused(what) => what.clone(),
             other => format!("{other:?}"),

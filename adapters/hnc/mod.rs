@@ -52,10 +52,10 @@ pub mod sampling;
 mod source;
 
 pub use actuator::HncActuator;
-pub use child::child;
-pub use open::{offsets, open, open_sampled};
+pub use child::serve_parent;
+pub use open::{build_offset_sink, open_address, open_sampled};
 pub use own::OwnValue;
-pub use source::{HncSource, channels as delivered};
+pub use source::{HncSource, list_channels as delivered};
 
 /// What the hidden subcommand calls this child.
 pub const KIND: &str = "hnc";

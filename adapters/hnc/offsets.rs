@@ -7,8 +7,8 @@
 //! in the control: the power should take it back to what the operator has saved.
 
 use super::answer::{HncAnswer, HncItemError, HncItemResult};
-use super::decode::{text, whole};
-use super::item::{self, HncItem, HncWidth, axis, channel, flag, register_type};
+use super::decode::{extract_text, extract_whole};
+use super::item::{self, HncItem, HncWidth, axis, channel, define_whole_item, register_type};
 use super::line::HncLine;
 use crate::clock::Clock;
 use crate::driver::{SEE_DOCTOR, SourceError};
@@ -20,10 +20,10 @@ use crate::offset::{Axis, OffsetSink};
 const AXES: i32 = 3;
 
 /// Nothing runs and nothing is held; `None` where the controller does not say.
-const STATE: [HncItem; 2] = [flag(channel::CYCLE), flag(channel::HOLD)];
+const STATE: [HncItem; 2] = [define_whole_item(channel::CYCLE), define_whole_item(channel::HOLD)];
 
 fn at_rest(state: &[HncItemResult]) -> Option<bool> {
-    let flags: Result<Vec<i32>, _> = state.iter().map(whole).collect();
+    let flags: Result<Vec<i32>, _> = state.iter().map(extract_whole).collect();
     flags.ok().map(|flags| flags.iter().all(|flag| *flag == 0))
 }
 
@@ -35,14 +35,18 @@ impl RegisterAccess for HncRegisters {
         self.0.name()
     }
 
-    fn look(&mut self, first: ControllerRegister, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
+    fn read_registers(
+        &mut self,
+        first: ControllerRegister,
+        count: u32,
+    ) -> Result<(Vec<i64>, Option<bool>), SourceError> {
         let kind = register_type(first).unwrap_or(-1);
         let registers =
             (first.index..first.index + count).map(|at| HncItem::Register(kind, i32::try_from(at).unwrap_or(-1)));
         let items: Vec<HncItem> = STATE.into_iter().chain(registers).collect();
         let mut results = self.0.read_each(&items)?;
         let words = results.split_off(STATE.len());
-        let words = words.iter().filter_map(|word| whole(word).ok()).map(i64::from).collect();
+        let words = words.iter().filter_map(|word| extract_whole(word).ok()).map(i64::from).collect();
         Ok((words, at_rest(&results)))
     }
 
@@ -66,31 +70,32 @@ impl ZeroOffsets {
     }
 
     /// The logical axis of this letter, which the control is asked for once.
-    fn number(&mut self, axis: Axis) -> Result<i32, SourceError> {
+    fn find_axis_number(&mut self, axis: Axis) -> Result<i32, SourceError> {
         if let Some(number) = self.numbers[axis.index()] {
             return Ok(number);
         }
         let names: Vec<HncItem> = (0..AXES).map(|number| HncItem::Axis(axis::NAME, number, HncWidth::Text)).collect();
         let found = self.line.read_each(&names)?;
-        let named =
-            |name: &HncItemResult| text(name).is_ok_and(|name| Axis::of(name.get(..1).unwrap_or("")) == Some(axis));
+        let named = |name: &HncItemResult| {
+            extract_text(name).is_ok_and(|name| Axis::from_word(name.get(..1).unwrap_or("")) == Some(axis))
+        };
         let number = found.iter().position(named).and_then(|at| i32::try_from(at).ok());
         self.numbers[axis.index()] = number;
         number.ok_or_else(|| {
-            self.refused(axis, "the control has no axis of this name", "Correct `axes` under [gate.offset].")
+            self.build_refusal(axis, "the control has no axis of this name", "Correct `axes` under [gate.offset].")
         })
     }
 
     /// What the address says a count is must be what the control says of its positions.
     fn same_unit(&self, axis: Axis, per_mm: &HncItemResult) -> Result<(), SourceError> {
-        let unit_um = whole(per_mm).ok().filter(|per_mm| *per_mm > 0).map(|per_mm| 1000.0 / f64::from(per_mm));
+        let unit_um = extract_whole(per_mm).ok().filter(|per_mm| *per_mm > 0).map(|per_mm| 1000.0 / f64::from(per_mm));
         match unit_um {
             Some(unit_um) if (unit_um / self.unit_um - 1.0).abs() < 1e-6 => Ok(()),
             Some(unit_um) => {
                 let what = format!("a count is {unit_um} µm for the control and {} µm in the address", self.unit_um);
-                Err(self.refused(axis, &what, "Compare one shift at the panel and correct offset_unit_um=."))
+                Err(self.build_refusal(axis, &what, "Compare one shift at the panel and correct offset_unit_um=."))
             }
-            None => Err(self.refused(axis, "the control does not say what a count is", SEE_DOCTOR)),
+            None => Err(self.build_refusal(axis, "the control does not say what a count is", SEE_DOCTOR)),
         }
     }
 
@@ -100,7 +105,7 @@ impl ZeroOffsets {
             Err(HncItemError::NotOffered) => "the library has no HNC_CrdsGetValue".to_owned(),
             other => format!("the external zero offset cannot be read ({other:?})"),
         };
-        Err(self.refused(axis, &what, "Write offset=D110 in the address, with rungs in the ladder."))
+        Err(self.build_refusal(axis, &what, "Write offset=D110 in the address, with rungs in the ladder."))
     }
 
     fn whole_um(&self, axis: Axis, counts: i32) -> Result<f64, SourceError> {
@@ -109,7 +114,7 @@ impl ZeroOffsets {
             return Ok(um.round());
         }
         let next = "Round the external zero offset to whole micrometres at the panel.";
-        Err(self.refused(axis, &format!("the operator has set {um} µm, which is not whole"), next))
+        Err(self.build_refusal(axis, &format!("the operator has set {um} µm, which is not whole"), next))
     }
 }
 
@@ -118,18 +123,18 @@ impl OffsetSink for ZeroOffsets {
         self.line.name()
     }
 
-    fn called(&self) -> &'static str {
+    fn offset_name(&self) -> &'static str {
         "the external zero offset"
     }
 
     fn at_rest(&mut self, _: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
-        let zero = HncItem::ExternalZero(self.number(axis)?);
+        let zero = HncItem::ExternalZero(self.find_axis_number(axis)?);
         let [cycle, hold] = STATE;
         let found = self.line.read_each(&[cycle, hold, item::MOVE_UNIT, zero])?;
         let [state @ .., per_mm, zero] = found.as_slice() else {
-            return Err(self.refused(axis, "the control does not answer", SEE_DOCTOR));
+            return Err(self.build_refusal(axis, "the control does not answer", SEE_DOCTOR));
         };
-        self.movable(axis, at_rest(state))?;
+        self.check_movable(axis, at_rest(state))?;
         self.same_unit(axis, per_mm)?;
         self.offset_um(axis, zero)
     }
@@ -137,8 +142,8 @@ impl OffsetSink for ZeroOffsets {
     /// Looks once more before it writes: a program may have been started, and the operator may have set something else.
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
         let now_um = self.at_rest(clock, axis)?;
-        self.unchanged(axis, now_um, found_um)?;
-        let number = self.number(axis)?;
+        self.check_unchanged(axis, now_um, found_um)?;
+        let number = self.find_axis_number(axis)?;
         #[expect(clippy::cast_possible_truncation, reason = "saturates; the gate has limited it")]
         let counts = (wanted_um / self.unit_um).round() as i32;
         self.line.write_zero(number, counts)?;

@@ -17,7 +17,7 @@ const DEADLINE: Duration = Duration::from_millis(4500);
 
 /// Opens an address; the child is started with the first poll.
 #[must_use]
-pub fn open(address: &Address, target: &HncNetTarget) -> Opened {
+pub fn open_address(address: &Address, target: &HncNetTarget) -> Opened {
     open_sampled(address, target, None)
 }
 
@@ -40,14 +40,14 @@ pub fn open_sampled(address: &Address, target: &HncNetTarget, sink: Option<Block
     if let Some(sink) = sink {
         source.on_block(sink);
     }
-    let offsets = target.offset.map(|how| offsets(&line, how));
+    let offsets = target.offset.map(|how| build_offset_sink(&line, how));
     let actuator = target.mailbox.map(|first| Box::new(HncActuator::new(line, first)) as Box<dyn Actuator>);
     Opened { sources: vec![Box::new(source)], actuator, offsets, simulated: None, refused: Refused::default() }
 }
 
 /// The way to the offsets that the address names.
 #[must_use]
-pub fn offsets(line: &HncLine, how: HncOffset) -> Box<dyn OffsetSink> {
+pub fn build_offset_sink(line: &HncLine, how: HncOffset) -> Box<dyn OffsetSink> {
     match how {
         HncOffset::Registers(first) => Box::new(LadderOffsets::new(HncRegisters(line.clone()), first)),
         HncOffset::Zero { unit_um } => Box::new(ZeroOffsets::new(line.clone(), unit_um)),

@@ -27,16 +27,16 @@ impl OwnRead for OwnValue {
         let words: Vec<&str> = text.split_whitespace().collect();
         let plain = |item| Some(Self { item, bit: None });
         let found = match words.as_slice() {
-            ["register", place] => register(place),
-            ["channel", kind, rest @ ..] => {
-                number(kind).zip(width(rest)).and_then(|(kind, width)| plain(HncItem::Channel(kind, 0, width)))
-            }
-            ["axis", axis, kind, rest @ ..] => number(axis)
-                .zip(number(kind))
-                .zip(width(rest))
+            ["register", place] => parse_register(place),
+            ["channel", kind, rest @ ..] => parse_number(kind)
+                .zip(parse_width(rest))
+                .and_then(|(kind, width)| plain(HncItem::Channel(kind, 0, width))),
+            ["axis", axis, kind, rest @ ..] => parse_number(axis)
+                .zip(parse_number(kind))
+                .zip(parse_width(rest))
                 .and_then(|((axis, kind), width)| plain(HncItem::Axis(kind, axis, width))),
             ["system", kind, rest @ ..] => {
-                number(kind).zip(width(rest)).and_then(|(kind, width)| plain(HncItem::System(kind, width)))
+                parse_number(kind).zip(parse_width(rest)).and_then(|(kind, width)| plain(HncItem::System(kind, width)))
             }
             _ => None,
         };
@@ -57,11 +57,11 @@ impl OwnRead for OwnValue {
     }
 }
 
-fn number(text: &str) -> Option<i32> {
+fn parse_number(text: &str) -> Option<i32> {
     text.parse().ok().filter(|number| (0..10_000).contains(number))
 }
 
-fn width(words: &[&str]) -> Option<HncWidth> {
+fn parse_width(words: &[&str]) -> Option<HncWidth> {
     match words {
         [] | ["whole"] => Some(HncWidth::Whole),
         ["real"] => Some(HncWidth::Real),
@@ -70,7 +70,7 @@ fn width(words: &[&str]) -> Option<HncWidth> {
     }
 }
 
-fn register(place: &str) -> Option<OwnValue> {
+fn parse_register(place: &str) -> Option<OwnValue> {
     let (name, bit) = place.split_once('.').map_or((place, None), |(name, bit)| (name, Some(bit)));
     let at: ControllerRegister = name.parse().ok()?;
     let index = i32::try_from(at.index).ok()?;
@@ -86,14 +86,14 @@ impl Own<OwnValue> {
     ///
     /// # Errors
     /// There is no value of the kind that the channel has.
-    pub(super) fn found(&self, result: &HncItemResult) -> Result<Value, Absence> {
+    pub(super) fn extract_value(&self, result: &HncItemResult) -> Result<Value, Absence> {
         match (result, self.item.bit) {
-            (Ok(HncAnswer::Whole(whole)), Some(bit)) => Value::number(f64::from(whole >> bit & 1)),
-            (Ok(HncAnswer::Whole(whole)), None) => Value::number(f64::from(*whole)),
-            (Ok(HncAnswer::Real(real)), _) => Value::number(*real),
+            (Ok(HncAnswer::Whole(whole)), Some(bit)) => Value::from_number(f64::from(whole >> bit & 1)),
+            (Ok(HncAnswer::Whole(whole)), None) => Value::from_number(f64::from(*whole)),
+            (Ok(HncAnswer::Real(real)), _) => Value::from_number(*real),
             (Ok(HncAnswer::Text(text)), _) => Ok(Value::Text(Arc::from(text.as_str()))),
             (Ok(HncAnswer::Alarms(_)), _) => Err(Absence::OutOfRange),
-            (Err(error), _) => Err(error.absence()),
+            (Err(error), _) => Err(error.to_absence()),
         }
     }
 }

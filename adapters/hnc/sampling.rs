@@ -69,7 +69,7 @@ pub struct Sampling {
 impl Sampling {
     /// Load current of the spindle and of these axes, and the spindle's speed.
     #[must_use]
-    pub fn of(spindle: i32, axes: &[i32]) -> Self {
+    pub fn from_axes(spindle: i32, axes: &[i32]) -> Self {
         let mut sampling = Self { items: vec![COUNTER], ..Self::default() };
         sampling.add(ACT_TRQ, spindle, "CURRENT");
         sampling.add(ACT_VEL, spindle, "SPEED");
@@ -79,7 +79,7 @@ impl Sampling {
 
     /// The same after the library was loaded anew: what was counted stays, the counter begins where it stands.
     #[must_use]
-    pub fn continuing(self, before: &Self) -> Self {
+    pub fn with_counts_of(self, before: &Self) -> Self {
         Self { counts: before.counts, ..self }
     }
 
@@ -103,7 +103,7 @@ impl Sampling {
     }
 
     /// The columns as blocks without gaps. `now_ms` is when they were fetched: the newest value is at most that old.
-    pub fn blocks(&mut self, columns: &Columns, now_ms: i64) -> Vec<SampleBlock> {
+    pub fn build_blocks(&mut self, columns: &Columns, now_ms: i64) -> Vec<SampleBlock> {
         let Some((counter, values)) = columns.values.split_first() else { return Vec::new() };
         let rows = values.iter().map(Vec::len).chain([counter.len()]).min().unwrap_or(0);
         let mut blocks: Vec<SampleBlock> = Vec::new();
@@ -111,12 +111,12 @@ impl Sampling {
             // The register has 16 bits.
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low half is meant")]
             let count = counter[row] as u16;
-            let Some(step) = self.step(count) else { continue };
+            let Some(step) = self.count_step(count) else { continue };
             let newest = i64::try_from(rows - row).unwrap_or(0);
             let at_ms = self.last.map_or(now_ms - newest, |(_, last_ms)| last_ms + i64::from(step));
             self.last = Some((count, at_ms));
             if blocks.is_empty() || step > 1 {
-                blocks.push(self.empty(at_ms));
+                blocks.push(self.build_empty_block(at_ms));
             }
             if let Some(block) = blocks.last_mut() {
                 block.instants += 1;
@@ -129,7 +129,7 @@ impl Sampling {
     }
 
     /// Milliseconds since the last one; `None` for one that was there already.
-    fn step(&mut self, count: u16) -> Option<u16> {
+    fn count_step(&mut self, count: u16) -> Option<u16> {
         let Some((last, _)) = self.last else { return Some(1) };
         match count.wrapping_sub(last) {
             0 | 0x8000.. => {
@@ -143,7 +143,7 @@ impl Sampling {
         }
     }
 
-    fn empty(&self, begin_ms: i64) -> SampleBlock {
+    fn build_empty_block(&self, begin_ms: i64) -> SampleBlock {
         let column = |path: &String| ItemColumn { path: path.clone(), values: Vec::new(), step_ms: 1.0, word: None };
         let columns = self.names.iter().map(column).collect();
         SampleBlock { channel: "hnc".to_owned(), begin_ms, interval_ms: 1.0, instants: 0, columns }
@@ -162,10 +162,10 @@ mod tests {
 
     #[test]
     fn milliseconds_follow_each_other_over_the_end_of_the_counter() {
-        let mut sampling = Sampling::of(5, &[]);
+        let mut sampling = Sampling::from_axes(5, &[]);
         assert_eq!(sampling.items().len(), 3);
-        let first = sampling.blocks(&columns(65_400..65_500), 1_000_000);
-        let second = sampling.blocks(&columns(65_500..65_700), 1_000_205);
+        let first = sampling.build_blocks(&columns(65_400..65_500), 1_000_000);
+        let second = sampling.build_blocks(&columns(65_500..65_700), 1_000_205);
         assert_eq!((first.len(), second.len()), (1, 1));
         assert_eq!(first[0].begin_ms, 999_900);
         assert_eq!((second[0].begin_ms, second[0].instants), (1_000_000, 200), "no gap, whenever it was fetched");
@@ -175,13 +175,13 @@ mod tests {
 
     #[test]
     fn a_gap_splits_and_a_repetition_is_dropped() {
-        let mut sampling = Sampling::of(5, &[0, 2]);
-        sampling.blocks(&columns(0..100), 1000);
-        let again = sampling.blocks(&columns(50..150), 1050);
+        let mut sampling = Sampling::from_axes(5, &[0, 2]);
+        sampling.build_blocks(&columns(0..100), 1000);
+        let again = sampling.build_blocks(&columns(50..150), 1050);
         assert_eq!((again[0].instants, again[0].columns[0].values[0]), (50, Some(1000.0)));
-        let later = sampling.blocks(&columns(160..200), 1100);
+        let later = sampling.build_blocks(&columns(160..200), 1100);
         assert_eq!(later[0].begin_ms, again[0].begin_ms + 60);
         assert_eq!(sampling.counts(), Sampled { instants: 190, missing: 10, repeated: 50 });
-        assert!(sampling.blocks(&Columns::default(), 0).is_empty());
+        assert!(sampling.build_blocks(&Columns::default(), 0).is_empty());
     }
 }

@@ -26,7 +26,7 @@ pub struct MergeCounts {
 }
 
 impl MergeCounts {
-    pub(super) fn count(&mut self, put: Put, late: bool) {
+    pub(super) fn count_reading(&mut self, put: Put, late: bool) {
         self.late += u64::from(late && put != Put::TooLate);
         match put {
             Put::Newest => {}

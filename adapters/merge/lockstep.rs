@@ -62,14 +62,14 @@ impl Lockstep {
             if at_ns > now_ns {
                 return true;
             }
-            match feed.source.pull(&mut self.readings) {
+            match feed.source.pull_readings(&mut self.readings) {
                 Ok(()) => {
                     see(SourceId(index), Some(&self.readings));
                     feed.last_error = None;
                 }
                 Err(error) => {
                     see(SourceId(index), None);
-                    self.merge.fail(SourceId(index), at_ns, &error);
+                    self.merge.record_failure(SourceId(index), at_ns, &error);
                     feed.last_error = Some(error);
                     if feed.source.next_ns() == Some(at_ns) {
                         return false;

@@ -51,7 +51,7 @@ pub struct SourcePlan {
 impl SourcePlan {
     /// The plan of a live source.
     #[must_use]
-    pub fn of(source: &dyn Source) -> Self {
+    pub fn from_source(source: &dyn Source) -> Self {
         Self { name: source.name().to_owned(), channels: source.channels().to_vec(), period: source.period() }
     }
 
@@ -134,8 +134,8 @@ impl Merge {
     #[must_use]
     pub fn new(plans: &[SourcePlan], delay: Delay) -> Self {
         let delay_ns = delay_of(plans, delay);
-        let channels = ChannelId::count();
-        let pace = |plan: &SourcePlan| PeriodLimits::new(nanoseconds(plan.period), delay_ns);
+        let channels = ChannelId::count_channels();
+        let pace = |plan: &SourcePlan| PeriodLimits::new(to_nanoseconds(plan.period), delay_ns);
         let mut merge = Self {
             sources: plans
                 .iter()
@@ -155,7 +155,7 @@ impl Merge {
             last_tick_ns: TimeNs::MIN,
             tick_steps: 0,
         };
-        ChannelId::all().take(channels).for_each(|channel| merge.add_lane(plans, channel));
+        ChannelId::list_all().take(channels).for_each(|channel| merge.add_lane(plans, channel));
         merge
     }
 
@@ -180,7 +180,7 @@ impl Merge {
     /// What this source says from now on was true so much before its stamps (behind them where negative). Whoever changes
     /// it does so slowly, by less than the time that passes; beyond [`LAG_MAX`] it is cut off.
     pub fn set_lag_ns(&mut self, source: SourceId, lag_ns: i64) {
-        let most_ns = nanoseconds(LAG_MAX);
+        let most_ns = to_nanoseconds(LAG_MAX);
         if let Some(state) = self.sources.get_mut(source.0) {
             state.lag_ns = lag_ns.clamp(-most_ns, most_ns);
         }
@@ -195,7 +195,7 @@ impl Merge {
     /// A source turned out to be slower (or faster) than it promised: gaps are measured with this period from now on.
     pub fn set_period(&mut self, source: SourceId, period: Duration) {
         let Some(state) = self.sources.get_mut(source.0) else { return };
-        state.pace = PeriodLimits::new(nanoseconds(period), self.delay_ns);
+        state.pace = PeriodLimits::new(to_nanoseconds(period), self.delay_ns);
     }
 
     /// Takes a reading. One of a channel that the source did not announce is counted and dropped.
@@ -215,8 +215,8 @@ impl Merge {
         }
         state.newest_ns = state.newest_ns.max(mid_ns);
         let late = mid_ns <= self.last_tick_ns;
-        let put = track.put(mid_ns, reading.value, self.last_tick_ns, &state.pace);
-        state.counts.count(put, late);
+        let put = track.insert_reading(mid_ns, reading.value, self.last_tick_ns, &state.pace);
+        state.counts.count_reading(put, late);
     }
 
     /// Takes every reading out of `readings`.
@@ -225,16 +225,16 @@ impl Merge {
     }
 
     /// A whole poll of the source failed at `at_ns`. Its channels have the reason from then on until the next answer.
-    pub fn fail(&mut self, source: SourceId, at_ns: TimeNs, error: &SourceError) {
+    pub fn record_failure(&mut self, source: SourceId, at_ns: TimeNs, error: &SourceError) {
         let Some(state) = self.sources.get_mut(source.0) else { return };
         state.counts.failures += 1;
         let since_ns = at_ns - state.lag_ns;
-        let new = Failure { after_ns: state.newest_ns, since_ns, until_ns: None, reason: error.absence() };
+        let new = Failure { after_ns: state.newest_ns, since_ns, until_ns: None, reason: error.to_absence() };
         let going_on = state.failure.filter(|failure| failure.until_ns.is_none());
         state.failure = Some(going_on.map_or(new, |failure| Failure { reason: new.reason, ..failure }));
     }
 
-    /// Writes every announced channel at `at_ns` into `sample` (from [`Sample::empty`]); other slots are left alone.
+    /// Writes every announced channel at `at_ns` into `sample` (from [`Sample::new_empty`]); other slots are left alone.
     /// Ticks normally increase; one that goes back counts as a clock step.
     pub fn sample_into(&mut self, sample: &mut Sample, at_ns: TimeNs) {
         if at_ns < self.last_tick_ns {
@@ -243,8 +243,8 @@ impl Merge {
         self.last_tick_ns = at_ns;
         sample.at_ns = at_ns;
         for lane in &self.lanes {
-            let slot = best(&mut self.tracks[lane.tracks.clone()], &mut self.sources, at_ns);
-            sample.set(lane.channel, slot);
+            let slot = choose_slot(&mut self.tracks[lane.tracks.clone()], &mut self.sources, at_ns);
+            sample.set_slot(lane.channel, slot);
         }
     }
 
@@ -269,24 +269,24 @@ impl Merge {
 }
 
 /// The first source with a value wins; without any, the reason of the first one stands.
-fn best(tracks: &mut [ReadingTrack], sources: &mut [SourceState], at_ns: TimeNs) -> Slot {
+fn choose_slot(tracks: &mut [ReadingTrack], sources: &mut [SourceState], at_ns: TimeNs) -> Slot {
     let mut reason: Option<Slot> = None;
     for track in tracks {
         let state = &mut sources[track.source];
-        let slot = explained(track.at(at_ns, state.pace.gap_ns), state.failure, at_ns);
+        let slot = explain_absence(track.evaluate_at(at_ns, state.pace.gap_ns), state.failure, at_ns);
         if slot.value.is_ok() {
             state.counts.stepped_in += u64::from(reason.is_some());
             return slot;
         }
         reason.get_or_insert(slot);
     }
-    reason.unwrap_or_else(|| Slot::absent(Absence::NotProvided))
+    reason.unwrap_or_else(|| Slot::from_absence(Absence::NotProvided))
 }
 
 /// Replaces "stale" and "not yet read" by what the source itself said. A poll that failed ends the freshness of what came
 /// before it: nothing is known from its end until the next answer. A number between two answers was measured on either
 /// side and stays.
-fn explained(slot: Slot, failure: Option<Failure>, at_ns: TimeNs) -> Slot {
+fn explain_absence(slot: Slot, failure: Option<Failure>, at_ns: TimeNs) -> Slot {
     let Some(failure) = failure.filter(|failure| !failure.ended_by(at_ns)) else { return slot };
     match slot.value {
         Err(Absence::Stale | Absence::NotYetRead) if failure.after_ns <= at_ns => {
@@ -305,12 +305,12 @@ fn delay_of(plans: &[SourcePlan], delay: Delay) -> i64 {
     let slowest = plans.iter().filter(waits).map(|plan| plan.period).max();
     let slowest = slowest.or_else(|| plans.iter().map(|plan| plan.period).max()).unwrap_or_default();
     match delay {
-        Delay::Fixed(delay) => nanoseconds(delay),
-        Delay::SlowestPeriod => nanoseconds((slowest * 5 / 4).min(DELAY_MAX)),
+        Delay::Fixed(delay) => to_nanoseconds(delay),
+        Delay::SlowestPeriod => to_nanoseconds((slowest * 5 / 4).min(DELAY_MAX)),
     }
 }
 
-fn nanoseconds(duration: Duration) -> i64 {
+fn to_nanoseconds(duration: Duration) -> i64 {
     i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX / 8).min(i64::MAX / 8)
 }
 

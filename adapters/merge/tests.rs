@@ -7,7 +7,7 @@ use std::sync::Arc;
 const MS: i64 = 1_000_000;
 
 fn channel(name: &str) -> ChannelId {
-    ChannelId::of(name).expect("in the table")
+    ChannelId::from_name(name).expect("in the table")
 }
 
 fn plan(name: &str, channels: &[&str], period_ms: u64) -> SourcePlan {
@@ -24,11 +24,11 @@ fn one() -> Merge {
 }
 
 fn number(name: &str, at_ms: i64, number: f64) -> Reading {
-    Reading::number(channel(name), Stamp::exact(at_ms * MS), number)
+    Reading::from_number(channel(name), Stamp::from_exact_time(at_ms * MS), number)
 }
 
 fn at(merge: &mut Merge, at_ms: i64) -> Sample {
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     merge.sample_into(&mut sample, at_ms * MS);
     sample
 }
@@ -73,7 +73,7 @@ fn nothing_bridges_a_gap_of_more_than_two_periods() {
 fn the_sources_own_reason_stands_once_the_value_is_too_old() {
     let mut merge = one();
     merge.push(SourceId(0), number("spindle_speed_rpm", 0, 100.0));
-    merge.fail(SourceId(0), 290 * MS, &line_error());
+    merge.record_failure(SourceId(0), 290 * MS, &line_error());
     assert_eq!(speed(&mut merge, 150), Ok(100.0));
     assert_eq!(speed(&mut merge, 250), Err(Absence::Disconnected), "the poll that failed began before its end");
     assert_eq!(speed(&mut merge, 300), Err(Absence::Disconnected));
@@ -86,7 +86,7 @@ fn the_sources_own_reason_stands_once_the_value_is_too_old() {
 fn a_machine_that_is_off_has_no_values_at_once() {
     let mut merge = one();
     merge.push(SourceId(0), number("spindle_speed_rpm", 0, 100.0));
-    merge.fail(SourceId(0), 50 * MS, &SourceError::Off { source_name: "cnc".into() });
+    merge.record_failure(SourceId(0), 50 * MS, &SourceError::Off { source_name: "cnc".into() });
     assert_eq!(speed(&mut merge, 49), Ok(100.0));
     assert_eq!(speed(&mut merge, 50), Err(Absence::MachineOff));
 }
@@ -95,7 +95,7 @@ fn a_machine_that_is_off_has_no_values_at_once() {
 fn an_absent_reading_hides_the_value_before_it() {
     let mut merge = one();
     merge.push(SourceId(0), number("spindle_speed_rpm", 0, 100.0));
-    let gone = Reading::absent(channel("spindle_speed_rpm"), Stamp::exact(100 * MS), Absence::Refused);
+    let gone = Reading::from_absence(channel("spindle_speed_rpm"), Stamp::from_exact_time(100 * MS), Absence::Refused);
     merge.push(SourceId(0), gone);
     assert_eq!(speed(&mut merge, 99), Ok(100.0), "not interpolated towards an absence");
     assert_eq!(speed(&mut merge, 100), Err(Absence::Refused));
@@ -159,7 +159,7 @@ fn the_first_configured_source_wins_while_it_has_a_value() {
 #[test]
 fn words_hold_and_unannounced_channels_are_counted() {
     let mut merge = one();
-    merge.push(SourceId(0), Reading::text(channel("program"), Stamp::exact(0), Arc::from("O1001")));
+    merge.push(SourceId(0), Reading::from_text(channel("program"), Stamp::from_exact_time(0), Arc::from("O1001")));
     merge.push(SourceId(0), number("total_power_w", 0, 1.0));
     let sample = at(&mut merge, 150);
     assert_eq!(sample.text(channel("program")), Some("O1001"));
@@ -188,18 +188,18 @@ fn a_slower_source_than_promised_can_be_told() {
 
 #[test]
 fn a_source_that_lags_is_put_back_to_its_time() {
-    let power = ChannelId::of("spindle_power_w").expect("in the table");
+    let power = ChannelId::from_name("spindle_power_w").expect("in the table");
     let plan = SourcePlan { name: "meter".to_owned(), channels: vec![power], period: Duration::from_millis(100) };
     let mut merge = Merge::new(&[plan], Delay::SlowestPeriod);
     let plain_ns = merge.delay_ns();
-    let (mut sample, mut last_ns, mut error) = (Sample::empty(0), i64::MIN, f64::INFINITY);
+    let (mut sample, mut last_ns, mut error) = (Sample::new_empty(0), i64::MIN, f64::INFINITY);
     for tick in 1..=100_i64 {
         let now_ns = tick * 100_000_000;
         merge.set_lag_ns(SourceId(0), (tick * 5_000_000).min(240_000_000));
         // The meter says at t what was true 240 ms before: a ramp of 1 W per ms.
         #[expect(clippy::cast_precision_loss, reason = "small")]
         let said_w = (now_ns / 1_000_000 - 240) as f64;
-        merge.push(SourceId(0), Reading::number(power, Stamp::exact(now_ns), said_w));
+        merge.push(SourceId(0), Reading::from_number(power, Stamp::from_exact_time(now_ns), said_w));
         let at_ns = now_ns - merge.delay_ns();
         assert!(at_ns > last_ns, "ticks keep their order");
         last_ns = at_ns;

@@ -72,7 +72,7 @@ impl ReadingTrack {
     }
 
     /// Puts a reading in its place.
-    pub(super) fn put(
+    pub(super) fn insert_reading(
         &mut self,
         mid_ns: TimeNs,
         value: Result<Value, Absence>,
@@ -88,10 +88,10 @@ impl ReadingTrack {
         }
         if mid_ns < last_ns.saturating_sub(pace.horizon_ns) && last_ns > last_tick_ns {
             self.drop_after(mid_ns.saturating_add(pace.horizon_ns));
-            let at = self.before(mid_ns);
+            let at = self.count_before(mid_ns);
             return self.insert(at, TrackPoint { mid_ns, value }, Put::AfterStep);
         }
-        let at = self.before(mid_ns);
+        let at = self.count_before(mid_ns);
         match at.checked_sub(1).and_then(|at| self.points.get_mut(at)).filter(|point| point.mid_ns == mid_ns) {
             Some(point) => {
                 point.value = value;
@@ -102,7 +102,7 @@ impl ReadingTrack {
     }
 
     /// How many readings are not after `at_ns`.
-    fn before(&self, at_ns: TimeNs) -> usize {
+    fn count_before(&self, at_ns: TimeNs) -> usize {
         self.points.partition_point(|point| point.mid_ns <= at_ns)
     }
 
@@ -122,19 +122,20 @@ impl ReadingTrack {
 
     /// Forgets the readings after `limit_ns`.
     pub(super) fn drop_after(&mut self, limit_ns: TimeNs) {
-        self.points.truncate(self.before(limit_ns));
+        self.points.truncate(self.count_before(limit_ns));
     }
 
     /// What is known at `at_ns`; forgets what no later tick can need.
-    pub(super) fn at(&mut self, at_ns: TimeNs, gap_ns: i64) -> Slot {
+    pub(super) fn evaluate_at(&mut self, at_ns: TimeNs, gap_ns: i64) -> Slot {
         while self.points.get(1).is_some_and(|point| point.mid_ns <= at_ns) {
             self.points.pop_front();
         }
         let Some(before) = self.points.front().filter(|point| point.mid_ns <= at_ns) else {
-            return Slot::absent(Absence::NotYetRead);
+            return Slot::from_absence(Absence::NotYetRead);
         };
         let age_ns = at_ns - before.mid_ns;
-        if let Some(value) = self.points.get(1).and_then(|after| self.between(before, after, at_ns, gap_ns)) {
+        if let Some(value) = self.points.get(1).and_then(|after| self.interpolate_between(before, after, at_ns, gap_ns))
+        {
             return Slot { value: Ok(Value::Number(value)), age_ns: 0 };
         }
         if age_ns > gap_ns {
@@ -145,7 +146,7 @@ impl ReadingTrack {
 
     /// Linear between two numbers around the tick, when they are close enough together and of one kind: between nothing and
     /// something an electrical quantity was never measured, so the earlier number is held.
-    fn between(&self, before: &TrackPoint, after: &TrackPoint, at_ns: TimeNs, gap_ns: i64) -> Option<f64> {
+    fn interpolate_between(&self, before: &TrackPoint, after: &TrackPoint, at_ns: TimeNs, gap_ns: i64) -> Option<f64> {
         let width_ns = after.mid_ns.checked_sub(before.mid_ns).filter(|width_ns| *width_ns <= gap_ns)?;
         if !self.continuous || before.mid_ns == at_ns {
             return None;
@@ -154,11 +155,11 @@ impl ReadingTrack {
         if self.electric && (from == 0.0) != (to == 0.0) {
             return None;
         }
-        Some(from + (to - from) * share(at_ns - before.mid_ns, width_ns))
+        Some(from + (to - from) * compute_share(at_ns - before.mid_ns, width_ns))
     }
 }
 
 #[expect(clippy::cast_precision_loss, reason = "both are within two periods, far below 2^53 ns")]
-fn share(part_ns: i64, whole_ns: i64) -> f64 {
+fn compute_share(part_ns: i64, whole_ns: i64) -> f64 {
     part_ns as f64 / whole_ns as f64
 }

@@ -49,7 +49,7 @@ impl ModbusError {
                 SourceError::Timeout { source_name, request, deadline_ms, next }
             }
             Self::Refused(code) => {
-                let (what, next) = pdu::exception(code);
+                let (what, next) = pdu::describe_exception(code);
                 let what = format!("exception {code}, {what}");
                 SourceError::Refused { source_name, request, what, next: format!("{next}.") }
             }
@@ -61,7 +61,7 @@ impl ModbusError {
 /// Something over which a unit can be asked.
 pub(crate) trait ModbusLine: Send {
     /// Asks and waits. `answer_bytes` is the length of a good answer without address and check.
-    fn ask(
+    fn exchange_pdu(
         &mut self,
         clock: &dyn Clock,
         unit: u8,

@@ -46,7 +46,7 @@ impl ModbusMeter {
     ///
     /// # Errors
     /// In words: an unusable profile; another address that uses the same host and port with other frames.
-    pub fn tcp(address: &Address, at: &Endpoint, meter: &MeterTarget) -> Result<Self, String> {
+    pub fn with_tcp_line(address: &Address, at: &Endpoint, meter: &MeterTarget) -> Result<Self, String> {
         let line = TcpLine::new(at, meter.framing, meter.timeout)?;
         Self::new(address, Box::new(line), meter, None)
     }
@@ -55,8 +55,8 @@ impl ModbusMeter {
     ///
     /// # Errors
     /// In words: an unusable profile; a line that another address uses at another speed.
-    pub fn rtu(address: &Address, target: &SerialTarget, meter: &MeterTarget) -> Result<Self, String> {
-        let line = RtuLine::new(Bus::of(target)?, meter.timeout);
+    pub fn with_rtu_line(address: &Address, target: &SerialTarget, meter: &MeterTarget) -> Result<Self, String> {
+        let line = RtuLine::new(Bus::from_target(target)?, meter.timeout);
         Self::new(address, Box::new(line), meter, Some(target.clone()))
     }
 
@@ -66,16 +66,17 @@ impl ModbusMeter {
         meter: &MeterTarget,
         serial: Option<SerialTarget>,
     ) -> Result<Self, String> {
-        let profile = profile::find(&meter.profile, meter.profiles.as_deref()).map_err(|error| error.to_string())?;
-        let mut registers = outputs::registers(&profile, meter)?;
-        let outputs = outputs::of(&profile, meter.circuit)?;
+        let profile =
+            profile::find_profile(&meter.profile, meter.profiles.as_deref()).map_err(|error| error.to_string())?;
+        let mut registers = outputs::list_registers(&profile, meter)?;
+        let outputs = outputs::list_channels(&profile, meter.circuit)?;
         let mut own = Vec::new();
         for channel in &meter.own {
             let from = registers.len();
-            registers.extend(channel.item.registers(channel.id));
+            registers.extend(channel.item.list_registers(channel.id));
             own.push((channel.clone(), from..registers.len()));
         }
-        let blocks = PollBlocks::of(&registers, profile.block_max, profile.block_gap)?;
+        let blocks = PollBlocks::from_registers(&registers, profile.block_max, profile.block_gap)?;
         let busy = serial.as_ref().map(|line| blocks.wire_time(line) * 5 / 4).unwrap_or_default();
         let channels = outputs.iter().map(|output| output.channel).chain(own.iter().map(|(own, _)| own.id));
         Ok(Self {
@@ -102,39 +103,42 @@ impl ModbusMeter {
         &self.profile
     }
 
-    fn failed(&self, (error, request): (ModbusError, String)) -> SourceError {
+    fn build_error(&self, (error, request): (ModbusError, String)) -> SourceError {
         error.of_source(&self.name, request, self.line.deadline())
     }
 
     fn own_reading(&self, own: &Own<OwnRegister>, places: &Range<usize>) -> Reading {
         let registers = self.registers.get(places.clone()).unwrap_or_default();
-        let mut stamp = self.poll.all().1;
+        let mut stamp = self.poll.list_all_registers().1;
         let mut parts: Vec<(&MeterRegister, Result<&[u16], Absence>)> = Vec::with_capacity(registers.len());
         for register in registers {
-            let found = self.poll.registers(register);
+            let found = self.poll.find_registers(register);
             stamp = found.as_ref().map_or_else(|(_, at)| *at, |(_, at)| *at);
             parts.push((register, found.map(|(found, _)| found).map_err(|(why, _)| why)));
         }
-        own.reading(stamp, own.found(&parts))
+        own.to_reading(stamp, own.extract_value(&parts))
     }
 
     /// Tries a profile on this meter: what it would give, or why it does not fit.
     fn try_profile(&mut self, clock: &dyn Clock, name: &str) -> Result<String, String> {
-        let profile = profile::find(name, self.target.profiles.as_deref()).map_err(|error| error.to_string())?;
-        let outputs = outputs::of(&profile, self.target.circuit)?;
-        let blocks = PollBlocks::of(&profile.registers, profile.block_max, profile.block_gap)?;
+        let profile =
+            profile::find_profile(name, self.target.profiles.as_deref()).map_err(|error| error.to_string())?;
+        let outputs = outputs::list_channels(&profile, self.target.circuit)?;
+        let blocks = PollBlocks::from_registers(&profile.registers, profile.block_max, profile.block_gap)?;
         let mut poll = RegisterPoll::new(blocks);
         poll.read(self.line.as_mut(), clock, self.target.unit).map_err(|(error, request)| match error {
-            ModbusError::Refused(code) => format!("{request}: exception {code}, {}", super::pdu::exception(code).0),
+            ModbusError::Refused(code) => {
+                format!("{request}: exception {code}, {}", super::pdu::describe_exception(code).0)
+            }
             ModbusError::Timeout { .. } => format!("{request}: no answer"),
             ModbusError::Line { what, .. } | ModbusError::Garbled(what) => what,
         })?;
-        let doubts = SupplyCheck::default().see(&outputs::supply(&profile.registers, &poll));
+        let doubts = SupplyCheck::default().judge_values(&outputs::collect_supply_values(&profile.registers, &poll));
         if let Some(problem) = doubts.problems.first() {
             return Err(problem.what.clone());
         }
         let shown = |output: &MeterChannel| {
-            let reading = output.reading(&profile.registers, &poll, &doubts);
+            let reading = output.build_reading(&profile.registers, &poll, &doubts);
             let unit = output.channel.channel().unit;
             match (reading.value.ok().and_then(|value| value.as_number()), reading.implausible) {
                 (Some(number), _) => Ok(format!("{} {number:.6} {unit}", output.channel)),
@@ -147,8 +151,8 @@ impl ModbusMeter {
         Ok(format!("may be it: {}{note}", values.join(", ")))
     }
 
-    fn missing(&self) -> Option<SourceProblem> {
-        let missing = self.registers.iter().filter(|register| !self.poll.has(register));
+    fn describe_missing(&self) -> Option<SourceProblem> {
+        let missing = self.registers.iter().filter(|register| !self.poll.has_register(register));
         let addresses: Vec<String> = missing.map(|register| register.address.to_string()).collect();
         (!addresses.is_empty()).then(|| SourceProblem {
             what: format!(
@@ -165,7 +169,7 @@ impl ModbusMeter {
 fn point_name(register: &MeterRegister) -> Option<Fact> {
     let RegisterMeaning::Channel(channel) = register.quantity else { return None };
     let name = register.name.as_ref()?;
-    Some(Fact::text(channel.name(), name.clone()))
+    Some(Fact::from_text(channel.name(), name.clone()))
 }
 
 impl Source for ModbusMeter {
@@ -183,52 +187,52 @@ impl Source for ModbusMeter {
 
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         if let Err(failed) = self.poll.read(self.line.as_mut(), clock, self.target.unit) {
-            self.refresh.interrupt();
-            return Err(self.failed(failed));
+            self.refresh.forget_last_change();
+            return Err(self.build_error(failed));
         }
-        let (all, stamp) = self.poll.all();
+        let (all, stamp) = self.poll.list_all_registers();
         self.refresh.push(all, stamp.mid_ns);
-        self.doubts = self.check.see(&outputs::supply(&self.registers, &self.poll));
-        out.extend(self.outputs.iter().map(|output| output.reading(&self.registers, &self.poll, &self.doubts)));
+        self.doubts = self.check.judge_values(&outputs::collect_supply_values(&self.registers, &self.poll));
+        out.extend(self.outputs.iter().map(|output| output.build_reading(&self.registers, &self.poll, &self.doubts)));
         out.extend(self.own.iter().map(|(own, places)| self.own_reading(own, places)));
         Ok(())
     }
 
-    fn facts(&self) -> Vec<Fact> {
-        let mut facts = vec![Fact::text("meter", self.profile.meter.clone())];
+    fn collect_facts(&self) -> Vec<Fact> {
+        let mut facts = vec![Fact::from_text("meter", self.profile.meter.clone())];
         if !self.profile.confirmed {
-            facts.push(Fact::text("register_map", format!("to be confirmed: {}", self.profile.source)));
+            facts.push(Fact::from_text("register_map", format!("to be confirmed: {}", self.profile.source)));
         }
         if let Some(line) = &self.serial {
             let wire = self.poll.wire_time(line);
-            facts.push(Fact::number("wire_time_ms", wire.as_secs_f64() * 1e3));
-            facts.push(Fact::number("wire_share_pct", 100.0 * wire.as_secs_f64() / self.period.as_secs_f64()));
+            facts.push(Fact::from_number("wire_time_ms", wire.as_secs_f64() * 1e3));
+            facts.push(Fact::from_number("wire_share_pct", 100.0 * wire.as_secs_f64() / self.period.as_secs_f64()));
         }
         if self.poll.is_split() {
-            let requests = u32::try_from(self.poll.requests()).unwrap_or(u32::MAX);
-            facts.push(Fact::number("requests_per_poll", f64::from(requests)));
+            let requests = u32::try_from(self.poll.count_requests()).unwrap_or(u32::MAX);
+            facts.push(Fact::from_number("requests_per_poll", f64::from(requests)));
         }
-        match self.refresh.effective() {
+        match self.refresh.estimate_interval() {
             Some(found) if found.at_least_as_fast => {
-                facts.push(Fact::text("effective_refresh", "at least as fast as it is polled"));
+                facts.push(Fact::from_text("effective_refresh", "at least as fast as it is polled"));
             }
             Some(found) => {
-                facts.push(Fact::number("effective_refresh_s", found.refresh_s));
-                facts.push(Fact::number("effective_refresh_uncertainty_s", found.uncertainty_s));
+                facts.push(Fact::from_number("effective_refresh_s", found.refresh_s));
+                facts.push(Fact::from_number("effective_refresh_uncertainty_s", found.uncertainty_s));
             }
-            None => facts.push(Fact::text("effective_refresh", "not known yet")),
+            None => facts.push(Fact::from_text("effective_refresh", "not known yet")),
         }
         #[expect(clippy::cast_precision_loss, reason = "a count of late answers stays far below 2^53")]
-        facts.push(Fact::number("late_answers", self.line.late_answers() as f64));
+        facts.push(Fact::from_number("late_answers", self.line.late_answers() as f64));
         facts.extend(self.profile.registers.iter().filter_map(point_name));
         facts
     }
 
-    fn problems(&self) -> Vec<SourceProblem> {
-        self.doubts.problems.iter().cloned().chain(self.missing()).collect()
+    fn list_problems(&self) -> Vec<SourceProblem> {
+        self.doubts.problems.iter().cloned().chain(self.describe_missing()).collect()
     }
 
-    fn offers(&mut self, clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
+    fn list_offers(&mut self, clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
         let names: Vec<&str> = profile::SHIPPED.iter().map(|(name, _)| *name).collect();
         let offer =
             |name: &str| Offer { name: format!("profile={name}"), says: self.try_profile(clock, name), channel: None };

@@ -60,7 +60,7 @@ impl WordOrder {
     }
 
     /// A register with its high byte first.
-    fn word(self, register: u16) -> u16 {
+    fn to_big_endian(self, register: u16) -> u16 {
         if matches!(self, Self::Badc | Self::Dcba) { register.swap_bytes() } else { register }
     }
 
@@ -72,7 +72,7 @@ impl WordOrder {
 impl Format {
     /// How many registers.
     #[must_use]
-    pub fn registers(self) -> u16 {
+    pub fn register_count(self) -> u16 {
         match self {
             Self::U16 | Self::I16 | Self::Sm16 => 1,
             Self::U32 | Self::I32 | Self::Sm32 | Self::F32 => 2,
@@ -99,8 +99,8 @@ impl Format {
 
     /// The bits in these registers; `None` when they are too few.
     #[must_use]
-    pub fn raw(self, registers: &[u16], order: WordOrder) -> Option<u64> {
-        Some(bits(registers.get(..usize::from(self.registers()))?, order))
+    pub fn extract_bits(self, registers: &[u16], order: WordOrder) -> Option<u64> {
+        Some(join_bits(registers.get(..usize::from(self.register_count()))?, order))
     }
 
     /// Bits that stand for no value unless a profile says otherwise: the ends of the range of a whole number, where meters
@@ -121,14 +121,14 @@ impl Format {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "no meter counts beyond 2^53")]
     pub fn decode(self, registers: &[u16], order: WordOrder) -> Option<f64> {
-        let bits = bits(registers.get(..usize::from(self.registers()))?, order);
+        let bits = join_bits(registers.get(..usize::from(self.register_count()))?, order);
         let low = |bits: u64| u32::try_from(bits & 0xFFFF_FFFF).unwrap_or(0);
         let number = match self {
             Self::U16 | Self::U32 => bits as f64,
             Self::I16 => f64::from(u16::try_from(bits & 0xFFFF).unwrap_or(0).cast_signed()),
             Self::I32 => f64::from(low(bits).cast_signed()),
-            Self::Sm16 => magnitude(bits, 15),
-            Self::Sm32 => magnitude(bits, 31),
+            Self::Sm16 => decode_sign_magnitude(bits, 15),
+            Self::Sm32 => decode_sign_magnitude(bits, 31),
             Self::F32 => f64::from(f32::from_bits(low(bits))),
             Self::I64 => bits.cast_signed() as f64,
             Self::F64 => f64::from_bits(bits),
@@ -152,19 +152,19 @@ impl Format {
             Self::I64 => (whole as i64).cast_unsigned(),
             Self::F64 => number.to_bits(),
         };
-        let words = (0..self.registers()).map(|word| u16::try_from((bits >> (16 * word)) & 0xFFFF).unwrap_or(0));
-        let words = words.map(|word| order.word(word));
+        let words = (0..self.register_count()).map(|word| u16::try_from((bits >> (16 * word)) & 0xFFFF).unwrap_or(0));
+        let words = words.map(|word| order.to_big_endian(word));
         if order.low_word_first() { words.collect() } else { words.rev().collect() }
     }
 }
 
-fn bits(registers: &[u16], order: WordOrder) -> u64 {
-    let join = |bits: u64, register: &u16| (bits << 16) | u64::from(order.word(*register));
+fn join_bits(registers: &[u16], order: WordOrder) -> u64 {
+    let join = |bits: u64, register: &u16| (bits << 16) | u64::from(order.to_big_endian(*register));
     if order.low_word_first() { registers.iter().rev().fold(0, join) } else { registers.iter().fold(0, join) }
 }
 
 #[expect(clippy::cast_precision_loss, reason = "31 bits fit a double")]
-fn magnitude(bits: u64, sign: u32) -> f64 {
+fn decode_sign_magnitude(bits: u64, sign: u32) -> f64 {
     let size = (bits & ((1 << sign) - 1)) as f64;
     if bits >> sign & 1 == 1 { -size } else { size }
 }

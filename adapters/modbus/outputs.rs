@@ -43,7 +43,7 @@ pub(super) struct MeterChannel {
 }
 
 impl Law {
-    fn of(self, numbers: &[f64]) -> f64 {
+    fn combine_numbers(self, numbers: &[f64]) -> f64 {
         let sum: f64 = numbers.iter().sum();
         let count = f64::from(u32::try_from(numbers.len()).unwrap_or(1)).max(1.0);
         match self {
@@ -68,24 +68,24 @@ impl Believed {
 
 impl MeterChannel {
     /// What the last poll says of it.
-    pub(super) fn reading(&self, registers: &[MeterRegister], poll: &RegisterPoll, doubts: &Doubts) -> Reading {
+    pub(super) fn build_reading(&self, registers: &[MeterRegister], poll: &RegisterPoll, doubts: &Doubts) -> Reading {
         let mut numbers = Vec::with_capacity(3);
         let mut at = None;
         for register in self.parts.iter().filter_map(|part| registers.get(*part)) {
-            match poll.number(register) {
+            match poll.find_number(register) {
                 Ok((number, stamp)) => {
                     at = Some(stamp);
                     numbers.push(number);
                 }
-                Err((reason, stamp)) => return Reading::absent(self.channel, stamp, reason),
+                Err((reason, stamp)) => return Reading::from_absence(self.channel, stamp, reason),
             }
         }
-        let stamp = at.unwrap_or_else(|| poll.all().1);
-        let number = self.law.of(&numbers);
+        let stamp = at.unwrap_or_else(|| poll.list_all_registers().1);
+        let number = self.law.combine_numbers(&numbers);
         if self.believed.is_doubted(doubts) {
-            return Reading::implausible(self.channel, stamp, number);
+            return Reading::from_implausible(self.channel, stamp, number);
         }
-        Reading::number(self.channel, stamp, number)
+        Reading::from_number(self.channel, stamp, number)
     }
 }
 
@@ -93,7 +93,7 @@ impl MeterChannel {
 ///
 /// # Errors
 /// Transformers were given for a meter that counts them in.
-pub(super) fn registers(profile: &Profile, meter: &MeterTarget) -> Result<Vec<MeterRegister>, String> {
+pub(super) fn list_registers(profile: &Profile, meter: &MeterTarget) -> Result<Vec<MeterRegister>, String> {
     let given = (meter.ct - 1.0).abs() > 1e-12 || (meter.pt - 1.0).abs() > 1e-12;
     if given && !profile.secondary {
         return Err(format!("{} counts its transformers in: leave ct and pt out", profile.meter));
@@ -119,7 +119,7 @@ pub(super) fn registers(profile: &Profile, meter: &MeterTarget) -> Result<Vec<Me
 ///
 /// # Errors
 /// It gives none, or one twice.
-pub(super) fn of(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel>, String> {
+pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel>, String> {
     let all = |wanted: &dyn Fn(RegisterMeaning) -> bool| -> Vec<usize> {
         let each = profile.registers.iter().enumerate();
         each.filter(|(_, register)| wanted(register.quantity)).map(|(at, _)| at).collect()
@@ -132,7 +132,7 @@ pub(super) fn of(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel
     let place = if circuit == Circuit::Spindle { "spindle" } else { "total" };
     let mut outputs = Vec::new();
     let mut add = |name: &str, law, believed, parts: Vec<usize>| {
-        if let Some(channel) = ChannelId::of(name).filter(|_| !parts.is_empty()) {
+        if let Some(channel) = ChannelId::from_name(name).filter(|_| !parts.is_empty()) {
             outputs.push(MeterChannel { channel, law, believed, parts });
         }
     };
@@ -168,10 +168,10 @@ pub(super) fn of(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel
 }
 
 /// What the last poll says of the supply.
-pub(super) fn supply(registers: &[MeterRegister], poll: &RegisterPoll) -> SupplyValues {
+pub(super) fn collect_supply_values(registers: &[MeterRegister], poll: &RegisterPoll) -> SupplyValues {
     let mut values = SupplyValues::default();
     for register in registers {
-        let number = poll.number(register).ok().map(|(number, _)| number);
+        let number = poll.find_number(register).ok().map(|(number, _)| number);
         let phase = |of: &mut [Option<f64>; 3], at: usize| {
             if let Some(place) = of.get_mut(at) {
                 *place = number;

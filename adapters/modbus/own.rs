@@ -46,13 +46,13 @@ impl OwnRead for OwnRegister {
         let found = match words.as_slice() {
             [table, address, "text", count] => {
                 let count = count.parse().ok().filter(|count| (1..=TEXT_MAX).contains(count));
-                count.and_then(|count| at(table, address, InRegisters::Text(count)))
+                count.and_then(|count| parse_register(table, address, InRegisters::Text(count)))
             }
             [table, address, format] => Format::of_name(format)
-                .and_then(|format| at(table, address, InRegisters::Number(format, WordOrder::Big))),
+                .and_then(|format| parse_register(table, address, InRegisters::Number(format, WordOrder::Big))),
             [table, address, format, order] => Format::of_name(format)
                 .zip(WordOrder::of_name(order))
-                .and_then(|(format, order)| at(table, address, InRegisters::Number(format, order))),
+                .and_then(|(format, order)| parse_register(table, address, InRegisters::Number(format, order))),
             _ => None,
         };
         found.ok_or_else(|| {
@@ -68,7 +68,7 @@ impl OwnRead for OwnRegister {
     }
 }
 
-fn at(table: &str, address: &str, holds: InRegisters) -> Option<OwnRegister> {
+fn parse_register(table: &str, address: &str, holds: InRegisters) -> Option<OwnRegister> {
     let table = match table {
         "input" => RegisterTable::Input,
         "holding" => RegisterTable::Holding,
@@ -79,19 +79,19 @@ fn at(table: &str, address: &str, holds: InRegisters) -> Option<OwnRegister> {
         None => address.parse().ok()?,
     };
     let own = OwnRegister { table, address, holds };
-    (u32::from(address) + u32::from(own.count()) <= 65_536).then_some(own)
+    (u32::from(address) + u32::from(own.register_count()) <= 65_536).then_some(own)
 }
 
 impl OwnRegister {
-    fn count(&self) -> u16 {
+    fn register_count(&self) -> u16 {
         match self.holds {
-            InRegisters::Number(format, _) => format.registers(),
+            InRegisters::Number(format, _) => format.register_count(),
             InRegisters::Text(count) => count,
         }
     }
 
     /// The number as a register of a meter, and the registers of a text one by one.
-    pub(super) fn registers(&self, channel: ChannelId) -> Vec<MeterRegister> {
+    pub(super) fn list_registers(&self, channel: ChannelId) -> Vec<MeterRegister> {
         let register = |address, format: Format, order| MeterRegister {
             quantity: RegisterMeaning::Channel(channel),
             table: self.table,
@@ -112,16 +112,16 @@ impl OwnRegister {
 }
 
 impl Own<OwnRegister> {
-    /// What stands in the registers, before the scale. `parts` are those of [`OwnRegister::registers`], each with what it
+    /// What stands in the registers, before the scale. `parts` are those of [`OwnRegister::list_registers`], each with what it
     /// holds.
     ///
     /// # Errors
     /// The device does not have them, or says that there is no value.
-    pub(super) fn found(&self, parts: &[(&MeterRegister, Result<&[u16], Absence>)]) -> Result<Value, Absence> {
+    pub(super) fn extract_value(&self, parts: &[(&MeterRegister, Result<&[u16], Absence>)]) -> Result<Value, Absence> {
         match self.item.holds {
             InRegisters::Number(..) => {
                 let (register, found) = parts.first().ok_or(Absence::NotSupported)?;
-                Value::number(register.number((*found)?).ok_or(Absence::NotSupported)?)
+                Value::from_number(register.decode_number((*found)?).ok_or(Absence::NotSupported)?)
             }
             InRegisters::Text(_) => {
                 let words = parts
@@ -130,7 +130,7 @@ impl Own<OwnRegister> {
                 let bytes: Vec<u8> =
                     words.collect::<Result<Vec<u16>, _>>()?.into_iter().flat_map(u16::to_be_bytes).collect();
                 let encoding = self.channel.encoding.unwrap_or_default();
-                Ok(Value::Text(Arc::from(encoding.text(&bytes))))
+                Ok(Value::Text(Arc::from(encoding.decode_trimmed(&bytes))))
             }
         }
     }

@@ -17,7 +17,7 @@ pub enum RegisterTable {
 impl RegisterTable {
     /// The function code that reads it.
     #[must_use]
-    pub fn function(self) -> u8 {
+    pub fn function_code(self) -> u8 {
         match self {
             Self::Holding => 3,
             Self::Input => 4,
@@ -39,9 +39,9 @@ pub struct RegisterBlock {
 impl RegisterBlock {
     /// The request for it.
     #[must_use]
-    pub fn request(&self) -> [u8; 5] {
+    pub fn encode_request(&self) -> [u8; 5] {
         let ([start_high, start_low], [count_high, count_low]) = (self.start.to_be_bytes(), self.count.to_be_bytes());
-        [self.table.function(), start_high, start_low, count_high, count_low]
+        [self.table.function_code(), start_high, start_low, count_high, count_low]
     }
 
     /// Bytes of the answer without address and check.
@@ -54,11 +54,11 @@ impl RegisterBlock {
     ///
     /// # Errors
     /// See [`NoRegisters`].
-    pub fn registers(&self, answer: &[u8]) -> Result<Vec<u16>, NoRegisters> {
+    pub fn parse_answer(&self, answer: &[u8]) -> Result<Vec<u16>, NoRegisters> {
         match answer {
-            [function, code] if *function == self.table.function() | 0x80 => Err(NoRegisters::Refused(*code)),
+            [function, code] if *function == self.table.function_code() | 0x80 => Err(NoRegisters::Refused(*code)),
             [function, bytes, data @ ..]
-                if *function == self.table.function()
+                if *function == self.table.function_code()
                     && usize::from(*bytes) == data.len()
                     && data.len() == 2 * usize::from(self.count) =>
             {
@@ -70,7 +70,7 @@ impl RegisterBlock {
 
     /// What it asks for, for messages.
     #[must_use]
-    pub fn told(&self) -> String {
+    pub fn describe_block(&self) -> String {
         let table = if self.table == RegisterTable::Holding { "holding" } else { "input" };
         format!("{} {table} registers from {} (0x{:04X})", self.count, self.start, self.start)
     }
@@ -87,7 +87,7 @@ pub enum NoRegisters {
 
 /// What an exception code means (7), and what to do about it.
 #[must_use]
-pub fn exception(code: u8) -> (&'static str, &'static str) {
+pub fn describe_exception(code: u8) -> (&'static str, &'static str) {
     match code {
         1 => ("illegal function", "The meter keeps its values in the other table: see registers= in the profile"),
         2 => (
@@ -111,7 +111,7 @@ pub fn exception(code: u8) -> (&'static str, &'static str) {
 ///
 /// # Errors
 /// The exception code to answer with.
-pub fn understood(request: &[u8]) -> Result<RegisterBlock, u8> {
+pub fn parse_request(request: &[u8]) -> Result<RegisterBlock, u8> {
     let table = match request.first() {
         Some(3) => RegisterTable::Holding,
         Some(4) => RegisterTable::Input,
@@ -125,16 +125,16 @@ pub fn understood(request: &[u8]) -> Result<RegisterBlock, u8> {
 
 /// The answer that carries these registers (at most 125).
 #[must_use]
-pub fn answer(table: RegisterTable, registers: &[u16]) -> Vec<u8> {
+pub fn encode_answer(table: RegisterTable, registers: &[u16]) -> Vec<u8> {
     let bytes = u8::try_from(2 * registers.len()).unwrap_or(u8::MAX);
-    let mut answer = vec![table.function(), bytes];
+    let mut answer = vec![table.function_code(), bytes];
     answer.extend(registers.iter().flat_map(|register| register.to_be_bytes()));
     answer
 }
 
 /// The answer that refuses.
 #[must_use]
-pub fn refusal(function: u8, code: u8) -> Vec<u8> {
+pub fn encode_refusal(function: u8, code: u8) -> Vec<u8> {
     vec![function | 0x80, code]
 }
 
@@ -146,28 +146,28 @@ mod tests {
     fn the_example_of_the_specification() {
         // 6.3: registers 108 to 110 hold 02 2B, 00 00, 00 64.
         let block = RegisterBlock { table: RegisterTable::Holding, start: 0x6B, count: 3 };
-        assert_eq!(block.request(), [0x03, 0x00, 0x6B, 0x00, 0x03]);
+        assert_eq!(block.encode_request(), [0x03, 0x00, 0x6B, 0x00, 0x03]);
         let bytes = [0x03, 0x06, 0x02, 0x2B, 0x00, 0x00, 0x00, 0x64];
-        assert_eq!(block.registers(&bytes), Ok(vec![0x022B, 0x0000, 0x0064]));
-        assert_eq!(understood(&block.request()), Ok(block));
-        assert_eq!(answer(RegisterTable::Holding, &[0x022B, 0, 0x64]), bytes);
+        assert_eq!(block.parse_answer(&bytes), Ok(vec![0x022B, 0x0000, 0x0064]));
+        assert_eq!(parse_request(&block.encode_request()), Ok(block));
+        assert_eq!(encode_answer(RegisterTable::Holding, &[0x022B, 0, 0x64]), bytes);
     }
 
     #[test]
     fn an_exception_and_an_answer_to_something_else_are_no_registers() {
         let block = RegisterBlock { table: RegisterTable::Input, start: 0, count: 2 };
-        assert_eq!(block.registers(&[0x84, 2]), Err(NoRegisters::Refused(2)));
-        assert_eq!(block.registers(&[0x83, 2]), Err(NoRegisters::Other(2)));
-        assert_eq!(block.registers(&[4, 2, 0, 0]), Err(NoRegisters::Other(4)));
-        assert_eq!(understood(&[6, 0, 0, 0, 1]), Err(1));
-        assert_eq!(understood(&[3, 0, 0, 0, 126]), Err(3));
+        assert_eq!(block.parse_answer(&[0x84, 2]), Err(NoRegisters::Refused(2)));
+        assert_eq!(block.parse_answer(&[0x83, 2]), Err(NoRegisters::Other(2)));
+        assert_eq!(block.parse_answer(&[4, 2, 0, 0]), Err(NoRegisters::Other(4)));
+        assert_eq!(parse_request(&[6, 0, 0, 0, 1]), Err(1));
+        assert_eq!(parse_request(&[3, 0, 0, 0, 126]), Err(3));
     }
 
     proptest::proptest! {
         #[test]
         fn no_answer_makes_it_panic(bytes in proptest::collection::vec(0_u8.., 0..300), count in 1_u16..126) {
-            let _ = RegisterBlock { table: RegisterTable::Input, start: 0, count }.registers(&bytes);
-            let _ = understood(&bytes);
+            let _ = RegisterBlock { table: RegisterTable::Input, start: 0, count }.parse_answer(&bytes);
+            let _ = parse_request(&bytes);
         }
     }
 }

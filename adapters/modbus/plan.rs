@@ -39,10 +39,14 @@ impl PollBlocks {
     ///
     /// # Errors
     /// In words: a profile that needs too many requests.
-    pub fn of<'a>(registers: impl IntoIterator<Item = &'a MeterRegister>, most: u16, gap: u16) -> Result<Self, String> {
+    pub fn from_registers<'a>(
+        registers: impl IntoIterator<Item = &'a MeterRegister>,
+        most: u16,
+        gap: u16,
+    ) -> Result<Self, String> {
         let span = |register: &MeterRegister| {
             let from = u32::from(register.address);
-            NumberSpan { table: register.table, from, to: from + u32::from(register.format.registers()) }
+            NumberSpan { table: register.table, from, to: from + u32::from(register.format.register_count()) }
         };
         let mut spans: Vec<NumberSpan> = registers.into_iter().map(span).collect();
         spans.sort_unstable();
@@ -55,11 +59,11 @@ impl PollBlocks {
     }
 
     /// In which block a register stands, and how many registers into it; `None` where the meter does not have it.
-    pub(super) fn place(&self, register: &MeterRegister) -> Option<(usize, usize)> {
+    pub(super) fn find_place(&self, register: &MeterRegister) -> Option<(usize, usize)> {
         let holds = |block: &RegisterBlock| {
             block.table == register.table
                 && register.address >= block.start
-                && register.address - block.start + register.format.registers() <= block.count
+                && register.address - block.start + register.format.register_count() <= block.count
         };
         let at = self.blocks.iter().position(holds)?;
         Some((at, usize::from(register.address - self.blocks[at].start)))
@@ -67,7 +71,7 @@ impl PollBlocks {
 
     /// The meter refuses this block: it is read in parts from now on. A single number that is refused does not exist, and
     /// nothing is read in its place.
-    pub(super) fn split(&mut self, at: usize) {
+    pub(super) fn split_block(&mut self, at: usize) {
         let Some(block) = self.blocks.get(at).copied() else { return };
         let (from, to) = (u32::from(block.start), u32::from(block.start) + u32::from(block.count));
         // A number that takes the whole block is refused with it; others may share registers with it.
@@ -117,18 +121,18 @@ fn join_spans(spans: &[NumberSpan], most: u16, gap: u16) -> Vec<RegisterBlock> {
 #[must_use]
 pub fn wire_time(line: &SerialTarget, registers: u16) -> Duration {
     let characters = REQUEST_BYTES + ANSWER_AROUND + 2 * usize::from(registers);
-    serial::wire_time(line, characters) + 2 * serial::silence(line)
+    serial::wire_time(line, characters) + 2 * serial::compute_silence(line)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::profile::{Profile, SHIPPED, find};
+    use super::super::profile::{Profile, SHIPPED, find_profile};
     use super::*;
     use crate::address::Parity;
     use std::path::PathBuf;
 
     fn plan(profile: &Profile) -> PollBlocks {
-        PollBlocks::of(&profile.registers, profile.block_max, profile.block_gap).expect("a plan")
+        PollBlocks::from_registers(&profile.registers, profile.block_max, profile.block_gap).expect("a plan")
     }
 
     fn blocks(plan: &PollBlocks) -> Vec<(u16, u16)> {
@@ -137,7 +141,7 @@ mod tests {
 
     #[test]
     fn every_shipped_profile_is_one_block() {
-        let of = |name| blocks(&plan(&find(name, None).expect("shipped")));
+        let of = |name| blocks(&plan(&find_profile(name, None).expect("shipped")));
         for (name, _) in SHIPPED {
             assert_eq!(of(name).len(), 1, "{name}");
         }
@@ -147,7 +151,7 @@ mod tests {
 
     #[test]
     fn a_meter_with_limits_gets_more_blocks() {
-        let profile = Profile { block_gap: 10, ..find("sdm630", None).expect("shipped") };
+        let profile = Profile { block_gap: 10, ..find_profile("sdm630", None).expect("shipped") };
         assert_eq!(blocks(&plan(&profile)), [(0, 18), (52, 2)]);
         let narrow = Profile { block_max: 4, ..profile };
         assert!(plan(&narrow).blocks.iter().all(|block| block.count <= 4));
@@ -155,15 +159,15 @@ mod tests {
 
     #[test]
     fn a_block_that_is_refused_is_read_in_parts() {
-        let mut plan = plan(&find("sdm630", None).expect("shipped"));
-        plan.split(0);
+        let mut plan = plan(&find_profile("sdm630", None).expect("shipped"));
+        plan.split_block(0);
         assert_eq!(blocks(&plan), [(0, 18), (52, 2)], "without the gap first");
-        plan.split(0);
+        plan.split_block(0);
         assert_eq!(blocks(&plan), [(0, 8), (8, 10), (52, 2)], "then in halves");
-        plan.split(2);
+        plan.split_block(2);
         assert_eq!(blocks(&plan), [(0, 8), (8, 10)], "a single number is not there");
         while !plan.blocks.is_empty() {
-            plan.split(0);
+            plan.split_block(0);
         }
     }
 
@@ -177,7 +181,7 @@ mod tests {
         ] {
             let mut plan = PollBlocks { blocks: join_spans(&spans, 125, 0), spans };
             for _ in 0..20 {
-                plan.split(0);
+                plan.split_block(0);
             }
             assert!(plan.blocks.is_empty(), "{plan:?}");
         }

@@ -26,7 +26,7 @@ pub(super) struct RegisterPoll {
 
 impl RegisterPoll {
     pub(super) fn new(blocks: PollBlocks) -> Self {
-        Self { whole: blocks.clone(), blocks, answers: Vec::new(), stamp: Stamp::exact(0) }
+        Self { whole: blocks.clone(), blocks, answers: Vec::new(), stamp: Stamp::from_exact_time(0) }
     }
 
     /// Asks for everything once. A block that is refused is kept as refused while another one is answered.
@@ -40,16 +40,16 @@ impl RegisterPoll {
         unit: u8,
     ) -> Result<(), (ModbusError, String)> {
         self.answers.clear();
-        self.stamp = Stamp::exact(clock.now_ns());
+        self.stamp = Stamp::from_exact_time(clock.now_ns());
         let mut refused = None;
         while let Some(block) = self.blocks.blocks.get(self.answers.len()).copied() {
-            match ask(line, clock, unit, &block) {
+            match ask_block(line, clock, unit, &block) {
                 Ok((registers, stamp)) => self.answers.push((Ok(registers), stamp)),
                 Err(ModbusError::Refused(code)) => {
-                    refused.get_or_insert((code, block.told()));
-                    self.refused(code, clock);
+                    refused.get_or_insert((code, block.describe_block()));
+                    self.record_refusal(code, clock);
                 }
-                Err(fault) => return Err((fault, block.told())),
+                Err(fault) => return Err((fault, block.describe_block())),
             }
         }
         if self.answers.iter().any(|(answer, _)| answer.is_ok()) {
@@ -63,17 +63,17 @@ impl RegisterPoll {
 
     /// Exception 2 is an address that is not there, 3 a number of registers that is too great: the block is split, and its
     /// parts are asked for next. Any other one is an answer.
-    fn refused(&mut self, code: u8, clock: &dyn Clock) {
+    fn record_refusal(&mut self, code: u8, clock: &dyn Clock) {
         if matches!(code, 2 | 3) {
-            self.blocks.split(self.answers.len());
+            self.blocks.split_block(self.answers.len());
         } else {
-            self.answers.push((Err(code), Stamp::exact(clock.now_ns())));
+            self.answers.push((Err(code), Stamp::from_exact_time(clock.now_ns())));
         }
     }
 
     /// The registers of a number, and when they were read.
-    pub(super) fn registers(&self, register: &MeterRegister) -> Result<(&[u16], Stamp), (Absence, Stamp)> {
-        let (block, offset) = self.blocks.place(register).ok_or((Absence::NotSupported, self.stamp))?;
+    pub(super) fn find_registers(&self, register: &MeterRegister) -> Result<(&[u16], Stamp), (Absence, Stamp)> {
+        let (block, offset) = self.blocks.find_place(register).ok_or((Absence::NotSupported, self.stamp))?;
         let (answer, stamp) = self.answers.get(block).ok_or((Absence::NotYetRead, self.stamp))?;
         match answer {
             Ok(registers) => Ok((registers.get(offset..).unwrap_or_default(), *stamp)),
@@ -82,25 +82,25 @@ impl RegisterPoll {
     }
 
     /// A number, in the unit of its quantity.
-    pub(super) fn number(&self, register: &MeterRegister) -> Result<(f64, Stamp), (Absence, Stamp)> {
-        let (registers, stamp) = self.registers(register)?;
+    pub(super) fn find_number(&self, register: &MeterRegister) -> Result<(f64, Stamp), (Absence, Stamp)> {
+        let (registers, stamp) = self.find_registers(register)?;
         // What a meter does not measure it gives as an IEEE number that is none, or as a number of its own that says so.
-        register.number(registers).map(|number| (number, stamp)).ok_or((Absence::NotSupported, stamp))
+        register.decode_number(registers).map(|number| (number, stamp)).ok_or((Absence::NotSupported, stamp))
     }
 
     /// Everything that came, in order, with the time of its first block.
-    pub(super) fn all(&self) -> (impl Iterator<Item = u16> + Clone + '_, Stamp) {
+    pub(super) fn list_all_registers(&self) -> (impl Iterator<Item = u16> + Clone + '_, Stamp) {
         let registers = self.answers.iter().filter_map(|(answer, _)| answer.as_ref().ok()).flatten().copied();
         (registers, self.answers.first().map_or(self.stamp, |(_, stamp)| *stamp))
     }
 
     /// Does the meter have the registers of this number, as far as is known?
-    pub(super) fn has(&self, register: &MeterRegister) -> bool {
-        self.blocks.place(register).is_some()
+    pub(super) fn has_register(&self, register: &MeterRegister) -> bool {
+        self.blocks.find_place(register).is_some()
     }
 
     /// Requests of a poll; more than the profile needs where the meter gives less at once.
-    pub(super) fn requests(&self) -> usize {
+    pub(super) fn count_requests(&self) -> usize {
         self.blocks.blocks.len()
     }
 
@@ -115,14 +115,14 @@ impl RegisterPoll {
     }
 }
 
-fn ask(
+fn ask_block(
     line: &mut dyn ModbusLine,
     clock: &dyn Clock,
     unit: u8,
     block: &RegisterBlock,
 ) -> Result<(Vec<u16>, Stamp), ModbusError> {
-    let answer = line.ask(clock, unit, &block.request(), block.answer_bytes())?;
-    match block.registers(&answer.pdu) {
+    let answer = line.exchange_pdu(clock, unit, &block.encode_request(), block.answer_bytes())?;
+    match block.parse_answer(&answer.pdu) {
         Ok(registers) => Ok((registers, answer.stamp)),
         Err(NoRegisters::Refused(code)) => Err(ModbusError::Refused(code)),
         Err(NoRegisters::Other(bytes)) => {

@@ -136,7 +136,7 @@ fn most() -> u16 {
 ///
 /// # Errors
 /// No such profile, or everything that is wrong with it.
-pub fn find(name: &str, directory: Option<&Path>) -> Result<Profile, ProfileError> {
+pub fn find_profile(name: &str, directory: Option<&Path>) -> Result<Profile, ProfileError> {
     let file: PathBuf = directory.unwrap_or(Path::new("")).join(format!("{name}.toml"));
     let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_'));
     if directory.is_some() && plain && file.exists() {
@@ -146,7 +146,7 @@ pub fn find(name: &str, directory: Option<&Path>) -> Result<Profile, ProfileErro
         return parse(name, name, text);
     }
     let names: Vec<&str> = SHIPPED.iter().map(|(shipped, _)| *shipped).collect();
-    let hint = channel::nearest(name, names.iter().copied())
+    let hint = channel::find_nearest_name(name, names.iter().copied())
         .map_or_else(|| format!("there are {}", names.join(", ")), |near| format!("did you mean {near}?"));
     let own = "a file of your own is found with profiles=DIRECTORY";
     Err(ProfileError { place: format!("profile {name}"), problems: vec![format!("not known; {hint}; {own}")] })
@@ -179,14 +179,14 @@ pub fn parse(name: &str, place: &str, text: &str) -> Result<Profile, ProfileErro
             Err(problem) => problems.push(format!("value {}: {problem}", index + 1)),
         }
     }
-    problems.extend(register::twice(&registers));
+    problems.extend(register::describe_overlaps(&registers));
     if !problems.is_empty() {
         return Err(refused(problems));
     }
     Ok(Profile {
         name: name.to_owned(),
         meter: raw.meter,
-        table: raw.registers.table(),
+        table: raw.registers.to_table(),
         secondary: raw.values == RawSide::Secondary,
         period: Duration::from_secs_f64(raw.period_s),
         block_max: raw.block_max,
@@ -219,16 +219,16 @@ mod tests {
     #[test]
     fn every_shipped_profile_can_be_used() {
         for (name, _) in SHIPPED {
-            let profile = find(name, None).unwrap_or_else(|error| panic!("{error}"));
+            let profile = find_profile(name, None).unwrap_or_else(|error| panic!("{error}"));
             assert!(!profile.source.is_empty() && !profile.registers.is_empty(), "{name}");
         }
     }
 
     #[test]
     fn a_misspelt_name_gets_a_suggestion() {
-        let error = find("sdm63", None).expect_err("no such profile").to_string();
+        let error = find_profile("sdm63", None).expect_err("no such profile").to_string();
         assert!(error.contains("sdm630") && error.contains("profiles="), "{error}");
-        assert!(find("../sdm630", Some(Path::new("/tmp"))).is_err());
+        assert!(find_profile("../sdm630", Some(Path::new("/tmp"))).is_err());
     }
 
     #[test]
@@ -250,7 +250,7 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let text = SHIPPED[0].1.replace("Eastron SDM630", "My meter");
         std::fs::write(directory.path().join("sdm630.toml"), text).expect("written");
-        assert_eq!(find("sdm630", Some(directory.path())).expect("found").meter, "My meter");
-        assert_eq!(find("pac", Some(directory.path())).expect("found").name, "pac");
+        assert_eq!(find_profile("sdm630", Some(directory.path())).expect("found").meter, "My meter");
+        assert_eq!(find_profile("pac", Some(directory.path())).expect("found").name, "pac");
     }
 }

@@ -55,22 +55,22 @@ impl Refresh {
     }
 
     /// A poll failed: the time over the gap says nothing.
-    pub fn interrupt(&mut self) {
+    pub fn forget_last_change(&mut self) {
         (self.changed_ns, self.polls_since) = (None, 0);
     }
 
     /// What is known; `None` before enough renewals were seen.
     #[must_use]
-    pub fn effective(&self) -> Option<Effective> {
+    pub fn estimate_interval(&self) -> Option<Effective> {
         if self.intervals.len() < LEAST {
             return None;
         }
         let mut sorted: Vec<i64> = self.intervals.iter().map(|(ns, _)| *ns).collect();
         sorted.sort_unstable();
-        let middle = seconds(sorted[sorted.len() / 2]);
+        let middle = to_seconds(sorted[sorted.len() / 2]);
         // A renewal with the same digits hides one; a stall of the line shows as a long one.
-        let near = |ns: &i64| (0.5 * middle..=1.5 * middle).contains(&seconds(*ns));
-        let kept: Vec<f64> = sorted.iter().filter(|ns| near(ns)).map(|ns| seconds(*ns)).collect();
+        let near = |ns: &i64| (0.5 * middle..=1.5 * middle).contains(&to_seconds(*ns));
+        let kept: Vec<f64> = sorted.iter().filter(|ns| near(ns)).map(|ns| to_seconds(*ns)).collect();
         let count = f64::from(u32::try_from(kept.len()).unwrap_or(u32::MAX)).max(1.0);
         let mean = kept.iter().sum::<f64>() / count;
         let variance = kept.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
@@ -85,7 +85,7 @@ impl Refresh {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "times between polls are far below 2^53 ns")]
-fn seconds(ns: i64) -> f64 {
+fn to_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }
 
@@ -101,7 +101,7 @@ mod tests {
             let number = u16::try_from(at_ms / refresh_ms % 65536).expect("sixteen bits");
             refresh.push([number, 7].into_iter(), at_ms * 1_000_000);
         }
-        refresh.effective()
+        refresh.estimate_interval()
     }
 
     #[test]

@@ -98,14 +98,14 @@ pub(super) struct Whole {
 }
 
 impl RawTable {
-    pub(super) fn table(self) -> RegisterTable {
+    pub(super) fn to_table(self) -> RegisterTable {
         if matches!(self, Self::Input) { RegisterTable::Input } else { RegisterTable::Holding }
     }
 }
 
 /// Table and protocol address of a value. A number that is one in most manuals is not guessed.
-fn place(raw: &RawValue, whole: Whole) -> Result<(RegisterTable, u16), String> {
-    let (table, address) = (raw.registers.unwrap_or(whole.registers).table(), raw.address);
+fn resolve_address(raw: &RawValue, whole: Whole) -> Result<(RegisterTable, u16), String> {
+    let (table, address) = (raw.registers.unwrap_or(whole.registers).to_table(), raw.address);
     let manual = match address {
         30_001..=39_999 => Some((RegisterTable::Input, address - 30_001)),
         40_001..=49_999 => Some((RegisterTable::Holding, address - 40_001)),
@@ -125,8 +125,8 @@ fn place(raw: &RawValue, whole: Whole) -> Result<(RegisterTable, u16), String> {
 }
 
 /// Registers that are read with two meanings.
-pub(super) fn twice(registers: &[MeterRegister]) -> Vec<String> {
-    let end = |register: &MeterRegister| u32::from(register.address) + u32::from(register.format.registers());
+pub(super) fn describe_overlaps(registers: &[MeterRegister]) -> Vec<String> {
+    let end = |register: &MeterRegister| u32::from(register.address) + u32::from(register.format.register_count());
     let overlaps = |a: &MeterRegister, b: &MeterRegister| {
         a.table == b.table && u32::from(a.address) < end(b) && u32::from(b.address) < end(a)
     };
@@ -154,13 +154,13 @@ pub(super) fn read(raw: &RawValue, whole: Whole) -> Result<MeterRegister, String
         (None, Some(channel)) => of_channel(channel)?,
         _ => return Err("give quantity or channel, one of the two".to_owned()),
     };
-    let unit = conversion::between(&raw.unit, base)
+    let unit = conversion::find_conversion(&raw.unit, base)
         .ok_or_else(|| format!("unit = {:?} is no unit for a number in {base}", raw.unit))?;
-    let (table, address) = place(raw, whole)?;
+    let (table, address) = resolve_address(raw, whole)?;
     if !(raw.scale.is_finite() && raw.scale != 0.0) {
         return Err(format!("scale = {}: give a number that is not 0", raw.scale));
     }
-    if u32::from(address) + u32::from(raw.r#type.registers()) > 65536 {
+    if u32::from(address) + u32::from(raw.r#type.register_count()) > 65536 {
         return Err(format!("address = {}: the number does not end within the 65536 registers", raw.address));
     }
     let given = raw.no_value.as_ref().map(|bits| bits.iter().map(|bits| bits.cast_unsigned()).collect());
@@ -179,10 +179,10 @@ pub(super) fn read(raw: &RawValue, whole: Whole) -> Result<MeterRegister, String
 impl MeterRegister {
     /// The number in these registers, in the unit of its quantity; `None` where the meter says that there is none.
     #[must_use]
-    pub fn number(&self, registers: &[u16]) -> Option<f64> {
-        let bits = self.format.raw(registers, self.order)?;
+    pub fn decode_number(&self, registers: &[u16]) -> Option<f64> {
+        let bits = self.format.extract_bits(registers, self.order)?;
         let number = self.format.decode(registers, self.order)?;
-        (!self.no_value.contains(&bits)).then(|| self.conversion.of(number))
+        (!self.no_value.contains(&bits)).then(|| self.conversion.convert_number(number))
     }
 }
 
@@ -209,17 +209,19 @@ fn of_quantity(name: &str) -> Result<(RegisterMeaning, &'static str), String> {
         return Ok((*quantity, base));
     }
     let names = QUANTITIES.iter().map(|(known, ..)| *known);
-    let near = channel::nearest(name, names.clone()).or_else(|| names.clone().find(|known| name.starts_with(known)));
+    let near =
+        channel::find_nearest_name(name, names.clone()).or_else(|| names.clone().find(|known| name.starts_with(known)));
     let hint = near.map(|near| format!("; did you mean {near}?")).unwrap_or_default();
     Err(format!("no quantity {name:?}{hint}"))
 }
 
 fn of_channel(name: &str) -> Result<(RegisterMeaning, &'static str), String> {
-    let id = ChannelId::of(name).filter(|id| !id.channel().unit.is_empty());
+    let id = ChannelId::from_name(name).filter(|id| !id.channel().unit.is_empty());
     if let Some(id) = id {
         return Ok((RegisterMeaning::Channel(id), id.channel().unit));
     }
     let names = CHANNELS.iter().map(|channel| channel.name);
-    let hint = channel::nearest(name, names).map(|near| format!("; did you mean {near}?")).unwrap_or_default();
+    let hint =
+        channel::find_nearest_name(name, names).map(|near| format!("; did you mean {near}?")).unwrap_or_default();
     Err(format!("no channel {name:?} that holds a number{hint}"))
 }

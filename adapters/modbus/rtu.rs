@@ -4,7 +4,7 @@
 //! a frame is found by address, function, length and CRC wherever it begins: bytes of noise in front of it, and the echo
 //! of our own request that two-wire adapters return, do no harm.
 
-use super::crc::{crc, is_whole};
+use super::crc::{compute_crc, is_whole};
 use super::line::{ModbusError, ModbusLine, ModbusResponse, serial_fault, serial_silence};
 use crate::clock::Clock;
 use crate::reading::Stamp;
@@ -32,7 +32,7 @@ impl RtuLine {
 }
 
 impl ModbusLine for RtuLine {
-    fn ask(
+    fn exchange_pdu(
         &mut self,
         clock: &dyn Clock,
         unit: u8,
@@ -40,8 +40,8 @@ impl ModbusLine for RtuLine {
         answer_bytes: usize,
     ) -> Result<ModbusResponse, ModbusError> {
         let mut bus = self.bus.lock().unwrap_or_else(PoisonError::into_inner);
-        let wanted = Wanted::of(unit, request, answer_bytes);
-        let answer = exchange(&mut bus, clock, &frame(unit, request), &wanted, self.deadline);
+        let wanted = Wanted::from_request(unit, request, answer_bytes);
+        let answer = exchange_frames(&mut bus, clock, &encode_frame(unit, request), &wanted, self.deadline);
         if matches!(answer, Err(ModbusError::Timeout { .. } | ModbusError::Garbled(_))) {
             bus.keep_quiet(2 * self.deadline);
         }
@@ -58,7 +58,7 @@ impl ModbusLine for RtuLine {
     }
 }
 
-fn exchange(
+fn exchange_frames(
     bus: &mut Bus,
     clock: &dyn Clock,
     frame: &[u8],
@@ -67,15 +67,15 @@ fn exchange(
 ) -> Result<ModbusResponse, ModbusError> {
     let target = bus.target().clone();
     let failed = |error| serial_fault(&error, &target);
-    bus.send(frame).map_err(failed)?;
+    bus.send_request(frame).map_err(failed)?;
     let (began_ns, until) = (clock.now_ns(), Instant::now() + deadline);
     let mut bytes = Vec::new();
-    while bytes.len() < BYTES_MAX && bus.receive(until, &mut bytes).map_err(failed)? {
-        if let Some(found) = wanted.find(&bytes) {
+    while bytes.len() < BYTES_MAX && bus.receive_bytes(until, &mut bytes).map_err(failed)? {
+        if let Some(found) = wanted.find_frame(&bytes) {
             let sent = wire_time(&target, frame.len());
             let received = wire_time(&target, found.len());
             let pdu = found[1..found.len() - 2].to_vec();
-            return Ok(ModbusResponse { pdu, stamp: between(began_ns, clock.now_ns(), sent, received) });
+            return Ok(ModbusResponse { pdu, stamp: estimate_stamp(began_ns, clock.now_ns(), sent, received) });
         }
     }
     if bytes.is_empty() {
@@ -86,20 +86,20 @@ fn exchange(
 
 /// What came instead of an answer.
 pub(super) fn without_frame(bytes: &[u8]) -> String {
-    format!("{} bytes without a good frame among them: {}", bytes.len(), excerpt(bytes))
+    format!("{} bytes without a good frame among them: {}", bytes.len(), format_excerpt(bytes))
 }
 
 /// Unit, request and check.
-pub(super) fn frame(unit: u8, request: &[u8]) -> Vec<u8> {
+pub(super) fn encode_frame(unit: u8, request: &[u8]) -> Vec<u8> {
     let mut frame = vec![unit];
     frame.extend(request);
-    let check = crc(&frame);
+    let check = compute_crc(&frame);
     frame.extend(check);
     frame
 }
 
 /// The value was taken after the request had left and before the answer began to come; the wire's own time is known.
-fn between(began_ns: i64, ended_ns: i64, sent: Duration, received: Duration) -> Stamp {
+fn estimate_stamp(began_ns: i64, ended_ns: i64, sent: Duration, received: Duration) -> Stamp {
     let nanoseconds = |time: Duration| i64::try_from(time.as_nanos()).unwrap_or(0);
     let wire_ns = (nanoseconds(sent), nanoseconds(received));
     if wire_ns.0 + wire_ns.1 > ended_ns - began_ns {
@@ -109,7 +109,7 @@ fn between(began_ns: i64, ended_ns: i64, sent: Duration, received: Duration) -> 
     Stamp::of_request(began_ns + wire_ns.0, ended_ns - wire_ns.1)
 }
 
-fn excerpt(bytes: &[u8]) -> String {
+fn format_excerpt(bytes: &[u8]) -> String {
     let shown: Vec<String> = bytes.iter().take(16).map(|byte| format!("{byte:02X}")).collect();
     shown.join(" ")
 }
@@ -123,16 +123,16 @@ pub(super) struct Wanted {
 
 impl Wanted {
     /// The answer to this request, whose good answer has so many bytes without address and check.
-    pub(super) fn of(unit: u8, request: &[u8], answer_bytes: usize) -> Self {
+    pub(super) fn from_request(unit: u8, request: &[u8], answer_bytes: usize) -> Self {
         Self { unit, function: request.first().copied().unwrap_or(0), bytes: answer_bytes + AROUND }
     }
 
     /// The whole frame, wherever it begins.
-    pub(super) fn find<'a>(&self, bytes: &'a [u8]) -> Option<&'a [u8]> {
-        (0..bytes.len()).find_map(|at| self.at(&bytes[at..]))
+    pub(super) fn find_frame<'a>(&self, bytes: &'a [u8]) -> Option<&'a [u8]> {
+        (0..bytes.len()).find_map(|at| self.match_frame(&bytes[at..]))
     }
 
-    fn at<'a>(&self, bytes: &'a [u8]) -> Option<&'a [u8]> {
+    fn match_frame<'a>(&self, bytes: &'a [u8]) -> Option<&'a [u8]> {
         let [unit, function, third, ..] = *bytes else { return None };
         if unit != self.unit {
             return None;
@@ -153,7 +153,7 @@ mod tests {
     const WANTED: Wanted = Wanted { unit: 1, function: 4, bytes: 9 };
 
     fn frame(body: &[u8]) -> Vec<u8> {
-        [body, &crc(body)].concat()
+        [body, &compute_crc(body)].concat()
     }
 
     #[test]
@@ -161,26 +161,26 @@ mod tests {
         let answer = frame(&[1, 4, 4, 0x43, 0x66, 0x33, 0x33]);
         let echo = frame(&[1, 4, 0, 0, 0, 2]);
         let bytes = [&[0x00, 0xFF, 0x01][..], &echo, &answer].concat();
-        assert_eq!(WANTED.find(&bytes), Some(&answer[..]));
-        assert_eq!(WANTED.find(&bytes[..bytes.len() - 1]), None);
+        assert_eq!(WANTED.find_frame(&bytes), Some(&answer[..]));
+        assert_eq!(WANTED.find_frame(&bytes[..bytes.len() - 1]), None);
     }
 
     #[test]
     fn another_unit_length_or_check_is_no_answer() {
         for body in [&[2, 4, 4, 0, 0, 0, 0][..], &[1, 3, 4, 0, 0, 0, 0], &[1, 4, 2, 0, 0]] {
-            assert_eq!(WANTED.find(&frame(body)), None);
+            assert_eq!(WANTED.find_frame(&frame(body)), None);
         }
         let mut broken = frame(&[1, 4, 4, 0, 0, 0, 0]);
         broken[4] ^= 0x10;
-        assert_eq!(WANTED.find(&broken), None);
-        assert!(WANTED.find(&frame(&[1, 0x84, 2])).is_some());
+        assert_eq!(WANTED.find_frame(&broken), None);
+        assert!(WANTED.find_frame(&frame(&[1, 0x84, 2])).is_some());
     }
 
     #[test]
     fn the_wire_is_left_out_of_the_stamp_where_it_was_there() {
         let ms = |count: u64| Duration::from_millis(count);
-        let stamp = between(0, 100_000_000, ms(8), ms(42));
+        let stamp = estimate_stamp(0, 100_000_000, ms(8), ms(42));
         assert_eq!((stamp.mid_ns, stamp.half_width_ns), (33_000_000, 25_000_000));
-        assert_eq!(between(0, 10, ms(8), ms(42)).mid_ns, 5);
+        assert_eq!(estimate_stamp(0, 10, ms(8), ms(42)).mid_ns, 5);
     }
 }

@@ -10,7 +10,7 @@
 use super::pdu::{self, RegisterBlock};
 use super::profile::Profile;
 use super::register::RegisterMeaning;
-use super::tcp::{frame, header};
+use super::tcp::{encode_frame, parse_header};
 use crate::clock::Clock;
 use crate::simulated::{MeterValues, Simulated, SimulatedMeter};
 use std::io::{self, ErrorKind, Read, Write};
@@ -58,13 +58,14 @@ impl ModbusServer {
         let stop = Arc::new(AtomicBool::new(false));
         let connections = AtomicUsize::new(0);
         let served = Arc::new(ServedMeter { meter: machine.meter(), clock, profile, stop: stop.clone(), connections });
-        let thread = std::thread::Builder::new().name("modbus".to_owned()).spawn(move || accept(&listener, &served))?;
+        let thread =
+            std::thread::Builder::new().name("modbus".to_owned()).spawn(move || accept_clients(&listener, &served))?;
         Ok(Self { at, stop, thread: Some(thread) })
     }
 
     /// Where it listens.
     #[must_use]
-    pub fn at(&self) -> SocketAddr {
+    pub fn listen_address(&self) -> SocketAddr {
         self.at
     }
 }
@@ -79,7 +80,7 @@ impl Drop for ModbusServer {
     }
 }
 
-fn accept(listener: &TcpListener, served: &Arc<ServedMeter>) {
+fn accept_clients(listener: &TcpListener, served: &Arc<ServedMeter>) {
     while !served.stop.load(Ordering::SeqCst) {
         let Ok((stream, _)) = listener.accept() else {
             std::thread::sleep(Duration::from_millis(5));
@@ -92,7 +93,7 @@ fn accept(listener: &TcpListener, served: &Arc<ServedMeter>) {
         let of_client = served.clone();
         let client = move || {
             // How a connection ends is the client's own affair.
-            let _ = talk(&of_client, stream);
+            let _ = serve_client(&of_client, stream);
             of_client.connections.fetch_sub(1, Ordering::SeqCst);
         };
         if std::thread::Builder::new().name("modbus client".to_owned()).spawn(client).is_err() {
@@ -101,24 +102,24 @@ fn accept(listener: &TcpListener, served: &Arc<ServedMeter>) {
     }
 }
 
-fn talk(served: &ServedMeter, mut stream: TcpStream) -> io::Result<()> {
+fn serve_client(served: &ServedMeter, mut stream: TcpStream) -> io::Result<()> {
     stream.set_nonblocking(false)?;
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(LOOK))?;
     stream.set_write_timeout(Some(Duration::from_secs(1)))?;
     loop {
         let mut head = [0_u8; 7];
-        fill(served, &mut stream, &mut head)?;
-        let head = header(head).ok_or(ErrorKind::InvalidData)?;
+        fill_buffer(served, &mut stream, &mut head)?;
+        let head = parse_header(head).ok_or(ErrorKind::InvalidData)?;
         let mut request = vec![0_u8; head.pdu];
-        fill(served, &mut stream, &mut request)?;
-        if let Some(answer) = served.answer(head.unit, &request) {
-            stream.write_all(&frame(head.transaction, head.unit, &answer))?;
+        fill_buffer(served, &mut stream, &mut request)?;
+        if let Some(answer) = served.answer_request(head.unit, &request) {
+            stream.write_all(&encode_frame(head.transaction, head.unit, &answer))?;
         }
     }
 }
 
-fn fill(served: &ServedMeter, stream: &mut TcpStream, mut into: &mut [u8]) -> io::Result<()> {
+fn fill_buffer(served: &ServedMeter, stream: &mut TcpStream, mut into: &mut [u8]) -> io::Result<()> {
     let until = Instant::now() + IDLE_MAX;
     while !into.is_empty() {
         if served.stop.load(Ordering::SeqCst) || Instant::now() > until {
@@ -136,40 +137,40 @@ fn fill(served: &ServedMeter, stream: &mut TcpStream, mut into: &mut [u8]) -> io
 
 impl ServedMeter {
     /// `None`: the meter is silent at this moment.
-    fn answer(&self, unit: u8, request: &[u8]) -> Option<Vec<u8>> {
+    fn answer_request(&self, unit: u8, request: &[u8]) -> Option<Vec<u8>> {
         let function = request.first().copied().unwrap_or(0);
-        let refuse = |code| Some(pdu::refusal(function, code));
+        let refuse = |code| Some(pdu::encode_refusal(function, code));
         let spindle = match unit {
             UNIT_SPINDLE => true,
             UNIT_MACHINE | 0 | 255 => false,
             _ => return refuse(11),
         };
-        match pdu::understood(request) {
+        match pdu::parse_request(request) {
             Ok(block) if block.table != self.profile.table => refuse(1),
             Ok(block) => {
-                let values = self.meter.values(self.clock.now_ns())?;
-                Some(
-                    self.registers(&block, &values, spindle)
-                        .map_or_else(|| pdu::refusal(function, 2), |registers| pdu::answer(block.table, &registers)),
-                )
+                let values = self.meter.read_values(self.clock.now_ns())?;
+                Some(self.read_registers(&block, &values, spindle).map_or_else(
+                    || pdu::encode_refusal(function, 2),
+                    |registers| pdu::encode_answer(block.table, &registers),
+                ))
             }
             Err(code) => refuse(code),
         }
     }
 
     /// `None`: not all of these registers exist.
-    fn registers(&self, block: &RegisterBlock, values: &MeterValues, spindle: bool) -> Option<Vec<u16>> {
+    fn read_registers(&self, block: &RegisterBlock, values: &MeterValues, spindle: bool) -> Option<Vec<u16>> {
         let registers = &self.profile.registers;
         let first = registers.iter().map(|register| usize::from(register.address)).min()?;
         let end = |address: u16, count: u16| usize::from(address) + usize::from(count);
-        let last = registers.iter().map(|register| end(register.address, register.format.registers())).max()?;
+        let last = registers.iter().map(|register| end(register.address, register.format.register_count())).max()?;
         let (from, to) = (usize::from(block.start), end(block.start, block.count));
         if from < first || to > last {
             return None;
         }
         let mut image = vec![0_u16; to - from];
         for register in registers {
-            let number = number(register.quantity, values, spindle).unwrap_or(f64::NAN);
+            let number = find_number(register.quantity, values, spindle).unwrap_or(f64::NAN);
             let number = (number - register.conversion.offset) / register.conversion.scale;
             let words = register.format.encode(number, register.order);
             for (offset, word) in words.into_iter().enumerate() {
@@ -184,7 +185,7 @@ impl ServedMeter {
 }
 
 /// `None`: the simulated meter does not measure it.
-fn number(quantity: RegisterMeaning, values: &MeterValues, spindle: bool) -> Option<f64> {
+fn find_number(quantity: RegisterMeaning, values: &MeterValues, spindle: bool) -> Option<f64> {
     let power_w = if spindle { values.spindle_power_w } else { values.total_power_w };
     let phase_v = values.supply_voltage_v / 3.0_f64.sqrt();
     let current_a = match spindle {

@@ -95,10 +95,10 @@ impl TcpPort {
     /// One request and its answer. A connection that was open and is closed without a byte is opened anew once: many converters
     /// close what has been idle. It is put back only after a good exchange: whatever still comes on another one belongs to a
     /// request that was given up.
-    fn exchange(&mut self, clock: &dyn Clock, asked: TcpRequest<'_>) -> Result<ModbusResponse, ModbusError> {
+    fn exchange_request(&mut self, clock: &dyn Clock, asked: TcpRequest<'_>) -> Result<ModbusResponse, ModbusError> {
         let was_open = self.stream.is_some();
-        match self.attempt(clock, asked) {
-            Err(Attempt::ClosedIdle(_)) if was_open => self.attempt(clock, asked),
+        match self.attempt_exchange(clock, asked) {
+            Err(Attempt::ClosedIdle(_)) if was_open => self.attempt_exchange(clock, asked),
             other => other,
         }
         .map_err(|attempt| match attempt {
@@ -108,30 +108,30 @@ impl TcpPort {
 
     /// RTU frames have no number that tells the late answer to one request from that to the next. As on a serial line, it is waited
     /// for and thrown away.
-    fn settle(&mut self, deadline: Duration) {
+    fn discard_late_answer(&mut self, deadline: Duration) {
         let Some(quiet_until) = self.quiet_until.take().filter(|until| *until > Instant::now()) else { return };
-        let Ok(mut stream) = connect(&self.at, Instant::now() + deadline) else { return };
+        let Ok(mut stream) = connect_device(&self.at, Instant::now() + deadline) else { return };
         let (mut late, mut until) = (Vec::new(), quiet_until);
-        while late.len() < rtu::BYTES_MAX && stream::some(&mut stream, &mut late, until).is_ok() {
+        while late.len() < rtu::BYTES_MAX && stream::append_available(&mut stream, &mut late, until).is_ok() {
             until = Instant::now() + SILENCE;
         }
         self.stray += u64::from(!late.is_empty());
         self.stream = Some(stream);
     }
 
-    fn attempt(&mut self, clock: &dyn Clock, asked: TcpRequest<'_>) -> Result<ModbusResponse, Attempt> {
+    fn attempt_exchange(&mut self, clock: &dyn Clock, asked: TcpRequest<'_>) -> Result<ModbusResponse, Attempt> {
         self.transaction = self.transaction.wrapping_add(1);
         let open = self.stream.take();
-        let connected = open.map_or_else(|| connect(&self.at, asked.until), Ok);
-        let mut stream = connected.map_err(|error| Attempt::Failed(unreachable(&self.at, &error)))?;
+        let connected = open.map_or_else(|| connect_device(&self.at, asked.until), Ok);
+        let mut stream = connected.map_err(|error| Attempt::Failed(build_unreachable_error(&self.at, &error)))?;
         let began_ns = clock.now_ns();
         let bytes = match self.framing {
-            TcpFraming::Tcp => frame(self.transaction, asked.unit, asked.request),
-            TcpFraming::Rtu => rtu::frame(asked.unit, asked.request),
+            TcpFraming::Tcp => encode_frame(self.transaction, asked.unit, asked.request),
+            TcpFraming::Rtu => rtu::encode_frame(asked.unit, asked.request),
         };
-        stream.write_all(&bytes).map_err(|error| Attempt::ClosedIdle(broken(&error)))?;
+        stream.write_all(&bytes).map_err(|error| Attempt::ClosedIdle(build_broken_error(&error)))?;
         let pdu = match self.framing {
-            TcpFraming::Tcp => self.matching(&mut stream, asked),
+            TcpFraming::Tcp => self.receive_matching(&mut stream, asked),
             TcpFraming::Rtu => in_rtu(&mut stream, asked),
         }?;
         let stamp = Stamp::of_request(began_ns, clock.now_ns());
@@ -139,12 +139,14 @@ impl TcpPort {
         Ok(ModbusResponse { pdu, stamp })
     }
 
-    fn matching(&mut self, stream: &mut TcpStream, asked: TcpRequest<'_>) -> Result<Vec<u8>, Attempt> {
+    fn receive_matching(&mut self, stream: &mut TcpStream, asked: TcpRequest<'_>) -> Result<Vec<u8>, Attempt> {
         let mut strays = 0;
         loop {
-            let (header, pdu) = match receive(stream, asked.until) {
+            let (header, pdu) = match receive_frame(stream, asked.until) {
                 Ok(found) => found,
-                Err(Attempt::Failed(ModbusError::Timeout { .. })) if strays > 0 => return Err(others(strays)),
+                Err(Attempt::Failed(ModbusError::Timeout { .. })) if strays > 0 => {
+                    return Err(build_stray_error(strays));
+                }
                 Err(error) => return Err(error),
             };
             if header.transaction == self.transaction {
@@ -152,7 +154,7 @@ impl TcpPort {
             }
             (self.stray, strays) = (self.stray + 1, strays + 1);
             if strays >= STRAY_MAX {
-                return Err(others(strays));
+                return Err(build_stray_error(strays));
             }
         }
     }
@@ -176,7 +178,7 @@ enum Attempt {
 }
 
 /// Answers came, and none to this request: somebody mixes up the numbers.
-fn others(count: u64) -> Attempt {
+fn build_stray_error(count: u64) -> Attempt {
     Attempt::Failed(ModbusError::Garbled(format!(
         "{count} answers came, none with the transaction number of this request; the device or the converter before it answers \
          with numbers of its own. Try framing=rtu, or let this box be its only client"
@@ -185,18 +187,18 @@ fn others(count: u64) -> Attempt {
 
 /// An RTU frame out of whatever comes.
 fn in_rtu(stream: &mut TcpStream, asked: TcpRequest<'_>) -> Result<Vec<u8>, Attempt> {
-    let wanted = rtu::Wanted::of(asked.unit, asked.request, asked.answer_bytes);
+    let wanted = rtu::Wanted::from_request(asked.unit, asked.request, asked.answer_bytes);
     let mut bytes = Vec::new();
     while bytes.len() < rtu::BYTES_MAX {
-        match stream::some(stream, &mut bytes, asked.until) {
+        match stream::append_available(stream, &mut bytes, asked.until) {
             Ok(()) => {}
             Err(Short::Silent) if !bytes.is_empty() => break,
             Err(why @ (Short::Closed | Short::Broken(_))) if bytes.is_empty() => {
-                return Err(Attempt::ClosedIdle(short(why)));
+                return Err(Attempt::ClosedIdle(convert_short(why)));
             }
-            Err(other) => return Err(Attempt::Failed(short(other))),
+            Err(other) => return Err(Attempt::Failed(convert_short(other))),
         }
-        if let Some(found) = wanted.find(&bytes) {
+        if let Some(found) = wanted.find_frame(&bytes) {
             return Ok(found[1..found.len() - 2].to_vec());
         }
     }
@@ -212,7 +214,7 @@ fn of_unit(answered: u8, asked: u8) -> Result<(), ModbusError> {
 }
 
 impl ModbusLine for TcpLine {
-    fn ask(
+    fn exchange_pdu(
         &mut self,
         clock: &dyn Clock,
         unit: u8,
@@ -220,10 +222,10 @@ impl ModbusLine for TcpLine {
         answer_bytes: usize,
     ) -> Result<ModbusResponse, ModbusError> {
         let mut port = self.port.lock().unwrap_or_else(PoisonError::into_inner);
-        port.settle(self.deadline);
+        port.discard_late_answer(self.deadline);
         // Others may have been served before; the deadline is for this request alone.
         let until = Instant::now() + self.deadline;
-        let answer = port.exchange(clock, TcpRequest { unit, request, answer_bytes, until });
+        let answer = port.exchange_request(clock, TcpRequest { unit, request, answer_bytes, until });
         let is_out = matches!(answer, Err(ModbusError::Timeout { .. } | ModbusError::Garbled(_)));
         if port.framing == TcpFraming::Rtu && is_out {
             port.quiet_until = Some(Instant::now() + 2 * self.deadline);
@@ -241,14 +243,14 @@ impl ModbusLine for TcpLine {
     }
 }
 
-fn connect(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
-    let stream = stream::connect(at, until)?;
+fn connect_device(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
+    let stream = stream::connect_host(at, until)?;
     let left = until.saturating_duration_since(Instant::now()).max(WRITE_LEAST);
     stream.set_write_timeout(Some(left))?;
     Ok(stream)
 }
 
-fn unreachable(Endpoint { host, port }: &Endpoint, error: &io::Error) -> ModbusError {
+fn build_unreachable_error(Endpoint { host, port }: &Endpoint, error: &io::Error) -> ModbusError {
     let next = match error.kind() {
         ErrorKind::ConnectionRefused => {
             format!("{host} is there but nothing listens on port {port}: is Modbus TCP enabled, is the port right?")
@@ -259,13 +261,13 @@ fn unreachable(Endpoint { host, port }: &Endpoint, error: &io::Error) -> ModbusE
     ModbusError::Line { what: format!("cannot connect: {error}"), next }
 }
 
-fn broken(error: &io::Error) -> ModbusError {
+fn build_broken_error(error: &io::Error) -> ModbusError {
     let next = "It is opened again by itself; many meters serve one or two clients at a time.".to_owned();
     ModbusError::Line { what: format!("the connection broke: {error}"), next }
 }
 
 /// Header and PDU as one write, so that they leave in one packet.
-pub(super) fn frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
+pub(super) fn encode_frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
     let length = u16::try_from(pdu.len() + 1).unwrap_or(u16::MAX);
     let mut frame = Vec::with_capacity(HEADER + pdu.len());
     frame.extend(transaction.to_be_bytes());
@@ -286,36 +288,36 @@ pub(super) struct MbapHeader {
 }
 
 /// `None`: this is not Modbus.
-pub(super) fn header(bytes: [u8; HEADER]) -> Option<MbapHeader> {
+pub(super) fn parse_header(bytes: [u8; HEADER]) -> Option<MbapHeader> {
     let [t_high, t_low, p_high, p_low, l_high, l_low, unit] = bytes;
     let pdu = usize::from(u16::from_be_bytes([l_high, l_low])).checked_sub(1)?;
     let modbus = (p_high, p_low) == (0, 0) && (1..=PDU_MAX).contains(&pdu);
     modbus.then_some(MbapHeader { transaction: u16::from_be_bytes([t_high, t_low]), unit, pdu })
 }
 
-fn receive(stream: &mut TcpStream, until: Instant) -> Result<(MbapHeader, Vec<u8>), Attempt> {
+fn receive_frame(stream: &mut TcpStream, until: Instant) -> Result<(MbapHeader, Vec<u8>), Attempt> {
     let mut head = [0_u8; HEADER];
     stream::fill_counting(stream, &mut head, until).map_err(|(got, why)| match why {
-        Short::Closed | Short::Broken(_) if got == 0 => Attempt::ClosedIdle(short(why)),
-        why => Attempt::Failed(short(why)),
+        Short::Closed | Short::Broken(_) if got == 0 => Attempt::ClosedIdle(convert_short(why)),
+        why => Attempt::Failed(convert_short(why)),
     })?;
-    let header = header(head).ok_or_else(|| {
+    let header = parse_header(head).ok_or_else(|| {
         Attempt::Failed(ModbusError::Garbled(format!(
             "{head:02X?} is no Modbus header; is this the port of another protocol, or does the converter want framing=rtu?"
         )))
     })?;
     let mut pdu = vec![0_u8; header.pdu];
-    stream::fill(stream, &mut pdu, until).map_err(|why| Attempt::Failed(short(why)))?;
+    stream::fill_buffer(stream, &mut pdu, until).map_err(|why| Attempt::Failed(convert_short(why)))?;
     Ok((header, pdu))
 }
 
-fn short(why: Short) -> ModbusError {
+fn convert_short(why: Short) -> ModbusError {
     match why {
         Short::Silent => ModbusError::Timeout {
             next: "Check the unit number and the power of the meter; a slow one may need timeout_ms=2000.".to_owned(),
         },
-        Short::Closed => broken(&io::Error::new(ErrorKind::UnexpectedEof, "the meter closed it")),
-        Short::Broken(error) => broken(&error),
+        Short::Closed => build_broken_error(&io::Error::new(ErrorKind::UnexpectedEof, "the meter closed it")),
+        Short::Broken(error) => build_broken_error(&error),
     }
 }
 
@@ -325,7 +327,7 @@ mod tests {
 
     /// The frame that a unit answers to `[3, 0, 0, 0, 1]`.
     fn register(value: u8) -> Vec<u8> {
-        rtu::frame(1, &[3, 2, 0, value])
+        rtu::encode_frame(1, &[3, 2, 0, value])
     }
 
     #[test]
@@ -347,7 +349,7 @@ mod tests {
         let at = Endpoint { host: "127.0.0.1".to_owned(), port };
         let mut line = TcpLine::new(&at, TcpFraming::Rtu, Duration::from_millis(150)).expect("a line");
         let clock = crate::clock::SystemClock::new();
-        let mut ask = || line.ask(&clock, 1, &[3, 0, 0, 0, 1], 4).map(|response| response.pdu);
+        let mut ask = || line.exchange_pdu(&clock, 1, &[3, 0, 0, 0, 1], 4).map(|response| response.pdu);
         assert!(matches!(ask(), Err(ModbusError::Timeout { .. })));
         assert_eq!(ask().expect("an answer"), [3, 2, 0, 2]);
         drop(line);
@@ -357,10 +359,10 @@ mod tests {
     #[test]
     fn the_header_of_the_guide() {
         // Guide 3.1.3, example: transaction 1501 hex, unit FF, read register 4 with a length of 6.
-        let bytes = frame(0x1501, 0xFF, &[3, 0, 4, 0, 1]);
+        let bytes = encode_frame(0x1501, 0xFF, &[3, 0, 4, 0, 1]);
         assert_eq!(bytes, [0x15, 0x01, 0, 0, 0, 6, 0xFF, 3, 0, 4, 0, 1]);
-        let head = header(*bytes.first_chunk().expect("seven bytes"));
+        let head = parse_header(*bytes.first_chunk().expect("seven bytes"));
         assert_eq!(head, Some(MbapHeader { transaction: 0x1501, unit: 0xFF, pdu: 5 }));
-        assert_eq!(header(*b"HTTP/1."), None);
+        assert_eq!(parse_header(*b"HTTP/1."), None);
     }
 }

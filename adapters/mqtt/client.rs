@@ -37,19 +37,19 @@ impl MqttClient {
         let broker = || format!("{}:{}", options.host, options.port);
         let io = |error: std::io::Error| MqttError::Unreachable { broker: broker(), what: error.to_string() };
         let until = Instant::now() + options.deadline;
-        let lines = options.tls.as_ref().map(TlsFiles::config).transpose()?;
-        let stream = stream::connect(&at, until).map_err(io)?;
+        let lines = options.tls.as_ref().map(TlsFiles::build_config).transpose()?;
+        let stream = stream::connect_host(&at, until).map_err(io)?;
         let pause = stream.try_clone().map_err(io)?;
         stream.set_write_timeout(Some(options.deadline)).map_err(io)?;
         stream.set_read_timeout(Some(options.deadline)).map_err(io)?;
-        let broken = |error: std::io::Error| match TlsError::within(&error, &options.host) {
+        let broken = |error: std::io::Error| match TlsError::from_io_error(&error, &options.host) {
             Some(error) => MqttError::Tls(error),
             None => MqttError::Closed(error.to_string()),
         };
-        let line = Arc::new(TcpConnection::over(stream, &options.host, &lines).map_err(broken)?);
+        let line = Arc::new(TcpConnection::from_tcp(stream, &options.host, &lines).map_err(broken)?);
         pause.set_read_timeout(Some(READ_PAUSE.min(options.deadline))).map_err(io)?;
-        line.write_all(&packet::connect(options)?).map_err(broken)?;
-        let (frames, allows) = greeted(&line, options, until)?;
+        line.write_all(&packet::encode_connect(options)?).map_err(broken)?;
+        let (frames, allows) = wait_for_connack(&line, options, until)?;
         let writer = Arc::new(PacketWriter::new(line));
         let inbox = Arc::new(Inbox::default());
         let asked = options.keep_alive.max(Duration::from_secs(1));
@@ -69,7 +69,7 @@ impl MqttClient {
     }
 
     /// What the broker has said it allows.
-    pub(super) fn allows(&self) -> Allows {
+    pub(super) fn broker_limits(&self) -> Allows {
         self.allows
     }
 
@@ -81,10 +81,10 @@ impl MqttClient {
     ///
     /// # Errors
     /// [`MqttError::Refused`] names the filters that the broker does not grant.
-    pub fn subscribe(&self, filters: &[String], qos: Qos) -> Result<(), MqttError> {
-        let id = self.id();
-        self.send(&packet::subscribe(self.version, id, filters, qos)?)?;
-        let codes = self.acknowledged(id, "a subscription")?;
+    pub fn subscribe_filters(&self, filters: &[String], qos: Qos) -> Result<(), MqttError> {
+        let id = self.allocate_packet_id();
+        self.send_packet(&packet::encode_subscribe(self.version, id, filters, qos)?)?;
+        let codes = self.wait_for_acknowledgement(id, "a subscription")?;
         let refused: Vec<&str> =
             filters.iter().zip(&codes).filter(|(_, code)| **code >= 0x80).map(|(filter, _)| filter.as_str()).collect();
         if refused.is_empty() {
@@ -98,42 +98,42 @@ impl MqttClient {
     ///
     /// # Errors
     /// [`MqttError::Closed`] when the connection is over and everything that had arrived is taken.
-    pub fn receive(&self, wait: Duration) -> Result<Option<MqttMessage>, MqttError> {
-        self.inbox.take(Instant::now() + wait)
+    pub fn receive_message(&self, wait: Duration) -> Result<Option<MqttMessage>, MqttError> {
+        self.inbox.take_message(Instant::now() + wait)
     }
 
     /// Why the connection is over; `None` while it stands.
     #[must_use]
-    pub fn closed(&self) -> Option<MqttError> {
-        self.inbox.closed()
+    pub fn close_reason(&self) -> Option<MqttError> {
+        self.inbox.close_reason()
     }
 
     /// Messages that nobody took in time.
     #[must_use]
-    pub fn dropped(&self) -> u64 {
-        self.inbox.dropped()
+    pub fn count_dropped(&self) -> u64 {
+        self.inbox.count_dropped()
     }
 
-    pub(super) fn send(&self, packet: &[u8]) -> Result<(), MqttError> {
-        self.writer.write(packet).map_err(|error| self.broke(&error))
+    pub(super) fn send_packet(&self, packet: &[u8]) -> Result<(), MqttError> {
+        self.writer.write(packet).map_err(|error| self.close_broken(&error))
     }
 
     /// Half a packet may be on the line: nothing can follow it.
-    fn broke(&self, error: &std::io::Error) -> MqttError {
+    fn close_broken(&self, error: &std::io::Error) -> MqttError {
         let why = MqttError::Closed(error.to_string());
         self.inbox.close(why.clone());
-        self.writer.shut();
+        self.writer.shut_connection();
         why
     }
 
-    pub(super) fn acknowledged(&self, id: u16, what: &'static str) -> Result<Vec<u8>, MqttError> {
+    pub(super) fn wait_for_acknowledgement(&self, id: u16, what: &'static str) -> Result<Vec<u8>, MqttError> {
         let found = self.inbox.take_acknowledgement(id, Instant::now() + self.deadline)?;
         found.ok_or(MqttError::Unacknowledged { what, deadline_ms: self.deadline.as_millis() })
     }
 
     /// Asks the broker for a sign of life and waits for it.
     pub(super) fn sign_of_life(&self) -> Result<(), MqttError> {
-        let count = self.writer.ping().map_err(|error| self.broke(&error))?;
+        let count = self.writer.send_ping().map_err(|error| self.close_broken(&error))?;
         match self.inbox.await_signs(count, Instant::now() + self.deadline)? {
             true => Ok(()),
             false => {
@@ -144,7 +144,7 @@ impl MqttClient {
     }
 
     /// 1 to 65535, around and around.
-    pub(super) fn id(&self) -> u16 {
+    pub(super) fn allocate_packet_id(&self) -> u16 {
         self.next_id
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |id| Some(id.checked_add(1).unwrap_or(1)))
             .unwrap_or(1)
@@ -155,7 +155,7 @@ impl Drop for MqttClient {
     fn drop(&mut self) {
         let farewell: &[u8] = if self.will_at_leave { &packet::DISCONNECT_WITH_WILL } else { &packet::DISCONNECT };
         let _broker_is_gone = self.writer.write(farewell);
-        self.writer.shut();
+        self.writer.shut_connection();
         if let Some(thread) = self.thread.take() {
             // The reading thread cannot panic; if it did, there is nobody to tell.
             let _ended = thread.join();
@@ -164,22 +164,22 @@ impl Drop for MqttClient {
 }
 
 /// Waits for `CONNACK` (section 3.2); what came after it stays in the frames.
-fn greeted(line: &TcpConnection, options: &Options, until: Instant) -> Result<(Frames, Allows), MqttError> {
-    let (mut frames, mut buffer) = (Frames::of(options.version), [0; 1024]);
+fn wait_for_connack(line: &TcpConnection, options: &Options, until: Instant) -> Result<(Frames, Allows), MqttError> {
+    let (mut frames, mut buffer) = (Frames::with_version(options.version), [0; 1024]);
     while Instant::now() < until {
         match line.read(&mut buffer) {
             Ok(0) => return Err(hung_up(line)),
             Ok(count) => frames.push(&buffer[..count]),
             Err(error) if stream::is_silence(&error) => continue,
             Err(error) => {
-                let within = TlsError::within(&error, &options.host);
+                let within = TlsError::from_io_error(&error, &options.host);
                 return Err(within.map_or_else(|| hung_up(line), MqttError::Tls));
             }
         }
         match frames.next().map_err(MqttError::Closed)? {
             Some(Incoming::ConnAck { code: 0, allows }) => return Ok((frames, allows)),
             Some(Incoming::ConnAck { code, .. }) => {
-                return Err(MqttError::Refused(words::connection(options.version, code)));
+                return Err(MqttError::Refused(words::describe_connect_refusal(options.version, code)));
             }
             Some(_) => return Err(MqttError::Closed("something else than a greeting came first".to_owned())),
             None => {}
@@ -242,10 +242,11 @@ mod tests {
     fn a_subscription_that_is_not_granted_is_named() {
         let (port, thread) = saying(b"\x20\x02\x00\x00\x90\x04\x00\x01\x00\x80");
         let client = MqttClient::connect(&options(port)).expect("greeted");
-        let said = client.subscribe(&["a".to_owned(), "b".to_owned()], Qos::AtMostOnce).expect_err("b is refused");
+        let said =
+            client.subscribe_filters(&["a".to_owned(), "b".to_owned()], Qos::AtMostOnce).expect_err("b is refused");
         assert!(said.to_string().contains("to subscribe b"), "{said}");
         assert!(matches!(
-            client.publish("t", b"", Qos::AtLeastOnce),
+            client.publish_message("t", b"", Qos::AtLeastOnce),
             Err(MqttError::Unacknowledged { what: "a message", .. })
         ));
         drop(client);

@@ -28,8 +28,8 @@ pub(super) struct Inbox {
 }
 
 impl Inbox {
-    pub(super) fn put(&self, message: MqttMessage) {
-        let mut contents = self.locked();
+    pub(super) fn push_message(&self, message: MqttMessage) {
+        let mut contents = self.lock_contents();
         contents.bytes += message.payload.len();
         contents.messages.push_back(message);
         while contents.messages.len() > QUEUE_MESSAGES || contents.bytes > QUEUE_BYTES {
@@ -40,8 +40,8 @@ impl Inbox {
         self.changed.notify_all();
     }
 
-    pub(super) fn acknowledge(&self, id: u16, codes: Vec<u8>) {
-        let mut contents = self.locked();
+    pub(super) fn record_acknowledgement(&self, id: u16, codes: Vec<u8>) {
+        let mut contents = self.lock_contents();
         contents.acknowledged.insert(id, codes);
         if contents.acknowledged.len() > ACKNOWLEDGEMENTS_MAX {
             contents.acknowledged.pop_first();
@@ -49,25 +49,25 @@ impl Inbox {
         self.changed.notify_all();
     }
 
-    pub(super) fn sign(&self) {
-        self.locked().signs += 1;
+    pub(super) fn record_life_sign(&self) {
+        self.lock_contents().signs += 1;
         self.changed.notify_all();
     }
 
     /// Waits until the broker has given so many signs of life; false when it has not until then.
     pub(super) fn await_signs(&self, count: u64, until: Instant) -> Result<bool, MqttError> {
-        self.wait(until, |contents| (contents.signs >= count).then_some(())).map(|found| found.is_some())
+        self.wait_until_found(until, |contents| (contents.signs >= count).then_some(())).map(|found| found.is_some())
     }
 
     /// The connection is over; the first reason stays.
     pub(super) fn close(&self, why: MqttError) {
-        self.locked().closed.get_or_insert(why);
+        self.lock_contents().closed.get_or_insert(why);
         self.changed.notify_all();
     }
 
     /// The oldest message, waiting for one until `until`. What arrived before the connection broke is still given.
-    pub(super) fn take(&self, until: Instant) -> Result<Option<MqttMessage>, MqttError> {
-        self.wait(until, |contents| {
+    pub(super) fn take_message(&self, until: Instant) -> Result<Option<MqttMessage>, MqttError> {
+        self.wait_until_found(until, |contents| {
             let message = contents.messages.pop_front()?;
             contents.bytes -= message.payload.len();
             Some(message)
@@ -76,15 +76,15 @@ impl Inbox {
 
     /// What the broker said to packet `id`, waiting for it until `until`.
     pub(super) fn take_acknowledgement(&self, id: u16, until: Instant) -> Result<Option<Vec<u8>>, MqttError> {
-        self.wait(until, |contents| contents.acknowledged.remove(&id))
+        self.wait_until_found(until, |contents| contents.acknowledged.remove(&id))
     }
 
-    fn wait<T>(
+    fn wait_until_found<T>(
         &self,
         until: Instant,
         mut take: impl FnMut(&mut Contents) -> Option<T>,
     ) -> Result<Option<T>, MqttError> {
-        let mut contents = self.locked();
+        let mut contents = self.lock_contents();
         loop {
             if let Some(found) = take(&mut contents) {
                 return Ok(Some(found));
@@ -100,15 +100,15 @@ impl Inbox {
         }
     }
 
-    pub(super) fn closed(&self) -> Option<MqttError> {
-        self.locked().closed.clone()
+    pub(super) fn close_reason(&self) -> Option<MqttError> {
+        self.lock_contents().closed.clone()
     }
 
-    pub(super) fn dropped(&self) -> u64 {
-        self.locked().dropped
+    pub(super) fn count_dropped(&self) -> u64 {
+        self.lock_contents().dropped
     }
 
-    fn locked(&self) -> MutexGuard<'_, Contents> {
+    fn lock_contents(&self) -> MutexGuard<'_, Contents> {
         self.contents.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -124,22 +124,22 @@ mod tests {
     #[test]
     fn a_full_inbox_drops_the_oldest_and_counts() {
         let inbox = Inbox::default();
-        (1..=QUEUE_MESSAGES + 3).for_each(|n| inbox.put(message(n)));
-        assert_eq!(inbox.dropped(), 3);
-        let oldest = inbox.take(Instant::now()).expect("open").expect("full");
+        (1..=QUEUE_MESSAGES + 3).for_each(|n| inbox.push_message(message(n)));
+        assert_eq!(inbox.count_dropped(), 3);
+        let oldest = inbox.take_message(Instant::now()).expect("open").expect("full");
         assert_eq!(oldest.payload.len(), 4, "messages 1 to 3 are gone");
-        inbox.put(message(QUEUE_BYTES));
-        assert_eq!(inbox.take(Instant::now()).expect("open").map(|m| m.payload.len()), Some(QUEUE_BYTES));
+        inbox.push_message(message(QUEUE_BYTES));
+        assert_eq!(inbox.take_message(Instant::now()).expect("open").map(|m| m.payload.len()), Some(QUEUE_BYTES));
     }
 
     #[test]
     fn what_arrived_before_the_end_is_still_given() {
         let inbox = Inbox::default();
-        inbox.put(message(1));
+        inbox.push_message(message(1));
         inbox.close(MqttError::Closed("first".to_owned()));
         inbox.close(MqttError::Closed("second".to_owned()));
-        assert!(inbox.take(Instant::now()).expect("waiting").is_some());
-        assert_eq!(inbox.take(Instant::now()), Err(MqttError::Closed("first".to_owned())));
+        assert!(inbox.take_message(Instant::now()).expect("waiting").is_some());
+        assert_eq!(inbox.take_message(Instant::now()), Err(MqttError::Closed("first".to_owned())));
         assert_eq!(inbox.take_acknowledgement(1, Instant::now()), Err(MqttError::Closed("first".to_owned())));
     }
 }

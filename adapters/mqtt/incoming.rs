@@ -46,7 +46,7 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    pub(super) fn of(version: Version) -> Self {
+    pub(super) fn with_version(version: Version) -> Self {
         Self { version, ..Self::default() }
     }
 
@@ -63,7 +63,7 @@ impl Frames {
         let waiting = &self.bytes[self.used..];
         let Some((length, header)) = remaining_length(waiting)? else { return Ok(None) };
         let Some(body) = waiting.get(header..header + length) else { return Ok(None) };
-        let packet = decode(self.version, waiting[0], body)?;
+        let packet = decode_packet(self.version, waiting[0], body)?;
         self.used += header + length;
         Ok(Some(packet))
     }
@@ -72,7 +72,7 @@ impl Frames {
 /// Length of the body, and of the header before it.
 fn remaining_length(bytes: &[u8]) -> Result<Option<(usize, usize)>, String> {
     let Some(after) = bytes.get(1..) else { return Ok(None) };
-    let Some((length, used)) = variable(after)? else { return Ok(None) };
+    let Some((length, used)) = decode_variable_int(after)? else { return Ok(None) };
     match length <= PACKET_MAX {
         true => Ok(Some((length, 1 + used))),
         false => Err(format!("a packet of {length} bytes; at most {PACKET_MAX} are taken")),
@@ -80,7 +80,7 @@ fn remaining_length(bytes: &[u8]) -> Result<Option<(usize, usize)>, String> {
 }
 
 /// A number of seven bits per byte, and how many bytes it took (section 2.2.3).
-fn variable(bytes: &[u8]) -> Result<Option<(usize, usize)>, String> {
+fn decode_variable_int(bytes: &[u8]) -> Result<Option<(usize, usize)>, String> {
     let mut number = 0;
     for index in 0..4 {
         let Some(byte) = bytes.get(index) else { return Ok(None) };
@@ -92,12 +92,13 @@ fn variable(bytes: &[u8]) -> Result<Option<(usize, usize)>, String> {
     Err("a length of more than four bytes: this is not MQTT".to_owned())
 }
 
-fn decode(version: Version, first: u8, body: &[u8]) -> Result<Incoming, String> {
+fn decode_packet(version: Version, first: u8, body: &[u8]) -> Result<Incoming, String> {
     let short = || format!("a packet of type {} is too short", first >> 4);
     let five = version == Version::V5;
     match (first >> 4, body) {
         (2, [_, code, rest @ ..]) => {
-            let allows = if five && *code == 0 { allows(rest).ok_or_else(short)? } else { Allows::default() };
+            let allows =
+                if five && *code == 0 { parse_broker_limits(rest).ok_or_else(short)? } else { Allows::default() };
             Ok(Incoming::ConnAck { code: *code, allows })
         }
         (3, _) => decode_publish(five, first, body).ok_or_else(short),
@@ -105,7 +106,7 @@ fn decode(version: Version, first: u8, body: &[u8]) -> Result<Incoming, String> 
             Ok(Incoming::PubAck(u16::from_be_bytes([*high, *low]), rest.first().copied().unwrap_or(0)))
         }
         (9, [high, low, rest @ ..]) => {
-            let codes = if five { properties(rest).ok_or_else(short)?.1 } else { rest };
+            let codes = if five { split_properties(rest).ok_or_else(short)?.1 } else { rest };
             Ok(Incoming::SubAck { id: u16::from_be_bytes([*high, *low]), codes: codes.to_vec() })
         }
         (13, []) => Ok(Incoming::PingResp),
@@ -123,19 +124,19 @@ fn decode_publish(five: bool, first: u8, body: &[u8]) -> Option<Incoming> {
         0 => (None, rest),
         _ => rest.split_first_chunk::<2>().map(|(id, rest)| (Some(u16::from_be_bytes(*id)), rest))?,
     };
-    let payload = if five { properties(rest)?.1 } else { rest };
+    let payload = if five { split_properties(rest)?.1 } else { rest };
     Some(Incoming::Publish { topic, payload: payload.to_vec(), acknowledge, retained: first & 1 == 1 })
 }
 
 /// The properties at the beginning, and what follows them (section 5-2.2.2).
-fn properties(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
-    let (length, used) = variable(bytes).ok()??;
+fn split_properties(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let (length, used) = decode_variable_int(bytes).ok()??;
     bytes.get(used..)?.split_at_checked(length)
 }
 
 /// What a greeting says in its properties; those that do not matter here are passed over (section 5-3.2.2.3).
-fn allows(bytes: &[u8]) -> Option<Allows> {
-    let (mut left, _) = properties(bytes)?;
+fn parse_broker_limits(bytes: &[u8]) -> Option<Allows> {
+    let (mut left, _) = split_properties(bytes)?;
     let mut allows = Allows::default();
     while let Some((kind, rest)) = left.split_first() {
         let length = match kind {
@@ -171,7 +172,7 @@ mod tests {
     use super::*;
 
     fn all(version: Version, line: &[u8], size: usize) -> Vec<Incoming> {
-        let (mut frames, mut found) = (Frames::of(version), Vec::new());
+        let (mut frames, mut found) = (Frames::with_version(version), Vec::new());
         for part in line.chunks(size) {
             frames.push(part);
             while let Some(packet) = frames.next().expect("well formed") {
@@ -184,7 +185,7 @@ mod tests {
     #[test]
     fn packets_survive_any_cut_of_the_line() {
         let mut line = b"\x20\x02\x00\x00\x90\x03\x00\x0a\x80\xd0\x00".to_vec();
-        line.extend(packet::publish(Version::V3, "t", &[7; 300], Some(9), false).expect("fits"));
+        line.extend(packet::encode_publish(Version::V3, "t", &[7; 300], Some(9), false).expect("fits"));
         let publish =
             Incoming::Publish { topic: "t".to_owned(), payload: vec![7; 300], acknowledge: Some(9), retained: false };
         let greeting = Incoming::ConnAck { code: 0, allows: Allows::default() };
@@ -199,7 +200,7 @@ mod tests {
     fn version_five_says_what_it_allows_and_why_it_ends() {
         let mut line = b"\x20\x13\x00\x00\x10\x21\x00\x14\x27\x00\x00\x10\x00\x13\x00\x1e\x26\x00\x00\x00\x00".to_vec();
         line.extend(b"\x40\x03\x00\x07\x95\xe0\x01\x8e\x90\x04\x00\x01\x00\x87");
-        line.extend(packet::publish(Version::V5, "t", b"xy", None, true).expect("fits"));
+        line.extend(packet::encode_publish(Version::V5, "t", b"xy", None, true).expect("fits"));
         let allows = Allows { receive_maximum: Some(20), packet_max: Some(4096), keep_alive_s: Some(30) };
         let payload = b"xy".to_vec();
         let expected = [
@@ -233,7 +234,7 @@ mod tests {
             bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..64),
             five in proptest::prelude::any::<bool>(),
         ) {
-            let mut frames = Frames::of(if five { Version::V5 } else { Version::V3 });
+            let mut frames = Frames::with_version(if five { Version::V5 } else { Version::V3 });
             frames.push(&bytes);
             while let Ok(Some(_)) = frames.next() {}
         }

@@ -7,7 +7,7 @@
 //! - `TCP_NODELAY` is on: without it a small request waits for the acknowledgement of the one before, 40 ms and more.
 //! - One thread per connection reads, answers the broker and fills a bounded queue, so that a message is stamped when it
 //!   arrives and not when somebody has time for it. When nobody takes, the oldest message goes and is counted.
-//! - A connection that broke stays broken ([`MqttClient::receive`] tells why); the caller connects again, and the name of the
+//! - A connection that broke stays broken ([`MqttClient::receive_message`] tells why); the caller connects again, and the name of the
 //!   broker is looked up again then.
 //!
 //! Limits: a packet of at most [`PACKET_MAX`] bytes, a queue of at most [`QUEUE_MESSAGES`] messages and [`QUEUE_BYTES`].
@@ -90,7 +90,7 @@ impl Options {
     /// A client with a name that nobody else has, 20 s of keep-alive and a deadline of 2 s.
     #[must_use]
     pub fn new(host: &str, port: u16, role: &str) -> Self {
-        let client_id = format!("{role}-{}", unique());
+        let client_id = format!("{role}-{}", generate_unique_id());
         let (keep_alive, deadline) = (Duration::from_secs(20), Duration::from_secs(2));
         let (version, tls, will, login) = (Version::default(), None, None, None);
         Self { host: host.to_owned(), port, client_id, login, version, tls, will, keep_alive, deadline }
@@ -99,7 +99,7 @@ impl Options {
 
 /// Twelve hexadecimal digits that differ between processes, threads and calls.
 #[must_use]
-pub fn unique() -> String {
+pub fn generate_unique_id() -> String {
     use std::hash::{BuildHasher, Hasher, RandomState};
     format!("{:012x}", RandomState::new().build_hasher().finish() & 0xffff_ffff_ffff)
 }

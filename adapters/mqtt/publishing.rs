@@ -28,11 +28,11 @@ impl MqttClient {
     ///
     /// # Errors
     /// See [`MqttError`].
-    pub fn publish(&self, topic: &str, payload: &[u8], qos: Qos) -> Result<(), MqttError> {
+    pub fn publish_message(&self, topic: &str, payload: &[u8], qos: Qos) -> Result<(), MqttError> {
         let message = Outgoing { topic: topic.to_owned(), payload: payload.to_vec(), retain: false };
-        let id = (qos == Qos::AtLeastOnce).then(|| self.id());
+        let id = (qos == Qos::AtLeastOnce).then(|| self.allocate_packet_id());
         self.send_one(&message, id)?;
-        id.map_or(Ok(()), |id| self.arrived(id))
+        id.map_or(Ok(()), |id| self.wait_for_puback(id))
     }
 
     /// Sends messages in this order and returns when the broker has read all of them: with [`Qos::AtLeastOnce`] several
@@ -45,43 +45,49 @@ impl MqttClient {
     pub fn publish_all(&self, messages: &[Outgoing], qos: Qos) -> Result<(), (usize, MqttError)> {
         let mut waiting: VecDeque<(usize, u16)> = VecDeque::new();
         for (index, message) in messages.iter().enumerate() {
-            let id = (qos == Qos::AtLeastOnce).then(|| self.id());
+            let id = (qos == Qos::AtLeastOnce).then(|| self.allocate_packet_id());
             if let Err(error) = self.send_one(message, id) {
                 // What went out before it decides first.
-                waiting.drain(..).try_for_each(|(index, id)| self.arrived(id).map_err(|error| (index, error)))?;
+                waiting
+                    .drain(..)
+                    .try_for_each(|(index, id)| self.wait_for_puback(id).map_err(|error| (index, error)))?;
                 return Err((index, error));
             }
             waiting.extend(id.map(|id| (index, id)));
-            if waiting.len() >= self.allows().receive_maximum.map_or(ON_THEIR_WAY, usize::from).max(1)
+            if waiting.len() >= self.broker_limits().receive_maximum.map_or(ON_THEIR_WAY, usize::from).max(1)
                 && let Some((index, id)) = waiting.pop_front()
             {
-                self.arrived(id).map_err(|error| (index, error))?;
+                self.wait_for_puback(id).map_err(|error| (index, error))?;
             }
         }
         if qos == Qos::AtMostOnce && !messages.is_empty() {
             return self.sign_of_life().map_err(|error| (0, error));
         }
-        waiting.drain(..).try_for_each(|(index, id)| self.arrived(id).map_err(|error| (index, error)))
+        waiting.drain(..).try_for_each(|(index, id)| self.wait_for_puback(id).map_err(|error| (index, error)))
     }
 
     fn send_one(&self, message: &Outgoing, id: Option<u16>) -> Result<(), MqttError> {
         let Outgoing { topic, payload, retain } = message;
-        let packet = packet::publish(self.version(), topic, payload, id, *retain)?;
-        let limit = self.allows().packet_max.map_or(usize::MAX, |limit| usize::try_from(limit).unwrap_or(usize::MAX));
+        let packet = packet::encode_publish(self.version(), topic, payload, id, *retain)?;
+        let limit =
+            self.broker_limits().packet_max.map_or(usize::MAX, |limit| usize::try_from(limit).unwrap_or(usize::MAX));
         if packet.len() > limit {
             let what = format!("{} bytes on {topic}; the broker takes at most {limit}", packet.len());
             return Err(MqttError::Unsendable(what));
         }
-        self.send(&packet)
+        self.send_packet(&packet)
     }
 
-    fn arrived(&self, id: u16) -> Result<(), MqttError> {
-        let code = self.acknowledged(id, "a message")?.first().copied().unwrap_or(0);
+    fn wait_for_puback(&self, id: u16) -> Result<(), MqttError> {
+        let code = self.wait_for_acknowledgement(id, "a message")?.first().copied().unwrap_or(0);
         if NEVER.contains(&code) {
-            return Err(MqttError::Unsendable(format!("the broker will not take it: {}", words::reason(code))));
+            return Err(MqttError::Unsendable(format!(
+                "the broker will not take it: {}",
+                words::describe_reason(code)
+            )));
         }
         if code >= REFUSED {
-            return Err(MqttError::Refused(format!("a message: {}", words::reason(code))));
+            return Err(MqttError::Refused(format!("a message: {}", words::describe_reason(code))));
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::inbox::Inbox;
 use super::incoming::{Frames, Incoming};
-use super::packet::{PING, acknowledge};
+use super::packet::{PING, encode_puback};
 use super::{MqttError, MqttMessage, words};
 use crate::stream::is_silence;
 use crate::tls::TcpConnection;
@@ -40,18 +40,18 @@ impl PacketWriter {
     }
 
     /// Asks for a sign of life; how many have been asked for with this one.
-    pub(super) fn ping(&self) -> std::io::Result<u64> {
+    pub(super) fn send_ping(&self) -> std::io::Result<u64> {
         let mut sent = self.sent.lock().unwrap_or_else(PoisonError::into_inner);
         (sent.at, sent.pings) = (Instant::now(), sent.pings + 1);
         self.line.write_all(&PING).map(|()| sent.pings)
     }
 
     /// Ends the connection in both directions; the reading thread ends by it.
-    pub(super) fn shut(&self) {
-        self.line.shut();
+    pub(super) fn shut_connection(&self) {
+        self.line.shut_connection();
     }
 
-    fn idle(&self, now: Instant) -> Duration {
+    fn idle_time(&self, now: Instant) -> Duration {
         now.saturating_duration_since(self.sent.lock().unwrap_or_else(PoisonError::into_inner).at)
     }
 }
@@ -68,20 +68,20 @@ impl Reader {
     pub(super) fn run(mut self) {
         let why = self.read().err().unwrap_or_else(|| "closed by the broker".to_owned());
         self.inbox.close(MqttError::Closed(why));
-        self.writer.shut();
+        self.writer.shut_connection();
     }
 
     fn read(&mut self) -> Result<(), String> {
         let mut buffer = vec![0; 64 * 1024];
         let mut heard = Instant::now();
-        self.dispatch()?;
+        self.dispatch_packets()?;
         loop {
             match self.writer.line.read(&mut buffer) {
                 Ok(0) => return Ok(()),
                 Ok(count) => {
                     heard = Instant::now();
                     self.frames.push(&buffer[..count]);
-                    self.dispatch()?;
+                    self.dispatch_packets()?;
                 }
                 Err(error) if is_silence(&error) => {}
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
@@ -91,19 +91,21 @@ impl Reader {
         }
     }
 
-    fn dispatch(&mut self) -> Result<(), String> {
+    fn dispatch_packets(&mut self) -> Result<(), String> {
         while let Some(packet) = self.frames.next()? {
             match packet {
                 Incoming::Publish { topic, payload, acknowledge: id, retained } => {
-                    self.inbox.put(MqttMessage { topic, payload, arrived: Instant::now(), retained });
+                    self.inbox.push_message(MqttMessage { topic, payload, arrived: Instant::now(), retained });
                     if let Some(id) = id {
-                        self.writer.write(&acknowledge(id)).map_err(|error| error.to_string())?;
+                        self.writer.write(&encode_puback(id)).map_err(|error| error.to_string())?;
                     }
                 }
-                Incoming::PubAck(id, code) => self.inbox.acknowledge(id, vec![code]),
-                Incoming::SubAck { id, codes } => self.inbox.acknowledge(id, codes),
-                Incoming::Disconnect(code) => return Err(format!("the broker ends it: {}", words::reason(code))),
-                Incoming::PingResp => self.inbox.sign(),
+                Incoming::PubAck(id, code) => self.inbox.record_acknowledgement(id, vec![code]),
+                Incoming::SubAck { id, codes } => self.inbox.record_acknowledgement(id, codes),
+                Incoming::Disconnect(code) => {
+                    return Err(format!("the broker ends it: {}", words::describe_reason(code)));
+                }
+                Incoming::PingResp => self.inbox.record_life_sign(),
                 Incoming::ConnAck { .. } => {}
             }
         }
@@ -118,8 +120,8 @@ impl Reader {
         if silent > self.keep_alive.mul_f64(1.5) {
             return Err(format!("the broker has been silent for {} s", silent.as_secs()));
         }
-        if self.writer.idle(now) >= self.keep_alive / 2 {
-            self.writer.ping().map_err(|error| error.to_string())?;
+        if self.writer.idle_time(now) >= self.keep_alive / 2 {
+            self.writer.send_ping().map_err(|error| error.to_string())?;
         }
         Ok(())
     }

@@ -3,9 +3,9 @@
 use super::Version;
 
 /// Table 3.1 of the standard: why a connection is refused. From 5 on section 5-3.2.2.2.
-pub(super) fn connection(version: Version, code: u8) -> String {
+pub(super) fn describe_connect_refusal(version: Version, code: u8) -> String {
     if version == Version::V5 {
-        return reason(code);
+        return describe_reason(code);
     }
     match code {
         1 => "it does not speak MQTT 3.1.1".to_owned(),
@@ -18,7 +18,7 @@ pub(super) fn connection(version: Version, code: u8) -> String {
 }
 
 /// Section 5-2.4: the codes of version 5 that say no.
-pub(super) fn reason(code: u8) -> String {
+pub(super) fn describe_reason(code: u8) -> String {
     let text = match code {
         0x81 | 0x82 => "it does not understand what was sent",
         0x84 => "it does not speak MQTT 5; write protocol=3.1.1",

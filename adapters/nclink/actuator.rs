@@ -27,9 +27,9 @@ impl NcLinkActuator {
     }
 
     /// The last letter once more, with or without a request. What could not be read back is not written.
-    fn post(&mut self, request: Option<LadderRequest>) -> Result<(), SourceError> {
-        self.line.requires(OVERRIDE)?;
-        let words = self.mailbox.post(self.last, request);
+    fn write_letter(&mut self, request: Option<LadderRequest>) -> Result<(), SourceError> {
+        self.line.check_item(OVERRIDE)?;
+        let words = self.mailbox.build_letter(self.last, request);
         self.line.write(&words)
     }
 }
@@ -41,20 +41,20 @@ impl Actuator for NcLinkActuator {
 
     fn write_feed_override(&mut self, _: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
         self.last = MailboxRequest::Override(wanted);
-        self.post(None)
+        self.write_letter(None)
     }
 
-    fn release(&mut self, _: &dyn Clock) -> Result<(), SourceError> {
+    fn release_override(&mut self, _: &dyn Clock) -> Result<(), SourceError> {
         self.last = MailboxRequest::Release;
-        self.post(None)
+        self.write_letter(None)
     }
 
-    fn ask(&mut self, _: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
-        self.post(Some(request))
+    fn ask_ladder(&mut self, _: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        self.write_letter(Some(request))
     }
 
     fn read_feed_override(&mut self, _: &dyn Clock) -> Result<OverridePct, SourceError> {
-        let answers = self.line.read(vec![RequestedItem::value(OVERRIDE)])?;
+        let answers = self.line.read(vec![RequestedItem::from_id(OVERRIDE)])?;
         let found = match answers.first() {
             Some(Some(Ok(values))) => first_number(values).ok_or(Absence::OutOfRange),
             _ => Err(Absence::Refused),

@@ -41,7 +41,7 @@ pub struct Link {
 impl Link {
     /// What an address of this name says.
     #[must_use]
-    pub fn of(name: &str, target: &NcLinkTarget, login: Option<(String, String)>) -> Self {
+    pub fn from_target(name: &str, target: &NcLinkTarget, login: Option<(String, String)>) -> Self {
         Self {
             name: name.to_owned(),
             host: target.at.host.clone(),
@@ -91,8 +91,9 @@ impl Connection {
         let client = MqttClient::connect(&options).map_err(fault)?;
         let answers = [Subject::ProbeAnswer, Subject::QueryAnswer, Subject::SetAnswer];
         let more: &[Subject] = if samples { &[Subject::Sample, Subject::Event] } else { &[] };
-        let filters: Vec<String> = answers.iter().chain(more).map(|subject| subject.filter(&link.serial)).collect();
-        client.subscribe(&filters, Qos::AtMostOnce).map_err(fault)?;
+        let filters: Vec<String> =
+            answers.iter().chain(more).map(|subject| subject.build_filter(&link.serial)).collect();
+        client.subscribe_filters(&filters, Qos::AtMostOnce).map_err(fault)?;
         Ok(Self { link: link.clone(), client, unasked: VecDeque::new(), lost: 0 })
     }
 
@@ -100,30 +101,30 @@ impl Connection {
     ///
     /// # Errors
     /// See [`SourceError`].
-    pub fn probe(&mut self) -> Result<Model, SourceError> {
+    pub fn probe_model(&mut self) -> Result<Model, SourceError> {
         let what = "the probe of its model";
-        let id = identifier();
-        let answer = self.exchange(Subject::Probe, &id, json!({"@id": id}).to_string().as_bytes(), what)?;
-        if let Some(reason) = message::refusal(&answer) {
-            return Err(self.refused(what, reason));
+        let id = generate_identifier();
+        let answer = self.exchange_messages(Subject::Probe, &id, json!({"@id": id}).to_string().as_bytes(), what)?;
+        if let Some(reason) = message::find_refusal(&answer) {
+            return Err(self.build_refusal(what, reason));
         }
-        Model::parse(&answer).map_err(|why| self.nonsense(what, why))
+        Model::parse(&answer).map_err(|why| self.build_decode_error(what, why))
     }
 
     /// Asks for values; one answer per ask, `None` where the device said nothing of it.
     ///
     /// # Errors
     /// See [`SourceError`]; a refusal of single items is in the answers.
-    pub fn query(&mut self, asks: &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
-        self.request(Subject::Query, asks, "the query of its values")
+    pub fn query_values(&mut self, asks: &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
+        self.request_answers(Subject::Query, asks, "the query of its values")
     }
 
     /// Writes values; one answer per ask.
     ///
     /// # Errors
     /// See [`SourceError`]; a refusal of single items is in the answers.
-    pub fn set(&mut self, asks: &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
-        self.request(Subject::Set, asks, "the setting of registers")
+    pub fn set_values(&mut self, asks: &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
+        self.request_answers(Subject::Set, asks, "the setting of registers")
     }
 
     /// Samples and events that have arrived, the oldest first.
@@ -132,7 +133,7 @@ impl Connection {
     /// [`SourceError::Line`] when the connection is over and everything is taken.
     pub fn take_unasked(&mut self) -> Result<Vec<Unasked>, SourceError> {
         while let Some(message) =
-            self.client.receive(Duration::ZERO).map_err(|error| broker_fault(&self.link, error))?
+            self.client.receive_message(Duration::ZERO).map_err(|error| broker_fault(&self.link, error))?
         {
             self.keep_unasked(&message);
         }
@@ -141,35 +142,45 @@ impl Connection {
 
     /// Messages of sample channels and events that were lost in this client: nobody took them, or they made no sense.
     #[must_use]
-    pub fn lost(&self) -> u64 {
-        self.lost + self.client.dropped()
+    pub fn count_lost(&self) -> u64 {
+        self.lost + self.client.count_dropped()
     }
 
-    fn request(
+    fn request_answers(
         &mut self,
         subject: Subject,
         asks: &[RequestedItem],
         what: &str,
     ) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
-        let id = identifier();
-        let answer = self.exchange(subject, &id, &message::request(&id, asks), what)?;
-        message::answers(&answer, asks).map_err(|why| match message::refusal(&answer) {
-            Some(reason) => self.refused(what, reason),
-            None => self.nonsense(what, why),
+        let id = generate_identifier();
+        let answer = self.exchange_messages(subject, &id, &message::encode_request(&id, asks), what)?;
+        message::parse_answers(&answer, asks).map_err(|why| match message::find_refusal(&answer) {
+            Some(reason) => self.build_refusal(what, reason),
+            None => self.build_decode_error(what, why),
         })
     }
 
     /// Sends a request and waits for the answer with its identifier; what else arrives is kept.
-    fn exchange(&mut self, subject: Subject, id: &str, payload: &[u8], what: &str) -> Result<Value, SourceError> {
+    fn exchange_messages(
+        &mut self,
+        subject: Subject,
+        id: &str,
+        payload: &[u8],
+        what: &str,
+    ) -> Result<Value, SourceError> {
         let fault = |error| broker_fault(&self.link, error);
-        self.client.publish(&subject.topic(&self.link.serial), payload, Qos::AtMostOnce).map_err(fault)?;
+        self.client
+            .publish_message(&subject.build_topic(&self.link.serial), payload, Qos::AtMostOnce)
+            .map_err(fault)?;
         let until = Instant::now() + self.link.deadline;
         let mut nonsense = None;
         loop {
             let left = until.saturating_duration_since(Instant::now());
-            let message = self.client.receive(left).map_err(|error| broker_fault(&self.link, error))?;
+            let message = self.client.receive_message(left).map_err(|error| broker_fault(&self.link, error))?;
             let Some(message) = message else {
-                return Err(nonsense.map_or_else(|| self.silent(what), |why| self.nonsense(what, why)));
+                return Err(
+                    nonsense.map_or_else(|| self.build_timeout_error(what), |why| self.build_decode_error(what, why))
+                );
             };
             match self.answer_to(subject, id, &message) {
                 Some(Ok(answer)) => return Ok(answer),
@@ -187,19 +198,19 @@ impl Connection {
             Subject::Set => Subject::SetAnswer,
             _ => Subject::QueryAnswer,
         };
-        Subject::of(&message.topic, &self.link.serial).filter(|(subject, _)| *subject == wanted)?;
-        match self.link.encoding.json(&message.payload) {
-            Ok(answer) => (message::identifier(&answer).as_deref() == Some(id)).then_some(Ok(answer)),
+        Subject::from_topic(&message.topic, &self.link.serial).filter(|(subject, _)| *subject == wanted)?;
+        match self.link.encoding.parse_json(&message.payload) {
+            Ok(answer) => (message::find_identifier(&answer).as_deref() == Some(id)).then_some(Ok(answer)),
             Err(error) => Some(Err(format!("it is no JSON ({error})"))),
         }
     }
 
     fn keep_unasked(&mut self, message: &MqttMessage) {
-        let Some((subject, tail)) = Subject::of(&message.topic, &self.link.serial) else { return };
+        let Some((subject, tail)) = Subject::from_topic(&message.topic, &self.link.serial) else { return };
         if !matches!(subject, Subject::Sample | Subject::Event) {
             return;
         }
-        match self.link.encoding.json(&message.payload) {
+        match self.link.encoding.parse_json(&message.payload) {
             Ok(said) => {
                 let (tail, arrived) = (tail.to_owned(), message.arrived);
                 self.unasked.push_back(Unasked { subject, tail, arrived, message: said });
@@ -212,7 +223,7 @@ impl Connection {
         }
     }
 
-    fn silent(&self, what: &str) -> SourceError {
+    fn build_timeout_error(&self, what: &str) -> SourceError {
         SourceError::Timeout {
             source_name: self.link.name.clone(),
             request: what.to_owned(),
@@ -225,7 +236,7 @@ impl Connection {
         }
     }
 
-    fn refused(&self, request: &str, what: String) -> SourceError {
+    fn build_refusal(&self, request: &str, what: String) -> SourceError {
         SourceError::Refused {
             source_name: self.link.name.clone(),
             request: request.to_owned(),
@@ -234,7 +245,7 @@ impl Connection {
         }
     }
 
-    fn nonsense(&self, request: &str, what: String) -> SourceError {
+    fn build_decode_error(&self, request: &str, what: String) -> SourceError {
         SourceError::Decode { source_name: self.link.name.clone(), request: request.to_owned(), what }
     }
 }
@@ -254,7 +265,7 @@ fn broker_fault(link: &Link, error: MqttError) -> SourceError {
 }
 
 /// An identifier that no other request has, in the form of a UUID.
-fn identifier() -> String {
-    let (a, b, c) = (mqtt::unique(), mqtt::unique(), mqtt::unique());
+fn generate_identifier() -> String {
+    let (a, b, c) = (mqtt::generate_unique_id(), mqtt::generate_unique_id(), mqtt::generate_unique_id());
     format!("{}-{}-4{}-8{}-{}", &a[..8], &a[8..], &b[..3], &b[3..6], c)
 }

@@ -60,7 +60,7 @@ pub enum MailboxRequest {
 impl MailboxRequest {
     /// What stands in the registers +1 and +0; `None` when it is no letter.
     #[must_use]
-    pub fn of(enable: i64, percent: i64) -> Option<Self> {
+    pub fn from_registers(enable: i64, percent: i64) -> Option<Self> {
         match enable {
             0 => Some(Self::Release),
             1 => u8::try_from(percent).ok().and_then(OverridePct::new).map(Self::Override),
@@ -103,22 +103,26 @@ impl Mailbox {
 
     /// The register this far behind the first.
     #[must_use]
-    pub fn word(&self, offset: u32) -> ControllerRegister {
+    pub fn register_at(&self, offset: u32) -> ControllerRegister {
         ControllerRegister { index: self.first.index + offset, ..self.first }
     }
 
     /// A letter as registers with their values, in the order in which they are to be written.
-    pub fn post(&mut self, letter: MailboxRequest, request: Option<LadderRequest>) -> [(ControllerRegister, i64); 4] {
+    pub fn build_letter(
+        &mut self,
+        letter: MailboxRequest,
+        request: Option<LadderRequest>,
+    ) -> [(ControllerRegister, i64); 4] {
         self.heartbeat = self.heartbeat % 100 + 1;
         let (percent, enable) = match letter {
             MailboxRequest::Override(wanted) => (wanted, 1),
             MailboxRequest::Release => (OverridePct::FULL, 0),
         };
         [
-            (self.word(Self::OVERRIDE), i64::from(percent.percent())),
-            (self.word(Self::REQUEST), request.map_or(0, request_word)),
-            (self.word(Self::ENABLE), enable),
-            (self.word(Self::HEARTBEAT), i64::from(self.heartbeat)),
+            (self.register_at(Self::OVERRIDE), i64::from(percent.percent())),
+            (self.register_at(Self::REQUEST), request.map_or(0, request_word)),
+            (self.register_at(Self::ENABLE), enable),
+            (self.register_at(Self::HEARTBEAT), i64::from(self.heartbeat)),
         ]
     }
 }
@@ -147,7 +151,7 @@ pub fn in_force(name: &str, found: Result<f64, Absence>) -> Result<OverridePct, 
         what,
     };
     let percent = found.map_err(|reason| nonsense(format!("there is no value ({reason})")))?;
-    OverridePct::nearest(percent).ok_or_else(|| nonsense(format!("{percent} % is no override")))
+    OverridePct::from_nearest_percent(percent).ok_or_else(|| nonsense(format!("{percent} % is no override")))
 }
 
 #[cfg(test)]
@@ -173,7 +177,7 @@ mod tests {
         let wanted = OverridePct::new(80).expect("exists");
         let mut last = 0;
         for _ in 0..250 {
-            let words = mailbox.post(MailboxRequest::Override(wanted), None);
+            let words = mailbox.build_letter(MailboxRequest::Override(wanted), None);
             let (heartbeat, value) = words[3];
             assert_eq!(heartbeat, ControllerRegister { kind: 'D', index: 103 });
             assert!(value != last && (1..=100).contains(&value));
@@ -186,11 +190,15 @@ mod tests {
     fn a_letter_is_read_back_from_its_registers() {
         for percent in 0..=254 {
             let wanted = OverridePct::new(percent).expect("exists");
-            assert_eq!(MailboxRequest::of(1, i64::from(percent)), Some(MailboxRequest::Override(wanted)));
+            assert_eq!(MailboxRequest::from_registers(1, i64::from(percent)), Some(MailboxRequest::Override(wanted)));
         }
-        assert_eq!(MailboxRequest::of(0, 80), Some(MailboxRequest::Release));
+        assert_eq!(MailboxRequest::from_registers(0, 80), Some(MailboxRequest::Release));
         assert_eq!(
-            (MailboxRequest::of(1, 255), MailboxRequest::of(1, -1), MailboxRequest::of(7, 80)),
+            (
+                MailboxRequest::from_registers(1, 255),
+                MailboxRequest::from_registers(1, -1),
+                MailboxRequest::from_registers(7, 80)
+            ),
             (None, None, None)
         );
     }

@@ -68,7 +68,7 @@ mod track;
 pub use actuator::NcLinkActuator;
 pub(crate) use decode::last_part;
 pub use message::{NcLinkAnswer, Params, RequestedItem};
-pub use open::{open, open_sampled};
+pub use open::{open_address, open_sampled};
 pub use own::OwnPath;
 pub use source::{BlockSink, NcLinkSource};
 pub use track::{ChannelTrack, SampleTracks};

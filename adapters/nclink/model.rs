@@ -3,7 +3,7 @@
 //! A path is the types of the components above an item, each with `@` and its number where it has one:
 //! `AXIS@5/MOTOR/CURRENT`, `CONTROLLER/VARIABLE@REG_G`. The device itself is not part of it.
 
-use super::liberal::{flag, list, number, text};
+use super::liberal::{find_flag, find_list, find_text, parse_number};
 use serde_json::Value;
 use std::collections::HashMap;
 
@@ -62,31 +62,31 @@ impl Model {
         // Some devices send the model as text within the text.
         let inner = root.as_str().and_then(|text| serde_json::from_str(text).ok());
         let root = inner.as_ref().unwrap_or(root);
-        let devices = list(root, &["devices", "device"]);
+        let devices = find_list(root, &["devices", "device"]);
         if devices.is_empty() {
             return Err("the model has no \"devices\"".to_owned());
         }
         let mut model = Self::default();
         for device in devices {
             if model.name.is_empty() {
-                model.name = text(device, &["name", "description"]).unwrap_or_default();
+                model.name = find_text(device, &["name", "description"]).unwrap_or_default();
             }
-            model.component(device, "", 0);
-            model.aliases(device);
+            model.add_component(device, "", 0);
+            model.add_aliases(device);
         }
         Ok(model)
     }
 
     /// The item that a device means by this name: node number, or path with or without a leading `/` and its device.
     #[must_use]
-    pub fn find(&self, name: &str) -> Option<&ModelItem> {
-        let index = self.by_name.get(name).or_else(|| self.by_name.get(&normal(name)))?;
+    pub fn find_item(&self, name: &str) -> Option<&ModelItem> {
+        let index = self.by_name.get(name).or_else(|| self.by_name.get(&normalize_name(name)))?;
         self.items.get(*index)
     }
 
     /// Items that end as `path` does and stand elsewhere, outside the axes: what another maker has put under another
     /// component.
-    pub fn elsewhere<'a>(&'a self, path: &'a str) -> impl Iterator<Item = &'a ModelItem> {
+    pub fn list_items_elsewhere<'a>(&'a self, path: &'a str) -> impl Iterator<Item = &'a ModelItem> {
         let end = path.rsplit('/').next().unwrap_or(path);
         let of_axis = |item: &&ModelItem| item.path.split('/').any(|part| part.starts_with("AXIS@"));
         self.items
@@ -101,56 +101,56 @@ impl Model {
         self.samples.iter().flat_map(|channel| &channel.items).any(|name| name.contains('/'))
     }
 
-    fn component(&mut self, node: &Value, above: &str, depth: usize) {
-        for item in list(node, &["dataItems", "dataitems"]) {
-            self.item(item, above);
+    fn add_component(&mut self, node: &Value, above: &str, depth: usize) {
+        for item in find_list(node, &["dataItems", "dataitems"]) {
+            self.add_item(item, above);
         }
-        for config in list(node, &["configs", "config"]) {
-            match text(config, &["type"]).as_deref() {
+        for config in find_list(node, &["configs", "config"]) {
+            match find_text(config, &["type"]).as_deref() {
                 Some("SAMPLE_CHANNEL") => self.samples.extend(sample_channel(config)),
-                _ => self.item(config, above),
+                _ => self.add_item(config, above),
             }
         }
         if depth < DEPTH_MAX {
-            for part in list(node, &["components", "component"]) {
-                self.component(part, &join_path(above, part), depth + 1);
+            for part in find_list(node, &["components", "component"]) {
+                self.add_component(part, &join_path(above, part), depth + 1);
             }
         }
     }
 
-    fn item(&mut self, item: &Value, above: &str) {
-        let Some(id) = text(item, &["id"]) else { return };
+    fn add_item(&mut self, item: &Value, above: &str) {
+        let Some(id) = find_text(item, &["id"]) else { return };
         if self.items.len() >= ITEMS_MAX {
             return;
         }
-        let path = normal(&join_path(above, item));
-        let settable = flag(item, &["setable", "settable"]);
+        let path = normalize_name(&join_path(above, item));
+        let settable = find_flag(item, &["setable", "settable"]);
         self.by_name.entry(id.clone()).or_insert(self.items.len());
         self.by_name.entry(path.clone()).or_insert(self.items.len());
-        if let Some(source) = text(item, &["source"]) {
-            self.by_name.entry(normal(&format!("{source}/{path}"))).or_insert(self.items.len());
+        if let Some(source) = find_text(item, &["source"]) {
+            self.by_name.entry(normalize_name(&format!("{source}/{path}"))).or_insert(self.items.len());
         }
         self.items.push(ModelItem {
             id,
             path,
             settable,
-            unit: text(item, &["units", "unit", "Units"]).filter(|unit| !unit.trim().is_empty()),
+            unit: find_text(item, &["units", "unit", "Units"]).filter(|unit| !unit.trim().is_empty()),
             value: item.get("value").filter(|value| !value.is_null()).cloned(),
         });
     }
 
     /// `MACHINE/STATUS` is `STATUS` where the device is a `MACHINE`.
-    fn aliases(&mut self, device: &Value) {
-        let Some(kind) = text(device, &["type"]) else { return };
+    fn add_aliases(&mut self, device: &Value) {
+        let Some(kind) = find_text(device, &["type"]) else { return };
         for (index, item) in self.items.iter().enumerate() {
-            self.by_name.entry(normal(&format!("{kind}/{}", item.path))).or_insert(index);
+            self.by_name.entry(normalize_name(&format!("{kind}/{}", item.path))).or_insert(index);
         }
     }
 }
 
 fn join_path(above: &str, node: &Value) -> String {
-    let kind = text(node, &["type"]).unwrap_or_default();
-    let own = match text(node, &["number"]) {
+    let kind = find_text(node, &["type"]).unwrap_or_default();
+    let own = match find_text(node, &["number"]) {
         Some(number) => format!("{kind}@{number}"),
         None => kind,
     };
@@ -158,19 +158,19 @@ fn join_path(above: &str, node: &Value) -> String {
 }
 
 /// In capitals, without a leading `/`, with one spelling of what is spelt in two ways.
-fn normal(name: &str) -> String {
+fn normalize_name(name: &str) -> String {
     name.trim_start_matches('/').to_ascii_uppercase().replace("WARNNING", "WARNING")
 }
 
 fn sample_channel(config: &Value) -> Option<SampleChannel> {
     let positive = |names: &[&str]| {
-        names.iter().find_map(|name| config.get(name)).and_then(number).filter(|ms| *ms > 0.0 && *ms < 1e9)
+        names.iter().find_map(|name| config.get(name)).and_then(parse_number).filter(|ms| *ms > 0.0 && *ms < 1e9)
     };
     let interval_ms = positive(&["sampleInterval", "sampleinterval", "interval"])?;
-    let items = list(config, &["ids", "paths"]).iter();
-    let named = |item: &Value| item.as_str().map(str::to_owned).or_else(|| text(item, &["id", "path"]));
+    let items = find_list(config, &["ids", "paths"]).iter();
+    let named = |item: &Value| item.as_str().map(str::to_owned).or_else(|| find_text(item, &["id", "path"]));
     Some(SampleChannel {
-        id: text(config, &["id"])?,
+        id: find_text(config, &["id"])?,
         interval_ms,
         upload_ms: positive(&["uploadInterval", "uploadinterval"]).unwrap_or(interval_ms),
         items: items.filter_map(named).collect(),
@@ -205,7 +205,7 @@ mod tests {
             ["STATUS", "AXIS@5/NAME", "AXIS@5/MOTOR/SPEED", "CONTROLLER/WARNING", "CONTROLLER/VARIABLE@REG_D"]
         );
         assert_eq!(model.name, "mill");
-        assert!(model.find("CONTROLLER/VARIABLE@REG_D").is_some_and(|item| item.settable));
+        assert!(model.find_item("CONTROLLER/VARIABLE@REG_D").is_some_and(|item| item.settable));
         let channel = &model.samples[0];
         assert_eq!((channel.id.as_str(), channel.interval_ms, channel.upload_ms), ("sample_channel1", 1.0, 200.0));
         assert_eq!(channel.items, ["0103532102", "010302"]);
@@ -216,10 +216,10 @@ mod tests {
     fn an_item_is_found_by_number_and_by_every_form_of_its_path() {
         let model = Model::parse(&machine()).expect("a model");
         for name in ["010302", "STATUS", "/STATUS", "/MACHINE/STATUS", "status"] {
-            assert_eq!(model.find(name).map(|item| item.id.as_str()), Some("010302"), "{name}");
+            assert_eq!(model.find_item(name).map(|item| item.id.as_str()), Some("010302"), "{name}");
         }
-        assert!(model.find("CONTROLLER/WARNNING").is_some() && model.find("/AXIS@5/MOTOR/SPEED").is_some());
-        assert!(model.find("NOTHING").is_none());
+        assert!(model.find_item("CONTROLLER/WARNNING").is_some() && model.find_item("/AXIS@5/MOTOR/SPEED").is_some());
+        assert!(model.find_item("NOTHING").is_none());
     }
 
     #[test]
@@ -235,7 +235,7 @@ mod tests {
             assert!(model.names_by_path());
             assert_eq!(model.samples[0].upload_ms, 1000.0);
             for (name, id) in [("/PLC/STATUS", "030001"), ("/CONTROLLER/WARNNING", "030003")] {
-                assert_eq!(model.find(name).map(|item| item.id.as_str()), Some(id));
+                assert_eq!(model.find_item(name).map(|item| item.id.as_str()), Some(id));
             }
         }
     }

@@ -36,7 +36,11 @@ pub(crate) trait RegisterAccess: Send {
     ///
     /// # Errors
     /// The controller refuses, or the line failed.
-    fn look(&mut self, first: ControllerRegister, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError>;
+    fn read_registers(
+        &mut self,
+        first: ControllerRegister,
+        count: u32,
+    ) -> Result<(Vec<i64>, Option<bool>), SourceError>;
 
     /// Writes registers, in this order.
     ///
@@ -86,21 +90,21 @@ impl OffsetMailbox {
 
     /// The register this far behind the first.
     #[must_use]
-    pub fn word(&self, offset: u32) -> ControllerRegister {
+    pub fn register_at(&self, offset: u32) -> ControllerRegister {
         ControllerRegister { index: self.first.index + offset, ..self.first }
     }
 
     /// Its first register and its last.
     #[must_use]
-    pub fn ends(&self) -> [ControllerRegister; 2] {
-        [self.first, self.word(Self::LENGTH - 1)]
+    pub fn end_registers(&self) -> [ControllerRegister; 2] {
+        [self.first, self.register_at(Self::LENGTH - 1)]
     }
 
     /// A register as a number with a sign: some interfaces tell W registers, which have 16 bits, and D registers, which
     /// have 32, without it.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "the low part is meant")]
-    pub fn signed(&self, word: i64) -> i64 {
+    pub fn decode_signed(&self, word: i64) -> i64 {
         if self.first.kind == 'W' { i64::from(word as i16) } else { i64::from(word as i32) }
     }
 
@@ -113,17 +117,22 @@ impl OffsetMailbox {
 
     /// A letter that wants these shifts, as registers in the order in which they are to be written.
     #[must_use]
-    pub fn post(&self, wanted_um: [i64; 3], found: &Letters) -> [(ControllerRegister, i64); 4] {
+    pub fn build_letter(&self, wanted_um: [i64; 3], found: &Letters) -> [(ControllerRegister, i64); 4] {
         let [x, y, z] = wanted_um;
         let number = found.taken.rem_euclid(100) + 1;
-        [(self.word(0), x), (self.word(1), y), (self.word(2), z), (self.word(Self::NUMBER), number)]
+        [
+            (self.register_at(0), x),
+            (self.register_at(1), y),
+            (self.register_at(2), z),
+            (self.register_at(Self::NUMBER), number),
+        ]
     }
 
     /// What the ladder writes when it has taken a letter.
     #[must_use]
-    pub fn taken(&self, in_force_um: [i64; 3], number: i64) -> [(ControllerRegister, i64); 4] {
+    pub fn build_ladder_answer(&self, in_force_um: [i64; 3], number: i64) -> [(ControllerRegister, i64); 4] {
         let [x, y, z] = in_force_um;
-        let at = |offset| self.word(Self::LADDERS + offset);
+        let at = |offset| self.register_at(Self::LADDERS + offset);
         [(at(0), x), (at(1), y), (at(2), z), (at(3), number)]
     }
 }
@@ -142,32 +151,32 @@ impl<R: RegisterAccess> LadderOffsets<R> {
     }
 
     /// What stands there; and is nothing running? Values that have not arrived yet are waited for.
-    fn look(&mut self, clock: &dyn Clock, axis: Axis) -> Result<(Letters, Option<bool>), SourceError> {
+    fn read_letters(&mut self, clock: &dyn Clock, axis: Axis) -> Result<(Letters, Option<bool>), SourceError> {
         for look in 0..LOOKS {
             if look > 0 {
                 clock.sleep_until(clock.now_ns().saturating_add(SETTLE_NS));
             }
-            let (words, at_rest) = self.registers.look(self.mailbox.word(0), OffsetMailbox::LENGTH)?;
-            let words: Vec<i64> = words.iter().map(|word| self.mailbox.signed(*word)).collect();
+            let (words, at_rest) = self.registers.read_registers(self.mailbox.register_at(0), OffsetMailbox::LENGTH)?;
+            let words: Vec<i64> = words.iter().map(|word| self.mailbox.decode_signed(*word)).collect();
             if let Some(letters) = OffsetMailbox::read(&words) {
                 return Ok((letters, at_rest));
             }
         }
-        let [first, last] = self.mailbox.ends();
+        let [first, last] = self.mailbox.end_registers();
         let next = "Name eight free registers with offset= in the address.";
-        Err(self.refused(axis, &format!("{first} to {last} cannot be read"), next))
+        Err(self.build_refusal(axis, &format!("{first} to {last} cannot be read"), next))
     }
 
     /// What stands there while nothing runs.
-    fn standing(&mut self, clock: &dyn Clock, axis: Axis) -> Result<Letters, SourceError> {
-        let (letters, at_rest) = self.look(clock, axis)?;
-        self.movable(axis, at_rest).map(|()| letters)
+    fn read_letters_at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<Letters, SourceError> {
+        let (letters, at_rest) = self.read_letters(clock, axis)?;
+        self.check_movable(axis, at_rest).map(|()| letters)
     }
 
     fn not_taken(&self, axis: Axis) -> SourceError {
-        let [first, last] = self.mailbox.ends();
+        let [first, last] = self.mailbox.end_registers();
         let what = format!("not held: no ladder takes the letter in {first} to {last}");
-        self.refused(axis, &what, "Let the machine's maker add the rungs, or compare offset= with the ladder.")
+        self.build_refusal(axis, &what, "Let the machine's maker add the rungs, or compare offset= with the ladder.")
     }
 }
 
@@ -176,30 +185,30 @@ impl<R: RegisterAccess> OffsetSink for LadderOffsets<R> {
         self.registers.name()
     }
 
-    fn called(&self) -> &'static str {
+    fn offset_name(&self) -> &'static str {
         "the offset"
     }
 
     fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
-        self.standing(clock, axis).map(|letters| micrometres(letters.in_force_um[axis.index()]))
+        self.read_letters_at_rest(clock, axis).map(|letters| to_micrometres(letters.in_force_um[axis.index()]))
     }
 
     /// Looks once more before it writes: a program may have been started.
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
-        let found = self.standing(clock, axis)?;
-        self.unchanged(axis, micrometres(found.in_force_um[axis.index()]), found_um)?;
+        let found = self.read_letters_at_rest(clock, axis)?;
+        self.check_unchanged(axis, to_micrometres(found.in_force_um[axis.index()]), found_um)?;
         let mut wanted = found.in_force_um;
         #[expect(clippy::cast_possible_truncation, reason = "saturates; the gate has limited it")]
         let whole_um = wanted_um.round() as i64;
         wanted[axis.index()] = whole_um;
-        let letter = self.mailbox.post(wanted, &found);
+        let letter = self.mailbox.build_letter(wanted, &found);
         self.registers.write(&letter)?;
         let (number_at, number) = letter[3];
         for _ in 0..LOOKS {
             clock.sleep_until(clock.now_ns().saturating_add(SETTLE_NS));
-            let (letters, _) = self.look(clock, axis)?;
+            let (letters, _) = self.read_letters(clock, axis)?;
             if letters.taken == number {
-                return Ok(micrometres(letters.in_force_um[axis.index()]));
+                return Ok(to_micrometres(letters.in_force_um[axis.index()]));
             }
         }
         self.registers.write(&[(number_at, found.taken)])?;
@@ -208,7 +217,7 @@ impl<R: RegisterAccess> OffsetSink for LadderOffsets<R> {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a shift has few digits")]
-fn micrometres(count: i64) -> f64 {
+fn to_micrometres(count: i64) -> f64 {
     count as f64
 }
 
@@ -236,7 +245,11 @@ mod tests {
             "nclink://x"
         }
 
-        fn look(&mut self, first: ControllerRegister, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
+        fn read_registers(
+            &mut self,
+            first: ControllerRegister,
+            count: u32,
+        ) -> Result<(Vec<i64>, Option<bool>), SourceError> {
             assert_eq!((first, count), (FIRST, OffsetMailbox::LENGTH));
             let mut inner = self.0.lock().expect("whole");
             if !inner.deaf && !inner.running && inner.words[3] != inner.words[7] {
@@ -284,7 +297,7 @@ mod tests {
 
     #[test]
     fn w_registers_have_sixteen_bits_with_a_sign() {
-        let signed = |kind, word| OffsetMailbox::new(ControllerRegister { kind, index: 0 }).signed(word);
+        let signed = |kind, word| OffsetMailbox::new(ControllerRegister { kind, index: 0 }).decode_signed(word);
         assert_eq!((signed('W', 65_531), signed('D', 65_531), signed('D', 0xFFFF_FFFB)), (-5, 65_531, -5));
     }
 }

@@ -2,11 +2,11 @@
 
 use super::connection::Link;
 use super::decode::{ChannelWord, status_word};
-use super::liberal::integer;
+use super::liberal::parse_integer;
 use super::mailbox::ControllerRegister;
 use super::message::{NcLinkAnswer, RequestedItem};
 use super::offset_mailbox::RegisterAccess;
-use super::registers::{RegisterLine, path};
+use super::registers::{RegisterLine, build_register_path};
 use crate::driver::SourceError;
 use crate::words::execution;
 
@@ -32,17 +32,22 @@ impl RegisterAccess for NcLinkRegisters {
         self.line.name()
     }
 
-    fn look(&mut self, first: ControllerRegister, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
+    fn read_registers(
+        &mut self,
+        first: ControllerRegister,
+        count: u32,
+    ) -> Result<(Vec<i64>, Option<bool>), SourceError> {
         let indexes: Vec<u32> = (first.index..first.index + count).collect();
-        let state = match self.line.requires(CHANNEL_WORDS) {
-            Ok(()) => RequestedItem::elements(CHANNEL_WORDS, &[self.f_channel]),
-            Err(SourceError::Refused { .. }) => RequestedItem::value(STATUS),
+        let state = match self.line.check_item(CHANNEL_WORDS) {
+            Ok(()) => RequestedItem::with_elements(CHANNEL_WORDS, &[self.f_channel]),
+            Err(SourceError::Refused { .. }) => RequestedItem::from_id(STATUS),
             Err(error) => return Err(error),
         };
         let by_word = state.id == CHANNEL_WORDS;
-        let answers = self.line.read(vec![RequestedItem::elements(&path(first), &indexes), state])?;
+        let answers =
+            self.line.read(vec![RequestedItem::with_elements(&build_register_path(first), &indexes), state])?;
         let numbers = match answers.first() {
-            Some(Some(Ok(values))) => values.iter().filter_map(integer).collect(),
+            Some(Some(Ok(values))) => values.iter().filter_map(parse_integer).collect(),
             _ => Vec::new(),
         };
         Ok((numbers, answers.get(1).and_then(|answer| at_rest(answer.as_ref(), by_word))))
@@ -56,7 +61,7 @@ impl RegisterAccess for NcLinkRegisters {
 fn at_rest(answer: Option<&NcLinkAnswer>, by_word: bool) -> Option<bool> {
     let value = answer?.as_ref().ok()?.first()?;
     if by_word {
-        return integer(value).map(|word| ChannelWord(word).at_rest());
+        return parse_integer(value).map(|word| ChannelWord(word).at_rest());
     }
     status_word(value).map(|word| word == execution::READY)
 }

@@ -6,7 +6,7 @@
 //! read = "0103532105"                      read = "CONTROLLER/VARIABLE@REG_X 12.3"
 //! ```
 
-use super::liberal::{integer, number};
+use super::liberal::{parse_integer, parse_number};
 use super::message::NcLinkAnswer;
 use crate::channel::Kind;
 use crate::own::{Own, OwnRead};
@@ -30,7 +30,7 @@ impl OwnRead for OwnPath {
         let found = match words.as_slice() {
             [name] => Some(Self { name: (*name).to_owned(), index: None, bit: None }),
             [name, place] => {
-                element(place).map(|(index, bit)| Self { name: (*name).to_owned(), index: Some(index), bit })
+                parse_element(place).map(|(index, bit)| Self { name: (*name).to_owned(), index: Some(index), bit })
             }
             _ => None,
         };
@@ -49,7 +49,7 @@ impl OwnRead for OwnPath {
 }
 
 /// `120` or `12.3`.
-fn element(place: &str) -> Option<(u32, Option<u8>)> {
+fn parse_element(place: &str) -> Option<(u32, Option<u8>)> {
     let (index, bit) = place.split_once('.').map_or((place, None), |(index, bit)| (index, Some(bit)));
     let bit = match bit {
         None => None,
@@ -63,7 +63,7 @@ impl Own<OwnPath> {
     ///
     /// # Errors
     /// There is no value of the kind that the channel has.
-    pub(super) fn found(&self, answer: Option<&NcLinkAnswer>) -> Result<Value, Absence> {
+    pub(super) fn extract_value(&self, answer: Option<&NcLinkAnswer>) -> Result<Value, Absence> {
         let value = match answer {
             Some(Ok(values)) => values.first().filter(|value| !value.is_null()).ok_or(Absence::NotYetRead)?,
             Some(Err(_)) => return Err(Absence::Refused),
@@ -74,10 +74,10 @@ impl Own<OwnPath> {
             return Ok(Value::Text(Arc::from(text)));
         }
         let found = match self.item.bit {
-            Some(bit) => integer(value).map(|whole| f64::from(u8::from(whole >> bit & 1 == 1))),
-            None => number(value),
+            Some(bit) => parse_integer(value).map(|whole| f64::from(u8::from(whole >> bit & 1 == 1))),
+            None => parse_number(value),
         };
-        Value::number(found.ok_or(Absence::OutOfRange)?)
+        Value::from_number(found.ok_or(Absence::OutOfRange)?)
     }
 }
 

@@ -29,15 +29,16 @@ impl RegisterLine {
     /// # Errors
     /// The first that is refused, or the line.
     pub(super) fn write(&mut self, words: &[(ControllerRegister, i64)]) -> Result<(), SourceError> {
-        let asks = words.iter().map(|(at, value)| RequestedItem::write(&path(*at), at.index, *value)).collect();
-        let answers = self.exchange(asks, Connection::set)?;
+        let asks =
+            words.iter().map(|(at, value)| RequestedItem::write(&build_register_path(*at), at.index, *value)).collect();
+        let answers = self.exchange_items(asks, Connection::set_values)?;
         for ((at, _), answer) in words.iter().zip(answers) {
             let no = match answer {
                 Some(Ok(_)) => continue,
                 Some(Err(reason)) => reason,
                 None => "it said nothing of it".to_owned(),
             };
-            return Err(refused(&self.link, &format!("writing {at}"), no));
+            return Err(build_refusal(&self.link, &format!("writing {at}"), no));
         }
         Ok(())
     }
@@ -47,25 +48,25 @@ impl RegisterLine {
     /// # Errors
     /// The device has not one of them, or the line failed.
     pub(super) fn read(&mut self, asks: Vec<RequestedItem>) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
-        self.exchange(asks, Connection::query)
+        self.exchange_items(asks, Connection::query_values)
     }
 
     /// Does the device have this?
     ///
     /// # Errors
     /// Refused where not; or the line.
-    pub(super) fn requires(&mut self, path: &str) -> Result<(), SourceError> {
-        self.with(|_, model, link| named(link, model, path, false).map(|_| ()))
+    pub(super) fn check_item(&mut self, path: &str) -> Result<(), SourceError> {
+        self.with(|_, model, link| resolve_name(link, model, path, false).map(|_| ()))
     }
 
-    fn exchange(
+    fn exchange_items(
         &mut self,
         mut asks: Vec<RequestedItem>,
         act: impl FnOnce(&mut Connection, &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, SourceError>,
     ) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
         self.with(|connection, model, link| {
             for ask in &mut asks {
-                ask.id = named(link, model, &ask.id, ask.params.value.is_some())?;
+                ask.id = resolve_name(link, model, &ask.id, ask.params.value.is_some())?;
             }
             act(connection, &asks)
         })
@@ -77,35 +78,36 @@ impl RegisterLine {
     ) -> Result<T, SourceError> {
         let (mut connection, model) = match self.session.take() {
             Some(session) => session,
-            None => self.connect()?,
+            None => self.connect_device()?,
         };
         let outcome = work(&mut connection, &model, &self.link);
         self.session = (!matches!(outcome, Err(SourceError::Line { .. }))).then_some((connection, model));
         outcome
     }
 
-    fn connect(&self) -> Result<(Connection, Model), SourceError> {
+    fn connect_device(&self) -> Result<(Connection, Model), SourceError> {
         let mut connection = Connection::open(&self.link, false)?;
-        let model = connection.probe()?;
+        let model = connection.probe_model()?;
         Ok((connection, model))
     }
 }
 
 /// The list that holds this register.
-pub(super) fn path(at: ControllerRegister) -> String {
+pub(super) fn build_register_path(at: ControllerRegister) -> String {
     format!("CONTROLLER/VARIABLE@REG_{}", at.kind)
 }
 
 /// The name by which the device knows an item.
-fn named(link: &Link, model: &Model, path: &str, written: bool) -> Result<String, SourceError> {
-    let item = model.find(path).ok_or_else(|| refused(link, path, "the device does not have it".to_owned()))?;
+fn resolve_name(link: &Link, model: &Model, path: &str, written: bool) -> Result<String, SourceError> {
+    let item =
+        model.find_item(path).ok_or_else(|| build_refusal(link, path, "the device does not have it".to_owned()))?;
     if written && !item.settable {
-        return Err(refused(link, path, "its model says that it may not be written".to_owned()));
+        return Err(build_refusal(link, path, "its model says that it may not be written".to_owned()));
     }
     Ok(if model.names_by_path() { format!("/{}", item.path) } else { item.id.clone() })
 }
 
-fn refused(link: &Link, request: &str, what: String) -> SourceError {
+fn build_refusal(link: &Link, request: &str, what: String) -> SourceError {
     SourceError::Refused {
         source_name: link.name.clone(),
         request: request.to_owned(),

@@ -1,6 +1,6 @@
 //! One message of a sample channel: a column of values per item, and when they were true on the device's clock.
 
-use super::liberal::{field, integer, list, number, text};
+use super::liberal::{find_field, find_list, find_text, parse_integer, parse_number};
 use super::model::Model;
 use serde_json::Value;
 
@@ -41,24 +41,26 @@ impl SampleBlock {
     /// # Errors
     /// What makes no sense in it.
     pub fn parse(message: &Value, tail: &str, model: &Model) -> Result<Self, String> {
-        let channel = text(message, &["id"]).unwrap_or_else(|| tail.to_owned());
+        let channel = find_text(message, &["id"]).unwrap_or_else(|| tail.to_owned());
         let known = model.samples.iter().find(|known| known.id == channel || known.id == tail);
-        let data = list(message, &["data"]);
-        let begin = field(message, &["beginTime", "begintime"]).ok_or("there is no \"beginTime\" in it")?;
-        let begin_ms = integer(begin).ok_or_else(|| format!("{begin} is no time in milliseconds"))?;
-        let interval = field(message, &["interval", "sampleInterval"]).and_then(number);
+        let data = find_list(message, &["data"]);
+        let begin = find_field(message, &["beginTime", "begintime"]).ok_or("there is no \"beginTime\" in it")?;
+        let begin_ms = parse_integer(begin).ok_or_else(|| format!("{begin} is no time in milliseconds"))?;
+        let interval = find_field(message, &["interval", "sampleInterval"]).and_then(parse_number);
         let interval_ms = interval.or(known.map(|known| known.interval_ms)).filter(|ms| *ms > 0.0);
         let interval_ms = interval_ms.ok_or("there is no interval in it, nor in the model")?;
-        let names = names(message, known.map(|known| known.items.as_slice()), data.len())?;
-        let sizes = data.iter().map(|column| list(column, &["data"]));
+        let names = resolve_names(message, known.map(|known| known.items.as_slice()), data.len())?;
+        let sizes = data.iter().map(|column| find_list(column, &["data"]));
         let total: usize = sizes.clone().flatten().map(|value| value.as_array().map_or(1, Vec::len)).sum();
         if total > VALUES_MAX {
             return Err(format!("{total} values; at most {VALUES_MAX} are taken from one message"));
         }
         let instants = sizes.map(<[Value]>::len).max().unwrap_or(0);
-        let path = |name: &String| model.find(name).map_or_else(|| name.clone(), |item| item.path.clone());
-        let columns =
-            data.iter().zip(&names).map(|(data, name)| column(list(data, &["data"]), path(name), interval_ms));
+        let path = |name: &String| model.find_item(name).map_or_else(|| name.clone(), |item| item.path.clone());
+        let columns = data
+            .iter()
+            .zip(&names)
+            .map(|(data, name)| build_column(find_list(data, &["data"]), path(name), interval_ms));
         Ok(Self { channel, begin_ms, interval_ms, instants, columns: columns.collect() })
     }
 
@@ -71,8 +73,8 @@ impl SampleBlock {
 }
 
 /// The names of the columns: from the message, else the order of the model.
-fn names(message: &Value, model: Option<&[String]>, columns: usize) -> Result<Vec<String>, String> {
-    let said: Vec<String> = list(message, &["paths", "ids"]).iter().filter_map(name).collect();
+fn resolve_names(message: &Value, model: Option<&[String]>, columns: usize) -> Result<Vec<String>, String> {
+    let said: Vec<String> = find_list(message, &["paths", "ids"]).iter().filter_map(parse_name).collect();
     let names = if said.is_empty() { model.unwrap_or_default().to_vec() } else { said };
     if names.len() == columns {
         return Ok(names);
@@ -80,24 +82,24 @@ fn names(message: &Value, model: Option<&[String]>, columns: usize) -> Result<Ve
     Err(format!("it has {columns} columns and names for {}", names.len()))
 }
 
-fn name(value: &Value) -> Option<String> {
-    value.as_str().map(str::to_owned).or_else(|| text(value, &["id", "path"]))
+fn parse_name(value: &Value) -> Option<String> {
+    value.as_str().map(str::to_owned).or_else(|| find_text(value, &["id", "path"]))
 }
 
 /// A value may itself be a list: several values within one interval. `[]` is none.
 #[expect(clippy::cast_precision_loss, reason = "a message holds at most a million values")]
-fn column(data: &[Value], path: String, interval_ms: f64) -> ItemColumn {
+fn build_column(data: &[Value], path: String, interval_ms: f64) -> ItemColumn {
     let mut values = Vec::with_capacity(data.len());
     let mut word = None;
     for value in data {
         match value {
             Value::Array(several) if several.is_empty() => values.push(None),
-            Value::Array(several) => values.extend(several.iter().map(number)),
-            Value::String(text) if number(value).is_none() => {
+            Value::Array(several) => values.extend(several.iter().map(parse_number)),
+            Value::String(text) if parse_number(value).is_none() => {
                 word = Some(text.clone());
                 values.push(None);
             }
-            other => values.push(number(other)),
+            other => values.push(parse_number(other)),
         }
     }
     let per_instant = if data.is_empty() { 1.0 } else { values.len() as f64 / data.len() as f64 };

@@ -48,14 +48,14 @@ impl NcLinkSource {
     /// A source of this name for what the address says.
     #[must_use]
     pub fn new(name: &str, target: &NcLinkTarget, login: Option<(String, String)>) -> Self {
-        let link = Link::of(name, target, login);
+        let link = Link::from_target(name, target, login);
         let layout = NcLinkLayout { f_channel: target.f_channel, spindle_axis: target.spindle_axis };
         let period = Duration::from_millis(target.period_ms);
         Self {
             link,
             layout,
             period,
-            channels: map::channels(&target.own),
+            channels: map::list_channels(&target.own),
             own: target.own.clone(),
             session: None,
             track: SampleTracks::default(),
@@ -85,32 +85,32 @@ impl NcLinkSource {
             Some(session) => session,
             None => NcLinkSession::open(&self.link, self.layout, &self.own)?,
         };
-        let answers = session.ask(self.layout, &self.own, clock);
+        let answers = session.query_values(self.layout, &self.own, clock);
         // What came by itself is taken in any case: a device that does not answer may still send.
         let unasked = session.connection.take_unasked()?;
-        self.track.lost_messages(session.connection.lost());
+        self.track.lost_messages(session.connection.count_lost());
         for message in &unasked {
-            self.take(message, &session.model);
+            self.record_message(message, &session.model);
         }
-        let outcome = answers.map(|(answers, stamp)| session.plan.readings(&answers, stamp, out));
+        let outcome = answers.map(|(answers, stamp)| session.plan.append_readings(&answers, stamp, out));
         session.doubtful = matches!(outcome, Err(SourceError::Timeout { .. }));
         // Only a broken line needs another connection.
         self.session = (!matches!(outcome, Err(SourceError::Line { .. }))).then_some(session);
         outcome
     }
 
-    fn take(&mut self, message: &Unasked, model: &Model) {
+    fn record_message(&mut self, message: &Unasked, model: &Model) {
         match message.subject {
             Subject::Sample => match SampleBlock::parse(&message.message, &message.tail, model) {
                 Ok(block) => {
-                    self.track.block(&block);
+                    self.track.record_block(&block);
                     if let Some(sink) = &mut self.sink {
                         sink(&block, message.arrived);
                     }
                 }
-                Err(why) => self.track.nonsense(why),
+                Err(why) => self.track.record_nonsense(why),
             },
-            _ => self.track.event(&message.message),
+            _ => self.track.record_event(&message.message),
         }
     }
 }
@@ -118,10 +118,10 @@ impl NcLinkSource {
 impl NcLinkSession {
     fn open(link: &Link, layout: NcLinkLayout, own: &[Own<OwnPath>]) -> Result<Self, SourceError> {
         let mut connection = Connection::open(link, true)?;
-        let model = connection.probe()?;
+        let model = connection.probe_model()?;
         let by_path = model.names_by_path();
-        let plan = NcLinkPoll::of(&model, layout, own, by_path);
-        if plan.asks().is_empty() {
+        let plan = NcLinkPoll::from_model(&model, layout, own, by_path);
+        if plan.requested_items().is_empty() {
             return Err(SourceError::Decode {
                 source_name: link.name.clone(),
                 request: "the probe of its model".to_owned(),
@@ -132,26 +132,26 @@ impl NcLinkSession {
     }
 
     /// Asks a device that was silent for its model again.
-    fn renew(&mut self, layout: NcLinkLayout, own: &[Own<OwnPath>]) -> Result<(), SourceError> {
-        self.model = self.connection.probe()?;
-        self.plan = NcLinkPoll::of(&self.model, layout, own, self.by_path);
+    fn renew_model(&mut self, layout: NcLinkLayout, own: &[Own<OwnPath>]) -> Result<(), SourceError> {
+        self.model = self.connection.probe_model()?;
+        self.plan = NcLinkPoll::from_model(&self.model, layout, own, self.by_path);
         self.doubtful = false;
         Ok(())
     }
 
     /// One query for everything. When a device refuses everything it is asked once by its other names.
-    fn ask(
+    fn query_values(
         &mut self,
         layout: NcLinkLayout,
         own: &[Own<OwnPath>],
         clock: &dyn Clock,
     ) -> Result<(Vec<Option<NcLinkAnswer>>, Stamp), SourceError> {
         if self.doubtful {
-            self.renew(layout, own)?;
+            self.renew_model(layout, own)?;
         }
         loop {
             let began_ns = clock.now_ns();
-            let answers = self.connection.query(self.plan.asks())?;
+            let answers = self.connection.query_values(self.plan.requested_items())?;
             let stamp = Stamp::of_request(began_ns, clock.now_ns());
             self.understood |= answers.iter().any(|answer| matches!(answer, Some(Ok(_))));
             if self.understood || self.turned {
@@ -159,7 +159,7 @@ impl NcLinkSession {
             }
             self.turned = true;
             self.by_path = !self.by_path;
-            self.plan = NcLinkPoll::of(&self.model, layout, own, self.by_path);
+            self.plan = NcLinkPoll::from_model(&self.model, layout, own, self.by_path);
         }
     }
 }
@@ -177,7 +177,7 @@ impl Source for NcLinkSource {
         self.period
     }
 
-    fn identity(&self) -> Vec<(&'static str, String)> {
+    fn query_identity(&self) -> Vec<(&'static str, String)> {
         let Some(model) = self.model() else { return Vec::new() };
         let sampled: Vec<String> =
             model.samples.iter().map(|channel| format!("{} every {} ms", channel.id, channel.interval_ms)).collect();
@@ -193,22 +193,22 @@ impl Source for NcLinkSource {
         self.poll(clock, out)
     }
 
-    fn facts(&self) -> Vec<Fact> {
-        let mut facts = self.track.facts();
-        facts.extend(self.model().map(|model| Fact::text("device", &model.name)));
+    fn collect_facts(&self) -> Vec<Fact> {
+        let mut facts = self.track.collect_facts();
+        facts.extend(self.model().map(|model| Fact::from_text("device", &model.name)));
         facts
     }
 
-    fn problems(&self) -> Vec<SourceProblem> {
+    fn list_problems(&self) -> Vec<SourceProblem> {
         self.session.as_ref().map_or_else(Vec::new, |session| session.plan.problems().to_vec())
     }
 
-    fn offers(&mut self, _: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
+    fn list_offers(&mut self, _: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
         let mut session = match self.session.take() {
             Some(session) => session,
             None => NcLinkSession::open(&self.link, self.layout, &self.own)?,
         };
-        let offers = session.offers();
+        let offers = session.list_offers();
         self.session = offers.is_ok().then_some(session);
         offers
     }
@@ -221,18 +221,18 @@ const SHOWN_MAX: usize = 60;
 
 impl NcLinkSession {
     /// Every item of the model, with what it says now. What the model itself tells is no data item.
-    fn offers(&mut self) -> Result<Vec<Offer>, SourceError> {
+    fn list_offers(&mut self) -> Result<Vec<Offer>, SourceError> {
         let items: Vec<ModelItem> = self.model.items.iter().filter(|item| item.value.is_none()).cloned().collect();
         let mut offers = Vec::with_capacity(items.len());
         for some in items.chunks(OFFERED_AT_ONCE) {
-            let names: Vec<String> = some.iter().map(|item| map::name(item, self.by_path)).collect();
-            let asks: Vec<RequestedItem> = names.iter().map(|name| RequestedItem::value(name)).collect();
-            let answers = self.connection.query(&asks)?;
+            let names: Vec<String> = some.iter().map(|item| map::name_item(item, self.by_path)).collect();
+            let asks: Vec<RequestedItem> = names.iter().map(|name| RequestedItem::from_id(name)).collect();
+            let answers = self.connection.query_values(&asks)?;
             for ((item, name), answer) in some.iter().zip(&names).zip(answers) {
                 offers.push(Offer {
                     name: item.path.clone(),
-                    says: said(item, answer),
-                    channel: self.plan.takes(name),
+                    says: describe_answer(item, answer),
+                    channel: self.plan.find_channel(name),
                 });
             }
         }
@@ -240,7 +240,7 @@ impl NcLinkSession {
     }
 }
 
-fn said(item: &ModelItem, answer: Option<NcLinkAnswer>) -> Result<String, String> {
+fn describe_answer(item: &ModelItem, answer: Option<NcLinkAnswer>) -> Result<String, String> {
     if item.path.contains("VARIABLE@") {
         return Ok("a list: name an element, as in `read = \"PATH 120\"`".to_owned());
     }

@@ -43,29 +43,29 @@ const TABLE: [(Subject, &str); 11] = [
 ];
 
 impl Subject {
-    fn beginning(self) -> &'static str {
+    fn topic_prefix(self) -> &'static str {
         TABLE.iter().find(|(subject, _)| *subject == self).map_or("", |(_, beginning)| beginning)
     }
 
     /// The topic of this subject for a device.
     #[must_use]
-    pub fn topic(self, serial: &str) -> String {
+    pub fn build_topic(self, serial: &str) -> String {
         match self {
-            Self::Register => self.beginning().to_owned(),
-            _ => format!("{}/{serial}", self.beginning()),
+            Self::Register => self.topic_prefix().to_owned(),
+            _ => format!("{}/{serial}", self.topic_prefix()),
         }
     }
 
     /// The filter that takes this subject, with anything behind the serial number: the name of a sample channel, or the
     /// name of a client.
     #[must_use]
-    pub fn filter(self, serial: &str) -> String {
-        format!("{}/#", self.topic(serial))
+    pub fn build_filter(self, serial: &str) -> String {
+        format!("{}/#", self.build_topic(serial))
     }
 
     /// The subject of a topic of this device, and what stands behind the serial number.
     #[must_use]
-    pub fn of<'a>(topic: &'a str, serial: &str) -> Option<(Self, &'a str)> {
+    pub fn from_topic<'a>(topic: &'a str, serial: &str) -> Option<(Self, &'a str)> {
         let matching = TABLE.iter().filter_map(|(subject, beginning)| {
             let rest = topic.strip_prefix(beginning)?.strip_prefix('/')?.strip_prefix(serial)?;
             if rest.is_empty() { Some((*subject, "")) } else { Some((*subject, rest.strip_prefix('/')?)) }
@@ -81,12 +81,12 @@ mod tests {
     #[test]
     fn topics_are_found_again_with_and_without_a_tail() {
         for (subject, _) in TABLE.into_iter().filter(|(subject, _)| *subject != Subject::Register) {
-            let topic = subject.topic("SN/1");
-            assert_eq!(Subject::of(&topic, "SN/1"), Some((subject, "")));
-            assert_eq!(Subject::of(&format!("{topic}/client"), "SN/1"), Some((subject, "client")));
-            assert_eq!(Subject::of(&format!("{topic}7"), "SN/1"), None, "another device");
+            let topic = subject.build_topic("SN/1");
+            assert_eq!(Subject::from_topic(&topic, "SN/1"), Some((subject, "")));
+            assert_eq!(Subject::from_topic(&format!("{topic}/client"), "SN/1"), Some((subject, "client")));
+            assert_eq!(Subject::from_topic(&format!("{topic}7"), "SN/1"), None, "another device");
         }
-        assert_eq!(Subject::Sample.filter("A1"), "Sample/A1/#");
-        assert_eq!(Subject::of("Register/Request", "A1"), None);
+        assert_eq!(Subject::Sample.build_filter("A1"), "Sample/A1/#");
+        assert_eq!(Subject::from_topic("Register/Request", "A1"), None);
     }
 }

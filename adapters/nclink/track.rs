@@ -56,21 +56,21 @@ impl SampleTracks {
 
     /// Messages that were lost in this client or made no sense, and why the last of them did not.
     #[must_use]
-    pub fn unusable(&self) -> (u64, Option<&str>) {
+    pub fn unusable_messages(&self) -> (u64, Option<&str>) {
         (self.lost + self.nonsense, self.why.as_deref())
     }
 
     /// The same as facts of the source: instants and missing instants of each sample channel, events, unusable messages.
     #[expect(clippy::cast_precision_loss, reason = "counts")]
-    pub(super) fn facts(&self) -> Vec<Fact> {
+    pub(super) fn collect_facts(&self) -> Vec<Fact> {
         let mut facts = Vec::new();
         for (name, channel) in &self.channels {
-            facts.push(Fact::number(format!("{name}_instants"), channel.instants as f64));
-            facts.push(Fact::number(format!("{name}_missing_instants"), channel.missing as f64));
+            facts.push(Fact::from_number(format!("{name}_instants"), channel.instants as f64));
+            facts.push(Fact::from_number(format!("{name}_missing_instants"), channel.missing as f64));
         }
-        facts.push(Fact::number("events", self.event_count as f64));
-        facts.extend(self.events.last().map(|event| Fact::text("last_event", event)));
-        facts.push(Fact::number("unusable_messages", self.unusable().0 as f64));
+        facts.push(Fact::from_number("events", self.event_count as f64));
+        facts.extend(self.events.last().map(|event| Fact::from_text("last_event", event)));
+        facts.push(Fact::from_number("unusable_messages", self.unusable_messages().0 as f64));
         facts
     }
 
@@ -78,15 +78,15 @@ impl SampleTracks {
         self.lost = lost;
     }
 
-    pub(super) fn nonsense(&mut self, why: String) {
+    pub(super) fn record_nonsense(&mut self, why: String) {
         self.nonsense += 1;
         self.why = Some(why);
     }
 
-    pub(super) fn event(&mut self, message: &Value) {
+    pub(super) fn record_event(&mut self, message: &Value) {
         self.event_count += 1;
         let said = message.get("event").unwrap_or(message);
-        let words = decode::alarm(said);
+        let words = decode::format_alarms(said);
         let text = if words.is_empty() { said.to_string() } else { words };
         if self.events.len() >= EVENTS_KEPT {
             self.events.remove(0);
@@ -94,11 +94,11 @@ impl SampleTracks {
         self.events.push(text.chars().take(200).collect());
     }
 
-    pub(super) fn block(&mut self, block: &SampleBlock) {
+    pub(super) fn record_block(&mut self, block: &SampleBlock) {
         if self.channels.len() >= CHANNELS_MAX && !self.channels.contains_key(&block.channel) {
-            return self.nonsense(format!("more than {CHANNELS_MAX} sample channels"));
+            return self.record_nonsense(format!("more than {CHANNELS_MAX} sample channels"));
         }
-        self.channels.entry(block.channel.clone()).or_default().block(block);
+        self.channels.entry(block.channel.clone()).or_default().record_block(block);
     }
 }
 
@@ -109,7 +109,7 @@ impl ChannelTrack {
         clippy::cast_sign_loss,
         reason = "a positive count; milliseconds since 1970 fit a double"
     )]
-    fn block(&mut self, block: &SampleBlock) {
+    fn record_block(&mut self, block: &SampleBlock) {
         let begin_ms = block.begin_ms as f64;
         if let Some(expected_ms) = self.expected_ms {
             // Half an interval is the rounding of the device's own milliseconds.
@@ -139,7 +139,7 @@ mod tests {
     fn a_missing_millisecond_is_counted() {
         let mut track = SampleTracks::default();
         for (begin_ms, instants) in [(0, 200), (200, 200), (401, 200), (801, 200), (900, 10)] {
-            track.block(&block(begin_ms, instants));
+            track.record_block(&block(begin_ms, instants));
         }
         let (_, channel) = track.channels().next().expect("one");
         assert_eq!((channel.messages, channel.instants, channel.missing, channel.overlapping), (5, 810, 201, 1));
@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn events_are_kept_as_words_and_bounded() {
         let mut track = SampleTracks::default();
-        (0..100).for_each(|number| track.event(&json!({"event": {"number": number, "text": "x"}})));
+        (0..100).for_each(|number| track.record_event(&json!({"event": {"number": number, "text": "x"}})));
         assert_eq!((track.event_count(), track.events().len()), (100, EVENTS_KEPT));
         assert_eq!(track.events().last().map(String::as_str), Some("99 x"));
     }

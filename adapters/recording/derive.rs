@@ -19,8 +19,8 @@ const DERIVABLE: [&str; 6] = [
 #[must_use]
 pub fn with_derived(mut recording: Recording) -> Recording {
     for name in DERIVABLE {
-        let lacking = recording.numbers(name).is_none_or(|numbers| numbers.present().next().is_none());
-        if lacking && let Some(numbers) = derived(&recording, name) {
+        let lacking = recording.find_numbers(name).is_none_or(|numbers| numbers.present_values().next().is_none());
+        if lacking && let Some(numbers) = derive_quantity(&recording, name) {
             recording.set_column(name, Cells::Numbers(numbers));
         }
     }
@@ -29,71 +29,73 @@ pub fn with_derived(mut recording: Recording) -> Recording {
 
 /// The quantity `name`, computed from the others; `None` where it cannot be.
 #[must_use]
-pub fn derived(recording: &Recording, name: &str) -> Option<Numbers> {
+pub fn derive_quantity(recording: &Recording, name: &str) -> Option<Numbers> {
     match name {
-        "feed_per_rev_mm" => combine2(recording, "feed_mm_min", "spindle_speed_rpm", |feed, speed| {
+        "feed_per_rev_mm" => combine_columns(recording, "feed_mm_min", "spindle_speed_rpm", |feed, speed| {
             (speed.abs() > 1.0).then(|| feed / speed.abs())
         }),
-        "cutting_speed_m_min" => combine2(recording, "diameter_mm", "spindle_speed_rpm", |diameter, speed| {
+        "cutting_speed_m_min" => combine_columns(recording, "diameter_mm", "spindle_speed_rpm", |diameter, speed| {
             Some(PI * diameter * speed.abs() / 1000.0)
         }),
         "feed_per_tooth_mm" => {
-            combine2(recording, "feed_per_rev_mm", "teeth", |feed, teeth| (teeth >= 1.0).then(|| feed / teeth))
+            combine_columns(recording, "feed_per_rev_mm", "teeth", |feed, teeth| (teeth >= 1.0).then(|| feed / teeth))
         }
         "removal_rate_cm3_min" => removal_rate(recording),
-        "spindle_acceleration_rpm_per_s" => rate(recording, "spindle_speed_rpm"),
+        "spindle_acceleration_rpm_per_s" => compute_rate(recording, "spindle_speed_rpm"),
         "cutting_time_min" => cutting_time(recording),
         _ => None,
     }
 }
 
-fn combine2(recording: &Recording, a: &str, b: &str, law: impl Fn(f64, f64) -> Option<f64>) -> Option<Numbers> {
-    let a = recording.numbers(a)?;
-    let b = recording.numbers(b)?;
+fn combine_columns(recording: &Recording, a: &str, b: &str, law: impl Fn(f64, f64) -> Option<f64>) -> Option<Numbers> {
+    let a = recording.find_numbers(a)?;
+    let b = recording.find_numbers(b)?;
     Some(a.iter().zip(b.iter()).map(|(a, b)| law(a?, b?)).collect())
 }
 
 /// Milling: `ap ae vf / 1000`; turning (no width of cut): `vc f ap`. Both in cm3/min.
 fn removal_rate(recording: &Recording) -> Option<Numbers> {
-    let depth = recording.numbers("depth_of_cut_mm")?;
-    if let (Some(width), Some(feed)) = (recording.numbers("width_of_cut_mm"), recording.numbers("feed_mm_min")) {
-        let rows = 0..recording.rows();
+    let depth = recording.find_numbers("depth_of_cut_mm")?;
+    if let (Some(width), Some(feed)) =
+        (recording.find_numbers("width_of_cut_mm"), recording.find_numbers("feed_mm_min"))
+    {
+        let rows = 0..recording.count_rows();
         return Some(rows.map(|row| Some(depth.get(row)? * width.get(row)? * feed.get(row)? / 1000.0)).collect());
     }
-    let speed = recording.numbers("cutting_speed_m_min")?;
-    let feed = recording.numbers("feed_per_rev_mm")?;
-    Some((0..recording.rows()).map(|row| Some(speed.get(row)? * feed.get(row)? * depth.get(row)?)).collect())
+    let speed = recording.find_numbers("cutting_speed_m_min")?;
+    let feed = recording.find_numbers("feed_per_rev_mm")?;
+    Some((0..recording.count_rows()).map(|row| Some(speed.get(row)? * feed.get(row)? * depth.get(row)?)).collect())
 }
 
 /// Central difference within a run, one-sided at its ends.
-fn rate(recording: &Recording, name: &str) -> Option<Numbers> {
-    let values = recording.numbers(name)?;
+fn compute_rate(recording: &Recording, name: &str) -> Option<Numbers> {
+    let values = recording.find_numbers(name)?;
     let mut rates = Numbers::default();
-    for run in recording.runs() {
+    for run in recording.list_runs() {
         for row in run.rows.clone() {
             let before = row.saturating_sub(1).max(run.rows.start);
             let after = (row + 1).min(run.rows.end - 1);
-            rates.push(slope(recording, values, before, after));
+            rates.push(compute_slope(recording, values, before, after));
         }
     }
     Some(rates)
 }
 
-fn slope(recording: &Recording, values: &Numbers, before: usize, after: usize) -> Option<f64> {
+fn compute_slope(recording: &Recording, values: &Numbers, before: usize, after: usize) -> Option<f64> {
     let dt_s = recording.time_s[after] - recording.time_s[before];
     (dt_s > 0.0).then_some((values.get(after)? - values.get(before)?) / dt_s)
 }
 
 /// Engaged minutes of this row's `tool`, summed over the whole recording, also when other tools cut in between.
 fn cutting_time(recording: &Recording) -> Option<Numbers> {
-    let engaged = recording.numbers("engaged")?;
-    let tools = recording.words("tool");
+    let engaged = recording.find_numbers("engaged")?;
+    let tools = recording.find_words("tool");
     let mut minutes: BTreeMap<Option<u32>, f64> = BTreeMap::new();
     let mut times = Numbers::default();
-    for run in recording.runs() {
+    for run in recording.list_runs() {
         for row in run.rows.clone() {
             let step_s = if row > run.rows.start { recording.time_s[row] - recording.time_s[row - 1] } else { 0.0 };
-            let sum = minutes.entry(tools.and_then(|tools| tools.code(row))).or_default();
+            let sum = minutes.entry(tools.and_then(|tools| tools.find_code(row))).or_default();
             *sum += engaged.get(row).unwrap_or(0.0) * step_s.max(0.0) / 60.0;
             times.push(Some(*sum));
         }
@@ -109,18 +111,19 @@ mod tests {
     #[test]
     fn the_published_cutting_speed() {
         let mut recording = Recording::new("test", vec![0.0], None);
-        recording.set_column("diameter_mm", Cells::Numbers(Numbers::full(vec![79.0])));
-        recording.set_column("spindle_speed_rpm", Cells::Numbers(Numbers::full(vec![800.0])));
-        let speed = derived(&recording, "cutting_speed_m_min").and_then(|numbers| numbers.get(0)).expect("derivable");
+        recording.set_column("diameter_mm", Cells::Numbers(Numbers::from_values(vec![79.0])));
+        recording.set_column("spindle_speed_rpm", Cells::Numbers(Numbers::from_values(vec![800.0])));
+        let speed =
+            derive_quantity(&recording, "cutting_speed_m_min").and_then(|numbers| numbers.get(0)).expect("derivable");
         assert!((speed - 198.5).abs() < 0.1, "{speed}");
     }
 
     #[test]
     fn cutting_time_belongs_to_the_tool() {
         let mut recording = Recording::new("test", (0..6).map(|i| f64::from(i) * 60.0).collect(), None);
-        recording.set_column("engaged", Cells::Numbers(Numbers::full(vec![1.0; 6])));
+        recording.set_column("engaged", Cells::Numbers(Numbers::from_values(vec![1.0; 6])));
         recording.set_column("tool", Cells::Words(Words::from_iter(["A", "A", "B", "B", "A", "A"])));
-        let minutes = derived(&recording, "cutting_time_min").expect("derivable");
+        let minutes = derive_quantity(&recording, "cutting_time_min").expect("derivable");
         assert_eq!(minutes.iter().flatten().collect::<Vec<_>>(), vec![0.0, 1.0, 1.0, 2.0, 2.0, 3.0]);
     }
 }

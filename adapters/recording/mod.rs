@@ -6,7 +6,7 @@
 mod derive;
 pub mod read;
 
-pub use derive::{derived, with_derived};
+pub use derive::{derive_quantity, with_derived};
 pub use read::mapping::{ColumnMapping, Mapping, MappingError, TimeMapping};
 pub use read::plan::{Note, NoteKind};
 pub use read::{ReadRecording, RecordingError, RowProblem, read_csv, read_path, read_path_as};
@@ -42,7 +42,7 @@ pub struct Numbers {
 impl Numbers {
     /// A column with a value in every row.
     #[must_use]
-    pub fn full(values: Vec<f64>) -> Self {
+    pub fn from_values(values: Vec<f64>) -> Self {
         let present = values.iter().map(|value| value.is_finite()).collect();
         Self { values, present }
     }
@@ -66,7 +66,7 @@ impl Numbers {
     }
 
     /// The values that are present.
-    pub fn present(&self) -> impl Iterator<Item = f64> + '_ {
+    pub fn present_values(&self) -> impl Iterator<Item = f64> + '_ {
         self.iter().flatten()
     }
 
@@ -131,19 +131,19 @@ impl Words {
     /// The word in `row`, if there is one.
     #[must_use]
     pub fn get(&self, row: usize) -> Option<&str> {
-        self.code(row).map(|code| self.words[code as usize].as_str())
+        self.find_code(row).map(|code| self.words[code as usize].as_str())
     }
 
     /// The number of the word in `row` within [`Words::words`].
     #[must_use]
-    pub fn code(&self, row: usize) -> Option<u32> {
+    pub fn find_code(&self, row: usize) -> Option<u32> {
         *self.codes.get(row)?
     }
 
     /// The words of these rows, with the same numbers.
     #[must_use]
     pub fn at_rows(&self, rows: impl Iterator<Item = usize>) -> Self {
-        let codes = rows.map(|row| self.code(row)).collect();
+        let codes = rows.map(|row| self.find_code(row)).collect();
         Self { codes, words: self.words.clone(), numbers: self.numbers.clone() }
     }
 
@@ -186,7 +186,7 @@ pub enum Cells {
 impl Cells {
     /// The cells of the rows that are kept.
     #[must_use]
-    pub(crate) fn only(&self, kept: &[bool]) -> Self {
+    pub(crate) fn select_rows(&self, kept: &[bool]) -> Self {
         let rows = || (0..kept.len()).filter(|row| kept[*row]);
         match self {
             Self::Numbers(numbers) => Self::Numbers(rows().map(|row| numbers.get(row)).collect()),
@@ -238,10 +238,10 @@ impl Recording {
     pub fn set_column(&mut self, name: &str, mut cells: Cells) {
         match &mut cells {
             Cells::Numbers(numbers) => {
-                numbers.values.resize(self.rows(), 0.0);
-                numbers.present.resize(self.rows(), false);
+                numbers.values.resize(self.count_rows(), 0.0);
+                numbers.present.resize(self.count_rows(), false);
             }
-            Cells::Words(words) => words.codes.resize(self.rows(), None),
+            Cells::Words(words) => words.codes.resize(self.count_rows(), None),
         }
         match self.columns.iter_mut().find(|column| column.name == name) {
             Some(column) => column.cells = cells,
@@ -251,16 +251,18 @@ impl Recording {
 
     /// How many rows.
     #[must_use]
-    pub fn rows(&self) -> usize {
+    pub fn count_rows(&self) -> usize {
         self.time_s.len()
     }
 
     /// The rows that are kept.
     #[must_use]
-    pub fn only(&self, kept: &[bool]) -> Self {
+    pub fn select_rows(&self, kept: &[bool]) -> Self {
         let times = self.time_s.iter().zip(kept).filter(|(_, kept)| **kept).map(|(time_s, _)| *time_s).collect();
-        let columns =
-            self.columns.iter().map(|column| Column { name: column.name.clone(), cells: column.cells.only(kept) });
+        let columns = self
+            .columns
+            .iter()
+            .map(|column| Column { name: column.name.clone(), cells: column.cells.select_rows(kept) });
         Self {
             source: self.source.clone(),
             time_s: times,
@@ -278,7 +280,7 @@ impl Recording {
 
     /// The quantity of this name.
     #[must_use]
-    pub fn numbers(&self, name: &str) -> Option<&Numbers> {
+    pub fn find_numbers(&self, name: &str) -> Option<&Numbers> {
         self.columns.iter().find(|column| column.name == name).and_then(|column| match &column.cells {
             Cells::Numbers(numbers) => Some(numbers),
             Cells::Words(_) => None,
@@ -287,7 +289,7 @@ impl Recording {
 
     /// The text column of this name.
     #[must_use]
-    pub fn words(&self, name: &str) -> Option<&Words> {
+    pub fn find_words(&self, name: &str) -> Option<&Words> {
         self.columns.iter().find(|column| column.name == name).and_then(|column| match &column.cells {
             Cells::Words(words) => Some(words),
             Cells::Numbers(_) => None,
@@ -296,11 +298,11 @@ impl Recording {
 
     /// Stretches of rows with the same `run`, in order. A run that returns later is a second stretch.
     #[must_use]
-    pub fn runs(&self) -> Vec<Run> {
-        let words = self.words("run");
+    pub fn list_runs(&self) -> Vec<Run> {
+        let words = self.find_words("run");
         let name = |row: usize| words.map_or("1", |words| words.get(row).unwrap_or(""));
         let mut runs: Vec<Run> = Vec::new();
-        for row in 0..self.rows() {
+        for row in 0..self.count_rows() {
             match runs.last_mut() {
                 Some(run) if run.name == name(row) => run.rows.end = row + 1,
                 _ => runs.push(Run { name: name(row).to_owned(), rows: row..row + 1 }),

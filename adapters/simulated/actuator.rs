@@ -17,9 +17,9 @@ impl SimulatedOverride {
         Self { name, machine }
     }
 
-    fn post(&self, clock: &dyn Clock, letter: LadderInput) -> Result<(), SourceError> {
+    fn post_letter(&self, clock: &dyn Clock, letter: LadderInput) -> Result<(), SourceError> {
         self.refuse_unless_booted(clock)?;
-        self.machine.locked().post(clock.now_ns(), letter);
+        self.machine.locked().post_letter(clock.now_ns(), letter);
         Ok(())
     }
 
@@ -35,7 +35,7 @@ impl Actuator for SimulatedOverride {
     }
 
     fn write_feed_override(&mut self, clock: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
-        self.post(clock, LadderInput::Override(wanted))
+        self.post_letter(clock, LadderInput::Override(wanted))
     }
 
     fn read_feed_override(&mut self, clock: &dyn Clock) -> Result<OverridePct, SourceError> {
@@ -49,11 +49,11 @@ impl Actuator for SimulatedOverride {
         Ok(OverridePct::new(self.machine.moment(clock.now_ns()).panel.dial_pct))
     }
 
-    fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
-        self.post(clock, LadderInput::Release)
+    fn release_override(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        self.post_letter(clock, LadderInput::Release)
     }
 
-    fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
-        self.post(clock, LadderInput::Ask(request))
+    fn ask_ladder(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        self.post_letter(clock, LadderInput::Ask(request))
     }
 }

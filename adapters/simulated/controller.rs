@@ -1,9 +1,9 @@
 //! The controller of the simulated machine as a source.
 
 use super::Simulated;
-use super::device::{PolledDevice, nanoseconds};
+use super::device::{PolledDevice, to_nanoseconds};
 use super::moment::{Moment, Panel};
-use super::noise::{Purpose, normal};
+use super::noise::{Purpose, sample_normal};
 use crate::address::SimulatedMachine;
 use crate::channel::ChannelId;
 use crate::clock::{Clock, TimeNs};
@@ -30,7 +30,7 @@ enum CachedText {
 }
 
 impl CachedText {
-    fn text(self) -> Arc<str> {
+    fn to_text(self) -> Arc<str> {
         match self {
             Self::Plain(word) => Arc::from(word),
             Self::Numbered(letter, number) => Arc::from(format!("{letter}{number}")),
@@ -46,16 +46,16 @@ const COMMON: [ChannelGetter; 25] = [
     ("spindle_programmed_rpm", Get::Number(|moment| moment.panel.spindle_programmed_rpm)),
     ("spindle_speed_rpm", Get::Speed),
     ("feed_programmed_mm_min", Get::Number(|moment| moment.panel.feed_programmed_mm_min.round())),
-    ("feed_mm_min", Get::Number(|moment| tenth(moment.panel.feed_mm_min))),
+    ("feed_mm_min", Get::Number(|moment| round_to_tenth(moment.panel.feed_mm_min))),
     ("feed_override_pct", Get::Number(|moment| f64::from(moment.panel.feed_override_pct))),
     ("feed_override_dial_pct", Get::Number(|moment| f64::from(moment.panel.dial_pct))),
     ("spindle_override_pct", Get::Number(|_| 100.0)),
     ("spindle_load_pct", Get::Number(|moment| moment.electric.spindle_load_pct.round())),
     ("motor_temperature_c", Get::Number(|moment| moment.electric.motor_temperature_c.round())),
-    ("x_axis_position_mm", Get::Number(|moment| thousandth(moment.panel.position_mm[0]))),
-    ("z_axis_position_mm", Get::Number(|moment| thousandth(moment.panel.position_mm[2]))),
-    ("x_axis_velocity_mm_min", Get::Number(|moment| tenth(moment.panel.velocity_mm_min[0]))),
-    ("z_axis_velocity_mm_min", Get::Number(|moment| tenth(moment.panel.velocity_mm_min[2]))),
+    ("x_axis_position_mm", Get::Number(|moment| round_to_thousandth(moment.panel.position_mm[0]))),
+    ("z_axis_position_mm", Get::Number(|moment| round_to_thousandth(moment.panel.position_mm[2]))),
+    ("x_axis_velocity_mm_min", Get::Number(|moment| round_to_tenth(moment.panel.velocity_mm_min[0]))),
+    ("z_axis_velocity_mm_min", Get::Number(|moment| round_to_tenth(moment.panel.velocity_mm_min[2]))),
     ("gear_stage", Get::Number(|moment| f64::from(moment.panel.gear_stage))),
     ("rapid", Get::Number(|moment| f64::from(u8::from(moment.panel.rapid)))),
     ("coolant_on", Get::Number(|moment| f64::from(u8::from(moment.panel.coolant_on)))),
@@ -73,12 +73,12 @@ const COMMON: [ChannelGetter; 25] = [
 const ANNOTATIONS: [ChannelGetter; 3] = [
     ("operation", Get::Text(|panel| CachedText::Plain(panel.operation))),
     ("depth_of_cut_mm", Get::Number(|moment| moment.panel.depth_of_cut_mm)),
-    ("diameter_mm", Get::Number(|moment| tenth(moment.panel.diameter_mm))),
+    ("diameter_mm", Get::Number(|moment| round_to_tenth(moment.panel.diameter_mm))),
 ];
 
 const MILL_POSITION: [ChannelGetter; 2] = [
-    ("y_axis_position_mm", Get::Number(|moment| thousandth(moment.panel.position_mm[1]))),
-    ("y_axis_velocity_mm_min", Get::Number(|moment| tenth(moment.panel.velocity_mm_min[1]))),
+    ("y_axis_position_mm", Get::Number(|moment| round_to_thousandth(moment.panel.position_mm[1]))),
+    ("y_axis_velocity_mm_min", Get::Number(|moment| round_to_tenth(moment.panel.velocity_mm_min[1]))),
 ];
 
 const MILL_ANNOTATIONS: [ChannelGetter; 2] = [
@@ -86,11 +86,11 @@ const MILL_ANNOTATIONS: [ChannelGetter; 2] = [
     ("teeth", Get::Number(|moment| moment.panel.teeth)),
 ];
 
-fn tenth(number: f64) -> f64 {
+fn round_to_tenth(number: f64) -> f64 {
     (number * 10.0).round() / 10.0
 }
 
-fn thousandth(number: f64) -> f64 {
+fn round_to_thousandth(number: f64) -> f64 {
     (number * 1000.0).round() / 1000.0
 }
 
@@ -123,40 +123,43 @@ impl SimulatedController {
             (mill && settings.annotations, &MILL_ANNOTATIONS),
         ];
         optional.iter().filter(|(wanted, _)| *wanted).for_each(|(_, more)| entries.extend_from_slice(more));
-        let output =
-            |(name, get): ChannelGetter| Some(ControllerChannel { channel: ChannelId::of(name)?, get, last: None });
+        let output = |(name, get): ChannelGetter| {
+            Some(ControllerChannel { channel: ChannelId::from_name(name)?, get, last: None })
+        };
         let outputs: Vec<ControllerChannel> = entries.into_iter().filter_map(output).collect();
         let channels = outputs.iter().map(|output| output.channel).collect();
         Self { name, machine, device, channels, outputs, seed: settings.seed }
     }
 
     /// What the controller answers to a request of this stamp.
-    fn answer(&mut self, stamp: Stamp, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+    fn append_readings(&mut self, stamp: Stamp, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let beat = self.device.newest_beat(stamp.mid_ns);
         let moment = self.machine.moment(self.device.beat_ns(beat));
         if !moment.panel.booted {
             return Err(SourceError::Off { source_name: self.name.clone() });
         }
-        let unrest_rpm = 0.6 * normal(self.seed, Purpose::Speed, beat);
-        out.extend(self.outputs.iter_mut().map(|output| output.reading(&moment, unrest_rpm, stamp)));
+        let unrest_rpm = 0.6 * sample_normal(self.seed, Purpose::Speed, beat);
+        out.extend(self.outputs.iter_mut().map(|output| output.build_reading(&moment, unrest_rpm, stamp)));
         Ok(())
     }
 }
 
 impl ControllerChannel {
-    fn reading(&mut self, moment: &Moment, unrest_rpm: f64, stamp: Stamp) -> Reading {
+    fn build_reading(&mut self, moment: &Moment, unrest_rpm: f64, stamp: Stamp) -> Reading {
         match self.get {
-            Get::Number(get) => Reading::number(self.channel, stamp, get(moment)),
-            Get::Speed => Reading::number(self.channel, stamp, encoder(moment.panel.spindle_speed_rpm, unrest_rpm)),
-            Get::Text(get) => Reading::text(self.channel, stamp, self.text(get(&moment.panel))),
+            Get::Number(get) => Reading::from_number(self.channel, stamp, get(moment)),
+            Get::Speed => {
+                Reading::from_number(self.channel, stamp, simulate_encoder(moment.panel.spindle_speed_rpm, unrest_rpm))
+            }
+            Get::Text(get) => Reading::from_text(self.channel, stamp, self.cache_text(get(&moment.panel))),
         }
     }
 
-    fn text(&mut self, word: CachedText) -> Arc<str> {
+    fn cache_text(&mut self, word: CachedText) -> Arc<str> {
         match &self.last {
             Some((last, text)) if *last == word => text.clone(),
             _ => {
-                let text = word.text();
+                let text = word.to_text();
                 self.last = Some((word, text.clone()));
                 text
             }
@@ -165,7 +168,7 @@ impl ControllerChannel {
 }
 
 /// Whole turns per minute; a standing spindle shows exactly zero.
-fn encoder(speed_rpm: f64, unrest_rpm: f64) -> f64 {
+fn simulate_encoder(speed_rpm: f64, unrest_rpm: f64) -> f64 {
     if speed_rpm == 0.0 { 0.0 } else { (speed_rpm + unrest_rpm).round() }
 }
 
@@ -186,8 +189,8 @@ impl Source for SimulatedController {
         let began_ns = clock.now_ns();
         clock.sleep_until(began_ns + self.device.round_trip_ns());
         let stamp = Stamp::of_request(began_ns, clock.now_ns());
-        self.device.polled(clock.now_ns());
-        self.answer(stamp, out)
+        self.device.schedule_next_poll(clock.now_ns());
+        self.append_readings(stamp, out)
     }
 }
 
@@ -208,10 +211,10 @@ impl Pull for SimulatedController {
         Some(self.device.next_begin_ns() + self.device.round_trip_ns())
     }
 
-    fn pull(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+    fn pull_readings(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let began_ns = self.device.next_begin_ns();
         let stamp = Stamp::of_request(began_ns, began_ns + self.device.round_trip_ns());
-        self.device.polled(began_ns + nanoseconds(self.device.period()));
-        self.answer(stamp, out)
+        self.device.schedule_next_poll(began_ns + to_nanoseconds(self.device.period()));
+        self.append_readings(stamp, out)
     }
 }

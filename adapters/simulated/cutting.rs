@@ -29,7 +29,13 @@ pub(super) struct Circumstances {
 }
 
 /// Power, loss and force of a cut.
-pub(super) fn load(frame: &MachineSnapshot, stage: &Stage, cut: &Cut, now: &Circumstances, level: CutLevel) -> Load {
+pub(super) fn compute_load(
+    frame: &MachineSnapshot,
+    stage: &Stage,
+    cut: &Cut,
+    now: &Circumstances,
+    level: CutLevel,
+) -> Load {
     if now.engaged <= 0.0 || now.feed_mm_min <= 0.0 || now.speed_rad_s < 0.5 {
         return Load::default();
     }
@@ -38,23 +44,23 @@ pub(super) fn load(frame: &MachineSnapshot, stage: &Stage, cut: &Cut, now: &Circ
     let force_n = planned_n * now.engaged * now.hardness;
     let power_w = force_n * speed_m_s;
     match level {
-        CutLevel::Planned(factor) => scaled(stage, force_n, power_w, factor, now.speed_rad_s),
+        CutLevel::Planned(factor) => scale_load(stage, force_n, power_w, factor, now.speed_rad_s),
         CutLevel::OfNoLoad(share) => {
             let wanted_w = share * now.no_load_w * now.engaged * now.hardness;
             let power_w = without_loss(stage, wanted_w, now.speed_rad_s);
-            scaled(stage, power_w / speed_m_s.max(1e-3), power_w, 1.0, now.speed_rad_s)
+            scale_load(stage, power_w / speed_m_s.max(1e-3), power_w, 1.0, now.speed_rad_s)
         }
     }
 }
 
-fn scaled(stage: &Stage, force_n: f64, power_w: f64, factor: f64, speed_rad_s: f64) -> Load {
+fn scale_load(stage: &Stage, force_n: f64, power_w: f64, factor: f64, speed_rad_s: f64) -> Load {
     let cutting_power_w = power_w * factor;
-    let load_loss_w = loss(stage, cutting_power_w, speed_rad_s);
+    let load_loss_w = compute_loss(stage, cutting_power_w, speed_rad_s);
     Load { cutting_power_w, load_loss_w, force_n: force_n * factor }
 }
 
 /// Transmission in proportion to the power, windings with the square of the torque.
-fn loss(stage: &Stage, power_w: f64, speed_rad_s: f64) -> f64 {
+fn compute_loss(stage: &Stage, power_w: f64, speed_rad_s: f64) -> f64 {
     stage.transmission * power_w + stage.copper * (power_w / speed_rad_s).powi(2)
 }
 
@@ -102,7 +108,7 @@ mod tests {
     /// The published cut: diameter 79 mm, 800 rpm, 0.153 mm/rev, 1 mm deep takes about 790 W.
     #[test]
     fn a_known_cut_takes_about_the_known_power() {
-        let frame = MachineSnapshot::of(SimulatedMachine::Lathe);
+        let frame = MachineSnapshot::from_machine(SimulatedMachine::Lathe);
         let cut = Cut { depth_mm: 1.0, ..Cut::default() };
         let now = Circumstances {
             speed_rad_s: 800.0 * std::f64::consts::TAU / 60.0,
@@ -113,9 +119,9 @@ mod tests {
             hardness: 1.0,
             no_load_w: 500.0,
         };
-        let load_planned = load(frame, frame.stage(1), &cut, &now, CutLevel::Planned(1.0));
+        let load_planned = compute_load(frame, frame.stage(1), &cut, &now, CutLevel::Planned(1.0));
         assert!((700.0..950.0).contains(&load_planned.cutting_power_w), "{load_planned:?}");
-        let light = load(frame, frame.stage(1), &cut, &now, CutLevel::OfNoLoad(0.05));
+        let light = compute_load(frame, frame.stage(1), &cut, &now, CutLevel::OfNoLoad(0.05));
         assert!((light.cutting_power_w + light.load_loss_w - 25.0).abs() < 1e-6, "{light:?}");
     }
 }

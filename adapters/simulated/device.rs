@@ -1,6 +1,6 @@
 //! A device's own clock and the line to it.
 
-use super::noise::{Purpose, uniform};
+use super::noise::{Purpose, sample_uniform};
 use super::settings::DeviceSettings;
 use crate::clock::{SECOND_NS, TimeNs};
 use crate::driver::SourceError;
@@ -30,27 +30,27 @@ impl PolledDevice {
 
     /// When the next poll begins if it keeps its beat.
     pub(super) fn next_begin_ns(&self) -> TimeNs {
-        self.origin_ns + self.poll * nanoseconds(self.settings.period)
+        self.origin_ns + self.poll * to_nanoseconds(self.settings.period)
     }
 
     /// How long the next request takes.
     pub(super) fn round_trip_ns(&self) -> i64 {
-        let excess = -(1.0 - uniform(self.seed, Purpose::RoundTrip, self.poll)).ln();
-        let slow = if uniform(self.seed, Purpose::SlowRoundTrip, self.poll) < 0.01 { 5.0 } else { 1.0 };
+        let excess = -(1.0 - sample_uniform(self.seed, Purpose::RoundTrip, self.poll)).ln();
+        let slow = if sample_uniform(self.seed, Purpose::SlowRoundTrip, self.poll) < 0.01 { 5.0 } else { 1.0 };
         let jitter = self.settings.jitter.mul_f64((excess * slow).min(20.0));
-        nanoseconds((self.settings.round_trip + jitter).min(DEADLINE))
+        to_nanoseconds((self.settings.round_trip + jitter).min(DEADLINE))
     }
 
     /// The next poll is the first one that begins at or after `after_ns`.
-    pub(super) fn polled(&mut self, after_ns: TimeNs) {
-        let period_ns = nanoseconds(self.settings.period).max(1);
+    pub(super) fn schedule_next_poll(&mut self, after_ns: TimeNs) {
+        let period_ns = to_nanoseconds(self.settings.period).max(1);
         let beats = (after_ns - self.origin_ns + period_ns - 1).div_euclid(period_ns);
         self.poll = (self.poll + 1).max(beats);
     }
 
     /// Number of the newest beat of the device's own clock that is published by `at_ns`.
     pub(super) fn newest_beat(&self, at_ns: TimeNs) -> i64 {
-        let published_ns = at_ns - nanoseconds(self.settings.latency);
+        let published_ns = at_ns - to_nanoseconds(self.settings.latency);
         #[expect(clippy::cast_possible_truncation, reason = "beats of centuries fit")]
         let beat = (self.device_s(published_ns) / self.settings.refresh.as_secs_f64()).floor() as i64;
         beat
@@ -60,7 +60,7 @@ impl PolledDevice {
     pub(super) fn beat_ns(&self, beat: i64) -> TimeNs {
         #[expect(clippy::cast_precision_loss, reason = "beats of centuries fit a double")]
         let device_s = beat as f64 * self.settings.refresh.as_secs_f64();
-        let since_s = (device_s - self.settings.clock_offset_s) / self.rate();
+        let since_s = (device_s - self.settings.clock_offset_s) / self.clock_rate();
         #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
         let since_ns = (since_s * SECOND_NS as f64).round() as i64;
         self.origin_ns + since_ns
@@ -69,15 +69,15 @@ impl PolledDevice {
     /// The device's own clock, s.
     #[expect(clippy::cast_precision_loss, reason = "a double counts nanoseconds exactly for 104 days")]
     pub(super) fn device_s(&self, at_ns: TimeNs) -> f64 {
-        (at_ns - self.origin_ns) as f64 / SECOND_NS as f64 * self.rate() + self.settings.clock_offset_s
+        (at_ns - self.origin_ns) as f64 / SECOND_NS as f64 * self.clock_rate() + self.settings.clock_offset_s
     }
 
-    fn rate(&self) -> f64 {
+    fn clock_rate(&self) -> f64 {
         1.0 + 1e-6 * self.settings.clock_drift_ppm
     }
 }
 
-pub(super) fn timeout(name: &str) -> SourceError {
+pub(super) fn build_timeout_error(name: &str) -> SourceError {
     SourceError::Timeout {
         source_name: name.to_owned(),
         request: "the measured values".to_owned(),
@@ -87,6 +87,6 @@ pub(super) fn timeout(name: &str) -> SourceError {
     }
 }
 
-pub(super) fn nanoseconds(duration: Duration) -> i64 {
+pub(super) fn to_nanoseconds(duration: Duration) -> i64 {
     i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX / 8)
 }

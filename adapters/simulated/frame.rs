@@ -89,7 +89,7 @@ static MILL: MachineSnapshot = MachineSnapshot {
 };
 
 impl MachineSnapshot {
-    pub(super) fn of(machine: SimulatedMachine) -> &'static Self {
+    pub(super) fn from_machine(machine: SimulatedMachine) -> &'static Self {
         match machine {
             SimulatedMachine::Lathe => &LATHE,
             SimulatedMachine::Mill => &MILL,

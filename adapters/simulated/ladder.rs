@@ -64,7 +64,7 @@ pub struct LadderCounts {
 impl LadderCounts {
     /// Everything that was ever written to the controller.
     #[must_use]
-    pub fn writes(&self) -> u64 {
+    pub fn count_writes(&self) -> u64 {
         self.overrides + self.releases + self.feed_holds + self.stops + self.offsets
     }
 }
@@ -119,7 +119,7 @@ impl Ladder {
     }
 
     /// Takes a letter; it has its effect a few scans later, in the order in which letters came.
-    pub(super) fn post(&mut self, at_ns: TimeNs, letter: LadderInput) {
+    pub(super) fn post_letter(&mut self, at_ns: TimeNs, letter: LadderInput) {
         match letter {
             LadderInput::Override(_) => self.counts.overrides += 1,
             LadderInput::Release => self.counts.releases += 1,
@@ -130,24 +130,24 @@ impl Ladder {
         if self.letters.len() >= LETTERS_MAX {
             self.letters.pop_back();
         }
-        let due_ns = at_ns.saturating_add(nanoseconds(self.settings.scan));
+        let due_ns = at_ns.saturating_add(to_nanoseconds(self.settings.scan));
         let earliest_ns = self.letters.back().map_or(due_ns, |(due_ns, _)| *due_ns);
         self.letters.push_back((due_ns.max(earliest_ns), letter));
     }
 
     /// One scan.
-    pub(super) fn scan(&mut self, at_ns: TimeNs) {
+    pub(super) fn run_scan(&mut self, at_ns: TimeNs) {
         while let Some((due_ns, letter)) = self.letters.pop_front_if(|(due_ns, _)| *due_ns <= at_ns) {
-            self.take(due_ns, letter);
+            self.apply_letter(due_ns, letter);
         }
-        let heartbeat_ns = nanoseconds(self.settings.heartbeat);
+        let heartbeat_ns = to_nanoseconds(self.settings.heartbeat);
         if self.mail.is_some_and(|mail| at_ns - mail.alive_ns >= heartbeat_ns) {
             self.mail = None;
             self.counts.heartbeats_lost += 1;
         }
     }
 
-    fn take(&mut self, at_ns: TimeNs, letter: LadderInput) {
+    fn apply_letter(&mut self, at_ns: TimeNs, letter: LadderInput) {
         match letter {
             LadderInput::Override(override_pct) => self.mail = Some(Mail { override_pct, alive_ns: at_ns }),
             LadderInput::Release => self.mail = None,
@@ -158,7 +158,7 @@ impl Ladder {
     }
 
     /// The operator turns the dial, now.
-    pub(super) fn turn(&mut self, dial: OverridePct) {
+    pub(super) fn turn_dial(&mut self, dial: OverridePct) {
         self.dial = dial;
     }
 
@@ -168,12 +168,12 @@ impl Ladder {
 
     /// The override that the feed obeys.
     pub(super) fn in_force(&self) -> OverridePct {
-        self.mail.map_or(self.dial, |mail| self.settings.rule.combine(self.dial, mail.override_pct))
+        self.mail.map_or(self.dial, |mail| self.settings.rule.combine_overrides(self.dial, mail.override_pct))
     }
 
     /// Do the axes stand because of a feed hold? The operator ends it when his time has come.
-    pub(super) fn holds(&mut self, at_ns: TimeNs) -> bool {
-        let attended_ns = nanoseconds(self.settings.attended_after);
+    pub(super) fn is_holding_feed(&mut self, at_ns: TimeNs) -> bool {
+        let attended_ns = to_nanoseconds(self.settings.attended_after);
         self.feed_hold = self.feed_hold.filter(|latch| at_ns - latch.since_ns < attended_ns);
         self.feed_hold.is_some()
     }
@@ -184,7 +184,7 @@ impl Ladder {
     }
 
     /// The program stands since `stood_s`; true when the operator has come and acknowledged.
-    pub(super) fn attended(&mut self, stood_s: f64) -> bool {
+    pub(super) fn acknowledge_stop(&mut self, stood_s: f64) -> bool {
         let attended = stood_s >= self.settings.attended_after.as_secs_f64();
         if attended {
             self.stop = None;
@@ -202,7 +202,7 @@ impl Ladder {
     }
 }
 
-fn nanoseconds(duration: Duration) -> i64 {
+fn to_nanoseconds(duration: Duration) -> i64 {
     i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX / 8)
 }
 
@@ -221,14 +221,14 @@ mod tests {
     fn an_override_counts_after_a_few_scans_and_as_long_as_the_sign_of_life_lasts() {
         let mut ladder = Ladder::new(LadderSettings::default());
         let at = |ladder: &mut Ladder, ms: i64| {
-            ladder.scan(ms * MS_NS);
+            ladder.run_scan(ms * MS_NS);
             ladder.in_force().percent()
         };
-        ladder.post(0, LadderInput::Override(pct(70)));
+        ladder.post_letter(0, LadderInput::Override(pct(70)));
         assert_eq!((at(&mut ladder, 23), at(&mut ladder, 24), at(&mut ladder, 1023)), (100, 70, 70));
         assert_eq!(at(&mut ladder, 1024), 100, "the sign of life has stopped");
-        ladder.post(2000 * MS_NS, LadderInput::Override(pct(70)));
-        ladder.post(2500 * MS_NS, LadderInput::Override(pct(70)));
+        ladder.post_letter(2000 * MS_NS, LadderInput::Override(pct(70)));
+        ladder.post_letter(2500 * MS_NS, LadderInput::Override(pct(70)));
         assert_eq!((at(&mut ladder, 3400), at(&mut ladder, 3524)), (70, 100));
         assert_eq!((ladder.counts().overrides, ladder.counts().heartbeats_lost), (3, 2));
     }
@@ -236,30 +236,39 @@ mod tests {
     #[test]
     fn the_dial_is_the_operators() {
         let mut ladder = Ladder::new(LadderSettings::default());
-        ladder.turn(pct(60));
-        ladder.post(0, LadderInput::Override(pct(120)));
-        ladder.scan(SECOND_NS / 2);
+        ladder.turn_dial(pct(60));
+        ladder.post_letter(0, LadderInput::Override(pct(120)));
+        ladder.run_scan(SECOND_NS / 2);
         assert_eq!(ladder.in_force(), pct(60), "the lesser one counts");
         let product = LadderSettings { rule: LadderRule::Product, ..LadderSettings::default() };
         let mut ladder = Ladder::new(product);
-        ladder.turn(pct(50));
-        ladder.post(0, LadderInput::Override(pct(120)));
-        ladder.scan(SECOND_NS / 2);
+        ladder.turn_dial(pct(50));
+        ladder.post_letter(0, LadderInput::Override(pct(120)));
+        ladder.run_scan(SECOND_NS / 2);
         assert_eq!(ladder.in_force(), pct(60));
-        ladder.turn(pct(0));
+        ladder.turn_dial(pct(0));
         assert_eq!(ladder.in_force(), pct(0), "a dial at zero stops the feed whatever was posted");
     }
 
     #[test]
     fn a_request_is_latched_once_until_the_operator_comes() {
         let mut ladder = Ladder::new(LadderSettings::default());
-        ladder.post(0, LadderInput::Ask(LadderRequest::FeedHold));
-        ladder.post(SECOND_NS, LadderInput::Ask(LadderRequest::FeedHold));
-        ladder.scan(2 * SECOND_NS);
-        assert!(ladder.holds(2 * SECOND_NS) && ladder.holds(44 * SECOND_NS) && !ladder.holds(46 * SECOND_NS));
-        ladder.post(50 * SECOND_NS, LadderInput::Ask(LadderRequest::Stop));
-        ladder.scan(51 * SECOND_NS);
-        assert!(ladder.stop_asked() && !ladder.attended(44.0) && ladder.attended(45.0) && !ladder.stop_asked());
-        assert_eq!(ladder.counts().writes(), 3);
+        ladder.post_letter(0, LadderInput::Ask(LadderRequest::FeedHold));
+        ladder.post_letter(SECOND_NS, LadderInput::Ask(LadderRequest::FeedHold));
+        ladder.run_scan(2 * SECOND_NS);
+        assert!(
+            ladder.is_holding_feed(2 * SECOND_NS)
+                && ladder.is_holding_feed(44 * SECOND_NS)
+                && !ladder.is_holding_feed(46 * SECOND_NS)
+        );
+        ladder.post_letter(50 * SECOND_NS, LadderInput::Ask(LadderRequest::Stop));
+        ladder.run_scan(51 * SECOND_NS);
+        assert!(
+            ladder.stop_asked()
+                && !ladder.acknowledge_stop(44.0)
+                && ladder.acknowledge_stop(45.0)
+                && !ladder.stop_asked()
+        );
+        assert_eq!(ladder.counts().count_writes(), 3);
     }
 }

@@ -53,7 +53,7 @@ pub(super) struct Machine {
 impl Machine {
     /// A machine at work, or on an experiment in place of its day.
     pub(super) fn new(settings: SimulatedSettings, origin_ns: TimeNs, experiment: Option<&[ExperimentStep]>) -> Self {
-        let frame = MachineSnapshot::of(settings.machine);
+        let frame = MachineSnapshot::from_machine(settings.machine);
         let rng = |stream: u64| Pcg64Mcg::seed_from_u64(settings.seed.wrapping_mul(31).wrapping_add(stream));
         let planner = Planner::new(settings, rng(1));
         let planner = match experiment {
@@ -80,13 +80,13 @@ impl Machine {
             current_a: 0.0,
             integrals: Integrals::default(),
         };
-        machine.step();
+        machine.run_step();
         machine
     }
 
     /// The ladder takes a letter at `at_ns`, or at once when the machine is already further.
-    pub(super) fn post(&mut self, at_ns: TimeNs, letter: LadderInput) {
-        self.ladder.post(at_ns, letter);
+    pub(super) fn post_letter(&mut self, at_ns: TimeNs, letter: LadderInput) {
+        self.ladder.post_letter(at_ns, letter);
     }
 
     pub(super) fn offset_um(&self, axis: Axis) -> f64 {
@@ -121,13 +121,13 @@ impl Machine {
     /// Makes every step up to and including the one after `at_ns`.
     fn advance_beyond(&mut self, at_ns: TimeNs) {
         while self.time_of(self.steps - 1) <= at_ns {
-            self.step();
+            self.run_step();
         }
     }
 
     /// The machine at `at_ns`. Before its origin it is as at its origin; more than four seconds before the furthest
     /// time ever asked for it is as then.
-    pub(super) fn at(&mut self, at_ns: TimeNs) -> Moment {
+    pub(super) fn compute_moment(&mut self, at_ns: TimeNs) -> Moment {
         self.advance_beyond(at_ns);
         let step = (at_ns - self.origin_ns).max(0) / STEP_NS;
         self.remembered_step(step)
@@ -155,36 +155,36 @@ impl Machine {
         }
     }
 
-    fn step(&mut self) {
+    fn run_step(&mut self) {
         let at_ns = self.time_of(self.steps);
-        self.ladder.scan(at_ns);
-        let since_s = seconds(at_ns - self.origin_ns);
-        self.control.hold_asked = self.ladder.holds(at_ns);
+        self.ladder.run_scan(at_ns);
+        let since_s = to_seconds(at_ns - self.origin_ns);
+        self.control.hold_asked = self.ladder.is_holding_feed(at_ns);
         self.control.stop_asked = self.ladder.stop_asked();
-        self.control.step(&self.plant, self.ladder.in_force().percent(), since_s, STEP_S);
+        self.control.run_step(&self.plant, self.ladder.in_force().percent(), since_s, STEP_S);
         if let Some(stood_s) = self.control.stood_s {
-            self.control.attended = self.ladder.attended(stood_s);
+            self.control.attended = self.ladder.acknowledge_stop(stood_s);
         }
         if let Some(dial) = self.control.dial_request.take().and_then(OverridePct::new) {
-            self.ladder.turn(dial);
+            self.ladder.turn_dial(dial);
         }
         if since_s >= self.settings.change.after_s {
             self.plant.friction = self.settings.change.friction;
         }
-        self.plant.spin(&self.control.demand, STEP_S);
-        self.engage(since_s);
-        self.power(since_s);
+        self.plant.advance_spindle(&self.control.demand, STEP_S);
+        self.update_engagement(since_s);
+        self.update_power(since_s);
         if self.steps % DRIFT_STEPS == 0 {
             let dt_s = STEP_S * 20.0;
-            self.plant.drift(dt_s, since_s, self.spindle_w, self.total_w, self.load.load_loss_w);
+            self.plant.advance_drift(dt_s, since_s, self.spindle_w, self.total_w, self.load.load_loss_w);
         }
-        self.remember(at_ns);
+        self.record_moment(at_ns);
         self.steps += 1;
     }
 
     /// The tool enters and leaves the work within about a turn of the spindle.
-    fn engage(&mut self, since_s: f64) {
-        let contact = self.control.contact();
+    fn update_engagement(&mut self, since_s: f64) {
+        let contact = self.control.find_contact();
         if let Some((cut, share)) = contact {
             self.cut = cut;
             self.diameter_mm = cut.diameter_from_mm + (cut.diameter_to_mm - cut.diameter_from_mm) * share;
@@ -195,9 +195,9 @@ impl Machine {
         if towards == 0.0 && self.engaged < 0.01 {
             self.engaged = 0.0;
         }
-        let now = self.circumstances();
+        let now = self.collect_circumstances();
         let stage = self.frame.stage(self.control.demand.gear_stage);
-        self.load = cutting::load(self.frame, stage, &self.cut, &now, self.cut_level(since_s));
+        self.load = cutting::compute_load(self.frame, stage, &self.cut, &now, self.cut_level(since_s));
         let lathe = self.settings.machine == SimulatedMachine::Lathe;
         let tool = self.control.tool_index();
         self.control.wear_mm[tool] += STEP_S * self.settings.day.wear_factor * cutting::wear_rate_mm_s(lathe, &now);
@@ -211,7 +211,7 @@ impl Machine {
         }
     }
 
-    fn circumstances(&self) -> Circumstances {
+    fn collect_circumstances(&self) -> Circumstances {
         Circumstances {
             speed_rad_s: self.plant.speed_rpm.abs() * TAU / 60.0,
             feed_mm_min: if self.control.holding { 0.0 } else { self.cutting_feed() },
@@ -227,7 +227,7 @@ impl Machine {
         if matches!(self.control.motion, Motion::Feed { .. }) { self.control.feed_mm_min } else { 0.0 }
     }
 
-    fn power(&mut self, since_s: f64) {
+    fn update_power(&mut self, since_s: f64) {
         let demand = self.control.demand;
         let running = demand.powered && demand.drives_on;
         let spindle_w =
@@ -241,20 +241,20 @@ impl Machine {
         self.integrals.mains_rad += TAU * self.plant.mains_hz * STEP_S;
     }
 
-    fn remember(&mut self, at_ns: TimeNs) {
+    fn record_moment(&mut self, at_ns: TimeNs) {
         if self.remembered.len() >= REMEMBERED {
             self.remembered.pop_front();
         }
         let moment = Moment {
-            panel: self.panel(),
-            electric: self.electric(),
-            truth: self.truth(at_ns),
+            panel: self.build_panel(),
+            electric: self.build_electric(),
+            truth: self.build_truth(at_ns),
             integrals: self.integrals,
         };
         self.remembered.push_back(moment);
     }
 
-    fn state(&self) -> TrueState {
+    fn classify_state(&self) -> TrueState {
         match self.plant.spin {
             _ if !self.control.demand.powered => TrueState::Off,
             _ if self.load.cutting_power_w > 0.0 && self.engaged > 0.1 => TrueState::Cutting,
@@ -266,10 +266,10 @@ impl Machine {
         }
     }
 
-    fn truth(&self, at_ns: TimeNs) -> Truth {
+    fn build_truth(&self, at_ns: TimeNs) -> Truth {
         Truth {
             at_ns,
-            state: self.state(),
+            state: self.classify_state(),
             spindle_speed_rpm: self.plant.speed_rpm,
             spindle_power_w: self.spindle_w,
             total_power_w: self.total_w,
@@ -285,7 +285,7 @@ impl Machine {
         }
     }
 
-    fn electric(&self) -> Electric {
+    fn build_electric(&self) -> Electric {
         Electric {
             supply_voltage_v: self.plant.supply_v,
             spindle_current_a: self.current_a,
@@ -296,7 +296,7 @@ impl Machine {
         }
     }
 
-    fn panel(&self) -> Panel {
+    fn build_panel(&self) -> Panel {
         let control = &self.control;
         let block = control.block.as_ref();
         let (cut, locked, programmed) = match control.motion {
@@ -309,7 +309,7 @@ impl Machine {
             block.map_or(execution::READY, |block| block.execution)
         };
         Panel {
-            booted: control.booted(),
+            booted: control.has_booted(),
             drives_on: control.demand.drives_on,
             mode: block.map_or(mode::MANUAL, |block| block.mode),
             execution,
@@ -351,6 +351,6 @@ impl Machine {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a double counts nanoseconds exactly for 104 days")]
-fn seconds(ns: i64) -> f64 {
+fn to_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }

@@ -2,8 +2,8 @@
 //! meters add.
 
 use super::Simulated;
-use super::device::{DEADLINE, PolledDevice, nanoseconds, timeout};
-use super::noise::{Purpose, normal, uniform};
+use super::device::{DEADLINE, PolledDevice, build_timeout_error, to_nanoseconds};
+use super::noise::{Purpose, sample_normal, sample_uniform};
 use super::settings::MeterSettings;
 use crate::channel::ChannelId;
 use crate::clock::{Clock, TimeNs};
@@ -12,7 +12,7 @@ use crate::reading::{Reading, Stamp};
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-/// The channels, in the order of [`MeterValues::numbers`].
+/// The channels, in the order of [`MeterValues::collect_numbers`].
 const CHANNELS: [&str; 6] = [
     "spindle_power_w",
     "total_power_w",
@@ -43,7 +43,7 @@ pub struct MeterValues {
 }
 
 impl MeterValues {
-    fn numbers(&self) -> [f64; 6] {
+    fn collect_numbers(&self) -> [f64; 6] {
         [
             self.spindle_power_w,
             self.total_power_w,
@@ -71,50 +71,51 @@ impl SimulatedMeter {
         // Another seed than the controller's, so that their lines are not slow together.
         let seed = settings.seed.wrapping_add(0x5EED);
         let device = PolledDevice::new(settings.meter.device, seed, machine.origin_ns());
-        let channels = CHANNELS.iter().filter_map(|name| ChannelId::of(name)).collect();
+        let channels = CHANNELS.iter().filter_map(|name| ChannelId::from_name(name)).collect();
         Self { name, machine, device, settings: settings.meter, channels, seed }
     }
 
     /// What the meter shows at `at_ns`, or `None` while it does not answer.
     #[must_use]
-    pub fn values(&self, at_ns: TimeNs) -> Option<MeterValues> {
-        (!self.drops_out(at_ns)).then(|| self.window(self.device.newest_beat(at_ns)))
+    pub fn read_values(&self, at_ns: TimeNs) -> Option<MeterValues> {
+        (!self.drops_out(at_ns)).then(|| self.average_window(self.device.newest_beat(at_ns)))
     }
 
     /// The averages over the window that ends with this beat.
-    fn window(&self, beat: i64) -> MeterValues {
+    fn average_window(&self, beat: i64) -> MeterValues {
         let (from_ns, to_ns) = (self.device.beat_ns(beat - 1), self.device.beat_ns(beat));
         let (from, to, moment) = self.machine.between(from_ns, to_ns);
         let window_s = self.settings.device.refresh.as_secs_f64();
         let mean = |from: f64, to: f64| (to - from) / window_s;
-        let ripple = self.ripple(from.mains_rad, to.mains_rad);
+        let ripple = self.average_ripple(from.mains_rad, to.mains_rad);
         let pulse_w = self.pulse_w(beat);
         let zero_w = self.zero_w(to_ns);
         let spindle_w = mean(from.spindle_j, to.spindle_j);
         let total_w = mean(from.total_j, to.total_j);
         let current_a = mean(from.current_squared_a2s, to.current_squared_a2s).max(0.0).sqrt();
-        let noise = |purpose| normal(self.seed, purpose, beat);
+        let noise = |purpose| sample_normal(self.seed, purpose, beat);
         let noisy = |truth: f64, purpose| {
             let sigma_w = (self.settings.noise_share * truth).hypot(self.settings.noise_floor_w);
-            tenth(truth * (1.0 + ripple) + zero_w + sigma_w * noise(purpose))
+            round_to_tenth(truth * (1.0 + ripple) + zero_w + sigma_w * noise(purpose))
         };
         let electric = moment.electric;
-        let sensor =
-            |truth: f64, shift: i64| tenth(truth + 0.04 * normal(self.seed, Purpose::Temperature, 2 * beat + shift));
+        let sensor = |truth: f64, shift: i64| {
+            round_to_tenth(truth + 0.04 * sample_normal(self.seed, Purpose::Temperature, 2 * beat + shift))
+        };
         MeterValues {
             spindle_power_w: noisy(spindle_w + pulse_w, Purpose::SpindlePower),
             total_power_w: noisy(total_w + pulse_w, Purpose::TotalPower),
-            spindle_current_a: hundredth(
+            spindle_current_a: round_to_hundredth(
                 (current_a * (1.0 + self.settings.noise_share * noise(Purpose::Current))).abs(),
             ),
-            supply_voltage_v: tenth(electric.supply_voltage_v + 0.1 * noise(Purpose::Voltage)),
+            supply_voltage_v: round_to_tenth(electric.supply_voltage_v + 0.1 * noise(Purpose::Voltage)),
             bearing_temperature_c: sensor(electric.bearing_temperature_c, 0),
             ambient_temperature_c: sensor(electric.ambient_temperature_c, 1),
         }
     }
 
     /// What is left of a ripple at twice the mains frequency after averaging over a window between two mains phases.
-    fn ripple(&self, from_rad: f64, to_rad: f64) -> f64 {
+    fn average_ripple(&self, from_rad: f64, to_rad: f64) -> f64 {
         let width_rad = 2.0 * (to_rad - from_rad);
         if width_rad <= 0.0 {
             return 0.0;
@@ -123,10 +124,10 @@ impl SimulatedMeter {
     }
 
     fn pulse_w(&self, beat: i64) -> f64 {
-        if uniform(self.seed, Purpose::Pulse, beat) >= self.settings.pulse_probability {
+        if sample_uniform(self.seed, Purpose::Pulse, beat) >= self.settings.pulse_probability {
             return 0.0;
         }
-        let size = 2.0 * uniform(self.seed, Purpose::PulseSize, beat) - 1.0;
+        let size = 2.0 * sample_uniform(self.seed, Purpose::PulseSize, beat) - 1.0;
         self.settings.pulse_w * (0.2 * size.signum() + 0.8 * size)
     }
 
@@ -142,27 +143,27 @@ impl SimulatedMeter {
         let stretch = (device_s / DROPOUT_STRETCH_S).floor() as i64;
         let within_s = device_s.rem_euclid(DROPOUT_STRETCH_S);
         let probability = self.settings.dropouts_per_h * DROPOUT_STRETCH_S / 3600.0;
-        if uniform(self.seed, Purpose::Dropout, stretch) >= probability {
+        if sample_uniform(self.seed, Purpose::Dropout, stretch) >= probability {
             return false;
         }
         let longest_s = self.settings.dropout_s.min(DROPOUT_STRETCH_S / 2.0);
-        let length_s = longest_s * (0.05 + 0.95 * uniform(self.seed, Purpose::DropoutLength, stretch));
-        let begin_s = (DROPOUT_STRETCH_S - length_s) * uniform(self.seed, Purpose::DropoutPlace, stretch);
+        let length_s = longest_s * (0.05 + 0.95 * sample_uniform(self.seed, Purpose::DropoutLength, stretch));
+        let begin_s = (DROPOUT_STRETCH_S - length_s) * sample_uniform(self.seed, Purpose::DropoutPlace, stretch);
         (begin_s..begin_s + length_s).contains(&within_s)
     }
 
-    fn answer(&self, stamp: Stamp, out: &mut Vec<Reading>) {
-        let numbers = self.window(self.device.newest_beat(stamp.mid_ns)).numbers();
+    fn append_readings(&self, stamp: Stamp, out: &mut Vec<Reading>) {
+        let numbers = self.average_window(self.device.newest_beat(stamp.mid_ns)).collect_numbers();
         let readings = self.channels.iter().zip(numbers);
-        out.extend(readings.map(|(channel, number)| Reading::number(*channel, stamp, number)));
+        out.extend(readings.map(|(channel, number)| Reading::from_number(*channel, stamp, number)));
     }
 }
 
-fn tenth(number: f64) -> f64 {
+fn round_to_tenth(number: f64) -> f64 {
     (number * 10.0).round() / 10.0
 }
 
-fn hundredth(number: f64) -> f64 {
+fn round_to_hundredth(number: f64) -> f64 {
     (number * 100.0).round() / 100.0
 }
 
@@ -182,14 +183,14 @@ impl Source for SimulatedMeter {
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let began_ns = clock.now_ns();
         let silent = self.drops_out(began_ns);
-        let wait_ns = if silent { nanoseconds(DEADLINE) } else { self.device.round_trip_ns() };
+        let wait_ns = if silent { to_nanoseconds(DEADLINE) } else { self.device.round_trip_ns() };
         clock.sleep_until(began_ns + wait_ns);
         let ended_ns = clock.now_ns();
-        self.device.polled(ended_ns);
+        self.device.schedule_next_poll(ended_ns);
         if silent {
-            return Err(timeout(&self.name));
+            return Err(build_timeout_error(&self.name));
         }
-        self.answer(Stamp::of_request(began_ns, ended_ns), out);
+        self.append_readings(Stamp::of_request(began_ns, ended_ns), out);
         Ok(())
     }
 }
@@ -210,18 +211,18 @@ impl Pull for SimulatedMeter {
     fn next_ns(&self) -> Option<TimeNs> {
         let began_ns = self.device.next_begin_ns();
         let silent = self.drops_out(began_ns);
-        Some(began_ns + if silent { nanoseconds(DEADLINE) } else { self.device.round_trip_ns() })
+        Some(began_ns + if silent { to_nanoseconds(DEADLINE) } else { self.device.round_trip_ns() })
     }
 
-    fn pull(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+    fn pull_readings(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let began_ns = self.device.next_begin_ns();
         let ended_ns = self.next_ns().unwrap_or(began_ns);
         let silent = self.drops_out(began_ns);
-        self.device.polled(ended_ns.max(began_ns + nanoseconds(self.device.period())));
+        self.device.schedule_next_poll(ended_ns.max(began_ns + to_nanoseconds(self.device.period())));
         if silent {
-            return Err(timeout(&self.name));
+            return Err(build_timeout_error(&self.name));
         }
-        self.answer(Stamp::of_request(began_ns, ended_ns), out);
+        self.append_readings(Stamp::of_request(began_ns, ended_ns), out);
         Ok(())
     }
 }

@@ -129,7 +129,7 @@ impl Simulated {
 
     /// The operator turns the dial of the feed override at `at_ns`.
     pub fn turn_dial(&self, at_ns: TimeNs, dial: OverridePct) {
-        self.locked().post(at_ns, LadderInput::Dial(dial));
+        self.locked().post_letter(at_ns, LadderInput::Dial(dial));
     }
 
     /// What was written to the controller since the beginning, as the controller itself has counted it.
@@ -142,7 +142,7 @@ impl Simulated {
     /// furthest time asked for are remembered exactly.
     #[must_use]
     pub fn moment(&self, at_ns: TimeNs) -> Moment {
-        self.locked().at(at_ns)
+        self.locked().compute_moment(at_ns)
     }
 
     /// What is true at `at_ns`: only for scoring.
@@ -155,7 +155,7 @@ impl Simulated {
     fn between(&self, from_ns: TimeNs, to_ns: TimeNs) -> (Integrals, Integrals, Moment) {
         let mut machine = self.locked();
         // The later one first would lose nothing: it is within the four seconds that are remembered.
-        (machine.integrals_at(from_ns), machine.integrals_at(to_ns), machine.at(to_ns))
+        (machine.integrals_at(from_ns), machine.integrals_at(to_ns), machine.compute_moment(to_ns))
     }
 
     fn locked(&self) -> MutexGuard<'_, Machine> {

@@ -28,7 +28,7 @@ impl TrueState {
 
     /// The word for tables and JSON.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Off => "off",
             Self::Standby => "standby",

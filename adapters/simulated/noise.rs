@@ -21,7 +21,7 @@ pub(super) enum Purpose {
 }
 
 /// A well mixed word for (seed, purpose, index): the finaliser of SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
-fn word(seed: u64, purpose: Purpose, index: i64) -> u64 {
+fn mix_word(seed: u64, purpose: Purpose, index: i64) -> u64 {
     let mut z = seed ^ (purpose as u64).wrapping_mul(0xA24B_AED4_963E_E407);
     z = z.wrapping_add(index.cast_unsigned().wrapping_mul(0x9E37_79B9_7F4A_7C15));
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -31,14 +31,14 @@ fn word(seed: u64, purpose: Purpose, index: i64) -> u64 {
 
 /// Uniform in [0, 1).
 #[expect(clippy::cast_precision_loss, reason = "53 bits fit a double")]
-pub(super) fn uniform(seed: u64, purpose: Purpose, index: i64) -> f64 {
-    (word(seed, purpose, index) >> 11) as f64 / (1_u64 << 53) as f64
+pub(super) fn sample_uniform(seed: u64, purpose: Purpose, index: i64) -> f64 {
+    (mix_word(seed, purpose, index) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// Standard normal, by Box and Muller.
-pub(super) fn normal(seed: u64, purpose: Purpose, index: i64) -> f64 {
-    let radius = (-2.0 * (1.0 - uniform(seed, purpose, 2 * index)).ln()).sqrt();
-    radius * (TAU * uniform(seed, purpose, 2 * index + 1)).cos()
+pub(super) fn sample_normal(seed: u64, purpose: Purpose, index: i64) -> f64 {
+    let radius = (-2.0 * (1.0 - sample_uniform(seed, purpose, 2 * index)).ln()).sqrt();
+    radius * (TAU * sample_uniform(seed, purpose, 2 * index + 1)).cos()
 }
 
 #[cfg(test)]
@@ -48,11 +48,11 @@ mod tests {
     #[test]
     fn the_numbers_have_the_moments_they_should() {
         let count = 20_000;
-        let normals: Vec<f64> = (0..count).map(|index| normal(7, Purpose::Current, index)).collect();
+        let normals: Vec<f64> = (0..count).map(|index| sample_normal(7, Purpose::Current, index)).collect();
         let mean = normals.iter().sum::<f64>() / 20_000.0;
         let variance = normals.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 20_000.0;
         assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04, "{mean} {variance}");
-        assert!(normal(7, Purpose::Current, 5).to_bits() == normal(7, Purpose::Current, 5).to_bits());
-        assert!(uniform(7, Purpose::Current, 5) != uniform(8, Purpose::Current, 5));
+        assert!(sample_normal(7, Purpose::Current, 5).to_bits() == sample_normal(7, Purpose::Current, 5).to_bits());
+        assert!(sample_uniform(7, Purpose::Current, 5) != sample_uniform(8, Purpose::Current, 5));
     }
 }

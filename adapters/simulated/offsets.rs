@@ -23,7 +23,7 @@ impl OffsetSink for SimulatedOffsets {
         &self.name
     }
 
-    fn called(&self) -> &'static str {
+    fn offset_name(&self) -> &'static str {
         "the external offset"
     }
 
@@ -32,13 +32,13 @@ impl OffsetSink for SimulatedOffsets {
         if !panel.booted {
             return Err(SourceError::Off { source_name: self.name.clone() });
         }
-        self.movable(axis, Some([execution::READY, execution::PROGRAM_COMPLETED].contains(&panel.execution)))?;
+        self.check_movable(axis, Some([execution::READY, execution::PROGRAM_COMPLETED].contains(&panel.execution)))?;
         Ok(self.machine.offset_um(axis))
     }
 
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
         let now_um = self.at_rest(clock, axis)?;
-        self.unchanged(axis, now_um, found_um)?;
+        self.check_unchanged(axis, now_um, found_um)?;
         self.machine.locked().write_offset(axis, wanted_um.round());
         Ok(self.machine.offset_um(axis))
     }

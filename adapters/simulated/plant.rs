@@ -86,7 +86,7 @@ impl Plant {
     }
 
     /// Moves the spindle on by `dt_s`.
-    pub(super) fn spin(&mut self, demand: &Demand, dt_s: f64) {
+    pub(super) fn advance_spindle(&mut self, demand: &Demand, dt_s: f64) {
         let wanted_rpm = if demand.powered { demand.spindle_rpm } else { 0.0 };
         if (wanted_rpm - self.target_rpm).abs() > 0.5 {
             self.new_target(wanted_rpm);
@@ -96,7 +96,7 @@ impl Plant {
         self.acceleration_w = self.acceleration_power(before, dt_s);
         self.excess_w *= (-dt_s / self.tau_s).exp();
         self.no_load_w = self.no_load(demand.gear_stage);
-        self.settle();
+        self.update_spin_state();
     }
 
     fn new_target(&mut self, wanted_rpm: f64) {
@@ -126,7 +126,7 @@ impl Plant {
         if power < 0.0 { 0.7 * power } else { power }
     }
 
-    fn settle(&mut self) {
+    fn update_spin_state(&mut self) {
         let off = (self.speed_rpm - self.target_rpm).abs();
         if self.target_rpm == 0.0 {
             if self.speed_rpm.abs() < 2.0 {
@@ -177,22 +177,22 @@ impl Plant {
     }
 
     /// Heat and supply, for which `dt_s` may be a tenth of a second.
-    pub(super) fn drift(&mut self, dt_s: f64, since_s: f64, spindle_w: f64, total_w: f64, load_loss_w: f64) {
+    pub(super) fn advance_drift(&mut self, dt_s: f64, since_s: f64, spindle_w: f64, total_w: f64, load_loss_w: f64) {
         let day = TAU * since_s / 86_400.0;
         self.ambient_c = 20.5 - 2.5 * (day + 0.9).cos() + 0.4 * (day * 7.3).sin();
         let friction_w = 0.55 * self.no_load_w;
-        approach(&mut self.bearing_c, self.housing_c + 0.042 * friction_w, dt_s, 420.0);
-        approach(&mut self.housing_c, self.ambient_c + 0.021 * friction_w + 0.01 * load_loss_w, dt_s, 4200.0);
+        approach_target(&mut self.bearing_c, self.housing_c + 0.042 * friction_w, dt_s, 420.0);
+        approach_target(&mut self.housing_c, self.ambient_c + 0.021 * friction_w + 0.01 * load_loss_w, dt_s, 4200.0);
         let motor_w = 0.2 * spindle_w.abs() + load_loss_w;
-        approach(&mut self.motor_c, self.ambient_c + 0.07 * motor_w, dt_s, 900.0);
-        self.wander(dt_s);
+        approach_target(&mut self.motor_c, self.ambient_c + 0.07 * motor_w, dt_s, 900.0);
+        self.advance_noise(dt_s);
         self.supply_v = 400.0 + 2.6 * self.supply_unrest - 0.45e-3 * total_w;
         self.mains_hz = 50.0 + 0.015 * self.frequency_unrest;
-        approach(&mut self.load_display_w, spindle_w, dt_s, 0.3);
+        approach_target(&mut self.load_display_w, spindle_w, dt_s, 0.3);
     }
 
     /// Ornstein-Uhlenbeck processes of unit variance.
-    fn wander(&mut self, dt_s: f64) {
+    fn advance_noise(&mut self, dt_s: f64) {
         for (state, tau_s) in
             [(&mut self.supply_unrest, 45.0), (&mut self.frequency_unrest, 90.0), (&mut self.cut_unrest, 0.35)]
         {
@@ -225,6 +225,6 @@ impl Plant {
 /// Full scale of the load display.
 const LOAD_DISPLAY_MAX_PCT: f64 = 300.0;
 
-fn approach(state: &mut f64, towards: f64, dt_s: f64, tau_s: f64) {
+fn approach_target(state: &mut f64, towards: f64, dt_s: f64, tau_s: f64) {
     *state += (towards - *state) * (1.0 - (-dt_s / tau_s).exp());
 }

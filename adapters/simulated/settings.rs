@@ -103,7 +103,7 @@ pub struct DaySettings {
 impl DaySettings {
     /// A day of five minutes: power-up, warm-up, four short parts, an alarm, a pause, off.
     #[must_use]
-    pub fn short() -> Self {
+    pub fn new_short() -> Self {
         Self {
             shift_s: 235.0,
             lunch_s: 0.0,
@@ -202,7 +202,7 @@ impl MeterSettings {
 
     /// The same meter with this lag against that controller, or the least one that its window allows.
     #[must_use]
-    pub fn lagging(mut self, lag: Duration, controller: &DeviceSettings) -> Self {
+    pub fn with_lag(mut self, lag: Duration, controller: &DeviceSettings) -> Self {
         self.device.latency = (lag + controller.mean_age()).saturating_sub(self.device.refresh);
         self
     }
@@ -235,7 +235,7 @@ impl Default for MeterSettings {
 impl SimulatedSettings {
     /// The settings an address asks for.
     #[must_use]
-    pub fn of(target: &SimulatedTarget) -> Self {
+    pub fn from_target(target: &SimulatedTarget) -> Self {
         let base = Self::default();
         let noise_share = target.noise_pct / 100.0;
         // A pulse while the machine is off looks like a fault to whoever sees the machine for the first time.
@@ -257,7 +257,7 @@ impl SimulatedSettings {
             day: match target.day {
                 SimulatedDay::Work => base.day,
                 SimulatedDay::Shifts => DaySettings { night_s: 1200.0, ..base.day },
-                SimulatedDay::Short => DaySettings::short(),
+                SimulatedDay::Short => DaySettings::new_short(),
             },
             meter: MeterSettings {
                 noise_share,
@@ -265,7 +265,7 @@ impl SimulatedSettings {
                 dropouts_per_h: target.dropouts_per_h,
                 ..base.meter
             }
-            .lagging(Duration::from_secs_f64(target.meter_lag_ms / 1e3), &base.controller),
+            .with_lag(Duration::from_secs_f64(target.meter_lag_ms / 1e3), &base.controller),
             ..base
         }
     }

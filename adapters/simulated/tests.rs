@@ -30,7 +30,7 @@ fn printed(settings: SimulatedSettings, seconds: i64) -> String {
     let (mut out, mut text) = (Vec::new(), String::new());
     while controller.next_ns() < Some(seconds * SECOND_NS) {
         let controller_first = controller.next_ns() <= meter.next_ns();
-        let result = if controller_first { controller.pull(&mut out) } else { meter.pull(&mut out) };
+        let result = if controller_first { controller.pull_readings(&mut out) } else { meter.pull_readings(&mut out) };
         text.push_str(&format!("{result:?} {out:?}\n"));
         out.clear();
     }
@@ -58,7 +58,7 @@ fn asking_more_often_changes_nothing() {
 fn seconds_per_state(machine: &Simulated, seconds: i64) -> BTreeMap<&'static str, f64> {
     let mut sums = BTreeMap::new();
     for tenth in 0..seconds * 10 {
-        *sums.entry(machine.truth(tenth * SECOND_NS / 10).state.word()).or_default() += 0.1;
+        *sums.entry(machine.truth(tenth * SECOND_NS / 10).state.as_word()).or_default() += 0.1;
     }
     sums
 }
@@ -68,7 +68,7 @@ fn all_states_come_within_minutes() {
     for settings in [lathe(), mill()] {
         let sums = seconds_per_state(&machine(settings), 420);
         for state in TrueState::ALL {
-            assert!(sums.get(state.word()).copied().unwrap_or(0.0) > 0.5, "{:?}: {sums:?}", settings.machine);
+            assert!(sums.get(state.as_word()).copied().unwrap_or(0.0) > 0.5, "{:?}: {sums:?}", settings.machine);
         }
         assert!(sums["cutting"] > 60.0, "{sums:?}");
     }
@@ -141,14 +141,14 @@ fn a_light_cut_adds_the_share_it_shall() {
 #[test]
 fn the_feed_override_is_obeyed() {
     let (free, slowed) = (machine(lathe()), machine(lathe()));
-    let clock = ManualClock::at(0);
+    let clock = ManualClock::with_time(0);
     let mut feed = slowed.feed_override();
     assert!(matches!(feed.write_feed_override(&clock, OverridePct::FULL), Err(SourceError::Off { .. })));
-    clock.set(60 * SECOND_NS);
+    clock.set_time(60 * SECOND_NS);
     let half = OverridePct::new(50).expect("in range");
     let mut first_cut = |machine: &Simulated, written: bool| {
         let at = |tenth: i64| {
-            clock.set(tenth * SECOND_NS / 10);
+            clock.set_time(tenth * SECOND_NS / 10);
             if written {
                 feed.write_feed_override(&clock, half).expect("the control is on");
             }
@@ -157,7 +157,7 @@ fn the_feed_override_is_obeyed() {
         (600..6000).map(at).find(|moment| moment.truth.engaged > 0.99).expect("a cut begins")
     };
     let (b, a) = (first_cut(&slowed, true), first_cut(&free, false));
-    assert_eq!(feed.read_feed_override(&ManualClock::at(b.truth.at_ns)), Ok(half));
+    assert_eq!(feed.read_feed_override(&ManualClock::with_time(b.truth.at_ns)), Ok(half));
     assert_eq!((a.panel.feed_override_pct, b.panel.feed_override_pct), (100, 50));
     assert!(
         (b.panel.feed_mm_min / a.panel.feed_mm_min - 0.5).abs() < 0.02,
@@ -192,7 +192,7 @@ fn the_meter_shows_the_truth_when_it_is_ideal() {
     for tenth in 300..3000 {
         let at_ns = tenth * SECOND_NS / 10;
         let truths = [0, 50, 100, 150].map(|back| machine.truth(at_ns - back * 1_000_000));
-        let values = meter.values(at_ns).expect("no dropouts");
+        let values = meter.read_values(at_ns).expect("no dropouts");
         let calm = truths.iter().all(|truth| (truth.spindle_power_w - truths[0].spindle_power_w).abs() < 2.0);
         if calm && truths[0].spindle_power_w > 0.0 {
             compared += 1;
@@ -212,7 +212,7 @@ fn the_real_meter_adds_noise_ripple_pulses_and_silence() {
     let (mut out, mut silent, mut pulses, mut squares, mut count) = (Vec::new(), 0, 0, 0.0, 0.0_f64);
     while meter.next_ns() < Some(900 * SECOND_NS) {
         let at_ns = meter.next_ns().unwrap_or(0);
-        silent += i32::from(meter.pull(&mut out).is_err());
+        silent += i32::from(meter.pull_readings(&mut out).is_err());
         let truth = machine.truth(at_ns - 70_000_000);
         if let Some(power) = out.first().and_then(|reading: &Reading| reading.value.as_ref().ok()?.as_number())
             && truth.state == TrueState::Idle
@@ -257,7 +257,7 @@ fn the_night_comes_and_the_morning_after() {
     let machine = machine(SimulatedSettings { day, ..lathe() });
     let mut words: Vec<&str> = Vec::new();
     for second in 0..4800 {
-        let word = machine.truth(second * SECOND_NS).state.word();
+        let word = machine.truth(second * SECOND_NS).state.as_word();
         if words.last() != Some(&word) && (word == "off" || word == "cutting") {
             words.push(word);
         }
@@ -271,8 +271,8 @@ fn both_devices_merge_into_one_picture() {
     let machine = machine(lathe());
     let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
     let mut lockstep = Lockstep::new(sources, Delay::default());
-    let mut sample = Sample::empty(0);
-    let of = |name: &str| ChannelId::of(name).expect("in the table");
+    let mut sample = Sample::new_empty(0);
+    let of = |name: &str| ChannelId::from_name(name).expect("in the table");
     let (mut off, mut close, mut turning) = (0, 0, 0);
     for tick in 10..3000 {
         assert!(lockstep.sample_into(&mut sample, tick * SECOND_NS / 10));
@@ -288,7 +288,7 @@ fn both_devices_merge_into_one_picture() {
     }
     assert!(off > 50, "{off} ticks with the machine off");
     assert!(close * 100 > turning * 95 && turning > 500, "{close} of {turning}");
-    assert!(sample.provided().count() >= 30);
+    assert!(sample.provided_slots().count() >= 30);
 }
 
 proptest::proptest! {
@@ -315,8 +315,8 @@ fn out_of_range(settings: SimulatedSettings, percent: u8) -> Option<Reading> {
     machine.turn_dial(40 * SECOND_NS, OverridePct::new(percent).expect("in range"));
     let (mut controller, mut meter, mut out) = (machine.controller(), machine.meter(), Vec::new());
     for _ in 0..4000 {
-        let _ = controller.pull(&mut out);
-        let _ = meter.pull(&mut out);
+        let _ = controller.pull_readings(&mut out);
+        let _ = meter.pull_readings(&mut out);
         if let Some(refused) = out.drain(..).find(|reading| reading.value == Err(Absence::OutOfRange)) {
             return Some(refused);
         }
@@ -342,18 +342,18 @@ fn a_feed_hold_stops_the_axes_and_a_stop_the_program_until_the_operator_comes() 
     let machine = machine(lathe());
     let mut ladder = machine.feed_override();
     let cut_s = first_s(&machine, 60, |moment| moment.truth.engaged > 0.99);
-    let clock = ManualClock::at((cut_s + 1) * SECOND_NS);
-    ladder.ask(&clock, LadderRequest::FeedHold).expect("the control is on");
+    let clock = ManualClock::with_time((cut_s + 1) * SECOND_NS);
+    ladder.ask_ladder(&clock, LadderRequest::FeedHold).expect("the control is on");
     let held = machine.moment((cut_s + 2) * SECOND_NS).panel;
     assert_eq!((held.execution, held.feed_mm_min), (crate::words::execution::FEED_HOLD, 0.0));
     let on_s = first_s(&machine, cut_s + 2, |moment| moment.panel.feed_mm_min > 0.0);
     assert!((44..=47).contains(&(on_s - cut_s)), "{on_s} {cut_s}");
-    clock.set((on_s + 1) * SECOND_NS);
-    ladder.ask(&clock, LadderRequest::Stop).expect("the control is on");
+    clock.set_time((on_s + 1) * SECOND_NS);
+    ladder.ask_ladder(&clock, LadderRequest::Stop).expect("the control is on");
     let stood_s = first_s(&machine, on_s + 1, |moment| moment.panel.execution == crate::words::execution::STOPPED);
     let before = machine.moment((stood_s - 1) * SECOND_NS).panel;
     let after_s = first_s(&machine, stood_s, |moment| moment.panel.execution == crate::words::execution::ACTIVE);
     let after = machine.moment(after_s * SECOND_NS).panel;
     assert!(after_s - stood_s >= 45 && after.part_count == 1, "{after:?}");
-    assert!(before.part_count <= 1 && machine.written().writes() == 2);
+    assert!(before.part_count <= 1 && machine.written().count_writes() == 2);
 }

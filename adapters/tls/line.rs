@@ -26,8 +26,8 @@ impl TcpConnection {
     /// connection.
     ///
     /// # Errors
-    /// What the system or TLS says; [`TlsError::within`](super::TlsError::within) puts the latter into words.
-    pub fn over(mut tcp: TcpStream, host: &str, lines: &Lines) -> io::Result<Self> {
+    /// What the system or TLS says; [`TlsError::from_io_error`](super::TlsError::within) puts the latter into words.
+    pub fn from_tcp(mut tcp: TcpStream, host: &str, lines: &Lines) -> io::Result<Self> {
         let Some(config) = lines else { return Ok(Self { tcp, host: host.to_owned(), tls: None }) };
         let name = ServerName::try_from(host.to_owned()).map_err(io::Error::other)?;
         let mut connection = ClientConnection::new(config.clone(), name).map_err(io::Error::other)?;
@@ -53,24 +53,24 @@ impl TcpConnection {
         let Some(tls) = &self.tls else { return (&self.tcp).read(into) };
         let mut chunk = [0; CHUNK];
         loop {
-            match locked(tls).reader().read(into) {
+            match lock_connection(tls).reader().read(into) {
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                 // Closed without the farewell of TLS: the packets inside have lengths of their own.
                 Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(0),
                 read => return read,
             }
             let count = (&self.tcp).read(&mut chunk)?;
-            self.take(&mut locked(tls), &chunk[..count])?;
+            self.feed_bytes(&mut lock_connection(tls), &chunk[..count])?;
         }
     }
 
-    fn take(&self, connection: &mut ClientConnection, mut bytes: &[u8]) -> io::Result<()> {
+    fn feed_bytes(&self, connection: &mut ClientConnection, mut bytes: &[u8]) -> io::Result<()> {
         loop {
             connection.read_tls(&mut bytes)?;
             let taken = connection.process_new_packets().map(drop);
             // An alert for the other side goes out even if nothing else does.
             let told = self.flush(connection);
-            taken.map_err(|error| io::Error::other(words::of(&error, &self.host)))?;
+            taken.map_err(|error| io::Error::other(words::build_tls_error(&error, &self.host)))?;
             told?;
             if bytes.is_empty() {
                 return Ok(());
@@ -84,7 +84,7 @@ impl TcpConnection {
     /// What the system says; nothing can follow a piece that was cut.
     pub fn write_all(&self, bytes: &[u8]) -> io::Result<()> {
         let Some(tls) = &self.tls else { return (&self.tcp).write_all(bytes) };
-        let mut connection = locked(tls);
+        let mut connection = lock_connection(tls);
         connection.writer().write_all(bytes)?;
         self.flush(&mut connection)
     }
@@ -97,9 +97,9 @@ impl TcpConnection {
     }
 
     /// Ends the connection in both directions; a thread that reads ends by it.
-    pub fn shut(&self) {
+    pub fn shut_connection(&self) {
         if let Some(tls) = &self.tls {
-            let mut connection = locked(tls);
+            let mut connection = lock_connection(tls);
             connection.send_close_notify();
             let _already_gone = self.flush(&mut connection);
         }
@@ -114,7 +114,7 @@ fn hung_up(error: io::Error, host: &str) -> io::Error {
     if gone { io::Error::other(words::no_tls(host)) } else { error }
 }
 
-fn locked(connection: &Mutex<ClientConnection>) -> MutexGuard<'_, ClientConnection> {
+fn lock_connection(connection: &Mutex<ClientConnection>) -> MutexGuard<'_, ClientConnection> {
     // rustls leaves no half-done work behind a panic, and panics at none of our inputs.
     connection.lock().unwrap_or_else(PoisonError::into_inner)
 }

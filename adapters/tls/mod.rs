@@ -36,29 +36,29 @@ impl TlsFiles {
     ///
     /// # Errors
     /// A file that cannot be read or holds something else, in words.
-    pub fn config(&self) -> Result<Arc<ClientConfig>, TlsError> {
+    pub fn build_config(&self) -> Result<Arc<ClientConfig>, TlsError> {
         let provider = Arc::new(rustls::crypto::ring::default_provider());
         let builder = ClientConfig::builder_with_provider(provider)
             .with_safe_default_protocol_versions()
             .map_err(|error| TlsError::new(format!("TLS cannot begin: {error}"), ""))?
-            .with_root_certificates(self.roots()?);
+            .with_root_certificates(self.load_roots()?);
         let config = match (&self.certificate, &self.key) {
             (Some(certificate), Some(key)) => builder
-                .with_client_auth_cert(certificates(certificate)?, private_key(key)?)
+                .with_client_auth_cert(load_certificates(certificate)?, private_key(key)?)
                 .map_err(|error| words::bad_pair(certificate, key, &error))?,
             _ => builder.with_no_client_auth(),
         };
         Ok(Arc::new(config))
     }
 
-    fn roots(&self) -> Result<RootCertStore, TlsError> {
+    fn load_roots(&self) -> Result<RootCertStore, TlsError> {
         let system = || SYSTEM_FILES.iter().map(PathBuf::from).find(|file| file.is_file());
         let Some(file) = self.ca.clone().or_else(system) else {
             let next = "install the package ca-certificates, or name the file with ca=/path/ca.pem";
             return Err(TlsError::new("this system has no file of trusted certificates", next));
         };
         let mut roots = RootCertStore::empty();
-        let (taken, _unusable) = roots.add_parsable_certificates(certificates(&file)?);
+        let (taken, _unusable) = roots.add_parsable_certificates(load_certificates(&file)?);
         if taken == 0 {
             let what = format!("{} holds no certificate that could be trusted", file.display());
             return Err(TlsError::new(what, "give the certificate of the authority that signed the broker's, as PEM"));
@@ -67,7 +67,7 @@ impl TlsFiles {
     }
 }
 
-fn certificates(file: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
+fn load_certificates(file: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
     let read = CertificateDer::pem_file_iter(file).and_then(Iterator::collect::<Result<Vec<_>, _>>);
     let found = read.map_err(|error| words::bad_file(file, "certificate", &error))?;
     match found.is_empty() {

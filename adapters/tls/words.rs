@@ -23,9 +23,12 @@ impl TlsError {
 
     /// What an input or output error of a TLS line hides, if it comes from TLS.
     #[must_use]
-    pub fn within(error: &io::Error, host: &str) -> Option<Self> {
+    pub fn from_io_error(error: &io::Error, host: &str) -> Option<Self> {
         let inner = error.get_ref()?;
-        inner.downcast_ref::<Self>().cloned().or_else(|| inner.downcast_ref::<Error>().map(|error| of(error, host)))
+        inner
+            .downcast_ref::<Self>()
+            .cloned()
+            .or_else(|| inner.downcast_ref::<Error>().map(|error| build_tls_error(error, host)))
     }
 }
 
@@ -44,10 +47,10 @@ pub(super) fn bad_pair(certificate: &Path, key: &Path, error: &Error) -> TlsErro
 }
 
 /// An error of rustls while talking to `host`.
-pub(super) fn of(error: &Error, host: &str) -> TlsError {
+pub(super) fn build_tls_error(error: &Error, host: &str) -> TlsError {
     match error {
-        Error::InvalidCertificate(wrong) => certificate(wrong, host),
-        Error::AlertReceived(alert) => refused(*alert, host),
+        Error::InvalidCertificate(wrong) => build_certificate_error(wrong, host),
+        Error::AlertReceived(alert) => build_alert_error(*alert, host),
         Error::InvalidMessage(_) => no_tls(host),
         Error::NoCertificatesPresented => {
             TlsError::new(format!("{host} shows no certificate"), "configure one on its TLS listener")
@@ -62,7 +65,7 @@ pub(super) fn no_tls(host: &str) -> TlsError {
     TlsError::new(format!("{host} does not speak TLS on this port"), next)
 }
 
-fn certificate(wrong: &CertificateError, host: &str) -> TlsError {
+fn build_certificate_error(wrong: &CertificateError, host: &str) -> TlsError {
     let clock = "look at the date of this box first (`date`; set it with `timedatectl`)";
     let (what, next) = match wrong {
         CertificateError::Expired | CertificateError::ExpiredContext { .. } => (
@@ -92,7 +95,7 @@ fn certificate(wrong: &CertificateError, host: &str) -> TlsError {
     TlsError::new(what, next)
 }
 
-fn refused(alert: AlertDescription, host: &str) -> TlsError {
+fn build_alert_error(alert: AlertDescription, host: &str) -> TlsError {
     let own = "name the client's own certificate and key with cert=/path/client.pem&key=/path/client.key";
     let (what, next) = match alert {
         AlertDescription::CertificateRequired => (format!("{host} asks for a client certificate"), own.to_owned()),

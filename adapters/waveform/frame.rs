@@ -46,7 +46,7 @@ pub enum FrameError {
 impl WaveformHeader {
     /// Currents of a number of phases.
     #[must_use]
-    pub fn currents(rate_hz: f64, channels: &[&str], scale_a: f64, full_scale: i16) -> Self {
+    pub fn with_currents(rate_hz: f64, channels: &[&str], scale_a: f64, full_scale: i16) -> Self {
         Self {
             format: FORMAT.to_owned(),
             rate_hz,
@@ -59,8 +59,8 @@ impl WaveformHeader {
 
     /// One current whose amplitude is sampled, not its course: the load current as a drive knows it.
     #[must_use]
-    pub fn amplitude(rate_hz: f64, scale_a: f64, full_scale: i16) -> Self {
-        Self { unit: AMPLITUDE.to_owned(), ..Self::currents(rate_hz, &["load_current"], scale_a, full_scale) }
+    pub fn with_amplitude(rate_hz: f64, scale_a: f64, full_scale: i16) -> Self {
+        Self { unit: AMPLITUDE.to_owned(), ..Self::with_currents(rate_hz, &["load_current"], scale_a, full_scale) }
     }
 
     /// The header in a line.
@@ -88,7 +88,7 @@ impl WaveformHeader {
 
     /// The line, with its line feed.
     #[must_use]
-    pub fn line(&self) -> String {
+    pub fn encode_line(&self) -> String {
         let text = serde_json::to_string(self).unwrap_or_default();
         text + "\n"
     }
@@ -113,7 +113,7 @@ pub struct WaveformFrame {
 }
 
 /// Sequence, time and bytes behind the head of a frame.
-pub(super) fn head(bytes: &[u8; FRAME_HEAD], channels: usize) -> Result<(u32, i64, usize), FrameError> {
+pub(super) fn parse_head(bytes: &[u8; FRAME_HEAD], channels: usize) -> Result<(u32, i64, usize), FrameError> {
     let [m0, m1, s0, s1, s2, s3, t0, t1, t2, t3, t4, t5, t6, t7, c0, c1] = *bytes;
     let count = u16::from_le_bytes([c0, c1]);
     if [m0, m1] != MARK || !(1..=COUNT_MAX).contains(&count) {
@@ -127,7 +127,7 @@ pub(super) fn head(bytes: &[u8; FRAME_HEAD], channels: usize) -> Result<(u32, i6
 impl WaveformFrame {
     /// The frame on the wire. At most 4096 samples per channel are sent.
     #[must_use]
-    pub fn bytes(&self, channels: usize) -> Vec<u8> {
+    pub fn to_bytes(&self, channels: usize) -> Vec<u8> {
         let count = u16::try_from(self.samples.len() / channels.max(1)).unwrap_or(COUNT_MAX).min(COUNT_MAX);
         let mut bytes = Vec::with_capacity(FRAME_HEAD + 2 * self.samples.len());
         bytes.extend(MARK);
@@ -141,7 +141,7 @@ impl WaveformFrame {
 }
 
 /// The samples in the body of a frame.
-pub(super) fn samples(body: &[u8]) -> Vec<i16> {
+pub(super) fn decode_samples(body: &[u8]) -> Vec<i16> {
     body.chunks_exact(2).map(|pair| i16::from_le_bytes([pair[0], pair[1]])).collect()
 }
 
@@ -156,21 +156,21 @@ mod tests {
             first_ns: 1_700_000_000_123_456_789,
             samples: vec![1, -2, 3, -4, 32767, -32768],
         };
-        let bytes = frame.bytes(3);
-        let (sequence, first_ns, body) = head(bytes.first_chunk().expect("a head"), 3).expect("a frame");
+        let bytes = frame.to_bytes(3);
+        let (sequence, first_ns, body) = parse_head(bytes.first_chunk().expect("a head"), 3).expect("a frame");
         assert_eq!((sequence, first_ns, body), (7, frame.first_ns, 12));
-        assert_eq!(samples(&bytes[FRAME_HEAD..]), frame.samples);
-        assert!(head(b"HTTP/1.1 400 Bad", 3).is_err());
+        assert_eq!(decode_samples(&bytes[FRAME_HEAD..]), frame.samples);
+        assert!(parse_head(b"HTTP/1.1 400 Bad", 3).is_err());
     }
 
     #[test]
     fn a_header_says_what_is_wrong_with_it() {
-        let header = WaveformHeader::currents(1000.0, &["i_u", "i_v", "i_w"], 0.01, 32767);
-        assert_eq!(WaveformHeader::parse(header.line().trim()), Ok(header.clone()));
+        let header = WaveformHeader::with_currents(1000.0, &["i_u", "i_v", "i_w"], 0.01, 32767);
+        assert_eq!(WaveformHeader::parse(header.encode_line().trim()), Ok(header.clone()));
         for (from, to, part) in
             [("waveform/1", "waveform/2", "format"), ("1000", "0", "rate_hz"), ("[0.01,", "[", "scales")]
         {
-            let error = WaveformHeader::parse(&header.line().replacen(from, to, 1)).expect_err(part).to_string();
+            let error = WaveformHeader::parse(&header.encode_line().replacen(from, to, 1)).expect_err(part).to_string();
             assert!(error.contains(part), "{error}");
         }
     }
@@ -178,7 +178,7 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn no_bytes_make_it_panic(bytes in proptest::collection::vec(0_u8.., 16), text in "\\PC{0,80}") {
-            let _ = head(bytes.first_chunk().expect("sixteen"), 3);
+            let _ = parse_head(bytes.first_chunk().expect("sixteen"), 3);
             let _ = WaveformHeader::parse(&text);
         }
     }

@@ -54,9 +54,9 @@ impl Iio {
     /// # Errors
     /// What is missing in sysfs, in words; a device that another program has open.
     pub fn open(sysfs: &Path, device: &Path, a_per_v: f64, clock: Arc<dyn Clock>) -> io::Result<Self> {
-        let mut elements = elements(sysfs, a_per_v)?;
-        let scan_bytes = place(&mut elements);
-        let rate_hz = number(&sysfs.join("sampling_frequency"))?;
+        let mut elements = read_elements(sysfs, a_per_v)?;
+        let scan_bytes = assign_offsets(&mut elements);
+        let rate_hz = read_number(&sysfs.join("sampling_frequency"))?;
         let channels = elements.iter().filter(|element| !element.timestamp).count();
         if !(1..=CHANNELS_MAX).contains(&channels) || !(1.0..=1e6).contains(&rate_hz) {
             let what = format!("{channels} channels enabled in scan_elements at {rate_hz} Hz; 1 to 8 are wanted");
@@ -77,29 +77,29 @@ impl Drop for Iio {
     }
 }
 
-fn number(file: &Path) -> io::Result<f64> {
+fn read_number(file: &Path) -> io::Result<f64> {
     let bad = |what: String| Error::new(ErrorKind::InvalidData, format!("{}: {what}", file.display()));
     let text = std::fs::read_to_string(file)
         .map_err(|error| Error::new(error.kind(), format!("{}: {error}", file.display())))?;
     text.trim().parse().map_err(|_| bad(format!("{:?} is no number", text.trim())))
 }
 
-fn elements(sysfs: &Path, a_per_v: f64) -> io::Result<Vec<Element>> {
+fn read_elements(sysfs: &Path, a_per_v: f64) -> io::Result<Vec<Element>> {
     let mut elements = Vec::new();
     for entry in std::fs::read_dir(sysfs.join("scan_elements"))? {
         let file = entry?.file_name().to_string_lossy().into_owned();
         let Some(name) = file.strip_suffix("_en").and_then(|name| name.strip_prefix("in_")) else { continue };
         let scan = |what: &str| sysfs.join("scan_elements").join(format!("in_{name}_{what}"));
-        if number(&scan("en"))? != 1.0 {
+        if read_number(&scan("en"))? != 1.0 {
             continue;
         }
         let text = std::fs::read_to_string(scan("type"))?;
         let unknown = || Error::new(ErrorKind::InvalidData, format!("in_{name}_type {:?}", text.trim()));
         let layout = ElementLayout::parse(text.trim()).ok_or_else(unknown)?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
-        let index = number(&scan("index"))? as u32;
+        let index = read_number(&scan("index"))? as u32;
         let timestamp = name == "timestamp";
-        let thousandths = if timestamp { 0.0 } else { scale(sysfs, name)? };
+        let thousandths = if timestamp { 0.0 } else { read_scale(sysfs, name)? };
         let scale_a = thousandths / 1000.0 * if name.starts_with("voltage") { a_per_v } else { 1.0 };
         elements.push(Element { name: name.to_owned(), index, layout, scale_a, timestamp, offset: 0 });
     }
@@ -108,13 +108,14 @@ fn elements(sysfs: &Path, a_per_v: f64) -> io::Result<Vec<Element>> {
 }
 
 /// Of the channel itself, or of all channels of its kind.
-fn scale(sysfs: &Path, name: &str) -> io::Result<f64> {
+fn read_scale(sysfs: &Path, name: &str) -> io::Result<f64> {
     let kind = name.trim_end_matches(|c: char| c.is_ascii_digit());
-    number(&sysfs.join(format!("in_{name}_scale"))).or_else(|_| number(&sysfs.join(format!("in_{kind}_scale"))))
+    read_number(&sysfs.join(format!("in_{name}_scale")))
+        .or_else(|_| read_number(&sysfs.join(format!("in_{kind}_scale"))))
 }
 
 /// Gives each element its place; the size of one scan.
-fn place(elements: &mut [Element]) -> usize {
+fn assign_offsets(elements: &mut [Element]) -> usize {
     let (mut end, mut widest) = (0_usize, 1);
     for element in elements {
         element.offset = end.next_multiple_of(element.layout.bytes);
@@ -151,12 +152,12 @@ impl ElementLayout {
 }
 
 impl Iio {
-    fn channels(&self) -> impl Iterator<Item = &Element> {
+    fn iter_channels(&self) -> impl Iterator<Item = &Element> {
         self.elements.iter().filter(|element| !element.timestamp)
     }
 
     /// Bits beyond sixteen are dropped from below.
-    fn coarse(element: &Element) -> u32 {
+    fn count_dropped_bits(element: &Element) -> u32 {
         element.layout.bits.saturating_sub(if element.layout.signed { 16 } else { 15 })
     }
 
@@ -168,12 +169,14 @@ impl Iio {
 
 impl Sampler for Iio {
     fn header(&self) -> WaveformHeader {
-        let names: Vec<&str> = self.channels().map(|element| element.name.as_str()).collect();
-        let scale =
-            self.channels().map(|element| element.scale_a * f64::from(1_u32 << Self::coarse(element))).collect();
-        let bits = self.channels().map(|element| element.layout.bits.min(16)).min().unwrap_or(16);
+        let names: Vec<&str> = self.iter_channels().map(|element| element.name.as_str()).collect();
+        let scale = self
+            .iter_channels()
+            .map(|element| element.scale_a * f64::from(1_u32 << Self::count_dropped_bits(element)))
+            .collect();
+        let bits = self.iter_channels().map(|element| element.layout.bits.min(16)).min().unwrap_or(16);
         let full_scale = i16::try_from((1_i32 << (bits - 1)) - 1).unwrap_or(i16::MAX).max(1);
-        WaveformHeader { scale, ..WaveformHeader::currents(self.rate_hz, &names, 1.0, full_scale) }
+        WaveformHeader { scale, ..WaveformHeader::with_currents(self.rate_hz, &names, 1.0, full_scale) }
     }
 
     fn next(&mut self) -> io::Result<Option<(i64, Vec<i16>)>> {
@@ -185,9 +188,9 @@ impl Sampler for Iio {
         }
         let mut samples = Vec::with_capacity(self.block * self.elements.len());
         for scan in bytes.chunks_exact(self.scan_bytes) {
-            for element in self.channels() {
+            for element in self.iter_channels() {
                 let value = element.layout.read(&scan[element.offset..element.offset + element.layout.bytes]);
-                let value = value >> Self::coarse(element);
+                let value = value >> Self::count_dropped_bits(element);
                 samples.push(i16::try_from(value).unwrap_or(if value < 0 { i16::MIN } else { i16::MAX }));
             }
         }
@@ -246,7 +249,7 @@ mod tests {
         }
         let device = sysfs.join("device");
         std::fs::write(&device, scans).expect("written");
-        let mut iio = Iio::open(sysfs, &device, 10.0, Arc::new(ManualClock::at(0))).expect("opens");
+        let mut iio = Iio::open(sysfs, &device, 10.0, Arc::new(ManualClock::with_time(0))).expect("opens");
         assert_eq!(std::fs::read_to_string(sysfs.join("buffer/enable")).expect("there"), "1");
         let header = iio.header();
         assert_eq!(header.channels, ["voltage0", "voltage1"]);

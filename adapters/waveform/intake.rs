@@ -44,7 +44,7 @@ pub struct Intake {
 
 impl Intake {
     /// The sampler begins anew with this header, perhaps on another clock.
-    pub(super) fn connected(&mut self, header: WaveformHeader) {
+    pub(super) fn record_connection(&mut self, header: WaveformHeader) {
         self.header = Some(header);
         self.time = TimeBase::default();
         self.counts.connections += 1;
@@ -69,7 +69,7 @@ impl Intake {
     }
 
     /// Takes samples whose first was taken at `first_ns` on the sampler's clock, with `gap` missing before them.
-    pub(super) fn block(
+    pub(super) fn accept_samples(
         &mut self,
         header: &WaveformHeader,
         first_ns: TimeNs,
@@ -98,7 +98,7 @@ pub(super) fn end_ns(header: &WaveformHeader, first_ns: TimeNs, count: usize) ->
 
 /// How many samples are missing between the time that was due and the time that came; rounded, and negative where some came
 /// again.
-pub(super) fn missing(header: &WaveformHeader, due_ns: TimeNs, first_ns: TimeNs) -> i64 {
+pub(super) fn count_missing(header: &WaveformHeader, due_ns: TimeNs, first_ns: TimeNs) -> i64 {
     let sample_ns = header.duration_ns(1.0).max(1);
     (first_ns.saturating_sub(due_ns) + sample_ns / 2).div_euclid(sample_ns)
 }

@@ -45,13 +45,13 @@ impl Producer {
         let stopping = stop.clone();
         let thread = std::thread::Builder::new()
             .name("waveform".to_owned())
-            .spawn(move || serve(&listener, sampler, &stopping))?;
+            .spawn(move || serve_listeners(&listener, sampler, &stopping))?;
         Ok(Self { at, stop, thread: Some(thread) })
     }
 
     /// Where it listens.
     #[must_use]
-    pub fn at(&self) -> SocketAddr {
+    pub fn listen_address(&self) -> SocketAddr {
         self.at
     }
 
@@ -65,7 +65,7 @@ impl Producer {
     ///
     /// # Errors
     /// Why the device failed.
-    pub fn end(mut self) -> io::Result<()> {
+    pub fn stop_sampling(mut self) -> io::Result<()> {
         self.stop.store(true, Ordering::SeqCst);
         let ended = self.thread.take().map(JoinHandle::join);
         ended.map_or(Ok(()), |ended| ended.unwrap_or_else(|_| Err(io::Error::other("the sampler broke off"))))
@@ -78,26 +78,26 @@ impl Drop for Producer {
     }
 }
 
-fn serve(listener: &TcpListener, mut sampler: Box<dyn Sampler>, stop: &AtomicBool) -> io::Result<()> {
+fn serve_listeners(listener: &TcpListener, mut sampler: Box<dyn Sampler>, stop: &AtomicBool) -> io::Result<()> {
     let header = sampler.header();
     let (channels, mut sequence) = (header.channels.len(), 0_u32);
     let mut listeners: Vec<TcpStream> = Vec::new();
     while !stop.load(Ordering::SeqCst) {
         let Some((first_ns, samples)) = sampler.next()? else { return Ok(()) };
         while let Ok((stream, _)) = listener.accept() {
-            listeners.extend(greeted(stream, &header).ok().filter(|_| listeners.len() < LISTENERS_MAX));
+            listeners.extend(send_header(stream, &header).ok().filter(|_| listeners.len() < LISTENERS_MAX));
         }
-        let bytes = WaveformFrame { sequence, first_ns, samples }.bytes(channels);
+        let bytes = WaveformFrame { sequence, first_ns, samples }.to_bytes(channels);
         listeners.retain_mut(|listener| listener.write_all(&bytes).is_ok());
         sequence = sequence.wrapping_add(1);
     }
     Ok(())
 }
 
-fn greeted(mut stream: TcpStream, header: &WaveformHeader) -> io::Result<TcpStream> {
+fn send_header(mut stream: TcpStream, header: &WaveformHeader) -> io::Result<TcpStream> {
     stream.set_nonblocking(false)?;
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(PATIENCE))?;
-    stream.write_all(header.line().as_bytes())?;
+    stream.write_all(header.encode_line().as_bytes())?;
     Ok(stream)
 }

@@ -55,7 +55,7 @@ impl Recorded {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "a cast from a double saturates, as a converter does")]
-    fn row(&mut self, out: &mut Vec<i16>) -> io::Result<bool> {
+    fn read_row(&mut self, out: &mut Vec<i16>) -> io::Result<bool> {
         let Some(text) = self.lines.next() else { return Ok(false) };
         self.line += 1;
         let text = text?;
@@ -75,12 +75,12 @@ impl Recorded {
 impl Sampler for Recorded {
     fn header(&self) -> WaveformHeader {
         let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
-        WaveformHeader::currents(self.rate_hz, &names, self.scale_a, FULL_SCALE)
+        WaveformHeader::with_currents(self.rate_hz, &names, self.scale_a, FULL_SCALE)
     }
 
     fn next(&mut self) -> io::Result<Option<(i64, Vec<i16>)>> {
         let (mut samples, first_ns, mut count) = (Vec::new(), self.time_ns(self.sent), 0);
-        while count < self.block && self.row(&mut samples)? {
+        while count < self.block && self.read_row(&mut samples)? {
             count += 1;
         }
         if count == 0 {

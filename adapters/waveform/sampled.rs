@@ -4,10 +4,10 @@
 //! It says of each block when its first value was true, on its own clock; that is mapped to the gateway's as the clock of
 //! any sampler. A value that is none is a gap, as is a time that is missing; values that come twice are taken once.
 //!
-//! What is sampled is not the current of a phase but its amplitude, as the drive knows it ([`WaveformHeader::amplitude`]).
+//! What is sampled is not the current of a phase but its amplitude, as the drive knows it ([`WaveformHeader::with_amplitude`]).
 
 use super::frame::WaveformHeader;
-use super::intake::{Block, Intake, end_ns, missing};
+use super::intake::{Block, Intake, count_missing, end_ns};
 use crate::clock::TimeNs;
 use crate::nclink::sample::{self, ItemColumn};
 
@@ -42,7 +42,7 @@ impl SampledCurrent {
     }
 
     /// The current out of a block of the controller's that arrived at `arrived_ns`, in pieces without a gap.
-    pub fn take(&mut self, block: &sample::SampleBlock, arrived_ns: TimeNs) -> Vec<Block> {
+    pub fn extract_blocks(&mut self, block: &sample::SampleBlock, arrived_ns: TimeNs) -> Vec<Block> {
         let wanted = |column: &&ItemColumn| column.step_ms > 0.0 && self.is_current(&column.path);
         let Some(column) = block.columns.iter().find(wanted) else { return Vec::new() };
         let header = self.header_of(1e3 / column.step_ms);
@@ -50,7 +50,7 @@ impl SampledCurrent {
         let mut blocks = Vec::new();
         let mut at = 0;
         for part in column.values.split(Option::is_none) {
-            blocks.extend(self.part(&header, begin_ns, at, part, column.step_ms, arrived_ns));
+            blocks.extend(self.build_block(&header, begin_ns, at, part, column.step_ms, arrived_ns));
             at += part.len() + 1;
         }
         blocks
@@ -62,16 +62,16 @@ impl SampledCurrent {
 
     /// A new rate begins anew.
     fn header_of(&mut self, rate_hz: f64) -> WaveformHeader {
-        let header = WaveformHeader::amplitude(rate_hz, SCALE_A, FULL_SCALE);
+        let header = WaveformHeader::with_amplitude(rate_hz, SCALE_A, FULL_SCALE);
         if self.intake.header() != Some(&header) {
             self.due_ns = None;
-            self.intake.connected(header.clone());
+            self.intake.record_connection(header.clone());
         }
         header
     }
 
     /// Values without a gap between them, the first of which is number `at` of its block.
-    fn part(
+    fn build_block(
         &mut self,
         header: &WaveformHeader,
         begin_ns: TimeNs,
@@ -83,7 +83,7 @@ impl SampledCurrent {
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         let after_ns = |count: usize| (f64::from(u32::try_from(count).unwrap_or(u32::MAX)) * step_ms * MS_NS) as i64;
         let first_ns = begin_ns.saturating_add(after_ns(at));
-        let lost = self.due_ns.map_or(0, |due_ns| missing(header, due_ns, first_ns));
+        let lost = self.due_ns.map_or(0, |due_ns| count_missing(header, due_ns, first_ns));
         // A device whose clock was set back begins anew; a few values that come twice are passed over.
         let again = if lost < 0 { usize::try_from(-lost).unwrap_or(usize::MAX) } else { 0 };
         let again = if again > part.len() { 0 } else { again };
@@ -93,7 +93,7 @@ impl SampledCurrent {
         }
         let first_ns = first_ns.saturating_add(after_ns(again));
         self.due_ns = Some(end_ns(header, first_ns, raw.len()));
-        Some(self.intake.block(header, first_ns, lost.max(0).unsigned_abs(), raw, arrived_ns))
+        Some(self.intake.accept_samples(header, first_ns, lost.max(0).unsigned_abs(), raw, arrived_ns))
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "clamped; what is beyond counts as clipped")]
@@ -117,10 +117,10 @@ mod tests {
     #[test]
     fn blocks_follow_each_other_and_gaps_are_counted() {
         let mut current = SampledCurrent::new(Some(5), 1.0);
-        let first = current.take(&block(1000, &[Some(1.5); 100]), 1_100_000_000);
+        let first = current.extract_blocks(&block(1000, &[Some(1.5); 100]), 1_100_000_000);
         assert_eq!((first.len(), first[0].gap, first[0].raw[0], first[0].raw.len()), (1, 0, 150, 100));
-        assert_eq!(current.take(&block(1100, &[Some(1.0); 50]), 1_150_000_000)[0].gap, 0);
-        assert_eq!(current.take(&block(1180, &[Some(1.0); 20]), 1_200_000_000)[0].gap, 30);
+        assert_eq!(current.extract_blocks(&block(1100, &[Some(1.0); 50]), 1_150_000_000)[0].gap, 0);
+        assert_eq!(current.extract_blocks(&block(1180, &[Some(1.0); 20]), 1_200_000_000)[0].gap, 30);
         let counts = current.intake().counts();
         assert_eq!((counts.samples, counts.gaps, counts.missing), (170, 1, 30));
         assert_eq!(current.intake().header().map(|header| header.rate_hz), Some(1000.0));
@@ -129,18 +129,18 @@ mod tests {
     #[test]
     fn a_value_that_is_none_splits_and_one_that_comes_twice_is_taken_once() {
         let mut current = SampledCurrent::new(None, 0.001);
-        let blocks = current.take(&block(0, &[Some(2000.0), None, None, Some(4000.0)]), 4_000_000);
+        let blocks = current.extract_blocks(&block(0, &[Some(2000.0), None, None, Some(4000.0)]), 4_000_000);
         let found: Vec<(u64, &[i16])> = blocks.iter().map(|block| (block.gap, block.raw.as_slice())).collect();
         assert_eq!(found, [(0, &[200][..]), (2, &[400][..])]);
-        let again = current.take(&block(2, &[Some(9.0), Some(9.0), Some(5000.0)]), 5_000_000);
+        let again = current.extract_blocks(&block(2, &[Some(9.0), Some(9.0), Some(5000.0)]), 5_000_000);
         assert_eq!((again.len(), again[0].gap, again[0].raw.as_slice()), (1, 0, &[500][..]));
-        assert!(current.take(&block(3, &[Some(1.0); 2]), 6_000_000).is_empty(), "all of it was there");
+        assert!(current.extract_blocks(&block(3, &[Some(1.0); 2]), 6_000_000).is_empty(), "all of it was there");
     }
 
     #[test]
     fn a_current_beyond_the_scale_is_clipped_and_others_are_not_taken() {
         let mut current = SampledCurrent::new(Some(5), 1.0);
-        assert_eq!(current.take(&block(0, &[Some(400.0), Some(-400.0)]), 2_000_000)[0].clipped, 2);
-        assert!(SampledCurrent::new(Some(7), 1.0).take(&block(0, &[Some(1.0)]), 1_000_000).is_empty());
+        assert_eq!(current.extract_blocks(&block(0, &[Some(400.0), Some(-400.0)]), 2_000_000)[0].clipped, 2);
+        assert!(SampledCurrent::new(Some(7), 1.0).extract_blocks(&block(0, &[Some(1.0)]), 1_000_000).is_empty());
     }
 }

@@ -44,7 +44,7 @@ impl SimulatedCurrent {
     }
 
     /// Uniform within one count either side, by a xorshift.
-    fn noise(&mut self) -> f64 {
+    fn sample_noise(&mut self) -> f64 {
         self.noise ^= self.noise << 13;
         self.noise ^= self.noise >> 7;
         self.noise ^= self.noise << 17;
@@ -53,11 +53,11 @@ impl SimulatedCurrent {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "a cast from a double saturates, as a converter does")]
-    fn instant(&mut self, peak_a: f64, out: &mut Vec<i16>) {
+    fn sample_instant(&mut self, peak_a: f64, out: &mut Vec<i16>) {
         for phase in 0..3 {
             let angle = self.angle_rad - TAU / 3.0 * f64::from(phase);
             let current_a = peak_a * (angle.sin() + FIFTH * (5.0 * angle).sin());
-            let counts = current_a / SCALE_A + NOISE_COUNTS * self.noise();
+            let counts = current_a / SCALE_A + NOISE_COUNTS * self.sample_noise();
             out.push(counts.round().clamp(-32767.0, 32767.0) as i16);
         }
     }
@@ -65,7 +65,7 @@ impl SimulatedCurrent {
 
 impl Sampler for SimulatedCurrent {
     fn header(&self) -> WaveformHeader {
-        WaveformHeader::currents(self.rate_hz, &["i_u", "i_v", "i_w"], SCALE_A, 32767)
+        WaveformHeader::with_currents(self.rate_hz, &["i_u", "i_v", "i_w"], SCALE_A, 32767)
     }
 
     fn next(&mut self) -> io::Result<Option<(i64, Vec<i16>)>> {
@@ -78,7 +78,7 @@ impl Sampler for SimulatedCurrent {
             let peak_a = 2.0_f64.sqrt() * moment.electric.spindle_current_a / (1.0 + FIFTH * FIFTH).sqrt();
             let hz = moment.truth.spindle_speed_rpm.abs() / 60.0 * POLE_PAIRS;
             self.angle_rad = (self.angle_rad + TAU * hz / self.rate_hz) % TAU;
-            self.instant(peak_a, &mut samples);
+            self.sample_instant(peak_a, &mut samples);
         }
         self.next += self.block;
         Ok(Some((first_ns, samples)))

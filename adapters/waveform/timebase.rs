@@ -43,7 +43,7 @@ impl TimeBase {
     #[must_use]
     #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "differences within a minute")]
     pub fn gateway_ns(&self, sampler_ns: TimeNs) -> TimeNs {
-        let Some((from_ns, offset_ns, slope)) = self.line() else { return sampler_ns };
+        let Some((from_ns, offset_ns, slope)) = self.fit_line() else { return sampler_ns };
         let drift_ns = (slope * (sampler_ns - from_ns) as f64) as i64;
         sampler_ns.saturating_add(offset_ns).saturating_add(drift_ns)
     }
@@ -52,12 +52,12 @@ impl TimeBase {
     #[must_use]
     pub fn drift_ppm(&self) -> Option<f64> {
         let span_ns = self.least.back()?.0 - self.least.front()?.0;
-        (span_ns >= 10 * SECOND_NS).then(|| 1e6 * self.line().map_or(0.0, |(.., slope)| slope))
+        (span_ns >= 10 * SECOND_NS).then(|| 1e6 * self.fit_line().map_or(0.0, |(.., slope)| slope))
     }
 
     /// Time, difference there, and slope. Below the points: their mean, lowered until none lies under it.
     #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "differences within a minute")]
-    fn line(&self) -> Option<(TimeNs, i64, f64)> {
+    fn fit_line(&self) -> Option<(TimeNs, i64, f64)> {
         let (from_ns, base_ns) = *self.least.front()?;
         let count = f64::from(u32::try_from(self.least.len()).ok()?);
         let points: Vec<(f64, f64)> =

@@ -139,7 +139,7 @@ impl Worker {
             see(poll);
             merge.push_all(source, &mut poll.readings);
             if let Some(error) = &poll.error {
-                merge.fail(source, poll.ended_ns, error);
+                merge.record_failure(source, poll.ended_ns, error);
             }
         });
         if let Some(period) = locked(&self.shared.ledger).take_new_pace() {
@@ -160,8 +160,8 @@ impl Worker {
     /// How the source has been doing, as of `now_ns`.
     #[must_use]
     pub fn stats(&self, now_ns: TimeNs) -> WorkerStats {
-        let dropped = locked(&self.shared.queue).dropped();
-        locked(&self.shared.ledger).stats(now_ns, dropped)
+        let dropped = locked(&self.shared.queue).count_dropped();
+        locked(&self.shared.ledger).build_stats(now_ns, dropped)
     }
 
     /// Polls and short waits between them that are over. Whoever looks twice sees whether the thread moves.
@@ -219,13 +219,13 @@ impl Poller {
     fn run(&mut self) {
         let mut due_ns = self.clock.now_ns();
         while !self.stopping() {
-            let readings = locked(&self.shared.queue).spare();
+            let readings = locked(&self.shared.queue).take_spare();
             let (began_ns, poll) = self.poll(readings);
             self.shared.steps.fetch_add(1, Ordering::Relaxed);
             let ended_ns = poll.ended_ns;
             let error = poll.error.clone();
-            self.plausibility.see(&poll.readings);
-            locked(&self.shared.queue).put(poll);
+            self.plausibility.record_readings(&poll.readings);
+            locked(&self.shared.queue).push_poll(poll);
             self.follow_pace();
             locked(&self.shared.ledger).poll_over(due_ns, began_ns, ended_ns, error.as_ref());
             self.take_facts(ended_ns);
@@ -236,14 +236,14 @@ impl Poller {
             due_ns = self.next_due(due_ns, ended_ns, error.as_ref());
             self.sleep_until(due_ns);
         }
-        locked(&self.shared.ledger).stopped(self.clock.now_ns());
+        locked(&self.shared.ledger).record_stop(self.clock.now_ns());
     }
 
     /// The device may keep a slower pace than was wanted.
     fn follow_pace(&mut self) {
         let wanted = self.settings.period.unwrap_or_else(|| self.source.period());
-        self.period = wanted.max(self.source.pace());
-        locked(&self.shared.ledger).paced(self.period);
+        self.period = wanted.max(self.source.achievable_period());
+        locked(&self.shared.ledger).set_beat(self.period);
     }
 
     fn take_facts(&mut self, now_ns: TimeNs) {
@@ -251,18 +251,18 @@ impl Poller {
             return;
         }
         self.asked_ns = now_ns;
-        let facts = self.source.facts().into_iter().chain(self.plausibility.fact()).collect();
-        locked(&self.shared.ledger).facts(facts);
+        let facts = self.source.collect_facts().into_iter().chain(self.plausibility.build_fact()).collect();
+        locked(&self.shared.ledger).set_facts(facts);
     }
 
     /// A source that does not answer has an error instead.
     fn take_problems(&mut self, answers: bool) {
         let problems = if answers {
-            self.source.problems().into_iter().chain(self.plausibility.problems()).collect()
+            self.source.list_problems().into_iter().chain(self.plausibility.list_problems()).collect()
         } else {
             Vec::new()
         };
-        locked(&self.shared.ledger).problems(problems);
+        locked(&self.shared.ledger).set_problems(problems);
     }
 
     fn stopping(&self) -> bool {
@@ -291,7 +291,7 @@ impl Poller {
         }
         let beats = (ended_ns - due_ns).max(0) / period_ns;
         if beats > 0 {
-            locked(&self.shared.ledger).missed(beats.unsigned_abs());
+            locked(&self.shared.ledger).count_missed(beats.unsigned_abs());
         }
         due_ns + (beats + 1) * period_ns
     }

@@ -19,18 +19,18 @@ impl Queue {
         Self { polls: VecDeque::new(), empty: VecDeque::new(), spares: Vec::new(), limit: limit.max(1), dropped: 0 }
     }
 
-    pub(super) fn put(&mut self, poll: Poll) {
+    pub(super) fn push_poll(&mut self, poll: Poll) {
         if self.polls.len() >= self.limit
             && let Some(oldest) = self.polls.pop_front()
         {
             self.dropped += 1;
-            self.keep(oldest.readings);
+            self.recycle_readings(oldest.readings);
         }
         self.polls.push_back(poll);
     }
 
     /// An empty list for the readings of the next poll.
-    pub(super) fn spare(&mut self) -> Vec<Reading> {
+    pub(super) fn take_spare(&mut self) -> Vec<Reading> {
         self.spares.pop().unwrap_or_default()
     }
 
@@ -40,18 +40,18 @@ impl Queue {
     }
 
     pub(super) fn give_back(&mut self, mut polls: VecDeque<Poll>) {
-        polls.drain(..).for_each(|poll| self.keep(poll.readings));
+        polls.drain(..).for_each(|poll| self.recycle_readings(poll.readings));
         self.empty = polls;
     }
 
-    fn keep(&mut self, mut readings: Vec<Reading>) {
+    fn recycle_readings(&mut self, mut readings: Vec<Reading>) {
         if self.spares.len() < 8 {
             readings.clear();
             self.spares.push(readings);
         }
     }
 
-    pub(super) fn dropped(&self) -> u64 {
+    pub(super) fn count_dropped(&self) -> u64 {
         self.dropped
     }
 }

@@ -44,7 +44,7 @@ pub enum WorkerState {
 impl WorkerState {
     /// The word used in JSON, SQL and on the page.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Starting => "starting",
             Self::Reading => "reading",
@@ -125,7 +125,7 @@ impl Window {
         }
     }
 
-    fn spread(&self) -> Spread {
+    fn compute_spread(&self) -> Spread {
         let mut sorted = self.values.clone();
         sorted.sort_unstable();
         let rank = |percent: usize| (sorted.len() * percent).div_ceil(100).saturating_sub(1);
@@ -192,7 +192,7 @@ impl WorkerCounters {
     }
 
     /// From now on it is polled at this pace.
-    pub(super) fn paced(&mut self, beat: Duration) {
+    pub(super) fn set_beat(&mut self, beat: Duration) {
         self.beat = beat;
     }
 
@@ -224,13 +224,13 @@ impl WorkerCounters {
         }
         self.last_began_ns = error.is_none().then_some(began_ns);
         if let Some(error) = error {
-            self.failed(error, ended_ns);
+            self.record_failure(error, ended_ns);
         }
-        self.enter(state_after(error), ended_ns);
+        self.enter_state(state_after(error), ended_ns);
         self.look_at_pace();
     }
 
-    fn failed(&mut self, error: &SourceError, ended_ns: TimeNs) {
+    fn record_failure(&mut self, error: &SourceError, ended_ns: TimeNs) {
         if matches!(error, SourceError::Off { .. } | SourceError::End { .. }) {
             return;
         }
@@ -241,7 +241,7 @@ impl WorkerCounters {
         }
     }
 
-    fn enter(&mut self, state: WorkerState, at_ns: TimeNs) {
+    fn enter_state(&mut self, state: WorkerState, at_ns: TimeNs) {
         if self.state != state {
             self.state = state;
             self.state_since_ns = at_ns;
@@ -249,7 +249,7 @@ impl WorkerCounters {
     }
 
     fn look_at_pace(&mut self) {
-        let pace = self.beat.max(self.kept()).min(SLOWEST.max(self.period));
+        let pace = self.beat.max(self.estimate_kept_pace()).min(SLOWEST.max(self.period));
         let differs = pace.abs_diff(self.pace).as_secs_f64() > SAME_PACE * self.pace.as_secs_f64();
         if differs || (pace == self.period && pace != self.pace) {
             self.pace = pace;
@@ -258,7 +258,7 @@ impl WorkerCounters {
     }
 
     /// The second longest of the last intervals, where it is visibly longer than the beat.
-    fn kept(&self) -> Duration {
+    fn estimate_kept_pace(&self) -> Duration {
         let since_ns = self.latest.back().map_or(TimeNs::MIN, |(ended_ns, _)| ended_ns.saturating_sub(PACE_NS));
         let late = self.latest.iter().rev().enumerate();
         let late = late.take_while(|(place, (ended_ns, _))| *place < 2 || *ended_ns > since_ns);
@@ -275,23 +275,23 @@ impl WorkerCounters {
         self.new_pace.take()
     }
 
-    pub(super) fn facts(&mut self, facts: Vec<Fact>) {
+    pub(super) fn set_facts(&mut self, facts: Vec<Fact>) {
         self.facts = facts;
     }
 
-    pub(super) fn problems(&mut self, problems: Vec<SourceProblem>) {
+    pub(super) fn set_problems(&mut self, problems: Vec<SourceProblem>) {
         self.problems = problems;
     }
 
-    pub(super) fn missed(&mut self, beats: u64) {
+    pub(super) fn count_missed(&mut self, beats: u64) {
         self.missed += beats;
     }
 
-    pub(super) fn stopped(&mut self, at_ns: TimeNs) {
-        self.enter(WorkerState::Stopped, at_ns);
+    pub(super) fn record_stop(&mut self, at_ns: TimeNs) {
+        self.enter_state(WorkerState::Stopped, at_ns);
     }
 
-    pub(super) fn stats(&self, now_ns: TimeNs, dropped: u64) -> WorkerStats {
+    pub(super) fn build_stats(&self, now_ns: TimeNs, dropped: u64) -> WorkerStats {
         let deadline_ns = i64::try_from(self.deadline.as_nanos()).unwrap_or(i64::MAX);
         let stuck_ns = self.in_poll_since_ns.filter(|since_ns| now_ns - since_ns > deadline_ns);
         WorkerStats {
@@ -299,9 +299,9 @@ impl WorkerCounters {
             state_since_ns: stuck_ns.unwrap_or(self.state_since_ns),
             period: self.period,
             pace: self.pace,
-            period_kept: self.intervals.spread(),
-            lateness: self.lateness.spread(),
-            round_trip: self.round_trip.spread(),
+            period_kept: self.intervals.compute_spread(),
+            lateness: self.lateness.compute_spread(),
+            round_trip: self.round_trip.compute_spread(),
             round_trips: self.round_trips,
             lag_s: self.last_success_ns.map(|last_ns| (now_ns - last_ns).max(0) as f64 / 1e9),
             polls: self.polls,

@@ -37,7 +37,7 @@ impl Source for Faulty {
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let poll = self.polls.fetch_add(1, Ordering::SeqCst);
         (self.behaviour)(poll)?;
-        out.push(Reading::number(self.channels[0], Stamp::exact(clock.now_ns()), f64::from(poll)));
+        out.push(Reading::from_number(self.channels[0], Stamp::from_exact_time(clock.now_ns()), f64::from(poll)));
         Ok(())
     }
 }
@@ -53,7 +53,7 @@ fn quick() -> WorkerSettings {
 }
 
 fn part_count() -> ChannelId {
-    ChannelId::of("part_count").expect("in the table")
+    ChannelId::from_name("part_count").expect("in the table")
 }
 
 fn start(settings: WorkerSettings, behaviour: Behaviour) -> (Worker, Arc<AtomicU32>, Arc<SystemClock>) {
@@ -88,7 +88,7 @@ fn a_good_source_keeps_its_pace_and_reaches_the_merge() {
     let mut merge = Merge::new(&[plan], Delay::default());
     wait_for(&polls, 40);
     assert!(worker.drain_into(&mut merge, SourceId(0)) >= 39);
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     merge.sample_into(&mut sample, clock.now_ns());
     assert!(merge.counts(SourceId(0)).readings >= 39);
     let stats = worker.stats(clock.now_ns());
@@ -121,7 +121,7 @@ fn a_machine_that_is_off_is_no_failure() {
     let stats = worker.stats(clock.now_ns());
     assert_eq!((stats.state, stats.failures, stats.last_error), (WorkerState::Off, 0, None));
     let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD };
-    let (mut merge, mut sample) = (Merge::new(&[plan], Delay::default()), Sample::empty(0));
+    let (mut merge, mut sample) = (Merge::new(&[plan], Delay::default()), Sample::new_empty(0));
     worker.drain_into(&mut merge, SourceId(0));
     merge.sample_into(&mut sample, clock.now_ns());
     assert_eq!(sample.number(part_count()), Err(Absence::MachineOff));
@@ -195,9 +195,9 @@ fn a_recording_replayed_by_the_clock_arrives_in_full() {
     let read = read_csv(format!("time_s,part_count\n{rows}").as_bytes(), "test.csv").expect("readable");
     let replay = LiveReplay::new(Replay::new("replay:test.csv", &read.recording, 0), 1.0);
     let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(100.0));
-    let plans = [SourcePlan::of(&replay)];
+    let plans = [SourcePlan::from_source(&replay)];
     let worker = Worker::start(Box::new(replay), clock.clone(), WorkerSettings::default()).expect("a thread");
-    let (mut merge, mut sample, mut seen) = (Merge::new(&plans, Delay::default()), Sample::empty(0), Vec::new());
+    let (mut merge, mut sample, mut seen) = (Merge::new(&plans, Delay::default()), Sample::new_empty(0), Vec::new());
     while !worker.is_finished() {
         worker.drain_into(&mut merge, SourceId(0));
         merge.sample_into(&mut sample, clock.now_ns() - merge.delay_ns());
@@ -219,7 +219,7 @@ fn a_slow_source_is_believed_its_own_pace() {
     );
     wait_for(&polls, 20);
     let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD };
-    let (mut merge, mut sample) = (Merge::new(&[plan], Delay::Fixed(Duration::ZERO)), Sample::empty(0));
+    let (mut merge, mut sample) = (Merge::new(&[plan], Delay::Fixed(Duration::ZERO)), Sample::new_empty(0));
     worker.stop();
     wait_until(|| worker.is_finished());
     worker.drain_into(&mut merge, SourceId(0));

@@ -23,7 +23,7 @@ struct Budget {
 
 impl Budget {
     /// May another row be written? Gives how many were left out before it.
-    fn take(&mut self, now: Instant) -> Option<u32> {
+    fn admit_row(&mut self, now: Instant) -> Option<u32> {
         if self.since.is_none_or(|since| now.saturating_duration_since(since) >= MINUTE) {
             (self.since, self.used) = (Some(now), 0);
         }
@@ -49,22 +49,24 @@ impl Account {
     }
 
     /// Something happened; false when it will not be stored.
-    pub(super) async fn row(&self, kind: &str, outcome: &str, reason: &str, person: &str) -> bool {
+    pub(super) async fn append_row(&self, kind: &str, outcome: &str, reason: &str, person: &str) -> bool {
         let cut = |text: &str| text.chars().filter(|sign| !sign.is_control()).take(TEXT_MAX).collect();
         let (kind, outcome) = (kind.to_owned(), outcome.to_owned());
-        self.post.account(Audit { kind, outcome, reason: cut(reason), person: cut(person), ..Audit::default() }).await
+        self.post
+            .send_audit_row(Audit { kind, outcome, reason: cut(reason), person: cut(person), ..Audit::default() })
+            .await
     }
 
     /// Something was refused. Nobody waits for the row.
-    pub(super) fn refused(&self, kind: &str, reason: &str, person: &str, now: Instant) {
-        let budget = self.refusals.lock().unwrap_or_else(PoisonError::into_inner).take(now);
+    pub(super) fn record_refusal(&self, kind: &str, reason: &str, person: &str, now: Instant) {
+        let budget = self.refusals.lock().unwrap_or_else(PoisonError::into_inner).admit_row(now);
         let Some(left_out) = budget else { return };
         let reason = match left_out {
             0 => reason.to_owned(),
             more => format!("{reason} ({more} more refusals before it were left out)"),
         };
         let (account, kind, person) = (Self::new(self.post.clone()), kind.to_owned(), person.to_owned());
-        tokio::spawn(async move { account.row(&kind, "refused", &reason, &person).await });
+        tokio::spawn(async move { account.append_row(&kind, "refused", &reason, &person).await });
     }
 }
 
@@ -75,8 +77,8 @@ mod tests {
     #[test]
     fn a_flood_of_refusals_is_counted() {
         let (mut budget, now) = (Budget::default(), Instant::now());
-        assert_eq!((0..1000).filter_map(|_| budget.take(now)).count(), REFUSALS_MAX as usize);
-        assert_eq!(budget.take(now + MINUTE), Some(1000 - REFUSALS_MAX));
-        assert_eq!(budget.take(now + MINUTE), Some(0));
+        assert_eq!((0..1000).filter_map(|_| budget.admit_row(now)).count(), REFUSALS_MAX as usize);
+        assert_eq!(budget.admit_row(now + MINUTE), Some(1000 - REFUSALS_MAX));
+        assert_eq!(budget.admit_row(now + MINUTE), Some(0));
     }
 }

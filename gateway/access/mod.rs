@@ -22,13 +22,13 @@ mod token;
 mod tries;
 
 pub use persons::{
-    FIRST, NAME_MAX, PERSONS_MAX, PersonDifference, PersonEntry, Persons, PersonsError, differences, path,
-    permission_problem,
+    FIRST, NAME_MAX, PERSONS_MAX, PersonDifference, PersonEntry, Persons, PersonsError, find_differences,
+    permission_problem, persons_path,
 };
 pub use role::Role;
-pub use sessions::{SessionKey, key};
+pub use sessions::{SessionKey, digest_cookie};
 pub use sign_in::{Access, NewSession, Rules, SignInError, Urgency};
-pub(crate) use token::random;
+pub(crate) use token::random_bytes;
 pub use token::{Token, TokenError};
 pub use tries::{LOCKED_FOR, TRIES_MAX};
 

@@ -1,7 +1,7 @@
 //! The persons who may do more than read: a file in the data directory, readable by the user of the gateway alone.
 //!
 //! The file is the one truth. Whoever changes it - the page, `cnc-gateway person`, an editor - is followed within a second by
-//! the running gateway, which writes every difference into the audit; see [`differences`].
+//! the running gateway, which writes every difference into the audit; see [`find_differences`].
 
 use super::role::Role;
 use super::token::{Token, TokenError};
@@ -76,14 +76,14 @@ pub enum PersonsError {
 
 /// Where the persons of this data directory are kept.
 #[must_use]
-pub fn path(data_dir: &Path) -> PathBuf {
+pub fn persons_path(data_dir: &Path) -> PathBuf {
     data_dir.join(FILE)
 }
 
 /// What is wrong with the permissions of the file of persons.
 #[must_use]
 pub fn permission_problem(data_dir: &Path) -> Option<StatusProblem> {
-    let file = path(data_dir);
+    let file = persons_path(data_dir);
     let mode = std::fs::metadata(&file).ok()?.permissions().mode();
     let what = match mode {
         _ if mode & 0o022 != 0 => "others can change who may do what here",
@@ -146,13 +146,13 @@ impl Persons {
 
     /// Everybody, in the order of the file.
     #[must_use]
-    pub fn all(&self) -> &[PersonEntry] {
+    pub fn list_entries(&self) -> &[PersonEntry] {
         &self.persons
     }
 
     /// The one of this name.
     #[must_use]
-    pub fn named(&self, name: &str) -> Option<&PersonEntry> {
+    pub fn find_by_name(&self, name: &str) -> Option<&PersonEntry> {
         self.persons.iter().find(|entry| entry.name == name)
     }
 
@@ -170,7 +170,7 @@ impl Persons {
         if self.persons.len() >= PERSONS_MAX {
             return Err(PersonsError::Full);
         }
-        let token = Token::make()?;
+        let token = Token::from_random_bytes()?;
         let (name, token_hash, by) = (name.to_owned(), token.hash()?, by.to_owned());
         self.persons.push(PersonEntry { name, role, token_hash, by });
         Ok(token)
@@ -182,7 +182,7 @@ impl Persons {
     /// Nobody has this name, or nobody would be left who manages persons.
     pub fn give_role(&mut self, name: &str, role: Role, by: &str) -> Result<(), PersonsError> {
         self.keep_an_admin(name, role != Role::Admin)?;
-        let entry = self.entry(name)?;
+        let entry = self.find_entry_mut(name)?;
         (entry.role, entry.by) = (role, by.to_owned());
         Ok(())
     }
@@ -192,9 +192,9 @@ impl Persons {
     /// # Errors
     /// Nobody has this name, or there is no token.
     pub fn give_token(&mut self, name: &str, by: &str) -> Result<Token, PersonsError> {
-        let token = Token::make()?;
+        let token = Token::from_random_bytes()?;
         let hash = token.hash()?;
-        let entry = self.entry(name)?;
+        let entry = self.find_entry_mut(name)?;
         (entry.token_hash, entry.by) = (hash, by.to_owned());
         Ok(token)
     }
@@ -205,19 +205,19 @@ impl Persons {
     /// Nobody has this name, or nobody would be left who manages persons.
     pub fn remove(&mut self, name: &str) -> Result<(), PersonsError> {
         self.keep_an_admin(name, true)?;
-        self.entry(name)?;
+        self.find_entry_mut(name)?;
         self.persons.retain(|entry| entry.name != name);
         Ok(())
     }
 
-    fn entry(&mut self, name: &str) -> Result<&mut PersonEntry, PersonsError> {
+    fn find_entry_mut(&mut self, name: &str) -> Result<&mut PersonEntry, PersonsError> {
         let found = self.persons.iter_mut().find(|entry| entry.name == name);
         found.ok_or_else(|| PersonsError::Nobody(name.to_owned()))
     }
 
     fn keep_an_admin(&self, name: &str, goes: bool) -> Result<(), PersonsError> {
         let another = self.persons.iter().any(|entry| entry.role == Role::Admin && entry.name != name);
-        let is_one = self.named(name).is_some_and(|entry| entry.role == Role::Admin);
+        let is_one = self.find_by_name(name).is_some_and(|entry| entry.role == Role::Admin);
         if goes && is_one && !another { Err(PersonsError::LastAdmin(name.to_owned())) } else { Ok(()) }
     }
 }
@@ -235,10 +235,10 @@ pub struct PersonDifference {
 
 /// Everything in which `now` differs from `before`.
 #[must_use]
-pub fn differences(before: &Persons, now: &Persons) -> Vec<PersonDifference> {
+pub fn find_differences(before: &Persons, now: &Persons) -> Vec<PersonDifference> {
     let told = |outcome, text, entry: &PersonEntry| PersonDifference { outcome, text, by: entry.by.clone() };
     let changed = now.persons.iter().flat_map(|entry| {
-        let Some(old) = before.named(&entry.name) else {
+        let Some(old) = before.find_by_name(&entry.name) else {
             return vec![told("added", format!("{} is {}", entry.name, entry.role), entry)];
         };
         let role = (old.role != entry.role)
@@ -247,7 +247,7 @@ pub fn differences(before: &Persons, now: &Persons) -> Vec<PersonDifference> {
             .then(|| told("token", format!("{} has a new token", entry.name), entry));
         role.into_iter().chain(token).collect()
     });
-    let gone = before.persons.iter().filter(|old| now.named(&old.name).is_none()).map(|old| PersonDifference {
+    let gone = before.persons.iter().filter(|old| now.find_by_name(&old.name).is_none()).map(|old| PersonDifference {
         outcome: "removed",
         text: format!("{} was {}", old.name, old.role),
         by: String::new(),
@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn the_file_holds_hashes_and_belongs_to_one_user() {
         let directory = tempfile::tempdir().expect("a directory");
-        let path = path(directory.path());
+        let path = persons_path(directory.path());
         assert!(Persons::read(&path).expect("readable").is_none());
         let mut persons = Persons::default();
         let token = persons.add(" 李伟 ", Role::Admin, "test").expect("added");
@@ -277,7 +277,7 @@ mod tests {
             assert!(problem.what.contains(part) && problem.next.contains("chmod 600"), "{problem:?}");
         }
         let read = Persons::read(&path).expect("readable").expect("there");
-        assert!(token.is(&read.named("李伟").expect("known").token_hash));
+        assert!(token.matches_hash(&read.find_by_name("李伟").expect("known").token_hash));
         std::fs::write(&path, "{\"schema\":\"persons/1\",\"persons\":[{\"name\":\"x\"}]}").expect("written");
         assert!(Persons::read(&path).is_err_and(|error| error.to_string().contains("role")));
     }
@@ -298,12 +298,12 @@ mod tests {
         }
         persons.add("Li", Role::Setter, "admin").expect("added");
         persons.give_token("admin", "admin").expect("given");
-        let words: Vec<&str> = differences(&before, &persons).iter().map(|it| it.outcome).collect();
+        let words: Vec<&str> = find_differences(&before, &persons).iter().map(|it| it.outcome).collect();
         assert_eq!(words, ["token", "added"]);
         let added = persons.clone();
         persons.give_role("Li", Role::Viewer, "admin").expect("given");
-        assert_eq!(differences(&added, &persons)[0].text, "Li was setter and is viewer");
+        assert_eq!(find_differences(&added, &persons)[0].text, "Li was setter and is viewer");
         persons.remove("Li").expect("removed");
-        assert_eq!(differences(&added, &persons)[0].outcome, "removed");
+        assert_eq!(find_differences(&added, &persons)[0].outcome, "removed");
     }
 }

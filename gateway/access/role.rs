@@ -23,7 +23,7 @@ impl Role {
 
     /// The word in files, documents and on the command line.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub const fn as_word(self) -> &'static str {
         match self {
             Self::Viewer => "viewer",
             Self::Setter => "setter",
@@ -34,7 +34,7 @@ impl Role {
 
     /// The word in Chinese.
     #[must_use]
-    pub const fn zh(self) -> &'static str {
+    pub const fn as_chinese_word(self) -> &'static str {
         match self {
             Self::Viewer => "查看",
             Self::Setter => "调试",
@@ -46,6 +46,6 @@ impl Role {
 
 impl fmt::Display for Role {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.word())
+        f.write_str(self.as_word())
     }
 }

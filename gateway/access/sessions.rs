@@ -1,7 +1,7 @@
 //! Who is signed in. A session is a random number in a cookie; the box keeps its digest, so that nobody can read one from its
 //! memory file. Time is an argument, so that the end of a session can be tried without waiting for it.
 
-use super::token::{TokenError, random};
+use super::token::{TokenError, random_bytes};
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -36,7 +36,7 @@ pub(super) struct Sessions {
 
 /// The digest of what the cookie holds.
 #[must_use]
-pub fn key(cookie: &str) -> SessionKey {
+pub fn digest_cookie(cookie: &str) -> SessionKey {
     Sha256::digest(cookie.as_bytes()).into()
 }
 
@@ -45,36 +45,36 @@ impl Sessions {
     ///
     /// # Errors
     /// The system gives no random numbers.
-    pub(super) fn begin(
+    pub(super) fn begin_session(
         &mut self,
         (name, token_hash): (&str, &str),
         lasts: Duration,
         now: Instant,
     ) -> Result<String, TokenError> {
-        let cookie = random::<32>()?.iter().fold(String::with_capacity(64), |mut hex, byte| {
+        let cookie = random_bytes::<32>()?.iter().fold(String::with_capacity(64), |mut hex, byte| {
             let _infallible = write!(hex, "{byte:02x}");
             hex
         });
-        self.forget(now);
+        self.remove_expired(now);
         self.make_room(PER_PERSON_MAX, |session| session.name == name);
         self.make_room(SESSIONS_MAX, |_| true);
         let (name, token_hash, since) = (name.to_owned(), token_hash.to_owned(), now);
-        self.by_key.insert(key(&cookie), Session { name, since, until: now + lasts, token_hash });
+        self.by_key.insert(digest_cookie(&cookie), Session { name, since, until: now + lasts, token_hash });
         Ok(cookie)
     }
 
     /// The session of this key, unless it has ended.
     #[must_use]
-    pub(super) fn find(&self, key: &SessionKey, now: Instant) -> Option<&Session> {
+    pub(super) fn find_session(&self, key: &SessionKey, now: Instant) -> Option<&Session> {
         self.by_key.get(key).filter(|session| now < session.until)
     }
 
     /// Ends one.
-    pub(super) fn end(&mut self, key: &SessionKey) {
+    pub(super) fn end_session(&mut self, key: &SessionKey) {
         self.by_key.remove(key);
     }
 
-    fn forget(&mut self, now: Instant) {
+    fn remove_expired(&mut self, now: Instant) {
         self.by_key.retain(|_, session| now < session.until);
     }
 
@@ -95,21 +95,24 @@ mod tests {
     fn a_session_ends_by_itself_by_order_and_for_newer_ones() {
         let (mut sessions, now) = (Sessions::default(), Instant::now());
         let hour = Duration::from_secs(3600);
-        let cookie = sessions.begin(("Li", "hash"), hour, now).expect("random");
+        let cookie = sessions.begin_session(("Li", "hash"), hour, now).expect("random");
         assert_eq!(cookie.len(), 64);
-        assert_eq!(sessions.find(&key(&cookie), now).map(|it| it.name.as_str()), Some("Li"));
-        assert!(sessions.find(&key("another"), now).is_none());
-        assert!(sessions.find(&key(&cookie), now + hour).is_none(), "its time is over");
-        sessions.end(&key(&cookie));
-        assert!(sessions.find(&key(&cookie), now).is_none());
+        assert_eq!(sessions.find_session(&digest_cookie(&cookie), now).map(|it| it.name.as_str()), Some("Li"));
+        assert!(sessions.find_session(&digest_cookie("another"), now).is_none());
+        assert!(sessions.find_session(&digest_cookie(&cookie), now + hour).is_none(), "its time is over");
+        sessions.end_session(&digest_cookie(&cookie));
+        assert!(sessions.find_session(&digest_cookie(&cookie), now).is_none());
         let later = |n: u32| now + Duration::from_millis(n.into());
-        let first = sessions.begin(("Li", "hash"), hour, later(1)).expect("random");
+        let first = sessions.begin_session(("Li", "hash"), hour, later(1)).expect("random");
         for n in 2..=PER_PERSON_MAX as u32 + 1 {
-            sessions.begin(("Li", "hash"), hour, later(n)).expect("random");
+            sessions.begin_session(("Li", "hash"), hour, later(n)).expect("random");
         }
-        assert!(sessions.find(&key(&first), later(99)).is_none(), "nine of one person are one too many");
+        assert!(
+            sessions.find_session(&digest_cookie(&first), later(99)).is_none(),
+            "nine of one person are one too many"
+        );
         for n in 0..1000 {
-            sessions.begin((&format!("p{n}"), "hash"), hour, later(100 + n)).expect("random");
+            sessions.begin_session((&format!("p{n}"), "hash"), hour, later(100 + n)).expect("random");
         }
         assert_eq!(sessions.by_key.len(), SESSIONS_MAX);
     }

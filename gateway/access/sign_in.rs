@@ -1,13 +1,13 @@
 //! From a name and a token to a session, and from a request to a person.
 
 use super::account::Account;
-use super::persons::{Persons, PersonsError, differences};
-use super::sessions::{SessionKey, Sessions, key};
+use super::persons::{Persons, PersonsError, find_differences};
+use super::sessions::{SessionKey, Sessions, digest_cookie};
 use super::token::Token;
 use super::tries::Tries;
 use super::{Person, Role};
 use crate::control::OrderSender;
-use crate::files::{Mark, mark};
+use crate::files::{Mark, read_mark};
 use crate::log::{Notice, Severity};
 use std::collections::HashMap;
 use std::net::IpAddr;
@@ -105,16 +105,16 @@ impl Access {
     /// once.
     #[must_use]
     pub fn open(file: PathBuf, rules: Rules, post: OrderSender) -> (Self, Option<Token>) {
-        let (persons, first) = match first(&file) {
+        let (persons, first) = match read_or_create_persons(&file) {
             Ok(found) => found,
             Err(error) => {
                 let text = format!("nobody can sign in on the page: {error}");
-                Notice::new(Severity::Error, "no_persons", text).say();
+                Notice::new(Severity::Error, "no_persons", text).write_to_logs();
                 (Persons::default(), None)
             }
         };
-        let nobody = persons.all().first().map(|entry| entry.token_hash.clone()).unwrap_or_default();
-        let known = Mutex::new(CachedPersons { mark: mark(&file), persons });
+        let nobody = persons.list_entries().first().map(|entry| entry.token_hash.clone()).unwrap_or_default();
+        let known = Mutex::new(CachedPersons { mark: read_mark(&file), persons });
         let access = Self {
             rules,
             file,
@@ -144,20 +144,20 @@ impl Access {
 
     /// Is there still a person of this name?
     #[must_use]
-    pub fn knows(&self, name: &str) -> bool {
-        lock(&self.known).persons.named(name).is_some()
+    pub fn has_person(&self, name: &str) -> bool {
+        lock(&self.known).persons.find_by_name(name).is_some()
     }
 
     /// Writes into the audit who the persons are, for whoever compares it with the last end.
     pub async fn tell_persons(&self) {
         let persons = self.persons();
-        let words: Vec<String> = persons.all().iter().map(|it| format!("{}: {}", it.name, it.role)).collect();
-        self.account.row("persons", "known", &words.join(", "), "").await;
+        let words: Vec<String> = persons.list_entries().iter().map(|it| format!("{}: {}", it.name, it.role)).collect();
+        self.account.append_row("persons", "known", &words.join(", "), "").await;
     }
 
     /// Reads the file again if it has changed, and accounts for every difference.
-    pub async fn follow(&self) {
-        let now = mark(&self.file);
+    pub async fn reload_if_changed(&self) {
+        let now = read_mark(&self.file);
         if lock(&self.known).mark == now {
             return;
         }
@@ -166,7 +166,7 @@ impl Access {
             Err(error) => {
                 lock(&self.known).mark = now;
                 let text = format!("{error}. Those who were known before still are");
-                return Notice::new(Severity::Error, "persons_refused", text).say();
+                return Notice::new(Severity::Error, "persons_refused", text).write_to_logs();
             }
         };
         let before = {
@@ -174,8 +174,8 @@ impl Access {
             known.mark = now;
             std::mem::replace(&mut known.persons, read.clone())
         };
-        for difference in differences(&before, &read) {
-            self.account.row("persons", difference.outcome, &difference.text, &difference.by).await;
+        for difference in find_differences(&before, &read) {
+            self.account.append_row("persons", difference.outcome, &difference.text, &difference.by).await;
         }
     }
 
@@ -183,7 +183,7 @@ impl Access {
     ///
     /// # Errors
     /// What `change` says, or the file cannot be read or written.
-    pub async fn change<T>(
+    pub async fn change_persons<T>(
         &self,
         change: impl FnOnce(&mut Persons) -> Result<T, PersonsError>,
     ) -> Result<T, PersonsError> {
@@ -191,7 +191,7 @@ impl Access {
         let mut persons = Persons::read(&self.file)?.unwrap_or_default();
         let given = change(&mut persons)?;
         persons.write(&self.file)?;
-        self.follow().await;
+        self.reload_if_changed().await;
         Ok(given)
     }
 
@@ -200,12 +200,12 @@ impl Access {
     /// # Errors
     /// Wrong name or token, too many tries, a busy box.
     pub async fn sign_in(&self, name: &str, token: &Token, from: IpAddr) -> Result<NewSession, SignInError> {
-        self.follow().await;
-        let person = self.check(name, token, from, "login", Urgency::Waits).await?;
+        self.reload_if_changed().await;
+        let person = self.check_token(name, token, from, "login", Urgency::Waits).await?;
         let hash = self.hash_of(&person.name).unwrap_or_default();
-        let begun = lock(&self.sessions).begin((&person.name, &hash), self.rules.session, Instant::now());
+        let begun = lock(&self.sessions).begin_session((&person.name, &hash), self.rules.session, Instant::now());
         let cookie = begun.map_err(|_| SignInError::Busy)?;
-        self.account.row("login", "done", &format!("{} from {from}", person.role), &person.name).await;
+        self.account.append_row("login", "done", &format!("{} from {from}", person.role), &person.name).await;
         Ok(NewSession { cookie, person })
     }
 
@@ -214,7 +214,7 @@ impl Access {
     ///
     /// # Errors
     /// Wrong name or token, too many tries, a busy box.
-    pub async fn check(
+    pub async fn check_token(
         &self,
         name: &str,
         token: &Token,
@@ -223,9 +223,9 @@ impl Access {
         urgency: Urgency,
     ) -> Result<Person, SignInError> {
         let name = name.trim();
-        let wait = lock(&self.tries).wait(from, name, Instant::now()).filter(|_| urgency == Urgency::Waits);
+        let wait = lock(&self.tries).remaining_wait(from, name, Instant::now()).filter(|_| urgency == Urgency::Waits);
         if let Some(wait) = wait {
-            self.account.refused(
+            self.account.record_refusal(
                 kind,
                 &format!("from {from}: waits after too many wrong tokens"),
                 name,
@@ -233,49 +233,49 @@ impl Access {
             );
             return Err(SignInError::Wait(wait));
         }
-        let entry = lock(&self.known).persons.named(name).cloned();
+        let entry = lock(&self.known).persons.find_by_name(name).cloned();
         let hash = entry.as_ref().map_or(&self.nobody, |entry| &entry.token_hash).clone();
-        let right = self.compare(token, hash, urgency).await?;
+        let right = self.compare_hash(token, hash, urgency).await?;
         match entry.filter(|_| right) {
             Some(entry) => {
-                lock(&self.tries).right(from, name);
+                lock(&self.tries).clear_failures(from, name);
                 Ok(Person { name: entry.name, role: entry.role })
             }
             None => {
-                let left = lock(&self.tries).wrong(from, name, Instant::now());
+                let left = lock(&self.tries).record_failure(from, name, Instant::now());
                 let wait = if left == 0 { "; it has to wait now" } else { "" };
                 let text = format!("from {from}: wrong name or token{wait}");
-                self.account.refused(kind, &text, name, Instant::now());
+                self.account.record_refusal(kind, &text, name, Instant::now());
                 Err(SignInError::Wrong(left))
             }
         }
     }
 
     /// Is it the token of this hash? Only a hash of an older version takes time.
-    async fn compare(&self, token: &Token, hash: String, urgency: Urgency) -> Result<bool, SignInError> {
+    async fn compare_hash(&self, token: &Token, hash: String, urgency: Urgency) -> Result<bool, SignInError> {
         if !Token::is_slow(&hash) {
-            return Ok(token.is(&hash));
+            return Ok(token.matches_hash(&hash));
         }
         let lane = &self.hashing[usize::from(urgency == Urgency::GivesBack)];
         let place = tokio::time::timeout(HASH_WITHIN, lane.acquire()).await;
         let Ok(Ok(_place)) = place else { return Err(SignInError::Busy) };
         let token = token.clone();
-        tokio::task::spawn_blocking(move || token.is(&hash)).await.map_err(|_| SignInError::Busy)
+        tokio::task::spawn_blocking(move || token.matches_hash(&hash)).await.map_err(|_| SignInError::Busy)
     }
 
     /// Who holds this cookie.
     #[must_use]
     pub fn of_cookie(&self, cookie: &str) -> Option<(Person, Instant)> {
-        self.of_key(&key(cookie))
+        self.of_key(&digest_cookie(cookie))
     }
 
     /// The same by its digest: what a stream keeps to see when its session has ended.
     #[must_use]
     pub fn of_key(&self, key: &SessionKey) -> Option<(Person, Instant)> {
         let sessions = lock(&self.sessions);
-        let session = sessions.find(key, Instant::now())?;
+        let session = sessions.find_session(key, Instant::now())?;
         let known = lock(&self.known);
-        let entry = known.persons.named(&session.name).filter(|entry| entry.token_hash == session.token_hash)?;
+        let entry = known.persons.find_by_name(&session.name).filter(|entry| entry.token_hash == session.token_hash)?;
         Some((Person { name: entry.name.clone(), role: entry.role }, session.until))
     }
 
@@ -284,12 +284,12 @@ impl Access {
     /// # Errors
     /// Wrong name or token, too many tries, a busy box.
     pub async fn of_bearer(&self, given: &str, from: IpAddr, urgency: Urgency) -> Result<Person, SignInError> {
-        let digest = key(given);
+        let digest = digest_cookie(given);
         if let Some(person) = self.kept_bearer(&digest) {
             return Ok(person);
         }
         let (name, token) = given.split_once(':').unwrap_or((given, ""));
-        let person = self.check(name, &Token::typed(token), from, "login", urgency).await?;
+        let person = self.check_token(name, &Token::from_typed_text(token), from, "login", urgency).await?;
         let (name, until) = (person.name.clone(), Instant::now() + BEARER_KEPT);
         let token_hash = self.hash_of(&name).unwrap_or_default();
         let mut bearers = lock(&self.bearers);
@@ -304,35 +304,40 @@ impl Access {
         let bearers = lock(&self.bearers);
         let bearer = bearers.get(digest).filter(|bearer| Instant::now() < bearer.until)?;
         let known = lock(&self.known);
-        let entry = known.persons.named(&bearer.name).filter(|entry| entry.token_hash == bearer.token_hash)?;
+        let entry = known.persons.find_by_name(&bearer.name).filter(|entry| entry.token_hash == bearer.token_hash)?;
         Some(Person { name: entry.name.clone(), role: entry.role })
     }
 
     fn hash_of(&self, name: &str) -> Option<String> {
-        lock(&self.known).persons.named(name).map(|entry| entry.token_hash.clone())
+        lock(&self.known).persons.find_by_name(name).map(|entry| entry.token_hash.clone())
     }
 
     /// Ends a session.
     pub async fn sign_out(&self, cookie: &str, from: IpAddr) {
         if let Some((person, _)) = self.of_cookie(cookie) {
-            lock(&self.sessions).end(&key(cookie));
-            self.account.row("logout", "done", &format!("from {from}"), &person.name).await;
+            lock(&self.sessions).end_session(&digest_cookie(cookie));
+            self.account.append_row("logout", "done", &format!("from {from}"), &person.name).await;
         }
     }
 
     /// A request was refused.
-    pub fn refused(&self, reason: &str, person: Option<&Person>) {
-        self.account.refused("request_refused", reason, person.map_or("", |person| &person.name), Instant::now());
+    pub fn record_refusal(&self, reason: &str, person: Option<&Person>) {
+        self.account.record_refusal(
+            "request_refused",
+            reason,
+            person.map_or("", |person| &person.name),
+            Instant::now(),
+        );
     }
 
     /// A request that changes something was answered; false when that will not be stored.
-    pub async fn changed(&self, outcome: &str, reason: &str, person: &Person) -> bool {
-        self.account.row("change", outcome, reason, &person.name).await
+    pub async fn record_change(&self, outcome: &str, reason: &str, person: &Person) -> bool {
+        self.account.append_row("change", outcome, reason, &person.name).await
     }
 }
 
 /// The persons of the file. Where there is none the first administrator is made.
-fn first(file: &std::path::Path) -> Result<(Persons, Option<Token>), PersonsError> {
+fn read_or_create_persons(file: &std::path::Path) -> Result<(Persons, Option<Token>), PersonsError> {
     if let Some(persons) = Persons::read(file)? {
         return Ok((persons, None));
     }

@@ -42,8 +42,8 @@ impl Token {
     ///
     /// # Errors
     /// The system gives no random numbers.
-    pub fn make() -> Result<Self, TokenError> {
-        let bytes: [u8; LENGTH] = random()?;
+    pub fn from_random_bytes() -> Result<Self, TokenError> {
+        let bytes: [u8; LENGTH] = random_bytes()?;
         let signs: Vec<u8> = bytes.iter().map(|byte| SIGNS[usize::from(byte % 32)]).collect();
         let groups: Vec<&str> = signs.chunks(GROUP).filter_map(|group| std::str::from_utf8(group).ok()).collect();
         Ok(Self(groups.join("-")))
@@ -51,7 +51,7 @@ impl Token {
 
     /// As somebody typed it: capitals, spaces and hyphens do not matter.
     #[must_use]
-    pub fn typed(text: &str) -> Self {
+    pub fn from_typed_text(text: &str) -> Self {
         let meant = text.chars().filter(|sign| sign.is_ascii_alphanumeric()).take(4 * LENGTH);
         let signs: String = meant.map(|sign| sign.to_ascii_lowercase()).collect();
         let groups: Vec<&str> =
@@ -70,19 +70,19 @@ impl Token {
     /// # Errors
     /// The system gives no random numbers.
     pub fn hash(&self) -> Result<String, TokenError> {
-        let salt = hex(&random::<SALT>()?);
-        Ok(format!("{SALTED}{salt}${}", self.digest(&salt)))
+        let salt = to_hex(&random_bytes::<SALT>()?);
+        Ok(format!("{SALTED}{salt}${}", self.digest_with_salt(&salt)))
     }
 
-    fn digest(&self, salt: &str) -> String {
-        hex(&Sha256::digest(format!("{salt}:{}", self.0)))
+    fn digest_with_salt(&self, salt: &str) -> String {
+        to_hex(&Sha256::digest(format!("{salt}:{}", self.0)))
     }
 
     /// Is it the one that was hashed? Takes the time of a hash in any case.
     #[must_use]
-    pub fn is(&self, hash: &str) -> bool {
+    pub fn matches_hash(&self, hash: &str) -> bool {
         match hash.strip_prefix(SALTED).and_then(|rest| rest.split_once('$')) {
-            Some((salt, digest)) => same(self.digest(salt).as_bytes(), digest.as_bytes()),
+            Some((salt, digest)) => equals_constant_time(self.digest_with_salt(salt).as_bytes(), digest.as_bytes()),
             None => self.is_argon2(hash),
         }
     }
@@ -105,11 +105,11 @@ impl Token {
 }
 
 /// Takes the same time wherever they differ.
-fn same(a: &[u8], b: &[u8]) -> bool {
+fn equals_constant_time(a: &[u8], b: &[u8]) -> bool {
     a.len() == b.len() && a.iter().zip(b).fold(0, |differs, (a, b)| differs | (a ^ b)) == 0
 }
 
-fn hex(bytes: &[u8]) -> String {
+fn to_hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut hex, byte| {
         let _infallible = write!(hex, "{byte:02x}");
         hex
@@ -126,7 +126,7 @@ impl fmt::Debug for Token {
 ///
 /// # Errors
 /// The system gives none.
-pub(crate) fn random<const N: usize>() -> Result<[u8; N], TokenError> {
+pub(crate) fn random_bytes<const N: usize>() -> Result<[u8; N], TokenError> {
     let mut bytes = [0; N];
     getrandom::fill(&mut bytes).map_err(|_| TokenError::NoRandomness)?;
     Ok(bytes)
@@ -138,17 +138,17 @@ mod tests {
 
     #[test]
     fn a_token_is_known_by_its_hash_however_it_is_typed() {
-        let token = Token::make().expect("random");
+        let token = Token::from_random_bytes().expect("random");
         assert_eq!(token.text().len(), LENGTH + LENGTH / GROUP - 1);
         let hash = token.hash().expect("hashed");
         assert!(hash.starts_with("sha256$") && !hash.contains(token.text()), "{hash}");
         assert_ne!(token.hash().expect("hashed"), hash, "salted");
         let typed = token.text().to_uppercase().replace('-', " ");
-        assert!(Token::typed(&typed).is(&hash));
-        assert_ne!(Token::make().expect("random").text(), token.text());
+        assert!(Token::from_typed_text(&typed).matches_hash(&hash));
+        assert_ne!(Token::from_random_bytes().expect("random").text(), token.text());
         let mut wrong = token.text().to_owned();
         wrong.replace_range(0..1, if wrong.starts_with('a') { "b" } else { "a" });
-        assert!(!Token::typed(&wrong).is(&hash));
+        assert!(!Token::from_typed_text(&wrong).matches_hash(&hash));
         for no_hash in [
             "",
             "sha256$",
@@ -158,7 +158,7 @@ mod tests {
             "plain",
             "$argon2id$v=19$m=4000000,t=2,p=1$c29tZXNhbHQ$AAAA",
         ] {
-            assert!(!token.is(no_hash), "{no_hash}");
+            assert!(!token.matches_hash(no_hash), "{no_hash}");
         }
         assert_eq!(format!("{token:?}"), "Token(..)");
     }
@@ -167,6 +167,10 @@ mod tests {
     fn a_hash_of_an_older_version_is_known() {
         // Made by argon2-cffi 25.1.0 (the reference implementation in C) of the token abcd-efgh.
         let hash = "$argon2id$v=19$m=19456,t=2,p=1$c29tZXNhbHQxMjM0NTY3OA$8zgA40/nOzw1xtkEHG+t19TEmu860DE8kzLy9TXt254";
-        assert!(Token::is_slow(hash) && Token::typed("ABCD EFGH").is(hash) && !Token::typed("abcd-efgi").is(hash));
+        assert!(
+            Token::is_slow(hash)
+                && Token::from_typed_text("ABCD EFGH").matches_hash(hash)
+                && !Token::from_typed_text("abcd-efgi").matches_hash(hash)
+        );
     }
 }

@@ -33,7 +33,7 @@ pub(super) struct Tries {
 impl Tries {
     /// How long this address has to wait before it may try this name.
     #[must_use]
-    pub(super) fn wait(&self, from: IpAddr, name: &str, now: Instant) -> Option<Duration> {
+    pub(super) fn remaining_wait(&self, from: IpAddr, name: &str, now: Instant) -> Option<Duration> {
         let of_name = self.wait_of(&(from, Some(name.to_owned())), TRIES_MAX, now);
         let of_address = self.wait_of(&(from, None), TRIES_OF_ADDRESS_MAX, now);
         of_name.max(of_address)
@@ -45,18 +45,19 @@ impl Tries {
     }
 
     /// A wrong token was given; gives how many are left before the wait.
-    pub(super) fn wrong(&mut self, from: IpAddr, name: &str, now: Instant) -> u32 {
-        let (own, all) = (self.count((from, Some(name.to_owned())), now), self.count((from, None), now));
+    pub(super) fn record_failure(&mut self, from: IpAddr, name: &str, now: Instant) -> u32 {
+        let (own, all) =
+            (self.count_failure((from, Some(name.to_owned())), now), self.count_failure((from, None), now));
         TRIES_MAX.saturating_sub(own).min(TRIES_OF_ADDRESS_MAX.saturating_sub(all))
     }
 
     /// The right token was given: what was wrong before is forgotten.
-    pub(super) fn right(&mut self, from: IpAddr, name: &str) {
+    pub(super) fn clear_failures(&mut self, from: IpAddr, name: &str) {
         self.counts.remove(&(from, Some(name.to_owned())));
         self.counts.remove(&(from, None));
     }
 
-    fn count(&mut self, key: (IpAddr, Option<String>), now: Instant) -> u32 {
+    fn count_failure(&mut self, key: (IpAddr, Option<String>), now: Instant) -> u32 {
         if self.counts.len() >= REMEMBERED_MAX && !self.counts.contains_key(&key) {
             let oldest = self.counts.iter().min_by_key(|(_, count)| count.last).map(|(key, _)| key.clone());
             oldest.map(|oldest| self.counts.remove(&oldest));
@@ -81,26 +82,26 @@ mod tests {
     #[test]
     fn the_fifth_wrong_token_makes_the_address_wait_and_nobody_else() {
         let (mut tries, now) = (Tries::default(), Instant::now());
-        let left: Vec<u32> = (0..5).map(|_| tries.wrong(HERE, "Li", now)).collect();
+        let left: Vec<u32> = (0..5).map(|_| tries.record_failure(HERE, "Li", now)).collect();
         assert_eq!(left, [4, 3, 2, 1, 0]);
-        assert_eq!(tries.wait(HERE, "Li", now), Some(LOCKED_FOR));
-        assert_eq!(tries.wait(THERE, "Li", now), None, "Li can sign in from elsewhere");
-        assert_eq!(tries.wait(HERE, "Wang", now), None);
-        assert_eq!(tries.wait(HERE, "Li", now + LOCKED_FOR), None, "over");
-        assert_eq!(tries.wrong(HERE, "Li", now + LOCKED_FOR), 4, "and forgotten");
+        assert_eq!(tries.remaining_wait(HERE, "Li", now), Some(LOCKED_FOR));
+        assert_eq!(tries.remaining_wait(THERE, "Li", now), None, "Li can sign in from elsewhere");
+        assert_eq!(tries.remaining_wait(HERE, "Wang", now), None);
+        assert_eq!(tries.remaining_wait(HERE, "Li", now + LOCKED_FOR), None, "over");
+        assert_eq!(tries.record_failure(HERE, "Li", now + LOCKED_FOR), 4, "and forgotten");
     }
 
     #[test]
     fn names_that_change_do_not_help_and_a_right_token_ends_it() {
         let (mut tries, now) = (Tries::default(), Instant::now());
         for n in 0..20 {
-            tries.wrong(HERE, &format!("p{n}"), now);
+            tries.record_failure(HERE, &format!("p{n}"), now);
         }
-        assert!(tries.wait(HERE, "anybody", now).is_some());
-        tries.right(HERE, "p1");
-        assert_eq!(tries.wait(HERE, "anybody", now), None);
+        assert!(tries.remaining_wait(HERE, "anybody", now).is_some());
+        tries.clear_failures(HERE, "p1");
+        assert_eq!(tries.remaining_wait(HERE, "anybody", now), None);
         for n in 0..10_000 {
-            tries.wrong(HERE, &format!("q{n}"), now + Duration::from_secs(1));
+            tries.record_failure(HERE, &format!("q{n}"), now + Duration::from_secs(1));
         }
         assert!(tries.counts.len() <= REMEMBERED_MAX);
     }

@@ -1,7 +1,7 @@
 //! The thread that estimates: one estimate at a time, started with the first one.
 
 use adapters::clock::{SECOND_NS, TimeNs};
-use rules::estimators::alignment::{Lag, LagSettings, NotIdentifiable, Transient, align};
+use rules::estimators::alignment::{Lag, LagSettings, NotIdentifiable, Transient, estimate_lag};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 
 /// An answer is taken so long after it was asked for, on the clock of the ticks.
@@ -42,16 +42,16 @@ impl Background {
     }
 
     /// Asks for an estimate. Without a thread there is none, and the next transient asks again.
-    pub(super) fn ask(&mut self, pair: usize, transients: Vec<Transient>, now_ns: TimeNs) {
+    pub(super) fn request_estimate(&mut self, pair: usize, transients: Vec<Transient>, now_ns: TimeNs) {
         if self.line.is_none() {
-            self.line = start();
+            self.line = spawn_thread();
         }
         let asked = self.line.as_ref().is_some_and(|line| line.ask.try_send(transients).is_ok());
         self.asked = asked.then_some((pair, now_ns + TAKEN_AFTER_NS));
     }
 
     /// The answer for a pair, when it is due and there.
-    pub(super) fn answer(&mut self, pair: usize, now_ns: TimeNs) -> Option<LagResult> {
+    pub(super) fn take_estimate(&mut self, pair: usize, now_ns: TimeNs) -> Option<LagResult> {
         let due = self.asked.is_some_and(|(asked, due_ns)| asked == pair && due_ns <= now_ns);
         let line = self.line.as_ref().filter(|_| due)?;
         let answer = match self.patience {
@@ -73,12 +73,12 @@ impl Background {
 }
 
 /// The thread ends when nobody asks any more.
-fn start() -> Option<BackgroundThread> {
+fn spawn_thread() -> Option<BackgroundThread> {
     let (ask, asked) = sync_channel::<Vec<Transient>>(1);
     let (answer, answers) = sync_channel(1);
     let estimate = move || {
         while let Ok(transients) = asked.recv() {
-            if answer.send(align(&transients, &LagSettings::default())).is_err() {
+            if answer.send(estimate_lag(&transients, &LagSettings::default())).is_err() {
                 return;
             }
         }

@@ -29,7 +29,7 @@ mod pair;
 mod shown;
 
 pub use background::Patience;
-pub use shown::{AlignmentStatus, SERIES, series};
+pub use shown::{AlignmentStatus, SERIES, list_series};
 
 use crate::config::{self, AlignmentUse};
 use crate::history::ExtraValue;
@@ -58,11 +58,13 @@ pub struct Alignment {
 impl Alignment {
     /// Of these sources, in the order of the merge.
     #[must_use]
-    pub fn of(plans: &[SourcePlan], config: &config::AlignmentConfig, patience: Patience) -> Self {
+    pub fn from_plans(plans: &[SourcePlan], config: &config::AlignmentConfig, patience: Patience) -> Self {
         let first = |channel: ChannelId| plans.iter().position(|plan| plan.channels.contains(&channel));
         let mut pairs: Vec<Pair> = Vec::new();
         for (name, purpose) in POWERS.into_iter().zip([config.spindle_power, config.total_power]) {
-            let (Some(speed), Some(power)) = (ChannelId::of(SPEED), ChannelId::of(name)) else { continue };
+            let (Some(speed), Some(power)) = (ChannelId::from_name(SPEED), ChannelId::from_name(name)) else {
+                continue;
+            };
             let (Some(controller), Some(meter)) = (first(speed), first(power)) else { continue };
             let taken = pairs.iter().any(|pair| pair.meter == SourceId(meter));
             if controller != meter && !taken && purpose != AlignmentUse::Off {
@@ -75,35 +77,35 @@ impl Alignment {
     }
 
     /// Looks at a poll on its way to the merge; `None`: it failed.
-    pub fn see(&mut self, source: SourceId, readings: Option<&[Reading]>) {
+    pub fn observe_readings(&mut self, source: SourceId, readings: Option<&[Reading]>) {
         let origin_ns = &mut self.origin_ns;
         for pair in &mut self.pairs {
-            pair.see(source, readings, |at_ns| seconds(at_ns, *origin_ns.get_or_insert(at_ns)));
+            pair.observe_readings(source, readings, |at_ns| seconds_since(at_ns, *origin_ns.get_or_insert(at_ns)));
         }
     }
 
     /// What the machine did at a time of the merge's; told after every tick. Where the state is not known it may have cut.
-    pub fn told(&mut self, at_ns: TimeNs, state: State) {
+    pub fn record_state(&mut self, at_ns: TimeNs, state: State) {
         self.cutting = matches!(state, State::Cutting | State::Unknown);
         if let Some(origin_ns) = self.origin_ns.filter(|_| self.cutting) {
-            self.pairs.iter_mut().for_each(|pair| pair.collector.cutting(seconds(at_ns, origin_ns)));
+            self.pairs.iter_mut().for_each(|pair| pair.collector.record_cutting(seconds_since(at_ns, origin_ns)));
         }
     }
 
     /// Once per tick, before the merge is asked: takes answers, asks for new ones, and tells the merge the lags in force.
-    pub fn step(&mut self, now_ns: TimeNs, merge: &mut Merge) {
-        let passed_s = self.last_ns.replace(now_ns).map_or(0.0, |last_ns| seconds(now_ns, last_ns));
+    pub fn update_lags(&mut self, now_ns: TimeNs, merge: &mut Merge) {
+        let passed_s = self.last_ns.replace(now_ns).map_or(0.0, |last_ns| seconds_since(now_ns, last_ns));
         let Some(origin_ns) = self.origin_ns else { return };
         for (index, pair) in self.pairs.iter_mut().enumerate() {
-            if let Some(found) = self.background.answer(index, now_ns) {
-                let change = pair.settle(found, now_ns, seconds(now_ns, origin_ns));
+            if let Some(found) = self.background.take_estimate(index, now_ns) {
+                let change = pair.accept_estimate(found, now_ns, seconds_since(now_ns, origin_ns));
                 self.notices.extend(change.map(|change| Notice::new(Severity::Info, change.0, change.1)));
             }
-            if pair.is_due(now_ns) && self.background.is_idle() && pair.collector.gathered().new {
-                self.background.ask(index, pair.collector.transients().to_vec(), now_ns);
+            if pair.is_due(now_ns) && self.background.is_idle() && pair.collector.take_gathered_data().new {
+                self.background.request_estimate(index, pair.collector.transients().to_vec(), now_ns);
             }
-            if pair.merges() {
-                merge.set_lag_ns(pair.meter, nanoseconds(pair.follower.step(passed_s, self.cutting)));
+            if pair.is_for_merge() {
+                merge.set_lag_ns(pair.meter, to_nanoseconds(pair.follower.step_lag(passed_s, self.cutting)));
             }
         }
     }
@@ -115,14 +117,14 @@ impl Alignment {
 
     /// For the page, the API and the metrics.
     #[must_use]
-    pub fn status(&self) -> Vec<AlignmentStatus> {
-        self.pairs.iter().map(Pair::status).collect()
+    pub fn build_status(&self) -> Vec<AlignmentStatus> {
+        self.pairs.iter().map(Pair::build_status).collect()
     }
 
     /// The newest values of [`series`].
     #[must_use]
-    pub fn values(&self) -> [ExtraValue<'static>; SERIES] {
-        shown::values(POWERS.map(|name| self.pairs.iter().find(|pair| pair.power_name() == name)))
+    pub fn current_values(&self) -> [ExtraValue<'static>; SERIES] {
+        shown::collect_values(POWERS.map(|name| self.pairs.iter().find(|pair| pair.power_name() == name)))
     }
 }
 
@@ -130,11 +132,11 @@ impl Alignment {
     clippy::cast_precision_loss,
     reason = "a double counts nanoseconds exactly for 104 days, then to a fraction of a ms"
 )]
-fn seconds(at_ns: TimeNs, origin_ns: TimeNs) -> f64 {
+fn seconds_since(at_ns: TimeNs, origin_ns: TimeNs) -> f64 {
     (at_ns - origin_ns) as f64 / SECOND_NS as f64
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "a lag of seconds")]
-fn nanoseconds(seconds: f64) -> i64 {
+fn to_nanoseconds(seconds: f64) -> i64 {
     (seconds * SECOND_NS as f64).round() as i64
 }

@@ -49,7 +49,7 @@ impl Pair {
         }
     }
 
-    pub(super) fn see(
+    pub(super) fn observe_readings(
         &mut self,
         source: SourceId,
         readings: Option<&[Reading]>,
@@ -58,20 +58,20 @@ impl Pair {
         if source != self.controller && source != self.meter {
             return;
         }
-        let Some(readings) = readings else { return self.collector.interrupt() };
+        let Some(readings) = readings else { return self.collector.discard_collected() };
         let wanted = if source == self.controller { self.speed } else { self.power };
         for reading in readings.iter().filter(|reading| reading.channel == wanted) {
             let Some(number) = reading.value.as_ref().ok().and_then(|value| value.as_number()) else { continue };
             let time_s = seconds(reading.stamp.mid_ns);
             if source == self.controller {
-                self.collector.speed(SpeedPoint { time_s, speed_rpm: number });
+                self.collector.record_speed(SpeedPoint { time_s, speed_rpm: number });
             } else {
-                self.collector.power(PowerPoint { time_s, power_w: number });
+                self.collector.record_power(PowerPoint { time_s, power_w: number });
             }
         }
     }
 
-    pub(super) fn merges(&self) -> bool {
+    pub(super) fn is_for_merge(&self) -> bool {
         self.purpose == AlignmentUse::Merge
     }
 
@@ -80,7 +80,12 @@ impl Pair {
     }
 
     /// Takes an answer. The kind and the text of an event when there is something to tell.
-    pub(super) fn settle(&mut self, found: LagResult, now_ns: TimeNs, now_s: f64) -> Option<(&'static str, String)> {
+    pub(super) fn accept_estimate(
+        &mut self,
+        found: LagResult,
+        now_ns: TimeNs,
+        now_s: f64,
+    ) -> Option<(&'static str, String)> {
         self.pause_ns = match &found {
             Ok(_) => PAUSE_NS.1,
             // That costs nothing, and the next change of speed may be the one that was missing.
@@ -88,9 +93,9 @@ impl Pair {
             Err(_) => (2 * self.pause_ns).min(PAUSE_NS.1),
         };
         self.due_ns = now_ns + self.pause_ns;
-        let aim_s = found.as_ref().ok().and_then(|lag| self.follower.aim(lag, now_s));
+        let aim_s = found.as_ref().ok().and_then(|lag| self.follower.aim_at_estimate(lag, now_s));
         let event = match (&self.found, &found) {
-            (_, Ok(lag)) => aim_s.map(|aim_s| self.known(lag, aim_s)),
+            (_, Ok(lag)) => aim_s.map(|aim_s| self.describe_lag(lag, aim_s)),
             (Some(Ok(_)), Err(reason)) => Some(("lag_unknown", format!("{}: {reason}", self.names[1]))),
             _ => None,
         };
@@ -98,7 +103,7 @@ impl Pair {
         event
     }
 
-    fn known(&self, lag: &Lag, aim_s: f64) -> (&'static str, String) {
+    fn describe_lag(&self, lag: &Lag, aim_s: f64) -> (&'static str, String) {
         let [controller, meter] = &self.names;
         let (lag_ms, width_ms) = (1e3 * lag.lag_s, 1e3 * lag.uncertainty_s);
         let text = format!("{meter} is {lag_ms:.0} ms (95 %: +-{width_ms:.0} ms) later than {controller}");
@@ -116,12 +121,12 @@ impl Pair {
     /// The lag, or a word for why there is none.
     pub(super) fn lag(&self) -> Result<Lag, &'static str> {
         match &self.found {
-            Some(found) => found.as_ref().copied().map_err(NotIdentifiable::word),
+            Some(found) => found.as_ref().copied().map_err(NotIdentifiable::as_word),
             None => Err("not_yet"),
         }
     }
 
-    pub(super) fn status(&self) -> AlignmentStatus {
+    pub(super) fn build_status(&self) -> AlignmentStatus {
         let (lag, missing) = (self.lag().ok(), self.lag().err());
         let why = match &self.found {
             Some(Err(reason)) => Some(reason.to_string()),
@@ -133,14 +138,14 @@ impl Pair {
             controller: self.names[0].clone(),
             meter: self.names[1].clone(),
             power: self.power.name(),
-            purpose: self.purpose.word(),
+            purpose: self.purpose.as_word(),
             lag_s: lag.map(|lag| lag.lag_s),
             uncertainty_s: lag.map(|lag| lag.uncertainty_s),
             window_s: lag.map(|lag| lag.window_s),
             drift_ppm: drift.map(|drift| drift.ppm),
             drift_uncertainty_ppm: drift.map(|drift| drift.uncertainty_ppm),
             transients: lag.map(|lag| lag.transients),
-            applied_s: if self.merges() { self.follower.applied_s() } else { 0.0 },
+            applied_s: if self.is_for_merge() { self.follower.applied_s() } else { 0.0 },
             missing,
             why,
         }

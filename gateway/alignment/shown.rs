@@ -45,8 +45,8 @@ pub struct AlignmentStatus {
 
 /// What is stored beside the channels.
 #[must_use]
-pub fn series() -> Vec<ExtraSeries> {
-    let seconds = |name: &str, en, zh| ExtraSeries::number(name, "s", en, zh);
+pub fn list_series() -> Vec<ExtraSeries> {
+    let seconds = |name: &str, en, zh| ExtraSeries::new_number(name, "s", en, zh);
     vec![
         seconds("spindle_power_lag_s", "Lag of the spindle's meter", "主轴功率计滞后"),
         seconds(
@@ -61,12 +61,12 @@ pub fn series() -> Vec<ExtraSeries> {
     ]
 }
 
-/// The values of one tick, in the order of [`series`].
-pub(super) fn values(pairs: [Option<&Pair>; 2]) -> [ExtraValue<'static>; SERIES] {
+/// The values of one tick, in the order of [`list_series`].
+pub(super) fn collect_values(pairs: [Option<&Pair>; 2]) -> [ExtraValue<'static>; SERIES] {
     let [spindle, total] = pairs.map(|pair| {
         let Some(pair) = pair else { return [ExtraValue::Missing("not_provided"); 3] };
         let lag = pair.lag();
-        let applied = if pair.merges() { Ok(pair.follower.applied_s()) } else { Err("shown_only") };
+        let applied = if pair.is_for_merge() { Ok(pair.follower.applied_s()) } else { Err("shown_only") };
         [lag.map(|lag| lag.lag_s), lag.map(|lag| lag.uncertainty_s / Z95), applied].map(ExtraValue::from)
     });
     let [a, b, c] = spindle;

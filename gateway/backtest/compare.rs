@@ -59,7 +59,7 @@ pub enum Evidence {
 impl Evidence {
     /// The word in JSON.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Both => "both",
             Self::History => "history",
@@ -90,7 +90,7 @@ impl SpellDifference {
 
     /// The word in JSON.
     #[must_use]
-    pub fn word(&self) -> &'static str {
+    pub fn as_word(&self) -> &'static str {
         match self {
             Self::Lost(..) => "lost",
             Self::Gained(_) => "gained",
@@ -102,7 +102,7 @@ impl SpellDifference {
 type SpellKey = (SpellKind, Arc<str>, Arc<str>);
 type SpellTable<'a> = BTreeMap<SpellKey, Vec<&'a Spell>>;
 
-fn table(spells: &[Spell]) -> SpellTable<'_> {
+fn group_by_key(spells: &[Spell]) -> SpellTable<'_> {
     let mut table = SpellTable::new();
     for spell in spells {
         table.entry(spell.key()).or_default().push(spell);
@@ -127,15 +127,15 @@ pub(super) struct Sides<'a> {
 impl Sides<'_> {
     /// Every difference, in the order of time.
     #[must_use]
-    pub(super) fn differences(&self) -> Vec<SpellDifference> {
-        let tables = [self.recorded, self.running, self.edited].map(table);
+    pub(super) fn find_differences(&self) -> Vec<SpellDifference> {
+        let tables = [self.recorded, self.running, self.edited].map(group_by_key);
         let keys: BTreeSet<&SpellKey> = tables.iter().flat_map(BTreeMap::keys).collect();
         let (from_ns, near_ns) = (self.from_ns, self.near_ns.max(SAME_NS));
         let mut found = Vec::new();
         for key in keys {
             let [recorded, running, edited] =
                 tables.each_ref().map(|table| table.get(key).cloned().unwrap_or_default());
-            Named { recorded, running, edited, from_ns, near_ns }.differences(&mut found);
+            Named { recorded, running, edited, from_ns, near_ns }.append_differences(&mut found);
         }
         found.sort_by_key(SpellDifference::at_ns);
         found
@@ -152,11 +152,11 @@ struct Named<'a> {
 }
 
 impl Named<'_> {
-    fn differences(&self, found: &mut Vec<SpellDifference>) {
+    fn append_differences(&self, found: &mut Vec<SpellDifference>) {
         let mut named = BTreeSet::new();
         for spell in self.recorded.iter().filter(|spell| spell.from_ns >= self.from_ns) {
-            let over_samples = self.meeting(spell, &self.running);
-            match self.meeting(spell, &self.edited) {
+            let over_samples = self.find_longest_overlap(spell, &self.running);
+            match self.find_longest_overlap(spell, &self.edited) {
                 None => {
                     let evidence = if over_samples.is_some() { Evidence::Both } else { Evidence::History };
                     found.push(SpellDifference::Lost((*spell).clone(), evidence));
@@ -171,16 +171,16 @@ impl Named<'_> {
             found.extend(self.of_running(spell));
         }
         let known = |spell: &&&Spell| {
-            [&self.running, &self.recorded].into_iter().any(|others| self.meeting(spell, others).is_some())
+            [&self.running, &self.recorded].into_iter().any(|others| self.find_longest_overlap(spell, others).is_some())
         };
         found.extend(self.edited.iter().filter(|it| !known(it)).map(|it| SpellDifference::Gained((*it).clone())));
     }
 
     fn of_running(&self, spell: &Spell) -> Option<SpellDifference> {
-        match self.meeting(spell, &self.edited) {
+        match self.find_longest_overlap(spell, &self.edited) {
             Some(at) => self.find_shift(spell, self.edited[at]),
             None => {
-                let raised = self.meeting(spell, &self.recorded).is_some();
+                let raised = self.find_longest_overlap(spell, &self.recorded).is_some();
                 let evidence = if raised { Evidence::Both } else { Evidence::Samples };
                 Some(SpellDifference::Lost(spell.clone(), evidence))
             }
@@ -194,7 +194,7 @@ impl Named<'_> {
     }
 
     /// Of the others that stand at the same time, the place of the one that does so for longest.
-    fn meeting(&self, spell: &Spell, others: &[&Spell]) -> Option<usize> {
+    fn find_longest_overlap(&self, spell: &Spell, others: &[&Spell]) -> Option<usize> {
         let first = others.partition_point(|other| other.end_ns().saturating_add(self.near_ns) < spell.from_ns);
         let meets = |other: &Spell| other.from_ns <= spell.end_ns().saturating_add(self.near_ns);
         let common_ns =
@@ -222,7 +222,7 @@ mod tests {
     }
 
     fn differences(recorded: &[Spell], running: &[Spell], edited: &[Spell], near_ns: i64) -> Vec<SpellDifference> {
-        Sides { recorded, running, edited, from_ns: 0, near_ns }.differences()
+        Sides { recorded, running, edited, from_ns: 0, near_ns }.find_differences()
     }
 
     #[test]
@@ -232,7 +232,7 @@ mod tests {
         let edited =
             [spell("a", 104, Some(111)), spell("b", 50, None), spell("d", 70, Some(71)), spell("c", 5, Some(9))];
         let found = differences(&[], &running, &edited, 0);
-        let words: Vec<(&str, i64)> = found.iter().map(|it| (it.word(), it.at_ns() / SECOND_NS)).collect();
+        let words: Vec<(&str, i64)> = found.iter().map(|it| (it.as_word(), it.at_ns() / SECOND_NS)).collect();
         assert_eq!(words, [("lost", 0), ("gained", 70), ("shifted", 100)]);
         assert!(differences(&[], &running, &running, 0).is_empty());
     }
@@ -253,7 +253,7 @@ mod tests {
         let running = [spell("a", 10, Some(12)), spell("a", 30, Some(32)), spell("a", 40, Some(42))];
         let edited = [spell("a", 30, Some(32)), spell("a", 50, Some(52))];
         let found = differences(&recorded, &running, &edited, 0);
-        let words: Vec<(&str, i64)> = found.iter().map(|it| (it.word(), it.at_ns() / SECOND_NS)).collect();
+        let words: Vec<(&str, i64)> = found.iter().map(|it| (it.as_word(), it.at_ns() / SECOND_NS)).collect();
         assert_eq!(words, [("lost", 10), ("lost", 20), ("lost", 40), ("gained", 50)]);
         let evidence =
             |it: &SpellDifference| if let SpellDifference::Lost(_, evidence) = it { Some(*evidence) } else { None };

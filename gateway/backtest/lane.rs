@@ -1,7 +1,7 @@
 //! What one set of scripts did on its way through the history.
 
 use super::compare::{Spell, SpellKind};
-use super::seconds;
+use super::to_seconds;
 use crate::pipeline::Tally;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rules::estimators::State;
@@ -36,21 +36,21 @@ impl RequestTotals {
         let Some(pct) = pct.filter(|pct| pct.is_finite()) else { return };
         self.times += u64::from(before.is_none());
         self.asked_ns += step_ns;
-        self.integral += pct * seconds(step_ns);
+        self.integral += pct * to_seconds(step_ns);
         self.least_pct = Some(self.least_pct.map_or(pct, |least| least.min(pct)));
         self.greatest_pct = Some(self.greatest_pct.map_or(pct, |greatest| greatest.max(pct)));
     }
 
     /// For how long, s.
     #[must_use]
-    pub fn seconds(&self) -> f64 {
-        seconds(self.asked_ns)
+    pub fn duration_s(&self) -> f64 {
+        to_seconds(self.asked_ns)
     }
 
     /// Mean over that time, %.
     #[must_use]
     pub fn mean_pct(&self) -> Option<f64> {
-        (self.asked_ns > 0).then(|| self.integral / self.seconds())
+        (self.asked_ns > 0).then(|| self.integral / self.duration_s())
     }
 }
 
@@ -87,31 +87,39 @@ impl Lane {
     }
 
     /// What the parts of the set have decided together at this time.
-    pub(super) fn step(&mut self, at_ns: TimeNs, step_ns: i64, state: State, decisions: &[&Decision]) {
+    pub(super) fn record_tick(&mut self, at_ns: TimeNs, step_ns: i64, state: State, decisions: &[&Decision]) {
         for decision in decisions {
-            self.take(at_ns, decision);
+            self.record_decision(at_ns, decision);
         }
-        self.stops(at_ns, decisions);
+        self.update_stops(at_ns, decisions);
         let requests = decisions.iter().filter_map(|decision| decision.request.as_ref());
-        let pct = OverrideRequest::least(requests).map(|request| request.pct);
+        let pct = OverrideRequest::find_least(requests).map(|request| request.pct);
         let before = std::mem::replace(&mut self.pct, pct);
         if at_ns >= self.from_ns {
-            self.tally.step(at_ns, state);
+            self.tally.count_tick(at_ns, state);
             self.asked.add(self.pct, before, step_ns);
         }
     }
 
-    fn take(&mut self, at_ns: TimeNs, decision: &Decision) {
+    fn record_decision(&mut self, at_ns: TimeNs, decision: &Decision) {
         for change in &decision.alarms {
             let named = |spell: &Spell| {
                 spell.kind == SpellKind::Alarm && *spell.name == *change.name && *spell.script == *change.script
             };
             if change.raised {
                 let (script, name, text) = (change.script.clone(), change.name.clone(), change.en.clone());
-                let level = change.level.word();
-                self.begin(Spell { kind: SpellKind::Alarm, script, name, text, level, from_ns: at_ns, to_ns: None });
+                let level = change.level.as_word();
+                self.begin_spell(Spell {
+                    kind: SpellKind::Alarm,
+                    script,
+                    name,
+                    text,
+                    level,
+                    from_ns: at_ns,
+                    to_ns: None,
+                });
             } else {
-                self.finish(at_ns, named);
+                self.finish_spells(at_ns, named);
             }
         }
         if at_ns >= self.from_ns {
@@ -122,25 +130,33 @@ impl Lane {
     }
 
     /// A stop lasts for as long as it is asked for.
-    fn stops(&mut self, at_ns: TimeNs, decisions: &[&Decision]) {
+    fn update_stops(&mut self, at_ns: TimeNs, decisions: &[&Decision]) {
         let asked = |word: &str| {
             let requests = decisions.iter().flat_map(|decision| &decision.stops);
             // The first script's words count.
-            requests.filter(|request| *request.stop.word() == *word).min_by_key(|request| request.script.clone())
+            requests.filter(|request| *request.stop.as_word() == *word).min_by_key(|request| request.script.clone())
         };
         let over = |spell: &Spell| spell.kind == SpellKind::Stop && asked(&spell.name).is_none();
-        self.finish(at_ns, over);
-        for word in [Stop::FeedHold, Stop::ToolChange].map(Stop::word) {
+        self.finish_spells(at_ns, over);
+        for word in [Stop::FeedHold, Stop::ToolChange].map(Stop::as_word) {
             let Some(request) = asked(word) else { continue };
             let standing = |at: &&usize| self.spells[**at].kind == SpellKind::Stop && *self.spells[**at].name == *word;
             if self.open.iter().find(standing).is_none() {
                 let (script, text, name) = (request.script.clone(), request.reason.clone(), Arc::from(word));
-                self.begin(Spell { kind: SpellKind::Stop, script, name, text, level: "", from_ns: at_ns, to_ns: None });
+                self.begin_spell(Spell {
+                    kind: SpellKind::Stop,
+                    script,
+                    name,
+                    text,
+                    level: "",
+                    from_ns: at_ns,
+                    to_ns: None,
+                });
             }
         }
     }
 
-    fn begin(&mut self, spell: Spell) {
+    fn begin_spell(&mut self, spell: Spell) {
         if self.spells.len() >= SPELLS_MAX {
             self.left_out += 1;
             return;
@@ -149,7 +165,7 @@ impl Lane {
         self.spells.push(spell);
     }
 
-    fn finish(&mut self, at_ns: TimeNs, which: impl Fn(&Spell) -> bool) {
+    fn finish_spells(&mut self, at_ns: TimeNs, which: impl Fn(&Spell) -> bool) {
         let spells = &mut self.spells;
         self.open.retain(|at| {
             let over = which(&spells[*at]);
@@ -161,14 +177,14 @@ impl Lane {
     }
 
     /// The stretch is over; what ended before it began is forgotten.
-    pub(super) fn end(&mut self) {
+    pub(super) fn clip_to_stretch(&mut self) {
         let from_ns = self.from_ns;
         self.spells.retain(|spell| spell.to_ns.is_none_or(|to_ns| to_ns >= from_ns));
         self.spells.iter_mut().for_each(|spell| spell.from_ns = spell.from_ns.max(from_ns));
         self.open.clear();
     }
 
-    pub(super) fn pct(&self) -> Option<f64> {
+    pub(super) fn requested_pct(&self) -> Option<f64> {
         self.pct
     }
 
@@ -180,7 +196,7 @@ impl Lane {
 
     /// What was asked for.
     #[must_use]
-    pub fn asked(&self) -> &RequestTotals {
+    pub fn request_totals(&self) -> &RequestTotals {
         &self.asked
     }
 
@@ -192,7 +208,7 @@ impl Lane {
 
     /// Notes written.
     #[must_use]
-    pub fn notes(&self) -> u64 {
+    pub fn note_count(&self) -> u64 {
         self.notes
     }
 
@@ -204,7 +220,7 @@ impl Lane {
 
     /// How many scripts there are.
     #[must_use]
-    pub fn scripts(&self) -> usize {
+    pub fn script_count(&self) -> usize {
         self.scripts
     }
 
@@ -216,7 +232,7 @@ impl Lane {
 }
 
 /// Is it another request? No request is the programmed feed.
-pub(super) fn differ(a: Option<f64>, b: Option<f64>) -> bool {
+pub(super) fn requests_differ(a: Option<f64>, b: Option<f64>) -> bool {
     let (a, b) = (a.unwrap_or(100.0), b.unwrap_or(100.0));
     (a - b).abs() > SAME_PCT || a.is_finite() != b.is_finite()
 }

@@ -63,21 +63,21 @@ pub struct BacktestPlan {
 ///
 /// # Errors
 /// A history that cannot be read.
-pub fn backtest(plan: BacktestPlan) -> Result<BacktestReport, HistoryError> {
+pub fn run_backtest(plan: BacktestPlan) -> Result<BacktestReport, HistoryError> {
     let began = Instant::now();
     let BacktestPlan { history, from_ns, to_ns, every_ns, running, edited } = plan;
     let reader = Reader::open(&history)?;
     let mut query = Query::between(from_ns.saturating_sub(LEAD_IN_NS), to_ns.unwrap_or(TimeNs::MAX));
-    query.series = rows::channels(&reader)?;
-    let trials = rules::script::trials(&edited).into_iter().filter_map(|result| result.problem).collect();
-    let concerned = Concerned::of(&running, &edited);
-    let raced = race::race(from_ns, running, edited, |take| {
+    query.series = rows::list_channels(&reader)?;
+    let trials = rules::script::run_trials(&edited).into_iter().filter_map(|result| result.problem).collect();
+    let concerned = Concerned::from_sets(&running, &edited);
+    let raced = race::run_both_sets(from_ns, running, edited, |take| {
         if query.series.is_empty() {
             return Ok(());
         }
         let mut rows = ChunkRows::new(every_ns);
-        reader.samples(&query, |chunk| {
-            rows.each(chunk, &mut *take);
+        reader.for_each_chunk(&query, |chunk| {
+            rows.for_each_sample(chunk, &mut *take);
             ControlFlow::Continue(())
         })
     })?;
@@ -99,7 +99,7 @@ pub fn backtest(plan: BacktestPlan) -> Result<BacktestReport, HistoryError> {
             from_ns,
             near_ns: every_ns,
         }
-        .differences(),
+        .find_differences(),
         recorded,
         trials,
         running: raced.running,
@@ -109,6 +109,6 @@ pub fn backtest(plan: BacktestPlan) -> Result<BacktestReport, HistoryError> {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "2^53 ns are a hundred days; beyond that microseconds suffice")]
-fn seconds(ns: i64) -> f64 {
+fn to_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }

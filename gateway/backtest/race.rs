@@ -6,7 +6,7 @@
 //! not grow with the stretch.
 
 use super::lane::{self, Lane};
-use super::seconds;
+use super::to_seconds;
 use crate::history::HistoryError;
 use crate::pipeline::{Channels, CycleFollower};
 use adapters::Sample;
@@ -31,11 +31,11 @@ struct Inferring {
 }
 
 impl Inferring {
-    fn infer(&mut self, sample: &Sample) -> Estimates {
-        let mut estimates = *self.estimators.infer(sample);
-        self.wear.step(sample, &mut estimates);
-        let _finished = self.parts.step(&self.channels, sample, &estimates);
-        estimates.part = self.parts.figures();
+    fn infer_estimates(&mut self, sample: &Sample) -> Estimates {
+        let mut estimates = *self.estimators.update_with_sample(sample);
+        self.wear.update_estimates(sample, &mut estimates);
+        let _finished = self.parts.follow_tick(&self.channels, sample, &estimates);
+        estimates.part = self.parts.last_figures();
         estimates
     }
 }
@@ -50,7 +50,7 @@ struct Runner {
 impl Runner {
     fn new(set: ScriptSet, infers: bool) -> Self {
         let mut host = Host::new();
-        host.install(set);
+        host.install_set(set);
         let estimators = infers.then(|| Inferring {
             estimators: estimators::Inference::new(host.settings().clone()),
             wear: WearEstimator::default(),
@@ -61,19 +61,19 @@ impl Runner {
     }
 
     /// The estimates that it goes by, and what its scripts decide.
-    fn step(&mut self, sample: &Sample, estimates: Option<&Estimates>) -> (Estimates, &Decision) {
+    fn run_tick(&mut self, sample: &Sample, estimates: Option<&Estimates>) -> (Estimates, &Decision) {
         let estimates = match (&mut self.estimators, estimates) {
             (None, Some(estimates)) => *estimates,
-            (None, None) => Estimates::none(sample.at_ns),
+            (None, None) => Estimates::without_samples(sample.at_ns),
             (Some(estimators), _) => {
                 if self.generation != self.host.generation() {
                     self.generation = self.host.generation();
-                    estimators.estimators.reconfigure(self.host.settings().clone());
+                    estimators.estimators.apply_settings(self.host.settings().clone());
                 }
-                estimators.infer(sample)
+                estimators.infer_estimates(sample)
             }
         };
-        let decision = self.host.tick(sample, &estimates);
+        let decision = self.host.run_due_scripts(sample, &estimates);
         if let Some(estimators) = &mut self.estimators {
             decision.learn_anew.iter().for_each(|program| estimators.estimators.learn_load_anew(program));
         }
@@ -114,7 +114,7 @@ impl Split {
             let (first, edited) = (Runner::new(running, true), Runner::new(edited, true));
             return Self { first, running: None, edited };
         }
-        let (common, running, edited) = running.split(edited);
+        let (common, running, edited) = running.partition_with(edited);
         let first = Runner::new(common, true);
         Self { first, running: Some(Runner::new(running, false)), edited: Runner::new(edited, false) }
     }
@@ -135,7 +135,7 @@ pub(super) struct Raced {
 ///
 /// # Errors
 /// What `read` says.
-pub(super) fn race(
+pub(super) fn run_both_sets(
     from_ns: TimeNs,
     running: ScriptSet,
     edited: ScriptSet,
@@ -148,11 +148,11 @@ pub(super) fn race(
     let (to_last, of_first) = sync_channel(BATCHES_MAX);
     let (give_back, empty) = sync_channel(2 * BATCHES_MAX + 3);
     let read = std::thread::scope(|scope| {
-        let common = scope.spawn(move || common(first, &of_reader, &to_last));
+        let common = scope.spawn(move || run_shared_scripts(first, &of_reader, &to_last));
         let last = &mut finish;
         let rest = scope.spawn(move || {
             for mut batch in &of_first {
-                last.take(&mut batch);
+                last.accept_batch(&mut batch);
                 // Whoever reads may have come to the end.
                 let _not_needed = give_back.try_send(batch);
             }
@@ -164,7 +164,7 @@ pub(super) fn race(
         }
         read
     });
-    read.map(|()| finish.result())
+    read.map(|()| finish.into_result())
 }
 
 /// Gathers samples into batches.
@@ -185,11 +185,11 @@ fn hand_on(
     read
 }
 
-fn common(mut first: Runner, from: &Receiver<SampleBatch>, to: &SyncSender<SampleBatch>) {
+fn run_shared_scripts(mut first: Runner, from: &Receiver<SampleBatch>, to: &SyncSender<SampleBatch>) {
     for mut batch in from {
         batch.first.clear();
         for sample in &batch.samples[..batch.used] {
-            let (estimates, decision) = first.step(sample, None);
+            let (estimates, decision) = first.run_tick(sample, None);
             // Empty at almost every tick, so that it costs nothing to copy.
             batch.first.push((estimates, decision.clone()));
         }
@@ -218,29 +218,29 @@ impl Finish {
         Self { from_ns, lanes, running, edited, rows: 0, first_ns, last_ns, covered_ns: 0, differing_ns: 0 }
     }
 
-    fn take(&mut self, batch: &mut SampleBatch) {
+    fn accept_batch(&mut self, batch: &mut SampleBatch) {
         for (sample, (estimates, decision)) in batch.samples[..batch.used].iter().zip(&batch.first) {
-            self.step(sample, estimates, decision);
+            self.accept_sample(sample, estimates, decision);
         }
         batch.used = 0;
     }
 
-    fn step(&mut self, sample: &Sample, estimates: &Estimates, first: &Decision) {
+    fn accept_sample(&mut self, sample: &Sample, estimates: &Estimates, first: &Decision) {
         let at_ns = sample.at_ns;
         let step_ns = self.last_ns.replace(at_ns).map_or(0, |last_ns| at_ns - last_ns);
         // A longer step is a gap, in which nobody asked for anything.
         let step_ns = if (0..=lane::STEP_MAX_NS).contains(&step_ns) { step_ns } else { 0 };
         let [running, edited] = &mut self.lanes;
         let of = |runner: &mut Runner, lane: &mut Lane, shared: bool| {
-            let (own, decision) = runner.step(sample, Some(estimates).filter(|_| shared));
+            let (own, decision) = runner.run_tick(sample, Some(estimates).filter(|_| shared));
             let both = [first, decision];
-            lane.step(at_ns, step_ns, own.state, if shared { &both } else { &both[1..] });
+            lane.record_tick(at_ns, step_ns, own.state, if shared { &both } else { &both[1..] });
         };
         // Then the edited scripts go by the decisions and estimates of `first` too.
         let shared = self.running.is_some();
         match &mut self.running {
             Some(runner) => of(runner, running, true),
-            None => running.step(at_ns, step_ns, estimates.state, &[first]),
+            None => running.record_tick(at_ns, step_ns, estimates.state, &[first]),
         }
         of(&mut self.edited, edited, shared);
         if at_ns < self.from_ns {
@@ -249,16 +249,16 @@ impl Finish {
         self.first_ns.get_or_insert(at_ns);
         self.rows += 1;
         self.covered_ns += step_ns;
-        if lane::differ(self.lanes[0].pct(), self.lanes[1].pct()) {
+        if lane::requests_differ(self.lanes[0].requested_pct(), self.lanes[1].requested_pct()) {
             self.differing_ns += step_ns;
         }
     }
 
-    fn result(self) -> Raced {
+    fn into_result(self) -> Raced {
         let [mut running, mut edited] = self.lanes;
-        running.end();
-        edited.end();
-        let (covered_s, differing_s) = (seconds(self.covered_ns), seconds(self.differing_ns));
+        running.clip_to_stretch();
+        edited.clip_to_stretch();
+        let (covered_s, differing_s) = (to_seconds(self.covered_ns), to_seconds(self.differing_ns));
         let Self { rows, first_ns, last_ns, .. } = self;
         Raced { running, edited, rows, first_ns, last_ns, covered_s, differing_s }
     }

@@ -45,7 +45,7 @@ pub(super) struct Concerned {
 }
 
 impl Concerned {
-    pub(super) fn of(running: &ScriptSet, edited: &ScriptSet) -> Self {
+    pub(super) fn from_sets(running: &ScriptSet, edited: &ScriptSet) -> Self {
         let versions = |set: &ScriptSet| -> Versions {
             set.versions().map(|(file, version)| (file.to_owned(), version)).collect()
         };
@@ -60,7 +60,7 @@ impl Concerned {
     }
 
     /// The running scripts that are not the same in both sets.
-    fn files(&self) -> impl Iterator<Item = &String> {
+    fn changed_files(&self) -> impl Iterator<Item = &String> {
         self.running.keys().filter(|file| !self.is_same(file))
     }
 }
@@ -72,12 +72,12 @@ impl Timeline {
     fn read(reader: &Reader, from_ns: TimeNs, to_ns: TimeNs) -> Result<Self, HistoryError> {
         let before = reader.events_of(active_scripts::KIND, RecordSpan::between(TimeNs::MIN, from_ns, 1))?;
         let within = reader.events_of(active_scripts::KIND, RecordSpan::between(from_ns, to_ns, READ_MAX))?;
-        let versions = |event: Event| Some((event.at_ns, active_scripts::versions(&event)?));
+        let versions = |event: Event| Some((event.at_ns, active_scripts::parse_versions(&event)?));
         Ok(Self(before.into_iter().chain(within).filter_map(versions).collect()))
     }
 
     /// The versions in charge at this time; `None` where the history does not say.
-    fn at(&self, at_ns: TimeNs) -> Option<&Versions> {
+    fn versions_at(&self, at_ns: TimeNs) -> Option<&Versions> {
         let after = self.0.partition_point(|(since_ns, _)| *since_ns <= at_ns);
         Some(&self.0.get(after.checked_sub(1)?)?.1)
     }
@@ -104,20 +104,20 @@ pub(super) fn read(
     let after_ns = to_ns.saturating_add(1);
     let timeline = Timeline::read(reader, from_ns, after_ns)?;
     let mut recorded = Recorded::default();
-    let alarms = reader.alarms(RecordSpan::between(from_ns, after_ns, READ_MAX))?;
+    let alarms = reader.read_alarms(RecordSpan::between(from_ns, after_ns, READ_MAX))?;
     recorded.more = alarms.len() >= READ_MAX as usize;
     for alarm in alarms {
         if alarm.source.ends_with(END) && alarm.code != SCRIPT_STOPPED {
-            recorded.take(concerned, &timeline, alarm, to_ns);
+            recorded.record_alarm(concerned, &timeline, alarm, to_ns);
         }
     }
-    for (file, version) in concerned.files().filter_map(|file| Some((file, *concerned.running.get(file)?))) {
+    for (file, version) in concerned.changed_files().filter_map(|file| Some((file, *concerned.running.get(file)?))) {
         if let Some(until_ns) = timeline.other_until_ns(file, version, from_ns, to_ns) {
             recorded.others.entry(file.clone()).or_default().until_ns = Some(until_ns);
         }
     }
     let known_ns = timeline.begins_ns().unwrap_or(TimeNs::MAX);
-    let unknown = known_ns > from_ns && concerned.files().next().is_some();
+    let unknown = known_ns > from_ns && concerned.changed_files().next().is_some();
     recorded.unknown_until_ns = unknown.then_some(known_ns.min(to_ns));
     Ok(recorded)
 }
@@ -130,28 +130,28 @@ impl Recorded {
         &self.spells
     }
 
-    fn take(&mut self, concerned: &Concerned, timeline: &Timeline, alarm: AlarmEntry, to_ns: TimeNs) {
+    fn record_alarm(&mut self, concerned: &Concerned, timeline: &Timeline, alarm: AlarmEntry, to_ns: TimeNs) {
         if concerned.is_same(&alarm.source) {
             return;
         }
         let running = concerned.running.get(&alarm.source);
-        let raised_by = timeline.at(alarm.raised_ns).map(|versions| versions.get(&alarm.source));
+        let raised_by = timeline.versions_at(alarm.raised_ns).map(|versions| versions.get(&alarm.source));
         if running.is_none() || raised_by.is_some_and(|version| version != running) {
             self.others.entry(alarm.source).or_default().alarms += 1;
         } else {
-            self.spells.push(spell(&alarm, to_ns));
+            self.spells.push(spell_from_alarm(&alarm, to_ns));
         }
     }
 }
 
 /// What stood at the end of the stretch has no end, as in the lanes.
-fn spell(alarm: &AlarmEntry, to_ns: TimeNs) -> Spell {
+fn spell_from_alarm(alarm: &AlarmEntry, to_ns: TimeNs) -> Spell {
     Spell {
         kind: SpellKind::Alarm,
         script: alarm.source.as_str().into(),
         name: alarm.code.as_str().into(),
         text: alarm.en.as_str().into(),
-        level: AlarmLevel::of(&alarm.severity).map_or("", AlarmLevel::word),
+        level: AlarmLevel::from_word(&alarm.severity).map_or("", AlarmLevel::as_word),
         from_ns: alarm.raised_ns,
         to_ns: alarm.cleared_ns.filter(|cleared_ns| *cleared_ns <= to_ns),
     }

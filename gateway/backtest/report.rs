@@ -3,8 +3,8 @@
 use super::compare::{Evidence, Spell, SpellDifference};
 use super::lane::{Lane, RequestTotals};
 use super::recorded::Recorded;
-use super::seconds;
-use crate::moment::utc;
+use super::to_seconds;
+use crate::moment::format_utc;
 use rules::script::ScriptProblem;
 use serde_json::{Value, json};
 use std::fmt;
@@ -45,12 +45,12 @@ pub struct BacktestReport {
 impl BacktestReport {
     /// Did the edited scripts lose an alarm or a stop, or fail?
     #[must_use]
-    pub fn worse(&self) -> bool {
-        !self.trials.is_empty() || !self.edited.problems().is_empty() || self.count("lost") > 0
+    pub fn is_worse(&self) -> bool {
+        !self.trials.is_empty() || !self.edited.problems().is_empty() || self.count_differences("lost") > 0
     }
 
-    fn count(&self, word: &str) -> usize {
-        self.differences.iter().filter(|difference| difference.word() == word).count()
+    fn count_differences(&self, word: &str) -> usize {
+        self.differences.iter().filter(|difference| difference.as_word() == word).count()
     }
 
     #[expect(clippy::cast_precision_loss, reason = "a rate")]
@@ -60,26 +60,26 @@ impl BacktestReport {
 
     /// The whole report.
     #[must_use]
-    pub fn json(&self) -> Value {
+    pub fn to_json(&self) -> Value {
         let listed = |word: &str| -> Vec<Value> {
-            self.differences.iter().filter(|difference| difference.word() == word).map(difference).collect()
+            self.differences.iter().filter(|difference| difference.as_word() == word).map(difference_to_json).collect()
         };
         json!({
             "schema": "backtest/1",
             "history": self.history.display().to_string(),
-            "from": utc(self.from_ns),
-            "to": utc(self.to_ns),
+            "from": format_utc(self.from_ns),
+            "to": format_utc(self.to_ns),
             "rows": self.rows,
             "covered_s": self.covered_s,
             "recorded": recorded_to_json(&self.recorded),
-            "running": lane(&self.running),
-            "edited": lane(&self.edited),
+            "running": lane_to_json(&self.running),
+            "edited": lane_to_json(&self.edited),
             "failing_trials": self.trials.iter().map(ToString::to_string).collect::<Vec<_>>(),
             "lost": listed("lost"),
             "gained": listed("gained"),
             "shifted": listed("shifted"),
             "override_differs_s": self.differing_s,
-            "seconds_per_state": self.states().map(|(state, running, edited)| {
+            "seconds_per_state": self.compare_state_seconds().map(|(state, running, edited)| {
                 json!({ "state": state, "running_s": running, "edited_s": edited })
             }).collect::<Vec<_>>(),
             "took_s": self.took.as_secs_f64(),
@@ -88,36 +88,35 @@ impl BacktestReport {
     }
 
     /// State, seconds with the running scripts, seconds with the edited ones.
-    fn states(&self) -> impl Iterator<Item = (&'static str, f64, f64)> {
+    fn compare_state_seconds(&self) -> impl Iterator<Item = (&'static str, f64, f64)> {
         let (running, edited) = (self.running.seconds_per_state(), self.edited.seconds_per_state());
         running.into_iter().zip(edited).map(|((state, running), (_, edited))| (state, running, edited))
     }
 }
 
 fn recorded_to_json(recorded: &Recorded) -> Value {
-    let others = recorded
-        .others
-        .iter()
-        .map(|(script, other)| json!({ "script": script, "alarms": other.alarms, "until": other.until_ns.map(utc) }));
+    let others = recorded.others.iter().map(
+        |(script, other)| json!({ "script": script, "alarms": other.alarms, "until": other.until_ns.map(format_utc) }),
+    );
     json!({
         "alarms": recorded.spells().len(),
         "others": others.collect::<Vec<_>>(),
-        "unknown_until": recorded.unknown_until_ns.map(utc),
+        "unknown_until": recorded.unknown_until_ns.map(format_utc),
         "more": recorded.more,
     })
 }
 
-fn lane(lane: &Lane) -> Value {
-    let RequestTotals { least_pct, greatest_pct, times, .. } = *lane.asked();
+fn lane_to_json(lane: &Lane) -> Value {
+    let RequestTotals { least_pct, greatest_pct, times, .. } = *lane.request_totals();
     json!({
-        "scripts": lane.scripts(),
+        "scripts": lane.script_count(),
         "alarms_and_stops": lane.spells().len(),
         "left_out": lane.left_out(),
-        "notes": lane.notes(),
+        "notes": lane.note_count(),
         "override": {
             "times": times,
-            "seconds": lane.asked().seconds(),
-            "mean_pct": lane.asked().mean_pct(),
+            "seconds": lane.request_totals().duration_s(),
+            "mean_pct": lane.request_totals().mean_pct(),
             "least_pct": least_pct,
             "greatest_pct": greatest_pct,
         },
@@ -125,33 +124,36 @@ fn lane(lane: &Lane) -> Value {
     })
 }
 
-fn difference(difference: &SpellDifference) -> Value {
+fn difference_to_json(difference: &SpellDifference) -> Value {
     match difference {
         SpellDifference::Lost(one, evidence) => {
-            let mut told = spell(one);
-            told["evidence"] = evidence.word().into();
+            let mut told = spell_to_json(one);
+            told["evidence"] = evidence.as_word().into();
             told
         }
-        SpellDifference::Gained(one) => spell(one),
-        SpellDifference::Shifted(running, edited) => json!({ "running": spell(running), "edited": spell(edited) }),
+        SpellDifference::Gained(one) => spell_to_json(one),
+        SpellDifference::Shifted(running, edited) => {
+            json!({ "running": spell_to_json(running), "edited": spell_to_json(edited) })
+        }
     }
 }
 
-fn spell(spell: &Spell) -> Value {
+fn spell_to_json(spell: &Spell) -> Value {
     json!({
         "name": &*spell.name, "script": &*spell.script, "level": spell.level, "text": &*spell.text,
-        "from": utc(spell.from_ns), "to": spell.to_ns.map(utc),
-        "seconds": spell.to_ns.map(|to_ns| seconds(to_ns - spell.from_ns)),
+        "from": format_utc(spell.from_ns), "to": spell.to_ns.map(format_utc),
+        "seconds": spell.to_ns.map(|to_ns| to_seconds(to_ns - spell.from_ns)),
     })
 }
 
-fn line(spell: &Spell) -> String {
-    let lasted =
-        spell.to_ns.map_or_else(|| "to the end".to_owned(), |to_ns| format!("{:.1} s", seconds(to_ns - spell.from_ns)));
-    format!("{} ({}) at {}, {lasted}: {}", spell.name, spell.script, utc(spell.from_ns), spell.text)
+fn format_spell(spell: &Spell) -> String {
+    let lasted = spell
+        .to_ns
+        .map_or_else(|| "to the end".to_owned(), |to_ns| format!("{:.1} s", to_seconds(to_ns - spell.from_ns)));
+    format!("{} ({}) at {}, {lasted}: {}", spell.name, spell.script, format_utc(spell.from_ns), spell.text)
 }
 
-fn remark(evidence: Evidence) -> &'static str {
+fn describe_evidence(evidence: Evidence) -> &'static str {
     match evidence {
         Evidence::Both => "",
         Evidence::History => " (raised then; over the stored samples the running scripts do not raise it either)",
@@ -162,7 +164,7 @@ fn remark(evidence: Evidence) -> &'static str {
 impl fmt::Display for Recorded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(until_ns) = self.unknown_until_ns {
-            let until = utc(until_ns);
+            let until = format_utc(until_ns);
             writeln!(
                 f,
                 "  until {until} the history does not say whose its alarms are: they are taken for the running scripts'"
@@ -170,7 +172,7 @@ impl fmt::Display for Recorded {
         }
         for (script, other) in &self.others {
             if let Some(until_ns) = other.until_ns {
-                let until = utc(until_ns);
+                let until = format_utc(until_ns);
                 writeln!(
                     f,
                     "  until {until} {script} was another one or not in charge: compared is what it does over the stored samples"
@@ -189,9 +191,9 @@ impl fmt::Display for Recorded {
 
 impl fmt::Display for BacktestReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (from, to, hours) = (utc(self.from_ns), utc(self.to_ns), self.covered_s / 3600.0);
+        let (from, to, hours) = (format_utc(self.from_ns), format_utc(self.to_ns), self.covered_s / 3600.0);
         writeln!(f, "{from} to {to}: {} samples, {hours:.2} h ({:.0} samples/s)", self.rows, self.rows_per_s())?;
-        let [lost, gained, shifted] = ["lost", "gained", "shifted"].map(|word| self.count(word));
+        let [lost, gained, shifted] = ["lost", "gained", "shifted"].map(|word| self.count_differences(word));
         writeln!(f, "alarms and stops: {lost} lost, {gained} gained, {shifted} at another time")?;
         for trial in &self.trials {
             writeln!(f, "  FAILED  {}", trial.to_string().replace('\n', "\n  "))?;
@@ -203,12 +205,12 @@ impl fmt::Display for BacktestReport {
         for difference in self.differences.iter().take(SHOWN) {
             match difference {
                 SpellDifference::Lost(spell, evidence) => {
-                    writeln!(f, "  lost    {}{}", line(spell), remark(*evidence))?
+                    writeln!(f, "  lost    {}{}", format_spell(spell), describe_evidence(*evidence))?
                 }
-                SpellDifference::Gained(spell) => writeln!(f, "  gained  {}", line(spell))?,
+                SpellDifference::Gained(spell) => writeln!(f, "  gained  {}", format_spell(spell))?,
                 SpellDifference::Shifted(running, edited) => {
-                    let later_s = seconds(edited.from_ns - running.from_ns);
-                    writeln!(f, "  shifted {}; with the edited scripts {later_s:+.1} s", line(running))?;
+                    let later_s = to_seconds(edited.from_ns - running.from_ns);
+                    writeln!(f, "  shifted {}; with the edited scripts {later_s:+.1} s", format_spell(running))?;
                 }
             }
         }
@@ -216,10 +218,10 @@ impl fmt::Display for BacktestReport {
             writeln!(f, "  and {} more: --json has all of them", self.differences.len() - SHOWN)?;
         }
         for (name, lane) in [("running", &self.running), ("edited", &self.edited)] {
-            let asked = lane.asked();
+            let asked = lane.request_totals();
             let pct = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |pct| format!("{pct:.1} %"));
             let (mean, least) = (pct(asked.mean_pct()), pct(asked.least_pct));
-            writeln!(f, "override, {name}: {:.0} s, mean {mean}, least {least}", asked.seconds())?;
+            writeln!(f, "override, {name}: {:.0} s, mean {mean}, least {least}", asked.duration_s())?;
             if lane.left_out() > 0 {
                 writeln!(
                     f,
@@ -230,7 +232,7 @@ impl fmt::Display for BacktestReport {
             lane.problems().iter().try_for_each(|problem| writeln!(f, "  {name} scripts failed: {problem}"))?;
         }
         writeln!(f, "another feed is asked for during {:.0} s", self.differing_s)?;
-        for (state, running, edited) in self.states().filter(|(_, a, b)| *a > 0.0 || *b > 0.0) {
+        for (state, running, edited) in self.compare_state_seconds().filter(|(_, a, b)| *a > 0.0 || *b > 0.0) {
             writeln!(f, "{state:>14} {running:>12.1} s {:>+12.1} s", edited - running)?;
         }
         Ok(())

@@ -5,9 +5,9 @@ use adapters::clock::TimeNs;
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
 
 /// The series of a history that are channels; estimates are inferred anew.
-pub(super) fn channels(reader: &Reader) -> Result<Vec<String>, HistoryError> {
-    let series = reader.series()?.into_iter().map(|series| series.name.to_string());
-    Ok(series.filter(|name| ChannelId::of(name).is_some()).collect())
+pub(super) fn list_channels(reader: &Reader) -> Result<Vec<String>, HistoryError> {
+    let series = reader.read_series()?.into_iter().map(|series| series.name.to_string());
+    Ok(series.filter(|name| ChannelId::from_name(name).is_some()).collect())
 }
 
 /// Goes through chunks; remembers the last row that was handed on.
@@ -23,9 +23,10 @@ impl ChunkRows {
     }
 
     /// Hands every row on as a sample, in the order of time; a row from before the last one is left out.
-    pub(super) fn each(&mut self, chunk: &Chunk<'_>, mut take: impl FnMut(&Sample)) {
-        let ids: Vec<Option<ChannelId>> = chunk.series.iter().map(|series| ChannelId::of(&series.name)).collect();
-        let mut sample = Sample::empty(0);
+    pub(super) fn for_each_sample(&mut self, chunk: &Chunk<'_>, mut take: impl FnMut(&Sample)) {
+        let ids: Vec<Option<ChannelId>> =
+            chunk.series.iter().map(|series| ChannelId::from_name(&series.name)).collect();
+        let mut sample = Sample::new_empty(0);
         for (row, at_ns) in chunk.at_ns.iter().enumerate() {
             // A hundredth of the pace does not make a row wait for the next one.
             let due = |last_ns: TimeNs| *at_ns - last_ns >= (self.every_ns - self.every_ns / 100).max(1);
@@ -36,7 +37,7 @@ impl ChunkRows {
             sample.at_ns = *at_ns;
             for (column, id) in ids.iter().enumerate() {
                 if let Some(id) = id {
-                    sample.set(*id, Slot { value: value(chunk, column, row), age_ns: 0 });
+                    sample.set_slot(*id, Slot { value: read_value(chunk, column, row), age_ns: 0 });
                 }
             }
             take(&sample);
@@ -44,12 +45,12 @@ impl ChunkRows {
     }
 }
 
-fn value(chunk: &Chunk<'_>, column: usize, row: usize) -> Result<Value, Absence> {
-    if let Some(word) = chunk.missing(column, row) {
+fn read_value(chunk: &Chunk<'_>, column: usize, row: usize) -> Result<Value, Absence> {
+    if let Some(word) = chunk.missing_reason(column, row) {
         return Err(Absence::from_word(word).unwrap_or(Absence::NotRecorded));
     }
     match &chunk.columns[column] {
-        Cells::Numbers(cells) => Value::number(cells.values[row]),
+        Cells::Numbers(cells) => Value::from_number(cells.values[row]),
         Cells::Words(cells) => {
             let word = cells.codes.get(row).and_then(|code| cells.words.get(usize::try_from(*code).ok()?));
             word.map(|word| Value::Text(word.clone())).ok_or(Absence::NotRecorded)

@@ -63,7 +63,7 @@ pub const LIST: &[Row] = &[
 
 /// What a backup makes of this file of the data directory, as far as names tell; `None`: nobody has thought of it.
 #[must_use]
-pub fn fate(places: &BackupPaths, path: &Path) -> Option<Fate> {
+pub fn find_fate(places: &BackupPaths, path: &Path) -> Option<Fate> {
     let below = path.strip_prefix(&places.data_dir).ok()?;
     let named = [&places.operations, &places.model, &places.thermal_model, &places.configuration];
     if named.into_iter().flatten().any(|it| it == path) {
@@ -85,11 +85,11 @@ pub fn fate(places: &BackupPaths, path: &Path) -> Option<Fate> {
 /// What a backup makes of a file of this name below the data directory.
 #[must_use]
 pub fn of_name(name: &str) -> Option<Fate> {
-    LIST.iter().find(|(pattern, _)| fits(pattern, name)).map(|(_, fate)| *fate)
+    LIST.iter().find(|(pattern, _)| matches_pattern(pattern, name)).map(|(_, fate)| *fate)
 }
 
 /// `*` stands for anything within one folder, so that no name leads elsewhere.
-fn fits(pattern: &str, name: &str) -> bool {
+fn matches_pattern(pattern: &str, name: &str) -> bool {
     let (mut wanted, mut given) = (pattern.split('/'), name.split('/'));
     loop {
         match (wanted.next(), given.next()) {

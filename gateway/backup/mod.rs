@@ -13,8 +13,8 @@ mod restore;
 mod restored;
 mod schedule;
 
-pub use restore::{RestoreRequest, restore};
-pub use restored::take as take_restored;
+pub use restore::{RestoreRequest, restore_backup};
+pub use restored::install_waiting_files as take_restored;
 pub use schedule::{BackupError, BackupSchedule, take_backup};
 
 use crate::archive::ArchivedFile;
@@ -57,7 +57,7 @@ pub struct BackupPaths {
 impl BackupPaths {
     /// Those of a configuration that was read from this file.
     #[must_use]
-    pub fn of(config: &crate::config::Config, file: Option<&Path>) -> Self {
+    pub fn from_config(config: &crate::config::Config, file: Option<&Path>) -> Self {
         Self {
             machine: config.gateway.name.clone(),
             data_dir: config.gateway.data_dir.clone(),
@@ -74,7 +74,7 @@ impl BackupPaths {
 /// Name of an archive of this kind that is made at this time, seconds since 1970.
 #[must_use]
 pub fn archive_name(what: &str, at_s: u64) -> String {
-    let at = moment::utc(i64::try_from(at_s).unwrap_or_default().saturating_mul(SECOND_NS));
+    let at = moment::format_utc(i64::try_from(at_s).unwrap_or_default().saturating_mul(SECOND_NS));
     format!("cnc-gateway-{what}-{}.tar.gz", at.replace([':', '.'], "-"))
 }
 
@@ -82,14 +82,14 @@ pub fn archive_name(what: &str, at_s: u64) -> String {
 ///
 /// # Errors
 /// The wear models of the history cannot be read.
-pub fn collect(places: &BackupPaths) -> Result<Vec<ArchivedFile>, HistoryError> {
+pub fn collect_files(places: &BackupPaths) -> Result<Vec<ArchivedFile>, HistoryError> {
     let mut taken = CopiedFiles::default();
-    names(&places.scripts).into_iter().filter(|name| is_of_scripts(name)).for_each(|name| {
-        taken.own(&places.scripts.join(&name), format!("scripts/{name}"));
+    list_names(&places.scripts).into_iter().filter(|name| is_of_scripts(name)).for_each(|name| {
+        taken.add_own_file(&places.scripts.join(&name), format!("scripts/{name}"));
     });
-    for name in below(&places.data_dir) {
+    for name in list_names_below(&places.data_dir) {
         if matches!(of_name(&name), Some(Fate::AtOnce | Fate::AtStart)) {
-            taken.own(&places.data_dir.join(&name), format!("{DATA}{name}"));
+            taken.add_own_file(&places.data_dir.join(&name), format!("{DATA}{name}"));
         }
     }
     // Without a file every setting has its default, which an empty file says as well.
@@ -97,17 +97,17 @@ pub fn collect(places: &BackupPaths) -> Result<Vec<ArchivedFile>, HistoryError> 
     if !taken.files.iter().any(|(name, _)| *name == settings) {
         taken.files.push((settings, Vec::new()));
     }
-    for (name, path) in named(places).into_iter().chain([("configuration.toml", &places.configuration)]) {
-        path.iter().for_each(|path| taken.one(path, name.to_owned()));
+    for (name, path) in configured_files(places).into_iter().chain([("configuration.toml", &places.configuration)]) {
+        path.iter().for_each(|path| taken.add_file(path, name.to_owned()));
     }
     taken.files.extend(wear_models(&places.history)?);
-    let about = about(&taken.too_long);
+    let about = describe_archive(&taken.too_long);
     taken.files.push(("about.txt".to_owned(), about.into_bytes()));
     Ok(taken.files)
 }
 
 /// The files that the configuration names, by their names in an archive.
-fn named(places: &BackupPaths) -> [(&'static str, &Option<PathBuf>); 3] {
+fn configured_files(places: &BackupPaths) -> [(&'static str, &Option<PathBuf>); 3] {
     [
         ("operations.toml", &places.operations),
         ("model.toml", &places.model),
@@ -129,13 +129,13 @@ struct CopiedFiles {
 
 impl CopiedFiles {
     /// A file of the box itself: a link leads to somebody else's, which is nothing to give away.
-    fn own(&mut self, path: &Path, name: String) {
+    fn add_own_file(&mut self, path: &Path, name: String) {
         if std::fs::symlink_metadata(path).is_ok_and(|file| file.is_file()) {
-            self.one(path, name);
+            self.add_file(path, name);
         }
     }
 
-    fn one(&mut self, path: &Path, name: String) {
+    fn add_file(&mut self, path: &Path, name: String) {
         match std::fs::metadata(path) {
             Ok(file) if file.is_file() && file.len() > FILE_MAX => self.too_long.push(name),
             Ok(file) if file.is_file() => self.files.extend(std::fs::read(path).ok().map(|content| (name, content))),
@@ -145,7 +145,7 @@ impl CopiedFiles {
 }
 
 /// Names of what is in this folder, in their order.
-fn names(directory: &Path) -> Vec<String> {
+fn list_names(directory: &Path) -> Vec<String> {
     let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
     let mut names: Vec<String> = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok()).collect();
     names.sort();
@@ -153,12 +153,12 @@ fn names(directory: &Path) -> Vec<String> {
 }
 
 /// Names of what is in this folder and in the folders in it.
-fn below(directory: &Path) -> Vec<String> {
+fn list_names_below(directory: &Path) -> Vec<String> {
     let deeper = |name: String| {
-        let inside = names(&directory.join(&name));
+        let inside = list_names(&directory.join(&name));
         if inside.is_empty() { vec![name] } else { inside.iter().map(|it| format!("{name}/{it}")).collect() }
     };
-    names(directory).into_iter().flat_map(deeper).collect()
+    list_names(directory).into_iter().flat_map(deeper).collect()
 }
 
 /// The models in force, one file for each.
@@ -178,7 +178,7 @@ fn wear_models(history: &Path) -> Result<Vec<ArchivedFile>, HistoryError> {
 }
 
 /// For whoever opens the archive.
-fn about(too_long: &[String]) -> String {
+fn describe_archive(too_long: &[String]) -> String {
     let mut text = format!(
         "Backup of a box: cnc-gateway {}\n\nPut back with `cnc-gateway restore FILE` or on the page (Audit, Backup and help).\n\
          The configuration is here to be read; it is not put back.\n\nNot in it:\n",

@@ -2,9 +2,9 @@
 
 use super::list::{Fate, of_name};
 use super::restored;
-use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, is_of_scripts, named, names};
+use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, configured_files, is_of_scripts, list_names};
 use crate::archive::ArchivedFile;
-use crate::files::{keep_last, replace, replace_durably};
+use crate::files::{keep_last, replace_durably, replace_file};
 use crate::history::{Reader, store_wear_model};
 use crate::reload::read_directory;
 use crate::settings;
@@ -45,13 +45,13 @@ struct Found {
 ///
 /// # Errors
 /// What is wrong with the backup, before anything was changed; or a file that cannot be written.
-pub fn restore(places: &BackupPaths, files: &[ArchivedFile], ask: RestoreRequest<'_>) -> Result<String, String> {
-    let found = Found::of(places, files)?;
+pub fn restore_backup(places: &BackupPaths, files: &[ArchivedFile], ask: RestoreRequest<'_>) -> Result<String, String> {
+    let found = Found::from_archive(places, files)?;
     if found.is_empty() {
         return Err("the archive holds nothing that this box has a place for: no script, recipe, model or file of a data directory"
             .to_owned());
     }
-    found.check(places)?;
+    found.check_contents(places)?;
     keep_before(&places.data_dir, ask.before)?;
     put_scripts(&places.scripts, &found)?;
     let say = |path: &Path, error: std::io::Error| format!("{}: {error}", path.display());
@@ -59,16 +59,16 @@ pub fn restore(places: &BackupPaths, files: &[ArchivedFile], ask: RestoreRequest
         replace_durably(path, text).map_err(|error| say(path, error))?;
     }
     if let Some(body) = &found.settings {
-        let path = settings::path(&places.data_dir);
-        replace_durably(&path, &settings::signed(body, ask.by)).map_err(|error| say(&path, error))?;
+        let path = settings::values_path(&places.data_dir);
+        replace_durably(&path, &settings::sign_text(body, ask.by)).map_err(|error| say(&path, error))?;
     }
-    let models = store(&places.history, &found.wear, ask.at_ns)?;
+    let models = store_wear_models(&places.history, &found.wear, ask.at_ns)?;
     restored::lay_ready(&places.data_dir, &found.later)?;
-    Ok(found.words(models, ask.before.1))
+    Ok(found.describe_restore(models, ask.before.1))
 }
 
 impl Found {
-    fn of(places: &BackupPaths, files: &[ArchivedFile]) -> Result<Self, String> {
+    fn from_archive(places: &BackupPaths, files: &[ArchivedFile]) -> Result<Self, String> {
         let mut found = Self::default();
         for (name, content) in files {
             let text = || String::from_utf8(content.clone()).map_err(|_| format!("{name} is no text"));
@@ -89,7 +89,9 @@ impl Found {
                 }
             } else if name.starts_with(WEAR_MODELS) {
                 found.wear.push(WearRecord::parse(&text()?).map_err(|what| format!("{name}: {what}"))?);
-            } else if let Some(path) = named(places).into_iter().find(|it| it.0 == name).and_then(|it| it.1.as_ref()) {
+            } else if let Some(path) =
+                configured_files(places).into_iter().find(|it| it.0 == name).and_then(|it| it.1.as_ref())
+            {
                 found.now.push((path.clone(), text()?));
             }
         }
@@ -101,16 +103,16 @@ impl Found {
     }
 
     /// Everything as the box will read it.
-    fn check(&self, places: &BackupPaths) -> Result<(), String> {
+    fn check_contents(&self, places: &BackupPaths) -> Result<(), String> {
         let of = |path: &Option<PathBuf>| {
             let path = path.as_ref()?;
             self.now.iter().find(|(it, _)| it == path).map(|(_, text)| text.as_str())
         };
         if let Some(recipe) = of(&places.operations) {
-            rules::operations::parse("operations.toml", recipe).map_err(lines)?;
+            rules::operations::parse("operations.toml", recipe).map_err(join_lines)?;
         }
         if let Some(model) = of(&places.model) {
-            rules::twin::parse_model(model).map_err(lines)?;
+            rules::twin::parse_model(model).map_err(join_lines)?;
         }
         if let Some(model) = of(&places.thermal_model) {
             ThermalModel::read(model, &places.machine).map_err(|what| format!("the thermal model {what}"))?;
@@ -130,19 +132,19 @@ impl Found {
         }
         let there;
         let scripts = if self.scripts.is_empty() {
-            there = read_directory(&places.scripts).map_err(lines)?;
+            there = read_directory(&places.scripts).map_err(join_lines)?;
             &there
         } else {
             &self.scripts
         };
         let values = match &self.settings {
-            Some(text) => SettingValues::parse(settings::FILE, text).map_err(lines)?,
-            None => settings::read(&settings::path(&places.data_dir)).map_err(lines)?,
+            Some(text) => SettingValues::parse(settings::FILE, text).map_err(join_lines)?,
+            None => settings::read(&settings::values_path(&places.data_dir)).map_err(join_lines)?,
         };
-        prepare_with(scripts, &values).map(drop).map_err(lines)
+        prepare_with(scripts, &values).map(drop).map_err(join_lines)
     }
 
-    fn words(&self, models: usize, before: &str) -> String {
+    fn describe_restore(&self, models: usize, before: &str) -> String {
         let files = self.now.len();
         let what = [
             (!self.scripts.is_empty()).then(|| format!("{} scripts", self.scripts.len())),
@@ -165,12 +167,12 @@ impl Found {
 }
 
 /// Every problem on a line of its own.
-fn lines<P: std::fmt::Display>(all: Vec<P>) -> String {
+fn join_lines<P: std::fmt::Display>(all: Vec<P>) -> String {
     all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
 /// Stores the models that are not in force yet; how many.
-fn store(history: &Path, wanted: &[WearRecord], at_ns: TimeNs) -> Result<usize, String> {
+fn store_wear_models(history: &Path, wanted: &[WearRecord], at_ns: TimeNs) -> Result<usize, String> {
     let say = |error: crate::history::HistoryError| format!("the wear models: {error}");
     let there = match wanted.is_empty() || !history.exists() {
         true => Vec::new(),
@@ -199,13 +201,13 @@ fn put_scripts(directory: &Path, found: &Found) -> Result<(), String> {
     }
     let say = |error: std::io::Error| format!("{}: {error}", directory.display());
     for file in &found.scripts {
-        replace(&directory.join(&file.name), &file.text).map_err(say)?;
+        replace_file(&directory.join(&file.name), &file.text).map_err(say)?;
     }
     if let Some(list) = &found.delivered {
-        replace(&directory.join(DELIVERED), list).map_err(say)?;
+        replace_file(&directory.join(DELIVERED), list).map_err(say)?;
     }
     let surplus = |name: &String| name.ends_with(".rhai") && !found.scripts.iter().any(|file| file.name == *name);
-    names(directory)
+    list_names(directory)
         .into_iter()
         .filter(surplus)
         .try_for_each(|name| std::fs::remove_file(directory.join(name)))

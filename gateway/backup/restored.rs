@@ -2,7 +2,7 @@
 //! holds these in memory and writes them every minute and at its end; so they take their place before the next start reads them.
 
 use super::list::{Fate, of_name};
-use super::names;
+use super::list_names;
 use crate::log::{Notice, Severity};
 use std::path::Path;
 use std::time::Duration;
@@ -28,9 +28,9 @@ fn clear(folder: &Path) -> std::io::Result<()> {
 }
 
 /// Before anything is read at a start: what waits takes its place. Tells so, or why not; nothing where nothing waits.
-pub fn take(data_dir: &Path) -> Option<Notice> {
+pub fn install_waiting_files(data_dir: &Path) -> Option<Notice> {
     let folder = data_dir.join(FOLDER);
-    let waiting = names(&folder);
+    let waiting = list_names(&folder);
     if waiting.is_empty() {
         return None;
     }
@@ -61,16 +61,16 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let place = directory.path();
         std::fs::write(place.join("wear.json"), "old").expect("written");
-        assert!(take(place).is_none());
+        assert!(install_waiting_files(place).is_none());
         lay_ready(place, &[("wear.json".to_owned(), "new".to_owned())]).expect("laid");
-        assert!(take(place).is_some_and(|notice| notice.operator.contains("wear.json")));
+        assert!(install_waiting_files(place).is_some_and(|notice| notice.operator.contains("wear.json")));
         let text = || std::fs::read_to_string(place.join("wear.json")).expect("there");
         assert_eq!(text(), "new");
-        assert!(take(place).is_none() && !place.join(FOLDER).exists());
+        assert!(install_waiting_files(place).is_none() && !place.join(FOLDER).exists());
         lay_ready(place, &[("wear.json".to_owned(), "too old".to_owned())]).expect("laid");
         let long_ago = std::time::SystemTime::now() - 2 * WAITS_MAX;
         std::fs::File::open(place.join(FOLDER)).and_then(|it| it.set_modified(long_ago)).expect("aged");
-        assert!(take(place).is_some_and(|notice| notice.operator.contains("dropped")));
+        assert!(install_waiting_files(place).is_some_and(|notice| notice.operator.contains("dropped")));
         assert_eq!(text(), "new");
     }
 }

@@ -1,7 +1,7 @@
 //! Backups that are taken by themselves: to a directory, a stick or a share that is mounted there; each one is restored into
 //! a scratch folder before it counts.
 
-use super::{BackupPaths, RestoreRequest, archive_name, collect, copy_history, restore};
+use super::{BackupPaths, RestoreRequest, archive_name, collect_files, copy_history, restore_backup};
 use crate::archive::{pack, unpack};
 use crate::config::BackupConfig;
 use crate::files::{keep_last, list_named};
@@ -54,7 +54,7 @@ pub fn take_backup(paths: &BackupPaths, config: &BackupConfig, at_s: u64) -> Res
     if !directory.is_dir() {
         return Err(BackupError::Directory(directory.clone()));
     }
-    let files = collect(paths).map_err(|error| BackupError::History(error.to_string()))?;
+    let files = collect_files(paths).map_err(|error| BackupError::History(error.to_string()))?;
     let file = |path: &Path| {
         let path = path.to_owned();
         move |error| BackupError::File { path, error }
@@ -111,7 +111,7 @@ fn verify_backup(paths: &BackupPaths, archive: &Path, at_s: u64) -> Result<(), B
     };
     let at_ns = i64::try_from(at_s).unwrap_or_default().saturating_mul(adapters::clock::SECOND_NS);
     let request = RestoreRequest { by: "backup", at_ns, before: (&[], "none.tar.gz") };
-    let outcome = restore(&places, &files, request).map(|_| ()).map_err(wrong);
+    let outcome = restore_backup(&places, &files, request).map(|_| ()).map_err(wrong);
     let _scratch_left = fs::remove_dir_all(&scratch);
     outcome
 }

@@ -1,9 +1,9 @@
 //! A backup taken and put back, in place and into an empty box.
 
 use super::*;
-use crate::files::replace;
+use crate::files::replace_file;
 use crate::settings::{self, NewSetting};
-use rules::script::{DeclarationPlace, SettingValue, shipped};
+use rules::script::{DeclarationPlace, SettingValue, list_shipped_scripts};
 
 fn places(below: &Path) -> BackupPaths {
     BackupPaths {
@@ -23,13 +23,13 @@ fn ask(name: &str) -> RestoreRequest<'_> {
 }
 
 fn taken(places: &BackupPaths) -> Vec<ArchivedFile> {
-    collect(places).expect("collected")
+    collect_files(places).expect("collected")
 }
 
 /// Scripts, a setting of the machine and one of a tool, an annotation, things learned.
 fn furnish(places: &BackupPaths) {
-    for file in shipped() {
-        replace(&places.scripts.join(&file.name), &file.text).expect("written");
+    for file in list_shipped_scripts() {
+        replace_file(&places.scripts.join(&file.name), &file.text).expect("written");
     }
     let wanted = |place| NewSetting {
         script: "constant_load".to_owned(),
@@ -39,10 +39,10 @@ fn furnish(places: &BackupPaths) {
         began_from: None,
     };
     for place in [DeclarationPlace::Machine, DeclarationPlace::Tool("T3".to_owned())] {
-        settings::set(&places.data_dir, &shipped(), &wanted(place), "Li").expect("set");
+        settings::change_setting(&places.data_dir, &list_shipped_scripts(), &wanted(place), "Li").expect("set");
     }
     for (name, text) in [("persons.json", "secret"), ("annotations.jsonl", "{}\n"), ("wear.json", "{\"edges\":1}")] {
-        replace(&places.data_dir.join(name), text).expect("written");
+        replace_file(&places.data_dir.join(name), text).expect("written");
     }
 }
 
@@ -53,9 +53,9 @@ fn a_backup_comes_back_as_it_was_and_a_broken_one_changes_nothing() {
     furnish(&places);
     let first = taken(&places);
     assert!(first.iter().all(|(name, content)| !name.contains("persons") && content != b"secret"));
-    replace(&places.scripts.join(&shipped()[0].name), "// gone").expect("written");
-    replace(&places.scripts.join("another.rhai"), "// by somebody").expect("written");
-    std::fs::remove_file(settings::path(directory.path())).expect("removed");
+    replace_file(&places.scripts.join(&list_shipped_scripts()[0].name), "// gone").expect("written");
+    replace_file(&places.scripts.join("another.rhai"), "// by somebody").expect("written");
+    std::fs::remove_file(settings::values_path(directory.path())).expect("removed");
     let with = |name: &str, text: &str| {
         let mut files = first.clone();
         files.retain(|(it, _)| it != name);
@@ -74,15 +74,15 @@ fn a_backup_comes_back_as_it_was_and_a_broken_one_changes_nothing() {
         Vec::new(),
     ];
     for wrong in broken {
-        assert!(restore(&places, &wrong, ask("x-before-restore-0.tar.gz")).is_err(), "{:?}", wrong.last());
+        assert!(restore_backup(&places, &wrong, ask("x-before-restore-0.tar.gz")).is_err(), "{:?}", wrong.last());
     }
-    assert!(places.scripts.join("another.rhai").exists() && !settings::path(directory.path()).exists());
-    let done = restore(&places, &first, ask("x-before-restore-1.tar.gz")).expect("restored");
+    assert!(places.scripts.join("another.rhai").exists() && !settings::values_path(directory.path()).exists());
+    let done = restore_backup(&places, &first, ask("x-before-restore-1.tar.gz")).expect("restored");
     assert!(done.contains("scripts, the settings") && done.contains("wear.json) waits for the next start"), "{done}");
     assert!(!places.scripts.join("another.rhai").exists());
     assert_eq!(std::fs::read(directory.path().join("x-before-restore-1.tar.gz")).expect("kept"), b"before");
-    let written = std::fs::read_to_string(settings::path(directory.path())).expect("there");
-    assert_eq!(settings::author(&written), "Wu", "who restores has changed them");
+    let written = std::fs::read_to_string(settings::values_path(directory.path())).expect("there");
+    assert_eq!(settings::find_author(&written), "Wu", "who restores has changed them");
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn an_empty_box_gets_everything_that_decides() {
     let record = rules::estimators::wear::WearRecord::parse(crate::demo::WEAR).expect("a model");
     crate::history::store_wear_model(&old.history, 5, &record).expect("stored");
     let first = taken(&old);
-    restore(&new, &first, ask("x-before-restore-1.tar.gz")).expect("restored");
+    restore_backup(&new, &first, ask("x-before-restore-1.tar.gz")).expect("restored");
     assert!(take_restored(&new.data_dir).is_some());
     let without_author = |files: Vec<ArchivedFile>| {
         let body = |text: &[u8]| String::from_utf8_lossy(text).lines().skip(1).collect::<String>().into_bytes();
@@ -103,7 +103,7 @@ fn an_empty_box_gets_everything_that_decides() {
         files.into_iter().map(each).collect::<Vec<_>>()
     };
     assert_eq!(without_author(taken(&new)), without_author(first.clone()));
-    restore(&new, &first, ask("x-before-restore-2.tar.gz")).expect("again");
+    restore_backup(&new, &first, ask("x-before-restore-2.tar.gz")).expect("again");
     let models = Reader::open(&new.history).and_then(|it| it.wear_models()).expect("there");
     assert_eq!(models.len(), 1, "a model that is in force is not stored twice");
 }

@@ -1,8 +1,8 @@
 //! `cnc-gateway annotate`: what only a person can measure, noted beside the history.
 
-use super::{CannotRun, CommandOutcome, CommandResult, configuration, print};
+use super::{CannotRun, CommandOutcome, CommandResult, load_configuration, print_text};
 use crate::clock;
-use crate::commission::annotations::{Quantity, TypedAnnotation, add, annotation};
+use crate::commission::annotations::{Quantity, TypedAnnotation, add, parse_annotation};
 use crate::history::Reader;
 use crate::moment;
 use clap::Args;
@@ -38,15 +38,15 @@ pub(super) struct AnnotateArguments {
 }
 
 pub(super) fn run(arguments: AnnotateArguments) -> CommandResult {
-    let config = configuration(arguments.config.as_deref())?;
-    let span = Reader::open(&config.history.path).and_then(|reader| reader.present());
+    let config = load_configuration(arguments.config.as_deref())?;
+    let span = Reader::open(&config.history.path).and_then(|reader| reader.read_present_span());
     // Without a history there is no newest sample yet; then the clock says what now is.
     let newest_ns = span.ok().flatten().map_or_else(clock::now_ns, |(_, newest_ns)| newest_ns);
     let AnnotateArguments { quantity, value, unit, at, sd, file, of, .. } = arguments;
     let given = TypedAnnotation { value, unit, at, sd, file, of };
-    match annotation(quantity, given, newest_ns) {
+    match parse_annotation(quantity, given, newest_ns) {
         Err(refused) => {
-            print(&format!("not noted: {refused}\n"));
+            print_text(&format!("not noted: {refused}\n"));
             Ok(CommandOutcome::No)
         }
         Ok(annotation) => {
@@ -55,7 +55,7 @@ pub(super) fn run(arguments: AnnotateArguments) -> CommandResult {
                 || annotation.file.as_ref().map(|file| file.display().to_string()).unwrap_or_default(),
                 |value| format!("{value} {}", quantity.unit()),
             );
-            print(&format!("noted: {} {what} at {}\n", quantity.word(), moment::utc(annotation.at_ns)));
+            print_text(&format!("noted: {} {what} at {}\n", quantity.as_word(), moment::format_utc(annotation.at_ns)));
             Ok(CommandOutcome::Fine)
         }
     }

@@ -1,7 +1,7 @@
 //! `cnc-gateway arm`, `disarm`, `acknowledge`: orders of a person at the box to the gateway that runs there.
 
 use super::gateway_options::GatewayOptions;
-use super::{CommandOutcome, CommandResult, print, print_json};
+use super::{CommandOutcome, CommandResult, print_json, print_text};
 use crate::control::{self, Order};
 use clap::Args;
 
@@ -19,7 +19,7 @@ pub(super) struct OrderOptions {
 #[derive(Debug, Args)]
 pub(super) struct ArmArguments {
     /// For how long: 90s, 30m, 8h; as long as the configuration allows when left out.
-    #[arg(long = "for", value_name = "TIME", value_parser = seconds)]
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration_s)]
     seconds: Option<f64>,
     #[command(flatten)]
     to: OrderOptions,
@@ -33,7 +33,7 @@ pub(super) struct OrderArguments {
 }
 
 /// `90s`, `30m`, `8h`, or seconds.
-fn seconds(text: &str) -> Result<f64, String> {
+fn parse_duration_s(text: &str) -> Result<f64, String> {
     let (number, unit_s) = match text.char_indices().last() {
         Some((at, 's')) => (&text[..at], 1.0),
         Some((at, 'm')) => (&text[..at], 60.0),
@@ -47,42 +47,42 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Lets the gate write.
-pub(super) fn arm(arguments: ArmArguments) -> CommandResult {
+pub(super) fn arm_gate(arguments: ArmArguments) -> CommandResult {
     let ArmArguments { seconds, to } = arguments;
-    send(&to, &Order::Arm { by: to.by.clone(), for_s: seconds })
+    send_order_and_print(&to, &Order::Arm { by: to.by.clone(), for_s: seconds })
 }
 
 /// Gives the machine back.
-pub(super) fn disarm(OrderArguments { to }: OrderArguments) -> CommandResult {
-    send(&to, &Order::Disarm { by: to.by.clone() })
+pub(super) fn disarm_gate(OrderArguments { to }: OrderArguments) -> CommandResult {
+    send_order_and_print(&to, &Order::Disarm { by: to.by.clone() })
 }
 
 /// Lets the next feed hold or stop pass.
-pub(super) fn acknowledge(OrderArguments { to }: OrderArguments) -> CommandResult {
-    send(&to, &Order::Acknowledge { by: to.by.clone() })
+pub(super) fn acknowledge_request(OrderArguments { to }: OrderArguments) -> CommandResult {
+    send_order_and_print(&to, &Order::Acknowledge { by: to.by.clone() })
 }
 
-fn send(to: &OrderOptions, order: &Order) -> CommandResult {
-    let reply = control::order(&to.at.data_dir()?, order)?;
+fn send_order_and_print(to: &OrderOptions, order: &Order) -> CommandResult {
+    let reply = control::send_order(&to.at.data_dir()?, order)?;
     match to.at.json {
         true => print_json(&serde_json::json!({ "schema": "order/1", "done": reply.done, "text": reply.text })),
-        false => print(&format!("{}\n", reply.text)),
+        false => print_text(&format!("{}\n", reply.text)),
     }
     Ok(if reply.done { CommandOutcome::Fine } else { CommandOutcome::No })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::seconds;
+    use super::parse_duration_s;
 
     #[test]
     fn times_are_said_as_people_say_them() {
         assert_eq!(
-            (seconds("90s"), seconds("30m"), seconds("8h"), seconds("45")),
+            (parse_duration_s("90s"), parse_duration_s("30m"), parse_duration_s("8h"), parse_duration_s("45")),
             (Ok(90.0), Ok(1800.0), Ok(28_800.0), Ok(45.0))
         );
         for wrong in ["", "m", "-5m", "0s", "25h", "NaNh", "30 min", "5分"] {
-            assert!(seconds(wrong).is_err(), "{wrong}");
+            assert!(parse_duration_s(wrong).is_err(), "{wrong}");
         }
     }
 }

@@ -1,8 +1,8 @@
 //! `cnc-gateway history audit`: what the gate was asked for, let through and wrote, and whether the rows are as they were
 //! written.
 
-use super::history::cannot;
-use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
+use super::history::to_cannot_run;
+use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::history::{AuditCheck, AuditEntry, Reader, audit_document};
 use crate::moment;
 use clap::Args;
@@ -29,22 +29,23 @@ pub(super) struct AuditArguments {
 }
 
 /// Lists or checks.
-pub(super) fn answer(arguments: &AuditArguments, reader: &Reader) -> CommandResult {
+pub(super) fn answer_audit(arguments: &AuditArguments, reader: &Reader) -> CommandResult {
     if arguments.verify {
-        let check = reader.verify_audit().map_err(|error| cannot(&error))?;
+        let check = reader.verify_audit().map_err(|error| to_cannot_run(&error))?;
         show_check(&check, arguments.json);
         return Ok(if check.broken.is_none() { CommandOutcome::Fine } else { CommandOutcome::No });
     }
-    let newest_ns = reader.present().map_err(|error| cannot(&error))?.map_or(0, |(_, newest_ns)| newest_ns);
+    let newest_ns =
+        reader.read_present_span().map_err(|error| to_cannot_run(&error))?.map_or(0, |(_, newest_ns)| newest_ns);
     let moment = |text: &Option<String>, otherwise: i64| {
         let parsed = text.as_ref().map(|text| moment::parse(text, newest_ns)).transpose();
         parsed.map(|ns| ns.unwrap_or(otherwise)).map_err(|what| CannotRun::new(what, ""))
     };
     let (from_ns, to_ns) = (moment(&arguments.from, i64::MIN)?, moment(&arguments.to, i64::MAX)?);
-    let rows = reader.audit(from_ns, to_ns, arguments.limit).map_err(|error| cannot(&error))?;
+    let rows = reader.read_audit(from_ns, to_ns, arguments.limit).map_err(|error| to_cannot_run(&error))?;
     match arguments.json {
         true => print_json(&audit_document(&rows)),
-        false => rows.iter().for_each(|row| print(&line(row))),
+        false => rows.iter().for_each(|row| print_text(&format_row(row))),
     }
     Ok(CommandOutcome::Fine)
 }
@@ -58,12 +59,12 @@ fn show_check(check: &AuditCheck, json: bool) {
         }));
     }
     if let Some(removed) = removed {
-        let (at, because) = (moment::utc(removed.at_ns), &removed.because);
-        print(&format!("rows 1 to {} are gone: removed, the last of them at {at} ({because})\n", removed.through));
+        let (at, because) = (moment::format_utc(removed.at_ns), &removed.because);
+        print_text(&format!("rows 1 to {} are gone: removed, the last of them at {at} ({because})\n", removed.through));
     }
     match broken {
-        None => print(&format!("intact: {rows} rows, numbers {first} to {last}, head {head}\n")),
-        Some(broken) => print(&format!(
+        None => print_text(&format!("intact: {rows} rows, numbers {first} to {last}, head {head}\n")),
+        Some(broken) => print_text(&format!(
             "BROKEN at row {}: {}. The {rows} rows before it are as they were written.\n  \
              Keep a copy of the file, and find out who can write to it.\n",
             broken.number, broken.what
@@ -72,7 +73,7 @@ fn show_check(check: &AuditCheck, json: bool) {
 }
 
 /// A row for a reader.
-fn line(row: &AuditEntry) -> String {
+fn format_row(row: &AuditEntry) -> String {
     let audit = &row.audit;
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.0}"));
     let values = match audit.unit.as_str() {
@@ -87,6 +88,6 @@ fn line(row: &AuditEntry) -> String {
         }
     };
     let who = [audit.person.as_str(), audit.script.as_str()].join(" ");
-    let at = moment::utc(audit.at_ns);
+    let at = moment::format_utc(audit.at_ns);
     format!("{:>6} {at} {:<12} {:<10}{values} {} {}\n", row.number, audit.kind, audit.outcome, audit.reason, who.trim())
 }

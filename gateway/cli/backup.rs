@@ -1,9 +1,9 @@
 //! `cnc-gateway backup` and `cnc-gateway restore`: what makes a box this box, as an archive, and its way back. At the box itself,
 //! whether the gateway runs or not.
 
-use super::{CannotRun, CommandOutcome, CommandResult, configuration, print};
+use super::{CannotRun, CommandOutcome, CommandResult, load_configuration, print_text};
 use crate::archive::{pack, unpack};
-use crate::backup::{BackupPaths, RestoreRequest, archive_name, collect, copy_history};
+use crate::backup::{BackupPaths, RestoreRequest, archive_name, collect_files, copy_history};
 use crate::clock;
 use adapters::clock::SECOND_NS;
 use clap::Args;
@@ -36,44 +36,45 @@ pub(super) struct RestoreArguments {
     by: String,
 }
 
-fn now() -> (i64, u64) {
+fn read_clock() -> (i64, u64) {
     let now_ns = clock::now_ns();
     (now_ns, now_ns.div_euclid(SECOND_NS).unsigned_abs())
 }
 
-fn cannot(what: impl ToString) -> CannotRun {
+fn to_cannot_run(what: impl ToString) -> CannotRun {
     CannotRun::new(what.to_string(), "")
 }
 
-pub(super) fn backup(arguments: &BackupArguments) -> CommandResult {
-    let config = configuration(arguments.config.as_deref())?;
-    let (_, at_s) = now();
-    let files = collect(&BackupPaths::of(&config, arguments.config.as_deref())).map_err(cannot)?;
-    let archive = pack(&files, at_s).map_err(cannot)?;
+pub(super) fn run_backup(arguments: &BackupArguments) -> CommandResult {
+    let config = load_configuration(arguments.config.as_deref())?;
+    let (_, at_s) = read_clock();
+    let files =
+        collect_files(&BackupPaths::from_config(&config, arguments.config.as_deref())).map_err(to_cannot_run)?;
+    let archive = pack(&files, at_s).map_err(to_cannot_run)?;
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(archive_name("backup", at_s)));
-    std::fs::write(&out, &archive).map_err(|error| cannot(format!("{}: {error}", out.display())))?;
-    print(&format!("{}: {} files, {} bytes\n", out.display(), files.len(), archive.len()));
+    std::fs::write(&out, &archive).map_err(|error| to_cannot_run(format!("{}: {error}", out.display())))?;
+    print_text(&format!("{}: {} files, {} bytes\n", out.display(), files.len(), archive.len()));
     match &arguments.history {
         Some(copy) => {
-            let bytes = copy_history(&config.history.path, copy).map_err(cannot)?;
-            print(&format!("{}: the history, {bytes} bytes\n", copy.display()));
+            let bytes = copy_history(&config.history.path, copy).map_err(to_cannot_run)?;
+            print_text(&format!("{}: the history, {bytes} bytes\n", copy.display()));
         }
-        None => print("the history is not in it; --history COPY.db copies it beside\n"),
+        None => print_text("the history is not in it; --history COPY.db copies it beside\n"),
     }
     Ok(CommandOutcome::Fine)
 }
 
-pub(super) fn restore(arguments: &RestoreArguments) -> CommandResult {
-    let config = configuration(arguments.config.as_deref())?;
-    let places = BackupPaths::of(&config, arguments.config.as_deref());
+pub(super) fn run_restore(arguments: &RestoreArguments) -> CommandResult {
+    let config = load_configuration(arguments.config.as_deref())?;
+    let places = BackupPaths::from_config(&config, arguments.config.as_deref());
     let shown = arguments.archive.display();
-    let bytes = std::fs::read(&arguments.archive).map_err(|error| cannot(format!("{shown}: {error}")))?;
-    let files = unpack(&bytes).map_err(|error| cannot(format!("{shown} is no backup: {error}")))?;
-    let (at_ns, at_s) = now();
-    let before = collect(&places).map_err(cannot)?;
-    let before = pack(&before, at_s).map_err(cannot)?;
+    let bytes = std::fs::read(&arguments.archive).map_err(|error| to_cannot_run(format!("{shown}: {error}")))?;
+    let files = unpack(&bytes).map_err(|error| to_cannot_run(format!("{shown} is no backup: {error}")))?;
+    let (at_ns, at_s) = read_clock();
+    let before = collect_files(&places).map_err(to_cannot_run)?;
+    let before = pack(&before, at_s).map_err(to_cannot_run)?;
     let ask = RestoreRequest { by: &arguments.by, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
-    let done = crate::backup::restore(&places, &files, ask).map_err(cannot)?;
-    print(&format!("{done}\n"));
+    let done = crate::backup::restore_backup(&places, &files, ask).map_err(to_cannot_run)?;
+    print_text(&format!("{done}\n"));
     Ok(CommandOutcome::Fine)
 }

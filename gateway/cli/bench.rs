@@ -1,6 +1,6 @@
 //! `cnc-gateway bench`: ticks per second on this computer.
 
-use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::bench::{self, TICKS_MIN};
 use clap::Args;
 use std::path::PathBuf;
@@ -25,13 +25,13 @@ pub(super) fn run(arguments: &BenchArguments) -> CommandResult {
     let directory = parent.join(format!("cnc-gateway-bench-{}", std::process::id()));
     let cannot = |error: &dyn std::fmt::Display| CannotRun::new(error.to_string(), "name another --directory");
     std::fs::create_dir_all(&directory).map_err(|error| cannot(&error))?;
-    let figures = bench::run(arguments.ticks, &directory, None);
+    let figures = bench::measure_ticks(arguments.ticks, &directory, None);
     let _left_behind = std::fs::remove_dir_all(&directory);
     let figures = figures.map_err(|error| cannot(&error))?;
     if arguments.json {
-        print_json(&figures.json());
+        print_json(&figures.to_json());
     } else {
-        print(&figures.to_string());
+        print_text(&figures.to_string());
     }
     Ok(CommandOutcome::Fine)
 }

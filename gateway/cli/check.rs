@@ -1,9 +1,9 @@
 //! `cnc-gateway check`: is everything right that the user wrote?
 
-use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
-use crate::check::check;
+use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
+use crate::check::check_configuration;
 use crate::config::{self, keys};
-use ::rules::script::{Declared, declarations, shipped};
+use ::rules::script::{Declared, list_declarations, list_shipped_scripts};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -30,14 +30,16 @@ pub(super) struct CheckArguments {
 /// Checks, or prints a table.
 pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
     if arguments.keys {
-        print(&keys::table());
-        print(&crate::settings::table(&read_declared_settings(arguments.config.as_deref())?));
+        print_text(&keys::format_table());
+        print_text(&crate::settings::format_table(&read_declared_settings(arguments.config.as_deref())?));
     } else if arguments.example {
-        print(&keys::example());
+        print_text(&keys::format_example());
     } else if arguments.vocabulary {
-        print(&::rules::script::vocabulary(super::lang::language() == ::rules::physics::explain::Language::Zh));
+        print_text(&::rules::script::format_vocabulary(
+            super::lang::language() == ::rules::physics::explain::Language::Zh,
+        ));
     } else {
-        return tell(arguments);
+        return report_problems(arguments);
     }
     Ok(CommandOutcome::Fine)
 }
@@ -45,13 +47,13 @@ pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
 /// The settings that the scripts of a configuration declare, or those that come with the gateway.
 fn read_declared_settings(config: Option<&Path>) -> Result<Vec<Declared>, CannotRun> {
     let files = match config {
-        Some(_) => super::rules::configured(&super::rules::configuration(config)?)?,
-        None => shipped(),
+        Some(_) => super::rules::load_configured_scripts(&super::rules::load_configuration(config)?)?,
+        None => list_shipped_scripts(),
     };
-    declarations(&files).map_err(super::refused)
+    list_declarations(&files).map_err(super::refuse_scripts)
 }
 
-fn tell(arguments: &CheckArguments) -> CommandResult {
+fn report_problems(arguments: &CheckArguments) -> CommandResult {
     let unreadable = arguments.config.as_deref().filter(|path| std::fs::File::open(path).is_err());
     if let Some(path) = unreadable {
         let problems = config::load(Some(path), []).err().unwrap_or_default();
@@ -60,12 +62,12 @@ fn tell(arguments: &CheckArguments) -> CommandResult {
     }
     let environment =
         std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
-    let report = check(arguments.config.as_deref(), environment);
+    let report = check_configuration(arguments.config.as_deref(), environment);
     if arguments.json {
-        let json = serde_json::json!({ "schema": "check/1", "fine": report.fine(), "read": report.read, "problems": report.problems });
+        let json = serde_json::json!({ "schema": "check/1", "fine": report.is_fine(), "read": report.read, "problems": report.problems });
         print_json(&json);
     } else {
-        print(&report.to_string());
+        print_text(&report.to_string());
     }
-    Ok(if report.fine() { CommandOutcome::Fine } else { CommandOutcome::No })
+    Ok(if report.is_fine() { CommandOutcome::Fine } else { CommandOutcome::No })
 }

@@ -1,14 +1,14 @@
 //! `cnc-gateway commission`: what is known of this machine, what is missing, what to do next and why.
 
-use super::{CannotRun, CommandOutcome, CommandResult, configuration, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, load_configuration, print_json, print_text};
 use crate::clock;
 use crate::commission::annotations::{self, Annotation};
 use crate::commission::columns::Merged;
-use crate::commission::learn::{Learned, all, prepared};
-use crate::commission::picture::page;
+use crate::commission::learn::{Learned, learn_parts, prepare_recording};
+use crate::commission::picture::render_page;
 use crate::commission::plan::{self, Limits, Which};
 use crate::config::Config;
-use crate::diagnosis::put;
+use crate::diagnosis::write_output;
 use crate::history::{Reader, store_wear_model};
 use crate::identified;
 use crate::moment;
@@ -71,50 +71,52 @@ struct PlanArguments {
 
 pub(super) fn run(arguments: &CommissionArguments) -> CommandResult {
     if let Some(which) = arguments.plan.which {
-        return list(which, &arguments.plan);
+        return print_plan(which, &arguments.plan);
     }
-    let config = configuration(arguments.config.as_deref())?;
+    let config = load_configuration(arguments.config.as_deref())?;
     let say = |problem| CannotRun::new(problem, "");
     let noted = annotations::read(&config.gateway.data_dir).map_err(say)?;
-    let Some((first_ns, newest_ns)) = span(&config.history.path)? else {
+    let Some((first_ns, newest_ns)) = read_span(&config.history.path)? else {
         let next = "start the box with this configuration and let it record: `cnc-gateway run --config FILE`";
-        return tell(
+        return print_answer(
             arguments,
             &format!("nothing is known yet: the history {} is empty\nnext: {next}\n", config.history.path.display()),
             &json!({ "schema": "commission/1", "parts": [], "next": next }),
         );
     };
     let from = arguments.from.as_deref().map(|text| moment::parse(text, newest_ns)).transpose().map_err(say)?;
-    let (recording, merged) = prepared(&config.history.path, &noted, from).map_err(say)?;
-    let learned = all(&recording, merged, &config.gateway.name, arguments.criterion_mm);
+    let (recording, merged) = prepare_recording(&config.history.path, &noted, from).map_err(say)?;
+    let learned = learn_parts(&recording, merged, &config.gateway.name, arguments.criterion_mm);
     let written = if arguments.write { write(&config, &learned)? } else { Vec::new() };
-    let text = words(&learned, &noted, &written, (from.unwrap_or(first_ns), newest_ns));
+    let text = describe_learned(&learned, &noted, &written, (from.unwrap_or(first_ns), newest_ns));
     if arguments.write {
         let path = config.gateway.data_dir.join("commission.html");
-        put(&path, &page(&config.gateway.name, &text, &learned.pictures)).map_err(say)?;
+        write_output(&path, &render_page(&config.gateway.name, &text, &learned.pictures)).map_err(say)?;
     }
-    let document = document(&learned, &written, (from.unwrap_or(first_ns), newest_ns));
-    tell(arguments, &text, &document)
+    let document = learned_to_json(&learned, &written, (from.unwrap_or(first_ns), newest_ns));
+    print_answer(arguments, &text, &document)
 }
 
-fn tell(arguments: &CommissionArguments, text: &str, document: &Value) -> CommandResult {
+fn print_answer(arguments: &CommissionArguments, text: &str, document: &Value) -> CommandResult {
     if arguments.json {
         print_json(document)
     } else {
-        print(text)
+        print_text(text)
     }
     let missing = document["next"].as_str().is_some_and(|next| !next.is_empty());
     Ok(if missing { CommandOutcome::No } else { CommandOutcome::Fine })
 }
 
-fn span(history: &Path) -> Result<Option<(i64, i64)>, CannotRun> {
+fn read_span(history: &Path) -> Result<Option<(i64, i64)>, CannotRun> {
     if !history.exists() {
         return Ok(None);
     }
-    Reader::open(history).and_then(|reader| reader.present()).map_err(|error| CannotRun::new(error.to_string(), ""))
+    Reader::open(history)
+        .and_then(|reader| reader.read_present_span())
+        .map_err(|error| CannotRun::new(error.to_string(), ""))
 }
 
-fn list(which: Which, arguments: &PlanArguments) -> CommandResult {
+fn print_plan(which: Which, arguments: &PlanArguments) -> CommandResult {
     let limits = Limits {
         speeds_rpm: arguments.speeds_rpm.clone(),
         cutting_speeds_m_min: arguments.cutting_speeds_m_min.clone(),
@@ -128,11 +130,12 @@ fn list(which: Which, arguments: &PlanArguments) -> CommandResult {
     if numbers.into_iter().flatten().chain([&limits.diameter_mm]).any(|number| !usable(number)) {
         return Err(CannotRun::new("a speed, feed, depth or diameter of the list is not greater than 0", ""));
     }
-    let steps = plan::steps(which, &limits).map_err(|problem| CannotRun::new(problem, ""))?;
+    let steps = plan::plan_steps(which, &limits).map_err(|problem| CannotRun::new(problem, ""))?;
     if let Some(path) = &arguments.out {
-        put(path, &plan::csv(&steps, limits.diameter_mm)).map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(path, &plan::format_csv(&steps, limits.diameter_mm))
+            .map_err(|problem| CannotRun::new(problem, ""))?;
     }
-    print(&plan::text(&steps, limits.diameter_mm));
+    print_text(&plan::format_text(&steps, limits.diameter_mm));
     Ok(CommandOutcome::Fine)
 }
 
@@ -140,14 +143,14 @@ fn list(which: Which, arguments: &PlanArguments) -> CommandResult {
 fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
     let mut written = Vec::new();
     let mut file = |path: PathBuf, text: &str| {
-        put(&path, text).map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(&path, text).map_err(|problem| CannotRun::new(problem, ""))?;
         written.push(path.display().to_string());
         Ok::<_, CannotRun>(())
     };
     let say = |error: std::io::Error| CannotRun::new(format!("{}: {error}", config.scripts.directory.display()), "");
     let scripts = [
-        ("no_load.rhai", learned.no_load.as_ref().map(|it| it.script())),
-        ("load_loss.rhai", learned.load_loss.as_ref().map(|it| it.script())),
+        ("no_load.rhai", learned.no_load.as_ref().map(|it| it.format_script())),
+        ("load_loss.rhai", learned.load_loss.as_ref().map(|it| it.format_script())),
     ];
     for (name, script) in scripts {
         if let Some(script) = script {
@@ -156,7 +159,7 @@ fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
         }
     }
     if let Some(model) = &learned.thermal {
-        let text = model.text().map_err(|problem| CannotRun::new(problem, ""))?;
+        let text = model.to_json_text().map_err(|problem| CannotRun::new(problem, ""))?;
         file(config.gateway.data_dir.join("thermal_model.json"), &text)?;
         written.push(
             "write model = \"thermal_model.json\" under [thermal], with its path from the configuration file"
@@ -170,16 +173,25 @@ fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
         written.push(format!("wear model {id} in {}", config.history.path.display()));
     }
     for (subject, found) in &learned.found {
-        let path = identified::keep(&config.gateway.data_dir, subject, found);
+        let path = identified::save_answer(&config.gateway.data_dir, subject, found);
         written.push(path.map_err(|problem| CannotRun::new(problem, ""))?.display().to_string());
     }
     written.push(config.gateway.data_dir.join("commission.html").display().to_string());
     Ok(written)
 }
 
-fn words(learned: &Learned, noted: &[Annotation], written: &[String], (from_ns, to_ns): (i64, i64)) -> String {
-    let mut text =
-        format!("history from {} to {}; {} annotations\n\n", moment::utc(from_ns), moment::utc(to_ns), noted.len());
+fn describe_learned(
+    learned: &Learned,
+    noted: &[Annotation],
+    written: &[String],
+    (from_ns, to_ns): (i64, i64),
+) -> String {
+    let mut text = format!(
+        "history from {} to {}; {} annotations\n\n",
+        moment::format_utc(from_ns),
+        moment::format_utc(to_ns),
+        noted.len()
+    );
     for part in &learned.parts {
         let _ = match &part.known {
             Ok(known) => writeln!(text, "known    {:<10} {known}", part.name),
@@ -215,7 +227,7 @@ fn of_file(merged: &Merged) -> String {
     }
 }
 
-fn document(learned: &Learned, written: &[String], (from_ns, to_ns): (i64, i64)) -> Value {
+fn learned_to_json(learned: &Learned, written: &[String], (from_ns, to_ns): (i64, i64)) -> Value {
     let parts: Vec<Value> = learned
         .parts
         .iter()
@@ -238,6 +250,6 @@ fn document(learned: &Learned, written: &[String], (from_ns, to_ns): (i64, i64))
         })
         .collect();
     let next = learned.parts.iter().find(|part| part.known.is_err()).map_or("", |part| part.next.as_str());
-    json!({ "schema": "commission/1", "from": moment::utc(from_ns), "to": moment::utc(to_ns), "parts": parts, "torque": files,
+    json!({ "schema": "commission/1", "from": moment::format_utc(from_ns), "to": moment::format_utc(to_ns), "parts": parts, "torque": files,
             "load_loss": learned.load_loss, "next": next, "written": written })
 }

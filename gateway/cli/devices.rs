@@ -1,6 +1,6 @@
 //! `cnc-gateway devices`: the `devices.xml` of this machine for an MTConnect agent.
 
-use super::{CannotRun, CommandOutcome, CommandResult, print};
+use super::{CannotRun, CommandOutcome, CommandResult, print_text};
 use crate::clock;
 use crate::config;
 use crate::history::{Query, Reader, box_id};
@@ -47,13 +47,13 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
         ));
     }
     let delivered = read_delivered_channels(path);
-    let created = moment::utc(clock::now_ns());
+    let created = moment::format_utc(clock::now_ns());
     let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));
     let others = arguments.others.iter().map(|file| read(file)).collect::<Result<Vec<_>, _>>()?;
     let described = Described { machine: &config.gateway.name, box_id: &box_id, prefix: &prefix };
     let text = devices_xml(described, &created, known, &others).map_err(|what| CannotRun::new(what, ""))?;
     match &arguments.out {
-        None => print(&text),
+        None => print_text(&text),
         Some(file) => std::fs::write(file, text).map_err(|error| {
             CannotRun::new(format!("{} cannot be written: {error}", file.display()), "choose another place")
         })?,
@@ -72,10 +72,10 @@ fn read(file: &Path) -> Result<(String, String), CannotRun> {
 /// The channels of which the history holds something; `None` before there is one.
 fn read_delivered_channels(path: &Path) -> Option<BTreeSet<String>> {
     let reader = Reader::open(path).ok()?;
-    let (_, newest_ns) = reader.present().ok()??;
+    let (_, newest_ns) = reader.read_present_span().ok()??;
     let query = Query { from_ns: Some(newest_ns - 3_600_000_000_000), ..Query::default() };
     let mut names = BTreeSet::new();
-    let read = reader.samples(&query, |chunk| {
+    let read = reader.for_each_chunk(&query, |chunk| {
         names.extend(chunk.series.iter().map(|series| series.name.to_string()));
         std::ops::ControlFlow::Continue(())
     });

@@ -1,9 +1,9 @@
 //! `cnc-gateway diagnose`: where model and recordings differ, which physics was left out, the model with it.
 
-use super::lang::{language, pick, say};
+use super::lang::{language, localize_text, pick_text};
 use super::{CannotRun, CommandOutcome, CommandResult};
 use crate::diagnosis::context::DiagnosisContext;
-use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach, recorded_output, series_model};
+use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach_series, recorded_output, series_model};
 use crate::diagnosis::{DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings_as, stretch};
 use clap::Args;
 use rules::twin::{self, Diagnosis, Model};
@@ -56,39 +56,41 @@ pub(super) struct DiagnoseArguments {
 }
 
 /// Reads, examines, compares, writes.
-pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
-    let (model, given) = inputs(&arguments)?;
-    given.warnings.iter().for_each(|warning| eprintln!("{}", say(warning)));
+pub(super) fn diagnose_recordings(arguments: DiagnoseArguments) -> CommandResult {
+    let (model, given) = read_inputs(&arguments)?;
+    given.warnings.iter().for_each(|warning| eprintln!("{}", localize_text(warning)));
     let examination = twin::examine(&given.recording, &model);
     let mut unusable = examination.unusable;
-    unusable.extend(outputs(&arguments).trouble());
-    let context = DiagnosisContext::before(&given.recording, &model, given.warnings.clone());
+    unusable.extend(collect_outputs(&arguments).find_unwritable_files());
+    let context = DiagnosisContext::from_recording(&given.recording, &model, given.warnings.clone());
     if !unusable.is_empty() {
         // What the file may have under another name, or in another unit, is the likeliest cure.
-        unusable.extend(context.doubts.iter().map(|doubt| say(&doubt.text).to_owned()));
+        unusable.extend(context.doubts.iter().map(|doubt| localize_text(&doubt.text).to_owned()));
         return Err(cannot_use(&unusable));
     }
-    examination.notes.iter().for_each(|note| eprintln!("{}{note}", pick("note: ", "提示：")));
+    examination.notes.iter().for_each(|note| eprintln!("{}{note}", pick_text("note: ", "提示：")));
     let found = twin::diagnose(&given.recording, &model, arguments.seed);
     let mut diagnosis = found.map_err(|all| cannot_use(&all))?;
     note_refusals(&mut diagnosis, &given);
-    let context = context.after(&model, &diagnosis);
+    let context = context.with_diagnosis(&model, &diagnosis);
     if arguments.search {
         eprintln!("{}", diagnosis.debug);
     }
-    outputs(&arguments).write(&diagnosis, &given.recording, &context).map_err(|problem| CannotRun::new(problem, ""))?;
+    collect_outputs(&arguments)
+        .write(&diagnosis, &given.recording, &context)
+        .map_err(|problem| CannotRun::new(problem, ""))?;
     Ok(CommandOutcome::Fine)
 }
 
 /// Model, hypotheses and recordings; every problem of all of them at once.
-fn inputs(arguments: &DiagnoseArguments) -> Result<(Model, InputRecordings), CannotRun> {
+fn read_inputs(arguments: &DiagnoseArguments) -> Result<(Model, InputRecordings), CannotRun> {
     let mut problems: Vec<String> = Vec::new();
     let model =
         arguments.model.as_ref().map(|path| read_model(path)).transpose().map_err(|wrong| problems.extend(wrong));
     let hypotheses = arguments.effects_dir.as_ref().map_or(Ok(Vec::new()), |directory| read_hypotheses(directory));
     let hypotheses = hypotheses.map_err(|wrong| problems.extend(wrong));
     let given = read_recordings_as(&arguments.recording, arguments.map.as_ref());
-    let given = given.map_err(|wrong| problems.extend(wrong.iter().map(|problem| say(problem).to_owned())));
+    let given = given.map_err(|wrong| problems.extend(wrong.iter().map(|problem| localize_text(problem).to_owned())));
     let (Ok(model), Ok(hypotheses), Ok(mut given)) = (model, hypotheses, given) else {
         return Err(cannot_use(&problems));
     };
@@ -112,17 +114,17 @@ fn with_series(
             .map(|model| (model, given))
             .ok_or_else(|| CannotRun::new("no model", "give --model or --simulated"));
     };
-    let series = SimulatedSeries::of(text, arguments.align);
+    let series = SimulatedSeries::from_text(text, arguments.align);
     let output =
         model.as_ref().map(|model| model.output.clone()).or_else(|| recorded_output(&given.recording, &series));
     let Some(output) = output else {
         let en = "which recorded quantity does the series simulate? Give --model with an output, or record spindle_power_w, axis_current_a or such";
         return Err(CannotRun::new(
-            pick(en, "仿真序列对应哪个实测量？请用--model指定output，或记录spindle_power_w、axis_current_a等"),
+            pick_text(en, "仿真序列对应哪个实测量？请用--model指定output，或记录spindle_power_w、axis_current_a等"),
             "",
         ));
     };
-    let attached = attach(&given.recording, &output, &series, None).map_err(|all| cannot_use_as(&all))?;
+    let attached = attach_series(&given.recording, &output, &series, None).map_err(|all| cannot_use_as(&all))?;
     given.recording = attached.recording;
     given.warnings.extend(attached.told);
     let model = match model {
@@ -133,12 +135,12 @@ fn with_series(
 }
 
 pub(super) fn cannot_use(problems: &[String]) -> CannotRun {
-    let head = pick("the input cannot be used:", "输入无法使用：");
+    let head = pick_text("the input cannot be used:", "输入无法使用：");
     CannotRun::new(format!("{head}\n{}", problems.join("\n")), "")
 }
 
 pub(super) fn cannot_use_as(problems: &[adapters::bilingual::Bilingual]) -> CannotRun {
-    cannot_use(&problems.iter().map(|problem| say(problem).to_owned()).collect::<Vec<_>>())
+    cannot_use(&problems.iter().map(|problem| localize_text(problem).to_owned()).collect::<Vec<_>>())
 }
 
 /// Rows that were refused while reading belong to the quality of the recording.
@@ -149,7 +151,7 @@ fn note_refusals(diagnosis: &mut Diagnosis, given: &InputRecordings) {
     }
 }
 
-fn outputs(arguments: &DiagnoseArguments) -> DiagnosisOutputs {
+fn collect_outputs(arguments: &DiagnoseArguments) -> DiagnosisOutputs {
     DiagnosisOutputs {
         json: arguments.json.clone(),
         html: arguments.html.clone(),

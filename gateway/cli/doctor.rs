@@ -1,6 +1,6 @@
 //! `cnc-gateway doctor ADDRESS`: who is there, what it answers, how long that takes, what is wrong and what to do next.
 
-use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::config;
 use crate::doctor::{self, DoctorReport, SystemFiles};
 use crate::sinks::{self, SinkAddress};
@@ -38,11 +38,11 @@ pub(super) struct DoctorArguments {
 }
 
 /// Prints the report. Exit code 0 reachable without problems, 1 with problems, 2 unusable address.
-pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
+pub(super) fn run_doctor(arguments: &DoctorArguments) -> CommandResult {
     let unusable = |text| CannotRun::new(text, "");
     let Some(address) = &arguments.address else { return Ok(examine_box(arguments)) };
     if SinkAddress::is_one(address) {
-        return sink(address, arguments.json);
+        return examine_sink(address, arguments.json);
     }
     let Some(library) = &arguments.compare else {
         let address = match &arguments.config {
@@ -52,20 +52,24 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
         let report = if arguments.all { doctor::examine_all(&address) } else { doctor::examine_address(&address) };
         let report = report.map_err(unusable)?;
         if arguments.json {
-            print_json(&report.json())
+            print_json(&report.to_json())
         } else {
-            print(&text(&report))
+            print_text(&format_report(&report))
         }
-        return Ok(outcome(report.problems.is_empty()));
+        return Ok(to_outcome(report.problems.is_empty()));
     };
-    let comparison = doctor::compare(address, library).map_err(unusable)?;
+    let comparison = doctor::compare_backends(address, library).map_err(unusable)?;
     if arguments.json {
-        print_json(&comparison.json());
+        print_json(&comparison.to_json());
     } else {
-        let lines = comparison.lines().join("\n");
-        print(&format!("{}{}comparison\n{lines}\n", text(&comparison.ours), text(&comparison.theirs)));
+        let lines = comparison.format_lines().join("\n");
+        print_text(&format!(
+            "{}{}comparison\n{lines}\n",
+            format_report(&comparison.ours),
+            format_report(&comparison.theirs)
+        ));
     }
-    Ok(outcome(comparison.is_well()))
+    Ok(to_outcome(comparison.is_well()))
 }
 
 /// The computer itself.
@@ -86,23 +90,23 @@ fn examine_box(arguments: &DoctorArguments) -> CommandOutcome {
         for problem in &report.problems {
             let _ = writeln!(text, "  problem: {}\n    next: {}", problem.what, problem.next);
         }
-        print(&text);
+        print_text(&text);
     }
-    outcome(report.problems.is_empty())
+    to_outcome(report.problems.is_empty())
 }
 
 /// Tries a receiver.
-fn sink(address: &str, json: bool) -> CommandResult {
+fn examine_sink(address: &str, json: bool) -> CommandResult {
     let address: SinkAddress = address.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let runtime = runtime.map_err(|error| CannotRun::new(format!("no threads: {error}"), ""))?;
-    let found = runtime.block_on(sinks::doctor::examine(&address));
+    let found = runtime.block_on(sinks::doctor::examine_sink(&address));
     if json {
-        print_json(&found.json(&address));
+        print_json(&found.to_json(&address));
     } else {
-        print(&found.text(&address));
+        print_text(&found.to_text(&address));
     }
-    Ok(outcome(found.error.is_none()))
+    Ok(to_outcome(found.error.is_none()))
 }
 
 /// The address of the source of this name in a configuration.
@@ -119,12 +123,12 @@ fn find_configured_address(file: &Path, wanted: &str) -> Result<Address, CannotR
     })
 }
 
-fn outcome(well: bool) -> CommandOutcome {
+fn to_outcome(well: bool) -> CommandOutcome {
     if well { CommandOutcome::Fine } else { CommandOutcome::No }
 }
 
 /// What the device offers, what nobody takes at the end.
-fn offers(report: &DoctorReport, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
+fn write_offers(report: &DoctorReport, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
     let Some(offers) = &report.offers else { return };
     if offers.is_empty() {
         return line(format_args!("  a device of this kind does not tell what else it offers"));
@@ -141,7 +145,7 @@ fn offers(report: &DoctorReport, line: &mut impl FnMut(std::fmt::Arguments<'_>))
     }
 }
 
-fn text(report: &DoctorReport) -> String {
+fn format_report(report: &DoctorReport) -> String {
     let mut text = format!("{}\n", report.address);
     let mut line = |what: std::fmt::Arguments<'_>| {
         // Writing to a string does not fail.
@@ -161,7 +165,7 @@ fn text(report: &DoctorReport) -> String {
             Err(missing) => line(format_args!("    {:<26} - ({missing})", channel.name())),
         }
     }
-    offers(report, &mut line);
+    write_offers(report, &mut line);
     for problem in &report.problems {
         line(format_args!("  problem: {}\n    next: {}", problem.what, problem.next));
     }

@@ -33,21 +33,21 @@ struct Printing {
 }
 
 /// Prints the catalogue or one effect.
-pub(super) fn effects(arguments: EffectsArguments) -> CommandResult {
+pub(super) fn print_effects(arguments: EffectsArguments) -> CommandResult {
     let text = match arguments.what {
         EffectsCommand::List(printing) if printing.json => format!("{:#}\n", explain::list_json()),
-        EffectsCommand::List(_) => explain::list(language()),
-        EffectsCommand::Show { kind, printing } => show(&kind, &printing)?,
+        EffectsCommand::List(_) => explain::format_effect_list(language()),
+        EffectsCommand::Show { kind, printing } => explain_effect(&kind, &printing)?,
     };
-    super::print(&text);
+    super::print_text(&text);
     Ok(CommandOutcome::Fine)
 }
 
-fn show(kind: &str, printing: &Printing) -> Result<String, CannotRun> {
+fn explain_effect(kind: &str, printing: &Printing) -> Result<String, CannotRun> {
     let text = if printing.json {
         explain::explain_json(kind).map(|json| format!("{json:#}\n"))
     } else {
-        explain::explain(kind, language())
+        explain::explain_effect(kind, language())
     };
     text.map_err(|unknown| CannotRun::new(format!("there is no effect {}", unknown.kind), unknown.hint))
 }

@@ -1,10 +1,10 @@
 //! `cnc-gateway fleet`: many boxes, one database.
 
-use super::{CannotRun, CommandOutcome, CommandResult, print};
+use super::{CannotRun, CommandOutcome, CommandResult, print_text};
 use crate::fleet::ingest::{self, Done, IngestSettings};
 use crate::fleet::questions::{QUESTIONS, of_name};
 use crate::fleet::retention::{self, Going, KEEPING};
-use crate::fleet::{DatabaseSettings, TABLES, VIEWS, cluster};
+use crate::fleet::{DatabaseSettings, TABLES, VIEWS, parse_cluster};
 use crate::nats::{Connection, NatsError, NatsTarget, StreamSettings};
 use crate::signals::{SignalRequest, Signals};
 use clap::{Args, Subcommand};
@@ -40,7 +40,7 @@ pub(super) struct DatabaseArguments {
 }
 
 impl DatabaseArguments {
-    fn settings(&self) -> DatabaseSettings {
+    fn to_settings(&self) -> DatabaseSettings {
         DatabaseSettings { address: self.database.clone(), password_file: self.password_file.clone() }
     }
 }
@@ -120,8 +120,8 @@ impl From<NatsError> for CannotRun {
 const DUPLICATE_WINDOW: Duration = Duration::from_secs(120);
 
 impl StreamArguments {
-    fn settings(&self) -> Result<(NatsTarget, StreamSettings), CannotRun> {
-        let (servers, prefix) = cluster(&self.address).map_err(|what| CannotRun::new(what, ""))?;
+    fn parse_settings(&self) -> Result<(NatsTarget, StreamSettings), CannotRun> {
+        let (servers, prefix) = parse_cluster(&self.address).map_err(|what| CannotRun::new(what, ""))?;
         let plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';
         if self.stream.is_empty() || !self.stream.chars().all(plain) {
             return Err(CannotRun::new(
@@ -155,32 +155,32 @@ pub(super) fn run(fleet: Fleet) -> CommandResult {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let runtime = runtime.map_err(|error| CannotRun::new(format!("no threads: {error}"), ""))?;
     match fleet {
-        Fleet::Ingest(arguments) => runtime.block_on(ingest(&arguments)),
-        Fleet::Stream(arguments) => runtime.block_on(stream(&arguments)),
-        Fleet::Retain(arguments) => runtime.block_on(retain(&arguments)),
-        Fleet::Sql { name } => sql(name.as_deref()),
+        Fleet::Ingest(arguments) => runtime.block_on(ingest_stream(&arguments)),
+        Fleet::Stream(arguments) => runtime.block_on(create_stream(&arguments)),
+        Fleet::Retain(arguments) => runtime.block_on(apply_retention(&arguments)),
+        Fleet::Sql { name } => print_sql(name.as_deref()),
     }
 }
 
-fn sql(name: Option<&str>) -> CommandResult {
+fn print_sql(name: Option<&str>) -> CommandResult {
     let names = || QUESTIONS.iter().map(|question| question.name).collect::<Vec<_>>().join(", ");
     match name {
-        None => print(&format!("tables, {}\n", names())),
-        Some("tables") => print(&format!("{TABLES}{VIEWS}")),
+        None => print_text(&format!("tables, {}\n", names())),
+        Some("tables") => print_text(&format!("{TABLES}{VIEWS}")),
         Some(name) => match of_name(name) {
-            Some(question) => print(question.sql),
+            Some(question) => print_text(question.sql),
             None => return Err(CannotRun::new(format!("{name} is no question"), format!("write tables, {}", names()))),
         },
     }
     Ok(CommandOutcome::Fine)
 }
 
-async fn retain(arguments: &RetainArguments) -> CommandResult {
+async fn apply_retention(arguments: &RetainArguments) -> CommandResult {
     let RetainArguments { items_d, minutes_d, hours_d, records_d, alarms_d, refused_d, dry_run, .. } = *arguments;
     let days = [items_d, minutes_d, hours_d, records_d, alarms_d, refused_d];
-    let going = retention::retain(&arguments.database.settings(), &days, dry_run).await?;
+    let going = retention::remove_expired(&arguments.database.to_settings(), &days, dry_run).await?;
     if arguments.json {
-        print(&format!("{}\n", serde_json::json!({"schema": "retain/1", "dry_run": dry_run, "removed": going})));
+        print_text(&format!("{}\n", serde_json::json!({"schema": "retain/1", "dry_run": dry_run, "removed": going})));
         return Ok(CommandOutcome::Fine);
     }
     let line = |Going { table, before, rows, bytes }: &Going| {
@@ -191,39 +191,39 @@ async fn retain(arguments: &RetainArguments) -> CommandResult {
         (false, true) => "nothing was removed: this was a dry run\n",
         (false, false) => "removed\n",
     };
-    print(&(going.iter().map(line).collect::<String>() + said));
+    print_text(&(going.iter().map(line).collect::<String>() + said));
     Ok(CommandOutcome::Fine)
 }
 
-async fn stream(arguments: &StreamArguments) -> CommandResult {
-    let (servers, settings) = arguments.settings()?;
+async fn create_stream(arguments: &StreamArguments) -> CommandResult {
+    let (servers, settings) = arguments.parse_settings()?;
     let mut connection = Connection::open(&servers, 0, "cnc-gateway fleet stream").await?;
     let created = connection.create_stream(&settings).await?;
     let (messages, bytes) = connection.stream_size(&settings.name).await?;
     let StreamSettings { name, subjects, replicas, .. } = &settings;
-    print(&match created {
+    print_text(&match created {
         true => format!("stream {name} created for {subjects}, on {replicas} server(s)\n"),
         false => format!("stream {name} is there: {messages} messages, {:.1} MB\n", bytes as f64 / 1e6),
     });
     Ok(CommandOutcome::Fine)
 }
 
-async fn ingest(arguments: &IngestArguments) -> CommandResult {
-    let (servers, stream) = arguments.stream.settings()?;
+async fn ingest_stream(arguments: &IngestArguments) -> CommandResult {
+    let (servers, stream) = arguments.stream.parse_settings()?;
     let settings = IngestSettings {
         servers,
         stream,
         consumer: arguments.consumer.clone(),
-        database: arguments.database.settings(),
+        database: arguments.database.to_settings(),
         once: arguments.once,
     };
     let mut signals =
-        Signals::listen().map_err(|error| CannotRun::new(format!("signals cannot be heard: {error}"), ""))?;
+        Signals::start_listening().map_err(|error| CannotRun::new(format!("signals cannot be heard: {error}"), ""))?;
     let stopped = async { while signals.next().await != SignalRequest::Stop {} };
     tokio::select! {
         ended = ingest::run(&settings) => {
             let Done { new, known, refused } = ended?;
-            print(&format!("{new} rows written, {known} known already, {refused} refused\n"));
+            print_text(&format!("{new} rows written, {known} known already, {refused} refused\n"));
         }
         // What was not committed was not acknowledged: it is given out again.
         () = stopped => {}

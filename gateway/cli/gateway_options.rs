@@ -1,6 +1,6 @@
 //! Which gateway on this box a command is for, and how it answers. Shared by `arm`, `disarm`, `acknowledge` and `person`.
 
-use super::{CannotRun, configuration};
+use super::{CannotRun, load_configuration};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -27,6 +27,6 @@ impl GatewayOptions {
         if let Some(directory) = &self.data_dir {
             return Ok(directory.clone());
         }
-        Ok(configuration(self.config.as_deref())?.gateway.data_dir)
+        Ok(load_configuration(self.config.as_deref())?.gateway.data_dir)
     }
 }

@@ -1,11 +1,11 @@
 //! `cnc-gateway help`: the chapters of the handbook, and what a command takes.
 
 use super::lang::language;
-use super::{CannotRun, CommandOutcome, CommandResult, print};
-use crate::handbook::{chapter, contents, nearest_topic};
+use super::{CannotRun, CommandOutcome, CommandResult, print_text};
+use crate::handbook::{find_chapter, list_contents, nearest_topic};
 use ::rules::physics::explain::Language;
-use ::rules::script::{RECIPES, recipe};
-use adapters::channel::nearest;
+use ::rules::script::{RECIPES, find_recipe};
+use adapters::channel::find_nearest_name;
 use clap::Args;
 
 /// Arguments of `help`.
@@ -19,23 +19,25 @@ pub(super) struct HelpArguments {
 }
 
 /// Prints the list of chapters, a chapter, or what a command takes. A chapter goes before a command of the same name.
-pub(super) fn help(arguments: &HelpArguments) -> CommandResult {
+pub(super) fn print_help(arguments: &HelpArguments) -> CommandResult {
     let text = match arguments.topic.as_deref() {
-        None => list(),
-        Some(topic) => match (chapter(topic), recipe(topic)) {
+        None => list_chapters(),
+        Some(topic) => match (find_chapter(topic), find_recipe(topic)) {
             (_, Some(recipe)) if arguments.script => recipe.text.to_owned(),
-            (Some(chapter), _) if chapter.topic == "rules" => format!("{}\n{}", chapter.text_in(language()), recipes()),
+            (Some(chapter), _) if chapter.topic == "rules" => {
+                format!("{}\n{}", chapter.text_in(language()), list_recipes())
+            }
             (Some(chapter), _) => chapter.text_in(language()).to_owned(),
-            (None, Some(recipe)) => recipe.page(),
-            (None, None) => of_command(topic).ok_or_else(|| unknown(topic))?,
+            (None, Some(recipe)) => recipe.format_page(),
+            (None, None) => of_command(topic).ok_or_else(|| unknown_topic(topic))?,
         },
     };
-    print(&text);
+    print_text(&text);
     Ok(CommandOutcome::Fine)
 }
 
-fn list() -> String {
-    let contents = contents(language());
+fn list_chapters() -> String {
+    let contents = list_contents(language());
     match language() {
         Language::En => format!(
             "Chapters of the handbook (cnc-gateway help TOPIC):\n\n{contents}\nWhat a command takes: cnc-gateway COMMAND --help\n"
@@ -47,7 +49,7 @@ fn list() -> String {
 }
 
 /// One line for each recipe.
-fn recipes() -> String {
+fn list_recipes() -> String {
     let width = RECIPES.iter().map(|recipe| recipe.name.len()).max().unwrap_or(0);
     let lines: String =
         RECIPES.iter().map(|recipe| format!("  {:width$}  {}\n", recipe.name, recipe.title())).collect();
@@ -55,15 +57,15 @@ fn recipes() -> String {
 }
 
 fn of_command(name: &str) -> Option<String> {
-    let mut arguments = super::command(language());
+    let mut arguments = super::build_command(language());
     // The usage of a command then begins with the name of the program.
     arguments.build();
     let command = arguments.find_subcommand_mut(name).filter(|command| !command.is_hide_set())?;
     Some(command.render_long_help().to_string())
 }
 
-fn unknown(topic: &str) -> CannotRun {
-    let near = nearest_topic(topic).or_else(|| nearest(topic, RECIPES.iter().map(|recipe| recipe.name)));
+fn unknown_topic(topic: &str) -> CannotRun {
+    let near = nearest_topic(topic).or_else(|| find_nearest_name(topic, RECIPES.iter().map(|recipe| recipe.name)));
     let guess = near.map(|near| format!("did you mean {near}? ")).unwrap_or_default();
     CannotRun::new(
         format!("the handbook has no chapter {topic}"),

@@ -9,22 +9,23 @@ use std::sync::LazyLock;
 /// English, tab, Chinese.
 const TABLE: &str = include_str!("help_zh.tsv");
 
-static WORDS: LazyLock<HashMap<String, &'static str>> =
-    LazyLock::new(|| TABLE.lines().filter_map(|line| line.split_once('\t')).map(|(en, zh)| (plain(en), zh)).collect());
+static WORDS: LazyLock<HashMap<String, &'static str>> = LazyLock::new(|| {
+    TABLE.lines().filter_map(|line| line.split_once('\t')).map(|(en, zh)| (normalize_text(en), zh)).collect()
+});
 
 /// What both writings of a text have in common: lines may be broken anywhere, and a short help has no full stop.
-fn plain(text: &str) -> String {
+fn normalize_text(text: &str) -> String {
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     text.trim_end_matches('.').to_owned()
 }
 
-fn zh(text: &StyledStr) -> Option<&'static str> {
-    WORDS.get(&plain(&text.to_string())).copied()
+fn find_translation(text: &StyledStr) -> Option<&'static str> {
+    WORDS.get(&normalize_text(&text.to_string())).copied()
 }
 
 /// Every text of the command and of those below it in Chinese, where the table has it.
 pub(super) fn translate_command(command: Command) -> Command {
-    let about = command.get_about().and_then(zh);
+    let about = command.get_about().and_then(find_translation);
     let command = match about {
         Some(text) => command.about(text),
         None => command,
@@ -32,8 +33,8 @@ pub(super) fn translate_command(command: Command) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
     let command = names.into_iter().fold(command, |command, name| command.mut_subcommand(name, translate_command));
     command.mut_args(|arg| {
-        let text = arg.get_help().and_then(zh);
-        let long = arg.get_long_help().and_then(zh).or(text);
+        let text = arg.get_help().and_then(find_translation);
+        let long = arg.get_long_help().and_then(find_translation).or(text);
         let arg = match text {
             Some(text) => arg.help(text),
             None => arg,
@@ -54,8 +55,8 @@ mod tests {
     fn collect(command: &Command, lacking: &mut Vec<String>) {
         let own = |name: &str| ["help", "version"].contains(&name);
         let mut check = |text: Option<&StyledStr>| {
-            if let Some(text) = text.filter(|text| zh(text).is_none()) {
-                lacking.push(plain(&text.to_string()));
+            if let Some(text) = text.filter(|text| find_translation(text).is_none()) {
+                lacking.push(normalize_text(&text.to_string()));
             }
         };
         check(command.get_about());

@@ -1,9 +1,9 @@
 //! `cnc-gateway history`: what the box remembers.
 
-use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::history::{DAY_NS, HistoryError, Query, Reader, SqlValue, day_of, plain_cell};
 use crate::moment;
-use crate::records::{RecordKind, RecordQuery, document, records};
+use crate::records::{RecordKind, RecordQuery, build_document, read_records};
 use crate::samples;
 use adapters::clock::TimeNs;
 use clap::{Args, Subcommand, ValueEnum};
@@ -72,7 +72,7 @@ struct QueryArguments {
     #[command(flatten)]
     selection: Selection,
     /// Length of a bucket in seconds, with mean, least and greatest value; without it every sample.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     resolution: Option<f64>,
     /// Records instead of samples.
     #[arg(long, value_enum, value_name = "KIND", conflicts_with_all = ["resolution", "channels", "sql"])]
@@ -81,7 +81,7 @@ struct QueryArguments {
     #[arg(long, value_name = "SELECT", conflicts_with_all = ["resolution", "channels"])]
     sql: Option<String>,
     /// The statement of --sql is given up after so long, seconds.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "60")]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, default_value = "60")]
     limit_s: f64,
     /// Form of the answer.
     #[arg(long, value_enum, default_value_t = OutputFormat::Csv)]
@@ -125,7 +125,7 @@ struct PartitionArguments {
 
 impl PartitionArguments {
     fn write(&self, reader: &Reader) -> CommandResult {
-        let span = reader.present().map_err(|error| cannot(&error))?;
+        let span = reader.read_present_span().map_err(|error| to_cannot_run(&error))?;
         let Some((first_ns, newest_ns)) = span else {
             return Err(CannotRun::new("the history holds no samples", "let the gateway run first"));
         };
@@ -137,16 +137,17 @@ impl PartitionArguments {
         let (from_ns, to_ns) = (day(&self.from, first_ns)?, day(&self.to, newest_ns)?);
         let mut day_ns = from_ns.max(day_of(first_ns));
         while day_ns <= to_ns.min(newest_ns) {
-            let written = reader.export_day(&self.directory, &self.machine, day_ns).map_err(|error| cannot(&error))?;
-            let date: String = moment::utc(day_ns).chars().take(10).collect();
-            print(&format!("{date}: {} samples, {} diagnoses\n", written.samples, written.diagnoses));
+            let written =
+                reader.export_day(&self.directory, &self.machine, day_ns).map_err(|error| to_cannot_run(&error))?;
+            let date: String = moment::format_utc(day_ns).chars().take(10).collect();
+            print_text(&format!("{date}: {} samples, {} diagnoses\n", written.samples, written.diagnoses));
             day_ns += DAY_NS;
         }
         Ok(CommandOutcome::Fine)
     }
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
+fn parse_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 31_622_400.0 => Ok(seconds),
         _ => Err("give a number of seconds above 0, at most a year".to_owned()),
@@ -156,14 +157,14 @@ fn seconds(text: &str) -> Result<f64, String> {
 /// Answers.
 pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
     let path = &arguments.history;
-    let open = || Reader::open(path).map_err(|error| cannot(&error));
+    let open = || Reader::open(path).map_err(|error| to_cannot_run(&error));
     let reader = match arguments.question {
-        Question::Repair(repair) => return super::history_upkeep::repair(&repair, path),
+        Question::Repair(repair) => return super::history_upkeep::repair_history(&repair, path),
         Question::SetApart(apart) => return super::history_upkeep::set_apart(&apart, path),
         _ => open()?,
     };
-    let answered = answer(arguments.question, &reader, path)?;
-    let damaged = reader.damaged();
+    let answered = answer_question(arguments.question, &reader, path)?;
+    let damaged = reader.damaged_rows();
     for rows in &damaged {
         eprintln!(
             "cnc-gateway: {rows} were changed by the disk and are left out; `cnc-gateway history repair NEW` saves the others"
@@ -172,28 +173,28 @@ pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
     Ok(if damaged.is_empty() { answered } else { CommandOutcome::No })
 }
 
-fn answer(question: Question, reader: &Reader, path: &Path) -> CommandResult {
+fn answer_question(question: Question, reader: &Reader, path: &Path) -> CommandResult {
     match question {
         Question::Repair(_) | Question::SetApart(_) => Ok(CommandOutcome::Fine),
-        Question::Info { json } => info(reader, json),
+        Question::Info { json } => print_info(reader, json),
         Question::Export(export) => {
-            let (query, _) = export.selection.query(reader)?;
-            let rows = reader.export(&query, &export.file).map_err(|error| cannot(&error))?;
-            print(&format!("{rows} rows written to {}\n", export.file.display()));
+            let (query, _) = export.selection.build_query(reader)?;
+            let rows = reader.export_to_file(&query, &export.file).map_err(|error| to_cannot_run(&error))?;
+            print_text(&format!("{rows} rows written to {}\n", export.file.display()));
             Ok(CommandOutcome::Fine)
         }
-        Question::Query(query) => query.answer(reader, path),
+        Question::Query(query) => query.answer_query(reader, path),
         Question::Partitions(partitions) => partitions.write(reader),
-        Question::Audit(audit) => super::audit::answer(&audit, reader),
+        Question::Audit(audit) => super::audit::answer_audit(&audit, reader),
     }
 }
 
-pub(super) fn cannot(error: &HistoryError) -> CannotRun {
+pub(super) fn to_cannot_run(error: &HistoryError) -> CannotRun {
     CannotRun::new(error.to_string(), "")
 }
 
-fn info(reader: &Reader, json: bool) -> CommandResult {
-    let info = reader.info().map_err(|error| cannot(&error))?;
+fn print_info(reader: &Reader, json: bool) -> CommandResult {
+    let info = reader.read_info().map_err(|error| to_cannot_run(&error))?;
     if json {
         let mut document = json!({ "schema": "history-info/1" });
         if let (Value::Object(document), Ok(Value::Object(fields))) = (&mut document, serde_json::to_value(&info)) {
@@ -201,15 +202,15 @@ fn info(reader: &Reader, json: bool) -> CommandResult {
         }
         print_json(&document);
     } else {
-        print(&info.to_string());
+        print_text(&info.to_string());
     }
     Ok(CommandOutcome::Fine)
 }
 
 impl Selection {
     /// The question, and its range with both ends named.
-    fn query(&self, reader: &Reader) -> Result<(Query, (TimeNs, TimeNs)), CannotRun> {
-        let span = reader.present().map_err(|error| cannot(&error))?;
+    fn build_query(&self, reader: &Reader) -> Result<(Query, (TimeNs, TimeNs)), CannotRun> {
+        let span = reader.read_present_span().map_err(|error| to_cannot_run(&error))?;
         let (first_ns, newest_ns) = span.unwrap_or((0, 0));
         let bad = |what: String| CannotRun::new(what, "");
         let moment =
@@ -229,21 +230,23 @@ impl Selection {
 }
 
 impl QueryArguments {
-    fn answer(&self, reader: &Reader, path: &Path) -> CommandResult {
-        let (query, range) = self.selection.query(reader)?;
+    fn answer_query(&self, reader: &Reader, path: &Path) -> CommandResult {
+        let (query, range) = self.selection.build_query(reader)?;
         let json = self.json || self.format == OutputFormat::Json;
         let out = BufWriter::new(std::io::stdout().lock());
         let done = match (&self.records, &self.sql, self.resolution) {
             (Some(kind), ..) => self.answer_records(reader, *kind, range, json, out),
             (None, Some(sql), _) => answer_sql(reader, (sql, Duration::from_secs_f64(self.limit_s)), json, out),
-            (None, None, Some(resolution_s)) if json => samples::bucketed(reader, &query, resolution_s, usize::MAX)
-                .map(|series| print_json(&samples::document(range, resolution_s, series))),
+            (None, None, Some(resolution_s)) if json => {
+                samples::read_bucketed(reader, &query, resolution_s, usize::MAX)
+                    .map(|series| print_json(&samples::build_document(range, resolution_s, series)))
+            }
             (None, None, Some(resolution_s)) => samples::bucketed_csv(reader, &query, resolution_s, out),
-            (None, None, None) if json => samples::raw(reader, &query, usize::MAX)
-                .map(|series| print_json(&samples::document(range, 0.0, series))),
+            (None, None, None) if json => samples::read_raw(reader, &query, usize::MAX)
+                .map(|series| print_json(&samples::build_document(range, 0.0, series))),
             (None, None, None) => reader.export_csv(&query, out, path).map(drop),
         };
-        done.map(|()| CommandOutcome::Fine).map_err(|error| cannot(&error))
+        done.map(|()| CommandOutcome::Fine).map_err(|error| to_cannot_run(&error))
     }
 
     fn answer_records(
@@ -255,17 +258,22 @@ impl QueryArguments {
         out: impl Write,
     ) -> Result<(), HistoryError> {
         let query = RecordQuery { from_ns, to_ns, state: self.selection.state.clone(), limit: self.limit };
-        let found = records(reader, kind, &query)?;
+        let found = read_records(reader, kind, &query)?;
         if json {
-            print_json(&document(kind, &query, found));
+            print_json(&build_document(kind, &query, found));
             return Ok(());
         }
         let mut table = CsvTable::new(out);
-        found.rows.iter().filter_map(Value::as_object).try_for_each(|row| table.row(row)).map_err(output)
+        found
+            .rows
+            .iter()
+            .filter_map(Value::as_object)
+            .try_for_each(|row| table.write_row(row))
+            .map_err(to_history_error)
     }
 }
 
-fn output(error: csv::Error) -> HistoryError {
+fn to_history_error(error: csv::Error) -> HistoryError {
     HistoryError::Io { path: "the output".into(), error: std::io::Error::other(error) }
 }
 
@@ -280,7 +288,7 @@ impl<W: Write> CsvTable<W> {
         Self { csv: csv::Writer::from_writer(out), headed: false }
     }
 
-    fn row(&mut self, row: &Map<String, Value>) -> Result<(), csv::Error> {
+    fn write_row(&mut self, row: &Map<String, Value>) -> Result<(), csv::Error> {
         if !self.headed {
             self.csv.write_record(row.keys())?;
             self.headed = true;
@@ -305,7 +313,7 @@ fn answer_sql(
     let mut rows = Vec::new();
     let mut table = CsvTable::new(out);
     let (mut failed, mut too_many) = (None, false);
-    reader.sql(sql, limit, |names, values| {
+    reader.run_sql(sql, limit, |names, values| {
         let row: Map<String, Value> = names.iter().cloned().zip(values.iter().map(json_of)).collect();
         if json && rows.len() >= JSON_ROWS_MAX {
             too_many = true;
@@ -313,7 +321,7 @@ fn answer_sql(
         }
         if json {
             rows.push(Value::Object(row));
-        } else if let Err(error) = table.row(&row) {
+        } else if let Err(error) = table.write_row(&row) {
             failed = Some(error);
             return ControlFlow::Break(());
         }
@@ -325,7 +333,7 @@ fn answer_sql(
     if json {
         print_json(&json!({ "schema": "sql/1", "rows": rows }));
     }
-    failed.map_or(Ok(()), |error| Err(output(error)))
+    failed.map_or(Ok(()), |error| Err(to_history_error(error)))
 }
 
 fn json_of(value: &SqlValue) -> Value {

@@ -1,9 +1,9 @@
 //! `cnc-gateway history repair` and `set-apart`: when a disk or a clock was wrong.
 
-use super::history::cannot;
-use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
+use super::history::to_cannot_run;
+use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::clock;
-use crate::history::{Repaired, repair as save, set_apart as move_apart};
+use crate::history::{Repaired, repair_history as save, set_apart as move_apart};
 use crate::moment;
 use clap::Args;
 use serde_json::json;
@@ -30,29 +30,29 @@ pub(super) struct SetApartArguments {
 }
 
 /// Saves what is whole; exit code 1 when something is lost.
-pub(super) fn repair(arguments: &RepairArguments, path: &Path) -> CommandResult {
-    let repaired = save(path, &arguments.new).map_err(|error| cannot(&error))?;
+pub(super) fn repair_history(arguments: &RepairArguments, path: &Path) -> CommandResult {
+    let repaired = save(path, &arguments.new).map_err(|error| to_cannot_run(&error))?;
     if arguments.json {
         print_json(&json!({ "schema": "history-repair/1", "whole": repaired.is_whole(), "tables": repaired.tables,
             "damaged": repaired.damaged }));
     } else {
-        tell(&repaired, &arguments.new);
+        print_repaired(&repaired, &arguments.new);
     }
     Ok(if repaired.is_whole() { CommandOutcome::Fine } else { CommandOutcome::No })
 }
 
-fn tell(repaired: &Repaired, new: &Path) {
+fn print_repaired(repaired: &Repaired, new: &Path) {
     for table in repaired.tables.iter().filter(|table| table.saved > 0 || !table.lost.is_empty()) {
-        print(&format!("{}: {} rows saved\n", table.table, table.saved));
+        print_text(&format!("{}: {} rows saved\n", table.table, table.saved));
         for (after, before) in &table.lost {
-            print(&format!("  LOST: rows with numbers above {after} and below {before}\n"));
+            print_text(&format!("  LOST: rows with numbers above {after} and below {before}\n"));
         }
     }
     for rows in &repaired.damaged {
-        print(&format!("LOST: {rows}\n"));
+        print_text(&format!("LOST: {rows}\n"));
     }
     let whole = if repaired.is_whole() { "everything" } else { "everything that is whole" };
-    print(&format!(
+    print_text(&format!(
         "{whole} is in {}. To go on with it, stop the gateway and put it in the place of its history.\n",
         new.display()
     ));
@@ -63,12 +63,12 @@ pub(super) fn set_apart(arguments: &SetApartArguments, path: &Path) -> CommandRe
     let now_ns = clock::now_ns();
     let after = arguments.after.as_deref().map(|text| moment::parse(text, now_ns)).transpose();
     let after_ns = after.map_err(|what| CannotRun::new(what, ""))?.unwrap_or(now_ns);
-    let apart = move_apart(path, &arguments.new, after_ns).map_err(|error| cannot(&error))?;
-    print(&format!(
+    let apart = move_apart(path, &arguments.new, after_ns).map_err(|error| to_cannot_run(&error))?;
+    print_text(&format!(
         "{} samples and {} records that are dated after {} are in {} now\n",
         apart.samples,
         apart.records,
-        moment::utc(after_ns),
+        moment::format_utc(after_ns),
         arguments.new.display()
     ));
     Ok(CommandOutcome::Fine)

@@ -26,7 +26,7 @@ impl From<Lang> for Language {
 static CHOSEN: OnceLock<Language> = OnceLock::new();
 
 /// Chooses once, before anything is printed.
-pub(super) fn choose(asked: Option<Lang>) {
+pub(super) fn choose_language(asked: Option<Lang>) {
     let _already_chosen = CHOSEN.set(asked.map_or_else(of_computer, Language::from));
 }
 
@@ -75,11 +75,11 @@ pub(super) fn move_behind_command(arguments: Vec<std::ffi::OsString>) -> Vec<std
 }
 
 /// A sentence in the language of this process.
-pub(super) fn say(text: &Bilingual) -> &str {
-    pick(&text.en, &text.zh)
+pub(super) fn localize_text(text: &Bilingual) -> &str {
+    pick_text(&text.en, &text.zh)
 }
 
 /// One of two texts.
-pub(super) fn pick<'t>(en: &'t str, zh: &'t str) -> &'t str {
+pub(super) fn pick_text<'t>(en: &'t str, zh: &'t str) -> &'t str {
     if language() == Language::En { en } else { zh }
 }

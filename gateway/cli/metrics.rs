@@ -1,6 +1,6 @@
 //! `cnc-gateway metrics`: what a plant with Prometheus and Grafana loads.
 
-use super::{CommandOutcome, CommandResult, print};
+use super::{CommandOutcome, CommandResult, print_text};
 use crate::monitoring::{ALERTS, DASHBOARD, DASHBOARD_FLEET, PROVISIONING};
 use clap::Subcommand;
 
@@ -19,7 +19,7 @@ pub(super) enum Metrics {
 
 /// Prints it.
 pub(super) fn run(metrics: Metrics) -> CommandResult {
-    print(match metrics {
+    print_text(match metrics {
         Metrics::Dashboard => DASHBOARD,
         Metrics::DashboardFleet => DASHBOARD_FLEET,
         Metrics::Provisioning => PROVISIONING,

@@ -43,7 +43,7 @@ use crate::config::LogConfig;
 use crate::log::{self, LogFormat};
 use crate::reload::read_directory;
 use ::rules::physics::explain::Language;
-use ::rules::script::{Host, ScriptProblem, shipped};
+use ::rules::script::{Host, ScriptProblem, list_shipped_scripts};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io::Write;
 use std::path::Path;
@@ -89,8 +89,8 @@ struct LogArguments {
 
 impl LogArguments {
     /// Starts the log; `config` is what the configuration says.
-    fn start(self, config: &LogConfig) {
-        log::start(self.log.unwrap_or(config.format), self.log_level.unwrap_or(config.level));
+    fn start_log(self, config: &LogConfig) {
+        log::start_engineer_log(self.log.unwrap_or(config.format), self.log_level.unwrap_or(config.level));
     }
 }
 
@@ -173,10 +173,10 @@ enum CliCommand {
 #[must_use]
 pub fn main() -> ExitCode {
     let language = lang::asked_in(std::env::args_os()).unwrap_or_else(lang::of_computer);
-    let matches = command(language).get_matches_from(lang::move_behind_command(std::env::args_os().collect()));
+    let matches = build_command(language).get_matches_from(lang::move_behind_command(std::env::args_os().collect()));
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    lang::choose(arguments.lang);
-    let done = dispatch(arguments);
+    lang::choose_language(arguments.lang);
+    let done = dispatch_command(arguments);
     log::flush();
     match done {
         Ok(CommandOutcome::Fine) => ExitCode::SUCCESS,
@@ -189,39 +189,39 @@ pub fn main() -> ExitCode {
 }
 
 /// The command line, its help in this language.
-fn command(language: Language) -> clap::Command {
+fn build_command(language: Language) -> clap::Command {
     let command = Arguments::command();
     if language == Language::Zh { help_zh::translate_command(command) } else { command }
 }
 
-fn dispatch(arguments: Arguments) -> CommandResult {
+fn dispatch_command(arguments: Arguments) -> CommandResult {
     let command = arguments.command.unwrap_or(CliCommand::Run(arguments.run));
     if !matches!(command, CliCommand::Run(_)) {
-        arguments.log.start(&LogConfig { format: LogFormat::Off, level: tracing::Level::INFO });
+        arguments.log.start_log(&LogConfig { format: LogFormat::Off, level: tracing::Level::INFO });
     }
     match command {
         CliCommand::Run(run) => run::run(run, arguments.log),
-        CliCommand::Arm(arm) => arm::arm(arm),
-        CliCommand::Disarm(order) => arm::disarm(order),
-        CliCommand::Acknowledge(order) => arm::acknowledge(order),
+        CliCommand::Arm(arm) => arm::arm_gate(arm),
+        CliCommand::Disarm(order) => arm::disarm_gate(order),
+        CliCommand::Acknowledge(order) => arm::acknowledge_request(order),
         CliCommand::Person(person) => person::run(person),
-        CliCommand::Backup(arguments) => backup::backup(&arguments),
-        CliCommand::Restore(arguments) => backup::restore(&arguments),
+        CliCommand::Backup(arguments) => backup::run_backup(&arguments),
+        CliCommand::Restore(arguments) => backup::run_restore(&arguments),
         CliCommand::Bench(bench) => bench::run(&bench),
         CliCommand::Check(check) => check::run(&check),
         CliCommand::Replay(replay) => replay::run(replay),
         CliCommand::History(history) => history::run(history),
-        CliCommand::Simulate(simulate) => simulate::simulate(simulate),
-        CliCommand::Diagnose(diagnose) => diagnose::diagnose(diagnose),
+        CliCommand::Simulate(simulate) => simulate::run_simulation(simulate),
+        CliCommand::Diagnose(diagnose) => diagnose::diagnose_recordings(diagnose),
         CliCommand::Recording(recording) => recording::run(&recording),
         CliCommand::Model(model) => model::run(model),
-        CliCommand::Effects(effects) => effects::effects(effects),
-        CliCommand::Identify(identify) => identify::identify(&identify),
+        CliCommand::Effects(effects) => effects::print_effects(effects),
+        CliCommand::Identify(identify) => identify::run_identification(&identify),
         CliCommand::Commission(commission) => commission::run(&commission),
         CliCommand::Annotate(annotate) => annotate::run(annotate),
         CliCommand::Pulses(pulses) => pulses::run(&pulses),
         CliCommand::Rules(rules) => rules::run(&rules),
-        CliCommand::Doctor(doctor) => doctor::doctor(&doctor),
+        CliCommand::Doctor(doctor) => doctor::run_doctor(&doctor),
         CliCommand::Devices(devices) => devices::run(&devices),
         CliCommand::Metrics(metrics) => metrics::run(metrics),
         #[cfg(feature = "fleet")]
@@ -230,7 +230,7 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         CliCommand::Setup(setup) => setup::run(&setup),
         CliCommand::Update(update) => update::run(&update),
         CliCommand::PackageFiles(files) => package_files::run(&files),
-        CliCommand::Help(topic) => help::help(&topic),
+        CliCommand::Help(topic) => help::print_help(&topic),
         CliCommand::VendorChild(child) => vendor_child::run(&child),
         CliCommand::DiagnosisChild => diagnosis_child::run(),
     }
@@ -245,7 +245,9 @@ fn command_line() -> clap::Command {
 ///
 /// # Errors
 /// What would be printed in place of an answer.
-pub fn parses<T: Into<std::ffi::OsString> + Clone>(arguments: impl IntoIterator<Item = T>) -> Result<(), String> {
+pub fn check_arguments<T: Into<std::ffi::OsString> + Clone>(
+    arguments: impl IntoIterator<Item = T>,
+) -> Result<(), String> {
     match Arguments::try_parse_from(arguments) {
         Ok(_) => Ok(()),
         Err(asked) if !asked.use_stderr() => Ok(()),
@@ -254,17 +256,17 @@ pub fn parses<T: Into<std::ffi::OsString> + Clone>(arguments: impl IntoIterator<
 }
 
 /// Prints to standard output; a reader who has gone is no error.
-fn print(text: &str) {
+fn print_text(text: &str) {
     let _reader_has_gone = std::io::stdout().write_all(text.as_bytes());
 }
 
 /// Prints a document on lines of its own.
 fn print_json(document: &serde_json::Value) {
-    print(&format!("{document:#}\n"));
+    print_text(&format!("{document:#}\n"));
 }
 
 /// The configuration in a file, or the built-in one.
-fn configuration(file: Option<&Path>) -> Result<crate::config::Config, CannotRun> {
+fn load_configuration(file: Option<&Path>) -> Result<crate::config::Config, CannotRun> {
     let environment =
         std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
     crate::config::load(file, environment).map_err(|problems| {
@@ -275,19 +277,19 @@ fn configuration(file: Option<&Path>) -> Result<crate::config::Config, CannotRun
 
 /// The operations recipe in a file.
 fn recipe_from(path: &Path) -> Result<::rules::operations::Recipe, CannotRun> {
-    crate::operations::read(path).map(|loaded| loaded.recipe).map_err(refused)
+    crate::operations::read(path).map(|loaded| loaded.recipe).map_err(refuse_scripts)
 }
 
 /// Files of the user that cannot be used.
-fn refused(problems: Vec<ScriptProblem>) -> CannotRun {
+fn refuse_scripts(problems: Vec<ScriptProblem>) -> CannotRun {
     let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
     CannotRun::new(lines.join("\n"), "")
 }
 
 /// The scripts of a directory, or those that come with the gateway.
 fn scripts_from(directory: Option<&Path>) -> Result<Host, CannotRun> {
-    let files = directory.map_or_else(|| Ok(shipped()), read_directory).map_err(refused)?;
+    let files = directory.map_or_else(|| Ok(list_shipped_scripts()), read_directory).map_err(refuse_scripts)?;
     let mut host = Host::new();
-    host.load(&files).map_err(refused)?;
+    host.load_scripts(&files).map_err(refuse_scripts)?;
     Ok(host)
 }

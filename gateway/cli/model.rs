@@ -1,11 +1,11 @@
 //! `cnc-gateway model`: a first model of a machine, and whether a model and a recording fit before anything runs.
 
 use super::diagnose::cannot_use_as;
-use super::lang::{language, pick, say};
-use super::recording::line;
-use super::{CannotRun, CommandOutcome, CommandResult, print};
+use super::lang::{language, localize_text, pick_text};
+use super::recording::read_typed_line;
+use super::{CannotRun, CommandOutcome, CommandResult, print_text};
 use crate::diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
-use crate::diagnosis::{put, read_model, read_recordings_as, simulation, unit_check};
+use crate::diagnosis::{read_model, read_recordings_as, simulation, unit_check, write_output};
 use clap::{Args, Subcommand};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::unit_of;
@@ -63,17 +63,17 @@ struct NewArguments {
 
 pub(super) fn run(arguments: ModelArguments) -> CommandResult {
     match arguments.what {
-        ModelCommand::New(new) => create(new),
-        ModelCommand::Check { model, recording, map } => check(&model, &recording, map.as_ref()),
+        ModelCommand::New(new) => create_model(new),
+        ModelCommand::Check { model, recording, map } => check_model(&model, &recording, map.as_ref()),
     }
 }
 
-fn create(arguments: NewArguments) -> CommandResult {
+fn create_model(arguments: NewArguments) -> CommandResult {
     let asks = std::io::stdin().is_terminal();
     let kind = arguments.kind.or_else(|| asks.then(ask_kind).flatten());
     let kind = kind.ok_or_else(|| {
         CannotRun::new(
-            pick("which kind of model?", "要建哪种模型？"),
+            pick_text("which kind of model?", "要建哪种模型？"),
             "model new lathe, mill, drill, axis, spindle, thermal or series",
         )
     })?;
@@ -94,10 +94,10 @@ fn create(arguments: NewArguments) -> CommandResult {
         axis: arguments.axis,
     };
     let out = arguments.out.unwrap_or_else(|| PathBuf::from("-"));
-    put(&out, &new.toml()).map_err(|problem| CannotRun::new(problem, ""))?;
+    write_output(&out, &new.to_toml()).map_err(|problem| CannotRun::new(problem, ""))?;
     if out.as_os_str() != "-" {
         let path = out.display();
-        print(pick(
+        print_text(pick_text(
             &format!("written: {path}\nnext: cnc-gateway model check {path} --recording FILE\n"),
             &format!("已写入：{path}\n下一步：cnc-gateway model check {path} --recording 文件\n"),
         ));
@@ -107,9 +107,9 @@ fn create(arguments: NewArguments) -> CommandResult {
 
 fn ask_kind() -> Option<ModelKind> {
     for (index, (_, word, en, zh)) in KINDS.iter().enumerate() {
-        print(&format!("  {} {word}: {}\n", index + 1, pick(en, zh)));
+        print_text(&format!("  {} {word}: {}\n", index + 1, pick_text(en, zh)));
     }
-    let text = line()?;
+    let text = read_typed_line()?;
     let by_number = text.parse::<usize>().ok().and_then(|number| KINDS.get(number.checked_sub(1)?));
     by_number.or_else(|| KINDS.iter().find(|(_, word, ..)| *word == text)).map(|(kind, ..)| *kind)
 }
@@ -117,32 +117,35 @@ fn ask_kind() -> Option<ModelKind> {
 fn ask_material() -> Option<String> {
     let names: Vec<&str> = MATERIALS.iter().map(|(name, ..)| *name).collect();
     let list = names.join(", ");
-    print(pick(&format!("material ({list}; Enter: C45)?\n"), &format!("工件材料（{list}；回车：C45）？\n")));
-    line().filter(|text| !text.is_empty())
+    print_text(pick_text(&format!("material ({list}; Enter: C45)?\n"), &format!("工件材料（{list}；回车：C45）？\n")));
+    read_typed_line().filter(|text| !text.is_empty())
 }
 
-fn check(path: &Path, recordings: &[String], map: Option<&PathBuf>) -> CommandResult {
+fn check_model(path: &Path, recordings: &[String], map: Option<&PathBuf>) -> CommandResult {
     let model = read_model(path).map_err(|wrong| super::diagnose::cannot_use(&wrong))?;
     let given = read_recordings_as(recordings, map).map_err(|all| cannot_use_as(&all))?;
-    given.warnings.iter().for_each(|warning| print(&format!("{}\n", say(warning))));
+    given.warnings.iter().for_each(|warning| print_text(&format!("{}\n", localize_text(warning))));
     let examination = twin::examine(&given.recording, &model);
-    let (rows, runs) = (given.recording.rows(), given.recording.runs().len());
-    print(pick(&format!("{rows} rows in {runs} runs\n"), &format!("{rows}行，{runs}个批次\n")));
+    let (rows, runs) = (given.recording.count_rows(), given.recording.list_runs().len());
+    print_text(pick_text(&format!("{rows} rows in {runs} runs\n"), &format!("{rows}行，{runs}个批次\n")));
     if let Ok(simulation) = simulation::run(&given.recording, &model)
         && let Some((rmse, rows)) = simulation.rmse()
     {
         let (error, unit) = (short(rmse), unit_of(&model.output));
-        print(pick(
+        print_text(pick_text(
             &format!("the model as given misses {} by {error} {unit} over {rows} rows\n", model.output),
             &format!("按给定模型，{}的误差为{error} {unit}（{rows}行）\n", model.output),
         ));
     }
-    let doubts = unit_check::inputs(&given.recording, &model);
+    let doubts = unit_check::find_input_doubts(&given.recording, &model);
     for doubt in &doubts {
-        print(&format!("{}{}\n", pick("unit? ", "单位？"), say(&doubt.text)));
+        print_text(&format!("{}{}\n", pick_text("unit? ", "单位？"), localize_text(&doubt.text)));
     }
-    examination.notes.iter().for_each(|note| print(&format!("{}{note}\n", pick("note: ", "提示："))));
-    examination.unusable.iter().for_each(|problem| print(&format!("{}{problem}\n", pick("missing: ", "缺少："))));
+    examination.notes.iter().for_each(|note| print_text(&format!("{}{note}\n", pick_text("note: ", "提示："))));
+    examination
+        .unusable
+        .iter()
+        .for_each(|problem| print_text(&format!("{}{problem}\n", pick_text("missing: ", "缺少："))));
     let fine = examination.unusable.is_empty() && doubts.is_empty();
     let closing = match (fine, language()) {
         (true, Language::En) => "model and recording fit: cnc-gateway diagnose\n",
@@ -150,6 +153,6 @@ fn check(path: &Path, recordings: &[String], map: Option<&PathBuf>) -> CommandRe
         (false, Language::En) => "not yet: see above\n",
         (false, Language::Zh) => "尚不能使用：见上\n",
     };
-    print(closing);
+    print_text(closing);
     Ok(if fine { CommandOutcome::Fine } else { CommandOutcome::No })
 }

@@ -1,8 +1,8 @@
 //! `cnc-gateway pulses`: insert pulses into encoder lines, with proof; vectors to test a device against.
 
-use super::{CannotRun, CommandOutcome, CommandResult, print};
-use crate::diagnosis::put;
-use crate::pulses::{stream, vectors};
+use super::{CannotRun, CommandOutcome, CommandResult, print_text};
+use crate::diagnosis::write_output;
+use crate::pulses::{build_vectors, stream_edges};
 use clap::Args;
 use serde_json::json;
 use std::fs::File;
@@ -46,26 +46,26 @@ pub(super) fn run(arguments: &PulsesArguments) -> CommandResult {
     } else {
         Box::new(File::create(&arguments.out).map_err(say(&arguments.out))?)
     };
-    let proof = stream(BufReader::new(reader), BufWriter::new(writer), arguments.spacing_ns, arguments.insert)
+    let proof = stream_edges(BufReader::new(reader), BufWriter::new(writer), arguments.spacing_ns, arguments.insert)
         .map_err(|what| CannotRun::new(format!("{}: {what}", input.display()), ""))?;
-    eprint!("{}", proof.text(arguments.spacing_ns));
-    Ok(if proof.holds(arguments.spacing_ns) { CommandOutcome::Fine } else { CommandOutcome::No })
+    eprint!("{}", proof.to_text(arguments.spacing_ns));
+    Ok(if proof.is_proven(arguments.spacing_ns) { CommandOutcome::Fine } else { CommandOutcome::No })
 }
 
 fn write_vectors(directory: &Path) -> CommandResult {
     let say = |problem: String| CannotRun::new(problem, "");
     std::fs::create_dir_all(directory).map_err(|error| say(format!("{}: {error}", directory.display())))?;
-    let all = vectors().map_err(say)?;
+    let all = build_vectors().map_err(say)?;
     let mut list = Vec::new();
     for vector in &all {
-        put(&directory.join(format!("{}.in.csv", vector.name)), &vector.input).map_err(say)?;
-        put(&directory.join(format!("{}.out.csv", vector.name)), &vector.expected).map_err(say)?;
+        write_output(&directory.join(format!("{}.in.csv", vector.name)), &vector.input).map_err(say)?;
+        write_output(&directory.join(format!("{}.out.csv", vector.name)), &vector.expected).map_err(say)?;
         list.push(json!({ "name": vector.name, "shows": vector.shows, "spacing_ns": vector.spacing_ns,
             "rows_in": vector.proof.rows, "edges_out": vector.proof.edges_out, "position_in_edges": vector.proof.in_edges,
             "position_out_edges": vector.proof.out_edges, "inserted_pulses": vector.proof.inserted }));
     }
     let document = json!({ "schema": "pulses/1", "edges_per_pulse": 4, "vectors": list });
-    put(&directory.join("vectors.json"), &format!("{document:#}\n")).map_err(say)?;
-    print(&format!("{} vectors in {}\n", all.len(), directory.display()));
+    write_output(&directory.join("vectors.json"), &format!("{document:#}\n")).map_err(say)?;
+    print_text(&format!("{} vectors in {}\n", all.len(), directory.display()));
     Ok(CommandOutcome::Fine)
 }

@@ -1,13 +1,13 @@
 //! `cnc-gateway recording`: how a foreign file is read, and the map that says it.
 
-use super::lang::{pick, say};
-use super::{CannotRun, CommandOutcome, CommandResult, print};
+use super::lang::{localize_text, pick_text};
+use super::{CannotRun, CommandOutcome, CommandResult, print_text};
 use crate::diagnosis::map_file::{MapProposal, first_rows};
-use crate::diagnosis::{describe_reading, put};
+use crate::diagnosis::{describe_reading, write_output};
 use adapters::channel::ChannelId;
 use adapters::channel::unit::Unit;
 use adapters::recording::Mapping;
-use adapters::recording::read::{Preview, preview};
+use adapters::recording::read::{Preview, preview_recording};
 use clap::{Args, Subcommand};
 use std::io::{BufRead, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -51,77 +51,81 @@ struct RecordingFile {
 
 pub(super) fn run(arguments: &RecordingArguments) -> CommandResult {
     match &arguments.what {
-        RecordingCommand::Show(file) => show(file),
+        RecordingCommand::Show(file) => show_file(file),
         RecordingCommand::Map { file, out, yes } => map(file, out.as_deref(), *yes),
     }
 }
 
-fn look(file: &RecordingFile) -> Result<(Preview, Mapping), CannotRun> {
-    let beside = Mapping::beside(&file.file);
+fn preview_file(file: &RecordingFile) -> Result<(Preview, Mapping), CannotRun> {
+    let beside = Mapping::build_path_beside(&file.file);
     let path = file.map.clone().or_else(|| beside.is_file().then_some(beside));
     let mapping = path
         .map_or_else(|| Ok(Mapping::default()), |path| Mapping::read(&path))
         .map_err(|wrong| CannotRun::new(wrong.to_string(), ""))?;
-    let found =
-        preview(&file.file, &mapping).map_err(|error| CannotRun::new(pick(&error.to_string(), &error.zh()), ""))?;
+    let found = preview_recording(&file.file, &mapping)
+        .map_err(|error| CannotRun::new(pick_text(&error.to_string(), &error.describe_in_chinese()), ""))?;
     Ok((found, mapping))
 }
 
-fn show(file: &RecordingFile) -> CommandResult {
-    let (found, _) = look(file)?;
-    tell(&found, &file.file)?;
+fn show_file(file: &RecordingFile) -> CommandResult {
+    let (found, _) = preview_file(file)?;
+    print_preview(&found, &file.file)?;
     Ok(CommandOutcome::Fine)
 }
 
 /// What was assumed, and the first rows.
-fn tell(found: &Preview, path: &Path) -> Result<(), CannotRun> {
+fn print_preview(found: &Preview, path: &Path) -> Result<(), CannotRun> {
     let name = path.display().to_string();
-    let read = found.read.as_ref().map_err(|error| CannotRun::new(pick(&error.to_string(), &error.zh()), ""))?;
-    describe_reading(&name, read).iter().for_each(|line| print(&format!("{}\n", say(line))));
-    let rows = read.recording.rows();
+    let read = found
+        .read
+        .as_ref()
+        .map_err(|error| CannotRun::new(pick_text(&error.to_string(), &error.describe_in_chinese()), ""))?;
+    describe_reading(&name, read).iter().for_each(|line| print_text(&format!("{}\n", localize_text(line))));
+    let rows = read.recording.count_rows();
     let refused = read.refused;
-    print(pick(&format!("{rows} rows, {refused} refused\n"), &format!("{rows}行，拒绝{refused}行\n")));
-    print(&first_rows(&read.recording, SHOWN.0, SHOWN.1));
+    print_text(pick_text(&format!("{rows} rows, {refused} refused\n"), &format!("{rows}行，拒绝{refused}行\n")));
+    print_text(&first_rows(&read.recording, SHOWN.0, SHOWN.1));
     Ok(())
 }
 
 fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
-    let beside = Mapping::beside(&file.file);
+    let beside = Mapping::build_path_beside(&file.file);
     let out = out.unwrap_or(&beside);
     if out.is_file() {
         return keep_map(file, out);
     }
-    let (found, _) = look(file)?;
-    let mut proposal = MapProposal::of(&found);
+    let (found, _) = preview_file(file)?;
+    let mut proposal = MapProposal::from_preview(&found);
     let asks = !yes && std::io::stdin().is_terminal();
     if asks {
         ask_all(&mut proposal, &found);
     }
-    let statement = found.read.as_ref().map(adapters::recording::ReadRecording::statement).unwrap_or_default();
+    let statement =
+        found.read.as_ref().map(adapters::recording::ReadRecording::describe_assumptions).unwrap_or_default();
     let name = file.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let text = proposal.toml(&statement, &name);
+    let text = proposal.to_toml(&statement, &name);
     Mapping::parse(&text, "map").map_err(|wrong| CannotRun::new(wrong.to_string(), ""))?;
-    put(out, &text).map_err(|problem| CannotRun::new(problem, ""))?;
+    write_output(out, &text).map_err(|problem| CannotRun::new(problem, ""))?;
     if out.as_os_str() == "-" {
         return Ok(CommandOutcome::Fine);
     }
-    let unsure = if asks { 0 } else { proposal.questions().len() };
+    let unsure = if asks { 0 } else { proposal.open_questions().len() };
     let path = out.display();
     if unsure > 0 {
         let en = format!("{unsure} columns are not sure and keep their names; they are marked in {path}\n");
-        print(pick(&en, &format!("{unsure}列不能确定，保留原名；已在{path}中标出\n")));
+        print_text(pick_text(&en, &format!("{unsure}列不能确定，保留原名；已在{path}中标出\n")));
     }
-    let (after, _) = look(&RecordingFile { file: file.file.clone(), map: Some(out.to_owned()) })?;
-    tell(&after, &file.file)?;
-    print(pick(&format!("written: {path}\n"), &format!("已写入：{path}\n")));
+    let (after, _) = preview_file(&RecordingFile { file: file.file.clone(), map: Some(out.to_owned()) })?;
+    print_preview(&after, &file.file)?;
+    print_text(pick_text(&format!("written: {path}\n"), &format!("已写入：{path}\n")));
     Ok(CommandOutcome::Fine)
 }
 
 /// A map that is there already may hold what a person has written: a unit, a factor, a zone. It stays, and is shown.
 fn keep_map(file: &RecordingFile, map: &Path) -> CommandResult {
-    show(&RecordingFile { file: file.file.clone(), map: Some(map.to_owned()) })?;
+    show_file(&RecordingFile { file: file.file.clone(), map: Some(map.to_owned()) })?;
     let path = map.display();
-    print(pick(
+    print_text(pick_text(
         &format!("kept: {path}; edit it, remove it first, or name another with --out\n"),
         &format!("保留：{path}；请编辑它、先删除它，或用--out指定其他文件\n"),
     ));
@@ -132,18 +136,21 @@ fn keep_map(file: &RecordingFile, map: &Path) -> CommandResult {
 fn ask_all(proposal: &mut MapProposal, found: &Preview) {
     if found.read.is_err() && proposal.columns.iter().all(|column| !column.is_time) {
         let names: Vec<String> = proposal.columns.iter().map(|column| column.from.clone()).collect();
-        print(pick("Which column is the time?\n", "哪一列是时间？\n"));
-        if let Some(index) = choice(&names) {
+        print_text(pick_text("Which column is the time?\n", "哪一列是时间？\n"));
+        if let Some(index) = ask_choice(&names) {
             proposal.time = Some(names[index].clone());
         }
     }
-    for index in proposal.questions() {
+    for index in proposal.open_questions() {
         let column = proposal.columns[index].clone();
         let mut options: Vec<String> = column.candidates.iter().map(|name| (*name).to_owned()).collect();
-        options.push(pick("keep its own name", "保留原名").to_owned());
-        options.push(pick("leave it out", "不读取").to_owned());
-        print(&format!("{}\n", pick(&format!("{}: what is it?", column.from), &format!("{}：是什么？", column.from))));
-        let Some(chosen) = choice(&options) else { continue };
+        options.push(pick_text("keep its own name", "保留原名").to_owned());
+        options.push(pick_text("leave it out", "不读取").to_owned());
+        print_text(&format!(
+            "{}\n",
+            pick_text(&format!("{}: what is it?", column.from), &format!("{}：是什么？", column.from))
+        ));
+        let Some(chosen) = ask_choice(&options) else { continue };
         let to = match options.len() - chosen {
             1 => String::new(),
             2 => column.from.clone(),
@@ -161,30 +168,30 @@ fn index_of(found: &Preview, from: &str) -> usize {
 
 /// A number of ours whose unit the file does not say.
 fn unit_needed(to: &str, said: &Option<String>) -> bool {
-    said.is_none() && ChannelId::of(to).is_some_and(|id| !["", "1"].contains(&id.channel().unit))
+    said.is_none() && ChannelId::from_name(to).is_some_and(|id| !["", "1"].contains(&id.channel().unit))
 }
 
 fn ask_unit(to: &str) -> Option<String> {
-    let own = ChannelId::of(to)?.channel().unit;
-    print(pick(&format!("in which unit? (Enter: {own})\n"), &format!("单位是什么？（回车：{own}）\n")));
-    let text = line()?;
-    let known = Unit::of(&text).is_some();
+    let own = ChannelId::from_name(to)?.channel().unit;
+    print_text(pick_text(&format!("in which unit? (Enter: {own})\n"), &format!("单位是什么？（回车：{own}）\n")));
+    let text = read_typed_line()?;
+    let known = Unit::from_symbol(&text).is_some();
     if !known && !text.is_empty() {
-        print(pick("that unit is not known; the file says what stands there\n", "未知单位，忽略\n"));
+        print_text(pick_text("that unit is not known; the file says what stands there\n", "未知单位，忽略\n"));
     }
     known.then_some(text)
 }
 
 /// Shows numbered choices; `None` where nothing usable was typed.
-fn choice(options: &[String]) -> Option<usize> {
+fn ask_choice(options: &[String]) -> Option<usize> {
     for (index, option) in options.iter().enumerate() {
-        print(&format!("  {} {option}\n", index + 1));
+        print_text(&format!("  {} {option}\n", index + 1));
     }
-    line()?.parse::<usize>().ok()?.checked_sub(1).filter(|index| *index < options.len())
+    read_typed_line()?.parse::<usize>().ok()?.checked_sub(1).filter(|index| *index < options.len())
 }
 
 /// What was typed; `None` at the end of the input.
-pub(super) fn line() -> Option<String> {
+pub(super) fn read_typed_line() -> Option<String> {
     let mut text = String::new();
     std::io::stdin().lock().read_line(&mut text).ok().filter(|length| *length > 0)?;
     Some(text.trim().to_owned())

@@ -2,7 +2,7 @@
 
 use super::{CannotRun, CommandOutcome, CommandResult, print_json, recipe_from, scripts_from};
 use crate::config;
-use crate::replay::{ReplayPlan, replay};
+use crate::replay::{ReplayPlan, replay_files};
 use clap::Args;
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -43,11 +43,11 @@ pub(super) fn run(arguments: ReplayArguments) -> CommandResult {
         talk: true,
     };
     let config = config::load(None, []).map_err(|problems| CannotRun::new(format!("{problems:?}"), ""))?;
-    let summary = replay(&plan, scripts_from(scripts.as_deref())?, config.gate)?;
+    let summary = replay_files(&plan, scripts_from(scripts.as_deref())?, config.gate)?;
     if json {
-        print_json(&summary.json());
+        print_json(&summary.to_json());
     } else {
-        super::print(&summary.to_string());
+        super::print_text(&summary.to_string());
     }
     Ok(CommandOutcome::Fine)
 }

@@ -1,9 +1,9 @@
 //! `cnc-gateway rules`: what scripts can see, call and set; their trials; edited ones over stored history.
 
 use super::lang::language;
-use super::{CannotRun, CommandOutcome, CommandResult, print, print_json, refused};
+use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text, refuse_scripts};
 use crate::active_scripts;
-use crate::backtest::{BacktestPlan, backtest};
+use crate::backtest::{BacktestPlan, run_backtest};
 use crate::config::{self, Config};
 use crate::history::Reader;
 use crate::moment;
@@ -83,14 +83,14 @@ struct BacktestArguments {
 pub(super) fn run(arguments: &RulesArguments) -> CommandResult {
     match &arguments.what {
         RulesCommand::Api { json: true, .. } => print_json(&script::api_json()),
-        RulesCommand::Api { .. } => print(&script::api(language() == Language::Zh)),
-        RulesCommand::Test(arguments) => return test(arguments),
-        RulesCommand::Backtest(arguments) => return compare(arguments),
+        RulesCommand::Api { .. } => print_text(&script::format_api_reference(language() == Language::Zh)),
+        RulesCommand::Test(arguments) => return test_scripts(arguments),
+        RulesCommand::Backtest(arguments) => return compare_over_history(arguments),
     }
     Ok(CommandOutcome::Fine)
 }
 
-pub(super) fn configuration(file: Option<&Path>) -> Result<Config, CannotRun> {
+pub(super) fn load_configuration(file: Option<&Path>) -> Result<Config, CannotRun> {
     let environment =
         std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
     config::load(file, environment).map_err(|problems| {
@@ -100,27 +100,34 @@ pub(super) fn configuration(file: Option<&Path>) -> Result<Config, CannotRun> {
 }
 
 /// The scripts of the configuration, or those that come with the gateway where the directory is not there yet.
-pub(super) fn configured(config: &Config) -> Result<Vec<ScriptFile>, CannotRun> {
+pub(super) fn load_configured_scripts(config: &Config) -> Result<Vec<ScriptFile>, CannotRun> {
     let directory = &config.scripts.directory;
-    if directory.is_dir() { read_directory(directory).map_err(refused) } else { Ok(script::shipped()) }
+    if directory.is_dir() {
+        read_directory(directory).map_err(refuse_scripts)
+    } else {
+        Ok(script::list_shipped_scripts())
+    }
 }
 
 fn read_named_scripts(files: &[PathBuf]) -> Result<Vec<ScriptFile>, CannotRun> {
     let mut found = Vec::new();
     for path in files {
         if path.is_dir() {
-            found.extend(read_directory(path).map_err(refused)?);
+            found.extend(read_directory(path).map_err(refuse_scripts)?);
         } else {
-            found.push(read_file(path).map_err(|problem| refused(vec![problem]))?);
+            found.push(read_file(path).map_err(|problem| refuse_scripts(vec![problem]))?);
         }
     }
     Ok(found)
 }
 
-fn test(arguments: &TestArguments) -> CommandResult {
+fn test_scripts(arguments: &TestArguments) -> CommandResult {
     let (files, values) = if arguments.files.is_empty() {
-        let config = configuration(arguments.config.as_deref())?;
-        (configured(&config)?, settings::read(&settings::path(&config.gateway.data_dir)).map_err(refused)?)
+        let config = load_configuration(arguments.config.as_deref())?;
+        (
+            load_configured_scripts(&config)?,
+            settings::read(&settings::values_path(&config.gateway.data_dir)).map_err(refuse_scripts)?,
+        )
     } else {
         (read_named_scripts(&arguments.files)?, SettingValues::default())
     };
@@ -130,11 +137,11 @@ fn test(arguments: &TestArguments) -> CommandResult {
         print_json(&json!({
             "schema": "trials/1",
             "fine": fine,
-            "trials": results.iter().map(trial).collect::<Vec<_>>(),
-            "problems": problems.iter().map(problem).collect::<Vec<_>>(),
+            "trials": results.iter().map(trial_to_json).collect::<Vec<_>>(),
+            "problems": problems.iter().map(problem_to_json).collect::<Vec<_>>(),
         }));
     } else {
-        print(&told(&files, &results, &problems));
+        print_text(&describe_trials(&files, &results, &problems));
     }
     Ok(if fine { CommandOutcome::Fine } else { CommandOutcome::No })
 }
@@ -144,7 +151,7 @@ fn run_trials(files: &[ScriptFile], values: &SettingValues) -> (Vec<TrialResult>
     let (mut results, mut problems) = (Vec::new(), Vec::new());
     for file in files {
         match script::compile_one(file, files, values) {
-            Ok(set) => results.extend(script::trials(&set)),
+            Ok(set) => results.extend(script::run_trials(&set)),
             Err(found) => problems.extend(found),
         }
     }
@@ -154,7 +161,7 @@ fn run_trials(files: &[ScriptFile], values: &SettingValues) -> (Vec<TrialResult>
     (results, problems)
 }
 
-fn told(files: &[ScriptFile], results: &[TrialResult], problems: &[ScriptProblem]) -> String {
+fn describe_trials(files: &[ScriptFile], results: &[TrialResult], problems: &[ScriptProblem]) -> String {
     let mut text = String::new();
     for result in results {
         let (file, line, name) = (&result.file, result.line, &result.name);
@@ -178,46 +185,46 @@ fn told(files: &[ScriptFile], results: &[TrialResult], problems: &[ScriptProblem
     text
 }
 
-fn trial(result: &TrialResult) -> Value {
+fn trial_to_json(result: &TrialResult) -> Value {
     json!({
         "file": &*result.file, "line": result.line, "name": result.name, "passed": result.problem.is_none(),
-        "met": result.met, "seconds": result.passed_s, "problem": result.problem.as_ref().map(problem),
+        "met": result.met, "seconds": result.passed_s, "problem": result.problem.as_ref().map(problem_to_json),
     })
 }
 
-fn problem(problem: &ScriptProblem) -> Value {
+fn problem_to_json(problem: &ScriptProblem) -> Value {
     let ScriptProblem { file, line, column, what, next } = problem;
     json!({ "file": file, "line": line, "column": column, "what": what, "next": next })
 }
 
-fn compare(arguments: &BacktestArguments) -> CommandResult {
-    let config = configuration(arguments.config.as_deref())?;
+fn compare_over_history(arguments: &BacktestArguments) -> CommandResult {
+    let config = load_configuration(arguments.config.as_deref())?;
     let history = arguments.history.clone().unwrap_or_else(|| config.history.path.clone());
-    let newest_ns = newest(&history)?;
+    let newest_ns = read_newest_ns(&history)?;
     if !(0.0..=3600.0).contains(&arguments.every) {
         return Err(CannotRun::new(format!("--every {} is outside 0 to 3600 s", arguments.every), ""));
     }
     #[expect(clippy::cast_possible_truncation, reason = "at most an hour")]
     let every_ns = (arguments.every * 1e9) as i64;
-    let report = backtest(BacktestPlan {
-        from_ns: instant(&arguments.since, newest_ns)?,
-        to_ns: arguments.until.as_deref().map(|until| instant(until, newest_ns)).transpose()?,
+    let report = run_backtest(BacktestPlan {
+        from_ns: parse_instant(&arguments.since, newest_ns)?,
+        to_ns: arguments.until.as_deref().map(|until| parse_instant(until, newest_ns)).transpose()?,
         history,
         every_ns,
-        running: running(arguments, &config)?,
+        running: load_running_set(arguments, &config)?,
         edited: load_edited_set(arguments, &config)?,
     });
     let report = report.map_err(|error| CannotRun::new(error.to_string(), ""))?;
     if arguments.json {
-        print_json(&report.json());
+        print_json(&report.to_json());
     } else {
-        print(&report.to_string());
+        print_text(&report.to_string());
     }
-    Ok(if report.worse() { CommandOutcome::No } else { CommandOutcome::Fine })
+    Ok(if report.is_worse() { CommandOutcome::No } else { CommandOutcome::Fine })
 }
 
-fn newest(history: &Path) -> Result<i64, CannotRun> {
-    let span = Reader::open(history).and_then(|reader| reader.present());
+fn read_newest_ns(history: &Path) -> Result<i64, CannotRun> {
+    let span = Reader::open(history).and_then(|reader| reader.read_present_span());
     let span = span.map_err(|error| CannotRun::new(error.to_string(), "--history names the database"))?;
     span.map(|(_, newest_ns)| newest_ns).ok_or_else(|| {
         CannotRun::new(format!("{} holds no samples yet", history.display()), "let the box run for a while first")
@@ -225,31 +232,31 @@ fn newest(history: &Path) -> Result<i64, CannotRun> {
 }
 
 /// `24h` means as much before the newest sample.
-fn instant(text: &str, newest_ns: i64) -> Result<i64, CannotRun> {
+fn parse_instant(text: &str, newest_ns: i64) -> Result<i64, CannotRun> {
     let back = text.ends_with(['s', 'm', 'h', 'd']) && text.starts_with(|c: char| c.is_ascii_digit());
     let text = if back { format!("-{text}") } else { text.to_owned() };
     moment::parse(&text, newest_ns).map_err(|what| CannotRun::new(what, ""))
 }
 
-fn running(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {
+fn load_running_set(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {
     let files = match &arguments.running {
-        Some(directory) => read_directory(directory).map_err(refused)?,
-        None => active_scripts::kept(&config.gateway.data_dir).unwrap_or_else(script::shipped),
+        Some(directory) => read_directory(directory).map_err(refuse_scripts)?,
+        None => active_scripts::read_texts(&config.gateway.data_dir).unwrap_or_else(script::list_shipped_scripts),
     };
-    script::compile_with(&files, &values_for(&files, config)).map_err(refused)
+    script::compile_with(&files, &values_for(&files, config)).map_err(refuse_scripts)
 }
 
 /// Failing trials do not end it: what a script does to the history may be looked at before they are rewritten. They are told.
 fn load_edited_set(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {
     let files = match &arguments.scripts {
-        Some(directory) => read_directory(directory).map_err(refused)?,
-        None => configured(config)?,
+        Some(directory) => read_directory(directory).map_err(refuse_scripts)?,
+        None => load_configured_scripts(config)?,
     };
-    script::compile_with(&files, &values_for(&files, config)).map_err(refused)
+    script::compile_with(&files, &values_for(&files, config)).map_err(refuse_scripts)
 }
 
 /// The settings of this machine, where these scripts declare them all; otherwise the defaults.
 fn values_for(files: &[ScriptFile], config: &Config) -> SettingValues {
-    let values = settings::read(&settings::path(&config.gateway.data_dir)).unwrap_or_default();
+    let values = settings::read(&settings::values_path(&config.gateway.data_dir)).unwrap_or_default();
     if script::compile_with(files, &values).is_ok() { values } else { SettingValues::default() }
 }

@@ -21,14 +21,14 @@ pub(super) struct RunArguments {
     #[arg(long, value_name = "HOST:PORT")]
     listen: Option<SocketAddr>,
     /// Machine time over real time, or max: simulated machines and recordings only.
-    #[arg(long, value_name = "N|max", value_parser = speed, default_value = "1")]
+    #[arg(long, value_name = "N|max", value_parser = parse_speed, default_value = "1")]
     speed: MachineSpeed,
     /// End after so many seconds of machine time.
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = parse_seconds)]
     seconds: Option<f64>,
 }
 
-fn speed(text: &str) -> Result<MachineSpeed, String> {
+fn parse_speed(text: &str) -> Result<MachineSpeed, String> {
     if text == "max" {
         return Ok(MachineSpeed::Max);
     }
@@ -39,7 +39,7 @@ fn speed(text: &str) -> Result<MachineSpeed, String> {
     }
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
+fn parse_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
         _ => Err("give a number of seconds above 0".to_owned()),
@@ -48,14 +48,14 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 /// Runs the box until it is told to stop.
 pub(super) fn run(arguments: RunArguments, log: LogArguments) -> CommandResult {
-    let plan = plan(arguments)?;
-    log.start(&plan.config.log);
+    let plan = build_plan(arguments)?;
+    log.start_log(&plan.config.log);
     run::run(plan)?;
     Ok(CommandOutcome::Fine)
 }
 
-fn plan(arguments: RunArguments) -> Result<RunPlan, CannotRun> {
-    let overrides = overrides(&arguments);
+fn build_plan(arguments: RunArguments) -> Result<RunPlan, CannotRun> {
+    let overrides = collect_overrides(&arguments);
     let listen_in_environment = std::env::var_os(format!("{}HTTP__LISTEN", config::ENVIRONMENT_PREFIX)).is_some();
     let port_named = arguments.config.is_some() || arguments.listen.is_some() || listen_in_environment;
     let own = |name: &str| overrides.iter().any(|(key, _)| key == name);
@@ -65,14 +65,14 @@ fn plan(arguments: RunArguments) -> Result<RunPlan, CannotRun> {
     let variables = environment.into_iter().chain(overrides.clone());
     let config = match arguments.config.as_deref() {
         Some(path) => config::load(Some(path), variables),
-        None => config::parse(config::BUILT_IN, &demo::text(arguments.speed), Path::new(""), variables),
+        None => config::parse(config::BUILT_IN, &demo::config_text(arguments.speed), Path::new(""), variables),
     };
     let mut config = config.map_err(|problems| {
         let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
         CannotRun::new(lines.join("\n"), "")
     })?;
     if arguments.config.is_none() {
-        demo::furnish(&mut config, arguments.speed);
+        demo::install_data(&mut config, arguments.speed);
     }
     Ok(RunPlan {
         config,
@@ -84,7 +84,7 @@ fn plan(arguments: RunArguments) -> Result<RunPlan, CannotRun> {
 }
 
 /// RunArguments go before the environment and the file: they are given as variables in place of those of the environment.
-fn overrides(arguments: &RunArguments) -> Vec<(String, String)> {
+fn collect_overrides(arguments: &RunArguments) -> Vec<(String, String)> {
     let mut overrides = Vec::new();
     let mut set = |key: &str, value: String| overrides.push((format!("{}{key}", config::ENVIRONMENT_PREFIX), value));
     if let Some(directory) = &arguments.data_dir {

@@ -1,6 +1,6 @@
 //! `cnc-gateway setup`: the questions that a box needs answered, each tried at once, and the configuration from the answers.
 
-use super::{CannotRun, CommandOutcome, CommandResult, lang, print};
+use super::{CannotRun, CommandOutcome, CommandResult, lang, print_text};
 use crate::access::{self, Persons, Role};
 use crate::doctor;
 use crate::setup::{AddressRange, SetupAnswers, scan_for_controls};
@@ -51,21 +51,21 @@ struct Dialogue {
 }
 
 impl Dialogue {
-    fn text(&self, words: Words) -> &'static str {
+    fn pick_text(&self, words: Words) -> &'static str {
         if self.zh { words.1 } else { words.0 }
     }
 
-    fn say(&self, words: Words) {
-        print(&format!("{}\n", self.text(words)));
+    fn print_words(&self, words: Words) {
+        print_text(&format!("{}\n", self.pick_text(words)));
     }
 
     /// The answer; empty where nothing is asked or nothing was typed.
-    fn ask(&self, words: Words, default: &str) -> Result<String, CannotRun> {
+    fn ask_question(&self, words: Words, default: &str) -> Result<String, CannotRun> {
         if !self.asks {
             return Ok(default.to_owned());
         }
         let shown = if default.is_empty() { String::new() } else { format!(" [{default}]") };
-        print(&format!("{}{shown}: ", self.text(words)));
+        print_text(&format!("{}{shown}: ", self.pick_text(words)));
         let _shown = std::io::stdout().flush();
         let mut line = String::new();
         let read = std::io::stdin().lock().read_line(&mut line);
@@ -76,8 +76,8 @@ impl Dialogue {
         }
     }
 
-    fn confirm(&self, words: Words, default: bool) -> Result<bool, CannotRun> {
-        let answer = self.ask(words, if default { "y" } else { "n" })?.to_lowercase();
+    fn ask_confirmation(&self, words: Words, default: bool) -> Result<bool, CannotRun> {
+        let answer = self.ask_question(words, if default { "y" } else { "n" })?.to_lowercase();
         Ok(["y", "yes", "j", "是", "1"].contains(&answer.as_str()))
     }
 }
@@ -91,7 +91,7 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
     let language = zh.then_some(Language::Zh);
     let machine = match &arguments.name {
         Some(name) => name.clone(),
-        None => dialogue.ask(("Name of the machine", "机床名称"), &host_name())?,
+        None => dialogue.ask_question(("Name of the machine", "机床名称"), &host_name())?,
     };
     if let Some(range) = arguments.scan {
         list_controls(&dialogue, range);
@@ -99,7 +99,7 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
     let control = choose_control(&dialogue, arguments.control.as_deref())?;
     let meters = choose_meters(&dialogue, &arguments.meter)?;
     let page_from_network = arguments.page_from_network
-        || dialogue.confirm(
+        || dialogue.ask_confirmation(
             (
                 "May other computers open the page (over TLS, with a token)?",
                 "允许其他电脑打开页面吗(TLS 加密,需要令牌)?",
@@ -113,7 +113,7 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
     let answers = SetupAnswers { machine, language, control, meters, page_from_network };
     write_configuration(&dialogue, arguments, &answers)?;
     add_administrator(&dialogue, arguments)?;
-    dialogue.say((
+    dialogue.print_words((
         "Now: systemctl restart cnc-gateway, and open the page. Everything can be changed later, on the page or in the file.",
         "下一步:systemctl restart cnc-gateway,然后打开页面。以后都可以在页面或文件中修改。",
     ));
@@ -128,10 +128,10 @@ fn host_name() -> String {
 fn list_controls(dialogue: &Dialogue, range: AddressRange) {
     let found = scan_for_controls(range);
     if found.is_empty() {
-        dialogue.say(("Nothing in this range listens where a control would.", "该范围内没有发现数控系统。"));
+        dialogue.print_words(("Nothing in this range listens where a control would.", "该范围内没有发现数控系统。"));
     }
     for control in found {
-        print(&format!("  {}\n", control.address));
+        print_text(&format!("  {}\n", control.address));
     }
 }
 
@@ -149,15 +149,15 @@ fn show_address(dialogue: &Dialogue, address: &str) -> LookedAt {
     let report = match doctor::examine_text(address) {
         Ok(report) => report,
         Err(what) => {
-            print(&format!("  {what}\n"));
+            print_text(&format!("  {what}\n"));
             return LookedAt::Unusable;
         }
     };
     let known = report.readings.iter().filter(|(_, value)| value.is_ok()).count();
     let answers = if report.reachable { ("answers", "有应答") } else { ("does not answer", "无应答") };
-    print(&format!("  {address}: {}, {known} / {}\n", dialogue.text(answers), report.readings.len()));
+    print_text(&format!("  {address}: {}, {known} / {}\n", dialogue.pick_text(answers), report.readings.len()));
     for problem in &report.problems {
-        print(&format!("  ! {}\n    {}\n", problem.what, problem.next));
+        print_text(&format!("  ! {}\n    {}\n", problem.what, problem.next));
     }
     if report.problems.is_empty() { LookedAt::Good } else { LookedAt::Doubtful }
 }
@@ -167,7 +167,7 @@ fn try_address(dialogue: &Dialogue, address: &str) -> Result<bool, CannotRun> {
     match show_address(dialogue, address) {
         LookedAt::Unusable => Ok(false),
         LookedAt::Good => Ok(true),
-        LookedAt::Doubtful => dialogue.confirm(("Use it all the same?", "仍然使用吗?"), false),
+        LookedAt::Doubtful => dialogue.ask_confirmation(("Use it all the same?", "仍然使用吗?"), false),
     }
 }
 
@@ -185,11 +185,11 @@ fn choose_control(dialogue: &Dialogue, given: Option<&str>) -> Result<Option<Str
         "数控系统:地址如 fanuc://192.168.1.10、nclink://BROKER/SERIAL、simulated://lathe,或 \"scan 192.168.1.0/24\",或 none",
     );
     loop {
-        let answer = dialogue.ask(question, "none")?;
+        let answer = dialogue.ask_question(question, "none")?;
         if let Some(range) = answer.strip_prefix("scan ") {
             match range.trim().parse() {
                 Ok(range) => list_controls(dialogue, range),
-                Err(error) => print(&format!("  {error}\n")),
+                Err(error) => print_text(&format!("  {error}\n")),
             }
             continue;
         }
@@ -215,7 +215,7 @@ fn choose_meters(dialogue: &Dialogue, given: &[String]) -> Result<Vec<String>, C
     );
     let mut meters = Vec::new();
     loop {
-        match complete_address(&dialogue.ask(question, "none")?, "modbus-tcp") {
+        match complete_address(&dialogue.ask_question(question, "none")?, "modbus-tcp") {
             None => return Ok(meters),
             Some(address) => {
                 if try_address(dialogue, &address)? {
@@ -254,32 +254,38 @@ fn write_configuration(
         let before = out.with_extension("before.toml");
         std::fs::copy(out, &before).map_err(cannot)?;
         give_to_owner_of_directory(&before);
-        print(&format!("{}: {}\n", dialogue.text(("what was there before", "原来的配置")), before.display()));
+        print_text(&format!("{}: {}\n", dialogue.pick_text(("what was there before", "原来的配置")), before.display()));
     }
     crate::files::replace_durably(out, &text).map_err(cannot)?;
     give_to_owner_of_directory(out);
-    print(&format!("{}: {}\n", dialogue.text(("written", "已写入")), out.display()));
+    print_text(&format!("{}: {}\n", dialogue.pick_text(("written", "已写入")), out.display()));
     Ok(())
 }
 
 /// The first person, whose token is shown once.
 fn add_administrator(dialogue: &Dialogue, arguments: &SetupArguments) -> Result<(), CannotRun> {
-    let path = access::path(&arguments.data_dir);
+    let path = access::persons_path(&arguments.data_dir);
     let cannot =
         |error: access::PersonsError| CannotRun::new(error.to_string(), "cnc-gateway person add NAME --role admin");
     let mut persons = Persons::read(&path).map_err(cannot)?.unwrap_or_default();
-    if !persons.all().is_empty() && arguments.admin.is_none() {
+    if !persons.list_entries().is_empty() && arguments.admin.is_none() {
         return Ok(());
     }
     let name = match &arguments.admin {
         Some(name) => name.clone(),
-        None => dialogue
-            .ask(("Your name (you may change everything on the page)", "您的姓名(可在页面上修改全部内容)"), "admin")?,
+        None => dialogue.ask_question(
+            ("Your name (you may change everything on the page)", "您的姓名(可在页面上修改全部内容)"),
+            "admin",
+        )?,
     };
     let token = persons.add(&name, Role::Admin, "setup").map_err(cannot)?;
     persons.write(&path).map_err(cannot)?;
     give_to_owner_of_directory(&path);
-    print(&format!("{} {name}: {}\n", dialogue.text(("token, shown only now, of", "令牌(仅显示一次):")), token.text()));
+    print_text(&format!(
+        "{} {name}: {}\n",
+        dialogue.pick_text(("token, shown only now, of", "令牌(仅显示一次):")),
+        token.text()
+    ));
     Ok(())
 }
 

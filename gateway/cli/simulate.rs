@@ -2,7 +2,7 @@
 
 use super::diagnose::cannot_use;
 use super::{CannotRun, CommandOutcome, CommandResult};
-use crate::diagnosis::{execute, put, read_model, read_recordings, simulation};
+use crate::diagnosis::{execute, read_model, read_recordings, simulation, write_output};
 use adapters::address::{Address, Target};
 use adapters::simulated::SimulatedSettings;
 use clap::Args;
@@ -36,27 +36,27 @@ pub(super) struct SimulateArguments {
     #[arg(long, value_name = "SENSOR.csv", requires = "machine")]
     torque: Option<PathBuf>,
     /// Rows per second of the simulated machine's recording.
-    #[arg(long, value_name = "HZ", default_value_t = 2.0, value_parser = rate)]
+    #[arg(long, value_name = "HZ", default_value_t = 2.0, value_parser = parse_rate)]
     rate: f64,
 }
 
-fn rate(text: &str) -> Result<f64, String> {
+fn parse_rate(text: &str) -> Result<f64, String> {
     let rate = text.parse::<f64>().ok().filter(|rate| (0.01..=100.0).contains(rate));
     rate.ok_or_else(|| "give a rate from 0.01 to 100 rows per second".to_owned())
 }
 
 /// Simulates and prints.
-pub(super) fn simulate(arguments: SimulateArguments) -> CommandResult {
+pub(super) fn run_simulation(arguments: SimulateArguments) -> CommandResult {
     match (&arguments.machine, &arguments.model) {
-        (Some(machine), _) => experiment(machine, &arguments),
-        (None, Some(path)) => model(path, &arguments),
+        (Some(machine), _) => simulate_experiment(machine, &arguments),
+        (None, Some(path)) => simulate_model(path, &arguments),
         (None, None) => {
             Err(CannotRun::new("nothing to simulate", "give --model and --recording, or --machine and --plan"))
         }
     }
 }
 
-fn model(path: &Path, arguments: &SimulateArguments) -> CommandResult {
+fn simulate_model(path: &Path, arguments: &SimulateArguments) -> CommandResult {
     let mut problems = Vec::new();
     let model = read_model(path).map_err(|wrong| problems.extend(wrong));
     let given = read_recordings(&arguments.recording).map_err(|wrong| problems.extend(wrong));
@@ -65,38 +65,38 @@ fn model(path: &Path, arguments: &SimulateArguments) -> CommandResult {
     let simulation = simulation::run(&given.recording, &model).map_err(|all| cannot_use(&all))?;
     let say = |problem| CannotRun::new(problem, "");
     if let Some(path) = &arguments.rows {
-        put(path, &simulation.rows_csv(&given.recording)).map_err(say)?;
+        write_output(path, &simulation.rows_csv(&given.recording)).map_err(say)?;
     }
-    let text = if arguments.json { format!("{:#}\n", simulation.json()) } else { simulation.text() };
-    put(Path::new("-"), &text).map_err(say)?;
+    let text = if arguments.json { format!("{:#}\n", simulation.to_json()) } else { simulation.format_text() };
+    write_output(Path::new("-"), &text).map_err(say)?;
     Ok(CommandOutcome::Fine)
 }
 
-fn experiment(machine: &str, arguments: &SimulateArguments) -> CommandResult {
+fn simulate_experiment(machine: &str, arguments: &SimulateArguments) -> CommandResult {
     let mut problems = Vec::new();
-    let settings = settings(machine).map_err(|wrong| problems.push(wrong));
+    let settings = parse_machine(machine).map_err(|wrong| problems.push(wrong));
     let plan: Vec<String> = arguments.plan.iter().cloned().collect();
     let given = read_recordings(&plan).map_err(|wrong| problems.extend(wrong));
     let (Ok(settings), Ok(given)) = (settings, given) else { return Err(cannot_use(&problems)) };
     let (recording, instruments) =
-        execute::execute(settings, &given.recording, arguments.rate).map_err(|wrong| cannot_use(&[wrong]))?;
+        execute::execute_plan(settings, &given.recording, arguments.rate).map_err(|wrong| cannot_use(&[wrong]))?;
     let out = arguments.out.as_deref().unwrap_or(Path::new("-"));
-    put(out, &execute::csv(&recording)).map_err(|problem| CannotRun::new(problem, ""))?;
+    write_output(out, &execute::format_csv(&recording)).map_err(|problem| CannotRun::new(problem, ""))?;
     if let Some(path) = &arguments.torque {
-        put(path, &instruments.torque_csv()).map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(path, &instruments.torque_csv()).map_err(|problem| CannotRun::new(problem, ""))?;
     }
-    eprintln!("{} rows of {machine} in {}", recording.rows(), out.display());
+    eprintln!("{} rows of {machine} in {}", recording.count_rows(), out.display());
     if let Some((before_mm, after_mm)) = instruments.flank_wear_mm {
         eprintln!("a microscope shows a flank wear of {before_mm:.4} mm before and {after_mm:.4} mm after");
     }
     Ok(CommandOutcome::Fine)
 }
 
-fn settings(machine: &str) -> Result<SimulatedSettings, String> {
+fn parse_machine(machine: &str) -> Result<SimulatedSettings, String> {
     let text = if machine.starts_with("simulated:") { machine.to_owned() } else { format!("simulated://{machine}") };
     let address: Address = text.parse().map_err(|error| format!("--machine {machine}: {error}"))?;
     match address.target() {
-        Target::Simulated(target) => Ok(SimulatedSettings::of(target)),
+        Target::Simulated(target) => Ok(SimulatedSettings::from_target(target)),
         _ => Err(format!("--machine {machine}: give lathe or mill")),
     }
 }

@@ -1,6 +1,6 @@
 //! `cnc-gateway update`: another version of the program, with the way back.
 
-use super::{CannotRun, CommandOutcome, CommandResult, print};
+use super::{CannotRun, CommandOutcome, CommandResult, print_text};
 use crate::update::{
     CONFIRM_WITHIN, HOME, PublicKeySource, SystemdService, TrialOutcome, UpdateError, VersionSlots, read_bundle,
     run_trial,
@@ -33,25 +33,25 @@ pub(super) struct UpdateArguments {
 
 /// Installs an update, or tells which version runs.
 pub(super) fn run(arguments: &UpdateArguments) -> CommandResult {
-    let slots = VersionSlots::open(&arguments.home).map_err(|error| cannot(&error))?;
+    let slots = VersionSlots::open(&arguments.home).map_err(|error| to_cannot_run(&error))?;
     let Some(file) = &arguments.file else { return print_versions(&slots, arguments) };
     let key = key_source(arguments.verify.as_deref())?;
-    let version = stage(&slots, arguments, file, &key).map_err(|error| cannot(&error))?;
-    print(&format!("{version} is in its place beside the running one; the service is started anew\n"));
+    let version = stage_update(&slots, arguments, file, &key).map_err(|error| to_cannot_run(&error))?;
+    print_text(&format!("{version} is in its place beside the running one; the service is started anew\n"));
     let outcome = run_trial(&slots, &version, &arguments.data_dir, &SystemdService, CONFIRM_WITHIN);
-    match outcome.map_err(|error| cannot(&error))? {
+    match outcome.map_err(|error| to_cannot_run(&error))? {
         TrialOutcome::Confirmed => {
-            print(&format!("{version} runs and is well. The gate is not armed: arming ends with every start\n"));
+            print_text(&format!("{version} runs and is well. The gate is not armed: arming ends with every start\n"));
             Ok(CommandOutcome::Fine)
         }
         TrialOutcome::RolledBack { reason } => {
-            print(&format!("{version} was taken back: {reason}. The version before runs again\n"));
+            print_text(&format!("{version} was taken back: {reason}. The version before runs again\n"));
             Ok(CommandOutcome::No)
         }
     }
 }
 
-fn cannot(error: &UpdateError) -> CannotRun {
+fn to_cannot_run(error: &UpdateError) -> CannotRun {
     CannotRun::new(error.to_string(), "what ran before still runs")
 }
 
@@ -66,31 +66,31 @@ fn key_source(given: Option<&str>) -> Result<PublicKeySource, CannotRun> {
 }
 
 fn print_versions(slots: &VersionSlots, arguments: &UpdateArguments) -> CommandResult {
-    let running = slots.running().unwrap_or_default();
+    let running = slots.running_slot().unwrap_or_default();
     let rolled_back = std::fs::read_to_string(arguments.home.join("rolled-back")).unwrap_or_default();
-    let trial = slots.trial().map(|trial| {
+    let trial = slots.read_trial().map(|trial| {
         format!("{} is on trial, {} starts so far; before it ran {}\n", trial.new, trial.starts, trial.before)
     });
-    print(&format!("runs: {running}\n{}{rolled_back}", trial.unwrap_or_default()));
+    print_text(&format!("runs: {running}\n{}{rolled_back}", trial.unwrap_or_default()));
     Ok(CommandOutcome::Fine)
 }
 
 /// Verifies, unpacks, asks the new program whether it runs here and accepts the configuration, and keeps it. Gives its version.
-fn stage(
+fn stage_update(
     slots: &VersionSlots,
     arguments: &UpdateArguments,
     file: &Path,
     key: &PublicKeySource,
 ) -> Result<String, UpdateError> {
     let bundle = read_bundle(file, key)?;
-    let program = slots.stage(&bundle.program)?;
+    let program = slots.stage_program(&bundle.program)?;
     let new = version_of(&program)?;
     let running = env!("CARGO_PKG_VERSION");
-    if !arguments.allow_older && number(&new) <= number(running) {
+    if !arguments.allow_older && parse_version(&new) <= parse_version(running) {
         return Err(UpdateError::Older { new, running: running.to_owned() });
     }
     ask_about_configuration(&program, &arguments.config, &arguments.data_dir)?;
-    slots.keep(&new)?;
+    slots.keep_staged(&new)?;
     Ok(new)
 }
 
@@ -105,7 +105,7 @@ fn version_of(program: &Path) -> Result<String, UpdateError> {
 }
 
 /// The numbers of a version, for comparing.
-fn number(version: &str) -> Vec<u64> {
+fn parse_version(version: &str) -> Vec<u64> {
     let numbers = version.split(['-', '+']).next().unwrap_or_default();
     numbers.split('.').map(|part| part.parse().unwrap_or(0)).collect()
 }
@@ -127,12 +127,12 @@ fn ask_about_configuration(program: &Path, config: &Path, data_dir: &Path) -> Re
 
 #[cfg(test)]
 mod tests {
-    use super::number;
+    use super::parse_version;
 
     #[test]
     fn versions_are_compared_by_their_numbers() {
-        assert!(number("0.10.0") > number("0.9.3"));
-        assert!(number("1.0.0-rc1") > number("0.9.9"));
-        assert!(number("0.1.0") <= number("0.1.0"));
+        assert!(parse_version("0.10.0") > parse_version("0.9.3"));
+        assert!(parse_version("1.0.0-rc1") > parse_version("0.9.9"));
+        assert!(parse_version("0.1.0") <= parse_version("0.1.0"));
     }
 }

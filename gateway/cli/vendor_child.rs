@@ -13,8 +13,8 @@ pub(super) struct VendorChildArguments {
 /// Answers the parent until it is gone.
 pub(super) fn run(arguments: &VendorChildArguments) -> CommandResult {
     let ended = match arguments.kind.as_str() {
-        adapters::fanuc::vendor::KIND => adapters::fanuc::vendor::child(),
-        adapters::hnc::KIND => adapters::hnc::child(),
+        adapters::fanuc::vendor::KIND => adapters::fanuc::vendor::serve_parent(),
+        adapters::hnc::KIND => adapters::hnc::serve_parent(),
         other => return Err(CannotRun::new(format!("no library is served as {other}"), "")),
     };
     ended

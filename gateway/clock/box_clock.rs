@@ -25,14 +25,14 @@ pub struct ClockMark {
 impl ClockMark {
     /// A machine that brings its own time: a recording, a simulation at another speed.
     #[must_use]
-    pub fn stepped() -> Self {
+    pub fn from_stepped_time() -> Self {
         Self { trust: "stepped", boot: String::new(), anchor_ns: 0 }
     }
 
     /// May anything be judged by the age that these rows give it?
     #[must_use]
     pub fn is_certain(&self) -> bool {
-        [Trust::Confirmed.word(), "stepped"].contains(&self.trust)
+        [Trust::Confirmed.as_word(), "stepped"].contains(&self.trust)
     }
 }
 
@@ -58,67 +58,67 @@ impl Default for BoxClock {
 }
 
 impl BoxClock {
-    /// Anchored to the wall clock of this moment, whatever it says; [`BoxClock::begin`] judges it.
+    /// Anchored to the wall clock of this moment, whatever it says; [`BoxClock::begin_run`] judges it.
     #[must_use]
     pub fn new() -> Self {
         let (wall_ns, rules) = (wall_ns(), ClockRules::default());
         let certain = Certain { at_least_ns: super::MADE_NS };
-        let (judge, _) = Judge::begin(rules, certain, wall_ns, true);
+        let (judge, _) = Judge::from_first_reading(rules, certain, wall_ns, true);
         Self { anchor_ns: AtomicI64::new(wall_ns.saturating_sub(since_boot_ns())), judge: Mutex::new(judge) }
     }
 
-    fn judge(&self) -> MutexGuard<'_, Judge> {
+    fn lock_judge(&self) -> MutexGuard<'_, Judge> {
         // It is complete whenever the lock is free.
         self.judge.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Begins a run: from now on the box has the time of the wall clock, or, where that cannot be, the last certain one.
     /// `decided`: the reading has stood long enough already. Nothing that lives by this clock may be running.
-    pub fn begin(&self, rules: ClockRules, certain: Certain, decided: bool) {
-        let (judge, now_ns) = Judge::begin(rules, certain, wall_ns(), decided);
+    pub fn begin_run(&self, rules: ClockRules, certain: Certain, decided: bool) {
+        let (judge, now_ns) = Judge::from_first_reading(rules, certain, wall_ns(), decided);
         self.anchor_ns.store(now_ns.saturating_sub(since_boot_ns()), Ordering::SeqCst);
-        *self.judge() = judge;
+        *self.lock_judge() = judge;
     }
 
     /// Compares with the wall clock; call it about once per second.
-    pub fn look(&self) -> Option<ClockNews> {
-        self.judge().look(self.now_ns(), wall_ns())
+    pub fn compare_with_wall(&self) -> Option<ClockNews> {
+        self.lock_judge().judge_reading(self.now_ns(), wall_ns())
     }
 
     /// What is thought of the wall clock.
     #[must_use]
     pub fn trust(&self) -> Trust {
-        self.judge().trust()
+        self.lock_judge().trust()
     }
 
     /// Are the rows of this run dated by a confirmed clock? Only then may anything go because of its age.
     #[must_use]
     pub fn is_confirmed(&self) -> bool {
-        self.judge().is_confirmed()
+        self.lock_judge().is_confirmed()
     }
 
     /// It is certainly later than this.
     #[must_use]
     pub fn at_least_ns(&self) -> TimeNs {
-        self.judge().certain().at_least_ns
+        self.lock_judge().certain().at_least_ns
     }
 
     /// By which clock rows are dated from now on.
     #[must_use]
-    pub fn mark(&self) -> ClockMark {
+    pub fn current_mark(&self) -> ClockMark {
         let trust = match self.trust() {
             Trust::Leapt if self.is_confirmed() => Trust::Confirmed,
             Trust::Leapt => Trust::Plausible,
             trust => trust,
         };
         let boot = std::fs::read_to_string(BOOT_ID).map(|id| id.trim().to_owned()).unwrap_or_default();
-        ClockMark { trust: trust.word(), boot, anchor_ns: self.anchor_ns.load(Ordering::SeqCst) }
+        ClockMark { trust: trust.as_word(), boot, anchor_ns: self.anchor_ns.load(Ordering::SeqCst) }
     }
 
     /// For the status.
     #[must_use]
-    pub fn status(&self) -> ClockStatus {
-        let judge = self.judge();
+    pub fn build_status(&self) -> ClockStatus {
+        let judge = self.lock_judge();
         #[expect(clippy::cast_precision_loss, reason = "for a reader")]
         let wall_ahead_s = judge.ahead_ns() as f64 / SECOND_NS as f64;
         ClockStatus { trust: judge.trust(), wall_ahead_s }
@@ -160,13 +160,13 @@ mod tests {
         let clock = BoxClock::new();
         assert!((clock.now_ns() - wall_ns()).abs() < SECOND_NS);
         let later_ns = wall_ns() + 1_000_000 * SECOND_NS;
-        clock.begin(ClockRules::default(), Certain { at_least_ns: later_ns }, false);
+        clock.begin_run(ClockRules::default(), Certain { at_least_ns: later_ns }, false);
         assert!(clock.now_ns() > later_ns && clock.trust() == Trust::Unset);
-        assert_eq!((clock.mark().trust, clock.at_least_ns()), ("unset", later_ns));
+        assert_eq!((clock.current_mark().trust, clock.at_least_ns()), ("unset", later_ns));
         let before_ns = clock.now_ns();
         clock.sleep_until(before_ns + 1_000_000);
         assert!(clock.now_ns() >= before_ns + 1_000_000);
-        assert_eq!(clock.look(), Some(ClockNews::Leapt { ahead_ns: clock.judge().ahead_ns() }));
-        assert!(clock.status().wall_ahead_s < -999_000.0);
+        assert_eq!(clock.compare_with_wall(), Some(ClockNews::Leapt { ahead_ns: clock.lock_judge().ahead_ns() }));
+        assert!(clock.build_status().wall_ahead_s < -999_000.0);
     }
 }

@@ -30,7 +30,7 @@ pub enum Trust {
 impl Trust {
     /// The word in files and documents.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub const fn as_word(self) -> &'static str {
         match self {
             Self::Unset => "unset",
             Self::Plausible => "plausible",
@@ -113,7 +113,12 @@ pub(super) struct Judge {
 
 impl Judge {
     /// The first reading of a run: the time at which the box begins. `decided`: the reading has stood long enough already.
-    pub(super) fn begin(rules: ClockRules, certain: Certain, wall_ns: TimeNs, decided: bool) -> (Self, TimeNs) {
+    pub(super) fn from_first_reading(
+        rules: ClockRules,
+        certain: Certain,
+        wall_ns: TimeNs,
+        decided: bool,
+    ) -> (Self, TimeNs) {
         let possible = wall_ns >= super::MADE_NS;
         let unset = !possible || (!decided && wall_ns < certain.at_least_ns);
         let now_ns = if unset { certain.at_least_ns.saturating_add(SECOND_NS) } else { wall_ns };
@@ -143,10 +148,10 @@ impl Judge {
     }
 
     /// The box says `now_ns`, the wall clock `wall_ns`.
-    pub(super) fn look(&mut self, now_ns: TimeNs, wall_ns: TimeNs) -> Option<ClockNews> {
+    pub(super) fn judge_reading(&mut self, now_ns: TimeNs, wall_ns: TimeNs) -> Option<ClockNews> {
         let ahead_ns = wall_ns.saturating_sub(now_ns);
         if ahead_ns.saturating_abs() < STEP_MIN_NS {
-            return self.agree(now_ns);
+            return self.record_agreement(now_ns);
         }
         let leap = match self.leap.filter(|leap| leap.ahead_ns.saturating_sub(ahead_ns).saturating_abs() < STEP_MIN_NS)
         {
@@ -169,7 +174,7 @@ impl Judge {
         Some(ClockNews::Leapt { ahead_ns })
     }
 
-    fn agree(&mut self, now_ns: TimeNs) -> Option<ClockNews> {
+    fn record_agreement(&mut self, now_ns: TimeNs) -> Option<ClockNews> {
         if self.leap.take().is_some() {
             self.agreed_since_ns = now_ns;
             if self.base == Trust::Unset {
@@ -218,7 +223,7 @@ mod tests {
     const NOW_NS: TimeNs = ROW_NS + HOUR_NS;
 
     fn begin(wall_ns: TimeNs) -> (Judge, TimeNs) {
-        Judge::begin(ClockRules::default(), Certain { at_least_ns: ROW_NS }, wall_ns, false)
+        Judge::from_first_reading(ClockRules::default(), Certain { at_least_ns: ROW_NS }, wall_ns, false)
     }
 
     /// Looks every second for so long; gives what was told, each with the second.
@@ -229,7 +234,9 @@ mod tests {
         wall_ns: impl Fn(TimeNs) -> TimeNs,
     ) -> Vec<(i64, ClockNews)> {
         let at = |second: i64| from_ns + second * SECOND_NS;
-        (0..seconds).filter_map(|second| Some((second, judge.look(at(second), wall_ns(at(second)))?))).collect()
+        (0..seconds)
+            .filter_map(|second| Some((second, judge.judge_reading(at(second), wall_ns(at(second)))?)))
+            .collect()
     }
 
     #[test]
@@ -290,9 +297,9 @@ mod tests {
     #[test]
     fn what_was_decided_is_not_doubted_again_but_the_impossible_is() {
         let certain = Certain { at_least_ns: ROW_NS };
-        let (judge, now_ns) = Judge::begin(ClockRules::default(), certain, ROW_NS - DAY_NS, true);
+        let (judge, now_ns) = Judge::from_first_reading(ClockRules::default(), certain, ROW_NS - DAY_NS, true);
         assert_eq!((judge.trust(), now_ns), (Trust::Plausible, ROW_NS - DAY_NS));
-        let (judge, _) = Judge::begin(ClockRules::default(), certain, 0, true);
+        let (judge, _) = Judge::from_first_reading(ClockRules::default(), certain, 0, true);
         assert_eq!(judge.trust(), Trust::Unset);
     }
 
@@ -311,7 +318,7 @@ mod tests {
         fn no_reading_makes_it_panic_or_follow_at_once(walls in proptest::collection::vec(proptest::prelude::any::<i64>(), 1..50)) {
             let (mut judge, now_ns) = begin(walls[0]);
             for (second, wall_ns) in (0..).zip(&walls) {
-                let news = judge.look(now_ns.saturating_add(second * SECOND_NS), *wall_ns);
+                let news = judge.judge_reading(now_ns.saturating_add(second * SECOND_NS), *wall_ns);
                 let follows = matches!(news, Some(ClockNews::Follow { .. }));
                 proptest::prop_assert!(second >= 30 || !follows);
             }

@@ -43,7 +43,7 @@ pub fn now_ns() -> TimeNs {
 
 /// A length of time in words.
 #[must_use]
-pub fn span(ns: i64) -> String {
+pub fn format_span(ns: i64) -> String {
     let seconds = ns.unsigned_abs().saturating_add(SECOND_NS.unsigned_abs() / 2) / SECOND_NS.unsigned_abs();
     match seconds {
         0..=119 => format!("{seconds} s"),

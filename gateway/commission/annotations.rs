@@ -31,7 +31,7 @@ pub enum Quantity {
 impl Quantity {
     /// The word on the command line.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::FlankWear => "flank-wear",
             Self::Gauge => "gauge",
@@ -51,7 +51,7 @@ impl Quantity {
     }
 
     /// Values that can be, in that unit, and where the limits come from.
-    fn range(self) -> (f64, f64, &'static str) {
+    fn allowed_range(self) -> (f64, f64, &'static str) {
         match self {
             Self::FlankWear => (0.0, 2.0, "an edge with more flank wear than 2 mm has broken"),
             Self::Gauge | Self::Probe => (-2000.0, 2000.0, "no machine tool grows by more than 2 mm"),
@@ -103,17 +103,17 @@ pub struct TypedAnnotation {
 ///
 /// # Errors
 /// What is missing or impossible, and what to write.
-pub fn annotation(quantity: Quantity, given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, String> {
+pub fn parse_annotation(quantity: Quantity, given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, String> {
     if quantity == Quantity::Torque {
-        return torque(given, newest_ns);
+        return parse_torque(given, newest_ns);
     }
-    let name = quantity.word();
+    let name = quantity.as_word();
     let value =
         given.value.ok_or_else(|| format!("{name}: the value is missing: write annotate {name} 0.12 --unit mm"))?;
     let unit = given.unit.as_deref().ok_or_else(|| {
         format!("{name} {value}: the unit is missing, and 0.12 mm is not 0.12 um: add --unit mm or --unit um")
     })?;
-    let factor = factor(unit, quantity.unit()).ok_or_else(|| {
+    let factor = length_factor(unit, quantity.unit()).ok_or_else(|| {
         format!("{name} {value} {unit}: {unit:?} is no unit of length that is known here: write mm, um or in")
     })?;
     let at = given.at.as_deref().ok_or_else(|| {
@@ -121,7 +121,7 @@ pub fn annotation(quantity: Quantity, given: TypedAnnotation, newest_ns: TimeNs)
     })?;
     let at_ns = moment::parse(at, newest_ns).map_err(|problem| format!("{name} --at {at}: {problem}"))?;
     let value = value * factor;
-    let (least, greatest, why) = quantity.range();
+    let (least, greatest, why) = quantity.allowed_range();
     if !(least..=greatest).contains(&value) {
         let kept = quantity.unit();
         return Err(format!(
@@ -135,7 +135,7 @@ pub fn annotation(quantity: Quantity, given: TypedAnnotation, newest_ns: TimeNs)
     Ok(Annotation { quantity, at_ns, value: Some(value), sd, file: None, of: given.of })
 }
 
-fn torque(given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, String> {
+fn parse_torque(given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, String> {
     let usage =
         "write annotate torque --file sensor.csv --unit Nm; the file has columns time_s (its own clock) and torque_nm";
     let file = given.file.ok_or_else(|| format!("torque: the file is missing: {usage}"))?;
@@ -157,7 +157,7 @@ fn torque(given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, Strin
 }
 
 /// Lengths of `from` in those of `to`.
-fn factor(from: &str, to: &str) -> Option<f64> {
+fn length_factor(from: &str, to: &str) -> Option<f64> {
     let in_um = match from {
         "mm" => 1000.0,
         "um" | "µm" | "μm" => 1.0,
@@ -217,13 +217,13 @@ mod tests {
 
     #[test]
     fn a_reading_needs_unit_and_time_and_must_be_possible() {
-        let refused = |given| annotation(Quantity::Gauge, given, 0).expect_err("refused");
+        let refused = |given| parse_annotation(Quantity::Gauge, given, 0).expect_err("refused");
         assert!(refused(given(12.0, None, Some("now"))).contains("unit is missing"));
         assert!(refused(given(12.0, Some("um"), None)).contains("time is missing"));
         assert!(refused(given(12.0, Some("kg"), Some("now"))).contains("mm, um or in"));
         assert!(refused(given(12.0, Some("mm"), Some("now"))).contains("is the unit right?"));
         assert!(refused(TypedAnnotation::default()).contains("value is missing"));
-        let torque = annotation(Quantity::Torque, TypedAnnotation::default(), 0).expect_err("no file");
+        let torque = parse_annotation(Quantity::Torque, TypedAnnotation::default(), 0).expect_err("no file");
         assert!(torque.contains("--file"), "{torque}");
     }
 
@@ -231,7 +231,7 @@ mod tests {
     fn what_was_added_is_read_by_time() {
         let directory = tempfile::tempdir().expect("a directory");
         for (value, at) in [(0.2, "2026-01-02"), (0.1, "2026-01-01")] {
-            let one = annotation(Quantity::FlankWear, given(value, Some("mm"), Some(at)), 0).expect("fine");
+            let one = parse_annotation(Quantity::FlankWear, given(value, Some("mm"), Some(at)), 0).expect("fine");
             add(directory.path(), &one).expect("written");
         }
         let all = read(directory.path()).expect("readable");

@@ -55,10 +55,10 @@ const GAUGE_REACHES_NS: i64 = 30 * SECOND_NS;
 pub fn read(history: &Path, from_ns: Option<TimeNs>) -> Result<Recording, String> {
     let reader = Reader::open(history).map_err(|error| error.to_string())?;
     let known: Vec<String> =
-        reader.series().map_err(|error| error.to_string())?.into_iter().map(|it| it.name.to_string()).collect();
+        reader.read_series().map_err(|error| error.to_string())?.into_iter().map(|it| it.name.to_string()).collect();
     let series: Vec<String> =
         SERIES.iter().filter(|name| known.iter().any(|it| it == *name)).map(|name| (*name).to_owned()).collect();
-    reader.recording(&Query { from_ns, series, ..Query::default() }).map_err(|error| error.to_string())
+    reader.read_recording(&Query { from_ns, series, ..Query::default() }).map_err(|error| error.to_string())
 }
 
 /// Time of every row, ns.
@@ -79,7 +79,7 @@ pub fn add_wear(recording: &mut Recording, annotations: &[Annotation]) {
         return;
     }
     let wear = |at_ns: TimeNs| {
-        let between = bracket(&readings, at_ns).map(|(one, other)| {
+        let between = find_bracket(&readings, at_ns).map(|(one, other)| {
             let share = (at_ns - one.0) as f64 / (other.0 - one.0).max(1) as f64;
             one.1 + share * (other.1 - one.1)
         });
@@ -96,7 +96,7 @@ pub fn add_wear(recording: &mut Recording, annotations: &[Annotation]) {
 type WearReading<'a> = (TimeNs, f64, &'a str);
 
 /// The closest two readings of one edge with a time between them: an edge was in the machine from the one to the other.
-fn bracket<'a>(readings: &[WearReading<'a>], at_ns: TimeNs) -> Option<(WearReading<'a>, WearReading<'a>)> {
+fn find_bracket<'a>(readings: &[WearReading<'a>], at_ns: TimeNs) -> Option<(WearReading<'a>, WearReading<'a>)> {
     let (before, after): (Vec<WearReading<'_>>, Vec<WearReading<'_>>) =
         readings.iter().copied().partition(|it| it.0 <= at_ns);
     let pair = |one: &WearReading<'a>| Some((*one, *after.iter().find(|it| it.2 == one.2 && it.1 >= one.1)?));
@@ -110,7 +110,7 @@ pub fn add_thermal_error(recording: &mut Recording, annotations: &[Annotation]) 
     let mut values = vec![None; times_ns.len()];
     for it in annotations.iter().filter(|it| matches!(it.quantity, Quantity::Gauge | Quantity::Probe)) {
         let next = times_ns.partition_point(|at_ns| *at_ns < it.at_ns);
-        let nearest = neighbours(next, times_ns.len()).min_by_key(|at| (times_ns[*at] - it.at_ns).abs());
+        let nearest = neighbouring_rows(next, times_ns.len()).min_by_key(|at| (times_ns[*at] - it.at_ns).abs());
         if let Some(at) = nearest.filter(|at| (times_ns[*at] - it.at_ns).abs() <= GAUGE_REACHES_NS) {
             values[at] = it.value;
         }
@@ -121,7 +121,7 @@ pub fn add_thermal_error(recording: &mut Recording, annotations: &[Annotation]) 
 }
 
 /// The rows before and after a place among so many rows.
-fn neighbours(next: usize, rows: usize) -> impl Iterator<Item = usize> {
+fn neighbouring_rows(next: usize, rows: usize) -> impl Iterator<Item = usize> {
     [next.checked_sub(1), Some(next)].into_iter().flatten().filter(move |at| *at < rows)
 }
 
@@ -133,7 +133,7 @@ pub fn torque_course(file: &Path) -> Result<Vec<(f64, f64)>, String> {
     let at = |what: &str| format!("{}: {what}", file.display());
     let read =
         crate::diagnosis::read_recordings(&[file.display().to_string()]).map_err(|problems| problems.join("\n"))?;
-    let torque = read.recording.numbers("torque_nm").ok_or_else(|| {
+    let torque = read.recording.find_numbers("torque_nm").ok_or_else(|| {
         at("there is no column torque_nm; the file needs time_s, on the sensor's own clock, and torque_nm in N·m")
     })?;
     let rows = read.recording.time_s.iter().zip(torque.iter());
@@ -156,13 +156,13 @@ pub struct Merged {
 /// A file that can no longer be read.
 pub fn add_torque(recording: &mut Recording, annotations: &[Annotation]) -> Result<Vec<Merged>, String> {
     let mut merged = Vec::new();
-    let mut sums = vec![(0.0, 0.0); recording.rows()];
+    let mut sums = vec![(0.0, 0.0); recording.count_rows()];
     let power = torque_like(recording);
     for file in annotations.iter().filter_map(|it| it.file.as_deref()) {
         let course = torque_course(file)?;
         let matched = match_courses(&power, &course);
         if let Ok(matched) = &matched {
-            spread(&mut sums, &recording.time_s, &course, matched);
+            spread_torques(&mut sums, &recording.time_s, &course, matched);
         }
         merged.push(Merged { file: file.display().to_string(), matched });
     }
@@ -175,24 +175,24 @@ pub fn add_torque(recording: &mut Recording, annotations: &[Annotation]) -> Resu
 
 /// What the torque must look like: spindle power over angular speed, while the spindle turns at a steady speed.
 fn torque_like(recording: &Recording) -> Vec<(f64, f64)> {
-    let number = |name: &str, row: usize| recording.numbers(name).and_then(|it| it.get(row));
+    let number = |name: &str, row: usize| recording.find_numbers(name).and_then(|it| it.get(row));
     let one = |row: usize| {
         let (power, speed) = (number("spindle_power_w", row)?, number("spindle_speed_rpm", row)?.abs());
         let no_load = number("no_load_power_w", row).unwrap_or(0.0);
-        let state = recording.words(STATE_SERIES).and_then(|words| words.get(row)).unwrap_or("");
+        let state = recording.find_words(STATE_SERIES).and_then(|words| words.get(row)).unwrap_or("");
         let cutting = state == "cutting" && speed > 1.0;
         let torque = if cutting { (power - no_load) * 60.0 / (std::f64::consts::TAU * speed) } else { 0.0 };
         Some((recording.time_s[row], torque))
     };
-    (0..recording.rows()).filter_map(one).collect()
+    (0..recording.count_rows()).filter_map(one).collect()
 }
 
 /// Adds the torques of a file to the rows that they fall into.
-fn spread(sums: &mut [(f64, f64)], time_s: &[f64], course: &[(f64, f64)], matched: &Matched) {
+fn spread_torques(sums: &mut [(f64, f64)], time_s: &[f64], course: &[(f64, f64)], matched: &Matched) {
     for (second_s, torque) in course {
         let at_s = matched.on_first_clock(*second_s);
         let next = time_s.partition_point(|row_s| *row_s < at_s);
-        let nearest = neighbours(next, time_s.len())
+        let nearest = neighbouring_rows(next, time_s.len())
             .min_by(|a, b| (time_s[*a] - at_s).abs().total_cmp(&(time_s[*b] - at_s).abs()));
         if let Some(at) = nearest.filter(|at| (time_s[*at] - at_s).abs() <= 0.5) {
             sums[at] = (sums[at].0 + torque, sums[at].1 + 1.0);
@@ -218,7 +218,7 @@ mod tests {
         let noted = [reading(0, 0.02, "a"), reading(99, 0.14, "b"), reading(100, 0.04, "a"), reading(200, 0.16, "b")];
         let mut recording = Recording::new("history", vec![50.0, 150.0, 300.0], Some(0));
         add_wear(&mut recording, &noted);
-        let wears: Vec<f64> = recording.numbers("flank_wear_mm").expect("a column").present().collect();
+        let wears: Vec<f64> = recording.find_numbers("flank_wear_mm").expect("a column").present_values().collect();
         let near = |at: usize, wear: f64| (wears[at] - wear).abs() < 1e-3;
         assert!(near(0, 0.03) && near(1, 0.15) && near(2, 0.16), "{wears:?}");
     }

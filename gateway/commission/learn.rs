@@ -10,9 +10,9 @@ use rules::estimators::power_separation::{
     LoadLossLearned, NoLoadLearned, ReferenceChoice, identify_load_loss, identify_no_load,
 };
 use rules::estimators::regression::{Refusal, RefusalKind};
-use rules::estimators::thermal::{SelectionSettings, ThermalModel, collect, learn};
+use rules::estimators::thermal::{SelectionSettings, ThermalModel, collect_rows, learn_law};
 use rules::estimators::wear::{
-    Cut, CutColumns, LearnedWear, WearKey, WearOptions, WearRecord, gather, identify_tool_wear,
+    Cut, CutColumns, LearnedWear, WearKey, WearOptions, WearRecord, gather_cuts, identify_tool_wear,
 };
 use serde_json::Value;
 
@@ -51,7 +51,7 @@ pub struct Learned {
 
 /// Learns what can be learned from a recording that holds the annotated columns.
 #[must_use]
-pub fn all(recording: &Recording, merged: Vec<Merged>, machine: &str, criterion_mm: f64) -> Learned {
+pub fn learn_parts(recording: &Recording, merged: Vec<Merged>, machine: &str, criterion_mm: f64) -> Learned {
     let mut learned = Learned {
         parts: Vec::new(),
         no_load: None,
@@ -64,13 +64,13 @@ pub fn all(recording: &Recording, merged: Vec<Merged>, machine: &str, criterion_
     };
     learned.no_load(recording);
     learned.load_loss(recording);
-    learned.wear(recording, machine, criterion_mm);
-    learned.thermal(recording, machine);
+    learned.learn_wear(recording, machine, criterion_mm);
+    learned.learn_thermal(recording, machine);
     learned
 }
 
 impl Learned {
-    fn part(&mut self, name: &'static str, known: Result<String, Refusal>, next: &str, minutes: f64) {
+    fn add_part(&mut self, name: &'static str, known: Result<String, Refusal>, next: &str, minutes: f64) {
         let (next, minutes) = if known.is_ok() { (String::new(), 0.0) } else { (next.to_owned(), minutes) };
         self.parts.push(JobPart { name, known, next, minutes });
     }
@@ -86,7 +86,7 @@ impl Learned {
             }
             Ok(format!("{speeds} speeds, {} visits", learned.stretches.len()))
         });
-        self.part(
+        self.add_part(
             "no-load",
             known,
             "let the spindle turn without feed at 4 speeds or more of every gear stage, 30 s each, after a warm-up: everything else is \
@@ -99,7 +99,7 @@ impl Learned {
             y: it.power_w,
             sd: 0.5 * (it.interval_w.1 - it.interval_w.0),
         });
-        self.pictures.push(Picture::curve("No-load power 空载功率", "rpm", "W", dots.collect()));
+        self.pictures.push(Picture::new_curve("No-load power 空载功率", "rpm", "W", dots.collect()));
         self.no_load = Some(learned);
     }
 
@@ -118,7 +118,7 @@ impl Learned {
             });
             each.collect::<Vec<String>>().join("; ")
         });
-        self.part(
+        self.add_part(
             "load-loss",
             known.map_err(Clone::clone),
             "mount a torque sensor at the spindle for this one run, cut four depths at each of three speeds with idling between, then give its file: \
@@ -129,11 +129,11 @@ impl Learned {
         let Ok(learned) = found else { return };
         let groups = learned.stages.iter().filter_map(|stage| stage.accuracy.as_ref()).flat_map(|it| &it.groups);
         let dots = groups.map(|it| Dot { x: it.measured_w, y: it.estimated_w, sd: 0.0 }).collect();
-        self.pictures.push(Picture::agreement("Cutting power: sensor and estimate 切削功率", "W", dots));
+        self.pictures.push(Picture::new_agreement("Cutting power: sensor and estimate 切削功率", "W", dots));
         self.load_loss = Some(learned);
     }
 
-    fn wear(&mut self, recording: &Recording, machine: &str, criterion_mm: f64) {
+    fn learn_wear(&mut self, recording: &Recording, machine: &str, criterion_mm: f64) {
         let separated = self.separate_power(recording).map_err(WearLack::of_all);
         let found = separated.and_then(|recording| wear_of(&recording, criterion_mm));
         let known = found.as_ref().map(|learned| {
@@ -141,12 +141,12 @@ impl Learned {
         });
         let known = known.map_err(|lack| lack.refusal.clone());
         let (next, minutes) = found.as_ref().err().map_or((String::new(), 0.0), WearLack::next);
-        self.part("wear", known, &next, minutes);
+        self.add_part("wear", known, &next, minutes);
         let Ok(learned) = found else { return };
-        self.found.push((TOOL_WEAR, learned.json()));
-        let predicted = |cut: &Cut| learned.model.predict(&cut.conditions).power_w;
+        self.found.push((TOOL_WEAR, learned.to_json()));
+        let predicted = |cut: &Cut| learned.model.predict_power(&cut.conditions).power_w;
         let dots = learned.cuts.iter().map(|cut| Dot { x: cut.cutting_power_w, y: predicted(cut), sd: 0.0 });
-        self.pictures.push(Picture::agreement("Cutting power of the wear model 磨损模型", "W", dots.collect()));
+        self.pictures.push(Picture::new_agreement("Cutting power of the wear model 磨损模型", "W", dots.collect()));
         let key = WearKey {
             machine: machine.to_owned(),
             tool: String::new(),
@@ -167,7 +167,7 @@ impl Learned {
             )
         })?;
         let mut recording = recording.clone();
-        if recording.numbers("flank_wear_mm").is_none() {
+        if recording.find_numbers("flank_wear_mm").is_none() {
             let what = "no flank wear has been annotated";
             return Err(Refusal::new(
                 RefusalKind::Missing,
@@ -175,30 +175,30 @@ impl Learned {
                 "annotate flank-wear 0.05 --unit mm --at now --of EDGE",
             ));
         }
-        let column = |name: &str, row: usize| recording.numbers(name).and_then(|it| it.get(row));
+        let column = |name: &str, row: usize| recording.find_numbers(name).and_then(|it| it.get(row));
         let inner = inner_rows(&recording);
         let one = |row: usize| {
             let excess_w = column("spindle_power_w", row)? - column("no_load_power_w", row)?;
             let stage = column("gear_stage", row).unwrap_or(0.0);
             let own = loss.stages.iter().find(|it| (it.stage as f64 - stage).abs() < 0.5).or(loss.stages.first())?;
-            let split = own.load_loss().split(excess_w, column("spindle_speed_rpm", row)?)?;
+            let split = own.load_loss().split_excess_power(excess_w, column("spindle_speed_rpm", row)?)?;
             inner[row].then_some(split.cutting_power_w)
         };
-        let cutting = (0..recording.rows()).map(one).collect::<Numbers>();
+        let cutting = (0..recording.count_rows()).map(one).collect::<Numbers>();
         recording.set_column("cutting_power_w", Cells::Numbers(cutting));
         Ok(recording)
     }
 
-    fn thermal(&mut self, recording: &Recording, machine: &str) {
-        let found = collect(recording).and_then(|collected| {
-            let learned = learn(&collected.course, SelectionSettings::default(), None)?;
+    fn learn_thermal(&mut self, recording: &Recording, machine: &str) {
+        let found = collect_rows(recording).and_then(|collected| {
+            let learned = learn_law(&collected.course, SelectionSettings::default(), None)?;
             Ok((learned, collected.left_out))
         });
         let known = found.as_ref().map(|(learned, _)| {
-            let best = learned.best();
+            let best = learned.best_candidate();
             format!("{} terms, {:.2} um in blocks left out", best.fit.law.terms.len(), best.held_out.rms_um)
         });
-        self.part(
+        self.add_part(
             "thermal",
             known.map_err(Clone::clone),
             "warm the machine up and let it cool, twice, and read the error every few minutes with a gauge or a probe: \
@@ -208,7 +208,7 @@ impl Learned {
         );
         let Ok((learned, left_out)) = found else { return };
         self.found.push((THERMAL, identified::of_thermal(&learned, &left_out)));
-        self.thermal = Some(ThermalModel::new(machine.to_owned(), learned.best().fit.law.clone()));
+        self.thermal = Some(ThermalModel::new(machine.to_owned(), learned.best_candidate().fit.law.clone()));
     }
 }
 
@@ -217,9 +217,9 @@ const GUARD_S: f64 = 1.0;
 
 /// Which rows lie inside a cut, away from its ends.
 fn inner_rows(recording: &Recording) -> Vec<bool> {
-    let states = recording.words(STATE_SERIES);
+    let states = recording.find_words(STATE_SERIES);
     let cutting = |row: usize| states.and_then(|words| words.get(row)) == Some("cutting");
-    let mut inner = vec![false; recording.rows()];
+    let mut inner = vec![false; recording.count_rows()];
     let mut begin = 0;
     while begin < inner.len() {
         let end = (begin..inner.len()).find(|row| !cutting(*row)).unwrap_or(inner.len());
@@ -278,7 +278,7 @@ impl WearLack {
 }
 
 fn wear_of(recording: &Recording, criterion_mm: f64) -> Result<LearnedWear, WearLack> {
-    let gathered = gather(recording, &CutColumns::default()).map_err(WearLack::of_all)?;
+    let gathered = gather_cuts(recording, &CutColumns::default()).map_err(WearLack::of_all)?;
     let levels = wear_levels(&gathered.cuts);
     if gathered.cuts.len() < 20 || levels < 3 {
         let what = format!("{} cuts at {levels} wears are known; the list has 27 at 3", gathered.cuts.len());
@@ -286,7 +286,7 @@ fn wear_of(recording: &Recording, criterion_mm: f64) -> Result<LearnedWear, Wear
         let made = levels.min(gathered.cuts.len() / 9).min(2);
         return Err(WearLack { refusal, made, most_mm: None });
     }
-    let most_mm = gathered.cuts.iter().map(|cut| cut.conditions.vector()[0]).fold(0.0, f64::max);
+    let most_mm = gathered.cuts.iter().map(|cut| cut.conditions.to_vector()[0]).fold(0.0, f64::max);
     if most_mm < criterion_mm {
         let what = format!(
             "the most worn edge had {most_mm:.3} mm, an edge counts as worn at {criterion_mm} mm: the limit would lie outside the model"
@@ -301,7 +301,7 @@ fn wear_of(recording: &Recording, criterion_mm: f64) -> Result<LearnedWear, Wear
 
 /// Wears that lie apart by more than 0.03 mm: what a microscope in the shop tells apart for certain.
 fn wear_levels(cuts: &[Cut]) -> usize {
-    let mut wears: Vec<f64> = cuts.iter().map(|cut| cut.conditions.vector()[0]).collect();
+    let mut wears: Vec<f64> = cuts.iter().map(|cut| cut.conditions.to_vector()[0]).collect();
     wears.sort_by(f64::total_cmp);
     usize::from(!wears.is_empty()) + wears.windows(2).filter(|pair| pair[1] - pair[0] > 0.03).count()
 }
@@ -310,7 +310,7 @@ fn wear_levels(cuts: &[Cut]) -> usize {
 ///
 /// # Errors
 /// What cannot be read.
-pub fn prepared(
+pub fn prepare_recording(
     history: &std::path::Path,
     annotations: &[super::annotations::Annotation],
     from_ns: Option<i64>,

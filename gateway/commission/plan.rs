@@ -2,7 +2,7 @@
 //! (`simulate --machine lathe --plan`).
 
 use clap::ValueEnum;
-use rules::estimators::wear::{Array, ConditionFactor, FactorLevels, plan};
+use rules::estimators::wear::{Array, ConditionFactor, FactorLevels, plan_experiment};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
@@ -69,7 +69,7 @@ const SENSED: [(usize, [(f64, f64); 2]); 6] = [
     (1, [(0.35, 17.0), (1.0, 21.0)]),
 ];
 
-fn idle(seconds: f64, rpm: f64) -> CommissionStep {
+fn idle_step(seconds: f64, rpm: f64) -> CommissionStep {
     CommissionStep { seconds, rpm, cut: None }
 }
 
@@ -82,20 +82,20 @@ fn spindle_rpm(cutting_speed_m_min: f64, diameter_mm: f64) -> f64 {
 ///
 /// # Errors
 /// Levels that make no design.
-pub fn steps(which: Which, limits: &Limits) -> Result<Vec<CommissionStep>, String> {
+pub fn plan_steps(which: Which, limits: &Limits) -> Result<Vec<CommissionStep>, String> {
     Ok(match which {
         Which::NoLoad => {
             let warm_rpm = limits.speeds_rpm.get(limits.speeds_rpm.len() / 2).copied();
-            let warm_up = warm_rpm.map(|rpm| idle(WARM_UP_S, rpm));
-            let each = limits.speeds_rpm.iter().map(|rpm| idle(IDLE_S, *rpm));
+            let warm_up = warm_rpm.map(|rpm| idle_step(WARM_UP_S, rpm));
+            let each = limits.speeds_rpm.iter().map(|rpm| idle_step(IDLE_S, *rpm));
             // There and back: what drifts with warmth shows as a difference of the two visits.
-            let back = limits.speeds_rpm.iter().rev().map(|rpm| idle(IDLE_S, *rpm));
+            let back = limits.speeds_rpm.iter().rev().map(|rpm| idle_step(IDLE_S, *rpm));
             warm_up.into_iter().chain(each).chain(back).collect()
         }
         Which::LoadLoss => load_loss(limits),
-        Which::Wear1 => l27(limits, 1)?,
-        Which::Wear2 => l27(limits, 2)?,
-        Which::Wear3 => l27(limits, 3)?,
+        Which::Wear1 => plan_l27(limits, 1)?,
+        Which::Wear2 => plan_l27(limits, 2)?,
+        Which::Wear3 => plan_l27(limits, 3)?,
     })
 }
 
@@ -104,7 +104,7 @@ pub fn steps(which: Which, limits: &Limits) -> Result<Vec<CommissionStep>, Strin
 /// loses less at the later speeds; each visit has a light and a heavy cut.
 fn load_loss(limits: &Limits) -> Vec<CommissionStep> {
     let feed_mm = limits.feeds_mm.get(1).copied().unwrap_or(0.2);
-    let (least, greatest) = ends(&limits.depths_mm);
+    let (least, greatest) = find_extremes(&limits.depths_mm);
     let mut speeds = limits.cutting_speeds_m_min.clone();
     speeds.sort_by(f64::total_cmp);
     let Some(last) = speeds.len().checked_sub(1) else { return Vec::new() };
@@ -113,23 +113,23 @@ fn load_loss(limits: &Limits) -> Vec<CommissionStep> {
         let rpm = three[speed];
         let pass = move |(depth, seconds): (f64, f64)| {
             let depth = least + depth * (greatest - least);
-            [idle(BETWEEN_S, rpm), CommissionStep { seconds, rpm, cut: Some((feed_mm * rpm, depth)) }]
+            [idle_step(BETWEEN_S, rpm), CommissionStep { seconds, rpm, cut: Some((feed_mm * rpm, depth)) }]
         };
         // The sensor's zero and the power without the cut are those before and after it.
-        cuts.into_iter().flat_map(pass).chain([idle(AFTER_S, rpm)])
+        cuts.into_iter().flat_map(pass).chain([idle_step(AFTER_S, rpm)])
     };
     SENSED.into_iter().flat_map(visit).collect()
 }
 
-fn ends(values: &[f64]) -> (f64, f64) {
+fn find_extremes(values: &[f64]) -> (f64, f64) {
     let of = |pick: fn(f64, f64) -> f64, from: f64| values.iter().copied().fold(from, pick);
     (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY))
 }
 
 /// The nine cuts of one wear, in the order of the design.
-fn l27(limits: &Limits, wear: usize) -> Result<Vec<CommissionStep>, String> {
+fn plan_l27(limits: &Limits, wear: usize) -> Result<Vec<CommissionStep>, String> {
     let factor = |symbol: &str, values: &[f64]| {
-        let factor = ConditionFactor::of(symbol).ok_or_else(|| format!("there is no factor {symbol}"))?;
+        let factor = ConditionFactor::find_by_name(symbol).ok_or_else(|| format!("there is no factor {symbol}"))?;
         Ok::<_, String>(FactorLevels { factor, values: values.to_vec() })
     };
     // The wears stand for the edges that come: what they are the microscope says.
@@ -139,29 +139,29 @@ fn l27(limits: &Limits, wear: usize) -> Result<Vec<CommissionStep>, String> {
         factor("f", &limits.feeds_mm)?,
         factor("ap", &limits.depths_mm)?,
     ];
-    let design = plan(Array::L27, &factors, limits.seed).map_err(|problems| problems.join("; "))?;
+    let design = plan_experiment(Array::L27, &factors, limits.seed).map_err(|problems| problems.join("; "))?;
     let own = design.cuts.iter().filter(|cut| cut.levels.first() == Some(&wear));
     let pass = |values: &[f64]| {
         let rpm = spindle_rpm(values[1], limits.diameter_mm);
         let cut = Some((values[2] * rpm, values[3]));
-        [idle(BETWEEN_S, rpm), CommissionStep { seconds: BETWEEN_S, rpm, cut }]
+        [idle_step(BETWEEN_S, rpm), CommissionStep { seconds: BETWEEN_S, rpm, cut }]
     };
     Ok(own.flat_map(|cut| pass(&cut.values)).collect())
 }
 
 /// Minutes that the steps take.
 #[must_use]
-pub fn minutes(steps: &[CommissionStep]) -> f64 {
+pub fn total_minutes(steps: &[CommissionStep]) -> f64 {
     steps.iter().map(|step| step.seconds).sum::<f64>() / 60.0
 }
 
 /// The list for a person.
 #[must_use]
-pub fn text(steps: &[CommissionStep], diameter_mm: f64) -> String {
+pub fn format_text(steps: &[CommissionStep], diameter_mm: f64) -> String {
     let mut text = format!(
         "{} steps, {:.0} min, work of {diameter_mm} mm\n step   s    rpm  feed mm/min  depth mm\n",
         steps.len(),
-        minutes(steps)
+        total_minutes(steps)
     );
     for (index, step) in steps.iter().enumerate() {
         let cut =
@@ -173,7 +173,7 @@ pub fn text(steps: &[CommissionStep], diameter_mm: f64) -> String {
 
 /// The plan as a recording of commanded inputs.
 #[must_use]
-pub fn csv(steps: &[CommissionStep], diameter_mm: f64) -> String {
+pub fn format_csv(steps: &[CommissionStep], diameter_mm: f64) -> String {
     let mut csv =
         String::from("time_s,run,spindle_programmed_rpm,feed_programmed_mm_min,depth_of_cut_mm,diameter_mm,engaged\n");
     let mut time_s = 0.0;

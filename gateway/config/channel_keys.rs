@@ -6,7 +6,13 @@ use adapters::channel::quantity::LIMITS;
 /// The section, below a source.
 pub(super) const SECTION: &str = "source.channel";
 
-const fn key(name: &'static str, kind: ValueKind, absent: Absent, en: &'static str, zh: &'static str) -> ConfigKey {
+const fn new_channel_key(
+    name: &'static str,
+    kind: ValueKind,
+    absent: Absent,
+    en: &'static str,
+    zh: &'static str,
+) -> ConfigKey {
     ConfigKey { section: SECTION, name, kind, absent, en, zh }
 }
 
@@ -25,77 +31,77 @@ const QUANTITIES: [&str; LIMITS.len()] = {
 const GREATEST: f64 = 1e12;
 
 pub(super) const KEYS: [ConfigKey; 11] = [
-    key(
+    new_channel_key(
         "name",
         ValueKind::Text,
         Absent::Required,
         "Name of the channel, the unit last: clamping_pressure_bar",
         "通道名称",
     ),
-    key(
+    new_channel_key(
         "read",
         ValueKind::Text,
         Absent::Required,
         "What is read, in the words of the source: pmc D20 word, AXIS@5/MOTOR/TEMPERATURE, register D120, input 52 f32",
         "读取内容",
     ),
-    key(
+    new_channel_key(
         "quantity",
         ValueKind::OneOf(&QUANTITIES),
         Absent::Optional,
         "What it is: gives unit, least and greatest where they are left out",
         "物理量",
     ),
-    key(
+    new_channel_key(
         "unit",
         ValueKind::Text,
         Absent::Optional,
         "Unit of the value after the scale; 1 for a pure number, text for a text; default: that of the quantity, else 1",
         "单位",
     ),
-    key(
+    new_channel_key(
         "scale",
         ValueKind::Number(-GREATEST, GREATEST),
         Absent::Default("1.0"),
         "What is read times this is the value",
         "比例",
     ),
-    key(
+    new_channel_key(
         "offset",
         ValueKind::Number(-GREATEST, GREATEST),
         Absent::Default("0.0"),
         "Added after the scale, in the unit",
         "偏移",
     ),
-    key(
+    new_channel_key(
         "least",
         ValueKind::Number(-GREATEST, GREATEST),
         Absent::Optional,
         "Least possible value, in the unit; default: that of the quantity, else -1000000",
         "最小值",
     ),
-    key(
+    new_channel_key(
         "greatest",
         ValueKind::Number(-GREATEST, GREATEST),
         Absent::Optional,
         "Greatest possible value, in the unit; default: that of the quantity, else 1000000",
         "最大值",
     ),
-    key(
+    new_channel_key(
         "pace",
         ValueKind::OneOf(&["slow", "fast"]),
         Absent::Default("\"slow\""),
         "slow with parts and times, fast with motion and states",
         "读取节奏",
     ),
-    key(
+    new_channel_key(
         "path",
         ValueKind::Number(1.0, 10.0),
         Absent::Optional,
         "Path of the control; default: that of the address",
         "通道号",
     ),
-    key(
+    new_channel_key(
         "encoding",
         ValueKind::Text,
         Absent::Optional,

@@ -20,7 +20,7 @@ pub(super) fn add(reading: &mut ConfigInput<'_>, source: &mut SourceConfig, valu
     for channel in &values.inner {
         match own_channel(channel) {
             Some(Ok(channel)) => own.push(channel),
-            Some(Err((origin, what, next))) => reading.problem(&origin, what, next),
+            Some(Err((origin, what, next))) => reading.add_problem(&origin, what, next),
             // A key is missing, which has been reported.
             None => {}
         }
@@ -28,27 +28,27 @@ pub(super) fn add(reading: &mut ConfigInput<'_>, source: &mut SourceConfig, valu
     match source.address.clone().with_channels(own) {
         Ok(address) => source.address = address,
         Err(error) => {
-            let of = |channel: &&SectionValues| text(channel, "name").is_some_and(|name| name == error.channel);
-            let at = values.inner.iter().find(of).map_or(Origin::Default, |channel| channel.origin(error.key));
+            let of = |channel: &&SectionValues| find_text(channel, "name").is_some_and(|name| name == error.channel);
+            let at = values.inner.iter().find(of).map_or(Origin::Default, |channel| channel.find_origin(error.key));
             let next = match error.key {
                 "name" => "give it another name, or start the gateway again after a change",
                 _ => "",
             };
-            reading.problem(&at, error.to_string(), next);
+            reading.add_problem(&at, error.to_string(), next);
         }
     }
 }
 
 type ChannelRefusal = (Origin, String, String);
 
-fn text(values: &SectionValues, key: &str) -> Option<String> {
+fn find_text(values: &SectionValues, key: &str) -> Option<String> {
     match &values.found.get(key)?.value {
         Scalar::Text(text) => Some(text.clone()),
         _ => None,
     }
 }
 
-fn number(values: &SectionValues, key: &str) -> Option<f64> {
+fn find_number(values: &SectionValues, key: &str) -> Option<f64> {
     match &values.found.get(key)?.value {
         Scalar::Number(number) => Some(*number),
         _ => None,
@@ -56,9 +56,9 @@ fn number(values: &SectionValues, key: &str) -> Option<f64> {
 }
 
 fn own_channel(values: &SectionValues) -> Option<Result<OwnChannel, ChannelRefusal>> {
-    let (name, read, pace) = (text(values, "name")?, text(values, "read")?, text(values, "pace")?);
-    let (scale, offset) = (number(values, "scale")?, number(values, "offset")?);
-    let refused = |key: &str, what: String, next: &str| Some(Err((values.origin(key), what, next.to_owned())));
+    let (name, read, pace) = (find_text(values, "name")?, find_text(values, "read")?, find_text(values, "pace")?);
+    let (scale, offset) = (find_number(values, "scale")?, find_number(values, "offset")?);
+    let refused = |key: &str, what: String, next: &str| Some(Err((values.find_origin(key), what, next.to_owned())));
     let new = new_channel(values, name, &read);
     if new.range.0 >= new.range.1 && new.kind != Kind::Text {
         let what = format!("least {} is not below greatest {}", new.range.0, new.range.1);
@@ -67,10 +67,12 @@ fn own_channel(values: &SectionValues) -> Option<Result<OwnChannel, ChannelRefus
     if scale == 0.0 {
         return refused("scale", "a scale of 0 makes every value 0".to_owned(), "leave it out, or give the factor");
     }
-    if Estimates::none(0).quantities().iter().any(|(known, _)| *known == new.name) || new.name == "state" {
+    if Estimates::without_samples(0).list_quantities().iter().any(|(known, _)| *known == new.name)
+        || new.name == "state"
+    {
         return refused("name", format!("`{}` is the name of an estimate", new.name), "choose another name");
     }
-    let label = text(values, "encoding");
+    let label = find_text(values, "encoding");
     let encoding = label.as_deref().map(|label| TextEncoding::of_label(label).ok_or(label));
     let encoding = match encoding.transpose() {
         Ok(encoding) => encoding,
@@ -81,24 +83,24 @@ fn own_channel(values: &SectionValues) -> Option<Result<OwnChannel, ChannelRefus
     };
     let pace = if pace == "fast" { ReadWith::Fast } else { ReadWith::Slow };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 10, checked by its key")]
-    let path = number(values, "path").map(|path| path as u8);
+    let path = find_number(values, "path").map(|path| path as u8);
     Some(Ok(OwnChannel { new, read, scale, offset, pace, path, encoding }))
 }
 
 /// Unit and limits: as they are written, else of the quantity, else of the channel of the table with this name.
 fn new_channel(values: &SectionValues, name: String, read: &str) -> NewChannel {
-    let quantity = text(values, "quantity").and_then(|word| LIMITS.iter().find(|(known, ..)| *known == word));
+    let quantity = find_text(values, "quantity").and_then(|word| LIMITS.iter().find(|(known, ..)| *known == word));
     let known = CHANNELS.iter().find(|channel| channel.name == name);
     let of_quantity = quantity.map(|(_, unit, range)| (*unit, *range));
     let (unit, range) = of_quantity.or(known.map(|row| (row.unit, row.range))).unwrap_or(("1", (-LIMIT, LIMIT)));
     let is_text =
-        text(values, "unit").is_some_and(|unit| unit == TEXT) || known.is_some_and(|row| row.kind == Kind::Text);
-    let range = (number(values, "least").unwrap_or(range.0), number(values, "greatest").unwrap_or(range.1));
+        find_text(values, "unit").is_some_and(|unit| unit == TEXT) || known.is_some_and(|row| row.kind == Kind::Text);
+    let range = (find_number(values, "least").unwrap_or(range.0), find_number(values, "greatest").unwrap_or(range.1));
     let (en, zh) = (format!("{read}, as configured"), format!("用户通道 {read}"));
     if is_text {
         return NewChannel { name, unit: String::new(), range: (0.0, 0.0), kind: Kind::Text, en, zh };
     }
-    let unit = text(values, "unit").unwrap_or_else(|| unit.to_owned());
+    let unit = find_text(values, "unit").unwrap_or_else(|| unit.to_owned());
     NewChannel { name, unit, range, kind: Kind::Held, en, zh }
 }
 
@@ -122,7 +124,7 @@ mod tests {
             read("name = \"config_test_pressure_bar\"\nread = \"pmc D20 word\"\nunit = \"bar\"\nscale = 0.1\n");
         let config = config.expect("accepted");
         assert_eq!(config.sources.len(), 1);
-        let id = adapters::ChannelId::of("config_test_pressure_bar").expect("declared");
+        let id = adapters::ChannelId::from_name("config_test_pressure_bar").expect("declared");
         assert_eq!(id.channel().unit, "bar");
     }
 
@@ -163,7 +165,7 @@ mod tests {
             };
             let name = format!("kind_test_{at}_c");
             with(&name, good).unwrap_or_else(|problems| panic!("{address}: {}", problems[0]));
-            let id = adapters::ChannelId::of(&name).expect("declared");
+            let id = adapters::ChannelId::from_name(&name).expect("declared");
             assert_eq!((id.channel().unit, id.channel().range), ("°C", (-60.0, 300.0)));
             let told = format!("{}", with(&format!("kind_test_bad_{at}_c"), bad).expect_err("refused")[0]);
             assert!(told.contains("test.toml:5") && told.contains(hint), "{told}");

@@ -4,7 +4,7 @@ use super::keys::{ConfigKey, NAME_MAX, ValueKind};
 use crate::sinks::SinkAddress;
 use adapters::Address;
 use adapters::address::AddressError;
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use toml::de::DeValue;
 
 /// A checked value.
@@ -24,7 +24,7 @@ pub(super) type ValueRefusal = (String, String);
 /// A value as it stands in the file.
 pub(super) fn check_written(key: &ConfigKey, value: &DeValue<'_>) -> Result<Scalar, ValueRefusal> {
     match (key.kind, value) {
-        (ValueKind::Number(..), DeValue::Integer(number)) => check_scalar(key, &decimal(number)),
+        (ValueKind::Number(..), DeValue::Integer(number)) => check_scalar(key, &to_decimal(number)),
         (ValueKind::Number(..), DeValue::Float(number)) => check_scalar(key, number.as_str()),
         (ValueKind::Flag, DeValue::Boolean(flag)) => Ok(Scalar::Flag(*flag)),
         (ValueKind::Number(..) | ValueKind::Flag, other) => Err(wrong_type(key, other)),
@@ -33,7 +33,7 @@ pub(super) fn check_written(key: &ConfigKey, value: &DeValue<'_>) -> Result<Scal
     }
 }
 
-fn decimal(number: &toml::de::DeInteger<'_>) -> String {
+fn to_decimal(number: &toml::de::DeInteger<'_>) -> String {
     i128::from_str_radix(number.as_str(), number.radix()).map_or_else(|_| number.to_string(), |value| value.to_string())
 }
 
@@ -46,7 +46,7 @@ fn wrong_type(key: &ConfigKey, value: &DeValue<'_>) -> ValueRefusal {
         DeValue::Array(_) => "a list",
         DeValue::Table(_) => "a section",
     };
-    (format!("`{}` is {found}; {} is needed", key.name, describe_kind(key.kind)), example(key))
+    (format!("`{}` is {found}; {} is needed", key.name, describe_kind(key.kind)), format_example(key))
 }
 
 fn describe_kind(kind: ValueKind) -> &'static str {
@@ -61,7 +61,7 @@ fn describe_kind(kind: ValueKind) -> &'static str {
     }
 }
 
-fn example(key: &ConfigKey) -> String {
+fn format_example(key: &ConfigKey) -> String {
     let value = match key.kind {
         ValueKind::Text | ValueKind::Name | ValueKind::Path => "\"...\"".to_owned(),
         ValueKind::OneOf(words) => format!("\"{}\"", words.first().copied().unwrap_or_default()),
@@ -77,18 +77,18 @@ fn example(key: &ConfigKey) -> String {
 /// A value as text without quotes, as in an environment variable.
 pub(super) fn check_scalar(key: &ConfigKey, text: &str) -> Result<Scalar, ValueRefusal> {
     match key.kind {
-        ValueKind::Number(min, max) => number(key, text, min, max),
+        ValueKind::Number(min, max) => check_number(key, text, min, max),
         ValueKind::Flag => match text {
             "true" => Ok(Scalar::Flag(true)),
             "false" => Ok(Scalar::Flag(false)),
             _ => Err((format!("`{}` is {text:?}; true or false is needed", key.name), String::new())),
         },
         _ if text.contains(char::is_control) => Err(with_control(key, text)),
-        _ if text.trim().is_empty() => Err((format!("`{}` is empty", key.name), example(key))),
-        ValueKind::OneOf(words) => word(key, text, words),
-        ValueKind::Listen => listen(key, text),
-        ValueKind::Address => address(text, text.parse::<Address>().map(drop)),
-        ValueKind::SinkAddress => address(text, text.parse::<SinkAddress>().map(drop)),
+        _ if text.trim().is_empty() => Err((format!("`{}` is empty", key.name), format_example(key))),
+        ValueKind::OneOf(words) => check_word(key, text, words),
+        ValueKind::Listen => check_listen(key, text),
+        ValueKind::Address => check_address(text, text.parse::<Address>().map(drop)),
+        ValueKind::SinkAddress => check_address(text, text.parse::<SinkAddress>().map(drop)),
         ValueKind::Name if text.chars().count() > NAME_MAX => {
             let what = format!("`{}` has {} letters", key.name, text.chars().count());
             Err((what, format!("give a name of at most {NAME_MAX}")))
@@ -104,9 +104,9 @@ fn with_control(key: &ConfigKey, text: &str) -> ValueRefusal {
     (what, "write it on one line, with letters, digits and signs only".to_owned())
 }
 
-fn number(key: &ConfigKey, text: &str, min: f64, max: f64) -> Result<Scalar, ValueRefusal> {
+fn check_number(key: &ConfigKey, text: &str, min: f64, max: f64) -> Result<Scalar, ValueRefusal> {
     let Ok(number) = text.replace('_', "").parse::<f64>() else {
-        return Err((format!("`{}` is {text:?}; a number is needed", key.name), example(key)));
+        return Err((format!("`{}` is {text:?}; a number is needed", key.name), format_example(key)));
     };
     if number >= min && number <= max {
         return Ok(Scalar::Number(number));
@@ -114,17 +114,17 @@ fn number(key: &ConfigKey, text: &str, min: f64, max: f64) -> Result<Scalar, Val
     Err((format!("`{} = {text}` is outside {min} to {max}", key.name), format!("{}: {}", key.name, key.en)))
 }
 
-fn word(key: &ConfigKey, text: &str, words: &[&str]) -> Result<Scalar, ValueRefusal> {
+fn check_word(key: &ConfigKey, text: &str, words: &[&str]) -> Result<Scalar, ValueRefusal> {
     if words.contains(&text) {
         return Ok(Scalar::Text(text.to_owned()));
     }
-    let near = nearest(text, words.iter().copied()).filter(|near| near.len() > 2);
+    let near = find_nearest_name(text, words.iter().copied()).filter(|near| near.len() > 2);
     let meant = near.map(|near| format!("; did you mean \"{near}\"?")).unwrap_or_default();
     let next = format!("write one of {}{meant}", words.join(", "));
     Err((format!("`{}` cannot be {text:?}", key.name), next))
 }
 
-fn listen(key: &ConfigKey, text: &str) -> Result<Scalar, ValueRefusal> {
+fn check_listen(key: &ConfigKey, text: &str) -> Result<Scalar, ValueRefusal> {
     let host = text.rsplit_once(':').filter(|(_, port)| port.parse::<u16>().is_ok()).map(|(host, _)| host);
     let named = |host: &str| !host.is_empty() && host.chars().all(|c| c.is_ascii_alphanumeric() || "-.".contains(c));
     if text.parse::<std::net::SocketAddr>().is_ok() || host.is_some_and(named) {
@@ -137,7 +137,7 @@ fn listen(key: &ConfigKey, text: &str) -> Result<Scalar, ValueRefusal> {
     ))
 }
 
-fn address(text: &str, parsed: Result<(), AddressError>) -> Result<Scalar, ValueRefusal> {
+fn check_address(text: &str, parsed: Result<(), AddressError>) -> Result<Scalar, ValueRefusal> {
     match parsed {
         Ok(_) => Ok(Scalar::Text(text.to_owned())),
         Err(error) => {

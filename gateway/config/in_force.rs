@@ -5,7 +5,7 @@ use super::channel_keys;
 use super::check_value::Scalar;
 use super::keys::{SECTIONS, keys_of};
 use super::read::{ConfigInput, Origin, SectionValues};
-use adapters::address::masked;
+use adapters::address::mask_secrets;
 use serde::Serialize;
 
 /// One key.
@@ -28,19 +28,19 @@ pub(super) fn in_force(reading: &ConfigInput<'_>) -> Vec<InForce> {
     for section in SECTIONS.iter().filter(|section| section.name != channel_keys::SECTION) {
         if !section.repeated {
             let get = |key: &str| reading.get(section.name, key).map(|found| (&found.value, &found.origin));
-            rows(&mut all, section.name, &format!("[{}]", section.name), get);
+            append_rows(&mut all, section.name, &format!("[{}]", section.name), get);
             continue;
         }
         let list: &[SectionValues] = if section.name == "sink" { &reading.sinks } else { &reading.sources };
         for (index, values) in list.iter().enumerate() {
             let get = |key: &str| values.found.get(key).map(|found| (&found.value, &found.origin));
-            rows(&mut all, section.name, &format!("[[{}]] {}", section.name, index + 1), get);
+            append_rows(&mut all, section.name, &format!("[[{}]] {}", section.name, index + 1), get);
         }
     }
     all
 }
 
-fn rows<'a>(
+fn append_rows<'a>(
     all: &mut Vec<InForce>,
     section: &str,
     title: &str,
@@ -54,7 +54,7 @@ fn rows<'a>(
             _ => "default",
         };
         let value = found.map(|(value, _)| match value {
-            Scalar::Text(text) => masked(text),
+            Scalar::Text(text) => mask_secrets(text),
             Scalar::Number(number) => number.to_string(),
             Scalar::Flag(flag) => flag.to_string(),
         });

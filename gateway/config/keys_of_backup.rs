@@ -2,26 +2,26 @@
 
 use super::keys::Absent::{Default, Optional};
 use super::keys::ValueKind::{Flag, Number, Path};
-use super::keys::{ConfigKey, key};
+use super::keys::{ConfigKey, new_key};
 
 /// The rows.
 pub(super) const BACKUP: &[ConfigKey] = &[
-    key(
+    new_key(
         ("backup", "directory"),
         Path,
         Optional,
         "Where backups go: a directory, a stick or a share that is mounted there; without it none is taken by itself",
         "备份目录(可为 U 盘或网络共享的挂载点)",
     ),
-    key(("backup", "every_h"), Number(1.0, 8760.0), Default("24.0"), "Time between two backups", "备份间隔(小时)"),
-    key(
+    new_key(("backup", "every_h"), Number(1.0, 8760.0), Default("24.0"), "Time between two backups", "备份间隔(小时)"),
+    new_key(
         ("backup", "keep"),
         Number(1.0, 1000.0),
         Default("14"),
         "So many are kept; whole number; the oldest goes first",
         "保留份数",
     ),
-    key(
+    new_key(
         ("backup", "history"),
         Flag,
         Default("false"),

@@ -120,7 +120,7 @@ pub enum AlignmentUse {
 impl AlignmentUse {
     /// The word in the configuration and in the status.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Off => "off",
             Self::Show => "show",
@@ -168,7 +168,7 @@ pub enum GateMode {
 impl GateMode {
     /// The word in the configuration, in the history and on the page.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Off => "off",
             Self::Shadow => "shadow",
@@ -342,18 +342,18 @@ pub fn load(
         return parse(BUILT_IN, BUILT_IN_TEXT, Path::new(""), environment);
     };
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| vec![unreadable(&name, &error)])?;
+    let text = std::fs::read_to_string(path).map_err(|error| vec![unreadable_problem(&name, &error)])?;
     let base = path.parent().unwrap_or(Path::new(""));
     parse(&name, &text, base, environment)
 }
 
-fn unreadable(name: &str, error: &std::io::Error) -> Problem {
+fn unreadable_problem(name: &str, error: &std::io::Error) -> Problem {
     let next = match error.kind() {
         std::io::ErrorKind::NotFound => "`cnc-gateway check --example` prints a file to start from",
         std::io::ErrorKind::InvalidData => "save the file as UTF-8",
         _ => "",
     };
-    Problem::of(name, format!("the configuration cannot be read: {error}"), next)
+    Problem::in_file(name, format!("the configuration cannot be read: {error}"), next)
 }
 
 /// The same from text. `file` is its name in messages, `base` the directory that relative paths begin at.
@@ -366,15 +366,15 @@ pub fn parse(
     base: &Path,
     environment: impl IntoIterator<Item = (String, String)>,
 ) -> Result<Config, Vec<Problem>> {
-    let mut reading = read::ConfigInput::of(file, text);
+    let mut reading = read::ConfigInput::from_text(file, text);
     let mut variables: Vec<_> =
         environment.into_iter().filter(|(name, _)| name.starts_with(ENVIRONMENT_PREFIX)).collect();
     variables.sort();
     for (name, value) in &variables {
-        reading.variable(name, ENVIRONMENT_PREFIX, value);
+        reading.overlay_variable(name, ENVIRONMENT_PREFIX, value);
     }
-    reading.complete();
-    let config = build::build(&mut reading, base);
+    reading.complete_sections();
+    let config = build::build_config(&mut reading, base);
     let mut problems = std::mem::take(&mut reading.problems);
     problems.sort_by_key(|problem| (problem.line.is_none(), problem.line, problem.column));
     match config {

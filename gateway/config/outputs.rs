@@ -1,30 +1,30 @@
 //! `[[sink]]` and `[outbox]`: from checked values to the configuration.
 
 use super::SinkConfig;
-use super::build::{as_text, number, origin_of_name, source_name, text};
+use super::build::{as_text, find_number, find_text, origin_of_name, source_name};
 use super::check_value::Scalar;
 use super::read::{ConfigInput, Origin, SectionValues};
 use crate::history::OutboxSettings;
 use crate::sinks::SinkAddress;
-use adapters::channel::{CHANNELS, nearest};
+use adapters::channel::{CHANNELS, find_nearest_name};
 use std::time::Duration;
 
 /// The sinks; names that are there twice are reported.
-pub(super) fn sinks(reading: &mut ConfigInput<'_>) -> Option<Vec<SinkConfig>> {
-    let sinks: Option<Vec<SinkConfig>> = reading.sinks.iter().map(sink).collect();
+pub(super) fn build_sinks(reading: &mut ConfigInput<'_>) -> Option<Vec<SinkConfig>> {
+    let sinks: Option<Vec<SinkConfig>> = reading.sinks.iter().map(build_sink).collect();
     requests_need_a_way_in(reading);
     let names: Vec<Option<String>> = reading.sinks.iter().map(source_name).collect();
     for (index, name) in names.iter().enumerate().filter(|(_, name)| name.is_some()) {
         if names[..index].contains(name) {
             let origin = origin_of_name(&reading.sinks[index]);
             let what = format!("there are two sinks named {:?}", name.clone().unwrap_or_default());
-            reading.problem(&origin, what, "give each [[sink]] its own `name`");
+            reading.add_problem(&origin, what, "give each [[sink]] its own `name`");
         }
     }
     sinks
 }
 
-fn sink(values: &SectionValues) -> Option<SinkConfig> {
+fn build_sink(values: &SectionValues) -> Option<SinkConfig> {
     let address = values.found.get("address").and_then(as_text)?.parse().ok()?;
     Some(SinkConfig { name: source_name(values)?, address, allow_requests: allows_requests(values) })
 }
@@ -37,35 +37,35 @@ fn allows_requests(values: &SectionValues) -> bool {
 fn requests_need_a_way_in(reading: &mut ConfigInput<'_>) {
     let origin = |values: &SectionValues| {
         let address: SinkAddress = values.found.get("address").and_then(as_text)?.parse().ok()?;
-        let deaf = allows_requests(values) && !address.hears();
+        let deaf = allows_requests(values) && !address.can_receive_requests();
         values.found.get("allow_requests").filter(|_| deaf).map(|found| (found.origin.clone(), address))
     };
     let deaf: Vec<_> = reading.sinks.iter().filter_map(origin).collect();
     for (origin, address) in deaf {
         let what = format!("`allow_requests = true`, but nothing can be asked for through {}:", address.scheme());
-        reading.problem(&origin, what, "leave it out, or use an mqtts:// or sparkplugs:// sink");
+        reading.add_problem(&origin, what, "leave it out, or use an mqtts:// or sparkplugs:// sink");
     }
 }
 
 /// What the sinks are sent.
-pub(super) fn outbox(reading: &mut ConfigInput<'_>) -> Option<OutboxSettings> {
-    let every_nth = number(reading, "outbox", "every_nth")?;
+pub(super) fn build_outbox(reading: &mut ConfigInput<'_>) -> Option<OutboxSettings> {
+    let every_nth = find_number(reading, "outbox", "every_nth")?;
     let origin = reading.get("outbox", "every_nth").map_or(Origin::Default, |found| found.origin.clone());
     if every_nth.fract() != 0.0 {
-        reading.problem(&origin, format!("`every_nth = {every_nth}` is no whole number"), "write 1, 2, 10, ...");
+        reading.add_problem(&origin, format!("`every_nth = {every_nth}` is no whole number"), "write 1, 2, 10, ...");
     }
-    let (dead_bands, ranges) = (dead_bands(reading), ranges(reading));
+    let (dead_bands, ranges) = (dead_bands(reading), parse_ranges(reading));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the table holds their ranges")]
-    let (every_nth, max_bytes) = (every_nth as u32, (number(reading, "outbox", "max_gb")? * 1e9) as u64);
+    let (every_nth, max_bytes) = (every_nth as u32, (find_number(reading, "outbox", "max_gb")? * 1e9) as u64);
     Some(OutboxSettings {
         every_nth,
         dead_bands,
         ranges,
-        refresh: Duration::from_secs_f64(number(reading, "outbox", "refresh_s")?),
-        tick: Duration::from_secs_f64(1.0 / number(reading, "gateway", "tick_hz")?),
-        drain: Duration::from_secs_f64(number(reading, "sinks", "drain_s")?),
+        refresh: Duration::from_secs_f64(find_number(reading, "outbox", "refresh_s")?),
+        tick: Duration::from_secs_f64(1.0 / find_number(reading, "gateway", "tick_hz")?),
+        drain: Duration::from_secs_f64(find_number(reading, "sinks", "drain_s")?),
         max_bytes,
-        max_age: Duration::from_secs_f64(number(reading, "outbox", "max_age_h")? * 3600.0),
+        max_age: Duration::from_secs_f64(find_number(reading, "outbox", "max_age_h")? * 3600.0),
     })
 }
 
@@ -76,7 +76,7 @@ fn dead_bands(reading: &mut ConfigInput<'_>) -> Vec<(String, f64)> {
 }
 
 /// `spindle_speed_rpm=0..4500`; what is wrong is reported.
-fn ranges(reading: &mut ConfigInput<'_>) -> Vec<(String, (f64, f64))> {
+fn parse_ranges(reading: &mut ConfigInput<'_>) -> Vec<(String, (f64, f64))> {
     let range = |text: &str| {
         let (low, high) = text.split_once("..")?;
         let (low, high) = (low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?);
@@ -92,13 +92,13 @@ fn named_values<T>(
     form: (&str, &str),
     value: impl Fn(&str) -> Option<T>,
 ) -> Vec<(String, T)> {
-    let Some(written) = text(reading, "outbox", key) else { return Vec::new() };
+    let Some(written) = find_text(reading, "outbox", key) else { return Vec::new() };
     let origin = reading.get("outbox", key).map_or(Origin::Default, |found| found.origin.clone());
     let mut values = Vec::new();
     for part in written.split(',').map(str::trim).filter(|part| !part.is_empty()) {
         match named_value(part, key, form, &value) {
             Ok(value) => values.push(value),
-            Err((what, next)) => reading.problem(&origin, what, next),
+            Err((what, next)) => reading.add_problem(&origin, what, next),
         }
     }
     values
@@ -118,7 +118,7 @@ fn named_value<T>(
     let stored: Vec<String> = crate::pipeline::stored_series().into_iter().map(|series| series.name).collect();
     let names = || CHANNELS.iter().map(|channel| channel.name).chain(stored.iter().map(String::as_str));
     if !names().any(|known| known == name) {
-        let next = match nearest(name, names()) {
+        let next = match find_nearest_name(name, names()) {
             Some(near) => format!("did you mean {near}?"),
             None => "`cnc-gateway check --vocabulary` prints the names".to_owned(),
         };

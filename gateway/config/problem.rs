@@ -23,13 +23,13 @@ pub struct Problem {
 impl Problem {
     /// A problem of a whole file or variable.
     #[must_use]
-    pub fn of(file: impl Into<String>, what: impl Into<String>, next: impl Into<String>) -> Self {
+    pub fn in_file(file: impl Into<String>, what: impl Into<String>, next: impl Into<String>) -> Self {
         Self { file: file.into(), line: None, column: None, what: what.into(), next: next.into() }
     }
 
     /// The same problem at a byte offset of the file's text.
     #[must_use]
-    pub fn at(mut self, text: &str, offset: usize) -> Self {
+    pub fn with_position(mut self, text: &str, offset: usize) -> Self {
         let (line, column) = line_column(text, offset);
         self.line = Some(line);
         self.column = Some(column);

@@ -2,9 +2,9 @@
 
 use super::channel_keys;
 use super::check_value::{Scalar, check_scalar, check_written};
-use super::keys::{Absent, ConfigKey, SECTIONS, Section, find, find_section, keys_of};
+use super::keys::{Absent, ConfigKey, SECTIONS, Section, find_key, find_section, keys_of};
 use super::problem::Problem;
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -38,7 +38,7 @@ pub(super) struct SectionValues {
 
 impl SectionValues {
     /// Where a key was written, or where its section begins.
-    pub(super) fn origin(&self, key: &str) -> Origin {
+    pub(super) fn find_origin(&self, key: &str) -> Origin {
         let section = self.offset.map_or(Origin::Default, Origin::File);
         let written = self.found.get(key).map(|found| found.origin.clone());
         written.filter(|origin| *origin != Origin::Default).unwrap_or(section)
@@ -58,15 +58,15 @@ pub(super) struct ConfigInput<'a> {
 
 impl<'a> ConfigInput<'a> {
     /// Reads `text`; `file` is its name in messages.
-    pub(super) fn of(file: &'a str, text: &'a str) -> Self {
+    pub(super) fn from_text(file: &'a str, text: &'a str) -> Self {
         let mut reading = Self { file, text, ..Self::default() };
         let (table, errors) = DeTable::parse_recoverable(text);
         for error in &errors {
-            reading.syntax(error);
+            reading.add_syntax_problem(error);
         }
         let broken: Vec<_> = reading.problems.iter().map(|problem| problem.line).collect();
         for (name, value) in table.get_ref().iter() {
-            reading.section(name, value);
+            reading.read_section(name, value);
         }
         let syntax = errors.len();
         let (found, semantic) = reading.problems.split_at(syntax);
@@ -75,34 +75,34 @@ impl<'a> ConfigInput<'a> {
         reading
     }
 
-    fn syntax(&mut self, error: &toml::de::Error) {
+    fn add_syntax_problem(&mut self, error: &toml::de::Error) {
         let what = format!("this is not TOML: {}", error.message());
         let next = "write one `key = value` per line; text stands in \"quotes\"";
-        let problem = Problem::of(self.file, what, next);
-        self.problems.push(problem.at(self.text, error.span().map_or(0, |span| span.start)));
+        let problem = Problem::in_file(self.file, what, next);
+        self.problems.push(problem.with_position(self.text, error.span().map_or(0, |span| span.start)));
     }
 
     /// Adds a problem at an origin.
-    pub(super) fn problem(&mut self, origin: &Origin, what: impl Into<String>, next: impl Into<String>) {
+    pub(super) fn add_problem(&mut self, origin: &Origin, what: impl Into<String>, next: impl Into<String>) {
         let problem = match origin {
-            Origin::File(offset) => Problem::of(self.file, what, next).at(self.text, *offset),
-            Origin::Variable(name) => Problem::of(name.clone(), what, next),
-            Origin::Default => Problem::of(self.file, what, next),
+            Origin::File(offset) => Problem::in_file(self.file, what, next).with_position(self.text, *offset),
+            Origin::Variable(name) => Problem::in_file(name.clone(), what, next),
+            Origin::Default => Problem::in_file(self.file, what, next),
         };
         self.problems.push(problem);
     }
 
-    fn section(&mut self, name: &Spanned<std::borrow::Cow<'_, str>>, value: &Spanned<DeValue<'_>>) {
+    fn read_section(&mut self, name: &Spanned<std::borrow::Cow<'_, str>>, value: &Spanned<DeValue<'_>>) {
         let at = Origin::File(name.span().start);
         let Some(section) = find_section(name.get_ref()) else {
             let outside = !matches!(value.get_ref(), DeValue::Table(_) | DeValue::Array(_));
             let stands = format!("`{}` stands outside every section", name.get_ref());
             let what = if outside { stands } else { unknown_section(name.get_ref()) };
-            return self.problem(&at, what, section_hint(name.get_ref()));
+            return self.add_problem(&at, what, section_hint(name.get_ref()));
         };
         match (section.repeated, value.get_ref()) {
             (false, DeValue::Table(table)) => {
-                let values = self.values(section, table, name.span().start);
+                let values = self.read_values(section, table, name.span().start);
                 self.single.insert(section.name, values);
             }
             (true, DeValue::Array(items)) => {
@@ -110,12 +110,12 @@ impl<'a> ConfigInput<'a> {
                     self.read_repeated_section(section, item);
                 }
             }
-            (true, DeValue::Table(_)) => self.problem(
+            (true, DeValue::Table(_)) => self.add_problem(
                 &at,
                 format!("[{0}] can stand there several times and is written with two brackets", section.name),
                 format!("write [[{}]]", section.name),
             ),
-            _ => self.problem(&at, format!("{} is a section", section.name), format!("write [{}]", section.name)),
+            _ => self.add_problem(&at, format!("{} is a section", section.name), format!("write [{}]", section.name)),
         }
     }
 
@@ -123,10 +123,10 @@ impl<'a> ConfigInput<'a> {
         let start = item.span().start;
         match item.get_ref() {
             DeValue::Table(table) => {
-                let values = self.values(section, table, start);
-                self.list(section).push(values);
+                let values = self.read_values(section, table, start);
+                self.repeated_sections_mut(section).push(values);
             }
-            other => self.problem(
+            other => self.add_problem(
                 &Origin::File(start),
                 format!("{} holds a {}", section.name, other.type_str()),
                 format!("write each one as a section [[{}]]", section.name),
@@ -135,10 +135,15 @@ impl<'a> ConfigInput<'a> {
     }
 
     /// A section below another one; those that can stand there several times belong to the one above.
-    fn within(&mut self, section: &'static Section, value: &Spanned<DeValue<'_>>, offset: usize) -> Vec<SectionValues> {
+    fn read_inner_section(
+        &mut self,
+        section: &'static Section,
+        value: &Spanned<DeValue<'_>>,
+        offset: usize,
+    ) -> Vec<SectionValues> {
         match (section.repeated, value.get_ref()) {
             (false, DeValue::Table(table)) => {
-                let found = self.values(section, table, offset);
+                let found = self.read_values(section, table, offset);
                 self.single.insert(section.name, found);
                 Vec::new()
             }
@@ -147,29 +152,29 @@ impl<'a> ConfigInput<'a> {
                     DeValue::Table(table) => Some((table, item.span().start)),
                     _ => None,
                 });
-                tables.map(|(table, start)| self.values(section, table, start)).collect()
+                tables.map(|(table, start)| self.read_values(section, table, start)).collect()
             }
             (repeated, _) => {
                 let (open, close) = if repeated { ("[[", "]]") } else { ("[", "]") };
                 let next = format!("write {open}{}{close}", section.name);
-                self.problem(&Origin::File(offset), format!("{} is a section", section.name), next);
+                self.add_problem(&Origin::File(offset), format!("{} is a section", section.name), next);
                 Vec::new()
             }
         }
     }
 
-    fn values(&mut self, section: &'static Section, table: &DeTable<'_>, offset: usize) -> SectionValues {
+    fn read_values(&mut self, section: &'static Section, table: &DeTable<'_>, offset: usize) -> SectionValues {
         let mut values = SectionValues { offset: Some(offset), ..SectionValues::default() };
         for (name, value) in table.iter() {
             let within = find_section(&format!("{}.{}", section.name, name.get_ref()));
             if let Some(within) = within {
-                let found = self.within(within, value, name.span().start);
+                let found = self.read_inner_section(within, value, name.span().start);
                 values.inner.extend(found);
                 continue;
             }
-            let Some(key) = find(section.name, name.get_ref()) else {
+            let Some(key) = find_key(section.name, name.get_ref()) else {
                 let at = Origin::File(name.span().start);
-                self.problem(
+                self.add_problem(
                     &at,
                     format!("[{}] has no key `{}`", section.name, name.get_ref()),
                     key_hint(section.name, name.get_ref()),
@@ -179,14 +184,14 @@ impl<'a> ConfigInput<'a> {
             let origin = Origin::File(value.span().start);
             match check_written(key, value.get_ref()) {
                 Ok(value) => drop(values.found.insert(key.name, LocatedValue { value, origin })),
-                Err((what, next)) => self.problem(&origin, what, next),
+                Err((what, next)) => self.add_problem(&origin, what, next),
             }
         }
         values
     }
 
     /// Overlays an environment variable whose name begins with the prefix.
-    pub(super) fn variable(&mut self, name: &str, prefix: &str, text: &str) {
+    pub(super) fn overlay_variable(&mut self, name: &str, prefix: &str, text: &str) {
         let origin = Origin::Variable(name.to_owned());
         let path = name[prefix.len()..].to_lowercase();
         let parts: Vec<&str> = path.split("__").collect();
@@ -195,29 +200,31 @@ impl<'a> ConfigInput<'a> {
             [section, key] => (section, None, key),
             [.., key] if within.is_some() && parts.len() == 3 => (within.as_deref().unwrap_or_default(), None, key),
             [section, index, key] => (section, index.parse::<usize>().ok(), key),
-            _ => return self.problem(&origin, "this variable names no key", variable_form(prefix)),
+            _ => return self.add_problem(&origin, "this variable names no key", variable_form(prefix)),
         };
         let Some(known) = find_section(section) else {
-            return self.problem(&origin, unknown_section(section), section_hint(section));
+            return self.add_problem(&origin, unknown_section(section), section_hint(section));
         };
-        let count = self.list(known).len();
+        let count = self.repeated_sections_mut(known).len();
         if known.repeated != index.is_some() || index.is_some_and(|index| index > count) {
-            return self.problem(&origin, "this variable names no key", variable_form(prefix));
+            return self.add_problem(&origin, "this variable names no key", variable_form(prefix));
         }
-        let Some(key) = find(known.name, key_name) else {
+        let Some(key) = find_key(known.name, key_name) else {
             let what = format!("[{section}] has no key `{key_name}`");
-            return self.problem(&origin, what, key_hint(known.name, key_name));
+            return self.add_problem(&origin, what, key_hint(known.name, key_name));
         };
         match check_scalar(key, text) {
-            Ok(value) => drop(self.place(known, index).found.insert(key.name, LocatedValue { value, origin })),
-            Err((what, next)) => self.problem(&origin, what, next),
+            Ok(value) => {
+                drop(self.section_values_mut(known, index).found.insert(key.name, LocatedValue { value, origin }))
+            }
+            Err((what, next)) => self.add_problem(&origin, what, next),
         }
     }
 
-    fn place(&mut self, section: &'static Section, index: Option<usize>) -> &mut SectionValues {
+    fn section_values_mut(&mut self, section: &'static Section, index: Option<usize>) -> &mut SectionValues {
         match index {
             Some(index) => {
-                let list = self.list(section);
+                let list = self.repeated_sections_mut(section);
                 if index >= list.len() {
                     list.push(SectionValues::default());
                 }
@@ -229,49 +236,51 @@ impl<'a> ConfigInput<'a> {
     }
 
     /// Fills in the defaults and reports required keys that are missing.
-    pub(super) fn complete(&mut self) {
+    pub(super) fn complete_sections(&mut self) {
         for section in SECTIONS.iter().filter(|section| !section.repeated) {
             let mut values = self.single.remove(section.name).unwrap_or_default();
-            self.fill(section, &mut values);
+            self.fill_section(section, &mut values);
             self.single.insert(section.name, values);
         }
         for section in SECTIONS.iter().filter(|section| section.repeated && section.name != channel_keys::SECTION) {
-            let mut list = std::mem::take(self.list(section));
+            let mut list = std::mem::take(self.repeated_sections_mut(section));
             list.iter_mut().for_each(|values| self.fill_with_channels(section, values));
-            *self.list(section) = list;
+            *self.repeated_sections_mut(section) = list;
         }
     }
 
     /// What is collected of a section that may stand there several times.
-    fn list(&mut self, section: &Section) -> &mut Vec<SectionValues> {
+    fn repeated_sections_mut(&mut self, section: &Section) -> &mut Vec<SectionValues> {
         if section.name == "sink" { &mut self.sinks } else { &mut self.sources }
     }
 
     fn fill_with_channels(&mut self, section: &Section, values: &mut SectionValues) {
-        self.fill(section, values);
+        self.fill_section(section, values);
         for channel in &mut values.inner {
-            find_section(channel_keys::SECTION).into_iter().for_each(|section| self.fill(section, channel));
+            find_section(channel_keys::SECTION).into_iter().for_each(|section| self.fill_section(section, channel));
         }
     }
 
-    fn fill(&mut self, section: &Section, values: &mut SectionValues) {
+    fn fill_section(&mut self, section: &Section, values: &mut SectionValues) {
         for key in keys_of(section.name) {
             match key.absent {
                 Absent::Default(text) => fill_default(key, text, values),
-                Absent::Required if !values.found.contains_key(key.name) => self.missing(section, key, values.offset),
+                Absent::Required if !values.found.contains_key(key.name) => {
+                    self.report_missing_key(section, key, values.offset)
+                }
                 Absent::Required | Absent::Optional => {}
             }
         }
     }
 
-    fn missing(&mut self, section: &Section, key: &ConfigKey, offset: Option<usize>) {
-        let already = offset.map(|offset| Problem::of("", "", "").at(self.text, offset));
+    fn report_missing_key(&mut self, section: &Section, key: &ConfigKey, offset: Option<usize>) {
+        let already = offset.map(|offset| Problem::in_file("", "", "").with_position(self.text, offset));
         let named = |problem: &Problem| {
             problem.what.contains(key.name) && already.as_ref().is_none_or(|here| problem.line >= here.line)
         };
         if !self.problems.iter().any(named) {
             let origin = offset.map_or(Origin::Default, Origin::File);
-            self.problem(&origin, format!("[[{}]] needs the key `{}`", section.name, key.name), key.en);
+            self.add_problem(&origin, format!("[[{}]] needs the key `{}`", section.name, key.name), key.en);
         }
     }
 
@@ -294,14 +303,14 @@ fn unknown_section(name: &str) -> String {
 fn section_hint(name: &str) -> String {
     let homes: Vec<String> = SECTIONS
         .iter()
-        .filter(|section| find(section.name, name).is_some())
+        .filter(|section| find_key(section.name, name).is_some())
         .map(|section| format!("[{}]", section.name))
         .collect();
     if !homes.is_empty() {
         return format!("`{name}` belongs under {}", homes.join(" or "));
     }
     let names = SECTIONS.iter().map(|section| section.name);
-    match nearest(name, names.clone()) {
+    match find_nearest_name(name, names.clone()) {
         Some(near) => format!("did you mean [{near}]?"),
         None => format!("the sections are {}", names.collect::<Vec<_>>().join(", ")),
     }
@@ -310,10 +319,10 @@ fn section_hint(name: &str) -> String {
 fn key_hint(section: &str, name: &str) -> String {
     let names: Vec<&str> = keys_of(section).map(|key| key.name).collect();
     let begins = || names.iter().copied().find(|key| key.starts_with(name));
-    if let Some(near) = nearest(name, names.iter().copied()).or_else(begins) {
+    if let Some(near) = find_nearest_name(name, names.iter().copied()).or_else(begins) {
         return format!("did you mean `{near}`?");
     }
-    match SECTIONS.iter().find(|other| find(other.name, name).is_some()) {
+    match SECTIONS.iter().find(|other| find_key(other.name, name).is_some()) {
         Some(other) => format!("`{name}` belongs under [{}]", other.name),
         None => format!("the keys here are {}", names.join(", ")),
     }

@@ -6,7 +6,7 @@ use super::keys::{ConfigKey, KEYS, NAME_MAX, SECTIONS, ValueKind, find_section, 
 impl ValueKind {
     /// What is accepted, as a reader of the table needs it.
     #[must_use]
-    pub fn range(&self) -> String {
+    pub fn describe_range(&self) -> String {
         match self {
             Self::Text => "text".to_string(),
             Self::Name => format!("text of at most {NAME_MAX} letters"),
@@ -21,7 +21,7 @@ impl ValueKind {
 }
 
 impl Absent {
-    fn text(self) -> &'static str {
+    fn describe_default(self) -> &'static str {
         match self {
             Required => "required",
             Optional => "-",
@@ -32,19 +32,20 @@ impl Absent {
 
 /// The table as Markdown, one row per key: what `check --keys` prints.
 #[must_use]
-pub fn table() -> String {
+pub fn format_table() -> String {
     let mut text = String::from("| key | default | accepts | what |\n|---|---|---|---|\n");
     for key in KEYS {
         let section = find_section(key.section).filter(|section| section.repeated);
-        let path = if section.is_some() { format!("[[{}]] {}", key.section, key.name) } else { key.path() };
-        text += &format!("| `{path}` | {} | {} | {} |\n", key.absent.text(), key.kind.range(), key.en);
+        let path = if section.is_some() { format!("[[{}]] {}", key.section, key.name) } else { key.dotted_path() };
+        text +=
+            &format!("| `{path}` | {} | {} | {} |\n", key.absent.describe_default(), key.kind.describe_range(), key.en);
     }
     text
 }
 
 /// A complete commented file with every default: what `check --example` prints.
 #[must_use]
-pub fn example() -> String {
+pub fn format_example() -> String {
     let mut text =
         String::from("# cnc-gateway.toml: every key with its default; a line that starts with # may be left out.\n");
     for section in SECTIONS {
@@ -69,5 +70,5 @@ fn example_line(key: &ConfigKey, commented: bool) -> String {
     };
     let mark = if commented || key.absent != Required { "# " } else { "" };
     let written = format!("{mark}{} = {value}", key.name);
-    format!("{written:40} # {} ({})\n", key.en, key.kind.range())
+    format!("{written:40} # {} ({})\n", key.en, key.kind.describe_range())
 }

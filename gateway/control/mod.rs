@@ -23,10 +23,10 @@ mod network;
 mod post;
 mod server;
 
-pub use client::order;
+pub use client::send_order;
 pub use network::{NetworkRequest, RequestedChange};
-pub use post::{OrderReceiver, OrderSender, PostedRequest, PostedRow, Wake, queue};
-pub use server::{Listening, listen};
+pub use post::{OrderReceiver, OrderSender, PostedRequest, PostedRow, Wake, create_queues};
+pub use server::{Listening, listen_for_orders};
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -74,7 +74,7 @@ pub enum Order {
 impl Order {
     /// Who orders.
     #[must_use]
-    pub fn by(&self) -> &str {
+    pub fn ordered_by(&self) -> &str {
         match self {
             Self::Arm { by, .. }
             | Self::Disarm { by }
@@ -106,12 +106,12 @@ pub struct Reply {
 
 impl Reply {
     /// It was done.
-    pub fn done(text: impl Into<String>) -> Self {
+    pub fn from_success(text: impl Into<String>) -> Self {
         Self { done: true, text: text.into() }
     }
 
     /// It was not.
-    pub fn refused(text: impl Into<String>) -> Self {
+    pub fn from_refusal(text: impl Into<String>) -> Self {
         Self { done: false, text: text.into() }
     }
 }
@@ -127,6 +127,6 @@ pub struct QueuedOrder {
 
 /// Where the socket of this data directory is.
 #[must_use]
-pub fn socket(data_dir: &Path) -> PathBuf {
+pub fn socket_path(data_dir: &Path) -> PathBuf {
     data_dir.join(SOCKET)
 }

@@ -40,13 +40,13 @@ impl RequestedChange {
                 "{pct} % cannot be asked for over the network: write a number from 0 to {GREATEST_PCT}; the gate does not go below min_pct"
             ));
         }
-        Ok(Self::FeedOverride { pct, reason: words(reason) })
+        Ok(Self::FeedOverride { pct, reason: clean_text(reason) })
     }
 
     /// An alarm that has been seen.
     #[must_use]
     pub fn acknowledge_alarm(code: &str) -> Self {
-        Self::AcknowledgeAlarm { code: words(code) }
+        Self::AcknowledgeAlarm { code: clean_text(code) }
     }
 }
 
@@ -73,7 +73,7 @@ pub struct NetworkRequest {
 }
 
 /// Text of somebody else, as it may stand in the audit and on the page.
-fn words(text: &str) -> String {
+fn clean_text(text: &str) -> String {
     text.chars().filter(|letter| !letter.is_control()).take(WORDS_MAX).collect()
 }
 

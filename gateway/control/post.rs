@@ -31,19 +31,19 @@ struct Woken {
 
 impl Wake {
     /// From now on the calling thread is the one that is woken.
-    pub fn here(&self) {
+    pub fn bind_current_thread(&self) {
         let _only_once = self.0.thread.set(std::thread::current());
     }
 
     /// Wakes it.
-    pub fn wake(&self) {
+    pub fn wake_thread(&self) {
         self.0.wanted.store(true, Ordering::SeqCst);
         self.0.thread.get().map(Thread::unpark);
     }
 
     /// Was it woken since the last call?
     #[must_use]
-    pub fn take(&self) -> bool {
+    pub fn take_wakeup(&self) -> bool {
         self.0.wanted.swap(false, Ordering::SeqCst)
     }
 }
@@ -90,7 +90,7 @@ pub struct OrderReceiver {
 
 /// Both ends.
 #[must_use]
-pub fn queue() -> (OrderSender, OrderReceiver) {
+pub fn create_queues() -> (OrderSender, OrderReceiver) {
     let (orders, to_obey) = sync_channel(WAITING_MAX);
     let (rows, to_keep) = sync_channel(ROWS_MAX);
     let (requests, to_judge) = sync_channel(REQUESTS_MAX);
@@ -101,15 +101,15 @@ pub fn queue() -> (OrderSender, OrderReceiver) {
 
 impl OrderSender {
     /// Hands an order to the tick and gives what it says.
-    pub async fn order(&self, order: Order) -> Reply {
+    pub async fn send_order(&self, order: Order) -> Reply {
         let (reply, answered) = oneshot::channel();
         if self.orders.try_send(QueuedOrder { order, reply }).is_err() {
-            return Reply::refused("the box is busy; look at its log and try again");
+            return Reply::from_refusal("the box is busy; look at its log and try again");
         }
-        self.wake.wake();
+        self.wake.wake_thread();
         match tokio::time::timeout(ANSWER_WITHIN, answered).await {
             Ok(Ok(reply)) => reply,
-            _ => Reply::refused(
+            _ => Reply::from_refusal(
                 "the tick does not answer; look at the log, and restart the gateway if it does not recover",
             ),
         }
@@ -117,24 +117,24 @@ impl OrderSender {
 
     /// Hands a request of the network to the tick and gives what it says. The tick is not woken for it: a request counts from
     /// the next tick on.
-    pub async fn request(&self, request: NetworkRequest) -> Reply {
+    pub async fn send_request(&self, request: NetworkRequest) -> Reply {
         let (reply, answered) = oneshot::channel();
         if self.requests.try_send(PostedRequest { request, reply }).is_err() {
-            return Reply::refused("too many requests wait for the gate; ask again later");
+            return Reply::from_refusal("too many requests wait for the gate; ask again later");
         }
         match tokio::time::timeout(ACCOUNT_WITHIN, answered).await {
             Ok(Ok(reply)) => reply,
-            _ => Reply::refused("the tick does not answer; look at the log of the box"),
+            _ => Reply::from_refusal("the tick does not answer; look at the log of the box"),
         }
     }
 
     /// Hands in a row of the audit; false when it will not be stored, or when that is not known in time.
-    pub async fn account(&self, row: Audit) -> bool {
+    pub async fn send_audit_row(&self, row: Audit) -> bool {
         let (stored, answered) = oneshot::channel();
         if self.rows.try_send(PostedRow { row, stored }).is_err() {
             return false;
         }
-        self.wake.wake();
+        self.wake.wake_thread();
         matches!(tokio::time::timeout(ACCOUNT_WITHIN, answered).await, Ok(Ok(true)))
     }
 }

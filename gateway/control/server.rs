@@ -1,6 +1,6 @@
 //! Listens for orders and hands each to the tick, on a thread of its own: however busy the page is, an order is heard.
 
-use super::{LINE_MAX, Order, OrderSender, Reply, socket};
+use super::{LINE_MAX, Order, OrderSender, Reply, socket_path};
 use crate::log::{Notice, Severity};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
@@ -34,28 +34,28 @@ impl Drop for Listening {
 
 /// Listens in this directory. Without a socket the box goes on; it cannot be armed then, and says so.
 #[must_use]
-pub fn listen(data_dir: &Path, post: OrderSender) -> Option<Listening> {
-    let path = socket(data_dir);
-    match bind(&path).and_then(|listener| start(listener, post)) {
+pub fn listen_for_orders(data_dir: &Path, post: OrderSender) -> Option<Listening> {
+    let path = socket_path(data_dir);
+    match bind_socket(&path).and_then(|listener| start_thread(listener, post)) {
         Ok(going_on) => Some(Listening { path, _going_on: going_on }),
         Err(error) => {
             let text =
                 format!("{}: no orders can be taken there ({error}), so the gate cannot be armed", path.display());
-            Notice::new(Severity::Warning, "no_control_socket", text).say();
+            Notice::new(Severity::Warning, "no_control_socket", text).write_to_logs();
             None
         }
     }
 }
 
 /// The thread that listens; it ends when what is given is dropped.
-fn start(listener: std::os::unix::net::UnixListener, post: OrderSender) -> io::Result<oneshot::Sender<()>> {
+fn start_thread(listener: std::os::unix::net::UnixListener, post: OrderSender) -> io::Result<oneshot::Sender<()>> {
     let (going_on, over) = oneshot::channel::<()>();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let listen = move || {
         runtime.block_on(async {
             let Ok(listener) = UnixListener::from_std(listener) else { return };
             tokio::select! {
-                () = take(listener, post) => {}
+                () = accept_orders(listener, post) => {}
                 _ = over => {}
             }
         });
@@ -65,7 +65,7 @@ fn start(listener: std::os::unix::net::UnixListener, post: OrderSender) -> io::R
 }
 
 /// Takes one order after another; whoever comes while too many are being talked to waits for his turn.
-async fn take(listener: UnixListener, post: OrderSender) {
+async fn accept_orders(listener: UnixListener, post: OrderSender) {
     let room = Arc::new(Semaphore::new(TALKING_MAX));
     loop {
         let Ok(place) = room.clone().acquire_owned().await else { return };
@@ -73,7 +73,7 @@ async fn take(listener: UnixListener, post: OrderSender) {
             Ok((stream, _)) => {
                 let post = post.clone();
                 tokio::spawn(async move {
-                    answer(stream, &post).await;
+                    answer_order(stream, &post).await;
                     drop(place);
                 });
             }
@@ -85,7 +85,7 @@ async fn take(listener: UnixListener, post: OrderSender) {
 
 /// Nobody else may ever open it: the file gets its place only when its mode is right. One that a killed gateway has left is
 /// replaced; the history's lock has kept a second gateway away by then.
-fn bind(path: &Path) -> io::Result<std::os::unix::net::UnixListener> {
+fn bind_socket(path: &Path) -> io::Result<std::os::unix::net::UnixListener> {
     let fresh = path.with_extension(format!("{}.sock", std::process::id()));
     let _left_behind = std::fs::remove_file(&fresh);
     let listener = std::os::unix::net::UnixListener::bind(&fresh)?;
@@ -98,12 +98,12 @@ fn bind(path: &Path) -> io::Result<std::os::unix::net::UnixListener> {
     Ok(listener)
 }
 
-async fn answer(mut stream: UnixStream, post: &OrderSender) {
+async fn answer_order(mut stream: UnixStream, post: &OrderSender) {
     let user = stream.peer_cred().ok().map(|peer| peer.uid());
     let reply = match tokio::time::timeout(ASK_WITHIN, read(&mut stream)).await {
-        Ok(Ok(line)) => obey(&line, user, post).await,
-        Ok(Err(error)) => Reply::refused(format!("the order could not be read: {error}")),
-        Err(_) => Reply::refused("nothing was ordered"),
+        Ok(Ok(line)) => forward_order(&line, user, post).await,
+        Ok(Err(error)) => Reply::from_refusal(format!("the order could not be read: {error}")),
+        Err(_) => Reply::from_refusal("nothing was ordered"),
     };
     let line = serde_json::to_string(&reply).unwrap_or_default() + "\n";
     let _gone = stream.write_all(line.as_bytes()).await;
@@ -115,9 +115,9 @@ async fn read(stream: &mut UnixStream) -> io::Result<String> {
     Ok(line)
 }
 
-async fn obey(line: &str, user: Option<u32>, post: &OrderSender) -> Reply {
+async fn forward_order(line: &str, user: Option<u32>, post: &OrderSender) -> Reply {
     match serde_json::from_str::<Order>(line) {
-        Ok(order) => post.order(order.of_user(user)).await,
-        Err(error) => Reply::refused(format!("this is no order: {error}")),
+        Ok(order) => post.send_order(order.of_user(user)).await,
+        Err(error) => Reply::from_refusal(format!("this is no order: {error}")),
     }
 }

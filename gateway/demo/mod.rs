@@ -10,7 +10,7 @@
 
 use crate::clock;
 use crate::config::Config;
-use crate::files::replace;
+use crate::files::replace_file;
 use crate::history::{Reader, store_wear_model};
 use crate::log::{Notice, Severity};
 use crate::run::open::MachineSpeed;
@@ -41,7 +41,7 @@ const DECADES_S: Range<f64> = 1.5e9..4e9;
 
 /// The configuration at this speed.
 #[must_use]
-pub fn text(speed: MachineSpeed) -> String {
+pub fn config_text(speed: MachineSpeed) -> String {
     let day = match speed {
         MachineSpeed::Real => "day=short&begun_s=44&wear_mm=0.27&change_h=0&change_friction_pct=150&dropouts_per_h=0",
         MachineSpeed::Times(_) | MachineSpeed::Max => "day=shifts",
@@ -51,40 +51,40 @@ pub fn text(speed: MachineSpeed) -> String {
 
 /// Puts models and memory of the demonstration into the data directory, unless something is there already. A demonstration
 /// that cannot be furnished runs without them, and says so.
-pub fn furnish(config: &mut Config, speed: MachineSpeed) {
+pub fn install_data(config: &mut Config, speed: MachineSpeed) {
     if speed != MachineSpeed::Real {
         return;
     }
     let data_dir = config.gateway.data_dir.clone();
-    match models(&data_dir, &config.history.path) {
+    match write_models(&data_dir, &config.history.path) {
         Ok(()) => {
             config.twin.model = Some(data_dir.join("demo-lathe.toml"));
             config.operations.path.get_or_insert(data_dir.join(RECIPE_FILE));
         }
         Err(error) => {
             let text = format!("the demonstration runs without its models: {error}");
-            Notice::new(Severity::Warning, "demo", text).say();
+            Notice::new(Severity::Warning, "demo", text).write_to_logs();
         }
     }
 }
 
-fn models(data_dir: &Path, history: &Path) -> Result<(), String> {
+fn write_models(data_dir: &Path, history: &Path) -> Result<(), String> {
     let words = |error: std::io::Error| error.to_string();
     std::fs::create_dir_all(data_dir).map_err(words)?;
     let model = data_dir.join("demo-lathe.toml");
     let now_ns = clock::now_ns();
     if !model.exists() {
         let ended_s = (now_ns / SECOND_NS - HOUR_S) as f64;
-        replace(&data_dir.join("twin.json"), &shift_times(LEARNED, ended_s)?).map_err(words)?;
-        replace(&data_dir.join("wear.json"), &shift_times(WORN, ended_s)?).map_err(words)?;
+        replace_file(&data_dir.join("twin.json"), &shift_times(LEARNED, ended_s)?).map_err(words)?;
+        replace_file(&data_dir.join("wear.json"), &shift_times(WORN, ended_s)?).map_err(words)?;
         // The state that the estimators remember would otherwise seem to have lasted since then.
-        replace(&data_dir.join("estimators.json"), &shift_times(ESTIMATED, (now_ns / SECOND_NS) as f64)?)
+        replace_file(&data_dir.join("estimators.json"), &shift_times(ESTIMATED, (now_ns / SECOND_NS) as f64)?)
             .map_err(words)?;
-        replace(&model, MODEL).map_err(words)?;
+        replace_file(&model, MODEL).map_err(words)?;
     }
     let recipe = data_dir.join(RECIPE_FILE);
     if !recipe.exists() {
-        replace(&recipe, RECIPE).map_err(words)?;
+        replace_file(&recipe, RECIPE).map_err(words)?;
     }
     let known = history.exists() && Reader::open(history).and_then(|it| it.newest_wear_model()).is_ok_and(|id| id > 0);
     if !known {
@@ -133,13 +133,13 @@ mod tests {
     #[test]
     fn the_demonstration_is_a_configuration_and_its_models_are_sound() {
         for speed in [MachineSpeed::Real, MachineSpeed::Times(60.0), MachineSpeed::Max] {
-            assert!(parse("demo", &text(speed), Path::new(""), []).is_ok(), "{speed:?}");
+            assert!(parse("demo", &config_text(speed), Path::new(""), []).is_ok(), "{speed:?}");
         }
         assert!(WearRecord::parse(WEAR).is_ok());
         let directory = tempfile::tempdir().expect("a directory");
         let history = directory.path().join("history.db");
         for _start in 0..2 {
-            models(directory.path(), &history).expect("furnished");
+            write_models(directory.path(), &history).expect("furnished");
         }
         let library = Reader::open(&history).and_then(|reader| reader.wear_models()).expect("readable");
         assert_eq!(library.len(), 1, "stored once");

@@ -72,14 +72,14 @@ pub type Onset = (Regime, TimeNs);
 #[must_use]
 pub fn beside_model(recording: &Recording, model: &Model, found: &Diagnosis, onsets: &[Onset]) -> Vec<BesideModel> {
     let Ok(simulated) = simulation::run(recording, model) else { return Vec::new() };
-    let rows = rows(recording, &found.output, simulated.total(), found);
+    let rows = compare_rows(recording, &found.output, simulated.total(), found);
     let moved = moved_parameters(model, found);
     let start_ns = recording.start_ns.unwrap_or(0);
     let of = |regime: Regime| {
         let onset_ns = onsets.iter().find(|(its, _)| *its == regime).map(|(_, onset_ns)| *onset_ns);
         let from_ns = onset_ns.unwrap_or(start_ns);
         let here: Vec<&ComparedRow> = rows.iter().filter(|row| row.regime == regime && row.at_ns >= from_ns).collect();
-        (here.len() >= ROWS_MIN).then(|| summed(regime, from_ns.max(start_ns), &here, found, &moved))
+        (here.len() >= ROWS_MIN).then(|| sum_rows(regime, from_ns.max(start_ns), &here, found, &moved))
     };
     Regime::ALL.into_iter().filter_map(of).collect()
 }
@@ -112,8 +112,8 @@ struct ComparedRow {
     after: f64,
 }
 
-fn rows(recording: &Recording, output: &str, expected: &[Option<f64>], found: &Diagnosis) -> Vec<ComparedRow> {
-    let Some(recorded) = recording.numbers(output) else { return Vec::new() };
+fn compare_rows(recording: &Recording, output: &str, expected: &[Option<f64>], found: &Diagnosis) -> Vec<ComparedRow> {
+    let Some(recorded) = recording.find_numbers(output) else { return Vec::new() };
     let start_ns = recording.start_ns.unwrap_or(0);
     let one = |row: usize| {
         let (regime, _) = regime::of(&second_of(recording, row))?;
@@ -128,16 +128,16 @@ fn rows(recording: &Recording, output: &str, expected: &[Option<f64>], found: &D
             after: (*found.rows.simulated_after.get(row)?)?,
         })
     };
-    (0..recording.rows()).filter_map(one).collect()
+    (0..recording.count_rows()).filter_map(one).collect()
 }
 
 /// The row as the watch sees it.
 fn second_of(recording: &Recording, row: usize) -> Row {
-    let number = |id: ChannelId| recording.numbers(id.name()).and_then(|numbers| numbers.get(row));
-    Row { numbers: ChannelId::all().map(number).collect(), ..Row::default() }
+    let number = |id: ChannelId| recording.find_numbers(id.name()).and_then(|numbers| numbers.get(row));
+    Row { numbers: ChannelId::list_all().map(number).collect(), ..Row::default() }
 }
 
-fn summed(
+fn sum_rows(
     regime: Regime,
     from_ns: TimeNs,
     rows: &[&ComparedRow],
@@ -167,20 +167,20 @@ fn summed(
         en: String::new(),
         zh: String::new(),
     };
-    (one.en, one.zh) = words(&one, &found.unit, moved);
+    (one.en, one.zh) = describe_model(&one, &found.unit, moved);
     one
 }
 
 impl BesideModel {
     /// A difference up to this is none.
-    fn negligible(&self) -> f64 {
+    fn negligible_difference(&self) -> f64 {
         if self.expected.abs() > self.noise { TOLD_SHARE * self.expected.abs() } else { self.noise }
     }
 
     /// Is the difference worth telling?
     #[must_use]
-    pub fn differs(&self) -> bool {
-        self.difference.abs() > self.negligible()
+    pub fn has_difference(&self) -> bool {
+        self.difference.abs() > self.negligible_difference()
     }
 
     /// How far the machine is from the model in charge, English and Chinese.
@@ -188,7 +188,7 @@ impl BesideModel {
         let (en_where, zh_where) = self.regime.words();
         let amount = format!("{} {unit}", short(self.difference.abs()));
         // A share of nothing is no figure.
-        let share = (self.expected.abs() > self.negligible())
+        let share = (self.expected.abs() > self.negligible_difference())
             .then(|| short(100.0 * self.difference.abs() / self.expected.abs()));
         let en_share = share.as_ref().map_or(String::new(), |share| format!(" ({share} %)"));
         let zh_share = share.map_or(String::new(), |share| format!("（{share} %）"));
@@ -202,7 +202,7 @@ impl BesideModel {
     /// Is it mostly a parameter of the model in charge that has become another one?
     #[must_use]
     pub fn is_of_parameters(&self) -> bool {
-        self.differs()
+        self.has_difference()
             && self.by_parameters * self.difference > 0.0
             && self.by_parameters.abs() > 0.5 * self.difference.abs()
     }
@@ -211,9 +211,9 @@ impl BesideModel {
 /// Before what a diagnosis makes of it stands how far the machine is from the model in charge: a diagnosis refits the model, and what it
 /// then adds may have the other sign.
 #[must_use]
-pub fn headline(beside: &[BesideModel], unit: &str, (en, zh): (&str, &str)) -> (String, String) {
+pub fn compose_headline(beside: &[BesideModel], unit: &str, (en, zh): (&str, &str)) -> (String, String) {
     let (first, second): (Vec<String>, Vec<String>) =
-        beside.iter().filter(|one| one.differs()).map(|one| one.difference_words(unit)).unzip();
+        beside.iter().filter(|one| one.has_difference()).map(|one| one.difference_words(unit)).unzip();
     if first.is_empty() {
         return (en.to_owned(), zh.to_owned());
     }
@@ -222,15 +222,15 @@ pub fn headline(beside: &[BesideModel], unit: &str, (en, zh): (&str, &str)) -> (
     (format!("{begin}. With its parameters fitted anew: {en}"), format!("{}。重新拟合参数后：{zh}", second.join("；")))
 }
 
-fn words(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (String, String) {
+fn describe_model(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (String, String) {
     let (en_where, zh_where) = one.regime.words();
-    if !one.differs() {
+    if !one.has_difference() {
         return (
             format!(
                 "{en_where} the machine takes what the model in charge says ({:+} {unit})",
-                rounded(one.difference)
+                round_for_display(one.difference)
             ),
-            format!("{zh_where}与当前模型一致（{:+} {unit}）", rounded(one.difference)),
+            format!("{zh_where}与当前模型一致（{:+} {unit}）", round_for_display(one.difference)),
         );
     }
     let mut en: Vec<String> = Vec::new();
@@ -242,24 +242,24 @@ fn words(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (String, St
         let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
         en.push(format!(
             "{:+} {unit} because parameters of the model are other ones now{names}",
-            rounded(one.by_parameters)
+            round_for_display(one.by_parameters)
         ));
-        zh.push(format!("模型参数变化{:+} {unit}{names}", rounded(one.by_parameters)));
+        zh.push(format!("模型参数变化{:+} {unit}{names}", round_for_display(one.by_parameters)));
     }
     for (kind, share) in one.by_effects.iter().filter(|(_, share)| told(*share)) {
-        en.push(format!("{:+} {unit} by {kind}", rounded(*share)));
-        zh.push(format!("{kind} {:+} {unit}", rounded(*share)));
+        en.push(format!("{:+} {unit} by {kind}", round_for_display(*share)));
+        zh.push(format!("{kind} {:+} {unit}", round_for_display(*share)));
     }
     if told(one.left) || en.is_empty() {
-        en.push(format!("{:+} {unit} by nothing that was found", rounded(one.left)));
-        zh.push(format!("未找到原因{:+} {unit}", rounded(one.left)));
+        en.push(format!("{:+} {unit} by nothing that was found", round_for_display(one.left)));
+        zh.push(format!("未找到原因{:+} {unit}", round_for_display(one.left)));
     }
     let (en_difference, zh_difference) = one.difference_words(unit);
     (format!("{en_difference}: {}", en.join(", ")), format!("{zh_difference}：{}", zh.join("，")))
 }
 
 /// For a sum that can be checked on the page.
-fn rounded(value: f64) -> f64 {
+fn round_for_display(value: f64) -> f64 {
     let digits = if value.abs() >= 10.0 { 0 } else { 1 };
     let scale = 10_f64.powi(digits);
     (value * scale).round() / scale
@@ -283,22 +283,24 @@ mod tests {
             en: String::new(),
             zh: String::new(),
         };
-        (one.en, one.zh) = words(&one, "W", &[]);
+        (one.en, one.zh) = describe_model(&one, "W", &[]);
         one
     }
 
     #[test]
     fn below_the_noise_of_a_second_nothing_differs_and_of_nothing_there_is_no_share() {
-        assert!(!one(Regime::Standby, 0.0, 0.3).differs());
-        assert!(!one(Regime::Cutting, 2000.0, 39.0).differs() && one(Regime::Cutting, 2000.0, 41.0).differs());
+        assert!(!one(Regime::Standby, 0.0, 0.3).has_difference());
+        assert!(
+            !one(Regime::Cutting, 2000.0, 39.0).has_difference() && one(Regime::Cutting, 2000.0, 41.0).has_difference()
+        );
         let standby = one(Regime::Standby, 0.0, -120.0);
-        assert!(standby.differs() && !standby.en.contains('%') && !standby.zh.contains('%'), "{}", standby.en);
+        assert!(standby.has_difference() && !standby.en.contains('%') && !standby.zh.contains('%'), "{}", standby.en);
     }
 
     #[test]
     fn the_answer_begins_with_what_the_watch_sees() {
         let beside = [one(Regime::Standby, 0.0, 0.3), one(Regime::Cutting, 1772.0, 251.0)];
-        let (en, zh) = headline(&beside, "W", ("The model lacks gear stage.", "模型缺少换挡。"));
+        let (en, zh) = compose_headline(&beside, "W", ("The model lacks gear stage.", "模型缺少换挡。"));
         assert_eq!(
             en,
             "While cutting the machine takes 251 W (14.16 %) more than the model in charge says. With its parameters fitted anew: The \
@@ -306,7 +308,7 @@ mod tests {
         );
         assert_eq!(zh, "切削时比当前模型高251 W（14.16 %）。重新拟合参数后：模型缺少换挡。");
         assert_eq!(
-            headline(&beside[..1], "W", ("It agrees.", "一致。")),
+            compose_headline(&beside[..1], "W", ("It agrees.", "一致。")),
             ("It agrees.".to_owned(), "一致。".to_owned())
         );
     }

@@ -4,10 +4,10 @@
 //! The gateway writes one line, the [`DiagnosisJob`], and holds the pipe open: the child ends when the pipe does, so that nothing is left
 //! behind by a gateway that was killed. The child answers with a line for every stage and one with the outcome, each a [`ChildMessage`].
 
-use super::beside::{BesideModel, Onset, beside_model, headline};
+use super::beside::{BesideModel, Onset, beside_model, compose_headline};
 use super::context::DiagnosisContext;
 use super::recordings::read_recordings_as;
-use super::series::{AlignBy, SimulatedSeries, attach, recorded_output, series_model};
+use super::series::{AlignBy, SimulatedSeries, attach_series, recorded_output, series_model};
 use super::store::DiagnosisStore;
 use super::{outputs, stretch};
 use crate::history;
@@ -116,7 +116,7 @@ pub fn start(job: &DiagnosisJob) -> std::io::Result<Child> {
 }
 
 /// Every line of the child until it ends or says the outcome.
-pub fn listen(output: impl Read, mut said: impl FnMut(ChildMessage)) {
+pub fn read_messages(output: impl Read, mut said: impl FnMut(ChildMessage)) {
     let mut lines = BufReader::new(output.take(LINE_MAX)).lines();
     while let Some(Ok(line)) = lines.next() {
         if let Ok(it) = serde_json::from_str(&line) {
@@ -139,12 +139,12 @@ pub fn run() -> std::io::Result<()> {
         let _until_it_is_gone = std::io::copy(&mut input, &mut std::io::sink());
         std::process::exit(2);
     })?;
-    let outcome = diagnose(&job)
+    let outcome = run_job(&job)
         .map_or_else(ChildMessage::Refused, |(row, missing)| ChildMessage::Finished(Box::new(row), missing));
-    say(&outcome)
+    write_message(&outcome)
 }
 
-fn say(said: &ChildMessage) -> std::io::Result<()> {
+fn write_message(said: &ChildMessage) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{}", serde_json::to_string(said)?)?;
     out.flush()
@@ -167,7 +167,7 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
         JobInput::Stretch { history, from_ns, to_ns, .. } => {
             let model = parsed(&job.toml)?;
             let recording = stretch::read(history, *from_ns, *to_ns, &model.output).map_err(|it| it.to_string())?;
-            if recording.rows() == 0 {
+            if recording.count_rows() == 0 {
                 return Err("the history holds no sample of this time; choose another one".to_owned());
             }
             let from_ns = begin_ns(&recording).unwrap_or(*from_ns);
@@ -180,13 +180,13 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
             let given = read_recordings_as(&[path.display().to_string()], None).map_err(together)?;
             let (mut recording, mut reading) = (given.recording, given.warnings);
             if let Some(text) = simulated {
-                let series = SimulatedSeries::of(text, AlignBy::Auto);
+                let series = SimulatedSeries::from_text(text, AlignBy::Auto);
                 let output = model
                     .as_ref()
                     .map(|model| model.output.clone())
                     .or_else(|| recorded_output(&recording, &series))
                     .ok_or_else(|| "which recorded quantity does the series simulate? choose a model".to_owned())?;
-                let found = attach(&recording, &output, &series, None).map_err(together)?;
+                let found = attach_series(&recording, &output, &series, None).map_err(together)?;
                 recording = found.recording;
                 reading.extend(found.told);
                 model = Some(model.map_or_else(|| series_model(&output).map_err(|wrong| wrong.join("; ")), Ok)?);
@@ -198,20 +198,20 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
     }
 }
 
-fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), String> {
-    let tell = |stage, rows| say(&ChildMessage::Stage(stage, rows)).map_err(|error| error.to_string());
+fn run_job(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), String> {
+    let tell = |stage, rows| write_message(&ChildMessage::Stage(stage, rows)).map_err(|error| error.to_string());
     tell(Stage::Reading, 0)?;
     let Compared { model, recording, reading, from_ns, to_ns } = read_input(job)?;
-    tell(Stage::Comparing, recording.rows())?;
+    tell(Stage::Comparing, recording.count_rows())?;
     let examination = twin::examine(&recording, &model);
-    let context = DiagnosisContext::before(&recording, &model, reading);
+    let context = DiagnosisContext::from_recording(&recording, &model, reading);
     if !examination.unusable.is_empty() {
         let doubts = context.doubts.iter().map(|doubt| doubt.text.en.clone());
         return Err(examination.unusable.into_iter().chain(doubts).collect::<Vec<_>>().join("; "));
     }
     let found = twin::diagnose(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
-    let context = context.after(&model, &found);
-    tell(Stage::Writing, recording.rows())?;
+    let context = context.with_diagnosis(&model, &found);
+    tell(Stage::Writing, recording.count_rows())?;
     let beside = match &job.input {
         JobInput::Stretch { onsets, .. } => beside_model(&recording, &model, &found, onsets),
         JobInput::File { .. } => Vec::new(),
@@ -221,21 +221,21 @@ fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Str
         from_ns,
         to_ns,
         verdict: found.verdict.word().to_owned(),
-        summary: summary(&found, &beside),
-        json: outputs::document(&found, &context).to_string(),
+        summary: describe_finding(&found, &beside),
+        json: outputs::diagnosis_to_json(&found, &context).to_string(),
     };
-    let kept = DiagnosisStore::at(job.kept.clone());
-    kept.keep(&row, &found, &recording, (&context, beside))
+    let kept = DiagnosisStore::from_directory(job.kept.clone());
+    kept.write_diagnosis(&row, &found, &recording, (&context, beside))
         .map_err(|error| format!("{}: {error}", kept.directory().display()))?;
     Ok((row, found.missing.iter().map(|missing| missing.effect.clone()).collect()))
 }
 
 /// The answer in a sentence. A model that fits only with other parameters does not agree with the machine: what has moved is the
 /// finding, and it is told in the place of "it agrees".
-fn summary(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
+fn describe_finding(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
     let moved: Vec<&str> = beside.iter().filter(|one| one.is_of_parameters()).map(|one| one.en.as_str()).collect();
     if found.verdict != Verdict::NoMismatch || moved.is_empty() {
-        return headline(beside, &found.unit, (&found.summary.en, "")).0;
+        return compose_headline(beside, &found.unit, (&found.summary.en, "")).0;
     }
     format!("A parameter of the model has changed: {}. Nothing else is missing.", moved.join("; "))
 }

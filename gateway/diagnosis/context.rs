@@ -39,20 +39,24 @@ pub struct SeriesErrors {
 impl DiagnosisContext {
     /// Before the diagnosis: units of the inputs, error of the series.
     #[must_use]
-    pub fn before(recording: &Recording, model: &Model, reading: Vec<Bilingual>) -> Self {
-        Self { reading, doubts: unit_check::inputs(recording, model), series: series_errors(recording, &model.output) }
+    pub fn from_recording(recording: &Recording, model: &Model, reading: Vec<Bilingual>) -> Self {
+        Self {
+            reading,
+            doubts: unit_check::find_input_doubts(recording, model),
+            series: series_errors(recording, &model.output),
+        }
     }
 
     /// Adds what only the fitted parameters show.
     #[must_use]
-    pub fn after(mut self, nominal: &Model, diagnosis: &Diagnosis) -> Self {
-        self.doubts.extend(unit_check::parameters(nominal, &diagnosis.model));
+    pub fn with_diagnosis(mut self, nominal: &Model, diagnosis: &Diagnosis) -> Self {
+        self.doubts.extend(unit_check::find_parameter_doubts(nominal, &diagnosis.model));
         self
     }
 
     /// Before everything else in a report of words.
     #[must_use]
-    pub fn words(&self, language: Language, unit: &str) -> String {
+    pub fn to_words(&self, language: Language, unit: &str) -> String {
         let pick = |text: &Bilingual| if language == Language::En { text.en.clone() } else { text.zh.clone() };
         let mut text = String::new();
         for doubt in &self.doubts {
@@ -60,7 +64,7 @@ impl DiagnosisContext {
             text.push_str(&format!("{mark}{}\n", pick(&doubt.text)));
         }
         if let Some(series) = &self.series {
-            text.push_str(&format!("{}\n", pick(&series.words(unit))));
+            text.push_str(&format!("{}\n", pick(&series.describe_errors(unit))));
         }
         text
     }
@@ -90,7 +94,7 @@ impl DiagnosisContext {
 impl SeriesErrors {
     /// One sentence.
     #[must_use]
-    pub fn words(&self, unit: &str) -> Bilingual {
+    pub fn describe_errors(&self, unit: &str) -> Bilingual {
         let [given, fitted, gain, offset] = [self.as_given, self.refitted, self.gain, self.offset].map(short);
         Bilingual::new(
             format!(
@@ -105,7 +109,7 @@ impl SeriesErrors {
 #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
 fn series_errors(recording: &Recording, output: &str) -> Option<SeriesErrors> {
     let (as_given, rows) = error_as_given(recording, output)?;
-    let (recorded, series) = (recording.numbers(output)?, recording.numbers(&series_column(output))?);
+    let (recorded, series) = (recording.find_numbers(output)?, recording.find_numbers(&series_column(output))?);
     let pairs: Vec<(f64, f64)> = series.iter().zip(recorded.iter()).filter_map(|(x, y)| Some((x?, y?))).collect();
     let n = pairs.len() as f64;
     let mean = pairs.iter().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x / n, sum.1 + y / n));

@@ -37,21 +37,21 @@ impl Steps {
     ///
     /// # Errors
     /// What the plan lacks, or why it is too long.
-    pub fn of(plan: &Recording) -> Result<Self, String> {
-        if plan.numbers("spindle_programmed_rpm").is_none() {
+    pub fn from_plan(plan: &Recording) -> Result<Self, String> {
+        if plan.find_numbers("spindle_programmed_rpm").is_none() {
             return Err(
                 "the plan has no column spindle_programmed_rpm; `diagnose --experiment` writes plans".to_owned()
             );
         }
         let mut found = Self { steps: Vec::new(), runs: Vec::new(), settled: Vec::new() };
         let mut last_tool: Option<String> = None;
-        for run in plan.runs() {
+        for run in plan.list_runs() {
             for row in run.rows {
-                let mut step = step(plan, row);
-                let tool = plan.words("tool").and_then(|words| words.get(row)).map(str::to_owned);
+                let mut step = read_step(plan, row);
+                let tool = plan.find_words("tool").and_then(|words| words.get(row)).map(str::to_owned);
                 step.new_edge = tool.is_some() && last_tool.is_some() && tool != last_tool;
                 last_tool = tool.or(last_tool);
-                let operation = plan.words("operation").and_then(|words| words.get(row));
+                let operation = plan.find_words("operation").and_then(|words| words.get(row));
                 found.add(step, &run.name, operation.is_some_and(|operation| operation != TRANSITION));
             }
         }
@@ -86,8 +86,8 @@ impl Steps {
     }
 }
 
-fn step(plan: &Recording, row: usize) -> ExperimentStep {
-    let number = |name: &str| plan.numbers(name).and_then(|numbers| numbers.get(row));
+fn read_step(plan: &Recording, row: usize) -> ExperimentStep {
+    let number = |name: &str| plan.find_numbers(name).and_then(|numbers| numbers.get(row));
     let next_s = plan.time_s.get(row + 1).filter(|next_s| **next_s > plan.time_s[row]);
     let before_s = (row > 0).then(|| plan.time_s[row] - plan.time_s[row - 1]).filter(|step_s| *step_s > 0.0);
     let cut = (number("engaged").unwrap_or(0.0) > 0.5).then(|| ExperimentCut {
@@ -118,13 +118,13 @@ fn step(plan: &Recording, row: usize) -> ExperimentStep {
 /// the gateway show.
 ///
 /// # Errors
-/// See [`Steps::of`].
-pub fn execute(
+/// See [`Steps::from_plan`].
+pub fn execute_plan(
     settings: SimulatedSettings,
     plan: &Recording,
     rate_hz: f64,
 ) -> Result<(Recording, Instruments), String> {
-    let steps = Steps::of(plan)?;
+    let steps = Steps::from_plan(plan)?;
     let name = match settings.machine {
         SimulatedMachine::Lathe => "simulated://lathe",
         SimulatedMachine::Mill => "simulated://mill",
@@ -133,10 +133,10 @@ pub fn execute(
     let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
     let mut table = RecordingBuilder::new(name, &steps);
     let mut instruments = Instruments::new(settings.seed);
-    table.fill(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz, |at_ns| {
+    table.record_samples(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz, |at_ns| {
         instruments.read(&machine.truth(at_ns), at_ns)
     });
-    Ok((table.finish(), instruments))
+    Ok((table.into_recording(), instruments))
 }
 
 /// What instruments that are no part of the gateway show of the simulated machine during an experiment.
@@ -168,7 +168,7 @@ impl Instruments {
         let rad_s = truth.spindle_speed_rpm.abs() * std::f64::consts::TAU / 60.0;
         let cutting = if rad_s > 1.0 { truth.cutting_power_w / rad_s } else { 0.0 };
         let own_s = (at_ns - first_ns) as f64 / SECOND_NS as f64 * (1.0 + SENSOR_CLOCK.1) + SENSOR_CLOCK.0;
-        self.torque.push((own_s, cutting + SENSOR_ERRORS_NM.0 + SENSOR_ERRORS_NM.1 * self.noise.normal()));
+        self.torque.push((own_s, cutting + SENSOR_ERRORS_NM.0 + SENSOR_ERRORS_NM.1 * self.noise.next_normal()));
     }
 
     /// The file of the torque sensor.
@@ -187,7 +187,7 @@ impl Instruments {
 struct Noise(u64);
 
 impl Noise {
-    fn normal(&mut self) -> f64 {
+    fn next_normal(&mut self) -> f64 {
         let mut even = || {
             self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (self.0 >> 11) as f64 / (1_u64 << 53) as f64
@@ -211,10 +211,10 @@ impl<'a> RecordingBuilder<'a> {
     }
 
     /// Samples from the first step to the end of the last one; `at` hears of each.
-    fn fill(&mut self, mut lockstep: Lockstep, rate_hz: f64, mut at: impl FnMut(TimeNs)) {
+    fn record_samples(&mut self, mut lockstep: Lockstep, rate_hz: f64, mut at: impl FnMut(TimeNs)) {
         #[expect(clippy::cast_possible_truncation, reason = "between a millisecond and a thousand seconds")]
         let period_ns = (SECOND_NS as f64 / rate_hz.clamp(0.001, 1000.0)) as i64;
-        let mut sample = Sample::empty(0);
+        let mut sample = Sample::new_empty(0);
         let mut now_ns = ORIGIN_NS;
         let mut begun = false;
         let limit_ns = ORIGIN_NS + (SECOND_NS as f64 * 2.0 * SECONDS_MAX) as i64;
@@ -247,7 +247,7 @@ impl<'a> RecordingBuilder<'a> {
         let (Some(wanted), Some(settled)) = (self.steps.steps.get(step - 1), self.steps.settled.get(step - 1)) else {
             return false;
         };
-        let off = number(sample, "spindle_speed_rpm")
+        let off = read_number(sample, "spindle_speed_rpm")
             .is_some_and(|rpm| (rpm - wanted.spindle_rpm).abs() > AT_SPEED * wanted.spindle_rpm.abs() + 1.0);
         if off {
             self.on_the_way_ns = Some(sample.at_ns);
@@ -255,13 +255,13 @@ impl<'a> RecordingBuilder<'a> {
         *settled && self.on_the_way_ns.is_some_and(|then_ns| sample.at_ns - then_ns < SETTLED_NS)
     }
 
-    fn finish(self) -> Recording {
+    fn into_recording(self) -> Recording {
         let time_s = self.samples.iter().map(|(time_s, ..)| *time_s).collect();
         let mut recording = Recording::new(self.name, time_s, None);
         let run = |step: usize| self.steps.runs.get(step - 1).map_or("", String::as_str);
         recording.set_column("run", Cells::Words(self.samples.iter().map(|(_, step, _)| run(*step)).collect()));
-        for id in ChannelId::all() {
-            if let Some(cells) = self.cells(id) {
+        for id in ChannelId::list_all() {
+            if let Some(cells) = self.collect_cells(id) {
                 recording.set_column(id.name(), cells);
             }
         }
@@ -272,7 +272,7 @@ impl<'a> RecordingBuilder<'a> {
         recording
     }
 
-    fn cells(&self, id: ChannelId) -> Option<Cells> {
+    fn collect_cells(&self, id: ChannelId) -> Option<Cells> {
         let values = || self.samples.iter().map(|(.., sample)| sample.slot(id).value.as_ref().ok());
         values().flatten().next()?;
         if id.channel().kind == Kind::Text {
@@ -284,46 +284,46 @@ impl<'a> RecordingBuilder<'a> {
     }
 }
 
-fn text<'a>(sample: &'a Sample, name: &str) -> Option<&'a str> {
-    sample.text(ChannelId::of(name)?)
+fn read_text<'a>(sample: &'a Sample, name: &str) -> Option<&'a str> {
+    sample.text(ChannelId::from_name(name)?)
 }
 
-fn number(sample: &Sample, name: &str) -> Option<f64> {
-    sample.number(ChannelId::of(name)?).ok()
+fn read_number(sample: &Sample, name: &str) -> Option<f64> {
+    sample.number(ChannelId::from_name(name)?).ok()
 }
 
 /// The step in progress, from 1.
 fn step_of(sample: &Sample) -> Option<usize> {
-    let program = text(sample, "program")?;
-    let block = text(sample, "block")?.strip_prefix('N')?.parse().ok()?;
+    let program = read_text(sample, "program")?;
+    let block = read_text(sample, "block")?.strip_prefix('N')?.parse().ok()?;
     (program == format!("O{EXPERIMENT_PROGRAM}") && block > 0).then_some(block)
 }
 
 fn has_ended(sample: &Sample) -> bool {
-    text(sample, "program").is_some_and(|program| program != format!("O{EXPERIMENT_PROGRAM}"))
+    read_text(sample, "program").is_some_and(|program| program != format!("O{EXPERIMENT_PROGRAM}"))
 }
 
 /// In the cut, as the program says it: a depth is planned and the axis feeds.
 fn compute_engagement(sample: &Sample) -> Option<f64> {
-    let (depth, feed) = (number(sample, "depth_of_cut_mm")?, number(sample, "feed_mm_min")?);
-    let rapid = number(sample, "rapid").unwrap_or(0.0) > 0.5;
+    let (depth, feed) = (read_number(sample, "depth_of_cut_mm")?, read_number(sample, "feed_mm_min")?);
+    let rapid = read_number(sample, "rapid").unwrap_or(0.0) > 0.5;
     Some(f64::from(u8::from(depth > 0.0 && feed > 0.0 && !rapid)))
 }
 
 /// A recording as CSV.
 #[must_use]
-pub fn csv(recording: &Recording) -> String {
+pub fn format_csv(recording: &Recording) -> String {
     let mut text = String::from("time_s");
     recording.columns().iter().for_each(|column| text.push_str(&format!(",{}", column.name)));
     text.push('\n');
-    for row in 0..recording.rows() {
+    for row in 0..recording.count_rows() {
         let _ = write!(text, "{}", recording.time_s[row]);
         for column in recording.columns() {
             let _ = match &column.cells {
                 Cells::Numbers(numbers) => {
-                    write!(text, ",{}", numbers.get(row).map(|x| six(x).to_string()).unwrap_or_default())
+                    write!(text, ",{}", numbers.get(row).map(|x| round_to_six(x).to_string()).unwrap_or_default())
                 }
-                Cells::Words(words) => write!(text, ",{}", super::simulation::quoted(words.get(row).unwrap_or(""))),
+                Cells::Words(words) => write!(text, ",{}", super::simulation::quote_cell(words.get(row).unwrap_or(""))),
             };
         }
         text.push('\n');
@@ -332,6 +332,6 @@ pub fn csv(recording: &Recording) -> String {
 }
 
 /// Six decimals are finer than any of the simulated instruments.
-fn six(x: f64) -> f64 {
+fn round_to_six(x: f64) -> f64 {
     (x * 1e6).round() / 1e6
 }

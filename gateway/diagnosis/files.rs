@@ -3,10 +3,10 @@
 
 use super::child::{DiagnosisJob, JobInput};
 use super::handle::{DiagnosisHandle, DiagnosisRefusal};
-use super::store::{DiagnosisStore, key};
+use super::store::{DiagnosisStore, diagnosis_key};
 use super::worker::{DiagnosisRequest, in_child};
-use crate::files::{read_text, replace};
-use crate::reload::digest;
+use crate::files::{read_text, replace_file};
+use crate::reload::compute_digest;
 use adapters::clock::TimeNs;
 use adapters::recording::Mapping;
 use serde::{Deserialize, Serialize};
@@ -66,16 +66,18 @@ impl FileDiagnoses {
     ///
     /// # Errors
     /// No thread could be started.
-    pub fn below(data_dir: &Path) -> std::io::Result<Self> {
+    pub fn from_data_dir(data_dir: &Path) -> std::io::Result<Self> {
         let directory = data_dir.join("recordings");
         let (requests, asked) = sync_channel(1);
-        let kept = DiagnosisStore::at(directory.join("diagnoses"));
+        let kept = DiagnosisStore::from_directory(directory.join("diagnoses"));
         let handle = DiagnosisHandle::new(requests, directory.join("model.toml"), kept);
         let own = Self { directory, handle };
-        let (index, kept) = (own.index(), own.handle.kept().clone());
+        let (index, kept) = (own.index(), own.handle.diagnosis_store().clone());
         // The thread holds no handle that could ask: it ends when the last one outside is gone.
         let state = own.handle.without_requests();
-        std::thread::Builder::new().name("files".to_owned()).spawn(move || work(&asked, &state, &kept, &index))?;
+        std::thread::Builder::new()
+            .name("files".to_owned())
+            .spawn(move || run_requests(&asked, &state, &kept, &index))?;
         Ok(own)
     }
 
@@ -91,7 +93,7 @@ impl FileDiagnoses {
 
     /// The files, newest first.
     #[must_use]
-    pub fn files(&self) -> Vec<BroughtFile> {
+    pub fn list_files(&self) -> Vec<BroughtFile> {
         let text = read_text(&self.directory.join("files.json"), INDEX_MAX).unwrap_or_default();
         serde_json::from_str(&text).unwrap_or_default()
     }
@@ -101,25 +103,25 @@ impl FileDiagnoses {
     /// # Errors
     /// The folder cannot be written.
     pub fn add(&self, name: &str, bytes: &[u8], at_ms: i64) -> std::io::Result<BroughtFile> {
-        let key = format!("{:016x}", digest(bytes));
-        let file = BroughtFile { key: key.clone(), name: plain(name), at_ms, bytes: bytes.len() };
+        let key = format!("{:016x}", compute_digest(bytes));
+        let file = BroughtFile { key: key.clone(), name: sanitize_name(name), at_ms, bytes: bytes.len() };
         let folder = self.directory.join(&key);
         std::fs::create_dir_all(&folder)?;
         std::fs::write(folder.join("data"), bytes)?;
-        let mut files = self.files();
+        let mut files = self.list_files();
         files.retain(|known| known.key != key);
         files.insert(0, file.clone());
         for gone in files.split_off(FILES_MAX.min(files.len())) {
             let _already_gone = std::fs::remove_dir_all(self.directory.join(gone.key));
         }
-        replace(&self.directory.join("files.json"), &serde_json::to_string(&files)?)?;
+        replace_file(&self.directory.join("files.json"), &serde_json::to_string(&files)?)?;
         Ok(file)
     }
 
     /// The path of a file; `None` where there is none of this key.
     #[must_use]
-    pub fn path(&self, key: &str) -> Option<PathBuf> {
-        let known = self.files().into_iter().any(|file| file.key == key);
+    pub fn find_path(&self, key: &str) -> Option<PathBuf> {
+        let known = self.list_files().into_iter().any(|file| file.key == key);
         known.then(|| self.directory.join(key).join("data"))
     }
 
@@ -128,20 +130,20 @@ impl FileDiagnoses {
     /// # Errors
     /// It cannot be written.
     pub fn set_map(&self, path: &Path, toml: &str) -> std::io::Result<()> {
-        replace(&Mapping::beside(path), toml)
+        replace_file(&Mapping::build_path_beside(path), toml)
     }
 
     /// The finished diagnoses, newest first.
     #[must_use]
-    pub fn results(&self) -> Vec<FileDiagnosis> {
-        results(&self.index())
+    pub fn list_results(&self) -> Vec<FileDiagnosis> {
+        read_results(&self.index())
     }
 
     /// Asks for a diagnosis of a file.
     ///
     /// # Errors
     /// One is under way.
-    pub fn ask(
+    pub fn request_diagnosis(
         &self,
         by: String,
         toml: String,
@@ -149,7 +151,7 @@ impl FileDiagnoses {
         simulated: Option<String>,
         at_ns: TimeNs,
     ) -> Result<(), DiagnosisRefusal> {
-        self.handle.begin(DiagnosisRequest {
+        self.handle.submit_request(DiagnosisRequest {
             toml,
             by: Some(by),
             from_ns: at_ns,
@@ -161,17 +163,17 @@ impl FileDiagnoses {
 }
 
 /// A name without a path, and not longer than a line.
-fn plain(name: &str) -> String {
+fn sanitize_name(name: &str) -> String {
     let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
     last.chars().filter(|c| !c.is_control()).take(120).collect()
 }
 
-fn results(index: &Path) -> Vec<FileDiagnosis> {
+fn read_results(index: &Path) -> Vec<FileDiagnosis> {
     let text = read_text(index, INDEX_MAX).unwrap_or_default();
     serde_json::from_str(&text).unwrap_or_default()
 }
 
-fn work(asked: &Receiver<DiagnosisRequest>, handle: &DiagnosisHandle, kept: &DiagnosisStore, index: &Path) {
+fn run_requests(asked: &Receiver<DiagnosisRequest>, handle: &DiagnosisHandle, kept: &DiagnosisStore, index: &Path) {
     while let Ok(request) = asked.recv() {
         let DiagnosisRequest { toml, by, to_ns, file, .. } = request;
         let Some((path, simulated)) = file else { continue };
@@ -183,9 +185,9 @@ fn work(asked: &Receiver<DiagnosisRequest>, handle: &DiagnosisHandle, kept: &Dia
         };
         let found = in_child(&job, handle);
         if let Ok((row, missing)) = &found {
-            let mut all = results(index);
+            let mut all = read_results(index);
             let result = FileDiagnosis {
-                key: key(row),
+                key: diagnosis_key(row),
                 file: name,
                 by,
                 at_ms: row.to_ns.div_euclid(1_000_000),
@@ -197,9 +199,9 @@ fn work(asked: &Receiver<DiagnosisRequest>, handle: &DiagnosisHandle, kept: &Dia
             all.retain(|known| known.key != result.key);
             all.insert(0, result);
             all.truncate(RESULTS_MAX);
-            let _told_by_the_handle = serde_json::to_string(&all).map(|text| replace(index, &text));
+            let _told_by_the_handle = serde_json::to_string(&all).map(|text| replace_file(index, &text));
         }
-        handle.ended(found.as_ref().map(|(row, _)| key(row)).map_err(Clone::clone));
+        handle.record_outcome(found.as_ref().map(|(row, _)| diagnosis_key(row)).map_err(Clone::clone));
     }
 }
 

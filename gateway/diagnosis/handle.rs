@@ -29,7 +29,7 @@ pub enum Run {
     Done {
         /// Who asked for it; `None`: the box itself.
         by: Option<String>,
-        /// See `store::key`.
+        /// See `store::diagnosis_key`.
         key: String,
         /// How long it took, s.
         seconds: f64,
@@ -122,13 +122,13 @@ impl DiagnosisHandle {
 
     /// What was kept of diagnoses.
     #[must_use]
-    pub fn kept(&self) -> &DiagnosisStore {
+    pub fn diagnosis_store(&self) -> &DiagnosisStore {
         &self.kept
     }
 
     /// The model file.
     #[must_use]
-    pub fn model(&self) -> &Path {
+    pub fn model_path(&self) -> &Path {
         &self.model
     }
 
@@ -144,7 +144,7 @@ impl DiagnosisHandle {
 
     /// What is being done, and about how long it takes in all, s, where that is known.
     #[must_use]
-    pub fn run(&self) -> (Run, Option<f64>) {
+    pub fn current_run(&self) -> (Run, Option<f64>) {
         let state = self.lock();
         let rows = if let Run::Running(running) = &state.run { running.rows } else { 0 };
         #[expect(clippy::cast_precision_loss, reason = "at most some ten thousand rows")]
@@ -156,21 +156,26 @@ impl DiagnosisHandle {
     ///
     /// # Errors
     /// No model is in charge, or one is under way.
-    pub fn ask(&self, by: Option<String>, from_ns: TimeNs, to_ns: TimeNs) -> Result<(), DiagnosisRefusal> {
+    pub fn request_diagnosis(
+        &self,
+        by: Option<String>,
+        from_ns: TimeNs,
+        to_ns: TimeNs,
+    ) -> Result<(), DiagnosisRefusal> {
         let none =
             || DiagnosisRefusal::new("no model is in charge", "name one under [twin] model in the configuration");
         let state = self.lock();
         let toml = state.model.as_ref().ok_or_else(none)?.toml.clone();
         let onsets = state.onsets.clone();
         drop(state);
-        self.begin(DiagnosisRequest { toml, by, from_ns, to_ns, onsets, file: None })
+        self.submit_request(DiagnosisRequest { toml, by, from_ns, to_ns, onsets, file: None })
     }
 
     /// Asks for a diagnosis.
     ///
     /// # Errors
     /// One is under way.
-    pub(super) fn begin(&self, request: DiagnosisRequest) -> Result<(), DiagnosisRefusal> {
+    pub(super) fn submit_request(&self, request: DiagnosisRequest) -> Result<(), DiagnosisRefusal> {
         let mut state = self.lock();
         if let Run::Running(running) = &state.run {
             let who = running.by.as_deref().unwrap_or("the box itself");
@@ -206,7 +211,7 @@ impl DiagnosisHandle {
 
     /// Who has ended the one under way.
     #[must_use]
-    pub fn cancelled(&self) -> Option<String> {
+    pub fn cancelled_by(&self) -> Option<String> {
         if let Run::Running(running) = &self.lock().run { running.cancelled.clone() } else { None }
     }
 
@@ -224,14 +229,14 @@ impl DiagnosisHandle {
         self.lock().child.take()
     }
 
-    pub(super) fn reached(&self, stage: Stage, rows: usize) {
+    pub(super) fn record_stage(&self, stage: Stage, rows: usize) {
         if let Run::Running(running) = &mut self.lock().run {
             (running.stage, running.rows) = (stage, rows);
         }
     }
 
     /// What came of it.
-    pub(super) fn ended(&self, outcome: Result<String, String>) {
+    pub(super) fn record_outcome(&self, outcome: Result<String, String>) {
         let mut state = self.lock();
         let Run::Running(RunningDiagnosis { by, since, rows, cancelled, .. }) = std::mem::take(&mut state.run) else {
             return;
@@ -254,14 +259,14 @@ impl DiagnosisHandle {
     ///
     /// # Errors
     /// The diagnosis has no model, the file has been changed since, or it cannot be written.
-    pub fn accept(&self, key: &str) -> Result<String, DiagnosisRefusal> {
+    pub fn accept_model(&self, key: &str) -> Result<String, DiagnosisRefusal> {
         let gone = || {
             DiagnosisRefusal::new(
                 "this diagnosis has left no model",
                 "only one that names what is missing does; diagnose again",
             )
         };
-        let text = self.kept.text(key, DiagnosisFile::Model).ok_or_else(gone)?;
+        let text = self.kept.read_file(key, DiagnosisFile::Model).ok_or_else(gone)?;
         let next = "look at the file; `cnc-gateway diagnose --accept` writes one by hand";
         let model =
             parse_model(&text).map_err(|wrong| DiagnosisRefusal::new(format!("the kept model: {}", wrong[0]), next))?;

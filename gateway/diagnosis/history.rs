@@ -13,13 +13,13 @@ const NOTATION: &str =
 pub(super) fn read(address: &str) -> Result<Recording, String> {
     let (path, conditions) = address.split_once('?').unwrap_or((address, ""));
     let reader = Reader::open(Path::new(path)).map_err(|error| error.to_string())?;
-    let span = reader.present().map_err(|error| error.to_string())?;
+    let span = reader.read_present_span().map_err(|error| error.to_string())?;
     let newest_ns = span.map_or(0, |(_, newest_ns)| newest_ns);
-    let query = query(conditions, newest_ns).map_err(|problem| format!("history:{address}: {problem}"))?;
-    reader.recording(&query).map_err(|error| format!("history:{address}: {error}"))
+    let query = parse_query(conditions, newest_ns).map_err(|problem| format!("history:{address}: {problem}"))?;
+    reader.read_recording(&query).map_err(|error| format!("history:{address}: {error}"))
 }
 
-fn query(conditions: &str, newest_ns: i64) -> Result<Query, String> {
+fn parse_query(conditions: &str, newest_ns: i64) -> Result<Query, String> {
     let mut query = Query::default();
     for condition in conditions.split('&').filter(|condition| !condition.is_empty()) {
         let (key, value) =
@@ -48,10 +48,10 @@ mod tests {
 
     #[test]
     fn conditions_are_read_and_wrong_ones_named() {
-        let query = query("from=1970-01-01&to=1970-01-02&tool=T2", 0).expect("fine");
+        let query = parse_query("from=1970-01-01&to=1970-01-02&tool=T2", 0).expect("fine");
         assert_eq!((query.from_ns, query.to_ns), (Some(0), Some(86_400_000_000_000)));
         assert_eq!(query.tool.as_deref(), Some("T2"));
-        assert!(super::query("since=1970-01-01", 0).expect_err("unknown").contains("since"));
-        assert!(super::query("from=1970-01-02&to=1970-01-01", 0).expect_err("empty").contains("not before"));
+        assert!(super::parse_query("since=1970-01-01", 0).expect_err("unknown").contains("since"));
+        assert!(super::parse_query("from=1970-01-02&to=1970-01-01", 0).expect_err("empty").contains("not before"));
     }
 }

@@ -34,7 +34,7 @@ pub struct MapProposal {
 impl MapProposal {
     /// From how a file is understood.
     #[must_use]
-    pub fn of(preview: &Preview) -> Self {
+    pub fn from_preview(preview: &Preview) -> Self {
         let column = |column: &ColumnPreview| {
             let sure = column
                 .to
@@ -55,7 +55,7 @@ impl MapProposal {
 
     /// Columns that a person has to decide about.
     #[must_use]
-    pub fn questions(&self) -> Vec<usize> {
+    pub fn open_questions(&self) -> Vec<usize> {
         let is_question = |column: &ProposedColumn| {
             let kept = column.to.as_deref().is_none_or(|to| to == column.from);
             !column.is_time && kept && column.candidates.iter().any(|candidate| *candidate != column.from)
@@ -65,7 +65,7 @@ impl MapProposal {
 
     /// The map as TOML, with a word about each line in both languages.
     #[must_use]
-    pub fn toml(&self, statement: &Bilingual, file: &str) -> String {
+    pub fn to_toml(&self, statement: &Bilingual, file: &str) -> String {
         let mut text = format!(
             "# Map of {file}: how it is read. What stands here is not guessed.\n# {file}的映射：如何读取该文件。此处写明的内容不再猜测。\n"
         );

@@ -63,56 +63,56 @@ pub struct NewModel {
 }
 
 /// The words for a line, both languages.
-fn comment(text: &mut String, en: &str, zh: &str) {
+fn write_comment(text: &mut String, en: &str, zh: &str) {
     let _ = write!(text, "# {en}\n# {zh}\n");
 }
 
 impl NewModel {
     /// The quantity that it simulates.
     #[must_use]
-    pub fn output(&self) -> String {
+    pub fn output_name(&self) -> String {
         let usual = match self.kind {
-            ModelKind::Axis => format!("{}axis_current_a", self.prefix()),
+            ModelKind::Axis => format!("{}axis_current_a", self.axis_prefix()),
             ModelKind::Thermal => "thermal_error_um".to_owned(),
             _ => "spindle_power_w".to_owned(),
         };
         self.output.clone().unwrap_or(usual)
     }
 
-    fn prefix(&self) -> String {
+    fn axis_prefix(&self) -> String {
         self.axis.as_ref().map_or_else(String::new, |axis| format!("{axis}_"))
     }
 
     /// The model file.
     #[must_use]
-    pub fn toml(&self) -> String {
+    pub fn to_toml(&self) -> String {
         if self.kind == ModelKind::Series {
-            return series_model_text(&self.output());
+            return series_model_text(&self.output_name());
         }
         let mut text = String::new();
-        comment(
+        write_comment(
             &mut text,
             "What the simulation believes (model/1). Numbers are first guesses: diagnose refits all but those in `fixed`.",
             "仿真模型（model/1）。数值只是初值：除fixed外，诊断时都会重新拟合。",
         );
         let _ = write!(text, "schema = \"model/1\"\nname = {}\n", toml_text(&self.name));
-        comment(&mut text, "the recorded quantity that is simulated", "被仿真的实测量");
-        let _ = write!(text, "output = {}\n\n", toml_text(&self.output()));
+        write_comment(&mut text, "the recorded quantity that is simulated", "被仿真的实测量");
+        let _ = write!(text, "output = {}\n\n", toml_text(&self.output_name()));
         match self.kind {
             ModelKind::Lathe | ModelKind::Mill | ModelKind::Drill => {
                 no_load(&mut text);
-                self.cut(&mut text);
-                loss(&mut text);
+                self.write_cut(&mut text);
+                write_loss(&mut text);
             }
             ModelKind::Spindle => no_load(&mut text),
             ModelKind::Axis => self.feed_axis(&mut text),
-            ModelKind::Thermal => thermal(&mut text),
+            ModelKind::Thermal => write_thermal(&mut text),
             ModelKind::Series => {}
         }
         text
     }
 
-    fn cut(&self, text: &mut String) {
+    fn write_cut(&self, text: &mut String) {
         let (material, kc11, mc) = self
             .material
             .as_deref()
@@ -135,12 +135,12 @@ impl NewModel {
                 "需要depth_of_cut_mm、feed_per_rev_mm（或feed_mm_min）、工件diameter_mm、engaged",
             ),
         };
-        comment(
+        write_comment(
             text,
             &format!("the cut, by Kienzle: specific cutting force kc1.1 and exponent mc of {material}"),
             &format!("切削功率（Kienzle公式）：{material}的单位切削力kc1.1与指数mc"),
         );
-        comment(text, needs, needs_zh);
+        write_comment(text, needs, needs_zh);
         let _ = write!(
             text,
             "[[effect]]\nkind = \"cutting_power\"\n{process}parameters = {{ kc11_n_per_mm2 = {kc11:.1}, mc = {mc} }}\n\n"
@@ -148,9 +148,9 @@ impl NewModel {
     }
 
     fn feed_axis(&self, text: &mut String) {
-        let prefix = self.prefix();
+        let prefix = self.axis_prefix();
         let (velocity, position) = (format!("{prefix}axis_velocity_mm_min"), format!("{prefix}axis_position_mm"));
-        comment(
+        write_comment(
             text,
             "friction that changes sign with the direction, friction that grows with speed, and a constant",
             "随方向变号的摩擦、随速度增大的摩擦和常量",
@@ -159,7 +159,11 @@ impl NewModel {
             text,
             "[[effect]]\nkind = \"linear\"\ncolumns = {{ \"sign({velocity})\" = 1.0, {velocity} = 5e-5, one = 0.0 }}\n\n"
         );
-        comment(text, "which column plays which part for the effects that are looked for", "各列在候选效应中的角色");
+        write_comment(
+            text,
+            "which column plays which part for the effects that are looked for",
+            "各列在候选效应中的角色",
+        );
         let _ = write!(text, "[roles]\nvelocity = {velocity:?}\nposition = {position:?}\n");
         if self.axis.as_deref() == Some("z") {
             text.push_str("vertical = \"z\"\n");
@@ -168,7 +172,7 @@ impl NewModel {
 }
 
 fn no_load(text: &mut String) {
-    comment(
+    write_comment(
         text,
         "the spindle without a cut: p0 + p1 n + p2 n^2, n in rpm; needs spindle_speed_rpm",
         "主轴空载：p0 + p1 n + p2 n^2，n单位rpm；需要spindle_speed_rpm",
@@ -176,8 +180,8 @@ fn no_load(text: &mut String) {
     text.push_str("[[effect]]\nkind = \"no_load_power\"\nparameters = { p0_w = 120.0, p1_w_per_rpm = 0.2, p2_w_per_rpm2 = 2e-5 }\n\n");
 }
 
-fn loss(text: &mut String) {
-    comment(
+fn write_loss(text: &mut String) {
+    write_comment(
         text,
         "what drive and gears lose under the cut, as a share of it; fixed where it is not known apart from kc1.1",
         "驱动与传动在切削时的损耗占比；无法与kc1.1区分时固定",
@@ -185,8 +189,8 @@ fn loss(text: &mut String) {
     text.push_str("[[effect]]\nkind = \"load_loss\"\nparameters = { linear = 0.15, quadratic_per_w = 0.0 }\nfixed = [\"linear\", \"quadratic_per_w\"]\n");
 }
 
-fn thermal(text: &mut String) {
-    comment(
+fn write_thermal(text: &mut String) {
+    write_comment(
         text,
         "growth with the temperatures that are measured, um per K; name the columns that you have",
         "随实测温度的伸长，um/K；请写上已有的温度列",
@@ -211,8 +215,8 @@ mod tests {
                     axis,
                 };
                 let model =
-                    parse_model(&new.toml()).unwrap_or_else(|wrong| panic!("{word}: {wrong:?}\n{}", new.toml()));
-                assert_eq!(model.output, new.output(), "{word}");
+                    parse_model(&new.to_toml()).unwrap_or_else(|wrong| panic!("{word}: {wrong:?}\n{}", new.to_toml()));
+                assert_eq!(model.output, new.output_name(), "{word}");
                 assert!(!model.parts.is_empty());
             }
         }

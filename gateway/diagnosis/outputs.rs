@@ -29,7 +29,7 @@ pub struct DiagnosisOutputs {
 impl DiagnosisOutputs {
     /// Files that cannot be written, before any work is done.
     #[must_use]
-    pub fn trouble(&self) -> Vec<String> {
+    pub fn find_unwritable_files(&self) -> Vec<String> {
         let paths = [&self.json, &self.html, &self.rows, &self.accept, &self.experiment].into_iter().flatten();
         paths.filter(|path| !is_stdout(path)).filter_map(|path| trouble_of(path)).collect()
     }
@@ -45,19 +45,19 @@ impl DiagnosisOutputs {
         context: &DiagnosisContext,
     ) -> Result<(), String> {
         if let Some(path) = &self.json {
-            put(path, &format!("{:#}\n", document(diagnosis, context)))?;
+            write_output(path, &format!("{:#}\n", diagnosis_to_json(diagnosis, context)))?;
         } else {
-            put(Path::new("-"), &words(diagnosis, context, self.language))?;
+            write_output(Path::new("-"), &describe_diagnosis(diagnosis, context, self.language))?;
         }
         if let Some(path) = &self.html {
-            put(path, &page(&PageInput { diagnosis, recording, context, language: self.language }))?;
+            write_output(path, &page(&PageInput { diagnosis, recording, context, language: self.language }))?;
         }
         if let Some(path) = &self.rows {
-            put(path, &rows(diagnosis, recording))?;
+            write_output(path, &format_rows(diagnosis, recording))?;
         }
         if let Some(path) = &self.experiment {
             match plan(diagnosis, recording) {
-                Ok(plan) => put(path, &plan.csv(self.language))?,
+                Ok(plan) => write_output(path, &plan.csv(self.language))?,
                 Err(reason) => eprintln!("note: {reason}"),
             }
         }
@@ -65,7 +65,7 @@ impl DiagnosisOutputs {
             Some(_) if diagnosis.verdict == Verdict::CannotTell => {
                 eprintln!("note: no model was written, because nothing could be told");
             }
-            Some(path) => put(path, &write_model(&diagnosis.model))?,
+            Some(path) => write_output(path, &write_model(&diagnosis.model))?,
             None => {}
         }
         Ok(())
@@ -73,31 +73,31 @@ impl DiagnosisOutputs {
 }
 
 /// The report in words, with what is doubtful before it.
-fn words(diagnosis: &Diagnosis, context: &DiagnosisContext, language: Language) -> String {
-    context.words(language, &diagnosis.unit) + text::report(diagnosis, language).as_str()
+fn describe_diagnosis(diagnosis: &Diagnosis, context: &DiagnosisContext, language: Language) -> String {
+    context.to_words(language, &diagnosis.unit) + text::report(diagnosis, language).as_str()
 }
 
 /// The document (`diagnosis/1`), with the report in words in both languages.
 #[must_use]
-pub(super) fn document(diagnosis: &Diagnosis, context: &DiagnosisContext) -> serde_json::Value {
+pub(super) fn diagnosis_to_json(diagnosis: &Diagnosis, context: &DiagnosisContext) -> serde_json::Value {
     let mut document = report::to_json(diagnosis);
     context.add_to(&mut document);
     document["words"] = serde_json::json!({
-        "en": words(diagnosis, context, Language::En),
-        "zh": words(diagnosis, context, Language::Zh),
+        "en": describe_diagnosis(diagnosis, context, Language::En),
+        "zh": describe_diagnosis(diagnosis, context, Language::Zh),
     });
     document
 }
 
 /// The rows as the contract wants them: one line per row of the input, in input order.
-fn rows(diagnosis: &Diagnosis, recording: &Recording) -> String {
-    let mut names = Vec::with_capacity(recording.rows());
-    for run in recording.runs() {
+fn format_rows(diagnosis: &Diagnosis, recording: &Recording) -> String {
+    let mut names = Vec::with_capacity(recording.count_rows());
+    for run in recording.list_runs() {
         names.extend(std::iter::repeat_n(run.name, run.rows.len()));
     }
-    let recorded: Vec<Option<f64>> = match recording.numbers(&diagnosis.output) {
+    let recorded: Vec<Option<f64>> = match recording.find_numbers(&diagnosis.output) {
         Some(numbers) => numbers.iter().collect(),
-        None => vec![None; recording.rows()],
+        None => vec![None; recording.count_rows()],
     };
     report::rows_csv(&recording.time_s, &names, &recorded, &diagnosis.rows)
 }
@@ -118,7 +118,7 @@ fn trouble_of(path: &Path) -> Option<String> {
 ///
 /// # Errors
 /// The path and what the system said.
-pub fn put(path: &Path, text: &str) -> Result<(), String> {
+pub fn write_output(path: &Path, text: &str) -> Result<(), String> {
     if is_stdout(path) {
         let mut out = std::io::stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
@@ -129,5 +129,5 @@ pub fn put(path: &Path, text: &str) -> Result<(), String> {
         // A pipe or a device is written into, never replaced.
         return std::fs::write(path, text).map_err(say);
     }
-    crate::files::replace(path, text).map_err(say)
+    crate::files::replace_file(path, text).map_err(say)
 }

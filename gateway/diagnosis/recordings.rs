@@ -1,6 +1,6 @@
 //! The recordings that a command is given: a file of any kind that people have, or a range of a history, read and put together.
 
-use super::{history, join};
+use super::{history, join_recordings};
 use adapters::Recording;
 use adapters::bilingual::Bilingual;
 use adapters::recording::{self, Mapping, NoteKind, ReadRecording, RecordingError};
@@ -50,7 +50,7 @@ pub fn read_recordings_as(sources: &[String], map: Option<&PathBuf>) -> Result<I
     let mut warnings = Vec::new();
     for (source, one) in &read {
         warnings.extend(describe_reading(source, one));
-        if let Some(text) = refusals(source, one) {
+        if let Some(text) = describe_refusals(source, one) {
             if is_too_much(one) { problems.push(text) } else { warnings.push(text) }
         }
     }
@@ -60,13 +60,15 @@ pub fn read_recordings_as(sources: &[String], map: Option<&PathBuf>) -> Result<I
     let refused = read.iter().map(|(_, one)| usize::try_from(one.refused).unwrap_or(usize::MAX)).sum();
     let refused_column = read.iter().find_map(|(_, one)| one.problems.first()?.column.clone());
     let recordings = read.into_iter().map(|(_, one)| one.recording).collect();
-    let recording = join(recordings).map_err(|problem| vec![Bilingual::new(problem.clone(), problem)])?;
+    let recording = join_recordings(recordings).map_err(|problem| vec![Bilingual::new(problem.clone(), problem)])?;
     Ok(InputRecordings { recording, refused, refused_column, warnings })
 }
 
 fn read_one(source: &str, mapping: Option<&Mapping>) -> Result<ReadRecording, Bilingual> {
     if let Some(address) = source.strip_prefix("history:") {
-        return history::read(address).map(whole).map_err(|problem| Bilingual::new(problem.clone(), problem));
+        return history::read(address)
+            .map(to_read_recording)
+            .map_err(|problem| Bilingual::new(problem.clone(), problem));
     }
     let path = Path::new(source);
     let read = mapping.map_or_else(|| recording::read_path(path), |mapping| recording::read_path_as(path, mapping));
@@ -78,12 +80,12 @@ fn read_one(source: &str, mapping: Option<&Mapping>) -> Result<ReadRecording, Bi
                 format!("{file}：没有可用的行{}", lines.concat()),
             )
         }
-        other => Bilingual::new(other.to_string(), other.zh()),
+        other => Bilingual::new(other.to_string(), other.describe_in_chinese()),
     })
 }
 
 /// A recording of which nothing was refused.
-fn whole(recording: Recording) -> ReadRecording {
+fn to_read_recording(recording: Recording) -> ReadRecording {
     ReadRecording { recording, problems: Vec::new(), refused: 0, notes: Vec::new() }
 }
 
@@ -91,7 +93,7 @@ fn whole(recording: Recording) -> ReadRecording {
 #[must_use]
 pub fn describe_reading(source: &str, read: &ReadRecording) -> Vec<Bilingual> {
     let mut lines = Vec::new();
-    let statement = read.statement();
+    let statement = read.describe_assumptions();
     if !statement.en.is_empty() {
         lines.push(Bilingual::new(format!("{source}: {}", statement.en), format!("{source}：{}", statement.zh)));
     }
@@ -106,14 +108,14 @@ pub fn describe_reading(source: &str, read: &ReadRecording) -> Vec<Bilingual> {
 #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
 fn is_too_much(read: &ReadRecording) -> bool {
     let refused = read.refused as f64;
-    refused > REFUSED_SHARE_MAX * (refused + read.recording.rows() as f64)
+    refused > REFUSED_SHARE_MAX * (refused + read.recording.count_rows() as f64)
 }
 
-fn refusals(source: &str, read: &ReadRecording) -> Option<Bilingual> {
+fn describe_refusals(source: &str, read: &ReadRecording) -> Option<Bilingual> {
     if read.refused == 0 {
         return None;
     }
-    let all = read.refused + read.recording.rows() as u64;
+    let all = read.refused + read.recording.count_rows() as u64;
     let (verdict, verdict_zh) = if is_too_much(read) {
         ("more than 1 %: correct the file or record again", "超过1 %：请改正文件或重新记录")
     } else {

@@ -43,7 +43,7 @@ pub struct SimulatedSeries {
 impl SimulatedSeries {
     /// From `FILE` or `FILE:COLUMN`.
     #[must_use]
-    pub fn of(text: &str, by: AlignBy) -> Self {
+    pub fn from_text(text: &str, by: AlignBy) -> Self {
         // A column may have a colon in its name: the file is what is there.
         let mut split = text.match_indices(':').map(|(at, _)| (&text[..at], &text[at + 1..]));
         let split = split.find(|(file, _)| Path::new(file).is_file()).or_else(|| text.rsplit_once(':'));
@@ -59,7 +59,7 @@ impl SimulatedSeries {
 /// The recorded quantity of the same name as the series, else the first that is measured of a machine's drives.
 #[must_use]
 pub fn recorded_output(recording: &Recording, series: &SimulatedSeries) -> Option<String> {
-    let has = |name: &str| recording.numbers(name).is_some_and(|numbers| numbers.count_present() > 0);
+    let has = |name: &str| recording.find_numbers(name).is_some_and(|numbers| numbers.count_present() > 0);
     let own = series.column.as_deref().filter(|name| has(name)).map(str::to_owned);
     let usual = [
         "spindle_power_w",
@@ -94,7 +94,7 @@ const ALIKE_MIN: f64 = 0.5;
 ///
 /// # Errors
 /// It cannot be read, has no such column, or does not belong to this recording.
-pub fn attach(
+pub fn attach_series(
     recording: &Recording,
     output: &str,
     asked: &SimulatedSeries,
@@ -102,16 +102,16 @@ pub fn attach(
 ) -> Result<AttachedSeries, Vec<Bilingual>> {
     let path = Path::new(&asked.file);
     let read = map.map_or_else(|| read_path(path), |map| read_path_as(path, map));
-    let read = read.map_err(|error| vec![Bilingual::new(error.to_string(), error.zh())])?;
+    let read = read.map_err(|error| vec![Bilingual::new(error.to_string(), error.describe_in_chinese())])?;
     let mut told = describe_reading(&asked.file, &read);
-    let wanted = recording.numbers(output).ok_or_else(|| {
+    let wanted = recording.find_numbers(output).ok_or_else(|| {
         vec![Bilingual::new(
             format!("{output} is not recorded: there is nothing to compare the simulation with"),
             format!("没有{output}的实测值，无法与仿真比较"),
         )]
     })?;
-    let (name, factor) = column(&read.recording, output, asked)?;
-    let numbers = read.recording.numbers(&name).cloned().unwrap_or_default();
+    let (name, factor) = find_column(&read.recording, output, asked)?;
+    let numbers = read.recording.find_numbers(&name).cloned().unwrap_or_default();
     let (cells, how) = align_series(recording, wanted, &read.recording, &numbers, asked.by)?;
     let cells: Numbers = cells.iter().map(|value| value.map(|value| value * factor)).collect();
     if (factor - 1.0).abs() > 1e-12 {
@@ -124,7 +124,7 @@ pub fn attach(
         format!("  simulated series {name}: {}", how.en),
         format!("  仿真序列{name}：{}", how.zh),
     ));
-    told.extend(belongs(wanted, &cells, &name)?);
+    told.extend(check_match(wanted, &cells, &name)?);
     let column = series_column(output);
     let mut with = recording.clone();
     with.set_column(&column, Cells::Numbers(cells));
@@ -158,12 +158,12 @@ pub fn series_model_text(output: &str) -> String {
 }
 
 /// The column that is meant, and what turns it into the unit of the output.
-fn column(series: &Recording, output: &str, asked: &SimulatedSeries) -> Result<(String, f64), Vec<Bilingual>> {
+fn find_column(series: &Recording, output: &str, asked: &SimulatedSeries) -> Result<(String, f64), Vec<Bilingual>> {
     let names: Vec<&str> = series
         .columns()
         .iter()
         .map(|column| column.name.as_str())
-        .filter(|name| series.numbers(name).is_some())
+        .filter(|name| series.find_numbers(name).is_some())
         .collect();
     let list = names.join(", ");
     if let Some(wanted) = &asked.column {
@@ -173,18 +173,21 @@ fn column(series: &Recording, output: &str, asked: &SimulatedSeries) -> Result<(
                 format!("{}没有数值列{wanted}；现有：{list}", asked.file),
             )]
         })?;
-        return Ok(((*found).to_owned(), factor(found, output).unwrap_or(1.0)));
+        return Ok(((*found).to_owned(), unit_factor(found, output).unwrap_or(1.0)));
     }
     let same: Vec<&&str> = match names.len() {
         1 => names.iter().collect(),
         _ if names.contains(&output) => names.iter().filter(|name| **name == output).collect(),
         _ => names
             .iter()
-            .filter(|name| Quantity::of(name) == Quantity::of(output) && Quantity::of(output) != Quantity::Other)
+            .filter(|name| {
+                Quantity::from_column_name(name) == Quantity::from_column_name(output)
+                    && Quantity::from_column_name(output) != Quantity::Other
+            })
             .collect(),
     };
     match same[..] {
-        [name] => Ok(((*name).to_owned(), factor(name, output).unwrap_or(1.0))),
+        [name] => Ok(((*name).to_owned(), unit_factor(name, output).unwrap_or(1.0))),
         _ => Err(vec![Bilingual::new(
             format!(
                 "which column of {} is the simulated {output}? Write {}:COLUMN; it has {list}",
@@ -196,16 +199,16 @@ fn column(series: &Recording, output: &str, asked: &SimulatedSeries) -> Result<(
 }
 
 /// What turns a column into the unit of the output, where its name says its unit.
-fn factor(name: &str, output: &str) -> Option<f64> {
+fn unit_factor(name: &str, output: &str) -> Option<f64> {
     let inner = name.rsplit_once(['[', '(']).map(|(_, unit)| unit.trim_end_matches([']', ')']));
-    let unit = inner.and_then(Unit::of).or_else(|| unit_of(name).and_then(Unit::of))?;
-    let (factor, _) = unit.to(unit_of(output).and_then(Unit::of)?)?;
+    let unit = inner.and_then(Unit::from_symbol).or_else(|| unit_of(name).and_then(Unit::from_symbol))?;
+    let (factor, _) = unit.compute_conversion(unit_of(output).and_then(Unit::from_symbol)?)?;
     Some(factor)
 }
 
 /// Enough of the rows have a value, and both go up and down together.
 #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
-fn belongs(recorded: &Numbers, simulated: &Numbers, name: &str) -> Result<Vec<Bilingual>, Vec<Bilingual>> {
+fn check_match(recorded: &Numbers, simulated: &Numbers, name: &str) -> Result<Vec<Bilingual>, Vec<Bilingual>> {
     let pairs: Vec<(f64, f64)> = recorded.iter().zip(simulated.iter()).filter_map(|(a, b)| Some((a?, b?))).collect();
     let share = pairs.len() as f64 / recorded.count_present().max(1) as f64;
     if share < COVERED_MIN {
@@ -240,7 +243,7 @@ fn belongs(recorded: &Numbers, simulated: &Numbers, name: &str) -> Result<Vec<Bi
 #[must_use]
 #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
 pub fn error_as_given(recording: &Recording, output: &str) -> Option<(f64, usize)> {
-    let (recorded, simulated) = (recording.numbers(output)?, recording.numbers(&series_column(output))?);
+    let (recorded, simulated) = (recording.find_numbers(output)?, recording.find_numbers(&series_column(output))?);
     let squares: Vec<f64> =
         recorded.iter().zip(simulated.iter()).filter_map(|(a, b)| Some((a? - b?).powi(2))).collect();
     (!squares.is_empty()).then(|| ((squares.iter().sum::<f64>() / squares.len() as f64).sqrt(), squares.len()))
@@ -259,7 +262,7 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("cam.csv");
         std::fs::write(&path, text).expect("written");
-        let asked = SimulatedSeries::of(&path.display().to_string(), AlignBy::Auto);
+        let asked = SimulatedSeries::from_text(&path.display().to_string(), AlignBy::Auto);
         (directory, asked)
     }
 
@@ -267,10 +270,14 @@ mod tests {
     fn a_series_is_laid_beside_by_time_in_the_unit_of_the_output() {
         let here = recording("time_s,spindle_power_w\n0,100\n1,200\n2,300\n3,400\n");
         let (_kept, asked) = file("time_s,force,power [kW]\n0,1,0.1\n1,1,0.2\n2,1,0.3\n3,1,0.4\n");
-        let found =
-            attach(&here, "spindle_power_w", &SimulatedSeries { column: Some("power [kW]".to_owned()), ..asked }, None)
-                .expect("fits");
-        assert_eq!(found.recording.numbers("simulated_spindle_power_w").and_then(|n| n.get(2)), Some(300.0));
+        let found = attach_series(
+            &here,
+            "spindle_power_w",
+            &SimulatedSeries { column: Some("power [kW]".to_owned()), ..asked },
+            None,
+        )
+        .expect("fits");
+        assert_eq!(found.recording.find_numbers("simulated_spindle_power_w").and_then(|n| n.get(2)), Some(300.0));
         assert_eq!(error_as_given(&found.recording, "spindle_power_w").map(|(error, _)| error < 1e-9), Some(true));
         assert!(series_model("spindle_power_w").is_ok());
     }
@@ -280,10 +287,12 @@ mod tests {
         let here = recording("time_s,block,axis_position_mm,spindle_power_w\n0,N10,0,100\n1,N20,5,200\n2,N20,10,200\n");
         let (_kept, asked) = file("time_s,block,axis_position_mm,spindle_power_w\n0,N10,0,110\n1,N20,10,210\n");
         let by = |by| {
-            attach(&here, "spindle_power_w", &SimulatedSeries { by, ..asked.clone() }, None).expect("fits").recording
+            attach_series(&here, "spindle_power_w", &SimulatedSeries { by, ..asked.clone() }, None)
+                .expect("fits")
+                .recording
         };
         let series = |recording: &Recording| {
-            recording.numbers("simulated_spindle_power_w").map(|n| n.iter().collect::<Vec<_>>())
+            recording.find_numbers("simulated_spindle_power_w").map(|n| n.iter().collect::<Vec<_>>())
         };
         assert_eq!(series(&by(AlignBy::Block)), Some(vec![Some(110.0), Some(210.0), Some(210.0)]));
         assert_eq!(series(&by(AlignBy::Position)), Some(vec![Some(110.0), Some(160.0), Some(210.0)]));
@@ -293,7 +302,7 @@ mod tests {
     fn which_column_is_asked_where_several_could_be_it() {
         let here = recording("time_s,spindle_power_w\n0,100\n1,200\n");
         let (_kept, asked) = file("time_s,a_w,b_w\n0,1,0.1\n1,1,0.2\n");
-        let wrong = attach(&here, "spindle_power_w", &asked, None).expect_err("two");
+        let wrong = attach_series(&here, "spindle_power_w", &asked, None).expect_err("two");
         assert!(wrong[0].en.contains(":COLUMN") && wrong[0].en.contains("a_w, b_w"), "{}", wrong[0]);
     }
 }

@@ -73,7 +73,7 @@ fn by_course(
                 ),
             ))
         }
-        Err(_) if by == AlignBy::Auto && overlap(recording, series) => {
+        Err(_) if by == AlignBy::Auto && clocks_overlap(recording, series) => {
             let (cells, how) = by_time(recording, series, numbers);
             Ok((
                 cells,
@@ -90,7 +90,7 @@ fn by_course(
 }
 
 /// Do both clocks begin near one another and last about as long?
-fn overlap(recording: &Recording, series: &Recording) -> bool {
+fn clocks_overlap(recording: &Recording, series: &Recording) -> bool {
     let span = |times: &[f64]| (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
     let (here, there) = (span(&recording.time_s), span(&series.time_s));
     let common = here.1.min(there.1) - here.0.max(there.0);
@@ -99,7 +99,9 @@ fn overlap(recording: &Recording, series: &Recording) -> bool {
 
 fn by_position(recording: &Recording, series: &Recording, numbers: &Numbers) -> Result<Aligned, Vec<Bilingual>> {
     let name = series.columns().iter().map(|column| column.name.as_str()).find(|name| {
-        Quantity::of(name) == Quantity::Position && recording.numbers(name).is_some() && series.numbers(name).is_some()
+        Quantity::from_column_name(name) == Quantity::Position
+            && recording.find_numbers(name).is_some()
+            && series.find_numbers(name).is_some()
     });
     let Some(name) = name else {
         return Err(vec![Bilingual::new(
@@ -108,7 +110,7 @@ fn by_position(recording: &Recording, series: &Recording, numbers: &Numbers) -> 
         )]);
     };
     let mut points: Vec<(f64, f64)> = series
-        .numbers(name)
+        .find_numbers(name)
         .into_iter()
         .flat_map(Numbers::iter)
         .zip(numbers.iter())
@@ -117,7 +119,7 @@ fn by_position(recording: &Recording, series: &Recording, numbers: &Numbers) -> 
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (places, values): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
     let values: Numbers = values.into_iter().map(Some).collect();
-    let here = recording.numbers(name).into_iter().flat_map(Numbers::iter);
+    let here = recording.find_numbers(name).into_iter().flat_map(Numbers::iter);
     let cells = here.map(|at| at.and_then(|at| interpolate_at(&places, &values, at))).collect();
     let quantity = without_unit(name);
     Ok((cells, Bilingual::new(format!("laid beside by {quantity}"), format!("按{quantity}对齐"))))
@@ -125,21 +127,21 @@ fn by_position(recording: &Recording, series: &Recording, numbers: &Numbers) -> 
 
 /// The mean of the series in each block of the program.
 fn by_block(recording: &Recording, series: &Recording, numbers: &Numbers) -> Result<Aligned, Vec<Bilingual>> {
-    let (Some(here), Some(there)) = (recording.words("block"), series.words("block")) else {
+    let (Some(here), Some(there)) = (recording.find_words("block"), series.find_words("block")) else {
         return Err(vec![Bilingual::new(
             "both need a column block (the line of the NC program) to be laid beside by it",
             "按程序段对齐时，两者需有block列",
         )]);
     };
     let mut sums: std::collections::HashMap<&str, (f64, f64)> = std::collections::HashMap::new();
-    for row in 0..series.rows() {
+    for row in 0..series.count_rows() {
         if let (Some(block), Some(value)) = (there.get(row), numbers.get(row)) {
             let sum = sums.entry(block).or_default();
             *sum = (sum.0 + value, sum.1 + 1.0);
         }
     }
     let mean = |block: &str| sums.get(block).map(|(sum, count)| sum / count);
-    let cells = (0..recording.rows()).map(|row| here.get(row).and_then(mean)).collect();
+    let cells = (0..recording.count_rows()).map(|row| here.get(row).and_then(mean)).collect();
     Ok((cells, Bilingual::new("laid beside by program block, its mean in each", "按程序段对齐，取各段平均值")))
 }
 

@@ -26,7 +26,8 @@ pub struct Simulation {
 /// # Errors
 /// Everything the model needs and the recording lacks.
 pub fn run(recording: &Recording, model: &Model) -> Result<Simulation, Vec<String>> {
-    let recorded: Option<Vec<Option<f64>>> = recording.numbers(&model.output).map(|numbers| numbers.iter().collect());
+    let recorded: Option<Vec<Option<f64>>> =
+        recording.find_numbers(&model.output).map(|numbers| numbers.iter().collect());
     let mut complete = recording.clone();
     if recorded.is_none() {
         complete.set_column(&model.output, Cells::Numbers(Numbers::default()));
@@ -44,7 +45,7 @@ pub fn run(recording: &Recording, model: &Model) -> Result<Simulation, Vec<Strin
         name: model.name.clone(),
         total,
         parts: labels.zip(simulated.contributions).collect(),
-        recorded: recorded.unwrap_or_else(|| vec![None; recording.rows()]),
+        recorded: recorded.unwrap_or_else(|| vec![None; recording.count_rows()]),
     })
 }
 
@@ -66,7 +67,7 @@ impl Simulation {
 
     /// Label, mean, least and greatest contribution of each part.
     #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
-    fn summaries(&self) -> impl Iterator<Item = (&str, f64, f64, f64)> {
+    fn part_summaries(&self) -> impl Iterator<Item = (&str, f64, f64, f64)> {
         self.parts.iter().map(|(label, values)| {
             let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
             let low = values.iter().copied().fold(f64::INFINITY, f64::min);
@@ -76,11 +77,11 @@ impl Simulation {
 
     /// For the reader.
     #[must_use]
-    pub fn text(&self) -> String {
+    pub fn format_text(&self) -> String {
         let unit = unit_of(&self.output);
         let rows = self.total.iter().flatten().count();
         let mut text = format!("{}: {} simulated in {rows} of {} rows\n", self.name, self.output, self.total.len());
-        for (label, mean, low, high) in self.summaries() {
+        for (label, mean, low, high) in self.part_summaries() {
             let _ = writeln!(text, "  {label}: mean {}, {} to {} {unit}", short(mean), short(low), short(high));
         }
         match self.rmse() {
@@ -94,7 +95,7 @@ impl Simulation {
 
     /// For programs.
     #[must_use]
-    pub fn json(&self) -> Value {
+    pub fn to_json(&self) -> Value {
         let part = |(label, mean, low, high): (&str, f64, f64, f64)| json!({ "effect": label, "mean": mean, "min": low, "max": high });
         json!({
             "schema": "simulation/1",
@@ -103,7 +104,7 @@ impl Simulation {
             "unit": unit_of(&self.output),
             "rows": self.total.len(),
             "simulated_rows": self.total.iter().flatten().count(),
-            "parts": self.summaries().map(part).collect::<Vec<_>>(),
+            "parts": self.part_summaries().map(part).collect::<Vec<_>>(),
             "rmse": self.rmse().map(|(rmse, _)| rmse),
             "compared_rows": self.rmse().map_or(0, |(_, rows)| rows),
         })
@@ -116,8 +117,8 @@ impl Simulation {
         self.parts.iter().for_each(|(label, _)| text.push_str(&format!(",effect_{label}")));
         text.push('\n');
         let cell = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
-        for run in recording.runs() {
-            let name = quoted(&run.name);
+        for run in recording.list_runs() {
+            let name = quote_cell(&run.name);
             for row in run.rows {
                 let (time_s, total) = (recording.time_s[row], self.total[row]);
                 let _ = write!(text, "{time_s},{name},{},{}", cell(self.recorded[row]), cell(total));
@@ -131,6 +132,6 @@ impl Simulation {
     }
 }
 
-pub(super) fn quoted(text: &str) -> String {
+pub(super) fn quote_cell(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }

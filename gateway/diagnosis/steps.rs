@@ -21,25 +21,25 @@ pub struct DiagnosisStep {
 
 /// The steps of a plan, in the order of time.
 #[must_use]
-pub fn steps(plan: &Plan) -> Vec<DiagnosisStep> {
+pub fn group_steps(plan: &Plan) -> Vec<DiagnosisStep> {
     let mut groups: Vec<Vec<&Move>> = Vec::new();
     for a in &plan.moves {
         match groups.last_mut() {
-            Some(group) if group.last().is_some_and(|last| alike(last, a)) => group.push(a),
+            Some(group) if group.last().is_some_and(|last| are_alike(last, a)) => group.push(a),
             _ => groups.push(vec![a]),
         }
     }
     let repeated = groups.last().and_then(|group| group.last()).is_some_and(|a| a.run > 1);
-    groups.iter().take(STEPS_MAX).map(|group| step(group, repeated)).collect()
+    groups.iter().take(STEPS_MAX).map(|group| describe_step(group, repeated)).collect()
 }
 
 /// Of the same kind, with the same quantities commanded.
-fn alike(a: &Move, b: &Move) -> bool {
+fn are_alike(a: &Move, b: &Move) -> bool {
     (a.run, a.operation, a.instruction, &a.words) == (b.run, b.operation, b.instruction, &b.words)
         && a.commands.keys().eq(b.commands.keys())
 }
 
-fn step(group: &[&Move], repeated: bool) -> DiagnosisStep {
+fn describe_step(group: &[&Move], repeated: bool) -> DiagnosisStep {
     let first = group[0];
     let (mut en, mut zh) = (String::new(), String::new());
     if repeated {
@@ -59,9 +59,9 @@ fn step(group: &[&Move], repeated: bool) -> DiagnosisStep {
         if first.operation == "standstill" && *value == 0.0 {
             continue;
         }
-        let channel = ChannelId::of(name).map(|id| id.channel());
+        let channel = ChannelId::from_name(name).map(|id| id.channel());
         let (label, label_zh, unit) = channel.map_or((name.as_str(), name.as_str(), ""), |it| (it.en, it.zh, it.unit));
-        let levels = levels(group, name);
+        let levels = format_levels(group, name);
         let _ = write!(en, "; {} {levels} {unit}", label.to_lowercase());
         let _ = write!(zh, "；{label_zh} {levels} {unit}");
     }
@@ -85,7 +85,7 @@ fn step(group: &[&Move], repeated: bool) -> DiagnosisStep {
 }
 
 /// The values of one quantity over a group, each once where all are the same.
-fn levels(group: &[&Move], name: &str) -> String {
+fn format_levels(group: &[&Move], name: &str) -> String {
     let mut values: Vec<String> = group.iter().filter_map(|a| a.commands.get(name)).map(f64::to_string).collect();
     values.dedup();
     let more = values.len() > LEVELS_MAX;
@@ -110,7 +110,7 @@ mod tests {
             axis_column: "z_axis_velocity_mm_min".to_owned(),
             spindle: true,
         };
-        let steps = steps(&of_kinds(&["no_load_power"], &envelope));
+        let steps = group_steps(&of_kinds(&["no_load_power"], &envelope));
         assert_eq!(steps.len(), 4, "{steps:#?}");
         assert_eq!(steps[0].en, "Run 1: drives on, nothing moves, 20 s");
         assert!(steps[1].en.starts_with("Run 1: turn without a cut; ") && steps[1].en.contains("1500"), "{steps:#?}");

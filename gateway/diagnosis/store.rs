@@ -2,12 +2,12 @@
 //! the experiment it asks for as a plan and as steps. Files in a folder of the data directory, found by a key that follows from
 //! the row, so that no second list can disagree with the history.
 
-use super::beside::{BesideModel, headline};
+use super::beside::{BesideModel, compose_headline};
 use super::context::DiagnosisContext;
-use super::steps::{DiagnosisStep, steps};
-use crate::files::{read_text, replace};
+use super::steps::{DiagnosisStep, group_steps};
+use crate::files::{read_text, replace_file};
 use crate::history;
-use crate::reload::digest;
+use crate::reload::compute_digest;
 use crate::report::{PageInput, page};
 use adapters::Recording;
 use rules::physics::explain::Language;
@@ -69,8 +69,8 @@ pub struct EffectTexts {
 }
 
 impl EffectTexts {
-    fn of(kind: &str) -> Option<Self> {
-        let doc = rules::physics::effect(kind)?.doc();
+    fn from_kind(kind: &str) -> Option<Self> {
+        let doc = rules::physics::find_effect(kind)?.doc();
         let both = |en: &str, zh: &str| DiagnosisStep { en: en.to_owned(), zh: zh.to_owned() };
         Some(Self {
             name: both(doc.en.name, doc.zh.name),
@@ -85,13 +85,13 @@ fn effect_texts(found: &twin::Diagnosis) -> BTreeMap<String, EffectTexts> {
     let missing = found.missing.iter().map(|missing| &missing.effect);
     let others = found.alternatives.iter().flat_map(|other| [&other.effect, &other.instead_of]);
     let next = found.next_experiment.iter().map(|next| &next.effect);
-    missing.chain(others).chain(next).filter_map(|kind| Some((kind.clone(), EffectTexts::of(kind)?))).collect()
+    missing.chain(others).chain(next).filter_map(|kind| Some((kind.clone(), EffectTexts::from_kind(kind)?))).collect()
 }
 
 /// The key of a row: the end of its stretch and what was found.
 #[must_use]
-pub fn key(row: &history::Diagnosis) -> String {
-    format!("{}-{:016x}", row.to_ns.div_euclid(1_000_000), digest(row.json.as_bytes()))
+pub fn diagnosis_key(row: &history::Diagnosis) -> String {
+    format!("{}-{:016x}", row.to_ns.div_euclid(1_000_000), compute_digest(row.json.as_bytes()))
 }
 
 /// Has it the form of a key? Anything else must not become part of a path.
@@ -105,13 +105,13 @@ pub fn is_key(text: &str) -> bool {
 impl DiagnosisStore {
     /// Below this data directory.
     #[must_use]
-    pub fn below(data_dir: &Path) -> Self {
+    pub fn from_data_dir(data_dir: &Path) -> Self {
         Self { directory: data_dir.join("diagnoses") }
     }
 
     /// In this folder.
     #[must_use]
-    pub fn at(directory: PathBuf) -> Self {
+    pub fn from_directory(directory: PathBuf) -> Self {
         Self { directory }
     }
 
@@ -123,7 +123,7 @@ impl DiagnosisStore {
 
     /// The path of a file.
     #[must_use]
-    pub fn path(&self, key: &str, part: DiagnosisFile) -> PathBuf {
+    pub fn file_path(&self, key: &str, part: DiagnosisFile) -> PathBuf {
         let word = |language| if language == Language::Zh { "zh" } else { "en" };
         let end = match part {
             DiagnosisFile::Page(language) => format!("{}.html", word(language)),
@@ -136,29 +136,29 @@ impl DiagnosisStore {
 
     /// The text of a file; `None` where nothing was kept, or no longer.
     #[must_use]
-    pub fn text(&self, key: &str, part: DiagnosisFile) -> Option<String> {
-        is_key(key).then(|| read_text(&self.path(key, part), FILE_MAX).ok()).flatten()
+    pub fn read_file(&self, key: &str, part: DiagnosisFile) -> Option<String> {
+        is_key(key).then(|| read_text(&self.file_path(key, part), FILE_MAX).ok()).flatten()
     }
 
     /// What is shown of it besides its JSON.
     #[must_use]
-    pub fn words(&self, key: &str) -> Option<DiagnosisTexts> {
-        serde_json::from_str(&self.text(key, DiagnosisFile::Words)?).ok()
+    pub fn read_texts(&self, key: &str) -> Option<DiagnosisTexts> {
+        serde_json::from_str(&self.read_file(key, DiagnosisFile::Words)?).ok()
     }
 
     /// Keeps everything of a diagnosis; older ones beyond the limit go.
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn keep(
+    pub fn write_diagnosis(
         &self,
         row: &history::Diagnosis,
         found: &twin::Diagnosis,
         recording: &Recording,
         (context, beside): (&DiagnosisContext, Vec<BesideModel>),
     ) -> std::io::Result<()> {
-        let key = key(row);
-        let put = |part, text: &str| replace(&self.path(&key, part), text);
+        let key = diagnosis_key(row);
+        let put = |part, text: &str| replace_file(&self.file_path(&key, part), text);
         for language in [Language::En, Language::Zh] {
             put(DiagnosisFile::Page(language), &page(&PageInput { diagnosis: found, recording, context, language }))?;
         }
@@ -166,7 +166,7 @@ impl DiagnosisStore {
         let mut words =
             DiagnosisTexts { summary_zh, beside, effects: effect_texts(found), ..DiagnosisTexts::default() };
         if let Ok(plan) = plan::plan(found, recording) {
-            (words.steps, words.minutes) = (steps(&plan), Some(plan.minutes()));
+            (words.steps, words.minutes) = (group_steps(&plan), Some(plan.minutes()));
             for language in [Language::En, Language::Zh] {
                 put(DiagnosisFile::Plan(language), &plan.csv(language))?;
             }
@@ -203,7 +203,7 @@ fn summary_zh(found: &twin::Diagnosis, beside: &[BesideModel]) -> String {
     if found.verdict == Verdict::NoMismatch && !moved.is_empty() {
         return format!("模型参数已改变：{}。", moved.join("；"));
     }
-    headline(beside, &found.unit, ("", &found.summary.zh)).1
+    compose_headline(beside, &found.unit, ("", &found.summary.zh)).1
 }
 
 #[cfg(test)]
@@ -213,20 +213,20 @@ mod tests {
     #[test]
     fn a_key_is_never_a_way_out_of_the_folder() {
         let row = history::Diagnosis { to_ns: 1_700_000_000_123_000_000, json: "{}".to_owned(), ..Default::default() };
-        assert!(is_key(&key(&row)) && key(&row).starts_with("1700000000123-"));
+        assert!(is_key(&diagnosis_key(&row)) && diagnosis_key(&row).starts_with("1700000000123-"));
         for wrong in ["", "-", "1-", "../1-a", "1-a/b", "1-g", "a-1", "1-a.html", "123456789012345678901-a"] {
             assert!(!is_key(wrong), "{wrong}");
-            assert_eq!(DiagnosisStore::at(PathBuf::from("/")).text(wrong, DiagnosisFile::Words), None);
+            assert_eq!(DiagnosisStore::from_directory(PathBuf::from("/")).read_file(wrong, DiagnosisFile::Words), None);
         }
     }
 
     #[test]
     fn the_oldest_go_with_all_their_files() {
         let directory = tempfile::tempdir().expect("a directory");
-        let kept = DiagnosisStore::at(directory.path().to_owned());
+        let kept = DiagnosisStore::from_directory(directory.path().to_owned());
         for at in 0..KEPT_MAX + 3 {
             for part in [DiagnosisFile::Words, DiagnosisFile::Model] {
-                replace(&kept.path(&format!("{}-00ff", 900 + at), part), "{}").expect("written");
+                replace_file(&kept.file_path(&format!("{}-00ff", 900 + at), part), "{}").expect("written");
             }
         }
         std::fs::write(directory.path().join("of a person.txt"), "stays").expect("written");
@@ -234,8 +234,8 @@ mod tests {
         let left = std::fs::read_dir(directory.path()).expect("there").count();
         assert_eq!(left, 2 * KEPT_MAX + 1);
         assert!(
-            kept.text("902-00ff", DiagnosisFile::Model).is_none()
-                && kept.text("903-00ff", DiagnosisFile::Model).is_some()
+            kept.read_file("902-00ff", DiagnosisFile::Model).is_none()
+                && kept.read_file("903-00ff", DiagnosisFile::Model).is_some()
         );
     }
 }

@@ -25,10 +25,10 @@ const RUNS_MIN: usize = 8;
 /// What the history says.
 pub fn read(history: &Path, from_ns: TimeNs, to_ns: TimeNs, output: &str) -> Result<Recording, HistoryError> {
     let reader = Reader::open(history)?;
-    let names: Vec<String> = reader.series()?.iter().map(|series| series.name.to_string()).collect();
-    let channels = names.iter().map(String::as_str).filter(|name| ChannelId::of(name).is_some());
-    let recording = reader.recording(&Query::between(from_ns, to_ns).of(channels))?;
-    Ok(select_settled_rows(complete(per_second(&recording, ROWS_MAX)), output))
+    let names: Vec<String> = reader.read_series()?.iter().map(|series| series.name.to_string()).collect();
+    let channels = names.iter().map(String::as_str).filter(|name| ChannelId::from_name(name).is_some());
+    let recording = reader.read_recording(&Query::between(from_ns, to_ns).with_series(channels))?;
+    Ok(select_settled_rows(add_derived_columns(per_second(&recording, ROWS_MAX)), output))
 }
 
 /// A range of a history as `diagnose --recording history:...` reads it: the same as for the page. What was stored once a second or
@@ -37,24 +37,28 @@ pub fn read(history: &Path, from_ns: TimeNs, to_ns: TimeNs, output: &str) -> Res
 pub fn of_history(recording: Recording, output: &str) -> Recording {
     let span_s = recording.time_s.last().zip(recording.time_s.first()).map_or(0.0, |(last, first)| last - first);
     #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
-    let dense = recording.rows() as f64 > DENSE_PER_S * (span_s + 1.0);
-    if dense { select_settled_rows(complete(per_second(&recording, usize::MAX)), output) } else { complete(recording) }
+    let dense = recording.count_rows() as f64 > DENSE_PER_S * (span_s + 1.0);
+    if dense {
+        select_settled_rows(add_derived_columns(per_second(&recording, usize::MAX)), output)
+    } else {
+        add_derived_columns(recording)
+    }
 }
 
 /// The output stands only in rows of settled work.
 fn select_settled_rows(mut recording: Recording, output: &str) -> Recording {
-    let Some(measured) = recording.numbers(output) else { return recording };
+    let Some(measured) = recording.find_numbers(output) else { return recording };
     let kept = |row: usize| measured.get(row).filter(|_| is_settled(&recording, row));
-    let kept: Numbers = (0..recording.rows()).map(kept).collect();
+    let kept: Numbers = (0..recording.count_rows()).map(kept).collect();
     recording.set_column(output, Cells::Numbers(kept));
     recording
 }
 
 fn is_settled(recording: &Recording, row: usize) -> bool {
     let (before, after) = SETTLED;
-    let near = row.saturating_sub(before)..(row + after + 1).min(recording.rows());
-    let number = |name: &str, row: usize| recording.numbers(name).and_then(|numbers| numbers.get(row));
-    let word = |name: &str, row: usize| recording.words(name).and_then(|words| words.code(row));
+    let near = row.saturating_sub(before)..(row + after + 1).min(recording.count_rows());
+    let number = |name: &str, row: usize| recording.find_numbers(name).and_then(|numbers| numbers.get(row));
+    let word = |name: &str, row: usize| recording.find_words(name).and_then(|words| words.find_code(row));
     let speed = number("spindle_speed_rpm", row).unwrap_or(0.0);
     let steady = |other: f64| (other - speed).abs() <= STEADY_SHARE * speed.abs().max(1.0);
     near.into_iter().all(|other| {
@@ -67,7 +71,7 @@ fn is_settled(recording: &Recording, row: usize) -> bool {
 /// The mean of every number and the last of every word in each second; of more seconds than `rows_max` the beginning is left out.
 #[must_use]
 pub fn per_second(recording: &Recording, rows_max: usize) -> Recording {
-    let mut seconds = seconds(recording);
+    let mut seconds = split_seconds(recording);
     let surplus = seconds.len().saturating_sub(rows_max);
     seconds.drain(..surplus);
     let time_s = seconds.iter().map(|rows| recording.time_s[rows.start].floor()).collect();
@@ -77,7 +81,7 @@ pub fn per_second(recording: &Recording, rows_max: usize) -> Recording {
             // A channel that nobody delivered is no column: it may follow from others.
             Cells::Numbers(numbers) if numbers.count_present() == 0 => continue,
             Cells::Words(words) if words.words().is_empty() => continue,
-            Cells::Numbers(numbers) => Cells::Numbers(seconds.iter().map(|rows| mean(numbers, rows)).collect()),
+            Cells::Numbers(numbers) => Cells::Numbers(seconds.iter().map(|rows| mean_of_rows(numbers, rows)).collect()),
             Cells::Words(words) => {
                 Cells::Words(seconds.iter().map(|rows| words.get(rows.end - 1).unwrap_or("")).collect::<Words>())
             }
@@ -88,7 +92,7 @@ pub fn per_second(recording: &Recording, rows_max: usize) -> Recording {
 }
 
 /// Rows of each whole second.
-fn seconds(recording: &Recording) -> Vec<Range<usize>> {
+fn split_seconds(recording: &Recording) -> Vec<Range<usize>> {
     let mut seconds: Vec<Range<usize>> = Vec::new();
     for (row, time_s) in recording.time_s.iter().enumerate() {
         match seconds.last_mut() {
@@ -100,7 +104,7 @@ fn seconds(recording: &Recording) -> Vec<Range<usize>> {
 }
 
 /// The mean of the rows that have a value, where at least half of them have.
-fn mean(numbers: &Numbers, rows: &Range<usize>) -> Option<f64> {
+fn mean_of_rows(numbers: &Numbers, rows: &Range<usize>) -> Option<f64> {
     let present: Vec<f64> = rows.clone().filter_map(|row| numbers.get(row)).collect();
     let enough = !present.is_empty() && 2 * present.len() >= rows.len();
     #[expect(clippy::cast_precision_loss, reason = "rows of one second")]
@@ -109,14 +113,14 @@ fn mean(numbers: &Numbers, rows: &Range<usize>) -> Option<f64> {
 
 /// Adds what the machine's own words say without saying it: in the cut where a depth is planned and the axis feeds, and
 /// a run per part.
-fn complete(mut recording: Recording) -> Recording {
-    if recording.numbers("engaged").is_none()
-        && let Some(engaged) = engaged(&recording)
+fn add_derived_columns(mut recording: Recording) -> Recording {
+    if recording.find_numbers("engaged").is_none()
+        && let Some(engaged) = derive_engaged(&recording)
     {
         recording.set_column("engaged", Cells::Numbers(engaged));
     }
-    if recording.words("run").is_none()
-        && let Some(runs) = runs(&recording)
+    if recording.find_words("run").is_none()
+        && let Some(runs) = derive_runs(&recording)
     {
         recording.set_column("run", Cells::Words(runs));
     }
@@ -125,21 +129,21 @@ fn complete(mut recording: Recording) -> Recording {
 
 /// In the cut as the program says it: a depth is planned, the axis feeds, and not in rapid traverse.
 #[must_use]
-pub fn engaged(recording: &Recording) -> Option<Numbers> {
-    let (depth, feed) = (recording.numbers("depth_of_cut_mm")?, recording.numbers("feed_mm_min")?);
-    let rapid = recording.numbers("rapid");
+pub fn derive_engaged(recording: &Recording) -> Option<Numbers> {
+    let (depth, feed) = (recording.find_numbers("depth_of_cut_mm")?, recording.find_numbers("feed_mm_min")?);
+    let rapid = recording.find_numbers("rapid");
     let in_cut = |row: usize| {
         let rapid = rapid.and_then(|rapid| rapid.get(row)).unwrap_or(0.0) > 0.0;
         Some(f64::from(u8::from(depth.get(row)? > 0.0 && feed.get(row)? > 0.0 && !rapid)))
     };
-    Some((0..recording.rows()).map(in_cut).collect())
+    Some((0..recording.count_rows()).map(in_cut).collect())
 }
 
-fn runs(recording: &Recording) -> Option<Words> {
-    let parts = recording.numbers("part_count")?;
-    let mut names = Vec::with_capacity(recording.rows());
+fn derive_runs(recording: &Recording) -> Option<Words> {
+    let parts = recording.find_numbers("part_count")?;
+    let mut names = Vec::with_capacity(recording.count_rows());
     let (mut run, mut last) = (1, None);
-    for row in 0..recording.rows() {
+    for row in 0..recording.count_rows() {
         let count = parts.get(row).or(last);
         run += usize::from(last.is_some() && count != last);
         last = count;
@@ -161,17 +165,17 @@ mod tests {
         recording.set_column("feed_mm_min", numbers(|_| Some(100.0)));
         recording.set_column("engaged", numbers(|_| None));
         recording.set_column("spindle_power_w_missing", Cells::Words(std::iter::repeat_n("", 40).collect()));
-        let thinned = complete(per_second(&recording, ROWS_MAX));
+        let thinned = add_derived_columns(per_second(&recording, ROWS_MAX));
         assert_eq!(thinned.time_s, [0.0, 1.0, 2.0, 3.0]);
-        let power = thinned.numbers("spindle_power_w").expect("kept").get(0).expect("nine of ten");
+        let power = thinned.find_numbers("spindle_power_w").expect("kept").get(0).expect("nine of ten");
         assert!((power - 42.0 / 9.0).abs() < 1e-12, "{power}");
-        let engaged: Vec<_> = thinned.numbers("engaged").expect("told by the program").iter().flatten().collect();
+        let engaged: Vec<_> = thinned.find_numbers("engaged").expect("told by the program").iter().flatten().collect();
         assert_eq!(engaged, [0.0, 0.0, 1.0, 1.0]);
         let settled: Vec<bool> = {
             let settled = select_settled_rows(thinned.clone(), "spindle_power_w");
-            settled.numbers("spindle_power_w").expect("kept").iter().map(|power| power.is_some()).collect()
+            settled.find_numbers("spindle_power_w").expect("kept").iter().map(|power| power.is_some()).collect()
         };
         assert_eq!(settled, [false; 4], "the cut begins in the middle of four seconds");
-        assert!(thinned.words("spindle_power_w_missing").is_none() && thinned.words("run").is_none());
+        assert!(thinned.find_words("spindle_power_w_missing").is_none() && thinned.find_words("run").is_none());
     }
 }

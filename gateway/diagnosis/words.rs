@@ -6,20 +6,20 @@ use rules::twin::text::short;
 
 /// A time in seconds since 1970 as nanoseconds.
 #[must_use]
-pub fn nanoseconds(at_s: f64) -> TimeNs {
+pub fn to_nanoseconds(at_s: f64) -> TimeNs {
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     let at_ns = (at_s * SECOND_NS as f64) as i64;
     at_ns
 }
 
-fn clock(at_s: f64) -> String {
-    let stamp = jiff::Timestamp::from_nanosecond(i128::from(nanoseconds(at_s)));
+fn format_time(at_s: f64) -> String {
+    let stamp = jiff::Timestamp::from_nanosecond(i128::from(to_nanoseconds(at_s)));
     stamp.map_or_else(|_| "?".to_owned(), |stamp| stamp.strftime("%Y-%m-%d %H:%M").to_string())
 }
 
 /// Hour and minute, the day only where it differs from that of `beside_s`.
-fn beside(at_s: f64, beside_s: f64) -> String {
-    let (at, other) = (clock(at_s), clock(beside_s));
+fn format_time_near(at_s: f64, beside_s: f64) -> String {
+    let (at, other) = (format_time(at_s), format_time(beside_s));
     match (at.split_once(' '), other.split_once(' ')) {
         (Some((day, hour)), Some((same, _))) if day == same => hour.to_owned(),
         _ => at,
@@ -29,13 +29,14 @@ fn beside(at_s: f64, beside_s: f64) -> String {
 /// A difference for the operator with its beginning, English and Chinese: for the history and the log, whose times are UTC.
 #[must_use]
 pub fn mismatch_since(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String, String) {
-    let ((en, zh), (en_since, zh_since)) = (mismatch(found, quantity, unit), since(found.onset.as_ref()));
+    let ((en, zh), (en_since, zh_since)) =
+        (describe_mismatch(found, quantity, unit), describe_onset(found.onset.as_ref()));
     (format!("{en_since}, {}", lower_first(&en)), format!("{zh_since}，{zh}"))
 }
 
 /// A difference for the operator, English and Chinese, without a time: who shows it has the clock of the reader.
 #[must_use]
-pub fn mismatch(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String, String) {
+pub fn describe_mismatch(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String, String) {
     let size = format!("{} {unit}", short(found.mean.abs()));
     let percent = found.percent().map_or(String::new(), |percent| format!(" ({} %)", short(percent.abs())));
     let (en_where, zh_where) = found.regime.words();
@@ -47,19 +48,19 @@ pub fn mismatch(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String
     )
 }
 
-fn since(onset: Option<&LevelChange>) -> (String, String) {
+fn describe_onset(onset: Option<&LevelChange>) -> (String, String) {
     let Some(LevelChange { at_s, low_s, high_s, .. }) = onset else {
         return ("Ever since the comparison began".to_owned(), "自开始比较以来".to_owned());
     };
     // Whole minutes that contain the interval.
     let (low, high) = ((low_s / 60.0).floor() * 60.0, (high_s / 60.0).ceil() * 60.0);
-    let (at, low, high) = (clock(*at_s), beside(low, *at_s), beside(high, *at_s));
+    let (at, low, high) = (format_time(*at_s), format_time_near(low, *at_s), format_time_near(high, *at_s));
     (format!("Since {at} UTC (between {low} and {high})"), format!("自{at}（UTC，{low}至{high}之间）起"))
 }
 
 /// The end of a difference, English and Chinese.
 #[must_use]
-pub fn agreement(regime: Regime, quantity: (&str, &str)) -> (String, String) {
+pub fn describe_agreement(regime: Regime, quantity: (&str, &str)) -> (String, String) {
     let (en_where, zh_where) = regime.words();
     let (en, zh) = quantity;
     (format!("{} {en_where} agrees with the simulation again", short_name(en)), format!("{zh_where}{zh}与仿真重新一致"))

@@ -6,7 +6,7 @@ use super::child::{self, ChildMessage, DiagnosisJob, JobInput, Stage};
 use super::handle::DiagnosisHandle;
 use super::outputs;
 use super::store::{self, DiagnosisFile, DiagnosisStore};
-use crate::files::{LOOK_EVERY, Mark, Rest, mark};
+use crate::files::{LOOK_EVERY, Mark, Rest, read_mark};
 use crate::history::{self, Reader};
 use adapters::clock::TimeNs;
 use rules::twin::{self, Model, parse_model};
@@ -117,7 +117,7 @@ impl Worker {
         let diagnoses = DiagnosisHandle::new(requests, places.model.clone(), places.kept.clone());
         let going_on = Arc::new(());
         let (own, still) = (diagnoses.clone(), Arc::downgrade(&going_on));
-        let body = move || work(file, &places, (&asked, &own), &send, &still);
+        let body = move || run_worker(file, &places, (&asked, &own), &send, &still);
         std::thread::Builder::new().name("twin".to_owned()).spawn(body)?;
         Ok(Self { diagnoses, reports, _going_on: going_on })
     }
@@ -129,12 +129,12 @@ impl Worker {
     }
 
     /// What there is to tell since the last call.
-    pub fn take(&self) -> Option<WorkerReport> {
+    pub fn take_report(&self) -> Option<WorkerReport> {
         self.reports.try_recv().ok()
     }
 }
 
-fn work(
+fn run_worker(
     mut file: FileWatch,
     places: &WorkerPaths,
     (asked, diagnoses): (&Receiver<DiagnosisRequest>, &DiagnosisHandle),
@@ -143,8 +143,8 @@ fn work(
 ) {
     while going_on.strong_count() > 0 {
         let report = match asked.recv_timeout(LOOK_EVERY) {
-            Ok(request) => Some(diagnose(request, places, diagnoses)),
-            Err(RecvTimeoutError::Timeout) => file.look(),
+            Ok(request) => Some(diagnose_stretch(request, places, diagnoses)),
+            Err(RecvTimeoutError::Timeout) => file.read_if_changed(),
             Err(RecvTimeoutError::Disconnected) => return,
         };
         if report.is_some_and(|report| send.send(report).is_err()) {
@@ -161,8 +161,8 @@ struct FileWatch {
 }
 
 impl FileWatch {
-    fn look(&mut self) -> Option<WorkerReport> {
-        if !self.rest.look(mark(&self.path), false) {
+    fn read_if_changed(&mut self) -> Option<WorkerReport> {
+        if !self.rest.should_read(read_mark(&self.path), false) {
             return None;
         }
         let text = std::fs::read_to_string(&self.path).ok()?;
@@ -174,13 +174,13 @@ impl FileWatch {
     }
 }
 
-fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: &DiagnosisHandle) -> WorkerReport {
+fn diagnose_stretch(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: &DiagnosisHandle) -> WorkerReport {
     wait_for_samples(&places.history, request.to_ns, diagnoses);
     let DiagnosisRequest { toml, by, from_ns, to_ns, onsets, .. } = request;
     let input = JobInput::Stretch { history: places.history.clone(), from_ns, to_ns, onsets };
     let job = DiagnosisJob { toml, input, kept: places.kept.directory().to_owned() };
     let found = in_child(&job, diagnoses);
-    diagnoses.ended(found.as_ref().map(|(record, _)| store::key(record)).map_err(Clone::clone));
+    diagnoses.record_outcome(found.as_ref().map(|(record, _)| store::diagnosis_key(record)).map_err(Clone::clone));
     match found {
         Ok((record, missing)) => WorkerReport::Diagnosed(Box::new(finish_diagnosis(by, places, record, missing))),
         Err(problem) => WorkerReport::NotDiagnosed(problem, by),
@@ -191,7 +191,7 @@ fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: &Diagnos
 pub(super) type FoundDiagnosis = (history::Diagnosis, Vec<String>);
 
 pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, String> {
-    let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled().map(|by| format!("{by} has ended it"));
+    let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled_by().map(|by| format!("{by} has ended it"));
     if let Some(ended) = ended_by(diagnoses) {
         return Err(ended);
     }
@@ -200,8 +200,8 @@ pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Resul
     diagnoses.put_child(child);
     let mut outcome = None;
     if let Some(output) = output {
-        child::listen(output, |said| match said {
-            ChildMessage::Stage(stage, rows) => diagnoses.reached(stage, rows),
+        child::read_messages(output, |said| match said {
+            ChildMessage::Stage(stage, rows) => diagnoses.record_stage(stage, rows),
             ChildMessage::Finished(record, missing) => outcome = Some(Ok((*record, missing))),
             ChildMessage::Refused(problem) => outcome = Some(Err(problem)),
         });
@@ -219,18 +219,18 @@ fn finish_diagnosis(
     record: history::Diagnosis,
     missing: Vec<String>,
 ) -> Finished {
-    let model = places.kept.text(&store::key(&record), DiagnosisFile::Model);
-    let written = model.map(|model| outputs::put(&places.improved, &model)).and_then(Result::ok);
+    let model = places.kept.read_file(&store::diagnosis_key(&record), DiagnosisFile::Model);
+    let written = model.map(|model| outputs::write_output(&places.improved, &model)).and_then(Result::ok);
     Finished { by, record, missing, improved: written.map(|()| places.improved.clone()) }
 }
 
 /// What was just measured may not be durable yet.
 fn wait_for_samples(history: &Path, to_ns: TimeNs, diagnoses: &DiagnosisHandle) {
-    diagnoses.reached(Stage::Waiting, 0);
+    diagnoses.record_stage(Stage::Waiting, 0);
     let until = Instant::now() + WAIT_MAX;
-    let newest_ns = || Reader::open(history).ok()?.span().ok()?.map(|(_, newest_ns)| newest_ns);
+    let newest_ns = || Reader::open(history).ok()?.read_span().ok()?.map(|(_, newest_ns)| newest_ns);
     while newest_ns().is_none_or(|newest_ns| newest_ns < to_ns)
-        && diagnoses.cancelled().is_none()
+        && diagnoses.cancelled_by().is_none()
         && Instant::now() < until
     {
         std::thread::sleep(Duration::from_millis(200));

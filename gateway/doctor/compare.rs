@@ -3,7 +3,7 @@
 //! A machine goes on while it is read. Each value of the library is therefore held against two of ours, one from just
 //! before and one from just after, and a channel differs only if it did so in every one of several rounds.
 
-use super::{DoctorReport, ValueWithUnit, begin};
+use super::{DoctorReport, ValueWithUnit, begin_examination};
 use adapters::address::{FanucBackend, Target};
 use adapters::channel::Kind;
 use adapters::clock::SystemClock;
@@ -48,27 +48,27 @@ type ValuesByIndex = BTreeMap<usize, Value>;
 ///
 /// # Errors
 /// The address is no FANUC controller that we talk to by ourselves, in words.
-pub fn compare(text: &str, library: &Path) -> Result<Comparison, String> {
+pub fn compare_backends(text: &str, library: &Path) -> Result<Comparison, String> {
     let address: Address = text.parse().map_err(|error| format!("{error}"))?;
     if !matches!(address.target(), Target::Fanuc { backend: FanucBackend::Native, .. }) {
         return Err(format!("{text}: give a fanuc:// address without backend=vendor to compare with a library"));
     }
     let clock = SystemClock::new();
-    let (ours, mut native) = begin(text, &clock)?;
-    let (theirs, mut vendor) = begin(&through(text, library), &clock)?;
+    let (ours, mut native) = begin_examination(text, &clock)?;
+    let (theirs, mut vendor) = begin_examination(&address_with_library(text, library), &clock)?;
     let mut rounds = Rounds::default();
     if ours.reachable && theirs.reachable {
         (0..ROUNDS).for_each(|_| {
-            let before = values(&mut native, &clock);
-            let between = values(&mut vendor, &clock);
-            rounds.add(&before, &between, &values(&mut native, &clock));
+            let before = read_values(&mut native, &clock);
+            let between = read_values(&mut vendor, &clock);
+            rounds.add(&before, &between, &read_values(&mut native, &clock));
         });
     }
-    Ok(rounds.told(ours, theirs))
+    Ok(rounds.into_comparison(ours, theirs))
 }
 
 /// The same address through the library.
-fn through(text: &str, library: &Path) -> String {
+fn address_with_library(text: &str, library: &Path) -> String {
     let (at, keys) = text.split_once('?').unwrap_or((text, ""));
     let escaped = library.display().to_string().replace('%', "%25").replace('&', "%26").replace('?', "%3F");
     let kept = keys.split('&').filter(|key| !key.is_empty() && !key.starts_with("backend="));
@@ -78,7 +78,7 @@ fn through(text: &str, library: &Path) -> String {
 }
 
 /// Everything that has a value now. A source that fails in between is looked at again in the next round.
-fn values(sources: &mut [Box<dyn Source>], clock: &SystemClock) -> ValuesByIndex {
+fn read_values(sources: &mut [Box<dyn Source>], clock: &SystemClock) -> ValuesByIndex {
     let mut readings = Vec::new();
     for source in sources {
         let _shown_by_the_report = source.read(clock, &mut readings);
@@ -106,10 +106,10 @@ impl Rounds {
     fn add(&mut self, before: &ValuesByIndex, between: &ValuesByIndex, after: &ValuesByIndex) {
         for (index, vendor) in between {
             let (Some(first), Some(last)) = (before.get(index), after.get(index)) else { continue };
-            let Some(channel) = ChannelId::at(*index) else { continue };
+            let Some(channel) = ChannelId::from_index(*index) else { continue };
             let seen = self.seen.entry(*index).or_default();
             seen.rounds += 1;
-            if !agree(channel, first, vendor, last) {
+            if !values_agree(channel, first, vendor, last) {
                 seen.differed += 1;
                 seen.pair = Some((last.clone(), vendor.clone()));
             }
@@ -118,15 +118,19 @@ impl Rounds {
         self.vendor.extend(between.clone());
     }
 
-    fn told(self, ours: DoctorReport, theirs: DoctorReport) -> Comparison {
+    fn into_comparison(self, ours: DoctorReport, theirs: DoctorReport) -> Comparison {
         let only = |these: &ValuesByIndex, others: &ValuesByIndex| -> Vec<ChannelId> {
-            these.keys().filter(|index| !others.contains_key(index)).filter_map(|index| ChannelId::at(*index)).collect()
+            these
+                .keys()
+                .filter(|index| !others.contains_key(index))
+                .filter_map(|index| ChannelId::from_index(*index))
+                .collect()
         };
         let (only_native, only_vendor) = (only(&self.native, &self.vendor), only(&self.vendor, &self.native));
         let compared = self.seen.len();
         let always = self.seen.into_iter().filter(|(_, seen)| seen.differed == seen.rounds);
         let differences = always.filter_map(|(index, seen)| {
-            let (channel, (native, vendor)) = (ChannelId::at(index)?, seen.pair?);
+            let (channel, (native, vendor)) = (ChannelId::from_index(index)?, seen.pair?);
             Some(ChannelDifference { channel, native, vendor })
         });
         let differences = differences.collect();
@@ -144,7 +148,7 @@ fn tolerance(channel: ChannelId, number: f64) -> f64 {
 }
 
 /// Is the library's value one that could have been between two of ours?
-fn agree(channel: ChannelId, before: &Value, vendor: &Value, after: &Value) -> bool {
+fn values_agree(channel: ChannelId, before: &Value, vendor: &Value, after: &Value) -> bool {
     match (before, vendor, after) {
         (Value::Number(before), Value::Number(vendor), Value::Number(after)) => {
             let tolerance = tolerance(channel, *vendor);
@@ -166,12 +170,12 @@ impl Comparison {
 
     /// For `doctor --json`: our own report, with the rest beside it.
     #[must_use]
-    pub fn json(&self) -> serde_json::Value {
+    pub fn to_json(&self) -> serde_json::Value {
         let names = |channels: &[ChannelId]| channels.iter().map(|channel| channel.name()).collect::<Vec<_>>();
-        let mut document = self.ours.json();
-        document["vendor"] = self.theirs.json();
+        let mut document = self.ours.to_json();
+        document["vendor"] = self.theirs.to_json();
         document["compared"] = json!(self.compared);
-        document["differences"] = self.differences.iter().map(ChannelDifference::json).collect();
+        document["differences"] = self.differences.iter().map(ChannelDifference::to_json).collect();
         document["only_native"] = json!(names(&self.only_native));
         document["only_vendor"] = json!(names(&self.only_vendor));
         document
@@ -179,7 +183,7 @@ impl Comparison {
 
     /// For people: what was compared, then line by line what differs.
     #[must_use]
-    pub fn lines(&self) -> Vec<String> {
+    pub fn format_lines(&self) -> Vec<String> {
         if self.compared == 0 {
             return vec!["  nothing could be compared: see the problems above".to_owned()];
         }
@@ -188,7 +192,7 @@ impl Comparison {
             format!("  read once: native {:.1} ms, library {:.1} ms", self.ours.read_ms, self.theirs.read_ms),
             format!("  {} channels compared in {ROUNDS} rounds, {count} differ", self.compared),
         ];
-        lines.extend(self.differences.iter().map(ChannelDifference::line));
+        lines.extend(self.differences.iter().map(ChannelDifference::format_line));
         for (who, channels) in [("native", &self.only_native), ("the library", &self.only_vendor)] {
             let names: Vec<&str> = channels.iter().map(|channel| channel.name()).collect();
             if !names.is_empty() {
@@ -202,7 +206,7 @@ impl Comparison {
 impl ChannelDifference {
     /// For `doctor --json`.
     #[must_use]
-    pub fn json(&self) -> serde_json::Value {
+    pub fn to_json(&self) -> serde_json::Value {
         let value = |value: &Value| match value {
             Value::Number(number) => json!(number),
             Value::Text(text) => json!(&**text),
@@ -211,7 +215,7 @@ impl ChannelDifference {
         json!({"channel": self.channel.name(), "native": native, "vendor": vendor})
     }
 
-    fn line(&self) -> String {
+    fn format_line(&self) -> String {
         let shown = |value: &Value| ValueWithUnit(self.channel, value.clone()).to_string();
         let (native, vendor) = (shown(&self.native), shown(&self.vendor));
         format!("    {:<26} native {native:<16} library {vendor}", self.channel.name())
@@ -223,26 +227,26 @@ mod tests {
     use super::*;
 
     fn channel(name: &str) -> ChannelId {
-        ChannelId::of(name).expect("in the table")
+        ChannelId::from_name(name).expect("in the table")
     }
 
     #[test]
     fn a_moving_axis_does_not_differ_and_a_flag_does() {
         let agrees = |name: &str, before: f64, vendor: f64, after: f64| {
-            agree(channel(name), &Value::Number(before), &Value::Number(vendor), &Value::Number(after))
+            values_agree(channel(name), &Value::Number(before), &Value::Number(vendor), &Value::Number(after))
         };
         assert!(agrees("x_axis_position_mm", 10.0, 14.0, 20.0), "it was there in between");
         assert!(!agrees("x_axis_position_mm", 10.0, 10.5, 10.0), "it stood somewhere else");
         assert!(!agrees("gear_stage", 1.0, 2.0, 1.0) && !agrees("rapid", 0.0, 1.0, 0.0));
         assert!(agrees("spindle_speed_rpm", 3000.0, 3020.0, 3000.0));
         let text = |text: &str| Value::Text(text.into());
-        assert!(agree(channel("block"), &text("N10"), &text("N20"), &text("N20")));
-        assert!(!agree(channel("block"), &text("N10"), &text("N20"), &text("N10")));
+        assert!(values_agree(channel("block"), &text("N10"), &text("N20"), &text("N20")));
+        assert!(!values_agree(channel("block"), &text("N10"), &text("N20"), &text("N10")));
     }
 
     #[test]
     fn the_address_through_the_library_keeps_its_keys() {
-        let through = |text| through(text, Path::new("/opt/a&b.so"));
+        let through = |text| address_with_library(text, Path::new("/opt/a&b.so"));
         assert_eq!(through("fanuc://cnc"), "fanuc://cnc?backend=vendor&library=/opt/a%26b.so");
         let text = through("fanuc://cnc?backend=native&path=2");
         assert_eq!(text, "fanuc://cnc?path=2&backend=vendor&library=/opt/a%26b.so");

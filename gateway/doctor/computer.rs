@@ -29,15 +29,15 @@ pub struct ComputerReport {
 }
 
 impl ComputerReport {
-    fn text(&mut self, name: &str, value: impl Into<String>) {
-        self.facts.push(Fact::text(name, value));
+    fn add_text(&mut self, name: &str, value: impl Into<String>) {
+        self.facts.push(Fact::from_text(name, value));
     }
 
-    fn number(&mut self, name: &str, value: f64) {
-        self.facts.push(Fact::number(name, value));
+    fn add_number(&mut self, name: &str, value: f64) {
+        self.facts.push(Fact::from_number(name, value));
     }
 
-    fn problem(&mut self, what: String, next: &str) {
+    fn add_problem(&mut self, what: String, next: &str) {
         self.problems.push(Trouble { what, next: next.to_owned() });
     }
 
@@ -74,7 +74,7 @@ impl Default for SystemFiles {
 impl SystemFiles {
     /// Files below this folder.
     #[must_use]
-    pub fn below(root: &Path) -> Self {
+    pub fn from_root(root: &Path) -> Self {
         Self { root: root.to_owned() }
     }
 
@@ -82,7 +82,7 @@ impl SystemFiles {
         fs::read_to_string(self.root.join(path)).ok().map(|text| text.trim().to_owned())
     }
 
-    fn list(&self, path: &str) -> Vec<String> {
+    fn list_names(&self, path: &str) -> Vec<String> {
         let entries = fs::read_dir(self.root.join(path)).ok();
         let names =
             entries.into_iter().flatten().flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
@@ -113,9 +113,9 @@ pub fn examine_computer(system: &SystemFiles, data_dir: &Path) -> ComputerReport
 fn examine_kernel(system: &SystemFiles, report: &mut ComputerReport) {
     let version = system.read("proc/sys/kernel/osrelease").unwrap_or_else(|| "unknown".to_owned());
     let real_time = system.read("sys/kernel/realtime").as_deref() == Some("1");
-    report.text("kernel", version);
-    report.text("real-time kernel", if real_time { "yes" } else { "no" });
-    report.text("program", env!("CARGO_PKG_VERSION"));
+    report.add_text("kernel", version);
+    report.add_text("real-time kernel", if real_time { "yes" } else { "no" });
+    report.add_text("program", env!("CARGO_PKG_VERSION"));
 }
 
 fn examine_memory(system: &SystemFiles, report: &mut ComputerReport) {
@@ -125,10 +125,10 @@ fn examine_memory(system: &SystemFiles, report: &mut ComputerReport) {
         line.split_whitespace().nth(1)?.parse().ok()
     };
     let Some(available_kb) = field("MemAvailable:") else { return };
-    report.number("available_memory_mb", (available_kb / 1024) as f64);
+    report.add_number("available_memory_mb", (available_kb / 1024) as f64);
     if available_kb / 1024 < MEMORY_MIN_MB {
         let what = format!("{} MB of memory are available", available_kb / 1024);
-        report.problem(what, "stop other programs; the gateway needs about 100 MB, a diagnosis more");
+        report.add_problem(what, "stop other programs; the gateway needs about 100 MB, a diagnosis more");
     }
 }
 
@@ -136,60 +136,63 @@ fn examine_space(data_dir: &Path, report: &mut ComputerReport) {
     match rustix::fs::statvfs(data_dir) {
         Ok(space) => {
             let free_gb = space.f_bavail as f64 * space.f_frsize as f64 / 1e9;
-            report.number("free_space_gb", (free_gb * 100.0).round() / 100.0);
+            report.add_number("free_space_gb", (free_gb * 100.0).round() / 100.0);
             if free_gb < FREE_MIN_GB {
                 let what = format!("{free_gb:.2} GB are free where {} lies", data_dir.display());
-                report.problem(what, "make room, or lower max_gb under [history]");
+                report.add_problem(what, "make room, or lower max_gb under [history]");
             }
         }
-        Err(error) => report.text("free space", format!("not told: {error}")),
+        Err(error) => report.add_text("free space", format!("not told: {error}")),
     }
 }
 
 /// eMMC and some cards tell their wear; most disks do not.
 fn examine_wear(system: &SystemFiles, report: &mut ComputerReport) {
     let mut told = false;
-    for disk in system.list("sys/block") {
+    for disk in system.list_names("sys/block") {
         let Some(life) = system.read(&format!("sys/block/{disk}/device/life_time")) else { continue };
         let tenths =
             life.split_whitespace().filter_map(|word| u32::from_str_radix(word.trim_start_matches("0x"), 16).ok());
         let Some(worst) = tenths.max().filter(|worst| *worst > 0) else { continue };
         told = true;
-        report.text(&format!("wear of {disk}"), format!("{} to {} %", (worst - 1) * 10, worst * 10));
+        report.add_text(&format!("wear of {disk}"), format!("{} to {} %", (worst - 1) * 10, worst * 10));
         if worst > WEAR_MAX_TENTHS {
             let what = format!("{disk} says that {} % of its life is used", (worst - 1) * 10);
-            report.problem(what, "back up, and exchange it: cnc-gateway backup --history, then restore on the new one");
+            report.add_problem(
+                what,
+                "back up, and exchange it: cnc-gateway backup --history, then restore on the new one",
+            );
         }
     }
     if !told {
-        report.text("wear of the disk", "not told by this computer; smartctl tells it for SSDs");
+        report.add_text("wear of the disk", "not told by this computer; smartctl tells it for SSDs");
     }
 }
 
 fn examine_clock(system: &SystemFiles, report: &mut ComputerReport) {
     let source = system.read("sys/devices/system/clocksource/clocksource0/current_clocksource");
-    report.text("clock source", source.unwrap_or_else(|| "unknown".to_owned()));
+    report.add_text("clock source", source.unwrap_or_else(|| "unknown".to_owned()));
     let has_battery = system.exists("dev/rtc0") || system.exists("sys/class/rtc/rtc0");
     let synchronised = system.exists("run/systemd/timesync/synchronized") || system.exists("var/lib/chrony/drift");
-    report.text("clock with a battery", if has_battery { "yes" } else { "no" });
-    report.text("clock set over the network", if synchronised { "yes" } else { "not seen" });
+    report.add_text("clock with a battery", if has_battery { "yes" } else { "no" });
+    report.add_text("clock set over the network", if synchronised { "yes" } else { "not seen" });
     if !has_battery && !synchronised {
         let what = "the clock has no battery and nothing sets it: after a power cut every time is wrong".to_owned();
-        report.problem(what, "let systemd-timesyncd or chrony set it, from the control or a server of the plant");
+        report.add_problem(what, "let systemd-timesyncd or chrony set it, from the control or a server of the plant");
     }
 }
 
 fn examine_temperature(system: &SystemFiles, report: &mut ComputerReport) {
-    let zones = system.list("sys/class/thermal").into_iter().filter(|name| name.starts_with("thermal_zone"));
+    let zones = system.list_names("sys/class/thermal").into_iter().filter(|name| name.starts_with("thermal_zone"));
     let read = |zone: String| system.read(&format!("sys/class/thermal/{zone}/temp"))?.parse::<f64>().ok();
     let warmest = zones.filter_map(read).fold(f64::NEG_INFINITY, f64::max) / 1000.0;
     if !warmest.is_finite() {
-        report.text("temperature", "not told by this computer");
+        report.add_text("temperature", "not told by this computer");
         return;
     }
-    report.number("temperature_degc", warmest);
+    report.add_number("temperature_degc", warmest);
     if warmest > TEMPERATURE_MAX_C {
-        report.problem(format!("the computer is at {warmest:.0} °C"), "look at its cooling and at the cabinet");
+        report.add_problem(format!("the computer is at {warmest:.0} °C"), "look at its cooling and at the cabinet");
     }
 }
 
@@ -201,10 +204,10 @@ fn examine_priority(system: &SystemFiles, report: &mut ComputerReport) {
         Some(number) => number.parse().unwrap_or(0),
         None => 0,
     };
-    report.text("real-time priority", if limit == u64::MAX { "unlimited".to_owned() } else { limit.to_string() });
+    report.add_text("real-time priority", if limit == u64::MAX { "unlimited".to_owned() } else { limit.to_string() });
     if limit < REAL_TIME_MIN {
         let what = format!("real-time priority is limited to {limit}: ticks come up to 2 ms late under load");
-        report.problem(what, "the service of the package has LimitRTPRIO=40; for a shell: ulimit -r 40 as root");
+        report.add_problem(what, "the service of the package has LimitRTPRIO=40; for a shell: ulimit -r 40 as root");
     }
 }
 
@@ -226,7 +229,7 @@ mod tests {
         put("sys/block/mmcblk0/device/life_time", "0x02 0x0a\n");
         put("sys/class/thermal/thermal_zone0/temp", "91000\n");
         put("proc/self/limits", "Limit Soft Hard Units\nMax realtime priority     0                    0\n");
-        let report = examine_computer(&SystemFiles::below(root.path()), root.path());
+        let report = examine_computer(&SystemFiles::from_root(root.path()), root.path());
         let told: Vec<&str> = report.problems.iter().map(|problem| problem.what.as_str()).collect();
         let words = ["memory", "mmcblk0", "battery", "91", "real-time"];
         assert!(words.iter().all(|word| told.iter().any(|text| text.contains(word))), "{told:?}");

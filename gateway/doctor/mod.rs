@@ -4,10 +4,10 @@
 mod compare;
 mod computer;
 
-pub use compare::{ChannelDifference, Comparison, compare};
+pub use compare::{ChannelDifference, Comparison, compare_backends};
 pub use computer::{ComputerReport, SystemFiles, examine_computer};
 
-use crate::run::open::opened;
+use crate::run::open::open_source;
 use adapters::clock::{Clock, SystemClock};
 use adapters::driver::{Fact, FactValue};
 use adapters::plausibility::Plausibility;
@@ -89,7 +89,7 @@ pub fn examine_all(address: &Address) -> Result<DoctorReport, String> {
     let (mut report, mut sources) = begin_at(address, &clock)?;
     let mut offers = Vec::new();
     for source in &mut sources {
-        match source.offers(&clock) {
+        match source.list_offers(&clock) {
             Ok(found) => offers.extend(found),
             Err(error) => report.record_failure(&error),
         }
@@ -99,14 +99,14 @@ pub fn examine_all(address: &Address) -> Result<DoctorReport, String> {
 }
 
 /// Examines an address and leaves open what works.
-fn begin(text: &str, clock: &SystemClock) -> Result<(DoctorReport, Vec<Box<dyn Source>>), String> {
+fn begin_examination(text: &str, clock: &SystemClock) -> Result<(DoctorReport, Vec<Box<dyn Source>>), String> {
     let address: Address = text.parse().map_err(|error| format!("{error}"))?;
     begin_at(&address, clock)
 }
 
 fn begin_at(address: &Address, clock: &SystemClock) -> Result<(DoctorReport, Vec<Box<dyn Source>>), String> {
     let began = Instant::now();
-    let opened = opened(address, clock.now_ns()).map_err(|error| error.to_string())?;
+    let opened = open_source(address, clock.now_ns()).map_err(|error| error.to_string())?;
     let mut report = DoctorReport {
         address: address.text().to_owned(),
         reachable: false,
@@ -118,15 +118,15 @@ fn begin_at(address: &Address, clock: &SystemClock) -> Result<(DoctorReport, Vec
         offers: None,
     };
     let mut sources = opened.sources;
-    sources.retain_mut(|source| report.first(source.as_mut(), clock));
-    report.open_ms = milliseconds(began);
+    sources.retain_mut(|source| report.read_first(source.as_mut(), clock));
+    report.open_ms = elapsed_ms(began);
     let began = Instant::now();
-    sources.iter_mut().for_each(|source| report.again(source.as_mut(), clock));
-    report.read_ms = milliseconds(began);
+    sources.iter_mut().for_each(|source| report.read_again(source.as_mut(), clock));
+    report.read_ms = elapsed_ms(began);
     Ok((report, sources))
 }
 
-fn milliseconds(since: Instant) -> f64 {
+fn elapsed_ms(since: Instant) -> f64 {
     (since.elapsed().as_secs_f64() * 1e4).round() / 10.0
 }
 
@@ -135,7 +135,7 @@ const SLOW: f64 = 2.0;
 
 impl DoctorReport {
     /// The first look at a source: does it work at all?
-    fn first(&mut self, source: &mut dyn Source, clock: &dyn Clock) -> bool {
+    fn read_first(&mut self, source: &mut dyn Source, clock: &dyn Clock) -> bool {
         let mut readings = Vec::new();
         match source.read(clock, &mut readings) {
             Ok(()) => {
@@ -150,36 +150,36 @@ impl DoctorReport {
     }
 
     /// The second look, whose values are shown.
-    fn again(&mut self, source: &mut dyn Source, clock: &dyn Clock) {
+    fn read_again(&mut self, source: &mut dyn Source, clock: &dyn Clock) {
         let mut readings = Vec::new();
         if let Err(error) = source.read(clock, &mut readings) {
             self.record_failure(&error);
         }
         self.check_pace(source);
-        let named = source.identity().into_iter().map(|(name, value)| Fact::text(name, value));
+        let named = source.query_identity().into_iter().map(|(name, value)| Fact::from_text(name, value));
         let new = |fact: &Fact| self.identity.iter().all(|known| known.name != fact.name);
-        let fresh: Vec<Fact> = named.chain(source.facts()).filter(new).collect();
+        let fresh: Vec<Fact> = named.chain(source.collect_facts()).filter(new).collect();
         self.identity.extend(fresh);
-        self.judge(source, &readings);
-        self.readings.extend(readings.into_iter().map(shown));
+        self.judge_readings(source, &readings);
+        self.readings.extend(readings.into_iter().map(attach_unit));
     }
 
     /// What is wrong with a source that answers: what it says itself, what is not believed, and what has no value for a reason
     /// that neither of them has told; one sentence per reason.
-    fn judge(&mut self, source: &dyn Source, readings: &[Reading]) {
+    fn judge_readings(&mut self, source: &dyn Source, readings: &[Reading]) {
         let mut plausibility = Plausibility::default();
-        plausibility.see(readings);
-        let own = source.problems();
+        plausibility.record_readings(readings);
+        let own = source.list_problems();
         let told_refusals = !own.is_empty();
-        for problem in own.into_iter().chain(plausibility.problems()) {
-            self.trouble(Trouble { what: problem.what, next: problem.next });
+        for problem in own.into_iter().chain(plausibility.list_problems()) {
+            self.add_trouble(Trouble { what: problem.what, next: problem.next });
         }
         for reason in [Absence::OutOfRange, Absence::Refused, Absence::Timeout] {
             let silent = |reading: &&Reading| reading.value == Err(reason) && reading.implausible.is_none();
             let names: Vec<&str> = readings.iter().filter(silent).map(|reading| reading.channel.name()).collect();
             let is_told = reason == Absence::Refused && told_refusals;
             if !names.is_empty() && !is_told {
-                self.trouble(Trouble {
+                self.add_trouble(Trouble {
                     what: format!("no value ({reason}): {}", names.join(", ")),
                     next: next(reason),
                 });
@@ -187,7 +187,7 @@ impl DoctorReport {
         }
     }
 
-    fn trouble(&mut self, trouble: Trouble) {
+    fn add_trouble(&mut self, trouble: Trouble) {
         if !self.problems.contains(&trouble) {
             self.problems.push(trouble);
         }
@@ -195,7 +195,7 @@ impl DoctorReport {
 
     /// A device that answers too slowly for the period that is wanted.
     fn check_pace(&mut self, source: &dyn Source) {
-        let (wanted_s, kept_s) = (source.period().as_secs_f64(), source.pace().as_secs_f64());
+        let (wanted_s, kept_s) = (source.period().as_secs_f64(), source.achievable_period().as_secs_f64());
         if kept_s > wanted_s * SLOW {
             let name = source.name();
             self.problems.push(Trouble {
@@ -214,12 +214,12 @@ impl DoctorReport {
     fn record_failure(&mut self, error: &SourceError) {
         // A machine that refuses or answers nonsense is there all the same.
         self.reachable |= matches!(error, SourceError::Refused { .. } | SourceError::Decode { .. });
-        self.trouble(trouble(error));
+        self.add_trouble(trouble_from_error(error));
     }
 
     /// The report as the contract lays it out.
     #[must_use]
-    pub fn json(&self) -> serde_json::Value {
+    pub fn to_json(&self) -> serde_json::Value {
         let identity: Map<String, serde_json::Value> =
             self.identity.iter().map(|fact| (fact.name.clone(), fact_json(&fact.value))).collect();
         let reading = |(channel, value): &(ChannelId, Result<ValueWithUnit, Absence>)| match value {
@@ -227,7 +227,7 @@ impl DoctorReport {
                 json!({"channel": channel.name(), "value": number, "unit": channel.channel().unit})
             }
             Ok(ValueWithUnit(_, Value::Text(text))) => json!({"channel": channel.name(), "value": &**text, "unit": ""}),
-            Err(absence) => json!({"channel": channel.name(), "missing": absence.word()}),
+            Err(absence) => json!({"channel": channel.name(), "missing": absence.as_word()}),
         };
         let mut report = json!({
             "address": self.address,
@@ -259,7 +259,7 @@ fn fact_json(value: &FactValue) -> serde_json::Value {
     }
 }
 
-fn shown(reading: Reading) -> (ChannelId, Result<ValueWithUnit, Absence>) {
+fn attach_unit(reading: Reading) -> (ChannelId, Result<ValueWithUnit, Absence>) {
     (reading.channel, reading.value.map(|value| ValueWithUnit(reading.channel, value)))
 }
 
@@ -274,7 +274,7 @@ fn next(absence: Absence) -> String {
     next.to_owned()
 }
 
-fn trouble(error: &SourceError) -> Trouble {
+fn trouble_from_error(error: &SourceError) -> Trouble {
     let (what, next) = match error {
         SourceError::Line { what, next, .. } => (what.clone(), next.clone()),
         SourceError::Timeout { request, deadline_ms, next, .. } => {

@@ -25,24 +25,24 @@ impl CopyRows {
     }
 
     /// How many rows.
-    pub(super) fn count(&self) -> u64 {
+    pub(super) fn row_count(&self) -> u64 {
         self.rows
     }
 
     /// A row of so many fields begins.
-    pub(super) fn begin(&mut self, fields: i16) -> &mut Self {
+    pub(super) fn begin_row(&mut self, fields: i16) -> &mut Self {
         self.rows += 1;
         self.bytes.extend(fields.to_be_bytes());
         self
     }
 
     /// Everything, with the mark of the end.
-    pub(super) fn finish(mut self) -> Vec<u8> {
+    pub(super) fn into_bytes(mut self) -> Vec<u8> {
         self.bytes.extend((-1_i16).to_be_bytes());
         self.bytes
     }
 
-    fn field(&mut self, bytes: &[u8]) -> &mut Self {
+    fn append_field(&mut self, bytes: &[u8]) -> &mut Self {
         // A field is part of a message of at most a megabyte.
         let length = i32::try_from(bytes.len()).unwrap_or(i32::MAX);
         self.bytes.extend(length.to_be_bytes());
@@ -50,41 +50,41 @@ impl CopyRows {
         self
     }
 
-    pub(super) fn null(&mut self) -> &mut Self {
+    pub(super) fn append_null(&mut self) -> &mut Self {
         self.bytes.extend((-1_i32).to_be_bytes());
         self
     }
 
-    pub(super) fn int4(&mut self, number: i32) -> &mut Self {
-        self.field(&number.to_be_bytes())
+    pub(super) fn append_int4(&mut self, number: i32) -> &mut Self {
+        self.append_field(&number.to_be_bytes())
     }
 
-    pub(super) fn int8(&mut self, number: i64) -> &mut Self {
-        self.field(&number.to_be_bytes())
+    pub(super) fn append_int8(&mut self, number: i64) -> &mut Self {
+        self.append_field(&number.to_be_bytes())
     }
 
-    pub(super) fn flag(&mut self, flag: bool) -> &mut Self {
-        self.field(&[u8::from(flag)])
+    pub(super) fn append_flag(&mut self, flag: bool) -> &mut Self {
+        self.append_field(&[u8::from(flag)])
     }
 
-    pub(super) fn text(&mut self, text: &str) -> &mut Self {
-        self.field(text.as_bytes())
+    pub(super) fn append_text(&mut self, text: &str) -> &mut Self {
+        self.append_field(text.as_bytes())
     }
 
     /// A time, in microseconds since 1970.
-    pub(super) fn time(&mut self, at_us: i64) -> &mut Self {
-        self.int8(at_us.saturating_sub(EPOCH_US))
+    pub(super) fn append_time(&mut self, at_us: i64) -> &mut Self {
+        self.append_int8(at_us.saturating_sub(EPOCH_US))
     }
 
-    pub(super) fn json(&mut self, text: Option<&str>) -> &mut Self {
+    pub(super) fn append_json(&mut self, text: Option<&str>) -> &mut Self {
         match text {
-            None => self.null(),
-            Some(text) => self.field(&[b"\x01", text.as_bytes()].concat()),
+            None => self.append_null(),
+            Some(text) => self.append_field(&[b"\x01", text.as_bytes()].concat()),
         }
     }
 
     /// A list without holes.
-    fn list<T, const N: usize>(&mut self, kind: i32, items: &[T], bytes: impl Fn(&T) -> [u8; N]) -> &mut Self {
+    fn append_list<T, const N: usize>(&mut self, kind: i32, items: &[T], bytes: impl Fn(&T) -> [u8; N]) -> &mut Self {
         self.list_of(kind, items.iter().map(|item| Some(bytes(item))))
     }
 
@@ -111,11 +111,11 @@ impl CopyRows {
     }
 
     pub(super) fn int4_list(&mut self, items: &[i32]) -> &mut Self {
-        self.list(INT4, items, |number| number.to_be_bytes())
+        self.append_list(INT4, items, |number| number.to_be_bytes())
     }
 
     pub(super) fn float8_list(&mut self, items: &[f64]) -> &mut Self {
-        self.list(FLOAT8, items, |number| number.to_be_bytes())
+        self.append_list(FLOAT8, items, |number| number.to_be_bytes())
     }
 
     /// Single precision, with holes.
@@ -135,9 +135,9 @@ mod tests {
     #[test]
     fn a_row_is_what_the_format_says() {
         let mut rows = CopyRows::new();
-        rows.begin(4).int4(7).null().int4_list(&[5]).time(946_684_800_000_001);
-        assert_eq!(rows.count(), 1);
-        let bytes = rows.finish();
+        rows.begin_row(4).append_int4(7).append_null().int4_list(&[5]).append_time(946_684_800_000_001);
+        assert_eq!(rows.row_count(), 1);
+        let bytes = rows.into_bytes();
         let expected = [
             SIGNATURE,
             b"\0\x04\0\0\0\x04\0\0\0\x07\xff\xff\xff\xff",

@@ -47,12 +47,12 @@ impl DatabaseError {
     pub(super) fn new(doing: &str, error: &tokio_postgres::Error) -> Self {
         let of_the_data =
             error.code().is_some_and(|code| OF_THE_DATA.iter().any(|class| code.code().starts_with(class)));
-        Self { said: words(doing, error), of_the_data }
+        Self { said: describe_error(doing, error), of_the_data }
     }
 }
 
 /// An error of the database in words.
-fn words(doing: &str, error: &tokio_postgres::Error) -> NatsError {
+fn describe_error(doing: &str, error: &tokio_postgres::Error) -> NatsError {
     if let Some(tls) = tls_within(error) {
         return NatsError::new(format!("PostgreSQL, {doing}: {}", tls.what), tls.next);
     }
@@ -87,7 +87,7 @@ fn words(doing: &str, error: &tokio_postgres::Error) -> NatsError {
 /// What TLS says, where it is the reason.
 fn tls_within(error: &tokio_postgres::Error) -> Option<TlsError> {
     let cause = std::error::Error::source(error)?.downcast_ref::<std::io::Error>()?;
-    TlsError::within(cause, "the database")
+    TlsError::from_io_error(cause, "the database")
 }
 
 /// Is the database on this computer?
@@ -100,12 +100,15 @@ fn is_here(config: &Config) -> bool {
 }
 
 impl DatabaseSettings {
-    fn config(&self) -> Result<(Config, Option<TlsFiles>), NatsError> {
+    fn parse_config(&self) -> Result<(Config, Option<TlsFiles>), NatsError> {
         let (address, files) = secured::files_of(&self.address);
         let mut config: Config = address.parse().map_err(|error: tokio_postgres::Error| {
             let cause = std::error::Error::source(&error).map_or(String::new(), |cause| format!(": {cause}"));
             NatsError::new(
-                format!("{:?} is no address of PostgreSQL: {error}{cause}", adapters::address::masked(&self.address)),
+                format!(
+                    "{:?} is no address of PostgreSQL: {error}{cause}",
+                    adapters::address::mask_secrets(&self.address)
+                ),
                 "write postgres://USER@HOST:5432/DATABASE, and ?sslmode=require for an encrypted line",
             )
         })?;
@@ -141,7 +144,7 @@ where
     T::TlsConnect: Send,
     <T::TlsConnect as tokio_postgres::tls::TlsConnect<Socket>>::Future: Send,
 {
-    let (client, connection) = config.connect(tls).await.map_err(|error| words("connecting", &error))?;
+    let (client, connection) = config.connect(tls).await.map_err(|error| describe_error("connecting", &error))?;
     tokio::spawn(async move {
         let _seen_by_the_next_statement = connection.await;
     });
@@ -153,21 +156,21 @@ where
 /// # Errors
 /// What is wrong, in words.
 pub(super) async fn connect(settings: &DatabaseSettings) -> Result<(Client, schema::Partitioning), NatsError> {
-    let (config, files) = settings.config()?;
+    let (config, files) = settings.parse_config()?;
     let mut client = match files {
         Some(files) => {
-            let tls = files.config().map_err(|error| NatsError::new(error.what, error.next))?;
+            let tls = files.build_config().map_err(|error| NatsError::new(error.what, error.next))?;
             connect_with(&config, Securing(tls)).await?
         }
         None => {
             if !is_here(&config) {
-                Notice::new(Severity::Warning, "database_plain", PLAIN).say();
+                Notice::new(Severity::Warning, "database_plain", PLAIN).write_to_logs();
             }
             connect_with(&config, NoTls).await?
         }
     };
     let settings = "SET client_encoding = 'UTF8'; SET TimeZone = 'UTC'; SET client_min_messages = warning";
-    client.batch_execute(settings).await.map_err(|error| words("connecting", &error))?;
+    client.batch_execute(settings).await.map_err(|error| describe_error("connecting", &error))?;
     let partitioning = schema::bring_up(&mut client).await?;
     Ok((client, partitioning))
 }

@@ -69,7 +69,7 @@ pub async fn run(settings: &IngestSettings) -> Result<Done, NatsError> {
     let mut last = String::new();
     loop {
         let before = ingest.done;
-        match ingest.session().await {
+        match ingest.run_session().await {
             Ok(()) => return Ok(ingest.done),
             Err(error) if settings.once => return Err(error),
             Err(error) => {
@@ -78,7 +78,7 @@ pub async fn run(settings: &IngestSettings) -> Result<Done, NatsError> {
                 }
                 let text = error.to_string();
                 if text != last {
-                    Notice::new(Severity::Warning, "ingest_failed", text.clone()).say();
+                    Notice::new(Severity::Warning, "ingest_failed", text.clone()).write_to_logs();
                     last = text;
                 }
                 tokio::time::sleep(pause).await;
@@ -90,7 +90,7 @@ pub async fn run(settings: &IngestSettings) -> Result<Done, NatsError> {
 
 impl Ingest<'_> {
     /// From connecting to the first failure, or to the end of the work.
-    async fn session(&mut self) -> Result<(), NatsError> {
+    async fn run_session(&mut self) -> Result<(), NatsError> {
         let IngestSettings { servers, stream, consumer, database, once } = self.settings;
         let first = self.server;
         self.server += 1;
@@ -98,34 +98,35 @@ impl Ingest<'_> {
         let mut connection = Connection::open(servers, first, "cnc-gateway fleet ingest").await?;
         if connection.create_stream(stream).await? {
             let text = format!("stream {} created for {}", stream.name, stream.subjects);
-            Notice::new(Severity::Info, "stream_created", text).say();
+            Notice::new(Severity::Info, "stream_created", text).write_to_logs();
         }
         connection.create_consumer(&stream.name, consumer).await?;
-        Notice::new(Severity::Info, "ingest_running", format!("taking items from stream {}", stream.name)).say();
+        Notice::new(Severity::Info, "ingest_running", format!("taking items from stream {}", stream.name))
+            .write_to_logs();
         let limits = FetchLimits { messages: BATCH_MESSAGES, bytes: BATCH_BYTES, patience: PATIENCE };
-        let mut batch = connection.fetch(&stream.name, consumer, limits).await?;
+        let mut batch = connection.fetch_messages(&stream.name, consumer, limits).await?;
         loop {
-            let fetching = connection.fetch(&stream.name, consumer, limits);
+            let fetching = connection.fetch_messages(&stream.name, consumer, limits);
             let (written, fetched) = tokio::join!(write(&mut database, &batch), fetching);
-            self.count(written?);
-            connection.acknowledge(&batch);
+            self.count_written(written?);
+            connection.acknowledge_messages(&batch);
             connection.flush().await?;
             batch = fetched?;
             if batch.is_empty() {
-                let backlog = connection.backlog(&stream.name, consumer).await?;
+                let backlog = connection.read_backlog(&stream.name, consumer).await?;
                 if *once && backlog.pending == 0 && backlog.under_way == 0 {
                     return Ok(());
                 }
             }
             if self.told.elapsed() >= TELL_EVERY {
                 self.told = Instant::now();
-                let pending = connection.backlog(&stream.name, consumer).await?.pending;
-                self.tell(pending);
+                let pending = connection.read_backlog(&stream.name, consumer).await?.pending;
+                self.report_progress(pending);
             }
         }
     }
 
-    fn count(&mut self, written: Written) {
+    fn count_written(&mut self, written: Written) {
         self.done.new += written.result.new;
         self.done.known += written.result.known;
         self.done.refused += written.refused.len() as u64;
@@ -133,15 +134,15 @@ impl Ingest<'_> {
         if let Some(RefusalRecord { subject, reason, .. }) = written.refused.first() {
             let text =
                 format!("{} messages are kept in the table `refused`; {subject}: {reason}", written.refused.len());
-            Notice::new(Severity::Warning, "refused", text).say();
+            Notice::new(Severity::Warning, "refused", text).write_to_logs();
         }
     }
 
-    fn tell(&self, pending: u64) {
+    fn report_progress(&self, pending: u64) {
         let Done { new, known, refused } = self.done;
         let text =
             format!("{new} rows written, {known} known already, {refused} refused; {pending} wait in the stream");
-        Notice::new(Severity::Info, "ingest", text).say();
+        Notice::new(Severity::Info, "ingest", text).write_to_logs();
     }
 }
 
@@ -157,9 +158,9 @@ async fn write(database: &mut Database, messages: &[Message]) -> Result<Written,
     let mut written = Written::default();
     let mut items: Vec<(FleetRow<'_>, &Message)> = Vec::with_capacity(messages.len());
     for message in messages {
-        match FleetRow::of(&message.subject, &message.payload) {
+        match FleetRow::from_message(&message.subject, &message.payload) {
             Ok(row) => items.push((row, message)),
-            Err(RefusedMessage(why)) => written.refused.push(refusal(message, &why)),
+            Err(RefusedMessage(why)) => written.refused.push(build_refusal(message, &why)),
         }
     }
     // Stretches that are still to be written; one that the database does not take is halved.
@@ -179,16 +180,16 @@ async fn write(database: &mut Database, messages: &[Message]) -> Result<Written,
             }
             Err(error) if error.of_the_data => {
                 let message = items[from].1;
-                written.refused.push(refusal(message, &error.said.what));
+                written.refused.push(build_refusal(message, &error.said.what));
             }
             Err(error) => return Err(error.said),
         }
     }
-    database.refuse(&written.refused).await?;
+    database.insert_refused(&written.refused).await?;
     Ok(written)
 }
 
-fn refusal(message: &Message, why: &str) -> RefusalRecord {
+fn build_refusal(message: &Message, why: &str) -> RefusalRecord {
     let kept =
         |text: &str, letters: usize| text.chars().filter(|letter| *letter != '\0').take(letters).collect::<String>();
     // So many bytes hold so many letters.

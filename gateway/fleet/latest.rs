@@ -19,7 +19,7 @@ pub(super) struct LatestOfBox {
 
 impl LatestOfBox {
     /// `{"12":[microseconds,2249.5],"13":[microseconds,null,"stale"]}`.
-    pub(super) fn json(&self) -> String {
+    pub(super) fn to_json(&self) -> String {
         let cell = |(id, (at_us, value, reason)): (&i32, &(i64, Json, Option<String>))| {
             let cell = match reason {
                 None => json!([at_us, value]),
@@ -97,6 +97,6 @@ mod tests {
         latest.add(1, &row(10, 4.0, true), &[3], 22);
         let found = &latest.boxes[&1];
         assert_eq!((found.first_us, found.last_us, found.arrived_us, found.sequence), (10, 20, 22, 20));
-        assert_eq!(found.json(), r#"{"3":[20,5.0]}"#);
+        assert_eq!(found.to_json(), r#"{"3":[20,5.0]}"#);
     }
 }

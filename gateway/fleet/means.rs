@@ -25,18 +25,18 @@ pub(super) const LEVELS: [MeanLevel; 3] = [
 
 impl MeanLevel {
     /// Where the row begins that holds this time, in microseconds since 1970, and the place in it.
-    fn place(&self, at_us: i64) -> Option<(i64, usize)> {
+    fn find_place(&self, at_us: i64) -> Option<(i64, usize)> {
         let at = Timestamp::from_microsecond(at_us).ok()?.to_zoned(TimeZone::UTC).datetime();
         let (start, place) = match self.kind {
             "minute" => (at.date().at(at.hour(), 0, 0, 0), at.minute()),
             "hour" => (at.date().at(0, 0, 0, 0), at.hour()),
             _ => (at.date().first_of_month().at(0, 0, 0, 0), at.day() - 1),
         };
-        Some((microseconds(start)?, usize::try_from(place).ok()?))
+        Some((to_microseconds(start)?, usize::try_from(place).ok()?))
     }
 }
 
-fn microseconds(at: DateTime) -> Option<i64> {
+fn to_microseconds(at: DateTime) -> Option<i64> {
     at.to_zoned(TimeZone::UTC).ok().map(|at| at.timestamp().as_microsecond())
 }
 
@@ -53,7 +53,7 @@ impl MeanRows {
     /// Takes on the means of an item, whose series have these numbers. Of two items of the same place the one that knows more seconds
     /// counts, whatever the order: the summaries of a box only grow.
     pub(super) fn add(&mut self, level: &MeanLevel, box_id: i32, row: &FleetRow<'_>, series: &[i32]) {
-        let Some((start_us, place)) = level.place(row.at_us()) else { return };
+        let Some((start_us, place)) = level.find_place(row.at_us()) else { return };
         for (id, (_, numbers)) in series.iter().zip(&row.means) {
             let empty = || std::array::from_fn(|_| vec![None; level.places]);
             let places = self.rows.entry((*id, box_id, start_us)).or_insert_with(empty);
@@ -74,8 +74,8 @@ mod tests {
     fn a_time_has_its_place_in_hour_day_and_month() {
         let at = |text: &str| text.parse::<Timestamp>().expect("a time").as_microsecond();
         let noon = at("2026-02-28T12:34:00Z");
-        assert_eq!(LEVELS[0].place(noon), Some((at("2026-02-28T12:00:00Z"), 34)));
-        assert_eq!(LEVELS[1].place(noon), Some((at("2026-02-28T00:00:00Z"), 12)));
-        assert_eq!(LEVELS[2].place(noon), Some((at("2026-02-01T00:00:00Z"), 27)));
+        assert_eq!(LEVELS[0].find_place(noon), Some((at("2026-02-28T12:00:00Z"), 34)));
+        assert_eq!(LEVELS[1].find_place(noon), Some((at("2026-02-28T00:00:00Z"), 12)));
+        assert_eq!(LEVELS[2].find_place(noon), Some((at("2026-02-01T00:00:00Z"), 27)));
     }
 }

@@ -41,7 +41,7 @@ use crate::nats::NatsTarget;
 ///
 /// # Errors
 /// What is wrong with it, in words.
-pub fn cluster(address: &str) -> Result<(NatsTarget, String), String> {
+pub fn parse_cluster(address: &str) -> Result<(NatsTarget, String), String> {
     let sink: crate::sinks::SinkAddress = address.parse().map_err(|error| format!("{error}"))?;
     match sink.target() {
         crate::sinks::SinkTarget::Nats(target) => Ok((target.servers.clone(), target.prefix.clone())),

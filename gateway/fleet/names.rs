@@ -31,7 +31,7 @@ impl Names {
     }
 
     /// Asks for what is not known yet, and notes a machine that has another name now.
-    pub(super) async fn learn(&mut self, client: &Client, rows: &[Arrived<'_>]) -> Result<(), DatabaseError> {
+    pub(super) async fn resolve_names(&mut self, client: &Client, rows: &[Arrived<'_>]) -> Result<(), DatabaseError> {
         if self.boxes.len() > REMEMBERED_MAX || self.series.len() > REMEMBERED_MAX {
             *self = Self::default();
         }
@@ -45,7 +45,7 @@ impl Names {
                     .map_err(naming)?;
                 self.boxes.insert(row.box_name.to_string(), (found.get(0), row.machine.to_string()));
             }
-            for series in row.series() {
+            for series in row.series_names() {
                 if self.series_id(series).is_none() {
                     let found =
                         client.query_one(NAME_SERIES, &[&&*series.name, &&*series.unit]).await.map_err(naming)?;

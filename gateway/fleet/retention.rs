@@ -68,7 +68,7 @@ pub struct Going {
 ///
 /// # Errors
 /// What is wrong, in words.
-pub async fn retain(settings: &DatabaseSettings, days: &[u32], dry: bool) -> Result<Vec<Going>, NatsError> {
+pub async fn remove_expired(settings: &DatabaseSettings, days: &[u32], dry: bool) -> Result<Vec<Going>, NatsError> {
     let (client, partitioning) = database::connect(settings).await?;
     let mut going = Vec::new();
     for (keeping, days) in KEEPING.iter().zip(days) {
@@ -86,7 +86,7 @@ pub async fn retain(settings: &DatabaseSettings, days: &[u32], dry: bool) -> Res
 }
 
 /// The time of `now() - days`, UTC.
-async fn horizon(client: &Client, days: u32) -> Result<String, tokio_postgres::Error> {
+async fn read_horizon(client: &Client, days: u32) -> Result<String, tokio_postgres::Error> {
     let text = format!("SELECT to_char(now() - interval '{days} days', 'YYYY-MM-DD HH24:MI:SS')");
     client.query_one(&text, &[]).await.map(|row| row.get(0))
 }
@@ -98,7 +98,7 @@ async fn drop_partitions(
     days: u32,
     dry: bool,
 ) -> Result<Vec<Going>, tokio_postgres::Error> {
-    let before = horizon(client, days).await?;
+    let before = read_horizon(client, days).await?;
     let list = "
         SELECT c.oid::regclass::text, greatest(c.reltuples, 0)::bigint, pg_total_relation_size(c.oid)
         FROM pg_inherits JOIN pg_class c ON c.oid = inhrelid
@@ -118,7 +118,7 @@ async fn drop_partitions(
 
 /// The same by TimescaleDB.
 async fn drop_chunks(client: &Client, table: &str, days: u32, dry: bool) -> Result<Vec<Going>, tokio_postgres::Error> {
-    let before = horizon(client, days).await?;
+    let before = read_horizon(client, days).await?;
     let which = if dry { "show_chunks" } else { "drop_chunks" };
     let call = format!("SELECT {which}('{table}', older_than => interval '{days} days')::text");
     let rows = client.query(&call, &[]).await?;
@@ -132,7 +132,7 @@ async fn delete_rows(
     days: u32,
     dry: bool,
 ) -> Result<Vec<Going>, tokio_postgres::Error> {
-    let before = horizon(client, days).await?;
+    let before = read_horizon(client, days).await?;
     let verb = if dry { "SELECT" } else { "DELETE" };
     let statement = format!("{verb} FROM {table} WHERE {column} < '{before}+00'");
     let rows = i64::try_from(client.execute(&statement, &[]).await?).unwrap_or(i64::MAX);

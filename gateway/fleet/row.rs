@@ -1,6 +1,6 @@
 //! A message of the stream as a row. Pure.
 
-use crate::history::unnested;
+use crate::history::parse_nested_json;
 use adapters::clock::TimeNs;
 use serde::Deserialize;
 use serde_json::Value as Json;
@@ -95,23 +95,25 @@ enum ValueInItem<'a> {
     Missing,
 }
 
-fn refused<T>(what: impl Into<String>) -> Result<T, RefusedMessage> {
+fn refuse_message<T>(what: impl Into<String>) -> Result<T, RefusedMessage> {
     Err(RefusedMessage(what.into()))
 }
 
 /// Names become rows of their own and titles of charts.
-fn name<'a>(what: &str, name: Cow<'a, str>) -> Result<Cow<'a, str>, RefusedMessage> {
+fn check_name<'a>(what: &str, name: Cow<'a, str>) -> Result<Cow<'a, str>, RefusedMessage> {
     if name.is_empty() || name.contains(char::is_control) {
-        return refused(format!("the name of the {what} is empty or holds a control character"));
+        return refuse_message(format!("the name of the {what} is empty or holds a control character"));
     }
     match name.chars().count() {
         0..=NAME_MAX => Ok(name),
-        letters => refused(format!("the name of the {what} has {letters} letters, at most {NAME_MAX} are taken")),
+        letters => {
+            refuse_message(format!("the name of the {what} has {letters} letters, at most {NAME_MAX} are taken"))
+        }
     }
 }
 
 /// PostgreSQL has no NUL in texts.
-fn text(text: Cow<'_, str>) -> Cow<'_, str> {
+fn clean_text(text: Cow<'_, str>) -> Cow<'_, str> {
     match text.contains('\0') || text.len() > TEXT_MAX {
         true => text.chars().filter(|letter| *letter != '\0').take(TEXT_MAX).collect::<String>().into(),
         false => text,
@@ -136,44 +138,44 @@ fn without_nul(json: &mut Json) {
 impl<'a> FleetRow<'a> {
     /// Reads a message. Its subject must end in `BOX.KIND` of its own document: then the rights of the servers over subjects
     /// hold for what stands in the table, too.
-    pub(super) fn of(subject: &str, payload: &'a [u8]) -> Result<Self, RefusedMessage> {
+    pub(super) fn from_message(subject: &str, payload: &'a [u8]) -> Result<Self, RefusedMessage> {
         if payload.len() > BYTES_MAX {
-            return refused(format!("a message of {} bytes is no item: at most {BYTES_MAX}", payload.len()));
+            return refuse_message(format!("a message of {} bytes is no item: at most {BYTES_MAX}", payload.len()));
         }
         let document: ItemDocument<'a> = serde_json::from_slice(payload)
             .map_err(|error| RefusedMessage(format!("no document of an item: {error}")))?;
         if document.schema != "item/1" {
             let version: String = document.schema.chars().take(40).collect();
-            return refused(format!("an item of another version: {version:?}"));
+            return refuse_message(format!("an item of another version: {version:?}"));
         }
         let mut ends = subject.rsplit('.');
         if ends.next() != Some(&document.kind) || ends.next() != Some(&document.box_name) {
-            return refused("the subject belongs to another box or kind than the document says");
+            return refuse_message("the subject belongs to another box or kind than the document says");
         }
         let sequence = match i64::try_from(document.sequence) {
             Ok(sequence) if sequence > 0 => sequence,
-            _ => return refused("the number of the item is out of range"),
+            _ => return refuse_message("the number of the item is out of range"),
         };
         let at = jiff::Timestamp::from_nanosecond(i128::from(document.at_ns));
         let year = at.map(|at| at.to_zoned(jiff::tz::TimeZone::UTC).year());
         if !year.is_ok_and(|year| YEARS.contains(&year)) {
-            return refused("the time lies outside the years 1990 to 2100: set the clock of the box");
+            return refuse_message("the time lies outside the years 1990 to 2100: set the clock of the box");
         }
         if document.values.len() > VALUES_MAX {
-            return refused(format!("{} values in one item: at most {VALUES_MAX}", document.values.len()));
+            return refuse_message(format!("{} values in one item: at most {VALUES_MAX}", document.values.len()));
         }
         let mut row = Self {
-            box_name: name("box", document.box_name)?,
-            machine: name("machine", document.machine)?,
+            box_name: check_name("box", document.box_name)?,
+            machine: check_name("machine", document.machine)?,
             sequence,
             at_ns: document.at_ns,
-            kind: name("kind", document.kind)?,
+            kind: check_name("kind", document.kind)?,
             historical: document.historical,
             numbers: Vec::new(),
             texts: Vec::new(),
             missing: Vec::new(),
             means: Vec::new(),
-            record: document.record.map(unnested),
+            record: document.record.map(parse_nested_json),
         };
         row.record.iter_mut().for_each(without_nul);
         document.values.into_iter().try_for_each(|value| row.add(value))?;
@@ -181,8 +183,8 @@ impl<'a> FleetRow<'a> {
     }
 
     fn add(&mut self, value: FieldValue<'a>) -> Result<(), RefusedMessage> {
-        let unit = if value.unit.is_empty() { value.unit } else { name("unit", value.unit)? };
-        let series = SeriesName { name: name("series", value.name)?, unit };
+        let unit = if value.unit.is_empty() { value.unit } else { check_name("unit", value.unit)? };
+        let series = SeriesName { name: check_name("series", value.name)?, unit };
         if let (Some(mean), Some(seconds)) = (value.mean, value.seconds) {
             let (least, greatest) = (value.least.unwrap_or(mean), value.greatest.unwrap_or(mean));
             self.means.push((series, [mean, least, greatest, seconds]));
@@ -190,8 +192,10 @@ impl<'a> FleetRow<'a> {
         }
         match value.value {
             ValueInItem::Number(number) => self.numbers.push((series, number)),
-            ValueInItem::Text(words) => self.texts.push((series, text(words))),
-            ValueInItem::Missing => self.missing.push((series, value.missing.map_or("not_provided".into(), text))),
+            ValueInItem::Text(words) => self.texts.push((series, clean_text(words))),
+            ValueInItem::Missing => {
+                self.missing.push((series, value.missing.map_or("not_provided".into(), clean_text)))
+            }
         }
         Ok(())
     }
@@ -202,7 +206,7 @@ impl<'a> FleetRow<'a> {
     }
 
     /// Every series that it names.
-    pub(super) fn series(&self) -> impl Iterator<Item = &SeriesName<'a>> {
+    pub(super) fn series_names(&self) -> impl Iterator<Item = &SeriesName<'a>> {
         let cells = self.texts.iter().chain(&self.missing).map(|(series, _)| series);
         self.numbers.iter().map(|(series, _)| series).chain(cells).chain(self.means.iter().map(|(series, _)| series))
     }
@@ -226,7 +230,7 @@ mod tests {
     #[test]
     fn a_sample_is_numbers_texts_and_reasons() {
         let payload = sample().to_string();
-        let row = FleetRow::of(SUBJECT, payload.as_bytes()).expect("an item");
+        let row = FleetRow::from_message(SUBJECT, payload.as_bytes()).expect("an item");
         assert_eq!((row.sequence, row.at_us(), row.at_ns % 1000), (7, 1_769_847_300_100_000, 999));
         assert_eq!((row.numbers[0].1, &*row.numbers[0].0.unit), (2249.5, "W"));
         assert_eq!((&*row.texts[0].0.name, &*row.texts[0].1), ("program", "O1\t\\"));
@@ -238,7 +242,7 @@ mod tests {
         let said = |subject: &str, change: &dyn Fn(&mut Json)| {
             let mut document = sample();
             change(&mut document);
-            FleetRow::of(subject, document.to_string().as_bytes()).expect_err("refused").0
+            FleetRow::from_message(subject, document.to_string().as_bytes()).expect_err("refused").0
         };
         assert!(said("cnc.Mill-1-000000.sample", &|_| {}).contains("another box"));
         assert!(said(SUBJECT, &|d| d["at_ns"] = json!(0)).contains("clock"));
@@ -250,7 +254,12 @@ mod tests {
         assert!(said(SUBJECT, &|d| d["values"][0]["name"] = json!("p\0w")).contains("series"));
         assert!(said(SUBJECT, &|d| d["values"][0]["name"] = json!("n".repeat(9000))).contains("9000 letters"));
         assert!(said(SUBJECT, &|d| d["machine"] = json!("x".repeat(2_000_000))).contains("bytes"));
-        assert!(FleetRow::of(SUBJECT, b"{\"schema\":\"item/1\xff\"}").expect_err("refused").0.contains("no document"));
+        assert!(
+            FleetRow::from_message(SUBJECT, b"{\"schema\":\"item/1\xff\"}")
+                .expect_err("refused")
+                .0
+                .contains("no document")
+        );
     }
 
     #[test]
@@ -259,7 +268,7 @@ mod tests {
         document["values"][1]["value"] = json!("a\0b\\u0000");
         document["record"] = json!({"text": "c\0\\u0000", "d\0": 1, "detail": "{\"tools\":[]}", "list": ["\0"]});
         let payload = document.to_string();
-        let row = FleetRow::of(SUBJECT, payload.as_bytes()).expect("an item");
+        let row = FleetRow::from_message(SUBJECT, payload.as_bytes()).expect("an item");
         assert_eq!(&*row.texts[0].1, "ab\\u0000");
         assert_eq!(row.record, Some(json!({"text": "c\\u0000", "detail": {"tools": []}, "list": [""]})));
     }
@@ -267,7 +276,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_are_a_row_or_refused(subject in ".{0,40}", payload in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _either = FleetRow::of(&subject, &payload);
+            let _either = FleetRow::from_message(&subject, &payload);
         }
     }
 }

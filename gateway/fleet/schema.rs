@@ -40,7 +40,7 @@ pub(super) struct PartitionedTable {
     storage: &'static str,
 }
 
-const fn table(name: &'static str, column: &'static str, period: Period) -> PartitionedTable {
+const fn new_table(name: &'static str, column: &'static str, period: Period) -> PartitionedTable {
     PartitionedTable { name, column, period, storage: "" }
 }
 
@@ -48,13 +48,13 @@ const MEANS: &str = "WITH (fillfactor = 80, toast_tuple_target = 256)";
 
 /// Every table that is partitioned.
 pub(super) const PARTITIONED: [PartitionedTable; 7] = [
-    table("items", "at", Period::Day),
-    PartitionedTable { storage: MEANS, ..table("minute_means", "hour", Period::Month) },
-    PartitionedTable { storage: MEANS, ..table("hour_means", "day", Period::Year) },
-    PartitionedTable { storage: MEANS, ..table("day_means", "month", Period::Year) },
-    table("state_list", "since", Period::Month),
-    table("part_list", "ended", Period::Month),
-    table("operation_list", "ended", Period::Month),
+    new_table("items", "at", Period::Day),
+    PartitionedTable { storage: MEANS, ..new_table("minute_means", "hour", Period::Month) },
+    PartitionedTable { storage: MEANS, ..new_table("hour_means", "day", Period::Year) },
+    PartitionedTable { storage: MEANS, ..new_table("day_means", "month", Period::Year) },
+    new_table("state_list", "since", Period::Month),
+    new_table("part_list", "ended", Period::Month),
+    new_table("operation_list", "ended", Period::Month),
 ];
 
 /// Who divides tables by time.
@@ -68,7 +68,7 @@ pub(super) enum Partitioning {
 
 impl Period {
     /// The first and the day after the last day of the period that holds this time.
-    fn around(self, at_us: i64) -> Option<(Date, Date)> {
+    fn bounds_around(self, at_us: i64) -> Option<(Date, Date)> {
         let day = Timestamp::from_microsecond(at_us).ok()?.to_zoned(TimeZone::UTC).date();
         let (first, span) = match self {
             Self::Day => (day, Span::new().days(1)),
@@ -78,7 +78,7 @@ impl Period {
         Some((first, first.checked_add(span).ok()?))
     }
 
-    fn suffix(self, first: Date) -> String {
+    fn name_suffix(self, first: Date) -> String {
         let (year, month, day) = (first.year(), first.month(), first.day());
         match self {
             Self::Day => format!("{year:04}_{month:02}_{day:02}"),
@@ -87,7 +87,7 @@ impl Period {
         }
     }
 
-    fn interval(self) -> &'static str {
+    fn sql_interval(self) -> &'static str {
         match self {
             Self::Day => "1 day",
             Self::Month => "1 month",
@@ -105,9 +105,9 @@ pub(super) struct Partition {
 
 impl PartitionedTable {
     /// The partition of this time.
-    pub(super) fn partition(&self, at_us: i64) -> Option<Partition> {
-        let (first, after) = self.period.around(at_us)?;
-        let name = format!("{}_{}", self.name, self.period.suffix(first));
+    pub(super) fn partition_at(&self, at_us: i64) -> Option<Partition> {
+        let (first, after) = self.period.bounds_around(at_us)?;
+        let name = format!("{}_{}", self.name, self.period.name_suffix(first));
         let create = format!(
             "CREATE TABLE IF NOT EXISTS {name} PARTITION OF {} FOR VALUES FROM ('{first} 00:00:00+00') TO ('{after} 00:00:00+00') {}",
             self.name, self.storage
@@ -116,17 +116,17 @@ impl PartitionedTable {
     }
 
     /// The table becomes one of TimescaleDB. It had been declared as partitioned, and is empty.
-    fn hypertable(&self) -> String {
+    fn hypertable_sql(&self) -> String {
         let Self { name, column, period, .. } = self;
         format!(
             "SELECT create_hypertable('{name}', '{column}', chunk_time_interval => interval '{}');\n",
-            period.interval()
+            period.sql_interval()
         )
     }
 }
 
 /// The table of the name.
-pub(super) fn partitioned(name: &str) -> Option<&'static PartitionedTable> {
+pub(super) fn find_partitioned(name: &str) -> Option<&'static PartitionedTable> {
     PARTITIONED.iter().find(|table| table.name == name)
 }
 
@@ -138,7 +138,7 @@ fn tables_of(partitioning: Partitioning) -> String {
             let plain = PARTITIONED.iter().fold(TABLES.to_owned(), |text, table| {
                 text.replace(&format!(") PARTITION BY RANGE ({});", table.column), ");")
             });
-            let hyper: String = PARTITIONED.iter().map(PartitionedTable::hypertable).collect();
+            let hyper: String = PARTITIONED.iter().map(PartitionedTable::hypertable_sql).collect();
             format!("{plain}{hyper}{COMPRESSION}")
         }
     }
@@ -150,18 +150,18 @@ const COMPRESSION: &str = "DO $$ BEGIN
   PERFORM add_compression_policy('items', interval '7 days');
 EXCEPTION WHEN OTHERS THEN RAISE WARNING 'old items are not compressed: %', SQLERRM; END $$;\n";
 
-fn failed(doing: &str) -> impl Fn(tokio_postgres::Error) -> NatsError + Copy + '_ {
+fn to_nats_error(doing: &str) -> impl Fn(tokio_postgres::Error) -> NatsError + Copy + '_ {
     move |error| DatabaseError::new(doing, &error).said
 }
 
 /// Creates what is missing, and brings older tables to the version of this program. Several processes may ask at once.
 pub(super) async fn bring_up(client: &mut Client) -> Result<Partitioning, NatsError> {
-    let creating = failed("creating the tables");
+    let creating = to_nats_error("creating the tables");
     let transaction = client.transaction().await.map_err(creating)?;
     transaction.execute("SELECT pg_advisory_xact_lock($1)", &[&LOCK]).await.map_err(creating)?;
-    let partitioning = partitioning(&transaction).await?;
-    match version(&transaction).await? {
-        0 => create(&transaction, partitioning).await?,
+    let partitioning = detect_partitioning(&transaction).await?;
+    match read_version(&transaction).await? {
+        0 => create_tables(&transaction, partitioning).await?,
         1 => from_1(&transaction, partitioning).await?,
         VERSION => {}
         newer => {
@@ -174,8 +174,8 @@ pub(super) async fn bring_up(client: &mut Client) -> Result<Partitioning, NatsEr
 }
 
 /// 0: there are none; 1: those of before, which had no number.
-async fn version(transaction: &Transaction<'_>) -> Result<i32, NatsError> {
-    let asking = failed("asking for the version of the tables");
+async fn read_version(transaction: &Transaction<'_>) -> Result<i32, NatsError> {
+    let asking = to_nats_error("asking for the version of the tables");
     let there = "SELECT to_regclass('fleet_schema') IS NOT NULL, to_regclass('items') IS NOT NULL";
     let row = transaction.query_one(there, &[]).await.map_err(asking)?;
     if !row.get::<_, bool>(0) {
@@ -187,8 +187,8 @@ async fn version(transaction: &Transaction<'_>) -> Result<i32, NatsError> {
 }
 
 /// TimescaleDB, where the database has the extension.
-async fn partitioning(transaction: &Transaction<'_>) -> Result<Partitioning, NatsError> {
-    let asking = failed("asking for extensions");
+async fn detect_partitioning(transaction: &Transaction<'_>) -> Result<Partitioning, NatsError> {
+    let asking = to_nats_error("asking for extensions");
     let found = transaction.query_one("SELECT count(*) FROM pg_extension WHERE extname = 'timescaledb'", &[]).await;
     let has_it = found.map_err(asking)?.get::<_, i64>(0) > 0;
     if !has_it {
@@ -200,21 +200,22 @@ async fn partitioning(transaction: &Transaction<'_>) -> Result<Partitioning, Nat
     Ok(if declared { Partitioning::Declared } else { Partitioning::Timescale })
 }
 
-async fn create(transaction: &Transaction<'_>, partitioning: Partitioning) -> Result<(), NatsError> {
+async fn create_tables(transaction: &Transaction<'_>, partitioning: Partitioning) -> Result<(), NatsError> {
     let text = format!("{}{VIEWS}\nINSERT INTO fleet_schema (version) VALUES ({VERSION});", tables_of(partitioning));
-    transaction.batch_execute(&text).await.map_err(failed("creating the tables"))
+    transaction.batch_execute(&text).await.map_err(to_nats_error("creating the tables"))
 }
 
 async fn from_1(transaction: &Transaction<'_>, partitioning: Partitioning) -> Result<(), NatsError> {
-    let moving = failed("bringing the tables from version 1 to 2");
+    let moving = to_nats_error("bringing the tables from version 1 to 2");
     Notice::new(Severity::Info, "tables_move", "the tables are brought from version 1 to 2; this may take minutes")
-        .say();
+        .write_to_logs();
     transaction.batch_execute(FROM_1[0]).await.map_err(moving)?;
-    create(transaction, partitioning).await?;
+    create_tables(transaction, partitioning).await?;
     let times = "SELECT (extract(epoch FROM min(at)) * 1000000)::bigint FROM items_1 GROUP BY date_trunc('day', at)";
     let days: Vec<i64> = transaction.query(times, &[]).await.map_err(moving)?.iter().map(|row| row.get(0)).collect();
     if partitioning == Partitioning::Declared {
-        let partitions = PARTITIONED.iter().flat_map(|table| days.iter().filter_map(|at_us| table.partition(*at_us)));
+        let partitions =
+            PARTITIONED.iter().flat_map(|table| days.iter().filter_map(|at_us| table.partition_at(*at_us)));
         let statements: Vec<String> = partitions.collect::<BTreeSet<_>>().into_iter().map(|it| it.create).collect();
         transaction.batch_execute(&statements.join(";")).await.map_err(moving)?;
     }
@@ -247,7 +248,8 @@ mod tests {
     #[test]
     fn a_partition_holds_its_day_month_or_year() {
         let at_us = "2026-02-28T23:59:59Z".parse::<Timestamp>().expect("a time").as_microsecond();
-        let created = |name: &str| partitioned(name).and_then(|table| table.partition(at_us)).expect("a partition");
+        let created =
+            |name: &str| find_partitioned(name).and_then(|table| table.partition_at(at_us)).expect("a partition");
         assert_eq!(created("items").name, "items_2026_02_28");
         assert!(created("items").create.contains("FROM ('2026-02-28 00:00:00+00') TO ('2026-03-01 00:00:00+00')"));
         assert!(created("part_list").create.contains("FROM ('2026-02-01 00:00:00+00') TO ('2026-03-01 00:00:00+00')"));

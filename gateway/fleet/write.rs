@@ -65,7 +65,7 @@ struct Encoded {
     partitions: BTreeSet<Partition>,
 }
 
-fn writing(error: tokio_postgres::Error) -> DatabaseError {
+fn writing_error(error: tokio_postgres::Error) -> DatabaseError {
     DatabaseError::new("writing a batch", &error)
 }
 
@@ -74,7 +74,7 @@ impl Database {
     pub(super) async fn open(settings: &DatabaseSettings) -> Result<Self, NatsError> {
         let (client, partitioning) = database::connect(settings).await?;
         let text = format!("{}{INCOMING}", schema::INCOMING_RECORDS);
-        client.batch_execute(&text).await.map_err(|error| writing(error).said)?;
+        client.batch_execute(&text).await.map_err(|error| writing_error(error).said)?;
         Ok(Self { client, partitioning, names: Names::default(), partitions: BTreeSet::new() })
     }
 
@@ -83,32 +83,32 @@ impl Database {
         if rows.is_empty() {
             return Ok(BatchResult::default());
         }
-        self.names.learn(&self.client, rows).await?;
+        self.names.resolve_names(&self.client, rows).await?;
         // Several write at a time: the same order everywhere leaves no two that wait for each other.
         rows.sort_by(|a, b| {
             (&a.row.box_name, a.row.at_ns, a.row.sequence).cmp(&(&b.row.box_name, b.row.at_ns, b.row.sequence))
         });
-        let encoded = self.encode(rows);
-        self.prepare(&encoded.partitions).await?;
-        let mut transaction = self.client.transaction().await.map_err(writing)?;
-        let count = encoded.items.count();
+        let encoded = self.encode_rows(rows);
+        self.create_missing_partitions(&encoded.partitions).await?;
+        let mut transaction = self.client.transaction().await.map_err(writing_error)?;
+        let count = encoded.items.row_count();
         let new = put_items(&mut transaction, encoded.items).await?;
-        if encoded.records.count() > 0 {
-            copy(&transaction, "incoming (box_id, sequence, at, kind, record)", encoded.records).await?;
-            transaction.batch_execute(schema::RECORDS).await.map_err(writing)?;
+        if encoded.records.row_count() > 0 {
+            copy_rows(&transaction, "incoming (box_id, sequence, at, kind, record)", encoded.records).await?;
+            transaction.batch_execute(schema::RECORDS).await.map_err(writing_error)?;
         }
         for (level, rows) in encoded.means {
-            copy(&transaction, "incoming_means", rows).await?;
-            transaction.batch_execute(&merge_means(level)).await.map_err(writing)?;
+            copy_rows(&transaction, "incoming_means", rows).await?;
+            transaction.batch_execute(&merge_means(level)).await.map_err(writing_error)?;
         }
-        copy(&transaction, "incoming_latest", encoded.latest).await?;
-        transaction.batch_execute(MERGE_LATEST).await.map_err(writing)?;
-        transaction.commit().await.map_err(writing)?;
+        copy_rows(&transaction, "incoming_latest", encoded.latest).await?;
+        transaction.batch_execute(MERGE_LATEST).await.map_err(writing_error)?;
+        transaction.commit().await.map_err(writing_error)?;
         Ok(BatchResult { new, known: count - new })
     }
 
     /// Notes what is not taken.
-    pub(super) async fn refuse(&self, refused: &[RefusalRecord]) -> Result<(), DatabaseError> {
+    pub(super) async fn insert_refused(&self, refused: &[RefusalRecord]) -> Result<(), DatabaseError> {
         let noting = |error| DatabaseError::new("noting what is refused", &error);
         let insert = "INSERT INTO refused (stream_sequence, subject, reason, payload) VALUES ($1, $2, $3, $4) ON CONFLICT DO NOTHING";
         for RefusalRecord { stream_sequence, subject, reason, payload } in refused {
@@ -117,19 +117,19 @@ impl Database {
         Ok(())
     }
 
-    fn encode(&self, rows: &[Arrived<'_>]) -> Encoded {
+    fn encode_rows(&self, rows: &[Arrived<'_>]) -> Encoded {
         let (mut items, mut records) = (CopyRows::new(), CopyRows::new());
         let (mut latest, mut of_levels) = (Latest::default(), [const { None::<MeanRows> }; means::LEVELS.len()]);
         let mut times = BTreeSet::new();
         for Arrived { row, arrived_us } in rows {
             let Some(box_id) = self.names.box_id(&row.box_name) else { continue };
-            let series: Vec<i32> = row.series().filter_map(|series| self.names.series_id(series)).collect();
+            let series: Vec<i32> = row.series_names().filter_map(|series| self.names.series_id(series)).collect();
             let record = row.record.as_ref().map(serde_json::Value::to_string);
             put_item(&mut items, row, (box_id, *arrived_us), &series, record.as_deref());
             times.insert(("items", day_of(row.at_us())));
             if let Some(record) = &record {
-                let place = records.begin(5).int4(box_id).int8(row.sequence).time(row.at_us());
-                place.text(&row.kind).json(Some(record));
+                let place = records.begin_row(5).append_int4(box_id).append_int8(row.sequence).append_time(row.at_us());
+                place.append_text(&row.kind).append_json(Some(record));
                 times.extend(RECORD_TABLES.iter().map(|table| (*table, day_of(row.at_us()))));
                 let until_us = row.record.as_ref().and_then(|record| record["until_ns"].as_i64()).map(|ns| ns / 1000);
                 times.extend(until_us.map(|until_us| ("state_list", day_of(until_us))));
@@ -141,14 +141,14 @@ impl Database {
                 times.insert((level.table, day_of(row.at_us())));
             }
         }
-        let of_time = |(table, day): (&str, i64)| schema::partitioned(table)?.partition(day * DAY_US);
+        let of_time = |(table, day): (&str, i64)| schema::find_partitioned(table)?.partition_at(day * DAY_US);
         let partitions = times.into_iter().filter_map(of_time).collect();
         let of_level = |(level, rows): (&'static means::MeanLevel, Option<MeanRows>)| Some((level, copy_means(&rows?)));
         let means = means::LEVELS.iter().zip(of_levels).filter_map(of_level).collect();
         Encoded { items, records, latest: copy_latest(&latest), means, partitions }
     }
 
-    async fn prepare(&mut self, wanted: &BTreeSet<Partition>) -> Result<(), DatabaseError> {
+    async fn create_missing_partitions(&mut self, wanted: &BTreeSet<Partition>) -> Result<(), DatabaseError> {
         let missing: BTreeSet<Partition> = wanted.difference(&self.partitions).cloned().collect();
         if self.partitioning == Partitioning::Timescale || missing.is_empty() {
             return Ok(());
@@ -174,23 +174,29 @@ fn put_item(
     series: &[i32],
     record: Option<&str>,
 ) {
-    items.begin(12).int8(row.sequence).time(row.at_us()).int8(row.at_ns).time(arrived_us).int4(box_id);
-    items.flag(row.historical).text(&row.kind);
+    items
+        .begin_row(12)
+        .append_int8(row.sequence)
+        .append_time(row.at_us())
+        .append_int8(row.at_ns)
+        .append_time(arrived_us)
+        .append_int4(box_id);
+    items.append_flag(row.historical).append_text(&row.kind);
     if row.kind == "sample" {
         let texts: Vec<&str> = row.texts.iter().map(|(_, text)| &**text).collect();
         let reasons: Vec<&str> = row.missing.iter().map(|(_, reason)| &**reason).collect();
         let numbers: Vec<f64> = row.numbers.iter().map(|(_, number)| *number).collect();
         items.int4_list(series).float8_list(&numbers).text_list(&texts).text_list(&reasons);
     } else {
-        items.null().null().null().null();
+        items.append_null().append_null().append_null().append_null();
     }
-    items.json(record);
+    items.append_json(record);
 }
 
 fn copy_means(rows: &MeanRows) -> CopyRows {
     let mut copied = CopyRows::new();
     for ((series, box_id, start_us), places) in &rows.rows {
-        copied.begin(7).int4(*series).int4(*box_id).time(*start_us);
+        copied.begin_row(7).append_int4(*series).append_int4(*box_id).append_time(*start_us);
         places.iter().for_each(|column| {
             copied.float4_list(column);
         });
@@ -201,14 +207,14 @@ fn copy_means(rows: &MeanRows) -> CopyRows {
 fn copy_latest(latest: &Latest) -> CopyRows {
     let mut copied = CopyRows::new();
     for (box_id, one) in &latest.boxes {
-        copied.begin(6).int4(*box_id).time(one.first_us);
+        copied.begin_row(6).append_int4(*box_id).append_time(one.first_us);
         // A batch that tells nothing of now leaves the time as it is.
         if one.last_us == i64::MIN {
-            copied.null()
+            copied.append_null()
         } else {
-            copied.time(one.last_us)
+            copied.append_time(one.last_us)
         };
-        copied.time(one.arrived_us).int8(one.sequence).json(Some(&one.json()));
+        copied.append_time(one.arrived_us).append_int8(one.sequence).append_json(Some(&one.to_json()));
     }
     copied
 }
@@ -242,30 +248,32 @@ fn merge_means(level: &means::MeanLevel) -> String {
 
 /// Copies the items into their table; where some of them are there already, those are left out. The rows that are new.
 async fn put_items(transaction: &mut Transaction<'_>, items: CopyRows) -> Result<u64, DatabaseError> {
-    let count = items.count();
-    let trying = transaction.savepoint("direct").await.map_err(writing)?;
+    let count = items.row_count();
+    let trying = transaction.savepoint("direct").await.map_err(writing_error)?;
     match copy_raw(&trying, &format!("items ({ITEM_COLUMNS})"), items.clone()).await {
         Ok(()) => {
-            trying.commit().await.map_err(writing)?;
+            trying.commit().await.map_err(writing_error)?;
             return Ok(count);
         }
-        Err(error) if error.code() == Some(&SqlState::UNIQUE_VIOLATION) => trying.rollback().await.map_err(writing)?,
-        Err(error) => return Err(writing(error)),
+        Err(error) if error.code() == Some(&SqlState::UNIQUE_VIOLATION) => {
+            trying.rollback().await.map_err(writing_error)?
+        }
+        Err(error) => return Err(writing_error(error)),
     }
-    copy(transaction, &format!("incoming_items ({ITEM_COLUMNS})"), items).await?;
+    copy_rows(transaction, &format!("incoming_items ({ITEM_COLUMNS})"), items).await?;
     let merge =
         format!("INSERT INTO items ({ITEM_COLUMNS}) SELECT {ITEM_COLUMNS} FROM incoming_items ON CONFLICT DO NOTHING");
-    transaction.execute(&merge, &[]).await.map_err(writing)
+    transaction.execute(&merge, &[]).await.map_err(writing_error)
 }
 
-async fn copy(transaction: &Transaction<'_>, table: &str, rows: CopyRows) -> Result<(), DatabaseError> {
-    copy_raw(transaction, table, rows).await.map_err(writing)
+async fn copy_rows(transaction: &Transaction<'_>, table: &str, rows: CopyRows) -> Result<(), DatabaseError> {
+    copy_raw(transaction, table, rows).await.map_err(writing_error)
 }
 
 async fn copy_raw(transaction: &Transaction<'_>, table: &str, rows: CopyRows) -> Result<(), tokio_postgres::Error> {
     use futures_util::SinkExt;
     let statement = format!("COPY {table} FROM STDIN BINARY");
     let mut sink = Box::pin(transaction.copy_in::<_, bytes::Bytes>(&statement).await?);
-    sink.send(rows.finish().into()).await?;
+    sink.send(rows.into_bytes().into()).await?;
     sink.close().await
 }

@@ -58,7 +58,7 @@ pub const EXAMPLES: [Example; 3] = [
 
 /// The example of this name.
 #[must_use]
-pub fn example(name: &str) -> Option<&'static Example> {
+pub fn find_example(name: &str) -> Option<&'static Example> {
     EXAMPLES.iter().find(|example| example.name == name)
 }
 

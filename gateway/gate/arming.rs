@@ -43,7 +43,7 @@ pub enum Disarmed {
 impl Disarmed {
     /// The word in the audit.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Start => "start",
             Self::Person => "person",
@@ -115,7 +115,7 @@ impl Arming {
 
     pub(super) fn arm(&mut self, by: &str, lasts: Option<Duration>, at_ns: TimeNs) -> Result<&Armed, ArmError> {
         if self.mode != GateMode::Armed {
-            return Err(ArmError::Mode(self.mode.word()));
+            return Err(ArmError::Mode(self.mode.as_word()));
         }
         if by.trim().is_empty() {
             return Err(ArmError::Nobody);
@@ -137,7 +137,7 @@ impl Arming {
     }
 
     /// Ends an arming whose time is over.
-    pub(super) fn expire(&mut self, at_ns: TimeNs) {
+    pub(super) fn end_if_expired(&mut self, at_ns: TimeNs) {
         match &self.state {
             Ok(armed) if at_ns >= armed.until_ns => self.disarm(Disarmed::Expired),
             Ok(armed) if at_ns < armed.since_ns => self.disarm(Disarmed::Clock),
@@ -147,7 +147,7 @@ impl Arming {
 
     /// Told at every tick whether fresh values are missing. A tick that comes late counts like values that come late: a process
     /// that stood still has seen nothing meanwhile, whatever it sees now.
-    pub(super) fn silent(&mut self, missing: bool, at_ns: TimeNs) {
+    pub(super) fn end_if_silent(&mut self, missing: bool, at_ns: TimeNs) {
         if at_ns.saturating_sub(self.fresh_ns) >= SILENT_NS {
             self.disarm(Disarmed::Silent);
         }

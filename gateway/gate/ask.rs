@@ -5,7 +5,7 @@
 //! seen to it at the machine (started again after a feed hold, or after the program stood) or has acknowledged it on the
 //! box. A limit that chatters therefore stops the machine once and not fifty times.
 
-use super::channel;
+use super::find_channel;
 use adapters::words::execution;
 use adapters::{ChannelId, LadderRequest, Sample};
 use rules::script::{Stop, StopRequest};
@@ -27,7 +27,7 @@ pub struct ScriptRequest {
 impl ScriptRequest {
     /// What a script asks for, as the ladder knows it: a tool change is a stop after this part.
     #[must_use]
-    pub fn of(wanted: &StopRequest) -> Self {
+    pub fn from_stop(wanted: &StopRequest) -> Self {
         let StopRequest { stop, reason, script, version } = wanted.clone();
         let request = match stop {
             Stop::FeedHold => LadderRequest::FeedHold,
@@ -51,7 +51,7 @@ pub enum AskOutcome {
 impl AskOutcome {
     /// The word in the history.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Sent => "written",
             Self::Shadow => "shadow",
@@ -80,10 +80,10 @@ pub(super) struct Asks {
 
 impl Asks {
     pub(super) fn new() -> Self {
-        Self { latches: Default::default(), execution: channel("execution"), held: false, stood: false }
+        Self { latches: Default::default(), execution: find_channel("execution"), held: false, stood: false }
     }
 
-    pub(super) fn judge(
+    pub(super) fn judge_requests(
         &mut self,
         asks: &[ScriptRequest],
         sample: &Sample,
@@ -106,7 +106,7 @@ impl Asks {
         judged
     }
 
-    pub(super) fn acknowledge(&mut self) {
+    pub(super) fn acknowledge_requests(&mut self) {
         self.latches.iter_mut().for_each(|latch| latch.latched = false);
     }
 
@@ -119,14 +119,14 @@ impl Asks {
             return;
         }
         if std::mem::take(&mut self.held) {
-            self.release(LadderRequest::FeedHold);
+            self.release_request(LadderRequest::FeedHold);
         }
         if std::mem::take(&mut self.stood) {
-            self.release(LadderRequest::Stop);
+            self.release_request(LadderRequest::Stop);
         }
     }
 
-    fn release(&mut self, request: LadderRequest) {
+    fn release_request(&mut self, request: LadderRequest) {
         let each = self.latches.iter_mut().zip(LadderRequest::ALL);
         each.filter(|(_, kind)| *kind == request).for_each(|(latch, _)| latch.latched = false);
     }
@@ -138,9 +138,9 @@ mod tests {
     use adapters::{Slot, Value};
 
     fn sample(word: &str) -> Sample {
-        let mut sample = Sample::empty(0);
+        let mut sample = Sample::new_empty(0);
         let slot = Slot { value: Ok(Value::Text(word.into())), age_ns: 0 };
-        sample.set(ChannelId::of("execution").expect("a channel"), slot);
+        sample.set_slot(ChannelId::from_name("execution").expect("a channel"), slot);
         sample
     }
 
@@ -158,7 +158,7 @@ mod tests {
         let mut asks = Asks::new();
         let mut judge = |wanted: bool, word: &str| {
             let asked = if wanted { hold() } else { Vec::new() };
-            asks.judge(&asked, &sample(word), true).first().map(|(_, outcome)| *outcome)
+            asks.judge_requests(&asked, &sample(word), true).first().map(|(_, outcome)| *outcome)
         };
         assert_eq!(judge(true, execution::ACTIVE), Some(AskOutcome::Sent));
         assert_eq!(judge(true, execution::FEED_HOLD), None);
@@ -176,15 +176,15 @@ mod tests {
         let mut asks = Asks::new();
         let mut judge = |wanted: bool, word: &str| {
             let asked: &[ScriptRequest] = if wanted { &stop } else { &[] };
-            asks.judge(asked, &sample(word), true).first().map(|(_, outcome)| *outcome)
+            asks.judge_requests(asked, &sample(word), true).first().map(|(_, outcome)| *outcome)
         };
         let active = execution::ACTIVE;
         assert_eq!((judge(true, active), judge(false, active)), (Some(AskOutcome::Sent), None));
         assert_eq!((judge(true, active), judge(false, active)), (Some(AskOutcome::Latched), None));
         assert_eq!((judge(false, execution::STOPPED), judge(false, execution::READY)), (None, None));
         assert_eq!((judge(true, active), judge(false, active)), (Some(AskOutcome::Sent), None));
-        asks.acknowledge();
-        assert_eq!(asks.judge(&stop, &sample(active), true)[0].1, AskOutcome::Sent);
-        assert_eq!(asks.judge(&hold(), &sample(active), false)[0].1, AskOutcome::Shadow);
+        asks.acknowledge_requests();
+        assert_eq!(asks.judge_requests(&stop, &sample(active), true)[0].1, AskOutcome::Sent);
+        assert_eq!(asks.judge_requests(&hold(), &sample(active), false)[0].1, AskOutcome::Shadow);
     }
 }

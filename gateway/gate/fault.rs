@@ -16,7 +16,7 @@ pub struct UnexpectedReading {
     pub rule: LadderRule,
 }
 
-/// Why the machine is not written to any more. The gate is to be disarmed with [`Fault::disarmed`], and an alarm raised.
+/// Why the machine is not written to any more. The gate is to be disarmed with [`Fault::disarm_reason`], and an alarm raised.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fault {
     /// The machine shows another override than any that was written while it had time to settle.
@@ -55,7 +55,7 @@ pub enum Fault {
 impl Fault {
     /// The reason the gate is disarmed with.
     #[must_use]
-    pub fn disarmed(&self) -> Disarmed {
+    pub fn disarm_reason(&self) -> Disarmed {
         match self {
             // A machine that answers and says no has been reached.
             Self::ReadBack { .. }
@@ -71,7 +71,7 @@ impl Fault {
 
     /// The alarm in Chinese.
     #[must_use]
-    pub fn zh(&self) -> &'static str {
+    pub fn describe_in_chinese(&self) -> &'static str {
         match self {
             Self::ReadBack { asked, shown } if shown.replaces_dial(*asked) => {
                 "梯形图用网关倍率取代了面板倍率，闸门已解除；请让梯形图取面板与网关倍率的较小者"
@@ -91,7 +91,7 @@ impl Fault {
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::ReadBack { asked, shown } => shown.told(*asked, f),
+            Self::ReadBack { asked, shown } => shown.write_explanation(*asked, f),
             Self::StillInForce(UnexpectedReading { found, dial, .. }) => {
                 let dial = dial.map_or_else(|| "the dial".to_owned(), |dial| format!("the dial at {dial}"));
                 write!(
@@ -110,7 +110,7 @@ impl fmt::Display for Fault {
                 f,
                 "offset {asked_um:.0} um of {} was written and the control shows {found_um:.0} um; the gate is disarmed. Look \
                  whether the offsets are protected, and who else writes them",
-                axis.word()
+                axis.as_word()
             ),
             Self::OffsetLine(error) => {
                 write!(f, "the offset could not be written or read back; the gate is disarmed. {error}")
@@ -131,11 +131,11 @@ impl fmt::Display for Fault {
 impl UnexpectedReading {
     /// The override that was written is in force although the dial stands below it.
     fn replaces_dial(&self, asked: OverridePct) -> bool {
-        let expected = self.dial.map(|dial| self.rule.combine(dial, asked));
+        let expected = self.dial.map(|dial| self.rule.combine_overrides(dial, asked));
         self.found == asked && expected.is_some_and(|expected| expected != asked)
     }
 
-    fn told(&self, asked: OverridePct, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn write_explanation(&self, asked: OverridePct, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { found, dial, rule } = *self;
         let Some(dial) = dial else {
             return write!(
@@ -144,7 +144,7 @@ impl UnexpectedReading {
                  disarmed. Look whether the ladder passes the gateway's override on, and whether the dial limits it"
             );
         };
-        let expected = rule.combine(dial, asked);
+        let expected = rule.combine_overrides(dial, asked);
         write!(
             f,
             "feed override {asked} was written with the dial at {dial}: {expected} should be in force and {found} is. "
@@ -190,9 +190,9 @@ mod tests {
         let (source_name, what, next) = ("fanuc://10.0.0.7".to_owned(), "protected".to_owned(), String::new());
         let line = SourceError::Line { source_name: source_name.clone(), what: what.clone(), next: next.clone() };
         let refused = SourceError::Refused { source_name, request: "the offset".to_owned(), what, next };
-        assert_eq!(Fault::Line(refused.clone()).disarmed(), Disarmed::ReadBack);
-        assert_eq!(Fault::OffsetLine(refused).disarmed(), Disarmed::Offset);
-        assert_eq!(Fault::OffsetLine(line.clone()).disarmed(), Disarmed::Line);
-        assert_eq!(Fault::Line(line).disarmed(), Disarmed::Line);
+        assert_eq!(Fault::Line(refused.clone()).disarm_reason(), Disarmed::ReadBack);
+        assert_eq!(Fault::OffsetLine(refused).disarm_reason(), Disarmed::Offset);
+        assert_eq!(Fault::OffsetLine(line.clone()).disarm_reason(), Disarmed::Line);
+        assert_eq!(Fault::Line(line).disarm_reason(), Disarmed::Line);
     }
 }

@@ -1,6 +1,6 @@
 //! The reasons that hold 100 %, whatever a script asks for.
 
-use super::channel;
+use super::find_channel;
 use super::thread_cycle::ThreadCycle;
 use adapters::words::{execution, mode, of_channel, operation};
 use adapters::{Absence, ChannelId, Sample};
@@ -49,7 +49,7 @@ pub enum Hold {
 impl Hold {
     /// The reason in Chinese.
     #[must_use]
-    pub fn zh(self) -> String {
+    pub fn describe_in_chinese(self) -> String {
         let fixed = match self {
             Self::Missing(channel, absence) => return format!("{} 无有效数据（{absence}）", channel.channel().zh),
             Self::UnknownWord(channel) => {
@@ -124,33 +124,33 @@ impl Interlocks {
     pub(super) fn new(stale_ns: i64) -> Self {
         Self {
             stale_ns,
-            mode: channel("mode"),
-            execution: channel("execution"),
-            feed: channel("feed_mm_min"),
-            speed: channel("spindle_speed_rpm"),
-            alarm: channel("alarm"),
-            rapid: channel("rapid"),
-            switches: [(channel("single_block"), Hold::SingleBlock), (channel("dry_run"), Hold::DryRun)],
-            operation: channel("operation"),
-            block: channel("block"),
-            loads: ["spindle_power_w", "spindle_current_a", "spindle_load_pct"].map(channel),
+            mode: find_channel("mode"),
+            execution: find_channel("execution"),
+            feed: find_channel("feed_mm_min"),
+            speed: find_channel("spindle_speed_rpm"),
+            alarm: find_channel("alarm"),
+            rapid: find_channel("rapid"),
+            switches: [(find_channel("single_block"), Hold::SingleBlock), (find_channel("dry_run"), Hold::DryRun)],
+            operation: find_channel("operation"),
+            block: find_channel("block"),
+            loads: ["spindle_power_w", "spindle_current_a", "spindle_load_pct"].map(find_channel),
             cycle: ThreadCycle::default(),
         }
     }
 
     /// The first reason, or none. Called at every tick: it also follows the NC blocks.
-    pub(super) fn look(&mut self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
+    pub(super) fn find_hold(&mut self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
         if let Some(block) = self.block.and_then(|block| sample.text(block)) {
-            self.cycle.follow(block);
+            self.cycle.follow_block(block);
         }
-        self.thread(sample)
-            .or_else(|| self.data(sample))
-            .or_else(|| self.controller(sample))
-            .or_else(|| self.motion(sample, estimates))
+        self.find_thread_hold(sample)
+            .or_else(|| self.find_data_hold(sample))
+            .or_else(|| self.find_controller_hold(sample))
+            .or_else(|| self.find_motion_hold(sample, estimates))
     }
 
     /// Threads come first: there a change of the feed spoils the part even when everything else is well.
-    fn thread(&self, sample: &Sample) -> Option<Hold> {
+    fn find_thread_hold(&self, sample: &Sample) -> Option<Hold> {
         let operation = self.operation.and_then(|operation| sample.text(operation)).unwrap_or_default();
         if operation.eq_ignore_ascii_case(operation::THREADING) {
             return Some(Hold::Threading);
@@ -161,26 +161,26 @@ impl Interlocks {
         self.cycle.hold()
     }
 
-    fn data(&self, sample: &Sample) -> Option<Hold> {
+    fn find_data_hold(&self, sample: &Sample) -> Option<Hold> {
         let needed = [self.mode, self.execution, self.feed, self.speed];
-        let missing = needed.into_iter().flatten().find_map(|id| self.absence(sample, id).map(|why| (id, why)));
+        let missing = needed.into_iter().flatten().find_map(|id| self.find_absence(sample, id).map(|why| (id, why)));
         if let Some((id, why)) = missing {
             return Some(Hold::Missing(id, why));
         }
         let switches = self.switches.map(|(id, _)| id);
         let optional = [self.alarm, self.rapid, self.operation].into_iter().chain(switches).flatten();
-        let silent = optional.filter_map(|id| self.absence(sample, id).map(|why| (id, why)));
+        let silent = optional.filter_map(|id| self.find_absence(sample, id).map(|why| (id, why)));
         // A controller may not have these at all; one that has them and is silent is another matter.
         let mut silent = silent.filter(|(_, why)| !matches!(why, Absence::NotProvided | Absence::NotSupported));
         if let Some((id, why)) = silent.next() {
             return Some(Hold::Missing(id, why));
         }
-        let measured = self.loads.into_iter().flatten().any(|id| self.absence(sample, id).is_none());
+        let measured = self.loads.into_iter().flatten().any(|id| self.find_absence(sample, id).is_none());
         (!measured).then_some(Hold::OnlyEstimated)
     }
 
     /// Why there is no fresh value.
-    fn absence(&self, sample: &Sample, id: ChannelId) -> Option<Absence> {
+    fn find_absence(&self, sample: &Sample, id: ChannelId) -> Option<Absence> {
         let slot = sample.slot(id);
         match &slot.value {
             Err(why) => Some(*why),
@@ -190,29 +190,31 @@ impl Interlocks {
     }
 
     /// The number in this channel, unless it is too old.
-    pub(super) fn fresh(&self, sample: &Sample, id: ChannelId) -> Option<f64> {
-        self.absence(sample, id).is_none().then(|| sample.number(id).ok())?
+    pub(super) fn fresh_number(&self, sample: &Sample, id: ChannelId) -> Option<f64> {
+        self.find_absence(sample, id).is_none().then(|| sample.number(id).ok())?
     }
 
-    /// What stands in the way of moving an offset; nothing between two programs. Call it after [`Interlocks::look`].
+    /// What stands in the way of moving an offset; nothing between two programs. Call it after [`Interlocks::find_hold`].
     pub(super) fn between_programs(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
         let needed = [self.mode, self.execution].into_iter().flatten();
-        let missing = needed.chain(self.alarm).find_map(|id| self.absence(sample, id).map(|why| (id, why)));
+        let missing = needed.chain(self.alarm).find_map(|id| self.find_absence(sample, id).map(|why| (id, why)));
         if let Some((id, why)) = missing {
             return Some(Hold::Missing(id, why));
         }
         let rests = [execution::READY, execution::PROGRAM_COMPLETED];
-        self.automatic(sample).or_else(|| match self.execution.and_then(|id| sample.text(id)).unwrap_or_default() {
-            _ if estimates.state == State::Unknown => Some(Hold::StateUnknown),
-            word if rests.contains(&word) => None,
-            execution::FEED_HOLD => Some(Hold::FeedHold),
-            word if execution::ALL.contains(&word) => Some(Hold::Running),
-            _ => self.execution.map(Hold::UnknownWord),
+        self.find_mode_hold(sample).or_else(|| {
+            match self.execution.and_then(|id| sample.text(id)).unwrap_or_default() {
+                _ if estimates.state == State::Unknown => Some(Hold::StateUnknown),
+                word if rests.contains(&word) => None,
+                execution::FEED_HOLD => Some(Hold::FeedHold),
+                word if execution::ALL.contains(&word) => Some(Hold::Running),
+                _ => self.execution.map(Hold::UnknownWord),
+            }
         })
     }
 
     /// No alarm, and automatic.
-    fn automatic(&self, sample: &Sample) -> Option<Hold> {
+    fn find_mode_hold(&self, sample: &Sample) -> Option<Hold> {
         let text = |id: Option<ChannelId>| id.and_then(|id| sample.text(id)).unwrap_or_default();
         if !text(self.alarm).is_empty() {
             return Some(Hold::Alarm);
@@ -227,8 +229,8 @@ impl Interlocks {
         }
     }
 
-    fn controller(&self, sample: &Sample) -> Option<Hold> {
-        if let Some(hold) = self.automatic(sample) {
+    fn find_controller_hold(&self, sample: &Sample) -> Option<Hold> {
+        if let Some(hold) = self.find_mode_hold(sample) {
             return Some(hold);
         }
         let text = |id: Option<ChannelId>| id.and_then(|id| sample.text(id)).unwrap_or_default();
@@ -244,7 +246,7 @@ impl Interlocks {
         }
     }
 
-    fn motion(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
+    fn find_motion_hold(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
         let rapid = self.rapid.and_then(|id| sample.number(id).ok()).is_some_and(|flag| flag > 0.0);
         match estimates.state {
             State::Unknown => Some(Hold::StateUnknown),

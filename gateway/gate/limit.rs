@@ -20,7 +20,7 @@ pub enum Bound {
 }
 
 /// The target inside the band, and what was in the way.
-pub(super) fn band(wanted_pct: Option<f64>, min_pct: f64, max_pct: f64) -> (f64, Option<Bound>) {
+pub(super) fn clamp_to_band(wanted_pct: Option<f64>, min_pct: f64, max_pct: f64) -> (f64, Option<Bound>) {
     let (min_pct, max_pct) = (min_pct.ceil(), max_pct.floor());
     match wanted_pct {
         None => (100.0, None),
@@ -32,11 +32,11 @@ pub(super) fn band(wanted_pct: Option<f64>, min_pct: f64, max_pct: f64) -> (f64,
 }
 
 /// The target below the ceiling that the operator's dial sets.
-pub(super) fn below(ceiling_pct: f64, target_pct: f64, bound: Option<Bound>) -> (f64, Option<Bound>) {
+pub(super) fn clamp_to_ceiling(ceiling_pct: f64, target_pct: f64, bound: Option<Bound>) -> (f64, Option<Bound>) {
     if target_pct <= ceiling_pct {
         return (target_pct, bound);
     }
-    (ceiling_pct, Some(Bound::Dial(OverridePct::nearest(ceiling_pct).unwrap_or(OverridePct::FULL))))
+    (ceiling_pct, Some(Bound::Dial(OverridePct::from_nearest_percent(ceiling_pct).unwrap_or(OverridePct::FULL))))
 }
 
 /// Keeps to a target until another differs by more than the dead band. 100 % is always taken, and what the limits no longer
@@ -53,7 +53,7 @@ impl Aim {
     }
 
     /// What is aimed at now that this is wanted; never above the ceiling.
-    pub(super) fn take(&mut self, target_pct: f64, ceiling_pct: f64) -> f64 {
+    pub(super) fn update_target(&mut self, target_pct: f64, ceiling_pct: f64) -> f64 {
         let far = (target_pct - self.pct).abs() >= self.dead_band_pct;
         if far || target_pct == 100.0 {
             self.pct = target_pct;
@@ -62,7 +62,7 @@ impl Aim {
         self.pct
     }
 
-    pub(super) fn reset(&mut self) {
+    pub(super) fn reset_target(&mut self) {
         self.pct = 100.0;
     }
 }
@@ -86,7 +86,7 @@ impl Slew {
     }
 
     /// A step towards the target.
-    pub(super) fn approach(&mut self, target_pct: f64, at_ns: TimeNs) -> OverridePct {
+    pub(super) fn step_towards(&mut self, target_pct: f64, at_ns: TimeNs) -> OverridePct {
         let mut elapsed_ns = self.at_ns.map_or(0, |before_ns| at_ns.saturating_sub(before_ns));
         if !(0..=PAUSE_NS).contains(&elapsed_ns) {
             self.exact_pct = 100.0;
@@ -96,11 +96,11 @@ impl Slew {
         let (down, up) = (self.down_pct_per_s * elapsed_s, self.up_pct_per_s * elapsed_s);
         self.exact_pct += (target_pct - self.exact_pct).clamp(-down, up);
         self.at_ns = Some(at_ns);
-        whole(self.exact_pct)
+        round_to_whole(self.exact_pct)
     }
 
     /// Begins anew, at 100 %, with the next step.
-    pub(super) fn restart(&mut self) {
+    pub(super) fn restart_ramp(&mut self) {
         (self.exact_pct, self.at_ns) = (100.0, None);
     }
 
@@ -113,7 +113,7 @@ impl Slew {
 }
 
 /// Whole percent, rounded towards 100 so that rounding never goes beyond what was permitted.
-fn whole(pct: f64) -> OverridePct {
+fn round_to_whole(pct: f64) -> OverridePct {
     // A sum of small steps ends a hair beside a whole number.
     let near = pct.round();
     let rounded = if (pct - near).abs() < 1e-9 {
@@ -134,38 +134,38 @@ mod tests {
 
     #[test]
     fn the_band_holds_and_a_mistake_is_no_wish() {
-        let within = |pct| band(Some(pct), 50.0, 120.0);
+        let within = |pct| clamp_to_band(Some(pct), 50.0, 120.0);
         assert_eq!(within(80.0), (80.0, None));
         assert_eq!(within(49.9), (50.0, Some(Bound::Least)));
         assert_eq!(within(120.1), (120.0, Some(Bound::Greatest)));
         for mistake in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0, 254.5, 300.0] {
             assert_eq!(within(mistake), (100.0, Some(Bound::NotPossible)), "{mistake}");
         }
-        assert_eq!(band(Some(10.0), 50.5, 120.0), (51.0, Some(Bound::Least)), "a band is rounded inwards");
+        assert_eq!(clamp_to_band(Some(10.0), 50.5, 120.0), (51.0, Some(Bound::Least)), "a band is rounded inwards");
     }
 
     #[test]
     fn a_small_change_is_left_alone_and_the_way_back_never_is() {
         let mut aim = Aim::new(2.0);
-        let mut take = |target: f64| aim.take(target, 120.0);
+        let mut take = |target: f64| aim.update_target(target, 120.0);
         assert_eq!([take(90.0), take(91.9), take(88.1), take(92.0)], [90.0, 90.0, 90.0, 92.0]);
         assert_eq!([take(99.0), take(100.0), take(99.5)], [99.0, 100.0, 100.0]);
         take(115.0);
-        assert_eq!(aim.take(115.5, 110.0), 110.0, "a ceiling counts at once");
+        assert_eq!(aim.update_target(115.5, 110.0), 110.0, "a ceiling counts at once");
     }
 
     #[test]
     fn a_change_takes_its_time_and_a_pause_begins_at_full() {
         let mut slew = Slew::new(10.0, 50.0);
         let tenth = SECOND_NS / 10;
-        assert_eq!(slew.approach(60.0, 0).percent(), 100, "the first decision has no time behind it");
-        assert_eq!(slew.approach(60.0, tenth).percent(), 95);
+        assert_eq!(slew.step_towards(60.0, 0).percent(), 100, "the first decision has no time behind it");
+        assert_eq!(slew.step_towards(60.0, tenth).percent(), 95);
         for tick in 2..=8 {
-            slew.approach(60.0, tick * tenth);
+            slew.step_towards(60.0, tick * tenth);
         }
-        assert_eq!(slew.approach(60.0, 9 * tenth).percent(), 60);
-        assert_eq!(slew.approach(100.0, 10 * tenth).percent(), 61);
-        assert_eq!(slew.approach(60.0, 100 * tenth).percent(), 100);
-        assert_eq!(slew.approach(60.0, -100 * tenth).percent(), 100, "a clock that jumps back begins anew");
+        assert_eq!(slew.step_towards(60.0, 9 * tenth).percent(), 60);
+        assert_eq!(slew.step_towards(100.0, 10 * tenth).percent(), 61);
+        assert_eq!(slew.step_towards(60.0, 100 * tenth).percent(), 100);
+        assert_eq!(slew.step_towards(60.0, -100 * tenth).percent(), 100, "a clock that jumps back begins anew");
     }
 }

@@ -1,6 +1,6 @@
 //! The gate: what a script asks for becomes a command, or it does not, with the reason.
 //!
-//! Compiled, because no script may widen it. [`Gate::decide`] looks at the request, the sample, the estimates and the
+//! Compiled, because no script may widen it. [`Gate::decide_override`] looks at the request, the sample, the estimates and the
 //! limits of the configuration, and at nothing else; given the same it decides the same. It never writes: in `shadow`,
 //! which is the default, a [`Verdict`] is recorded and that is all. Only a [`OverrideWriter`] writes, and only verdicts that say
 //! so, which needs `mode = "armed"` in the configuration *and* arming on the box, for a limited time, after every start.
@@ -79,7 +79,7 @@ impl Gate {
         let stale_ns = i64::try_from(limits.stale.as_nanos()).unwrap_or(i64::MAX);
         Self {
             interlocks: Interlocks::new(stale_ns),
-            dial: channel("feed_override_dial_pct"),
+            dial: find_channel("feed_override_dial_pct"),
             aim: Aim::new(limits.dead_band_pct),
             slew: Slew::new(limits.slew_up_pct_per_s, limits.slew_down_pct_per_s),
             arming: Arming::new(limits.greatest_mode(), limits.armed_for),
@@ -116,30 +116,35 @@ impl Gate {
     ///
     /// # Errors
     /// Why it is not.
-    pub fn armed(&self) -> Result<&Armed, Disarmed> {
+    pub fn current_arming(&self) -> Result<&Armed, Disarmed> {
         self.arming.state()
     }
 
     /// Decides about this tick's request; without one, the programmed feed is what is wanted.
-    pub fn decide(&mut self, request: Option<&OverrideRequest>, sample: &Sample, estimates: &Estimates) -> Verdict {
+    pub fn decide_override(
+        &mut self,
+        request: Option<&OverrideRequest>,
+        sample: &Sample,
+        estimates: &Estimates,
+    ) -> Verdict {
         let at_ns = sample.at_ns;
-        self.arming.expire(at_ns);
+        self.arming.end_if_expired(at_ns);
         let hold = match self.limits.mode {
             GateMode::Off => Some(Hold::Off),
-            GateMode::Shadow | GateMode::Armed => self.interlocks.look(sample, estimates),
+            GateMode::Shadow | GateMode::Armed => self.interlocks.find_hold(sample, estimates),
         };
-        self.arming.silent(matches!(hold, Some(Hold::Missing(..))), at_ns);
+        self.arming.end_if_silent(matches!(hold, Some(Hold::Missing(..))), at_ns);
         let armed = self.writes_override() && !std::mem::take(&mut self.ended);
         if armed && !std::mem::replace(&mut self.wrote, armed) {
             // The machine is at its dial; what was decided before nobody wrote is no place to begin from.
-            self.aim.reset();
-            self.slew.restart();
+            self.aim.reset_target();
+            self.slew.restart_ramp();
         }
         self.wrote = armed;
         let wanted_pct = request.map(|request| request.pct);
-        let (target_pct, bound) = limit::band(wanted_pct, self.limits.min_pct, self.limits.max_pct);
+        let (target_pct, bound) = limit::clamp_to_band(wanted_pct, self.limits.min_pct, self.limits.max_pct);
         let ceiling_pct = self.ceiling_pct(sample);
-        let (target_pct, bound) = limit::below(ceiling_pct, target_pct, bound);
+        let (target_pct, bound) = limit::clamp_to_ceiling(ceiling_pct, target_pct, bound);
         let dial_pct = self.lesser_dial_pct(sample);
         let outcome = match (hold, bound) {
             (Some(hold), _) => GateOutcome::Held(hold),
@@ -148,17 +153,17 @@ impl Gate {
             (None, None) => GateOutcome::Permitted,
         };
         let (target_pct, permitted, outcome) = if hold.is_some() {
-            self.aim.reset();
+            self.aim.reset_target();
             (target_pct, self.slew.jump_to_full(at_ns), outcome)
         } else {
-            let aim_pct = self.aim.take(target_pct, ceiling_pct);
+            let aim_pct = self.aim.update_target(target_pct, ceiling_pct);
             match dial_pct.filter(|dial_pct| wanted_pct.is_some() && aim_pct < 100.0 && *dial_pct <= aim_pct) {
                 Some(dial_pct) => (
                     100.0,
                     self.slew.jump_to_full(at_ns),
-                    GateOutcome::DialCounts(OverridePct::nearest(dial_pct).unwrap_or(OverridePct::FULL)),
+                    GateOutcome::DialCounts(OverridePct::from_nearest_percent(dial_pct).unwrap_or(OverridePct::FULL)),
                 ),
-                None => (aim_pct, self.slew.approach(aim_pct, at_ns), outcome),
+                None => (aim_pct, self.slew.step_towards(aim_pct, at_ns), outcome),
             }
         };
         let moves = hold.is_none() && bound.is_none() && !matches!(outcome, GateOutcome::DialCounts(_));
@@ -167,11 +172,11 @@ impl Gate {
         Verdict { at_ns, wanted_pct, permitted, outcome, armed }
     }
 
-    /// Judges what scripts ask of the ladder at this tick, after [`Gate::decide`]: each request passes once, and then not
+    /// Judges what scripts ask of the ladder at this tick, after [`Gate::decide_override`]: each request passes once, and then not
     /// before it has been withdrawn and the operator has seen to the last one. Gives those that are new.
-    pub fn ask(&mut self, asks: &[ScriptRequest], sample: &Sample) -> Vec<(ScriptRequest, AskOutcome)> {
+    pub fn judge_requests(&mut self, asks: &[ScriptRequest], sample: &Sample) -> Vec<(ScriptRequest, AskOutcome)> {
         let armed = self.wrote && self.writes_override();
-        self.asks.judge(asks, sample, armed)
+        self.asks.judge_requests(asks, sample, armed)
     }
 
     /// Armed, and for overrides: the arming may be there for offsets only.
@@ -179,8 +184,8 @@ impl Gate {
         self.limits.mode == GateMode::Armed && self.arming.state().is_ok()
     }
 
-    /// Judges the offsets that are proposed at this tick, after [`Gate::decide`]. Nothing while `[gate.offset]` is off.
-    pub fn shift(
+    /// Judges the offsets that are proposed at this tick, after [`Gate::decide_override`]. Nothing while `[gate.offset]` is off.
+    pub fn judge_offsets(
         &mut self,
         proposals: &[OffsetProposal],
         sample: &Sample,
@@ -194,14 +199,14 @@ impl Gate {
             hold: self.interlocks.between_programs(sample, estimates),
             armed: self.writes_offsets(),
         };
-        self.offsets.decide(proposals, now)
+        self.offsets.decide_offsets(proposals, now)
     }
 
     /// What is to be looked at in the control, because nobody knows for sure what is in force there. Call it after
-    /// [`Gate::decide`].
-    pub fn looks(&mut self, sample: &Sample, estimates: &Estimates) -> Vec<offset::OffsetOrder> {
+    /// [`Gate::decide_override`].
+    pub fn collect_look_orders(&mut self, sample: &Sample, estimates: &Estimates) -> Vec<offset::OffsetOrder> {
         let may = self.offsets.is_unsettled() && self.interlocks.between_programs(sample, estimates).is_none();
-        if may { self.offsets.looks(sample.at_ns) } else { Vec::new() }
+        if may { self.offsets.collect_look_orders(sample.at_ns) } else { Vec::new() }
     }
 
     /// May offsets be written?
@@ -222,15 +227,15 @@ impl Gate {
     }
 
     /// Somebody has seen to what the ladder was asked for.
-    pub fn acknowledge(&mut self) {
-        self.asks.acknowledge();
+    pub fn acknowledge_requests(&mut self) {
+        self.asks.acknowledge_requests();
     }
 
     /// The dial, where it is known and the ladder takes the lesser one of dial and override: at and below it there is nothing
     /// to ask for.
     fn lesser_dial_pct(&self, sample: &Sample) -> Option<f64> {
         let dial = self.dial.filter(|_| !self.limits.above_dial)?;
-        self.interlocks.fresh(sample, dial)
+        self.interlocks.fresh_number(sample, dial)
     }
 
     /// What the ladder's rule and the operator's dial leave: a ladder that takes the lesser one of dial and override makes
@@ -239,14 +244,14 @@ impl Gate {
         if self.limits.above_dial {
             return self.limits.max_pct;
         }
-        let dial_pct = self.dial.and_then(|dial| self.interlocks.fresh(sample, dial));
+        let dial_pct = self.dial.and_then(|dial| self.interlocks.fresh_number(sample, dial));
         dial_pct.unwrap_or(100.0).clamp(100.0, 254.0)
     }
 }
 
 /// A channel of the table that the gate cannot do without.
-fn channel(name: &str) -> Option<ChannelId> {
-    ChannelId::of(name)
+fn find_channel(name: &str) -> Option<ChannelId> {
+    ChannelId::from_name(name)
 }
 
 /// The longest time between two decisions over which the slew limit still counts; after more, it begins at 100 %.

@@ -25,7 +25,7 @@ const ENDING: [u32; 6] = [0, 1, 2, 3, 64, 80];
 
 impl ThreadCycle {
     /// Takes one block.
-    pub(super) fn follow(&mut self, block: &str) {
+    pub(super) fn follow_block(&mut self, block: &str) {
         let mut ended = false;
         let mut begun = None;
         for code in g_codes(block) {
@@ -95,7 +95,7 @@ mod tests {
     fn a_cycle_lasts_until_another_motion() {
         let mut cycle = ThreadCycle::default();
         let mut held = |block: &str| {
-            cycle.follow(block);
+            cycle.follow_block(block);
             cycle.hold()
         };
         assert_eq!(held("G0 X10"), None);

@@ -40,7 +40,7 @@ pub(super) struct Author {
 
 impl Author {
     pub(super) fn new(script: &str, version: u64, reason: &str) -> Self {
-        Self { script: words(script), version: format!("{version:016x}"), reason: words(reason) }
+        Self { script: truncate_text(script), version: format!("{version:016x}"), reason: truncate_text(reason) }
     }
 }
 
@@ -100,7 +100,7 @@ impl RowRate {
 
 impl Trail {
     /// The row of this tick's request, if it or its fate is another than before.
-    pub fn request(&mut self, request: Option<&OverrideRequest>, verdict: &Verdict) -> Option<Audit> {
+    pub fn audit_override(&mut self, request: Option<&OverrideRequest>, verdict: &Verdict) -> Option<Audit> {
         let told = LastRequest {
             #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
             asked: request.map(|request| request.pct.round() as i64),
@@ -114,22 +114,23 @@ impl Trail {
             return None;
         }
         let author = request.map_or(Author::default(), |it| Author::new(&it.script, it.version, &it.reason));
-        self.follow(verdict.at_ns, &author);
+        self.record_author(verdict.at_ns, &author);
         self.told = Some(told);
         let also = self.pace.may_tell(verdict.at_ns)?;
-        let wanted = request.map_or("nothing is asked for any more".to_owned(), |request| words(&request.reason));
+        let wanted =
+            request.map_or("nothing is asked for any more".to_owned(), |request| truncate_text(&request.reason));
         Some(Audit {
-            outcome: outcome(verdict).to_owned(),
+            outcome: outcome_word(verdict).to_owned(),
             asked: request.map(|request| request.pct),
-            after: Some(percent(verdict.permitted)),
+            after: Some(to_percent(verdict.permitted)),
             reason: format!("{wanted}: {}{also}", verdict.reason()),
             script: author.script,
             script_version: author.version,
-            ..of("request", verdict.at_ns)
+            ..new_row("request", verdict.at_ns)
         })
     }
 
-    fn follow(&mut self, at_ns: TimeNs, author: &Author) {
+    fn record_author(&mut self, at_ns: TimeNs, author: &Author) {
         if self.authors.back().is_some_and(|(_, last)| last == author) {
             return;
         }
@@ -140,7 +141,7 @@ impl Trail {
     }
 
     /// Who asked for what this write came from; nobody when the machine was given back.
-    fn author(&self, written: &WriteRecord) -> Author {
+    fn find_author(&self, written: &WriteRecord) -> Author {
         let before = self.authors.iter().rev().find(|(at_ns, _)| *at_ns <= written.sample_ns);
         let author = before.filter(|_| !matches!(written.occasion, Occasion::Release | Occasion::Leftover));
         author.map_or(Author::default(), |(_, author)| author.clone())
@@ -152,37 +153,37 @@ impl Trail {
         if written.occasion == Occasion::SignOfLife && written.fault.is_none() {
             return None;
         }
-        let Author { script, version, reason } = self.author(written);
+        let Author { script, version, reason } = self.find_author(written);
         Some(Audit {
             outcome: if written.fault.is_some() { "failed" } else { "written" }.to_owned(),
-            before: written.before.map(percent),
-            asked: Some(percent(written.asked)),
-            after: written.after.map(percent),
-            reason: why(written, &reason),
+            before: written.before.map(to_percent),
+            asked: Some(to_percent(written.asked)),
+            after: written.after.map(to_percent),
+            reason: describe_reason(written, &reason),
             script,
             script_version: version,
-            ..of("write", written.at_ns)
+            ..new_row("write", written.at_ns)
         })
     }
 
     /// The same for the table of commands.
     #[must_use]
-    pub fn command(&self, written: &WriteRecord, target: &str) -> Option<Command> {
+    pub fn command_from_write(&self, written: &WriteRecord, target: &str) -> Option<Command> {
         let outcome = if written.fault.is_some() { "failed" } else { "done" };
         Some(self.write(written)?.as_command("feed_override_pct", target, outcome))
     }
 }
 
 /// Why it was written, and by whose words; or what went wrong.
-fn why(written: &WriteRecord, reason: &str) -> String {
+fn describe_reason(written: &WriteRecord, reason: &str) -> String {
     match &written.fault {
         Some(fault) => fault.to_string().chars().take(FAULT_MAX).collect(),
-        None if reason.is_empty() => written.occasion.words().to_owned(),
-        None => format!("{}: {reason}", written.occasion.words()),
+        None if reason.is_empty() => written.occasion.as_words().to_owned(),
+        None => format!("{}: {reason}", written.occasion.as_words()),
     }
 }
 
-fn outcome(verdict: &Verdict) -> &'static str {
+fn outcome_word(verdict: &Verdict) -> &'static str {
     match verdict.outcome {
         GateOutcome::Held(_) => "held",
         GateOutcome::Refused => "refused",
@@ -192,62 +193,62 @@ fn outcome(verdict: &Verdict) -> &'static str {
     }
 }
 
-fn of(kind: &str, at_ns: TimeNs) -> Audit {
+fn new_row(kind: &str, at_ns: TimeNs) -> Audit {
     Audit { at_ns, kind: kind.to_owned(), unit: "%".to_owned(), ..Audit::default() }
 }
 
-pub(super) fn words(text: &str) -> String {
+pub(super) fn truncate_text(text: &str) -> String {
     text.chars().take(WORDS_MAX).collect()
 }
 
-fn percent(pct: OverridePct) -> f64 {
+fn to_percent(pct: OverridePct) -> f64 {
     f64::from(pct.percent())
 }
 
 /// The box has started with these limits.
 #[must_use]
-pub fn started(limits: &config::GateConfig, at_ns: TimeNs) -> Audit {
+pub fn audit_start(limits: &config::GateConfig, at_ns: TimeNs) -> Audit {
     let config::GateConfig { min_pct, max_pct, slew_up_pct_per_s: up, slew_down_pct_per_s: down, above_dial, .. } =
         limits;
     let target = limits.source.as_deref().unwrap_or("no source");
     let dial = if *above_dial { ", may exceed the dial" } else { "" };
-    let offsets = offsets(&limits.offset);
+    let offsets = describe_offsets(&limits.offset);
     let reason = format!("disarmed; {target}, {min_pct} to {max_pct} %, +{up} and -{down} %/s{dial}{offsets}");
-    Audit { outcome: limits.mode.word().to_owned(), reason, ..of("started", at_ns) }
+    Audit { outcome: limits.mode.as_word().to_owned(), reason, ..new_row("started", at_ns) }
 }
 
 /// What may be shifted, if anything.
-fn offsets(limits: &config::OffsetConfig) -> String {
+fn describe_offsets(limits: &config::OffsetConfig) -> String {
     if limits.mode == config::GateMode::Off {
         return String::new();
     }
-    let axes: Vec<&str> = limits.axes.iter().map(|axis| axis.word()).collect();
+    let axes: Vec<&str> = limits.axes.iter().map(|axis| axis.as_word()).collect();
     let config::OffsetConfig { step_um, total_um, .. } = limits;
-    format!("; offsets of {} {}, by {step_um} um up to {total_um} um", axes.join(" "), limits.mode.word())
+    format!("; offsets of {} {}, by {step_um} um up to {total_um} um", axes.join(" "), limits.mode.as_word())
 }
 
 /// A step was seen to be in force.
 #[must_use]
-pub fn reaction(reaction: &Reaction) -> Audit {
-    let times = times(reaction);
+pub fn audit_reaction(reaction: &Reaction) -> Audit {
+    let times = reaction_times(reaction);
     let reason = format!("seen in force {:.1} ms after it was written", times.write_to_seen_ms);
     Audit {
         outcome: "seen".to_owned(),
         asked: Some(times.asked_pct),
         after: Some(times.found_pct),
         reason,
-        ..of("reaction", reaction.seen_ns)
+        ..new_row("reaction", reaction.seen_ns)
     }
 }
 
 /// The times of a step.
 #[must_use]
-pub fn times(reaction: &Reaction) -> ReactionTime {
+pub fn reaction_times(reaction: &Reaction) -> ReactionTime {
     let ms = |from_ns: TimeNs, to_ns: TimeNs| (to_ns - from_ns) as f64 / 1e6;
     ReactionTime {
         at_ns: reaction.seen_ns,
-        asked_pct: percent(reaction.asked),
-        found_pct: percent(reaction.found),
+        asked_pct: to_percent(reaction.asked),
+        found_pct: to_percent(reaction.found),
         sample_to_write_ms: ms(reaction.sample_ns, reaction.issued_ns),
         write_to_seen_ms: ms(reaction.issued_ns, reaction.seen_ns),
         ..ReactionTime::default()
@@ -256,57 +257,57 @@ pub fn times(reaction: &Reaction) -> ReactionTime {
 
 /// A request to the ladder, and what the machine said to it where it was sent.
 #[must_use]
-pub fn asked(ask: &ScriptRequest, outcome: AskOutcome, failed: Option<&str>, at_ns: TimeNs) -> Audit {
+pub fn audit_ladder_request(ask: &ScriptRequest, outcome: AskOutcome, failed: Option<&str>, at_ns: TimeNs) -> Audit {
     let more = match (outcome, failed) {
-        (_, Some(failed)) => words(failed),
+        (_, Some(failed)) => truncate_text(failed),
         (AskOutcome::Sent, None) => "handed to the ladder".to_owned(),
         (AskOutcome::Shadow, None) => "the gate is not armed: recorded, not written".to_owned(),
         (AskOutcome::Latched, None) => "nobody has seen to the last one yet".to_owned(),
     };
     Audit {
-        outcome: if failed.is_some() { "failed" } else { outcome.word() }.to_owned(),
-        reason: format!("{}: {more}", words(&ask.reason)),
-        script: words(&ask.script),
+        outcome: if failed.is_some() { "failed" } else { outcome.as_word() }.to_owned(),
+        reason: format!("{}: {more}", truncate_text(&ask.reason)),
+        script: truncate_text(&ask.script),
         script_version: format!("{:016x}", ask.version),
         unit: String::new(),
-        ..of(ask.request.word(), at_ns)
+        ..new_row(ask.request.as_word(), at_ns)
     }
 }
 
 /// Somebody armed the gate.
 #[must_use]
-pub fn armed(armed: &Armed) -> Audit {
+pub fn audit_arming(armed: &Armed) -> Audit {
     let seconds = (armed.until_ns - armed.since_ns) / SECOND_NS;
     Audit {
         outcome: "armed".to_owned(),
         reason: format!("for {seconds} s"),
-        person: words(&armed.by),
+        person: truncate_text(&armed.by),
         unit: String::new(),
-        ..of("armed", armed.since_ns)
+        ..new_row("armed", armed.since_ns)
     }
 }
 
 /// The arming has ended.
 #[must_use]
-pub fn disarmed(why: Disarmed, by: &str, at_ns: TimeNs) -> Audit {
+pub fn audit_disarming(why: Disarmed, by: &str, at_ns: TimeNs) -> Audit {
     Audit {
-        outcome: why.word().to_owned(),
+        outcome: why.as_word().to_owned(),
         reason: why.to_string(),
-        person: words(by),
+        person: truncate_text(by),
         unit: String::new(),
-        ..of("disarmed", at_ns)
+        ..new_row("disarmed", at_ns)
     }
 }
 
 /// Somebody wanted something of the gate that it refused, or has seen to a request.
 #[must_use]
-pub fn order(kind: &str, outcome: &str, reason: &str, by: &str, at_ns: TimeNs) -> Audit {
+pub fn audit_order(kind: &str, outcome: &str, reason: &str, by: &str, at_ns: TimeNs) -> Audit {
     Audit {
         outcome: outcome.to_owned(),
-        reason: words(reason),
-        person: words(by),
+        reason: truncate_text(reason),
+        person: truncate_text(by),
         unit: String::new(),
-        ..of(kind, at_ns)
+        ..new_row(kind, at_ns)
     }
 }
 
@@ -325,14 +326,18 @@ mod tests {
     #[test]
     fn a_request_is_recorded_when_it_or_its_fate_changes() {
         let mut trail = Trail::default();
-        assert_eq!(trail.request(None, &verdict(0, GateOutcome::Permitted)), None, "nothing has ever been asked for");
-        let first = trail.request(Some(&asking(80.0)), &verdict(1, GateOutcome::Permitted)).expect("new");
+        assert_eq!(
+            trail.audit_override(None, &verdict(0, GateOutcome::Permitted)),
+            None,
+            "nothing has ever been asked for"
+        );
+        let first = trail.audit_override(Some(&asking(80.0)), &verdict(1, GateOutcome::Permitted)).expect("new");
         assert_eq!((first.asked, first.outcome.as_str()), (Some(80.0), "permitted"));
         assert!(first.reason.len() < 300, "a script's words are cut");
-        assert_eq!(trail.request(Some(&asking(80.2)), &verdict(2, GateOutcome::Permitted)), None);
-        let refused = trail.request(Some(&asking(f64::NAN)), &verdict(3, GateOutcome::Refused)).expect("new");
+        assert_eq!(trail.audit_override(Some(&asking(80.2)), &verdict(2, GateOutcome::Permitted)), None);
+        let refused = trail.audit_override(Some(&asking(f64::NAN)), &verdict(3, GateOutcome::Refused)).expect("new");
         assert_eq!(refused.outcome, "refused");
-        assert!(trail.request(None, &verdict(4, GateOutcome::Permitted)).is_some_and(|row| row.asked.is_none()));
+        assert!(trail.audit_override(None, &verdict(4, GateOutcome::Permitted)).is_some_and(|row| row.asked.is_none()));
     }
 
     #[test]
@@ -342,7 +347,7 @@ mod tests {
         for tick in 0..100_000 {
             let at_ns = tick * SECOND_NS / 1000;
             rows.extend(
-                trail.request(Some(&asking(60.0 + (tick % 50) as f64)), &verdict(at_ns, GateOutcome::Permitted)),
+                trail.audit_override(Some(&asking(60.0 + (tick % 50) as f64)), &verdict(at_ns, GateOutcome::Permitted)),
             );
         }
         assert!((1000..1300).contains(&rows.len()), "{} rows in 100 s", rows.len());

@@ -38,13 +38,13 @@ pub struct Verdict {
 impl Verdict {
     /// Is the machine asked for anything? At 100 % the dial alone counts, and the enable is withdrawn.
     #[must_use]
-    pub fn asks(&self) -> bool {
+    pub fn has_request(&self) -> bool {
         self.permitted != OverridePct::FULL
     }
 
     /// The word in the history: `written`, `shadow`, `held`, `limited` or `refused`.
     #[must_use]
-    pub fn word(&self) -> &'static str {
+    pub fn as_word(&self) -> &'static str {
         match self.outcome {
             GateOutcome::Held(_) => "held",
             GateOutcome::Refused => "refused",
@@ -58,7 +58,7 @@ impl Verdict {
     #[must_use]
     pub fn reason(&self) -> String {
         match self.outcome {
-            GateOutcome::Permitted if self.armed && !self.asks() => {
+            GateOutcome::Permitted if self.armed && !self.has_request() => {
                 "nothing is asked of the machine: the dial counts".to_owned()
             }
             GateOutcome::Permitted if self.armed => "as asked for".to_owned(),

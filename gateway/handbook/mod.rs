@@ -4,7 +4,7 @@
 //! A chapter is about one topic. Its topic is the name of its file, its title is its first heading. Every chapter is a row
 //! of the table below; `tests/handbook/` fails when a file of the folder has no row.
 
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use rules::physics::explain::Language;
 
 /// One chapter of the handbook.
@@ -71,19 +71,19 @@ chapters! {
 
 /// The chapter of this topic. Case does not count.
 #[must_use]
-pub fn chapter(topic: &str) -> Option<&'static Chapter> {
+pub fn find_chapter(topic: &str) -> Option<&'static Chapter> {
     CHAPTERS.iter().find(|chapter| chapter.topic.eq_ignore_ascii_case(topic))
 }
 
 /// The topic that is written most like this one, if one is near.
 #[must_use]
 pub fn nearest_topic(topic: &str) -> Option<&'static str> {
-    nearest(topic, CHAPTERS.iter().map(|chapter| chapter.topic))
+    find_nearest_name(topic, CHAPTERS.iter().map(|chapter| chapter.topic))
 }
 
 /// One line for each chapter: topic and title.
 #[must_use]
-pub fn contents(language: Language) -> String {
+pub fn list_contents(language: Language) -> String {
     let width = CHAPTERS.iter().map(|chapter| chapter.topic.len()).max().unwrap_or(0);
     let line = |chapter: &Chapter| format!("  {:width$}  {}\n", chapter.topic, chapter.title(language));
     CHAPTERS.iter().map(line).collect()

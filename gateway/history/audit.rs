@@ -89,7 +89,7 @@ fn hash(previous: &str, number: i64, audit: &Audit) -> String {
 }
 
 /// Number and hash of the newest row.
-fn head(db: &Connection) -> Result<(i64, String), rusqlite::Error> {
+fn read_head(db: &Connection) -> Result<(i64, String), rusqlite::Error> {
     let newest = db
         .prepare_cached("SELECT number, hash FROM audit ORDER BY number DESC LIMIT 1")?
         .query_row([], |row| Ok((row.get(0)?, row.get(1)?)))
@@ -114,9 +114,9 @@ fn noted_head(db: &Connection) -> Result<Option<(i64, String)>, rusqlite::Error>
 }
 
 /// Appends a row, in the transaction of the caller.
-pub(crate) fn append(db: &Connection, audit: &Audit) -> Result<(), rusqlite::Error> {
-    let (last, previous) = head(db)?;
-    let (number, audit) = (last + 1, audit.storable());
+pub(crate) fn append_row(db: &Connection, audit: &Audit) -> Result<(), rusqlite::Error> {
+    let (last, previous) = read_head(db)?;
+    let (number, audit) = (last + 1, audit.to_storable());
     let hash = hash(&previous, number, &audit);
     db.prepare_cached(
         "INSERT INTO audit (number, at_ns, kind, outcome, before, asked, after, unit, reason, script, script_version, person,
@@ -146,7 +146,7 @@ pub(crate) fn append(db: &Connection, audit: &Audit) -> Result<(), rusqlite::Err
 const COLUMNS: &str =
     "number, at_ns, kind, outcome, before, asked, after, unit, reason, script, script_version, person, previous, hash";
 
-fn entry(row: &Row<'_>) -> Result<AuditEntry, rusqlite::Error> {
+fn read_entry(row: &Row<'_>) -> Result<AuditEntry, rusqlite::Error> {
     let audit = Audit {
         at_ns: row.get(1)?,
         kind: row.get(2)?,
@@ -177,7 +177,7 @@ struct AuditChain {
 
 impl AuditChain {
     /// The next row, or why it cannot be the next one.
-    fn follow(&mut self, entry: &AuditEntry) -> Result<(), Break> {
+    fn check_entry(&mut self, entry: &AuditEntry) -> Result<(), Break> {
         let broken = |what: String| Err(Break { number: entry.number, what });
         if self.rows > 0 && entry.number != self.last + 1 {
             return broken(format!("the rows {} to {} before it are missing", self.last + 1, entry.number - 1));
@@ -192,11 +192,11 @@ impl AuditChain {
         if self.first == 0 {
             (self.first, self.from) = (entry.number, entry.previous.clone());
         }
-        self.removed.extend(AuditRemoval::of(entry));
+        self.removed.extend(AuditRemoval::from_entry(entry));
         Ok(())
     }
 
-    fn check(mut self, broken: Option<Break>) -> AuditCheck {
+    fn finish_check(mut self, broken: Option<Break>) -> AuditCheck {
         let told =
             self.removed.iter().position(|removed| removed.through == self.first - 1 && removed.hash == self.from);
         let removed = told.map(|index| self.removed.swap_remove(index));
@@ -222,22 +222,22 @@ impl Reader {
             .query_row("SELECT 1 FROM sqlite_schema WHERE name = 'audit'", [], |_| Ok(()))
             .optional()
             .map(|found| found.is_some())
-            .doing("looking for the audit")
+            .with_activity("looking for the audit")
     }
 
     /// Rows of the time range, the newest `limit` of them, oldest first.
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn audit(&self, from_ns: TimeNs, to_ns: TimeNs, limit: u32) -> Result<Vec<AuditEntry>, HistoryError> {
+    pub fn read_audit(&self, from_ns: TimeNs, to_ns: TimeNs, limit: u32) -> Result<Vec<AuditEntry>, HistoryError> {
         if !self.has_audit()? {
             return Ok(Vec::new());
         }
         let select =
             format!("SELECT {COLUMNS} FROM audit WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY number DESC LIMIT ?3");
-        let mut statement = self.db.prepare(&select).doing("reading the audit")?;
-        let rows = statement.query_map(params![from_ns, to_ns, limit], entry);
-        let mut rows: Vec<AuditEntry> = rows.and_then(Iterator::collect).doing("reading the audit")?;
+        let mut statement = self.db.prepare(&select).with_activity("reading the audit")?;
+        let rows = statement.query_map(params![from_ns, to_ns, limit], read_entry);
+        let mut rows: Vec<AuditEntry> = rows.and_then(Iterator::collect).with_activity("reading the audit")?;
         rows.reverse();
         Ok(rows)
     }
@@ -251,9 +251,9 @@ impl Reader {
             return Ok(Vec::new());
         }
         let select = format!("SELECT {COLUMNS} FROM audit WHERE number > ?1 ORDER BY number LIMIT ?2");
-        let mut statement = self.db.prepare(&select).doing("reading the audit")?;
-        let rows = statement.query_map(params![number, limit], entry);
-        rows.and_then(Iterator::collect).doing("reading the audit")
+        let mut statement = self.db.prepare(&select).with_activity("reading the audit")?;
+        let rows = statement.query_map(params![number, limit], read_entry);
+        rows.and_then(Iterator::collect).with_activity("reading the audit")
     }
 
     /// Checks the whole chain from the oldest row on, and its end against the head that was noted with it.
@@ -264,44 +264,45 @@ impl Reader {
         let (from, head) = (String::new(), BEGINNING.to_owned());
         let mut chain = AuditChain { rows: 0, first: 0, from, last: 0, head, removed: Vec::new() };
         if !self.has_audit()? {
-            return Ok(chain.check(None));
+            return Ok(chain.finish_check(None));
         }
         // One view of the file, also while a gateway appends to it.
-        let reading = self.db.unchecked_transaction().doing("reading the audit")?;
-        let mut statement =
-            reading.prepare(&format!("SELECT {COLUMNS} FROM audit ORDER BY number")).doing("reading the audit")?;
-        let mut rows = statement.query([]).doing("reading the audit")?;
+        let reading = self.db.unchecked_transaction().with_activity("reading the audit")?;
+        let mut statement = reading
+            .prepare(&format!("SELECT {COLUMNS} FROM audit ORDER BY number"))
+            .with_activity("reading the audit")?;
+        let mut rows = statement.query([]).with_activity("reading the audit")?;
         loop {
-            let row = match rows.next().doing("reading the audit") {
+            let row = match rows.next().with_activity("reading the audit") {
                 Ok(Some(row)) => row,
                 Ok(None) => break,
                 Err(error) if error.is_damage() => {
                     let broken = Break { number: chain.last + 1, what: format!("it cannot be read: {error}") };
-                    return Ok(chain.check(Some(broken)));
+                    return Ok(chain.finish_check(Some(broken)));
                 }
                 Err(error) => return Err(error),
             };
-            let number: i64 = row.get(0).doing("reading the audit")?;
-            let followed = match entry(row) {
-                Ok(entry) => chain.follow(&entry),
+            let number: i64 = row.get(0).with_activity("reading the audit")?;
+            let followed = match read_entry(row) {
+                Ok(entry) => chain.check_entry(&entry),
                 Err(error) => Err(Break { number, what: format!("it cannot be read: {error}") }),
             };
             if let Err(broken) = followed {
-                return Ok(chain.check(Some(broken)));
+                return Ok(chain.finish_check(Some(broken)));
             }
         }
-        let noted = noted_head(&reading).doing("reading the head of the audit")?;
+        let noted = noted_head(&reading).with_activity("reading the head of the audit")?;
         let cut = noted.filter(|(number, hash)| (*number, hash.as_str()) != (chain.last, chain.head.as_str()));
         let broken = cut.map(|(number, _)| Break {
             number: chain.last + 1,
             what: format!("the chain ends before it; its last row was number {number}"),
         });
-        Ok(chain.check(broken))
+        Ok(chain.finish_check(broken))
     }
 }
 
 /// Of the rows of this condition those at the beginning of the chain, also when the clock has gone back in between.
-pub(crate) fn oldest(condition: &str) -> String {
+pub(crate) fn restrict_to_oldest(condition: &str) -> String {
     format!(
         "number < (SELECT coalesce(min(number), 9223372036854775807) FROM audit WHERE NOT coalesce(({condition}), 0))"
     )
@@ -312,7 +313,7 @@ const REMOVED: &str = "removed";
 
 impl AuditRemoval {
     /// What this row says of others, if it does.
-    fn of(entry: &AuditEntry) -> Option<Self> {
+    fn from_entry(entry: &AuditEntry) -> Option<Self> {
         let Audit { kind, after, at_ns, reason, script_version, .. } = &entry.audit;
         #[expect(clippy::cast_possible_truncation, reason = "numbers of rows, far below 2^53")]
         let through = after.filter(|_| kind == REMOVED)? as i64;
@@ -336,13 +337,13 @@ pub(crate) fn remove(
         |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)),
     )?;
     let hash: String = db.query_row("SELECT hash FROM audit WHERE number = ?1", [last], |row| row.get(0))?;
-    append(db, &removal(first, last, hash, at_ns.unwrap_or(at_newest_ns), because))?;
+    append_row(db, &build_removal_row(first, last, hash, at_ns.unwrap_or(at_newest_ns), because))?;
     db.execute("INSERT OR REPLACE INTO meta (key, value) VALUES ('audit_released', ?1)", [last])?;
     db.execute("DELETE FROM audit WHERE number BETWEEN ?1 AND ?2", [first, last]).map(drop)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "numbers of rows, far below 2^53")]
-fn removal(first: i64, last: i64, hash: String, at_ns: TimeNs, because: &str) -> Audit {
+fn build_removal_row(first: i64, last: i64, hash: String, at_ns: TimeNs, because: &str) -> Audit {
     Audit {
         at_ns,
         kind: REMOVED.to_owned(),
@@ -373,5 +374,8 @@ pub(crate) fn account_for_earlier(db: &Connection) -> Result<(), rusqlite::Error
         .optional()?;
     let noted = noted_head(db)?.map(|(_, hash)| (hash, 0));
     let Some((hash, at_ns)) = oldest.or(noted) else { return Ok(()) };
-    append(db, &removal(1, last, hash, at_ns, "an earlier version removed them and did not say when or why"))
+    append_row(
+        db,
+        &build_removal_row(1, last, hash, at_ns, "an earlier version removed them and did not say when or why"),
+    )
 }

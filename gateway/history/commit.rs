@@ -39,10 +39,11 @@ pub(crate) struct TailSlots {
 impl TailSlots {
     /// The slots of a file that is opened again; their rows are in blocks by then.
     pub(crate) fn load(db: &Connection) -> Result<Self, HistoryError> {
-        let mut statement =
-            db.prepare("SELECT slot, first_row + rows FROM tail ORDER BY first_row").doing("reading the crash tail")?;
+        let mut statement = db
+            .prepare("SELECT slot, first_row + rows FROM tail ORDER BY first_row")
+            .with_activity("reading the crash tail")?;
         let used = statement.query_map([], |row| Ok(TailEntry { slot: row.get(0)?, end_row: row.get(1)? }));
-        Ok(Self { used: used.and_then(Iterator::collect).doing("reading the crash tail")? })
+        Ok(Self { used: used.and_then(Iterator::collect).with_activity("reading the crash tail")? })
     }
 
     /// Takes out the oldest entry if its rows are in blocks and not needed to show the last rows up to `next_row`.
@@ -59,7 +60,7 @@ impl TailSlots {
 /// Makes the oldest of what is in `minute_buffer` durable, dated as `dated` says (origin and clock of new segments), or changes nothing. False when blocks are left; with the last of
 /// them go, if `with_tail`, the rows of the running minute. Records go with their rows: what a kill leaves behind is the
 /// history up to one moment, with everything before it and nothing after it.
-pub(crate) fn commit(
+pub(crate) fn commit_buffer(
     db: &mut Connection,
     minute_buffer: &mut MinuteBuffer,
     slots: &mut TailSlots,
@@ -67,7 +68,8 @@ pub(crate) fn commit(
     dated: (&str, &ClockMark),
     with_tail: bool,
 ) -> Result<bool, HistoryError> {
-    let writing = db.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate).doing("beginning a commit")?;
+    let writing =
+        db.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate).with_activity("beginning a commit")?;
     minute_buffer.segments.iter().try_for_each(|segment| segments::insert(&writing, segment, dated))?;
     let blocks = minute_buffer.blocks.len().min(BLOCKS_MAX);
     minute_buffer.blocks.iter().take(blocks).try_for_each(|block| insert_block(&writing, block))?;
@@ -79,17 +81,19 @@ pub(crate) fn commit(
     let end_row = rows_end(minute_buffer, blocks, with_tail);
     let records = minute_buffer.records_through(end_row);
     let mut storing = minute_buffer.records.iter().take(records);
-    storing.try_for_each(|posted| record_sql::store(&writing, &posted.record)).doing("storing a record")?;
+    storing
+        .try_for_each(|posted| record_sql::store_record(&writing, &posted.record))
+        .with_activity("storing a record")?;
     let items = outbox.as_ref().map(|outbox| {
         let records = minute_buffer.records.iter().take(records);
         let stored = minute_buffer.blocks.iter().take(blocks).map(|block| block.key.start_ns);
         let rows = (minute_buffer.opened_row, end_row);
-        outbox.put(&writing, records, rows, (stored, dated.1.is_certain()))
+        outbox.store_items(&writing, records, rows, (stored, dated.1.is_certain()))
     });
     let items = items.transpose()?;
-    writing.commit().doing("making samples durable")?;
+    writing.commit().with_activity("making samples durable")?;
     if let (Some(outbox), Some(items)) = (outbox, items) {
-        outbox.committed(items, &minute_buffer.reasons);
+        outbox.confirm_commit(items, &minute_buffer.reasons);
     }
     minute_buffer.segments.clear();
     minute_buffer.blocks.drain(..blocks);
@@ -132,14 +136,14 @@ fn put_tail(db: &Connection, minute_buffer: &MinuteBuffer, slots: &mut TailSlots
     while let Some(slot) = slots.take_spare(minute_buffer.open_row(), minute_buffer.next_row) {
         db.prepare_cached("DELETE FROM tail WHERE slot = ?1")
             .and_then(|mut delete| delete.execute([slot]))
-            .doing("shortening the crash tail")?;
+            .with_activity("shortening the crash tail")?;
     }
     Ok(())
 }
 
 /// Stores a fresh block and its summaries.
 pub(crate) fn insert_block(db: &Connection, block: &Block) -> Result<(), HistoryError> {
-    put_block(db, block).and_then(|()| pyramid::add(db, block)).doing("storing a block")
+    put_block(db, block).and_then(|()| pyramid::add(db, block)).with_activity("storing a block")
 }
 
 /// Stores a block without touching the summaries.
@@ -176,5 +180,5 @@ fn insert_tail(
         ])
     })
     .map(drop)
-    .doing("storing the crash tail")
+    .with_activity("storing the crash tail")
 }

@@ -20,9 +20,9 @@ const ROWS_MAX: i64 = 20_000;
 const LOOK_AHEAD: i64 = 64;
 
 /// Compacts the next ten minutes; false when there is nothing left that is complete.
-pub(crate) fn step(db: &mut Connection) -> Result<bool, HistoryError> {
-    let cursor = cursor(db)?;
-    let stored = load(db, cursor)?;
+pub(crate) fn compact_next(db: &mut Connection) -> Result<bool, HistoryError> {
+    let cursor = read_cursor(db)?;
+    let stored = read_blocks(db, cursor)?;
     let Some(first) = stored.first() else { return Ok(false) };
     let first = first.key;
     let mut end_row = first.first_row;
@@ -43,46 +43,46 @@ pub(crate) fn step(db: &mut Connection) -> Result<bool, HistoryError> {
     }
     let group = &stored[..together];
     // Blocks that the disk has changed stay as they are, and are told by whoever reads them.
-    let merged = if together > 1 { merge(db, group)? } else { None };
-    replace(db, group, merged.as_ref(), stored[together].key.first_row)?;
+    let merged = if together > 1 { merge_blocks(db, group)? } else { None };
+    replace_blocks(db, group, merged.as_ref(), stored[together].key.first_row)?;
     Ok(true)
 }
 
-fn cursor(db: &Connection) -> Result<i64, HistoryError> {
+fn read_cursor(db: &Connection) -> Result<i64, HistoryError> {
     let cursor: Option<i64> = db
         .query_row("SELECT value FROM meta WHERE key = 'compacted_row'", [], |row| row.get(0))
         .optional()
-        .doing("looking up what is compacted")?;
+        .with_activity("looking up what is compacted")?;
     Ok(cursor.unwrap_or(0))
 }
 
-fn load(db: &Connection, cursor: i64) -> Result<Vec<StoredBlock>, HistoryError> {
+fn read_blocks(db: &Connection, cursor: i64) -> Result<Vec<StoredBlock>, HistoryError> {
     let mut statement = db
         .prepare_cached(&format!(
             "SELECT {BLOCK_COLUMNS} FROM blocks WHERE first_row >= ?1 ORDER BY first_row LIMIT ?2"
         ))
-        .doing("reading blocks")?;
+        .with_activity("reading blocks")?;
     let blocks = statement.query_map([cursor, LOOK_AHEAD], StoredBlock::of_row);
-    blocks.and_then(Iterator::collect).doing("reading blocks")
+    blocks.and_then(Iterator::collect).with_activity("reading blocks")
 }
 
 /// The block of all of these; `None` when one of them is damaged.
-fn merge(db: &Connection, group: &[StoredBlock]) -> Result<Option<Block>, HistoryError> {
+fn merge_blocks(db: &Connection, group: &[StoredBlock]) -> Result<Option<Block>, HistoryError> {
     let mut series = known_series(db)?;
     // What is stored has been rounded already.
     series.iter_mut().for_each(|series| series.decimals = None);
     let zstd = |error| HistoryError::Io { path: "zstd".into(), error };
     let mut decoder = Decoder::new().map_err(zstd)?;
     let mut reasons = Reasons::default();
-    let mut rows = SeriesRows::of(&series);
+    let mut rows = SeriesRows::for_series(&series);
     for stored in group {
         let Some(more) = rows_of(stored, &series, &mut decoder, &mut reasons) else { return Ok(None) };
         let count = more.len();
-        rows.append(&more, 0..count);
+        rows.append_rows(&more, 0..count);
     }
     let mut encoder = Encoder::new(LEVEL_COMPACT).map_err(zstd)?;
     let key = group[0].key;
-    Ok(Some(encoder.encode(&rows, &series, &reasons, key.segment, key.first_row)))
+    Ok(Some(encoder.encode_block(&rows, &series, &reasons, key.segment, key.first_row)))
 }
 
 /// All rows of a block, with the reasons of `reasons`; `None` when it is damaged.
@@ -92,13 +92,13 @@ pub(crate) fn rows_of(
     decoder: &mut Decoder,
     reasons: &mut Reasons,
 ) -> Option<SeriesRows> {
-    let directory = stored.checked()?;
-    let mut rows = SeriesRows::of(series);
-    rows.at_ns = decoder.times(&directory, &stored.columns)?;
+    let directory = stored.verify_directory()?;
+    let mut rows = SeriesRows::for_series(series);
+    rows.at_ns = decoder.decode_times(&directory, &stored.columns)?;
     let codes = own_codes(&directory, reasons);
     for (series, column) in series.iter().zip(&mut rows.columns) {
-        if let Some(entry) = directory.entry(series.id) {
-            *column = column_of(decoder.cells(&directory, entry, &stored.columns)?, &codes);
+        if let Some(entry) = directory.find_entry(series.id) {
+            *column = column_of(decoder.decode_cells(&directory, entry, &stored.columns)?, &codes);
         }
     }
     Some(rows)
@@ -108,7 +108,7 @@ pub(crate) fn rows_of(
 pub(crate) fn own_codes(directory: &Directory, reasons: &mut Reasons) -> [u8; 256] {
     let mut codes: [u8; 256] = std::array::from_fn(|code| u8::try_from(code).unwrap_or(NOT_PROVIDED));
     for (code, word) in &directory.words {
-        codes[usize::from(*code)] = reasons.code(word);
+        codes[usize::from(*code)] = reasons.intern_word(word);
     }
     codes
 }
@@ -131,23 +131,23 @@ fn column_of(cells: Cells, codes: &[u8; 256]) -> Column {
     }
 }
 
-fn replace(
+fn replace_blocks(
     db: &mut Connection,
     group: &[StoredBlock],
     merged: Option<&Block>,
     next_row: i64,
 ) -> Result<(), HistoryError> {
-    let replacing = db.transaction().doing("beginning to compact")?;
+    let replacing = db.transaction().with_activity("beginning to compact")?;
     if let Some(merged) = merged {
         let first_row = merged.key.first_row;
         let last_row = group.last().map_or(first_row, |last| last.key.first_row);
         replacing
             .execute("DELETE FROM blocks WHERE first_row BETWEEN ?1 AND ?2", [first_row, last_row])
             .and_then(|_| put_block(&replacing, merged))
-            .doing("replacing blocks by one")?;
+            .with_activity("replacing blocks by one")?;
     }
     replacing
         .execute("INSERT OR REPLACE INTO meta (key, value) VALUES ('compacted_row', ?1)", params![next_row])
-        .doing("noting what is compacted")?;
-    replacing.commit().doing("compacting")
+        .with_activity("noting what is compacted")?;
+    replacing.commit().with_activity("compacting")
 }

@@ -1,8 +1,8 @@
 //! What a disk has changed: how it is recognised, and how it is told.
 
-use super::error::{HistoryError, at};
-use super::info::utc;
-use super::lock::beside;
+use super::error::{HistoryError, add_path};
+use super::info::format_utc;
+use super::lock::append_suffix;
 use crate::{clock, moment};
 use adapters::clock::TimeNs;
 use rusqlite::{Connection, ErrorCode, ffi};
@@ -41,7 +41,7 @@ impl fmt::Display for DamagedRows {
             _ => write!(f, "samples from {first_row} on")?,
         }
         match span_ns {
-            Some((from_ns, to_ns)) => write!(f, " ({} to {})", utc(*from_ns), utc(*to_ns)),
+            Some((from_ns, to_ns)) => write!(f, " ({} to {})", format_utc(*from_ns), format_utc(*to_ns)),
             None => Ok(()),
         }
     }
@@ -88,12 +88,12 @@ impl Aside {
 /// # Errors
 /// It cannot be renamed.
 pub fn set_aside(path: &Path, why: Aside) -> Result<PathBuf, HistoryError> {
-    let time: String = moment::utc(clock::now_ns()).chars().filter(char::is_ascii_alphanumeric).collect();
-    let aside = beside(path, &format!("{}{time}", why.word()));
-    std::fs::rename(path, &aside).map_err(at(path))?;
+    let time: String = moment::format_utc(clock::now_ns()).chars().filter(char::is_ascii_alphanumeric).collect();
+    let aside = append_suffix(path, &format!("{}{time}", why.word()));
+    std::fs::rename(path, &aside).map_err(add_path(path))?;
     for companion in COMPANIONS {
         // Where there is none, nothing belongs to it.
-        let _none = std::fs::rename(beside(path, companion), beside(&aside, companion));
+        let _none = std::fs::rename(append_suffix(path, companion), append_suffix(&aside, companion));
     }
     Ok(aside)
 }

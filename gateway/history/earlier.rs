@@ -5,8 +5,8 @@
 //! goes on with the copy. What was stored in between stays in the newer file, which the newer program reads.
 
 use super::damage::{Aside, set_aside};
-use super::error::{HistoryError, at};
-use super::lock::beside;
+use super::error::{HistoryError, add_path};
+use super::lock::append_suffix;
 use super::outbox::skip_numbers;
 use super::record::Event;
 use super::schema::{SCHEMA, copy_whole};
@@ -29,13 +29,13 @@ const KEEP_FREE: u64 = 256 * 1024 * 1024;
 pub const COPYING: &str = ".copying";
 
 fn name_copy(path: &Path, schema: i64) -> PathBuf {
-    beside(path, &format!("{COPY}{schema}"))
+    append_suffix(path, &format!("{COPY}{schema}"))
 }
 
 /// Copies the history with the tables of `schema` and returns the event that tells it.
 /// Without a copy, for want of room, the tables are changed all the same: a box that stores nothing would lose more.
 pub(crate) fn copy_before_change(path: &Path, db: &Connection, schema: i64) -> Event {
-    let text = match copy(path, db, schema) {
+    let text = match copy_database(path, db, schema) {
         Ok(to) => format!(
             "the tables of schema {schema} became those of {SCHEMA}; the history of before is kept as {}",
             to.display()
@@ -49,8 +49,8 @@ pub(crate) fn copy_before_change(path: &Path, db: &Connection, schema: i64) -> E
     Event { at_ns: clock::now_ns(), kind, source, text, detail: String::new() }
 }
 
-fn copy(path: &Path, db: &Connection, schema: i64) -> Result<PathBuf, String> {
-    let (to, fresh) = (name_copy(path, schema), beside(path, COPYING));
+fn copy_database(path: &Path, db: &Connection, schema: i64) -> Result<PathBuf, String> {
+    let (to, fresh) = (name_copy(path, schema), append_suffix(path, COPYING));
     // One that a power cut has left is half a copy.
     let _none_left = fs::remove_file(&fresh);
     let told = |error: std::io::Error| format!("{}: {error}", fresh.display());
@@ -118,6 +118,6 @@ pub fn go_back(path: &Path) -> Result<Option<PathBuf>, HistoryError> {
     // What the newer version has sent has these numbers already.
     skip_numbers(&copy)?;
     let newer = if path.exists() { set_aside(path, Aside::Newer)? } else { path.to_owned() };
-    fs::rename(&copy, path).map_err(at(&copy))?;
+    fs::rename(&copy, path).map_err(add_path(&copy))?;
     Ok(Some(newer))
 }

@@ -74,7 +74,7 @@ pub enum HistoryError {
         error: rusqlite::Error,
     },
     /// `SQLite` found that the file is not as it was written.
-    #[error("history, while {doing}: the file is not as it was written{}: {error}. {REPAIR}.", told(*page))]
+    #[error("history, while {doing}: the file is not as it was written{}: {error}. {REPAIR}.", describe_page(*page))]
     NotAsWritten {
         /// What was being done.
         doing: &'static str,
@@ -107,18 +107,18 @@ pub enum HistoryError {
     },
 }
 
-fn told(page: Option<u32>) -> String {
+fn describe_page(page: Option<u32>) -> String {
     page.map_or_else(String::new, |page| format!(" (page {page})"))
 }
 
 /// Adds what was being done to an error of `SQLite`.
 pub(crate) trait Doing<T> {
     /// `doing` completes the sentence "history, while ...".
-    fn doing(self, doing: &'static str) -> Result<T, HistoryError>;
+    fn with_activity(self, doing: &'static str) -> Result<T, HistoryError>;
 }
 
 impl<T> Doing<T> for Result<T, rusqlite::Error> {
-    fn doing(self, doing: &'static str) -> Result<T, HistoryError> {
+    fn with_activity(self, doing: &'static str) -> Result<T, HistoryError> {
         self.map_err(|error| match is_of_disk(&error) {
             true => HistoryError::NotAsWritten { doing, page: damaged_page(), error },
             false => HistoryError::Sqlite { doing, error },
@@ -127,7 +127,7 @@ impl<T> Doing<T> for Result<T, rusqlite::Error> {
 }
 
 /// Adds the file to an input or output error.
-pub(crate) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> HistoryError + '_ {
+pub(crate) fn add_path(path: &Path) -> impl FnOnce(std::io::Error) -> HistoryError + '_ {
     move |error| HistoryError::Io { path: path.to_owned(), error }
 }
 

@@ -14,7 +14,7 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 /// Makes `samples` known to statements on `db`.
-pub(super) fn load(db: &Connection, path: &Path) -> Result<(), Error> {
+pub(super) fn register_samples(db: &Connection, path: &Path) -> Result<(), Error> {
     const MODULE: Module<'_, VirtualTable> = Module::eponymous_only_module();
     db.create_module(c"samples", &MODULE, Some(path.to_owned()))
 }
@@ -53,23 +53,23 @@ unsafe impl<'vtab> VTab<'vtab> for VirtualTable {
         db.config(VTabConfig::DirectOnly)?;
         let path = path.ok_or_else(|| Error::ModuleError("no history is connected".to_owned()))?;
         let samples = Samples::connect(path)?;
-        Ok((Cow::Owned(samples.declaration()?), Self { base: sqlite3_vtab::default(), samples }))
+        Ok((Cow::Owned(samples.declare_columns()?), Self { base: sqlite3_vtab::default(), samples }))
     }
 
     fn best_index(&self, info: &mut IndexInfo) -> Result<bool, Error> {
-        Samples::plan(info);
+        Samples::plan_query(info);
         Ok(true)
     }
 
     fn open(&'vtab mut self) -> Result<Scan<'vtab>, Error> {
-        Ok(Scan { base: sqlite3_vtab_cursor::default(), cursor: self.samples.open()?, table: PhantomData })
+        Ok(Scan { base: sqlite3_vtab_cursor::default(), cursor: self.samples.open_cursor()?, table: PhantomData })
     }
 }
 
 // SAFETY: `Scan` is `repr(C)` and its first field is the `sqlite3_vtab_cursor` that the trait asks for.
 unsafe impl VTabCursor for Scan<'_> {
     fn filter(&mut self, _number: c_int, letters: Option<&str>, arguments: &Filters<'_>) -> Result<(), Error> {
-        self.cursor.filter(letters.unwrap_or(""), arguments)
+        self.cursor.begin_scan(letters.unwrap_or(""), arguments)
     }
 
     fn next(&mut self) -> Result<(), Error> {
@@ -77,14 +77,14 @@ unsafe impl VTabCursor for Scan<'_> {
     }
 
     fn eof(&self) -> bool {
-        self.cursor.eof()
+        self.cursor.is_at_end()
     }
 
     fn column(&self, context: &mut Context, column: c_int) -> Result<(), Error> {
-        self.cursor.column(context, column)
+        self.cursor.write_column(context, column)
     }
 
     fn rowid(&self) -> Result<i64, Error> {
-        Ok(self.cursor.rowid())
+        Ok(self.cursor.current_rowid())
     }
 }

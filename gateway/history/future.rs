@@ -1,7 +1,7 @@
 //! Rows that say they come from the future: a clock that was wrong, and believed, when they were stored.
 
 use super::error::{Doing, HistoryError};
-use super::info::utc;
+use super::info::format_utc;
 use super::schema;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, params};
@@ -29,7 +29,7 @@ fn of_wall(db: &Connection) -> Result<&'static str, HistoryError> {
 }
 
 impl FutureRows {
-    pub(crate) fn after(db: &Connection, now_ns: TimeNs) -> Result<Option<Self>, HistoryError> {
+    pub(crate) fn find_after(db: &Connection, now_ns: TimeNs) -> Result<Option<Self>, HistoryError> {
         let sum = |table: &str, of_wall: &str| {
             format!(
                 "SELECT sum(rows) AS rows, min(start_ns) AS first_ns, max(end_ns) AS last_ns FROM {table}
@@ -46,7 +46,7 @@ impl FutureRows {
         );
         let found: (Option<i64>, Option<TimeNs>, Option<TimeNs>) = db
             .query_row(&select, [now_ns.saturating_add(AHEAD_NS)], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
-            .doing("looking for rows from the future")?;
+            .with_activity("looking for rows from the future")?;
         let (Some(samples), Some(first_ns), Some(last_ns)) = found else { return Ok(None) };
         Ok(Some(Self { samples, first_ns, last_ns }))
     }
@@ -55,13 +55,13 @@ impl FutureRows {
 impl fmt::Display for FutureRows {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { samples, first_ns, last_ns } = self;
-        write!(f, "{samples} samples that are dated after now ({} to {})", utc(*first_ns), utc(*last_ns))
+        write!(f, "{samples} samples that are dated after now ({} to {})", format_utc(*first_ns), format_utc(*last_ns))
     }
 }
 
 /// The newest time that is not from the future, where `newest_ns` is after it.
 pub(crate) fn present_ns(db: &Connection, now_ns: TimeNs, newest_ns: TimeNs) -> Result<TimeNs, HistoryError> {
-    if FutureRows::after(db, now_ns)?.is_none() {
+    if FutureRows::find_after(db, now_ns)?.is_none() {
         return Ok(newest_ns);
     }
     let found: Option<TimeNs> = db
@@ -72,6 +72,6 @@ pub(crate) fn present_ns(db: &Connection, now_ns: TimeNs, newest_ns: TimeNs) -> 
             params![now_ns.saturating_add(AHEAD_NS)],
             |row| row.get(0),
         )
-        .doing("looking for the newest row")?;
+        .with_activity("looking for the newest row")?;
     Ok(found.unwrap_or(now_ns))
 }

@@ -82,8 +82,8 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn info(&self) -> Result<Info, HistoryError> {
-        let span = self.span()?;
+    pub fn read_info(&self) -> Result<Info, HistoryError> {
+        let span = self.read_span()?;
         let used_bytes = used_bytes(&self.db)?;
         let (samples, sample_bytes): (i64, i64) = self
             .db
@@ -92,18 +92,18 @@ impl Reader {
                 [],
                 |row| Ok((row.get(0)?, row.get(1)?)),
             )
-            .doing("counting samples")?;
+            .with_activity("counting samples")?;
         let bytes_per_day = self.bytes_per_day(used_bytes, sample_bytes)?;
         let room = disk_room(&self.path).map(|room| room.free);
-        let max_bytes = self.number("SELECT value FROM meta WHERE key = 'max_bytes'")?;
+        let max_bytes = self.read_number("SELECT value FROM meta WHERE key = 'max_bytes'")?;
         let left = max_bytes.map(|max| max.unsigned_abs().saturating_sub(used_bytes));
         let days = |bytes: Option<u64>| bytes.zip(bytes_per_day).map(|(bytes, rate)| bytes as f64 / rate);
         Ok(Info {
             path: self.path.display().to_string(),
             first_ns: span.map(|(first_ns, _)| first_ns),
             last_ns: span.map(|(_, last_ns)| last_ns),
-            samples: samples + self.number(UNSEALED)?.unwrap_or(0),
-            segments: self.number("SELECT count(*) FROM segments")?.unwrap_or(0),
+            samples: samples + self.read_number(UNSEALED)?.unwrap_or(0),
+            segments: self.read_number("SELECT count(*) FROM segments")?.unwrap_or(0),
             file_bytes: std::fs::metadata(&self.path).map_or(0, |file| file.len()),
             used_bytes,
             sample_bytes,
@@ -113,7 +113,7 @@ impl Reader {
             max_bytes,
             disk_lasts_days: days(room),
             limit_reached_days: days(left),
-            tables: self.tables()?,
+            tables: self.count_table_rows()?,
             dropped: self.read_dropped()?,
         })
     }
@@ -128,7 +128,7 @@ impl Reader {
                 [RATE_OVER_NS],
                 |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)),
             )
-            .doing("measuring the growth")?;
+            .with_activity("measuring the growth")?;
         let (Some(bytes), Some(first_ns), Some(last_ns)) = week else { return Ok(None) };
         let days = (last_ns - first_ns) as f64 / DAY_NS as f64;
         let all_to_samples = used_bytes as f64 / (sample_bytes as f64).max(1.0);
@@ -136,14 +136,14 @@ impl Reader {
         Ok((days >= RATE_AFTER_DAYS).then(|| bytes as f64 / days * all_to_samples))
     }
 
-    fn number(&self, select: &str) -> Result<Option<i64>, HistoryError> {
+    fn read_number(&self, select: &str) -> Result<Option<i64>, HistoryError> {
         use rusqlite::OptionalExtension;
         let number = self.db.query_row(select, [], |row| row.get::<_, Option<i64>>(0)).optional();
-        Ok(number.doing("counting rows")?.flatten())
+        Ok(number.with_activity("counting rows")?.flatten())
     }
 
-    fn tables(&self) -> Result<Vec<TableRows>, HistoryError> {
-        let count = |table| Ok(self.number(&format!("SELECT count(*) FROM {table}"))?.unwrap_or(0));
+    fn count_table_rows(&self) -> Result<Vec<TableRows>, HistoryError> {
+        let count = |table| Ok(self.read_number(&format!("SELECT count(*) FROM {table}"))?.unwrap_or(0));
         TABLES.iter().map(|table| Ok(TableRows { table, rows: count(table)? })).collect()
     }
 
@@ -151,11 +151,11 @@ impl Reader {
         let mut statement = self
             .db
             .prepare("SELECT kind, rows, through_ns, because FROM dropped ORDER BY kind")
-            .doing("reading what was removed")?;
+            .with_activity("reading what was removed")?;
         let rows = statement.query_map([], |row| {
             Ok(Dropped { kind: row.get(0)?, rows: row.get(1)?, through_ns: row.get(2)?, because: row.get(3)? })
         });
-        rows.and_then(Iterator::collect).doing("reading what was removed")
+        rows.and_then(Iterator::collect).with_activity("reading what was removed")
     }
 }
 
@@ -163,11 +163,11 @@ const UNSEALED: &str = "SELECT sum(rows) FROM tail
     WHERE first_row >= coalesce((SELECT first_row + rows FROM blocks ORDER BY first_row DESC LIMIT 1), 0)";
 
 /// A time as a person reads it.
-pub(crate) fn utc(at_ns: TimeNs) -> String {
+pub(crate) fn format_utc(at_ns: TimeNs) -> String {
     jiff::Timestamp::from_nanosecond(i128::from(at_ns)).map_or_else(|_| format!("{at_ns} ns"), |at| at.to_string())
 }
 
-fn megabytes(bytes: f64) -> String {
+fn format_bytes(bytes: f64) -> String {
     if bytes < 1e9 { format!("{:.1} MB", bytes / 1e6) } else { format!("{:.2} GB", bytes / 1e9) }
 }
 
@@ -179,22 +179,22 @@ impl fmt::Display for Info {
                 f,
                 "{} samples from {} to {}, {} segment(s)",
                 self.samples,
-                utc(first_ns),
-                utc(last_ns),
+                format_utc(first_ns),
+                format_utc(last_ns),
                 self.segments
             )?,
             _ => writeln!(f, "no samples yet")?,
         }
-        write!(f, "{} in use", megabytes(self.used_bytes as f64))?;
+        write!(f, "{} in use", format_bytes(self.used_bytes as f64))?;
         if let Some(bytes) = self.bytes_per_sample {
             write!(f, ", {bytes:.1} bytes per sample")?;
         }
         writeln!(f)?;
         if let (Some(rate), Some(days)) = (self.bytes_per_day, self.disk_lasts_days) {
-            writeln!(f, "grows by {} a day; at this rate the disk lasts {days:.0} days", megabytes(rate))?;
+            writeln!(f, "grows by {} a day; at this rate the disk lasts {days:.0} days", format_bytes(rate))?;
         }
         if let (Some(max), Some(days)) = (self.max_bytes, self.limit_reached_days) {
-            let max = megabytes(max as f64);
+            let max = format_bytes(max as f64);
             writeln!(f, "the limit of {max} is reached in {days:.0} days; then the oldest raw samples go first")?;
         }
         if self.bytes_per_day.is_none() && self.samples > 0 {
@@ -204,7 +204,7 @@ impl fmt::Display for Info {
             writeln!(f, "{table}: {rows}")?;
         }
         for dropped in &self.dropped {
-            let (rows, kind, through) = (dropped.rows, &dropped.kind, utc(dropped.through_ns));
+            let (rows, kind, through) = (dropped.rows, &dropped.kind, format_utc(dropped.through_ns));
             writeln!(f, "removed: {rows} {kind} up to {through} ({})", dropped.because)?;
         }
         Ok(())

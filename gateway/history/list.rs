@@ -81,12 +81,18 @@ pub struct StateHour {
     pub seconds: f64,
 }
 
-fn text(row: &Row<'_>, column: usize) -> Result<String, rusqlite::Error> {
+fn read_text_or_empty(row: &Row<'_>, column: usize) -> Result<String, rusqlite::Error> {
     Ok(row.get::<_, Option<String>>(column)?.unwrap_or_default())
 }
 
-fn event(row: &Row<'_>) -> Result<Event, rusqlite::Error> {
-    Ok(Event { at_ns: row.get(0)?, kind: row.get(1)?, source: row.get(2)?, text: row.get(3)?, detail: text(row, 4)? })
+fn read_event(row: &Row<'_>) -> Result<Event, rusqlite::Error> {
+    Ok(Event {
+        at_ns: row.get(0)?,
+        kind: row.get(1)?,
+        source: row.get(2)?,
+        text: row.get(3)?,
+        detail: read_text_or_empty(row, 4)?,
+    })
 }
 
 impl Reader {
@@ -94,17 +100,17 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn states(&self, span: RecordSpan) -> Result<Vec<StateInterval>, HistoryError> {
+    pub fn read_states(&self, span: RecordSpan) -> Result<Vec<StateInterval>, HistoryError> {
         let select = "SELECT state, since_ns, until_ns, program, tool, ended_by FROM states
             WHERE since_ns < ?2 AND (until_ns IS NULL OR until_ns > ?1) ORDER BY since_ns DESC, id DESC LIMIT ?3";
-        self.list(select, span, |row| {
+        self.read_records(select, span, |row| {
             Ok(StateInterval {
                 state: row.get(0)?,
                 since_ns: row.get(1)?,
                 until_ns: row.get(2)?,
-                program: text(row, 3)?,
-                tool: text(row, 4)?,
-                ended_by: text(row, 5)?,
+                program: read_text_or_empty(row, 3)?,
+                tool: read_text_or_empty(row, 4)?,
+                ended_by: read_text_or_empty(row, 5)?,
             })
         })
     }
@@ -116,17 +122,19 @@ impl Reader {
     pub fn state_hours(&self, span: RecordSpan) -> Result<Vec<StateHour>, HistoryError> {
         let select = "SELECT hour * 3600000000000, state, seconds FROM state_hours
             WHERE hour * 3600000000000 < ?2 AND (hour + 1) * 3600000000000 > ?1 ORDER BY hour DESC, state DESC LIMIT ?3";
-        self.list(select, span, |row| Ok(StateHour { start_ns: row.get(0)?, state: row.get(1)?, seconds: row.get(2)? }))
+        self.read_records(select, span, |row| {
+            Ok(StateHour { start_ns: row.get(0)?, state: row.get(1)?, seconds: row.get(2)? })
+        })
     }
 
     /// Alarms that were up in the range.
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn alarms(&self, span: RecordSpan) -> Result<Vec<AlarmEntry>, HistoryError> {
+    pub fn read_alarms(&self, span: RecordSpan) -> Result<Vec<AlarmEntry>, HistoryError> {
         let select = "SELECT code, source, severity, raised_ns, cleared_ns, count, en, zh FROM alarms
             WHERE raised_ns < ?2 AND (cleared_ns IS NULL OR cleared_ns >= ?1) ORDER BY raised_ns DESC, id DESC LIMIT ?3";
-        self.list(select, span, |row| {
+        self.read_records(select, span, |row| {
             Ok(AlarmEntry {
                 code: row.get(0)?,
                 source: row.get(1)?,
@@ -144,10 +152,10 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn events(&self, span: RecordSpan) -> Result<Vec<Event>, HistoryError> {
+    pub fn read_events(&self, span: RecordSpan) -> Result<Vec<Event>, HistoryError> {
         let select = "SELECT at_ns, kind, source, text, detail FROM events
             WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
-        self.list(select, span, event)
+        self.read_records(select, span, read_event)
     }
 
     /// Events of this kind in the range.
@@ -157,26 +165,26 @@ impl Reader {
     pub fn events_of(&self, kind: &str, span: RecordSpan) -> Result<Vec<Event>, HistoryError> {
         let select = "SELECT at_ns, kind, source, text, detail FROM events
             WHERE at_ns >= ?1 AND at_ns < ?2 AND kind = ?4 ORDER BY at_ns DESC, id DESC LIMIT ?3";
-        self.list_with(select, params![span.from_ns, span.to_ns, span.limit, kind], event)
+        self.list_with(select, params![span.from_ns, span.to_ns, span.limit, kind], read_event)
     }
 
     /// Parts finished in the range.
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn parts(&self, span: RecordSpan) -> Result<Vec<Part>, HistoryError> {
+    pub fn read_parts(&self, span: RecordSpan) -> Result<Vec<Part>, HistoryError> {
         let select = "SELECT began_ns, ended_ns, part, program, count, cutting_s, energy_j, detail FROM parts
             WHERE ended_ns >= ?1 AND ended_ns < ?2 ORDER BY ended_ns DESC, id DESC LIMIT ?3";
-        self.list(select, span, |row| {
+        self.read_records(select, span, |row| {
             Ok(Part {
                 began_ns: row.get(0)?,
                 ended_ns: row.get(1)?,
-                part: text(row, 2)?,
-                program: text(row, 3)?,
+                part: read_text_or_empty(row, 2)?,
+                program: read_text_or_empty(row, 3)?,
                 count: row.get(4)?,
                 cutting_s: row.get(5)?,
                 energy_j: row.get(6)?,
-                detail: text(row, 7)?,
+                detail: read_text_or_empty(row, 7)?,
             })
         })
     }
@@ -185,10 +193,10 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn decisions(&self, span: RecordSpan) -> Result<Vec<Decision>, HistoryError> {
+    pub fn read_decisions(&self, span: RecordSpan) -> Result<Vec<Decision>, HistoryError> {
         let select = "SELECT at_ns, script, script_version, wanted, value, unit, reason, outcome, outcome_reason
             FROM decisions WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
-        self.list(select, span, |row| {
+        self.read_records(select, span, |row| {
             Ok(Decision {
                 at_ns: row.get(0)?,
                 script: row.get(1)?,
@@ -207,11 +215,11 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn commands(&self, span: RecordSpan) -> Result<Vec<Command>, HistoryError> {
+    pub fn read_commands(&self, span: RecordSpan) -> Result<Vec<Command>, HistoryError> {
         let select =
             "SELECT at_ns, command, target, before, asked, after, unit, outcome, reason, script, script_version
             FROM commands WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
-        self.list(select, span, |row| {
+        self.read_records(select, span, |row| {
             Ok(Command {
                 at_ns: row.get(0)?,
                 command: row.get(1)?,
@@ -222,8 +230,8 @@ impl Reader {
                 unit: row.get(6)?,
                 outcome: row.get(7)?,
                 reason: row.get(8)?,
-                script: text(row, 9)?,
-                script_version: text(row, 10)?,
+                script: read_text_or_empty(row, 9)?,
+                script_version: read_text_or_empty(row, 10)?,
             })
         })
     }
@@ -232,10 +240,10 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn models(&self, span: RecordSpan) -> Result<Vec<Model>, HistoryError> {
+    pub fn read_models(&self, span: RecordSpan) -> Result<Vec<Model>, HistoryError> {
         let select = "SELECT at_ns, name, origin, toml FROM models
             WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
-        self.list(select, span, |row| {
+        self.read_records(select, span, |row| {
             Ok(Model { at_ns: row.get(0)?, name: row.get(1)?, origin: row.get(2)?, toml: row.get(3)? })
         })
     }
@@ -244,10 +252,10 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn diagnoses(&self, span: RecordSpan) -> Result<Vec<Diagnosis>, HistoryError> {
+    pub fn read_diagnoses(&self, span: RecordSpan) -> Result<Vec<Diagnosis>, HistoryError> {
         let select = "SELECT at_ns, from_ns, to_ns, verdict, summary, json FROM diagnoses
             WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
-        self.list(select, span, |row| {
+        self.read_records(select, span, |row| {
             Ok(Diagnosis {
                 at_ns: row.get(0)?,
                 from_ns: row.get(1)?,
@@ -259,7 +267,7 @@ impl Reader {
         })
     }
 
-    fn list<T>(
+    fn read_records<T>(
         &self,
         select: &str,
         span: RecordSpan,
@@ -274,9 +282,9 @@ impl Reader {
         values: impl Params,
         read: impl FnMut(&Row<'_>) -> Result<T, rusqlite::Error>,
     ) -> Result<Vec<T>, HistoryError> {
-        let mut statement = self.db.prepare_cached(select).doing("reading records")?;
+        let mut statement = self.db.prepare_cached(select).with_activity("reading records")?;
         let rows = statement.query_map(values, read);
-        let mut records: Vec<T> = rows.and_then(Iterator::collect).doing("reading records")?;
+        let mut records: Vec<T> = rows.and_then(Iterator::collect).with_activity("reading records")?;
         records.reverse();
         Ok(records)
     }

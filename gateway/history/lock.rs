@@ -1,7 +1,7 @@
 //! One writer per history: a lock file beside the database. The system releases it when the process ends, however it
 //! ends, so a killed gateway leaves nothing to clean up.
 
-use super::error::{HistoryError, at};
+use super::error::{HistoryError, add_path};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -14,8 +14,8 @@ pub(crate) struct Lock {
 
 impl Lock {
     /// Takes the lock of the history at `path`, or says who has it.
-    pub(crate) fn take(path: &Path) -> Result<Self, HistoryError> {
-        let beside = beside(path, ".lock");
+    pub(crate) fn acquire_at(path: &Path) -> Result<Self, HistoryError> {
+        let beside = append_suffix(path, ".lock");
         let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&beside);
         let mut file = opened.map_err(|error| lock_error(path, &beside, error))?;
         match file.try_lock() {
@@ -42,7 +42,7 @@ fn note_holder(file: &mut File) -> std::io::Result<()> {
 }
 
 /// The file beside the database whose name ends in `suffix`.
-pub(crate) fn beside(path: &Path, suffix: &str) -> PathBuf {
+pub(crate) fn append_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);
     name.into()
@@ -51,7 +51,7 @@ pub(crate) fn beside(path: &Path, suffix: &str) -> PathBuf {
 fn lock_error(path: &Path, beside: &Path, error: std::io::Error) -> HistoryError {
     use std::io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
     if !matches!(error.kind(), PermissionDenied | ReadOnlyFilesystem) {
-        return at(beside)(error);
+        return add_path(beside)(error);
     }
     let place = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     HistoryError::ReadOnly { path: path.to_owned(), place: place.to_owned(), error: error.to_string() }

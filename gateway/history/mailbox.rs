@@ -94,7 +94,7 @@ pub(crate) struct QueueFigures {
 impl Mailbox {
     pub(crate) fn new(series: &[Series], options: &Options) -> Self {
         let post = MailboxState {
-            current: SeriesRows::of(series),
+            current: SeriesRows::for_series(series),
             full: VecDeque::new(),
             free: Vec::new(),
             queued_rows: 0,
@@ -121,21 +121,21 @@ impl Mailbox {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, MailboxState> {
+    fn lock_state(&self) -> MutexGuard<'_, MailboxState> {
         // Nothing in here is left half done by a panic: every push is completed before the lock is released.
         self.post.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn wait<'a>(&self, post: MutexGuard<'a, MailboxState>) -> MutexGuard<'a, MailboxState> {
+    fn wait_for_progress<'a>(&self, post: MutexGuard<'a, MailboxState>) -> MutexGuard<'a, MailboxState> {
         self.progressed.wait(post).unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Queues one tick; the samples dropped so far.
-    pub(crate) fn sample(&self, sample: &Sample, extras: &[ExtraValue<'_>]) -> u64 {
-        let mut post = self.lock();
+    pub(crate) fn queue_sample(&self, sample: &Sample, extras: &[ExtraValue<'_>]) -> u64 {
+        let mut post = self.lock_state();
         while post.queued_rows >= self.queue_rows && self.when_full == WhenFull::Wait && !post.stopped {
             self.arrived.notify_one();
-            post = self.wait(post);
+            post = self.wait_for_progress(post);
         }
         if post.queued_rows >= self.queue_rows || post.stopped {
             post.dropped_samples += 1;
@@ -153,11 +153,11 @@ impl Mailbox {
     }
 
     /// Queues one record; its ticket, or `None` when the queue is full.
-    pub(crate) fn record(&self, record: Record) -> Option<u64> {
-        let mut post = self.lock();
+    pub(crate) fn queue_record(&self, record: Record) -> Option<u64> {
+        let mut post = self.lock_state();
         while post.waiting_records() >= self.queue_records && self.when_full == WhenFull::Wait && !post.stopped {
             self.arrived.notify_one();
-            post = self.wait(post);
+            post = self.wait_for_progress(post);
         }
         if post.waiting_records() >= self.queue_records || post.stopped {
             post.dropped_records += 1;
@@ -170,8 +170,8 @@ impl Mailbox {
     }
 
     /// Asks for a job and returns its number.
-    pub(crate) fn ask(&self, job: WriterJob) -> u64 {
-        let mut post = self.lock();
+    pub(crate) fn queue_job(&self, job: WriterJob) -> u64 {
+        let mut post = self.lock_state();
         post.last_job += 1;
         let number = post.last_job;
         post.jobs.push_back((number, job));
@@ -182,7 +182,7 @@ impl Mailbox {
     /// Waits until job `number` is finished; false when it was not within `limit` or the writer has stopped.
     pub(crate) fn await_job(&self, number: u64, limit: Duration) -> bool {
         let until = Instant::now() + limit;
-        let mut post = self.lock();
+        let mut post = self.lock_state();
         while post.finished_job < number && !post.stopped {
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
@@ -194,15 +194,15 @@ impl Mailbox {
     }
 
     /// Asks the writer to finish.
-    pub(crate) fn close(&self) {
-        self.lock().closing = true;
+    pub(crate) fn request_close(&self) {
+        self.lock_state().closing = true;
         self.arrived.notify_one();
     }
 
     /// The writer's side: waits until there is a full batch, a job or `limit` has passed, then takes what is there.
     /// `rows_too` false leaves the samples where they are.
-    pub(crate) fn take(&self, limit: Duration, rows_too: bool, job_too: bool) -> Delivery {
-        let mut post = self.lock();
+    pub(crate) fn receive_delivery(&self, limit: Duration, rows_too: bool, job_too: bool) -> Delivery {
+        let mut post = self.lock_state();
         let ready = |post: &MailboxState| {
             (rows_too && !post.full.is_empty()) || (job_too && !post.jobs.is_empty()) || post.closing
         };
@@ -210,15 +210,15 @@ impl Mailbox {
             let waited = self.arrived.wait_timeout_while(post, limit, |post| !ready(post));
             post = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
-        let delivery = post.deliver(rows_too, job_too);
+        let delivery = post.collect_delivery(rows_too, job_too);
         self.progressed.notify_all();
         delivery
     }
 
     /// The writer's side: an emptied batch, and how many records it still holds.
-    pub(crate) fn recycle(&self, mut batch: SeriesRows) {
+    pub(crate) fn recycle_batch(&self, mut batch: SeriesRows) {
         batch.clear();
-        let mut post = self.lock();
+        let mut post = self.lock_state();
         if post.free.len() < FREE_MAX {
             post.free.push(batch);
         }
@@ -226,24 +226,24 @@ impl Mailbox {
 
     /// The writer's side: how many records it holds that are not durable yet.
     pub(crate) fn hold_records(&self, count: usize) {
-        self.lock().held_records = count;
+        self.lock_state().held_records = count;
         self.progressed.notify_all();
     }
 
     /// The writer's side: job `number` is done.
-    pub(crate) fn finish(&self, number: u64) {
-        self.lock().finished_job = number;
+    pub(crate) fn finish_job(&self, number: u64) {
+        self.lock_state().finished_job = number;
         self.progressed.notify_all();
     }
 
     /// The writer's side: there is nobody to write any more.
-    pub(crate) fn stop(&self) {
-        self.lock().stopped = true;
+    pub(crate) fn mark_stopped(&self) {
+        self.lock_state().stopped = true;
         self.progressed.notify_all();
     }
 
-    pub(crate) fn waiting(&self) -> QueueFigures {
-        let post = self.lock();
+    pub(crate) fn measure_queue(&self) -> QueueFigures {
+        let post = self.lock_state();
         QueueFigures {
             rows: post.queued_rows,
             records: post.waiting_records(),
@@ -264,7 +264,7 @@ impl MailboxState {
         self.full.push_back(full);
     }
 
-    fn deliver(&mut self, rows_too: bool, job_too: bool) -> Delivery {
+    fn collect_delivery(&mut self, rows_too: bool, job_too: bool) -> Delivery {
         let mut batches = VecDeque::new();
         if rows_too {
             if !self.current.is_empty() {

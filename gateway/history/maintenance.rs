@@ -2,7 +2,7 @@
 
 use super::compact;
 use super::error::{Doing, HistoryError};
-use super::lock::beside;
+use super::lock::append_suffix;
 use super::options::Retention;
 use super::retention::{AgeLimits, remove_aged, remove_oldest, used_bytes};
 use super::seal;
@@ -53,8 +53,8 @@ enum MaintenanceStage {
 
 impl Maintenance {
     pub(crate) fn new(path: &Path, retention: Retention, reserve_bytes: u64) -> Self {
-        let mut reserve = Reserve::beside(path, reserve_bytes);
-        reserve.keep();
+        let mut reserve = Reserve::new_beside(path, reserve_bytes);
+        reserve.claim_space();
         Self {
             path: path.to_owned(),
             retention,
@@ -70,11 +70,11 @@ impl Maintenance {
     /// Keeps the log so short that the reserve has room for all of it when it must be copied back on a full disk.
     pub(crate) fn bound_log(&self, db: &Connection) -> Result<(), HistoryError> {
         let pages = (self.reserve.bytes() / 2 / PAGE_BYTES).clamp(LOG_PAGES_MIN, LOG_PAGES_MAX);
-        db.pragma_update(None, "wal_autocheckpoint", pages as i64).doing("bounding the write-ahead log")?;
+        db.pragma_update(None, "wal_autocheckpoint", pages as i64).with_activity("bounding the write-ahead log")?;
         // What a reader made it grow beyond that is given back to the disk.
         let bytes = 2 * pages * PAGE_BYTES;
         db.query_row(&format!("PRAGMA journal_size_limit = {bytes}"), [], |_| Ok(()))
-            .doing("bounding the write-ahead log")
+            .with_activity("bounding the write-ahead log")
     }
 
     /// After a commit: looks at the disk now and then, and keeps the file below what it may have. Returns its size.
@@ -82,12 +82,12 @@ impl Maintenance {
         let mut used = used_bytes(db)?;
         if self.looked.is_none_or(|looked| looked.elapsed() >= LOOK_EVERY) {
             self.looked = Some(Instant::now());
-            self.look(used);
-            self.log_bytes = std::fs::metadata(beside(&self.path, "-wal")).map_or(0, |file| file.len());
+            self.update_ceiling(used);
+            self.log_bytes = std::fs::metadata(append_suffix(&self.path, "-wal")).map_or(0, |file| file.len());
         }
         let because = if self.ceiling.is_some() { "the disk is full" } else { "the size limit" };
         for _ in 0..STEPS_MAX {
-            if used <= self.limit() || !self.remove(db, because)? {
+            if used <= self.limit_bytes() || !self.remove(db, because)? {
                 break;
             }
             used = used_bytes(db)?;
@@ -100,18 +100,18 @@ impl Maintenance {
         self.ceiling.is_some()
     }
 
-    fn limit(&self) -> u64 {
+    fn limit_bytes(&self) -> u64 {
         self.ceiling.unwrap_or(u64::MAX).min(self.retention.max_bytes)
     }
 
-    fn look(&mut self, used: u64) {
+    fn update_ceiling(&mut self, used: u64) {
         let Some(room) = disk_room(&self.path) else { return };
         let keep = self.retention.keep_free_bytes.min(room.total / 10);
         if room.free < keep {
             self.ceiling.get_or_insert(used);
         } else if room.free > keep + keep / 4 {
             self.ceiling = None;
-            self.reserve.keep();
+            self.reserve.claim_space();
         }
     }
 
@@ -123,8 +123,8 @@ impl Maintenance {
 
     /// The disk took nothing any more: gives the reserve back, copies the log into the file, and makes room in it.
     pub(crate) fn make_room(&mut self, db: &mut Connection, wanted: u64) -> Result<(), HistoryError> {
-        self.reserve.release();
-        checkpoint(db)?;
+        self.reserve.release_space();
+        checkpoint_log(db)?;
         let used = used_bytes(db)?;
         let target = used.saturating_sub(wanted.max(used / 50));
         self.ceiling = Some(used);
@@ -133,21 +133,23 @@ impl Maintenance {
                 break;
             }
         }
-        checkpoint(db)
+        checkpoint_log(db)
     }
 
     /// Begins maintenance; what is too old at `now_ns` goes, where that is known.
-    pub(crate) fn begin(&mut self, now_ns: Option<TimeNs>) {
+    pub(crate) fn begin_run(&mut self, now_ns: Option<TimeNs>) {
         self.task = Some(MaintenanceStage::Compact(now_ns));
     }
 
     /// Does a bounded piece of maintenance; false when there is none left.
-    pub(crate) fn step(&mut self, db: &mut Connection) -> Result<bool, HistoryError> {
+    pub(crate) fn run_step(&mut self, db: &mut Connection) -> Result<bool, HistoryError> {
         let Some(task) = &self.task else { return Ok(false) };
         let next = match task {
-            MaintenanceStage::Compact(now_ns) => match (compact::step(db)?, now_ns) {
+            MaintenanceStage::Compact(now_ns) => match (compact::compact_next(db)?, now_ns) {
                 (true, _) => return Ok(true),
-                (false, Some(now_ns)) => Some(MaintenanceStage::Age(AgeLimits::at(db, &self.retention, *now_ns)?)),
+                (false, Some(now_ns)) => {
+                    Some(MaintenanceStage::Age(AgeLimits::from_retention(db, &self.retention, *now_ns)?))
+                }
                 (false, None) => Some(MaintenanceStage::Seal(seal::BLOCKS_PER_RUN)),
             },
             MaintenanceStage::Age(limits) => {
@@ -158,18 +160,20 @@ impl Maintenance {
                     false => Some(MaintenanceStage::Seal(seal::BLOCKS_PER_RUN)),
                 }
             }
-            MaintenanceStage::Seal(left) => match left.checked_sub(seal::step(db)?).filter(|next| next < left) {
-                Some(left) => Some(MaintenanceStage::Seal(left)),
-                None => Some(MaintenanceStage::Shrink),
-            },
-            MaintenanceStage::Shrink => shrink(db)?.then_some(MaintenanceStage::Shrink),
+            MaintenanceStage::Seal(left) => {
+                match left.checked_sub(seal::seal_next_blocks(db)?).filter(|next| next < left) {
+                    Some(left) => Some(MaintenanceStage::Seal(left)),
+                    None => Some(MaintenanceStage::Shrink),
+                }
+            }
+            MaintenanceStage::Shrink => shrink_file(db)?.then_some(MaintenanceStage::Shrink),
         };
         self.task = next;
         Ok(self.task.is_some())
     }
 
     /// Gives maintenance up until it is asked for again.
-    pub(crate) fn abandon(&mut self) {
+    pub(crate) fn abandon_run(&mut self) {
         self.task = None;
     }
 
@@ -178,23 +182,23 @@ impl Maintenance {
     }
 }
 
-fn checkpoint(db: &Connection) -> Result<(), HistoryError> {
+fn checkpoint_log(db: &Connection) -> Result<(), HistoryError> {
     // Without TRUNCATE the log keeps its room on disk, which is what the next deletion writes into.
-    db.query_row("PRAGMA wal_checkpoint(RESTART)", [], |_| Ok(())).doing("copying the log into the database")
+    db.query_row("PRAGMA wal_checkpoint(RESTART)", [], |_| Ok(())).with_activity("copying the log into the database")
 }
 
 /// Gives free pages beyond an eighth of the file back to the disk; false when there are none.
-fn shrink(db: &Connection) -> Result<bool, HistoryError> {
+fn shrink_file(db: &Connection) -> Result<bool, HistoryError> {
     let pragma = |name: &str| {
-        db.query_row(&format!("PRAGMA {name}"), [], |row| row.get::<_, u32>(0)).doing("measuring the database")
+        db.query_row(&format!("PRAGMA {name}"), [], |row| row.get::<_, u32>(0)).with_activity("measuring the database")
     };
     let (pages, free) = (pragma("page_count")?, pragma("freelist_count")?);
     if free <= pages / 8 {
         return Ok(false);
     }
     let mut statement =
-        db.prepare(&format!("PRAGMA incremental_vacuum({VACUUM_PAGES})")).doing("shrinking the database")?;
-    let mut rows = statement.query([]).doing("shrinking the database")?;
-    while rows.next().doing("shrinking the database")?.is_some() {}
+        db.prepare(&format!("PRAGMA incremental_vacuum({VACUUM_PAGES})")).with_activity("shrinking the database")?;
+    let mut rows = statement.query([]).with_activity("shrinking the database")?;
+    while rows.next().with_activity("shrinking the database")?.is_some() {}
     Ok(pragma("freelist_count")? < free)
 }

@@ -63,7 +63,7 @@ pub(crate) struct MinuteBuffer {
 impl MinuteBuffer {
     pub(crate) fn new(series: Vec<Series>, end: End) -> Result<Self, HistoryError> {
         let encoder = Encoder::new(LEVEL_FRESH).map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
-        let open = SeriesRows::of(&series);
+        let open = SeriesRows::for_series(&series);
         Ok(Self {
             series,
             reasons: Reasons::default(),
@@ -122,16 +122,16 @@ impl MinuteBuffer {
     }
 
     /// Right after a commit: the time of the newest durable row, and the number of the row after it.
-    pub(crate) fn durable(&self) -> (Option<TimeNs>, i64) {
+    pub(crate) fn durable_end(&self) -> (Option<TimeNs>, i64) {
         let in_tail = self.in_tail.checked_sub(1).map(|row| self.open.at_ns[row]);
         (in_tail.or(self.sealed_ns), self.open_row() + self.in_tail as i64)
     }
 
     /// Takes a batch on: rows of the same minute gather, a new minute or a clock that went back seals what is there.
-    pub(crate) fn ingest(&mut self, batch: &SeriesRows) {
+    pub(crate) fn ingest_batch(&mut self, batch: &SeriesRows) {
         let mut from = 0;
         while from < batch.len() {
-            self.begin(batch.at_ns[from]);
+            self.prepare_row_at(batch.at_ns[from]);
             let minute = batch.at_ns[from].div_euclid(MINUTE_NS);
             let room = BLOCK_ROWS_MAX - self.open.len();
             let mut to = from + 1;
@@ -142,7 +142,7 @@ impl MinuteBuffer {
             {
                 to += 1;
             }
-            self.open.append(batch, from..to);
+            self.open.append_rows(batch, from..to);
             self.next_row += (to - from) as i64;
             self.last_ns = Some(batch.at_ns[to - 1]);
             from = to;
@@ -150,13 +150,13 @@ impl MinuteBuffer {
     }
 
     /// Makes the open rows ready for one at `at_ns`.
-    fn begin(&mut self, at_ns: TimeNs) {
+    fn prepare_row_at(&mut self, at_ns: TimeNs) {
         let went_back = self.last_ns.filter(|last_ns| at_ns < *last_ns);
         if let Some(last_ns) = went_back {
             self.note_step(last_ns, at_ns);
         }
         if self.fresh || went_back.is_some() {
-            self.seal();
+            self.seal_open_rows();
             self.segment += 1;
             let reason = if self.fresh { "start" } else { "clock_went_back" };
             self.fresh = false;
@@ -168,7 +168,7 @@ impl MinuteBuffer {
             .first()
             .is_some_and(|first_ns| first_ns.div_euclid(MINUTE_NS) != at_ns.div_euclid(MINUTE_NS));
         if other_minute || self.open.len() >= BLOCK_ROWS_MAX {
-            self.seal();
+            self.seal_open_rows();
         }
     }
 
@@ -187,12 +187,12 @@ impl MinuteBuffer {
     }
 
     /// Turns the open rows into a block.
-    pub(crate) fn seal(&mut self) {
+    pub(crate) fn seal_open_rows(&mut self) {
         if self.open.is_empty() {
             return;
         }
         let first_row = self.open_row();
-        let block = self.encoder.encode(&self.open, &self.series, &self.reasons, self.segment, first_row);
+        let block = self.encoder.encode_block(&self.open, &self.series, &self.reasons, self.segment, first_row);
         self.sealed_ns = Some(block.key.end_ns);
         self.open.clear();
         self.in_tail = 0;

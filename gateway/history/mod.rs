@@ -99,7 +99,7 @@ pub use future::FutureRows;
 pub use info::{Dropped, Info, TableRows};
 pub use list::{AlarmEntry, RecordSpan, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
-pub(crate) use outbox::unnested;
+pub(crate) use outbox::parse_nested_json;
 pub use outbox::{
     Cell, Content, DeliveryState, Gap, Item, Outbox, OutboxFigures, OutboxHead, OutboxReader, OutboxSettings,
     OutboxStretch, Position, Reading, SeriesInfo, SeriesMean, box_id,
@@ -112,8 +112,8 @@ pub use record::{
     Alarm, AlarmClear, Audit, Command, Decision, Diagnosis, Event, Model, Part, ReactionTime, Record, StateChange,
 };
 pub use redate::{Redated, set_clock};
-pub use repair::{Repaired, RepairedTable, repair};
-pub use rounding::rounded;
+pub use repair::{Repaired, RepairedTable, repair_history};
+pub use rounding::round_to_decimals;
 pub use rusqlite::types::Value as SqlValue;
 pub use schema::page_layer;
 pub use series::{Series, as_stored, decimals_of_unit};

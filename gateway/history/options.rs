@@ -57,7 +57,7 @@ pub struct ExtraSeries {
 impl ExtraSeries {
     /// A quantity, with the usual resolution of its unit.
     #[must_use]
-    pub fn number(name: &str, unit: &str, en: &str, zh: &str) -> Self {
+    pub fn new_number(name: &str, unit: &str, en: &str, zh: &str) -> Self {
         Self {
             name: name.to_owned(),
             unit: unit.to_owned(),
@@ -70,8 +70,8 @@ impl ExtraSeries {
 
     /// A state word.
     #[must_use]
-    pub fn text(name: &str, en: &str, zh: &str) -> Self {
-        Self { kind: SeriesKind::Text, ..Self::number(name, "", en, zh) }
+    pub fn new_text(name: &str, en: &str, zh: &str) -> Self {
+        Self { kind: SeriesKind::Text, ..Self::new_number(name, "", en, zh) }
     }
 }
 
@@ -174,7 +174,7 @@ impl Default for Options {
             retention: Retention::default(),
             extras: Vec::new(),
             origin: "live".to_owned(),
-            clock: ClockMark::stepped(),
+            clock: ClockMark::from_stepped_time(),
             goes_on: false,
             reserve_bytes: 8_192_000,
             outbox: None,

@@ -60,17 +60,17 @@ impl Reader {
     /// # Errors
     /// [`HistoryError::Question`] for a series that does not exist or more than a million buckets;
     /// [`HistoryError::Damaged`], or what `SQLite` says.
-    pub fn overview(&self, query: &Query, width_ns: i64) -> Result<Overview, HistoryError> {
+    pub fn read_overview(&self, query: &Query, width_ns: i64) -> Result<Overview, HistoryError> {
         self.refuse_too_many(query, width_ns)?;
-        let known: Arc<[Series]> = self.series()?.into();
+        let known: Arc<[Series]> = self.read_series()?.into();
         let level = Level::for_width(width_ns).filter(|_| !query.has_filter());
         if let Some(level) = level {
-            let view = self.db.unchecked_transaction().doing("beginning to read")?;
+            let view = self.db.unchecked_transaction().with_activity("beginning to read")?;
             let wanted = self.wanted_numbers(query, &known, level)?;
             if wanted.iter().all(|series| series.kind == SeriesKind::Number) {
                 let building = self.read_pyramid(query, wanted, width_ns, level, &known)?;
                 drop(view);
-                return Ok(building.finish());
+                return Ok(building.into_overview());
             }
         }
         self.read_samples(query, width_ns)
@@ -80,7 +80,7 @@ impl Reader {
         if width_ns <= 0 {
             return Err(HistoryError::Question("the resolution must be more than 0 s".to_owned()));
         }
-        let Some((first_ns, last_ns)) = self.span()? else { return Ok(()) };
+        let Some((first_ns, last_ns)) = self.read_span()? else { return Ok(()) };
         let range = query.range();
         let length_ns = range.end.min(last_ns).saturating_sub(range.start.max(first_ns));
         if length_ns / width_ns <= BUCKETS_MAX {
@@ -96,16 +96,16 @@ impl Reader {
     /// The series asked for by name, or the quantities that have a value in that time.
     fn wanted_numbers(&self, query: &Query, known: &Arc<[Series]>, level: &Level) -> Result<Vec<Series>, HistoryError> {
         if !query.series.is_empty() {
-            return self.wanted(query, known);
+            return self.resolve_series(query, known);
         }
         let range = buckets_of(level, query);
         let text = format!("SELECT DISTINCT series FROM {} WHERE {} BETWEEN ?1 AND ?2", level.table, level.key);
-        let mut statement = self.db.prepare_cached(&text).doing("looking for series")?;
+        let mut statement = self.db.prepare_cached(&text).with_activity("looking for series")?;
         let ids = statement.query_map([range.start, range.end], |row| row.get::<_, i64>(0));
-        let mut ids: Vec<i64> = ids.and_then(Iterator::collect).doing("looking for series")?;
+        let mut ids: Vec<i64> = ids.and_then(Iterator::collect).with_activity("looking for series")?;
         let mut walk = Walk::of_tail(&self.db, query.range(), known.clone())?;
         while let Some(stretch) = walk.next(&self.db)? {
-            ids.extend(stretch.delivered(known).into_iter().map(|(id, _)| id));
+            ids.extend(stretch.delivered_series(known).into_iter().map(|(id, _)| id));
         }
         let numbers = known.iter().filter(|series| series.kind == SeriesKind::Number && ids.contains(&series.id));
         Ok(numbers.cloned().collect())
@@ -128,17 +128,17 @@ impl Reader {
             "SELECT {key}, series, count, min, max, mean FROM {table} WHERE {key} BETWEEN ?1 AND ?2 AND series IN ({})",
             ids.join(",")
         );
-        let mut statement = self.db.prepare(&text).doing("reading summaries")?;
-        let mut rows = statement.query(params![range.start, range.end]).doing("reading summaries")?;
-        while let Some(row) = rows.next().doing("reading summaries")? {
-            let summary = summary_of(row).doing("reading a summary")?;
-            let (bucket, id): (i64, i64) = (row.get(0).doing("reading")?, row.get(1).doing("reading")?);
+        let mut statement = self.db.prepare(&text).with_activity("reading summaries")?;
+        let mut rows = statement.query(params![range.start, range.end]).with_activity("reading summaries")?;
+        while let Some(row) = rows.next().with_activity("reading summaries")? {
+            let summary = summary_of(row).with_activity("reading a summary")?;
+            let (bucket, id): (i64, i64) = (row.get(0).with_activity("reading")?, row.get(1).with_activity("reading")?);
             building.add(bucket.saturating_mul(level.width_ns), places[&id], summary);
         }
         let mut walk = Walk::of_tail(&self.db, query.range(), known.clone())?;
         while let Some(stretch) = walk.next(&self.db)? {
             for (id, column) in &places {
-                if let Some(cells) = walk.cells(&stretch, *id)? {
+                if let Some(cells) = walk.read_cells(&stretch, *id)? {
                     building.add_cells(&stretch.at_ns, *column, &cells);
                 }
             }
@@ -148,14 +148,14 @@ impl Reader {
 
     fn read_samples(&self, query: &Query, width_ns: i64) -> Result<Overview, HistoryError> {
         let mut building = BucketBuilder { width_ns, series: Vec::new(), buckets: BTreeMap::new() };
-        self.samples(query, |chunk| {
+        self.for_each_chunk(query, |chunk| {
             building.add_chunk(chunk);
             ControlFlow::Continue(())
         })?;
         if building.series.is_empty() {
-            building.series = self.wanted(query, &self.series()?.into())?;
+            building.series = self.resolve_series(query, &self.read_series()?.into())?;
         }
-        Ok(building.finish())
+        Ok(building.into_overview())
     }
 }
 
@@ -171,11 +171,11 @@ fn summary_of(row: &rusqlite::Row<'_>) -> Result<ValueSummary, rusqlite::Error> 
 /// First and last bucket of `level` that the time of `query` touches.
 fn buckets_of(level: &Level, query: &Query) -> Range<i64> {
     let range = query.range();
-    level.bucket(range.start)..level.bucket(range.end.saturating_sub(1))
+    level.bucket_at(range.start)..level.bucket_at(range.end.saturating_sub(1))
 }
 
 impl BucketBuilder {
-    fn cell(&mut self, at_ns: TimeNs, column: usize) -> &mut BucketCell {
+    fn cell_mut(&mut self, at_ns: TimeNs, column: usize) -> &mut BucketCell {
         let count = self.series.len();
         let cells =
             self.buckets.entry(at_ns.div_euclid(self.width_ns)).or_insert_with(|| vec![BucketCell::default(); count]);
@@ -183,8 +183,8 @@ impl BucketBuilder {
     }
 
     fn add(&mut self, at_ns: TimeNs, column: usize, summary: ValueSummary) {
-        let cell = self.cell(at_ns, column);
-        cell.summary = cell.summary.and(summary);
+        let cell = self.cell_mut(at_ns, column);
+        cell.summary = cell.summary.merge_with(summary);
     }
 
     fn add_chunk(&mut self, chunk: &Chunk<'_>) {
@@ -203,16 +203,16 @@ impl BucketBuilder {
             let bucket = at_ns[row].div_euclid(self.width_ns);
             let end = row + at_ns[row..].partition_point(|at_ns| at_ns.div_euclid(self.width_ns) <= bucket);
             values.clear();
-            values.extend((row..end).filter_map(|row| cells.number(row)));
-            let word = (row..end).rev().find_map(|row| cells.word(row)).map(Arc::from);
-            let cell = self.cell(at_ns[row], column);
-            cell.summary = cell.summary.and(ValueSummary::of(&values));
+            values.extend((row..end).filter_map(|row| cells.number_at(row)));
+            let word = (row..end).rev().find_map(|row| cells.word_at(row)).map(Arc::from);
+            let cell = self.cell_mut(at_ns[row], column);
+            cell.summary = cell.summary.merge_with(ValueSummary::from_values(&values));
             cell.word = word.or(cell.word.take());
             row = end;
         }
     }
 
-    fn finish(self) -> Overview {
+    fn into_overview(self) -> Overview {
         let start_ns = self.buckets.keys().map(|bucket| bucket.saturating_mul(self.width_ns)).collect();
         let column = |(index, series): (usize, &Series)| {
             let cells = self.buckets.values().map(|cells| &cells[index]);

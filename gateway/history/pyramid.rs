@@ -56,7 +56,7 @@ impl Level {
     }
 
     /// Number of the bucket that holds `at_ns`.
-    pub(crate) fn bucket(&self, at_ns: TimeNs) -> i64 {
+    pub(crate) fn bucket_at(&self, at_ns: TimeNs) -> i64 {
         at_ns.div_euclid(self.width_ns)
     }
 
@@ -72,7 +72,7 @@ pub(crate) fn add(db: &Connection, block: &Block) -> Result<(), rusqlite::Error>
         let mut insert = db.prepare_cached(level.insert)?;
         for (series, summary) in &block.summaries {
             let ValueSummary { count, min, max, mean } = *summary;
-            insert.execute(params![level.bucket(block.key.start_ns), series, count as i64, min, max, mean])?;
+            insert.execute(params![level.bucket_at(block.key.start_ns), series, count as i64, min, max, mean])?;
         }
     }
     Ok(())
@@ -82,12 +82,12 @@ pub(crate) fn add(db: &Connection, block: &Block) -> Result<(), rusqlite::Error>
 pub(crate) fn with_blocks(db: &Connection, minutes: Range<i64>) -> Result<Range<i64>, HistoryError> {
     let oldest: Option<i64> = db
         .query_row("SELECT min(start_ns) / ?1 FROM blocks", [MINUTE_NS], |row| row.get(0))
-        .doing("looking for the oldest block")?;
+        .with_activity("looking for the oldest block")?;
     Ok(minutes.start.max(oldest.unwrap_or(minutes.end))..minutes.end)
 }
 
 /// Makes the summaries of these minutes anew from the blocks, and those of their hours and days from them.
-pub(crate) fn renew(db: &Connection, minutes: Range<i64>) -> Result<(), HistoryError> {
+pub(crate) fn renew_buckets(db: &Connection, minutes: Range<i64>) -> Result<(), HistoryError> {
     if minutes.is_empty() {
         return Ok(());
     }
@@ -97,7 +97,7 @@ pub(crate) fn renew(db: &Connection, minutes: Range<i64>) -> Result<(), HistoryE
         let (fine, coarse) = (&pair[0], &pair[1]);
         let per = coarse.width_ns / fine.width_ns;
         range = range.start.div_euclid(per)..(range.end - 1).div_euclid(per) + 1;
-        renew_level(db, fine, coarse, &range).doing("making summaries anew")?;
+        renew_level(db, fine, coarse, &range).with_activity("making summaries anew")?;
     }
     Ok(())
 }
@@ -106,10 +106,10 @@ fn renew_minutes(db: &Connection, minutes: &Range<i64>) -> Result<(), HistoryErr
     let sums = minute_sums(db, minutes)?;
     let minute = &LEVELS[0];
     db.execute("DELETE FROM minutes WHERE minute >= ?1 AND minute < ?2", [minutes.start, minutes.end])
-        .doing("making summaries anew")?;
-    let mut insert = db.prepare_cached(minute.insert).doing("making summaries anew")?;
+        .with_activity("making summaries anew")?;
+    let mut insert = db.prepare_cached(minute.insert).with_activity("making summaries anew")?;
     for ((bucket, series), ValueSummary { count, min, max, mean }) in sums {
-        insert.execute(params![bucket, series, count as i64, min, max, mean]).doing("making summaries anew")?;
+        insert.execute(params![bucket, series, count as i64, min, max, mean]).with_activity("making summaries anew")?;
     }
     Ok(())
 }
@@ -122,11 +122,11 @@ fn minute_sums(db: &Connection, minutes: &Range<i64>) -> Result<BTreeMap<(i64, i
     let mut sums: BTreeMap<(i64, i64), ValueSummary> = BTreeMap::new();
     while let Some(stretch) = walk.next(db)? {
         for one in series.iter().filter(|one| one.kind == SeriesKind::Number) {
-            let Some(cells) = walk.cells(&stretch, one.id)? else { continue };
+            let Some(cells) = walk.read_cells(&stretch, one.id)? else { continue };
             for row in walk.rows_of(&stretch) {
-                let Some(value) = cells.number(row) else { continue };
+                let Some(value) = cells.number_at(row) else { continue };
                 let sum = sums.entry((stretch.at_ns[row].div_euclid(MINUTE_NS), one.id)).or_default();
-                *sum = sum.and(ValueSummary { count: 1, min: value, max: value, mean: value });
+                *sum = sum.merge_with(ValueSummary { count: 1, min: value, max: value, mean: value });
             }
         }
     }

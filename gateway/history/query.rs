@@ -7,7 +7,7 @@ use super::reader::Reader;
 use super::reason::Reasons;
 use super::series::Series;
 use super::walk::{SegmentStretch, Walk};
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use adapters::clock::TimeNs;
 use rules::estimators::wear::tool_of;
 use std::ops::{ControlFlow, Range};
@@ -42,7 +42,7 @@ impl Query {
 
     /// The same for these series only.
     #[must_use]
-    pub fn of<'a>(mut self, series: impl IntoIterator<Item = &'a str>) -> Self {
+    pub fn with_series<'a>(mut self, series: impl IntoIterator<Item = &'a str>) -> Self {
         self.series = series.into_iter().map(str::to_owned).collect();
         self
     }
@@ -74,8 +74,8 @@ pub struct Chunk<'a> {
 impl Chunk<'_> {
     /// The reason why `columns[column]` has no value in `row`; `None` when it has one.
     #[must_use]
-    pub fn missing(&self, column: usize, row: usize) -> Option<&str> {
-        self.reasons.word(self.columns[column].missing(row))
+    pub fn missing_reason(&self, column: usize, row: usize) -> Option<&str> {
+        self.reasons.find_word(self.columns[column].missing_code(row))
     }
 }
 
@@ -88,22 +88,22 @@ impl Reader {
     ///
     /// # Errors
     /// [`HistoryError::Question`] for a series that does not exist, [`HistoryError::Damaged`], or what `SQLite` says.
-    pub fn samples(
+    pub fn for_each_chunk(
         &self,
         query: &Query,
         mut each: impl FnMut(&Chunk<'_>) -> ControlFlow<()>,
     ) -> Result<(), HistoryError> {
-        let _view = self.db.unchecked_transaction().doing("beginning to read")?;
-        let known: Arc<[Series]> = self.series()?.into();
-        let wanted = self.wanted(query, &known)?;
-        let conditions = conditions(query, &known)?;
+        let _view = self.db.unchecked_transaction().with_activity("beginning to read")?;
+        let known: Arc<[Series]> = self.read_series()?.into();
+        let wanted = self.resolve_series(query, &known)?;
+        let conditions = build_conditions(query, &known)?;
         let mut walk = Walk::new(&self.db, query.range(), known)?;
         while let Some(stretch) = walk.next(&self.db)? {
-            let rows = matching(&mut walk, &stretch, &conditions)?;
+            let rows = find_matching_rows(&mut walk, &stretch, &conditions)?;
             if rows.is_empty() {
                 continue;
             }
-            let chunk = chunk(&mut walk, &stretch, &rows, &wanted)?;
+            let chunk = read_chunk(&mut walk, &stretch, &rows, &wanted)?;
             let chunk = Chunk { reasons: &walk.reasons, ..chunk };
             if each(&chunk).is_break() {
                 break;
@@ -114,19 +114,23 @@ impl Reader {
     }
 
     /// The series that `query` asks for.
-    pub(crate) fn wanted(&self, query: &Query, known: &Arc<[Series]>) -> Result<Vec<Series>, HistoryError> {
+    pub(crate) fn resolve_series(&self, query: &Query, known: &Arc<[Series]>) -> Result<Vec<Series>, HistoryError> {
         if !query.series.is_empty() {
-            return query.series.iter().map(|name| find(known, name).cloned()).collect();
+            return query.series.iter().map(|name| find_series(known, name).cloned()).collect();
         }
-        Ok(self.delivered(query, known)?.into_iter().map(|(series, _)| series).collect())
+        Ok(self.find_delivered(query, known)?.into_iter().map(|(series, _)| series).collect())
     }
 
     /// The series that anything delivered in the time of `query`, and whether a value of them is missing anywhere.
-    pub(crate) fn delivered(&self, query: &Query, known: &Arc<[Series]>) -> Result<Vec<(Series, bool)>, HistoryError> {
+    pub(crate) fn find_delivered(
+        &self,
+        query: &Query,
+        known: &Arc<[Series]>,
+    ) -> Result<Vec<(Series, bool)>, HistoryError> {
         let mut seen = vec![(false, false); known.len()];
         let mut walk = Walk::new(&self.db, query.range(), known.clone())?;
         while let Some(stretch) = walk.next(&self.db)? {
-            for (id, missing) in stretch.delivered(known) {
+            for (id, missing) in stretch.delivered_series(known) {
                 if let Some(index) = known.iter().position(|series| series.id == id) {
                     seen[index].0 = true;
                     seen[index].1 |= missing;
@@ -139,9 +143,9 @@ impl Reader {
 }
 
 /// The series called `name`.
-pub(crate) fn find<'a>(known: &'a [Series], name: &str) -> Result<&'a Series, HistoryError> {
+pub(crate) fn find_series<'a>(known: &'a [Series], name: &str) -> Result<&'a Series, HistoryError> {
     known.iter().find(|series| *series.name == *name).ok_or_else(|| {
-        let hint = nearest(name, known.iter().map(|series| &*series.name));
+        let hint = find_nearest_name(name, known.iter().map(|series| &*series.name));
         let hint = hint.map_or_else(
             || "`cnc-gateway history query --sql 'SELECT name, unit FROM series'` lists what is stored".to_owned(),
             |near| format!("did you mean {near}?"),
@@ -150,11 +154,11 @@ pub(crate) fn find<'a>(known: &'a [Series], name: &str) -> Result<&'a Series, Hi
     })
 }
 
-fn conditions(query: &Query, known: &[Series]) -> Result<Vec<Condition>, HistoryError> {
+fn build_conditions(query: &Query, known: &[Series]) -> Result<Vec<Condition>, HistoryError> {
     let asked = [(STATE_SERIES, &query.state), ("program", &query.program), ("tool", &query.tool)];
     let set = asked.into_iter().filter_map(|(name, word)| word.as_ref().map(|word| (name, word)));
     set.map(|(name, word)| {
-        let series = find(known, name)?;
+        let series = find_series(known, name)?;
         if series.kind == SeriesKind::Text {
             return Ok((series.id, word.clone(), name == "tool"));
         }
@@ -164,20 +168,24 @@ fn conditions(query: &Query, known: &[Series]) -> Result<Vec<Condition>, History
 }
 
 /// The rows of `stretch` in the range that meet every condition.
-fn matching(walk: &mut Walk, stretch: &SegmentStretch, conditions: &[Condition]) -> Result<Vec<usize>, HistoryError> {
+fn find_matching_rows(
+    walk: &mut Walk,
+    stretch: &SegmentStretch,
+    conditions: &[Condition],
+) -> Result<Vec<usize>, HistoryError> {
     let mut rows: Vec<usize> = walk.rows_of(stretch).collect();
     for (series, word, tool) in conditions {
-        let Some(cells) = walk.cells(stretch, *series)? else { return Ok(Vec::new()) };
+        let Some(cells) = walk.read_cells(stretch, *series)? else { return Ok(Vec::new()) };
         // Asked for a tool, every edge of it is meant.
         let is = |found: &str| found == word || *tool && tool_of(found) == word;
-        rows.retain(|row| cells.word(*row).is_some_and(is));
+        rows.retain(|row| cells.word_at(*row).is_some_and(is));
     }
     Ok(rows)
 }
 
 static NO_REASONS: Reasons = Reasons::none();
 
-fn chunk<'a>(
+fn read_chunk<'a>(
     walk: &mut Walk,
     stretch: &SegmentStretch,
     rows: &[usize],
@@ -186,10 +194,10 @@ fn chunk<'a>(
     let whole = rows.len() == stretch.at_ns.len();
     let mut columns = Vec::with_capacity(wanted.len());
     for series in wanted {
-        columns.push(match walk.cells(stretch, series.id)? {
+        columns.push(match walk.read_cells(stretch, series.id)? {
             None => Cells::not_provided(rows.len()),
             Some(cells) if whole => cells,
-            Some(cells) => cells.keep(rows),
+            Some(cells) => cells.select_rows(rows),
         });
     }
     let at_ns = rows.iter().map(|row| stretch.at_ns[*row]).collect();

@@ -34,7 +34,7 @@ impl Reader {
 
     /// What the answers until now have left out because the disk has changed it, in the order of recording.
     #[must_use]
-    pub fn damaged(&self) -> Vec<DamagedRows> {
+    pub fn damaged_rows(&self) -> Vec<DamagedRows> {
         self.damaged.borrow().values().copied().collect()
     }
 
@@ -52,7 +52,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn series(&self) -> Result<Vec<Series>, HistoryError> {
+    pub fn read_series(&self) -> Result<Vec<Series>, HistoryError> {
         schema::known_series(&self.db)
     }
 
@@ -60,7 +60,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn span(&self) -> Result<Option<(TimeNs, TimeNs)>, HistoryError> {
+    pub fn read_span(&self) -> Result<Option<(TimeNs, TimeNs)>, HistoryError> {
         let bounds: (Option<TimeNs>, Option<TimeNs>) = self
             .db
             .query_row(
@@ -73,7 +73,7 @@ impl Reader {
                 [],
                 |row| Ok((row.get(0)?, row.get(1)?)),
             )
-            .doing("looking for the first and the last row")?;
+            .with_activity("looking for the first and the last row")?;
         Ok(bounds.0.zip(bounds.1))
     }
 
@@ -82,9 +82,9 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn present(&self) -> Result<Option<(TimeNs, TimeNs)>, HistoryError> {
+    pub fn read_present_span(&self) -> Result<Option<(TimeNs, TimeNs)>, HistoryError> {
         let now_ns = clock::now_ns();
-        match self.span()? {
+        match self.read_span()? {
             Some((first_ns, newest_ns)) if newest_ns > now_ns.saturating_add(future::AHEAD_NS) => {
                 Ok(Some((first_ns, future::present_ns(&self.db, now_ns, newest_ns)?.max(first_ns))))
             }
@@ -96,8 +96,8 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn future(&self, now_ns: TimeNs) -> Result<Option<FutureRows>, HistoryError> {
-        FutureRows::after(&self.db, now_ns)
+    pub fn find_future_rows(&self, now_ns: TimeNs) -> Result<Option<FutureRows>, HistoryError> {
+        FutureRows::find_after(&self.db, now_ns)
     }
 
     /// It is certainly later than this: a row was stored then under a confirmed clock. `None` when no clock was confirmed yet.
@@ -116,17 +116,17 @@ impl Reader {
         if to.exists() {
             return Err(HistoryError::Question(format!("{} is there already; name another file", to.display())));
         }
-        schema::copy_whole(&self.db, to).doing("copying the history")
+        schema::copy_whole(&self.db, to).with_activity("copying the history")
     }
 
     /// Does the file pass `SQLite`'s own check? The findings otherwise.
     ///
     /// # Errors
     /// What `SQLite` says when it cannot even check.
-    pub fn check(&self) -> Result<Vec<String>, HistoryError> {
-        let mut statement = self.db.prepare("PRAGMA integrity_check").doing("checking the file")?;
+    pub fn check_integrity(&self) -> Result<Vec<String>, HistoryError> {
+        let mut statement = self.db.prepare("PRAGMA integrity_check").with_activity("checking the file")?;
         let lines = statement.query_map([], |row| row.get::<_, String>(0));
-        let lines: Vec<String> = lines.and_then(Iterator::collect).doing("checking the file")?;
+        let lines: Vec<String> = lines.and_then(Iterator::collect).with_activity("checking the file")?;
         Ok(lines.into_iter().filter(|line| line != "ok").collect())
     }
 }

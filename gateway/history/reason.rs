@@ -21,7 +21,7 @@ const OTHER: &str = "other";
 
 /// The code of a reading's reason.
 pub(crate) fn code_of(absence: Absence) -> u8 {
-    let code = absence.code() + 1;
+    let code = absence.as_code() + 1;
     if code < FIRST_OWN { code } else { FIRST_FURTHER + (code - FIRST_OWN) }
 }
 
@@ -38,7 +38,7 @@ impl Reasons {
     }
 
     /// The code of `word`, learned when it is new.
-    pub(crate) fn code(&mut self, word: &str) -> u8 {
+    pub(crate) fn intern_word(&mut self, word: &str) -> u8 {
         if let Some(position) = self.own.iter().position(|known| &**known == word) {
             return own_code(position);
         }
@@ -53,11 +53,11 @@ impl Reasons {
 
     /// The word of `code`; `None` for a value that is there.
     #[must_use]
-    pub fn word(&self, code: u8) -> Option<&str> {
+    pub fn find_word(&self, code: u8) -> Option<&str> {
         match code {
             PRESENT => None,
-            1..FIRST_OWN => Absence::from_code(code - 1).map(Absence::word),
-            FIRST_FURTHER.. => Absence::from_code(code - FIRST_FURTHER + FIRST_OWN - 1).map(Absence::word),
+            1..FIRST_OWN => Absence::from_code(code - 1).map(Absence::as_word),
+            FIRST_FURTHER.. => Absence::from_code(code - FIRST_FURTHER + FIRST_OWN - 1).map(Absence::as_word),
             _ => Some(self.own.get(usize::from(code - FIRST_OWN)).map_or(OTHER, |word| word)),
         }
     }
@@ -80,21 +80,21 @@ mod tests {
     fn every_reason_survives_its_code() {
         let mut reasons = Reasons::default();
         for absence in Absence::ALL {
-            assert_eq!(reasons.word(code_of(absence)), Some(absence.word()));
-            assert_eq!(reasons.code(absence.word()), code_of(absence));
+            assert_eq!(reasons.find_word(code_of(absence)), Some(absence.as_word()));
+            assert_eq!(reasons.intern_word(absence.as_word()), code_of(absence));
         }
-        assert_eq!(reasons.word(NOT_PROVIDED), Some("not_provided"));
-        assert_eq!(reasons.word(OUT_OF_RANGE), Some("out_of_range"));
-        let own = reasons.code("not_learned");
-        assert_eq!((reasons.code("not_learned"), reasons.word(own)), (own, Some("not_learned")));
+        assert_eq!(reasons.find_word(NOT_PROVIDED), Some("not_provided"));
+        assert_eq!(reasons.find_word(OUT_OF_RANGE), Some("out_of_range"));
+        let own = reasons.intern_word("not_learned");
+        assert_eq!((reasons.intern_word("not_learned"), reasons.find_word(own)), (own, Some("not_learned")));
     }
 
     #[test]
     fn too_many_words_end_in_other() {
         let mut reasons = Reasons::default();
-        let codes: Vec<u8> = (0..400).map(|number| reasons.code(&format!("word_{number}"))).collect();
-        assert_eq!(reasons.word(codes[0]), Some("word_0"));
-        assert_eq!(reasons.word(codes[399]), Some("other"));
+        let codes: Vec<u8> = (0..400).map(|number| reasons.intern_word(&format!("word_{number}"))).collect();
+        assert_eq!(reasons.find_word(codes[0]), Some("word_0"));
+        assert_eq!(reasons.find_word(codes[399]), Some("other"));
         assert!(codes.iter().all(|code| Reasons::is_own(*code)), "none of them is the reason of a reading");
     }
 }

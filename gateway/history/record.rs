@@ -198,7 +198,7 @@ impl Audit {
     }
 
     /// As it comes back from the file: numbers that are none become absent, and -0 becomes 0.
-    pub(crate) fn storable(&self) -> Self {
+    pub(crate) fn to_storable(&self) -> Self {
         let number = |value: Option<f64>| value.filter(|value| value.is_finite()).map(|value| value + 0.0);
         Self { before: number(self.before), asked: number(self.asked), after: number(self.after), ..self.clone() }
     }
@@ -275,7 +275,7 @@ impl Record {
 
 impl Record {
     /// Moves every time of it by so much.
-    pub(crate) fn shift(&mut self, by_ns: i64) {
+    pub(crate) fn shift_times(&mut self, by_ns: i64) {
         let move_ns = |at_ns: &mut TimeNs| *at_ns = at_ns.saturating_add(by_ns);
         match self {
             Self::Event(record) => move_ns(&mut record.at_ns),

@@ -14,20 +14,20 @@ const SPREAD_HOURS_MAX: i64 = 9_000;
 const HOUR_NS: i64 = 3_600 * SECOND_NS;
 
 /// Empty text as NULL.
-fn some(text: &str) -> Option<&str> {
+fn none_if_empty(text: &str) -> Option<&str> {
     (!text.is_empty()).then_some(text)
 }
 
 /// One change of a table, by a statement that is prepared once.
-fn put(db: &Connection, sql: &str, values: impl Params) -> Result<(), rusqlite::Error> {
+fn execute_change(db: &Connection, sql: &str, values: impl Params) -> Result<(), rusqlite::Error> {
     db.prepare_cached(sql)?.execute(values).map(drop)
 }
 
 /// Stores one record.
-pub(crate) fn store(db: &Connection, record: &Record) -> Result<(), rusqlite::Error> {
+pub(crate) fn store_record(db: &Connection, record: &Record) -> Result<(), rusqlite::Error> {
     match record {
         Record::Event(event) => store_event(db, event),
-        Record::Alarm(alarm) => raise(db, alarm),
+        Record::Alarm(alarm) => raise_alarm(db, alarm),
         Record::AlarmClear(clear) => clear_alarm(db, clear),
         Record::State(change) => change_state(db, change),
         Record::Part(part) => store_part(db, part),
@@ -35,21 +35,21 @@ pub(crate) fn store(db: &Connection, record: &Record) -> Result<(), rusqlite::Er
         Record::Command(command) => store_command(db, command),
         Record::Model(model) => store_model(db, model),
         Record::Diagnosis(diagnosis) => store_diagnosis(db, diagnosis),
-        Record::Audit(row) => audit::append(db, row),
+        Record::Audit(row) => audit::append_row(db, row),
         Record::Reaction(reaction) => store_reaction(db, reaction),
     }
 }
 
 fn store_event(db: &Connection, event: &Event) -> Result<(), rusqlite::Error> {
-    put(
+    execute_change(
         db,
         "INSERT INTO events (at_ns, kind, source, text, detail) VALUES (?1, ?2, ?3, ?4, ?5)",
-        params![event.at_ns, event.kind, event.source, event.text, some(&event.detail)],
+        params![event.at_ns, event.kind, event.source, event.text, none_if_empty(&event.detail)],
     )
 }
 
-fn raise(db: &Connection, alarm: &Alarm) -> Result<(), rusqlite::Error> {
-    put(
+fn raise_alarm(db: &Connection, alarm: &Alarm) -> Result<(), rusqlite::Error> {
+    execute_change(
         db,
         "INSERT INTO alarms (code, source, severity, raised_ns, count, en, zh) VALUES (?1, ?2, ?3, ?4, 1, ?5, ?6)
          ON CONFLICT (source, code) WHERE cleared_ns IS NULL DO UPDATE SET count = count + 1",
@@ -58,7 +58,7 @@ fn raise(db: &Connection, alarm: &Alarm) -> Result<(), rusqlite::Error> {
 }
 
 fn clear_alarm(db: &Connection, clear: &AlarmClear) -> Result<(), rusqlite::Error> {
-    put(
+    execute_change(
         db,
         "UPDATE alarms SET cleared_ns = max(?1, raised_ns) WHERE source = ?2 AND code = ?3 AND cleared_ns IS NULL",
         params![clear.at_ns, clear.source, clear.code],
@@ -67,10 +67,10 @@ fn clear_alarm(db: &Connection, clear: &AlarmClear) -> Result<(), rusqlite::Erro
 
 fn change_state(db: &Connection, change: &StateChange) -> Result<(), rusqlite::Error> {
     close_state(db, change.at_ns, "change")?;
-    put(
+    execute_change(
         db,
         "INSERT INTO states (state, since_ns, program, tool) VALUES (?1, ?2, ?3, ?4)",
-        params![change.state, change.at_ns, some(&change.program), some(&change.tool)],
+        params![change.state, change.at_ns, none_if_empty(&change.program), none_if_empty(&change.tool)],
     )
 }
 
@@ -82,12 +82,16 @@ pub(crate) fn close_state(db: &Connection, until_ns: TimeNs, ended_by: &str) -> 
         .optional()?;
     let Some((id, state, since_ns)) = open else { return Ok(()) };
     let until_ns = until_ns.max(since_ns);
-    put(db, "UPDATE states SET until_ns = ?1, ended_by = ?2 WHERE id = ?3", params![until_ns, ended_by, id])?;
-    spread(db, &state, since_ns..until_ns, 1.0)
+    execute_change(
+        db,
+        "UPDATE states SET until_ns = ?1, ended_by = ?2 WHERE id = ?3",
+        params![until_ns, ended_by, id],
+    )?;
+    add_to_state_hours(db, &state, since_ns..until_ns, 1.0)
 }
 
 /// Adds the time of a state to its hours `times` times; -1 takes it away again.
-pub(crate) fn spread(
+pub(crate) fn add_to_state_hours(
     db: &Connection,
     state: &str,
     Range { start: since_ns, end: until_ns }: Range<TimeNs>,
@@ -113,25 +117,25 @@ pub(crate) fn spread(
 }
 
 fn store_part(db: &Connection, part: &Part) -> Result<(), rusqlite::Error> {
-    put(
+    execute_change(
         db,
         "INSERT INTO parts (began_ns, ended_ns, part, program, count, cutting_s, energy_j, detail)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
         params![
             part.began_ns,
             part.ended_ns,
-            some(&part.part),
-            some(&part.program),
+            none_if_empty(&part.part),
+            none_if_empty(&part.program),
             part.count,
             part.cutting_s,
             part.energy_j,
-            some(&part.detail)
+            none_if_empty(&part.detail)
         ],
     )
 }
 
 fn store_decision(db: &Connection, decision: &Decision) -> Result<(), rusqlite::Error> {
-    put(
+    execute_change(
         db,
         "INSERT INTO decisions (at_ns, script, script_version, wanted, value, unit,
          reason, outcome, outcome_reason)
@@ -151,7 +155,7 @@ fn store_decision(db: &Connection, decision: &Decision) -> Result<(), rusqlite::
 }
 
 fn store_command(db: &Connection, command: &Command) -> Result<(), rusqlite::Error> {
-    put(
+    execute_change(
         db,
         "INSERT INTO commands (at_ns, command, target, before, asked, after, unit,
          outcome, reason, script, script_version)
@@ -166,14 +170,14 @@ fn store_command(db: &Connection, command: &Command) -> Result<(), rusqlite::Err
             command.unit,
             command.outcome,
             command.reason,
-            some(&command.script),
-            some(&command.script_version)
+            none_if_empty(&command.script),
+            none_if_empty(&command.script_version)
         ],
     )
 }
 
 fn store_model(db: &Connection, model: &Model) -> Result<(), rusqlite::Error> {
-    put(
+    execute_change(
         db,
         "INSERT INTO models (at_ns, name, origin, toml) VALUES (?1, ?2, ?3, ?4)",
         params![model.at_ns, model.name, model.origin, model.toml],
@@ -181,7 +185,7 @@ fn store_model(db: &Connection, model: &Model) -> Result<(), rusqlite::Error> {
 }
 
 fn store_diagnosis(db: &Connection, diagnosis: &Diagnosis) -> Result<(), rusqlite::Error> {
-    put(
+    execute_change(
         db,
         "INSERT INTO diagnoses (at_ns, from_ns, to_ns, verdict, summary, json) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
         params![
@@ -196,7 +200,7 @@ fn store_diagnosis(db: &Connection, diagnosis: &Diagnosis) -> Result<(), rusqlit
 }
 
 fn store_reaction(db: &Connection, reaction: &ReactionTime) -> Result<(), rusqlite::Error> {
-    put(
+    execute_change(
         db,
         "INSERT INTO reactions (at_ns, asked_pct, found_pct, sample_to_write_ms, write_to_seen_ms,
          program, block, tool)

@@ -7,7 +7,7 @@ use super::error::{Doing, HistoryError};
 use super::minute_buffer::End;
 use super::reason::Reasons;
 use super::record::{Event, Record};
-use super::record_sql::{close_state, store};
+use super::record_sql::{close_state, store_record};
 use super::rows::SeriesRows;
 use super::{schema, tail};
 use adapters::clock::TimeNs;
@@ -15,15 +15,15 @@ use rusqlite::{Connection, OptionalExtension};
 
 /// Brings the file into order and says where it ends. If the last rows came from `goes_on`, the state they ended in is
 /// left open.
-pub(crate) fn recover(db: &mut Connection, goes_on: Option<&str>) -> Result<End, HistoryError> {
-    let repairing = db.transaction().doing("beginning to recover")?;
+pub(crate) fn recover_file(db: &mut Connection, goes_on: Option<&str>) -> Result<End, HistoryError> {
+    let repairing = db.transaction().with_activity("beginning to recover")?;
     let end = end_of_blocks(&repairing)?;
     let end = seal_tail(&repairing, end)?;
     let last_origin = last_origin(&repairing)?;
     if let Some(last_ns) = end.last_ns.filter(|_| goes_on.is_none() || goes_on != last_origin.as_deref()) {
-        close_state(&repairing, last_ns, "stop").doing("ending the last state")?;
+        close_state(&repairing, last_ns, "stop").with_activity("ending the last state")?;
     }
-    repairing.commit().doing("recovering")?;
+    repairing.commit().with_activity("recovering")?;
     Ok(end)
 }
 
@@ -33,9 +33,10 @@ fn end_of_blocks(db: &Connection) -> Result<End, HistoryError> {
             Ok((row.get(0)?, row.get(1)?))
         })
         .optional()
-        .doing("looking for the last block")?;
-    let segment: Option<i64> =
-        db.query_row("SELECT max(id) FROM segments", [], |row| row.get(0)).doing("looking for the last segment")?;
+        .with_activity("looking for the last block")?;
+    let segment: Option<i64> = db
+        .query_row("SELECT max(id) FROM segments", [], |row| row.get(0))
+        .with_activity("looking for the last segment")?;
     Ok(End {
         segment: segment.unwrap_or(0),
         next_row: last.map_or(0, |(row, _)| row),
@@ -47,7 +48,7 @@ fn end_of_blocks(db: &Connection) -> Result<End, HistoryError> {
 fn last_origin(db: &Connection) -> Result<Option<String>, HistoryError> {
     db.query_row("SELECT origin FROM segments ORDER BY id DESC LIMIT 1", [], |row| row.get(0))
         .optional()
-        .doing("looking for the last segment")
+        .with_activity("looking for the last segment")
 }
 
 /// One entry of the crash tail whose rows are in no block.
@@ -62,18 +63,18 @@ pub(crate) struct Unsealed {
 
 impl Unsealed {
     /// Its rows, when its text is none.
-    pub(crate) fn damaged(&self) -> DamagedRows {
+    pub(crate) fn to_damaged_rows(&self) -> DamagedRows {
         DamagedRows { first_row: self.first_row, rows: self.rows, span_ns: Some((self.start_ns, self.end_ns)) }
     }
 }
 
 /// The entries of the crash tail from row `from_row` on, in order.
-pub(crate) fn unsealed(db: &Connection, from_row: i64) -> Result<Vec<Unsealed>, HistoryError> {
+pub(crate) fn read_unsealed(db: &Connection, from_row: i64) -> Result<Vec<Unsealed>, HistoryError> {
     let mut statement = db
         .prepare_cached(
             "SELECT segment, first_row, rows, start_ns, end_ns, body FROM tail WHERE first_row >= ?1 ORDER BY first_row",
         )
-        .doing("reading the crash tail")?;
+        .with_activity("reading the crash tail")?;
     let entries = statement.query_map([from_row], |row| {
         Ok(Unsealed {
             segment: row.get(0)?,
@@ -84,7 +85,7 @@ pub(crate) fn unsealed(db: &Connection, from_row: i64) -> Result<Vec<Unsealed>, 
             body: row.get(5)?,
         })
     });
-    entries.and_then(Iterator::collect).doing("reading the crash tail")
+    entries.and_then(Iterator::collect).with_activity("reading the crash tail")
 }
 
 fn seal_tail(db: &Connection, mut end: End) -> Result<End, HistoryError> {
@@ -92,18 +93,19 @@ fn seal_tail(db: &Connection, mut end: End) -> Result<End, HistoryError> {
     // The tail holds what is to be kept already.
     series.iter_mut().for_each(|series| series.decimals = None);
     let mut encoder = Encoder::new(LEVEL_FRESH).map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
-    let entries = unsealed(db, end.next_row)?;
+    let entries = read_unsealed(db, end.next_row)?;
     // A commit only ever holds rows of one minute and one segment in the tail, so one block takes them all.
     for group in entries.chunk_by(|a, b| a.segment == b.segment && b.first_row == a.first_row + a.rows) {
-        let (mut rows, mut reasons) = (SeriesRows::of(&series), Reasons::default());
-        let whole = group.iter().all(|entry| tail::append(&entry.body, &mut rows, &series, &mut reasons).is_some());
+        let (mut rows, mut reasons) = (SeriesRows::for_series(&series), Reasons::default());
+        let whole =
+            group.iter().all(|entry| tail::parse_rows_into(&entry.body, &mut rows, &series, &mut reasons).is_some());
         if !whole {
             note_damage(db, &group[0])?;
         }
         if rows.is_empty() {
             continue;
         }
-        let block = encoder.encode(&rows, &series, &reasons, group[0].segment, group[0].first_row);
+        let block = encoder.encode_block(&rows, &series, &reasons, group[0].segment, group[0].first_row);
         insert_block(db, &block)?;
         end.next_row = block.key.first_row + block.key.rows;
         end.last_ns = Some(block.key.end_ns);
@@ -120,5 +122,5 @@ fn note_damage(db: &Connection, entry: &Unsealed) -> Result<(), HistoryError> {
         text: "Part of the last minute before the gateway stopped is unreadable and was left out.".to_owned(),
         detail: format!("{{\"first_row\":{},\"rows\":{}}}", entry.first_row, entry.rows),
     };
-    store(db, &Record::Event(event)).doing("noting damage")
+    store_record(db, &Record::Event(event)).with_activity("noting damage")
 }

@@ -12,11 +12,11 @@ use super::lock::Lock;
 use super::outbox;
 use super::pyramid::{self, MINUTE_NS};
 use super::record::Audit;
-use super::record_sql::spread;
-use super::recover::recover;
+use super::record_sql::add_to_state_hours;
+use super::recover::recover_file;
 use super::schema;
 use super::segments::{RECORD_TABLES, RecordMarks};
-use crate::clock::{ClockMark, Trust, span};
+use crate::clock::{ClockMark, Trust, format_span};
 use adapters::clock::TimeNs;
 use rusqlite::{Connection, OptionalExtension, params};
 use std::ops::Range;
@@ -54,21 +54,21 @@ pub fn set_clock(path: &Path, mark: &ClockMark, decided_ns: Option<TimeNs>) -> R
     if !path.exists() {
         return Ok(None);
     }
-    let _lock = Lock::take(path)?;
+    let _lock = Lock::acquire_at(path)?;
     let mut db = schema::open_for_writing(path)?;
     // What lies in the crash tail goes into blocks first.
-    recover(&mut db, None)?;
-    let writing = db.transaction().doing("dating rows anew")?;
+    recover_file(&mut db, None)?;
+    let writing = db.transaction().with_activity("dating rows anew")?;
     if let Some(now_ns) = decided_ns {
         note_decided(&writing, now_ns)?;
     }
-    let misdated = if mark.trust == Trust::Unset.word() { Vec::new() } else { misdated(&writing, mark)? };
+    let misdated = if mark.trust == Trust::Unset.as_word() { Vec::new() } else { find_misdated(&writing, mark)? };
     let mut done: Option<Redated> = None;
     for segment in &misdated {
-        let samples = segment.redate(&writing, mark)?;
+        let samples = segment.redate_segment(&writing, mark)?;
         let before = done.take();
         let (least, greatest) = before.as_ref().map_or((segment.by_ns, segment.by_ns), |done| done.by_ns);
-        let sent = outbox::redate(
+        let sent = outbox::redate_items(
             &writing,
             segment.marks.outbox,
             segment.next_marks.as_ref().map(|marks| marks.outbox),
@@ -83,7 +83,7 @@ pub fn set_clock(path: &Path, mark: &ClockMark, decided_ns: Option<TimeNs>) -> R
                 .map_or(sent.clone(), |done| done.sent.start..sent.end.max(done.sent.end)),
         });
     }
-    writing.commit().doing("dating rows anew")?;
+    writing.commit().with_activity("dating rows anew")?;
     Ok(done)
 }
 
@@ -95,11 +95,11 @@ fn note_decided(db: &Connection, now_ns: TimeNs) -> Result<(), HistoryError> {
         [now_ns],
     )
     .map(drop)
-    .doing("noting the time")
+    .with_activity("noting the time")
 }
 
 /// The segments of this start of the computer that another clock has dated and nothing has confirmed.
-fn misdated(db: &Connection, mark: &ClockMark) -> Result<Vec<Misdated>, HistoryError> {
+fn find_misdated(db: &Connection, mark: &ClockMark) -> Result<Vec<Misdated>, HistoryError> {
     if mark.boot.is_empty() {
         return Ok(Vec::new());
     }
@@ -109,7 +109,7 @@ fn misdated(db: &Connection, mark: &ClockMark) -> Result<Vec<Misdated>, HistoryE
              FROM segments s LEFT JOIN segments n ON n.id = (SELECT min(id) FROM segments WHERE id > s.id)
              WHERE s.boot = ?1 AND s.clock IN ('unset', 'plausible') AND s.anchor_ns <> ?2 ORDER BY s.id",
         )
-        .doing("looking for rows to date anew")?;
+        .with_activity("looking for rows to date anew")?;
     let marks = |text: Option<String>| text.and_then(|text| serde_json::from_str::<RecordMarks>(&text).ok());
     let rows = statement.query_map(params![mark.boot, mark.anchor_ns], |row| {
         let (first, next): (i64, Option<i64>) = (row.get(1)?, row.get(4)?);
@@ -121,27 +121,27 @@ fn misdated(db: &Connection, mark: &ClockMark) -> Result<Vec<Misdated>, HistoryE
             next_marks: marks(row.get(5)?),
         })
     });
-    rows.and_then(Iterator::collect).doing("looking for rows to date anew")
+    rows.and_then(Iterator::collect).with_activity("looking for rows to date anew")
 }
 
 impl Misdated {
     /// Moves everything of the segment; gives how many samples.
-    fn redate(&self, db: &Connection, mark: &ClockMark) -> Result<i64, HistoryError> {
+    fn redate_segment(&self, db: &Connection, mark: &ClockMark) -> Result<i64, HistoryError> {
         let (samples, before) = self.move_blocks(db)?;
         self.move_records(db)?;
         db.execute(
             "UPDATE segments SET start_ns = start_ns + ?2, anchor_ns = ?3, clock = ?4 WHERE id = ?1",
             params![self.id, self.by_ns, mark.anchor_ns, mark.trust],
         )
-        .doing("dating rows anew")?;
+        .with_activity("dating rows anew")?;
         if let Some(before) = before {
             let after = before.start.saturating_add(self.by_ns)..before.end.saturating_add(self.by_ns);
             let minutes =
                 |range: &Range<TimeNs>| range.start.div_euclid(MINUTE_NS)..range.end.div_euclid(MINUTE_NS) + 1;
-            pyramid::renew(db, minutes(&before))?;
-            pyramid::renew(db, pyramid::with_blocks(db, minutes(&after))?)?;
+            pyramid::renew_buckets(db, minutes(&before))?;
+            pyramid::renew_buckets(db, pyramid::with_blocks(db, minutes(&after))?)?;
         }
-        self.account(db)?;
+        self.append_audit_row(db)?;
         Ok(samples)
     }
 
@@ -153,14 +153,14 @@ impl Misdated {
             .prepare(&format!(
                 "SELECT {BLOCK_COLUMNS} FROM blocks WHERE first_row >= ?1 AND first_row < ?2 ORDER BY first_row LIMIT 1"
             ))
-            .doing("reading a block")?;
+            .with_activity("reading a block")?;
         let (mut from, mut samples, mut span_ns) = (self.rows.start, 0, None::<Range<TimeNs>>);
         while let Some(stored) =
-            select.query_row([from, self.rows.end], StoredBlock::of_row).optional().doing("reading a block")?
+            select.query_row([from, self.rows.end], StoredBlock::of_row).optional().with_activity("reading a block")?
         {
             from = stored.key.first_row + 1;
             // A damaged block cannot be moved; it is left out of every answer anyway.
-            let Some(moved) = stored.moved(self.by_ns, &mut encoder, &mut decoder) else { continue };
+            let Some(moved) = stored.with_shifted_times(self.by_ns, &mut encoder, &mut decoder) else { continue };
             let key = moved.key;
             db.prepare_cached(
                 "UPDATE blocks SET start_ns = ?2, end_ns = ?3, directory = ?4, columns = ?5 WHERE first_row = ?1",
@@ -168,19 +168,19 @@ impl Misdated {
             .and_then(|mut update| {
                 update.execute(params![key.first_row, key.start_ns, key.end_ns, moved.directory, moved.columns])
             })
-            .doing("dating a block anew")?;
+            .with_activity("dating a block anew")?;
             samples += key.rows;
             let old = span_ns.get_or_insert(stored.key.start_ns..stored.key.end_ns);
             *old = old.start.min(stored.key.start_ns)..old.end.max(stored.key.end_ns);
         }
         // What is left in the tail lies in blocks, and has the old dates.
         db.execute("DELETE FROM tail WHERE first_row >= ?1 AND first_row < ?2", [self.rows.start, self.rows.end])
-            .doing("dating rows anew")?;
+            .with_activity("dating rows anew")?;
         Ok((samples, span_ns))
     }
 
     /// Numbers of its rows in the table at `index` of [`RECORD_TABLES`]: after the first, up to the second.
-    fn numbers(&self, index: usize) -> Option<(i64, i64)> {
+    fn record_bounds(&self, index: usize) -> Option<(i64, i64)> {
         let from = *self.marks.numbers.get(index)?;
         let to = self.next_marks.as_ref().and_then(|marks| marks.numbers.get(index)).copied().unwrap_or(i64::MAX);
         Some((from, to))
@@ -188,13 +188,13 @@ impl Misdated {
 
     fn move_records(&self, db: &Connection) -> Result<(), HistoryError> {
         for (index, (table, times)) in RECORD_TABLES.iter().enumerate() {
-            let Some((from, to)) = self.numbers(index) else { continue };
+            let Some((from, to)) = self.record_bounds(index) else { continue };
             if *table == "states" {
                 spread_states(db, (from, to), -1.0)?;
             }
             let set: Vec<String> = times.iter().map(|time| format!("{time} = {time} + ?3")).collect();
             let update = format!("UPDATE {table} SET {} WHERE id > ?1 AND id <= ?2", set.join(", "));
-            db.execute(&update, [from, to, self.by_ns]).doing("dating records anew")?;
+            db.execute(&update, [from, to, self.by_ns]).with_activity("dating records anew")?;
             if *table == "states" {
                 spread_states(db, (from, to), 1.0)?;
             }
@@ -203,20 +203,20 @@ impl Misdated {
     }
 
     /// A row of the audit is never changed: another one says what is wrong with the date of these.
-    fn account(&self, db: &Connection) -> Result<(), HistoryError> {
-        let Some((from, to)) = self.numbers(RECORD_TABLES.len()) else { return Ok(()) };
+    fn append_audit_row(&self, db: &Connection) -> Result<(), HistoryError> {
+        let Some((from, to)) = self.record_bounds(RECORD_TABLES.len()) else { return Ok(()) };
         let found: (Option<i64>, Option<i64>, Option<TimeNs>) = db
             .query_row(
                 "SELECT min(number), max(number), max(at_ns) FROM audit WHERE number > ?1 AND number <= ?2",
                 [from, to],
                 |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)),
             )
-            .doing("reading the audit")?;
+            .with_activity("reading the audit")?;
         let (Some(first), Some(last), Some(at_ns)) = found else { return Ok(()) };
         let way = if self.by_ns > 0 { "earlier" } else { "later" };
         let reason = format!(
             "rows {first} to {last} are dated {} {way} than they were: the clock was wrong by {} ns",
-            span(self.by_ns),
+            format_span(self.by_ns),
             self.by_ns
         );
         let row = Audit {
@@ -226,7 +226,7 @@ impl Misdated {
             reason,
             ..Audit::default()
         };
-        audit::append(db, &row).doing("noting the dates of the audit")
+        audit::append_row(db, &row).with_activity("noting the dates of the audit")
     }
 }
 
@@ -234,11 +234,13 @@ impl Misdated {
 fn spread_states(db: &Connection, (from, to): (i64, i64), times: f64) -> Result<(), HistoryError> {
     let mut select = db
         .prepare("SELECT state, since_ns, until_ns FROM states WHERE id > ?1 AND id <= ?2 AND until_ns IS NOT NULL")
-        .doing("reading states")?;
+        .with_activity("reading states")?;
     let rows = select.query_map([from, to], |row| Ok((row.get::<_, String>(0)?, row.get(1)?, row.get(2)?)));
-    let states: Vec<(String, TimeNs, TimeNs)> = rows.and_then(Iterator::collect).doing("reading states")?;
+    let states: Vec<(String, TimeNs, TimeNs)> = rows.and_then(Iterator::collect).with_activity("reading states")?;
     for (state, since_ns, until_ns) in states {
-        spread(db, &state, since_ns..until_ns, times).doing("counting states by the hour")?;
+        add_to_state_hours(db, &state, since_ns..until_ns, times).with_activity("counting states by the hour")?;
     }
-    db.execute("DELETE FROM state_hours WHERE seconds < 1e-6", []).map(drop).doing("counting states by the hour")
+    db.execute("DELETE FROM state_hours WHERE seconds < 1e-6", [])
+        .map(drop)
+        .with_activity("counting states by the hour")
 }

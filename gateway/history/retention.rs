@@ -36,24 +36,26 @@ static KINDS: [RowKind; 15] = [
         step: 16,
         days: |retention| retention.raw_days,
     },
-    kind("minute summaries", "minutes", "minute", 60 * SECOND_NS, "1", |retention| retention.minutes_days),
-    kind("hour summaries", "hours", "hour", HOUR_NS, "1", |retention| retention.records_days),
-    kind("state hours", "state_hours", "hour", HOUR_NS, "1", |retention| retention.records_days),
-    kind("day summaries", "days", "day", 24 * HOUR_NS, "1", |retention| retention.records_days),
-    kind("states", "states", "since_ns", 1, "until_ns IS NOT NULL", |retention| retention.records_days),
-    kind("parts", "parts", "ended_ns", 1, "1", |retention| retention.records_days),
-    kind("diagnoses", "diagnoses", "at_ns", 1, "1", |retention| retention.records_days),
-    kind("models", "models", "at_ns", 1, "id < (SELECT max(id) FROM models)", |retention| retention.records_days),
-    kind("events", "events", "at_ns", 1, "1", |retention| retention.records_days),
-    kind("decisions", "decisions", "at_ns", 1, "1", |retention| retention.audit_days),
-    kind("commands", "commands", "at_ns", 1, "1", |retention| retention.audit_days),
-    kind("reactions", "reactions", "at_ns", 1, "1", |retention| retention.audit_days),
-    kind("alarms", "alarms", "raised_ns", 1, "cleared_ns IS NOT NULL", |retention| retention.audit_days),
+    define_kind("minute summaries", "minutes", "minute", 60 * SECOND_NS, "1", |retention| retention.minutes_days),
+    define_kind("hour summaries", "hours", "hour", HOUR_NS, "1", |retention| retention.records_days),
+    define_kind("state hours", "state_hours", "hour", HOUR_NS, "1", |retention| retention.records_days),
+    define_kind("day summaries", "days", "day", 24 * HOUR_NS, "1", |retention| retention.records_days),
+    define_kind("states", "states", "since_ns", 1, "until_ns IS NOT NULL", |retention| retention.records_days),
+    define_kind("parts", "parts", "ended_ns", 1, "1", |retention| retention.records_days),
+    define_kind("diagnoses", "diagnoses", "at_ns", 1, "1", |retention| retention.records_days),
+    define_kind("models", "models", "at_ns", 1, "id < (SELECT max(id) FROM models)", |retention| {
+        retention.records_days
+    }),
+    define_kind("events", "events", "at_ns", 1, "1", |retention| retention.records_days),
+    define_kind("decisions", "decisions", "at_ns", 1, "1", |retention| retention.audit_days),
+    define_kind("commands", "commands", "at_ns", 1, "1", |retention| retention.audit_days),
+    define_kind("reactions", "reactions", "at_ns", 1, "1", |retention| retention.audit_days),
+    define_kind("alarms", "alarms", "raised_ns", 1, "cleared_ns IS NOT NULL", |retention| retention.audit_days),
     // By age only through the oldest rows: the chain is cut at its beginning and nowhere else.
-    kind("audit", "audit", "at_ns", 1, "1", |retention| retention.audit_days),
+    define_kind("audit", "audit", "at_ns", 1, "1", |retention| retention.audit_days),
 ];
 
-const fn kind(
+const fn define_kind(
     name: &'static str,
     table: &'static str,
     time: &'static str,
@@ -80,7 +82,7 @@ pub(crate) fn used_bytes(db: &Connection) -> Result<u64, HistoryError> {
         |row| row.get::<_, i64>(0),
     )
     .map(i64::unsigned_abs)
-    .doing("measuring the database")
+    .with_activity("measuring the database")
 }
 
 /// Removes the oldest of the first kind that can spare anything; nothing at all when only the newest rows are left.
@@ -96,7 +98,7 @@ pub(crate) fn remove_oldest(db: &mut Connection, because: &str) -> Result<Remove
                 [],
                 |row| row.get(0),
             )
-            .doing("looking for the oldest rows")?;
+            .with_activity("looking for the oldest rows")?;
         if let Some(threshold) = threshold {
             return remove(db, kind, &format!("{time} <= {threshold}"), None, because);
         }
@@ -120,7 +122,7 @@ pub(crate) struct AgeLimits {
 
 impl AgeLimits {
     /// Those of a run that begins at `now_ns`, which a confirmed clock says.
-    pub(crate) fn at(db: &Connection, retention: &Retention, now_ns: TimeNs) -> Result<Self, HistoryError> {
+    pub(crate) fn from_retention(db: &Connection, retention: &Retention, now_ns: TimeNs) -> Result<Self, HistoryError> {
         let before_ns = KINDS.iter().map(|kind| before_ns(db, kind, (kind.days)(retention), now_ns));
         Ok(Self { now_ns, before_ns: before_ns.collect::<Result<_, _>>()? })
     }
@@ -131,7 +133,7 @@ fn before_ns(db: &Connection, kind: &RowKind, days: f64, now_ns: TimeNs) -> Resu
     let (time, only, table) = (if kind.table == "blocks" { "start_ns" } else { kind.time }, kind.only, kind.table);
     let oldest: Option<i64> = db
         .query_row(&format!("SELECT min({time}) FROM {table} WHERE {only}"), [], |row| row.get(0))
-        .doing("looking for the oldest rows")?;
+        .with_activity("looking for the oldest rows")?;
     let Some(oldest) = oldest else { return Ok(None) };
     let horizon_ns = Retention::horizon_ns(days, now_ns);
     let run_ns = oldest.saturating_mul(kind.unit_ns).saturating_add(RUN_TAKES_NS);
@@ -148,7 +150,7 @@ fn stored_since_ns(db: &Connection, days: f64) -> Result<Option<TimeNs>, History
     let day: Option<i64> = db
         .query_row("SELECT DISTINCT day FROM days ORDER BY day DESC LIMIT 1 OFFSET ?1", [needed - 1], |row| row.get(0))
         .optional()
-        .doing("counting days with samples")?;
+        .with_activity("counting days with samples")?;
     Ok(day.map(|day| day.saturating_mul(24 * HOUR_NS)))
 }
 
@@ -187,19 +189,19 @@ fn remove(
 ) -> Result<Removed, HistoryError> {
     let RowKind { name, table, only, rows, time, unit_ns, .. } = kind;
     let time = if *table == "blocks" { "end_ns" } else { time };
-    let condition = &if *table == "audit" { audit::oldest(condition) } else { condition.to_owned() };
-    let removing = db.transaction().doing("beginning to remove old rows")?;
+    let condition = &if *table == "audit" { audit::restrict_to_oldest(condition) } else { condition.to_owned() };
+    let removing = db.transaction().with_activity("beginning to remove old rows")?;
     let (count, through): (Option<i64>, Option<i64>) = removing
         .query_row(&format!("SELECT {rows}, max({time}) FROM {table} WHERE {only} AND {condition}"), [], |row| {
             Ok((row.get(0)?, row.get(1)?))
         })
-        .doing("counting old rows")?;
+        .with_activity("counting old rows")?;
     let (Some(count @ 1..), Some(through)) = (count, through) else { return Ok(Removed::default()) };
     match *table {
         "audit" => audit::remove(&removing, condition, at_ns, because),
         _ => removing.execute(&format!("DELETE FROM {table} WHERE {only} AND {condition}"), []).map(drop),
     }
-    .doing("removing old rows")?;
+    .with_activity("removing old rows")?;
     removing
         .execute(
             "INSERT INTO dropped (kind, rows, through_ns, because) VALUES (?1, ?2, ?3, ?4)
@@ -207,7 +209,7 @@ fn remove(
                through_ns = max(through_ns, excluded.through_ns)",
             params![name, count, through.saturating_mul(*unit_ns), because],
         )
-        .doing("counting what was removed")?;
-    removing.commit().doing("removing old rows")?;
+        .with_activity("counting what was removed")?;
+    removing.commit().with_activity("removing old rows")?;
     Ok(Removed { any: true, samples: if *table == "blocks" { count.unsigned_abs() } else { 0 } })
 }

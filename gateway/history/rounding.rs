@@ -16,7 +16,7 @@ pub(crate) const TEN: [f64; 10] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 
 
 /// The nearest integer of `x`, ties to even; exact for |x| < 2^51.
 #[inline]
-pub(crate) fn nearest(x: f64) -> f64 {
+pub(crate) fn round_to_integer(x: f64) -> f64 {
     const MAGIC: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52: adding it pushes the fraction out of the mantissa
     (x + MAGIC) - MAGIC
 }
@@ -25,28 +25,29 @@ pub(crate) fn nearest(x: f64) -> f64 {
 /// otherwise rounded to `decimals` places. Numbers too large for that are left alone.
 #[must_use]
 #[inline]
-pub fn rounded(value: f64, decimals: u8) -> f64 {
+pub fn round_to_decimals(value: f64, decimals: u8) -> f64 {
     let scale = TEN[usize::from(decimals.min(PLACES_MAX))];
     let scaled = value * scale;
     // NaN fails the comparison too and is left to the caller.
     if scaled.abs() >= SCALED_MAX || scaled.is_nan() {
         return value;
     }
-    let kept = nearest(scaled) / scale;
+    let kept = round_to_integer(scaled) / scale;
     if kept == value || is_short_decimal(value) { value } else { kept }
 }
 
 fn is_short_decimal(value: f64) -> bool {
     let magnitude = value.abs();
     let places = TEN.iter().take_while(|ten| magnitude * **ten < SIGNIFICANT_MAX).count();
-    places > 0 && nearest(value * TEN[places - 1]) / TEN[places - 1] == value
+    places > 0 && round_to_integer(value * TEN[places - 1]) / TEN[places - 1] == value
 }
 
 /// The fewest decimal places, at least `at_least`, with which every one of `values` is an exact scaled integer.
 pub(crate) fn places_of(values: &[f64]) -> Option<u8> {
     let mut places = 0;
     for value in values {
-        while nearest(value * TEN[places]) / TEN[places] != *value || (value * TEN[places]).abs() >= SCALED_MAX {
+        while round_to_integer(value * TEN[places]) / TEN[places] != *value || (value * TEN[places]).abs() >= SCALED_MAX
+        {
             places += 1;
             if places > usize::from(PLACES_MAX) {
                 return None;
@@ -63,25 +64,25 @@ mod tests {
 
     #[test]
     fn short_decimals_stay_and_long_fractions_are_rounded() {
-        assert_eq!(rounded(0.000_696, 1), 0.000_696);
-        assert_eq!(rounded(1203.4, 1), 1203.4);
-        assert_eq!(rounded(817.238_746_112_359, 1), 817.2);
-        assert_eq!(rounded(-1.0 / 3.0, 3), -0.333);
-        assert_eq!(rounded(1e300, 3), 1e300);
+        assert_eq!(round_to_decimals(0.000_696, 1), 0.000_696);
+        assert_eq!(round_to_decimals(1203.4, 1), 1203.4);
+        assert_eq!(round_to_decimals(817.238_746_112_359, 1), 817.2);
+        assert_eq!(round_to_decimals(-1.0 / 3.0, 3), -0.333);
+        assert_eq!(round_to_decimals(1e300, 3), 1e300);
     }
 
     proptest! {
         #[test]
         fn rounding_is_close_and_once_is_enough(value in -1e9f64..1e9, decimals in 0u8..=9) {
-            let kept = rounded(value, decimals);
+            let kept = round_to_decimals(value, decimals);
             prop_assert!((kept - value).abs() <= 0.5000001 / TEN[usize::from(decimals)] + value.abs() * 2.3e-16);
-            prop_assert_eq!(rounded(kept, decimals), kept);
+            prop_assert_eq!(round_to_decimals(kept, decimals), kept);
         }
 
         #[test]
         fn nine_digits_survive(digits in -999_999_999i64..1_000_000_000, places in 0usize..=9) {
             let value = digits as f64 / TEN[places];
-            prop_assert_eq!(rounded(value, 0), value);
+            prop_assert_eq!(round_to_decimals(value, 0), value);
             prop_assert!(places_of(&[value]).is_some());
         }
     }

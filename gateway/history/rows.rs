@@ -17,7 +17,7 @@ pub(crate) enum Word {
 }
 
 impl Word {
-    fn is(&self, text: &str) -> bool {
+    fn is_text(&self, text: &str) -> bool {
         matches!(self, Self::Is(word) if **word == *text)
     }
 }
@@ -74,8 +74,8 @@ impl Column {
 
     fn push_text(&mut self, row: usize, text: &str, shared: impl FnOnce() -> Arc<str>) {
         match self {
-            Self::Words(changes) if changes.last().is_some_and(|(_, last)| last.is(text)) => {}
-            Self::Words(_) => self.change(row, Word::Is(shared())),
+            Self::Words(changes) if changes.last().is_some_and(|(_, last)| last.is_text(text)) => {}
+            Self::Words(_) => self.push_change(row, Word::Is(shared())),
             Self::Numbers { .. } => self.push_missing(row, code_of(Absence::NotSupported)),
         }
     }
@@ -96,13 +96,13 @@ impl Column {
                     Word::Missing(code) => *code,
                 });
                 if last != code {
-                    self.change(row, Word::Missing(code));
+                    self.push_change(row, Word::Missing(code));
                 }
             }
         }
     }
 
-    fn change(&mut self, row: usize, word: Word) {
+    fn push_change(&mut self, row: usize, word: Word) {
         if let Self::Words(changes) = self {
             if changes.is_empty() && row > 0 {
                 changes.push((0, Word::Missing(NOT_PROVIDED)));
@@ -111,7 +111,7 @@ impl Column {
         }
     }
 
-    fn append(&mut self, have: usize, other: &Self, rows: &Range<usize>) {
+    fn append_cells(&mut self, have: usize, other: &Self, rows: &Range<usize>) {
         match (self, other) {
             (Self::Numbers { values, missing }, Self::Numbers { values: more, missing: codes }) => {
                 if more.is_empty() && values.is_empty() {
@@ -160,7 +160,7 @@ pub(crate) struct SeriesRows {
 
 impl SeriesRows {
     /// No rows yet of these series.
-    pub(crate) fn of(series: &[Series]) -> Self {
+    pub(crate) fn for_series(series: &[Series]) -> Self {
         let channels = series.iter().take_while(|series| !series.estimated).count();
         Self { channels, at_ns: Vec::new(), columns: series.iter().map(|series| Column::new(series.kind)).collect() }
     }
@@ -194,7 +194,7 @@ impl SeriesRows {
         self.at_ns.push(sample.at_ns);
         let channels = self.channels.min(self.columns.len());
         let (channels, estimates) = self.columns.split_at_mut(channels);
-        for (channel, column) in ChannelId::all().zip(channels) {
+        for (channel, column) in ChannelId::list_all().zip(channels) {
             match &sample.slot(channel).value {
                 Ok(Value::Number(number)) => column.push_number(row, *number),
                 Ok(Value::Text(text)) => column.push_text(row, text, || text.clone()),
@@ -206,18 +206,18 @@ impl SeriesRows {
             match extras.get(index) {
                 Some(ExtraValue::Number(number)) => column.push_number(row, *number),
                 Some(ExtraValue::Text(text)) => column.push_text(row, text, || (*text).into()),
-                Some(ExtraValue::Missing(word)) => column.push_missing(row, reasons.code(word)),
+                Some(ExtraValue::Missing(word)) => column.push_missing(row, reasons.intern_word(word)),
                 None => column.push_missing(row, NOT_PROVIDED),
             }
         }
     }
 
     /// Appends a stretch of other rows of the same series.
-    pub(crate) fn append(&mut self, other: &Self, rows: Range<usize>) {
+    pub(crate) fn append_rows(&mut self, other: &Self, rows: Range<usize>) {
         let have = self.at_ns.len();
         self.at_ns.extend_from_slice(&other.at_ns[rows.clone()]);
         for (column, more) in self.columns.iter_mut().zip(&other.columns) {
-            column.append(have, more, &rows);
+            column.append_cells(have, more, &rows);
         }
     }
 }
@@ -230,18 +230,18 @@ mod tests {
     use adapters::Slot;
 
     fn series() -> Vec<Series> {
-        let extras = vec![ExtraSeries::number("a_w", "W", "", ""), ExtraSeries::text("state", "", "")];
+        let extras = vec![ExtraSeries::new_number("a_w", "W", "", ""), ExtraSeries::new_text("state", "", "")];
         stored_series(&Options { extras, ..Options::default() }).expect("fine")
     }
 
     fn rows(count: usize) -> SeriesRows {
-        let mut rows = SeriesRows::of(&series());
+        let mut rows = SeriesRows::for_series(&series());
         let mut reasons = Reasons::default();
-        let power = ChannelId::of("spindle_power_w").expect("in the table");
+        let power = ChannelId::from_name("spindle_power_w").expect("in the table");
         for row in 0..count {
-            let mut sample = Sample::empty(row as i64);
+            let mut sample = Sample::new_empty(row as i64);
             if row % 5 > 1 {
-                sample.set(power, Slot { value: Ok(Value::Number(row as f64)), age_ns: 0 });
+                sample.set_slot(power, Slot { value: Ok(Value::Number(row as f64)), age_ns: 0 });
             }
             let state = if row % 7 < 3 { ExtraValue::Text("idle") } else { ExtraValue::Missing("unsure") };
             rows.push(&sample, &[ExtraValue::Missing("not_learned"), state], &mut reasons);
@@ -253,9 +253,9 @@ mod tests {
     fn appending_in_pieces_is_the_same_as_pushing() {
         let whole = rows(40);
         for cut in 0..=40 {
-            let mut pieces = SeriesRows::of(&series());
-            pieces.append(&whole, 0..cut);
-            pieces.append(&whole, cut..40);
+            let mut pieces = SeriesRows::for_series(&series());
+            pieces.append_rows(&whole, 0..cut);
+            pieces.append_rows(&whole, cut..40);
             assert_eq!(pieces, whole, "cut at {cut}");
         }
     }

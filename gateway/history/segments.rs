@@ -36,11 +36,11 @@ pub(crate) struct RecordMarks {
 
 impl RecordMarks {
     /// Those of this moment.
-    pub(crate) fn now(db: &Connection) -> Result<Self, HistoryError> {
+    pub(crate) fn read_current(db: &Connection) -> Result<Self, HistoryError> {
         let last = |table: &str, key: &str| {
             db.prepare_cached(&format!("SELECT coalesce(max({key}), 0) FROM {table}"))
                 .and_then(|mut select| select.query_row([], |row| row.get(0)))
-                .doing("numbering records")
+                .with_activity("numbering records")
         };
         let mut numbers: Vec<i64> = Vec::with_capacity(RECORD_TABLES.len() + 1);
         for (table, _) in RECORD_TABLES {
@@ -57,7 +57,7 @@ pub(crate) fn insert(
     segment: &Segment,
     (origin, clock): (&str, &ClockMark),
 ) -> Result<(), HistoryError> {
-    let marks = serde_json::to_string(&RecordMarks::now(db)?).unwrap_or_default();
+    let marks = serde_json::to_string(&RecordMarks::read_current(db)?).unwrap_or_default();
     db.prepare_cached(
         "INSERT INTO segments (id, first_row, start_ns, origin, reason, version, clock, boot, anchor_ns, marks)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
@@ -77,17 +77,17 @@ pub(crate) fn insert(
         ])
     })
     .map(drop)
-    .doing("beginning a segment")
+    .with_activity("beginning a segment")
 }
 
 /// The clock of the running segments is confirmed: what they hold is dated for good.
-pub(crate) fn confirm(db: &Connection, clock: &ClockMark) -> Result<(), HistoryError> {
+pub(crate) fn confirm_clock(db: &Connection, clock: &ClockMark) -> Result<(), HistoryError> {
     db.execute(
         "UPDATE segments SET clock = 'confirmed' WHERE clock = 'plausible' AND boot = ?1 AND anchor_ns = ?2",
         params![clock.boot, clock.anchor_ns],
     )
     .map(drop)
-    .doing("noting that the clock is confirmed")
+    .with_activity("noting that the clock is confirmed")
 }
 
 /// The latest time that a row stored under a confirmed clock has; it is certainly later by now. `None`: no clock was confirmed
@@ -99,7 +99,7 @@ pub(crate) fn certain_ns(db: &Connection) -> Result<Option<TimeNs>, HistoryError
     let decided: Option<String> = db
         .query_row("SELECT value FROM meta WHERE key = 'clock_decided'", [], |row| row.get(0))
         .optional()
-        .doing("looking for the last certain time")?;
+        .with_activity("looking for the last certain time")?;
     let decided = decided.as_deref().and_then(|text| text.split_once(' '));
     let (after, decided_ns) = decided.map_or((0, None), |(id, at)| (id.parse().unwrap_or(0), at.parse().ok()));
     let row_ns: Option<TimeNs> = db
@@ -112,6 +112,6 @@ pub(crate) fn certain_ns(db: &Connection) -> Result<Option<TimeNs>, HistoryError
             [after],
             |row| row.get(0),
         )
-        .doing("looking for the last certain time")?;
+        .with_activity("looking for the last certain time")?;
     Ok(row_ns.max(decided_ns))
 }

@@ -2,7 +2,7 @@
 
 use super::error::HistoryError;
 use super::options::{ExtraSeries, Fidelity, Options, SeriesKind};
-use super::rounding::{PLACES_MAX, rounded};
+use super::rounding::{PLACES_MAX, round_to_decimals};
 use adapters::ChannelId;
 use adapters::channel::{Channel, Kind};
 use std::sync::Arc;
@@ -36,7 +36,7 @@ impl Series {
             name: channel.name.into(),
             unit: channel.unit.into(),
             kind,
-            decimals: kept(None, channel.unit, fidelity),
+            decimals: choose_decimals(None, channel.unit, fidelity),
             en: channel.en.into(),
             zh: channel.zh.into(),
             estimated: false,
@@ -49,7 +49,7 @@ impl Series {
             name: extra.name.as_str().into(),
             unit: extra.unit.as_str().into(),
             kind: extra.kind,
-            decimals: kept(extra.decimals, &extra.unit, fidelity),
+            decimals: choose_decimals(extra.decimals, &extra.unit, fidelity),
             en: extra.en.as_str().into(),
             zh: extra.zh.as_str().into(),
             estimated: true,
@@ -57,7 +57,7 @@ impl Series {
     }
 }
 
-fn kept(decimals: Option<u8>, unit: &str, fidelity: Fidelity) -> Option<u8> {
+fn choose_decimals(decimals: Option<u8>, unit: &str, fidelity: Fidelity) -> Option<u8> {
     let decimals = decimals.unwrap_or_else(|| decimals_of_unit(unit)).min(PLACES_MAX);
     (fidelity == Fidelity::Resolution).then_some(decimals)
 }
@@ -79,13 +79,13 @@ pub fn decimals_of_unit(unit: &str) -> u8 {
 /// query` show the same digits.
 #[must_use]
 pub fn as_stored(channel: ChannelId, number: f64) -> f64 {
-    rounded(number, decimals_of_unit(channel.channel().unit))
+    round_to_decimals(number, decimals_of_unit(channel.channel().unit))
 }
 
 /// Every series a writer stores, channels first. The `id` is still 0.
 pub(crate) fn stored_series(options: &Options) -> Result<Vec<Series>, HistoryError> {
     let mut series: Vec<Series> =
-        ChannelId::all().map(|id| Series::of_channel(id.channel(), options.fidelity)).collect();
+        ChannelId::list_all().map(|id| Series::of_channel(id.channel(), options.fidelity)).collect();
     for extra in &options.extras {
         if extra.name.is_empty() || series.iter().any(|known| *known.name == *extra.name) {
             let name = &extra.name;
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn an_estimate_may_not_take_the_name_of_a_channel() {
-        let extras = vec![ExtraSeries::number("spindle_power_w", "W", "", "")];
+        let extras = vec![ExtraSeries::new_number("spindle_power_w", "W", "", "")];
         let error = stored_series(&Options { extras, ..Options::default() }).expect_err("refused").to_string();
         assert!(error.contains("spindle_power_w"), "{error}");
     }
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn channels_keep_their_place() {
         let series = stored_series(&Options::default()).expect("fine");
-        assert_eq!(series.len(), ChannelId::count());
-        assert!(series.iter().zip(ChannelId::all()).all(|(series, channel)| *series.name == *channel.name()));
+        assert_eq!(series.len(), ChannelId::count_channels());
+        assert!(series.iter().zip(ChannelId::list_all()).all(|(series, channel)| *series.name == *channel.name()));
     }
 }

@@ -4,7 +4,7 @@
 //! the disk is full it is removed, the oldest raw samples are deleted, their pages are used again, and the reserve is
 //! written again once there is room.
 
-use super::lock::beside;
+use super::lock::append_suffix;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -39,9 +39,9 @@ pub(crate) struct Reserve {
 
 impl Reserve {
     /// The reserve beside the history at `path`, at most a sixteenth of its disk.
-    pub(crate) fn beside(path: &Path, bytes: u64) -> Self {
+    pub(crate) fn new_beside(path: &Path, bytes: u64) -> Self {
         let total = disk_room(path).map_or(u64::MAX, |room| room.total);
-        Self { path: beside(path, ".reserve"), bytes: bytes.min(total / 16), held: false }
+        Self { path: append_suffix(path, ".reserve"), bytes: bytes.min(total / 16), held: false }
     }
 
     /// Its size.
@@ -50,21 +50,21 @@ impl Reserve {
     }
 
     /// Gives the room back to the disk.
-    pub(crate) fn release(&mut self) {
+    pub(crate) fn release_space(&mut self) {
         self.held = false;
         // A reserve that is already gone is as good as released.
         let _ = std::fs::remove_file(&self.path);
     }
 
     /// Takes the room when there is twice as much free. Real bytes: a sparse file would reserve nothing.
-    pub(crate) fn keep(&mut self) {
+    pub(crate) fn claim_space(&mut self) {
         let room = disk_room(&self.path).map_or(u64::MAX, |room| room.free);
         if self.held || self.bytes == 0 || room < self.bytes.saturating_mul(2) {
             return;
         }
-        self.held = self.is_there() || self.fill().is_ok();
+        self.held = self.is_there() || self.fill_file().is_ok();
         if !self.held {
-            self.release();
+            self.release_space();
         }
     }
 
@@ -72,7 +72,7 @@ impl Reserve {
         std::fs::metadata(&self.path).is_ok_and(|file| file.len() == self.bytes)
     }
 
-    fn fill(&self) -> std::io::Result<()> {
+    fn fill_file(&self) -> std::io::Result<()> {
         let mut file = File::create(&self.path)?;
         let chunk = [0xa5u8; 65_536];
         let mut left = self.bytes;

@@ -21,7 +21,7 @@ impl Reader {
     ///
     /// # Errors
     /// [`HistoryError::Question`] with what `SQLite` says of the statement, or when it has not ended within `limit`.
-    pub fn sql(
+    pub fn run_sql(
         &self,
         statement: &str,
         limit: Duration,
@@ -33,10 +33,10 @@ impl Reader {
             ))
         };
         let mut db = schema::open_for_reading(&self.path)?;
-        ffi::load(&db, &self.path).doing("preparing the table samples")?;
-        db.authorizer(Some(only_this_file)).doing("preparing to read only this file")?;
+        ffi::register_samples(&db, &self.path).with_activity("preparing the table samples")?;
+        db.authorizer(Some(only_this_file)).with_activity("preparing to read only this file")?;
         let until = Instant::now() + limit;
-        db.progress_handler(STEPS, Some(move || Instant::now() >= until)).doing("limiting the statement")?;
+        db.progress_handler(STEPS, Some(move || Instant::now() >= until)).with_activity("limiting the statement")?;
         let say = |error: rusqlite::Error| match error.sqlite_error_code() {
             Some(ErrorCode::OperationInterrupted) => HistoryError::Question(format!(
                 "the statement has not ended within {} s: ask for less, or give it more time with --limit-s",

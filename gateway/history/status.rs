@@ -98,24 +98,24 @@ impl SharedStatus {
     }
 
     /// All is well again.
-    pub(crate) fn recovered(&self) {
+    pub(crate) fn mark_recovered(&self) {
         self.words.lock().unwrap_or_else(PoisonError::into_inner).degraded = None;
     }
 
     /// Nothing is becoming durable, because of `error`.
-    pub(crate) fn degraded(&self, error: &str) {
+    pub(crate) fn mark_degraded(&self, error: &str) {
         let mut words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
         words.degraded = Some(error.to_owned());
         words.last_error = Some(error.to_owned());
     }
 
     /// The file is not as it was written.
-    pub(crate) fn damaged(&self, error: &str) {
+    pub(crate) fn mark_damaged(&self, error: &str) {
         self.words.lock().unwrap_or_else(PoisonError::into_inner).damaged = Some(error.to_owned());
     }
 
     /// Everything but the queue.
-    pub(crate) fn status(&self) -> HistoryFigures {
+    pub(crate) fn read_figures(&self) -> HistoryFigures {
         let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
         HistoryFigures {
             acknowledged_through_ns: self.acknowledged_ns(),

@@ -6,7 +6,7 @@
 
 use super::options::SeriesKind;
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
-use super::rounding::rounded;
+use super::rounding::round_to_decimals;
 use super::rows::{Column, SeriesRows, Word};
 use super::series::Series;
 use serde_json::Value as Json;
@@ -18,14 +18,14 @@ use std::sync::Arc;
 pub(crate) fn to_text(rows: &SeriesRows, range: Range<usize>, series: &[Series], reasons: &Reasons) -> String {
     let mut out = String::from("{\"t\":[");
     for (index, at_ns) in rows.at_ns[range.clone()].iter().enumerate() {
-        comma(&mut out, index);
+        append_comma(&mut out, index);
         // Writing to a string cannot fail, here and below.
         let _ = write!(out, "{at_ns}");
     }
     out.push_str("],\"s\":{");
     let used = series.iter().zip(&rows.columns).filter(|(_, column)| !column.is_unused());
     for (index, (series, column)) in used.enumerate() {
-        comma(&mut out, index);
+        append_comma(&mut out, index);
         let _ = write!(out, "\"{}\":", series.id);
         match column {
             Column::Numbers { values, missing } => {
@@ -49,7 +49,7 @@ fn is_whole(text: &str) -> bool {
     sum.trim_end().strip_suffix('}').and_then(|sum| sum.parse().ok()) == Some(crc32fast::hash(summed.as_bytes()))
 }
 
-pub(super) fn comma(out: &mut String, index: usize) {
+pub(super) fn append_comma(out: &mut String, index: usize) {
     if index > 0 {
         out.push(',');
     }
@@ -57,7 +57,7 @@ pub(super) fn comma(out: &mut String, index: usize) {
 
 fn put_numbers(out: &mut String, values: &[f64], missing: &[u8], decimals: Option<u8>, reasons: &Reasons) {
     let cell = |out: &mut String, row: usize| match missing[row] {
-        PRESENT => put_number(out, decimals.map_or(values[row], |decimals| rounded(values[row], decimals))),
+        PRESENT => put_number(out, decimals.map_or(values[row], |decimals| round_to_decimals(values[row], decimals))),
         code => put_missing(out, code, reasons),
     };
     let same = (1..values.len()).all(|row| missing[row] == missing[0] && values[row].to_bits() == values[0].to_bits());
@@ -66,7 +66,7 @@ fn put_numbers(out: &mut String, values: &[f64], missing: &[u8], decimals: Optio
     }
     out.push('[');
     for row in 0..values.len() {
-        comma(out, row);
+        append_comma(out, row);
         cell(out, row);
     }
     out.push(']');
@@ -79,7 +79,7 @@ pub(super) fn put_number(out: &mut String, number: f64) {
 }
 
 pub(super) fn put_missing(out: &mut String, code: u8, reasons: &Reasons) {
-    let _ = write!(out, "{{\"m\":{}}}", Json::from(reasons.word(code)));
+    let _ = write!(out, "{{\"m\":{}}}", Json::from(reasons.find_word(code)));
 }
 
 fn put_words(out: &mut String, changes: &[(u32, Word)], range: &Range<usize>, reasons: &Reasons) {
@@ -96,14 +96,19 @@ fn put_words(out: &mut String, changes: &[(u32, Word)], range: &Range<usize>, re
     }
     out.push('[');
     for (index, row) in range.clone().enumerate() {
-        comma(out, index);
+        append_comma(out, index);
         cell(out, at(row).map(|index| &changes[index].1));
     }
     out.push(']');
 }
 
 /// Appends the rows of `text` to `rows`; `None`, and nothing appended, when it is not what [`to_text`] writes.
-pub(crate) fn append(text: &str, rows: &mut SeriesRows, series: &[Series], reasons: &mut Reasons) -> Option<()> {
+pub(crate) fn parse_rows_into(
+    text: &str,
+    rows: &mut SeriesRows,
+    series: &[Series],
+    reasons: &mut Reasons,
+) -> Option<()> {
     let body: Json = serde_json::from_str(text).ok().filter(|_| is_whole(text))?;
     let times: Vec<i64> = body.get("t")?.as_array()?.iter().map(Json::as_i64).collect::<Option<_>>()?;
     let cells = body.get("s")?.as_object()?;
@@ -115,7 +120,7 @@ pub(crate) fn append(text: &str, rows: &mut SeriesRows, series: &[Series], reaso
         }
     }
     let count = more.len();
-    rows.append(&more, 0..count);
+    rows.append_rows(&more, 0..count);
     Some(())
 }
 
@@ -124,7 +129,8 @@ fn column_of(cell: &Json, count: usize, kind: SeriesKind, reasons: &mut Reasons)
         Json::Array(cells) => cells.iter().take(count).collect(),
         alone => vec![alone; count],
     };
-    let mut reason = |cell: &Json| cell.get("m").and_then(Json::as_str).map_or(NOT_PROVIDED, |word| reasons.code(word));
+    let mut reason =
+        |cell: &Json| cell.get("m").and_then(Json::as_str).map_or(NOT_PROVIDED, |word| reasons.intern_word(word));
     match kind {
         SeriesKind::Number => Column::Numbers {
             values: cells.iter().map(|cell| cell.as_f64().unwrap_or(0.0)).collect(),
@@ -151,26 +157,26 @@ mod tests {
 
     #[test]
     fn the_tail_gives_back_every_row() {
-        let extras = vec![ExtraSeries::number("a_w", "W", "", ""), ExtraSeries::text("state", "", "")];
+        let extras = vec![ExtraSeries::new_number("a_w", "W", "", ""), ExtraSeries::new_text("state", "", "")];
         let mut series = stored_series(&Options { extras, ..Options::default() }).expect("fine");
         (1..).zip(&mut series).for_each(|(id, series)| series.id = id);
         let mut reasons = Reasons::default();
-        let mut rows = SeriesRows::of(&series);
-        let channel = |name| ChannelId::of(name).expect("in the table");
+        let mut rows = SeriesRows::for_series(&series);
+        let channel = |name| ChannelId::from_name(name).expect("in the table");
         for row in 0..30 {
-            let mut sample = Sample::empty(1_700_000_000_000_000_000 + row);
-            sample.set(channel("spindle_power_w"), Slot { value: Ok(Value::Number(row as f64 * 0.1)), age_ns: 0 });
-            sample.set(channel("program"), Slot { value: Ok(Value::Text("O1 \"a\"".into())), age_ns: 0 });
-            sample.set(channel("total_power_w"), Slot::absent(Absence::Stale));
+            let mut sample = Sample::new_empty(1_700_000_000_000_000_000 + row);
+            sample.set_slot(channel("spindle_power_w"), Slot { value: Ok(Value::Number(row as f64 * 0.1)), age_ns: 0 });
+            sample.set_slot(channel("program"), Slot { value: Ok(Value::Text("O1 \"a\"".into())), age_ns: 0 });
+            sample.set_slot(channel("total_power_w"), Slot::from_absence(Absence::Stale));
             let state = if row % 4 == 0 { "idle" } else { "cutting" };
             rows.push(&sample, &[ExtraValue::Missing("not_learned"), ExtraValue::Text(state)], &mut reasons);
         }
         let mut back = rows.empty_like();
         for part in [0..7, 7..8, 8..30] {
             let text = to_text(&rows, part, &series, &reasons);
-            append(&text, &mut back, &series, &mut reasons).expect("readable");
+            parse_rows_into(&text, &mut back, &series, &mut reasons).expect("readable");
         }
-        let exact: Vec<f64> = (0..30).map(|row| rounded(f64::from(row) * 0.1, 1)).collect();
+        let exact: Vec<f64> = (0..30).map(|row| round_to_decimals(f64::from(row) * 0.1, 1)).collect();
         let power = series.iter().position(|series| &*series.name == "spindle_power_w").expect("there");
         assert!(matches!(&back.columns[power], Column::Numbers { values, .. } if *values == exact));
         for (index, (back, rows)) in back.columns.iter().zip(&rows.columns).enumerate() {
@@ -182,8 +188,8 @@ mod tests {
     fn a_damaged_tail_is_refused() {
         let series = stored_series(&Options::default()).expect("fine");
         for text in ["", "{}", "{\"t\":[1.5],\"s\":{}}", "{\"t\":[1],\"s\":3}"] {
-            let mut rows = SeriesRows::of(&series);
-            assert_eq!(append(text, &mut rows, &series, &mut Reasons::default()), None, "{text}");
+            let mut rows = SeriesRows::for_series(&series);
+            assert_eq!(parse_rows_into(text, &mut rows, &series, &mut Reasons::default()), None, "{text}");
             assert!(rows.is_empty());
         }
     }

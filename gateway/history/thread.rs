@@ -1,7 +1,7 @@
 //! The writer thread: takes what has gathered, seals minutes, commits at its own pace, and keeps going whatever the
 //! disk says.
 
-use super::commit::{TailSlots, commit};
+use super::commit::{TailSlots, commit_buffer};
 use super::error::HistoryError;
 use super::mailbox::{Delivery, Mailbox, WriterJob};
 use super::maintenance::Maintenance;
@@ -59,7 +59,7 @@ struct StopGuard(Arc<Mailbox>);
 
 impl Drop for StopGuard {
     fn drop(&mut self) {
-        self.0.stop();
+        self.0.mark_stopped();
     }
 }
 
@@ -69,14 +69,14 @@ impl Thread {
         loop {
             self.shared.rounds.fetch_add(1, Ordering::Relaxed);
             let rows_too = self.takes_rows();
-            let delivery = self.take(rows_too);
+            let delivery = self.receive_delivery(rows_too);
             let closing = delivery.closing && delivery.batches.is_empty();
-            self.accept(delivery);
+            self.accept_delivery(delivery);
             self.commit_if_due(closing);
-            self.maintain();
+            self.run_maintenance();
             let done = rows_too && !self.is_dirty();
             if closing && (done || self.pace.failures >= LAST_ATTEMPTS) {
-                return self.finish();
+                return self.finish_writing();
             }
         }
     }
@@ -86,43 +86,43 @@ impl Thread {
         !(self.minute_buffer.is_full() && self.options.when_full == WhenFull::Wait)
     }
 
-    fn take(&mut self, rows_too: bool) -> Delivery {
+    fn receive_delivery(&mut self, rows_too: bool) -> Delivery {
         let until_commit = self.pace.next_commit.saturating_duration_since(Instant::now());
         let limit = if self.maintenance.is_busy() { Duration::ZERO } else { until_commit };
         // A flush promises everything before it, so it cannot come before its rows.
         let job_too = rows_too && self.pace.flushing.is_none() && self.pace.maintaining.is_none();
-        self.mailbox.take(limit, rows_too, job_too)
+        self.mailbox.receive_delivery(limit, rows_too, job_too)
     }
 
-    fn accept(&mut self, delivery: Delivery) {
+    fn accept_delivery(&mut self, delivery: Delivery) {
         self.minute_buffer.reasons = delivery.reasons;
         self.minute_buffer.records.extend(delivery.records);
         for batch in delivery.batches {
             if let Some(outbox) = &mut self.outbox {
-                outbox.gather(
+                outbox.gather_rows(
                     &batch,
                     self.minute_buffer.next_row,
                     &self.minute_buffer.series,
                     &self.minute_buffer.reasons,
                 );
             }
-            self.minute_buffer.ingest(&batch);
-            self.mailbox.recycle(batch);
+            self.minute_buffer.ingest_batch(&batch);
+            self.mailbox.recycle_batch(batch);
             if self.minute_buffer.blocks.len() >= BLOCKS_PRESSING && self.pace.failures == 0 {
                 // The next regular commit adds what the running minute has by then.
-                self.commit(false);
+                self.commit_pending(false);
             }
         }
         match delivery.job {
             Some((number, WriterJob::Flush)) => self.pace.flushing = Some(number),
             Some((number, WriterJob::Maintain(now_ns))) => {
                 self.pace.maintaining = Some(number);
-                self.maintenance.begin(now_ns);
+                self.maintenance.begin_run(now_ns);
             }
             Some((number, WriterJob::ConfirmClock)) => {
-                self.options.clock.trust = Trust::Confirmed.word();
+                self.options.clock.trust = Trust::Confirmed.as_word();
                 self.pace.confirming = true;
-                self.mailbox.finish(number);
+                self.mailbox.finish_job(number);
             }
             None => {}
         }
@@ -131,20 +131,20 @@ impl Thread {
     fn commit_if_due(&mut self, closing: bool) {
         let urgent = self.pace.failures == 0 && (closing || self.pace.flushing.is_some());
         if urgent || Instant::now() >= self.pace.next_commit {
-            self.commit(true);
+            self.commit_pending(true);
         } else if closing {
             std::thread::sleep(self.pace.next_commit.saturating_duration_since(Instant::now()));
         }
     }
 
-    fn commit(&mut self, with_tail: bool) {
+    fn commit_pending(&mut self, with_tail: bool) {
         let began = Instant::now();
         let wait = self.options.group_commit;
         if !self.is_dirty() {
             self.pace.next_commit = began + wait;
-            return self.acknowledge();
+            return self.acknowledge_rows();
         }
-        match self.attempt(with_tail) {
+        match self.commit_with_retry(with_tail) {
             Ok(()) => {
                 let took = u64::try_from(began.elapsed().as_micros()).unwrap_or(u64::MAX);
                 self.shared.commit_us.store(took, Ordering::Relaxed);
@@ -153,19 +153,19 @@ impl Thread {
                 if with_tail {
                     self.pace.next_commit = began + wait;
                 }
-                self.shared.recovered();
+                self.shared.mark_recovered();
                 self.note_clock();
-                self.acknowledge();
-                self.tidy();
+                self.acknowledge_rows();
+                self.tidy_after_commit();
             }
             Err(error) => {
                 self.pace.failures += 1;
                 self.pace.next_commit = Instant::now() + wait.max(RETRY);
-                self.shared.degraded(&degraded_text(&error));
+                self.shared.mark_degraded(&degraded_text(&error));
                 if error.is_damage() {
                     // Trying again changes nothing: whoever holds the writer goes on with another file.
                     self.pace.failures = LAST_ATTEMPTS;
-                    self.shared.damaged(&error.to_string());
+                    self.shared.mark_damaged(&error.to_string());
                 }
             }
         }
@@ -174,10 +174,10 @@ impl Thread {
     }
 
     /// One commit; on a full disk a second one after making room.
-    fn attempt(&mut self, with_tail: bool) -> Result<(), HistoryError> {
+    fn commit_with_retry(&mut self, with_tail: bool) -> Result<(), HistoryError> {
         match self.commit_all(with_tail) {
             Err(error) if error.is_full() => {
-                let waiting: u64 = self.minute_buffer.blocks.iter().map(|block| block.bytes() as u64).sum();
+                let waiting: u64 = self.minute_buffer.blocks.iter().map(|block| block.size_bytes() as u64).sum();
                 self.maintenance.make_room(&mut self.db, 2 * waiting + 65_536)?;
                 self.commit_all(with_tail)
             }
@@ -188,7 +188,7 @@ impl Thread {
     fn commit_all(&mut self, with_tail: bool) -> Result<(), HistoryError> {
         let Self { db, minute_buffer, slots, outbox, options, .. } = self;
         let dated = (options.origin.as_str(), &options.clock);
-        while !commit(db, minute_buffer, slots, outbox, dated, with_tail)? {}
+        while !commit_buffer(db, minute_buffer, slots, outbox, dated, with_tail)? {}
         Ok(())
     }
 
@@ -197,8 +197,8 @@ impl Thread {
         self.minute_buffer.is_dirty() || self.outbox.as_ref().is_some_and(Gatherer::is_dirty)
     }
 
-    fn acknowledge(&mut self) {
-        let (through_ns, next_row) = self.minute_buffer.durable();
+    fn acknowledge_rows(&mut self) {
+        let (through_ns, next_row) = self.minute_buffer.durable_end();
         if let Some(through_ns) = through_ns {
             self.shared.acknowledged_ns.store(through_ns, Ordering::Release);
         }
@@ -206,7 +206,7 @@ impl Thread {
         self.shared.rows.store(rows.saturating_sub(self.minute_buffer.lost_rows), Ordering::Relaxed);
         self.shared.acknowledged_record.store(self.minute_buffer.durable_ticket, Ordering::Release);
         if let Some(number) = self.pace.flushing.take() {
-            self.mailbox.finish(number);
+            self.mailbox.finish_job(number);
         }
     }
 
@@ -214,42 +214,42 @@ impl Thread {
     fn note_clock(&mut self) {
         if self.pace.confirming {
             // Where this fails it is tried again after the next commit.
-            self.pace.confirming = segments::confirm(&self.db, &self.options.clock).is_err();
+            self.pace.confirming = segments::confirm_clock(&self.db, &self.options.clock).is_err();
         }
     }
 
-    fn tidy(&mut self) {
+    fn tidy_after_commit(&mut self) {
         match self.maintenance.after_commit(&mut self.db) {
             Ok(used) => self.shared.bytes.store(used, Ordering::Relaxed),
-            Err(error) => self.shared.degraded(&degraded_text(&error)),
+            Err(error) => self.shared.mark_degraded(&degraded_text(&error)),
         }
         self.shared.retired.store(self.maintenance.retired, Ordering::Relaxed);
         self.shared.log_bytes.store(self.maintenance.log_bytes, Ordering::Relaxed);
         self.shared.short_of_room.store(self.maintenance.is_short(), Ordering::Relaxed);
     }
 
-    fn maintain(&mut self) {
+    fn run_maintenance(&mut self) {
         if !self.maintenance.is_busy() {
             return;
         }
-        let more = self.maintenance.step(&mut self.db).unwrap_or_else(|error| {
+        let more = self.maintenance.run_step(&mut self.db).unwrap_or_else(|error| {
             // Maintenance can wait; what is being recorded cannot.
-            self.shared.degraded(&degraded_text(&error));
-            self.maintenance.abandon();
+            self.shared.mark_degraded(&degraded_text(&error));
+            self.maintenance.abandon_run();
             false
         });
         self.shared.retired.store(self.maintenance.retired, Ordering::Relaxed);
         if let Some(number) = self.pace.maintaining.take_if(|_| !more) {
-            self.mailbox.finish(number);
+            self.mailbox.finish_job(number);
         }
     }
 
-    fn finish(mut self) {
+    fn finish_writing(mut self) {
         if let Some(number) = self.pace.maintaining {
-            self.mailbox.finish(number);
+            self.mailbox.finish_job(number);
         }
         // The running minute becomes a block, so that its summaries are complete and leave the box; where this fails, the tail has it.
-        self.minute_buffer.seal();
+        self.minute_buffer.seal_open_rows();
         let _ = self.commit_all(false);
         // A clean end ends the state that the machine was in; after a failure the next start does it.
         if let Some(newest_ns) = self.minute_buffer.newest_ns() {

@@ -46,7 +46,7 @@ impl Samples {
     }
 
     /// The statement that declares the columns.
-    pub(super) fn declaration(&self) -> Result<CString, Error> {
+    pub(super) fn declare_columns(&self) -> Result<CString, Error> {
         let mut columns = vec!["at_ns INTEGER".to_owned(), "time_utc TEXT".to_owned(), "segment INTEGER".to_owned()];
         for series in self.series.iter() {
             let kind = if series.kind == SeriesKind::Text { "TEXT" } else { "REAL" };
@@ -58,12 +58,12 @@ impl Samples {
         Ok(CString::new(format!("CREATE TABLE x({})", columns.join(", ")))?)
     }
 
-    /// Takes over the conditions on time: one letter per argument of [`Cursor::filter`], small for `at_ns`, capital for
+    /// Takes over the conditions on time: one letter per argument of [`Cursor::begin_scan`], small for `at_ns`, capital for
     /// `time_utc`. `SQLite` checks them again row by row.
-    pub(super) fn plan(info: &mut IndexInfo) {
+    pub(super) fn plan_query(info: &mut IndexInfo) {
         let mut letters = String::new();
         for (constraint, mut usage) in info.constraints_and_usages() {
-            let letter = letter(constraint.column(), constraint.operator());
+            let letter = encode_constraint(constraint.column(), constraint.operator());
             if let Some(letter) = letter.filter(|_| constraint.is_usable()) {
                 letters.push(letter);
                 usage.set_argv_index(c_int::try_from(letters.len()).unwrap_or(0));
@@ -77,7 +77,7 @@ impl Samples {
         info.set_idx_str(&letters);
     }
 
-    pub(super) fn open(&self) -> Result<Cursor, Error> {
+    pub(super) fn open_cursor(&self) -> Result<Cursor, Error> {
         let db = schema::open_for_reading(&self.path).map_err(module_error)?;
         // One view for the whole scan, also while the gateway writes on.
         db.execute_batch("BEGIN")?;
@@ -89,7 +89,7 @@ fn quote_name(name: &str) -> String {
     format!("\"{}\"", name.replace('"', "\"\""))
 }
 
-fn letter(column: c_int, operator: IndexConstraintOp) -> Option<char> {
+fn encode_constraint(column: c_int, operator: IndexConstraintOp) -> Option<char> {
     use IndexConstraintOp::{
         SQLITE_INDEX_CONSTRAINT_EQ as Equal, SQLITE_INDEX_CONSTRAINT_GE as NotBelow,
         SQLITE_INDEX_CONSTRAINT_GT as Above, SQLITE_INDEX_CONSTRAINT_LE as NotAbove,
@@ -125,7 +125,7 @@ pub(super) struct Cursor {
 
 impl Cursor {
     /// Begins a scan of the range that the arguments leave.
-    pub(super) fn filter(&mut self, letters: &str, arguments: &Filters<'_>) -> Result<(), Error> {
+    pub(super) fn begin_scan(&mut self, letters: &str, arguments: &Filters<'_>) -> Result<(), Error> {
         let mut range = TimeNs::MIN..TimeNs::MAX;
         for (letter, argument) in letters.chars().zip(arguments.iter()) {
             let bounds = if letter.is_ascii_lowercase() { number_bounds(argument) } else { text_bounds(argument) };
@@ -163,16 +163,16 @@ impl Cursor {
         Ok(())
     }
 
-    pub(super) fn eof(&self) -> bool {
+    pub(super) fn is_at_end(&self) -> bool {
         self.place.as_ref().is_none_or(|place| place.stretch.is_none())
     }
 
-    pub(super) fn rowid(&self) -> i64 {
+    pub(super) fn current_rowid(&self) -> i64 {
         let row = |place: &Place| place.stretch.as_ref().map(|stretch| stretch.first_row + place.rows.start as i64);
         self.place.as_ref().and_then(row).unwrap_or(0)
     }
 
-    pub(super) fn column(&self, context: &mut Context, column: c_int) -> Result<(), Error> {
+    pub(super) fn write_column(&self, context: &mut Context, column: c_int) -> Result<(), Error> {
         let Some((place, stretch)) = self.place.as_ref().and_then(|place| Some((place, place.stretch.as_ref()?)))
         else {
             return Ok(());
@@ -181,7 +181,7 @@ impl Cursor {
             AT_NS => context.set_result(stretch.at_ns[place.rows.start]),
             TIME_UTC => context.set_result(time_text(stretch.at_ns[place.rows.start])),
             SEGMENT => context.set_result(stretch.segment),
-            column => context.set_result(self.cell(
+            column => context.set_result(self.read_cell(
                 place,
                 stretch,
                 usize::try_from(column).unwrap_or(0).saturating_sub(FIXED),
@@ -189,23 +189,23 @@ impl Cursor {
         }
     }
 
-    fn cell(&self, place: &Place, stretch: &SegmentStretch, index: usize) -> Result<Value, Error> {
+    fn read_cell(&self, place: &Place, stretch: &SegmentStretch, index: usize) -> Result<Value, Error> {
         let (series, reason) = match self.series.get(index) {
             Some(series) => (series.id, false),
             None => (self.series[index - self.series.len()].id, true),
         };
         let mut cache = place.cells.borrow_mut();
         if let std::collections::btree_map::Entry::Vacant(vacant) = cache.entry(series) {
-            vacant.insert(place.walk.borrow_mut().cells(stretch, series).map_err(module_error)?);
+            vacant.insert(place.walk.borrow_mut().read_cells(stretch, series).map_err(module_error)?);
         }
         let (cells, row) = (cache.get(&series).and_then(Option::as_ref), place.rows.start);
         if reason {
-            let code = cells.map_or(super::reason::NOT_PROVIDED, |cells| cells.missing(row));
-            let word = place.walk.borrow().reasons.word(code).map(str::to_owned);
+            let code = cells.map_or(super::reason::NOT_PROVIDED, |cells| cells.missing_code(row));
+            let word = place.walk.borrow().reasons.find_word(code).map(str::to_owned);
             return Ok(word.map_or(Value::Null, Value::Text));
         }
-        let number = cells.and_then(|cells| cells.number(row)).map(Value::Real);
-        let text = || cells.and_then(|cells| cells.word(row)).map(|word| Value::Text(word.to_owned()));
+        let number = cells.and_then(|cells| cells.number_at(row)).map(Value::Real);
+        let text = || cells.and_then(|cells| cells.word_at(row)).map(|word| Value::Text(word.to_owned()));
         Ok(number.or_else(text).unwrap_or(Value::Null))
     }
 }

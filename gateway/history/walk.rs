@@ -5,7 +5,7 @@ use super::compact::{COMPACT_NS, own_codes};
 use super::damage::{DamagedRows, is_of_disk};
 use super::error::{Doing, HistoryError};
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
-use super::recover::unsealed;
+use super::recover::read_unsealed;
 use super::rows::{Column, SeriesRows, Word};
 use super::series::Series;
 use super::tail;
@@ -47,12 +47,12 @@ pub(crate) fn blocks_in(db: &Connection, range: &Range<TimeNs>) -> Result<VecDeq
         .prepare_cached(
             "SELECT first_row FROM blocks WHERE start_ns >= ?1 AND start_ns < ?2 AND end_ns >= ?3 ORDER BY first_row",
         )
-        .doing("looking for blocks")?;
+        .with_activity("looking for blocks")?;
     // No block is longer than a compacted one and the minute that was the last of its parts, so an earlier start cannot reach
     // into the range.
     let earliest_ns = range.start.saturating_sub(2 * COMPACT_NS);
     let keys = statement.query_map(params![earliest_ns, range.end, range.start], |row| row.get(0));
-    keys.and_then(Iterator::collect).doing("looking for blocks")
+    keys.and_then(Iterator::collect).with_activity("looking for blocks")
 }
 
 impl Walk {
@@ -63,7 +63,7 @@ impl Walk {
         let sealed: Option<i64> = db
             .query_row("SELECT first_row + rows FROM blocks ORDER BY first_row DESC LIMIT 1", [], |row| row.get(0))
             .optional()
-            .doing("looking for the last block")?;
+            .with_activity("looking for the last block")?;
         let decoder = Decoder::new().map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
         Ok(Self {
             blocks,
@@ -95,7 +95,7 @@ impl Walk {
     /// The next stretch that has a row in the range. What is damaged is passed over, and noted in `damaged`.
     pub(crate) fn next(&mut self, db: &Connection) -> Result<Option<SegmentStretch>, HistoryError> {
         while let Some(first_row) = self.blocks.pop_front() {
-            match self.load(db, first_row)? {
+            match self.load_block(db, first_row)? {
                 Some(stretch) if !self.rows_of(&stretch).is_empty() => return Ok(Some(stretch)),
                 Some(_) => {}
                 None => self.damaged.push(DamagedRows::of_block(db, first_row)),
@@ -120,12 +120,12 @@ impl Walk {
     }
 
     /// The cells of one series in all rows of `stretch`; `None` when nothing delivered it there.
-    pub(crate) fn cells(&mut self, stretch: &SegmentStretch, series: i64) -> Result<Option<Cells>, HistoryError> {
+    pub(crate) fn read_cells(&mut self, stretch: &SegmentStretch, series: i64) -> Result<Option<Cells>, HistoryError> {
         match &stretch.form {
             StretchForm::Block { directory, columns, codes } => {
-                let Some(entry) = directory.entry(series) else { return Ok(None) };
+                let Some(entry) = directory.find_entry(series) else { return Ok(None) };
                 let damaged = damage_error(stretch.first_row);
-                let mut cells = self.decoder.cells(directory, entry, columns).ok_or(damaged)?;
+                let mut cells = self.decoder.decode_cells(directory, entry, columns).ok_or(damaged)?;
                 if entry.any_missing && !directory.words.is_empty() {
                     let missing = cells.missing_mut();
                     missing.iter_mut().for_each(|code| *code = codes[usize::from(*code)]);
@@ -141,16 +141,16 @@ impl Walk {
     }
 
     /// The block of this key; `None` when the disk has changed it.
-    fn load(&mut self, db: &Connection, first_row: i64) -> Result<Option<SegmentStretch>, HistoryError> {
+    fn load_block(&mut self, db: &Connection, first_row: i64) -> Result<Option<SegmentStretch>, HistoryError> {
         let stored = db
             .prepare_cached(&format!("SELECT {BLOCK_COLUMNS} FROM blocks WHERE first_row = ?1"))
             .and_then(|mut statement| statement.query_row([first_row], StoredBlock::of_row));
         let stored = match stored {
             Err(error) if is_of_disk(&error) => return Ok(None),
-            stored => stored.doing("reading a block")?,
+            stored => stored.with_activity("reading a block")?,
         };
-        let Some(directory) = stored.checked() else { return Ok(None) };
-        let Some(at_ns) = self.decoder.times(&directory, &stored.columns) else { return Ok(None) };
+        let Some(directory) = stored.verify_directory() else { return Ok(None) };
+        let Some(at_ns) = self.decoder.decode_times(&directory, &stored.columns) else { return Ok(None) };
         let codes = Box::new(own_codes(&directory, &mut self.reasons));
         let (segment, columns) = (stored.key.segment, stored.columns);
         Ok(Some(SegmentStretch { segment, first_row, at_ns, form: StretchForm::Block { directory, columns, codes } }))
@@ -158,12 +158,12 @@ impl Walk {
 
     fn load_tail(&mut self, db: &Connection, from_row: i64) -> Result<VecDeque<SegmentStretch>, HistoryError> {
         let mut stretches = VecDeque::new();
-        let entries = unsealed(db, from_row)?;
+        let entries = read_unsealed(db, from_row)?;
         for group in entries.chunk_by(|a, b| a.segment == b.segment && b.first_row == a.first_row + a.rows) {
-            let mut rows = SeriesRows::of(&self.series);
+            let mut rows = SeriesRows::for_series(&self.series);
             for entry in group {
-                if tail::append(&entry.body, &mut rows, &self.series, &mut self.reasons).is_none() {
-                    self.damaged.push(entry.damaged());
+                if tail::parse_rows_into(&entry.body, &mut rows, &self.series, &mut self.reasons).is_none() {
+                    self.damaged.push(entry.to_damaged_rows());
                 }
             }
             let (segment, first_row) = (group[0].segment, group[0].first_row);
@@ -184,7 +184,7 @@ fn damage_error(first_row: i64) -> HistoryError {
 
 impl SegmentStretch {
     /// The series delivered here, and whether a value of it is missing anywhere.
-    pub(crate) fn delivered(&self, series: &[Series]) -> Vec<(i64, bool)> {
+    pub(crate) fn delivered_series(&self, series: &[Series]) -> Vec<(i64, bool)> {
         match &self.form {
             StretchForm::Block { directory, .. } => {
                 directory.entries.iter().map(|entry| (entry.series, entry.any_missing)).collect()
@@ -252,7 +252,7 @@ impl Cells {
 
     /// The code of the reason in `row`, 0 when there is a value.
     #[must_use]
-    pub fn missing(&self, row: usize) -> u8 {
+    pub fn missing_code(&self, row: usize) -> u8 {
         match self {
             Self::Numbers(cells) => cells.missing[row],
             Self::Words(cells) => cells.missing[row],
@@ -261,7 +261,7 @@ impl Cells {
 
     /// The number in `row`; `None` when it is missing or the series is text.
     #[must_use]
-    pub fn number(&self, row: usize) -> Option<f64> {
+    pub fn number_at(&self, row: usize) -> Option<f64> {
         match self {
             Self::Numbers(cells) if cells.missing[row] == PRESENT => Some(cells.values[row]),
             _ => None,
@@ -270,7 +270,7 @@ impl Cells {
 
     /// The word in `row`; `None` when it is missing or the series is a quantity.
     #[must_use]
-    pub fn word(&self, row: usize) -> Option<&str> {
+    pub fn word_at(&self, row: usize) -> Option<&str> {
         match self {
             Self::Words(cells) if cells.missing[row] == PRESENT => {
                 cells.words.get(cells.codes[row] as usize).map(|word| &**word)
@@ -280,7 +280,7 @@ impl Cells {
     }
 
     /// Only these rows, in order.
-    pub(crate) fn keep(&self, rows: &[usize]) -> Self {
+    pub(crate) fn select_rows(&self, rows: &[usize]) -> Self {
         match self {
             Self::Numbers(cells) => Self::Numbers(NumberCells {
                 values: rows.iter().map(|row| cells.values[*row]).collect(),

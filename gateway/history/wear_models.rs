@@ -48,7 +48,7 @@ pub fn store_wear_model(path: &Path, at_ns: TimeNs, record: &WearRecord) -> Resu
             toml
         ],
     )
-    .doing("storing a wear model")?;
+    .with_activity("storing a wear model")?;
     Ok(db.last_insert_rowid())
 }
 
@@ -64,7 +64,7 @@ fn has_library(db: &Connection) -> Result<bool, HistoryError> {
     db.query_row("SELECT 1 FROM sqlite_schema WHERE name = 'wear_models'", [], |_| Ok(()))
         .optional()
         .map(|found| found.is_some())
-        .doing("looking for the wear models")
+        .with_activity("looking for the wear models")
 }
 
 impl Reader {
@@ -78,7 +78,7 @@ impl Reader {
         }
         self.db
             .query_row("SELECT coalesce(max(id), 0) FROM wear_models", [], |row| row.get(0))
-            .doing("looking for the newest wear model")
+            .with_activity("looking for the newest wear model")
     }
 
     /// Every model, the oldest first.
@@ -92,11 +92,11 @@ impl Reader {
         let mut statement = self
             .db
             .prepare("SELECT id, at_ns, in_force, (SELECT toml FROM wear_models AS it WHERE it.id = list.id) FROM wear_model_list AS list ORDER BY id")
-            .doing("reading the wear models")?;
+            .with_activity("reading the wear models")?;
         let rows = statement.query_map([], |row| {
             Ok((row.get::<_, i64>(0)?, row.get::<_, i64>(1)?, row.get::<_, bool>(2)?, row.get::<_, String>(3)?))
         });
-        let rows: Vec<_> = rows.and_then(Iterator::collect).doing("reading the wear models")?;
+        let rows: Vec<_> = rows.and_then(Iterator::collect).with_activity("reading the wear models")?;
         rows.into_iter()
             .map(|(id, at_ns, in_force, toml)| {
                 let spoilt = |what| HistoryError::Question(format!("wear model {id} of the library: {what}"));

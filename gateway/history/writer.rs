@@ -1,7 +1,7 @@
 //! The handle through which the box writes its history.
 
 use super::commit::TailSlots;
-use super::error::{HistoryError, at};
+use super::error::{HistoryError, add_path};
 use super::lock::Lock;
 use super::mailbox::{Mailbox, WriterJob};
 use super::maintenance::Maintenance;
@@ -9,7 +9,7 @@ use super::minute_buffer::MinuteBuffer;
 use super::options::{ExtraValue, Options};
 use super::outbox::Gatherer;
 use super::record::Record;
-use super::recover::recover;
+use super::recover::recover_file;
 use super::schema;
 use super::series::stored_series;
 use super::status::{HistoryFigures, SharedStatus};
@@ -44,14 +44,14 @@ impl Writer {
     /// [`HistoryError::NotAHistory`], [`HistoryError::ReadOnly`], or what `SQLite` says.
     pub fn open(path: &Path, options: Options) -> Result<Self, HistoryError> {
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-            std::fs::create_dir_all(parent).map_err(at(parent))?;
+            std::fs::create_dir_all(parent).map_err(add_path(parent))?;
         }
-        let lock = Lock::take(path)?;
+        let lock = Lock::acquire_at(path)?;
         let mut db = schema::open_for_writing(path)?;
         let mut series = stored_series(&options)?;
-        schema::register(&mut db, &mut series)?;
+        schema::register_series(&mut db, &mut series)?;
         schema::note_limit(&db, options.retention.max_bytes)?;
-        let end = recover(&mut db, options.goes_on.then_some(options.origin.as_str()))?;
+        let end = recover_file(&mut db, options.goes_on.then_some(options.origin.as_str()))?;
         let outbox =
             options.outbox.clone().map(|outbox| Gatherer::open(&mut db, outbox, &series, end.last_ns)).transpose()?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));
@@ -69,21 +69,22 @@ impl Writer {
             options,
             pace: CommitSchedule::default(),
         };
-        let thread = std::thread::Builder::new().name("history".to_owned()).spawn(|| thread.run()).map_err(at(path))?;
+        let thread =
+            std::thread::Builder::new().name("history".to_owned()).spawn(|| thread.run()).map_err(add_path(path))?;
         Ok(Self { path: path.to_owned(), mailbox, shared, thread: Some(thread), _lock: lock })
     }
 
     /// Hands in one tick: the channels of `sample`, and the values of the registered extras in their order. Takes well
     /// under a microsecond and never waits for the disk (unless [`WhenFull::Wait`](super::WhenFull::Wait) was chosen).
     /// Returns how many samples have been dropped so far because the queue was full.
-    pub fn sample(&self, sample: &Sample, extras: &[ExtraValue<'_>]) -> u64 {
-        self.mailbox.sample(sample, extras)
+    pub fn queue_sample(&self, sample: &Sample, extras: &[ExtraValue<'_>]) -> u64 {
+        self.mailbox.queue_sample(sample, extras)
     }
 
     /// Hands in an event, alarm, state, part, decision, command, model or diagnosis. Returns its ticket, which is durable
     /// once [`Self::acknowledged_record`] reaches it; `None` when the queue was full and it was dropped.
-    pub fn record(&self, record: impl Into<Record>) -> Option<u64> {
-        self.mailbox.record(record.into())
+    pub fn queue_record(&self, record: impl Into<Record>) -> Option<u64> {
+        self.mailbox.queue_record(record.into())
     }
 
     /// Samples up to and including this time survive a power cut. `None` before the first commit.
@@ -108,16 +109,16 @@ impl Writer {
 
     /// Begins compaction, and removal of what is too old at `now_ns`, piece by piece between commits. Without a time nothing
     /// is too old: give one only where the clock is confirmed. Call it once a night.
-    pub fn maintain(&self, now_ns: Option<TimeNs>) {
-        self.mailbox.ask(WriterJob::Maintain(now_ns));
+    pub fn request_maintenance(&self, now_ns: Option<TimeNs>) {
+        self.mailbox.queue_job(WriterJob::Maintain(now_ns));
     }
 
     /// The clock of [`Options::clock`] is confirmed: the rows since opening are dated for good.
     pub fn confirm_clock(&self) {
-        self.mailbox.ask(WriterJob::ConfirmClock);
+        self.mailbox.queue_job(WriterJob::ConfirmClock);
     }
 
-    /// As [`Self::maintain`], and waits at most `limit` for the end of it.
+    /// As [`Self::request_maintenance`], and waits at most `limit` for the end of it.
     ///
     /// # Errors
     /// [`HistoryError::NotDurable`] with the reason.
@@ -126,27 +127,27 @@ impl Writer {
     }
 
     fn await_job(&self, job: WriterJob, limit: Duration) -> Result<(), HistoryError> {
-        let number = self.mailbox.ask(job);
+        let number = self.mailbox.queue_job(job);
         if self.mailbox.await_job(number, limit) {
             return Ok(());
         }
         if self.thread.as_ref().is_none_or(JoinHandle::is_finished) {
             return Err(HistoryError::Stopped);
         }
-        let reason = self.shared.status().degraded.unwrap_or_else(|| "the writer is still busy".to_owned());
+        let reason = self.shared.read_figures().degraded.unwrap_or_else(|| "the writer is still busy".to_owned());
         Err(HistoryError::NotDurable { seconds: limit.as_secs_f64(), reason })
     }
 
     /// How the writer is doing.
     #[must_use]
     pub fn status(&self) -> HistoryFigures {
-        let waiting = self.mailbox.waiting();
+        let waiting = self.mailbox.measure_queue();
         HistoryFigures {
             queued_samples: waiting.rows,
             queued_records: waiting.records,
             dropped_samples: waiting.dropped_samples,
             dropped_records: waiting.dropped_records,
-            ..self.shared.status()
+            ..self.shared.read_figures()
         }
     }
 
@@ -166,12 +167,12 @@ impl Writer {
     /// could not be made durable.
     #[must_use]
     pub fn close(mut self) -> HistoryFigures {
-        self.join();
+        self.join_thread();
         self.status()
     }
 
-    fn join(&mut self) {
-        self.mailbox.close();
+    fn join_thread(&mut self) {
+        self.mailbox.request_close();
         if let Some(thread) = self.thread.take() {
             // A panic of the thread has been printed by then; there is nobody left to tell.
             let _ = thread.join();
@@ -181,6 +182,6 @@ impl Writer {
 
 impl Drop for Writer {
     fn drop(&mut self) {
-        self.join();
+        self.join_thread();
     }
 }

@@ -1,14 +1,14 @@
 //! Edited scripts over the history: one run at a time, in the background, with its report kept until the next one.
 
 use super::ServerState;
-use super::guard::told;
+use super::guard::with_audit_note;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::{named, on_disk, with};
+use super::rules::{check_name, on_disk, with};
 use crate::access::Role;
 use crate::active_scripts;
-use crate::backtest::{BacktestPlan, backtest};
+use crate::backtest::{BacktestPlan, run_backtest};
 use crate::history::Reader;
 use crate::moment;
 use axum::Json;
@@ -22,8 +22,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::read("/api/v1/backtest", || get(state)),
-    Route::post(Role::Setter, "/api/v1/rules/{file}/backtest", 2 * TEXT_MAX + 4096, || post(begin)),
+    Route::read("/api/v1/backtest", || get(serve_backtest)),
+    Route::post(Role::Setter, "/api/v1/rules/{file}/backtest", 2 * TEXT_MAX + 4096, || post(begin_backtest)),
 ];
 
 /// What is asked for.
@@ -57,14 +57,14 @@ enum Run {
 pub(super) struct Backtests(Arc<Mutex<Run>>);
 
 impl Backtests {
-    fn locked(&self) -> MutexGuard<'_, Run> {
+    fn lock_run(&self) -> MutexGuard<'_, Run> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// `GET /api/v1/backtest`
-async fn state(State(shared): State<ServerState>) -> Json<Value> {
-    Json(match &*shared.backtests.locked() {
+async fn serve_backtest(State(shared): State<ServerState>) -> Json<Value> {
+    Json(match &*shared.backtests.lock_run() {
         Run::None => json!({ "schema": "backtest-run/1", "state": "none" }),
         Run::Running { file, by, since } => {
             let seconds = since.elapsed().as_secs_f64();
@@ -76,18 +76,18 @@ async fn state(State(shared): State<ServerState>) -> Json<Value> {
 }
 
 /// `POST /api/v1/rules/{file}/backtest`: begins; `GET /api/v1/backtest` tells how it goes.
-async fn begin(
+async fn begin_backtest(
     State(shared): State<ServerState>,
     Path(name): Path<String>,
     SignedIn(person): SignedIn,
     JsonBody(asked): JsonBody<Asked>,
 ) -> Result<Response, ApiProblem> {
-    named(&name)?;
+    check_name(&name)?;
     let shown = shared.clone();
-    let plan = super::rules::aside(move || plan(&shown, &name, &asked).map(|plan| (plan, name))).await;
+    let plan = super::rules::run_blocking(move || plan_backtest(&shown, &name, &asked).map(|plan| (plan, name))).await;
     let (plan, name) = plan?;
     {
-        let mut run = shared.backtests.locked();
+        let mut run = shared.backtests.lock_run();
         if let Run::Running { by, .. } = &*run {
             let title = format!("a backtest of {by} is under way");
             return Err(ApiProblem::conflict(title, "wait for it; there is one at a time"));
@@ -96,45 +96,47 @@ async fn begin(
     }
     let (backtests, free) = (shared.backtests.clone(), shared.backtests.clone());
     let work = move || {
-        let done = match backtest(plan) {
-            Ok(report) => Run::Done(report.json()),
+        let done = match run_backtest(plan) {
+            Ok(report) => Run::Done(report.to_json()),
             Err(error) => Run::Failed(error.to_string()),
         };
-        *backtests.locked() = done;
+        *backtests.lock_run() = done;
     };
     let thread = std::thread::Builder::new().name("backtest".to_owned()).spawn(move || {
         // A run that breaks off leaves the place free.
         if std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).is_err() {
-            *shared.backtests.locked() = Run::Failed("the run broke off; the log says more".to_owned());
+            *shared.backtests.lock_run() = Run::Failed("the run broke off; the log says more".to_owned());
         }
     });
     if let Err(error) = thread {
-        *free.locked() = Run::None;
+        *free.lock_run() = Run::None;
         return Err(ApiProblem::unavailable(format!("no thread for the run: {error}"), "try again"));
     }
-    Ok(told(Json(json!({ "schema": "backtest-run/1", "state": "running" })), format!("{name}: a backtest")))
+    Ok(with_audit_note(Json(json!({ "schema": "backtest-run/1", "state": "running" })), format!("{name}: a backtest")))
 }
 
-fn plan(shared: &ServerState, name: &str, asked: &Asked) -> Result<BacktestPlan, ApiProblem> {
+fn plan_backtest(shared: &ServerState, name: &str, asked: &Asked) -> Result<BacktestPlan, ApiProblem> {
     let unusable = |found: Vec<ScriptProblem>| {
         let all: Vec<String> = found.iter().map(ToString::to_string).collect();
-        ApiProblem::request(all.join("\n"), "mend it; `Run trials` marks the line")
+        ApiProblem::bad_request(all.join("\n"), "mend it; `Run trials` marks the line")
     };
-    let newest = Reader::open(&shared.history).and_then(|reader| reader.present());
+    let newest = Reader::open(&shared.history).and_then(|reader| reader.read_present_span());
     let newest = newest.map_err(|error| ApiProblem::unavailable(error.to_string(), "look at the history"))?;
     let nothing = || ApiProblem::conflict("the history holds no samples yet", "let the box run for a while first");
     let (_, newest_ns) = newest.ok_or_else(nothing)?;
-    let bad = |what: String| ApiProblem::request(format!("since: {what}"), "write 24h, 7d or 90m");
+    let bad = |what: String| ApiProblem::bad_request(format!("since: {what}"), "write 24h, 7d or 90m");
     let from_ns = moment::parse(&format!("-{}", asked.since), newest_ns).map_err(bad)?;
     let files = on_disk(shared)?;
-    let running = active_scripts::kept(&shared.data_dir).unwrap_or_else(|| files.clone());
-    let values = super::rules::values(shared);
+    let running = active_scripts::read_texts(&shared.data_dir).unwrap_or_else(|| files.clone());
+    let values = super::rules::read_values(shared);
     Ok(BacktestPlan {
         history: shared.history.clone(),
         from_ns,
         to_ns: None,
         every_ns: 0,
-        running: script::compile_with(&running, &values).or_else(|_| script::compile(&running)).map_err(unusable)?,
+        running: script::compile_with(&running, &values)
+            .or_else(|_| script::compile_scripts(&running))
+            .map_err(unusable)?,
         edited: script::compile_with(&with(files, name, &asked.text), &values).map_err(unusable)?,
     })
 }

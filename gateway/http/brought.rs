@@ -2,12 +2,12 @@
 
 use super::ServerState;
 use super::diagnoses::run_document;
-use super::guard::told;
+use super::guard::with_audit_note;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
-use super::rules::aside;
+use super::rules::run_blocking;
 use crate::access::Role;
 use crate::diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis};
 use crate::diagnosis::map_file::{MapProposal, ProposedColumn};
@@ -15,7 +15,7 @@ use crate::diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
 use crate::gallery;
 use adapters::bilingual::Bilingual;
 use adapters::channel::CHANNELS;
-use adapters::recording::read::preview;
+use adapters::recording::read::preview_recording;
 use adapters::recording::read::preview_rows;
 use adapters::recording::{Mapping, NoteKind, TEXT_COLUMNS};
 use axum::Json;
@@ -35,36 +35,36 @@ const BODY_MAX: usize = 256 << 10;
 const ROWS_SHOWN: usize = 6;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::read("/api/v1/files", || get(list)),
-    Route::post(Role::Setter, "/api/v1/files", FILE_MAX, || post(bring)),
-    Route::read("/api/v1/files/{key}", || get(describe)),
+    Route::read("/api/v1/files", || get(serve_files)),
+    Route::post(Role::Setter, "/api/v1/files", FILE_MAX, || post(upload_file)),
+    Route::read("/api/v1/files/{key}", || get(serve_file)),
     Route::put(Role::Setter, "/api/v1/files/{key}/map", BODY_MAX, || put(map)),
-    Route::post(Role::Setter, "/api/v1/files/{key}/diagnosis", BODY_MAX, || post(begin)),
-    Route::read("/api/v1/files-diagnosis", || get(state)),
-    Route::delete(Role::Setter, "/api/v1/files-diagnosis", 0, || delete(cancel)),
-    Route::post(Role::Setter, "/api/v1/gallery/{name}", 1024, || post(example)),
-    Route::read("/api/v1/gallery/{name}/truth", || get(truth)),
+    Route::post(Role::Setter, "/api/v1/files/{key}/diagnosis", BODY_MAX, || post(begin_file_diagnosis)),
+    Route::read("/api/v1/files-diagnosis", || get(serve_file_diagnosis)),
+    Route::delete(Role::Setter, "/api/v1/files-diagnosis", 0, || delete(cancel_file_diagnosis)),
+    Route::post(Role::Setter, "/api/v1/gallery/{name}", 1024, || post(diagnose_example)),
+    Route::read("/api/v1/gallery/{name}/truth", || get(serve_truth)),
 ];
 
 impl ServerState {
-    pub(super) fn files(&self) -> Result<&FileDiagnoses, ApiProblem> {
+    pub(super) fn require_files(&self) -> Result<&FileDiagnoses, ApiProblem> {
         let none = || ApiProblem::unavailable("files cannot be taken", "look at the data directory and at the log");
         self.files.as_ref().ok_or_else(none)
     }
 }
 
-fn broken(error: std::io::Error) -> ApiProblem {
+fn describe_io_error(error: std::io::Error) -> ApiProblem {
     ApiProblem::unavailable(format!("the file cannot be kept: {error}"), "look at the data directory")
 }
 
-fn both(text: &Bilingual) -> Value {
+fn bilingual_to_json(text: &Bilingual) -> Value {
     json!({ "en": text.en, "zh": text.zh })
 }
 
 /// `GET /api/v1/files`: what was brought, what was found, and what can be chosen.
-async fn list(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
-    let files = shared.files()?.clone();
-    aside(move || {
+async fn serve_files(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
+    let files = shared.require_files()?.clone();
+    run_blocking(move || {
         let kinds: Vec<Value> =
             KINDS.iter().map(|(_, word, en, zh)| json!({ "kind": word, "en": en, "zh": zh })).collect();
         let materials: Vec<&str> = MATERIALS.iter().map(|(name, ..)| *name).collect();
@@ -72,11 +72,11 @@ async fn list(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProbl
             .iter()
             .map(|channel| json!({ "name": channel.name, "unit": channel.unit, "en": channel.en, "zh": channel.zh }))
             .collect();
-        let results: Vec<Value> = files.results().iter().map(|result| result_document(&files, result)).collect();
+        let results: Vec<Value> = files.list_results().iter().map(|result| result_document(&files, result)).collect();
         let examples: Vec<Value> =
             gallery::EXAMPLES.iter().map(|it| json!({ "name": it.name, "en": it.en, "zh": it.zh })).collect();
         Ok(Json(json!({
-            "schema": "files/1", "files": files.files(), "diagnoses": results, "kinds": kinds, "materials": materials,
+            "schema": "files/1", "files": files.list_files(), "diagnoses": results, "kinds": kinds, "materials": materials,
             "columns": columns, "text_columns": TEXT_COLUMNS, "examples": examples, "bytes_max": FILE_MAX,
         })))
     })
@@ -84,8 +84,12 @@ async fn list(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProbl
 }
 
 fn result_document(files: &FileDiagnoses, result: &FileDiagnosis) -> Value {
-    let words = files.handle().kept().words(&result.key).unwrap_or_default();
-    let has_model = files.handle().kept().text(&result.key, crate::diagnosis::store::DiagnosisFile::Model).is_some();
+    let words = files.handle().diagnosis_store().read_texts(&result.key).unwrap_or_default();
+    let has_model = files
+        .handle()
+        .diagnosis_store()
+        .read_file(&result.key, crate::diagnosis::store::DiagnosisFile::Model)
+        .is_some();
     json!({
         "key": result.key, "file": result.file, "by": result.by, "at_ms": result.at_ms, "from_ms": result.at_ms, "to_ms": result.at_ms,
         "verdict": result.verdict, "summary": result.summary, "summary_zh": words.summary_zh, "missing": result.missing,
@@ -95,47 +99,47 @@ fn result_document(files: &FileDiagnoses, result: &FileDiagnosis) -> Value {
 }
 
 /// `POST /api/v1/files?name=week.xlsx`: the bytes of a file.
-async fn bring(
+async fn upload_file(
     State(shared): State<ServerState>,
     SignedIn(_): SignedIn,
     Pairs(pairs): Pairs<Vec<(String, String)>>,
     bytes: Bytes,
 ) -> Result<Response, ApiProblem> {
-    let name = QueryKeys::of(pairs, &["name"])?.text("name").unwrap_or("recording").to_owned();
+    let name = QueryKeys::from_pairs(pairs, &["name"])?.find_text("name").unwrap_or("recording").to_owned();
     if bytes.is_empty() {
-        return Err(ApiProblem::request("the file is empty", "choose another one"));
+        return Err(ApiProblem::bad_request("the file is empty", "choose another one"));
     }
-    let files = shared.files()?.clone();
+    let files = shared.require_files()?.clone();
     let at_ms = now_ms(&shared);
-    let file: BroughtFile = aside(move || files.add(&name, &bytes, at_ms).map_err(broken)).await?;
+    let file: BroughtFile = run_blocking(move || files.add(&name, &bytes, at_ms).map_err(describe_io_error)).await?;
     let words = format!("a file for a diagnosis: {} ({} bytes)", file.name, file.bytes);
-    let files = shared.files()?.clone();
-    let document = aside(move || document(&files, &file.key)).await?;
-    Ok(told(Json(document), words))
+    let files = shared.require_files()?.clone();
+    let document = run_blocking(move || build_file_document(&files, &file.key)).await?;
+    Ok(with_audit_note(Json(document), words))
 }
 
 fn now_ms(shared: &ServerState) -> i64 {
-    shared.status().map(|status| status.at_ms).unwrap_or_default()
+    shared.require_status().map(|status| status.at_ms).unwrap_or_default()
 }
 
 /// `GET /api/v1/files/{key}`: how it is understood.
-async fn describe(State(shared): State<ServerState>, Path(key): Path<String>) -> Result<Json<Value>, ApiProblem> {
-    let files = shared.files()?.clone();
-    aside(move || document(&files, &key).map(Json)).await
+async fn serve_file(State(shared): State<ServerState>, Path(key): Path<String>) -> Result<Json<Value>, ApiProblem> {
+    let files = shared.require_files()?.clone();
+    run_blocking(move || build_file_document(&files, &key).map(Json)).await
 }
 
-fn document(files: &FileDiagnoses, key: &str) -> Result<Value, ApiProblem> {
+fn build_file_document(files: &FileDiagnoses, key: &str) -> Result<Value, ApiProblem> {
     let gone = || ApiProblem::not_found(&format!("a file {key:?} (the newest 20 are kept)"));
-    let file = files.files().into_iter().find(|file| file.key == key).ok_or_else(gone)?;
-    let path = files.path(key).ok_or_else(gone)?;
-    let beside = Mapping::beside(&path);
+    let file = files.list_files().into_iter().find(|file| file.key == key).ok_or_else(gone)?;
+    let path = files.find_path(key).ok_or_else(gone)?;
+    let beside = Mapping::build_path_beside(&path);
     let mapping = if beside.is_file() { Mapping::read(&beside).unwrap_or_default() } else { Mapping::default() };
     let refused = |error: adapters::recording::RecordingError| {
-        let (en, zh) = (error.to_string(), error.zh());
+        let (en, zh) = (error.to_string(), error.describe_in_chinese());
         let path = path.display().to_string();
         json!({ "en": en.replace(&path, &file.name), "zh": zh.replace(&path, &file.name) })
     };
-    let found = match preview(&path, &mapping) {
+    let found = match preview_recording(&path, &mapping) {
         Ok(found) => found,
         Err(error) => {
             return Ok(
@@ -143,8 +147,8 @@ fn document(files: &FileDiagnoses, key: &str) -> Result<Value, ApiProblem> {
             );
         }
     };
-    let proposal = MapProposal::of(&found);
-    let questions = proposal.questions();
+    let proposal = MapProposal::from_preview(&found);
+    let questions = proposal.open_questions();
     let column = |(index, column): (usize, &ProposedColumn)| {
         let known = found.columns.iter().find(|known| known.from == column.from);
         json!({
@@ -158,12 +162,12 @@ fn document(files: &FileDiagnoses, key: &str) -> Result<Value, ApiProblem> {
     match found.read {
         Err(error) => document["error"] = refused(error),
         Ok(read) => {
-            document["statement"] = both(&read.statement());
+            document["statement"] = bilingual_to_json(&read.describe_assumptions());
             let notes = read.notes.iter().filter(|note| note.kind != NoteKind::Assumption);
             document["notes"] = notes
                 .map(|note| json!({ "doubt": note.kind == NoteKind::Doubt, "en": note.text.en, "zh": note.text.zh }))
                 .collect();
-            document["rows"] = json!(read.recording.rows());
+            document["rows"] = json!(read.recording.count_rows());
             document["refused"] = json!(read.refused);
             document["problems"] = read.problems.iter().take(5).map(ToString::to_string).collect();
             let (head, rows) = preview_rows(&read.recording, ROWS_SHOWN);
@@ -201,7 +205,7 @@ struct ClickedColumn {
 }
 
 impl ClickedMap {
-    fn toml(&self) -> String {
+    fn to_toml(&self) -> String {
         let columns = self.columns.iter().map(|column| ProposedColumn {
             from: column.from.clone(),
             to: Some(column.to.clone()),
@@ -211,7 +215,7 @@ impl ClickedMap {
         });
         let proposal =
             MapProposal { columns: columns.collect(), time: Some(self.time.clone()).filter(|time| !time.is_empty()) };
-        let text = proposal.toml(&Bilingual::default(), "the file");
+        let text = proposal.to_toml(&Bilingual::default(), "the file");
         let mut said = String::new();
         for (key, value) in [("zone", &self.zone), ("unit", &self.time_unit), ("order", &self.order)] {
             if !value.is_empty() {
@@ -234,18 +238,18 @@ async fn map(
     SignedIn(_): SignedIn,
     JsonBody(clicked): JsonBody<ClickedMap>,
 ) -> Result<Response, ApiProblem> {
-    let toml = clicked.toml();
+    let toml = clicked.to_toml();
     Mapping::parse(&toml, "the map")
-        .map_err(|wrong| ApiProblem::request(wrong.to_string(), "change the choice that is named"))?;
-    let files = shared.files()?.clone();
+        .map_err(|wrong| ApiProblem::bad_request(wrong.to_string(), "change the choice that is named"))?;
+    let files = shared.require_files()?.clone();
     let words = format!("file {key}: its map");
-    let document = aside(move || {
-        let path = files.path(&key).ok_or_else(|| ApiProblem::not_found(&format!("a file {key:?}")))?;
-        files.set_map(&path, &toml).map_err(broken)?;
-        document(&files, &key)
+    let document = run_blocking(move || {
+        let path = files.find_path(&key).ok_or_else(|| ApiProblem::not_found(&format!("a file {key:?}")))?;
+        files.set_map(&path, &toml).map_err(describe_io_error)?;
+        build_file_document(&files, &key)
     })
     .await?;
-    Ok(told(Json(document), words))
+    Ok(with_audit_note(Json(document), words))
 }
 
 /// What a file is compared with.
@@ -281,20 +285,21 @@ struct SeriesChoice {
 }
 
 /// `POST /api/v1/files/{key}/diagnosis`
-async fn begin(
+async fn begin_file_diagnosis(
     State(shared): State<ServerState>,
     Path(key): Path<String>,
     SignedIn(person): SignedIn,
     JsonBody(asked): JsonBody<FileDiagnosisRequest>,
 ) -> Result<Response, ApiProblem> {
-    let files = shared.files()?.clone();
-    let path = files.path(&key).ok_or_else(|| ApiProblem::not_found(&format!("a file {key:?}")))?;
+    let files = shared.require_files()?.clone();
+    let path = files.find_path(&key).ok_or_else(|| ApiProblem::not_found(&format!("a file {key:?}")))?;
     let toml = model_text(&shared, &asked)?;
     let simulated = match &asked.simulated {
         None => None,
         Some(choice) => {
-            let path =
-                files.path(&choice.key).ok_or_else(|| ApiProblem::not_found(&format!("a file {:?}", choice.key)))?;
+            let path = files
+                .find_path(&choice.key)
+                .ok_or_else(|| ApiProblem::not_found(&format!("a file {:?}", choice.key)))?;
             Some(if choice.column.is_empty() {
                 path.display().to_string()
             } else {
@@ -303,28 +308,33 @@ async fn begin(
         }
     };
     if toml.is_empty() && simulated.is_none() {
-        return Err(ApiProblem::request(
+        return Err(ApiProblem::bad_request(
             "nothing to compare the file with",
             "choose a kind of machine, a model or a simulated series",
         ));
     }
     let at_ns = now_ms(&shared).saturating_mul(1_000_000);
-    files.ask(person.name, toml, path, simulated, at_ns).map_err(super::diagnoses::refused)?;
-    Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "running" })), format!("a diagnosis of file {key}")))
+    files
+        .request_diagnosis(person.name, toml, path, simulated, at_ns)
+        .map_err(super::diagnoses::describe_diagnosis_refusal)?;
+    Ok(with_audit_note(
+        Json(json!({ "schema": "diagnosis-run/1", "state": "running" })),
+        format!("a diagnosis of file {key}"),
+    ))
 }
 
 fn model_text(shared: &ServerState, asked: &FileDiagnosisRequest) -> Result<String, ApiProblem> {
     if let Some(toml) = &asked.toml {
         let wrong = |problems: Vec<rules::twin::Problem>| {
-            ApiProblem::request(format!("the model: {}", problems[0]), "correct that line")
+            ApiProblem::bad_request(format!("the model: {}", problems[0]), "correct that line")
         };
         rules::twin::parse_model(toml).map_err(wrong)?;
         return Ok(toml.clone());
     }
     if asked.active_model {
         let none = || ApiProblem::conflict("no simulation runs beside this machine", "choose a kind of machine");
-        let path = shared.diagnoses.as_ref().ok_or_else(none)?.model().to_owned();
-        return crate::files::read_text(&path, 4 << 20).map_err(broken);
+        let path = shared.diagnoses.as_ref().ok_or_else(none)?.model_path().to_owned();
+        return crate::files::read_text(&path, 4 << 20).map_err(describe_io_error);
     }
     let Some(kind) = asked.kind.filter(|kind| *kind != ModelKind::Series) else { return Ok(String::new()) };
     let filled = |text: &Option<String>| text.clone().filter(|text| !text.is_empty());
@@ -335,43 +345,49 @@ fn model_text(shared: &ServerState, asked: &FileDiagnosisRequest) -> Result<Stri
         material: filled(&asked.material),
         axis: filled(&asked.axis).filter(|axis| ["x", "y", "z"].contains(&axis.as_str())),
     };
-    Ok(new.toml())
+    Ok(new.to_toml())
 }
 
 /// `GET /api/v1/files-diagnosis`: how it goes.
-async fn state(State(shared): State<ServerState>) -> Json<Value> {
-    let run = shared.files.as_ref().map(|files| files.handle().run()).unwrap_or_default();
+async fn serve_file_diagnosis(State(shared): State<ServerState>) -> Json<Value> {
+    let run = shared.files.as_ref().map(|files| files.handle().current_run()).unwrap_or_default();
     Json(run_document(run))
 }
 
 /// `DELETE /api/v1/files-diagnosis`
-async fn cancel(State(shared): State<ServerState>, SignedIn(person): SignedIn) -> Result<Response, ApiProblem> {
-    shared.files()?.handle().cancel(&person.name).map_err(super::diagnoses::refused)?;
-    Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "cancelled" })), "the diagnosis is ended"))
+async fn cancel_file_diagnosis(
+    State(shared): State<ServerState>,
+    SignedIn(person): SignedIn,
+) -> Result<Response, ApiProblem> {
+    shared.require_files()?.handle().cancel(&person.name).map_err(super::diagnoses::describe_diagnosis_refusal)?;
+    Ok(with_audit_note(Json(json!({ "schema": "diagnosis-run/1", "state": "cancelled" })), "the diagnosis is ended"))
 }
 
 /// `POST /api/v1/gallery/{name}`: an example is brought and diagnosed.
-async fn example(
+async fn diagnose_example(
     State(shared): State<ServerState>,
     Path(name): Path<String>,
     SignedIn(person): SignedIn,
 ) -> Result<Response, ApiProblem> {
-    let it = gallery::example(&name).ok_or_else(|| ApiProblem::not_found(&format!("an example {name:?}")))?;
-    let files = shared.files()?.clone();
+    let it = gallery::find_example(&name).ok_or_else(|| ApiProblem::not_found(&format!("an example {name:?}")))?;
+    let files = shared.require_files()?.clone();
     let at_ms = now_ms(&shared);
     let file = {
         let files = files.clone();
-        aside(move || files.add(it.file, it.recording, at_ms).map_err(broken)).await?
+        run_blocking(move || files.add(it.file, it.recording, at_ms).map_err(describe_io_error)).await?
     };
-    let path = files.path(&file.key).ok_or_else(|| ApiProblem::not_found("the example"))?;
+    let path = files.find_path(&file.key).ok_or_else(|| ApiProblem::not_found("the example"))?;
     files
-        .ask(person.name, it.model.to_owned(), path, None, at_ms.saturating_mul(1_000_000))
-        .map_err(super::diagnoses::refused)?;
-    Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "running", "file": file })), format!("example {name}")))
+        .request_diagnosis(person.name, it.model.to_owned(), path, None, at_ms.saturating_mul(1_000_000))
+        .map_err(super::diagnoses::describe_diagnosis_refusal)?;
+    Ok(with_audit_note(
+        Json(json!({ "schema": "diagnosis-run/1", "state": "running", "file": file })),
+        format!("example {name}"),
+    ))
 }
 
 /// `GET /api/v1/gallery/{name}/truth`
-async fn truth(Path(name): Path<String>) -> Result<Json<Value>, ApiProblem> {
-    let it = gallery::example(&name).ok_or_else(|| ApiProblem::not_found(&format!("an example {name:?}")))?;
+async fn serve_truth(Path(name): Path<String>) -> Result<Json<Value>, ApiProblem> {
+    let it = gallery::find_example(&name).ok_or_else(|| ApiProblem::not_found(&format!("an example {name:?}")))?;
     Ok(Json(json!({ "schema": "truth/1", "name": it.name, "en": it.truth_en, "zh": it.truth_zh })))
 }

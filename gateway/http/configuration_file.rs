@@ -1,22 +1,22 @@
 //! The configuration as a text to be edited on the page: read with its digest, checked as `check` does, put back whole when
 //! all of it is right, and the box started anew, where a service manager starts it again.
 //!
-//! A new source is tried before it is written: [`examine`] opens any address that an administrator names.
+//! A new source is tried before it is written: [`serve_address_findings`] opens any address that an administrator names.
 //!
 //! What decides whether the box may write to the machine is changed at the box only, not from the page ([`find_widened`]): the gate, the
 //! right to arm from the page, what sinks may ask for, and the parts of an address that name a way of writing, a library to load, or a
 //! file whose content is sent as a password: who may edit the page may not read every file of the box.
 
 use super::ServerState;
-use super::guard::told;
+use super::guard::with_audit_note;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::aside;
+use super::rules::run_blocking;
 use crate::access::Role;
 use crate::config::{self, Config, Problem};
 use crate::drafts::digest_of;
-use crate::files::{advice, read_text, replace_durably};
+use crate::files::{advise_on_read_error, read_text, replace_durably};
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -32,8 +32,8 @@ pub(super) const ROUTES: &[Route] = &[
     Route::read_by(Role::Admin, "/api/v1/configuration/file", || get(read_file)),
     Route::post(Role::Admin, "/api/v1/configuration/check", 2 * TEXT_MAX, || post(check_text)),
     Route::put(Role::Admin, "/api/v1/configuration/file", 2 * TEXT_MAX, || put(replace_file)),
-    Route::post(Role::Admin, "/api/v1/restart", 64, || post(restart)),
-    Route::post(Role::Admin, "/api/v1/doctor/address", 4096, || post(examine)),
+    Route::post(Role::Admin, "/api/v1/restart", 64, || post(restart_box)),
+    Route::post(Role::Admin, "/api/v1/doctor/address", 4096, || post(serve_address_findings)),
 ];
 
 /// A text to be checked.
@@ -68,7 +68,7 @@ fn file_path(shared: &ServerState) -> Result<PathBuf, ApiProblem> {
 
 fn read_limited(path: &Path) -> Result<String, ApiProblem> {
     read_text(path, TEXT_MAX)
-        .map_err(|error| ApiProblem::unavailable(format!("{}: {error}", path.display()), advice(&error)))
+        .map_err(|error| ApiProblem::unavailable(format!("{}: {error}", path.display()), advise_on_read_error(&error)))
 }
 
 /// The configuration of a text, or everything that `check` would refuse.
@@ -134,7 +134,7 @@ fn refuse_widened(before: &Config, path: &Path, after: &Config) -> Result<(), Ap
                 "what may write to the machine, and which files are loaded or sent, is changed at the box: edit {} there",
                 path.display()
             );
-            Err(ApiProblem::request(widened.join("; "), hint))
+            Err(ApiProblem::bad_request(widened.join("; "), hint))
         }
     }
 }
@@ -146,7 +146,7 @@ fn is_started_by_service_manager() -> bool {
 
 /// `GET /api/v1/configuration/file`
 async fn read_file(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
-    aside(move || {
+    run_blocking(move || {
         let path = file_path(&shared)?;
         let text = read_limited(&path)?;
         let problems = problems_json(&find_problems(&path, &text));
@@ -161,7 +161,7 @@ async fn check_text(
     State(shared): State<ServerState>,
     JsonBody(asked): JsonBody<ConfigurationText>,
 ) -> Result<Json<Value>, ApiProblem> {
-    aside(move || {
+    run_blocking(move || {
         let problems = find_problems(&file_path(&shared)?, &asked.text);
         Ok(Json(json!({ "schema": "check/1", "fine": problems.is_empty(), "problems": problems_json(&problems) })))
     })
@@ -174,7 +174,7 @@ async fn replace_file(
     SignedIn(person): SignedIn,
     JsonBody(edited): JsonBody<EditedConfiguration>,
 ) -> Result<Response, ApiProblem> {
-    let done = aside(move || {
+    let done = run_blocking(move || {
         let path = file_path(&shared)?;
         let now = read_limited(&path)?;
         if digest_of(&now) != edited.digest {
@@ -184,23 +184,24 @@ async fn replace_file(
         }
         let after = parse_text(&path, &edited.text).map_err(|problems| {
             let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
-            ApiProblem::request(lines.join("\n"), "mend it; the configuration in force stays")
+            ApiProblem::bad_request(lines.join("\n"), "mend it; the configuration in force stays")
         })?;
         refuse_widened(&shared.configured.config, &path, &after)?;
         let write = |path: &Path, text: &str| {
-            replace_durably(path, text)
-                .map_err(|error| ApiProblem::unavailable(format!("{}: {error}", path.display()), advice(&error)))
+            replace_durably(path, text).map_err(|error| {
+                ApiProblem::unavailable(format!("{}: {error}", path.display()), advise_on_read_error(&error))
+            })
         };
         write(&path.with_extension("before.toml"), &now)?;
         write(&path, &edited.text)?;
         Ok(format!("{} was written by {}; it is in force after the next start", path.display(), person.name))
     });
     let done = done.await?;
-    Ok(told(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
+    Ok(with_audit_note(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
 }
 
 /// `POST /api/v1/restart`: ends as a SIGTERM does, where somebody starts the box again.
-async fn restart(SignedIn(person): SignedIn) -> Result<Response, ApiProblem> {
+async fn restart_box(SignedIn(person): SignedIn) -> Result<Response, ApiProblem> {
     if !is_started_by_service_manager() {
         let hint = "start it again at the box, where it was started";
         return Err(ApiProblem::conflict("no service manager has started this box; it would not come back", hint));
@@ -209,29 +210,29 @@ async fn restart(SignedIn(person): SignedIn) -> Result<Response, ApiProblem> {
     rustix::process::kill_process(own, rustix::process::Signal::TERM)
         .map_err(|error| ApiProblem::unavailable(format!("the box cannot be stopped: {error}"), "systemctl restart"))?;
     let text = format!("{} starts the box anew; arming has ended", person.name);
-    Ok(told(Json(json!({ "schema": "order/1", "done": true, "text": text })), text))
+    Ok(with_audit_note(Json(json!({ "schema": "order/1", "done": true, "text": text })), text))
 }
 
 /// `POST /api/v1/doctor/address`: what `doctor ADDRESS` finds.
-async fn examine(
+async fn serve_address_findings(
     State(shared): State<ServerState>,
     JsonBody(asked): JsonBody<AddressQuery>,
 ) -> Result<Response, ApiProblem> {
     if let Some(part) = needs_the_box(&asked.address) {
         let what = format!("an address with {part} is not opened from the page");
-        return Err(ApiProblem::request(what, "cnc-gateway doctor ADDRESS at the box"));
+        return Err(ApiProblem::bad_request(what, "cnc-gateway doctor ADDRESS at the box"));
     }
     let busy = || ApiProblem::conflict("a source is being looked at already", "wait a few seconds");
     let place = shared.doctor.clone().try_acquire_owned().map_err(|_| busy())?;
-    let report = aside(move || {
+    let report = run_blocking(move || {
         let _place = place;
-        crate::doctor::examine_text(&asked.address).map_err(|what| ApiProblem::request(what, "look at the address"))
+        crate::doctor::examine_text(&asked.address).map_err(|what| ApiProblem::bad_request(what, "look at the address"))
     });
     let report = report.await?;
-    let mut document = report.json();
+    let mut document = report.to_json();
     document["schema"] = json!("doctor/1");
-    document["address"] = json!(adapters::address::masked(&report.address));
-    Ok(told(Json(document), "looked at an address that is not configured".to_owned()))
+    document["address"] = json!(adapters::address::mask_secrets(&report.address));
+    Ok(with_audit_note(Json(document), "looked at an address that is not configured".to_owned()))
 }
 
 #[cfg(test)]

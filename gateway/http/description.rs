@@ -1,8 +1,8 @@
 //! The description of the API (OpenAPI 3.1): written by hand for what a request and an answer hold, completed from the table of
 //! routes for what stands before every route - who may ask, and how a request is refused.
 
+use super::list_routes;
 use super::route::{Needs, Route};
-use super::routes;
 use serde_json::{Map, Value, json};
 use std::sync::LazyLock;
 
@@ -30,31 +30,31 @@ fn build_document() -> Value {
     let mut parts = WRITTEN.iter().map(|text| serde_json::from_str::<Value>(text).unwrap_or(Value::Null));
     let mut document = parts.next().unwrap_or(Value::Null);
     for part in parts {
-        adopt(&mut document["paths"], &part["paths"]);
-        adopt(&mut document["components"]["schemas"], &part["schemas"]);
+        merge_objects(&mut document["paths"], &part["paths"]);
+        merge_objects(&mut document["components"]["schemas"], &part["schemas"]);
     }
     document["components"]["securitySchemes"] = json!({
         "session": { "type": "apiKey", "in": "cookie", "name": "cnc_gateway",
                      "description": "Set by POST /api/v1/login; named __Host-cnc_gateway over TLS" },
         "token": { "type": "http", "scheme": "bearer", "description": "NAME:TOKEN" },
     });
-    routes().for_each(|route| complete(&mut document, route));
+    list_routes().for_each(|route| complete_operation(&mut document, route));
     document
 }
 
 /// Takes over the entries of another object, deeply where both have one.
-fn adopt(into: &mut Value, from: &Value) {
+fn merge_objects(into: &mut Value, from: &Value) {
     let (Some(into), Some(from)) = (into.as_object_mut(), from.as_object()) else { return };
     for (key, value) in from {
         match into.get_mut(key) {
-            Some(known) if known.is_object() => adopt(known, value),
+            Some(known) if known.is_object() => merge_objects(known, value),
             _ => drop(into.insert(key.clone(), value.clone())),
         }
     }
 }
 
 /// What the guard of this route demands and how it refuses.
-fn complete(document: &mut Value, route: &Route) {
+fn complete_operation(document: &mut Value, route: &Route) {
     let verb = route.verb().word().to_ascii_lowercase();
     let Some(operation) = document["paths"][route.path()].get_mut(verb.as_str()).filter(|it| it.is_object()) else {
         return;
@@ -68,18 +68,18 @@ fn complete(document: &mut Value, route: &Route) {
     if matches!(route.needs(), Needs::Role(_)) {
         operation["security"] = json!([{ "session": [] }, { "token": [] }]);
     }
-    for (code, why) in refusals(route) {
+    for (code, why) in list_refusals(route) {
         let responses = operation["responses"].as_object_mut();
         let Some(responses) = responses.filter(|known| !known.contains_key(code)) else { continue };
-        responses.insert(code.to_owned(), problem(why));
+        responses.insert(code.to_owned(), build_problem_response(why));
     }
-    if route.changes() {
+    if route.changes_state() {
         operation["x-body-max-bytes"] = json!(route.body_max());
     }
 }
 
 /// The refusals that any request to this route may meet before its handler is asked.
-fn refusals(route: &Route) -> Vec<(&'static str, &'static str)> {
+fn list_refusals(route: &Route) -> Vec<(&'static str, &'static str)> {
     let mut refusals = vec![
         ("400", "The request cannot be understood"),
         ("421", "The request is meant for another host"),
@@ -92,7 +92,7 @@ fn refusals(route: &Route) -> Vec<(&'static str, &'static str)> {
             ("429", "Too many wrong tokens"),
         ]);
     }
-    if route.changes() {
+    if route.changes_state() {
         refusals.extend([
             ("403", "The request comes from another site"),
             ("408", "The request came too slowly"),
@@ -103,7 +103,7 @@ fn refusals(route: &Route) -> Vec<(&'static str, &'static str)> {
     refusals
 }
 
-fn problem(why: &str) -> Value {
+fn build_problem_response(why: &str) -> Value {
     json!({
         "description": why,
         "content": { "application/problem+json": { "schema": { "$ref": "#/components/schemas/Problem" } } },
@@ -112,7 +112,7 @@ fn problem(why: &str) -> Value {
 
 /// The paths of the document with their methods, for whoever holds them against the table.
 #[must_use]
-pub fn described(document: &Value) -> Vec<(String, String)> {
+pub fn list_operations(document: &Value) -> Vec<(String, String)> {
     let none = Map::new();
     let paths = document["paths"].as_object().unwrap_or(&none);
     let pairs = paths.iter().flat_map(|(path, item)| {

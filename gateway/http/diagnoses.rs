@@ -2,9 +2,9 @@
 //! own, see `diagnosis::child`; what is found is stored by the tick, as it is for diagnoses that the box begins by itself.
 
 use super::ServerState;
-use super::guard::told;
+use super::guard::with_audit_note;
 use super::headers;
-use super::history::range;
+use super::history::parse_range;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
@@ -28,13 +28,13 @@ const BYTES_MAX: usize = 1024;
 const SPAN_MIN_NS: i64 = 120 * SECOND_NS;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::read("/api/v1/diagnosis", || get(state)),
-    Route::post(Role::Setter, "/api/v1/diagnosis", BYTES_MAX, || post(begin)),
-    Route::delete(Role::Setter, "/api/v1/diagnosis", 0, || delete(cancel)),
-    Route::read("/api/v1/diagnoses/{key}/page", || get(page)),
-    Route::read("/api/v1/diagnoses/{key}/plan", || get(plan)),
-    Route::read("/api/v1/diagnoses/{key}/model", || get(model)),
-    Route::post(Role::Setter, "/api/v1/twin/model", BYTES_MAX, || post(accept)),
+    Route::read("/api/v1/diagnosis", || get(serve_diagnosis)),
+    Route::post(Role::Setter, "/api/v1/diagnosis", BYTES_MAX, || post(begin_diagnosis)),
+    Route::delete(Role::Setter, "/api/v1/diagnosis", 0, || delete(cancel_diagnosis)),
+    Route::read("/api/v1/diagnoses/{key}/page", || get(serve_report)),
+    Route::read("/api/v1/diagnoses/{key}/plan", || get(serve_plan)),
+    Route::read("/api/v1/diagnoses/{key}/model", || get(serve_model)),
+    Route::post(Role::Setter, "/api/v1/twin/model", BYTES_MAX, || post(accept_model)),
 ];
 
 /// The stretch to be diagnosed, as everywhere in the API: `2026-01-31T08:00:00Z`, or `-2h` before the newest sample.
@@ -53,19 +53,19 @@ struct Accepted {
 }
 
 impl ServerState {
-    fn diagnoses(&self) -> Result<&DiagnosisHandle, ApiProblem> {
+    fn require_diagnoses(&self) -> Result<&DiagnosisHandle, ApiProblem> {
         let none = || ApiProblem::conflict("no simulation runs beside this machine", "name a model under [twin] model");
         self.diagnoses.as_ref().ok_or_else(none)
     }
 }
 
-pub(super) fn refused(refusal: DiagnosisRefusal) -> ApiProblem {
+pub(super) fn describe_diagnosis_refusal(refusal: DiagnosisRefusal) -> ApiProblem {
     ApiProblem::conflict(refusal.what, refusal.next)
 }
 
 /// `GET /api/v1/diagnosis`
-async fn state(State(shared): State<ServerState>) -> Json<Value> {
-    Json(run_document(shared.diagnoses.as_ref().map(DiagnosisHandle::run).unwrap_or_default()))
+async fn serve_diagnosis(State(shared): State<ServerState>) -> Json<Value> {
+    Json(run_document(shared.diagnoses.as_ref().map(DiagnosisHandle::current_run).unwrap_or_default()))
 }
 
 /// What is being done, and about how long it takes in all.
@@ -94,34 +94,41 @@ pub(super) fn run_document((run, about_s): (Run, Option<f64>)) -> Value {
 }
 
 /// `POST /api/v1/diagnosis`: begins; `GET` tells how it goes.
-async fn begin(
+async fn begin_diagnosis(
     State(shared): State<ServerState>,
     SignedIn(person): SignedIn,
     JsonBody(asked): JsonBody<StretchRequest>,
 ) -> Result<Response, ApiProblem> {
-    let newest_ns = shared.status()?.at_ms.saturating_mul(1_000_000);
+    let newest_ns = shared.require_status()?.at_ms.saturating_mul(1_000_000);
     let pairs = vec![("from".to_owned(), asked.from.clone()), ("to".to_owned(), asked.to.clone())];
-    let (from_ns, to_ns) = range(&QueryKeys::of(pairs, &["from", "to"])?, newest_ns)?;
+    let (from_ns, to_ns) = parse_range(&QueryKeys::from_pairs(pairs, &["from", "to"])?, newest_ns)?;
     let to_ns = to_ns.min(newest_ns);
     if to_ns.saturating_sub(from_ns) < SPAN_MIN_NS {
         let what = "this is less than two minutes of history".to_owned();
-        return Err(ApiProblem::request(what, "choose a longer time, best one with cuts of several kinds"));
+        return Err(ApiProblem::bad_request(what, "choose a longer time, best one with cuts of several kinds"));
     }
-    shared.diagnoses()?.ask(Some(person.name), from_ns, to_ns).map_err(refused)?;
-    let words = format!("a diagnosis of {} to {}", crate::moment::utc(from_ns), crate::moment::utc(to_ns));
-    Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "running" })), words))
+    shared
+        .require_diagnoses()?
+        .request_diagnosis(Some(person.name), from_ns, to_ns)
+        .map_err(describe_diagnosis_refusal)?;
+    let words =
+        format!("a diagnosis of {} to {}", crate::moment::format_utc(from_ns), crate::moment::format_utc(to_ns));
+    Ok(with_audit_note(Json(json!({ "schema": "diagnosis-run/1", "state": "running" })), words))
 }
 
 /// `DELETE /api/v1/diagnosis`: ends the one under way.
-async fn cancel(State(shared): State<ServerState>, SignedIn(person): SignedIn) -> Result<Response, ApiProblem> {
-    shared.diagnoses()?.cancel(&person.name).map_err(refused)?;
-    Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "cancelled" })), "the diagnosis is ended"))
+async fn cancel_diagnosis(
+    State(shared): State<ServerState>,
+    SignedIn(person): SignedIn,
+) -> Result<Response, ApiProblem> {
+    shared.require_diagnoses()?.cancel(&person.name).map_err(describe_diagnosis_refusal)?;
+    Ok(with_audit_note(Json(json!({ "schema": "diagnosis-run/1", "state": "cancelled" })), "the diagnosis is ended"))
 }
 
 type DiagnosisQuery = Pairs<Vec<(String, String)>>;
 
 /// A file that was kept of a diagnosis.
-async fn kept(shared: ServerState, key: String, part: DiagnosisFile) -> Result<String, ApiProblem> {
+async fn read_kept_file(shared: ServerState, key: String, part: DiagnosisFile) -> Result<String, ApiProblem> {
     let gone = || ApiProblem::not_found(&format!("the files of diagnosis {key:?} (the newest 40 are kept)"));
     if !is_key(&key) {
         return Err(gone());
@@ -129,58 +136,61 @@ async fn kept(shared: ServerState, key: String, part: DiagnosisFile) -> Result<S
     let of_files = shared.files.as_ref().map(|files| files.handle().clone());
     let stores: Vec<_> = shared.diagnoses.iter().cloned().chain(of_files).collect();
     let wanted = key.clone();
-    let text =
-        super::rules::aside(move || Ok(stores.iter().find_map(|store| store.kept().text(&wanted, part)))).await?;
+    let text = super::rules::run_blocking(move || {
+        Ok(stores.iter().find_map(|store| store.diagnosis_store().read_file(&wanted, part)))
+    })
+    .await?;
     text.ok_or_else(gone)
 }
 
-fn language(pairs: Vec<(String, String)>) -> Result<Language, ApiProblem> {
-    match QueryKeys::of(pairs, &["lang"])?.text("lang") {
+fn parse_language(pairs: Vec<(String, String)>) -> Result<Language, ApiProblem> {
+    match QueryKeys::from_pairs(pairs, &["lang"])?.find_text("lang") {
         None | Some("en") => Ok(Language::En),
         Some("zh") => Ok(Language::Zh),
-        Some(other) => Err(ApiProblem::request(format!("lang={other} is not known"), "write lang=en or lang=zh")),
+        Some(other) => Err(ApiProblem::bad_request(format!("lang={other} is not known"), "write lang=en or lang=zh")),
     }
 }
 
 /// `GET /api/v1/diagnoses/{key}/page`: the report.
-async fn page(
+async fn serve_report(
     State(shared): State<ServerState>,
     Path(key): Path<String>,
     Pairs(pairs): DiagnosisQuery,
 ) -> Result<Response, ApiProblem> {
-    let html = kept(shared, key, DiagnosisFile::Page(language(pairs)?)).await?;
-    Ok(headers::report(&html))
+    let html = read_kept_file(shared, key, DiagnosisFile::Page(parse_language(pairs)?)).await?;
+    Ok(headers::respond_with_report(&html))
 }
 
 /// `GET /api/v1/diagnoses/{key}/plan`: the experiment as a recording plan.
-async fn plan(
+async fn serve_plan(
     State(shared): State<ServerState>,
     Path(key): Path<String>,
     Pairs(pairs): DiagnosisQuery,
 ) -> Result<Response, ApiProblem> {
-    let csv = kept(shared, key, DiagnosisFile::Plan(language(pairs)?)).await?;
-    Ok(download("text/csv; charset=utf-8", "experiment.csv", csv))
+    let csv = read_kept_file(shared, key, DiagnosisFile::Plan(parse_language(pairs)?)).await?;
+    Ok(respond_with_download("text/csv; charset=utf-8", "experiment.csv", csv))
 }
 
 /// `GET /api/v1/diagnoses/{key}/model`: the model with what was missing.
-async fn model(State(shared): State<ServerState>, Path(key): Path<String>) -> Result<Response, ApiProblem> {
-    let toml = kept(shared, key, DiagnosisFile::Model).await?;
-    Ok(download("application/toml", "model.toml", toml))
+async fn serve_model(State(shared): State<ServerState>, Path(key): Path<String>) -> Result<Response, ApiProblem> {
+    let toml = read_kept_file(shared, key, DiagnosisFile::Model).await?;
+    Ok(respond_with_download("application/toml", "model.toml", toml))
 }
 
 /// A file that a browser saves.
-pub(super) fn download(kind: &'static str, name: &str, content: impl IntoResponse) -> Response {
+pub(super) fn respond_with_download(kind: &'static str, name: &str, content: impl IntoResponse) -> Response {
     let disposition = format!("attachment; filename=\"{name}\"");
     ([(header::CONTENT_TYPE, kind.to_owned()), (header::CONTENT_DISPOSITION, disposition)], content).into_response()
 }
 
 /// `POST /api/v1/twin/model`: the model of a diagnosis takes the place of the one in charge.
-async fn accept(
+async fn accept_model(
     State(shared): State<ServerState>,
     SignedIn(_): SignedIn,
     JsonBody(Accepted { key }): JsonBody<Accepted>,
 ) -> Result<Response, ApiProblem> {
-    let diagnoses = shared.diagnoses()?.clone();
-    let done = super::rules::aside(move || diagnoses.accept(&key).map_err(refused)).await?;
-    Ok(told(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
+    let diagnoses = shared.require_diagnoses()?.clone();
+    let done =
+        super::rules::run_blocking(move || diagnoses.accept_model(&key).map_err(describe_diagnosis_refusal)).await?;
+    Ok(with_audit_note(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
 }

@@ -3,7 +3,7 @@
 
 use super::ServerState;
 use super::peer::Peer;
-use super::person::{SignedIn, cookie, name_of_cookie};
+use super::person::{SignedIn, find_cookie, name_of_cookie};
 use super::problem::ApiProblem;
 use super::route::{Needs, Route};
 use crate::access::{Person, Role, SignInError, Token, Urgency};
@@ -25,7 +25,7 @@ const ANSWER_WITHIN: Duration = Duration::from_secs(60);
 struct AuditNote(String);
 
 /// The answer with what stands in the audit about it: which thing was changed, from what to what. One line.
-pub(super) fn told(answer: impl IntoResponse, words: impl Into<String>) -> Response {
+pub(super) fn with_audit_note(answer: impl IntoResponse, words: impl Into<String>) -> Response {
     let mut answer = answer.into_response();
     answer.extensions_mut().insert(AuditNote(words.into()));
     answer
@@ -39,46 +39,48 @@ pub(super) struct Guarded {
 }
 
 /// See the [module](self).
-pub(super) async fn guard(State(guarded): State<Guarded>, request: Request, next: Next) -> Response {
-    match admit(&guarded, request).await {
-        Ok((request, person)) => answer(&guarded, request, person, next).await,
+pub(super) async fn guard_route(State(guarded): State<Guarded>, request: Request, next: Next) -> Response {
+    match admit_request(&guarded, request).await {
+        Ok((request, person)) => answer_and_audit(&guarded, request, person, next).await,
         Err(refused) => *refused,
     }
 }
 
 type Admitted = (Request, Option<Person>);
 
-async fn admit(Guarded { shared, route }: &Guarded, mut request: Request) -> Result<Admitted, Box<Response>> {
+async fn admit_request(Guarded { shared, route }: &Guarded, mut request: Request) -> Result<Admitted, Box<Response>> {
     let refuse = |problem: ApiProblem| Box::new(problem.into_response());
-    if !route.verb().is(request.method()) {
-        return Err(refuse(ApiProblem::method(route.verb().word())));
+    if !route.verb().matches_method(request.method()) {
+        return Err(refuse(ApiProblem::method_not_allowed(route.verb().word())));
     }
     let Some(peer) = request.extensions().get::<Peer>().copied() else {
         return Err(refuse(ApiProblem::unavailable("the connection has no address", "connect again")));
     };
-    let mut person = recognise(shared, route, request.headers(), &peer).await.map_err(|error| refuse(wrong(&error)))?;
+    let mut person = recognise_person(shared, route, request.headers(), &peer)
+        .await
+        .map_err(|error| refuse(describe_sign_in_error(&error)))?;
     if person.is_none() && route.urgency() == Urgency::GivesBack {
         // Whoever sends what names nobody is nobody.
-        let unnamed = |problem| refuse(allowed(shared, route, None).err().unwrap_or(problem));
+        let unnamed = |problem| refuse(check_role(shared, route, None).err().unwrap_or(problem));
         request = with_body(request, route.body_max()).await.map_err(unnamed)?;
-        (request, person) = named(shared, request, &peer).await.map_err(refuse)?;
+        (request, person) = identify_by_body(shared, request, &peer).await.map_err(refuse)?;
     }
-    if let Err(problem) = allowed(shared, route, person.as_ref()) {
+    if let Err(problem) = check_role(shared, route, person.as_ref()) {
         let what = format!("{} {} from {}: {}", route.verb().word(), route.path(), peer.from, problem.title);
         // Whoever reads without having signed in is shown where to do so, which a page may ask for again and again.
         if matches!(route.needs(), Needs::Role(_)) {
-            shared.access.refused(&what, person.as_ref());
+            shared.access.record_refusal(&what, person.as_ref());
         }
         return Err(Box::new(ask_to_sign_in(&request, problem)));
     }
-    if route.changes() {
+    if route.changes_state() {
         same_origin(request.headers(), &peer)
             .inspect_err(|problem| {
                 let what = format!("{} {} from {}: {}", route.verb().word(), route.path(), peer.from, problem.title);
-                shared.access.refused(&what, person.as_ref());
+                shared.access.record_refusal(&what, person.as_ref());
             })
             .map_err(refuse)?;
-        accountable(shared, route).map_err(refuse)?;
+        check_accountability(shared, route).map_err(refuse)?;
         request = with_body(request, route.body_max()).await.map_err(refuse)?;
     }
     if let Some(person) = &person {
@@ -87,7 +89,12 @@ async fn admit(Guarded { shared, route }: &Guarded, mut request: Request) -> Res
     Ok((request, person))
 }
 
-async fn answer(Guarded { shared, route }: &Guarded, request: Request, person: Option<Person>, next: Next) -> Response {
+async fn answer_and_audit(
+    Guarded { shared, route }: &Guarded,
+    request: Request,
+    person: Option<Person>,
+    next: Next,
+) -> Response {
     let path = request.uri().path().to_owned();
     let answer = match tokio::time::timeout(ANSWER_WITHIN, next.run(request)).await {
         Ok(answer) => answer,
@@ -96,7 +103,7 @@ async fn answer(Guarded { shared, route }: &Guarded, request: Request, person: O
             ApiProblem::unavailable(title, "ask for less, or again when the box has less to do").into_response()
         }
     };
-    if let (true, Some(person)) = (route.changes(), person) {
+    if let (true, Some(person)) = (route.changes_state(), person) {
         let outcome = match answer.status() {
             status if status.is_success() || status.is_redirection() => "done",
             status if status.is_client_error() => "refused",
@@ -104,13 +111,13 @@ async fn answer(Guarded { shared, route }: &Guarded, request: Request, person: O
         };
         let words = answer.extensions().get::<AuditNote>().map_or(String::new(), |told| format!(": {}", told.0));
         let code = answer.status().as_u16();
-        shared.access.changed(outcome, &format!("{} {path} ({code}){words}", route.verb().word()), &person).await;
+        shared.access.record_change(outcome, &format!("{} {path} ({code}){words}", route.verb().word()), &person).await;
     }
     answer
 }
 
 /// Who asks: by the cookie of a session, or by name and token in the request itself.
-async fn recognise(
+async fn recognise_person(
     shared: &ServerState,
     route: &Route,
     headers: &HeaderMap,
@@ -120,16 +127,20 @@ async fn recognise(
     if let Some(given) = given.and_then(|text| text.strip_prefix("Bearer ")) {
         return shared.access.of_bearer(given.trim(), peer.from, route.urgency()).await.map(Some);
     }
-    Ok(cookie(headers, name_of_cookie(peer))
+    Ok(find_cookie(headers, name_of_cookie(peer))
         .and_then(|cookie| shared.access.of_cookie(cookie))
         .map(|(person, _)| person))
 }
 
 /// Whoever gives the machine back may say who he is with the request itself, signed in or not: `name` and `token`, as a form or as
 /// JSON.
-async fn named(shared: &ServerState, request: Request, peer: &Peer) -> Result<(Request, Option<Person>), ApiProblem> {
+async fn identify_by_body(
+    shared: &ServerState,
+    request: Request,
+    peer: &Peer,
+) -> Result<(Request, Option<Person>), ApiProblem> {
     let (parts, body) = request.into_parts();
-    let broken = |error: axum::Error| ApiProblem::request(format!("the body broke off: {error}"), "send it again");
+    let broken = |error: axum::Error| ApiProblem::bad_request(format!("the body broke off: {error}"), "send it again");
     let bytes = axum::body::to_bytes(body, usize::MAX).await.map_err(broken)?;
     let again = Request::from_parts(parts.clone(), Body::from(bytes.clone()));
     let named = match serde_json::from_slice::<NameAndToken>(&bytes) {
@@ -139,9 +150,9 @@ async fn named(shared: &ServerState, request: Request, peer: &Peer) -> Result<(R
     let person = match named {
         None => None,
         Some(NameAndToken { name, token }) => {
-            let token = Token::typed(&token);
-            let found = shared.access.check(&name, &token, peer.from, "disarmed", Urgency::GivesBack).await;
-            Some(found.map_err(|error| wrong(&error))?)
+            let token = Token::from_typed_text(&token);
+            let found = shared.access.check_token(&name, &token, peer.from, "disarmed", Urgency::GivesBack).await;
+            Some(found.map_err(|error| describe_sign_in_error(&error))?)
         }
     };
     Ok((Request::from_parts(parts, Body::from(bytes)), person))
@@ -154,7 +165,7 @@ struct NameAndToken {
 }
 
 /// Why nobody was recognised.
-pub(super) fn wrong(error: &SignInError) -> ApiProblem {
+pub(super) fn describe_sign_in_error(error: &SignInError) -> ApiProblem {
     match error {
         SignInError::Wrong(0) => ApiProblem::too_many(crate::access::LOCKED_FOR),
         SignInError::Wrong(left) => ApiProblem::unauthorised(
@@ -166,7 +177,7 @@ pub(super) fn wrong(error: &SignInError) -> ApiProblem {
     }
 }
 
-fn allowed(shared: &ServerState, route: &Route, person: Option<&Person>) -> Result<(), ApiProblem> {
+fn check_role(shared: &ServerState, route: &Route, person: Option<&Person>) -> Result<(), ApiProblem> {
     let needed = match route.needs() {
         Needs::Nothing => return Ok(()),
         Needs::Reading if !shared.access.rules().tokens_always => return Ok(()),
@@ -188,7 +199,7 @@ fn ask_to_sign_in(request: &Request, problem: ApiProblem) -> Response {
     let accepts = request.headers().get(header::ACCEPT).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let wants_page = request.method() == axum::http::Method::GET && accepts.contains("text/html");
     let path = request.uri().path_and_query().map_or("/", |path| path.as_str());
-    match problem.status == StatusCode::UNAUTHORIZED.as_u16() && wants_page && super::plain::local(path) {
+    match problem.status == StatusCode::UNAUTHORIZED.as_u16() && wants_page && super::plain::is_local_path(path) {
         // The signs that would end the value, or be read as others in it.
         true => {
             let next = path.replace('%', "%25").replace('&', "%26").replace('+', "%2B");
@@ -217,7 +228,7 @@ fn same_origin(headers: &HeaderMap, peer: &Peer) -> Result<(), ApiProblem> {
 }
 
 /// What cannot be accounted for is not changed. What a viewer may do - give the machine back, sign out - always works.
-fn accountable(shared: &ServerState, route: &Route) -> Result<(), ApiProblem> {
+fn check_accountability(shared: &ServerState, route: &Route) -> Result<(), ApiProblem> {
     let more = matches!(route.needs(), Needs::Role(role) if role > Role::Viewer);
     let error = shared.live.borrow().as_ref().and_then(|published| published.status.history.error.clone());
     match error.filter(|_| more) {
@@ -239,17 +250,17 @@ async fn with_body(request: Request, most: usize) -> Result<Request, ApiProblem>
     }
     let bytes: Bytes = match tokio::time::timeout(BODY_WITHIN, axum::body::to_bytes(body, most)).await {
         Ok(Ok(bytes)) => bytes,
-        Ok(Err(error)) => return Err(broken(&error, most)),
-        Err(_) => return Err(ApiProblem::slow(BODY_WITHIN)),
+        Ok(Err(error)) => return Err(describe_body_error(&error, most)),
+        Err(_) => return Err(ApiProblem::request_timeout(BODY_WITHIN)),
     };
     Ok(Request::from_parts(parts, Body::from(bytes)))
 }
 
-fn broken(error: &axum::Error, most: usize) -> ApiProblem {
+fn describe_body_error(error: &axum::Error, most: usize) -> ApiProblem {
     let text = format!("{error}");
     match text.contains("length limit") {
         true => ApiProblem::too_large(most),
-        false => ApiProblem::request(format!("the body broke off: {text}"), "send it again"),
+        false => ApiProblem::bad_request(format!("the body broke off: {text}"), "send it again"),
     }
 }
 

@@ -11,7 +11,7 @@ use rules::physics::explain::Language;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-pub(super) const ROUTES: &[Route] = &[Route::file("/api/v1/handbook/{chapter}", || get(chapter))];
+pub(super) const ROUTES: &[Route] = &[Route::for_file("/api/v1/handbook/{chapter}", || get(serve_chapter))];
 
 /// The language of a chapter.
 #[derive(Debug, Default, Deserialize)]
@@ -21,14 +21,14 @@ struct ChapterQuery {
 }
 
 /// `GET /api/v1/handbook/{chapter}?lang=zh`: Markdown; `index` gives the list of the chapters with their titles.
-async fn chapter(Path(name): Path<String>, Query(asked): Query<ChapterQuery>) -> Response {
+async fn serve_chapter(Path(name): Path<String>, Query(asked): Query<ChapterQuery>) -> Response {
     let language = if asked.lang == "zh" { Language::Zh } else { Language::En };
     if name == "index" {
         let row = |chapter: &Chapter| json!({ "name": chapter.topic, "title": chapter.title(language), "zh": chapter.zh.is_some() });
         let list: Vec<Value> = CHAPTERS.iter().map(row).collect();
         return axum::Json(json!({ "schema": "handbook/1", "chapters": list })).into_response();
     }
-    match crate::handbook::chapter(&name) {
+    match crate::handbook::find_chapter(&name) {
         Some(chapter) => {
             ([(header::CONTENT_TYPE, "text/markdown; charset=utf-8")], chapter.text_in(language)).into_response()
         }

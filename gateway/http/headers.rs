@@ -27,7 +27,7 @@ const ALWAYS: [(HeaderName, &str); 7] = [
 ];
 
 /// Puts the headers on every answer of the router.
-pub(super) fn on<S: Clone + Send + Sync + 'static>(router: Router<S>) -> Router<S> {
+pub(super) fn add_headers<S: Clone + Send + Sync + 'static>(router: Router<S>) -> Router<S> {
     ALWAYS.into_iter().fold(router, |router, (name, value)| {
         router.layer(SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value)))
     })
@@ -35,12 +35,12 @@ pub(super) fn on<S: Clone + Send + Sync + 'static>(router: Router<S>) -> Router<
 
 /// A page of the box. Where it holds `{{nonce}}`, a number that nobody can foresee takes this place, and style elements with
 /// this number are allowed: what an editor makes its style of.
-pub(super) fn page(html: &str) -> Response {
+pub(super) fn respond_with_page(html: &str) -> Response {
     let kind = (header::CONTENT_TYPE, HeaderValue::from_static("text/html; charset=utf-8"));
     if !html.contains(PLACE) {
         return ([kind], html.to_owned()).into_response();
     }
-    let nonce = nonce().unwrap_or_default();
+    let nonce = create_nonce().unwrap_or_default();
     let policy = POLICY.replacen("style-src 'self'", &format!("style-src 'self' 'nonce-{nonce}'"), 1);
     let policy = HeaderValue::from_str(&policy).unwrap_or(HeaderValue::from_static(POLICY));
     ([kind, (header::CONTENT_SECURITY_POLICY, policy)], html.replace(PLACE, &nonce)).into_response()
@@ -48,8 +48,8 @@ pub(super) fn page(html: &str) -> Response {
 
 /// A report that was made to be read anywhere, with its style and script inside. Here nothing inline is allowed, so its style and
 /// script get a nonce, and what stands in `style` attributes moves into a style element of its own.
-pub(super) fn report(html: &str) -> Response {
-    let nonce = nonce().unwrap_or_default();
+pub(super) fn respond_with_report(html: &str) -> Response {
+    let nonce = create_nonce().unwrap_or_default();
     let (html, rules) = without_style_attributes(html);
     let head = format!("<style nonce=\"{nonce}\">{rules}</style></head>");
     let html = html.replacen("<style>", &format!("<style nonce=\"{nonce}\">"), 1);
@@ -75,8 +75,8 @@ fn without_style_attributes(html: &str) -> (String, String) {
     (kept, rules)
 }
 
-fn nonce() -> Result<String, TokenError> {
-    Ok(crate::access::random::<16>()?.iter().fold(String::with_capacity(32), |mut hex, byte| {
+fn create_nonce() -> Result<String, TokenError> {
+    Ok(crate::access::random_bytes::<16>()?.iter().fold(String::with_capacity(32), |mut hex, byte| {
         let _infallible = write!(hex, "{byte:02x}");
         hex
     }))
@@ -92,7 +92,8 @@ mod tests {
         let (kept, rules) = without_style_attributes(html);
         assert!(!kept.contains(" style=") && kept.contains("<i data-style=\"0\" class=\"x\">"), "{kept}");
         assert_eq!(rules, "[data-style=\"0\"]{width:3%}[data-style=\"1\"]{left:1%}");
-        let policy = report(html).headers()[header::CONTENT_SECURITY_POLICY].to_str().expect("text").to_owned();
+        let policy =
+            respond_with_report(html).headers()[header::CONTENT_SECURITY_POLICY].to_str().expect("text").to_owned();
         assert!(policy.contains("script-src 'nonce-") && !policy.contains("unsafe"), "{policy}");
     }
 
@@ -103,8 +104,12 @@ mod tests {
             let policy = response.headers()[header::CONTENT_SECURITY_POLICY].to_str().expect("text").to_owned();
             policy.split_once("'nonce-").expect("there").1[..32].to_owned()
         };
-        let (one, other) = (page("<meta content=\"{{nonce}}\">"), page("<meta content=\"{{nonce}}\">"));
+        let (one, other) =
+            (respond_with_page("<meta content=\"{{nonce}}\">"), respond_with_page("<meta content=\"{{nonce}}\">"));
         assert_ne!(nonce(&one), nonce(&other));
-        assert!(page("<p>").headers().get(header::CONTENT_SECURITY_POLICY).is_none(), "the usual one is added later");
+        assert!(
+            respond_with_page("<p>").headers().get(header::CONTENT_SECURITY_POLICY).is_none(),
+            "the usual one is added later"
+        );
     }
 }

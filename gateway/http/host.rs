@@ -12,17 +12,17 @@ use axum::response::{IntoResponse, Response};
 use std::net::IpAddr;
 
 /// Refuses what is meant for another host.
-pub(super) async fn check(State(shared): State<ServerState>, request: Request, next: Next) -> Response {
+pub(super) async fn guard_host(State(shared): State<ServerState>, request: Request, next: Next) -> Response {
     let Some(peer) = request.extensions().get::<Peer>().copied() else {
         return ApiProblem::unavailable("the connection has no address", "connect again").into_response();
     };
-    match meant(&request) {
+    match parse_hosts(&request) {
         Ok(hosts) => {
             let other = hosts.iter().find(|host| !is_ours(host, &peer, &shared.hosts));
             if let Some(other) = other {
                 let reason = format!("from {}: asked for host {other:?}", peer.from);
-                shared.access.refused(&reason, None);
-                return ApiProblem::misdirected(other).into_response();
+                shared.access.record_refusal(&reason, None);
+                return ApiProblem::misdirected_request(other).into_response();
             }
             next.run(request).await
         }
@@ -31,20 +31,20 @@ pub(super) async fn check(State(shared): State<ServerState>, request: Request, n
 }
 
 /// The hosts that the request names: in the header, and in the address where it names one. There must be one.
-fn meant(request: &Request) -> Result<Vec<String>, ApiProblem> {
+fn parse_hosts(request: &Request) -> Result<Vec<String>, ApiProblem> {
     let hint = "send one Host header with the address of this box, as every browser does";
     let headers = request.headers().get_all(HOST);
     let mut hosts = Vec::new();
     for value in headers {
         let authority = value.to_str().ok().and_then(|text| text.parse::<Authority>().ok());
-        let authority = authority.ok_or_else(|| ApiProblem::request("the Host header cannot be read", hint))?;
+        let authority = authority.ok_or_else(|| ApiProblem::bad_request("the Host header cannot be read", hint))?;
         hosts.push(authority.host().to_lowercase());
     }
     if hosts.len() > 1 {
-        return Err(ApiProblem::request("there are several Host headers", hint));
+        return Err(ApiProblem::bad_request("there are several Host headers", hint));
     }
     hosts.extend(request.uri().host().map(str::to_lowercase));
-    if hosts.is_empty() { Err(ApiProblem::request("the Host header is missing", hint)) } else { Ok(hosts) }
+    if hosts.is_empty() { Err(ApiProblem::bad_request("the Host header is missing", hint)) } else { Ok(hosts) }
 }
 
 /// Is this a name of this box? An address is, when it is the one that was connected to: nobody can give another name to it.

@@ -5,9 +5,9 @@
 use super::ServerState;
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::aside;
+use super::rules::run_blocking;
 use crate::files::read_text;
-use crate::identified::{SUBJECTS, path};
+use crate::identified::{SUBJECTS, answer_path};
 use axum::Json;
 use axum::extract::{Path, State};
 use axum::routing::get;
@@ -16,14 +16,17 @@ use serde_json::{Value, json};
 /// Such a document is some ten kilobytes.
 const BYTES_MAX: usize = 4 << 20;
 
-pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/identified/{subject}", || get(identified))];
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/identified/{subject}", || get(serve_identified))];
 
-async fn identified(State(shared): State<ServerState>, Path(subject): Path<String>) -> Result<Json<Value>, ApiProblem> {
+async fn serve_identified(
+    State(shared): State<ServerState>,
+    Path(subject): Path<String>,
+) -> Result<Json<Value>, ApiProblem> {
     if !SUBJECTS.contains(&subject.as_str()) {
         return Err(ApiProblem::not_found(&format!("/api/v1/identified/{subject}; known are {}", SUBJECTS.join(", "))));
     }
-    aside(move || {
-        let path = path(&shared.data_dir, &subject);
+    run_blocking(move || {
+        let path = answer_path(&shared.data_dir, &subject);
         let found = match read_text(&path, BYTES_MAX) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Value::Null,
             Err(error) => {

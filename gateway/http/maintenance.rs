@@ -2,13 +2,13 @@
 //! archive for whoever helps from afar. None of it holds a token, a key or a password.
 
 use super::ServerState;
-use super::diagnoses::download;
-use super::guard::told;
-use super::history::trouble;
+use super::diagnoses::respond_with_download;
+use super::guard::with_audit_note;
+use super::history::describe_history_error;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::aside;
+use super::rules::run_blocking;
 use crate::access::Role;
 use crate::archive::{ArchivedFile, pack, unpack};
 use crate::backup::{self, BackupPaths, RestoreRequest, archive_name};
@@ -32,11 +32,11 @@ const BACKUP_MAX: usize = 16 << 20;
 const ROWS: u32 = 2000;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::read("/api/v1/configuration", || get(configuration)),
-    Route::post(Role::Setter, "/api/v1/doctor", NAME_MAX, || post(doctor)),
-    Route::read_by(Role::Admin, "/api/v1/backup", || get(take)),
-    Route::post(Role::Admin, "/api/v1/restore", BACKUP_MAX, || post(restore)),
-    Route::read_by(Role::Setter, "/api/v1/support", || get(support)),
+    Route::read("/api/v1/configuration", || get(serve_configuration)),
+    Route::post(Role::Setter, "/api/v1/doctor", NAME_MAX, || post(examine_source)),
+    Route::read_by(Role::Admin, "/api/v1/backup", || get(download_backup)),
+    Route::post(Role::Admin, "/api/v1/restore", BACKUP_MAX, || post(restore_backup)),
+    Route::read_by(Role::Setter, "/api/v1/support", || get(download_support_bundle)),
 ];
 
 /// What the page knows of the configuration.
@@ -49,7 +49,7 @@ pub struct Configured {
 }
 
 impl Configured {
-    fn json(&self) -> Value {
+    fn to_json(&self) -> Value {
         json!({
             "schema": "configuration/1",
             "file": self.file.as_ref().map(|file| file.display().to_string()),
@@ -61,14 +61,14 @@ impl Configured {
         })
     }
 
-    pub(super) fn places(&self) -> BackupPaths {
-        BackupPaths::of(&self.config, self.file.as_deref())
+    pub(super) fn backup_paths(&self) -> BackupPaths {
+        BackupPaths::from_config(&self.config, self.file.as_deref())
     }
 }
 
 /// `GET /api/v1/configuration`
-async fn configuration(State(shared): State<ServerState>) -> Json<Value> {
-    Json(shared.configured.json())
+async fn serve_configuration(State(shared): State<ServerState>) -> Json<Value> {
+    Json(shared.configured.to_json())
 }
 
 /// Which source is looked at.
@@ -79,14 +79,17 @@ struct SourceQuery {
 }
 
 /// `POST /api/v1/doctor`: what `doctor --config FILE NAME` finds, with a second connection beside the one that polls.
-async fn doctor(
+async fn examine_source(
     State(shared): State<ServerState>,
     JsonBody(asked): JsonBody<SourceQuery>,
 ) -> Result<Response, ApiProblem> {
     let found = shared.configured.config.sources.iter().find(|it| it.name == asked.source);
     let names = || shared.configured.config.sources.iter().map(|it| it.name.as_str()).collect::<Vec<_>>().join(", ");
     let none = || {
-        ApiProblem::request(format!("there is no source {:?}", asked.source), format!("its sources are {}", names()))
+        ApiProblem::bad_request(
+            format!("there is no source {:?}", asked.source),
+            format!("its sources are {}", names()),
+        )
     };
     let address = found.ok_or_else(none)?.address.clone();
     if address.text().contains("/dev/") {
@@ -95,19 +98,19 @@ async fn doctor(
     }
     let busy = || ApiProblem::conflict("a source is being looked at already", "wait a few seconds");
     let place = shared.doctor.clone().try_acquire_owned().map_err(|_| busy())?;
-    let report = aside(move || {
+    let report = run_blocking(move || {
         let _place = place;
         crate::doctor::examine_address(&address).map_err(|what| ApiProblem::conflict(what, "look at the address"))
     });
     let report = report.await?;
-    let mut document = report.json();
+    let mut document = report.to_json();
     document["schema"] = json!("doctor/1");
-    document["address"] = json!(adapters::address::masked(&report.address));
-    Ok(told(Json(document), format!("looked at source {}", asked.source)))
+    document["address"] = json!(adapters::address::mask_secrets(&report.address));
+    Ok(with_audit_note(Json(document), format!("looked at source {}", asked.source)))
 }
 
 fn now_s(shared: &ServerState) -> Result<u64, ApiProblem> {
-    Ok(shared.status()?.at_ms.div_euclid(1000).unsigned_abs())
+    Ok(shared.require_status()?.at_ms.div_euclid(1000).unsigned_abs())
 }
 
 fn pack_archive(files: &[ArchivedFile], at_s: u64) -> Result<Vec<u8>, ApiProblem> {
@@ -116,55 +119,59 @@ fn pack_archive(files: &[ArchivedFile], at_s: u64) -> Result<Vec<u8>, ApiProblem
 }
 
 fn collect_files(places: &BackupPaths) -> Result<Vec<ArchivedFile>, ApiProblem> {
-    backup::collect(places).map_err(|error| trouble(&error))
+    backup::collect_files(places).map_err(|error| describe_history_error(&error))
 }
 
 /// `GET /api/v1/backup`
-async fn take(State(shared): State<ServerState>) -> Result<Response, ApiProblem> {
+async fn download_backup(State(shared): State<ServerState>) -> Result<Response, ApiProblem> {
     let at_s = now_s(&shared)?;
-    let bytes = aside(move || pack_archive(&collect_files(&shared.configured.places())?, at_s)).await?;
-    Ok(download("application/gzip", &archive_name("backup", at_s), bytes))
+    let bytes = run_blocking(move || pack_archive(&collect_files(&shared.configured.backup_paths())?, at_s)).await?;
+    Ok(respond_with_download("application/gzip", &archive_name("backup", at_s), bytes))
 }
 
 /// `POST /api/v1/restore`: what a backup holds takes the place of what is in force; what was learned, at the next start.
-async fn restore(
+async fn restore_backup(
     State(shared): State<ServerState>,
     SignedIn(person): SignedIn,
     body: Bytes,
 ) -> Result<Response, ApiProblem> {
     let at_s = now_s(&shared)?;
-    let done = aside(move || {
+    let done = run_blocking(move || {
         let files = unpack(&body).map_err(|error| {
-            ApiProblem::request(format!("this is no backup: {error}"), "give the file that `Take a backup` has made")
+            ApiProblem::bad_request(
+                format!("this is no backup: {error}"),
+                "give the file that `Take a backup` has made",
+            )
         })?;
-        let places = shared.configured.places();
+        let places = shared.configured.backup_paths();
         let before = pack_archive(&collect_files(&places)?, at_s)?;
-        let cannot =
-            |what: String| ApiProblem::request(what, "nothing was changed; take the backup of a box of this version");
+        let cannot = |what: String| {
+            ApiProblem::bad_request(what, "nothing was changed; take the backup of a box of this version")
+        };
         let at_ns = i64::try_from(at_s).unwrap_or_default().saturating_mul(SECOND_NS);
         let ask = RestoreRequest { by: &person.name, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
-        backup::restore(&places, &files, ask).map_err(cannot)
+        backup::restore_backup(&places, &files, ask).map_err(cannot)
     });
     let done = done.await?;
-    Ok(told(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
+    Ok(with_audit_note(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
 }
 
 /// `GET /api/v1/support`
-async fn support(State(shared): State<ServerState>) -> Result<Response, ApiProblem> {
-    let (at_s, status) = (now_s(&shared)?, shared.status()?);
-    let bytes = aside(move || {
+async fn download_support_bundle(State(shared): State<ServerState>) -> Result<Response, ApiProblem> {
+    let (at_s, status) = (now_s(&shared)?, shared.require_status()?);
+    let bytes = run_blocking(move || {
         let text = |value: &Value| format!("{value:#}\n").into_bytes();
-        let mut files: Vec<ArchivedFile> = vec![("configuration.json".to_owned(), text(&shared.configured.json()))];
+        let mut files: Vec<ArchivedFile> = vec![("configuration.json".to_owned(), text(&shared.configured.to_json()))];
         let status = serde_json::to_value(&*status).unwrap_or(Value::Null);
         files.push(("status.json".to_owned(), text(&without_secrets(status))));
-        let reader = Reader::open(&shared.history).map_err(|error| trouble(&error))?;
+        let reader = Reader::open(&shared.history).map_err(|error| describe_history_error(&error))?;
         for (name, found) in history_of(&reader) {
             files.push((name.to_owned(), text(&found)));
         }
-        files.push(("about.txt".to_owned(), about().into_bytes()));
+        files.push(("about.txt".to_owned(), describe_bundle().into_bytes()));
         pack_archive(&files, at_s)
     });
-    Ok(download("application/gzip", &archive_name("support", at_s), bytes.await?))
+    Ok(respond_with_download("application/gzip", &archive_name("support", at_s), bytes.await?))
 }
 
 /// Addresses in the status, masked as in the configuration.
@@ -172,7 +179,7 @@ fn without_secrets(mut status: Value) -> Value {
     for list in ["sources", "sinks"] {
         for one in status[list].as_array_mut().into_iter().flatten() {
             for key in ["name", "address"] {
-                if let Some(text) = one[key].as_str().map(adapters::address::masked) {
+                if let Some(text) = one[key].as_str().map(adapters::address::mask_secrets) {
                     one[key] = json!(text);
                 }
             }
@@ -183,7 +190,7 @@ fn without_secrets(mut status: Value) -> Value {
 
 /// The newest of everything that is told in words; what cannot be read says so in its place.
 fn history_of(reader: &Reader) -> [(&'static str, Value); 5] {
-    fn told<T: serde::Serialize, E: std::fmt::Display>(found: Result<T, E>) -> Value {
+    fn to_json_or_error<T: serde::Serialize, E: std::fmt::Display>(found: Result<T, E>) -> Value {
         found.map_or_else(
             |error| json!({ "error": error.to_string() }),
             |it| serde_json::to_value(it).unwrap_or(Value::Null),
@@ -191,15 +198,15 @@ fn history_of(reader: &Reader) -> [(&'static str, Value); 5] {
     }
     let newest = || RecordSpan::newest(ROWS);
     [
-        ("history.json", told(reader.info())),
-        ("events.json", told(reader.events(newest()))),
-        ("alarms.json", told(reader.alarms(newest()))),
-        ("diagnoses.json", told(reader.diagnoses(RecordSpan::newest(5)))),
-        ("audit.json", told(reader.audit(0, i64::MAX, ROWS).map(|rows| audit_document(&rows)))),
+        ("history.json", to_json_or_error(reader.read_info())),
+        ("events.json", to_json_or_error(reader.read_events(newest()))),
+        ("alarms.json", to_json_or_error(reader.read_alarms(newest()))),
+        ("diagnoses.json", to_json_or_error(reader.read_diagnoses(RecordSpan::newest(5)))),
+        ("audit.json", to_json_or_error(reader.read_audit(0, i64::MAX, ROWS).map(|rows| audit_document(&rows)))),
     ]
 }
 
-fn about() -> String {
+fn describe_bundle() -> String {
     format!(
         "cnc-gateway {}\n\nWhat a helper needs: the configuration in force (secrets masked), the status, the newest events, alarms, diagnoses\nand rows of the audit. No token, key, password, script or sample is in it. Names of persons, programs and tools are.\n",
         env!("CARGO_PKG_VERSION")

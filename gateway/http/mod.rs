@@ -44,13 +44,13 @@ mod vocabulary;
 mod wear;
 
 pub use connection::{Certificate, CertificateError};
-pub use description::{described, description};
+pub use description::{description, list_operations};
 pub use maintenance::Configured;
-pub use metrics::render as render_metrics;
+pub use metrics::render_metrics;
 pub use problem::ApiProblem;
 pub use route::{Needs, Route, Verb};
-pub use server::{Server, bind, port_trouble};
-pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
+pub use server::{Server, bind_port, port_trouble};
+pub use vocabulary::{ESTIMATES, build_vocabulary as vocabulary, name_state as state_text};
 
 use crate::access::Access;
 use crate::control::OrderSender;
@@ -64,7 +64,7 @@ use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use backtests::Backtests;
-use guard::{Guarded, guard};
+use guard::{Guarded, guard_route};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -137,7 +137,7 @@ impl ServerState {
         let ServerParts { live, history, scripts, data_dir, language, access, post, hosts, diagnoses, configured } =
             parts;
         let readers = Arc::new(Semaphore::new(history::READERS_MAX));
-        let files = FileDiagnoses::below(&data_dir).ok();
+        let files = FileDiagnoses::from_data_dir(&data_dir).ok();
         Self {
             live,
             streams: Streams::default(),
@@ -157,7 +157,7 @@ impl ServerState {
         }
     }
 
-    fn status(&self) -> Result<Arc<Status>, ApiProblem> {
+    fn require_status(&self) -> Result<Arc<Status>, ApiProblem> {
         let published = self.live.borrow();
         let starting = || ApiProblem::unavailable("the box is starting", "ask again in a second");
         published.as_ref().map(|published| published.status.clone()).ok_or_else(starting)
@@ -166,9 +166,9 @@ impl ServerState {
 
 /// What stands in this file.
 const OWN: &[Route] = &[
-    Route::file("/healthz", || get(healthz)),
-    Route::file("/openapi.json", || get(openapi)),
-    Route::read("/api/v1/status", || get(status)),
+    Route::for_file("/healthz", || get(serve_health)),
+    Route::for_file("/openapi.json", || get(serve_description)),
+    Route::read("/api/v1/status", || get(serve_status)),
 ];
 
 /// The rows of every module.
@@ -199,23 +199,23 @@ const GROUPS: &[&[Route]] = &[
 ];
 
 /// Everything that is served.
-pub fn routes() -> impl Iterator<Item = &'static Route> {
+pub fn list_routes() -> impl Iterator<Item = &'static Route> {
     GROUPS.iter().flat_map(|group| group.iter())
 }
 
 /// All routes with what they see, each behind its guard.
-pub fn router(shared: ServerState) -> Router {
-    let routes = routes().fold(Router::new(), |router, route| {
+pub fn build_router(shared: ServerState) -> Router {
+    let routes = list_routes().fold(Router::new(), |router, route| {
         let guarded = Guarded { shared: shared.clone(), route: *route };
-        router.route(route.path(), route.method_router().route_layer(from_fn_with_state(guarded, guard)))
+        router.route(route.path(), route.method_router().route_layer(from_fn_with_state(guarded, guard_route)))
     });
     let routes = routes
         .fallback(|uri: Uri| async move { ApiProblem::not_found(uri.path()) })
         .layer(from_fn(in_our_words))
         .layer(CompressionLayer::new())
-        .layer(CatchPanicLayer::custom(|_| ApiProblem::broken().into_response()))
-        .layer(from_fn_with_state(shared.clone(), host::check));
-    headers::on(routes).with_state(shared)
+        .layer(CatchPanicLayer::custom(|_| ApiProblem::internal_error().into_response()))
+        .layer(from_fn_with_state(shared.clone(), host::guard_host));
+    headers::add_headers(routes).with_state(shared)
 }
 
 /// What the library refuses by itself is told as everything else is: a wrong method, a query that cannot be read.
@@ -227,28 +227,28 @@ async fn in_our_words(request: axum::extract::Request, next: axum::middleware::N
         StatusCode::METHOD_NOT_ALLOWED if !own => {
             let allow = answer.headers().get(header::ALLOW).cloned();
             let takes = allow.as_ref().and_then(|value| value.to_str().ok()).unwrap_or("other methods").to_owned();
-            let mut told = ApiProblem::method(&takes).into_response();
+            let mut told = ApiProblem::method_not_allowed(&takes).into_response();
             allow.map(|value| told.headers_mut().insert(header::ALLOW, value));
             told
         }
         StatusCode::BAD_REQUEST if !own => {
             let hint = "GET /openapi.json describes every address";
-            ApiProblem::request("the address or its query cannot be read", hint).into_response()
+            ApiProblem::bad_request("the address or its query cannot be read", hint).into_response()
         }
         _ => answer,
     }
 }
 
-async fn status(axum::extract::State(shared): axum::extract::State<ServerState>) -> Response {
-    shared.status().map(|status| axum::Json(&*status).into_response()).into_response()
+async fn serve_status(axum::extract::State(shared): axum::extract::State<ServerState>) -> Response {
+    shared.require_status().map(|status| axum::Json(&*status).into_response()).into_response()
 }
 
-async fn openapi() -> Response {
+async fn serve_description() -> Response {
     ([(header::CONTENT_TYPE, "application/json")], description()).into_response()
 }
 
 /// `GET /healthz`: 200 while the tick goes on, 503 with the reason otherwise.
-async fn healthz(axum::extract::State(shared): axum::extract::State<ServerState>) -> Response {
+async fn serve_health(axum::extract::State(shared): axum::extract::State<ServerState>) -> Response {
     let Some(age) = shared.live.borrow().as_ref().map(|published| published.at.elapsed()) else {
         return ApiProblem::unavailable("the box is starting", "ask again in a second").into_response();
     };

@@ -2,14 +2,14 @@
 //! right. The tick takes a changed file by itself.
 
 use super::ServerState;
-use super::guard::told;
+use super::guard::with_audit_note;
 use super::person::JsonBody;
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::aside;
+use super::rules::run_blocking;
 use crate::access::Role;
 use crate::drafts::digest_of;
-use crate::files::{advice, read_text, replace_durably};
+use crate::files::{advise_on_read_error, read_text, replace_durably};
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -20,8 +20,8 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::read("/api/v1/operations", || get(recipe)),
-    Route::put(Role::Setter, "/api/v1/operations", 2 * TEXT_MAX + 4096, || put(replace)),
+    Route::read("/api/v1/operations", || get(serve_recipe)),
+    Route::put(Role::Setter, "/api/v1/operations", 2 * TEXT_MAX + 4096, || put(replace_recipe)),
 ];
 
 /// Another text, and the digest of the one that was edited.
@@ -32,7 +32,7 @@ struct EditedRecipe {
     digest: String,
 }
 
-fn path(shared: &ServerState) -> Result<PathBuf, ApiProblem> {
+fn require_path(shared: &ServerState) -> Result<PathBuf, ApiProblem> {
     let none = || ApiProblem::conflict("no recipe is configured", "name a file under [operations] path");
     shared.configured.config.operations.path.clone().ok_or_else(none)
 }
@@ -41,26 +41,28 @@ fn path(shared: &ServerState) -> Result<PathBuf, ApiProblem> {
 fn on_disk(path: &std::path::Path) -> Result<String, ApiProblem> {
     match read_text(path, TEXT_MAX) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
-        Err(error) => Err(ApiProblem::unavailable(format!("{}: {error}", path.display()), advice(&error))),
+        Err(error) => {
+            Err(ApiProblem::unavailable(format!("{}: {error}", path.display()), advise_on_read_error(&error)))
+        }
         Ok(text) => Ok(text),
     }
 }
 
 /// `GET /api/v1/operations`
-async fn recipe(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
-    aside(move || {
-        let path = path(&shared)?;
+async fn serve_recipe(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
+    run_blocking(move || {
+        let path = require_path(&shared)?;
         let text = on_disk(&path)?;
         let parsed = parse(&path.display().to_string(), &text);
         let problems: Vec<String> = parsed.as_ref().err().into_iter().flatten().map(ToString::to_string).collect();
-        let rows: Vec<Value> = parsed.iter().flat_map(|recipe| recipe.operations()).map(row).collect();
+        let rows: Vec<Value> = parsed.iter().flat_map(|recipe| recipe.operations()).map(operation_to_json).collect();
         Ok(Json(json!({ "schema": "operations-file/1", "path": path.display().to_string(), "digest": digest_of(&text),
             "text": text, "rows": rows, "problems": problems })))
     })
     .await
 }
 
-fn row(it: &Operation) -> Value {
+fn operation_to_json(it: &Operation) -> Value {
     json!({
         "program": &*it.program,
         "blocks": it.blocks.as_ref().map(|blocks| [*blocks.start(), *blocks.end()]),
@@ -75,12 +77,12 @@ fn row(it: &Operation) -> Value {
 }
 
 /// `PUT /api/v1/operations`: another text, if all of it is right and nobody has changed the file meanwhile.
-async fn replace(
+async fn replace_recipe(
     State(shared): State<ServerState>,
     JsonBody(edited): JsonBody<EditedRecipe>,
 ) -> Result<Response, ApiProblem> {
-    let done = aside(move || {
-        let path = path(&shared)?;
+    let done = run_blocking(move || {
+        let path = require_path(&shared)?;
         let now = on_disk(&path)?;
         if digest_of(&now) != edited.digest {
             let hint = "nothing of yours was stored and nothing of theirs is lost: load the table again, then make your change";
@@ -88,12 +90,13 @@ async fn replace(
         }
         let recipe = parse("operations.toml", &edited.text).map_err(|problems| {
             let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
-            ApiProblem::request(lines.join("\n"), "mend it; the recipe in force stays")
+            ApiProblem::bad_request(lines.join("\n"), "mend it; the recipe in force stays")
         })?;
-        replace_durably(&path, &edited.text)
-            .map_err(|error| ApiProblem::unavailable(format!("{}: {error}", path.display()), advice(&error)))?;
+        replace_durably(&path, &edited.text).map_err(|error| {
+            ApiProblem::unavailable(format!("{}: {error}", path.display()), advise_on_read_error(&error))
+        })?;
         Ok(format!("{} operations, version {}", recipe.operations().len(), recipe.version()))
     });
     let done = done.await?;
-    Ok(told(Json(json!({ "schema": "order/1", "done": true, "text": done })), format!("the recipe: {done}")))
+    Ok(with_audit_note(Json(json!({ "schema": "order/1", "done": true, "text": done })), format!("the recipe: {done}")))
 }

@@ -2,7 +2,7 @@
 //! at the box, see `control`; what the tick makes of them stands in the audit with the name of the person.
 
 use super::ServerState;
-use super::guard::{told, wrong};
+use super::guard::{describe_sign_in_error, with_audit_note};
 use super::peer::Peer;
 use super::person::{JsonBody, SignedIn};
 use super::plain;
@@ -22,9 +22,9 @@ use serde_json::json;
 const BYTES_MAX: usize = 1024;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::post(Role::Armer, "/api/v1/arm", BYTES_MAX, || post(arm)),
-    Route::post(Role::Viewer, "/api/v1/disarm", BYTES_MAX, || post(disarm)).gives_back(),
-    Route::post(Role::Setter, "/api/v1/alarms/acknowledge", BYTES_MAX, || post(acknowledge)),
+    Route::post(Role::Armer, "/api/v1/arm", BYTES_MAX, || post(arm_gate)),
+    Route::post(Role::Viewer, "/api/v1/disarm", BYTES_MAX, || post(disarm_gate)).gives_back(),
+    Route::post(Role::Setter, "/api/v1/alarms/acknowledge", BYTES_MAX, || post(acknowledge_alarms)),
 ];
 
 #[derive(Debug, Deserialize)]
@@ -35,7 +35,7 @@ struct Arm {
 }
 
 /// `POST /api/v1/arm`: only where the configuration allows it, and only with the token once more.
-async fn arm(
+async fn arm_gate(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     SignedIn(person): SignedIn,
@@ -45,24 +45,31 @@ async fn arm(
         let hint = "arm at the box with `cnc-gateway arm --by NAME`, or write allow_arming = true under [http]";
         return Err(ApiProblem::forbidden("the gate cannot be armed from the page", hint));
     }
-    let again =
-        shared.access.check(&person.name, &Token::typed(&wanted.token), peer.from, "armed", Urgency::Waits).await;
-    again.map_err(|error| wrong(&error))?;
+    let again = shared
+        .access
+        .check_token(&person.name, &Token::from_typed_text(&wanted.token), peer.from, "armed", Urgency::Waits)
+        .await;
+    again.map_err(|error| describe_sign_in_error(&error))?;
     let order = Order::Arm { by: format_author(&person, &peer), for_s: wanted.for_s };
-    answer(shared.post.order(order).await, "look at [gate] in the configuration, and at the problems of /api/v1/status")
+    respond_to_order(
+        shared.post.send_order(order).await,
+        "look at [gate] in the configuration, and at the problems of /api/v1/status",
+    )
 }
 
 /// `POST /api/v1/disarm`: back to the dial.
-async fn disarm(
+async fn disarm_gate(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     SignedIn(person): SignedIn,
     headers: HeaderMap,
 ) -> Result<Response, ApiProblem> {
-    let reply = shared.post.order(Order::Disarm { by: format_author(&person, &peer) }).await;
+    let reply = shared.post.send_order(Order::Disarm { by: format_author(&person, &peer) }).await;
     match plain::wants_page(&headers) {
         true => Ok(Redirect::to("/plain").into_response()),
-        false => answer(reply, "press the button at the machine's panel; the dial of the machine always works"),
+        false => {
+            respond_to_order(reply, "press the button at the machine's panel; the dial of the machine always works")
+        }
     }
 }
 
@@ -74,7 +81,7 @@ struct Acknowledge {
 }
 
 /// `POST /api/v1/alarms/acknowledge`
-async fn acknowledge(
+async fn acknowledge_alarms(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     SignedIn(person): SignedIn,
@@ -85,7 +92,7 @@ async fn acknowledge(
         Some(code) => Order::AcknowledgeAlarm { by, code },
         None => Order::Acknowledge { by },
     };
-    answer(shared.post.order(order).await, "GET /api/v1/status lists the alarms that stand")
+    respond_to_order(shared.post.send_order(order).await, "GET /api/v1/status lists the alarms that stand")
 }
 
 /// The name as it stands in the audit.
@@ -93,11 +100,11 @@ fn format_author(person: &Person, peer: &Peer) -> String {
     format!("{} (from {})", person.name, peer.from)
 }
 
-fn answer(reply: Reply, hint: &str) -> Result<Response, ApiProblem> {
+fn respond_to_order(reply: Reply, hint: &str) -> Result<Response, ApiProblem> {
     match reply.done {
         true => {
             let body = json!({ "schema": "order/1", "done": true, "text": reply.text });
-            Ok(told(Json(body), reply.text))
+            Ok(with_audit_note(Json(body), reply.text))
         }
         false => Err(ApiProblem::conflict(reply.text, hint)),
     }

@@ -11,39 +11,39 @@ use axum::routing::get;
 use rules::physics::explain::Language;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::read("/", || get(page)),
-    Route::read("/now", || get(page)),
-    Route::read("/history", || get(page)),
-    Route::read("/wear", || get(page)),
-    Route::read("/thermal", || get(page)),
-    Route::read("/twin", || get(page)),
-    Route::read("/rules", || get(page)),
-    Route::read("/audit", || get(page)),
-    Route::read("/help", || get(page)),
-    Route::file("/web/{file}", || get(web)),
+    Route::read("/", || get(serve_page)),
+    Route::read("/now", || get(serve_page)),
+    Route::read("/history", || get(serve_page)),
+    Route::read("/wear", || get(serve_page)),
+    Route::read("/thermal", || get(serve_page)),
+    Route::read("/twin", || get(serve_page)),
+    Route::read("/rules", || get(serve_page)),
+    Route::read("/audit", || get(serve_page)),
+    Route::read("/help", || get(serve_page)),
+    Route::for_file("/web/{file}", || get(serve_web_file)),
 ];
 
 /// `GET /` and the address of every view.
-async fn page(State(shared): State<ServerState>) -> Response {
+async fn serve_page(State(shared): State<ServerState>) -> Response {
     let chosen = match shared.language {
-        None => return headers::page(INDEX),
+        None => return headers::respond_with_page(INDEX),
         Some(Language::En) => "<html lang=\"en\" data-opens=\"en\">",
         Some(Language::Zh) => "<html lang=\"zh-CN\" data-opens=\"zh\">",
     };
-    headers::page(&INDEX.replacen("<html lang=\"en\">", chosen, 1))
+    headers::respond_with_page(&INDEX.replacen("<html lang=\"en\">", chosen, 1))
 }
 
 /// `GET /web/{file}`: a browser that has this version already is told so.
-async fn web(Path(name): Path<String>, asked: HeaderMap) -> Response {
+async fn serve_web_file(Path(name): Path<String>, asked: HeaderMap) -> Response {
     let Some(file) = FILES.iter().find(|file| file.name == name) else {
         return ApiProblem::not_found(&format!("/web/{name}")).into_response();
     };
-    let tag = format!("\"{:016x}\"", crate::reload::digest(file.content.as_bytes()));
+    let tag = format!("\"{:016x}\"", crate::reload::compute_digest(file.content.as_bytes()));
     let known = asked.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
     let mut response = if known == Some(tag.as_str()) {
         StatusCode::NOT_MODIFIED.into_response()
     } else {
-        answer(file.kind, file.content)
+        respond_with_content(file.kind, file.content)
     };
     if let Ok(tag) = HeaderValue::from_str(&tag) {
         response.headers_mut().insert(header::ETAG, tag);
@@ -51,7 +51,7 @@ async fn web(Path(name): Path<String>, asked: HeaderMap) -> Response {
     response
 }
 
-fn answer(kind: &'static str, content: impl IntoResponse) -> Response {
+fn respond_with_content(kind: &'static str, content: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
         (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),

@@ -45,9 +45,9 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
             return Err(ApiProblem::media_type(&essence));
         }
         let bytes = axum::body::Bytes::from_request(request, state).await;
-        let bytes = bytes.map_err(|error| ApiProblem::request(error.to_string(), "send it again"))?;
+        let bytes = bytes.map_err(|error| ApiProblem::bad_request(error.to_string(), "send it again"))?;
         let unusable = |error: &dyn std::fmt::Display| {
-            ApiProblem::request(format!("the body cannot be used: {error}"), "/openapi.json describes it")
+            ApiProblem::bad_request(format!("the body cannot be used: {error}"), "/openapi.json describes it")
         };
         // A list in the place of an object would fill its fields in their order.
         if !bytes.trim_ascii_start().starts_with(b"{") {
@@ -63,7 +63,7 @@ pub(super) fn name_of_cookie(peer: &Peer) -> &'static str {
 }
 
 /// The value of a cookie.
-pub(super) fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+pub(super) fn find_cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     let lines = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
     let mut pairs = lines.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
     pairs.find(|(key, _)| *key == name).map(|(_, value)| value)
@@ -83,8 +83,8 @@ mod tests {
     fn a_cookie_is_found_among_others() {
         let mut headers = HeaderMap::new();
         headers.append(header::COOKIE, "a=1; cnc_gateway=abc ;b=2".parse().expect("one"));
-        assert_eq!(cookie(&headers, "cnc_gateway"), Some("abc"));
-        assert_eq!(cookie(&headers, "cnc"), None);
+        assert_eq!(find_cookie(&headers, "cnc_gateway"), Some("abc"));
+        assert_eq!(find_cookie(&headers, "cnc"), None);
         let peer = Peer::new("[::1]:9".parse().expect("one"), "[::1]:80".parse().expect("one"), true);
         let set = set_cookie(&peer, "abc", 60);
         assert!(set.contains("Secure") && set.contains("HttpOnly") && set.contains("SameSite=Strict"), "{set}");

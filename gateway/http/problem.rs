@@ -20,69 +20,73 @@ pub struct ApiProblem {
 }
 
 impl ApiProblem {
-    fn of(status: StatusCode, title: impl Into<String>, hint: impl Into<String>) -> Self {
+    fn with_status(status: StatusCode, title: impl Into<String>, hint: impl Into<String>) -> Self {
         Self { status: status.as_u16(), title: title.into(), hint: hint.into(), retry_after_s: None }
     }
 
     /// The request cannot be understood: 400.
-    pub fn request(title: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self::of(StatusCode::BAD_REQUEST, title, hint)
+    pub fn bad_request(title: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self::with_status(StatusCode::BAD_REQUEST, title, hint)
     }
 
     /// Nobody is signed in, or name and token are wrong: 401.
     pub fn unauthorised(title: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self::of(StatusCode::UNAUTHORIZED, title, hint)
+        Self::with_status(StatusCode::UNAUTHORIZED, title, hint)
     }
 
     /// Whoever asks may not: 403.
     pub fn forbidden(title: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self::of(StatusCode::FORBIDDEN, title, hint)
+        Self::with_status(StatusCode::FORBIDDEN, title, hint)
     }
 
     /// There is no such page: 404.
     #[must_use]
     pub fn not_found(path: &str) -> Self {
         let title = format!("there is nothing at {path}");
-        Self::of(StatusCode::NOT_FOUND, title, "GET /openapi.json lists everything there is")
+        Self::with_status(StatusCode::NOT_FOUND, title, "GET /openapi.json lists everything there is")
     }
 
     /// The address takes another method: 405.
     #[must_use]
-    pub fn method(takes: &str) -> Self {
-        Self::of(StatusCode::METHOD_NOT_ALLOWED, format!("this address takes {takes}"), "GET /openapi.json says more")
+    pub fn method_not_allowed(takes: &str) -> Self {
+        Self::with_status(
+            StatusCode::METHOD_NOT_ALLOWED,
+            format!("this address takes {takes}"),
+            "GET /openapi.json says more",
+        )
     }
 
     /// The request does not fit what is there now: 409.
     pub fn conflict(title: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self::of(StatusCode::CONFLICT, title, hint)
+        Self::with_status(StatusCode::CONFLICT, title, hint)
     }
 
     /// The request came too slowly: 408.
     #[must_use]
-    pub fn slow(within: Duration) -> Self {
+    pub fn request_timeout(within: Duration) -> Self {
         let title = format!("the request was not complete within {} s", within.as_secs());
-        Self::of(StatusCode::REQUEST_TIMEOUT, title, "send it again")
+        Self::with_status(StatusCode::REQUEST_TIMEOUT, title, "send it again")
     }
 
     /// The body is longer than so many bytes: 413.
     #[must_use]
     pub fn too_large(most: usize) -> Self {
         let title = format!("the body is longer than {most} bytes");
-        Self::of(StatusCode::PAYLOAD_TOO_LARGE, title, "send less")
+        Self::with_status(StatusCode::PAYLOAD_TOO_LARGE, title, "send less")
     }
 
     /// The body is of another kind than JSON: 415.
     #[must_use]
     pub fn media_type(found: &str) -> Self {
         let title = format!("the body is {found:?}; application/json is needed");
-        Self::of(StatusCode::UNSUPPORTED_MEDIA_TYPE, title, "send Content-Type: application/json")
+        Self::with_status(StatusCode::UNSUPPORTED_MEDIA_TYPE, title, "send Content-Type: application/json")
     }
 
     /// The request is meant for another host: 421.
     #[must_use]
-    pub fn misdirected(host: &str) -> Self {
+    pub fn misdirected_request(host: &str) -> Self {
         let hint = "write the address of this box, or add the name to `allow_hosts` under [http]";
-        Self::of(StatusCode::MISDIRECTED_REQUEST, format!("this box is not {host:?}"), hint)
+        Self::with_status(StatusCode::MISDIRECTED_REQUEST, format!("this box is not {host:?}"), hint)
     }
 
     /// Too many wrong tokens: 429.
@@ -91,19 +95,19 @@ impl ApiProblem {
         let seconds = wait.as_secs().max(1);
         let title = format!("too many wrong tokens: nothing is tried for {seconds} s");
         let hint = "wait, or sign in from another computer; arming and disarming at the box itself work";
-        Self { retry_after_s: Some(seconds), ..Self::of(StatusCode::TOO_MANY_REQUESTS, title, hint) }
+        Self { retry_after_s: Some(seconds), ..Self::with_status(StatusCode::TOO_MANY_REQUESTS, title, hint) }
     }
 
     /// The box itself went wrong: 500.
     #[must_use]
-    pub fn broken() -> Self {
+    pub fn internal_error() -> Self {
         let hint = "report this with the log; the machine is still polled";
-        Self::of(StatusCode::INTERNAL_SERVER_ERROR, "the answer could not be made", hint)
+        Self::with_status(StatusCode::INTERNAL_SERVER_ERROR, "the answer could not be made", hint)
     }
 
     /// The box cannot answer at this moment: 503.
     pub fn unavailable(title: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self::of(StatusCode::SERVICE_UNAVAILABLE, title, hint)
+        Self::with_status(StatusCode::SERVICE_UNAVAILABLE, title, hint)
     }
 }
 
@@ -111,7 +115,7 @@ impl IntoResponse for ApiProblem {
     fn into_response(self) -> Response {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let kind = [(header::CONTENT_TYPE, "application/problem+json")];
-        let mut answer = (status, kind, text(&self)).into_response();
+        let mut answer = (status, kind, format_problem(&self)).into_response();
         if let Some(seconds) = self.retry_after_s {
             answer.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
@@ -123,7 +127,7 @@ impl IntoResponse for ApiProblem {
     }
 }
 
-fn text(problem: &ApiProblem) -> String {
+fn format_problem(problem: &ApiProblem) -> String {
     serde_json::to_string(problem)
         .unwrap_or_else(|_| r#"{"status":500,"title":"the answer cannot be written"}"#.to_owned())
 }

@@ -37,7 +37,7 @@ impl Verb {
 
     /// Is this the method of the request? `HEAD` is a `GET` without its body.
     #[must_use]
-    pub fn is(self, method: &Method) -> bool {
+    pub fn matches_method(self, method: &Method) -> bool {
         method.as_str() == self.word() || (self == Self::Get && *method == Method::HEAD)
     }
 }
@@ -82,7 +82,7 @@ impl Route {
 
     /// `GET` of something that says nothing of the machine: a file of the page, the health of the box.
     #[must_use]
-    pub const fn file(path: &'static str, answers: Answers) -> Self {
+    pub const fn for_file(path: &'static str, answers: Answers) -> Self {
         Self { verb: Verb::Get, path, needs: Needs::Nothing, body_max: 0, answers, urgency: Urgency::Waits }
     }
 
@@ -147,7 +147,7 @@ impl Route {
 
     /// Does it change something?
     #[must_use]
-    pub const fn changes(&self) -> bool {
+    pub const fn changes_state(&self) -> bool {
         !matches!(self.verb, Verb::Get)
     }
 

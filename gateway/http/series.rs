@@ -1,7 +1,7 @@
 //! `GET /api/v1/series`: what this history holds, and from when to when.
 
 use super::ServerState;
-use super::history::{Answer, HistoryQuery, reading, trouble};
+use super::history::{Answer, HistoryQuery, describe_history_error, read_history};
 use super::query::QueryKeys;
 use super::route::Route;
 use crate::history::SeriesKind;
@@ -9,14 +9,14 @@ use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
 use serde_json::{Value, json};
 
-pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/series", || get(series))];
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/series", || get(serve_series))];
 
 /// `GET /api/v1/series`
-async fn series(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
-    QueryKeys::of(pairs, &[])?;
-    reading(shared, |reader, _| {
-        let span = reader.present().map_err(|error| trouble(&error))?;
-        let known = reader.series().map_err(|error| trouble(&error))?;
+async fn serve_series(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
+    QueryKeys::from_pairs(pairs, &[])?;
+    read_history(shared, |reader, _| {
+        let span = reader.read_present_span().map_err(|error| describe_history_error(&error))?;
+        let known = reader.read_series().map_err(|error| describe_history_error(&error))?;
         let rows: Vec<Value> = known
             .iter()
             .map(|series| {

@@ -1,6 +1,6 @@
 //! The listening socket: bound before anything else starts when the user asked for it, retried otherwise.
 
-use super::{Certificate, ServerState, connection, router};
+use super::{Certificate, ServerState, build_router, connection};
 use crate::log::{Notice, Severity};
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -26,7 +26,7 @@ pub fn port_trouble(listen: SocketAddr, error: &std::io::Error) -> String {
 ///
 /// # Errors
 /// What the system said; see [`port_trouble`] for words.
-pub async fn bind(listen: SocketAddr) -> std::io::Result<TcpListener> {
+pub async fn bind_port(listen: SocketAddr) -> std::io::Result<TcpListener> {
     TcpListener::bind(listen).await
 }
 
@@ -48,7 +48,7 @@ impl Server {
         report: watch::Sender<Option<String>>,
     ) -> Self {
         let (stop, stopped) = watch::channel(false);
-        let task = tokio::spawn(serve((listen, listener), certificate, shared, stopped, report));
+        let task = tokio::spawn(serve_until_stopped((listen, listener), certificate, shared, stopped, report));
         Self { stop, task }
     }
 
@@ -59,7 +59,7 @@ impl Server {
     }
 }
 
-async fn serve(
+async fn serve_until_stopped(
     (listen, listener): (SocketAddr, Option<TcpListener>),
     certificate: Option<Certificate>,
     shared: ServerState,
@@ -76,21 +76,21 @@ async fn serve(
     report.send_replace(None);
     let address = listener.local_addr().unwrap_or(listen);
     let scheme = if certificate.is_some() { "https" } else { "http" };
-    Notice::new(Severity::Info, "serving", format!("live page: {scheme}://{address}/")).say();
+    Notice::new(Severity::Info, "serving", format!("live page: {scheme}://{address}/")).write_to_logs();
     if let Some(certificate) = &certificate {
         let text = format!(
             "the certificate is {}; a browser that asks shows the SHA-256 fingerprint {}",
             certificate.file.display(),
             certificate.fingerprint
         );
-        Notice::new(Severity::Info, "certificate", text).say();
+        Notice::new(Severity::Info, "certificate", text).write_to_logs();
     }
-    connection::serve(listener, certificate.map(|it| it.acceptor()), router(shared), stopped).await;
+    connection::serve_connections(listener, certificate.map(|it| it.acceptor()), build_router(shared), stopped).await;
 }
 
 async fn keep_trying(listen: SocketAddr, report: &watch::Sender<Option<String>>) -> TcpListener {
     loop {
-        match bind(listen).await {
+        match bind_port(listen).await {
             Ok(listener) => return listener,
             Err(error) => say_once(report, listen, &error),
         }
@@ -107,6 +107,6 @@ fn say_once(report: &watch::Sender<Option<String>>, listen: SocketAddr, error: &
     });
     if new {
         let text = format!("{trouble}: no page for now. Polling goes on; trying again every {} s", RETRY.as_secs());
-        Notice::new(Severity::Warning, "port_in_use", text).detail(error.to_string()).say();
+        Notice::new(Severity::Warning, "port_in_use", text).with_detail(error.to_string()).write_to_logs();
     }
 }

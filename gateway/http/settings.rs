@@ -1,12 +1,12 @@
 //! The settings of the scripts over the API: every one that is declared, with what is in force; one changed by a setter.
 
 use super::ServerState;
-use super::guard::told;
-use super::history::{reading, trouble};
+use super::guard::with_audit_note;
+use super::history::{describe_history_error, read_history};
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::{aside, on_disk};
+use super::rules::{on_disk, run_blocking};
 use crate::access::Role;
 use crate::history::RecordSpan;
 use crate::settings::{self, NewSetting, Refused};
@@ -14,13 +14,13 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use axum::routing::{get, put};
-use rules::script::{DeclarationPlace, ScriptProblem, SettingValue, declarations};
+use rules::script::{DeclarationPlace, ScriptProblem, SettingValue, list_declarations};
 use serde::Deserialize;
 use serde_json::Value;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::read("/api/v1/settings", || get(list)),
-    Route::put(Role::Setter, "/api/v1/settings", 4096, || put(change)),
+    Route::read("/api/v1/settings", || get(serve_settings)),
+    Route::put(Role::Setter, "/api/v1/settings", 4096, || put(change_setting)),
 ];
 
 /// A number, a text, or nothing: as elsewhere again.
@@ -53,7 +53,7 @@ impl SettingRequest {
             (Some(tool), None) => DeclarationPlace::Tool(tool),
             (None, Some(operation)) => DeclarationPlace::Operation(operation),
             (Some(_), Some(_)) => {
-                return Err(ApiProblem::request("a tool and an operation are both named", "name one of them"));
+                return Err(ApiProblem::bad_request("a tool and an operation are both named", "name one of them"));
             }
         };
         let value = self.value.map(|value| match value {
@@ -68,7 +68,7 @@ impl SettingRequest {
 fn settings_problem(problems: &[ScriptProblem]) -> ApiProblem {
     let what: Vec<&str> = problems.iter().map(|problem| problem.what.as_str()).collect();
     let next = problems.iter().map(|problem| problem.next.as_str()).find(|next| !next.is_empty());
-    ApiProblem::request(what.join("; "), next.unwrap_or("GET /api/v1/settings lists every setting with its range"))
+    ApiProblem::bad_request(what.join("; "), next.unwrap_or("GET /api/v1/settings lists every setting with its range"))
 }
 
 fn not_set(why: Refused) -> ApiProblem {
@@ -86,10 +86,12 @@ fn not_set(why: Refused) -> ApiProblem {
 }
 
 /// Who has changed settings, as far as the history can be read: without it the settings are shown all the same.
-async fn changes(shared: &ServerState) -> Vec<Value> {
-    let read = reading(shared.clone(), |reader, _| {
+async fn read_changes(shared: &ServerState) -> Vec<Value> {
+    let read = read_history(shared.clone(), |reader, _| {
         let events = reader.events_of(settings::KIND, RecordSpan::newest(settings::EVENTS_MAX));
-        events.map(|events| Value::Array(settings::told_changes(&events))).map_err(|error| trouble(&error))
+        events
+            .map(|events| Value::Array(settings::told_changes(&events)))
+            .map_err(|error| describe_history_error(&error))
     });
     match read.await {
         Ok(Json(Value::Array(changes))) => changes,
@@ -98,29 +100,29 @@ async fn changes(shared: &ServerState) -> Vec<Value> {
 }
 
 /// `GET /api/v1/settings`
-async fn list(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
-    let changes = changes(&shared).await;
-    aside(move || {
-        let declared = declarations(&on_disk(&shared)?).map_err(|problems| settings_problem(&problems))?;
-        Ok(Json(settings::document(declared.iter(), &super::rules::values(&shared), &changes)))
+async fn serve_settings(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
+    let changes = read_changes(&shared).await;
+    run_blocking(move || {
+        let declared = list_declarations(&on_disk(&shared)?).map_err(|problems| settings_problem(&problems))?;
+        Ok(Json(settings::build_document(declared.iter(), &super::rules::read_values(&shared), &changes)))
     })
     .await
 }
 
 /// `PUT /api/v1/settings`: tried with every script first; in force within a second.
-async fn change(
+async fn change_setting(
     State(shared): State<ServerState>,
     SignedIn(person): SignedIn,
     JsonBody(asked): JsonBody<SettingRequest>,
 ) -> Result<Response, ApiProblem> {
     let wanted = asked.into_new_setting()?;
-    let changes = changes(&shared).await;
-    aside(move || {
+    let changes = read_changes(&shared).await;
+    run_blocking(move || {
         let files = on_disk(&shared)?;
-        let words = settings::set(&shared.data_dir, &files, &wanted, &person.name).map_err(not_set)?;
-        let declared = declarations(&files).map_err(|problems| settings_problem(&problems))?;
-        let answer = settings::document(declared.iter(), &super::rules::values(&shared), &changes);
-        Ok(told(Json(answer), words))
+        let words = settings::change_setting(&shared.data_dir, &files, &wanted, &person.name).map_err(not_set)?;
+        let declared = list_declarations(&files).map_err(|problems| settings_problem(&problems))?;
+        let answer = settings::build_document(declared.iter(), &super::rules::read_values(&shared), &changes);
+        Ok(with_audit_note(Json(answer), words))
     })
     .await
 }

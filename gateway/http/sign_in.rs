@@ -1,10 +1,10 @@
 //! Signing in and out, and who may: `/api/v1/login`, `logout`, `session`, `persons`.
 
 use super::ServerState;
-use super::guard::{told, wrong};
+use super::guard::{describe_sign_in_error, with_audit_note};
 use super::history::{Answer, HistoryQuery};
 use super::peer::Peer;
-use super::person::{JsonBody, SignedIn, cookie, name_of_cookie, set_cookie};
+use super::person::{JsonBody, SignedIn, find_cookie, name_of_cookie, set_cookie};
 use super::plain;
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
@@ -25,10 +25,10 @@ const LOGIN_BYTES_MAX: usize = 4096;
 const PERSON_BYTES_MAX: usize = 1024;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::sign_in("/api/v1/login", LOGIN_BYTES_MAX, || post(login)),
-    Route::post(Role::Viewer, "/api/v1/logout", PERSON_BYTES_MAX, || post(logout)),
-    Route::file("/api/v1/session", || get(session)),
-    Route::read_by(Role::Admin, "/api/v1/persons", || get(persons)),
+    Route::sign_in("/api/v1/login", LOGIN_BYTES_MAX, || post(sign_in_person)),
+    Route::post(Role::Viewer, "/api/v1/logout", PERSON_BYTES_MAX, || post(sign_out_person)),
+    Route::for_file("/api/v1/session", || get(serve_session)),
+    Route::read_by(Role::Admin, "/api/v1/persons", || get(serve_persons)),
     Route::post(Role::Admin, "/api/v1/persons", PERSON_BYTES_MAX, || post(add)),
     Route::put(Role::Admin, "/api/v1/persons/{name}", PERSON_BYTES_MAX, || put(give_role)),
     Route::delete(Role::Admin, "/api/v1/persons/{name}", 0, || delete(remove)),
@@ -46,19 +46,24 @@ struct Login {
 }
 
 /// `POST /api/v1/login`, as JSON or from the form of `/sign-in`.
-async fn login(State(shared): State<ServerState>, Extension(peer): Extension<Peer>, request: Request) -> Response {
+async fn sign_in_person(
+    State(shared): State<ServerState>,
+    Extension(peer): Extension<Peer>,
+    request: Request,
+) -> Response {
     let kind = request.headers().get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let headers = request.headers().clone();
     if kind.starts_with("application/x-www-form-urlencoded") {
         return match Form::<Login>::from_request(request, &()).await {
             Ok(Form(login)) => login_by_form(&shared, &peer, &headers, login).await,
-            Err(error) => ApiProblem::request(error.to_string(), "fill in the form at /sign-in").into_response(),
+            Err(error) => ApiProblem::bad_request(error.to_string(), "fill in the form at /sign-in").into_response(),
         };
     }
     match JsonBody::<Login>::from_request(request, &()).await {
-        Ok(JsonBody(login)) => match begin(&shared, &peer, &login).await {
+        Ok(JsonBody(login)) => match begin_session(&shared, &peer, &login).await {
             Ok((begun, set)) => {
-                ([(header::SET_COOKIE, set)], Json(about(&shared, Some((begun.person, None))))).into_response()
+                ([(header::SET_COOKIE, set)], Json(session_to_json(&shared, Some((begun.person, None)))))
+                    .into_response()
             }
             Err(problem) => problem.into_response(),
         },
@@ -67,50 +72,54 @@ async fn login(State(shared): State<ServerState>, Extension(peer): Extension<Pee
 }
 
 async fn login_by_form(shared: &ServerState, peer: &Peer, headers: &HeaderMap, login: Login) -> Response {
-    match begin(shared, peer, &login).await {
+    match begin_session(shared, peer, &login).await {
         Ok((_, set)) => {
-            let next = if plain::local(&login.next) { login.next.as_str() } else { "/" };
+            let next = if plain::is_local_path(&login.next) { login.next.as_str() } else { "/" };
             ([(header::SET_COOKIE, set)], Redirect::to(next)).into_response()
         }
         Err(problem) => plain::sign_in_again(shared, headers, &login.next, &problem),
     }
 }
 
-async fn begin(shared: &ServerState, peer: &Peer, login: &Login) -> Result<(NewSession, String), ApiProblem> {
-    let begun = shared.access.sign_in(&login.name, &Token::typed(&login.token), peer.from).await;
-    let begun = begun.map_err(|error| wrong(&error))?;
+async fn begin_session(shared: &ServerState, peer: &Peer, login: &Login) -> Result<(NewSession, String), ApiProblem> {
+    let begun = shared.access.sign_in(&login.name, &Token::from_typed_text(&login.token), peer.from).await;
+    let begun = begun.map_err(|error| describe_sign_in_error(&error))?;
     let set = set_cookie(peer, &begun.cookie, shared.access.rules().session.as_secs());
     Ok((begun, set))
 }
 
 /// `POST /api/v1/logout`
-async fn logout(State(shared): State<ServerState>, Extension(peer): Extension<Peer>, headers: HeaderMap) -> Response {
-    if let Some(cookie) = cookie(&headers, name_of_cookie(&peer)) {
+async fn sign_out_person(
+    State(shared): State<ServerState>,
+    Extension(peer): Extension<Peer>,
+    headers: HeaderMap,
+) -> Response {
+    if let Some(cookie) = find_cookie(&headers, name_of_cookie(&peer)) {
         shared.access.sign_out(cookie, peer.from).await;
     }
     let gone = [(header::SET_COOKIE, set_cookie(&peer, "", 0))];
     match plain::wants_page(&headers) {
         true => (gone, Redirect::to("/plain")).into_response(),
-        false => (gone, Json(about(&shared, None))).into_response(),
+        false => (gone, Json(session_to_json(&shared, None))).into_response(),
     }
 }
 
 /// `GET /api/v1/session`
-async fn session(
+async fn serve_session(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     person: Option<SignedIn>,
     headers: HeaderMap,
     Pairs(pairs): HistoryQuery,
 ) -> Answer {
-    QueryKeys::of(pairs, &[])?;
-    let until = cookie(&headers, name_of_cookie(&peer)).and_then(|cookie| shared.access.of_cookie(cookie));
-    Ok(Json(about(&shared, person.map(|SignedIn(person)| (person, until.map(|(_, until)| until))))))
+    QueryKeys::from_pairs(pairs, &[])?;
+    let until = find_cookie(&headers, name_of_cookie(&peer)).and_then(|cookie| shared.access.of_cookie(cookie));
+    Ok(Json(session_to_json(&shared, person.map(|SignedIn(person)| (person, until.map(|(_, until)| until))))))
 }
 
 /// `session/1`: who is signed in, for how long, and what the box lets such a person do. Times are lengths: the clock of a
 /// browser may be wrong.
-fn about(shared: &ServerState, person: Option<(Person, Option<Instant>)>) -> Value {
+fn session_to_json(shared: &ServerState, person: Option<(Person, Option<Instant>)>) -> Value {
     let rules = shared.access.rules();
     let until = person.as_ref().and_then(|(_, until)| *until);
     let left_s = match (&person, until) {
@@ -124,7 +133,7 @@ fn about(shared: &ServerState, person: Option<(Person, Option<Instant>)>) -> Val
         "schema": "session/1",
         "person": person.map(|(person, _)| json!({ "name": person.name, "role": person.role })),
         "left_s": left_s,
-        "roles": Role::ALL.map(Role::word),
+        "roles": Role::ALL.map(Role::as_word),
         "tokens": if rules.tokens_always { "always" } else { "changes" },
         "arming_allowed": rules.allow_arming,
         "may": {
@@ -137,11 +146,11 @@ fn about(shared: &ServerState, person: Option<(Person, Option<Instant>)>) -> Val
 }
 
 /// `GET /api/v1/persons`
-async fn persons(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
-    QueryKeys::of(pairs, &[])?;
+async fn serve_persons(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
+    QueryKeys::from_pairs(pairs, &[])?;
     let persons = shared.access.persons();
     let rows: Vec<Value> =
-        persons.all().iter().map(|it| json!({ "name": it.name, "role": it.role, "by": it.by })).collect();
+        persons.list_entries().iter().map(|it| json!({ "name": it.name, "role": it.role, "by": it.by })).collect();
     Ok(Json(json!({ "schema": "persons/1", "persons": rows })))
 }
 
@@ -158,10 +167,13 @@ async fn add(
     SignedIn(by): SignedIn,
     JsonBody(wanted): JsonBody<NewPerson>,
 ) -> Result<Response, ApiProblem> {
-    let token =
-        shared.access.change(|persons| persons.add(&wanted.name, wanted.role, &by.name)).await.map_err(trouble)?;
+    let token = shared
+        .access
+        .change_persons(|persons| persons.add(&wanted.name, wanted.role, &by.name))
+        .await
+        .map_err(describe_persons_error)?;
     let body = json!({ "schema": "token/1", "name": wanted.name.trim(), "role": wanted.role, "token": token.text() });
-    Ok(told((StatusCode::CREATED, Json(body)), format!("{} is {}", wanted.name.trim(), wanted.role)))
+    Ok(with_audit_note((StatusCode::CREATED, Json(body)), format!("{} is {}", wanted.name.trim(), wanted.role)))
 }
 
 #[derive(Debug, Deserialize)]
@@ -177,9 +189,13 @@ async fn give_role(
     Path(name): Path<String>,
     JsonBody(wanted): JsonBody<NewRole>,
 ) -> Result<Response, ApiProblem> {
-    shared.access.change(|persons| persons.give_role(&name, wanted.role, &by.name)).await.map_err(trouble)?;
+    shared
+        .access
+        .change_persons(|persons| persons.give_role(&name, wanted.role, &by.name))
+        .await
+        .map_err(describe_persons_error)?;
     let body = json!({ "schema": "person/1", "name": name, "role": wanted.role });
-    Ok(told(Json(body), format!("{name} is {}", wanted.role)))
+    Ok(with_audit_note(Json(body), format!("{name} is {}", wanted.role)))
 }
 
 /// `POST /api/v1/persons/{name}/token`: the token is in the answer, once; sessions with the one before end.
@@ -188,23 +204,30 @@ async fn give_token(
     SignedIn(by): SignedIn,
     Path(name): Path<String>,
 ) -> Result<Response, ApiProblem> {
-    let token = shared.access.change(|persons| persons.give_token(&name, &by.name)).await.map_err(trouble)?;
-    let role = shared.access.persons().named(&name).map(|it| it.role);
+    let token = shared
+        .access
+        .change_persons(|persons| persons.give_token(&name, &by.name))
+        .await
+        .map_err(describe_persons_error)?;
+    let role = shared.access.persons().find_by_name(&name).map(|it| it.role);
     let body = json!({ "schema": "token/1", "name": name, "role": role, "token": token.text() });
-    Ok(told(Json(body), format!("{name} has a new token")))
+    Ok(with_audit_note(Json(body), format!("{name} has a new token")))
 }
 
 /// `DELETE /api/v1/persons/{name}`
 async fn remove(State(shared): State<ServerState>, Path(name): Path<String>) -> Result<Response, ApiProblem> {
-    shared.access.change(|persons| persons.remove(&name)).await.map_err(trouble)?;
-    Ok(told(Json(json!({ "schema": "person/1", "name": name, "role": null })), format!("{name} was removed")))
+    shared.access.change_persons(|persons| persons.remove(&name)).await.map_err(describe_persons_error)?;
+    Ok(with_audit_note(
+        Json(json!({ "schema": "person/1", "name": name, "role": null })),
+        format!("{name} was removed"),
+    ))
 }
 
-fn trouble(error: PersonsError) -> ApiProblem {
+fn describe_persons_error(error: PersonsError) -> ApiProblem {
     let hint = "GET /api/v1/persons lists everybody";
     match error {
         PersonsError::Nobody(name) => ApiProblem::not_found(&format!("/api/v1/persons/{name}")),
-        PersonsError::Name(_) => ApiProblem::request(error.to_string(), hint),
+        PersonsError::Name(_) => ApiProblem::bad_request(error.to_string(), hint),
         PersonsError::Taken(_) | PersonsError::LastAdmin(_) | PersonsError::Full => {
             ApiProblem::conflict(error.to_string(), hint)
         }

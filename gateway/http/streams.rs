@@ -26,7 +26,7 @@ impl Streams {
     ///
     /// # Errors
     /// There are too many.
-    pub(super) fn take(&self, from: IpAddr) -> Result<OpenStream, ApiProblem> {
+    pub(super) fn open_stream(&self, from: IpAddr) -> Result<OpenStream, ApiProblem> {
         let mut counts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let own = counts.get(&from).copied().unwrap_or(0);
         let refuse =
@@ -60,11 +60,11 @@ mod tests {
     fn nobody_takes_all_and_what_is_closed_is_free_again() {
         let streams = Streams::default();
         let address = |n: u8| IpAddr::from([10, 0, 0, n]);
-        let of_one: Vec<_> = (0..40).filter_map(|_| streams.take(address(1)).ok()).collect();
+        let of_one: Vec<_> = (0..40).filter_map(|_| streams.open_stream(address(1)).ok()).collect();
         assert_eq!(of_one.len(), STREAMS_OF_ONE_MAX);
-        let others: Vec<_> = (0..40).filter_map(|n| streams.take(address(2 + n)).ok()).collect();
+        let others: Vec<_> = (0..40).filter_map(|n| streams.open_stream(address(2 + n)).ok()).collect();
         assert_eq!(of_one.len() + others.len(), STREAMS_MAX);
         drop((of_one, others));
-        assert!(streams.take(address(1)).is_ok() && streams.0.lock().expect("free").is_empty());
+        assert!(streams.open_stream(address(1)).is_ok() && streams.0.lock().expect("free").is_empty());
     }
 }

@@ -1,7 +1,7 @@
 //! `GET /api/v1/twin`: the simulation beside the machine, and the diagnoses of the history.
 
 use super::ServerState;
-use super::history::{Answer, HistoryQuery, reading, trouble};
+use super::history::{Answer, HistoryQuery, describe_history_error, read_history};
 use super::query::QueryKeys;
 use super::route::Route;
 use crate::diagnosis::beside::BesideModel;
@@ -15,17 +15,17 @@ use serde_json::{Value, json};
 /// Diagnoses told when nobody says otherwise.
 const DIAGNOSES_DEFAULT: u32 = 5;
 
-pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/twin", || get(twin))];
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/twin", || get(serve_twin))];
 
 /// `GET /api/v1/twin`
-pub(super) async fn twin(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
-    let keys = QueryKeys::of(pairs, &["limit"])?;
-    let limit = keys.number("limit", 1, 100)?.unwrap_or(DIAGNOSES_DEFAULT);
-    let status = shared.status()?;
-    let kept = shared.diagnoses.as_ref().map(|diagnoses| diagnoses.kept().clone());
-    reading(shared, move |reader, _| {
-        let found = reader.diagnoses(RecordSpan::newest(limit)).map_err(|error| trouble(&error))?;
-        let diagnoses: Vec<Value> = found.iter().rev().map(|row| diagnosis(row, kept.as_ref())).collect();
+pub(super) async fn serve_twin(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
+    let keys = QueryKeys::from_pairs(pairs, &["limit"])?;
+    let limit = keys.parse_number("limit", 1, 100)?.unwrap_or(DIAGNOSES_DEFAULT);
+    let status = shared.require_status()?;
+    let kept = shared.diagnoses.as_ref().map(|diagnoses| diagnoses.diagnosis_store().clone());
+    read_history(shared, move |reader, _| {
+        let found = reader.read_diagnoses(RecordSpan::newest(limit)).map_err(|error| describe_history_error(&error))?;
+        let diagnoses: Vec<Value> = found.iter().rev().map(|row| diagnosis_to_json(row, kept.as_ref())).collect();
         Ok(json!({ "schema": "twin/1", "at_ms": status.at_ms, "twin": status.twin, "diagnoses": diagnoses }))
     })
     .await
@@ -33,11 +33,11 @@ pub(super) async fn twin(State(shared): State<ServerState>, Pairs(pairs): Histor
 
 /// Newest first; the whole diagnosis stands under `diagnosis` (`diagnosis/1`). What was kept of it - the report page, the model, the
 /// steps of the experiment - is told where it is still there.
-fn diagnosis(found: &Diagnosis, kept: Option<&DiagnosisStore>) -> Value {
+fn diagnosis_to_json(found: &Diagnosis, kept: Option<&DiagnosisStore>) -> Value {
     let ms = |at_ns: TimeNs| at_ns.div_euclid(1_000_000);
-    let key = store::key(found);
-    let words = kept.and_then(|kept| kept.words(&key));
-    let model = kept.is_some_and(|kept| kept.path(&key, DiagnosisFile::Model).exists());
+    let key = store::diagnosis_key(found);
+    let words = kept.and_then(|kept| kept.read_texts(&key));
+    let model = kept.is_some_and(|kept| kept.file_path(&key, DiagnosisFile::Model).exists());
     json!({
         "at_ms": ms(found.at_ns),
         "from_ms": ms(found.from_ns),
@@ -49,7 +49,7 @@ fn diagnosis(found: &Diagnosis, kept: Option<&DiagnosisStore>) -> Value {
         "model": model,
         "key": key,
         "steps": words.as_ref().map(|words| &words.steps),
-        "beside": words.as_ref().map(|words| words.beside.iter().map(beside).collect::<Vec<Value>>()),
+        "beside": words.as_ref().map(|words| words.beside.iter().map(model_to_json).collect::<Vec<Value>>()),
         "minutes": words.as_ref().and_then(|words| words.minutes),
         "effects": words.as_ref().map(|words| &words.effects),
         "diagnosis": serde_json::from_str::<Value>(&found.json).unwrap_or(Value::Null),
@@ -57,7 +57,7 @@ fn diagnosis(found: &Diagnosis, kept: Option<&DiagnosisStore>) -> Value {
 }
 
 /// The diagnosis beside the watch: figures in the unit of the output that add up to the difference.
-fn beside(one: &BesideModel) -> Value {
+fn model_to_json(one: &BesideModel) -> Value {
     json!({
         "regime": one.regime.word(),
         "from_ms": one.from_ns.div_euclid(1_000_000),
@@ -67,7 +67,7 @@ fn beside(one: &BesideModel) -> Value {
         "by_parameters": one.by_parameters,
         "by_effects": one.by_effects.iter().map(|(effect, share)| json!({ "effect": effect, "difference": share })).collect::<Vec<_>>(),
         "left": one.left,
-        "differs": one.differs(),
+        "differs": one.has_difference(),
         "of_parameters": one.is_of_parameters(),
         "text": one.en,
         "zh": one.zh,

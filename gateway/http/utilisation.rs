@@ -1,7 +1,7 @@
 //! `GET /api/v1/utilisation`: seconds in each machine state, by hour, shift, day or week of the reader's own clock.
 
 use super::ServerState;
-use super::history::{Answer, HistoryQuery, range, reading, trouble};
+use super::history::{Answer, HistoryQuery, describe_history_error, parse_range, read_history};
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
@@ -33,7 +33,7 @@ enum GroupBy {
 
 impl GroupBy {
     /// Beginning of the stretch that holds this minute of the reader's clock (minutes since 1970, local).
-    fn begin(&self, minute: i64) -> i64 {
+    fn find_start(&self, minute: i64) -> i64 {
         let day = minute.div_euclid(DAY_MINUTES);
         match self {
             Self::Hour => minute.div_euclid(60) * 60,
@@ -54,45 +54,50 @@ impl GroupBy {
 }
 
 /// `6:00,14:00,22:00` in minutes after midnight.
-fn shifts(keys: &QueryKeys, usual: &[i64]) -> Result<Vec<i64>, ApiProblem> {
+fn parse_shifts(keys: &QueryKeys, usual: &[i64]) -> Result<Vec<i64>, ApiProblem> {
     let bad = |text: &str| {
-        ApiProblem::request(format!("shifts: {text:?} is no time of day"), "write the beginnings as 6:00,14:00,22:00")
+        ApiProblem::bad_request(
+            format!("shifts: {text:?} is no time of day"),
+            "write the beginnings as 6:00,14:00,22:00",
+        )
     };
-    let mut starts =
-        keys.list("shifts").map(|text| time_of_day(text).ok_or_else(|| bad(text))).collect::<Result<Vec<_>, _>>()?;
+    let mut starts = keys
+        .split_list("shifts")
+        .map(|text| time_of_day(text).ok_or_else(|| bad(text)))
+        .collect::<Result<Vec<_>, _>>()?;
     if starts.is_empty() {
         starts = usual.to_vec();
     }
     if starts.len() > SHIFTS_MAX {
-        return Err(ApiProblem::request(format!("{} shifts in one day", starts.len()), "give at most 12"));
+        return Err(ApiProblem::bad_request(format!("{} shifts in one day", starts.len()), "give at most 12"));
     }
     starts.sort_unstable();
     Ok(starts)
 }
 
-fn cut(keys: &QueryKeys, usual: &[i64]) -> Result<GroupBy, ApiProblem> {
-    match keys.text("by") {
+fn parse_group_by(keys: &QueryKeys, usual: &[i64]) -> Result<GroupBy, ApiProblem> {
+    match keys.find_text("by") {
         None | Some("day") => Ok(GroupBy::Day),
         Some("hour") => Ok(GroupBy::Hour),
         Some("week") => Ok(GroupBy::Week),
-        Some("shift") => shifts(keys, usual).map(GroupBy::Shift),
+        Some("shift") => parse_shifts(keys, usual).map(GroupBy::Shift),
         Some(other) => {
-            Err(ApiProblem::request(format!("by={other} is not known"), "write by=hour, shift, day or week"))
+            Err(ApiProblem::bad_request(format!("by={other} is not known"), "write by=hour, shift, day or week"))
         }
     }
 }
 
-pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/utilisation", || get(utilisation))];
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/utilisation", || get(serve_utilisation))];
 
 /// `GET /api/v1/utilisation`
-async fn utilisation(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
-    let keys = QueryKeys::of(pairs, &["from", "to", "by", "shifts", "offset_min"])?;
+async fn serve_utilisation(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
+    let keys = QueryKeys::from_pairs(pairs, &["from", "to", "by", "shifts", "offset_min"])?;
     let usual = shared.configured.config.http.shifts.clone();
-    let by = cut(&keys, &usual)?;
-    let offset_min = keys.number("offset_min", -1080_i64, 1080)?.unwrap_or(0);
-    reading(shared, move |reader, newest_ns| {
-        let (from_ns, to_ns) = range(&keys, newest_ns)?;
-        let hours = hours(reader, from_ns, to_ns, newest_ns)?;
+    let by = parse_group_by(&keys, &usual)?;
+    let offset_min = keys.parse_number("offset_min", -1080_i64, 1080)?.unwrap_or(0);
+    read_history(shared, move |reader, newest_ns| {
+        let (from_ns, to_ns) = parse_range(&keys, newest_ns)?;
+        let hours = read_hours(reader, from_ns, to_ns, newest_ns)?;
         let rows = group_hours(&hours, &by, offset_min);
         Ok(json!({
             "schema": "utilisation/1",
@@ -106,24 +111,30 @@ async fn utilisation(State(shared): State<ServerState>, Pairs(pairs): HistoryQue
 }
 
 /// The stored hours, and those of the state that lasts.
-fn hours(reader: &Reader, from_ns: TimeNs, to_ns: TimeNs, newest_ns: TimeNs) -> Result<Vec<StateHour>, ApiProblem> {
+fn read_hours(
+    reader: &Reader,
+    from_ns: TimeNs,
+    to_ns: TimeNs,
+    newest_ns: TimeNs,
+) -> Result<Vec<StateHour>, ApiProblem> {
     let span = RecordSpan::between(from_ns, to_ns, HOURS_MAX);
-    let mut hours = reader.state_hours(span).map_err(|error| trouble(&error))?;
-    let newest = reader.states(RecordSpan::between(from_ns, to_ns, 1)).map_err(|error| trouble(&error))?;
+    let mut hours = reader.state_hours(span).map_err(|error| describe_history_error(&error))?;
+    let newest =
+        reader.read_states(RecordSpan::between(from_ns, to_ns, 1)).map_err(|error| describe_history_error(&error))?;
     let open = newest.into_iter().find(|interval| interval.until_ns.is_none());
     let Some(open) = open else { return Ok(hours) };
     let (mut at_ns, end_ns) = (open.since_ns.max(from_ns), newest_ns.min(to_ns));
     while at_ns < end_ns {
         let start_ns = at_ns.div_euclid(HOUR_NS) * HOUR_NS;
         let until_ns = end_ns.min(start_ns + HOUR_NS);
-        hours.push(StateHour { start_ns, state: open.state.clone(), seconds: seconds(until_ns - at_ns) });
+        hours.push(StateHour { start_ns, state: open.state.clone(), seconds: to_seconds(until_ns - at_ns) });
         at_ns = until_ns;
     }
     Ok(hours)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "less than an hour")]
-fn seconds(ns: i64) -> f64 {
+fn to_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }
 
@@ -132,7 +143,7 @@ fn group_hours(hours: &[StateHour], by: &GroupBy, offset_min: i64) -> Vec<Value>
     let mut rows: BTreeMap<i64, BTreeMap<&str, f64>> = BTreeMap::new();
     for hour in hours {
         let local = hour.start_ns.div_euclid(MINUTE_NS) + offset_min;
-        let begin = (by.begin(local) - offset_min).saturating_mul(60_000);
+        let begin = (by.find_start(local) - offset_min).saturating_mul(60_000);
         *rows.entry(begin).or_default().entry(&hour.state).or_default() += hour.seconds;
     }
     let row = |(from_ms, states): (i64, BTreeMap<&str, f64>)| {
@@ -151,12 +162,12 @@ mod tests {
     fn days_weeks_and_shifts_begin_where_the_readers_clock_says() {
         // 1970-01-07 was a Wednesday; its week began on Monday the 5th, day number 4.
         let wednesday_5_00 = 6 * DAY_MINUTES + 5 * 60;
-        assert_eq!(GroupBy::Day.begin(wednesday_5_00), 6 * DAY_MINUTES);
-        assert_eq!(GroupBy::Week.begin(wednesday_5_00), 4 * DAY_MINUTES);
+        assert_eq!(GroupBy::Day.find_start(wednesday_5_00), 6 * DAY_MINUTES);
+        assert_eq!(GroupBy::Week.find_start(wednesday_5_00), 4 * DAY_MINUTES);
         let shift = GroupBy::Shift(vec![360, 840, 1320]);
-        assert_eq!(shift.begin(wednesday_5_00), 5 * DAY_MINUTES + 22 * 60);
-        assert_eq!(shift.begin(wednesday_5_00 + 60), 6 * DAY_MINUTES + 6 * 60);
-        assert_eq!(GroupBy::Week.begin(-1), -3 * DAY_MINUTES);
+        assert_eq!(shift.find_start(wednesday_5_00), 5 * DAY_MINUTES + 22 * 60);
+        assert_eq!(shift.find_start(wednesday_5_00 + 60), 6 * DAY_MINUTES + 6 * 60);
+        assert_eq!(GroupBy::Week.find_start(-1), -3 * DAY_MINUTES);
     }
 
     #[test]
@@ -178,12 +189,13 @@ mod tests {
 
     #[test]
     fn a_shift_that_is_no_time_is_refused() {
-        let keys =
-            |text: &str| QueryKeys::of(vec![("shifts".to_owned(), text.to_owned())], &["shifts"]).expect("known");
+        let keys = |text: &str| {
+            QueryKeys::from_pairs(vec![("shifts".to_owned(), text.to_owned())], &["shifts"]).expect("known")
+        };
         for text in ["25:00", "6:61", "six", "-1:00"] {
-            assert!(shifts(&keys(text), &[0]).is_err(), "{text}");
+            assert!(parse_shifts(&keys(text), &[0]).is_err(), "{text}");
         }
-        assert_eq!(shifts(&keys("14,6:30"), &[0]), Ok(vec![390, 840]));
-        assert_eq!(shifts(&keys(""), &[360]), Ok(vec![360]));
+        assert_eq!(parse_shifts(&keys("14,6:30"), &[0]), Ok(vec![390, 840]));
+        assert_eq!(parse_shifts(&keys(""), &[360]), Ok(vec![360]));
     }
 }

@@ -60,7 +60,7 @@ const NO_ESTIMATES: [(&str, &str, &str); 29] = [
     ("warming_up", "the model has not seen enough yet", "模型数据尚不足"),
 ];
 
-fn absence(reason: Absence) -> (&'static str, &'static str) {
+fn name_absence(reason: Absence) -> (&'static str, &'static str) {
     match reason {
         Absence::NotProvided => ("no source has it", "无数据源"),
         Absence::NotYetRead => ("not read yet", "尚未读取"),
@@ -78,7 +78,7 @@ fn absence(reason: Absence) -> (&'static str, &'static str) {
 
 /// A state's name, English and Chinese.
 #[must_use]
-pub fn state(state: State) -> (&'static str, &'static str) {
+pub fn name_state(state: State) -> (&'static str, &'static str) {
     match state {
         State::Off => ("Off", "关机"),
         State::Standby => ("Standby", "待机"),
@@ -93,24 +93,24 @@ pub fn state(state: State) -> (&'static str, &'static str) {
 
 /// The name of a state in one language, by its word.
 pub(super) fn state_text(word: &str, zh: bool) -> &'static str {
-    let found = State::ALL.into_iter().find(|state| state.word() == word).unwrap_or(State::Unknown);
-    let (en, cn) = state(found);
+    let found = State::ALL.into_iter().find(|state| state.as_word() == word).unwrap_or(State::Unknown);
+    let (en, cn) = name_state(found);
     if zh { cn } else { en }
 }
 
 /// Why a value is missing, in one language, by its word.
 pub(super) fn absence_text(word: &str, zh: bool) -> &'static str {
-    let found = Absence::ALL.into_iter().find(|reason| reason.word() == word).unwrap_or(Absence::NotProvided);
-    let (en, cn) = absence(found);
+    let found = Absence::ALL.into_iter().find(|reason| reason.as_word() == word).unwrap_or(Absence::NotProvided);
+    let (en, cn) = name_absence(found);
     if zh { cn } else { en }
 }
 
-fn texts(en: &str, zh: &str) -> Value {
+fn texts_to_json(en: &str, zh: &str) -> Value {
     json!({ "en": en, "zh": zh })
 }
 
-fn quantities() -> Map<String, Value> {
-    let measured = ChannelId::all().map(|id| {
+fn list_quantities() -> Map<String, Value> {
+    let measured = ChannelId::list_all().map(|id| {
         let channel = id.channel();
         let kind = match channel.kind {
             Kind::Continuous => "continuous",
@@ -133,29 +133,29 @@ fn quantities() -> Map<String, Value> {
 
 /// The whole vocabulary as one document.
 #[must_use]
-pub fn document() -> Value {
+pub fn build_vocabulary() -> Value {
     let reasons = Absence::ALL.into_iter().map(|reason| {
-        let (en, zh) = absence(reason);
-        (reason.word().to_owned(), texts(en, zh))
+        let (en, zh) = name_absence(reason);
+        (reason.as_word().to_owned(), texts_to_json(en, zh))
     });
-    let no_estimates = NO_ESTIMATES.iter().map(|(word, en, zh)| ((*word).to_owned(), texts(en, zh)));
+    let no_estimates = NO_ESTIMATES.iter().map(|(word, en, zh)| ((*word).to_owned(), texts_to_json(en, zh)));
     let states = State::ALL.into_iter().map(|word| {
-        let (en, zh) = state(word);
-        (word.word().to_owned(), texts(en, zh))
+        let (en, zh) = name_state(word);
+        (word.as_word().to_owned(), texts_to_json(en, zh))
     });
     json!({
         "schema": "channels/1",
-        "quantities": quantities(),
+        "quantities": list_quantities(),
         "states": states.collect::<Map<_, _>>(),
         "absences": reasons.chain(no_estimates).collect::<Map<_, _>>(),
     })
 }
 
-pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/channels", || get(channels))];
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/channels", || get(serve_channels))];
 
 /// `GET /api/v1/channels`
-pub(super) async fn channels() -> Json<Value> {
-    Json(document())
+pub(super) async fn serve_channels() -> Json<Value> {
+    Json(build_vocabulary())
 }
 
 #[cfg(test)]
@@ -165,13 +165,16 @@ mod tests {
 
     #[test]
     fn everything_the_page_shows_has_a_name_in_both_languages() {
-        let document = document();
-        for (name, _) in Estimates::none(0).quantities() {
+        let document = build_vocabulary();
+        for (name, _) in Estimates::without_samples(0).list_quantities() {
             assert!(document["quantities"][name]["zh"].is_string(), "{name}");
         }
-        assert_eq!(document["quantities"].as_object().map(Map::len), Some(ChannelId::count() + ESTIMATES.len()));
+        assert_eq!(
+            document["quantities"].as_object().map(Map::len),
+            Some(ChannelId::count_channels() + ESTIMATES.len())
+        );
         for state in State::ALL {
-            assert!(document["states"][state.word()]["en"].is_string(), "{state}");
+            assert!(document["states"][state.as_word()]["en"].is_string(), "{state}");
         }
     }
 }

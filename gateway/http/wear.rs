@@ -1,7 +1,7 @@
 //! `GET /api/v1/wear`: the library of wear models, each with what it is for and how well it fits.
 
 use super::ServerState;
-use super::history::{Answer, HistoryQuery, reading, trouble};
+use super::history::{Answer, HistoryQuery, describe_history_error, read_history};
 use super::query::QueryKeys;
 use super::route::Route;
 use crate::history::StoredWearModel;
@@ -10,24 +10,24 @@ use axum::routing::get;
 use rules::estimators::wear::WearModel;
 use serde_json::{Value, json};
 
-pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/wear", || get(wear))];
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/wear", || get(serve_wear_models))];
 
 /// `GET /api/v1/wear`
-async fn wear(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
-    QueryKeys::of(pairs, &[])?;
-    reading(shared, |reader, _| {
-        let models = reader.wear_models().map_err(|error| trouble(&error))?;
-        let rows: Vec<Value> = models.iter().rev().map(row).collect();
+async fn serve_wear_models(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
+    QueryKeys::from_pairs(pairs, &[])?;
+    read_history(shared, |reader, _| {
+        let models = reader.wear_models().map_err(|error| describe_history_error(&error))?;
+        let rows: Vec<Value> = models.iter().rev().map(wear_model_to_json).collect();
         Ok(json!({ "schema": "wear-models/1", "models": rows }))
     })
     .await
 }
 
 /// Newest first.
-fn row(stored: &StoredWearModel) -> Value {
+fn wear_model_to_json(stored: &StoredWearModel) -> Value {
     let record = &stored.record;
     let (formula, residual_sd_w) = match &record.model {
-        WearModel::Surface(surface) => (surface.formula(), surface.residual_sd_w),
+        WearModel::Surface(surface) => (surface.format_formula(), surface.residual_sd_w),
         WearModel::Physical(it) => ("P = P0 (vc/vc0)^x (f/f0)^y (ap/ap0)^z + W VB vc ap".to_owned(), it.residual_sd_w),
     };
     json!({

@@ -26,18 +26,18 @@ const FLUSH_WITHIN: Duration = Duration::from_secs(1);
 static OPERATOR: OnceLock<Outlet> = OnceLock::new();
 static ENGINEER: OnceLock<Outlet> = OnceLock::new();
 
-fn operator() -> &'static Outlet {
+fn operator_outlet() -> &'static Outlet {
     OPERATOR.get_or_init(|| Outlet::start("told", Box::new(std::io::stdout())))
 }
 
-fn engineer() -> &'static Outlet {
+fn engineer_outlet() -> &'static Outlet {
     ENGINEER.get_or_init(|| Outlet::start("log", Box::new(std::io::stderr())))
 }
 
 /// Lines of both streams that were left out because nobody was reading.
 #[must_use]
-pub fn dropped() -> u64 {
-    [&OPERATOR, &ENGINEER].into_iter().filter_map(OnceLock::get).map(Outlet::dropped).sum()
+pub fn count_dropped_lines() -> u64 {
+    [&OPERATOR, &ENGINEER].into_iter().filter_map(OnceLock::get).map(Outlet::dropped_lines).sum()
 }
 
 /// Returns when everything said so far is written, or soon after where a stream is not read.
@@ -100,16 +100,16 @@ impl Notice {
 
     /// Adds the engineer's detail.
     #[must_use]
-    pub fn detail(mut self, detail: impl Into<String>) -> Self {
+    pub fn with_detail(mut self, detail: impl Into<String>) -> Self {
         self.detail = detail.into();
         self
     }
 
     /// Prints both texts: a line with the time for the operator, an event for the engineer. Never waits for either stream.
-    pub fn say(&self) {
+    pub fn write_to_logs(&self) {
         let Self { code, operator, detail, .. } = self;
         let mark = if self.severity == Severity::Info { " " } else { "!" };
-        self::operator().put(format!("{} {mark} {operator}\n", clock_text()).into_bytes());
+        self::operator_outlet().queue_line(format!("{} {mark} {operator}\n", clock_text()).into_bytes());
         match self.severity {
             Severity::Info => tracing::info!(code, detail, "{operator}"),
             Severity::Warning => tracing::warn!(code, detail, "{operator}"),
@@ -120,7 +120,7 @@ impl Notice {
 
 /// A line for the operator that must not stand in any log: a token that is shown once.
 pub fn say_to_operator_alone(text: &str) {
-    operator().put(format!("{}   {text}\n", clock_text()).into_bytes());
+    operator_outlet().queue_line(format!("{}   {text}\n", clock_text()).into_bytes());
 }
 
 /// One event of the engineer's log on its way to the outlet.
@@ -141,18 +141,18 @@ impl Write for LogLine {
 impl Drop for LogLine {
     fn drop(&mut self) {
         if !self.0.is_empty() {
-            engineer().put(std::mem::take(&mut self.0));
+            engineer_outlet().queue_line(std::mem::take(&mut self.0));
         }
     }
 }
 
 /// The time of the box as `14:03:22Z`.
 fn clock_text() -> String {
-    crate::moment::utc(crate::clock::now_ns()).get(11..19).map_or_else(String::new, |time| format!("{time}Z"))
+    crate::moment::format_utc(crate::clock::now_ns()).get(11..19).map_or_else(String::new, |time| format!("{time}Z"))
 }
 
 /// Starts the engineer's log. A second call in one process changes nothing.
-pub fn start(format: LogFormat, level: Level) {
+pub fn start_engineer_log(format: LogFormat, level: Level) {
     let wanted = filter_fn(move |event| *event.level() <= level);
     let base = tracing_subscriber::fmt::layer().with_writer(LogLine::default).with_ansi(false);
     let layer = match format {

@@ -41,12 +41,12 @@ impl Outlet {
         let counts = Arc::new(LineCounts::default());
         let of_thread = counts.clone();
         let thread =
-            std::thread::Builder::new().name(name.to_owned()).spawn(move || work(&waiting, stream, &of_thread));
+            std::thread::Builder::new().name(name.to_owned()).spawn(move || write_lines(&waiting, stream, &of_thread));
         Self { lines: thread.is_ok().then_some(lines), counts }
     }
 
     /// Hands in a line with its end. Never waits.
-    pub(super) fn put(&self, line: Vec<u8>) {
+    pub(super) fn queue_line(&self, line: Vec<u8>) {
         self.counts.handed.fetch_add(1, Ordering::AcqRel);
         if self.lines.as_ref().is_none_or(|lines| lines.try_send(line).is_err()) {
             self.counts.dropped.fetch_add(1, Ordering::AcqRel);
@@ -63,12 +63,12 @@ impl Outlet {
     }
 
     /// Lines left out since the start.
-    pub(super) fn dropped(&self) -> u64 {
+    pub(super) fn dropped_lines(&self) -> u64 {
         self.counts.dropped.load(Ordering::Acquire)
     }
 }
 
-fn work(waiting: &Receiver<Vec<u8>>, mut stream: LogStream, counts: &LineCounts) {
+fn write_lines(waiting: &Receiver<Vec<u8>>, mut stream: LogStream, counts: &LineCounts) {
     let mut told = 0;
     for line in waiting {
         // Whoever closed the terminal is no reason to stop the box.
@@ -103,10 +103,10 @@ mod tests {
         let (outlet, mut reader, room) = blocked();
         let began = Instant::now();
         let lines = 2 * WAITING_MAX;
-        (0..lines).for_each(|number| outlet.put(format!("line {number}\n").into_bytes()));
+        (0..lines).for_each(|number| outlet.queue_line(format!("line {number}\n").into_bytes()));
         outlet.flush(Duration::from_millis(50));
         assert!(began.elapsed() < LIMIT / 2, "the pipe is full, and nobody reads");
-        let dropped = outlet.dropped();
+        let dropped = outlet.dropped_lines();
         // One may be with the thread already.
         assert!((WAITING_MAX as u64 - 1..=WAITING_MAX as u64).contains(&dropped), "{dropped}");
         reader.read_exact(&mut vec![0; room]).expect("what was there");
@@ -115,7 +115,7 @@ mod tests {
             reader.read_to_string(&mut rest).map(|_| rest)
         });
         outlet.flush(LIMIT);
-        outlet.put(b"the last\n".to_vec());
+        outlet.queue_line(b"the last\n".to_vec());
         outlet.flush(LIMIT);
         drop(outlet);
         let rest = rest.join().expect("no panic").expect("text");
@@ -128,9 +128,9 @@ mod tests {
     fn lines_come_in_order_and_are_there_after_a_flush() {
         let (mut reader, writer) = std::io::pipe().expect("a pipe");
         let outlet = Outlet::start("test", Box::new(writer));
-        (0..100).for_each(|number| outlet.put(format!("{number}\n").into_bytes()));
+        (0..100).for_each(|number| outlet.queue_line(format!("{number}\n").into_bytes()));
         outlet.flush(LIMIT);
-        assert_eq!(outlet.dropped(), 0);
+        assert_eq!(outlet.dropped_lines(), 0);
         drop(outlet);
         let mut text = String::new();
         reader.read_to_string(&mut text).expect("text");

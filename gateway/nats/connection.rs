@@ -65,9 +65,9 @@ impl Connection {
     }
 
     async fn open_one(target: &NatsTarget, at: &Endpoint, name: &str) -> Result<Self, NatsError> {
-        let secrets = target.secrets()?;
+        let secrets = target.read_secrets()?;
         let broken = |error: io::Error| words::of_io(at, &error);
-        let config = target.tls.as_ref().map(adapters::tls::TlsFiles::config).transpose();
+        let config = target.tls.as_ref().map(adapters::tls::TlsFiles::build_config).transpose();
         let config = config.map_err(|error| NatsError::new(error.what, error.next))?;
         let stream = TcpStream::connect((at.host.as_str(), at.port)).await.map_err(broken)?;
         stream.set_nodelay(true).map_err(broken)?;
@@ -77,11 +77,11 @@ impl Connection {
             inbox: ReceivedBytes::default(),
             waiting_out: Vec::new(),
             info: ServerInfo::default(),
-            answers: format!("_INBOX.{}", adapters::mqtt::unique()),
+            answers: format!("_INBOX.{}", adapters::mqtt::generate_unique_id()),
             next_token: 0,
             next_subscription: ANSWERS + 1,
         };
-        connection.info = match connection.take().await? {
+        connection.info = match connection.receive_operation().await? {
             ServerOperation::Info(info) => info,
             other => return Err(words::no_nats(at, &format!("{other:?}"))),
         };
@@ -114,7 +114,7 @@ impl Connection {
         let text = format!("CONNECT {says}\r\nPING\r\nSUB {}.* {ANSWERS}\r\n", self.answers);
         self.waiting_out.extend(text.as_bytes());
         loop {
-            match self.take().await? {
+            match self.receive_operation().await? {
                 ServerOperation::Pong => return Ok(()),
                 ServerOperation::Error(said) => return Err(words::of_server(&self.at, &said)),
                 _ => {}
@@ -128,7 +128,7 @@ impl Connection {
         self.info.max_payload
     }
 
-    pub(super) fn at(&self) -> &Endpoint {
+    pub(super) fn current_endpoint(&self) -> &Endpoint {
         &self.at
     }
 
@@ -158,7 +158,7 @@ impl Connection {
     }
 
     /// Puts a message into what is sent next.
-    pub(super) fn put(&mut self, subject: &str, reply: Option<&str>, id: Option<&str>, payload: &[u8]) {
+    pub(super) fn queue_message(&mut self, subject: &str, reply: Option<&str>, id: Option<&str>, payload: &[u8]) {
         let reply = reply.map_or(String::new(), |reply| format!("{reply} "));
         let header = id.map_or(String::new(), |id| format!("NATS/1.0\r\nNats-Msg-Id: {id}\r\n\r\n"));
         let line = match header.len() {
@@ -192,7 +192,7 @@ impl Connection {
     /// The connection is over, or the server refuses what was asked.
     pub async fn next(&mut self) -> Result<Message, NatsError> {
         loop {
-            match self.take().await? {
+            match self.receive_operation().await? {
                 ServerOperation::Message(message) => return Ok(message),
                 ServerOperation::Error(said) => return Err(words::of_server(&self.at, &said)),
                 ServerOperation::Info(info) if info.ldm => {
@@ -205,9 +205,9 @@ impl Connection {
         }
     }
 
-    async fn take(&mut self) -> Result<ServerOperation, NatsError> {
+    async fn receive_operation(&mut self) -> Result<ServerOperation, NatsError> {
         loop {
-            match self.inbox.take().map_err(|came| words::no_nats(&self.at, &came))? {
+            match self.inbox.next_operation().map_err(|came| words::no_nats(&self.at, &came))? {
                 Some(ServerOperation::Ping) => self.waiting_out.extend(b"PONG\r\n"),
                 Some(operation) => return Ok(operation),
                 None => {
@@ -226,12 +226,12 @@ impl Connection {
     ///
     /// # Errors
     /// No answer in time, nobody who could answer, or the connection is over.
-    pub(super) async fn request(&mut self, subject: &str, payload: &[u8]) -> Result<Message, NatsError> {
+    pub(super) async fn request_reply(&mut self, subject: &str, payload: &[u8]) -> Result<Message, NatsError> {
         let (reply, token) = self.answer_subject();
-        self.put(subject, Some(&reply), None, payload);
+        self.queue_message(subject, Some(&reply), None, payload);
         let until = Instant::now() + DEADLINE;
         loop {
-            let came = timeout_at(until, self.next()).await.map_err(|_| words::silent(&self.at, subject))??;
+            let came = timeout_at(until, self.next()).await.map_err(|_| words::no_answer(&self.at, subject))??;
             if self.token_of(&came) == Some(token) {
                 return Ok(came);
             }

@@ -81,12 +81,12 @@ pub struct Backlog {
     pub under_way: u64,
 }
 
-fn nanoseconds(span: Duration) -> u64 {
+fn to_nanoseconds(span: Duration) -> u64 {
     u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }
 
 /// The error of an answer, with its number.
-fn refusal(answer: &Json) -> Option<(u64, String)> {
+fn find_refusal(answer: &Json) -> Option<(u64, String)> {
     let error = answer.get("error")?;
     let code = error["err_code"].as_u64().or(error["code"].as_u64()).unwrap_or(0);
     Some((code, error["description"].as_str().unwrap_or("no description").to_owned()))
@@ -104,7 +104,7 @@ impl Connection {
         for message in &messages[..sendable] {
             let (reply, token) = self.answer_subject();
             first_token.get_or_insert(token);
-            self.put(&message.subject, Some(&reply), Some(&message.id), &message.payload);
+            self.queue_message(&message.subject, Some(&reply), Some(&message.id), &message.payload);
         }
         let first_token = first_token.unwrap_or(0);
         let mut open: Vec<bool> = vec![true; sendable];
@@ -115,14 +115,14 @@ impl Connection {
             let first_open = open.iter().position(|open| *open).unwrap_or(0);
             let line = |error| (first_open, JetStreamFailure::Line(error));
             let waited = timeout_at(until, self.next()).await;
-            let late = |_| line(words::silent(self.at(), "a message is not acknowledged"));
+            let late = |_| line(words::no_answer(self.current_endpoint(), "a message is not acknowledged"));
             let came = waited.map_err(late)?.map_err(line)?;
             let index = self.token_of(&came).and_then(|token| token.checked_sub(first_token));
             let index =
                 index.and_then(|index| usize::try_from(index).ok()).filter(|index| open.get(*index) == Some(&true));
             let Some(index) = index else { continue };
             (open[index], left) = (false, left - 1);
-            match acknowledgement(&came, &messages[index].subject) {
+            match parse_acknowledgement(&came, &messages[index].subject) {
                 Ok(duplicate) => duplicates += u64::from(duplicate),
                 Err(failure) if failed.as_ref().is_none_or(|(first, _)| index < *first) => {
                     failed = Some((index, failure))
@@ -141,19 +141,20 @@ impl Connection {
         }
     }
 
-    async fn api(&mut self, what: &str, request: &Json) -> Result<Result<Json, (u64, String)>, NatsError> {
+    async fn call_api(&mut self, what: &str, request: &Json) -> Result<Result<Json, (u64, String)>, NatsError> {
         let subject = format!("$JS.API.{what}");
-        let answer = self.request(&subject, request.to_string().as_bytes()).await?;
+        let answer = self.request_reply(&subject, request.to_string().as_bytes()).await?;
         if answer.status.as_ref().is_some_and(|(code, _)| *code == NO_RESPONDERS) {
-            return Err(words::no_jetstream(self.at()));
+            return Err(words::no_jetstream(self.current_endpoint()));
         }
-        let document: Json = serde_json::from_slice(&answer.payload)
-            .map_err(|error| words::no_nats(self.at(), &format!("an answer of JetStream that is no JSON ({error})")))?;
-        Ok(refusal(&document).map_or(Ok(document), Err))
+        let document: Json = serde_json::from_slice(&answer.payload).map_err(|error| {
+            words::no_nats(self.current_endpoint(), &format!("an answer of JetStream that is no JSON ({error})"))
+        })?;
+        Ok(find_refusal(&document).map_or(Ok(document), Err))
     }
 
     async fn call_api_or_fail(&mut self, what: &str, request: &Json) -> Result<Json, NatsError> {
-        self.api(what, request).await?.map_err(|(code, said)| words::of_jetstream(code, &said))
+        self.call_api(what, request).await?.map_err(|(code, said)| words::of_jetstream(code, &said))
     }
 
     /// The stream that takes this subject.
@@ -172,15 +173,15 @@ impl Connection {
     /// What JetStream says.
     pub async fn create_stream(&mut self, settings: &StreamSettings) -> Result<bool, NatsError> {
         let name = &settings.name;
-        match self.api(&format!("STREAM.INFO.{name}"), &json!({})).await? {
+        match self.call_api(&format!("STREAM.INFO.{name}"), &json!({})).await? {
             Ok(_exists) => return Ok(false),
             Err((10059, _not_found)) => {}
             Err((code, said)) => return Err(words::of_jetstream(code, &said)),
         }
         let request = json!({
             "name": name, "subjects": [settings.subjects], "retention": "limits", "storage": "file", "discard": "new",
-            "num_replicas": settings.replicas, "max_age": nanoseconds(settings.max_age), "max_bytes": settings.max_bytes,
-            "duplicate_window": nanoseconds(settings.duplicate_window.min(settings.max_age)),
+            "num_replicas": settings.replicas, "max_age": to_nanoseconds(settings.max_age), "max_bytes": settings.max_bytes,
+            "duplicate_window": to_nanoseconds(settings.duplicate_window.min(settings.max_age)),
             "max_msgs": -1, "max_consumers": -1, "max_msg_size": -1,
         });
         self.call_api_or_fail(&format!("STREAM.CREATE.{name}"), &request).await.map(|_created| true)
@@ -204,7 +205,7 @@ impl Connection {
     pub async fn create_consumer(&mut self, stream: &str, name: &str) -> Result<(), NatsError> {
         let request = json!({"stream_name": stream, "config": {
             "durable_name": name, "ack_policy": "explicit", "deliver_policy": "all", "replay_policy": "instant",
-            "ack_wait": nanoseconds(ACKNOWLEDGE_WITHIN), "max_deliver": -1, "max_ack_pending": UNDER_WAY_MAX,
+            "ack_wait": to_nanoseconds(ACKNOWLEDGE_WITHIN), "max_deliver": -1, "max_ack_pending": UNDER_WAY_MAX,
         }});
         self.call_api_or_fail(&format!("CONSUMER.DURABLE.CREATE.{stream}.{name}"), &request).await.map(drop)
     }
@@ -213,7 +214,7 @@ impl Connection {
     ///
     /// # Errors
     /// What JetStream says.
-    pub async fn backlog(&mut self, stream: &str, consumer: &str) -> Result<Backlog, NatsError> {
+    pub async fn read_backlog(&mut self, stream: &str, consumer: &str) -> Result<Backlog, NatsError> {
         let answer = self.call_api_or_fail(&format!("CONSUMER.INFO.{stream}.{consumer}"), &json!({})).await?;
         let number = |key: &str| answer[key].as_u64().unwrap_or(0);
         Ok(Backlog { pending: number("num_pending"), under_way: number("num_ack_pending") })
@@ -223,24 +224,29 @@ impl Connection {
     ///
     /// # Errors
     /// The connection is over, the consumer is gone, or the server does not answer.
-    pub async fn fetch(
+    pub async fn fetch_messages(
         &mut self,
         stream: &str,
         consumer: &str,
         limits: FetchLimits,
     ) -> Result<Vec<Message>, NatsError> {
         let FetchLimits { messages: most, bytes, patience } = limits;
-        let inbox = format!("_INBOX.{}", adapters::mqtt::unique());
+        let inbox = format!("_INBOX.{}", adapters::mqtt::generate_unique_id());
         let number = self.subscribe(&inbox);
         // A single message that is larger would never be given out.
         let bytes = bytes.max(self.max_payload() + ENVELOPE);
-        let request = json!({"batch": most, "expires": nanoseconds(patience), "max_bytes": bytes}).to_string();
-        self.put(&format!("$JS.API.CONSUMER.MSG.NEXT.{stream}.{consumer}"), Some(&inbox), None, request.as_bytes());
+        let request = json!({"batch": most, "expires": to_nanoseconds(patience), "max_bytes": bytes}).to_string();
+        self.queue_message(
+            &format!("$JS.API.CONSUMER.MSG.NEXT.{stream}.{consumer}"),
+            Some(&inbox),
+            None,
+            request.as_bytes(),
+        );
         let until = Instant::now() + patience + DEADLINE;
         let mut messages = Vec::new();
         while messages.len() < most {
             let waited = timeout_at(until, self.next()).await;
-            let came = waited.map_err(|_| words::silent(self.at(), "messages were asked for"))??;
+            let came = waited.map_err(|_| words::no_answer(self.current_endpoint(), "messages were asked for"))??;
             if came.subscription != number {
                 continue;
             }
@@ -269,20 +275,20 @@ impl Connection {
     }
 
     /// These messages are done; sent with the next [`Connection::flush`]. One that does not arrive is given out again.
-    pub fn acknowledge<'a>(&mut self, messages: impl IntoIterator<Item = &'a Message>) {
+    pub fn acknowledge_messages<'a>(&mut self, messages: impl IntoIterator<Item = &'a Message>) {
         for reply in messages.into_iter().filter_map(|message| message.reply.clone()) {
-            self.put(&reply, None, None, b"+ACK");
+            self.queue_message(&reply, None, None, b"+ACK");
         }
     }
 }
 
 /// Was the message there already?
-fn acknowledgement(came: &Message, subject: &str) -> Result<bool, JetStreamFailure> {
+fn parse_acknowledgement(came: &Message, subject: &str) -> Result<bool, JetStreamFailure> {
     if came.status.as_ref().is_some_and(|(code, _)| *code == NO_RESPONDERS) {
         return Err(JetStreamFailure::Line(words::no_stream(subject)));
     }
     let answer: Json = serde_json::from_slice(&came.payload).unwrap_or(Json::Null);
-    match refusal(&answer) {
+    match find_refusal(&answer) {
         Some((code, said)) if code == TOO_LARGE || (code, said.as_str()) == NOT_STORED => {
             Err(JetStreamFailure::Message(NatsError::new(
                 format!("JetStream says {said:?}"),

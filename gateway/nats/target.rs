@@ -1,7 +1,7 @@
 //! The servers of an address: `//HOST:4222,HOST:4222/REST?keys`.
 
 use super::NatsError;
-use adapters::address::{Endpoint, Keys, Login, endpoint, tls_files};
+use adapters::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
 use adapters::tls::TlsFiles;
 use std::path::PathBuf;
 
@@ -37,15 +37,15 @@ impl NatsTarget {
     /// A host is none, in words.
     pub fn parse<'a>(body: &'a str, keys: &mut Keys, secured: bool) -> Result<(Self, &'a str), String> {
         let tls = tls_files(keys, secured);
-        let login = Login::of(keys);
-        let token_file = keys.text("token_file").map(PathBuf::from);
+        let login = Login::from_keys(keys);
+        let token_file = keys.take_text("token_file").map(PathBuf::from);
         if token_file.is_some() && login.user.is_some() {
-            keys.problem("give either user= or token_file=".to_owned());
+            keys.add_problem("give either user= or token_file=".to_owned());
         }
         let body = body.strip_prefix("//").unwrap_or(body);
         let (hosts, rest) = body.split_once('/').unwrap_or((body, ""));
         let servers: Vec<Endpoint> =
-            hosts.split(',').map(|host| endpoint(host, Some(PORT))).collect::<Result<_, String>>()?;
+            hosts.split(',').map(|host| parse_endpoint(host, Some(PORT))).collect::<Result<_, String>>()?;
         if servers.len() > SERVERS_MAX {
             return Err(format!("{} servers; name at most {SERVERS_MAX} of the cluster", servers.len()));
         }
@@ -54,18 +54,18 @@ impl NatsTarget {
 
     /// What is wrong with the files that the address names, each with what to do.
     #[must_use]
-    pub fn check(&self) -> Vec<(String, String)> {
+    pub fn check_files(&self) -> Vec<(String, String)> {
         let mut problems = Vec::new();
-        if let Some(Err(error)) = self.tls.as_ref().map(TlsFiles::config) {
+        if let Some(Err(error)) = self.tls.as_ref().map(TlsFiles::build_config) {
             problems.push((error.what, error.next));
         }
-        if let Err(error) = self.secrets() {
+        if let Err(error) = self.read_secrets() {
             problems.push((error.what, error.next));
         }
         problems
     }
 
-    pub(super) fn secrets(&self) -> Result<Secrets, NatsError> {
+    pub(super) fn read_secrets(&self) -> Result<Secrets, NatsError> {
         let unreadable = |kind: &str, file: &std::path::Path, error: &std::io::Error| {
             let what = format!("the {kind} file {} cannot be read: {error}", file.display());
             NatsError::new(what, "make it readable for the gateway's user, or write another path")

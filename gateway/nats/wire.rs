@@ -41,7 +41,7 @@ pub struct Message {
 impl Message {
     /// The words of the subject on which a message of JetStream is acknowledged: `$JS.ACK.` and, from newer servers, domain and
     /// account; then stream, consumer, how often it was given out, its number in the stream, ...
-    fn acknowledgement(&self, index: usize) -> Option<i64> {
+    fn parse_ack_number(&self, index: usize) -> Option<i64> {
         let words: Vec<&str> = self.reply.as_deref()?.strip_prefix("$JS.ACK.")?.split('.').collect();
         let further = if words.len() >= 9 { 2 } else { 0 };
         words.get(index + further)?.parse().ok()
@@ -50,13 +50,13 @@ impl Message {
     /// Its number in the stream.
     #[must_use]
     pub fn stream_sequence(&self) -> Option<i64> {
-        self.acknowledgement(3)
+        self.parse_ack_number(3)
     }
 
     /// When the stream stored it, microseconds since 1970.
     #[must_use]
     pub fn stored_us(&self) -> Option<i64> {
-        self.acknowledgement(5).map(|at_ns| at_ns.div_euclid(1000))
+        self.parse_ack_number(5).map(|at_ns| at_ns.div_euclid(1000))
     }
 }
 
@@ -83,7 +83,7 @@ impl ReceivedBytes {
     ///
     /// # Errors
     /// What came is no NATS, in words.
-    pub(super) fn take(&mut self) -> Result<Option<ServerOperation>, String> {
+    pub(super) fn next_operation(&mut self) -> Result<Option<ServerOperation>, String> {
         let waiting = &self.bytes[self.start..];
         let found = parse(waiting)?;
         let taken = found.map(|(operation, length)| {
@@ -108,8 +108,8 @@ fn parse(bytes: &[u8]) -> Result<Option<(ServerOperation, usize)>, String> {
     let (verb, rest) = line.split_once([' ', '\t']).unwrap_or((line, ""));
     let after = end + 2;
     let operation = match verb.to_ascii_uppercase().as_str() {
-        "MSG" => return message(&bytes[after..], rest, false).map(|found| found.map(|(m, n)| (m, after + n))),
-        "HMSG" => return message(&bytes[after..], rest, true).map(|found| found.map(|(m, n)| (m, after + n))),
+        "MSG" => return parse_message(&bytes[after..], rest, false).map(|found| found.map(|(m, n)| (m, after + n))),
+        "HMSG" => return parse_message(&bytes[after..], rest, true).map(|found| found.map(|(m, n)| (m, after + n))),
         "PING" => ServerOperation::Ping,
         "PONG" => ServerOperation::Pong,
         "+OK" => ServerOperation::Fine,
@@ -123,7 +123,7 @@ fn parse(bytes: &[u8]) -> Result<Option<(ServerOperation, usize)>, String> {
 }
 
 /// `subject sid [reply] [header bytes] bytes`, then the content.
-fn message(content: &[u8], line: &str, headed: bool) -> Result<Option<(ServerOperation, usize)>, String> {
+fn parse_message(content: &[u8], line: &str, headed: bool) -> Result<Option<(ServerOperation, usize)>, String> {
     let unreadable = || format!("an unreadable message line {line:?}");
     let words: Vec<&str> = line.split_ascii_whitespace().collect();
     let lengths = if headed { 2 } else { 1 };
@@ -142,14 +142,14 @@ fn message(content: &[u8], line: &str, headed: bool) -> Result<Option<(ServerOpe
     if content.len() < total + 2 {
         return Ok(None);
     }
-    let status = status(&content[..header]);
+    let status = parse_status(&content[..header]);
     let payload = content[header..total].to_vec();
     let message = Message { subject: subject.to_owned(), subscription, reply, status, payload };
     Ok(Some((ServerOperation::Message(message), total + 2)))
 }
 
 /// `NATS/1.0 503 No Responders`: code and words, where the first line of the header has them.
-fn status(header: &[u8]) -> Option<(u16, String)> {
+fn parse_status(header: &[u8]) -> Option<(u16, String)> {
     let text = std::str::from_utf8(header).ok()?;
     let rest = text.lines().next()?.strip_prefix("NATS/1.0")?.trim();
     let (code, words) = rest.split_once(' ').unwrap_or((rest, ""));
@@ -170,15 +170,15 @@ mod tests {
         let mut inbox = inbox(
             b"MSG a.b 1 5\r\nhello\r\nHMSG _INBOX.x.7 2 $JS.ACK.1 16 18\r\nNATS/1.0 503\r\n\r\nok\r\nPING\r\n+OK\r\n-ERR 'Authorization Violation'\r\n",
         );
-        let Ok(Some(ServerOperation::Message(first))) = inbox.take() else { panic!("a message") };
+        let Ok(Some(ServerOperation::Message(first))) = inbox.next_operation() else { panic!("a message") };
         assert_eq!((first.subject.as_str(), first.subscription, first.payload.as_slice()), ("a.b", 1, &b"hello"[..]));
-        let Ok(Some(ServerOperation::Message(second))) = inbox.take() else { panic!("a message") };
+        let Ok(Some(ServerOperation::Message(second))) = inbox.next_operation() else { panic!("a message") };
         assert_eq!(second.status, Some((503, String::new())));
         assert_eq!((second.reply.as_deref(), second.payload.as_slice()), (Some("$JS.ACK.1"), &b"ok"[..]));
-        assert_eq!(inbox.take(), Ok(Some(ServerOperation::Ping)));
-        assert_eq!(inbox.take(), Ok(Some(ServerOperation::Fine)));
-        assert_eq!(inbox.take(), Ok(Some(ServerOperation::Error("Authorization Violation".to_owned()))));
-        assert_eq!(inbox.take(), Ok(None));
+        assert_eq!(inbox.next_operation(), Ok(Some(ServerOperation::Ping)));
+        assert_eq!(inbox.next_operation(), Ok(Some(ServerOperation::Fine)));
+        assert_eq!(inbox.next_operation(), Ok(Some(ServerOperation::Error("Authorization Violation".to_owned()))));
+        assert_eq!(inbox.next_operation(), Ok(None));
         assert!(inbox.bytes.is_empty());
     }
 
@@ -202,9 +202,9 @@ mod tests {
 
     #[test]
     fn another_protocol_is_refused() {
-        assert!(inbox(b"HTTP/1.1 400 Bad Request\r\n\r\n").take().is_err());
-        assert!(inbox(b"MSG a 1 99999999999\r\n").take().is_err());
-        assert!(inbox(b"HMSG a 1 20 10\r\n").take().is_err());
+        assert!(inbox(b"HTTP/1.1 400 Bad Request\r\n\r\n").next_operation().is_err());
+        assert!(inbox(b"MSG a 1 99999999999\r\n").next_operation().is_err());
+        assert!(inbox(b"HMSG a 1 20 10\r\n").next_operation().is_err());
     }
 
     proptest! {
@@ -212,7 +212,7 @@ mod tests {
         fn any_bytes_in_any_pieces_end(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
             let mut inbox = inbox(&bytes);
             for _ in 0..=bytes.len() {
-                if !matches!(inbox.take(), Ok(Some(_))) { break; }
+                if !matches!(inbox.next_operation(), Ok(Some(_))) { break; }
             }
         }
 
@@ -223,11 +223,11 @@ mod tests {
             whole.extend(b"\r\n");
             let cut = cut.min(whole.len());
             let mut inbox = inbox(&whole[..cut]);
-            let early = inbox.take().expect("legal");
+            let early = inbox.next_operation().expect("legal");
             prop_assert_eq!(early.is_some(), cut == whole.len());
             if early.is_none() {
                 inbox.bytes.extend(&whole[cut..]);
-                let Ok(Some(ServerOperation::Message(message))) = inbox.take() else { panic!("whole") };
+                let Ok(Some(ServerOperation::Message(message))) = inbox.next_operation() else { panic!("whole") };
                 prop_assert_eq!(message.payload, payload);
             }
         }

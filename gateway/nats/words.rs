@@ -7,7 +7,7 @@ use std::io::{self, ErrorKind};
 
 /// The connection could not be made or broke.
 pub(super) fn of_io(at: &Endpoint, error: &io::Error) -> NatsError {
-    if let Some(error) = TlsError::within(error, &at.host) {
+    if let Some(error) = TlsError::from_io_error(error, &at.host) {
         return NatsError::new(error.what, error.next);
     }
     let place = format!("{}:{}", at.host, at.port);
@@ -69,7 +69,7 @@ pub(super) fn of_server(at: &Endpoint, said: &str) -> NatsError {
 }
 
 /// Nobody answers a request.
-pub(super) fn silent(at: &Endpoint, what: &str) -> NatsError {
+pub(super) fn no_answer(at: &Endpoint, what: &str) -> NatsError {
     let what = format!("{}:{} did not answer in time: {what}", at.host, at.port);
     NatsError::new(
         what,

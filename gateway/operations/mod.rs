@@ -44,7 +44,7 @@ pub struct Operations {
 impl Operations {
     /// Reads the recipe and begins to watch it. A file that cannot be used is told, and the box waits for a better one.
     #[must_use]
-    pub fn begin(path: &Path) -> Self {
+    pub fn start_watching(path: &Path) -> Self {
         let mut operations = Self {
             path: path.to_owned(),
             completion: Completion::new(),
@@ -54,8 +54,8 @@ impl Operations {
             told: Vec::new(),
             in_force: None,
         };
-        operations.take(read(path));
-        match watch::watch(path) {
+        operations.accept_recipe(read(path));
+        match watch::watch_file(path) {
             Ok(watcher) => operations.watcher = Some(watcher),
             Err(error) => {
                 let text =
@@ -66,26 +66,26 @@ impl Operations {
         operations
     }
 
-    fn take(&mut self, found: RecipeResult) {
+    fn accept_recipe(&mut self, found: RecipeResult) {
         match found {
             Ok(loaded) => {
                 let (count, version) = (loaded.recipe.operations().len(), loaded.recipe.version());
                 let text = format!("{}: {count} operations are in force, version {version}", self.path.display());
-                self.told.push(Notice::new(Severity::Info, "recipe_in_force", text).detail(loaded.text.clone()));
+                self.told.push(Notice::new(Severity::Info, "recipe_in_force", text).with_detail(loaded.text.clone()));
                 self.refused.clear();
                 self.active = Some(loaded);
             }
             Err(problems) => {
                 let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
                 let lines = lines.join("\n").replace('\n', "\n  ");
-                let text = format!("the operations recipe is refused, {}:\n  {lines}", self.consequence());
+                let text = format!("the operations recipe is refused, {}:\n  {lines}", self.describe_consequence());
                 self.told.push(Notice::new(Severity::Warning, "recipe_refused", text));
                 self.refused = problems;
             }
         }
     }
 
-    fn consequence(&self) -> String {
+    fn describe_consequence(&self) -> String {
         match &self.active {
             Some(loaded) => format!("version {} stays in force", loaded.recipe.version()),
             None => "depth of cut and diameter stay unknown".to_owned(),
@@ -94,19 +94,19 @@ impl Operations {
 
     /// Takes what has been found on disk since the last tick, with `reload` looks again at once, and fills in the sample.
     /// Costs a look-up and allocates nothing while the operation stays the same.
-    pub fn step(&mut self, sample: &mut Sample, reload: bool, mut tell: impl FnMut(&Notice)) {
+    pub fn update_sample(&mut self, sample: &mut Sample, reload: bool, mut tell: impl FnMut(&Notice)) {
         if let Some(watcher) = &self.watcher {
             if reload {
-                watcher.ask();
+                watcher.request_look();
             }
-            if let Some(found) = watcher.take() {
-                self.take(found);
+            if let Some(found) = watcher.take_newest() {
+                self.accept_recipe(found);
             }
         }
         self.told.drain(..).for_each(|notice| tell(&notice));
         if let Some(loaded) = &self.active {
-            let lookup = self.completion.apply(&loaded.recipe, sample);
-            remember(&mut self.in_force, lookup);
+            let lookup = self.completion.apply_recipe(&loaded.recipe, sample);
+            note_operation(&mut self.in_force, lookup);
         }
     }
 
@@ -127,21 +127,21 @@ impl Operations {
 
     /// What does not work, for the list of problems.
     #[must_use]
-    pub fn problem(&self) -> Option<status::StatusProblem> {
+    pub fn describe_problem(&self) -> Option<status::StatusProblem> {
         let first = self.refused.first()?;
         let more = self.refused.len() - 1;
         let others = if more > 0 { format!(" (and {more} more)") } else { String::new() };
-        let what = format!("the operations recipe is refused, {}: {first}{others}", self.consequence());
+        let what = format!("the operations recipe is refused, {}: {first}{others}", self.describe_consequence());
         Some(status::StatusProblem { what, next: "correct the file; it is taken within two seconds".to_owned() })
     }
 }
 
 /// Notes a change of the operation; a lasting one costs a comparison.
-fn remember(in_force: &mut Option<Result<String, &'static str>>, lookup: Lookup<'_>) {
+fn note_operation(in_force: &mut Option<Result<String, &'static str>>, lookup: Lookup<'_>) {
     match (lookup, &*in_force) {
         (Lookup::Found(operation), Some(Ok(name))) if **name == *operation.mark => {}
         (Lookup::Found(operation), _) => *in_force = Some(Ok(operation.mark.to_string())),
-        (why, _) => *in_force = why.missing().map(Err),
+        (why, _) => *in_force = why.explain_missing().map(Err),
     }
 }
 
@@ -166,16 +166,16 @@ mod tests {
     }
 
     fn sample() -> Sample {
-        let mut sample = Sample::empty(0);
+        let mut sample = Sample::new_empty(0);
         let slot = Slot { value: Ok(Value::Text("O1".into())), age_ns: 0 };
-        sample.set(ChannelId::of("program").expect("in the table"), slot);
+        sample.set_slot(ChannelId::from_name("program").expect("in the table"), slot);
         sample
     }
 
     fn depth(operations: &mut Operations, told: &mut Vec<Notice>) -> Result<f64, adapters::Absence> {
         let mut sample = sample();
-        operations.step(&mut sample, true, |notice| told.push(notice.clone()));
-        sample.number(ChannelId::of("depth_of_cut_mm").expect("in the table"))
+        operations.update_sample(&mut sample, true, |notice| told.push(notice.clone()));
+        sample.number(ChannelId::from_name("depth_of_cut_mm").expect("in the table"))
     }
 
     /// Steps until the depth is as expected, or the time is over.
@@ -192,7 +192,7 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("operations.toml");
         write(&path, &table("1.5"));
-        let (mut operations, mut told) = (Operations::begin(&path), Vec::new());
+        let (mut operations, mut told) = (Operations::start_watching(&path), Vec::new());
         assert_eq!(depth(&mut operations, &mut told), Ok(1.5));
         write(&path, &table("2.25"));
         until(&mut operations, &mut told, |depth, _| depth == 2.25);
@@ -201,17 +201,17 @@ mod tests {
         assert_eq!(depth(&mut operations, &mut told), Ok(2.25), "the one before stays");
         let status = operations.status();
         assert!(status.error.is_some_and(|error| error.contains("in micrometres?")));
-        assert!(operations.problem().is_some_and(|problem| problem.what.contains("stays in force")));
+        assert!(operations.describe_problem().is_some_and(|problem| problem.what.contains("stays in force")));
         write(&path, &table("3"));
         until(&mut operations, &mut told, |depth, _| depth == 3.0);
-        assert_eq!((operations.problem(), operations.status().operations), (None, 1));
+        assert_eq!((operations.describe_problem(), operations.status().operations), (None, 1));
     }
 
     #[test]
     fn a_recipe_that_is_not_there_is_told_and_waited_for() {
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("operations.toml");
-        let (mut operations, mut told) = (Operations::begin(&path), Vec::new());
+        let (mut operations, mut told) = (Operations::start_watching(&path), Vec::new());
         assert!(depth(&mut operations, &mut told).is_err());
         assert!(told.iter().any(|notice| notice.code == "recipe_refused"));
         write(&path, &table("1.5"));

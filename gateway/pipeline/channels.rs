@@ -22,7 +22,7 @@ impl Channels {
     /// Never: a test holds the names against the table.
     #[must_use]
     pub fn new() -> Self {
-        let of = |name| ChannelId::of(name).expect("the name stands in the table, which a test checks");
+        let of = |name| ChannelId::from_name(name).expect("the name stands in the table, which a test checks");
         Self {
             part_count: of("part_count"),
             part: of("part"),

@@ -20,10 +20,10 @@ struct RoundedRequest {
 }
 
 impl RoundedRequest {
-    fn of(request: &OverrideRequest, verdict: &Verdict) -> Self {
+    fn from_request(request: &OverrideRequest, verdict: &Verdict) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
         let pct = request.pct.round() as i64;
-        Self { pct, reason: request.reason.clone(), script: request.script.clone(), outcome: verdict.word() }
+        Self { pct, reason: request.reason.clone(), script: request.script.clone(), outcome: verdict.as_word() }
     }
 }
 
@@ -48,35 +48,35 @@ pub struct Decisions {
 
 impl Decisions {
     /// The latest changes, newest first.
-    pub fn recent(&self) -> impl Iterator<Item = &ShownChange> {
+    pub fn recent_changes(&self) -> impl Iterator<Item = &ShownChange> {
         self.recent.iter()
     }
 
     /// Gives every record that this decision, and what the gate made of it, makes to `keep`.
-    pub fn step(&mut self, decision: &Decision, verdict: &Verdict, mut keep: impl FnMut(Record)) {
+    pub fn record_decision(&mut self, decision: &Decision, verdict: &Verdict, mut keep: impl FnMut(Record)) {
         for change in &decision.alarms {
-            keep(alarm(change, decision.at_ns));
+            keep(build_alarm_record(change, decision.at_ns));
         }
         for note in &decision.notes {
-            keep(event("note", &note.script, &note.text, decision.at_ns));
+            keep(build_event_record("note", &note.script, &note.text, decision.at_ns));
         }
         for problem in &decision.problems {
-            keep(event("script_failed", &problem.file, &problem.to_string(), decision.at_ns));
+            keep(build_event_record("script_failed", &problem.file, &problem.to_string(), decision.at_ns));
         }
-        self.stops(decision, &mut keep);
-        self.offsets(decision, &mut keep);
-        let asked = decision.request.as_ref().map(|request| RoundedRequest::of(request, verdict));
+        self.record_stops(decision, &mut keep);
+        self.record_offsets(decision, &mut keep);
+        let asked = decision.request.as_ref().map(|request| RoundedRequest::from_request(request, verdict));
         if asked != self.asked {
-            keep(self.change(decision, verdict, asked).into());
+            keep(self.note_change(decision, verdict, asked).into());
         }
     }
 
     /// A request to hold or to change the tool is recorded when it begins.
-    fn stops(&mut self, decision: &Decision, keep: &mut impl FnMut(Record)) {
+    fn record_stops(&mut self, decision: &Decision, keep: &mut impl FnMut(Record)) {
         for request in &decision.stops {
             if !self.stops.iter().any(|(stop, script)| *stop == request.stop && *script == request.script) {
                 keep(stop_row(request, decision.at_ns).into());
-                let text = format!("{} asked for ({})", request.stop.word(), request.reason);
+                let text = format!("{} asked for ({})", request.stop.as_word(), request.reason);
                 self.recent.push_front(ShownChange { at_ns: decision.at_ns, text });
                 self.recent.truncate(RECENT);
             }
@@ -86,7 +86,7 @@ impl Decisions {
     }
 
     /// A proposed offset is recorded when it has changed by a micrometre.
-    fn offsets(&mut self, decision: &Decision, keep: &mut impl FnMut(Record)) {
+    fn record_offsets(&mut self, decision: &Decision, keep: &mut impl FnMut(Record)) {
         for proposal in &decision.offsets {
             #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
             let whole_um = proposal.offset_um.round() as i64;
@@ -100,7 +100,7 @@ impl Decisions {
         self.offsets.retain(|(axis, _)| decision.offsets.iter().any(|proposal| proposal.axis == *axis));
     }
 
-    fn change(&mut self, decision: &Decision, verdict: &Verdict, asked: Option<RoundedRequest>) -> DecisionRow {
+    fn note_change(&mut self, decision: &Decision, verdict: &Verdict, asked: Option<RoundedRequest>) -> DecisionRow {
         let at_ns = decision.at_ns;
         let before = std::mem::replace(&mut self.asked, asked);
         let (text, row) = match &decision.request {
@@ -117,7 +117,7 @@ impl Decisions {
         };
         self.recent.push_front(ShownChange { at_ns, text });
         self.recent.truncate(RECENT);
-        DecisionRow { outcome: verdict.word().to_owned(), outcome_reason: verdict.reason(), ..row }
+        DecisionRow { outcome: verdict.as_word().to_owned(), outcome_reason: verdict.reason(), ..row }
     }
 }
 
@@ -144,7 +144,7 @@ fn stop_row(request: &StopRequest, at_ns: TimeNs) -> DecisionRow {
         at_ns,
         script: request.script.to_string(),
         script_version: format!("{:016x}", request.version),
-        wanted: request.stop.word().to_owned(),
+        wanted: request.stop.as_word().to_owned(),
         reason: request.reason.to_string(),
         outcome: ASKED.to_owned(),
         ..DecisionRow::default()
@@ -156,7 +156,7 @@ fn offset_row(proposal: &OffsetProposal, at_ns: TimeNs) -> DecisionRow {
         at_ns,
         script: proposal.script.to_string(),
         script_version: format!("{:016x}", proposal.version),
-        wanted: format!("{}_offset_um", proposal.axis.word()),
+        wanted: format!("{}_offset_um", proposal.axis.as_word()),
         value: proposal.offset_um.is_finite().then_some(proposal.offset_um),
         unit: "um".to_owned(),
         reason: proposal.reason.to_string(),
@@ -165,16 +165,16 @@ fn offset_row(proposal: &OffsetProposal, at_ns: TimeNs) -> DecisionRow {
     }
 }
 
-fn alarm(change: &AlarmChange, at_ns: TimeNs) -> Record {
+fn build_alarm_record(change: &AlarmChange, at_ns: TimeNs) -> Record {
     let (code, source) = (change.name.to_string(), change.script.to_string());
     if !change.raised {
         return AlarmClear { at_ns, code, source }.into();
     }
-    let severity = change.level.word().to_owned();
+    let severity = change.level.as_word().to_owned();
     Alarm { at_ns, code, source, severity, en: change.en.to_string(), zh: change.zh.to_string() }.into()
 }
 
-fn event(kind: &str, source: &str, text: &str, at_ns: TimeNs) -> Record {
+fn build_event_record(kind: &str, source: &str, text: &str, at_ns: TimeNs) -> Record {
     Event { at_ns, kind: kind.to_owned(), source: source.to_owned(), text: text.to_owned(), detail: String::new() }
         .into()
 }
@@ -201,11 +201,11 @@ mod tests {
         for (at_ns, pct) in
             [(1, Some(90.0)), (2, Some(90.3)), (3, Some(89.0)), (4, Some(f64::NAN)), (5, None), (6, None)]
         {
-            decisions.step(&asking(at_ns, pct), &verdict(at_ns), |record| rows.push(record));
+            decisions.record_decision(&asking(at_ns, pct), &verdict(at_ns), |record| rows.push(record));
         }
         let values: Vec<_> =
             rows.iter().map(|row| matches!(row, Record::Decision(row) if row.value.is_some())).collect();
         assert_eq!(values, [true, true, false, false]);
-        assert_eq!(decisions.recent().next().map(|change| change.at_ns), Some(5));
+        assert_eq!(decisions.recent_changes().next().map(|change| change.at_ns), Some(5));
     }
 }

@@ -22,7 +22,13 @@ pub struct Journal {
 
 impl Journal {
     /// Gives every record that this tick makes to `keep`.
-    pub fn step(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates, mut keep: impl FnMut(Record)) {
+    pub fn record_tick(
+        &mut self,
+        channels: &Channels,
+        sample: &Sample,
+        estimates: &Estimates,
+        mut keep: impl FnMut(Record),
+    ) {
         self.since_ns.get_or_insert(sample.at_ns);
         if self.state != Some(estimates.state) {
             keep(self.state_change(channels, sample, estimates).into());
@@ -43,7 +49,7 @@ impl Journal {
         let text = |channel| sample.text(channel).unwrap_or_default().to_owned();
         StateChange {
             at_ns,
-            state: estimates.state.word().to_owned(),
+            state: estimates.state.as_word().to_owned(),
             program: text(channels.program),
             tool: tool_of(&text(channels.tool)).to_owned(),
         }
@@ -63,7 +69,7 @@ impl Journal {
 
     /// The controller's alarm that stands, and since when.
     #[must_use]
-    pub fn alarm(&self) -> Option<(&str, TimeNs)> {
+    pub fn standing_alarm(&self) -> Option<(&str, TimeNs)> {
         self.alarm.as_ref().map(|(text, since_ns)| (&**text, *since_ns))
     }
 }
@@ -74,14 +80,14 @@ mod tests {
     use adapters::{ChannelId, Slot, Value};
 
     fn records(journal: &mut Journal, at_ns: TimeNs, state: State, alarm: Option<&str>) -> Vec<Record> {
-        let mut sample = Sample::empty(at_ns);
+        let mut sample = Sample::new_empty(at_ns);
         if let Some(text) = alarm {
             let slot = Slot { value: Ok(Value::Text(text.into())), age_ns: 0 };
-            sample.set(ChannelId::of("alarm").expect("in the table"), slot);
+            sample.set_slot(ChannelId::from_name("alarm").expect("in the table"), slot);
         }
-        let estimates = Estimates { state, since_ns: at_ns - 3, ..Estimates::none(at_ns) };
+        let estimates = Estimates { state, since_ns: at_ns - 3, ..Estimates::without_samples(at_ns) };
         let mut kept = Vec::new();
-        journal.step(&Channels::new(), &sample, &estimates, |record| kept.push(record));
+        journal.record_tick(&Channels::new(), &sample, &estimates, |record| kept.push(record));
         kept
     }
 

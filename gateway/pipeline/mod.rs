@@ -14,8 +14,8 @@ mod wear_news;
 
 pub use channels::Channels;
 pub use decide::{Decisions, ShownChange};
-pub use extras::series as stored_series;
-use extras::{StoredEstimates, own, own_value};
+pub use extras::list_series as stored_series;
+use extras::{StoredEstimates, list_script_series, own_value};
 pub use journal::Journal;
 pub use part_detail::{OperationUse, PartDetail, ToolUse};
 pub use parts::CycleFollower;
@@ -36,14 +36,14 @@ const WEAR: &str = "wear";
 /// Where a tick leaves what is to be remembered.
 pub trait Store {
     /// A sample with what is stored beside its channels.
-    fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]);
+    fn store_sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]);
 
     /// Something that happened at this tick; always after the tick's sample.
-    fn record(&mut self, record: Record);
+    fn store_record(&mut self, record: Record);
 
     /// Something to tell; a live box also writes it into its log.
-    fn notice(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
-        self.record(event_of(at_ns, source, notice).into());
+    fn store_notice(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
+        self.store_record(event_of(at_ns, source, notice).into());
     }
 }
 
@@ -59,9 +59,9 @@ pub fn event_of(at_ns: TimeNs, source: &str, notice: &Notice) -> Event {
 pub struct NoStore;
 
 impl Store for NoStore {
-    fn sample(&mut self, _: &Sample, _: &[ExtraValue<'_>]) {}
+    fn store_sample(&mut self, _: &Sample, _: &[ExtraValue<'_>]) {}
 
-    fn record(&mut self, _: Record) {}
+    fn store_record(&mut self, _: Record) {}
 }
 
 /// Everything between the merge and the store.
@@ -94,13 +94,13 @@ impl Pipeline {
     /// A pipeline that has seen nothing. The settings of the estimators are those of the scripts.
     #[must_use]
     pub fn new(mut estimators: estimators::Inference, scripts: Host, gate: Gate) -> Self {
-        estimators.reconfigure(scripts.settings().clone());
+        estimators.apply_settings(scripts.settings().clone());
         Self {
             channels: Channels::new(),
             estimates: *estimators.estimates(),
             estimators,
             wear: WearEstimator::default(),
-            own: own(&scripts),
+            own: list_script_series(&scripts),
             extras: Vec::new(),
             stored: StoredEstimates::default(),
             generation: scripts.generation(),
@@ -118,74 +118,74 @@ impl Pipeline {
     }
 
     /// These series are stored by somebody else: a script's channel of the same name is not stored a second time. Before
-    /// [`Pipeline::series`].
-    pub fn leave(&mut self, names: &[ExtraSeries]) {
+    /// [`Pipeline::extra_series`].
+    pub fn exclude_series(&mut self, names: &[ExtraSeries]) {
         self.own.retain(|own| !names.iter().any(|known| known.name == own.name));
     }
 
-    /// An offset that the box itself proposes at this tick, before [`Pipeline::decide`].
-    pub fn propose(&mut self, proposal: Option<OffsetProposal>) {
+    /// An offset that the box itself proposes at this tick, before [`Pipeline::decide_commands`].
+    pub fn propose_offset(&mut self, proposal: Option<OffsetProposal>) {
         self.proposal = proposal;
     }
 
-    /// A feed override that the network asks for at this tick, before [`Pipeline::decide`].
-    pub fn request(&mut self, request: Option<OverrideRequest>) {
+    /// A feed override that the network asks for at this tick, before [`Pipeline::decide_commands`].
+    pub fn request_override(&mut self, request: Option<OverrideRequest>) {
         self.request = request;
     }
 
     /// What is stored beside the channels: estimates, then the channels of the scripts' own that were there at the start.
     #[must_use]
-    pub fn series(&self) -> Vec<ExtraSeries> {
+    pub fn extra_series(&self) -> Vec<ExtraSeries> {
         [stored_series(), self.own.clone()].concat()
     }
 
     /// Takes one tick. Samples come in the order of time.
-    pub fn step(&mut self, sample: &Sample, store: &mut dyn Store) {
-        self.infer(sample);
-        self.decide(sample);
-        self.record(sample, store);
+    pub fn run_tick(&mut self, sample: &Sample, store: &mut dyn Store) {
+        self.infer_estimates(sample);
+        self.decide_commands(sample);
+        self.record_tick(sample, store);
     }
 
     /// The first half of a tick.
-    pub fn infer(&mut self, sample: &Sample) -> &Estimates {
+    pub fn infer_estimates(&mut self, sample: &Sample) -> &Estimates {
         self.follow_settings();
-        self.estimates = *self.estimators.infer(sample);
-        self.wear.step(sample, &mut self.estimates);
+        self.estimates = *self.estimators.update_with_sample(sample);
+        self.wear.update_estimates(sample, &mut self.estimates);
         &self.estimates
     }
 
     /// The second half of a tick: decides.
-    pub fn decide(&mut self, sample: &Sample) {
-        self.finished = self.parts.step(&self.channels, sample, &self.estimates);
-        self.estimates.part = self.parts.figures();
+    pub fn decide_commands(&mut self, sample: &Sample) {
+        self.finished = self.parts.follow_tick(&self.channels, sample, &self.estimates);
+        self.estimates.part = self.parts.last_figures();
         let estimates = self.estimates;
-        self.tally.step(sample.at_ns, estimates.state);
-        let decision = self.scripts.tick(sample, &estimates);
+        self.tally.count_tick(sample.at_ns, estimates.state);
+        let decision = self.scripts.run_due_scripts(sample, &estimates);
         decision.learn_anew.iter().for_each(|program| self.estimators.learn_load_anew(program));
         if let Some(request) = self.request.take() {
-            self.scripts.request(request);
+            self.scripts.add_override_request(request);
         }
-        self.verdict = Some(self.gate.decide(self.scripts.decision().request.as_ref(), sample, &estimates));
+        self.verdict = Some(self.gate.decide_override(self.scripts.decision().request.as_ref(), sample, &estimates));
         if let Some(proposal) = self.proposal.take() {
-            self.scripts.propose(proposal);
+            self.scripts.add_offset_proposal(proposal);
         }
     }
 
     /// What can wait until the decision is on its way to the machine: stores and records, where something was decided.
-    pub fn record(&mut self, sample: &Sample, store: &mut dyn Store) {
+    pub fn record_tick(&mut self, sample: &Sample, store: &mut dyn Store) {
         let Some(verdict) = self.verdict else { return };
         let estimates = self.estimates;
         self.extras.clear();
-        self.extras.extend(self.stored.values(&estimates));
+        self.extras.extend(self.stored.compute_values(&estimates));
         self.extras.extend(self.own.iter().map(|series| own_value(&self.scripts, &series.name)));
-        store.sample(sample, &self.extras);
-        self.journal.step(&self.channels, sample, &estimates, |record| store.record(record));
-        self.decisions.step(self.scripts.decision(), &verdict, |record| store.record(record));
+        store.store_sample(sample, &self.extras);
+        self.journal.record_tick(&self.channels, sample, &estimates, |record| store.store_record(record));
+        self.decisions.record_decision(self.scripts.decision(), &verdict, |record| store.store_record(record));
         for news in self.wear.take_news() {
-            store.notice(sample.at_ns, WEAR, &wear_news::notice(&news));
+            store.store_notice(sample.at_ns, WEAR, &wear_news::describe_news(&news));
         }
         if let Some(part) = self.finished.take() {
-            store.record(part.into());
+            store.store_record(part.into());
         }
     }
 
@@ -193,7 +193,7 @@ impl Pipeline {
     fn follow_settings(&mut self) {
         if self.generation != self.scripts.generation() {
             self.generation = self.scripts.generation();
-            self.estimators.reconfigure(self.scripts.settings().clone());
+            self.estimators.apply_settings(self.scripts.settings().clone());
         }
     }
 
@@ -230,15 +230,15 @@ impl Pipeline {
         &mut self.gate
     }
 
-    /// What the gate makes of the offsets that were proposed at this tick; after [`Pipeline::decide`].
-    pub fn shift(&mut self, sample: &Sample) -> Vec<OffsetVerdict> {
-        self.gate.shift(&self.scripts.decision().offsets, sample, &self.estimates)
+    /// What the gate makes of the offsets that were proposed at this tick; after [`Pipeline::decide_commands`].
+    pub fn judge_offsets(&mut self, sample: &Sample) -> Vec<OffsetVerdict> {
+        self.gate.judge_offsets(&self.scripts.decision().offsets, sample, &self.estimates)
     }
 
     /// What is to be looked at in the control, because nobody knows for sure what is in force there; after
-    /// [`Pipeline::decide`].
-    pub fn looks(&mut self, sample: &Sample) -> Vec<offset::OffsetOrder> {
-        self.gate.looks(sample, &self.estimates)
+    /// [`Pipeline::decide_commands`].
+    pub fn list_readbacks(&mut self, sample: &Sample) -> Vec<offset::OffsetOrder> {
+        self.gate.collect_look_orders(sample, &self.estimates)
     }
 
     /// What the gate made of the last request.

@@ -108,14 +108,14 @@ pub(super) struct Gathering {
 
 impl Gathering {
     /// Takes `step_s` seconds of the part.
-    pub(super) fn step(
+    pub(super) fn add_step(
         &mut self,
         estimates: &Estimates,
         (tool, operation): (&str, &str),
         power_w: Option<f64>,
         step_s: f64,
     ) {
-        self.operate(estimates, operation, power_w, step_s);
+        self.add_operation_time(estimates, operation, power_w, step_s);
         if let Some(index) = State::ALL.iter().position(|state| *state == estimates.state) {
             self.seconds[index] += step_s;
         }
@@ -123,11 +123,11 @@ impl Gathering {
             self.peak_power_w = Some(self.peak_power_w.map_or(power_w, |peak| peak.max(power_w)));
         }
         if estimates.state == State::Cutting {
-            self.cut(estimates, tool, step_s);
+            self.add_cutting_time(estimates, tool, step_s);
         }
     }
 
-    fn operate(&mut self, estimates: &Estimates, name: &str, power_w: Option<f64>, step_s: f64) {
+    fn add_operation_time(&mut self, estimates: &Estimates, name: &str, power_w: Option<f64>, step_s: f64) {
         let index = self.operations.iter().position(|operation| operation.name == name).or_else(|| {
             (self.operations.len() < TOOLS_MAX).then(|| {
                 self.operations.push(OpenOperation { name: name.to_owned(), ..OpenOperation::default() });
@@ -143,7 +143,7 @@ impl Gathering {
     }
 
     /// Adds the energy of a short silence of the meter to the operation in which it ended.
-    pub(super) fn bridge(&mut self, name: &str, (energy_j, seconds): (f64, f64)) {
+    pub(super) fn bridge_energy_gap(&mut self, name: &str, (energy_j, seconds): (f64, f64)) {
         let operation = self.operations.iter_mut().find(|operation| operation.name == name);
         if let Some(operation) = operation.filter(|_| energy_j > 0.0) {
             operation.power.sum += energy_j;
@@ -151,7 +151,7 @@ impl Gathering {
         }
     }
 
-    fn cut(&mut self, estimates: &Estimates, name: &str, step_s: f64) {
+    fn add_cutting_time(&mut self, estimates: &Estimates, name: &str, step_s: f64) {
         let index = self.tools.iter().position(|tool| tool.name == name).or_else(|| {
             (self.tools.len() < TOOLS_MAX).then(|| {
                 self.tools.push(Tool { name: name.to_owned(), ..Tool::default() });
@@ -168,23 +168,23 @@ impl Gathering {
     }
 
     /// The detail of the finished part; what follows belongs to the next one.
-    pub(super) fn finish(&mut self) -> PartDetail {
+    pub(super) fn finish_part(&mut self) -> PartDetail {
         let done = std::mem::take(self);
         let named = State::ALL.iter().zip(done.seconds).filter(|(_, seconds)| *seconds > 0.0);
         PartDetail {
-            seconds: named.map(|(state, seconds)| (state.word().to_owned(), round_value(seconds, 1.0))).collect(),
+            seconds: named.map(|(state, seconds)| (state.as_word().to_owned(), round_value(seconds, 1.0))).collect(),
             peak_power_w: done.peak_power_w,
-            tools: done.tools.into_iter().map(ToolUse::of).collect(),
+            tools: done.tools.into_iter().map(ToolUse::from_tool).collect(),
             operations: match &done.operations[..] {
                 [only] if only.name.is_empty() => Vec::new(),
-                _ => done.operations.into_iter().map(OperationUse::of).collect(),
+                _ => done.operations.into_iter().map(OperationUse::from_operation).collect(),
             },
         }
     }
 }
 
 impl ToolUse {
-    fn of(tool: Tool) -> Self {
+    fn from_tool(tool: Tool) -> Self {
         Self {
             tool: tool_of(&tool.name).to_owned(),
             edge: if tool_of(&tool.name) == tool.name { String::new() } else { tool.name },
@@ -198,7 +198,7 @@ impl ToolUse {
 }
 
 impl OperationUse {
-    fn of(operation: OpenOperation) -> Self {
+    fn from_operation(operation: OpenOperation) -> Self {
         let known = operation.power.seconds > 0.0;
         Self {
             operation: operation.name,
@@ -223,30 +223,35 @@ mod tests {
 
     fn cutting(power_w: f64) -> Estimates {
         let estimate = Estimate { value: power_w, sd: 1.0 };
-        Estimates { state: State::Cutting, cutting_power_w: Ok(estimate), ..Estimates::none(0) }
+        Estimates { state: State::Cutting, cutting_power_w: Ok(estimate), ..Estimates::without_samples(0) }
     }
 
     #[test]
     fn means_are_over_the_time_and_the_next_part_begins_anew() {
         let mut gathering = Gathering::default();
-        gathering.step(&Estimates { state: State::Idle, ..Estimates::none(0) }, ("T1", ""), Some(300.0), 4.0);
-        gathering.step(&cutting(1000.0), ("T1", ""), Some(1300.0), 1.0);
-        gathering.step(&cutting(400.0), ("T2", ""), Some(700.0), 1.0);
-        gathering.step(&cutting(1300.0), ("T1", ""), None, 2.0);
-        let detail = gathering.finish();
+        gathering.add_step(
+            &Estimates { state: State::Idle, ..Estimates::without_samples(0) },
+            ("T1", ""),
+            Some(300.0),
+            4.0,
+        );
+        gathering.add_step(&cutting(1000.0), ("T1", ""), Some(1300.0), 1.0);
+        gathering.add_step(&cutting(400.0), ("T2", ""), Some(700.0), 1.0);
+        gathering.add_step(&cutting(1300.0), ("T1", ""), None, 2.0);
+        let detail = gathering.finish_part();
         assert_eq!(detail.seconds, BTreeMap::from([("cutting".to_owned(), 4.0), ("idle".to_owned(), 4.0)]));
         assert_eq!(detail.peak_power_w, Some(1300.0));
         let tools: Vec<_> =
             detail.tools.iter().map(|it| (it.tool.as_str(), it.cutting_s, it.cutting_power_w)).collect();
         assert_eq!(tools, [("T1", 3.0, Some(1200.0)), ("T2", 1.0, Some(400.0))]);
         assert_eq!(detail.tools[0].limit_w, None);
-        assert_eq!(gathering.finish(), PartDetail::default());
+        assert_eq!(gathering.finish_part(), PartDetail::default());
     }
 
     #[test]
     fn a_part_with_endless_tools_stays_small() {
         let mut gathering = Gathering::default();
-        (0..1000).for_each(|at| gathering.step(&cutting(1.0), (&format!("T{at}"), ""), None, 1.0));
-        assert_eq!(gathering.finish().tools.len(), TOOLS_MAX);
+        (0..1000).for_each(|at| gathering.add_step(&cutting(1.0), (&format!("T{at}"), ""), None, 1.0));
+        assert_eq!(gathering.finish_part().tools.len(), TOOLS_MAX);
     }
 }

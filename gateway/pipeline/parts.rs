@@ -39,24 +39,24 @@ pub struct CycleFollower {
 impl CycleFollower {
     /// Parts finished since the start.
     #[must_use]
-    pub fn finished(&self) -> u64 {
+    pub fn finished_count(&self) -> u64 {
         self.finished
     }
 
     /// Of the part that was finished last.
     #[must_use]
-    pub fn figures(&self) -> PartFigures {
-        self.last.unwrap_or(PartFigures::none())
+    pub fn last_figures(&self) -> PartFigures {
+        self.last.unwrap_or(PartFigures::without_parts())
     }
 
     /// Takes one tick; gives the part that it finishes.
-    pub fn step(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates) -> Option<Part> {
-        self.integrate(channels, sample, estimates);
+    pub fn follow_tick(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates) -> Option<Part> {
+        self.integrate_step(channels, sample, estimates);
         let parts = self.parts_by_count(channels, sample).or_else(|| self.part_by_name(channels, sample));
         self.last_ns = Some(sample.at_ns);
         let began_ns = *self.began_ns.get_or_insert(sample.at_ns);
         let (count, name) = parts?;
-        let part = self.close(channels, sample, began_ns, count, name);
+        let part = self.close_part(channels, sample, began_ns, count, name);
         Some(part)
     }
 
@@ -80,7 +80,7 @@ impl CycleFollower {
         (!counted && !before.is_empty()).then(|| (1, before.to_string()))
     }
 
-    fn integrate(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates) {
+    fn integrate_step(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates) {
         let step_ns = self.last_ns.map_or(0, |last_ns| sample.at_ns - last_ns);
         if !(1..=STEP_MAX_NS).contains(&step_ns) {
             return;
@@ -99,11 +99,11 @@ impl CycleFollower {
         let power = sample.number(channels.total_power).or_else(|_| sample.number(channels.spindle_power));
         let tool = sample.text(channels.tool).unwrap_or_default();
         let operation = sample.text(channels.operation).unwrap_or_default();
-        self.gathering.step(estimates, (tool, operation), power.ok(), step_s);
+        self.gathering.add_step(estimates, (tool, operation), power.ok(), step_s);
         match power {
             Ok(power_w) => {
                 let bridged_j = self.bridged_j(power_w);
-                self.gathering.bridge(operation, (bridged_j, self.silent_s));
+                self.gathering.bridge_energy_gap(operation, (bridged_j, self.silent_s));
                 self.energy_j += power_w * step_s + bridged_j;
                 (self.energy_known, self.last_power_w, self.silent_s) = (true, Some(power_w), 0.0);
             }
@@ -117,7 +117,7 @@ impl CycleFollower {
         self.last_power_w.filter(|_| short).map_or(0.0, |before_w| 0.5 * (before_w + power_w) * self.silent_s)
     }
 
-    fn close(&mut self, channels: &Channels, sample: &Sample, began_ns: TimeNs, count: i64, part: String) -> Part {
+    fn close_part(&mut self, channels: &Channels, sample: &Sample, began_ns: TimeNs, count: i64, part: String) -> Part {
         let program = self.program.take().or_else(|| sample.text(channels.program).map(Arc::from));
         let finished = Part {
             began_ns,
@@ -128,7 +128,7 @@ impl CycleFollower {
             cutting_s: Some(self.cutting_s),
             energy_j: self.energy_known.then_some(self.energy_j),
             // Numbers and texts only: there is nothing in it that JSON could not hold.
-            detail: serde_json::to_string(&self.gathering.finish()).unwrap_or_default(),
+            detail: serde_json::to_string(&self.gathering.finish_part()).unwrap_or_default(),
         };
         self.finished += u64::try_from(count).unwrap_or(0);
         self.last = Some(PartFigures {
@@ -148,8 +148,9 @@ mod tests {
     use adapters::{Absence, ChannelId, Slot, Value};
 
     fn sample(at_s: i64, count: Result<f64, Absence>, part: &str) -> Sample {
-        let mut sample = Sample::empty(at_s * SECOND_NS);
-        let mut set = |name: &str, value| sample.set(ChannelId::of(name).expect(name), Slot { value, age_ns: 0 });
+        let mut sample = Sample::new_empty(at_s * SECOND_NS);
+        let mut set =
+            |name: &str, value| sample.set_slot(ChannelId::from_name(name).expect(name), Slot { value, age_ns: 0 });
         set("part_count", count.map(Value::Number));
         set("part", Ok(Value::Text(part.into())));
         set("total_power_w", Ok(Value::Number(100.0)));
@@ -157,13 +158,14 @@ mod tests {
     }
 
     fn in_state(state: State) -> Estimates {
-        Estimates { state, ..Estimates::none(0) }
+        Estimates { state, ..Estimates::without_samples(0) }
     }
 
     #[test]
     fn the_counter_finishes_parts_and_a_reset_does_not() {
         let (channels, mut parts) = (Channels::new(), CycleFollower::default());
-        let mut step = |at_s, count| parts.step(&channels, &sample(at_s, Ok(count), "A"), &in_state(State::Cutting));
+        let mut step =
+            |at_s, count| parts.follow_tick(&channels, &sample(at_s, Ok(count), "A"), &in_state(State::Cutting));
         assert_eq!(step(0, 7.0), None);
         assert_eq!(step(1, 7.0), None);
         let part = step(2, 8.0).expect("finished");
@@ -171,14 +173,15 @@ mod tests {
         assert_eq!((part.began_ns, part.ended_ns), (0, 2 * SECOND_NS));
         assert_eq!(step(3, 0.0), None);
         assert_eq!(step(4, 2.0).expect("two at once").count, 2);
-        assert_eq!(parts.finished(), 3);
+        assert_eq!(parts.finished_count(), 3);
     }
 
     #[test]
     fn without_a_counter_the_name_tells() {
         let (channels, mut parts) = (Channels::new(), CycleFollower::default());
-        let mut step =
-            |at_s, part| parts.step(&channels, &sample(at_s, Err(Absence::NotProvided), part), &in_state(State::Idle));
+        let mut step = |at_s, part| {
+            parts.follow_tick(&channels, &sample(at_s, Err(Absence::NotProvided), part), &in_state(State::Idle))
+        };
         assert_eq!(step(0, "A"), None);
         assert_eq!(step(1, "A"), None);
         assert_eq!(step(2, "B").expect("A is finished").part, "A");

@@ -16,11 +16,11 @@ pub struct Tally {
 
 impl Tally {
     /// Takes one tick: the time since the one before counts for the state it is in.
-    pub fn step(&mut self, at_ns: TimeNs, state: State) {
+    pub fn count_tick(&mut self, at_ns: TimeNs, state: State) {
         self.ticks += 1;
         let step_ns = self.last_ns.replace(at_ns).map_or(0, |last_ns| at_ns - last_ns);
         if (0..=STEP_MAX_NS).contains(&step_ns) {
-            self.ns_per_state[usize::from(state.code())] += step_ns;
+            self.ns_per_state[usize::from(state.to_code())] += step_ns;
         }
     }
 
@@ -34,8 +34,8 @@ impl Tally {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "2^53 ns are a hundred days; beyond that microseconds suffice")]
     pub fn seconds_per_state(&self) -> Vec<(&'static str, f64)> {
-        let seconds = |state: State| self.ns_per_state[usize::from(state.code())] as f64 / SECOND_NS as f64;
-        State::ALL.into_iter().map(|state| (state.word(), seconds(state))).collect()
+        let seconds = |state: State| self.ns_per_state[usize::from(state.to_code())] as f64 / SECOND_NS as f64;
+        State::ALL.into_iter().map(|state| (state.as_word(), seconds(state))).collect()
     }
 }
 
@@ -49,7 +49,7 @@ mod tests {
         for (at_s, state) in
             [(0, State::Off), (1, State::Idle), (3, State::Cutting), (100, State::Cutting), (101, State::Off)]
         {
-            tally.step(at_s * SECOND_NS, state);
+            tally.count_tick(at_s * SECOND_NS, state);
         }
         let seconds = tally.seconds_per_state();
         assert_eq!(tally.ticks(), 5);

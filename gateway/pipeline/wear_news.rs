@@ -3,7 +3,7 @@
 use crate::log::{Notice, Severity};
 use rules::estimators::wear::WearNews;
 
-pub(super) fn notice(news: &WearNews) -> Notice {
+pub(super) fn describe_news(news: &WearNews) -> Notice {
     let (kind, text) = match news {
         WearNews::NotObservable { edge } => (
             "wear_not_observable",

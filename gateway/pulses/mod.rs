@@ -6,7 +6,7 @@
 
 mod vectors;
 
-pub use vectors::{Vector, vectors};
+pub use vectors::{Vector, build_vectors};
 
 use rules::estimators::thermal::{Decoder, EDGES_PER_PULSE, Lines, PulseInserter};
 use std::io::{BufRead, Write};
@@ -52,23 +52,23 @@ impl Proof {
     /// Is the position that leaves the one that came in and what was asked for, all of it, without an illegal transition and
     /// no closer than the spacing?
     #[must_use]
-    pub fn holds(&self, spacing_ns: u64) -> bool {
+    pub fn is_proven(&self, spacing_ns: u64) -> bool {
         let counted = self.out_edges - self.in_edges == EDGES_PER_PULSE * self.inserted;
         let spaced = self.least_ns.is_none_or(|least| least >= spacing_ns);
-        counted && spaced && self.illegal == 0 && self.waiting() == 0
+        counted && spaced && self.illegal == 0 && self.count_waiting() == 0
     }
 
     /// Pulses that were asked for and have not left.
     #[must_use]
-    pub fn waiting(&self) -> i64 {
+    pub fn count_waiting(&self) -> i64 {
         self.asked - self.inserted
     }
 
     /// In words.
     #[must_use]
-    pub fn text(&self, spacing_ns: u64) -> String {
+    pub fn to_text(&self, spacing_ns: u64) -> String {
         let least = self.least_ns.map_or_else(|| "-".to_owned(), |least| least.to_string());
-        let proof = match (self.holds(spacing_ns), self.waiting()) {
+        let proof = match (self.is_proven(spacing_ns), self.count_waiting()) {
             (true, _) => "holds".to_owned(),
             (false, 0) => "DOES NOT HOLD".to_owned(),
             (false, waiting) => format!(
@@ -102,7 +102,7 @@ struct Heads {
 }
 
 impl Heads {
-    fn of(line: &str) -> Result<Self, String> {
+    fn parse_head(line: &str) -> Result<Self, String> {
         let names: Vec<&str> = line.trim().split(',').map(str::trim).collect();
         let at = |name: &str| names.iter().position(|it| *it == name);
         let need = |name: &str| {
@@ -112,7 +112,7 @@ impl Heads {
         Ok(Self { time: need("time_ns")?, a: need("a")?, b: need("b")?, request: at("request"), bypass: at("bypass") })
     }
 
-    fn row(&self, line: &str, number: usize) -> Result<PulseRow, String> {
+    fn parse_row(&self, line: &str, number: usize) -> Result<PulseRow, String> {
         let cells: Vec<&str> = line.trim().split(',').map(str::trim).collect();
         let cell = |at: usize| cells.get(at).copied().unwrap_or("");
         let level = |at: usize, name: &str| match cell(at) {
@@ -161,21 +161,21 @@ impl DecodedDevice {
         }
     }
 
-    fn take(&mut self, row: &PulseRow, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
+    fn feed_row(&mut self, row: &PulseRow, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
         if let Some(bypass) = row.bypass {
             self.device.set_bypass(bypass);
         }
-        self.device.request(row.request);
+        self.device.request_pulses(row.request);
         self.proof.asked += row.request;
         self.proof.rows += 1;
-        self.encoder.see(row.lines, row.at_ns).map_err(|error| error.to_string())?;
-        self.pass(row.at_ns, row.lines, out)
+        self.encoder.decode_lines(row.lines, row.at_ns).map_err(|error| error.to_string())?;
+        self.advance_device(row.at_ns, row.lines, out)
     }
 
-    fn pass(&mut self, at_ns: u64, lines: Lines, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
+    fn advance_device(&mut self, at_ns: u64, lines: Lines, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
         let Self { device, decoder, last_ns, proof, .. } = self;
-        let passed = device.advance(at_ns, lines, |edge| {
-            proof.illegal += u64::from(decoder.see(edge.lines, edge.at_ns).is_err());
+        let passed = device.advance_to(at_ns, lines, |edge| {
+            proof.illegal += u64::from(decoder.decode_lines(edge.lines, edge.at_ns).is_err());
             let apart = last_ns.map(|last| edge.at_ns.saturating_sub(last));
             proof.least_ns = match (proof.least_ns, apart) {
                 (Some(least), Some(apart)) => Some(least.min(apart)),
@@ -188,7 +188,7 @@ impl DecodedDevice {
         passed.map_err(|fault| fault.to_string())
     }
 
-    fn finish(&mut self) -> Proof {
+    fn finish_proof(&mut self) -> Proof {
         self.proof.in_edges = self.encoder.position_edges() - self.begun.0;
         self.proof.out_edges = self.decoder.position_edges() - self.begun.1;
         self.proof.inserted = self.device.inserted_pulses();
@@ -200,7 +200,7 @@ impl DecodedDevice {
 ///
 /// # Errors
 /// A row that is none with its line, a fault of the device, or what the system said.
-pub fn stream(
+pub fn stream_edges(
     input: impl BufRead,
     mut output: impl Write,
     spacing_ns: u64,
@@ -218,15 +218,15 @@ pub fn stream(
             continue;
         }
         let Some(heads) = &heads else {
-            heads = Some(Heads::of(&line)?);
+            heads = Some(Heads::parse_head(&line)?);
             continue;
         };
-        let mut row = heads.row(&line, index + 1)?;
+        let mut row = heads.parse_row(&line, index + 1)?;
         let bench = bench.get_or_insert_with(|| {
             row.request += first_request;
             DecodedDevice::new(&row, spacing_ns)
         });
-        bench.take(&row, &mut out).map_err(|what| format!("line {}: {what}", index + 1))?;
+        bench.feed_row(&row, &mut out).map_err(|what| format!("line {}: {what}", index + 1))?;
         last = Some(row);
         flush(&mut out, &mut output).map_err(io)?;
     }
@@ -234,9 +234,9 @@ pub fn stream(
         return Err("there is no row of encoder lines".to_owned());
     };
     let end_ns = last.at_ns.saturating_add(spacing_ns.saturating_mul(TAIL_SPACINGS));
-    bench.pass(end_ns, last.lines, &mut out)?;
+    bench.advance_device(end_ns, last.lines, &mut out)?;
     flush(&mut out, &mut output).map_err(io)?;
-    Ok(bench.finish())
+    Ok(bench.finish_proof())
 }
 
 fn flush(out: &mut Vec<(u64, Lines)>, output: &mut impl Write) -> std::io::Result<()> {
@@ -255,14 +255,14 @@ mod tests {
 
     #[test]
     fn every_vector_is_proved_and_bad_rows_are_told_with_their_line() {
-        let all = vectors().expect("every vector runs");
+        let all = build_vectors().expect("every vector runs");
         assert!(all.len() >= 10);
         for vector in &all {
-            assert!(vector.proof.holds(vector.spacing_ns), "{}: {:?}", vector.name, vector.proof);
+            assert!(vector.proof.is_proven(vector.spacing_ns), "{}: {:?}", vector.name, vector.proof);
             assert_eq!(vector.proof.inserted, vector.proof.asked, "{}", vector.name);
             assert!(vector.proof.edges_out > 0, "{}", vector.name);
         }
-        let refused = |text: &str| stream(text.as_bytes(), Vec::new(), 250, 0).expect_err("refused");
+        let refused = |text: &str| stream_edges(text.as_bytes(), Vec::new(), 250, 0).expect_err("refused");
         assert!(refused("time_ns,a\n1,0\n").contains("no column b"));
         assert!(refused("time_ns,a,b\n1,0,2\n").contains("line 2: b is"));
         assert!(refused("time_ns,a,b\n1,0,0\n2,1,1\n").contains("both encoder lines"));
@@ -273,14 +273,15 @@ mod tests {
     #[test]
     fn a_proof_that_does_not_hold_says_so() {
         let proof = Proof { out_edges: 4, inserted: 2, ..Proof::default() };
-        assert!(!proof.holds(250) && proof.text(250).contains("DOES NOT HOLD"));
-        assert!(!Proof { illegal: 1, ..Proof::default() }.holds(250));
-        assert!(!Proof { least_ns: Some(100), ..Proof::default() }.holds(250));
+        assert!(!proof.is_proven(250) && proof.to_text(250).contains("DOES NOT HOLD"));
+        assert!(!Proof { illegal: 1, ..Proof::default() }.is_proven(250));
+        assert!(!Proof { least_ns: Some(100), ..Proof::default() }.is_proven(250));
         // A line stays high: one pulse is inserted with the edge, and the proof says how many still wait.
-        let proof = stream("time_ns,a,b\n1,0,0\n900,1,0\n".as_bytes(), Vec::new(), 250, 0).expect("runs");
-        assert!(proof.holds(250), "{proof:?}");
-        let proof = stream("time_ns,a,b,request\n1,0,0,0\n900,1,0,7\n".as_bytes(), Vec::new(), 250, 0).expect("runs");
-        let text = proof.text(250);
-        assert!(!proof.holds(250) && text.contains("6 pulses that were asked for have not left"), "{text}");
+        let proof = stream_edges("time_ns,a,b\n1,0,0\n900,1,0\n".as_bytes(), Vec::new(), 250, 0).expect("runs");
+        assert!(proof.is_proven(250), "{proof:?}");
+        let proof =
+            stream_edges("time_ns,a,b,request\n1,0,0,0\n900,1,0,7\n".as_bytes(), Vec::new(), 250, 0).expect("runs");
+        let text = proof.to_text(250);
+        assert!(!proof.is_proven(250) && text.contains("6 pulses that were asked for have not left"), "{text}");
     }
 }

@@ -1,6 +1,6 @@
 //! Reference vectors: what goes into a pulse inserter, and what must come out.
 
-use super::{Proof, stream};
+use super::{Proof, stream_edges};
 use rules::estimators::thermal::Lines;
 use std::fmt::Write as _;
 
@@ -25,8 +25,8 @@ pub struct Vector {
 ///
 /// # Errors
 /// A vector that the device refuses: never, a test holds it.
-pub fn vectors() -> Result<Vec<Vector>, String> {
-    VECTORS.iter().map(VectorSource::vector).collect()
+pub fn build_vectors() -> Result<Vec<Vector>, String> {
+    VECTORS.iter().map(VectorSource::build_vector).collect()
 }
 
 /// How a vector is made: encoder edges at a pace, and requests.
@@ -114,20 +114,20 @@ const VECTORS: &[VectorSource] = &[
 ];
 
 impl VectorSource {
-    fn vector(&self) -> Result<Vector, String> {
-        let input = self.input();
+    fn build_vector(&self) -> Result<Vector, String> {
+        let input = self.format_input();
         let mut expected = Vec::new();
-        let proof = stream(input.as_bytes(), &mut expected, self.spacing_ns, 0)?;
+        let proof = stream_edges(input.as_bytes(), &mut expected, self.spacing_ns, 0)?;
         let expected = String::from_utf8(expected).map_err(|error| error.to_string())?;
         let (name, shows, spacing_ns) = (self.name, self.shows, self.spacing_ns);
         Ok(Vector { name, shows, spacing_ns, input, expected, proof })
     }
 
-    fn input(&self) -> String {
+    fn format_input(&self) -> String {
         let mut text = String::from("time_ns,a,b,request,bypass\n");
         let (mut at_ns, mut position) = (1000_u64, 0_i64);
         let mut row = |at_ns: u64, position: i64, request: i64, bypass: Option<bool>| {
-            let lines = Lines::at(position);
+            let lines = Lines::from_position(position);
             let bypass = bypass.map_or("", |on| if on { "1" } else { "0" });
             let _ = writeln!(text, "{at_ns},{},{},{request},{bypass}", u8::from(lines.a), u8::from(lines.b));
         };

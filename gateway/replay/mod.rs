@@ -58,22 +58,22 @@ struct ReplaySink {
 }
 
 impl Store for ReplaySink {
-    fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
+    fn store_sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
         self.counts.rows += 1;
         if !self.before.has_row(self.counts.rows)
             && let Some(writer) = &self.writer
         {
-            writer.sample(sample, extras);
+            writer.queue_sample(sample, extras);
             self.counts.stored += 1;
         }
     }
 
-    fn record(&mut self, record: Record) {
-        self.counts.record(&record);
+    fn store_record(&mut self, record: Record) {
+        self.counts.count_record(&record);
         if !self.before.has_record(self.counts.rows, &record)
             && let Some(writer) = &self.writer
         {
-            writer.record(record);
+            writer.queue_record(record);
         }
     }
 }
@@ -82,11 +82,11 @@ impl Store for ReplaySink {
 ///
 /// # Errors
 /// A file that cannot be read, or a history that cannot be written.
-pub fn replay(plan: &ReplayPlan, scripts: Host, gate: config::GateConfig) -> Result<ReplaySummary, CannotRun> {
+pub fn replay_files(plan: &ReplayPlan, scripts: Host, gate: config::GateConfig) -> Result<ReplaySummary, CannotRun> {
     let began = Instant::now();
     let fresh = estimators::Inference::new(estimators::Settings::default());
     let mut pipeline = Pipeline::new(fresh, scripts, Gate::new(gate));
-    library(plan, &mut pipeline)?;
+    load_wear_models(plan, &mut pipeline)?;
     let mut files = Vec::new();
     let mut counts = ReplayCounts::default();
     let mut visibility = VisibilityTally::default();
@@ -94,7 +94,7 @@ pub fn replay(plan: &ReplayPlan, scripts: Host, gate: config::GateConfig) -> Res
     let mut next_ns = 0;
     for file in &plan.files {
         let read = read_path(file).map_err(|error| CannotRun::new(error.to_string(), ""))?;
-        files.push(FileSummary::of(file, &read));
+        files.push(FileSummary::from_recording(file, &read));
         let mut one = OneFile {
             plan,
             pipeline: &mut pipeline,
@@ -106,14 +106,14 @@ pub fn replay(plan: &ReplayPlan, scripts: Host, gate: config::GateConfig) -> Res
         counts.add(&of_file);
         next_ns = last_ns + (UNKNOWN_PAUSE_S * 1e9) as i64;
     }
-    let kept = plan.history.as_ref().map(|path| StoredRows::of(path, &counts));
+    let kept = plan.history.as_ref().map(|path| StoredRows::from_counts(path, &counts));
     Ok(ReplaySummary {
         files,
         counts,
         kept,
         seconds_per_state: pipeline.tally().seconds_per_state(),
-        parts: pipeline.parts().finished(),
-        visibility: visibility.verdict(),
+        parts: pipeline.parts().finished_count(),
+        visibility: visibility.judge_visibility(),
         motion,
         took: began.elapsed(),
     })
@@ -121,7 +121,7 @@ pub fn replay(plan: &ReplayPlan, scripts: Host, gate: config::GateConfig) -> Res
 
 /// Gives the pipeline the wear models of the history. A recording does not name its machine: a library of several machines is
 /// used for what names none.
-fn library(plan: &ReplayPlan, pipeline: &mut Pipeline) -> Result<(), CannotRun> {
+fn load_wear_models(plan: &ReplayPlan, pipeline: &mut Pipeline) -> Result<(), CannotRun> {
     let Some(path) = plan.models.as_ref().or(plan.history.as_ref()).filter(|path| path.exists()) else { return Ok(()) };
     let cannot = |error: crate::history::HistoryError| CannotRun::new(error.to_string(), "");
     let stored = Reader::open(path).and_then(|reader| reader.wear_models()).map_err(cannot)?;
@@ -149,44 +149,44 @@ impl OneFile<'_> {
     /// Replays the file, which begins at `next_ns` when it has no dates; what happened, and the time of the last row.
     fn run(&mut self, file: &Path, read: &ReadRecording, next_ns: TimeNs) -> Result<(ReplayCounts, TimeNs), CannotRun> {
         let origin = origin_of(file).map_err(|error| CannotRun::new(format!("{}: {error}", file.display()), ""))?;
-        let before = self.before(&origin)?;
+        let before = self.read_before(&origin)?;
         let writer = self
             .plan
             .history
             .as_ref()
-            .map(|path| open(path, &origin, before.rows() > 0, self.pipeline.series()))
+            .map(|path| open_writer(path, &origin, before.rows() > 0, self.pipeline.extra_series()))
             .transpose()?;
         let source = Replay::new(origin, &read.recording, before.origin_ns.unwrap_or(next_ns.max(before.free_ns)));
-        let rows = source.rows() as u64;
+        let rows = source.count_rows() as u64;
         if let (Some(path), true) = (&self.plan.history, self.plan.talk) {
             // Not on standard output, which belongs to the summary.
             eprintln!("{}: storing in {} from row {} on", file.display(), path.display(), before.rows() + 1);
         }
-        let bar = self.bar(rows, file);
+        let bar = self.build_progress_bar(rows, file);
         let mut sink = ReplaySink { writer, before, counts: ReplayCounts::default() };
-        let last_ns = self.through(source, &mut sink, &bar);
+        let last_ns = self.feed_pipeline(source, &mut sink, &bar);
         bar.finish_and_clear();
-        close(sink.writer.take())?;
+        close_writer(sink.writer.take())?;
         Ok((sink.counts, last_ns))
     }
 
     /// What the history already holds of this recording.
-    fn before(&self, origin: &str) -> Result<Before, CannotRun> {
+    fn read_before(&self, origin: &str) -> Result<Before, CannotRun> {
         let found = self.plan.history.as_deref().filter(|path| path.exists()).map(|path| Before::read(path, origin));
         found.transpose().map(Option::unwrap_or_default).map_err(|error| CannotRun::new(error.to_string(), ""))
     }
 
-    fn through(&mut self, source: Replay, sink: &mut ReplaySink, bar: &ProgressBar) -> TimeNs {
+    fn feed_pipeline(&mut self, source: Replay, sink: &mut ReplaySink, bar: &ProgressBar) -> TimeNs {
         let mut sources = Lockstep::new(vec![Box::new(source) as Box<dyn Pull>], Delay::Fixed(Duration::ZERO));
-        let mut sample = Sample::empty(0);
+        let mut sample = Sample::new_empty(0);
         while let Some(now_ns) = sources.next_ns() {
             sources.sample_into(&mut sample, now_ns);
             if let Some(recipe) = &self.plan.operations {
-                let _marked_in_the_sample = self.completion.apply(recipe, &mut sample);
+                let _marked_in_the_sample = self.completion.apply_recipe(recipe, &mut sample);
             }
-            self.pipeline.step(&sample, sink);
-            if let Some(record) = sink.before.continued(sink.counts.rows, &sample, self.pipeline.estimates()) {
-                sink.record(record);
+            self.pipeline.run_tick(&sample, sink);
+            if let Some(record) = sink.before.continue_state(sink.counts.rows, &sample, self.pipeline.estimates()) {
+                sink.store_record(record);
             }
             self.visibility.add(self.pipeline.estimates());
             self.motion.add(&sample, self.pipeline.estimates());
@@ -197,7 +197,7 @@ impl OneFile<'_> {
         sample.at_ns
     }
 
-    fn bar(&self, rows: u64, file: &Path) -> ProgressBar {
+    fn build_progress_bar(&self, rows: u64, file: &Path) -> ProgressBar {
         let target = if self.plan.progress { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(rows), target);
         let form = "{msg} {wide_bar} {human_pos}/{human_len} rows, {per_sec}, {eta} left";
@@ -207,13 +207,13 @@ impl OneFile<'_> {
     }
 }
 
-fn open(path: &Path, origin: &str, goes_on: bool, extras: Vec<ExtraSeries>) -> Result<Writer, CannotRun> {
+fn open_writer(path: &Path, origin: &str, goes_on: bool, extras: Vec<ExtraSeries>) -> Result<Writer, CannotRun> {
     let origin = origin.to_owned();
     let options = Options { when_full: WhenFull::Wait, extras, origin, goes_on, ..Options::default() };
     Writer::open(path, options).map_err(|error| CannotRun::new(error.to_string(), ""))
 }
 
-fn close(writer: Option<Writer>) -> Result<(), CannotRun> {
+fn close_writer(writer: Option<Writer>) -> Result<(), CannotRun> {
     let Some(writer) = writer else { return Ok(()) };
     let flushed = writer.flush();
     let status = writer.close();

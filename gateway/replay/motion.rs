@@ -28,7 +28,7 @@ pub struct Motion {
 impl Motion {
     /// Takes one row.
     pub fn add(&mut self, sample: &Sample, estimates: &Estimates) {
-        let found = || Some((ChannelId::of("motion")?, ChannelId::of("spindle_speed_rpm")?));
+        let found = || Some((ChannelId::from_name("motion")?, ChannelId::from_name("spindle_speed_rpm")?));
         let Some((motion, speed)) = self.channels.or_else(found) else { return };
         self.channels = Some((motion, speed));
         self.add_edge(sample.number(speed).ok(), estimates);
@@ -56,34 +56,35 @@ impl Motion {
             self.rows.insert(Arc::from(word), [0; State::ALL.len()]);
         }
         if let Some(counts) = self.rows.get_mut(word) {
-            counts[usize::from(estimates.state.code())] += 1;
+            counts[usize::from(estimates.state.to_code())] += 1;
         }
     }
 
     /// One line per word: how many rows, and in which states they were, most frequent first.
-    pub(super) fn lines(&self) -> Vec<String> {
+    pub(super) fn format_lines(&self) -> Vec<String> {
         let wide = self.rows.keys().map(|word| word.chars().count()).max().unwrap_or(0);
-        self.rows.iter().map(|(word, counts)| line(word, wide, counts)).collect()
+        self.rows.iter().map(|(word, counts)| format_line(word, wide, counts)).collect()
     }
 
     /// Rows per word and state, where the recording has such words; states that never occur are left out.
     #[must_use]
-    pub fn json(&self) -> Option<Value> {
+    pub fn to_json(&self) -> Option<Value> {
         let row = |counts: &[u64; State::ALL.len()]| -> Map<String, Value> {
             let each = State::ALL.into_iter().zip(counts).filter(|(_, count)| **count > 0);
-            each.map(|(state, count)| (state.word().to_owned(), json!(count))).collect()
+            each.map(|(state, count)| (state.as_word().to_owned(), json!(count))).collect()
         };
         let words = self.rows.iter().map(|(word, counts)| (word.to_string(), Value::Object(row(counts))));
         (!self.rows.is_empty()).then(|| Value::Object(words.collect()))
     }
 }
 
-fn line(word: &str, wide: usize, counts: &[u64; State::ALL.len()]) -> String {
+fn format_line(word: &str, wide: usize, counts: &[u64; State::ALL.len()]) -> String {
     let all: u64 = counts.iter().sum();
     let mut states: Vec<(State, u64)> = State::ALL.into_iter().zip(*counts).filter(|(_, count)| *count > 0).collect();
     states.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     #[expect(clippy::cast_precision_loss, reason = "a share")]
-    let share = |(state, count): &(State, u64)| format!("{} {:.0} %", state.word(), 100.0 * *count as f64 / all as f64);
+    let share =
+        |(state, count): &(State, u64)| format!("{} {:.0} %", state.as_word(), 100.0 * *count as f64 / all as f64);
     let shares: Vec<String> = states.iter().map(share).collect();
     format!("{word:<wide$} {all:>8} rows: {}", shares.join(", "))
 }

@@ -54,12 +54,12 @@ impl Before {
             return Ok(Self::default());
         }
         let reader = Reader::open(path)?;
-        let free_ns = reader.span()?.map_or(0, |(_, newest_ns)| newest_ns + PAUSE_NS);
+        let free_ns = reader.read_span()?.map_or(0, |(_, newest_ns)| newest_ns + PAUSE_NS);
         let (rows, first_ns, last_ns) = read_stored_span(&reader, origin)?;
         if rows == 0 {
             return Ok(Self { free_ns, ..Self::default() });
         }
-        let records = records(&reader, RecordSpan::between(last_ns - LOOK_BACK_NS, TimeNs::MAX, RECORDS_MAX))?;
+        let records = read_records(&reader, RecordSpan::between(last_ns - LOOK_BACK_NS, TimeNs::MAX, RECORDS_MAX))?;
         Ok(Self { origin_ns: Some(first_ns), free_ns, rows, records, state_ended: !state_open(&reader)? })
     }
 
@@ -80,7 +80,7 @@ impl Before {
 
     /// Somebody else has written this history in between and ended the state that the replay was in; this begins it
     /// again at the first new row.
-    pub(super) fn continued(&mut self, row: u64, sample: &Sample, estimates: &Estimates) -> Option<Record> {
+    pub(super) fn continue_state(&mut self, row: u64, sample: &Sample, estimates: &Estimates) -> Option<Record> {
         if !self.state_ended || row <= self.rows {
             return None;
         }
@@ -88,7 +88,7 @@ impl Before {
         if estimates.since_ns >= sample.at_ns {
             return None;
         }
-        let (state, at_ns) = (estimates.state.word().to_owned(), sample.at_ns);
+        let (state, at_ns) = (estimates.state.as_word().to_owned(), sample.at_ns);
         Some(StateChange { at_ns, state, program: String::new(), tool: String::new() }.into())
     }
 }
@@ -104,7 +104,7 @@ fn read_stored_span(reader: &Reader, origin: &str) -> Result<(u64, TimeNs, TimeN
          SELECT coalesce(sum(rows), 0), coalesce(min(start_ns), 0), coalesce(max(end_ns), 0) FROM parts"
     );
     let mut found = (0, 0, 0);
-    reader.sql(&statement, SQL_WITHIN, |_, row| {
+    reader.run_sql(&statement, SQL_WITHIN, |_, row| {
         if let [SqlValue::Integer(rows), SqlValue::Integer(first_ns), SqlValue::Integer(last_ns)] = row {
             found = (rows.unsigned_abs(), *first_ns, *last_ns);
         }
@@ -116,7 +116,7 @@ fn read_stored_span(reader: &Reader, origin: &str) -> Result<(u64, TimeNs, TimeN
 /// Is there a state that has not ended?
 fn state_open(reader: &Reader) -> Result<bool, HistoryError> {
     let mut open = false;
-    reader.sql("SELECT 1 FROM states WHERE until_ns IS NULL", SQL_WITHIN, |_, _| {
+    reader.run_sql("SELECT 1 FROM states WHERE until_ns IS NULL", SQL_WITHIN, |_, _| {
         open = true;
         ControlFlow::Break(())
     })?;
@@ -124,16 +124,16 @@ fn state_open(reader: &Reader) -> Result<bool, HistoryError> {
 }
 
 /// Everything recorded in this time, as it was handed in.
-fn records(reader: &Reader, span: RecordSpan) -> Result<Vec<Record>, HistoryError> {
+fn read_records(reader: &Reader, span: RecordSpan) -> Result<Vec<Record>, HistoryError> {
     let mut records: Vec<Record> = Vec::new();
-    records.extend(reader.events(span)?.into_iter().map(Record::from));
-    records.extend(reader.parts(span)?.into_iter().map(Record::from));
-    records.extend(reader.decisions(span)?.into_iter().map(Record::from));
-    for interval in reader.states(span)? {
+    records.extend(reader.read_events(span)?.into_iter().map(Record::from));
+    records.extend(reader.read_parts(span)?.into_iter().map(Record::from));
+    records.extend(reader.read_decisions(span)?.into_iter().map(Record::from));
+    for interval in reader.read_states(span)? {
         let (at_ns, state) = (interval.since_ns, interval.state);
         records.push(StateChange { at_ns, state, program: interval.program, tool: interval.tool }.into());
     }
-    for entry in reader.alarms(span)? {
+    for entry in reader.read_alarms(span)? {
         let crate::history::AlarmEntry { code, source, severity, raised_ns, cleared_ns, en, zh, .. } = entry;
         if let Some(at_ns) = cleared_ns {
             records.push(crate::history::AlarmClear { at_ns, code: code.clone(), source: source.clone() }.into());

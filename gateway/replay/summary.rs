@@ -29,7 +29,7 @@ pub struct ReplayCounts {
 
 impl ReplayCounts {
     /// Counts a record.
-    pub(super) fn record(&mut self, record: &Record) {
+    pub(super) fn count_record(&mut self, record: &Record) {
         match record {
             Record::Alarm(_) => self.alarms += 1,
             Record::Decision(_) => self.decisions += 1,
@@ -66,13 +66,13 @@ pub struct FileSummary {
 impl FileSummary {
     /// What was read from `file`.
     #[must_use]
-    pub fn of(file: &Path, read: &ReadRecording) -> Self {
+    pub fn from_recording(file: &Path, read: &ReadRecording) -> Self {
         let name = file.display();
         let problems = read.problems.iter().map(|problem| format!("{name}, {problem}")).collect();
-        Self { file: file.to_owned(), rows: read.recording.rows() as u64, refused: read.refused, problems }
+        Self { file: file.to_owned(), rows: read.recording.count_rows() as u64, refused: read.refused, problems }
     }
 
-    fn json(&self) -> Value {
+    fn to_json(&self) -> Value {
         let Self { file, rows, refused, problems } = self;
         json!({ "file": file.display().to_string(), "rows": rows, "refused_rows": refused, "problems": problems })
     }
@@ -90,7 +90,7 @@ pub struct StoredRows {
 }
 
 impl StoredRows {
-    pub(super) fn of(path: &Path, counts: &ReplayCounts) -> Self {
+    pub(super) fn from_counts(path: &Path, counts: &ReplayCounts) -> Self {
         Self { path: path.to_owned(), stored: counts.stored, already: counts.rows - counts.stored }
     }
 }
@@ -128,7 +128,7 @@ impl ReplaySummary {
 
     /// The whole summary.
     #[must_use]
-    pub fn json(&self) -> Value {
+    pub fn to_json(&self) -> Value {
         let seconds: Map<String, Value> = self
             .seconds_per_state
             .iter()
@@ -139,7 +139,7 @@ impl ReplaySummary {
         });
         json!({
             "schema": "replay/1",
-            "files": self.files.iter().map(FileSummary::json).collect::<Vec<_>>(),
+            "files": self.files.iter().map(FileSummary::to_json).collect::<Vec<_>>(),
             "rows": self.counts.rows,
             "refused_rows": self.count_refused(),
             "seconds_per_state": seconds,
@@ -147,9 +147,9 @@ impl ReplaySummary {
             "parts": self.parts,
             "alarms": self.counts.alarms,
             "decisions": self.counts.decisions,
-            "visibility": { "verdict": self.visibility.word(), "text": self.visibility.to_string() },
+            "visibility": { "verdict": self.visibility.as_word(), "text": self.visibility.to_string() },
             "spindle_edges": { "all": self.motion.edges, "right": self.motion.right },
-            "motion": self.motion.json(),
+            "motion": self.motion.to_json(),
             "history": kept,
             "took_s": self.took.as_secs_f64(),
             "rows_per_s": self.rows_per_s().round(),
@@ -173,7 +173,7 @@ impl fmt::Display for ReplaySummary {
             writeln!(f, "spindle on and off: {right} of {edges} edges right at the very row")?;
         }
         writeln!(f, "{}", self.visibility)?;
-        let words = self.motion.lines();
+        let words = self.motion.format_lines();
         if !words.is_empty() {
             writeln!(f, "what the machine itself calls its motion, and the states of these rows:")?;
         }

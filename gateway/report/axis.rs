@@ -1,6 +1,6 @@
 //! One axis of a chart: its range, the round values marked on it, and their labels.
 
-use super::text::fixed;
+use super::text::format_fixed;
 
 /// A range of values and the round values in it.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,7 +11,7 @@ pub(super) struct Axis {
 
 impl Axis {
     /// From the least to the greatest finite value; `None` where there is none.
-    pub(super) fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+    pub(super) fn from_values(values: impl Iterator<Item = f64>) -> Option<Self> {
         let start = (f64::INFINITY, f64::NEG_INFINITY);
         let (low, high) = values.filter(|x| x.is_finite()).fold(start, |(low, high), x| (low.min(x), high.max(x)));
         (low <= high).then(|| Self { low, high }.widen_range())
@@ -27,7 +27,7 @@ impl Axis {
     }
 
     /// With a margin so that no curve touches the frame.
-    pub(super) fn padded(self) -> Self {
+    pub(super) fn with_margin(self) -> Self {
         let room = 0.05 * (self.high - self.low);
         Self { low: self.low - room, high: self.high + room }
     }
@@ -38,12 +38,12 @@ impl Axis {
     }
 
     /// Where a value lies: 0 at the low end, 1 at the high end.
-    pub(super) fn share(&self, x: f64) -> f64 {
+    pub(super) fn to_fraction(&self, x: f64) -> f64 {
         ((x - self.low) / (self.high - self.low)).clamp(-0.5, 1.5)
     }
 
     /// The distance between round values when about `wanted` of them shall stand on the axis.
-    fn step(&self, wanted: f64) -> f64 {
+    fn choose_tick_step(&self, wanted: f64) -> f64 {
         let rough = (self.high - self.low) / wanted;
         let power = 10_f64.powf(rough.log10().floor());
         let round = [1.0, 2.0, 5.0, 10.0].into_iter().find(|round| round * power >= rough * 0.999);
@@ -51,21 +51,21 @@ impl Axis {
     }
 
     /// Round values with their labels.
-    pub(super) fn ticks(&self, wanted: f64) -> Vec<(f64, String)> {
-        let step = self.step(wanted);
+    pub(super) fn compute_ticks(&self, wanted: f64) -> Vec<(f64, String)> {
+        let step = self.choose_tick_step(wanted);
         if !step.is_finite() || step <= 0.0 {
             return Vec::new();
         }
         let first = (self.low / step).ceil();
         let values = (0..20).map(|k| (first + f64::from(k)) * step);
-        values.take_while(|x| *x <= self.high + 1e-9 * step).map(|x| (x, label(x, step))).collect()
+        values.take_while(|x| *x <= self.high + 1e-9 * step).map(|x| (x, format_tick(x, step))).collect()
     }
 }
 
 /// The label of a round value: as many decimals as the step needs.
-fn label(x: f64, step: f64) -> String {
-    let digits = -super::text::exponent(step * 1.0001);
-    if (-7..=5).contains(&digits) { fixed(x, digits.max(0)) } else { super::text::significant(x, 2) }
+fn format_tick(x: f64, step: f64) -> String {
+    let digits = -super::text::decimal_exponent(step * 1.0001);
+    if (-7..=5).contains(&digits) { format_fixed(x, digits.max(0)) } else { super::text::format_significant(x, 2) }
 }
 
 /// Seconds in a unit that reads well over this length: divisor and unit.
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn round_values_stand_on_the_axis() {
-        let labels = |low, high| Axis { low, high }.ticks(5.0).into_iter().map(|(_, l)| l).collect::<Vec<_>>();
+        let labels = |low, high| Axis { low, high }.compute_ticks(5.0).into_iter().map(|(_, l)| l).collect::<Vec<_>>();
         assert_eq!(labels(0.0, 100.0), ["0", "20", "40", "60", "80", "100"]);
         assert_eq!(labels(-0.5, 0.5), ["\u{2212}0.4", "\u{2212}0.2", "0.0", "0.2", "0.4"]);
         assert_eq!(labels(0.0, 50_000.0).last().map(String::as_str), Some("50\u{202f}000"));
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_single_value_gets_room_and_nothing_has_no_axis() {
-        assert_eq!(Axis::of([5.0].into_iter()), Some(Axis { low: 4.5, high: 5.5 }));
-        assert_eq!(Axis::of([f64::NAN].into_iter()), None);
+        assert_eq!(Axis::from_values([5.0].into_iter()), Some(Axis { low: 4.5, high: 5.5 }));
+        assert_eq!(Axis::from_values([f64::NAN].into_iter()), None);
     }
 }

@@ -2,8 +2,8 @@
 
 use super::axis::{Axis, time_unit};
 use super::data::{Data, Fit};
-use super::plot::{Curve, Plot, thinned};
-use super::text::{number, with_unit};
+use super::plot::{Curve, Plot, thin_curve};
+use super::text::{format_number, with_unit};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::Fits;
 use rules::twin::units::Unit;
@@ -16,14 +16,19 @@ const CURVES_MAX: usize = 6;
 const LISTED_MAX: usize = 24;
 
 /// The section; empty where nothing was fitted.
-pub(super) fn section(data: &Data<'_>) -> String {
+pub(super) fn render_section(data: &Data<'_>) -> String {
     let Some(fit) = &data.diagnosis.fit else { return String::new() };
-    let title = if data.added() {
-        data.say("How much better", "改进多少")
+    let title = if data.has_added_effects() {
+        data.pick_text("How much better", "改进多少")
     } else {
-        data.say("How well it fits", "吻合程度")
+        data.pick_text("How well it fits", "吻合程度")
     };
-    format!("<section><h2>{title}</h2>{}{}{}</section>\n", bars(data, fit), per_run(data), curves(data))
+    format!(
+        "<section><h2>{title}</h2>{}{}{}</section>\n",
+        render_error_bars(data, fit),
+        per_run(data),
+        render_curves(data)
+    )
 }
 
 /// One bar of a bar chart.
@@ -33,40 +38,42 @@ struct Bar<'a> {
     value: Option<f64>,
 }
 
-fn bars(data: &Data<'_>, fit: &Fits) -> String {
-    let mut rows = vec![(data.say("held-out runs", "留出的运行"), fit.before.held_out_rmse, fit.after.held_out_rmse)];
-    rows.push((data.say("fitted runs", "参与拟合的运行"), Some(fit.before.rmse), Some(fit.after.rmse)));
+fn render_error_bars(data: &Data<'_>, fit: &Fits) -> String {
+    let mut rows =
+        vec![(data.pick_text("held-out runs", "留出的运行"), fit.before.held_out_rmse, fit.after.held_out_rmse)];
+    rows.push((data.pick_text("fitted runs", "参与拟合的运行"), Some(fit.before.rmse), Some(fit.after.rmse)));
     let top = [fit.before.held_out_rmse, fit.after.held_out_rmse, Some(fit.before.rmse), Some(fit.after.rmse)];
     let top = top.into_iter().flatten().fold(fit.noise_floor, f64::max).max(f64::MIN_POSITIVE) * 1.04;
     let mut html = String::new();
     for (name, before, after) in rows {
-        let mut pair = vec![Bar { class: "before", label: data.say("before", "之前").to_owned(), value: before }];
-        if data.added() {
-            pair.push(Bar { class: "after", label: data.say("after", "之后").to_owned(), value: after });
+        let mut pair =
+            vec![Bar { class: "before", label: data.pick_text("before", "之前").to_owned(), value: before }];
+        if data.has_added_effects() {
+            pair.push(Bar { class: "after", label: data.pick_text("after", "之后").to_owned(), value: after });
         } else {
             pair[0] = Bar { class: "after", label: String::new(), value: before };
         }
         let pair: String = pair.iter().map(|bar| bar_row(data, bar, top, fit.noise_floor)).collect();
         let _ = write!(html, "<div class=\"bars\"><h4>{name}</h4>{pair}</div>");
     }
-    let floor = with_unit(&number(fit.noise_floor), &data.unit());
+    let floor = with_unit(&format_number(fit.noise_floor), &data.output_unit());
     let note = match data.tongue.0 {
         Language::En => {
             format!("Root mean square of recorded minus simulated. The dashed line is the ordinary noise, {floor}.")
         }
         Language::Zh => format!("实测减仿真的均方根。虚线为普通噪声{floor}。"),
     };
-    let before = data.say(
+    let before = data.pick_text(
         " \u{201c}Before\u{201d} is the simulation refitted to this recording, not its nominal parameters.",
         "“之前”指对此记录重新拟合后的仿真，而非名义参数。",
     );
-    let before = if data.added() { before } else { "" };
+    let before = if data.has_added_effects() { before } else { "" };
     format!("<div class=\"pairs\">{html}</div><p class=\"note\">{note}{before}</p>")
 }
 
 fn bar_row(data: &Data<'_>, bar: &Bar<'_>, top: f64, floor: f64) -> String {
     let Some(value) = bar.value else {
-        let none = data.say("no figure: too few runs to hold one out", "无数值：运行次数太少，无法留出");
+        let none = data.pick_text("no figure: too few runs to hold one out", "无数值：运行次数太少，无法留出");
         return format!("<div class=\"bar\"><span>{}</span><p class=\"note\">{none}</p></div>", bar.label);
     };
     format!(
@@ -75,7 +82,7 @@ fn bar_row(data: &Data<'_>, bar: &Bar<'_>, top: f64, floor: f64) -> String {
         bar.class,
         100.0 * value / top,
         100.0 * floor / top,
-        with_unit(&number(value), &data.unit())
+        with_unit(&format_number(value), &data.output_unit())
     )
 }
 
@@ -86,16 +93,16 @@ struct Held<'a> {
     after: f64,
 }
 
-fn held<'a>(data: &'a Data<'_>) -> Vec<Held<'a>> {
+fn collect_held_out<'a>(data: &'a Data<'_>) -> Vec<Held<'a>> {
     let errors = |unit: &'a Unit| {
-        let before = data.error(unit.rows.clone(), Fit::Before)?;
-        Some(Held { unit, before, after: data.error(unit.rows.clone(), Fit::After)? })
+        let before = data.compute_rmse(unit.rows.clone(), Fit::Before)?;
+        Some(Held { unit, before, after: data.compute_rmse(unit.rows.clone(), Fit::After)? })
     };
     data.held.iter().filter_map(errors).collect()
 }
 
 /// So many of the runs, evenly spread from the least to the greatest improvement, in the order of the recording.
-fn spread<'a>(mut held: Vec<Held<'a>>, wanted: usize) -> Vec<Held<'a>> {
+fn select_spread_runs<'a>(mut held: Vec<Held<'a>>, wanted: usize) -> Vec<Held<'a>> {
     if held.len() > wanted {
         held.sort_by(|a, b| (a.before - a.after).total_cmp(&(b.before - b.after)));
         let last = held.len() - 1;
@@ -112,14 +119,14 @@ fn spread<'a>(mut held: Vec<Held<'a>>, wanted: usize) -> Vec<Held<'a>> {
 
 /// Every held-out run as a line from its error before to its error after.
 fn per_run(data: &Data<'_>) -> String {
-    let all = held(data);
+    let all = collect_held_out(data);
     let (count, floor) = (all.len(), data.diagnosis.fit.as_ref().map_or(0.0, |fit| fit.noise_floor));
-    if count < 2 || !data.added() {
+    if count < 2 || !data.has_added_effects() {
         return String::new();
     }
-    let listed = spread(all, LISTED_MAX);
+    let listed = select_spread_runs(all, LISTED_MAX);
     let top = listed.iter().fold(floor, |top, held| top.max(held.before).max(held.after)).max(f64::MIN_POSITIVE) * 1.04;
-    let mut html: String = listed.iter().map(|held| dumbbell(data, held, top, floor)).collect();
+    let mut html: String = listed.iter().map(|held| render_dumbbell(data, held, top, floor)).collect();
     if count > LISTED_MAX {
         let note = match data.tongue.0 {
             Language::En => {
@@ -131,12 +138,12 @@ fn per_run(data: &Data<'_>) -> String {
     }
     format!(
         "<h3>{}</h3><div class=\"dumbbells\">{html}</div>{}",
-        data.say("Every held-out run", "每次留出的运行"),
-        keys(data, false)
+        data.pick_text("Every held-out run", "每次留出的运行"),
+        render_legend(data, false)
     )
 }
 
-fn dumbbell(data: &Data<'_>, held: &Held<'_>, top: f64, floor: f64) -> String {
+fn render_dumbbell(data: &Data<'_>, held: &Held<'_>, top: f64, floor: f64) -> String {
     let at = |x: f64| 100.0 * x / top;
     let (low, high) = (held.before.min(held.after), held.before.max(held.after));
     format!(
@@ -147,19 +154,21 @@ fn dumbbell(data: &Data<'_>, held: &Held<'_>, top: f64, floor: f64) -> String {
         at(high - low),
         at(held.before),
         at(held.after),
-        number(held.before),
-        with_unit(&number(held.after), &data.unit())
+        format_number(held.before),
+        with_unit(&format_number(held.after), &data.output_unit())
     )
 }
 
-fn keys(data: &Data<'_>, recorded: bool) -> String {
+fn render_legend(data: &Data<'_>, recorded: bool) -> String {
     let mut html = String::new();
     if recorded {
-        let _ = write!(html, "<span><i class=\"key rec\"></i>{}</span>", data.say("recorded", "实测"));
+        let _ = write!(html, "<span><i class=\"key rec\"></i>{}</span>", data.pick_text("recorded", "实测"));
     }
-    let (before, after) = match data.added() {
-        true => (data.say("simulated before", "之前的仿真"), Some(data.say("simulated after", "之后的仿真"))),
-        false => (data.say("simulated", "仿真"), None),
+    let (before, after) = match data.has_added_effects() {
+        true => {
+            (data.pick_text("simulated before", "之前的仿真"), Some(data.pick_text("simulated after", "之后的仿真")))
+        }
+        false => (data.pick_text("simulated", "仿真"), None),
     };
     let class = if after.is_some() { "before" } else { "after" };
     let _ = write!(html, "<span><i class=\"key {class}\"></i>{before}</span>");
@@ -170,10 +179,10 @@ fn keys(data: &Data<'_>, recorded: bool) -> String {
 }
 
 /// Recorded, before and after over time, one chart per held-out run, chosen by a tab.
-fn curves(data: &Data<'_>) -> String {
-    let all = held(data);
+fn render_curves(data: &Data<'_>) -> String {
+    let all = collect_held_out(data);
     let count = all.len();
-    let drawn = spread(all, CURVES_MAX);
+    let drawn = select_spread_runs(all, CURVES_MAX);
     if drawn.is_empty() {
         return String::new();
     }
@@ -182,10 +191,12 @@ fn curves(data: &Data<'_>) -> String {
         gain(*a).total_cmp(&gain(*b)).then(b.cmp(a))
     });
     let mut html =
-        format!("<h3>{}</h3>", data.say("Recorded and simulated, on held-out runs", "留出运行上的实测与仿真"));
+        format!("<h3>{}</h3>", data.pick_text("Recorded and simulated, on held-out runs", "留出运行上的实测与仿真"));
     if count > drawn.len() {
-        let note = data
-            .say("The least improved, the most improved, and runs between.", "包括改进最小、最大以及介于其间的运行。");
+        let note = data.pick_text(
+            "The least improved, the most improved, and runs between.",
+            "包括改进最小、最大以及介于其间的运行。",
+        );
         let _ = write!(html, "<p class=\"note\">{note}</p>");
     }
     html.push_str("<div class=\"tabs\">");
@@ -202,23 +213,23 @@ fn curves(data: &Data<'_>) -> String {
             html,
             "<div class=\"tab\"><h4>{}: {}</h4>{}</div>",
             data.unit_name(&held.unit.name),
-            figures(data, held),
-            charts(data, held)
+            format_errors(data, held),
+            render_run_charts(data, held)
         );
     }
-    format!("{html}</div>{}", keys(data, true))
+    format!("{html}</div>{}", render_legend(data, true))
 }
 
-fn figures(data: &Data<'_>, held: &Held<'_>) -> String {
-    let after = with_unit(&number(held.after), &data.unit());
-    match data.added() {
-        true => format!("{} {} → {after}", data.say("error", "误差"), number(held.before)),
-        false => format!("{} {after}", data.say("error", "误差")),
+fn format_errors(data: &Data<'_>, held: &Held<'_>) -> String {
+    let after = with_unit(&format_number(held.after), &data.output_unit());
+    match data.has_added_effects() {
+        true => format!("{} {} → {after}", data.pick_text("error", "误差"), format_number(held.before)),
+        false => format!("{} {after}", data.pick_text("error", "误差")),
     }
 }
 
 /// The curves, and below them what remains of them.
-fn charts(data: &Data<'_>, held: &Held<'_>) -> String {
+fn render_run_charts(data: &Data<'_>, held: &Held<'_>) -> String {
     let rows = held.unit.rows.clone();
     let start = data.time_s(rows.start);
     let (divisor, time) = time_unit(data.length_s(&rows));
@@ -226,42 +237,47 @@ fn charts(data: &Data<'_>, held: &Held<'_>) -> String {
     let drawn = |class: &str, label: &str, y: &dyn Fn(usize) -> Option<f64>| Curve {
         class: class.to_owned(),
         label: label.to_owned(),
-        pieces: thinned(rows.clone(), x, y),
+        pieces: thin_curve(rows.clone(), x, y),
     };
-    let (before, after) = (data.say("before", "之前"), data.say("after", "之后"));
-    let (class, before) = if data.added() { ("before", before) } else { ("after", data.say("simulated", "仿真")) };
+    let (before, after) = (data.pick_text("before", "之前"), data.pick_text("after", "之后"));
+    let (class, before) =
+        if data.has_added_effects() { ("before", before) } else { ("after", data.pick_text("simulated", "仿真")) };
     let mut values = vec![
-        drawn("rec", data.say("recorded", "实测"), &|row| data.recorded(row)),
-        drawn(class, before, &|row| data.simulated(row, Fit::Before)),
+        drawn("rec", data.pick_text("recorded", "实测"), &|row| data.recorded_value(row)),
+        drawn(class, before, &|row| data.simulated_value(row, Fit::Before)),
     ];
     let mut rest = vec![drawn(class, before, &|row| data.residual(row, Fit::Before))];
-    if data.added() {
-        values.push(drawn("after", after, &|row| data.simulated(row, Fit::After)));
+    if data.has_added_effects() {
+        values.push(drawn("after", after, &|row| data.simulated_value(row, Fit::After)));
         rest.push(drawn("after", after, &|row| data.residual(row, Fit::After)));
     }
-    let Some(across) = Axis::of([x(rows.start), x(rows.end - 1)].into_iter()) else { return String::new() };
-    let output = data.tongue.quantity(&data.diagnosis.output);
-    let difference = format!("{} ({})", data.say("recorded minus simulated", "实测减仿真"), data.unit());
+    let Some(across) = Axis::from_values([x(rows.start), x(rows.end - 1)].into_iter()) else { return String::new() };
+    let output = data.tongue.name_column_with_unit(&data.diagnosis.output);
+    let difference = format!("{} ({})", data.pick_text("recorded minus simulated", "实测减仿真"), data.output_unit());
     let plot = |curves: Vec<Curve>, y: Option<Axis>, y_title: String, low: bool| {
-        let y = y.map(Axis::padded)?;
-        let x_title = format!("{} ({time})", data.say("time", "时间"));
-        let (x, x_unit, y_unit) = (across.clone(), time.to_owned(), data.unit());
-        Some(Plot { x, y, x_title, y_title, x_unit, y_unit, curves, marks: Vec::new(), bands: Vec::new(), low }.html())
+        let y = y.map(Axis::with_margin)?;
+        let x_title = format!("{} ({time})", data.pick_text("time", "时间"));
+        let (x, x_unit, y_unit) = (across.clone(), time.to_owned(), data.output_unit());
+        Some(
+            Plot { x, y, x_title, y_title, x_unit, y_unit, curves, marks: Vec::new(), bands: Vec::new(), low }
+                .render_html(),
+        )
     };
-    let upper = plot(values, span(data, &rows), output, false);
+    let upper = plot(values, find_value_range(data, &rows), output, false);
     let lower = plot(rest, rest_span(data, &rows), difference, true);
     upper.into_iter().chain(lower).collect()
 }
 
 /// Range of recorded and simulated values. Spikes that took no part in the comparison may leave the frame.
-fn span(data: &Data<'_>, rows: &Range<usize>) -> Option<Axis> {
-    let recorded = |row: usize| data.compared(row).then(|| data.recorded(row)).flatten();
-    let all = |row: usize| [recorded(row), data.simulated(row, Fit::Before), data.simulated(row, Fit::After)];
-    Axis::of(rows.clone().flat_map(all).flatten())
+fn find_value_range(data: &Data<'_>, rows: &Range<usize>) -> Option<Axis> {
+    let recorded = |row: usize| data.was_compared(row).then(|| data.recorded_value(row)).flatten();
+    let all =
+        |row: usize| [recorded(row), data.simulated_value(row, Fit::Before), data.simulated_value(row, Fit::After)];
+    Axis::from_values(rows.clone().flat_map(all).flatten())
 }
 
 /// Range of what remains.
 fn rest_span(data: &Data<'_>, rows: &Range<usize>) -> Option<Axis> {
     let all = |row: usize| [data.residual(row, Fit::Before), data.residual(row, Fit::After)];
-    Axis::of(rows.clone().flat_map(all).flatten()).map(Axis::with_zero)
+    Axis::from_values(rows.clone().flat_map(all).flatten()).map(Axis::with_zero)
 }

@@ -1,8 +1,8 @@
 //! Columns cut into bins, and how much of a quantity's variation a column tells.
 
 use super::data::Data;
-use super::text::{escape, number};
-use adapters::recording::{Cells, Numbers, Words, derived};
+use super::text::{escape_html, format_number};
+use adapters::recording::{Cells, Numbers, Words, derive_quantity};
 use rules::twin::locate::Condition;
 use std::borrow::Cow;
 
@@ -61,10 +61,10 @@ impl Binned<'_> {
     }
 
     /// The value in a row of a quantity.
-    pub(super) fn value(&self, data: &Data<'_>, row: usize) -> Option<f64> {
+    pub(super) fn value_of_row(&self, data: &Data<'_>, row: usize) -> Option<f64> {
         match &self.values {
             ColumnSource::Numbers(numbers) => numbers.get(row),
-            ColumnSource::Words(words) => words.code(row).map(f64::from),
+            ColumnSource::Words(words) => words.find_code(row).map(f64::from),
             ColumnSource::InRun => {
                 let run = data.runs.get(data.run_of(row))?;
                 Some(data.time_s(row) - data.time_s(run.rows.start))
@@ -73,11 +73,11 @@ impl Binned<'_> {
     }
 
     /// The bin of a row.
-    pub(super) fn bin(&self, data: &Data<'_>, row: usize) -> Option<usize> {
+    pub(super) fn bin_of_row(&self, data: &Data<'_>, row: usize) -> Option<usize> {
         if let (ColumnSource::Words(words), Cut::Words(_)) = (&self.values, &self.cut) {
-            return words.code(row).and_then(|code| usize::try_from(code).ok());
+            return words.find_code(row).and_then(|code| usize::try_from(code).ok());
         }
-        let x = self.value(data, row)?;
+        let x = self.value_of_row(data, row)?;
         Some(match &self.cut {
             Cut::Levels(levels) => levels.partition_point(|level| *level < x).min(levels.len() - 1),
             Cut::Edges(edges) => edges[1..edges.len() - 1].partition_point(|edge| *edge <= x),
@@ -86,15 +86,15 @@ impl Binned<'_> {
     }
 
     /// Labels along the axis: where, as a share of its length, and what.
-    pub(super) fn labels(&self) -> Vec<(f64, String)> {
+    pub(super) fn format_axis_labels(&self) -> Vec<(f64, String)> {
         let count = self.len() as f64;
         let middle = |index: usize| (index as f64 + 0.5) / count;
         match &self.cut {
-            Cut::Levels(levels) => levels.iter().enumerate().map(|(i, x)| (middle(i), number(*x))).collect(),
-            Cut::Words(words) => words.iter().enumerate().map(|(i, word)| (middle(i), escape(word))).collect(),
+            Cut::Levels(levels) => levels.iter().enumerate().map(|(i, x)| (middle(i), format_number(*x))).collect(),
+            Cut::Words(words) => words.iter().enumerate().map(|(i, word)| (middle(i), escape_html(word))).collect(),
             Cut::Edges(edges) => {
                 let axis = super::axis::Axis { low: edges[0], high: edges[edges.len() - 1] };
-                axis.ticks(4.0).into_iter().map(|(x, text)| (axis.share(x), text)).collect()
+                axis.compute_ticks(4.0).into_iter().map(|(x, text)| (axis.to_fraction(x), text)).collect()
             }
         }
     }
@@ -102,21 +102,21 @@ impl Binned<'_> {
     /// A bin in words, escaped.
     pub(super) fn bin_text(&self, index: usize) -> String {
         match &self.cut {
-            Cut::Levels(levels) => number(levels[index]),
-            Cut::Edges(edges) => format!("{} … {}", number(edges[index]), number(edges[index + 1])),
-            Cut::Words(words) => escape(&words[index]),
+            Cut::Levels(levels) => format_number(levels[index]),
+            Cut::Edges(edges) => format!("{} … {}", format_number(edges[index]), format_number(edges[index + 1])),
+            Cut::Words(words) => escape_html(&words[index]),
         }
     }
 }
 
 /// Rows to look at when choosing.
-pub(super) fn sample(data: &Data<'_>) -> Vec<usize> {
-    let step = data.rows().div_ceil(SAMPLE_MAX).max(1);
-    (0..data.rows()).step_by(step).filter(|row| data.compared(*row)).collect()
+pub(super) fn sample_rows(data: &Data<'_>) -> Vec<usize> {
+    let step = data.count_rows().div_ceil(SAMPLE_MAX).max(1);
+    (0..data.count_rows()).step_by(step).filter(|row| data.was_compared(*row)).collect()
 }
 
 /// Every column that may be an axis, cut into about `bins` bins.
-pub(super) fn candidates<'a>(data: &Data<'a>, rows: &[usize], bins: usize) -> Vec<Binned<'a>> {
+pub(super) fn list_axis_columns<'a>(data: &Data<'a>, rows: &[usize], bins: usize) -> Vec<Binned<'a>> {
     let recording = data.input.recording;
     let mut sources: Vec<(String, ColumnSource<'a>)> = Vec::new();
     for column in recording.columns().iter().filter(|column| may_be_axis(data, &column.name)) {
@@ -130,8 +130,8 @@ pub(super) fn candidates<'a>(data: &Data<'a>, rows: &[usize], bins: usize) -> Ve
             Cells::Words(_) => {}
         }
     }
-    for name in DERIVED.into_iter().filter(|name| recording.numbers(name).is_none()) {
-        if let Some(numbers) = derived(recording, name) {
+    for name in DERIVED.into_iter().filter(|name| recording.find_numbers(name).is_none()) {
+        if let Some(numbers) = derive_quantity(recording, name) {
             sources.push((name.to_owned(), ColumnSource::Numbers(Cow::Owned(numbers))));
         }
     }
@@ -142,11 +142,11 @@ pub(super) fn candidates<'a>(data: &Data<'a>, rows: &[usize], bins: usize) -> Ve
 fn may_be_axis(data: &Data<'_>, name: &str) -> bool {
     let declared = data.diagnosis.model.roles.values().any(|column| column == name);
     name != data.diagnosis.output
-        && (declared || describes(data, name) || !MEASURED.iter().any(|word| name.contains(word)))
+        && (declared || is_region_column(data, name) || !MEASURED.iter().any(|word| name.contains(word)))
 }
 
 /// Is a region described by this column?
-pub(super) fn describes(data: &Data<'_>, name: &str) -> bool {
+pub(super) fn is_region_column(data: &Data<'_>, name: &str) -> bool {
     let by = |condition: &Condition| match condition {
         Condition::Range { column, .. } | Condition::Equals { column, .. } => column == name,
     };
@@ -166,7 +166,7 @@ fn bin_column<'a>(
         return fits.then_some(Binned { name, values, cut: Cut::Words(words) });
     }
     let mut column = Binned { name, values, cut: Cut::Levels(Vec::new()) };
-    let mut known: Vec<f64> = rows.iter().filter_map(|row| column.value(data, *row)).collect();
+    let mut known: Vec<f64> = rows.iter().filter_map(|row| column.value_of_row(data, *row)).collect();
     known.sort_by(f64::total_cmp);
     let trim = known.len() / 100;
     let (low, high) = (*known.get(trim)?, *known.get(known.len().checked_sub(1 + trim)?)?);
@@ -213,7 +213,7 @@ impl BinCell {
 }
 
 /// Share of the variance that lies between the cells, less what chance alone would put there.
-pub(super) fn told(cells: &[BinCell]) -> f64 {
+pub(super) fn compute_explained_share(cells: &[BinCell]) -> f64 {
     let rows: f64 = cells.iter().map(|cell| f64::from(cell.rows)).sum();
     let sum: f64 = cells.iter().map(|cell| cell.sum).sum();
     let squares: f64 = cells.iter().map(|cell| cell.squares).sum();
@@ -240,8 +240,8 @@ mod tests {
 
     #[test]
     fn a_column_tells_everything_or_nothing() {
-        let apart = told(&[cell(&[1.0, 1.01, 0.99]), cell(&[-1.0, -1.01, -0.99])]);
-        let alike = told(&[cell(&[1.0, -1.0, 0.5]), cell(&[1.0, -1.0, 0.5])]);
+        let apart = compute_explained_share(&[cell(&[1.0, 1.01, 0.99]), cell(&[-1.0, -1.01, -0.99])]);
+        let alike = compute_explained_share(&[cell(&[1.0, -1.0, 0.5]), cell(&[1.0, -1.0, 0.5])]);
         assert!(apart > 0.999 && alike < 0.05, "{apart} {alike}");
     }
 }

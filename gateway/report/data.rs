@@ -1,7 +1,7 @@
 //! The rows behind the page: runs, what was held out, residuals, and a clock without pauses.
 
 use super::PageInput;
-use super::text::{Tongue, escape};
+use super::text::{Tongue, escape_html};
 use adapters::recording::{Numbers, Run};
 use rules::twin::diagnosis::Diagnosis;
 use rules::twin::units::{Unit, units_of};
@@ -32,24 +32,24 @@ pub(super) struct Data<'a> {
 impl<'a> Data<'a> {
     pub(super) fn new(input: &'a PageInput<'a>) -> Self {
         let diagnosis = input.diagnosis;
-        let runs = input.recording.runs();
+        let runs = input.recording.list_runs();
         let rows: Vec<Range<usize>> = runs.iter().map(|run| run.rows.clone()).collect();
         let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
         let held = diagnosis.fit.as_ref().map_or(&[][..], |fit| &fit.held_out_runs);
         let held = units_of(&rows, &names).into_iter().filter(|unit| held.contains(&unit.name)).collect();
-        let starts_s = starts(&input.recording.time_s, &rows);
-        let recorded = input.recording.numbers(&diagnosis.output);
+        let starts_s = compute_run_starts(&input.recording.time_s, &rows);
+        let recorded = input.recording.find_numbers(&diagnosis.output);
         Self { input, diagnosis, tongue: Tongue(input.language), runs, held, starts_s, recorded }
     }
 
     /// The text in the page's language.
-    pub(super) fn say<'t>(&self, en: &'t str, zh: &'t str) -> &'t str {
-        self.tongue.say(en, zh)
+    pub(super) fn pick_text<'t>(&self, en: &'t str, zh: &'t str) -> &'t str {
+        self.tongue.pick_text(en, zh)
     }
 
     /// How many rows the recording has.
-    pub(super) fn rows(&self) -> usize {
-        self.input.recording.rows()
+    pub(super) fn count_rows(&self) -> usize {
+        self.input.recording.count_rows()
     }
 
     /// Seconds as recorded.
@@ -58,29 +58,32 @@ impl<'a> Data<'a> {
     }
 
     /// The recorded output.
-    pub(super) fn recorded(&self, row: usize) -> Option<f64> {
+    pub(super) fn recorded_value(&self, row: usize) -> Option<f64> {
         self.recorded?.get(row)
     }
 
     /// The simulated output.
-    pub(super) fn simulated(&self, row: usize, fit: Fit) -> Option<f64> {
+    pub(super) fn simulated_value(&self, row: usize, fit: Fit) -> Option<f64> {
         let rows = &self.diagnosis.rows;
         let values = if fit == Fit::Before { &rows.simulated_before } else { &rows.simulated_after };
         values.get(row).copied().flatten()
     }
 
     /// Did the row take part in the comparison?
-    pub(super) fn compared(&self, row: usize) -> bool {
+    pub(super) fn was_compared(&self, row: usize) -> bool {
         self.diagnosis.rows.compared.get(row).copied().unwrap_or(false)
     }
 
     /// Recorded minus simulated, where the row took part.
     pub(super) fn residual(&self, row: usize, fit: Fit) -> Option<f64> {
-        self.recorded(row).zip(self.simulated(row, fit)).filter(|_| self.compared(row)).map(|(a, b)| a - b)
+        self.recorded_value(row)
+            .zip(self.simulated_value(row, fit))
+            .filter(|_| self.was_compared(row))
+            .map(|(a, b)| a - b)
     }
 
     /// Root mean square error over rows; `None` where none took part.
-    pub(super) fn error(&self, rows: Range<usize>, fit: Fit) -> Option<f64> {
+    pub(super) fn compute_rmse(&self, rows: Range<usize>, fit: Fit) -> Option<f64> {
         let (sum, count) = rows
             .filter_map(|row| self.residual(row, fit))
             .fold((0.0, 0_u32), |(sum, count), x| (sum + x * x, count.saturating_add(1)));
@@ -88,7 +91,7 @@ impl<'a> Data<'a> {
     }
 
     /// Was something added to the model?
-    pub(super) fn added(&self) -> bool {
+    pub(super) fn has_added_effects(&self) -> bool {
         !self.diagnosis.rows.effects.is_empty()
     }
 
@@ -110,16 +113,16 @@ impl<'a> Data<'a> {
     }
 
     /// A moment as the recording knows it: by the clock where it knows the day, else run and seconds.
-    pub(super) fn moment(&self, run: &str, time_s: f64) -> String {
-        let at = self.clock(time_s).unwrap_or_else(|| {
-            let seconds = super::text::with_unit(&super::text::fixed(time_s, self.decimals()), "s");
-            format!("{}{seconds}", self.say("at ", ""))
+    pub(super) fn format_moment(&self, run: &str, time_s: f64) -> String {
+        let at = self.format_clock_time(time_s).unwrap_or_else(|| {
+            let seconds = super::text::with_unit(&super::text::format_fixed(time_s, self.time_decimals()), "s");
+            format!("{}{seconds}", self.pick_text("at ", ""))
         });
         format!("{}, {at}", self.unit_name(run))
     }
 
     /// The clock of this computer's zone; `None` where the recording does not know the day.
-    pub(super) fn clock(&self, time_s: f64) -> Option<String> {
+    pub(super) fn format_clock_time(&self, time_s: f64) -> Option<String> {
         let start_ns = self.input.recording.start_ns?;
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         let at_ns = i128::from(start_ns) + (time_s * 1e9) as i128;
@@ -128,11 +131,11 @@ impl<'a> Data<'a> {
     }
 
     /// Decimals that the steps of time need: none at 1 Hz, two at 200 Hz.
-    pub(super) fn decimals(&self) -> i32 {
+    pub(super) fn time_decimals(&self) -> i32 {
         let times = &self.input.recording.time_s;
         let rows = times.len().max(2);
         let step_s = (times.last().unwrap_or(&0.0) - times.first().unwrap_or(&0.0)) / (rows - 1) as f64;
-        if step_s > 0.0 { (-super::text::exponent(step_s)).clamp(0, 4) } else { 0 }
+        if step_s > 0.0 { (-super::text::decimal_exponent(step_s)).clamp(0, 4) } else { 0 }
     }
 
     /// Length of a stretch in seconds.
@@ -141,16 +144,16 @@ impl<'a> Data<'a> {
     }
 
     /// The unit of the output, escaped.
-    pub(super) fn unit(&self) -> String {
+    pub(super) fn output_unit(&self) -> String {
         super::text::unit_text(&self.diagnosis.unit)
     }
 
     /// The name of a run or stretch in words, escaped.
     pub(super) fn unit_name(&self, name: &str) -> String {
         let Some((run, part)) = name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) else {
-            return format!("{} {}", self.say("run", "运行"), escape(name));
+            return format!("{} {}", self.pick_text("run", "运行"), escape_html(name));
         };
-        let (run, part) = (escape(run), escape(part));
+        let (run, part) = (escape_html(run), escape_html(part));
         match (self.runs.len(), self.tongue.0) {
             (1, rules::physics::explain::Language::En) => format!("stretch {part}"),
             (1, rules::physics::explain::Language::Zh) => format!("第{part}段"),
@@ -160,7 +163,7 @@ impl<'a> Data<'a> {
     }
 }
 
-fn starts(time_s: &[f64], runs: &[Range<usize>]) -> Vec<f64> {
+fn compute_run_starts(time_s: &[f64], runs: &[Range<usize>]) -> Vec<f64> {
     let mut at = 0.0;
     let mut starts = Vec::with_capacity(runs.len());
     for run in runs {
@@ -178,6 +181,6 @@ mod tests {
     #[test]
     fn the_clock_leaves_pauses_out_and_goes_on_where_time_restarts() {
         let time_s = [0.0, 1.0, 2.0, 0.0, 1.0, 500.0];
-        assert_eq!(starts(&time_s, &[0..3, 3..5, 5..6]), vec![0.0, 2.0 + 2.0 / 3.0, 2.0 + 2.0 / 3.0 + 1.5]);
+        assert_eq!(compute_run_starts(&time_s, &[0..3, 3..5, 5..6]), vec![0.0, 2.0 + 2.0 / 3.0, 2.0 + 2.0 / 3.0 + 1.5]);
     }
 }

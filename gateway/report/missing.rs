@@ -1,9 +1,9 @@
 //! What is missing: each effect with its law, its parameters and how sure they are.
 
 use super::data::Data;
-use super::place::capital;
-use super::table::{ColumnHead, table};
-use super::text::{escape, exponent, fixed, law, number, unit_text, with_unit};
+use super::place::capitalise_first;
+use super::table::{ColumnHead, render_table};
+use super::text::{decimal_exponent, escape_html, format_fixed, format_law, format_number, unit_text, with_unit};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::{Missing, ParameterEstimate};
 use std::fmt::Write as _;
@@ -15,67 +15,67 @@ const HIDDEN_SHARE: f64 = 0.95;
 const NO_GAIN: f64 = 0.995;
 
 /// The section; empty where nothing is missing.
-pub(super) fn section(data: &Data<'_>) -> String {
+pub(super) fn render_section(data: &Data<'_>) -> String {
     let missing = &data.diagnosis.missing;
     if missing.is_empty() {
         return String::new();
     }
     let title = if missing.len() == 1 {
-        data.say("What is missing", "缺少什么")
+        data.pick_text("What is missing", "缺少什么")
     } else {
-        data.say("What is missing, most important first", "缺少什么（按重要性排列）")
+        data.pick_text("What is missing, most important first", "缺少什么（按重要性排列）")
     };
-    let cards: String = missing.iter().map(|missing| card(data, missing)).collect();
+    let cards: String = missing.iter().map(|missing| render_card(data, missing)).collect();
     format!("<section><h2>{title}</h2>{cards}</section>\n")
 }
 
-fn card(data: &Data<'_>, missing: &Missing) -> String {
+fn render_card(data: &Data<'_>, missing: &Missing) -> String {
     let lane = data.diagnosis.mismatch.iter().position(|region| region.effect == missing.effect);
     let colour =
         lane.filter(|lane| *lane < super::strip::REGIONS_MAX).map_or("none".to_owned(), |lane| format!("e{lane}"));
     let mut html = format!(
         "<article class=\"effect {colour}\"><h3>{} <code>{}</code></h3><p>{}{}</p><div class=\"law\">{}</div>",
-        capital(&data.tongue.effect(&missing.effect)),
-        escape(&missing.effect),
-        data.tongue.catalogue(&missing.statement).trim_end_matches(['.', '。']),
-        data.say(".", "。"),
-        law(&missing.equation)
+        capitalise_first(&data.tongue.name_effect(&missing.effect)),
+        escape_html(&missing.effect),
+        data.tongue.translate_catalogue(&missing.statement).trim_end_matches(['.', '。']),
+        data.pick_text(".", "。"),
+        format_law(&missing.equation)
     );
-    html.push_str(&parameters(data, missing));
-    html.push_str(&super::response::chart(data, &missing.effect));
+    html.push_str(&render_parameters(data, missing));
+    html.push_str(&super::response::render_chart(data, &missing.effect));
     let _ = write!(
         html,
         "<dl class=\"facts\">{}{}{}</dl></article>",
-        sure(data, missing),
-        gain(data, missing),
+        render_certainty(data, missing),
+        render_gain(data, missing),
         render_absorption(data, missing)
     );
     html
 }
 
-fn parameters(data: &Data<'_>, missing: &Missing) -> String {
+fn render_parameters(data: &Data<'_>, missing: &Missing) -> String {
     if missing.parameters.is_empty() {
-        let none = data.say("The effect has no free parameter.", "该效应没有自由参数。");
+        let none = data.pick_text("The effect has no free parameter.", "该效应没有自由参数。");
         return format!("<p class=\"note\">{none}</p>");
     }
-    let rows: String = missing.parameters.iter().map(|e| parameter(data, &missing.effect, e)).collect();
+    let rows: String = missing.parameters.iter().map(|e| render_parameter(data, &missing.effect, e)).collect();
     let heads = [
-        ColumnHead::Words(data.say("parameter", "参数")),
-        ColumnHead::Number(data.say("value", "值")),
-        ColumnHead::Number(data.say("95\u{202f}% interval", "95\u{202f}%区间")),
-        ColumnHead::Words(data.say("unit", "单位")),
+        ColumnHead::Words(data.pick_text("parameter", "参数")),
+        ColumnHead::Number(data.pick_text("value", "值")),
+        ColumnHead::Number(data.pick_text("95\u{202f}% interval", "95\u{202f}%区间")),
+        ColumnHead::Words(data.pick_text("unit", "单位")),
     ];
-    table(&heads, &rows)
+    render_table(&heads, &rows)
 }
 
-fn parameter(data: &Data<'_>, effect: &str, e: &ParameterEstimate) -> String {
+fn render_parameter(data: &Data<'_>, effect: &str, e: &ParameterEstimate) -> String {
     let [value, low, high] = format_estimate(e);
-    let meaning = data.tongue.parameter(effect, &e.name);
+    let meaning = data.tongue.describe_parameter(effect, &e.name);
     let unit = unit_text(&e.unit);
     let unit = if unit.is_empty() { "\u{2013}".to_owned() } else { unit };
     let interval = match e.low.is_finite() && e.high.is_finite() {
         true => format!("{low} … {high}"),
-        false => data.say("not determined by this recording", "此记录无法确定").to_owned(),
+        false => data.pick_text("not determined by this recording", "此记录无法确定").to_owned(),
     };
     let (class, about) = match meaning.is_empty() {
         true => ("", String::new()),
@@ -83,7 +83,7 @@ fn parameter(data: &Data<'_>, effect: &str, e: &ParameterEstimate) -> String {
     };
     format!(
         "<tr{class}><td><code>{}</code></td><td class=\"n\">{value}</td><td class=\"n\">{interval}</td><td>{unit}</td></tr>{about}",
-        escape(&e.name)
+        escape_html(&e.name)
     )
 }
 
@@ -92,42 +92,42 @@ fn format_estimate(e: &ParameterEstimate) -> [String; 3] {
     let numbers = [e.value, e.low, e.high];
     let width = 0.5 * (e.high - e.low);
     let greatest = numbers.iter().fold(0.0_f64, |top, x| top.max(x.abs()));
-    if !width.is_finite() || width <= 0.0 || !(-3..6).contains(&exponent(greatest)) {
-        return numbers.map(number);
+    if !width.is_finite() || width <= 0.0 || !(-3..6).contains(&decimal_exponent(greatest)) {
+        return numbers.map(format_number);
     }
-    let decimals = (1 - exponent(width)).clamp(0, 6);
-    numbers.map(|x| fixed(x, decimals))
+    let decimals = (1 - decimal_exponent(width)).clamp(0, 6);
+    numbers.map(|x| format_fixed(x, decimals))
 }
 
-fn fact(name: &str, value: &str) -> String {
+fn render_fact(name: &str, value: &str) -> String {
     format!("<div><dt>{name}</dt><dd>{value}</dd></div>")
 }
 
-fn sure(data: &Data<'_>, missing: &Missing) -> String {
-    let searches = fixed((1.0 / missing.p_value.max(1e-6)).max(1.0).floor(), 0);
+fn render_certainty(data: &Data<'_>, missing: &Missing) -> String {
+    let searches = format_fixed((1.0 / missing.p_value.max(1e-6)).max(1.0).floor(), 0);
     let strength = match missing.delta_ic {
-        gain if gain >= 20.0 => data.say("Beyond reasonable doubt", "毋庸置疑"),
-        gain if gain >= 6.0 => data.say("Well supported", "证据充分"),
-        _ => data.say("Weakly supported", "证据较弱"),
+        gain if gain >= 20.0 => data.pick_text("Beyond reasonable doubt", "毋庸置疑"),
+        gain if gain >= 6.0 => data.pick_text("Well supported", "证据充分"),
+        _ => data.pick_text("Weakly supported", "证据较弱"),
     };
     let text = match data.tongue.0 {
         Language::En => format!(
             "{strength}: without it the fit loses {} units of information (6 are decisive), and noise alone would do as well in at most 1 of {searches} searches (p\u{a0}≤\u{a0}{}).",
-            number(missing.delta_ic),
+            format_number(missing.delta_ic),
             chance_text(missing.p_value)
         ),
         Language::Zh => format!(
             "{strength}：去掉它，拟合损失{}个信息单位（6个即具决定性）；仅凭噪声达到同样效果的可能至多为{searches}次搜索中的1次（p\u{a0}≤\u{a0}{}）。",
-            number(missing.delta_ic),
+            format_number(missing.delta_ic),
             chance_text(missing.p_value)
         ),
     };
-    fact(data.say("How sure", "有多确定"), &text)
+    render_fact(data.pick_text("How sure", "有多确定"), &text)
 }
 
 /// A probability with two significant digits at most.
 fn chance_text(p: f64) -> String {
-    let text = super::text::significant(p, 2);
+    let text = super::text::format_significant(p, 2);
     if text.contains('.') && !text.contains('<') {
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
     } else {
@@ -135,38 +135,38 @@ fn chance_text(p: f64) -> String {
     }
 }
 
-fn gain(data: &Data<'_>, missing: &Missing) -> String {
-    let unit = data.unit();
+fn render_gain(data: &Data<'_>, missing: &Missing) -> String {
+    let unit = data.output_unit();
     let text = match (missing.held_out_rmse_before, missing.held_out_rmse_after, data.tongue.0) {
         (Some(before), Some(after), _) if after > NO_GAIN * before => format!(
             "{} ({}).",
-            data.say("On held-out runs it makes no difference to the error", "在留出的运行上，它不改变误差"),
-            with_unit(&number(after), &unit)
+            data.pick_text("On held-out runs it makes no difference to the error", "在留出的运行上，它不改变误差"),
+            with_unit(&format_number(after), &unit)
         ),
         (Some(before), Some(after), Language::En) => format!(
             "On held-out runs the error is {} without this effect and {} with it.",
-            with_unit(&number(before), &unit),
-            with_unit(&number(after), &unit)
+            with_unit(&format_number(before), &unit),
+            with_unit(&format_number(after), &unit)
         ),
         (Some(before), Some(after), Language::Zh) => format!(
             "在留出的运行上，不含该效应时误差为{}，包含后为{}。",
-            with_unit(&number(before), &unit),
-            with_unit(&number(after), &unit)
+            with_unit(&format_number(before), &unit),
+            with_unit(&format_number(after), &unit)
         ),
         _ => data
-            .say(
+            .pick_text(
                 "Too few runs to hold one out, so there is no figure on fresh data.",
                 "运行次数太少，无法留出，因此没有新数据上的数值。",
             )
             .to_owned(),
     };
-    fact(data.say("What it brings", "带来的改进"), &text)
+    render_fact(data.pick_text("What it brings", "带来的改进"), &text)
 }
 
 fn render_absorption(data: &Data<'_>, missing: &Missing) -> String {
     let share = missing.absorbed_share.clamp(0.0, 1.0);
-    let [swallowed, left] = [100.0 * share, 100.0 * (1.0 - share)].map(percent);
-    let caution = data.say(
+    let [swallowed, left] = [100.0 * share, 100.0 * (1.0 - share)].map(format_percent);
+    let caution = data.pick_text(
         " How large the effect is as a whole therefore rests on very little; the gain in fit does not.",
         "因此其总体大小的依据很弱，但拟合的改进不受影响。",
     );
@@ -180,17 +180,17 @@ fn render_absorption(data: &Data<'_>, missing: &Missing) -> String {
         }
     };
     let bar = format!("<span class=\"share\"><i style=\"width:{:.1}%\"></i></span>", 100.0 * share);
-    fact(data.say("How hidden it was", "隐藏程度"), &(bar + text.as_str()))
+    render_fact(data.pick_text("How hidden it was", "隐藏程度"), &(bar + text.as_str()))
 }
 
 /// A share in percent; what is less than a tenth of a percent from none or all is told so.
-pub(super) fn percent(x: f64) -> String {
+pub(super) fn format_percent(x: f64) -> String {
     let text = match x {
         x if x <= 0.0 => "0".to_owned(),
         x if x >= 100.0 => "100".to_owned(),
         x if x <= 0.1 => "&lt;\u{202f}0.1".to_owned(),
         x if x >= 99.9 => "&gt;\u{202f}99.9".to_owned(),
-        x => fixed(x, i32::from(!(1.0..=99.0).contains(&x))),
+        x => format_fixed(x, i32::from(!(1.0..=99.0).contains(&x))),
     };
     with_unit(&text, "%")
 }

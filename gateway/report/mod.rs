@@ -29,7 +29,7 @@ use data::Data;
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::Diagnosis;
 use std::fmt::Write as _;
-pub(crate) use text::escape;
+pub(crate) use text::escape_html;
 
 /// Styles of the page.
 const STYLE: &str = include_str!("style.css");
@@ -54,31 +54,31 @@ pub struct PageInput<'a> {
 pub fn page(input: &PageInput<'_>) -> String {
     let data = Data::new(input);
     let mut html = head(&data);
-    html.push_str(&doubts::section(&data));
-    html.push_str(&verdict::section(&data));
-    html.push_str(&place::section(&data));
-    html.push_str(&missing::section(&data));
-    html.push_str(&next::alternatives(&data));
-    html.push_str(&next::experiment(&data));
-    html.push_str(&better::section(&data));
-    html.push_str(&contribution::section(&data));
-    html.push_str(&maps::section(&data));
-    html.push_str(&next::shifts(&data));
-    html.push_str(&next::quality(&data));
-    html.push_str(&next::glossary(&data));
+    html.push_str(&doubts::render_section(&data));
+    html.push_str(&verdict::render_section(&data));
+    html.push_str(&place::render_section(&data));
+    html.push_str(&missing::render_section(&data));
+    html.push_str(&next::render_alternatives(&data));
+    html.push_str(&next::render_experiment(&data));
+    html.push_str(&better::render_section(&data));
+    html.push_str(&contribution::render_section(&data));
+    html.push_str(&maps::render_section(&data));
+    html.push_str(&next::render_shifts(&data));
+    html.push_str(&next::render_data_quality(&data));
+    html.push_str(&next::render_glossary(&data));
     let _ = write!(html, "</main>\n<script>{READ_OUT}</script>\n</body>\n</html>\n");
     html
 }
 
 fn head(data: &Data<'_>) -> String {
-    let output = data.tongue.column(&data.diagnosis.output);
-    let title = format!("{}{output}", data.say("Diagnosis: ", "诊断："));
+    let output = data.tongue.name_column(&data.diagnosis.output);
+    let title = format!("{}{output}", data.pick_text("Diagnosis: ", "诊断："));
     let source = file_name(&data.input.recording.source);
     let model = &data.diagnosis.model.name;
     let lines = [
-        (data.say("simulation", "仿真"), escape(model)),
-        (data.say("recording", "记录"), escape(source)),
-        (data.say("quantity", "物理量"), data.tongue.quantity(&data.diagnosis.output)),
+        (data.pick_text("simulation", "仿真"), escape_html(model)),
+        (data.pick_text("recording", "记录"), escape_html(source)),
+        (data.pick_text("quantity", "物理量"), data.tongue.name_column_with_unit(&data.diagnosis.output)),
     ];
     let lines: String = lines
         .iter()
@@ -87,7 +87,7 @@ fn head(data: &Data<'_>) -> String {
         .collect();
     format!(
         "<!doctype html>\n<html lang=\"{}\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n<header>{lines}</header>\n",
-        data.say("en", "zh")
+        data.pick_text("en", "zh")
     )
 }
 

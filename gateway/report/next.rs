@@ -1,103 +1,103 @@
 //! What else it could be, what to record next, bent parameters, data quality, and how to read the page.
 
 use super::data::Data;
-use super::table::{ColumnHead, listed};
-use super::text::{escape, fixed, number, signed, unit_text, with_unit};
+use super::table::{ColumnHead, render_table_section};
+use super::text::{escape_html, format_fixed, format_number, format_signed, unit_text, with_unit};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::{Alternative, Shift};
 use rules::twin::quality::Fault;
 use std::fmt::Write as _;
 
 /// Other explanations, each with what separates it.
-pub(super) fn alternatives(data: &Data<'_>) -> String {
+pub(super) fn render_alternatives(data: &Data<'_>) -> String {
     let others = &data.diagnosis.alternatives;
     if others.is_empty() {
         return String::new();
     }
-    let rows: String = others.iter().map(|other| alternative(data, other)).collect();
-    let note = data.say(
+    let rows: String = others.iter().map(|other| render_alternative(data, other)).collect();
+    let note = data.pick_text(
         "This recording supports these nearly as well. The smaller the lead, the harder they are to tell apart; under 6 units it is no proof.",
         "此记录对下列解释的支持几乎相同。领先越小越难区分；不足6个单位不能作为证据。",
     );
     let heads = [
-        ColumnHead::Words(data.say("could also be", "也可能是")),
-        ColumnHead::Words(data.say("instead of", "而不是")),
-        ColumnHead::Number(data.say("lead of the best (units of information)", "最佳解释的领先（信息单位）")),
-        ColumnHead::Words(data.say("what tells them apart", "区分方法")),
+        ColumnHead::Words(data.pick_text("could also be", "也可能是")),
+        ColumnHead::Words(data.pick_text("instead of", "而不是")),
+        ColumnHead::Number(data.pick_text("lead of the best (units of information)", "最佳解释的领先（信息单位）")),
+        ColumnHead::Words(data.pick_text("what tells them apart", "区分方法")),
     ];
-    listed(data.say("What else it could be", "还可能是什么"), note, &heads, &rows)
+    render_table_section(data.pick_text("What else it could be", "还可能是什么"), note, &heads, &rows)
 }
 
-fn alternative(data: &Data<'_>, other: &Alternative) -> String {
+fn render_alternative(data: &Data<'_>, other: &Alternative) -> String {
     let experiment = match other.separating_experiment.is_empty() {
-        true => data.say("no experiment is known", "尚无已知试验").to_owned(),
-        false => data.tongue.catalogue(&other.separating_experiment),
+        true => data.pick_text("no experiment is known", "尚无已知试验").to_owned(),
+        false => data.tongue.translate_catalogue(&other.separating_experiment),
     };
     format!(
         "<tr><td>{}</td><td>{}</td><td class=\"n\">{}</td><td>{experiment}</td></tr>",
-        data.tongue.effect(&other.effect),
-        data.tongue.effect(&other.instead_of),
-        fixed(other.delta_ic, 1)
+        data.tongue.name_effect(&other.effect),
+        data.tongue.name_effect(&other.instead_of),
+        format_fixed(other.delta_ic, 1)
     )
 }
 
 /// The experiment to do next.
-pub(super) fn experiment(data: &Data<'_>) -> String {
+pub(super) fn render_experiment(data: &Data<'_>) -> String {
     let Some(next) = &data.diagnosis.next_experiment else { return String::new() };
-    let minutes = with_unit(&fixed(next.minutes, i32::from(next.minutes.fract() != 0.0)), "min");
+    let minutes = with_unit(&format_fixed(next.minutes, i32::from(next.minutes.fract() != 0.0)), "min");
     let gain = match (next.expected_delta_ic > 0.0, data.tongue.0) {
         (true, Language::En) => {
-            format!("expected to bring {} units of information; 6 decide", number(next.expected_delta_ic))
+            format!("expected to bring {} units of information; 6 decide", format_number(next.expected_delta_ic))
         }
-        (true, Language::Zh) => format!("预计带来{}个信息单位；6个即可判定", number(next.expected_delta_ic)),
-        (false, _) => data.say("what it will bring cannot be foreseen", "收益无法预估").to_owned(),
+        (true, Language::Zh) => format!("预计带来{}个信息单位；6个即可判定", format_number(next.expected_delta_ic)),
+        (false, _) => data.pick_text("what it will bring cannot be foreseen", "收益无法预估").to_owned(),
     };
     format!(
         "<section class=\"next\"><h2>{}</h2><p class=\"lead\">{}{}</p><p class=\"note\">{} {minutes} · {gain}</p></section>\n",
-        data.say("What to record next", "下一步记录什么"),
-        super::place::capital(data.tongue.catalogue(&next.statement).trim_end_matches(['.', '。'])),
-        data.say(".", "。"),
-        data.say("about", "约"),
+        data.pick_text("What to record next", "下一步记录什么"),
+        super::place::capitalise_first(data.tongue.translate_catalogue(&next.statement).trim_end_matches(['.', '。'])),
+        data.pick_text(".", "。"),
+        data.pick_text("about", "约"),
     )
 }
 
 /// Parameters of the simulation that had been bent to imitate what was missing.
-pub(super) fn shifts(data: &Data<'_>) -> String {
+pub(super) fn render_shifts(data: &Data<'_>) -> String {
     let shifts = &data.diagnosis.baseline_shift;
     if shifts.is_empty() {
         return String::new();
     }
     let rows: String = shifts.iter().map(|shift| render_shift(data, shift)).collect();
-    let note = data.say(
+    let note = data.pick_text(
         "While the effect was missing, fitting had bent these parameters of the simulation to imitate it.",
         "在缺少该效应时，拟合曾扭曲仿真的这些参数来模仿它。",
     );
     let heads = [
-        ColumnHead::Words(data.say("parameter", "参数")),
-        ColumnHead::Number(data.say("before", "之前")),
-        ColumnHead::Number(data.say("after", "之后")),
-        ColumnHead::Number(data.say("change", "变化")),
-        ColumnHead::Words(data.say("unit", "单位")),
+        ColumnHead::Words(data.pick_text("parameter", "参数")),
+        ColumnHead::Number(data.pick_text("before", "之前")),
+        ColumnHead::Number(data.pick_text("after", "之后")),
+        ColumnHead::Number(data.pick_text("change", "变化")),
+        ColumnHead::Words(data.pick_text("unit", "单位")),
     ];
-    listed(data.say("Parameters that had been bent", "曾被扭曲的参数"), note, &heads, &rows)
+    render_table_section(data.pick_text("Parameters that had been bent", "曾被扭曲的参数"), note, &heads, &rows)
 }
 
 fn render_shift(data: &Data<'_>, shift: &Shift) -> String {
     let relative = 100.0 * (shift.after / shift.before - 1.0);
     let change = match shift.before > 0.0 && shift.after > 0.0 && relative < 1000.0 {
         true => with_unit(&signed_whole(relative), "%"),
-        false => signed(shift.after - shift.before),
+        false => format_signed(shift.after - shift.before),
     };
-    let [before, after] = [shift.before, shift.after].map(|x| super::text::significant(x, 4));
+    let [before, after] = [shift.before, shift.after].map(|x| super::text::format_significant(x, 4));
     format!(
         "<tr><td><code>{}</code></td><td class=\"n\">{before}</td><td class=\"n\">{after}</td><td class=\"n\">{change}</td><td>{}</td></tr>",
-        escape(&shift.parameter).replace('.', ".<wbr>"),
+        escape_html(&shift.parameter).replace('.', ".<wbr>"),
         unit_of(data, &shift.parameter)
     )
 }
 
 fn signed_whole(x: f64) -> String {
-    let text = fixed(x, if x.abs() < 10.0 { 1 } else { 0 });
+    let text = format_fixed(x, if x.abs() < 10.0 { 1 } else { 0 });
     if x > 0.0 { format!("+{text}") } else { text }
 }
 
@@ -112,48 +112,48 @@ fn unit_of(data: &Data<'_>, name: &str) -> String {
 }
 
 /// Faults of the recording.
-pub(super) fn quality(data: &Data<'_>) -> String {
+pub(super) fn render_data_quality(data: &Data<'_>) -> String {
     let faults = &data.diagnosis.data_quality;
-    let title = data.say("The recording itself", "记录本身");
+    let title = data.pick_text("The recording itself", "记录本身");
     if faults.is_empty() {
-        let none = data.say(
+        let none = data.pick_text(
             "No dropouts, spikes, coarse steps or repeated times were found.",
             "未发现缺失、尖峰、粗量化或重复时间。",
         );
         return format!("<section><h2>{title}</h2><p class=\"note\">{none}</p></section>\n");
     }
-    let rows: String = faults.iter().map(|fault| faulty(data, fault)).collect();
-    let note = data.say(
+    let rows: String = faults.iter().map(|fault| render_fault(data, fault)).collect();
+    let note = data.pick_text(
         "These do not bias the comparison. Rows without a trustworthy value took no part in it.",
         "这些不会使比较产生偏差。没有可信数值的行未参与比较。",
     );
     let heads = [
-        ColumnHead::Words(data.say("what", "问题")),
-        ColumnHead::Words(data.say("column", "列")),
-        ColumnHead::Number(data.say("rows", "行数")),
+        ColumnHead::Words(data.pick_text("what", "问题")),
+        ColumnHead::Words(data.pick_text("column", "列")),
+        ColumnHead::Number(data.pick_text("rows", "行数")),
     ];
-    listed(title, note, &heads, &rows)
+    render_table_section(title, note, &heads, &rows)
 }
 
-fn faulty(data: &Data<'_>, fault: &Fault) -> String {
+fn render_fault(data: &Data<'_>, fault: &Fault) -> String {
     let known = match fault.fault {
-        "dropouts" => data.say("no value, or a value that was held", "无值或保持的旧值"),
-        "spikes" => data.say("isolated spikes", "孤立尖峰"),
-        "quantisation" => data.say("recorded in coarse steps", "量化步长较粗"),
-        "duplicate_time" => data.say("time stands still or runs backwards", "时间停滞或倒退"),
-        "refused_rows" => data.say("rows refused while reading", "读取时被拒绝的行"),
+        "dropouts" => data.pick_text("no value, or a value that was held", "无值或保持的旧值"),
+        "spikes" => data.pick_text("isolated spikes", "孤立尖峰"),
+        "quantisation" => data.pick_text("recorded in coarse steps", "量化步长较粗"),
+        "duplicate_time" => data.pick_text("time stands still or runs backwards", "时间停滞或倒退"),
+        "refused_rows" => data.pick_text("rows refused while reading", "读取时被拒绝的行"),
         other => other,
     };
     format!(
         "<tr><td>{}</td><td><code>{}</code></td><td class=\"n\">{}</td></tr>",
-        escape(known),
-        escape(&fault.column),
-        fixed(fault.rows as f64, 0)
+        escape_html(known),
+        escape_html(&fault.column),
+        format_fixed(fault.rows as f64, 0)
     )
 }
 
 /// Words an engineer may want explained.
-pub(super) fn glossary(data: &Data<'_>) -> String {
+pub(super) fn render_glossary(data: &Data<'_>) -> String {
     let words = [
         (
             ("Before and after", "之前与之后"),
@@ -190,10 +190,15 @@ pub(super) fn glossary(data: &Data<'_>) -> String {
     ];
     let mut html = String::new();
     for (word, meaning) in words {
-        let _ = write!(html, "<dt>{}</dt><dd>{}</dd>", data.say(word.0, word.1), data.say(meaning.0, meaning.1));
+        let _ = write!(
+            html,
+            "<dt>{}</dt><dd>{}</dd>",
+            data.pick_text(word.0, word.1),
+            data.pick_text(meaning.0, meaning.1)
+        );
     }
     format!(
         "<details><summary>{}</summary><dl>{html}</dl></details>\n",
-        data.say("How to read this page", "如何阅读本页")
+        data.pick_text("How to read this page", "如何阅读本页")
     )
 }

@@ -1,8 +1,8 @@
 //! Where the missing effects act: conditions in words, sizes, times, and the strip of runs.
 
 use super::data::Data;
-use super::strip::{REGIONS_MAX, strip};
-use super::text::{fixed, number, signed, with_unit};
+use super::strip::{REGIONS_MAX, render_strip};
+use super::text::{format_fixed, format_number, format_signed, with_unit};
 use rules::physics::explain::Language;
 use rules::twin::locate::{OnsetInterval, Region, active_rows, usual_size};
 
@@ -10,70 +10,71 @@ use rules::twin::locate::{OnsetInterval, Region, active_rows, usual_size};
 const MEAN_TELLS: f64 = 0.3;
 
 /// The section; empty where nothing is located.
-pub(super) fn section(data: &Data<'_>) -> String {
+pub(super) fn render_section(data: &Data<'_>) -> String {
     let regions = &data.diagnosis.mismatch;
     if regions.is_empty() {
         return String::new();
     }
-    let items: String = regions.iter().enumerate().map(|(lane, region)| item(data, lane, region)).collect();
+    let items: String = regions.iter().enumerate().map(|(lane, region)| render_region(data, lane, region)).collect();
     format!(
         "<section><h2>{}</h2><ul class=\"regions\">{items}</ul>{}</section>\n",
-        data.say("Where", "在哪里"),
-        strip(data)
+        data.pick_text("Where", "在哪里"),
+        render_strip(data)
     )
 }
 
-fn item(data: &Data<'_>, lane: usize, region: &Region) -> String {
+fn render_region(data: &Data<'_>, lane: usize, region: &Region) -> String {
     let tongue = data.tongue;
-    let conditions: Vec<String> = region.conditions.iter().map(|condition| tongue.condition(condition)).collect();
+    let conditions: Vec<String> =
+        region.conditions.iter().map(|condition| tongue.describe_condition(condition)).collect();
     let place = match conditions.is_empty() {
         true => data
-            .say("Throughout the recording; no condition narrows it down", "遍及整个记录，没有条件能缩小范围")
+            .pick_text("Throughout the recording; no condition narrows it down", "遍及整个记录，没有条件能缩小范围")
             .to_owned(),
-        false => format!("{}{}", data.say("Where ", ""), tongue.list(&conditions, (" and ", "且"))),
+        false => format!("{}{}", data.pick_text("Where ", ""), tongue.join_words(&conditions, (" and ", "且"))),
     };
     let colour = if lane < REGIONS_MAX { format!("e{lane}") } else { "none".to_owned() };
     format!(
         "<li><i class=\"{colour} s4\"></i><div><strong>{}</strong><p>{place}{}</p><p class=\"note\">{}</p></div></li>",
-        capital(&tongue.effect(&region.effect)),
-        data.say(".", "。"),
-        facts(data, region)
+        capitalise_first(&tongue.name_effect(&region.effect)),
+        data.pick_text(".", "。"),
+        describe_region(data, region)
     )
 }
 
 /// First letter upper case, where it is a plain letter.
-pub(super) fn capital(text: &str) -> String {
+pub(super) fn capitalise_first(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-fn facts(data: &Data<'_>, region: &Region) -> String {
-    let share = super::missing::percent(100.0 * region.share);
+fn describe_region(data: &Data<'_>, region: &Region) -> String {
+    let share = super::missing::format_percent(100.0 * region.share);
     let mut facts = match data.tongue.0 {
         Language::En => vec![format!("{share} of what is missing lies here")],
         Language::Zh => vec![format!("缺失部分的{share}位于此处")],
     };
-    facts.push(amount(data, region));
-    facts.push(stretches(data, region));
+    facts.push(describe_amount(data, region));
+    facts.push(describe_stretches(data, region));
     if let Some(onset) = &region.onset {
-        facts.push(since(data, onset));
+        facts.push(describe_onset(data, onset));
     }
     facts.join(" · ")
 }
 
 /// How much it is there: a mean, or a typical size where both signs would cancel.
-pub(super) fn amount(data: &Data<'_>, region: &Region) -> String {
-    let unit = data.unit();
-    match size(data, &region.effect).filter(|size| region.mean.abs() < MEAN_TELLS * size) {
+pub(super) fn describe_amount(data: &Data<'_>, region: &Region) -> String {
+    let unit = data.output_unit();
+    match compute_effect_rms(data, &region.effect).filter(|size| region.mean.abs() < MEAN_TELLS * size) {
         Some(size) => {
-            let size = with_unit(&format!("±{}", number(size)), &unit);
-            format!("{}{size}", data.say("of both signs, typically ", "正负交替，典型大小"))
+            let size = with_unit(&format!("±{}", format_number(size)), &unit);
+            format!("{}{size}", data.pick_text("of both signs, typically ", "正负交替，典型大小"))
         }
-        None => format!("{}{}", data.say("on average ", "平均"), with_unit(&signed(region.mean), &unit)),
+        None => format!("{}{}", data.pick_text("on average ", "平均"), with_unit(&format_signed(region.mean), &unit)),
     }
 }
 
-fn stretches(data: &Data<'_>, region: &Region) -> String {
+fn describe_stretches(data: &Data<'_>, region: &Region) -> String {
     let mut runs: Vec<&str> = region.spans.iter().map(|span| span.run.as_str()).collect();
     runs.dedup();
     runs.sort_unstable();
@@ -86,10 +87,11 @@ fn stretches(data: &Data<'_>, region: &Region) -> String {
     }
 }
 
-fn since(data: &Data<'_>, onset: &OnsetInterval) -> String {
-    let at = data.moment(&onset.run, onset.time_s);
-    let [low, high] = [onset.low_s, onset.high_s]
-        .map(|time_s| data.clock(time_s).unwrap_or_else(|| with_unit(&fixed(time_s, data.decimals()), "s")));
+fn describe_onset(data: &Data<'_>, onset: &OnsetInterval) -> String {
+    let at = data.format_moment(&onset.run, onset.time_s);
+    let [low, high] = [onset.low_s, onset.high_s].map(|time_s| {
+        data.format_clock_time(time_s).unwrap_or_else(|| with_unit(&format_fixed(time_s, data.time_decimals()), "s"))
+    });
     match data.tongue.0 {
         Language::En => format!("since {at} (95\u{202f}% between {low} and {high})"),
         Language::Zh => format!("自{at}起（95\u{202f}%区间{low}至{high}）"),
@@ -97,7 +99,7 @@ fn since(data: &Data<'_>, onset: &OnsetInterval) -> String {
 }
 
 /// Root mean square of an effect over the rows where it acts: an effect of both signs has a mean that tells little.
-fn size(data: &Data<'_>, effect: &str) -> Option<f64> {
+fn compute_effect_rms(data: &Data<'_>, effect: &str) -> Option<f64> {
     let (_, values) = data.diagnosis.rows.effects.iter().find(|(name, _)| name == effect)?;
     let active = active_rows(values, usual_size(values));
     let inside = values.iter().zip(active).filter(|(_, active)| *active);

@@ -47,14 +47,14 @@ pub(super) struct Plot {
 
 /// The values of rows as a curve of at most [`POINTS_MAX`] points: of every group of rows the least and the greatest
 /// value stay, in their order. Where a whole group has no value the curve breaks.
-pub(super) fn thinned(rows: Range<usize>, x: impl Fn(usize) -> f64, y: impl Fn(usize) -> Option<f64>) -> Pieces {
+pub(super) fn thin_curve(rows: Range<usize>, x: impl Fn(usize) -> f64, y: impl Fn(usize) -> Option<f64>) -> Pieces {
     let group = if rows.len() <= POINTS_MAX { 1 } else { rows.len().div_ceil(POINTS_MAX / 2) };
     let mut pieces: Pieces = Vec::new();
     let mut broken = true;
     let mut start = rows.start;
     while start < rows.end {
         let end = (start + group).min(rows.end);
-        let known = extremes(start..end, &y);
+        let known = find_extremes(start..end, &y);
         if broken && !known.is_empty() {
             pieces.push(Vec::new());
         }
@@ -68,7 +68,7 @@ pub(super) fn thinned(rows: Range<usize>, x: impl Fn(usize) -> f64, y: impl Fn(u
 }
 
 /// The rows of the least and greatest value, in order; one row where they coincide.
-fn extremes(rows: Range<usize>, y: &impl Fn(usize) -> Option<f64>) -> Vec<(usize, f64)> {
+fn find_extremes(rows: Range<usize>, y: &impl Fn(usize) -> Option<f64>) -> Vec<(usize, f64)> {
     let mut least: Option<(usize, f64)> = None;
     let mut greatest: Option<(usize, f64)> = None;
     for row in rows {
@@ -85,7 +85,7 @@ fn extremes(rows: Range<usize>, y: &impl Fn(usize) -> Option<f64>) -> Vec<(usize
 
 impl Plot {
     /// The chart.
-    pub(super) fn html(&self) -> String {
+    pub(super) fn render_html(&self) -> String {
         let mut html = format!(
             "<div class=\"plot{}\" data-x=\"{} {}\" data-y=\"{} {}\" data-ux=\"{}\" data-uy=\"{}\">",
             if self.low { " low" } else { "" },
@@ -99,7 +99,7 @@ impl Plot {
         let _ = write!(html, "<div class=\"ytitle\">{}</div><div class=\"area\">", self.y_title);
         html.push_str(&self.mark_labels());
         html.push_str(&self.y_labels());
-        html.push_str(&self.drawing());
+        html.push_str(&self.render_drawing());
         html.push_str(&self.x_labels());
         let _ = writeln!(html, "</div><div class=\"xtitle\">{}</div></div>", self.x_title);
         html
@@ -111,20 +111,21 @@ impl Plot {
 
     fn y_labels(&self) -> String {
         let label = |(y, text): (f64, String)| {
-            format!("<span style=\"top:{:.1}%\">{text}</span>", 100.0 * (1.0 - self.y.share(y)))
+            format!("<span style=\"top:{:.1}%\">{text}</span>", 100.0 * (1.0 - self.y.to_fraction(y)))
         };
-        let labels: String = self.y.ticks(self.wanted_y()).into_iter().map(label).collect();
+        let labels: String = self.y.compute_ticks(self.wanted_y()).into_iter().map(label).collect();
         format!("<div class=\"yl\" aria-hidden=\"true\">{labels}</div>")
     }
 
     fn x_labels(&self) -> String {
-        let label =
-            |(x, text): (f64, String)| format!("<span style=\"left:{:.1}%\">{text}</span>", 100.0 * self.x.share(x));
-        let labels: String = self.x.ticks(5.0).into_iter().map(label).collect();
+        let label = |(x, text): (f64, String)| {
+            format!("<span style=\"left:{:.1}%\">{text}</span>", 100.0 * self.x.to_fraction(x))
+        };
+        let labels: String = self.x.compute_ticks(5.0).into_iter().map(label).collect();
         format!("<div class=\"xl\" aria-hidden=\"true\">{labels}</div>")
     }
 
-    fn drawing(&self) -> String {
+    fn render_drawing(&self) -> String {
         let names: Vec<&str> = self.curves.iter().map(|curve| curve.label.as_str()).collect();
         let mut html = String::from("<div class=\"draw\">");
         let _ = write!(
@@ -134,18 +135,18 @@ impl Plot {
             names.join(", ")
         );
         for (from, to) in &self.bands {
-            let (from, to) = (self.across(*from), self.across(*to));
+            let (from, to) = (self.to_drawing_x(*from), self.to_drawing_x(*to));
             let _ = write!(html, "<rect class=\"band\" x=\"{from:.0}\" width=\"{:.0}\" height=\"{HIGH}\"/>", to - from);
         }
-        let _ = write!(html, "<path class=\"grid\" d=\"{}\"/>", self.grid());
+        let _ = write!(html, "<path class=\"grid\" d=\"{}\"/>", self.format_grid_path());
         if self.y.low < 0.0 && self.y.high > 0.0 {
-            let _ = write!(html, "<path class=\"zero\" d=\"M0 {:.0}H{WIDE}\"/>", self.down(0.0));
+            let _ = write!(html, "<path class=\"zero\" d=\"M0 {:.0}H{WIDE}\"/>", self.to_drawing_y(0.0));
         }
         for (at, _) in &self.marks {
-            let _ = write!(html, "<path class=\"mark\" d=\"M{:.0} 0V{HIGH}\"/>", self.across(*at));
+            let _ = write!(html, "<path class=\"mark\" d=\"M{:.0} 0V{HIGH}\"/>", self.to_drawing_x(*at));
         }
         for curve in &self.curves {
-            let line = self.line(&curve.pieces);
+            let line = self.format_curve_path(&curve.pieces);
             let _ = write!(html, "<path class=\"curve {}\" data-l=\"{}\" d=\"{line}\"/>", curve.class, curve.label);
         }
         html + "</svg></div>"
@@ -155,36 +156,38 @@ impl Plot {
     fn mark_labels(&self) -> String {
         let named = self.marks.iter().filter(|(_, text)| !text.is_empty());
         let label = |(at, text): &(f64, String)| {
-            format!("<span style=\"left:{:.1}%\">{text}</span>", 100.0 * self.x.share(*at))
+            format!("<span style=\"left:{:.1}%\">{text}</span>", 100.0 * self.x.to_fraction(*at))
         };
         let labels: String = named.map(label).collect();
         if labels.is_empty() { labels } else { format!("<div class=\"ml\" aria-hidden=\"true\">{labels}</div>") }
     }
 
-    fn grid(&self) -> String {
-        let ticks = self.y.ticks(self.wanted_y());
-        ticks.iter().map(|(y, _)| format!("M0 {:.0}H{WIDE}", self.down(*y))).collect()
+    fn format_grid_path(&self) -> String {
+        let ticks = self.y.compute_ticks(self.wanted_y());
+        ticks.iter().map(|(y, _)| format!("M0 {:.0}H{WIDE}", self.to_drawing_y(*y))).collect()
     }
 
-    fn across(&self, x: f64) -> f64 {
-        WIDE * self.x.share(x)
+    fn to_drawing_x(&self, x: f64) -> f64 {
+        WIDE * self.x.to_fraction(x)
     }
 
-    fn down(&self, y: f64) -> f64 {
-        HIGH * (1.0 - self.y.share(y))
+    fn to_drawing_y(&self, y: f64) -> f64 {
+        HIGH * (1.0 - self.y.to_fraction(y))
     }
 
     /// The pieces as path data in whole steps, relative, so that it stays short.
-    fn line(&self, pieces: &Pieces) -> String {
+    fn format_curve_path(&self, pieces: &Pieces) -> String {
         let mut text = String::new();
         for piece in pieces {
             let mut at: Option<(i64, i64)> = None;
             for (x, y) in piece {
-                let here = (whole(self.across(*x)), whole(self.down(*y)));
+                let here = (round_to_whole(self.to_drawing_x(*x)), round_to_whole(self.to_drawing_y(*y)));
                 match at {
                     None => text.push_str(&format!("M{} {}l", here.0, here.1)),
                     Some(last) if last == here => continue,
-                    Some(last) => text.push_str(&step(here.0 - last.0, here.1 - last.1, text.ends_with('l'))),
+                    Some(last) => {
+                        text.push_str(&format_path_step(here.0 - last.0, here.1 - last.1, text.ends_with('l')))
+                    }
                 }
                 at = Some(here);
             }
@@ -197,7 +200,7 @@ impl Plot {
     }
 }
 
-fn step(x: i64, y: i64, first: bool) -> String {
+fn format_path_step(x: i64, y: i64, first: bool) -> String {
     let gap = if first || x < 0 { "" } else { " " };
     let between = if y < 0 { "" } else { " " };
     format!("{gap}{x}{between}{y}")
@@ -205,7 +208,7 @@ fn step(x: i64, y: i64, first: bool) -> String {
 
 /// Within the drawing and a margin, so the conversion cannot overflow.
 #[allow(clippy::cast_possible_truncation, reason = "the share of an axis is clamped")]
-fn whole(x: f64) -> i64 {
+fn round_to_whole(x: f64) -> i64 {
     x.round() as i64
 }
 
@@ -221,7 +224,7 @@ mod tests {
             88_888 => Some(-99.0),
             row => Some((row % 7) as f64),
         };
-        let pieces = thinned(0..100_000, |row| row as f64, y);
+        let pieces = thin_curve(0..100_000, |row| row as f64, y);
         assert_eq!(pieces.len(), 2);
         let points: Vec<(f64, f64)> = pieces.concat();
         assert!(points.len() <= POINTS_MAX);
@@ -231,7 +234,7 @@ mod tests {
 
     #[test]
     fn few_rows_all_stay() {
-        let pieces = thinned(3..10, |row| row as f64, |row| Some(row as f64));
+        let pieces = thin_curve(3..10, |row| row as f64, |row| Some(row as f64));
         assert_eq!(pieces, vec![(3..10).map(|row| (f64::from(row), f64::from(row))).collect::<Vec<_>>()]);
     }
 }

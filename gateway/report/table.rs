@@ -9,7 +9,7 @@ pub(super) enum ColumnHead<'a> {
 }
 
 /// A table from its heads and its rows, the latter in HTML.
-pub(super) fn table(heads: &[ColumnHead<'_>], rows: &str) -> String {
+pub(super) fn render_table(heads: &[ColumnHead<'_>], rows: &str) -> String {
     let head = |head: &ColumnHead<'_>| match head {
         ColumnHead::Words(text) => format!("<th>{text}</th>"),
         ColumnHead::Number(text) => format!("<th class=\"n\">{text}</th>"),
@@ -19,6 +19,6 @@ pub(super) fn table(heads: &[ColumnHead<'_>], rows: &str) -> String {
 }
 
 /// A section with a title, a note and a table.
-pub(super) fn listed(title: &str, note: &str, heads: &[ColumnHead<'_>], rows: &str) -> String {
-    format!("<section><h2>{title}</h2><p class=\"note\">{note}</p>{}</section>\n", table(heads, rows))
+pub(super) fn render_table_section(title: &str, note: &str, heads: &[ColumnHead<'_>], rows: &str) -> String {
+    format!("<section><h2>{title}</h2><p class=\"note\">{note}</p>{}</section>\n", render_table(heads, rows))
 }

@@ -44,7 +44,7 @@ fn recording(runs: usize, rows_per_run: usize, friction_n: f64) -> Recording {
     let mut recording = Recording::new(format!("somewhere/{HOSTILE}.csv"), time_s, None);
     recording.set_column("run", Cells::Words(names));
     for (name, values) in [("velocity_m_s", velocity), ("acceleration_m_s2", acceleration), ("force_n", force)] {
-        recording.set_column(name, Cells::Numbers(Numbers::full(values)));
+        recording.set_column(name, Cells::Numbers(Numbers::from_values(values)));
     }
     recording
 }
@@ -182,7 +182,7 @@ fn the_size_does_not_grow_with_the_rows() {
         }
         // The worst case: many effects, all of them noise.
         let mut random = Pcg64Mcg::seed_from_u64(3);
-        let rows = recording.rows();
+        let rows = recording.count_rows();
         let noise = |random: &mut Pcg64Mcg| (0..rows).map(|_| random.random_range(-9.0..9.0)).collect::<Vec<f64>>();
         let simulated: Vec<Option<f64>> = noise(&mut random).into_iter().map(Some).collect();
         diagnosis.rows.compared = vec![true; rows];

@@ -2,14 +2,14 @@
 
 use adapters::channel::{ChannelId, quantity};
 use rules::physics::explain::Language;
-use rules::physics::{CATALOGUE, EffectDoc, effect};
+use rules::physics::{CATALOGUE, EffectDoc, find_effect};
 use rules::twin::locate::Condition;
 
 /// Words of a condition that are listed.
 const WORDS_MAX: usize = 8;
 
 /// Text that came from data, safe between tags and in attributes.
-pub(crate) fn escape(text: &str) -> String {
+pub(crate) fn escape_html(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -31,7 +31,7 @@ pub(super) struct Tongue(pub(super) Language);
 
 impl Tongue {
     /// The text in the page's language.
-    pub(super) fn say<'a>(self, en: &'a str, zh: &'a str) -> &'a str {
+    pub(super) fn pick_text<'a>(self, en: &'a str, zh: &'a str) -> &'a str {
         match self.0 {
             Language::En => en,
             Language::Zh => zh,
@@ -39,21 +39,21 @@ impl Tongue {
     }
 
     /// Words in a row: `a, b and c`.
-    pub(super) fn list(self, words: &[String], last: (&str, &str)) -> String {
-        let joint = self.say(last.0, last.1);
+    pub(super) fn join_words(self, words: &[String], last: (&str, &str)) -> String {
+        let joint = self.pick_text(last.0, last.1);
         match words {
             [] => String::new(),
             [one] => one.clone(),
-            [first @ .., end] => format!("{}{joint}{end}", first.join(self.say(", ", "、"))),
+            [first @ .., end] => format!("{}{joint}{end}", first.join(self.pick_text(", ", "、"))),
         }
     }
 
     /// Words in a row; of many the first, and how many more.
-    fn some(self, words: &[String]) -> String {
+    fn join_first_words(self, words: &[String]) -> String {
         let Some(more) = words.len().checked_sub(WORDS_MAX).filter(|more| *more > 1) else {
-            return self.list(words, (" or ", "或"));
+            return self.join_words(words, (" or ", "或"));
         };
-        let first = words[..WORDS_MAX].join(self.say(", ", "、"));
+        let first = words[..WORDS_MAX].join(self.pick_text(", ", "、"));
         match self.0 {
             Language::En => format!("{first} or one of {more} more"),
             Language::Zh => format!("{first}等（另有{more}个）"),
@@ -61,82 +61,82 @@ impl Tongue {
     }
 
     /// The name of an effect in plain words, escaped.
-    pub(super) fn effect(self, kind: &str) -> String {
+    pub(super) fn name_effect(self, kind: &str) -> String {
         if kind.starts_with("unknown") {
-            return self.say("an unknown effect", "未知影响").to_owned();
+            return self.pick_text("an unknown effect", "未知影响").to_owned();
         }
-        let plain = || escape(&kind.replace('_', " "));
-        effect(kind).map_or_else(plain, |effect| escape(effect.doc().texts(self.0).name))
+        let plain = || escape_html(&kind.replace('_', " "));
+        find_effect(kind).map_or_else(plain, |effect| escape_html(effect.doc().texts(self.0).name))
     }
 
     /// A text of the catalogue in the page's language; other text as it is. Escaped.
-    pub(super) fn catalogue(self, text: &str) -> String {
-        let pairs = CATALOGUE.iter().flat_map(|effect| pairs(effect.doc()));
+    pub(super) fn translate_catalogue(self, text: &str) -> String {
+        let pairs = CATALOGUE.iter().flat_map(|effect| list_translations(effect.doc()));
         let found = pairs.into_iter().find_map(|(en, zh)| Some((zh, text.strip_prefix(en)?)));
         match (self.0, found) {
-            (Language::Zh, Some((zh, rest))) => escape(&format!("{zh}{rest}")),
-            _ => escape(text),
+            (Language::Zh, Some((zh, rest))) => escape_html(&format!("{zh}{rest}")),
+            _ => escape_html(text),
         }
     }
 
     /// What a parameter of an effect is; empty where the catalogue does not know it.
-    pub(super) fn parameter(self, kind: &str, name: &str) -> String {
-        let doc = effect(kind).and_then(|effect| effect.doc().parameter(name));
-        doc.map(|doc| escape(self.say(doc.en, doc.zh))).unwrap_or_default()
+    pub(super) fn describe_parameter(self, kind: &str, name: &str) -> String {
+        let doc = find_effect(kind).and_then(|effect| effect.doc().find_parameter(name));
+        doc.map(|doc| escape_html(self.pick_text(doc.en, doc.zh))).unwrap_or_default()
     }
 
     /// A column as words without its unit, escaped.
-    pub(super) fn column(self, name: &str) -> String {
-        let known = ChannelId::of(name).map(|id| id.channel().zh);
-        match (self.0, known, special(name)) {
-            (_, _, Some((en, zh))) => self.say(en, zh).to_owned(),
-            (Language::Zh, Some(zh), _) => escape(zh),
-            _ => escape(&quantity::without_unit(name).replace('_', " ")),
+    pub(super) fn name_column(self, name: &str) -> String {
+        let known = ChannelId::from_name(name).map(|id| id.channel().zh);
+        match (self.0, known, find_special_name(name)) {
+            (_, _, Some((en, zh))) => self.pick_text(en, zh).to_owned(),
+            (Language::Zh, Some(zh), _) => escape_html(zh),
+            _ => escape_html(&quantity::without_unit(name).replace('_', " ")),
         }
     }
 
     /// A column with its unit in brackets, escaped.
-    pub(super) fn quantity(self, name: &str) -> String {
+    pub(super) fn name_column_with_unit(self, name: &str) -> String {
         let unit = unit_of(name);
-        if unit.is_empty() { self.column(name) } else { format!("{} ({unit})", self.column(name)) }
+        if unit.is_empty() { self.name_column(name) } else { format!("{} ({unit})", self.name_column(name)) }
     }
 
     /// A condition in words, escaped.
-    pub(super) fn condition(self, condition: &Condition) -> String {
+    pub(super) fn describe_condition(self, condition: &Condition) -> String {
         match condition {
             Condition::Equals { column, words } => {
-                let words: Vec<String> = words.iter().map(|word| escape(word)).collect();
-                format!("{}{}{}", self.column(column), self.say(" is ", "为"), self.some(&words))
+                let words: Vec<String> = words.iter().map(|word| escape_html(word)).collect();
+                format!("{}{}{}", self.name_column(column), self.pick_text(" is ", "为"), self.join_first_words(&words))
             }
-            Condition::Range { column, min, max } => self.range(column, *min, *max),
+            Condition::Range { column, min, max } => self.describe_range(column, *min, *max),
         }
     }
 
-    fn range(self, column: &str, min: Option<f64>, max: Option<f64>) -> String {
+    fn describe_range(self, column: &str, min: Option<f64>, max: Option<f64>) -> String {
         if column == "engaged" && min.is_some() != max.is_some() {
             let inside = min.is_some();
-            let (en, zh) = within(inside);
-            return self.say(en, zh).to_owned();
+            let (en, zh) = describe_engagement(inside);
+            return self.pick_text(en, zh).to_owned();
         }
-        let name = self.column(column);
-        let with_unit = |x: f64| with_unit(&number(x), &unit_of(column));
+        let name = self.name_column(column);
+        let with_unit = |x: f64| with_unit(&format_number(x), &unit_of(column));
         match (min, max) {
             (Some(min), Some(max)) if self.0 == Language::En => {
-                format!("{name} is between {} and {}", number(min), with_unit(max))
+                format!("{name} is between {} and {}", format_number(min), with_unit(max))
             }
-            (Some(min), Some(max)) => format!("{name}在{}至{}之间", number(min), with_unit(max)),
-            (Some(min), None) => format!("{name}{}{}", self.say(" is above ", "高于"), with_unit(min)),
-            (None, Some(max)) => format!("{name}{}{}", self.say(" is below ", "低于"), with_unit(max)),
-            (None, None) => format!("{name}{}", self.say(" has any value", "任意值")),
+            (Some(min), Some(max)) => format!("{name}在{}至{}之间", format_number(min), with_unit(max)),
+            (Some(min), None) => format!("{name}{}{}", self.pick_text(" is above ", "高于"), with_unit(min)),
+            (None, Some(max)) => format!("{name}{}{}", self.pick_text(" is below ", "低于"), with_unit(max)),
+            (None, None) => format!("{name}{}", self.pick_text(" has any value", "任意值")),
         }
     }
 }
 
-fn pairs(doc: &'static EffectDoc) -> [(&'static str, &'static str); 2] {
+fn list_translations(doc: &'static EffectDoc) -> [(&'static str, &'static str); 2] {
     [(doc.en.statement, doc.zh.statement), (doc.en.experiment, doc.zh.experiment)]
 }
 
-fn within(cut: bool) -> (&'static str, &'static str) {
+fn describe_engagement(cut: bool) -> (&'static str, &'static str) {
     if cut {
         ("the tool is in the cut", "刀具切削时")
     } else {
@@ -144,7 +144,7 @@ fn within(cut: bool) -> (&'static str, &'static str) {
     }
 }
 
-fn special(name: &str) -> Option<(&'static str, &'static str)> {
+fn find_special_name(name: &str) -> Option<(&'static str, &'static str)> {
     let known = [
         ("run", ("run", "运行")),
         ("tool", ("tool", "刀具")),
@@ -187,7 +187,7 @@ pub(super) fn unit_text(unit: &str) -> String {
     if let Some(rest) = text.strip_prefix("um") {
         text = format!("µm{rest}");
     }
-    escape(&text)
+    escape_html(&text)
 }
 
 /// A printed number before its printed unit, kept on one line.
@@ -200,26 +200,26 @@ pub(super) fn with_unit(number: &str, unit: &str) -> String {
 }
 
 /// A number with three significant digits.
-pub(super) fn number(x: f64) -> String {
-    significant(x, 3)
+pub(super) fn format_number(x: f64) -> String {
+    format_significant(x, 3)
 }
 
 /// A number with so many significant digits, whole digits kept.
-pub(super) fn significant(x: f64, digits: i32) -> String {
+pub(super) fn format_significant(x: f64, digits: i32) -> String {
     if x == 0.0 {
         return "0".to_owned();
     }
-    let size = exponent(x);
-    if !(-4..7).contains(&size) { scientific(x, digits) } else { fixed(x, (digits - 1 - size).max(0)) }
+    let size = decimal_exponent(x);
+    if !(-4..7).contains(&size) { format_scientific(x, digits) } else { format_fixed(x, (digits - 1 - size).max(0)) }
 }
 
 /// A number with its sign.
-pub(super) fn signed(x: f64) -> String {
-    if x > 0.0 { format!("+{}", number(x)) } else { number(x) }
+pub(super) fn format_signed(x: f64) -> String {
+    if x > 0.0 { format!("+{}", format_number(x)) } else { format_number(x) }
 }
 
 /// Decimal exponent of the leading digit.
-pub(super) fn exponent(x: f64) -> i32 {
+pub(super) fn decimal_exponent(x: f64) -> i32 {
     if x == 0.0 || !x.is_finite() {
         return 0;
     }
@@ -228,7 +228,7 @@ pub(super) fn exponent(x: f64) -> i32 {
 }
 
 /// A number with so many decimals, thousands set apart, a true minus sign.
-pub(super) fn fixed(x: f64, decimals: i32) -> String {
+pub(super) fn format_fixed(x: f64, decimals: i32) -> String {
     let places = usize::try_from(decimals.clamp(0, 12)).unwrap_or(0);
     let text = format!("{:.places$}", x.abs());
     let (whole, rest) = text.split_once('.').map_or((text.as_str(), String::new()), |(w, r)| (w, format!(".{r}")));
@@ -250,7 +250,7 @@ fn group_digits(whole: &str) -> String {
     text
 }
 
-fn scientific(x: f64, digits: i32) -> String {
+fn format_scientific(x: f64, digits: i32) -> String {
     let places = usize::try_from(digits - 1).unwrap_or(0);
     let text = format!("{:.places$e}", x.abs());
     let (mantissa, power) = text.split_once('e').unwrap_or((&text, "0"));
@@ -259,13 +259,13 @@ fn scientific(x: f64, digits: i32) -> String {
 }
 
 /// A law as HTML: one line per part, products and powers as printed mathematics.
-pub(super) fn law(text: &str) -> String {
+pub(super) fn format_law(text: &str) -> String {
     let lines: Vec<String> =
-        text.split("; ").map(|part| format!("<span class=\"line\">{}</span>", formula(part))).collect();
+        text.split("; ").map(|part| format!("<span class=\"line\">{}</span>", format_formula(part))).collect();
     lines.join("")
 }
 
-fn formula(text: &str) -> String {
+fn format_formula(text: &str) -> String {
     let text = text
         .replace(" * ", "\u{2009}·\u{2009}")
         .replace(" - ", " \u{2212} ")
@@ -275,12 +275,12 @@ fn formula(text: &str) -> String {
     let mut rest = text.as_str();
     while let Some((before, after)) = rest.split_once('^') {
         let end = power_end(after);
-        html.push_str(&escape(before));
+        html.push_str(&escape_html(before));
         let power = after[..end].trim_start_matches('(').trim_end_matches(')');
-        html.push_str(&format!("<sup>{}</sup>", escape(power)));
+        html.push_str(&format!("<sup>{}</sup>", escape_html(power)));
         rest = &after[end..];
     }
-    html + escape(rest).as_str()
+    html + escape_html(rest).as_str()
 }
 
 /// Where the power at the start of the text ends: after a bracketed term, a number or a name.
@@ -297,13 +297,13 @@ mod tests {
 
     #[test]
     fn numbers_read_as_in_print() {
-        let printed = [0.0, 12.345, -0.012345, 12345.6, 1.5e-7, -123_456_789.0].map(number);
+        let printed = [0.0, 12.345, -0.012345, 12345.6, 1.5e-7, -123_456_789.0].map(format_number);
         let wanted = ["0", "12.3", "\u{2212}0.0123", "12\u{202f}346"];
         assert_eq!(printed[..4], wanted);
         assert_eq!(printed[4], "1.50\u{202f}×\u{202f}10<sup>\u{2212}7</sup>");
         assert_eq!(printed[5], "\u{2212}1.23\u{202f}×\u{202f}10<sup>8</sup>");
-        assert_eq!(fixed(-0.001, 1), "0.0");
-        assert_eq!(exponent(999.9), 3);
+        assert_eq!(format_fixed(-0.001, 1), "0.0");
+        assert_eq!(decimal_exponent(999.9), 3);
     }
 
     #[test]
@@ -313,16 +313,16 @@ mod tests {
         assert_eq!(unit_text("W/(mm min^p)"), "W/(mm minᵖ)");
         assert_eq!(unit_of("x_force_n"), "N");
         let en = Tongue(Language::En);
-        assert_eq!(en.quantity("axis_velocity_mm_min"), "axis velocity (mm/min)");
-        assert_eq!(en.quantity("engaged"), "engaged");
+        assert_eq!(en.name_column_with_unit("axis_velocity_mm_min"), "axis velocity (mm/min)");
+        assert_eq!(en.name_column_with_unit("engaged"), "engaged");
         let tool = Condition::Equals { column: "tool".into(), words: vec!["<T1>".into(), "T2".into()] };
-        assert_eq!(en.condition(&tool), "tool is &lt;T1&gt; or T2");
+        assert_eq!(en.describe_condition(&tool), "tool is &lt;T1&gt; or T2");
     }
 
     #[test]
     fn laws_are_set_as_mathematics_and_escaped() {
-        assert_eq!(formula("P = k * W^p"), "P = k\u{2009}·\u{2009}W<sup>p</sup>");
-        assert_eq!(formula("g^(5/3) < n"), "g<sup>5/3</sup> &lt; n");
-        assert_eq!(formula("x^"), "x<sup></sup>");
+        assert_eq!(format_formula("P = k * W^p"), "P = k\u{2009}·\u{2009}W<sup>p</sup>");
+        assert_eq!(format_formula("g^(5/3) < n"), "g<sup>5/3</sup> &lt; n");
+        assert_eq!(format_formula("x^"), "x<sup></sup>");
     }
 }

@@ -13,13 +13,13 @@ pub struct AcknowledgedAlarms {
 
 impl AcknowledgedAlarms {
     /// These alarms stand now.
-    pub fn stand(&mut self, alarms: &[AlarmStatus]) {
+    pub fn update_standing(&mut self, alarms: &[AlarmStatus]) {
         self.standing = alarms.iter().map(|alarm| alarm.code.clone()).collect();
         self.seen.retain(|seen| alarms.iter().any(|alarm| alarm.code == seen.code && alarm.since_ms <= seen.at_ms));
     }
 
     /// Somebody has seen this one; false when it does not stand.
-    pub fn acknowledge(&mut self, code: &str, by: &str, at_ns: TimeNs) -> bool {
+    pub fn acknowledge_alarm(&mut self, code: &str, by: &str, at_ns: TimeNs) -> bool {
         if !self.standing.iter().any(|standing| standing == code) {
             return false;
         }
@@ -31,7 +31,7 @@ impl AcknowledgedAlarms {
 
     /// Those that have been seen.
     #[must_use]
-    pub fn all(&self) -> Vec<Acknowledged> {
+    pub fn list_alarms(&self) -> Vec<Acknowledged> {
         self.seen.clone()
     }
 }
@@ -48,15 +48,15 @@ mod tests {
     #[test]
     fn an_alarm_that_comes_again_has_not_been_seen() {
         let mut seen = AcknowledgedAlarms::default();
-        assert!(!seen.acknowledge("overload", "Li", 5_000_000), "it does not stand");
-        seen.stand(&[alarm("overload", 1)]);
-        assert!(seen.acknowledge("overload", "Li", 5_000_000));
-        seen.stand(&[alarm("overload", 1)]);
-        assert_eq!(seen.all().len(), 1);
-        seen.stand(&[alarm("overload", 9)]);
-        assert!(seen.all().is_empty(), "raised again since");
-        seen.acknowledge("overload", "Li", 10_000_000);
-        seen.stand(&[]);
-        assert!(seen.all().is_empty(), "gone");
+        assert!(!seen.acknowledge_alarm("overload", "Li", 5_000_000), "it does not stand");
+        seen.update_standing(&[alarm("overload", 1)]);
+        assert!(seen.acknowledge_alarm("overload", "Li", 5_000_000));
+        seen.update_standing(&[alarm("overload", 1)]);
+        assert_eq!(seen.list_alarms().len(), 1);
+        seen.update_standing(&[alarm("overload", 9)]);
+        assert!(seen.list_alarms().is_empty(), "raised again since");
+        seen.acknowledge_alarm("overload", "Li", 10_000_000);
+        seen.update_standing(&[]);
+        assert!(seen.list_alarms().is_empty(), "gone");
     }
 }

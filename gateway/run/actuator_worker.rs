@@ -66,7 +66,7 @@ pub struct Writers {
 }
 
 impl Writers {
-    fn of(tools: Tools, limits: &config::GateConfig) -> Self {
+    fn from_tools(tools: Tools, limits: &config::GateConfig) -> Self {
         Self { writer: tools.actuator.map(|actuator| OverrideWriter::new(actuator, limits)), offsets: tools.offsets }
     }
 
@@ -74,8 +74,8 @@ impl Writers {
         self.writer.as_ref().is_some_and(OverrideWriter::is_waiting)
     }
 
-    fn release(&mut self, clock: &dyn Clock) -> Option<WriteRecord> {
-        self.writer.as_mut()?.release(clock)
+    fn release_override(&mut self, clock: &dyn Clock) -> Option<WriteRecord> {
+        self.writer.as_mut()?.release_machine(clock)
     }
 
     fn owes_withdrawal(&self) -> bool {
@@ -106,24 +106,24 @@ impl ActuatorWorker {
         clock: Arc<dyn Clock>,
         period: Duration,
     ) -> std::io::Result<Self> {
-        let writers = Writers::of(tools, limits);
+        let writers = Writers::from_tools(tools, limits);
         let mailbox = Arc::new(VerdictMailbox::new(period));
         let (say, said) = sync_channel(REPORTS_MAX);
         let of_thread = mailbox.clone();
         let thread = std::thread::Builder::new()
             .name("gate".to_owned())
-            .spawn(move || work(writers, &of_thread, &*clock, &say))?;
+            .spawn(move || run_worker(writers, &of_thread, &*clock, &say))?;
         Ok(Self::Thread(Remote { mailbox, said, thread: Some(thread) }))
     }
 
     /// At the tick, for accelerated time.
     #[must_use]
-    pub fn inline(tools: Tools, limits: &config::GateConfig) -> Self {
-        Self::Inline(Box::new(Writers::of(tools, limits)), ManualClock::default())
+    pub fn with_inline_writers(tools: Tools, limits: &config::GateConfig) -> Self {
+        Self::Inline(Box::new(Writers::from_tools(tools, limits)), ManualClock::default())
     }
 
-    /// Hands over what was decided at `now_ns`. What is told about it comes with [`ActuatorWorker::listen`].
-    pub fn step(
+    /// Hands over what was decided at `now_ns`. What is told about it comes with [`ActuatorWorker::receive_reports`].
+    pub fn submit_verdict(
         &mut self,
         verdict: &Verdict,
         asks: &[ScriptRequest],
@@ -133,8 +133,8 @@ impl ActuatorWorker {
         match self {
             Self::None => {}
             Self::Inline(writers, clock) => {
-                clock.set(now_ns);
-                asks.iter().for_each(|it| ask(writers, it, clock, &mut tell));
+                clock.set_time(now_ns);
+                asks.iter().for_each(|it| send_request(writers, it, clock, &mut tell));
                 write(writers, Some(verdict), clock, &mut tell);
             }
             Self::Thread(remote) => {
@@ -144,23 +144,29 @@ impl ActuatorWorker {
         }
     }
 
-    /// Orders shifts of axes; `armed` tells whether any may be made. What came of them is told here or with [`ActuatorWorker::listen`].
-    pub fn shift(&mut self, orders: &[OffsetOrder], armed: bool, now_ns: TimeNs, mut tell: impl FnMut(ActuatorReport)) {
+    /// Orders shifts of axes; `armed` tells whether any may be made. What came of them is told here or with [`ActuatorWorker::receive_reports`].
+    pub fn order_shifts(
+        &mut self,
+        orders: &[OffsetOrder],
+        armed: bool,
+        now_ns: TimeNs,
+        mut tell: impl FnMut(ActuatorReport),
+    ) {
         match self {
             Self::None => {}
             Self::Inline(writers, clock) => {
-                clock.set(now_ns);
-                orders.iter().for_each(|order| shift(writers, *order, clock, &mut tell));
+                clock.set_time(now_ns);
+                orders.iter().for_each(|order| carry_out_shift(writers, *order, clock, &mut tell));
             }
             Self::Thread(remote) => {
-                let withdrawn = remote.mailbox.order(orders, armed);
+                let withdrawn = remote.mailbox.post_orders(orders, armed);
                 withdrawn.into_iter().for_each(|order| tell(ActuatorReport::Withdrawn(order)));
             }
         }
     }
 
     /// What the worker has reported since; also that it is not there any more.
-    pub fn listen(&mut self, mut tell: impl FnMut(ActuatorReport)) {
+    pub fn receive_reports(&mut self, mut tell: impl FnMut(ActuatorReport)) {
         let Self::Thread(remote) = self else { return };
         loop {
             match remote.said.try_recv() {
@@ -176,7 +182,7 @@ impl ActuatorWorker {
         match self {
             Self::None => {}
             Self::Inline(writers, clock) => {
-                writers.release(clock).into_iter().for_each(|it| tell(ActuatorReport::Written(it)))
+                writers.release_override(clock).into_iter().for_each(|it| tell(ActuatorReport::Written(it)))
             }
             Self::Thread(remote) => remote.close(&mut tell),
         }
@@ -205,23 +211,23 @@ impl Remote {
     }
 }
 
-fn work(mut writers: Writers, mailbox: &VerdictMailbox, clock: &dyn Clock, say: &SyncSender<ActuatorReport>) {
+fn run_worker(mut writers: Writers, mailbox: &VerdictMailbox, clock: &dyn Clock, say: &SyncSender<ActuatorReport>) {
     // The tick tells what is granted; it is the same for both.
-    let awake = priority::ask() == Granted::RealTime;
+    let awake = priority::request_priority() == Granted::RealTime;
     let mut heard = true;
     while heard {
-        let (verdict, closing) = mailbox.take(if writers.is_waiting() { LOOK_EVERY } else { REST }, awake);
+        let (verdict, closing) = mailbox.take_verdict(if writers.is_waiting() { LOOK_EVERY } else { REST }, awake);
         let mut tell = |said| heard &= say.try_send(said).is_ok();
         while let Some((it, in_time)) = mailbox.next_ask() {
             match in_time {
-                true => ask(&mut writers, &it, clock, &mut tell),
+                true => send_request(&mut writers, &it, clock, &mut tell),
                 false => tell(ActuatorReport::Asked(it, Some(NOT_PASSED_ON.to_owned()))),
             }
         }
         write(&mut writers, verdict.as_ref(), clock, &mut tell);
         while let Some((order, in_time)) = mailbox.next_order() {
             match in_time {
-                true => shift(&mut writers, order, clock, &mut tell),
+                true => carry_out_shift(&mut writers, order, clock, &mut tell),
                 false => tell(ActuatorReport::Withdrawn(order)),
             }
         }
@@ -232,7 +238,7 @@ fn work(mut writers: Writers, mailbox: &VerdictMailbox, clock: &dyn Clock, say: 
     // Nobody listens any more, or it is over: the machine is given back.
     let until = Instant::now() + WITHDRAW_WITHIN;
     while writers.owes_withdrawal() {
-        if let Some(written) = writers.release(clock) {
+        if let Some(written) = writers.release_override(clock) {
             let _nobody = say.try_send(ActuatorReport::Written(written));
         }
         if Instant::now() >= until {
@@ -244,25 +250,25 @@ fn work(mut writers: Writers, mailbox: &VerdictMailbox, clock: &dyn Clock, say: 
     }
 }
 
-fn ask(writers: &mut Writers, ask: &ScriptRequest, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
+fn send_request(writers: &mut Writers, ask: &ScriptRequest, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
     let Some(writer) = &mut writers.writer else { return };
-    let failed = writer.ask(ask.request, clock).err().map(|error| error.to_string());
+    let failed = writer.send_request(ask.request, clock).err().map(|error| error.to_string());
     tell(ActuatorReport::Asked(ask.clone(), failed));
 }
 
 fn write(writers: &mut Writers, verdict: Option<&Verdict>, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
     let Some(writer) = &mut writers.writer else { return };
-    if let Some(written) = verdict.and_then(|verdict| writer.step(verdict, clock)) {
+    if let Some(written) = verdict.and_then(|verdict| writer.write_verdict(verdict, clock)) {
         tell(ActuatorReport::Written(written));
     }
-    match writer.look(clock) {
+    match writer.read_reaction(clock) {
         None => {}
         Some(Ok(reaction)) => tell(ActuatorReport::Seen(reaction)),
         Some(Err(fault)) => tell(ActuatorReport::Fault(fault)),
     }
 }
 
-fn shift(writers: &mut Writers, order: OffsetOrder, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
+fn carry_out_shift(writers: &mut Writers, order: OffsetOrder, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
     let Some(offsets) = &mut writers.offsets else { return };
     tell(ActuatorReport::Moved(Box::new(offsets.carry_out(order, clock))));
 }

@@ -6,7 +6,7 @@ use super::actuator_worker::{ActuatorReport, ActuatorWorker};
 use super::health::Health;
 use super::network_requests::{self, NetworkRequests};
 use super::offset_commands::{self, OffsetCommands};
-use super::report::milliseconds;
+use super::report::to_milliseconds;
 use crate::config::{self, GateMode};
 use crate::control::{
     self, NetworkRequest, OrderReceiver, PostedRequest, PostedRow, QueuedOrder, Reply, RequestedChange,
@@ -71,44 +71,44 @@ impl Commands {
             alarm: None,
             written: None,
             begun: false,
-            place: ["program", "block", "tool"].map(ChannelId::of),
+            place: ["program", "block", "tool"].map(ChannelId::from_name),
         }
     }
 
     /// What the page has to account for: who signed in, what was refused, what was changed.
-    fn account(&mut self, at_ns: TimeNs, health: &mut Health) {
+    fn store_posted_rows(&mut self, at_ns: TimeNs, health: &mut Health) {
         for PostedRow { row, stored } in self.inbox.rows.try_iter().take(ROWS_AT_ONCE_MAX) {
-            let kept = health.stores() && health.audit(Audit { at_ns, ..row });
+            let kept = health.is_storing() && health.append_audit(Audit { at_ns, ..row });
             let _gone = stored.send(kept);
         }
     }
 
     /// Between two ticks: an arming that an order has ended is at once seen by the hand, which gives the machine back.
     pub fn let_go(&mut self, pipeline: &mut Pipeline, sample: &Sample, now_ns: TimeNs, health: &mut Health) {
-        if !self.was_armed || pipeline.gate().armed().is_ok() {
+        if !self.was_armed || pipeline.gate().current_arming().is_ok() {
             return;
         }
         if let Some(verdict) = pipeline.verdict().copied() {
             let mut said = Vec::new();
-            self.actuator_worker.step(&Verdict { armed: false, ..verdict }, &[], now_ns, |it| said.push(it));
-            self.hear(said, sample, pipeline.gate_mut(), health);
+            self.actuator_worker.submit_verdict(&Verdict { armed: false, ..verdict }, &[], now_ns, |it| said.push(it));
+            self.accept_reports(said, sample, pipeline.gate_mut(), health);
         }
         self.follow_arming(pipeline.gate_mut(), sample.at_ns, health);
     }
 
     /// Before the tick is decided: what persons at the box have ordered meanwhile.
-    pub fn obey(&mut self, gate: &mut Gate, sample: &Sample, health: &mut Health) {
+    pub fn carry_out_orders(&mut self, gate: &mut Gate, sample: &Sample, health: &mut Health) {
         if !std::mem::replace(&mut self.begun, true) {
-            self.keep(trail::started(gate.limits(), sample.at_ns), gate, health);
+            self.record_audit(trail::audit_start(gate.limits(), sample.at_ns), gate, health);
         }
         while let Ok(QueuedOrder { order, reply }) = self.inbox.orders.try_recv() {
-            let answer = self.order(&order, gate, sample, health);
+            let answer = self.carry_out_order(&order, gate, sample, health);
             // Whoever has gone meanwhile finds it in the audit.
             let _gone = reply.send(answer);
         }
-        self.account(sample.at_ns, health);
+        self.store_posted_rows(sample.at_ns, health);
         self.hear_network(gate, sample.at_ns, health);
-        if !health.stores() {
+        if !health.is_storing() {
             gate.disarm(Disarmed::NoAudit);
         }
     }
@@ -117,72 +117,93 @@ impl Commands {
     fn hear_network(&mut self, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) {
         for _ in 0..ROWS_AT_ONCE_MAX {
             let Ok(PostedRequest { request, reply }) = self.inbox.requests.try_recv() else { return };
-            let answer = match health.stores() {
-                true => self.grant(&request, at_ns),
-                false => Reply::refused(ArmError::NoAudit.to_string()),
+            let answer = match health.is_storing() {
+                true => self.grant_request(&request, at_ns),
+                false => Reply::from_refusal(ArmError::NoAudit.to_string()),
             };
-            self.keep(network_requests::row(&request, &answer, at_ns), gate, health);
+            self.record_audit(network_requests::build_audit_row(&request, &answer, at_ns), gate, health);
             let _gone = reply.send(answer);
         }
     }
 
-    fn grant(&mut self, NetworkRequest { sink, change, .. }: &NetworkRequest, at_ns: TimeNs) -> Reply {
+    fn grant_request(&mut self, NetworkRequest { sink, change, .. }: &NetworkRequest, at_ns: TimeNs) -> Reply {
         match change {
             Ok(RequestedChange::AcknowledgeAlarm { code }) => {
-                self.acknowledge_alarm(code, &network_requests::author(sink), at_ns)
+                self.acknowledge_alarm(code, &network_requests::format_author(sink), at_ns)
             }
-            Ok(change) => self.network.take(sink, change, at_ns),
-            Err(why) => Reply::refused(why),
+            Ok(change) => self.network.accept_change(sink, change, at_ns),
+            Err(why) => Reply::from_refusal(why),
         }
     }
 
     fn acknowledge_alarm(&mut self, code: &str, by: &str, at_ns: TimeNs) -> Reply {
-        match self.seen.acknowledge(code, by, at_ns) {
-            true => Reply::done(format!("the alarm {code} was seen; it stands until its reason has gone")),
-            false => Reply::refused(format!("no alarm {code:?} stands")),
+        match self.seen.acknowledge_alarm(code, by, at_ns) {
+            true => Reply::from_success(format!("the alarm {code} was seen; it stands until its reason has gone")),
+            false => Reply::from_refusal(format!("no alarm {code:?} stands")),
         }
     }
 
     /// The feed override that the network asks for at this tick.
-    pub fn requested(&mut self, at_ns: TimeNs) -> Option<OverrideRequest> {
-        self.network.at(at_ns)
+    pub fn network_override(&mut self, at_ns: TimeNs) -> Option<OverrideRequest> {
+        self.network.find_least_override(at_ns)
     }
 
-    fn order(&mut self, order: &control::Order, gate: &mut Gate, sample: &Sample, health: &mut Health) -> Reply {
+    fn carry_out_order(
+        &mut self,
+        order: &control::Order,
+        gate: &mut Gate,
+        sample: &Sample,
+        health: &mut Health,
+    ) -> Reply {
         let at_ns = sample.at_ns;
         match order {
-            control::Order::Arm { by, for_s } => self.arm(by, *for_s, gate, sample, health),
+            control::Order::Arm { by, for_s } => self.arm_gate(by, *for_s, gate, sample, health),
             control::Order::Disarm { by } => {
-                let was = gate.armed().is_ok();
+                let was = gate.current_arming().is_ok();
                 gate.disarm(Disarmed::Person);
                 self.by.clone_from(by);
                 if !was {
-                    self.keep(trail::order("disarmed", "was_not_armed", "", by, at_ns), gate, health);
+                    self.record_audit(trail::audit_order("disarmed", "was_not_armed", "", by, at_ns), gate, health);
                 }
-                Reply::done(if was { "disarmed; the machine is given back to its dial" } else { "it was not armed" })
+                Reply::from_success(if was {
+                    "disarmed; the machine is given back to its dial"
+                } else {
+                    "it was not armed"
+                })
             }
             control::Order::Acknowledge { by } => {
-                gate.acknowledge();
-                self.keep(
-                    trail::order("acknowledged", "done", "a feed hold or stop was seen to", by, at_ns),
+                gate.acknowledge_requests();
+                self.record_audit(
+                    trail::audit_order("acknowledged", "done", "a feed hold or stop was seen to", by, at_ns),
                     gate,
                     health,
                 );
-                Reply::done("the next feed hold or stop may pass")
+                Reply::from_success("the next feed hold or stop may pass")
             }
             control::Order::AcknowledgeAlarm { by, code } => {
                 let reply = self.acknowledge_alarm(code, by, at_ns);
                 let outcome = if reply.done { "done" } else { "refused" };
-                self.keep(trail::order("acknowledged", outcome, &format!("alarm {code}"), by, at_ns), gate, health);
+                self.record_audit(
+                    trail::audit_order("acknowledged", outcome, &format!("alarm {code}"), by, at_ns),
+                    gate,
+                    health,
+                );
                 reply
             }
         }
     }
 
-    fn arm(&mut self, by: &str, for_s: Option<f64>, gate: &mut Gate, sample: &Sample, health: &mut Health) -> Reply {
+    fn arm_gate(
+        &mut self,
+        by: &str,
+        for_s: Option<f64>,
+        gate: &mut Gate,
+        sample: &Sample,
+        health: &mut Health,
+    ) -> Reply {
         let at_ns = sample.at_ns;
         let lasts = for_s.map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::ZERO));
-        let armed = match health.stores() {
+        let armed = match health.is_storing() {
             true => gate.arm(by, lasts, at_ns).cloned(),
             false => Err(ArmError::NoAudit),
         };
@@ -191,28 +212,32 @@ impl Commands {
                 self.by = by.to_owned();
                 // Whoever disarms before the next tick ends an arming too.
                 self.was_armed = true;
-                self.keep(trail::armed(&armed), gate, health);
+                self.record_audit(trail::audit_arming(&armed), gate, health);
                 self.clear_alarm(at_ns, health);
-                let text = format!("{}; {}", told(&armed, &self.target, gate.limits()), StateBasis::of(sample));
-                health.event(at_ns, SOURCE, &Notice::new(Severity::Warning, "gate_armed", text.clone()));
-                Reply::done(text)
+                let text = format!(
+                    "{}; {}",
+                    describe_arming(&armed, &self.target, gate.limits()),
+                    StateBasis::from_sample(sample)
+                );
+                health.record_event(at_ns, SOURCE, &Notice::new(Severity::Warning, "gate_armed", text.clone()));
+                Reply::from_success(text)
             }
             Err(why) => {
-                self.keep(trail::order("armed", "refused", &why.to_string(), by, at_ns), gate, health);
-                Reply::refused(why.to_string())
+                self.record_audit(trail::audit_order("armed", "refused", &why.to_string(), by, at_ns), gate, health);
+                Reply::from_refusal(why.to_string())
             }
         }
     }
 
     /// What cannot be accounted for is not written.
-    fn keep(&self, row: Audit, gate: &mut Gate, health: &mut Health) {
-        if !health.audit(row) {
+    fn record_audit(&self, row: Audit, gate: &mut Gate, health: &mut Health) {
+        if !health.append_audit(row) {
             gate.disarm(Disarmed::NoAudit);
         }
     }
 
     /// After the tick was decided: into the audit first, then to the machine.
-    pub fn step(
+    pub fn apply_verdict(
         &mut self,
         pipeline: &mut Pipeline,
         asks: &[ScriptRequest],
@@ -221,113 +246,120 @@ impl Commands {
         health: &mut Health,
     ) {
         let Some(mut verdict) = pipeline.verdict().copied() else { return };
-        let row = self.trail.request(pipeline.scripts().decision().request.as_ref(), &verdict);
+        let row = self.trail.audit_override(pipeline.scripts().decision().request.as_ref(), &verdict);
         let gate = pipeline.gate_mut();
-        let judged = gate.ask(asks, sample);
-        row.into_iter().for_each(|row| self.keep(row, gate, health));
+        let judged = gate.judge_requests(asks, sample);
+        row.into_iter().for_each(|row| self.record_audit(row, gate, health));
         let mut sent = Vec::new();
         for (ask, outcome) in judged {
             match outcome {
                 AskOutcome::Sent => sent.push(ask),
-                _ => self.keep(trail::asked(&ask, outcome, None, sample.at_ns), gate, health),
+                _ => self.record_audit(trail::audit_ladder_request(&ask, outcome, None, sample.at_ns), gate, health),
             }
         }
-        verdict.armed &= gate.armed().is_ok();
+        verdict.armed &= gate.current_arming().is_ok();
         let mut said = Vec::new();
-        self.actuator_worker.step(&verdict, &sent, now_ns, |it| said.push(it));
-        self.actuator_worker.listen(|it| said.push(it));
-        self.hear(said, sample, gate, health);
-        self.shift(pipeline, sample, now_ns, health);
+        self.actuator_worker.submit_verdict(&verdict, &sent, now_ns, |it| said.push(it));
+        self.actuator_worker.receive_reports(|it| said.push(it));
+        self.accept_reports(said, sample, gate, health);
+        self.apply_offsets(pipeline, sample, now_ns, health);
         self.follow_arming(pipeline.gate_mut(), sample.at_ns, health);
     }
 
     /// Offsets: into the audit first, then to the machine.
-    fn shift(&mut self, pipeline: &mut Pipeline, sample: &Sample, now_ns: TimeNs, health: &mut Health) {
-        let verdicts = pipeline.shift(sample);
-        let rows = self.shifting.rows(&pipeline.scripts().decision().offsets, &verdicts, pipeline.gate());
-        let looks = pipeline.looks(sample);
+    fn apply_offsets(&mut self, pipeline: &mut Pipeline, sample: &Sample, now_ns: TimeNs, health: &mut Health) {
+        let verdicts = pipeline.judge_offsets(sample);
+        let rows = self.shifting.build_audit_rows(&pipeline.scripts().decision().offsets, &verdicts, pipeline.gate());
+        let looks = pipeline.list_readbacks(sample);
         let gate = pipeline.gate_mut();
-        rows.into_iter().for_each(|row| self.keep(row, gate, health));
+        rows.into_iter().for_each(|row| self.record_audit(row, gate, health));
         let orders: Vec<OffsetOrder> = verdicts.iter().filter_map(|verdict| verdict.order).chain(looks).collect();
         let mut said = Vec::new();
-        self.actuator_worker.shift(&orders, gate.writes_offsets(), now_ns, |it| said.push(it));
-        self.hear(said, sample, gate, health);
+        self.actuator_worker.order_shifts(&orders, gate.writes_offsets(), now_ns, |it| said.push(it));
+        self.accept_reports(said, sample, gate, health);
     }
 
     fn record_offset_result(&mut self, moved: &Moved, sample: &Sample, gate: &mut Gate, health: &mut Health) {
-        if let Some(row) = self.shifting.row(moved) {
-            let command = offset_commands::command(moved, &row, &self.target_of_offsets(gate));
-            self.keep(row, gate, health);
-            command.into_iter().for_each(|row| health.keep(row.into()));
+        if let Some(row) = self.shifting.build_audit_row(moved) {
+            let command = offset_commands::build_command(moved, &row, &self.target_of_offsets(gate));
+            self.record_audit(row, gate, health);
+            command.into_iter().for_each(|row| health.keep_record(row.into()));
         }
-        self.shifting.answered(moved, gate, health);
-        moved.fault().into_iter().for_each(|fault| self.fail(&fault, sample.at_ns, gate, health));
+        self.shifting.accept_answer(moved, gate, health);
+        moved.fault().into_iter().for_each(|fault| self.raise_fault(&fault, sample.at_ns, gate, health));
     }
 
     fn target_of_offsets(&self, gate: &Gate) -> String {
         gate.limits().offset.source.clone().unwrap_or_else(|| self.target.clone())
     }
 
-    fn hear(&mut self, said: Vec<ActuatorReport>, sample: &Sample, gate: &mut Gate, health: &mut Health) {
-        said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
+    fn accept_reports(&mut self, said: Vec<ActuatorReport>, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+        said.into_iter().for_each(|it| self.accept_report(it, sample, gate, health));
     }
 
-    fn heard(&mut self, said: ActuatorReport, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+    fn accept_report(&mut self, said: ActuatorReport, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         match said {
             ActuatorReport::Written(written) => {
                 let asks = matches!(written.occasion, Occasion::Change | Occasion::SignOfLife);
                 self.written = asks.then(|| f64::from(written.asked.percent()));
-                self.trail.write(&written).into_iter().for_each(|row| self.keep(row, gate, health));
-                self.trail.command(&written, &self.target).into_iter().for_each(|row| health.keep(row.into()));
-                written.fault.into_iter().for_each(|fault| self.fail(&fault, sample.at_ns, gate, health));
+                self.trail.write(&written).into_iter().for_each(|row| self.record_audit(row, gate, health));
+                self.trail
+                    .command_from_write(&written, &self.target)
+                    .into_iter()
+                    .for_each(|row| health.keep_record(row.into()));
+                written.fault.into_iter().for_each(|fault| self.raise_fault(&fault, sample.at_ns, gate, health));
             }
             ActuatorReport::Seen(reaction) => {
-                self.keep(trail::reaction(&reaction), gate, health);
+                self.record_audit(trail::audit_reaction(&reaction), gate, health);
                 let [program, block, tool] =
                     self.place.map(|id| id.and_then(|id| sample.text(id)).unwrap_or_default().to_owned());
-                health.keep(ReactionTime { program, block, tool, ..trail::times(&reaction) }.into());
+                health.keep_record(ReactionTime { program, block, tool, ..trail::reaction_times(&reaction) }.into());
             }
-            ActuatorReport::Fault(fault) => self.fail(&fault, sample.at_ns, gate, health),
+            ActuatorReport::Fault(fault) => self.raise_fault(&fault, sample.at_ns, gate, health),
             ActuatorReport::Moved(moved) => self.record_offset_result(&moved, sample, gate, health),
-            ActuatorReport::Withdrawn(order) => gate.offsets_mut().withdrawn(order),
+            ActuatorReport::Withdrawn(order) => gate.offsets_mut().withdraw_order(order),
             ActuatorReport::Asked(ask, failed) => {
-                self.keep(trail::asked(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns), gate, health);
+                self.record_audit(
+                    trail::audit_ladder_request(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns),
+                    gate,
+                    health,
+                );
                 if let Some(failed) = failed {
-                    health.event(sample.at_ns, SOURCE, &Notice::new(Severity::Error, "ask_failed", failed));
+                    health.record_event(sample.at_ns, SOURCE, &Notice::new(Severity::Error, "ask_failed", failed));
                 }
             }
         }
     }
 
-    fn fail(&mut self, fault: &Fault, at_ns: TimeNs, gate: &mut Gate, health: &mut Health) {
-        gate.disarm(fault.disarmed());
+    fn raise_fault(&mut self, fault: &Fault, at_ns: TimeNs, gate: &mut Gate, health: &mut Health) {
+        gate.disarm(fault.disarm_reason());
         let en = fault.to_string();
         if self.alarm.is_none() {
             let (code, source, severity) = (CODE.to_owned(), SOURCE.to_owned(), "critical".to_owned());
-            let zh = fault.zh().to_owned();
+            let zh = fault.describe_in_chinese().to_owned();
             self.alarm = Some((at_ns, en.clone(), zh.clone()));
-            health.keep(Alarm { at_ns, code, source, severity, en: en.clone(), zh }.into());
-            Notice::new(Severity::Error, CODE, en).say();
+            health.keep_record(Alarm { at_ns, code, source, severity, en: en.clone(), zh }.into());
+            Notice::new(Severity::Error, CODE, en).write_to_logs();
         } else {
             // What follows from the first fault is told, and raises no alarm of its own.
-            health.event(at_ns, SOURCE, &Notice::new(Severity::Error, "gate_fault", en));
+            health.record_event(at_ns, SOURCE, &Notice::new(Severity::Error, "gate_fault", en));
         }
     }
 
     fn clear_alarm(&mut self, at_ns: TimeNs, health: &mut Health) {
         if self.alarm.take().is_some() {
-            health.keep(AlarmClear { at_ns, code: CODE.to_owned(), source: SOURCE.to_owned() }.into());
+            health.keep_record(AlarmClear { at_ns, code: CODE.to_owned(), source: SOURCE.to_owned() }.into());
         }
     }
 
     fn follow_arming(&mut self, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) {
-        let armed = gate.armed().is_ok();
+        let armed = gate.current_arming().is_ok();
         if std::mem::replace(&mut self.was_armed, armed) && !armed {
-            let why = gate.armed().err().unwrap_or(Disarmed::Person);
+            let why = gate.current_arming().err().unwrap_or(Disarmed::Person);
             let by = if why == Disarmed::Person { self.by.clone() } else { String::new() };
-            self.keep(trail::disarmed(why, &by, at_ns), gate, health);
+            self.record_audit(trail::audit_disarming(why, &by, at_ns), gate, health);
             let text = format!("the gate is disarmed: {why}");
-            health.event(at_ns, SOURCE, &Notice::new(Severity::Warning, CODE, text));
+            health.record_event(at_ns, SOURCE, &Notice::new(Severity::Warning, CODE, text));
         }
     }
 
@@ -340,17 +372,18 @@ impl Commands {
     /// Gives the machine back and ends.
     pub fn close(&mut self, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         let mut said = Vec::new();
-        self.actuator_worker.shift(&gate.offsets().farewell(), false, sample.at_ns, |it| said.push(it));
+        self.actuator_worker
+            .order_shifts(&gate.offsets().list_restore_orders(), false, sample.at_ns, |it| said.push(it));
         self.actuator_worker.close(|it| said.push(it));
-        self.hear(said, sample, gate, health);
+        self.accept_reports(said, sample, gate, health);
         // What the page has asked to be noted just before the end is noted too.
-        self.account(sample.at_ns, health);
+        self.store_posted_rows(sample.at_ns, health);
     }
 
     /// Which alarms have been seen; told which ones stand.
-    pub fn seen(&mut self, standing: &[AlarmStatus]) -> Vec<Acknowledged> {
-        self.seen.stand(standing);
-        self.seen.all()
+    pub fn update_acknowledged(&mut self, standing: &[AlarmStatus]) -> Vec<Acknowledged> {
+        self.seen.update_standing(standing);
+        self.seen.list_alarms()
     }
 
     /// What stands in the machine's mailbox, percent.
@@ -360,25 +393,25 @@ impl Commands {
     }
 
     /// The alarm that stands.
-    pub fn alarm(&self) -> Option<AlarmStatus> {
+    pub fn standing_alarm(&self) -> Option<AlarmStatus> {
         self.alarm.as_ref().map(|(since_ns, text, zh)| AlarmStatus {
             code: CODE.to_owned(),
             severity: "critical".to_owned(),
             text: text.clone(),
             zh: zh.clone(),
-            since_ms: milliseconds(*since_ns),
+            since_ms: to_milliseconds(*since_ns),
         })
     }
 
     /// What is wrong with the way to the machine.
-    pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = StatusProblem> {
+    pub fn list_problems(&self, gate: &Gate) -> impl Iterator<Item = StatusProblem> {
         let next = "find the reason, then arm again with `cnc-gateway arm`".to_owned();
         let alarm = self.alarm.as_ref().map(|(_, text, _)| StatusProblem { what: text.clone(), next });
-        alarm.into_iter().chain(self.shifting.problems(gate))
+        alarm.into_iter().chain(self.shifting.list_problems(gate))
     }
 }
 
-fn told(armed: &Armed, target: &str, limits: &config::GateConfig) -> String {
+fn describe_arming(armed: &Armed, target: &str, limits: &config::GateConfig) -> String {
     let what = match (limits.mode, limits.offset.mode) {
         (GateMode::Armed, GateMode::Armed) => "overrides and offsets are",
         (_, GateMode::Armed) => "offsets are",

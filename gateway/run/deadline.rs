@@ -30,7 +30,7 @@ impl RunLimit {
 }
 
 impl Deadline for RunLimit {
-    fn begin(&self) {
+    fn begin_run(&self) {
         self.began_ns.store(self.since_ns(), Ordering::Relaxed);
     }
 

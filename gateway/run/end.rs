@@ -16,20 +16,20 @@ pub(super) async fn wait_for_end(
     live: watch::Receiver<Option<Published>>,
 ) {
     tokio::select! {
-        () = obey(run_flags, signals.as_deref_mut()) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
+        () = wait_for_stop(run_flags, signals.as_deref_mut()) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").write_to_logs(),
         () = until_closed(live.clone()) => {}
     }
     run_flags.stop.store(true, Ordering::SeqCst);
     // The last commit of the history waits for the sinks; who asks twice does not want to wait.
     tokio::select! {
-        () = obey(run_flags, signals) => outputs.into_iter().for_each(|outputs| outputs.outbox.set_hurried(true)),
+        () = wait_for_stop(run_flags, signals) => outputs.into_iter().for_each(|outputs| outputs.outbox.set_hurried(true)),
         () = until_closed(live.clone()) => {}
     }
     until_closed(live).await;
 }
 
 /// Returns when a signal says stop.
-async fn obey(run_flags: &RunFlags, signals: Option<&mut Signals>) {
+async fn wait_for_stop(run_flags: &RunFlags, signals: Option<&mut Signals>) {
     let Some(signals) = signals else { return std::future::pending().await };
     loop {
         match signals.next().await {

@@ -2,7 +2,7 @@
 //! remembered as an event, and is shown while it lasts.
 
 use super::history_store::HistoryStore;
-use super::problems::{apart, clock_problem, problems_of_disk, problems_of_history};
+use super::problems::{clock_problem, describe_clock_offset, problems_of_disk, problems_of_history};
 use super::sample_feed::{SampleFeed, SourcePace};
 use super::save::Saver;
 use super::service_manager::{ProgressMarks, WatchedService};
@@ -77,7 +77,7 @@ impl Health {
     ) -> Self {
         let data_dir = memory.parent().map(Path::to_owned).unwrap_or_default();
         let service = WatchedService::new(data_dir, marks);
-        let stores = history_store.stores();
+        let stores = history_store.is_storing();
         Self {
             history_store,
             clock,
@@ -101,70 +101,70 @@ impl Health {
     }
 
     /// From now on these notices become events.
-    pub fn hear(&mut self, notices: mpsc::Receiver<Notice>) {
+    pub fn follow_notices(&mut self, notices: mpsc::Receiver<Notice>) {
         self.heard = Some(notices);
     }
 
     /// Remembers and tells that something happened.
-    pub fn event(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
-        notice.say();
-        self.history_store.record(event_of(at_ns, source, notice).into());
+    pub fn record_event(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
+        notice.write_to_logs();
+        self.history_store.store_record(event_of(at_ns, source, notice).into());
     }
 
     /// Remembers a record that is no event.
-    pub fn keep(&mut self, record: Record) {
-        self.history_store.record(record);
+    pub fn keep_record(&mut self, record: Record) {
+        self.history_store.store_record(record);
     }
 
     /// Hands in a row of the audit; false when it will not be stored.
-    pub fn audit(&mut self, row: Audit) -> bool {
-        self.history_store.audit(row)
+    pub fn append_audit(&mut self, row: Audit) -> bool {
+        self.history_store.append_audit(row)
     }
 
     /// Does the history take anything at the moment?
     #[must_use]
-    pub fn stores(&self) -> bool {
+    pub fn is_storing(&self) -> bool {
         self.stores
     }
 
     /// From now on these lags are stored with every sample, after the values of the pipeline, and what has happened to
     /// them is remembered.
-    pub fn aligned(&mut self, at_ns: TimeNs, alignment: &mut Alignment) {
-        self.lags = alignment.values();
+    pub fn update_lags(&mut self, at_ns: TimeNs, alignment: &mut Alignment) {
+        self.lags = alignment.current_values();
         for notice in alignment.take_notices() {
-            self.event(at_ns, "alignment", &notice);
+            self.record_event(at_ns, "alignment", &notice);
         }
     }
 
     /// From now on these values are stored with every sample, after all others.
-    pub fn beside(&mut self, values: [ExtraValue<'static>; 2]) {
+    pub fn set_twin_values(&mut self, values: [ExtraValue<'static>; 2]) {
         self.beside = Some(values);
     }
 
     /// From now on these values are stored with every sample, after those of the simulation.
-    pub fn thermal(&mut self, values: &[ExtraValue<'static>]) {
+    pub fn set_thermal_values(&mut self, values: &[ExtraValue<'static>]) {
         self.thermal.clear();
         self.thermal.extend_from_slice(values);
     }
 
     /// Looks after everything, about once per second.
-    pub fn look(&mut self, pipeline: &Pipeline, feed: &SampleFeed, now_ns: TimeNs) {
+    pub fn look_at_parts(&mut self, pipeline: &Pipeline, feed: &SampleFeed, now_ns: TimeNs) {
         if self.looked.is_some_and(|at| at.elapsed() < LOOK_EVERY) {
             return;
         }
         self.looked = Some(Instant::now());
-        self.history_store.look();
+        self.history_store.look_at_condition();
         self.of_disk = problems_of_disk(&self.memory);
-        self.stores = self.history_store.stores();
-        self.service.report(feed.count_steps(), self.history_store.count_rounds());
+        self.stores = self.history_store.is_storing();
+        self.service.report_moved_parts(feed.count_steps(), self.history_store.count_rounds());
         let heard: Vec<Notice> = self.heard.iter().flat_map(mpsc::Receiver::try_iter).take(HEARD_MAX).collect();
-        heard.iter().for_each(|notice| self.event(now_ns, "gateway", notice));
+        heard.iter().for_each(|notice| self.record_event(now_ns, "gateway", notice));
         self.look_at_clock(now_ns);
         self.look_at_sources(feed, now_ns);
-        self.look_at_paces(&feed.paces(now_ns), now_ns);
+        self.look_at_paces(&feed.list_paces(now_ns), now_ns);
         self.look_at_day(now_ns);
         if self.saved.elapsed() >= SAVE_EVERY {
-            self.save(pipeline);
+            self.save_learned(pipeline);
         }
     }
 
@@ -173,18 +173,18 @@ impl Health {
         let confirmed = self.clock.as_ref().is_none_or(|clock| clock.is_confirmed());
         let day = now_ns.div_euclid(DAY_NS);
         if confirmed && self.day.replace(day).is_some_and(|before| before != day) {
-            self.history_store.maintain(now_ns);
+            self.history_store.maintain_file(now_ns);
         }
     }
 
     fn look_at_clock(&mut self, now_ns: TimeNs) {
-        let Some(news) = self.clock.as_ref().and_then(|clock| clock.look()) else { return };
+        let Some(news) = self.clock.as_ref().and_then(|clock| clock.compare_with_wall()) else { return };
         let told = |severity, code, text: String| Notice::new(severity, code, text);
         let notice = match news {
             ClockNews::Confirmed => {
                 self.history_store.confirm_clock();
                 // What is due by then is done; the next time at the turn of the day.
-                self.history_store.maintain(now_ns);
+                self.history_store.maintain_file(now_ns);
                 told(
                     Severity::Info,
                     "clock_confirmed",
@@ -194,7 +194,10 @@ impl Health {
             ClockNews::Leapt { ahead_ns } => told(
                 Severity::Warning,
                 "clock_leapt",
-                format!("the wall clock is {} the box now; the box keeps its own time", apart(ahead_ns)),
+                format!(
+                    "the wall clock is {} the box now; the box keeps its own time",
+                    describe_clock_offset(ahead_ns)
+                ),
             ),
             ClockNews::Returned => {
                 told(Severity::Info, "clock_right", "the wall clock agrees with the box again".to_owned())
@@ -203,12 +206,12 @@ impl Health {
                 self.follow = true;
                 let text = format!(
                     "the wall clock has been {} the box for long enough: the box begins again with it",
-                    apart(ahead_ns)
+                    describe_clock_offset(ahead_ns)
                 );
                 told(Severity::Warning, "clock_followed", text)
             }
         };
-        self.event(now_ns, "clock", &notice.detail(format!("{news:?}")));
+        self.record_event(now_ns, "clock", &notice.with_detail(format!("{news:?}")));
     }
 
     /// Shall the run end, and begin again with the time of the wall clock?
@@ -220,15 +223,15 @@ impl Health {
     /// What is thought of the clock.
     #[must_use]
     pub fn clock_status(&self) -> Option<ClockStatus> {
-        self.clock.as_ref().map(|clock| clock.status())
+        self.clock.as_ref().map(|clock| clock.build_status())
     }
 
     fn look_at_sources(&mut self, feed: &SampleFeed, now_ns: TimeNs) {
-        let status = feed.status(now_ns);
+        let status = feed.list_sources(now_ns);
         self.sources.resize_with(status.len(), KnownSource::default);
         for (index, source) in status.into_iter().enumerate() {
-            for notice in self.sources[index].notices(&source) {
-                self.event(now_ns, &source.name, &notice);
+            for notice in self.sources[index].notice_changes(&source) {
+                self.record_event(now_ns, &source.name, &notice);
             }
         }
     }
@@ -244,19 +247,19 @@ impl Health {
                 continue;
             }
             self.paces[index] = Some(kept_s);
-            self.event(now_ns, &pace.name, &told_pace(pace));
+            self.record_event(now_ns, &pace.name, &told_pace(pace));
         }
     }
 
     /// Saves what the estimators have learned, what is known of the edges and what the scripts remember: new files in the place of the old ones.
-    fn save(&mut self, pipeline: &Pipeline) {
+    fn save_learned(&mut self, pipeline: &Pipeline) {
         self.saved = Instant::now();
         let scripts = self.memory.with_file_name(SCRIPTS_MEMORY);
         let wear = self.memory.with_file_name(WEAR_MEMORY);
         let all = [
-            (&self.memory, pipeline.estimators().snapshot()),
-            (&scripts, pipeline.scripts().snapshot()),
-            (&wear, pipeline.wear().snapshot()),
+            (&self.memory, pipeline.estimators().take_snapshot()),
+            (&scripts, pipeline.scripts().take_snapshot()),
+            (&wear, pipeline.wear().take_snapshot()),
         ];
         for (path, snapshot) in all {
             self.saver.put_learned(path, snapshot.to_string());
@@ -264,8 +267,8 @@ impl Health {
     }
 
     /// Puts a file of the box's own on disk, beside the tick.
-    pub fn put(&self, path: &Path, text: String) {
-        self.saver.put(path, text);
+    pub fn put_file(&self, path: &Path, text: String) {
+        self.saver.put_file(path, text);
     }
 
     /// The same for what was learned: with a checksum, and beside the save before it.
@@ -275,22 +278,22 @@ impl Health {
 
     /// The last tick is over.
     pub fn close(&mut self, pipeline: &Pipeline, at_ns: TimeNs) {
-        self.save(pipeline);
+        self.save_learned(pipeline);
         self.saver.close();
         let stopped = Notice::new(Severity::Info, "stopped", "stopped");
-        self.history_store.record(event_of(at_ns, "gateway", &stopped).into());
+        self.history_store.store_record(event_of(at_ns, "gateway", &stopped).into());
         self.history_store.close();
     }
 
     /// The store.
     #[must_use]
     pub fn history_status(&self) -> HistoryStatus {
-        self.history_store.status()
+        self.history_store.build_status()
     }
 
     /// What does not work, of the store too.
     #[must_use]
-    pub fn problems(&self, history: &HistoryStatus) -> Vec<StatusProblem> {
+    pub fn list_problems(&self, history: &HistoryStatus) -> Vec<StatusProblem> {
         let mut problems = Vec::new();
         let mut add = |what: String, next: &str| problems.push(StatusProblem { what, next: next.to_owned() });
         if let Some(what) = self.port.borrow().clone() {
@@ -328,14 +331,14 @@ struct KnownSource {
 
 impl KnownSource {
     /// What is new, and what is over.
-    fn notices(&mut self, now: &SourceStatus) -> Vec<Notice> {
+    fn notice_changes(&mut self, now: &SourceStatus) -> Vec<Notice> {
         let mut notices = Vec::new();
         let before = std::mem::replace(&mut self.error, now.error.clone());
         if let (None, Some(error)) = (&before, &now.error) {
             notices.push(Notice::new(Severity::Warning, "source_lost", error.clone()));
             self.is_lost = true;
         }
-        if self.is_lost && now.state == WorkerState::Reading.word() {
+        if self.is_lost && now.state == WorkerState::Reading.as_word() {
             notices.push(Notice::new(Severity::Info, "source_back", format!("{} answers again", now.name)));
             self.is_lost = false;
         }
@@ -343,7 +346,7 @@ impl KnownSource {
         let told = |one: &StatusProblem| format!("{}: {}", now.name, one.what);
         let new = self.problems.iter().filter(|problem| !known.contains(problem));
         notices.extend(
-            new.map(|one| Notice::new(Severity::Warning, "source_problem", told(one)).detail(one.next.as_str())),
+            new.map(|one| Notice::new(Severity::Warning, "source_problem", told(one)).with_detail(one.next.as_str())),
         );
         let over = known.iter().filter(|problem| !self.problems.contains(problem));
         notices
@@ -369,20 +372,20 @@ fn told_pace(SourcePace { name, wanted, kept }: &SourcePace) -> Notice {
     );
     let detail =
         "a fanuc:// address may take more of the control's time with duty_pct=, or be read less often with period_ms=";
-    Notice::new(Severity::Warning, "source_pace", text).detail(detail)
+    Notice::new(Severity::Warning, "source_pace", text).with_detail(detail)
 }
 
 impl Store for Health {
-    fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
+    fn store_sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
         let beside: &[ExtraValue<'_>] = self.beside.as_ref().map_or(&[], |beside| beside);
-        self.history_store.sample(sample, &[extras, &self.lags, beside, &self.thermal].concat());
+        self.history_store.store_sample(sample, &[extras, &self.lags, beside, &self.thermal].concat());
     }
 
-    fn record(&mut self, record: Record) {
-        self.history_store.record(record);
+    fn store_record(&mut self, record: Record) {
+        self.history_store.store_record(record);
     }
 
-    fn notice(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
-        self.event(at_ns, source, notice);
+    fn store_notice(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
+        self.record_event(at_ns, source, notice);
     }
 }

@@ -38,7 +38,7 @@ use crate::config::Config;
 use crate::control::{self, OrderReceiver};
 use crate::diagnosis::handle::DiagnosisHandle;
 use crate::gate::Gate;
-use crate::http::{Certificate, Configured, Published, Server, ServerParts, ServerState, bind, port_trouble};
+use crate::http::{Certificate, Configured, Published, Server, ServerParts, ServerState, bind_port, port_trouble};
 use crate::log::{self, Notice, Severity};
 use crate::operations::Operations;
 use crate::pipeline::Pipeline;
@@ -96,19 +96,19 @@ type StartedTicker = (Ticker, watch::Receiver<Option<Published>>);
 /// # Errors
 /// Everything that makes it impossible to begin.
 pub fn run(plan: RunPlan) -> Result<(), CannotRun> {
-    let outputs = ConfiguredSinks::of(&plan.config);
+    let outputs = ConfiguredSinks::from_config(&plan.config);
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
-        .max_blocking_threads(BLOCKING_MAX + outputs.as_ref().map_or(0, ConfiguredSinks::threads))
+        .max_blocking_threads(BLOCKING_MAX + outputs.as_ref().map_or(0, ConfiguredSinks::count_threads))
         .thread_name("serve")
         .on_thread_start(priority::give_way)
         .enable_all()
         .build()
         .map_err(|error| CannotRun::new(format!("no threads to serve with: {error}"), ""))?;
     // Before anything is opened: from here on a signal ends the box in good order.
-    let mut signals = runtime.block_on(async { Signals::listen() }).map_err(|error| {
+    let mut signals = runtime.block_on(async { Signals::start_listening() }).map_err(|error| {
         let text = format!("signals cannot be heard ({error}): stop the box with SIGKILL; nothing stored is lost");
-        Notice::new(Severity::Warning, "no_signals", text).say();
+        Notice::new(Severity::Warning, "no_signals", text).write_to_logs();
     });
     log::keep_crash_reports(&plan.config.gateway.data_dir);
     let mut follows = false;
@@ -131,25 +131,26 @@ fn run_once(
     signals: Option<&mut Signals>,
     follows: bool,
 ) -> Result<RunEnd, CannotRun> {
-    let listener = runtime.block_on(listen(plan))?;
+    let listener = runtime.block_on(bind_named_port(plan))?;
     let opening = OpeningReport::start();
-    let started = ClockStart::of(plan, follows);
-    let outputs = ConfiguredSinks::of(&plan.config);
-    let certificate = certificate(plan)?;
+    let started = ClockStart::judge_clock(plan, follows);
+    let outputs = ConfiguredSinks::from_config(&plan.config);
+    let certificate = load_certificate(plan)?;
     let run_flags = Arc::new(RunFlags::default());
     let (report, port) = watch::channel(None);
-    let (post, inbox) = control::queue();
+    let (post, inbox) = control::create_queues();
     let marks = Arc::new(ProgressMarks::new());
-    let (mut ticker, live) = ticker(plan, &run_flags, (port, marks.clone()), inbox, (outputs.as_ref(), started))?;
+    let (mut ticker, live) = build_ticker(plan, &run_flags, (port, marks.clone()), inbox, (outputs.as_ref(), started))?;
     drop(opening);
     let _backups = schedule_backups(plan, &mut ticker.health)?;
     let beat = runtime.spawn(mark_page(marks));
-    let channels = (report, post, ticker.twin.as_ref().and_then(Twin::diagnoses));
+    let channels = (report, post, ticker.twin.as_ref().and_then(Twin::diagnosis_handle));
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    let serving = serve(plan, (listener, certificate), live, (&run_flags, signals), channels, outputs.as_ref());
+    let serving =
+        serve_until_end(plan, (listener, certificate), live, (&run_flags, signals), channels, outputs.as_ref());
     runtime.block_on(serving);
     beat.abort();
     thread.join().map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
@@ -158,9 +159,9 @@ fn run_once(
 /// Backups on a thread of their own, where the configuration wants them. They are taken while the box lives.
 fn schedule_backups(plan: &RunPlan, health: &mut Health) -> Result<Option<BackupSchedule>, CannotRun> {
     let Some(config) = &plan.config.backup else { return Ok(None) };
-    let paths = BackupPaths::of(&plan.config, plan.config_file.as_deref());
+    let paths = BackupPaths::from_config(&plan.config, plan.config_file.as_deref());
     let (tell, heard) = std::sync::mpsc::channel();
-    health.hear(heard);
+    health.follow_notices(heard);
     let now_s = || u64::try_from(clock::now_ns() / SECOND_NS).unwrap_or(0);
     // Without a tick nobody listens, and the box is about to end.
     let tell = move |notice: &Notice| drop(tell.send(notice.clone()));
@@ -174,11 +175,11 @@ async fn mark_page(marks: Arc<ProgressMarks>) {
     let mut beat = tokio::time::interval(PAGE_BEAT);
     loop {
         beat.tick().await;
-        marks.mark(WatchedPart::Page);
+        marks.mark_part(WatchedPart::Page);
     }
 }
 
-fn address(plan: &RunPlan) -> Result<Option<SocketAddr>, CannotRun> {
+fn parse_listen_address(plan: &RunPlan) -> Result<Option<SocketAddr>, CannotRun> {
     let http = &plan.config.http;
     if !http.enabled {
         return Ok(None);
@@ -188,37 +189,37 @@ fn address(plan: &RunPlan) -> Result<Option<SocketAddr>, CannotRun> {
 }
 
 /// What is shown to whoever connects, where the page is served over TLS.
-fn certificate(plan: &RunPlan) -> Result<Option<Certificate>, CannotRun> {
+fn load_certificate(plan: &RunPlan) -> Result<Option<Certificate>, CannotRun> {
     let http = &plan.config.http;
-    let Some(listen) = address(plan)?.filter(|_| http.tls) else { return Ok(None) };
+    let Some(listen) = parse_listen_address(plan)?.filter(|_| http.tls) else { return Ok(None) };
     let directory = plan.config.gateway.data_dir.join("tls");
     let certificate = match &http.certificate {
         Some((certificate, key)) => Certificate::read(certificate, key),
-        None => Certificate::own(&directory, listen, &http.allow_hosts),
+        None => Certificate::load_or_create(&directory, listen, &http.allow_hosts),
     };
     certificate.map(Some).map_err(|error| CannotRun::new(error.to_string(), "cnc-gateway check says more"))
 }
 
 /// A port that the user named is opened before anything else starts.
-async fn listen(plan: &RunPlan) -> Result<Option<TcpListener>, CannotRun> {
-    let Some(address) = address(plan)?.filter(|_| plan.port_named) else { return Ok(None) };
+async fn bind_named_port(plan: &RunPlan) -> Result<Option<TcpListener>, CannotRun> {
+    let Some(address) = parse_listen_address(plan)?.filter(|_| plan.port_named) else { return Ok(None) };
     let next = "stop the other program, or choose another port with --listen 127.0.0.1:8081";
-    bind(address).await.map(Some).map_err(|error| CannotRun::new(port_trouble(address, &error), next))
+    bind_port(address).await.map(Some).map_err(|error| CannotRun::new(port_trouble(address, &error), next))
 }
 
 /// The estimators and edges as they were remembered, the scripts in charge and the gate.
-fn pipeline(plan: &RunPlan, memory: &Path, told: &mut Vec<Notice>) -> (Pipeline, rules::ScriptWatch) {
-    let (mut scripts, watched) = rules::load(&plan.config);
+fn build_pipeline(plan: &RunPlan, memory: &Path, told: &mut Vec<Notice>) -> (Pipeline, rules::ScriptWatch) {
+    let (mut scripts, watched) = rules::load_scripts(&plan.config);
     if plan.speed == MachineSpeed::Real {
-        scripts.watch(Arc::new(RunLimit::new(RUN_MAX)));
+        scripts.set_deadline(Arc::new(RunLimit::new(RUN_MAX)));
     }
     let gate = Gate::new(plan.config.gate.clone());
-    let mut pipeline = Pipeline::new(remembered::estimators(memory, told), scripts, gate);
-    remembered::edges(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY), told);
+    let mut pipeline = Pipeline::new(remembered::restore_estimators(memory, told), scripts, gate);
+    remembered::restore_edge_wear(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY), told);
     (pipeline, watched)
 }
 
-fn ticker(
+fn build_ticker(
     plan: &RunPlan,
     run_flags: &Arc<RunFlags>,
     (port, marks): (watch::Receiver<Option<String>>, Arc<ProgressMarks>),
@@ -229,29 +230,29 @@ fn ticker(
     let data_dir = &config.gateway.data_dir;
     // Before anything is read that a restore has laid ready.
     let mut told: Vec<Notice> = take_restored(data_dir).into_iter().collect();
-    let twin = Twin::of(config);
+    let twin = Twin::from_config(config);
     let memory = data_dir.join("estimators.json");
-    let (mut pipeline, watched) = pipeline(plan, &memory, &mut told);
-    let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
-    let mut thermal = Thermal::of(config)?;
-    let of_thermal = thermal.as_ref().map(Thermal::series).unwrap_or_default();
-    pipeline.leave(&of_thermal);
-    let beside = [pipeline.series(), alignment::series(), beside, of_thermal].concat();
+    let (mut pipeline, watched) = build_pipeline(plan, &memory, &mut told);
+    let beside = twin.as_ref().map(Twin::extra_series).unwrap_or_default();
+    let mut thermal = Thermal::from_config(config)?;
+    let of_thermal = thermal.as_ref().map(Thermal::extra_series).unwrap_or_default();
+    pipeline.exclude_series(&of_thermal);
+    let beside = [pipeline.extra_series(), alignment::list_series(), beside, of_thermal].concat();
     let outbox = outputs.map(|outputs| outputs.outbox.clone());
     let history_store = HistoryStore::open(&config.history, beside, outbox, started.mark.clone())
         .map_err(|error| CannotRun::new(error.to_string(), ""))?;
     let own = of_box().clone();
     let clock: Arc<dyn Clock> = own.clone();
     let start_ns = start_ns(plan, &history_store, clock.now_ns());
-    let opened = open::sources(config, plan.speed, &clock, start_ns);
+    let opened = open::open_sources(config, plan.speed, &clock, start_ns);
     let Sources { feed, pace, simulated, ways, machines } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
     let wake = inbox.wake.clone();
-    let commands = way_to_machine::commands(plan, ways, inbox, &clock, pipeline.gate_mut())?;
+    let commands = way_to_machine::build_commands(plan, ways, inbox, &clock, pipeline.gate_mut())?;
     let identity = Identity {
         machine: config.gateway.name.clone(),
         simulated,
-        speed: plan.speed.factor(),
+        speed: plan.speed.time_factor(),
         rate_hz: config.gateway.tick_hz,
     };
     let (publish, live) = watch::channel(None);
@@ -259,19 +260,19 @@ fn ticker(
     let stop_after_ns = plan.stop_after_s.map(|seconds| (seconds * SECOND_NS as f64) as i64);
     let own = (plan.speed == MachineSpeed::Real).then_some(own);
     let mut health = Health::new(history_store, own, port, memory, marks);
-    if let Some(twin) = twin.as_ref().filter(|twin| !twin.series().is_empty()) {
-        health.beside(twin.values());
+    if let Some(twin) = twin.as_ref().filter(|twin| !twin.extra_series().is_empty()) {
+        health.set_twin_values(twin.extra_values());
     }
     if let Some(thermal) = &mut thermal {
-        thermal.begin(&mut health, start_ns);
+        thermal.report_notices(&mut health, start_ns);
     }
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
-    health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
-    told.iter().for_each(|notice| health.event(start_ns, "gateway", notice));
-    started.news.iter().for_each(|notice| health.event(start_ns, "clock", notice));
+    health.record_event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
+    told.iter().for_each(|notice| health.record_event(start_ns, "gateway", notice));
+    started.news.iter().for_each(|notice| health.record_event(start_ns, "clock", notice));
     let run_flags = run_flags.clone();
-    let operations = config.operations.path.as_deref().map(Operations::begin);
-    let wear = Wear::of(config);
+    let operations = config.operations.path.as_deref().map(Operations::start_watching);
+    let wear = Wear::from_config(config);
     Ok((
         Ticker {
             identity,
@@ -306,7 +307,7 @@ fn start_ns(plan: &RunPlan, history_store: &HistoryStore, now_ns: TimeNs) -> Tim
 }
 
 /// Serves until a signal says stop, or the tick has ended by itself.
-async fn serve(
+async fn serve_until_end(
     plan: &RunPlan,
     (listener, certificate): (Option<TcpListener>, Option<Certificate>),
     live: watch::Receiver<Option<Published>>,
@@ -317,11 +318,11 @@ async fn serve(
     // What runs beside ends with this run.
     let mut beside = JoinSet::new();
     let sinks = outputs.map(|outputs| outputs.start(&post));
-    let _listening = control::listen(&plan.config.gateway.data_dir, post.clone());
-    let server = match address(plan) {
+    let _listening = control::listen_for_orders(&plan.config.gateway.data_dir, post.clone());
+    let server = match parse_listen_address(plan) {
         Ok(Some(address)) => {
             let access = Arc::new(open_access(&plan.config, post.clone()));
-            beside.spawn(follow(access.clone()));
+            beside.spawn(follow_persons(access.clone()));
             let (history, language) = (plan.config.history.path.clone(), plan.config.gateway.language);
             let hosts = plan.config.http.allow_hosts.clone();
             let (scripts, data_dir) = (plan.config.scripts.directory.clone(), plan.config.gateway.data_dir.clone());
@@ -359,7 +360,7 @@ fn open_access(config: &Config, post: control::OrderSender) -> Access {
         session: config.http.session,
         allow_arming: config.http.allow_arming,
     };
-    let (access, first) = Access::open(access::path(&config.gateway.data_dir), rules, post);
+    let (access, first) = Access::open(access::persons_path(&config.gateway.data_dir), rules, post);
     if let Some(token) = first {
         let name = access::FIRST;
         log::say_to_operator_alone(&format!(
@@ -371,11 +372,11 @@ fn open_access(config: &Config, post: control::OrderSender) -> Access {
 }
 
 /// Whoever changes the file of persons is followed, and it stands in the audit.
-async fn follow(access: Arc<Access>) {
+async fn follow_persons(access: Arc<Access>) {
     access.tell_persons().await;
     let mut beat = tokio::time::interval(FOLLOW_EVERY);
     loop {
         beat.tick().await;
-        access.follow().await;
+        access.reload_if_changed().await;
     }
 }

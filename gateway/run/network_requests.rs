@@ -26,38 +26,38 @@ pub struct NetworkRequests {
 
 impl NetworkRequests {
     /// Takes a request for a feed override or its end; gives what became of it. An alarm is acknowledged by whoever holds the alarms.
-    pub fn take(&mut self, sink: &str, change: &RequestedChange, at_ns: TimeNs) -> Reply {
-        let author = author(sink);
+    pub fn accept_change(&mut self, sink: &str, change: &RequestedChange, at_ns: TimeNs) -> Reply {
+        let author = format_author(sink);
         self.standing.retain(|standing| *standing.request.script != *author);
         let RequestedChange::FeedOverride { pct, reason } = change else {
-            return Reply::done("nothing is asked for any more");
+            return Reply::from_success("nothing is asked for any more");
         };
         let reason = if reason.is_empty() { "asked over the network" } else { reason };
         let request = OverrideRequest { pct: *pct, reason: reason.into(), script: author.into(), version: 0 };
         self.standing.push(ActiveRequest { request, until_ns: at_ns.saturating_add(STANDS_S * SECOND_NS) });
-        Reply::done(format!("the gate is asked for {pct} % for {STANDS_S} s; it decides at every tick"))
+        Reply::from_success(format!("the gate is asked for {pct} % for {STANDS_S} s; it decides at every tick"))
     }
 
     /// The least of what stands at this tick; what is over goes.
-    pub fn at(&mut self, at_ns: TimeNs) -> Option<OverrideRequest> {
+    pub fn find_least_override(&mut self, at_ns: TimeNs) -> Option<OverrideRequest> {
         // A clock that went back ends it too: it would stand for longer than it may.
         let stands = |standing: &ActiveRequest| {
             at_ns < standing.until_ns && standing.until_ns.saturating_sub(at_ns) <= STANDS_S * SECOND_NS
         };
         self.standing.retain(stands);
-        OverrideRequest::least(self.standing.iter().map(|standing| &standing.request)).cloned()
+        OverrideRequest::find_least(self.standing.iter().map(|standing| &standing.request)).cloned()
     }
 }
 
 /// How a sink is named where scripts and persons are.
 #[must_use]
-pub fn author(sink: &str) -> String {
+pub fn format_author(sink: &str) -> String {
     format!("sink {sink}")
 }
 
 /// The row of the audit.
 #[must_use]
-pub fn row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -> Audit {
+pub fn build_audit_row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -> Audit {
     let what = request.change.as_ref().map_or_else(Clone::clone, |change| format!("{change}: {}", reply.text));
     let also = match request.left_out {
         0 => String::new(),
@@ -68,9 +68,9 @@ pub fn row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -> Audit {
         _ => None,
     };
     let outcome = if reply.done { "done" } else { "refused" };
-    let row = trail::order("network_request", outcome, &format!("{what}{also}"), "", at_ns);
+    let row = trail::audit_order("network_request", outcome, &format!("{what}{also}"), "", at_ns);
     let unit = if asked.is_some() { "%".to_owned() } else { String::new() };
-    Audit { asked, unit, script: author(&request.sink), ..row }
+    Audit { asked, unit, script: format_author(&request.sink), ..row }
 }
 
 #[cfg(test)]
@@ -84,23 +84,24 @@ mod tests {
     #[test]
     fn a_request_stands_for_a_minute_and_the_least_counts() {
         let mut requests = NetworkRequests::default();
-        requests.take("plant", &change(80.0), 0);
-        requests.take("cell", &change(60.0), 10 * SECOND_NS);
-        let pct = |requests: &mut NetworkRequests, at_s: i64| requests.at(at_s * SECOND_NS).map(|it| it.pct);
+        requests.accept_change("plant", &change(80.0), 0);
+        requests.accept_change("cell", &change(60.0), 10 * SECOND_NS);
+        let pct =
+            |requests: &mut NetworkRequests, at_s: i64| requests.find_least_override(at_s * SECOND_NS).map(|it| it.pct);
         assert_eq!(pct(&mut requests, 11), Some(60.0));
-        requests.take("cell", &RequestedChange::Withdraw, 12 * SECOND_NS);
+        requests.accept_change("cell", &RequestedChange::Withdraw, 12 * SECOND_NS);
         assert_eq!(pct(&mut requests, 12), Some(80.0));
-        requests.take("plant", &change(90.0), 50 * SECOND_NS);
+        requests.accept_change("plant", &change(90.0), 50 * SECOND_NS);
         assert_eq!(pct(&mut requests, 109), Some(90.0), "asked again");
         assert_eq!(pct(&mut requests, 110), None);
-        requests.take("plant", &change(90.0), 200 * SECOND_NS);
+        requests.accept_change("plant", &change(90.0), 200 * SECOND_NS);
         assert_eq!(pct(&mut requests, 100), None, "a clock that went back");
     }
 
     #[test]
     fn a_row_says_who_what_and_why() {
         let request = NetworkRequest { sink: "plant".to_owned(), change: Err("no request".to_owned()), left_out: 7 };
-        let row = row(&request, &Reply::refused("no request"), 5);
+        let row = build_audit_row(&request, &Reply::from_refusal("no request"), 5);
         assert_eq!(
             (row.kind.as_str(), row.outcome.as_str(), row.script.as_str()),
             ("network_request", "refused", "sink plant")

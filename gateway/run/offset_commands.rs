@@ -32,7 +32,7 @@ impl OffsetCommands {
     ///
     /// # Errors
     /// The book of what is left cannot be read, nor put aside.
-    pub fn resume(
+    pub fn resume_from_journal(
         data_dir: &Path,
         sink: Box<dyn OffsetSink>,
         gate: &mut Gate,
@@ -45,37 +45,45 @@ impl OffsetCommands {
             )?,
         };
         for axis in Axis::ALL {
-            if let Some(left) = book.left(axis) {
-                gate.offsets_mut().resume(axis, left.shift_um());
-                gate.offsets_mut().unsettle(axis);
+            if let Some(left) = book.find_leftover(axis) {
+                gate.offsets_mut().resume_shift(axis, left.shift_um());
+                gate.offsets_mut().mark_unsettled(axis);
             }
         }
-        let shifting = Self { target: Some(target), left: left(&book), unreadable, ..Self::default() };
+        let shifting = Self { target: Some(target), left: list_left_shifts(&book), unreadable, ..Self::default() };
         Ok((shifting, OffsetAccount::new(sink, book)))
     }
 
     /// Nothing can be written; but an earlier run may have left something, which a person has to see to.
     #[must_use]
-    pub fn idle(data_dir: &Path) -> Self {
-        Self { left: OffsetJournal::open(data_dir, "").map(|book| left(&book)).unwrap_or_default(), ..Self::default() }
+    pub fn without_sink(data_dir: &Path) -> Self {
+        Self {
+            left: OffsetJournal::open(data_dir, "").map(|book| list_left_shifts(&book)).unwrap_or_default(),
+            ..Self::default()
+        }
     }
 
     /// The rows of this tick's verdicts that say something new.
-    pub fn rows(&mut self, proposals: &[OffsetProposal], verdicts: &[OffsetVerdict], gate: &Gate) -> Vec<Audit> {
+    pub fn build_audit_rows(
+        &mut self,
+        proposals: &[OffsetProposal],
+        verdicts: &[OffsetVerdict],
+        gate: &Gate,
+    ) -> Vec<Audit> {
         let limits = &gate.limits().offset;
         let of = |axis: Axis| proposals.iter().find(|proposal| proposal.axis == axis);
-        verdicts.iter().filter_map(|verdict| self.trail.proposal(of(verdict.axis), verdict, limits)).collect()
+        verdicts.iter().filter_map(|verdict| self.trail.audit_proposal(of(verdict.axis), verdict, limits)).collect()
     }
 
     /// The row of the audit.
     #[must_use]
-    pub fn row(&self, moved: &Moved) -> Option<Audit> {
-        self.trail.moved(moved)
+    pub fn build_audit_row(&self, moved: &Moved) -> Option<Audit> {
+        self.trail.audit_move(moved)
     }
 
     /// The control has answered: for the gate, for the operator.
-    pub fn answered(&mut self, moved: &Moved, gate: &mut Gate, health: &mut Health) {
-        gate.offsets_mut().answered(moved);
+    pub fn accept_answer(&mut self, moved: &Moved, gate: &mut Gate, health: &mut Health) {
+        gate.offsets_mut().accept_answer(moved);
         if let Some(target) = &self.target {
             let axis = moved.order.axis();
             self.left.retain(|(of, known, _)| (of, *known) != (target, axis));
@@ -85,7 +93,7 @@ impl OffsetCommands {
             let text = format!(
                 "what is shifted in the control could not be kept ({why}); after a restart the control is looked at again"
             );
-            health.event(moved.at_ns, SOURCE, &Notice::new(Severity::Error, "offset_not_kept", text));
+            health.record_event(moved.at_ns, SOURCE, &Notice::new(Severity::Error, "offset_not_kept", text));
         }
         self.tell_refusal(moved, health);
     }
@@ -99,24 +107,23 @@ impl OffsetCommands {
         if refused != self.refused
             && let Some(text) = &refused
         {
-            health.event(moved.at_ns, SOURCE, &Notice::new(Severity::Warning, "offset_refused", text.clone()));
+            health.record_event(moved.at_ns, SOURCE, &Notice::new(Severity::Warning, "offset_refused", text.clone()));
         }
         self.refused = refused;
     }
 
     /// Shifts that stay in a control although nobody follows them up.
-    pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = StatusProblem> {
+    pub fn list_problems(&self, gate: &Gate) -> impl Iterator<Item = StatusProblem> {
         let unreadable = self.unreadable.as_ref().map(|path| StatusProblem {
             what: format!("{}: what an earlier run has left in the control cannot be read", path.display()),
             next: "look at the external offsets at the control, set them right there, and delete the file".to_owned(),
         });
-        let own =
-            self.describe_abandoned(|target, axis| self.is_own(target) && !self.follows(axis, gate)).map(|shifts| {
-                StatusProblem {
-                    what: format!("the external offset in the control is still shifted: {shifts}"),
-                    next: "arm the gate again, or set the offset back at the control".to_owned(),
-                }
-            });
+        let own = self.describe_abandoned(|target, axis| self.is_own(target) && !self.is_followed_up(axis, gate)).map(
+            |shifts| StatusProblem {
+                what: format!("the external offset in the control is still shifted: {shifts}"),
+                next: "arm the gate again, or set the offset back at the control".to_owned(),
+            },
+        );
         let others = self.describe_abandoned(|target, _| !self.is_own(target)).map(|shifts| StatusProblem {
             what: format!("the external offset is still shifted in a control that is no longer written to: {shifts}"),
             next: "name that control again as `source` under [gate.offset], or set the offset back there".to_owned(),
@@ -130,28 +137,28 @@ impl OffsetCommands {
     }
 
     /// Will somebody move it, or give it back?
-    fn follows(&self, axis: Axis, gate: &Gate) -> bool {
+    fn is_followed_up(&self, axis: Axis, gate: &Gate) -> bool {
         let limits = &gate.limits().offset;
-        self.target.is_some() && (limits.restore || (gate.armed().is_ok() && limits.axes.contains(&axis)))
+        self.target.is_some() && (limits.restore || (gate.current_arming().is_ok() && limits.axes.contains(&axis)))
     }
 
     fn describe_abandoned(&self, counts: impl Fn(&str, Axis) -> bool) -> Option<String> {
         let of = |(target, axis, left): &(String, Axis, Left)| {
             let place = if self.is_own(target) { String::new() } else { format!("{target} ") };
-            format!("{place}{} by {:+.0} um, to {:.0} um", axis.word(), left.shift_um(), left.written_um)
+            format!("{place}{} by {:+.0} um, to {:.0} um", axis.as_word(), left.shift_um(), left.written_um)
         };
         let shifts: Vec<String> = self.left.iter().filter(|(target, axis, _)| counts(target, *axis)).map(of).collect();
         (!shifts.is_empty()).then(|| shifts.join(", "))
     }
 }
 
-fn left(book: &OffsetJournal) -> Vec<(String, Axis, Left)> {
-    book.all().map(|(target, axis, left)| (target.to_owned(), axis, left)).collect()
+fn list_left_shifts(book: &OffsetJournal) -> Vec<(String, Axis, Left)> {
+    book.list_leftovers().map(|(target, axis, left)| (target.to_owned(), axis, left)).collect()
 }
 
 /// The row of the table of commands; nothing where nothing was to be written.
 #[must_use]
-pub fn command(moved: &Moved, row: &Audit, target: &str) -> Option<Command> {
+pub fn build_command(moved: &Moved, row: &Audit, target: &str) -> Option<Command> {
     let verb = match moved.order {
         OffsetOrder::Shift { .. } => "shift",
         OffsetOrder::Restore(_) => "restore",
@@ -162,5 +169,5 @@ pub fn command(moved: &Moved, row: &Audit, target: &str) -> Option<Command> {
         "settled" | "replaced" => return None,
         _ => "failed",
     };
-    Some(row.as_command(&format!("{}_offset_{verb}", moved.order.axis().word()), target, outcome))
+    Some(row.as_command(&format!("{}_offset_{verb}", moved.order.axis().as_word()), target, outcome))
 }

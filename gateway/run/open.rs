@@ -7,7 +7,7 @@ use crate::config::{self, Config};
 use adapters::address::Target;
 use adapters::clock::{Clock, TimeNs};
 use adapters::merge::{Delay, Lockstep, Merge, SourcePlan};
-use adapters::open::{OpenError, Opened, open, open_pull};
+use adapters::open::{OpenError, Opened, open_address, open_pull};
 use adapters::simulated::Simulated;
 use adapters::worker::{Worker, WorkerSettings};
 use adapters::{Actuator, Address, OffsetSink, Pull, Source};
@@ -28,7 +28,7 @@ pub enum MachineSpeed {
 impl MachineSpeed {
     /// Machine time over real time; `None` as fast as possible.
     #[must_use]
-    pub fn factor(self) -> Option<f64> {
+    pub fn time_factor(self) -> Option<f64> {
         match self {
             Self::Real => Some(1.0),
             Self::Times(times) => Some(times),
@@ -65,20 +65,20 @@ pub struct Way {
 ///
 /// # Errors
 /// Everything that cannot be opened, in words.
-pub fn sources(
+pub fn open_sources(
     config: &Config,
     speed: MachineSpeed,
     clock: &Arc<dyn Clock>,
     start_ns: TimeNs,
 ) -> Result<Sources, Vec<String>> {
     match speed {
-        MachineSpeed::Real => live(config, clock),
+        MachineSpeed::Real => open_live_sources(config, clock),
         MachineSpeed::Times(_) | MachineSpeed::Max => open_stepped_sources(config, speed, start_ns),
     }
 }
 
 /// Time between two ticks.
-pub(super) fn period(config: &Config) -> Duration {
+pub(super) fn tick_period(config: &Config) -> Duration {
     Duration::from_secs_f64(1.0 / config.gateway.tick_hz)
 }
 
@@ -86,11 +86,11 @@ fn is_simulated(config: &Config) -> bool {
     config.sources.iter().all(|source| matches!(source.address.target(), Target::Simulated(_)))
 }
 
-fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>> {
+fn open_live_sources(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>> {
     let (mut found, mut ways, mut problems) = (Vec::new(), Vec::new(), Vec::new());
     let mut machines = Vec::new();
     for source in &config.sources {
-        match opened(&source.address, clock.now_ns()) {
+        match open_source(&source.address, clock.now_ns()) {
             Ok(opened) => {
                 let (deadline, period) = (source.deadline, source.period);
                 let settings = WorkerSettings { deadline, period, ..WorkerSettings::default() };
@@ -105,9 +105,9 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     if !problems.is_empty() {
         return Err(problems);
     }
-    let feed =
-        threads(found, clock, &config.alignment).map_err(|error| vec![format!("no thread for a source: {error}")])?;
-    let pace = TickSchedule::on_clock(clock.clone(), period(config));
+    let feed = start_workers(found, clock, &config.alignment)
+        .map_err(|error| vec![format!("no thread for a source: {error}")])?;
+    let pace = TickSchedule::on_clock(clock.clone(), tick_period(config));
     Ok(Sources { feed, pace, ways, machines, simulated: is_simulated(config) })
 }
 
@@ -115,24 +115,24 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
 ///
 /// # Errors
 /// See [`OpenError`].
-pub(crate) fn opened(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
-    crate::waveform::opened(address).unwrap_or_else(|| open(address, now_ns))
+pub(crate) fn open_source(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
+    crate::waveform::open_source(address).unwrap_or_else(|| open_address(address, now_ns))
 }
 
-fn threads(
+fn start_workers(
     sources: Vec<(Box<dyn Source>, WorkerSettings)>,
     clock: &Arc<dyn Clock>,
     alignment: &config::AlignmentConfig,
 ) -> std::io::Result<SampleFeed> {
     let plan = |(source, settings): &(Box<dyn Source>, WorkerSettings)| {
-        let plan = SourcePlan::of(source.as_ref());
+        let plan = SourcePlan::from_source(source.as_ref());
         SourcePlan { period: settings.period.unwrap_or(plan.period), ..plan }
     };
     let plans: Vec<SourcePlan> = sources.iter().map(plan).collect();
     let merge = Merge::new(&plans, Delay::SlowestPeriod);
     let start = |(source, settings)| Worker::start(source, clock.clone(), settings);
     let workers = sources.into_iter().map(start).collect::<Result<_, _>>()?;
-    Ok(SampleFeed::Threads { workers, merge, alignment: Alignment::of(&plans, alignment, Patience::GoesOn) })
+    Ok(SampleFeed::Threads { workers, merge, alignment: Alignment::from_plans(&plans, alignment, Patience::GoesOn) })
 }
 
 fn open_stepped_sources(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
@@ -154,9 +154,9 @@ fn open_stepped_sources(config: &Config, speed: MachineSpeed, start_ns: TimeNs) 
     }
     let names = found.iter().map(|source| (source.name().to_owned(), source.period())).collect();
     let plans: Vec<SourcePlan> = found.iter().map(|source| SourcePlan::of_pull(source.as_ref())).collect();
-    let alignment = Alignment::of(&plans, &config.alignment, Patience::Waits);
+    let alignment = Alignment::from_plans(&plans, &config.alignment, Patience::Waits);
     let feed = SampleFeed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
-    let pace = TickSchedule::stepped(speed.factor(), start_ns, period(config));
+    let pace = TickSchedule::with_speed(speed.time_factor(), start_ns, tick_period(config));
     Ok(Sources { feed, pace, ways, machines, simulated: is_simulated(config) })
 }
 

@@ -20,7 +20,7 @@ pub struct ConfiguredSinks {
 impl ConfiguredSinks {
     /// `None` where no sink is configured.
     #[must_use]
-    pub fn of(config: &Config) -> Option<Self> {
+    pub fn from_config(config: &Config) -> Option<Self> {
         if config.sinks.is_empty() {
             return None;
         }
@@ -35,12 +35,12 @@ impl ConfiguredSinks {
     /// Starts their tasks on the runtime that is running; what the network asks for goes by this post.
     #[must_use]
     pub fn start(&self, post: &OrderSender) -> Sinks {
-        sinks::start(&self.sinks, post, (&self.outbox, &self.board), &self.history)
+        sinks::start_sinks(&self.sinks, post, (&self.outbox, &self.board), &self.history)
     }
 
     /// Threads that may be needed for what cannot be waited for asynchronously: reading the outbox, and a line.
     #[must_use]
-    pub fn threads(&self) -> usize {
+    pub fn count_threads(&self) -> usize {
         2 * self.sinks.len()
     }
 }

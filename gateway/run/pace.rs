@@ -61,7 +61,7 @@ impl TickSchedule {
 
     /// Ticks of an accelerated machine, beginning at `start_ns`.
     #[must_use]
-    pub fn stepped(speed: Option<f64>, start_ns: TimeNs, period: Duration) -> Self {
+    pub fn with_speed(speed: Option<f64>, start_ns: TimeNs, period: Duration) -> Self {
         Self::new(Beat::Stepped { speed, anchor: (Instant::now(), start_ns) }, start_ns, period)
     }
 
@@ -86,7 +86,7 @@ impl TickSchedule {
     /// The same; whenever the waiting thread is woken, `meanwhile` is done.
     pub fn next_tick_or(&mut self, stop: &AtomicBool, wake: &Wake, mut meanwhile: impl FnMut()) -> Option<TimeNs> {
         let mut look = || {
-            if wake.take() {
+            if wake.take_wakeup() {
                 meanwhile();
             }
         };
@@ -96,14 +96,14 @@ impl TickSchedule {
                 let wake_ns = self.due_ns - *early_ns;
                 while !stop.load(Ordering::SeqCst) && clock.now_ns() < wake_ns {
                     look();
-                    park((wake_ns - clock.now_ns()).min(STOP_LOOK_NS));
+                    park_thread((wake_ns - clock.now_ns()).min(STOP_LOOK_NS));
                 }
                 while !stop.load(Ordering::SeqCst) && clock.now_ns() < self.due_ns {
                     // Others of the same priority may go on meanwhile, on a box with one processor.
                     std::thread::yield_now();
                 }
                 let late_ns = clock.now_ns() - self.due_ns;
-                self.note(late_ns);
+                self.record_lateness(late_ns);
                 // What is more than a period late is left out, so that the box catches up at once.
                 let whole = (late_ns / self.period_ns).max(0);
                 self.skipped += whole.unsigned_abs();
@@ -111,11 +111,11 @@ impl TickSchedule {
             }
             Beat::Stepped { speed: None, .. } => {}
             Beat::Stepped { speed: Some(speed), anchor } => {
-                let late = wait(*speed, *anchor, self.due_ns, look);
+                let late = wait_until_due(*speed, *anchor, self.due_ns, look);
                 if late > BEHIND_MAX {
                     *anchor = (Instant::now(), self.due_ns);
                 }
-                self.note(i64::try_from(late.as_nanos()).unwrap_or(i64::MAX));
+                self.record_lateness(i64::try_from(late.as_nanos()).unwrap_or(i64::MAX));
             }
         }
         (!stop.load(Ordering::SeqCst)).then_some(self.due_ns)
@@ -123,11 +123,11 @@ impl TickSchedule {
 
     /// Lateness of all ticks since the start.
     #[must_use]
-    pub fn late(&self) -> Histogram {
+    pub fn lateness_histogram(&self) -> Histogram {
         self.late
     }
 
-    fn note(&mut self, late_ns: i64) {
+    fn record_lateness(&mut self, late_ns: i64) {
         self.late.add_ns(late_ns);
         if self.late_ns.len() < WINDOW {
             self.late_ns.push(late_ns);
@@ -151,13 +151,18 @@ impl TickSchedule {
 
     /// Ticks left out since the start.
     #[must_use]
-    pub fn skipped(&self) -> u64 {
+    pub fn skipped_ticks(&self) -> u64 {
         self.skipped
     }
 }
 
 /// Sleeps until machine time `due_ns`, and does `look` whenever it is woken; gives how late it is in real time.
-fn wait(speed: f64, (began, began_ns): (Instant, TimeNs), due_ns: TimeNs, mut look: impl FnMut()) -> Duration {
+fn wait_until_due(
+    speed: f64,
+    (began, began_ns): (Instant, TimeNs),
+    due_ns: TimeNs,
+    mut look: impl FnMut(),
+) -> Duration {
     let machine = Duration::from_nanos((due_ns - began_ns).max(0).unsigned_abs());
     let due = began + machine.div_f64(speed);
     while let Some(left) = due.checked_duration_since(Instant::now()).filter(|left| !left.is_zero()) {
@@ -168,7 +173,7 @@ fn wait(speed: f64, (began, began_ns): (Instant, TimeNs), due_ns: TimeNs, mut lo
 }
 
 /// Sleeps so long, or until somebody wakes this thread.
-fn park(ns: i64) {
+fn park_thread(ns: i64) {
     if ns > 0 {
         std::thread::park_timeout(Duration::from_nanos(ns.unsigned_abs()));
     }
@@ -183,27 +188,27 @@ mod tests {
 
     #[test]
     fn late_ticks_are_left_out_and_counted() {
-        let clock = ManualClock::at(0);
+        let clock = ManualClock::with_time(0);
         let mut pace = TickSchedule::on_clock(Arc::new(clock.clone()), Duration::from_millis(100));
-        clock.set(100_000_000);
+        clock.set_time(100_000_000);
         assert_eq!(pace.next_tick(&GO), Some(100_000_000));
-        clock.set(450_000_000);
+        clock.set_time(450_000_000);
         assert_eq!(pace.next_tick(&GO), Some(400_000_000));
-        assert_eq!(pace.skipped(), 2);
+        assert_eq!(pace.skipped_ticks(), 2);
         assert_eq!(pace.late_ms().1, 250.0);
     }
 
     #[test]
     fn whoever_is_woken_does_what_is_asked_and_the_tick_comes_when_it_is_due() {
         let wake = Wake::default();
-        let mut pace = TickSchedule::stepped(Some(1.0), 0, Duration::from_millis(300));
+        let mut pace = TickSchedule::with_speed(Some(1.0), 0, Duration::from_millis(300));
         let of_other = wake.clone();
         let (began, mut after) = (Instant::now(), None);
         let tick = std::thread::scope(|scope| {
-            wake.here();
+            wake.bind_current_thread();
             scope.spawn(move || {
                 std::thread::sleep(Duration::from_millis(20));
-                of_other.wake();
+                of_other.wake_thread();
             });
             pace.next_tick_or(&GO, &wake, || after = Some(began.elapsed()))
         });
@@ -214,11 +219,11 @@ mod tests {
 
     #[test]
     fn an_accelerated_machine_leaves_no_tick_out() {
-        let mut pace = TickSchedule::stepped(Some(1000.0), 0, Duration::from_millis(100));
+        let mut pace = TickSchedule::with_speed(Some(1000.0), 0, Duration::from_millis(100));
         let began = Instant::now();
         let ticks: Vec<_> = (0..100).filter_map(|_| pace.next_tick(&GO)).collect();
         assert_eq!(ticks, (1..=100).map(|n| n * 100_000_000).collect::<Vec<_>>());
         assert!(began.elapsed() >= Duration::from_millis(10));
-        assert_eq!(pace.skipped(), 0);
+        assert_eq!(pace.skipped_ticks(), 0);
     }
 }

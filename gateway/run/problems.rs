@@ -2,7 +2,7 @@
 
 use super::history_store::upkeep::{LOG_TOLD_BYTES, long_log};
 use crate::access;
-use crate::clock::{Trust, span};
+use crate::clock::{Trust, format_span};
 use crate::learned;
 use crate::status::{ClockStatus, HistoryStatus, StatusProblem};
 use adapters::clock::SECOND_NS;
@@ -11,7 +11,7 @@ use std::path::Path;
 /// What the disk has changed, and nobody has looked at yet. Reads the directory.
 pub(super) fn problems_of_disk(memory: &Path) -> Vec<StatusProblem> {
     let directory = memory.parent().unwrap_or(Path::new("."));
-    let mut problems = learned::damaged(directory);
+    let mut problems = learned::list_damaged(directory);
     problems.extend(access::permission_problem(directory));
     problems
 }
@@ -32,8 +32,8 @@ pub(super) fn problems_of_history(history: &HistoryStatus) -> Vec<StatusProblem>
 }
 
 /// `5 min ahead of`, `11 years behind`.
-pub(super) fn apart(ahead_ns: i64) -> String {
-    format!("{} {}", span(ahead_ns), if ahead_ns >= 0 { "ahead of" } else { "behind" })
+pub(super) fn describe_clock_offset(ahead_ns: i64) -> String {
+    format!("{} {}", format_span(ahead_ns), if ahead_ns >= 0 { "ahead of" } else { "behind" })
 }
 
 /// What is wrong with the clock, and what to do.
@@ -43,14 +43,14 @@ pub(super) fn clock_problem(ClockStatus { trust, wall_ahead_s }: ClockStatus) ->
     match trust {
         Trust::Plausible | Trust::Confirmed => None,
         Trust::Leapt => Some((
-            format!("the wall clock is {} the box, which keeps its own time", apart(ahead_ns)),
+            format!("the wall clock is {} the box, which keeps its own time", describe_clock_offset(ahead_ns)),
             "set the clock of the computer right; if it is right, the box follows by itself after some time",
         )),
         Trust::Unset => Some((
             format!(
                 "the clock of the computer is not set: it is {} the last certain time, with which the box goes on; times are \
                  provisional and will be corrected",
-                apart(ahead_ns)
+                describe_clock_offset(ahead_ns)
             ),
             "set the clock, or give the computer a time server or a battery",
         )),

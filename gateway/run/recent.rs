@@ -5,7 +5,7 @@
 //! the system at once, by a thread of its own; the system keeps it however the process ends. Against a power cut only the
 //! history helps.
 
-use crate::files::replace;
+use crate::files::replace_file;
 use crate::history::{Audit, Reader, Writer};
 use adapters::clock::{SECOND_NS, TimeNs};
 use std::collections::VecDeque;
@@ -26,7 +26,7 @@ const LOOK_BACK_NS: i64 = 60 * SECOND_NS;
 
 /// Where the rows lie that belong to this history.
 #[must_use]
-pub fn path(history: &Path) -> PathBuf {
+pub fn audit_path(history: &Path) -> PathBuf {
     let mut name = history.as_os_str().to_owned();
     name.push("-audit");
     name.into()
@@ -44,13 +44,13 @@ impl Recent {
     #[must_use]
     pub fn start(history: &Path) -> Self {
         let (send, rows) = sync_channel(WAITING_MAX);
-        let path = path(history);
-        let thread = std::thread::Builder::new().name("audit".to_owned()).spawn(move || work(&path, &rows)).ok();
+        let path = audit_path(history);
+        let thread = std::thread::Builder::new().name("audit".to_owned()).spawn(move || write_rows(&path, &rows)).ok();
         Self { rows: thread.is_some().then_some(send), thread }
     }
 
     /// Keeps this row. Never waits.
-    pub fn put(&self, row: Audit) {
+    pub fn keep_row(&self, row: Audit) {
         if self.rows.as_ref().is_some_and(|rows| rows.try_send(row).is_err()) {
             tracing::warn!("a row of the audit is in the history only: the disk has not taken what came before");
         }
@@ -67,8 +67,8 @@ impl Drop for Recent {
     }
 }
 
-fn work(path: &Path, rows: &Receiver<Audit>) {
-    let mut kept: VecDeque<String> = lines(path).into();
+fn write_rows(path: &Path, rows: &Receiver<Audit>) {
+    let mut kept: VecDeque<String> = read_lines(path).into();
     let mut added = ROWS_ADDED;
     let mut file = None;
     for row in rows {
@@ -83,7 +83,7 @@ fn work(path: &Path, rows: &Receiver<Audit>) {
             (added, file) = (0, None);
         }
         added += 1;
-        if let Err(error) = put(path, &line, kept, &mut file) {
+        if let Err(error) = append_line(path, &line, kept, &mut file) {
             tracing::warn!("{}: a row of the audit is in the history only: {error}", path.display());
             file = None;
         }
@@ -91,9 +91,14 @@ fn work(path: &Path, rows: &Receiver<Audit>) {
 }
 
 /// Appends the line, or begins the file anew with all that is kept.
-fn put(path: &Path, line: &str, kept: Option<&VecDeque<String>>, file: &mut Option<File>) -> std::io::Result<()> {
+fn append_line(
+    path: &Path,
+    line: &str,
+    kept: Option<&VecDeque<String>>,
+    file: &mut Option<File>,
+) -> std::io::Result<()> {
     if let Some(kept) = kept {
-        return replace(path, &kept.iter().map(String::as_str).collect::<String>());
+        return replace_file(path, &kept.iter().map(String::as_str).collect::<String>());
     }
     let open = match file.take() {
         Some(open) => open,
@@ -103,7 +108,7 @@ fn put(path: &Path, line: &str, kept: Option<&VecDeque<String>>, file: &mut Opti
 }
 
 /// Whole lines, each with its end.
-fn lines(path: &Path) -> Vec<String> {
+fn read_lines(path: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let whole = text.split_inclusive('\n').filter(|line| line.ends_with('\n')).map(str::to_owned);
     let mut lines: Vec<String> = whole.collect();
@@ -116,25 +121,26 @@ fn lines(path: &Path) -> Vec<String> {
 pub fn forget_without(history: &Path) {
     if !history.exists() {
         // There may be none.
-        let _gone = std::fs::remove_file(path(history));
+        let _gone = std::fs::remove_file(audit_path(history));
     }
 }
 
 /// Appends to the history what a process that was killed had handed over and the history has not; gives how many rows. Call
 /// it before anything else is recorded.
-pub fn recover(history: &Path, writer: &Writer) -> usize {
-    let missing = missing(history).unwrap_or_default();
-    missing.into_iter().filter(|row| writer.record(row.clone()).is_some()).count()
+pub fn recover_rows(history: &Path, writer: &Writer) -> usize {
+    let missing = find_missing_rows(history).unwrap_or_default();
+    missing.into_iter().filter(|row| writer.queue_record(row.clone()).is_some()).count()
 }
 
 /// Rows of the file from after the newest sample that the history lacks; nothing where the history cannot be read.
-fn missing(history: &Path) -> Option<Vec<Audit>> {
+fn find_missing_rows(history: &Path) -> Option<Vec<Audit>> {
     let reader = Reader::open(history).ok()?;
-    let newest = reader.present().ok()?;
+    let newest = reader.read_present_span().ok()?;
     let from_ns = newest.map_or(TimeNs::MIN, |(_, newest_ns)| newest_ns.saturating_sub(LOOK_BACK_NS));
-    let stored = reader.audit(from_ns, TimeNs::MAX, u32::MAX).ok()?;
-    let rows = lines(&path(history)).into_iter().filter_map(|line| serde_json::from_str::<Audit>(&line).ok());
-    let newer = rows.filter(|row| row.at_ns >= from_ns).map(|row| row.storable());
+    let stored = reader.read_audit(from_ns, TimeNs::MAX, u32::MAX).ok()?;
+    let rows =
+        read_lines(&audit_path(history)).into_iter().filter_map(|line| serde_json::from_str::<Audit>(&line).ok());
+    let newer = rows.filter(|row| row.at_ns >= from_ns).map(|row| row.to_storable());
     Some(newer.filter(|row| !stored.iter().any(|entry| entry.audit == *row)).collect())
 }
 
@@ -156,31 +162,31 @@ mod tests {
         let keep = || {
             let recent = Recent::start(&history);
             let rows = [row(1, 70.0), row(100, 71.0), row(101, f64::NAN), row(102, 73.0)];
-            rows.into_iter().for_each(|it| recent.put(it));
+            rows.into_iter().for_each(|it| recent.keep_row(it));
         };
         keep();
         forget_without(&history);
-        assert!(lines(&path(&history)).is_empty(), "there is no history");
+        assert!(read_lines(&audit_path(&history)).is_empty(), "there is no history");
         keep();
         std::fs::OpenOptions::new()
             .append(true)
-            .open(path(&history))
+            .open(audit_path(&history))
             .and_then(|mut file| file.write_all(b"{\"at_ns\":1"))
             .expect("written");
-        assert_eq!(missing(&history), None, "there is no history");
+        assert_eq!(find_missing_rows(&history), None, "there is no history");
         let writer = Writer::open(&history, Options::default()).expect("a history");
         forget_without(&history);
-        assert_eq!(missing(&history).map(|rows| rows.len()), Some(4), "killed before the first commit");
-        writer.sample(&Sample::empty(100 * SECOND_NS), &[]);
-        writer.record(row(100, 71.0));
+        assert_eq!(find_missing_rows(&history).map(|rows| rows.len()), Some(4), "killed before the first commit");
+        writer.queue_sample(&Sample::new_empty(100 * SECOND_NS), &[]);
+        writer.queue_record(row(100, 71.0));
         writer.flush().expect("durable");
-        assert_eq!(recover(&history, &writer), 2, "not the one of long ago, and not half a line");
+        assert_eq!(recover_rows(&history, &writer), 2, "not the one of long ago, and not half a line");
         writer.flush().expect("durable");
-        assert_eq!(recover(&history, &writer), 0, "they are there now");
+        assert_eq!(recover_rows(&history, &writer), 0, "they are there now");
         drop(writer);
         let reader = Reader::open(&history).expect("readable");
         let asked: Vec<_> =
-            reader.audit(0, TimeNs::MAX, 10).expect("rows").into_iter().map(|entry| entry.audit.asked).collect();
+            reader.read_audit(0, TimeNs::MAX, 10).expect("rows").into_iter().map(|entry| entry.audit.asked).collect();
         assert_eq!(asked, [Some(71.0), None, Some(73.0)]);
         assert_eq!(reader.verify_audit().expect("checked").broken, None);
     }
@@ -197,7 +203,7 @@ mod tests {
                 }
             }
             drop(recent);
-            let rows = std::fs::read_to_string(path(&history)).expect("there").lines().count();
+            let rows = std::fs::read_to_string(audit_path(&history)).expect("there").lines().count();
             assert!((ROWS_KEPT..=ROWS_KEPT + ROWS_ADDED).contains(&rows), "{rows}");
         }
     }

@@ -7,22 +7,22 @@ use ::rules::estimators;
 use std::path::Path;
 
 /// The wear of the edges, as it was known before.
-pub(super) fn edges(pipeline: &mut Pipeline, memory: &Path, told: &mut Vec<Notice>) {
+pub(super) fn restore_edge_wear(pipeline: &mut Pipeline, memory: &Path, told: &mut Vec<Notice>) {
     let Some(state) = learned::read(memory, |notice| told.push(notice)) else { return };
     let snapshot = serde_json::from_str(&state).unwrap_or(serde_json::Value::Null);
-    if !pipeline.wear_mut().restore(snapshot) {
+    if !pipeline.wear_mut().restore_snapshot(snapshot) {
         let text = format!("{} cannot be used: the wear of the edges is followed anew", memory.display());
         told.push(Notice::new(Severity::Warning, "wear_forgotten", text));
     }
 }
 
 /// The estimators, with what they had learned before.
-pub(super) fn estimators(memory: &Path, told: &mut Vec<Notice>) -> estimators::Inference {
+pub(super) fn restore_estimators(memory: &Path, told: &mut Vec<Notice>) -> estimators::Inference {
     let settings = estimators::Settings::default();
     let fresh = || estimators::Inference::new(settings.clone());
     let Some(state) = learned::read(memory, |notice| told.push(notice)) else { return fresh() };
     let snapshot = serde_json::from_str(&state).unwrap_or(serde_json::Value::Null);
-    estimators::Inference::restore(settings.clone(), snapshot).unwrap_or_else(|error| {
+    estimators::Inference::from_snapshot(settings.clone(), snapshot).unwrap_or_else(|error| {
         told.push(Notice::new(Severity::Warning, "nothing_learned", error.to_string()));
         fresh()
     })

@@ -7,10 +7,10 @@ use crate::config::Config;
 use crate::learned;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
-use crate::reload::{Fallback, Reloaded, Reloader, furnish, load_now, load_rest};
+use crate::reload::{Fallback, Reloaded, Reloader, load_now, load_rest, write_shipped_scripts};
 use crate::settings;
 use adapters::clock::TimeNs;
-use rules::script::{Host, ScriptProblem, SettingValues, shipped};
+use rules::script::{Host, ScriptProblem, SettingValues, list_shipped_scripts};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -18,21 +18,21 @@ use std::sync::atomic::Ordering;
 /// Writes the shipped scripts where there are none, loads what is there, and watches it. Whatever is wrong is told, and
 /// the box goes on: with the shipped scripts from memory when the directory cannot be read at all.
 #[must_use]
-pub fn load(config: &Config) -> (Host, ScriptWatch) {
+pub fn load_scripts(config: &Config) -> (Host, ScriptWatch) {
     let directory = &config.scripts.directory;
-    let values = settings::path(&config.gateway.data_dir);
+    let values = settings::values_path(&config.gateway.data_dir);
     let mut told = Vec::new();
-    if let Err(error) = furnish(directory) {
+    if let Err(error) = write_shipped_scripts(directory) {
         let text = format!("{}: the shipped scripts cannot be written there: {error}", directory.display());
         told.push(Notice::new(Severity::Warning, "scripts_not_written", text));
     }
     let mut host = Host::new();
     if let Some(remembered) = read_memory(config, &mut told) {
-        host.restore(&remembered);
+        host.restore_snapshot(&remembered);
     }
     if directory.is_dir() {
         if let Err(problems) = load_now(directory, Some(&values), &mut host) {
-            let last = active_scripts::last(&config.gateway.data_dir).and_then(Result::ok);
+            let last = active_scripts::prepare_last_set(&config.gateway.data_dir).and_then(Result::ok);
             let consequence = match load_rest((directory, Some(&values)), last, &problems, &mut host) {
                 Fallback::Last(count) => format!("the {count} that were in charge before are in charge again"),
                 Fallback::Others(1) => "the other script is in charge".to_owned(),
@@ -41,7 +41,7 @@ pub fn load(config: &Config) -> (Host, ScriptWatch) {
             };
             told.push(build_refusal_notice(&problems, &consequence));
         }
-    } else if host.load(&shipped()).is_ok() {
+    } else if host.load_scripts(&list_shipped_scripts()).is_ok() {
         told.push(Notice::new(
             Severity::Warning,
             "scripts_from_memory",
@@ -55,7 +55,7 @@ pub fn load(config: &Config) -> (Host, ScriptWatch) {
     }
     let (reloader, data_dir) = (reloader.ok(), config.gateway.data_dir.clone());
     let watched = ScriptWatch { reloader, data_dir, told, told_of: None, failed: BTreeMap::new() };
-    watched.keep(&host);
+    watched.save_active_texts(&host);
     (host, watched)
 }
 
@@ -84,71 +84,75 @@ pub struct ScriptWatch {
 
 impl ScriptWatch {
     /// Remembers the texts in charge, for a start at which the directory holds something broken and for backtests.
-    fn keep(&self, host: &Host) {
-        if let Err(error) = active_scripts::keep(&self.data_dir, host.files()) {
+    fn save_active_texts(&self, host: &Host) {
+        if let Err(error) = active_scripts::save_texts(&self.data_dir, host.files()) {
             tracing::warn!("the scripts in charge could not be kept in {}: {error}", self.data_dir.display());
         }
     }
 
     /// Prints what scripts have failed with at this tick, each once until scripts are reloaded or it fails with something else.
     /// The history has every one.
-    pub fn tell(&mut self, problems: &[ScriptProblem]) {
+    pub fn print_failures(&mut self, problems: &[ScriptProblem]) {
         for problem in problems {
             let text = format!("a script was stopped: {problem}");
             if self.failed.get(&problem.file) != Some(&text) {
-                Notice::new(Severity::Warning, "script_stopped", text.clone()).say();
+                Notice::new(Severity::Warning, "script_stopped", text.clone()).write_to_logs();
                 self.failed.insert(problem.file.clone(), text);
             }
         }
     }
 
     /// Takes what has been found on disk since the last tick, whose sample is of `at_ns`. Costs nothing when there is nothing.
-    pub fn step(
+    pub fn apply_changes(
         &mut self,
         pipeline: &mut Pipeline,
         health: &mut Health,
         run_flags: &RunFlags,
         (now_ns, at_ns): (TimeNs, TimeNs),
     ) {
-        self.take(pipeline, health, run_flags, now_ns);
+        self.apply_reload(pipeline, health, run_flags, now_ns);
         let host = pipeline.scripts();
         if self.told_of.replace(host.generation()) != Some(host.generation()) {
             // By the time of the sample, which is that of the alarms.
-            health.keep(active_scripts::event(host, at_ns).into());
+            health.keep_record(active_scripts::build_event(host, at_ns).into());
         }
     }
 
     /// The history is told every setting that has another value: who, before, after.
     fn tell_settings((before, by): (&SettingValues, &str), host: &Host, health: &mut Health, now_ns: TimeNs) {
-        let declared: Vec<_> = host.declared().collect();
-        let changes = settings::changes(before, host.values(), &declared);
+        let declared: Vec<_> = host.declared_settings().collect();
+        let changes = settings::list_changes(before, host.values(), &declared);
         for change in changes {
-            let text = format!("{}, by {by}", change.words());
-            let notice = Notice::new(Severity::Info, settings::KIND, text).detail(change.detail(by).to_string());
-            health.event(now_ns, "scripts", &notice);
+            let text = format!("{}, by {by}", change.describe_change());
+            let notice =
+                Notice::new(Severity::Info, settings::KIND, text).with_detail(change.build_detail(by).to_string());
+            health.record_event(now_ns, "scripts", &notice);
         }
     }
 
-    fn take(&mut self, pipeline: &mut Pipeline, health: &mut Health, run_flags: &RunFlags, now_ns: TimeNs) {
+    fn apply_reload(&mut self, pipeline: &mut Pipeline, health: &mut Health, run_flags: &RunFlags, now_ns: TimeNs) {
         for notice in self.told.drain(..) {
-            health.event(now_ns, "scripts", &notice);
+            health.record_event(now_ns, "scripts", &notice);
         }
         let Some(reloader) = &self.reloader else { return };
         if run_flags.reload.swap(false, Ordering::SeqCst) {
-            reloader.ask();
+            reloader.request_look();
         }
         let before = pipeline.scripts().values().clone();
-        let notice = match reloader.step(pipeline.scripts_mut()) {
+        let notice = match reloader.apply_found_scripts(pipeline.scripts_mut()) {
             None => return,
             Some(Ok(Reloaded { count, by })) => {
                 self.failed.clear();
-                health.put(&active_scripts::path(&self.data_dir), active_scripts::text(pipeline.scripts().files()));
+                health.put_file(
+                    &active_scripts::file_path(&self.data_dir),
+                    active_scripts::format_texts(pipeline.scripts().files()),
+                );
                 Self::tell_settings((&before, &by), pipeline.scripts(), health, now_ns);
                 let text = format!("{count} scripts are in charge as they are on disk");
                 Notice::new(Severity::Info, "scripts_reloaded", text)
             }
             Some(Err(problems)) => build_refusal_notice(&problems, "the ones before stay in charge"),
         };
-        health.event(now_ns, "scripts", &notice);
+        health.record_event(now_ns, "scripts", &notice);
     }
 }

@@ -45,7 +45,7 @@ pub struct SourcePace {
 impl SampleFeed {
     /// The pace of each source that has been read.
     #[must_use]
-    pub fn paces(&self, now_ns: TimeNs) -> Vec<Option<SourcePace>> {
+    pub fn list_paces(&self, now_ns: TimeNs) -> Vec<Option<SourcePace>> {
         let Self::Threads { workers, .. } = self else { return Vec::new() };
         let pace = |worker: &Worker| {
             let WorkerStats { period, pace, polls, .. } = worker.stats(now_ns);
@@ -60,16 +60,19 @@ impl SampleFeed {
             Self::Threads { workers, merge, alignment } => {
                 for (index, worker) in workers.iter().enumerate() {
                     let source = SourceId(index);
-                    let see = |poll: &Poll| alignment.see(source, poll.error.is_none().then_some(&poll.readings));
+                    let see = |poll: &Poll| {
+                        alignment.observe_readings(source, poll.error.is_none().then_some(&poll.readings))
+                    };
                     worker.drain_seen_into(merge, source, see);
                 }
-                alignment.step(now_ns, merge);
+                alignment.update_lags(now_ns, merge);
                 merge.sample_into(sample, now_ns.saturating_sub(merge.delay_ns()));
                 !workers.iter().all(Worker::is_finished)
             }
             Self::Stepped { lockstep, alignment, .. } => {
-                alignment.step(now_ns, lockstep.merge_mut());
-                lockstep.sample_seen_into(sample, now_ns, |source, readings| alignment.see(source, readings))
+                alignment.update_lags(now_ns, lockstep.merge_mut());
+                lockstep
+                    .sample_seen_into(sample, now_ns, |source, readings| alignment.observe_readings(source, readings))
             }
         }
     }
@@ -91,7 +94,7 @@ impl SampleFeed {
 
     /// How each source is doing.
     #[must_use]
-    pub fn status(&self, now_ns: TimeNs) -> Vec<SourceStatus> {
+    pub fn list_sources(&self, now_ns: TimeNs) -> Vec<SourceStatus> {
         match self {
             Self::Threads { workers, merge, .. } => {
                 let each = workers.iter().enumerate();
@@ -125,7 +128,7 @@ impl SampleFeed {
     }
 }
 
-fn milliseconds(duration: Duration) -> f64 {
+fn to_milliseconds(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e3
 }
 
@@ -138,30 +141,30 @@ fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStat
     let known = stats.polls > 1;
     SourceStatus {
         name: name.to_owned(),
-        state: stats.state.word(),
+        state: stats.state.as_word(),
         error: stats.last_error.as_ref().filter(|_| failing).map(ToString::to_string),
         period_s: stats.period.as_secs_f64(),
         period_kept_s: known.then_some(stats.period_kept.p50.as_secs_f64()),
-        jitter_p50_ms: known.then(|| milliseconds(stats.lateness.p50)),
-        jitter_p99_ms: known.then(|| milliseconds(stats.lateness.p99)),
-        round_trip_p50_ms: known.then(|| milliseconds(stats.round_trip.p50)),
-        round_trip_p99_ms: known.then(|| milliseconds(stats.round_trip.p99)),
+        jitter_p50_ms: known.then(|| to_milliseconds(stats.lateness.p50)),
+        jitter_p99_ms: known.then(|| to_milliseconds(stats.lateness.p99)),
+        round_trip_p50_ms: known.then(|| to_milliseconds(stats.round_trip.p50)),
+        round_trip_p99_ms: known.then(|| to_milliseconds(stats.round_trip.p99)),
         round_trips: stats.round_trips,
         lag_s: stats.lag_s,
         readings: counts.readings,
         failures: stats.failures,
         missed: stats.missed,
         dropped: count_dropped(counts) + stats.dropped,
-        facts: stats.facts.iter().map(shown).collect(),
-        problems: stats.problems.iter().map(problem).collect(),
+        facts: stats.facts.iter().map(to_fact_status).collect(),
+        problems: stats.problems.iter().map(to_status_problem).collect(),
     }
 }
 
-fn problem(problem: &SourceProblem) -> StatusProblem {
+fn to_status_problem(problem: &SourceProblem) -> StatusProblem {
     StatusProblem { what: problem.what.clone(), next: problem.next.clone() }
 }
 
-fn shown(fact: &Fact) -> FactStatus {
+fn to_fact_status(fact: &Fact) -> FactStatus {
     let value = match &fact.value {
         FactValue::Number(number) => NumberOrWord::Number(*number),
         FactValue::Text(text) => NumberOrWord::Text(text.clone()),

@@ -1,6 +1,6 @@
 //! What the box has learned goes to disk beside the tick, so that a slow disk never delays a write to the machine.
 
-use crate::files::replace;
+use crate::files::replace_file;
 use crate::learned;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
@@ -19,8 +19,12 @@ struct SaveJob {
 }
 
 impl SaveJob {
-    fn put(&self) {
-        let saved = if self.learned { learned::save(&self.path, &self.text) } else { replace(&self.path, &self.text) };
+    fn write_file(&self) {
+        let saved = if self.learned {
+            learned::save_state(&self.path, &self.text)
+        } else {
+            replace_file(&self.path, &self.text)
+        };
         if let Err(error) = saved {
             tracing::warn!("{} could not be saved: {error}", self.path.display());
         }
@@ -39,23 +43,23 @@ impl Saver {
     #[must_use]
     pub fn start() -> Self {
         let (send, jobs) = sync_channel::<SaveJob>(WAITING_MAX);
-        let work = move || jobs.iter().for_each(|job| job.put());
+        let work = move || jobs.iter().for_each(|job| job.write_file());
         let thread = std::thread::Builder::new().name("save".to_owned()).spawn(work).ok();
         Self { jobs: thread.is_some().then_some(send), thread }
     }
 
     /// Writes this file, a new one in the place of the old one, as soon as the disk has time.
-    pub fn put(&self, path: &Path, text: String) {
-        self.send(SaveJob { path: path.to_owned(), text, learned: false });
+    pub fn put_file(&self, path: &Path, text: String) {
+        self.queue_job(SaveJob { path: path.to_owned(), text, learned: false });
     }
 
     /// The same for what was learned: see [`learned`].
     pub fn put_learned(&self, path: &Path, state: String) {
-        self.send(SaveJob { path: path.to_owned(), text: state, learned: true });
+        self.queue_job(SaveJob { path: path.to_owned(), text: state, learned: true });
     }
 
-    fn send(&self, job: SaveJob) {
-        let Some(jobs) = &self.jobs else { return job.put() };
+    fn queue_job(&self, job: SaveJob) {
+        let Some(jobs) = &self.jobs else { return job.write_file() };
         if let Err(refused) = jobs.try_send(job) {
             let (TrySendError::Full(job) | TrySendError::Disconnected(job)) = refused;
             tracing::warn!("{} was not saved: the disk has not taken what came before", job.path.display());
@@ -87,11 +91,11 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let mut saver = Saver::start();
         let path = directory.path().join("learned.json");
-        saver.put(&path, "1".to_owned());
-        saver.put(&path, "2".to_owned());
+        saver.put_file(&path, "1".to_owned());
+        saver.put_file(&path, "2".to_owned());
         saver.close();
         assert_eq!(std::fs::read_to_string(&path).expect("written"), "2");
-        saver.put(&path, "3".to_owned());
+        saver.put_file(&path, "3".to_owned());
         assert_eq!(std::fs::read_to_string(&path).expect("written"), "3", "afterwards at once");
         saver.put_learned(&path, "4".to_owned());
         assert_eq!(learned::read(&path, |_| {}).as_deref(), Some("4"));

@@ -62,14 +62,14 @@ impl ProgressMarks {
     }
 
     /// This part has moved.
-    pub fn mark(&self, part: WatchedPart) {
+    pub fn mark_part(&self, part: WatchedPart) {
         let now_ms = u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX);
         self.moved_ms[part as usize].store(now_ms, Ordering::Relaxed);
     }
 
     /// Parts that have stood still for longer than `limit`.
     #[must_use]
-    pub fn still(&self, limit: Duration) -> Vec<WatchedPart> {
+    pub fn find_stalled(&self, limit: Duration) -> Vec<WatchedPart> {
         let since = |part: &WatchedPart| Duration::from_millis(self.moved_ms[*part as usize].load(Ordering::Relaxed));
         let now = self.began.elapsed();
         PARTS.into_iter().filter(|part| now.saturating_sub(since(part)) > limit).collect()
@@ -103,18 +103,18 @@ impl ServiceManager {
     /// # Errors
     /// The confirmation cannot be written; it is tried again at the next call.
     pub fn report_progress(&mut self, marks: &ProgressMarks) -> std::io::Result<()> {
-        let still = marks.still(STILL_MAX);
+        let still = marks.find_stalled(STILL_MAX);
         if !still.is_empty() {
             self.ready_since = None;
             let words: Vec<&str> = still.iter().map(|part| part.word()).collect();
-            send(&[NotifyState::Status(&format!("stands still: {}", words.join(", ")))]);
+            notify_manager(&[NotifyState::Status(&format!("stands still: {}", words.join(", ")))]);
             return Ok(());
         }
         let since = *self.ready_since.get_or_insert_with(|| {
-            send(&[NotifyState::Ready, NotifyState::Status("polling")]);
+            notify_manager(&[NotifyState::Ready, NotifyState::Status("polling")]);
             Instant::now()
         });
-        send(&[NotifyState::Watchdog]);
+        notify_manager(&[NotifyState::Watchdog]);
         if !self.confirmed && since.elapsed() >= WELL_FOR {
             confirm_running_version(&self.data_dir)?;
             self.confirmed = true;
@@ -142,12 +142,12 @@ impl WatchedService {
     }
 
     /// Marks what has moved since the last look, and reports it. A history that is not open has no thread that could hang.
-    pub fn report(&mut self, steps: Option<u64>, rounds: Option<u64>) {
-        self.marks.mark(WatchedPart::Tick);
+    pub fn report_moved_parts(&mut self, steps: Option<u64>, rounds: Option<u64>) {
+        self.marks.mark_part(WatchedPart::Tick);
         for (part, now, seen) in [(WatchedPart::Poll, steps, self.seen.0), (WatchedPart::History, rounds, self.seen.1)]
         {
             if now.is_none() || now != seen {
-                self.marks.mark(part);
+                self.marks.mark_part(part);
             }
         }
         self.seen = (steps, rounds);
@@ -156,7 +156,7 @@ impl WatchedService {
             let text = format!(
                 "that this version is well cannot be written down ({error}); an update goes back to the version before"
             );
-            Notice::new(Severity::Warning, "not_confirmed", text).say();
+            Notice::new(Severity::Warning, "not_confirmed", text).write_to_logs();
         }
     }
 }
@@ -187,7 +187,7 @@ impl OpeningReport {
                 && ended.recv_timeout(OPENING_EVERY) == Err(std::sync::mpsc::RecvTimeoutError::Timeout)
             {
                 let micros = u32::try_from(OPENING_EXTENDS.as_micros()).unwrap_or(u32::MAX);
-                send(&[
+                notify_manager(&[
                     NotifyState::Watchdog,
                     NotifyState::ExtendTimeoutUsec(micros),
                     NotifyState::Status("opening the history"),
@@ -201,11 +201,11 @@ impl OpeningReport {
 
 /// The box is being closed.
 pub fn report_stopping() {
-    send(&[NotifyState::Stopping]);
+    notify_manager(&[NotifyState::Stopping]);
 }
 
 /// Without a service manager this does nothing; one that has gone away is not this program's trouble.
-fn send(states: &[NotifyState<'_>]) {
+fn notify_manager(states: &[NotifyState<'_>]) {
     let _no_manager = sd_notify::notify(states);
 }
 
@@ -217,10 +217,10 @@ mod tests {
     fn a_part_that_stands_still_is_named() {
         let marks = ProgressMarks::new();
         std::thread::sleep(Duration::from_millis(30));
-        marks.mark(WatchedPart::Tick);
-        marks.mark(WatchedPart::Poll);
-        marks.mark(WatchedPart::Page);
-        assert_eq!(marks.still(Duration::from_millis(20)), [WatchedPart::History]);
-        assert!(marks.still(Duration::from_secs(5)).is_empty());
+        marks.mark_part(WatchedPart::Tick);
+        marks.mark_part(WatchedPart::Poll);
+        marks.mark_part(WatchedPart::Page);
+        assert_eq!(marks.find_stalled(Duration::from_millis(20)), [WatchedPart::History]);
+        assert!(marks.find_stalled(Duration::from_secs(5)).is_empty());
     }
 }

@@ -107,49 +107,49 @@ impl Ticker {
     pub fn run(mut self) -> RunEnd {
         let started = Instant::now();
         let mut published = None;
-        let mut sample = Sample::empty(0);
+        let mut sample = Sample::new_empty(0);
         let mut first_ns = None;
         if self.identity.speed == Some(1.0) {
-            let granted = priority::ask();
-            granted.tell();
+            let granted = priority::request_priority();
+            granted.tell_operator();
             if granted == Granted::RealTime && self.pipeline.gate().limits().greatest_mode() == GateMode::Armed {
                 self.pace.wake_early();
             }
         }
-        self.wake.here();
+        self.wake.bind_current_thread();
         let mut last_ns = None;
         while let Some(now_ns) = self.next_tick(&sample, last_ns) {
             last_ns = Some(now_ns);
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
-            self.complete(&mut sample, now_ns);
-            self.scripts.step(&mut self.pipeline, &mut self.health, &self.run_flags, (now_ns, sample.at_ns));
-            self.commands.obey(self.pipeline.gate_mut(), &sample, &mut self.health);
-            self.wear.supply(&mut self.pipeline, sample.at_ns, &mut self.health);
-            let inferred = *self.pipeline.infer(&sample);
-            self.feed.alignment_mut().told(sample.at_ns, inferred.state);
-            self.health.aligned(sample.at_ns, self.feed.alignment_mut());
+            self.fill_from_recipe(&mut sample, now_ns);
+            self.scripts.apply_changes(&mut self.pipeline, &mut self.health, &self.run_flags, (now_ns, sample.at_ns));
+            self.commands.carry_out_orders(self.pipeline.gate_mut(), &sample, &mut self.health);
+            self.wear.supply_models(&mut self.pipeline, sample.at_ns, &mut self.health);
+            let inferred = *self.pipeline.infer_estimates(&sample);
+            self.feed.alignment_mut().record_state(sample.at_ns, inferred.state);
+            self.health.update_lags(sample.at_ns, self.feed.alignment_mut());
             if let Some(thermal) = &mut self.thermal {
-                self.pipeline.propose(thermal.step(&sample, &mut self.health));
+                self.pipeline.propose_offset(thermal.propose_offset(&sample, &mut self.health));
             }
-            self.pipeline.request(self.commands.requested(sample.at_ns));
-            self.pipeline.decide(&sample);
+            self.pipeline.request_override(self.commands.network_override(sample.at_ns));
+            self.pipeline.decide_commands(&sample);
             let asks: Vec<ScriptRequest> =
-                self.pipeline.scripts().decision().stops.iter().map(ScriptRequest::of).collect();
-            self.commands.step(&mut self.pipeline, &asks, &sample, now_ns, &mut self.health);
+                self.pipeline.scripts().decision().stops.iter().map(ScriptRequest::from_stop).collect();
+            self.commands.apply_verdict(&mut self.pipeline, &asks, &sample, now_ns, &mut self.health);
             // What can wait comes after what is written to the machine.
-            self.pipeline.record(&sample, &mut self.health);
-            self.scripts.tell(&self.pipeline.scripts().decision().problems);
+            self.pipeline.record_tick(&sample, &mut self.health);
+            self.scripts.print_failures(&self.pipeline.scripts().decision().problems);
             if let Some(twin) = &mut self.twin {
-                twin.step(&sample, &self.pipeline, &mut self.health);
+                twin.compare_tick(&sample, &self.pipeline, &mut self.health);
             }
-            self.health.look(&self.pipeline, &self.feed, now_ns);
+            self.health.look_at_parts(&self.pipeline, &self.feed, now_ns);
             let over = !alive
                 || self.health.follows_clock()
                 || self.stop_after_ns.is_some_and(|limit_ns| now_ns - began_ns >= limit_ns);
             if over || published.is_none_or(|at: Instant| at.elapsed() >= PUBLISH_EVERY) {
                 published = Some(Instant::now());
-                self.send(&sample, now_ns, started);
+                self.publish_status(&sample, now_ns, started);
             }
             if over {
                 break;
@@ -162,7 +162,7 @@ impl Ticker {
         self.tell_writes(sample.at_ns);
         self.feed.stop();
         if let Some(twin) = &mut self.twin {
-            twin.save(&self.health);
+            twin.save_learned(&self.health);
         }
         self.health.close(&self.pipeline, sample.at_ns);
         self.run_flags.stop.store(true, Ordering::SeqCst);
@@ -177,7 +177,7 @@ impl Ticker {
             // Before the first tick there is nothing to order about.
             let Some(last_ns) = last_ns.filter(|_| left > 0) else { return };
             left -= 1;
-            commands.obey(pipeline.gate_mut(), sample, health);
+            commands.carry_out_orders(pipeline.gate_mut(), sample, health);
             commands.let_go(pipeline, sample, last_ns, health);
         })
     }
@@ -186,27 +186,27 @@ impl Ticker {
     fn tell_writes(&mut self, at_ns: TimeNs) {
         for machine in &self.machines {
             let counts = machine.written();
-            let text = format!("the simulated controller has counted {} writes", counts.writes());
-            let notice = Notice::new(Severity::Info, "machine_writes", text).detail(format!("{counts:?}"));
-            self.health.event(at_ns, "controller", &notice);
+            let text = format!("the simulated controller has counted {} writes", counts.count_writes());
+            let notice = Notice::new(Severity::Info, "machine_writes", text).with_detail(format!("{counts:?}"));
+            self.health.record_event(at_ns, "controller", &notice);
         }
     }
 
     /// The recipe fills in what the sources do not deliver.
-    fn complete(&mut self, sample: &mut Sample, now_ns: TimeNs) {
+    fn fill_from_recipe(&mut self, sample: &mut Sample, now_ns: TimeNs) {
         let Some(operations) = &mut self.operations else { return };
         let reload = self.run_flags.reload.load(Ordering::SeqCst);
-        operations.step(sample, reload, |notice| self.health.event(now_ns, SOURCE, notice));
+        operations.update_sample(sample, reload, |notice| self.health.record_event(now_ns, SOURCE, notice));
     }
 
-    fn send(&mut self, sample: &Sample, now_ns: TimeNs, started: Instant) {
-        let status = Arc::new(self.status(sample, now_ns, started));
+    fn publish_status(&mut self, sample: &Sample, now_ns: TimeNs, started: Instant) {
+        let status = Arc::new(self.build_status(sample, now_ns, started));
         self.publish.send_replace(Some(Published { status, at: Instant::now() }));
     }
 
-    fn status(&mut self, sample: &Sample, now_ns: TimeNs, started: Instant) -> Status {
-        let alarms = self.alarms();
-        let acknowledged = self.commands.seen(&alarms);
+    fn build_status(&mut self, sample: &Sample, now_ns: TimeNs, started: Instant) -> Status {
+        let alarms = self.list_alarms();
+        let acknowledged = self.commands.update_acknowledged(&alarms);
         let Identity { machine, simulated, speed, rate_hz } = self.identity.clone();
         let (late_p50_ms, late_p99_ms) = self.pace.late_ms();
         let count = self.pipeline.tally().ticks();
@@ -217,7 +217,7 @@ impl Ticker {
             machine,
             simulated,
             speed,
-            at_ms: report::milliseconds(sample.at_ns),
+            at_ms: report::to_milliseconds(sample.at_ns),
             uptime_s: started.elapsed().as_secs_f64(),
             clock: self.health.clock_status(),
             tick: TickStatus {
@@ -225,41 +225,41 @@ impl Ticker {
                 count,
                 late_p50_ms,
                 late_p99_ms,
-                late: self.pace.late(),
-                skipped: self.pace.skipped(),
+                late: self.pace.lateness_histogram(),
+                skipped: self.pace.skipped_ticks(),
             },
-            state: report::state(&self.pipeline),
-            channels: report::channels(sample),
-            estimates: report::estimates(self.pipeline.estimates()),
+            state: report::build_state_status(&self.pipeline),
+            channels: report::list_channels(sample),
+            estimates: report::list_estimates(self.pipeline.estimates()),
             alarms,
             acknowledged,
-            twin: self.twin.as_ref().map(Twin::status),
-            parts: self.pipeline.parts().finished(),
-            gate: report::gate(&self.pipeline, self.commands.written_pct()),
-            sources: self.feed.status(now_ns),
-            alignment: self.feed.alignment().status(),
-            scripts: report::scripts(&self.pipeline),
+            twin: self.twin.as_ref().map(Twin::build_status),
+            parts: self.pipeline.parts().finished_count(),
+            gate: report::build_gate_status(&self.pipeline, self.commands.written_pct()),
+            sources: self.feed.list_sources(now_ns),
+            alignment: self.feed.alignment().build_status(),
+            scripts: report::list_scripts(&self.pipeline),
             operations: self.operations.as_ref().map(Operations::status),
-            wear: wear::status(&self.pipeline),
-            sinks: self.sinks.status(),
-            problems: self.problems(&history),
+            wear: wear::build_status(&self.pipeline),
+            sinks: self.sinks.list_sinks(),
+            problems: self.list_problems(&history),
             history,
         }
     }
 
-    fn alarms(&self) -> Vec<AlarmStatus> {
-        let of_twin = self.twin.iter().flat_map(Twin::alarms);
-        report::alarms(&self.pipeline).into_iter().chain(of_twin).chain(self.commands.alarm()).collect()
+    fn list_alarms(&self) -> Vec<AlarmStatus> {
+        let of_twin = self.twin.iter().flat_map(Twin::list_alarms);
+        report::list_alarms(&self.pipeline).into_iter().chain(of_twin).chain(self.commands.standing_alarm()).collect()
     }
 
-    fn problems(&self, history: &HistoryStatus) -> Vec<StatusProblem> {
-        let recipe = self.operations.as_ref().and_then(Operations::problem);
+    fn list_problems(&self, history: &HistoryStatus) -> Vec<StatusProblem> {
+        let recipe = self.operations.as_ref().and_then(Operations::describe_problem);
         self.health
-            .problems(history)
+            .list_problems(history)
             .into_iter()
             .chain(recipe)
-            .chain(self.sinks.problems())
-            .chain(self.commands.problems(self.pipeline.gate()))
+            .chain(self.sinks.list_problems())
+            .chain(self.commands.list_problems(self.pipeline.gate()))
             .collect()
     }
 }

@@ -40,7 +40,7 @@ struct PendingVerdict {
 type TimedQueue<T> = VecDeque<(Instant, T)>;
 
 /// Queues these from now on; gives those for which there is no room.
-fn queue<T: Clone>(waiting: &mut TimedQueue<T>, most: usize, new: &[T]) -> Vec<T> {
+fn queue_items<T: Clone>(waiting: &mut TimedQueue<T>, most: usize, new: &[T]) -> Vec<T> {
     let (taken, left) = new.split_at(most.saturating_sub(waiting.len()).min(new.len()));
     waiting.extend(taken.iter().map(|it| (Instant::now(), it.clone())));
     left.to_vec()
@@ -63,7 +63,7 @@ impl VerdictMailbox {
         Self { period: Some(period).filter(|period| *period >= LEAD_PERIOD_MIN), ..Self::default() }
     }
 
-    fn told(&self) {
+    fn notify_worker(&self) {
         self.laid.fetch_add(1, Ordering::Release);
         self.arrived.notify_one();
     }
@@ -84,14 +84,14 @@ impl VerdictMailbox {
         if !verdict.armed {
             refused.extend(pending.asks.drain(..).map(|(_, ask)| ask));
         }
-        refused.extend(queue(&mut pending.asks, ASKS_MAX, asks));
+        refused.extend(queue_items(&mut pending.asks, ASKS_MAX, asks));
         drop(pending);
-        self.told();
+        self.notify_worker();
         refused
     }
 
     /// Orders to shift axes. Gives those that will not be carried out: there is no room, or the arming has ended.
-    pub(super) fn order(&self, orders: &[OffsetOrder], armed: bool) -> Vec<OffsetOrder> {
+    pub(super) fn post_orders(&self, orders: &[OffsetOrder], armed: bool) -> Vec<OffsetOrder> {
         let mut pending = self.lock();
         let mut withdrawn = Vec::new();
         if !armed {
@@ -99,10 +99,10 @@ impl VerdictMailbox {
             withdrawn.extend(pending.orders.iter().map(|(_, order)| *order).filter(is_step));
             pending.orders.retain(|(_, order)| !is_step(order));
         }
-        withdrawn.extend(queue(&mut pending.orders, ORDERS_MAX, orders));
+        withdrawn.extend(queue_items(&mut pending.orders, ORDERS_MAX, orders));
         drop(pending);
         if !orders.is_empty() {
-            self.told();
+            self.notify_worker();
         }
         withdrawn
     }
@@ -110,12 +110,12 @@ impl VerdictMailbox {
     /// Nothing more will come.
     pub(super) fn close(&self) {
         self.lock().closing = true;
-        self.told();
+        self.notify_worker();
     }
 
     /// Waits at most so long for something to do. Gives the newest verdict, and whether the end has come.
     /// `awake`, it waits awake for the next verdict that is due.
-    pub(super) fn take(&self, limit: Duration, awake: bool) -> (Option<Verdict>, bool) {
+    pub(super) fn take_verdict(&self, limit: Duration, awake: bool) -> (Option<Verdict>, bool) {
         let empty =
             |pending: &mut PendingVerdict| pending.verdict.is_none() && pending.orders.is_empty() && !pending.closing;
         let pending = self.lock();

@@ -18,7 +18,7 @@ type Ends = (Option<Box<dyn Actuator>>, Option<Box<dyn OffsetSink>>);
 
 /// The way to the machine. Unless the configuration allows arming there is no actuator in the process at all, and no sink
 /// of offsets.
-pub(super) fn commands(
+pub(super) fn build_commands(
     plan: &RunPlan,
     mut ways: Vec<Way>,
     inbox: OrderReceiver,
@@ -29,26 +29,25 @@ pub(super) fn commands(
     let data_dir = &plan.config.gateway.data_dir;
     let target = limits.source.clone().unwrap_or_default();
     if limits.greatest_mode() != GateMode::Armed {
-        return Ok(Commands::new(ActuatorWorker::None, OffsetCommands::idle(data_dir), target, inbox));
+        return Ok(Commands::new(ActuatorWorker::None, OffsetCommands::without_sink(data_dir), target, inbox));
     }
-    let (actuator, sink) = tools(limits, &mut ways)?;
+    let (actuator, sink) = take_writers(limits, &mut ways)?;
     let (shifting, offsets) = match sink {
-        Some(sink) => {
-            OffsetCommands::resume(data_dir, sink, gate).map(|(shifting, account)| (shifting, Some(account)))?
-        }
-        None => (OffsetCommands::idle(data_dir), None),
+        Some(sink) => OffsetCommands::resume_from_journal(data_dir, sink, gate)
+            .map(|(shifting, account)| (shifting, Some(account)))?,
+        None => (OffsetCommands::without_sink(data_dir), None),
     };
     let tools = Tools { actuator, offsets };
     let actuator_worker = match plan.speed {
-        MachineSpeed::Real => ActuatorWorker::start(tools, limits, clock.clone(), open::period(&plan.config))
+        MachineSpeed::Real => ActuatorWorker::start(tools, limits, clock.clone(), open::tick_period(&plan.config))
             .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,
-        MachineSpeed::Times(_) | MachineSpeed::Max => ActuatorWorker::inline(tools, limits),
+        MachineSpeed::Times(_) | MachineSpeed::Max => ActuatorWorker::with_inline_writers(tools, limits),
     };
     Ok(Commands::new(actuator_worker, shifting, target, inbox))
 }
 
 /// What may be written, and nothing else.
-fn tools(limits: &config::GateConfig, ways: &mut [Way]) -> Result<Ends, CannotRun> {
+fn take_writers(limits: &config::GateConfig, ways: &mut [Way]) -> Result<Ends, CannotRun> {
     let (mut actuator, mut sink) = (None, None);
     if limits.mode == GateMode::Armed {
         let target = limits.source.as_deref().unwrap_or_default();

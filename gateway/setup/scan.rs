@@ -85,7 +85,7 @@ fn scan_ports(range: AddressRange, ports: &[(u16, &str)]) -> Vec<FoundControl> {
                         return;
                     }
                     let host = Ipv4Addr::from(range.first + offset);
-                    let open = ports.iter().filter(|(port, _)| listens(host, *port));
+                    let open = ports.iter().filter(|(port, _)| is_listening(host, *port));
                     let open: Vec<(u32, String)> =
                         open.map(|(port, scheme)| (offset, format!("{scheme}://{host}:{port}"))).collect();
                     found.lock().unwrap_or_else(std::sync::PoisonError::into_inner).extend(open);
@@ -98,7 +98,7 @@ fn scan_ports(range: AddressRange, ports: &[(u16, &str)]) -> Vec<FoundControl> {
     found.into_iter().map(|(_, address)| FoundControl { address }).collect()
 }
 
-fn listens(host: Ipv4Addr, port: u16) -> bool {
+fn is_listening(host: Ipv4Addr, port: u16) -> bool {
     TcpStream::connect_timeout(&SocketAddr::new(IpAddr::V4(host), port), CONNECT_WITHIN).is_ok()
 }
 

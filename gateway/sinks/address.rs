@@ -8,7 +8,7 @@ use super::parquet::ParquetTarget;
 use super::shdr::ShdrTarget;
 use super::sparkplug::SparkplugTarget;
 use adapters::address::{self, AddressError, Keys};
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use std::fmt;
 use std::str::FromStr;
 
@@ -65,21 +65,21 @@ impl SinkAddress {
 
     /// What is wrong with the files that the address names, each with what to do. Nothing is connected.
     #[must_use]
-    pub fn check(&self) -> Vec<(String, String)> {
+    pub fn find_file_problems(&self) -> Vec<(String, String)> {
         match &self.target {
-            SinkTarget::Mqtt(target) => target.broker.check(),
-            SinkTarget::Nats(target) => target.servers.check(),
+            SinkTarget::Mqtt(target) => target.broker.find_file_problems(),
+            SinkTarget::Nats(target) => target.servers.check_files(),
             #[cfg(feature = "opcua")]
-            SinkTarget::Opcua(target) => target.check(),
-            SinkTarget::Parquet(target) => target.check(),
+            SinkTarget::Opcua(target) => target.find_file_problems(),
+            SinkTarget::Parquet(target) => target.find_file_problems(),
             SinkTarget::Shdr(_) => Vec::new(),
-            SinkTarget::Sparkplug(target) => target.broker.check(),
+            SinkTarget::Sparkplug(target) => target.broker.find_file_problems(),
         }
     }
 
     /// Can a computer on the network of this sink send the box anything?
     #[must_use]
-    pub fn hears(&self) -> bool {
+    pub fn can_receive_requests(&self) -> bool {
         matches!(self.target, SinkTarget::Mqtt(_) | SinkTarget::Sparkplug(_))
     }
 
@@ -137,7 +137,7 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String
         "sparkplug" | "sparkplugs" => {
             SparkplugTarget::parse(body, keys, scheme == "sparkplugs").map(SinkTarget::Sparkplug)
         }
-        _ => Err(unknown(scheme)),
+        _ => Err(describe_unknown_scheme(scheme)),
     }
 }
 
@@ -151,8 +151,8 @@ fn without_opcua(keys: &mut Keys) -> String {
     "this program was built without OPC UA; `cargo build --release --features opcua` makes one that has it".to_owned()
 }
 
-fn unknown(scheme: &str) -> String {
-    let hint = match nearest(scheme, SCHEMES.iter().map(|(known, _)| *known)) {
+fn describe_unknown_scheme(scheme: &str) -> String {
+    let hint = match find_nearest_name(scheme, SCHEMES.iter().map(|(known, _)| *known)) {
         Some(near) => format!("did you mean {near}:?"),
         None => no_scheme(),
     };
@@ -167,7 +167,7 @@ mod tests {
     fn opc_ua_is_there_or_the_sentence_says_which_build_has_it() {
         let parsed: Result<SinkAddress, _> = "opcua://0.0.0.0:4840?user=plant&password_file=/etc/cnc/password".parse();
         #[cfg(feature = "opcua")]
-        assert!(parsed.is_ok_and(|address| address.check().len() == 1), "the password file is not there");
+        assert!(parsed.is_ok_and(|address| address.find_file_problems().len() == 1), "the password file is not there");
         #[cfg(not(feature = "opcua"))]
         assert!(
             parsed.is_err_and(|error| error.problems.len() == 1 && error.problems[0].contains("--features opcua")),

@@ -52,17 +52,17 @@ impl Board {
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn change(&self, index: usize, change: impl FnOnce(&mut Progress)) {
+    pub(super) fn update_progress(&self, index: usize, change: impl FnOnce(&mut Progress)) {
         if let Some(entry) = self.lock().get_mut(index) {
             change(&mut entry.progress);
         }
     }
 
     /// True when this error is another one than before, or came back: worth telling.
-    pub(super) fn failed(&self, index: usize, error: &SinkError) -> bool {
+    pub(super) fn record_failure(&self, index: usize, error: &SinkError) -> bool {
         let text = error.to_string();
         let mut news = false;
-        self.change(index, |progress| {
+        self.update_progress(index, |progress| {
             news = !progress.failing || progress.error.as_deref() != Some(&text);
             progress.state = Some("waiting");
             progress.error = Some(text);
@@ -73,7 +73,7 @@ impl Board {
 
     /// The sinks that fail at the moment.
     #[must_use]
-    pub fn problems(&self) -> Vec<StatusProblem> {
+    pub fn list_problems(&self) -> Vec<StatusProblem> {
         let problem = |entry: &BoardEntry| {
             let next = "it is tried again by itself; what waits is kept (see `sinks` in the status)".to_owned();
             let error = entry.progress.error.as_ref().filter(|_| entry.progress.failing)?;
@@ -84,15 +84,16 @@ impl Board {
 
     /// Every sink at this moment.
     #[must_use]
-    pub fn status(&self) -> Vec<SinkStatus> {
+    pub fn list_sinks(&self) -> Vec<SinkStatus> {
         let Some(outbox) = &self.outbox else { return Vec::new() };
-        let (head, figures) = (*outbox.head().borrow(), outbox.figures());
+        let (head, figures) = (*outbox.watch_head().borrow(), outbox.figures());
         let fits = figures.outage_fits_h(outbox.settings());
         let status = |entry: &BoardEntry| {
             let BoardEntry { name, address, progress } = entry;
-            let standing = outbox.standing(name);
-            let behind_items = standing.as_ref().map_or(0, |standing| standing.position.waiting(head.next_sequence));
-            let age = head.newest_ns.zip(progress.reached_ns).map(|(newest, reached)| seconds(newest - reached));
+            let standing = outbox.delivery_state(name);
+            let behind_items =
+                standing.as_ref().map_or(0, |standing| standing.position.count_waiting(head.next_sequence));
+            let age = head.newest_ns.zip(progress.reached_ns).map(|(newest, reached)| to_seconds(newest - reached));
             SinkStatus {
                 name: name.clone(),
                 address: address.clone(),
@@ -115,6 +116,6 @@ impl Board {
     }
 }
 
-pub(super) fn seconds(span_ns: i64) -> f64 {
+pub(super) fn to_seconds(span_ns: i64) -> f64 {
     span_ns as f64 / SECOND_NS as f64
 }

@@ -1,7 +1,7 @@
 //! What every sink that sends through an MQTT broker has in common: address keys, connection, words.
 
 use super::SinkError;
-use adapters::address::{Endpoint, Keys, Login, endpoint, tls_files};
+use adapters::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
 use adapters::mqtt::{MqttClient, MqttError, MqttMessage, Options, Outgoing, Qos, Version, Will};
 use adapters::tls::TlsFiles;
 use std::sync::Arc;
@@ -36,26 +36,26 @@ impl BrokerTarget {
     /// The host is none, in words.
     pub(super) fn parse<'a>(body: &'a str, keys: &mut Keys, secured: bool) -> Result<(Self, &'a str), String> {
         let tls = tls_files(keys, secured);
-        let login = Login::of(keys);
-        let version = keys.choice("protocol", &[("3.1.1", Version::V3), ("5", Version::V5)]);
-        let client_id = keys.text("client_id");
-        let keep_alive = Duration::from_secs(keys.number("keep_alive_s", 20, 2, 3600));
+        let login = Login::from_keys(keys);
+        let version = keys.take_choice("protocol", &[("3.1.1", Version::V3), ("5", Version::V5)]);
+        let client_id = keys.take_text("client_id");
+        let keep_alive = Duration::from_secs(keys.take_number("keep_alive_s", 20, 2, 3600));
         let body = body.strip_prefix("//").unwrap_or(body);
         let (host, rest) = body.split_once('/').unwrap_or((body, ""));
-        let at = endpoint(host, Some(if secured { 8883 } else { 1883 }))?;
+        let at = parse_endpoint(host, Some(if secured { 8883 } else { 1883 }))?;
         Ok((Self { at, tls, login, version, client_id, keep_alive }, rest.trim_end_matches('/')))
     }
 
     /// What is wrong with the files that the address names, each with what to do.
     #[must_use]
-    pub fn check(&self) -> Vec<(String, String)> {
+    pub fn find_file_problems(&self) -> Vec<(String, String)> {
         broker_files(self.tls.as_ref(), &self.login)
     }
 
-    fn options(&self, name: &str, will: Option<Will>) -> Result<Options, SinkError> {
+    fn build_options(&self, name: &str, will: Option<Will>) -> Result<Options, SinkError> {
         let login = self.login.read().map_err(|(file, error)| {
             let what = format!("the password file {} cannot be read: {error}", file.display());
-            SinkError::line(what, READABLE)
+            SinkError::failed_line(what, READABLE)
         })?;
         let client_id = self.client_id.clone().unwrap_or_else(|| format!("cnc-gateway-{name}"));
         Ok(Options {
@@ -84,7 +84,7 @@ pub(super) fn client_name(box_id: &str, sink: &str) -> String {
 #[must_use]
 pub fn broker_files(tls: Option<&TlsFiles>, login: &Login) -> Vec<(String, String)> {
     let mut problems = Vec::new();
-    if let Some(Err(error)) = tls.map(TlsFiles::config) {
+    if let Some(Err(error)) = tls.map(TlsFiles::build_config) {
         problems.push((error.what, error.next));
     }
     if let Err((file, error)) = login.read() {
@@ -107,66 +107,68 @@ impl Link {
         name: &str,
         will: Option<Will>,
     ) -> Result<(), SinkError> {
-        self.leave().await;
-        let options = broker.options(name, will)?;
-        let place = place(broker);
-        let connected = blocking(move || MqttClient::connect(&options)).await?;
-        self.client = Some(Arc::new(connected.map_err(|error| line(&place, error))?));
+        self.disconnect_client().await;
+        let options = broker.build_options(name, will)?;
+        let place = format_place(broker);
+        let connected = run_blocking(move || MqttClient::connect(&options)).await?;
+        self.client = Some(Arc::new(connected.map_err(|error| to_line_error(&place, error))?));
         Ok(())
     }
 
     /// Connects and leaves, under a name that no running box has.
-    pub(super) async fn probe(&mut self, broker: &BrokerTarget) -> Result<(), SinkError> {
+    pub(super) async fn probe_broker(&mut self, broker: &BrokerTarget) -> Result<(), SinkError> {
         let own = BrokerTarget { client_id: None, ..broker.clone() };
-        self.connect(&own, &format!("doctor-{}", adapters::mqtt::unique()), None).await?;
-        self.leave().await;
+        self.connect(&own, &format!("doctor-{}", adapters::mqtt::generate_unique_id()), None).await?;
+        self.disconnect_client().await;
         Ok(())
     }
 
     /// Says goodbye: the broker does not publish the will.
-    pub(super) async fn leave(&mut self) {
+    pub(super) async fn disconnect_client(&mut self) {
         if let Some(client) = self.client.take() {
             // Ending the reading thread takes a moment.
-            let _ended = blocking(move || drop(client)).await;
+            let _ended = run_blocking(move || drop(client)).await;
         }
     }
 
     /// Sends messages in this order; on failure the index of the first that is not known to have arrived.
-    pub(super) async fn publish(
+    pub(super) async fn publish_messages(
         &self,
         messages: Vec<Outgoing>,
         qos: Qos,
         broker: &BrokerTarget,
     ) -> Result<(), (usize, BrokerFailure)> {
-        let place = place(broker);
+        let place = format_place(broker);
         let failed = |error| (0, BrokerFailure::Line(error));
         let client = self.client.clone().ok_or_else(|| failed(not_connected(&place)))?;
-        let sent = blocking(move || client.publish_all(&messages, qos)).await.map_err(failed)?;
+        let sent = run_blocking(move || client.publish_all(&messages, qos)).await.map_err(failed)?;
         sent.map_err(|(index, error)| match error {
             MqttError::Unsendable(what) => (index, BrokerFailure::Message(what)),
-            other => (index, BrokerFailure::Line(line(&place, other))),
+            other => (index, BrokerFailure::Line(to_line_error(&place, other))),
         })
     }
 
-    pub(super) async fn subscribe(
+    pub(super) async fn subscribe_to(
         &self,
         filters: Vec<String>,
         qos: Qos,
         broker: &BrokerTarget,
     ) -> Result<(), SinkError> {
-        let place = place(broker);
+        let place = format_place(broker);
         let client = self.client.clone().ok_or_else(|| not_connected(&place))?;
-        blocking(move || client.subscribe(&filters, qos)).await?.map_err(|error| line(&place, error))
+        run_blocking(move || client.subscribe_filters(&filters, qos))
+            .await?
+            .map_err(|error| to_line_error(&place, error))
     }
 
     /// The next message of a subscription; an error when the connection is over. May be dropped while it waits.
     pub(super) async fn next(&self, broker: &BrokerTarget) -> Result<MqttMessage, SinkError> {
         loop {
-            let Some(client) = &self.client else { return Err(not_connected(&place(broker))) };
-            match client.receive(Duration::ZERO) {
+            let Some(client) = &self.client else { return Err(not_connected(&format_place(broker))) };
+            match client.receive_message(Duration::ZERO) {
                 Ok(Some(message)) => return Ok(message),
                 Ok(None) => tokio::time::sleep(LOOK_EVERY).await,
-                Err(error) => return Err(line(&place(broker), error)),
+                Err(error) => return Err(to_line_error(&format_place(broker), error)),
             }
         }
     }
@@ -188,29 +190,31 @@ impl BrokerFailure {
         match (self, sequence) {
             (Self::Line(error), _) => error,
             (Self::Message(what), Some(sequence)) => SinkError::Item { sequence, what, next: next.to_owned() },
-            (Self::Message(what), None) => SinkError::line(what, next),
+            (Self::Message(what), None) => SinkError::failed_line(what, next),
         }
     }
 }
 
-fn place(broker: &BrokerTarget) -> String {
+fn format_place(broker: &BrokerTarget) -> String {
     format!("{}:{}", broker.at.host, broker.at.port)
 }
 
 fn not_connected(place: &str) -> SinkError {
-    SinkError::line(format!("not connected to {place}"), "")
+    SinkError::failed_line(format!("not connected to {place}"), "")
 }
 
-fn line(place: &str, error: MqttError) -> SinkError {
+fn to_line_error(place: &str, error: MqttError) -> SinkError {
     let next = error.next().trim_end_matches('.').to_owned();
     match error {
-        MqttError::Tls(error) => SinkError::line(error.what, error.next),
-        MqttError::Unreachable { .. } => SinkError::line(error.to_string(), next),
-        other => SinkError::line(format!("{place}: {other}"), next),
+        MqttError::Tls(error) => SinkError::failed_line(error.what, error.next),
+        MqttError::Unreachable { .. } => SinkError::failed_line(error.to_string(), next),
+        other => SinkError::failed_line(format!("{place}: {other}"), next),
     }
 }
 
-async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, SinkError> {
+async fn run_blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, SinkError> {
     let ended = tokio::task::spawn_blocking(work).await;
-    ended.map_err(|error| SinkError::line(format!("the task of the connection ended: {error}"), "restart the gateway"))
+    ended.map_err(|error| {
+        SinkError::failed_line(format!("the task of the connection ended: {error}"), "restart the gateway")
+    })
 }

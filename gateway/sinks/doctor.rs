@@ -1,6 +1,6 @@
 //! `doctor` for a sink: connects as the box would, and says what is wrong. Sends nothing.
 
-use super::{Requests, SinkAddress, SinkError, open};
+use super::{Requests, SinkAddress, SinkError, open_sink};
 use crate::history::{Outbox, OutboxSettings};
 use serde_json::json;
 use std::path::Path;
@@ -19,15 +19,15 @@ pub struct SinkFinding {
 }
 
 /// Connects to the receiver once.
-pub async fn examine(address: &SinkAddress) -> SinkFinding {
+pub async fn examine_sink(address: &SinkAddress) -> SinkFinding {
     let outbox = Outbox::new("doctor", OutboxSettings::default(), []);
-    let mut sink = open(address, ("doctor", Requests::none()), &outbox, Path::new(""));
+    let mut sink = open_sink(address, ("doctor", Requests::without_gate()), &outbox, Path::new(""));
     let began = Instant::now();
-    let connected = tokio::time::timeout(DEADLINE, sink.probe()).await;
+    let connected = tokio::time::timeout(DEADLINE, sink.probe_receiver()).await;
     let connected_ms = began.elapsed().as_secs_f64() * 1e3;
     let late = || {
         let what = format!("{address} did not become ready within {} s", DEADLINE.as_secs());
-        Err(SinkError::line(what, "look whether the receiver is overloaded or a firewall swallows the packets"))
+        Err(SinkError::failed_line(what, "look whether the receiver is overloaded or a firewall swallows the packets"))
     };
     let error = connected.unwrap_or_else(|_| late()).err();
     SinkFinding { connected_ms, error }
@@ -36,9 +36,9 @@ pub async fn examine(address: &SinkAddress) -> SinkFinding {
 impl SinkFinding {
     /// As a document.
     #[must_use]
-    pub fn json(&self, address: &SinkAddress) -> serde_json::Value {
+    pub fn to_json(&self, address: &SinkAddress) -> serde_json::Value {
         let problem = |error: &SinkError| {
-            let (what, next) = error.parts();
+            let (what, next) = error.as_parts();
             json!({"what": what, "next": next})
         };
         json!({
@@ -51,11 +51,11 @@ impl SinkFinding {
 
     /// In lines.
     #[must_use]
-    pub fn text(&self, address: &SinkAddress) -> String {
+    pub fn to_text(&self, address: &SinkAddress) -> String {
         match &self.error {
             None => format!("{address}\n  takes what the box sends; connected in {:.1} ms\n", self.connected_ms),
             Some(error) => {
-                let (what, next) = error.parts();
+                let (what, next) = error.as_parts();
                 format!("{address}\n  takes nothing\n  problem: {what}\n    next: {next}\n")
             }
         }

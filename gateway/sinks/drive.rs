@@ -1,8 +1,8 @@
 //! The task of a sink: connects, sends live data first and old data between, tries again with growing pauses.
 
-use super::board::{Board, seconds};
+use super::board::{Board, to_seconds};
 use super::isolation::{Isolation, Turn};
-use super::{Batch, Requests, Sink, SinkError, open};
+use super::{Batch, Requests, Sink, SinkError, open_sink};
 use crate::clock;
 use crate::config;
 use crate::control::OrderSender;
@@ -36,7 +36,7 @@ pub struct Sinks {
 /// Starts a task for each of these sinks, which must be known to outbox and board in this order. The history at `path` may be
 /// opened later. What the network asks for goes by `post`. Call it within a runtime.
 #[must_use]
-pub fn start(
+pub fn start_sinks(
     sinks: &[config::SinkConfig],
     post: &OrderSender,
     (outbox, board): (&Outbox, &Board),
@@ -44,7 +44,7 @@ pub fn start(
 ) -> Sinks {
     let opened = sinks.iter().map(|config::SinkConfig { name, address, allow_requests }| {
         let requests = Requests::new(name, *allow_requests, Some(post.clone()));
-        (name.clone(), open(address, (name, requests), outbox, path))
+        (name.clone(), open_sink(address, (name, requests), outbox, path))
     });
     start_with(opened.collect(), outbox, board, path)
 }
@@ -111,43 +111,43 @@ impl From<SinkError> for Left {
 impl SinkTask {
     async fn run(mut self, mut sink: Box<dyn Sink>) {
         let mut stopping = self.stopping.clone();
-        let mut head = self.outbox.head();
+        let mut head = self.outbox.watch_head();
         tokio::select! {
             ready = head.wait_for(|head| head.ready) => if ready.is_err() { return },
             _ = stopping.wait_for(|stop| *stop) => return,
         }
         let mut tries = 0;
         loop {
-            let left = self.connection(sink.as_mut(), &mut head, &mut tries).await;
+            let left = self.serve_connection(sink.as_mut(), &mut head, &mut tries).await;
             let error = match left {
                 Left::Stop => break,
                 Left::Failed(error) => error,
             };
             self.outbox.set_linked(&self.name, false);
-            if self.board.failed(self.index, &error) {
+            if self.board.record_failure(self.index, &error) {
                 let text = format!("sink {}: {error}", self.name);
-                Notice::new(Severity::Warning, "sink_failed", text).detail(format!("{error:?}")).say();
+                Notice::new(Severity::Warning, "sink_failed", text).with_detail(format!("{error:?}")).write_to_logs();
             }
             tries += 1;
             tokio::select! {
-                () = sleep(pause(&self.name, tries)) => {}
+                () = sleep(compute_retry_pause(&self.name, tries)) => {}
                 _ = stopping.wait_for(|stop| *stop) => break,
             }
         }
         self.outbox.set_linked(&self.name, false);
         // The receiver finds out by itself where the farewell does not reach it.
         let _late = timeout(FAREWELL, sink.close()).await;
-        self.board.change(self.index, |progress| progress.state = Some("stopped"));
+        self.board.update_progress(self.index, |progress| progress.state = Some("stopped"));
     }
 
     /// From connecting to the end of the connection.
-    async fn connection(
+    async fn serve_connection(
         &mut self,
         sink: &mut dyn Sink,
         head: &mut watch::Receiver<OutboxHead>,
         tries: &mut u32,
     ) -> Left {
-        self.board.change(self.index, |progress| progress.state = Some("connecting"));
+        self.board.update_progress(self.index, |progress| progress.state = Some("connecting"));
         let mut stopping = self.stopping.clone();
         let connected = tokio::select! {
             connected = timeout(DEADLINE, sink.connect()) => connected,
@@ -159,7 +159,7 @@ impl SinkTask {
         *tries = 0;
         self.outbox.set_linked(&self.name, true);
         let mut failed = false;
-        self.board.change(self.index, |progress| {
+        self.board.update_progress(self.index, |progress| {
             failed = std::mem::replace(&mut progress.failing, false);
             if failed {
                 progress.error = None;
@@ -168,77 +168,82 @@ impl SinkTask {
             progress.connections += 1;
         });
         let text = format!("sink {}: {}", self.name, if failed { "connected again" } else { "connected" });
-        Notice::new(Severity::Info, "sink_connected", text).say();
-        self.begin(sink, head);
+        Notice::new(Severity::Info, "sink_connected", text).write_to_logs();
+        self.begin_live_data(sink, head);
         loop {
             if *self.stopping.borrow() {
                 return Left::Stop;
             }
-            if let Err(left) = self.step(sink, head).await {
+            if let Err(left) = self.deliver_next(sink, head).await {
                 return left;
             }
         }
     }
 
     /// Live data begins now.
-    fn begin(&self, sink: &dyn Sink, head: &watch::Receiver<OutboxHead>) {
+    fn begin_live_data(&self, sink: &dyn Sink, head: &watch::Receiver<OutboxHead>) {
         let next = head.borrow().next_sequence;
-        let Some(standing) = self.outbox.standing(&self.name) else { return };
-        let waiting = standing.position.waiting(next);
+        let Some(standing) = self.outbox.delivery_state(&self.name) else { return };
+        let waiting = standing.position.count_waiting(next);
         if !sink.takes_history() {
             self.outbox.give_up(&self.name, 0, next);
         } else if waiting > JUMP_ITEMS {
             // With too many gaps it goes on in the order of the numbers until one is closed.
-            let _jumped = self.outbox.jump(&self.name);
+            let _jumped = self.outbox.jump_to_head(&self.name);
         }
     }
 
     /// One batch of live data, or else one of old data, or else waits for something to happen.
-    async fn step(&mut self, sink: &mut dyn Sink, head: &mut watch::Receiver<OutboxHead>) -> Result<(), Left> {
+    async fn deliver_next(&mut self, sink: &mut dyn Sink, head: &mut watch::Receiver<OutboxHead>) -> Result<(), Left> {
         let newest = *head.borrow_and_update();
-        let Some(standing) = self.outbox.standing(&self.name) else { return Err(Left::Stop) };
+        let Some(standing) = self.outbox.delivery_state(&self.name) else { return Err(Left::Stop) };
         let next = standing.position.next();
         if next < newest.next_sequence {
-            return self.batch(sink, (next, newest.next_sequence), false).await;
+            return self.deliver_batch(sink, (next, newest.next_sequence), false).await;
         }
         if let Some(gap) = standing.position.oldest_gap() {
-            return self.batch(sink, gap, true).await;
+            return self.deliver_batch(sink, gap, true).await;
         }
         let wanted = tokio::select! {
             changed = head.changed() => return changed.map_err(|_| Left::Stop),
-            wanted = sink.idle() => wanted,
+            wanted = sink.wait_for_receiver() => wanted,
             _ = self.stopping.wait_for(|stop| *stop) => return Err(Left::Stop),
         };
-        attend(sink, wanted).await
+        serve_within_deadline(sink, wanted).await
     }
 
-    async fn batch(&mut self, sink: &mut dyn Sink, (from, to): (u64, u64), historical: bool) -> Result<(), Left> {
+    async fn deliver_batch(
+        &mut self,
+        sink: &mut dyn Sink,
+        (from, to): (u64, u64),
+        historical: bool,
+    ) -> Result<(), Left> {
         let (turn, stretch) = self.next_items(from, to, sink.items_max().max(1)).await?;
         let Some(last) = stretch.items.last().map(|item| item.sequence) else {
-            self.outbox.delivered(&self.name, from, stretch.to.max(from + 1));
+            self.outbox.mark_delivered(&self.name, from, stretch.to.max(from + 1));
             return Ok(());
         };
         let items = &stretch.items;
         let from = self.skip_missing(turn, from, items);
-        let sent = timeout(DEADLINE, sink.send(Batch { items, historical })).await;
+        let sent = timeout(DEADLINE, sink.send_batch(Batch { items, historical })).await;
         match (turn, sent.unwrap_or_else(|_| Err(too_slow("sending")))) {
             // It is sent once more when it is its turn.
             (Turn::Past(_), Ok(()) | Err(SinkError::Item { .. })) => self.isolation.carried_witness(),
             (_, Ok(())) => {
-                self.isolation.arrived(from, last);
-                self.delivered(&stretch, from, historical);
+                self.isolation.record_arrival(from, last);
+                self.record_delivery(&stretch, from, historical);
             }
-            (_, Err(error @ SinkError::Item { sequence, .. })) => self.refused(&error, from, sequence),
+            (_, Err(error @ SinkError::Item { sequence, .. })) => self.record_refusal(&error, from, sequence),
             (turn, Err(error)) => {
-                if self.isolation.broke(turn, from, last) {
-                    self.refused(&breaks_line(from), from, from);
+                if self.isolation.record_break(turn, from, last) {
+                    self.record_refusal(&breaks_line(from), from, from);
                 }
                 return Err(error.into());
             }
         }
         // What the receiver wants is looked at between two batches as well.
-        match timeout(Duration::ZERO, sink.idle()).await {
-            Ok(wanted) => attend(sink, wanted).await,
+        match timeout(Duration::ZERO, sink.wait_for_receiver()).await {
+            Ok(wanted) => serve_within_deadline(sink, wanted).await,
             Err(_nothing) => Ok(()),
         }
     }
@@ -247,7 +252,7 @@ impl SinkTask {
     fn skip_missing(&self, turn: Turn, from: u64, items: &[Item]) -> u64 {
         match items.first() {
             Some(first) if first.sequence > from && !matches!(turn, Turn::Past(_)) => {
-                self.outbox.delivered(&self.name, from, first.sequence);
+                self.outbox.mark_delivered(&self.name, from, first.sequence);
                 first.sequence
             }
             _ => from,
@@ -256,10 +261,10 @@ impl SinkTask {
 
     /// What is to be sent of the items `from..to`.
     async fn next_items(&mut self, from: u64, to: u64, items_max: usize) -> Result<(Turn, OutboxStretch), Left> {
-        let turn = self.isolation.turn(from);
+        let turn = self.isolation.choose_turn(from);
         if let Turn::Past(item) = turn {
             // At the end of a gap the witness has been delivered before: it is sent once more.
-            let newest = self.outbox.head().borrow().next_sequence;
+            let newest = self.outbox.watch_head().borrow().next_sequence;
             let stretch = self.read(item + 1, newest, 1).await?;
             if !stretch.items.is_empty() {
                 return Ok((turn, stretch));
@@ -279,20 +284,22 @@ impl SinkTask {
             let mut feed = feed.map_or_else(|| OutboxReader::open(&path), |(_, feed)| Ok(feed))?;
             feed.read(from, to, items_max).map(|stretch| (feed, stretch))
         });
-        let failed = |text: String| Left::Failed(SinkError::line(format!("the outbox cannot be read: {text}"), ""));
+        let failed =
+            |text: String| Left::Failed(SinkError::failed_line(format!("the outbox cannot be read: {text}"), ""));
         let read = reading.await.map_err(|error| failed(error.to_string()))?;
         let (feed, stretch) = read.map_err(|error| failed(error.to_string()))?;
         self.feed = Some((box_id, feed));
         Ok(stretch)
     }
 
-    fn delivered(&self, stretch: &OutboxStretch, from: u64, historical: bool) {
-        self.outbox.delivered(&self.name, from, stretch.to);
+    fn record_delivery(&self, stretch: &OutboxStretch, from: u64, historical: bool) {
+        self.outbox.mark_delivered(&self.name, from, stretch.to);
         let reached_ns = stretch.items.iter().rev().find(|item| item.is_live()).map(|item| item.at_ns);
-        let gap = self.outbox.standing(&self.name).is_some_and(|standing| standing.position.oldest_gap().is_some());
+        let gap =
+            self.outbox.delivery_state(&self.name).is_some_and(|standing| standing.position.oldest_gap().is_some());
         // A record may have no time; an accelerated machine is ahead of the clock.
-        let delay_s = reached_ns.filter(|at_ns| *at_ns > 0).map(|at_ns| seconds(clock::now_ns() - at_ns).max(0.0));
-        self.board.change(self.index, |progress| {
+        let delay_s = reached_ns.filter(|at_ns| *at_ns > 0).map(|at_ns| to_seconds(clock::now_ns() - at_ns).max(0.0));
+        self.board.update_progress(self.index, |progress| {
             progress.delivered += stretch.items.len() as u64;
             if historical || !gap {
                 progress.reached_ns = reached_ns.or(progress.reached_ns);
@@ -304,18 +311,18 @@ impl SinkTask {
         });
     }
 
-    fn refused(&self, error: &SinkError, from: u64, sequence: u64) {
+    fn record_refusal(&self, error: &SinkError, from: u64, sequence: u64) {
         debug_assert!(sequence >= from, "an item that is not of this batch is refused");
-        self.outbox.delivered(&self.name, from, sequence);
-        self.outbox.delivered(&self.name, sequence, sequence + 1);
+        self.outbox.mark_delivered(&self.name, from, sequence);
+        self.outbox.mark_delivered(&self.name, sequence, sequence + 1);
         let mut first = false;
-        self.board.change(self.index, |progress| {
+        self.board.update_progress(self.index, |progress| {
             progress.refused += 1;
             progress.delivered += sequence.saturating_sub(from);
             first = progress.refusal.replace(error.to_string()).is_none();
         });
         if first {
-            Notice::new(Severity::Warning, "sink_refused", format!("sink {}: {error}", self.name)).say();
+            Notice::new(Severity::Warning, "sink_refused", format!("sink {}: {error}", self.name)).write_to_logs();
         }
     }
 }
@@ -328,19 +335,19 @@ fn breaks_line(sequence: u64) -> SinkError {
 }
 
 /// The receiver wants something, or the connection is over.
-async fn attend(sink: &mut dyn Sink, wanted: Result<(), SinkError>) -> Result<(), Left> {
+async fn serve_within_deadline(sink: &mut dyn Sink, wanted: Result<(), SinkError>) -> Result<(), Left> {
     wanted?;
-    timeout(DEADLINE, sink.attend()).await.unwrap_or_else(|_| Err(too_slow("answering"))).map_err(Left::Failed)
+    timeout(DEADLINE, sink.serve_receiver()).await.unwrap_or_else(|_| Err(too_slow("answering"))).map_err(Left::Failed)
 }
 
 fn too_slow(doing: &str) -> SinkError {
     let what = format!("{doing} took longer than {} s", DEADLINE.as_secs());
-    SinkError::line(what, "look whether the receiver is overloaded")
+    SinkError::failed_line(what, "look whether the receiver is overloaded")
 }
 
 /// Doubles from try to try, and differs by up to a quarter between sinks, so that many boxes do not come back in the same
 /// instant.
-fn pause(name: &str, tries: u32) -> Duration {
+fn compute_retry_pause(name: &str, tries: u32) -> Duration {
     let doubled = PAUSE_FIRST.saturating_mul(1 << tries.saturating_sub(1).min(10)).min(PAUSE_MAX);
     let spread = name.bytes().fold(u64::from(tries), |sum, byte| sum.wrapping_mul(31).wrapping_add(u64::from(byte)));
     doubled.mul_f64(1.0 - (spread % 256) as f64 / 1024.0)
@@ -352,7 +359,7 @@ mod tests {
 
     #[test]
     fn pauses_grow_to_a_bound() {
-        let pauses: Vec<Duration> = (1..20).map(|tries| pause("plant", tries)).collect();
+        let pauses: Vec<Duration> = (1..20).map(|tries| compute_retry_pause("plant", tries)).collect();
         assert!(pauses[0] <= PAUSE_FIRST && pauses[0] >= PAUSE_FIRST.mul_f64(0.75));
         assert!(pauses.iter().all(|pause| *pause <= PAUSE_MAX));
         assert!(pauses[18] >= PAUSE_MAX.mul_f64(0.75));

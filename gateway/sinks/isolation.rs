@@ -45,7 +45,7 @@ pub(super) struct Isolation {
 
 impl Isolation {
     /// What to send where the next item has this number.
-    pub(super) fn turn(&self, from: u64) -> Turn {
+    pub(super) fn choose_turn(&self, from: u64) -> Turn {
         let suspected = self.breaks >= BREAKS && !self.stands;
         match self.first {
             Some(first) if first == from && from < self.alone_until && suspected => Turn::Past(first + self.reach),
@@ -56,7 +56,7 @@ impl Isolation {
 
     /// The connection broke while the items from `first` to `last` were sent in this turn. True where it is proved that the first is
     /// to blame: it is to be left out.
-    pub(super) fn broke(&mut self, turn: Turn, first: u64, last: u64) -> bool {
+    pub(super) fn record_break(&mut self, turn: Turn, first: u64, last: u64) -> bool {
         if let Turn::Past(_) = turn {
             // The witness breaks the line as well: nothing is proved, and the next witness is another.
             (self.breaks, self.proofs) = (0, 0);
@@ -90,7 +90,7 @@ impl Isolation {
     }
 
     /// The items from `first` to `last` have arrived. Live data that arrive between two tries of a gap say nothing about its item.
-    pub(super) fn arrived(&mut self, first: u64, last: u64) {
+    pub(super) fn record_arrival(&mut self, first: u64, last: u64) {
         if self.first.is_some_and(|suspect| (first..=last).contains(&suspect)) {
             self.clear();
         }
@@ -116,7 +116,7 @@ mod tests {
         while next <= count && tries < 10_000 {
             tries += 1;
             // After the last item nothing comes yet: it is tried again.
-            let turn = match isolation.turn(next) {
+            let turn = match isolation.choose_turn(next) {
                 Turn::Past(item) if item >= count => {
                     isolation.without_witness();
                     Turn::Alone
@@ -130,7 +130,7 @@ mod tests {
             };
             if line(tries) || (from..=to).any(|item| poison.contains(&item)) {
                 breaks += 1;
-                if isolation.broke(turn, next, to) {
+                if isolation.record_break(turn, next, to) {
                     left_out.push(next);
                     next += 1;
                 }
@@ -141,7 +141,7 @@ mod tests {
                 isolation.carried_witness();
                 continue;
             }
-            isolation.arrived(from, to);
+            isolation.record_arrival(from, to);
             next = to + 1;
         }
         (arrived, left_out, breaks)
@@ -174,17 +174,17 @@ mod tests {
     fn live_data_between_do_not_hide_the_item_of_a_gap() {
         let (mut isolation, mut live, mut breaks) = (Isolation::default(), 1_000, 0);
         loop {
-            assert_eq!(isolation.turn(live), Turn::Many);
-            isolation.arrived(live, live);
+            assert_eq!(isolation.choose_turn(live), Turn::Many);
+            isolation.record_arrival(live, live);
             live += 1;
-            match isolation.turn(5) {
+            match isolation.choose_turn(5) {
                 Turn::Past(5) => isolation.carried_witness(),
-                turn if isolation.broke(turn, 5, 14) => break,
+                turn if isolation.record_break(turn, 5, 14) => break,
                 _ => breaks += 1,
             }
             assert!(breaks < 10, "it is never found");
         }
-        assert_eq!(isolation.turn(6), Turn::Alone);
+        assert_eq!(isolation.choose_turn(6), Turn::Alone);
     }
 
     #[test]

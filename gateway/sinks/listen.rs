@@ -12,6 +12,6 @@ pub(super) async fn listen_on(at: &Endpoint) -> Result<TcpListener, SinkError> {
     let Endpoint { host, port } = at;
     TcpListener::bind((host.as_str(), *port)).await.map_err(|error| {
         let next = "end the program that has the port, write another port, or an address of this box (0.0.0.0: all)";
-        SinkError::line(format!("the box cannot listen on {host}:{port}: {error}"), next)
+        SinkError::failed_line(format!("the box cannot listen on {host}:{port}: {error}"), next)
     })
 }

@@ -34,8 +34,8 @@ pub mod status;
 
 pub use address::{SinkAddress, SinkTarget};
 pub use board::Board;
-pub use drive::{Sinks, start};
-pub use open::open;
+pub use drive::{Sinks, start_sinks};
+pub use open::open_sink;
 pub use requests::Requests;
 pub use status::SinkStatus;
 
@@ -58,23 +58,23 @@ pub struct Batch<'a> {
 /// One receiver.
 ///
 /// The futures may be dropped at any point where they wait (the box stops, or a deadline is over); the next call is then
-/// [`Sink::connect`] or [`Sink::close`]. [`Sink::idle`] alone is dropped and called again all the time.
+/// [`Sink::connect`] or [`Sink::close`]. [`Sink::wait_for_receiver`] alone is dropped and called again all the time.
 pub trait Sink: Send {
     /// Opens the connection and makes it ready to send. Also called again after every failure; leaves nothing of an older
     /// connection behind.
     fn connect(&mut self) -> Pending<'_, Result<(), SinkError>>;
 
     /// Sends the items and returns when the receiver has taken all of them.
-    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>>;
+    fn send_batch<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>>;
 
-    /// Waits until the receiver wants something, and returns; [`Sink::attend`] comes next. An error when the connection is
+    /// Waits until the receiver wants something, and returns; [`Sink::serve_receiver`] comes next. An error when the connection is
     /// over. The default waits for ever.
-    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn wait_for_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(std::future::pending())
     }
 
-    /// Does what the receiver wants since [`Sink::idle`] returned.
-    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    /// Does what the receiver wants since [`Sink::wait_for_receiver`] returned.
+    fn serve_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(std::future::ready(Ok(())))
     }
 
@@ -84,7 +84,7 @@ pub trait Sink: Send {
     }
 
     /// For `doctor`: connects and says what is wrong, without telling the receiver anything, and ends the connection.
-    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn probe_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         self.connect()
     }
 
@@ -123,13 +123,13 @@ pub enum SinkError {
 
 impl SinkError {
     /// A failed line.
-    pub fn line(what: impl Into<String>, next: impl Into<String>) -> Self {
+    pub fn failed_line(what: impl Into<String>, next: impl Into<String>) -> Self {
         Self::Line { what: what.into(), next: next.into() }
     }
 
     /// What happened, and what to do next.
     #[must_use]
-    pub fn parts(&self) -> (&str, &str) {
+    pub fn as_parts(&self) -> (&str, &str) {
         match self {
             Self::Line { what, next } | Self::Item { what, next, .. } => (what, next),
         }

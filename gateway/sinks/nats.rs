@@ -4,7 +4,7 @@
 //! `Nats-Msg-Id` is `<box>-<sequence>`: what a box sends twice within the stream's window is stored once. A message counts as
 //! delivered when the stream has acknowledged it, with replicas when most of them have it.
 
-use super::mqtt::document;
+use super::mqtt::build_document;
 use super::{Batch, Pending, Sink, SinkError};
 use crate::history::{Item, Outbox};
 use crate::nats::{Connection, JetStreamFailure, NatsError, NatsTarget, Outgoing};
@@ -48,28 +48,28 @@ impl NatsSink {
         Self { target, name: name.to_owned(), outbox: outbox.clone(), connection: None, server: 0 }
     }
 
-    fn subject(&self, kind: &str) -> String {
+    fn format_subject(&self, kind: &str) -> String {
         let id = self.outbox.box_id();
         // `doctor` asks before there is a box.
         let id = if id.is_empty() { "doctor" } else { &id };
         format!("{}.{id}.{kind}", self.target.prefix)
     }
 
-    fn message(&self, item: &Item, historical: bool) -> Outgoing {
+    fn build_message(&self, item: &Item, historical: bool) -> Outgoing {
         Outgoing {
-            subject: self.subject(item.kind()),
+            subject: self.format_subject(item.kind()),
             id: format!("{}-{}", self.outbox.box_id(), item.sequence),
-            payload: document(&self.outbox, item, historical).to_string().into_bytes(),
+            payload: build_document(&self.outbox, item, historical).to_string().into_bytes(),
         }
     }
 
-    async fn begin(&mut self) -> Result<(), SinkError> {
+    async fn open_connection(&mut self) -> Result<(), SinkError> {
         self.connection = None;
         let name = format!("{} ({})", self.outbox.box_id(), self.name);
         let first = self.server;
         self.server = self.server.wrapping_add(1);
         let mut connection = Connection::open(&self.target.servers, first, &name).await?;
-        connection.stream_of(&self.subject("sample")).await?;
+        connection.stream_of(&self.format_subject("sample")).await?;
         self.connection = Some(connection);
         Ok(())
     }
@@ -82,17 +82,18 @@ impl From<NatsError> for SinkError {
 }
 
 fn not_connected() -> SinkError {
-    SinkError::line("not connected to a NATS server", "")
+    SinkError::failed_line("not connected to a NATS server", "")
 }
 
 impl Sink for NatsSink {
     fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(self.begin())
+        Box::pin(self.open_connection())
     }
 
-    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+    fn send_batch<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
         Box::pin(async move {
-            let messages: Vec<Outgoing> = batch.items.iter().map(|item| self.message(item, batch.historical)).collect();
+            let messages: Vec<Outgoing> =
+                batch.items.iter().map(|item| self.build_message(item, batch.historical)).collect();
             let connection = self.connection.as_mut().ok_or_else(not_connected)?;
             match connection.publish_all(&messages).await {
                 Ok(_duplicates) => Ok(()),
@@ -105,7 +106,7 @@ impl Sink for NatsSink {
         })
     }
 
-    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn wait_for_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
             // What comes here is nothing that was asked for: late acknowledgements.
             let connection = self.connection.as_mut().ok_or_else(not_connected)?;

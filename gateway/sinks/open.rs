@@ -14,7 +14,7 @@ use std::path::Path;
 /// The sink of an address. `name` is its name in the configuration, `requests` the way of its network to the gate, `outbox`
 /// knows the machine, the box and the series, `history` is the database that it belongs to. Nothing is connected yet.
 #[must_use]
-pub fn open(
+pub fn open_sink(
     address: &SinkAddress,
     (name, requests): (&str, Requests),
     outbox: &Outbox,

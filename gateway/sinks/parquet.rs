@@ -21,7 +21,7 @@ pub struct ParquetTarget {
 
 impl ParquetTarget {
     pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, String> {
-        let days = keys.number("days", 31, 1, 3660);
+        let days = keys.take_number("days", 31, 1, 3660);
         let path = body.strip_prefix("//").unwrap_or(body);
         if path.is_empty() {
             return Err("write the directory, such as parquet:/var/lib/cnc-gateway/lake".to_owned());
@@ -31,18 +31,18 @@ impl ParquetTarget {
 
     /// Can the directory be written to, where it is there already? Otherwise what is wrong and what to do.
     #[must_use]
-    pub fn check(&self) -> Vec<(String, String)> {
+    pub fn find_file_problems(&self) -> Vec<(String, String)> {
         let tried = if self.root.exists() { try_write(&self.root) } else { Ok(()) };
-        tried.err().map(|error| cannot(&self.root, &error)).into_iter().collect()
+        tried.err().map(|error| describe_unwritable(&self.root, &error)).into_iter().collect()
     }
 }
 
 fn try_write(root: &Path) -> std::io::Result<()> {
-    let file = root.join(format!(".{}", adapters::mqtt::unique()));
+    let file = root.join(format!(".{}", adapters::mqtt::generate_unique_id()));
     std::fs::write(&file, b"").and_then(|()| std::fs::remove_file(&file))
 }
 
-fn cannot(root: &Path, error: &std::io::Error) -> (String, String) {
+fn describe_unwritable(root: &Path, error: &std::io::Error) -> (String, String) {
     let next = "make it writable for the gateway's user, mount what belongs there, or write another directory";
     (format!("the directory {} cannot be written to: {error}", root.display()), next.to_owned())
 }
@@ -66,13 +66,15 @@ impl ParquetSink {
         let (target, history, machine) = (self.target.clone(), self.history.clone(), self.outbox.machine().to_owned());
         let root = self.target.root.clone();
         let work = tokio::task::spawn_blocking(move || write_missing(&target, &history, &machine, today_ns));
-        let done = work.await.map_err(|error| SinkError::line(format!("writing a day ended: {error}"), ""))?;
+        let done = work.await.map_err(|error| SinkError::failed_line(format!("writing a day ended: {error}"), ""))?;
         done.map_err(|error| match error {
             HistoryError::Io { error, .. } => {
-                let (what, next) = cannot(&root, &error);
-                SinkError::line(what, next)
+                let (what, next) = describe_unwritable(&root, &error);
+                SinkError::failed_line(what, next)
             }
-            other => SinkError::line(format!("a day cannot be read from the history: {other}"), "see `history info`"),
+            other => {
+                SinkError::failed_line(format!("a day cannot be read from the history: {other}"), "see `history info`")
+            }
         })?;
         self.today_ns = Some(today_ns);
         Ok(())
@@ -81,7 +83,7 @@ impl ParquetSink {
 
 fn write_missing(target: &ParquetTarget, history: &Path, machine: &str, today_ns: TimeNs) -> Result<(), HistoryError> {
     let reader = Reader::open(history)?;
-    let Some((first_ns, _)) = reader.span()? else { return Ok(()) };
+    let Some((first_ns, _)) = reader.read_span()? else { return Ok(()) };
     let mut day_ns = day_of(first_ns).max(today_ns - i64::from(target.days) * DAY_NS);
     while day_ns < today_ns {
         if !reader.has_day_file(&target.root, machine, day_ns)? {
@@ -98,13 +100,13 @@ impl Sink for ParquetSink {
             self.today_ns = None;
             let root = &self.target.root;
             std::fs::create_dir_all(root).and_then(|()| try_write(root)).map_err(|error| {
-                let (what, next) = cannot(root, &error);
-                SinkError::line(what, next)
+                let (what, next) = describe_unwritable(root, &error);
+                SinkError::failed_line(what, next)
             })
         })
     }
 
-    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+    fn send_batch<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
         Box::pin(async move {
             let newest_ns = batch.items.iter().map(|item| item.at_ns).max().map(day_of);
             match newest_ns.filter(|day_ns| self.today_ns.is_none_or(|today_ns| *day_ns > today_ns)) {

@@ -1,6 +1,6 @@
 //! Requests to the gate that come over a sink's connection: who may ask, how often, and what is answered.
 //!
-//! A sink hands every message that looks like a request to [`Requests::ask`], whether it is allowed or not: the tick writes
+//! A sink hands every message that looks like a request to [`Requests::submit_change`], whether it is allowed or not: the tick writes
 //! all of them into the audit, carries out what is allowed, and says what became of it.
 
 use crate::clock;
@@ -31,22 +31,22 @@ impl Requests {
 
     /// Of a sink behind which there is no gate.
     #[must_use]
-    pub fn none() -> Self {
+    pub fn without_gate() -> Self {
         Self::new("", false, None)
     }
 
     /// May anything be asked for?
     #[must_use]
-    pub fn allowed(&self) -> bool {
+    pub fn is_allowed(&self) -> bool {
         self.allowed
     }
 
     /// Asks, and gives what became of it; `None` for what came too fast, which is not answered.
-    pub async fn ask(&mut self, change: Result<RequestedChange, String>) -> Option<Reply> {
+    pub async fn submit_change(&mut self, change: Result<RequestedChange, String>) -> Option<Reply> {
         let left_out = self.rate.may_pass(clock::now_ns())?;
-        let Some(post) = &self.post else { return Some(Reply::refused("there is no gate here")) };
+        let Some(post) = &self.post else { return Some(Reply::from_refusal("there is no gate here")) };
         let change = if self.allowed { change } else { Err(describe_refusal(&self.sink, change)) };
-        Some(post.request(NetworkRequest { sink: self.sink.clone(), change, left_out }).await)
+        Some(post.send_request(NetworkRequest { sink: self.sink.clone(), change, left_out }).await)
     }
 }
 

@@ -29,7 +29,7 @@ impl PublicKeySource {
         match self {
             Self::Text(text) => PublicKey::from_base64(text.trim()).map_err(|_| UpdateError::Key(text.clone())),
             Self::File(path) => {
-                let text = fs::read_to_string(path).map_err(UpdateError::file(path))?;
+                let text = fs::read_to_string(path).map_err(UpdateError::file_error(path))?;
                 let bad = || UpdateError::Key(path.display().to_string());
                 PublicKey::decode(text.trim()).or_else(|_| PublicKey::from_base64(text.trim())).map_err(|_| bad())
             }
@@ -70,33 +70,36 @@ fn read_signature(path: &Path) -> Result<Signature, UpdateError> {
 
 fn read_limited(path: &Path) -> Result<Vec<u8>, UpdateError> {
     let mut bytes = Vec::new();
-    let file = fs::File::open(path).map_err(UpdateError::file(path))?;
-    file.take(BYTES_MAX + 1).read_to_end(&mut bytes).map_err(UpdateError::file(path))?;
+    let file = fs::File::open(path).map_err(UpdateError::file_error(path))?;
+    file.take(BYTES_MAX + 1).read_to_end(&mut bytes).map_err(UpdateError::file_error(path))?;
     match bytes.len() as u64 > BYTES_MAX {
-        true => Err(content(path, format!("it is larger than {} MB", BYTES_MAX / 1024 / 1024))),
+        true => Err(content_error(path, format!("it is larger than {} MB", BYTES_MAX / 1024 / 1024))),
         false => Ok(bytes),
     }
 }
 
-fn content(path: &Path, reason: impl Into<String>) -> UpdateError {
+fn content_error(path: &Path, reason: impl Into<String>) -> UpdateError {
     UpdateError::Content { path: path.to_owned(), reason: reason.into() }
 }
 
 fn find_program(path: &Path, bytes: &[u8]) -> Result<Vec<u8>, UpdateError> {
     let mut archive = tar::Archive::new(GzDecoder::new(bytes));
-    let entries = archive.entries().map_err(|error| content(path, error.to_string()))?;
+    let entries = archive.entries().map_err(|error| content_error(path, error.to_string()))?;
     for entry in entries.take(ENTRIES_MAX) {
-        let entry = entry.map_err(|error| content(path, error.to_string()))?;
+        let entry = entry.map_err(|error| content_error(path, error.to_string()))?;
         let is_file = entry.header().entry_type().is_file();
         let named = entry.path().is_ok_and(|name| name.file_name().is_some_and(|name| name == PROGRAM));
         if is_file && named {
             let mut program = Vec::new();
-            entry.take(BYTES_MAX + 1).read_to_end(&mut program).map_err(|error| content(path, error.to_string()))?;
+            entry
+                .take(BYTES_MAX + 1)
+                .read_to_end(&mut program)
+                .map_err(|error| content_error(path, error.to_string()))?;
             return match program.len() as u64 > BYTES_MAX {
-                true => Err(content(path, "the program in it is too large")),
+                true => Err(content_error(path, "the program in it is too large")),
                 false => Ok(program),
             };
         }
     }
-    Err(content(path, "there is no file cnc-gateway in it"))
+    Err(content_error(path, "there is no file cnc-gateway in it"))
 }

@@ -100,7 +100,7 @@ pub enum UpdateError {
 }
 
 impl UpdateError {
-    fn file(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+    fn file_error(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |error| Self::File { path, error }
     }

@@ -24,7 +24,7 @@ pub struct Trial {
 
 impl Trial {
     /// `before new starts`, as the script `guard` reads it.
-    fn line(&self) -> String {
+    fn to_line(&self) -> String {
         format!("{} {} {}\n", self.before, self.new, self.starts)
     }
 
@@ -56,7 +56,7 @@ impl VersionSlots {
     /// No package put anything there.
     pub fn open(home: &Path) -> Result<Self, UpdateError> {
         let slots = Self { home: home.to_owned() };
-        match slots.running() {
+        match slots.running_slot() {
             Some(_) => Ok(slots),
             None => Err(UpdateError::NotInstalled { path: home.join("current") }),
         }
@@ -64,15 +64,15 @@ impl VersionSlots {
 
     /// Name of the slot that the link names.
     #[must_use]
-    pub fn running(&self) -> Option<String> {
+    pub fn running_slot(&self) -> Option<String> {
         let target = fs::read_link(self.home.join("current")).ok()?;
         let name = target.strip_prefix("versions").ok()?.to_str()?.to_owned();
-        (is_slot_name(&name) && self.program(&name).is_file()).then_some(name)
+        (is_slot_name(&name) && self.program_path(&name).is_file()).then_some(name)
     }
 
     /// The program of a slot.
     #[must_use]
-    pub fn program(&self, slot: &str) -> PathBuf {
+    pub fn program_path(&self, slot: &str) -> PathBuf {
         self.home.join("versions").join(slot).join(PROGRAM)
     }
 
@@ -80,10 +80,10 @@ impl VersionSlots {
     ///
     /// # Errors
     /// The disk is full, or this user may not write there.
-    pub fn stage(&self, program: &[u8]) -> Result<PathBuf, UpdateError> {
+    pub fn stage_program(&self, program: &[u8]) -> Result<PathBuf, UpdateError> {
         let folder = self.home.join("versions").join(".staged");
         let _none_left = fs::remove_dir_all(&folder);
-        fs::create_dir_all(&folder).map_err(UpdateError::file(&folder))?;
+        fs::create_dir_all(&folder).map_err(UpdateError::file_error(&folder))?;
         let path = folder.join(PROGRAM);
         let written = || -> std::io::Result<()> {
             let mut file = fs::OpenOptions::new().write(true).create_new(true).mode(0o755).open(&path)?;
@@ -91,7 +91,7 @@ impl VersionSlots {
             file.sync_all()?;
             sync_folder(&folder)
         };
-        written().map_err(UpdateError::file(&path))?;
+        written().map_err(UpdateError::file_error(&path))?;
         Ok(path)
     }
 
@@ -99,13 +99,13 @@ impl VersionSlots {
     ///
     /// # Errors
     /// It runs, or the system refuses.
-    pub fn keep(&self, slot: &str) -> Result<(), UpdateError> {
+    pub fn keep_staged(&self, slot: &str) -> Result<(), UpdateError> {
         let versions = self.home.join("versions");
         let (staged, kept) = (versions.join(".staged"), versions.join(slot));
         if !is_slot_name(slot) || slot == PACKAGE_SLOT {
             return Err(UpdateError::DoesNotRun(format!("its version {slot:?} is no name of a folder")));
         }
-        if self.running().as_deref() == Some(slot) {
+        if self.running_slot().as_deref() == Some(slot) {
             return Err(UpdateError::Older { new: slot.to_owned(), running: slot.to_owned() });
         }
         let replaced = || -> std::io::Result<()> {
@@ -115,12 +115,12 @@ impl VersionSlots {
             fs::rename(&staged, &kept)?;
             sync_folder(&versions)
         };
-        replaced().map_err(UpdateError::file(&kept))
+        replaced().map_err(UpdateError::file_error(&kept))
     }
 
     /// The version on trial, where there is one.
     #[must_use]
-    pub fn trial(&self) -> Option<Trial> {
+    pub fn read_trial(&self) -> Option<Trial> {
         Trial::parse(&fs::read_to_string(self.home.join("trial")).ok()?)
     }
 
@@ -130,7 +130,7 @@ impl VersionSlots {
     /// The disk is full, or this user may not write there.
     pub fn begin_trial(&self, trial: &Trial) -> Result<(), UpdateError> {
         let path = self.home.join("trial");
-        crate::files::replace_durably(&path, &trial.line()).map_err(UpdateError::file(&path))
+        crate::files::replace_durably(&path, &trial.to_line()).map_err(UpdateError::file_error(&path))
     }
 
     /// The trial is over.
@@ -141,7 +141,7 @@ impl VersionSlots {
         let path = self.home.join("trial");
         match fs::remove_file(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(UpdateError::File { path, error }),
-            _ => sync_folder(&self.home).map_err(UpdateError::file(&self.home)),
+            _ => sync_folder(&self.home).map_err(UpdateError::file_error(&self.home)),
         }
     }
 
@@ -157,7 +157,7 @@ impl VersionSlots {
             fs::rename(&fresh, &current)?;
             sync_folder(&self.home)
         };
-        moved().map_err(UpdateError::file(&current))
+        moved().map_err(UpdateError::file_error(&current))
     }
 
     /// Removes versions that neither run nor ran before, but never that of the package.
@@ -194,28 +194,28 @@ mod tests {
     #[test]
     fn a_version_is_staged_kept_tried_and_taken_back() {
         let (home, slots) = installed();
-        slots.stage(b"new").expect("staged");
-        slots.keep("0.3.0").expect("kept");
+        slots.stage_program(b"new").expect("staged");
+        slots.keep_staged("0.3.0").expect("kept");
         let trial = Trial { before: PACKAGE_SLOT.to_owned(), new: "0.3.0".to_owned(), starts: 0 };
         slots.begin_trial(&trial).expect("noted");
         slots.switch_to("0.3.0").expect("switched");
-        assert_eq!(slots.running().as_deref(), Some("0.3.0"));
-        assert_eq!(slots.trial(), Some(trial));
+        assert_eq!(slots.running_slot().as_deref(), Some("0.3.0"));
+        assert_eq!(slots.read_trial(), Some(trial));
         assert_eq!(fs::read(home.path().join("current").join(PROGRAM)).expect("read"), b"new");
         slots.switch_to(PACKAGE_SLOT).expect("switched");
         slots.end_trial().expect("over");
         slots.end_trial().expect("over twice");
         slots.remove_others(&[PACKAGE_SLOT]);
-        assert_eq!((slots.running().as_deref(), slots.trial()), (Some(PACKAGE_SLOT), None));
-        assert!(!slots.program("0.3.0").exists());
+        assert_eq!((slots.running_slot().as_deref(), slots.read_trial()), (Some(PACKAGE_SLOT), None));
+        assert!(!slots.program_path("0.3.0").exists());
     }
 
     #[test]
     fn names_that_lead_elsewhere_are_refused() {
         let (_home, slots) = installed();
-        slots.stage(b"new").expect("staged");
+        slots.stage_program(b"new").expect("staged");
         for name in ["../evil", "", ".hidden", "a/b", PACKAGE_SLOT] {
-            assert!(slots.keep(name).is_err(), "{name}");
+            assert!(slots.keep_staged(name).is_err(), "{name}");
         }
         assert_eq!(Trial::parse("package ../../x 0"), None);
         assert_eq!(Trial::parse("package 0.3.0 1 more"), None);

@@ -65,7 +65,7 @@ pub fn run_trial(
     service: &dyn ServiceControl,
     within: Duration,
 ) -> Result<TrialOutcome, UpdateError> {
-    let before = slots.running().unwrap_or_else(|| PACKAGE_SLOT.to_owned());
+    let before = slots.running_slot().unwrap_or_else(|| PACKAGE_SLOT.to_owned());
     let confirmed = data_dir.join(CONFIRMED);
     let _none_left = fs::remove_file(&confirmed);
     slots.begin_trial(&Trial { before: before.clone(), new: new.to_owned(), starts: 0 })?;
@@ -98,7 +98,7 @@ fn wait_for_confirmation(slots: &VersionSlots, new: &str, confirmed: &Path, with
         if fs::read_to_string(confirmed).is_ok_and(|text| text == new) {
             return None;
         }
-        if slots.running().as_deref() != Some(new) {
+        if slots.running_slot().as_deref() != Some(new) {
             return Some("it was started several times and was not well".to_owned());
         }
         // A large history is copied before its tables change; that is no bad health.

@@ -1,6 +1,6 @@
 //! Filter and feature of one stream.
 
-use super::nanoseconds;
+use super::to_nanoseconds;
 use adapters::Stamp;
 use adapters::clock::TimeNs;
 use adapters::waveform::{AMPLITUDE, Block, WaveformHeader};
@@ -59,7 +59,7 @@ impl WaveformChain {
         let span = if amplitude { WindowSpan::Known { hz: AMPLITUDE_HZ } } else { WindowSpan::Crossings { least_a } };
         let phase = PhaseFeature::new(FeatureKind::Rms, span, HALVES, rate_hz).map_err(text)?;
         let phases = match (header.channels.len(), header.unit.as_str()) {
-            (1, "A" | AMPLITUDE) => Phases::One(Box::new((design.filter(), phase))),
+            (1, "A" | AMPLITUDE) => Phases::One(Box::new((design.build_filter(), phase))),
             (3, "A") => Phases::Three(Box::new(ThreePhase::new(&design, phase))),
             (channels, unit) => {
                 return Err(format!("{channels} channels in {unit:?}: spindle current is 1 or 3 in \"A\""));
@@ -68,7 +68,7 @@ impl WaveformChain {
         Ok(Self { header: header.clone(), phases, delay_s: design.delay_s(), least_a })
     }
 
-    pub(super) fn fits(&self, header: &WaveformHeader) -> bool {
+    pub(super) fn matches_header(&self, header: &WaveformHeader) -> bool {
         self.header == *header
     }
 
@@ -89,7 +89,7 @@ impl WaveformChain {
             time_s += sample_s;
             let ampere = |at: usize| f64::from(instant[at]) * self.header.scale[at];
             for at in 0..channels {
-                sums.raw(ampere(at));
+                sums.add_raw_sample(ampere(at));
             }
             let feature = match &mut self.phases {
                 Phases::One(one) => one.0.push(ampere(0)).and_then(|filtered| one.1.push(filtered)),
@@ -98,24 +98,24 @@ impl WaveformChain {
             if let Some(feature) = feature {
                 greatest = Some(greatest.map_or(feature.value, |known| known.max(feature.value)));
                 let middle_s = time_s - self.delay_s - 0.5 * feature.window_s;
-                sums.feature(&feature, block.first_ns + nanoseconds(middle_s));
+                sums.add_feature(&feature, block.first_ns + to_nanoseconds(middle_s));
             }
         }
         let from_ns = if sums.raw_ns.0 == 0 { block.first_ns } else { sums.raw_ns.0 };
-        sums.raw_ns = (from_ns, block.first_ns + nanoseconds(time_s));
+        sums.raw_ns = (from_ns, block.first_ns + to_nanoseconds(time_s));
         greatest
     }
 }
 
 impl Sums {
-    fn raw(&mut self, ampere: f64) {
+    fn add_raw_sample(&mut self, ampere: f64) {
         self.raw_square_a2 += ampere * ampere;
         self.raw_samples += 1.0;
         self.peak_a = self.peak_a.max(ampere.abs());
     }
 
     #[expect(clippy::cast_precision_loss, reason = "times within one poll")]
-    fn feature(&mut self, feature: &Feature, middle_ns: TimeNs) {
+    fn add_feature(&mut self, feature: &Feature, middle_ns: TimeNs) {
         let first_ns = *self.first_ns.get_or_insert(middle_ns);
         self.features += 1.0;
         self.square_a2 += feature.value * feature.value;
@@ -125,10 +125,10 @@ impl Sums {
 
     /// One value for the poll. Without a whole period in it there is one only if there is no current at all.
     #[expect(clippy::cast_possible_truncation, reason = "times within one poll")]
-    pub(super) fn reading(&self) -> Option<(Stamp, f64)> {
+    pub(super) fn compute_reading(&self) -> Option<(Stamp, f64)> {
         if let Some(first_ns) = self.first_ns {
             let mid_ns = first_ns + (self.middle_ns / self.features) as i64;
-            let stamp = Stamp { mid_ns, half_width_ns: nanoseconds(0.5 * self.length_s) };
+            let stamp = Stamp { mid_ns, half_width_ns: to_nanoseconds(0.5 * self.length_s) };
             return Some((stamp, (self.square_a2 / self.features).sqrt()));
         }
         if self.raw_samples == 0.0 || self.peak_a > self.least_a {
@@ -157,11 +157,11 @@ mod tests {
 
     #[test]
     fn a_sine_gives_its_root_mean_square_in_the_middle() {
-        let header = WaveformHeader::currents(1000.0, &["u", "v", "w"], 0.01, 32767);
+        let header = WaveformHeader::with_currents(1000.0, &["u", "v", "w"], 0.01, 32767);
         let mut chain = WaveformChain::new(&header).expect("three phases");
         let mut sums = Sums::default();
         chain.push(&block(&header), &mut sums);
-        let (stamp, value_a) = sums.reading().expect("many periods");
+        let (stamp, value_a) = sums.compute_reading().expect("many periods");
         assert!((value_a - 10.0).abs() < 0.05, "{value_a}");
         assert!((stamp.mid_ns - 500_000_000).abs() < 20_000_000, "{stamp:?}");
         assert!(chain.unbalance().is_some_and(|unbalance| unbalance < 0.01));
@@ -169,21 +169,21 @@ mod tests {
 
     #[test]
     fn an_amplitude_is_its_own_root_mean_square() {
-        let mut chain = WaveformChain::new(&WaveformHeader::amplitude(1000.0, 0.01, 32767)).expect("an amplitude");
+        let mut chain = WaveformChain::new(&WaveformHeader::with_amplitude(1000.0, 0.01, 32767)).expect("an amplitude");
         let mut sums = Sums::default();
         chain.push(&Block { first_ns: 0, gap: 0, clipped: 0, raw: vec![-1234; 1000] }, &mut sums);
-        let (stamp, value_a) = sums.reading().expect("a second");
+        let (stamp, value_a) = sums.compute_reading().expect("a second");
         assert!((value_a - 12.34).abs() < 0.2, "{value_a}");
         assert!((stamp.mid_ns - 500_000_000).abs() < 60_000_000, "{stamp:?}");
     }
 
     #[test]
     fn no_current_is_a_value_and_two_phases_are_refused() {
-        let header = WaveformHeader::currents(1000.0, &["u"], 0.01, 32767);
+        let header = WaveformHeader::with_currents(1000.0, &["u"], 0.01, 32767);
         let mut sums = Sums::default();
         let still = Block { first_ns: 10, gap: 0, clipped: 0, raw: vec![1; 100] };
         WaveformChain::new(&header).expect("one phase").push(&still, &mut sums);
-        assert!(sums.reading().is_some_and(|(_, value_a)| value_a < 0.02));
-        assert!(WaveformChain::new(&WaveformHeader::currents(1000.0, &["u", "v"], 0.01, 32767)).is_err());
+        assert!(sums.compute_reading().is_some_and(|(_, value_a)| value_a < 0.02));
+        assert!(WaveformChain::new(&WaveformHeader::with_currents(1000.0, &["u", "v"], 0.01, 32767)).is_err());
     }
 }

@@ -2,7 +2,7 @@
 //! and five behind. The files are CSV as `serve waveform --file` plays them. Bounded: one file at a time, fifty files in the
 //! directory, the oldest go.
 
-use super::nanoseconds;
+use super::to_nanoseconds;
 use crate::files::keep_last;
 use crate::log::{Notice, Severity};
 use adapters::clock::TimeNs;
@@ -36,7 +36,7 @@ impl ExcerptWriter {
     }
 
     /// Files written since the start.
-    pub(super) fn written(&self) -> u64 {
+    pub(super) fn count_files(&self) -> u64 {
         self.written
     }
 
@@ -45,7 +45,7 @@ impl ExcerptWriter {
         let now_ns = block.first_ns;
         self.samples += block.raw.len();
         self.blocks.push_back(block.clone());
-        let from_ns = now_ns - nanoseconds(BEFORE_S + BEHIND_S);
+        let from_ns = now_ns - to_nanoseconds(BEFORE_S + BEHIND_S);
         while self.samples > SAMPLES_MAX || self.blocks.front().is_some_and(|oldest| oldest.first_ns < from_ns) {
             let Some(oldest) = self.blocks.pop_front() else { break };
             self.samples -= oldest.raw.len();
@@ -53,7 +53,7 @@ impl ExcerptWriter {
         if let Some(feature_a) = feature_a {
             let over = feature_a > self.above_a;
             if over && !self.over && self.due_ns.is_none() {
-                self.due_ns = Some(now_ns + nanoseconds(BEHIND_S));
+                self.due_ns = Some(now_ns + to_nanoseconds(BEHIND_S));
             }
             self.over = over;
         }
@@ -66,18 +66,18 @@ impl ExcerptWriter {
     fn write(&mut self, header: &WaveformHeader, now_ns: TimeNs) {
         let file = self.directory.join(format!("waveform-{now_ns}.csv"));
         let done = std::fs::create_dir_all(&self.directory)
-            .and_then(|()| std::fs::write(&file, self.text(header)))
+            .and_then(|()| std::fs::write(&file, self.format_csv(header)))
             .and_then(|()| self.forget_oldest());
         match done {
             Ok(()) => self.written += 1,
             Err(error) => {
                 let text = format!("a waveform could not be kept: {}: {error}", file.display());
-                Notice::new(Severity::Warning, "waveform_not_kept", text).say();
+                Notice::new(Severity::Warning, "waveform_not_kept", text).write_to_logs();
             }
         }
     }
 
-    fn text(&self, header: &WaveformHeader) -> String {
+    fn format_csv(&self, header: &WaveformHeader) -> String {
         let mut text = format!("time_s,{}\n", header.channels.join(","));
         let sample_s = 1.0 / header.rate_hz;
         let begin_ns = self.blocks.front().map_or(0, |block| block.first_ns);
@@ -109,14 +109,14 @@ mod tests {
     #[test]
     fn a_high_current_leaves_one_file_with_what_was_before_and_behind() {
         let directory = tempfile::tempdir().expect("a directory");
-        let header = WaveformHeader::currents(1000.0, &["u"], 0.01, 32767);
+        let header = WaveformHeader::with_currents(1000.0, &["u"], 0.01, 32767);
         let mut excerpt_writer = ExcerptWriter::new(directory.path(), 20.0);
         for k in 0_i64..1000 {
             let block = Block { first_ns: k * 20_000_000, gap: 0, clipped: 0, raw: vec![100; 20] };
             let high = (500..520).contains(&k);
             excerpt_writer.push(&header, &block, Some(if high { 30.0 } else { 5.0 }));
         }
-        assert_eq!(excerpt_writer.written(), 1);
+        assert_eq!(excerpt_writer.count_files(), 1);
         let file = std::fs::read_dir(directory.path()).expect("there").next().expect("one").expect("readable").path();
         let text = std::fs::read_to_string(file).expect("text");
         let rows = text.lines().count() - 1;

@@ -22,7 +22,7 @@ impl Features {
         Self {
             chain: None,
             excerpt_writer: keep.map(|keep| ExcerptWriter::new(&keep.directory, keep.above_a)),
-            channels: ChannelId::of("spindle_current_a").into_iter().collect(),
+            channels: ChannelId::from_name("spindle_current_a").into_iter().collect(),
             sums: Sums::default(),
             clipped: false,
         }
@@ -36,13 +36,13 @@ impl Features {
     ///
     /// # Errors
     /// [`SourceError::Decode`]: a stream that is no spindle current.
-    pub(super) fn feed(
+    pub(super) fn feed_block(
         &mut self,
         source_name: &str,
         header: &WaveformHeader,
         block: &Block,
     ) -> Result<(), SourceError> {
-        if block.gap > 0 || self.chain.as_ref().is_none_or(|chain| !chain.fits(header)) {
+        if block.gap > 0 || self.chain.as_ref().is_none_or(|chain| !chain.matches_header(header)) {
             let unsuitable = |what| SourceError::Decode {
                 source_name: source_name.to_owned(),
                 request: "the header of the stream".to_owned(),
@@ -60,27 +60,27 @@ impl Features {
     }
 
     /// The stream is interrupted: what comes next has nothing to do with what was.
-    pub(super) fn interrupt(&mut self) {
+    pub(super) fn reset_stream(&mut self) {
         (self.chain, self.sums, self.clipped) = (None, Sums::default(), false);
     }
 
     /// The value of the blocks since the last one, where they give one. With a clipped sample among them there is none,
     /// because it would be too low.
-    pub(super) fn reading(&mut self) -> Option<Reading> {
+    pub(super) fn take_reading(&mut self) -> Option<Reading> {
         let (sums, clipped) = (std::mem::take(&mut self.sums), std::mem::take(&mut self.clipped));
-        let (channel, (stamp, value_a)) = (*self.channels.first()?, sums.reading()?);
+        let (channel, (stamp, value_a)) = (*self.channels.first()?, sums.compute_reading()?);
         Some(if clipped {
-            Reading::absent(channel, stamp, Absence::OutOfRange)
+            Reading::from_absence(channel, stamp, Absence::OutOfRange)
         } else {
-            Reading::number(channel, stamp, value_a)
+            Reading::from_number(channel, stamp, value_a)
         })
     }
 
     /// What is known of the stream.
-    pub(super) fn facts(&self, intake: &Intake) -> Vec<Fact> {
+    pub(super) fn list_facts(&self, intake: &Intake) -> Vec<Fact> {
         let counts = intake.counts();
         #[expect(clippy::cast_precision_loss, reason = "counts of samples stay far below 2^53 for centuries")]
-        let count = |name: &str, count: u64| Fact::number(name, count as f64);
+        let count = |name: &str, count: u64| Fact::from_number(name, count as f64);
         let mut facts = vec![
             count("waveform_samples", counts.samples),
             count("waveform_gaps", counts.gaps),
@@ -88,13 +88,15 @@ impl Features {
             count("waveform_clipped_samples", counts.clipped),
             count("waveform_connections", counts.connections),
         ];
-        facts.extend(intake.header().map(|header| Fact::number("waveform_rate_hz", header.rate_hz)));
-        facts.extend(intake.drift_ppm().map(|ppm| Fact::number("waveform_clock_drift_ppm", ppm)));
+        facts.extend(intake.header().map(|header| Fact::from_number("waveform_rate_hz", header.rate_hz)));
+        facts.extend(intake.drift_ppm().map(|ppm| Fact::from_number("waveform_clock_drift_ppm", ppm)));
         if let Some(unbalance) = self.chain.as_ref().and_then(WaveformChain::unbalance) {
-            facts.push(Fact::number("phase_unbalance_pct", 100.0 * unbalance));
+            facts.push(Fact::from_number("phase_unbalance_pct", 100.0 * unbalance));
         }
         facts.extend(
-            self.excerpt_writer.as_ref().map(|excerpt_writer| count("waveform_files_kept", excerpt_writer.written())),
+            self.excerpt_writer
+                .as_ref()
+                .map(|excerpt_writer| count("waveform_files_kept", excerpt_writer.count_files())),
         );
         facts
     }

@@ -38,8 +38,8 @@ const BLOCKS_MAX: usize = 512;
 /// An address whose samples become a channel only here: a stream, or a controller whose own sampling is wanted. `None` for
 /// every other address.
 #[must_use]
-pub fn opened(address: &Address) -> Option<Result<Opened, OpenError>> {
-    let Target::Waveform { at, keep } = address.target() else { return sampled::opened(address) };
+pub fn open_source(address: &Address) -> Option<Result<Opened, OpenError>> {
+    let Target::Waveform { at, keep } = address.target() else { return sampled::open_sampled_source(address) };
     let source: Box<dyn Source> = Box::new(SpindleCurrent::new(address.text(), at, keep.as_ref()));
     Some(Ok(Opened {
         sources: vec![source],
@@ -66,7 +66,7 @@ impl SpindleCurrent {
     }
 
     /// Takes what has arrived; stops with the block that reaches the beginning of this poll.
-    fn take(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+    fn receive_blocks(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
         let began_ns = clock.now_ns();
         for _ in 0..BLOCKS_MAX {
             let block = self.receiver.read(clock)?;
@@ -74,7 +74,7 @@ impl SpindleCurrent {
             let instants = block.raw.len() / header.channels.len();
             let length_ns = header.duration_ns(f64::from(u32::try_from(instants).unwrap_or(u32::MAX)));
             let end_ns = block.first_ns + length_ns;
-            self.features.feed(&self.name, &header, &block)?;
+            self.features.feed_block(&self.name, &header, &block)?;
             if end_ns + length_ns >= began_ns {
                 break;
             }
@@ -97,18 +97,18 @@ impl Source for SpindleCurrent {
     }
 
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
-        self.take(clock).inspect_err(|_| self.features.interrupt())?;
-        out.extend(self.features.reading());
+        self.receive_blocks(clock).inspect_err(|_| self.features.reset_stream())?;
+        out.extend(self.features.take_reading());
         Ok(())
     }
 
-    fn facts(&self) -> Vec<Fact> {
-        self.features.facts(self.receiver.intake())
+    fn collect_facts(&self) -> Vec<Fact> {
+        self.features.list_facts(self.receiver.intake())
     }
 }
 
 /// Seconds as nanoseconds.
 #[expect(clippy::cast_possible_truncation, reason = "a cast from a double saturates")]
-fn nanoseconds(seconds: f64) -> TimeNs {
+fn to_nanoseconds(seconds: f64) -> TimeNs {
     (seconds * SECOND_NS as f64) as i64
 }

@@ -29,23 +29,23 @@ const SPINDLE_AXIS: u32 = 5;
 type SampleQueue = Arc<Mutex<VecDeque<(SampleBlock, Instant)>>>;
 
 /// A controller whose sampling is wanted, opened with it; `None` for every other address.
-pub(super) fn opened(address: &Address) -> Option<Result<Opened, OpenError>> {
+pub(super) fn open_sampled_source(address: &Address) -> Option<Result<Opened, OpenError>> {
     match address.target() {
-        Target::NcLink(target) if target.sample => Some(nclink(address, target)),
-        Target::HncNet(target) => target.sample_scale_a.map(|scale_a| Ok(hnc(address, target, scale_a))),
+        Target::NcLink(target) if target.sample => Some(open_nclink(address, target)),
+        Target::HncNet(target) => target.sample_scale_a.map(|scale_a| Ok(open_hnc(address, target, scale_a))),
         _ => None,
     }
 }
 
-fn nclink(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenError> {
-    let (waiting, sink) = queue();
+fn open_nclink(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenError> {
+    let (waiting, sink) = create_queue();
     let current = SampledCurrent::new(Some(target.spindle_axis.unwrap_or(SPINDLE_AXIS)), 1.0);
     let opened = adapters::nclink::open_sampled(address, target, Some(sink))?;
     Ok(join_sources(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened))
 }
 
-fn hnc(address: &Address, target: &HncNetTarget, scale_a: f64) -> Opened {
-    let (waiting, sink) = queue();
+fn open_hnc(address: &Address, target: &HncNetTarget, scale_a: f64) -> Opened {
+    let (waiting, sink) = create_queue();
     // The driver lets the spindle be the first of the load currents.
     let current = SampledCurrent::new(None, scale_a);
     let opened = adapters::hnc::open_sampled(address, target, Some(sink));
@@ -58,7 +58,7 @@ fn join_sources(samples: ControllerSamples, mut opened: Opened) -> Opened {
     opened
 }
 
-fn queue() -> (SampleQueue, BlockSink) {
+fn create_queue() -> (SampleQueue, BlockSink) {
     let waiting = SampleQueue::default();
     let filled = waiting.clone();
     let sink = move |block: &SampleBlock, arrived: Instant| {
@@ -85,22 +85,22 @@ impl ControllerSamples {
         Self { name: format!("{address}#samples"), current, waiting, features: Features::new(keep), heard: None }
     }
 
-    fn take(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<bool, SourceError> {
+    fn receive_blocks(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<bool, SourceError> {
         let waiting = std::mem::take(&mut *self.waiting.lock().unwrap_or_else(PoisonError::into_inner));
         let some = !waiting.is_empty();
         for (block, arrived) in waiting {
-            let blocks = self.current.take(&block, arrived_ns(clock, arrived));
+            let blocks = self.current.extract_blocks(&block, arrived_ns(clock, arrived));
             let Some(header) = self.current.intake().header().cloned() else { continue };
             for block in &blocks {
-                self.features.feed(&self.name, &header, block)?;
+                self.features.feed_block(&self.name, &header, block)?;
             }
             // One reading for every block of the controller's.
-            out.extend(self.features.reading());
+            out.extend(self.features.take_reading());
         }
         Ok(some)
     }
 
-    fn silent(&self) -> SourceError {
+    fn timeout_error(&self) -> SourceError {
         SourceError::Timeout {
             source_name: self.name.clone(),
             request: "the sampled load current of the spindle".to_owned(),
@@ -133,16 +133,16 @@ impl Source for ControllerSamples {
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let now = Instant::now();
         let heard = *self.heard.get_or_insert(now);
-        if self.take(clock, out)? {
+        if self.receive_blocks(clock, out)? {
             self.heard = Some(now);
         } else if now.saturating_duration_since(heard) > SILENT {
-            self.features.interrupt();
-            return Err(self.silent());
+            self.features.reset_stream();
+            return Err(self.timeout_error());
         }
         Ok(())
     }
 
-    fn facts(&self) -> Vec<Fact> {
-        self.features.facts(self.current.intake())
+    fn collect_facts(&self) -> Vec<Fact> {
+        self.features.list_facts(self.current.intake())
     }
 }

@@ -47,19 +47,19 @@ impl StateBasis {
     /// The best basis among these channels.
     #[must_use]
     pub fn of_channels(provided: impl Fn(ChannelId) -> bool) -> Self {
-        let found = CHANNELS.into_iter().find(|(name, _)| ChannelId::of(name).is_some_and(&provided));
+        let found = CHANNELS.into_iter().find(|(name, _)| ChannelId::from_name(name).is_some_and(&provided));
         found.map_or(Self::Motion, |(_, basis)| basis)
     }
 
     /// The best basis among the channels that a sample has; one whose source is silent at the moment is there all the same.
     #[must_use]
-    pub fn of(sample: &Sample) -> Self {
+    pub fn from_sample(sample: &Sample) -> Self {
         Self::of_channels(|id| !matches!(sample.slot(id).value, Err(Absence::NotProvided | Absence::NotSupported)))
     }
 
     /// The word in JSON and on the page.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::SpindlePower => "spindle_power",
             Self::TotalPower => "total_power",
@@ -91,7 +91,7 @@ impl StateBasis {
 
     /// What it means for whoever relies on the state, in Chinese.
     #[must_use]
-    pub fn zh(self) -> &'static str {
+    pub fn describe_in_chinese(self) -> &'static str {
         match self {
             Self::SpindlePower => "机床状态由主轴功率推断",
             Self::TotalPower => "机床状态由总功率推断：其他用电设备会造成干扰",
@@ -130,18 +130,20 @@ mod tests {
 
     #[test]
     fn the_best_channel_that_is_there_counts_and_a_silent_one_is_there() {
-        let mut sample = Sample::empty(0);
-        assert_eq!(StateBasis::of(&sample), StateBasis::Motion);
+        let mut sample = Sample::new_empty(0);
+        assert_eq!(StateBasis::from_sample(&sample), StateBasis::Motion);
         let mut add = |name: &str, value| {
-            sample.set(ChannelId::of(name).expect("in the table"), Slot { value, age_ns: 0 });
-            StateBasis::of(&sample)
+            sample.set_slot(ChannelId::from_name(name).expect("in the table"), Slot { value, age_ns: 0 });
+            StateBasis::from_sample(&sample)
         };
         assert_eq!(add("spindle_current_a", Ok(Value::Number(3.0))), StateBasis::SpindleCurrent);
         assert_eq!(add("spindle_load_pct", Ok(Value::Number(3.0))), StateBasis::SpindleLoad);
         assert_eq!(add("spindle_power_w", Err(Absence::NotSupported)), StateBasis::SpindleLoad);
         assert_eq!(add("spindle_power_w", Err(Absence::Timeout)), StateBasis::SpindlePower);
         for basis in StateBasis::ALL {
-            assert!(!basis.to_string().is_empty() && !basis.zh().is_empty() && !basis.word().is_empty());
+            assert!(
+                !basis.to_string().is_empty() && !basis.describe_in_chinese().is_empty() && !basis.as_word().is_empty()
+            );
         }
     }
 }

@@ -21,11 +21,11 @@ pub(super) struct Normal {
 const LEFT_MIN: f64 = 1e-6;
 
 /// What is known of the quantity once it is known to be no greater than `level`, which was measured with `noise_sd`.
-pub(super) fn below(before: Normal, level: f64, noise_sd: f64) -> Normal {
+pub(super) fn condition_on_upper_bound(before: Normal, level: f64, noise_sd: f64) -> Normal {
     let variance = before.sd * before.sd;
     let total = variance + noise_sd * noise_sd;
     let z = (level - before.mean) / total.sqrt();
-    let ratio = hazard(z);
+    let ratio = inverse_mills_ratio(z);
     let mean = before.mean - variance / total.sqrt() * ratio;
     let left = variance - variance * variance / total * ratio * (z + ratio);
     Normal { mean, sd: left.max(LEFT_MIN * variance).sqrt() }
@@ -39,7 +39,7 @@ pub(super) fn as_measurement(before: Normal, after: Normal) -> Normal {
 }
 
 /// Density over distribution of the standard normal, phi(z)/Phi(z).
-fn hazard(z: f64) -> f64 {
+fn inverse_mills_ratio(z: f64) -> f64 {
     if z < -8.0 {
         // The first terms of the asymptotic series; the quotient itself is 0/0 there.
         return -z - 1.0 / z;
@@ -71,7 +71,7 @@ mod tests {
     fn the_moments_are_those_of_the_cut_off_normal() {
         let before = Normal { mean: 500.0, sd: 25.0 };
         for (level, noise) in [(600.0, 3.0), (500.0, 3.0), (475.0, 5.0), (450.0, 2.0), (430.0, 10.0)] {
-            let (known, summed) = (below(before, level, noise), added_up(before, level, noise));
+            let (known, summed) = (condition_on_upper_bound(before, level, noise), added_up(before, level, noise));
             assert!((known.mean - summed.mean).abs() < 0.01 && (known.sd - summed.sd).abs() < 0.01, "{level}");
         }
     }
@@ -79,9 +79,9 @@ mod tests {
     #[test]
     fn a_level_far_above_says_nothing_and_one_far_below_is_believed() {
         let before = Normal { mean: 500.0, sd: 10.0 };
-        let above = below(before, 600.0, 2.0);
+        let above = condition_on_upper_bound(before, 600.0, 2.0);
         assert!((above.mean - 500.0).abs() < 1e-6 && (above.sd - 10.0).abs() < 1e-6);
-        let far = below(before, 300.0, 2.0);
+        let far = condition_on_upper_bound(before, 300.0, 2.0);
         // A twenty-fifth of the contradiction is put down to noise, as the variances say.
         assert!(far.mean < 308.0 && far.mean > 300.0 && far.sd.is_finite() && far.sd > 0.0, "{far:?}");
     }
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn the_measurement_leads_where_it_should() {
         let before = Normal { mean: 500.0, sd: 20.0 };
-        let after = below(before, 480.0, 3.0);
+        let after = condition_on_upper_bound(before, 480.0, 3.0);
         let seen = as_measurement(before, after);
         let gain = before.sd.powi(2) / (before.sd.powi(2) + seen.sd.powi(2));
         assert!((before.mean + gain * (seen.mean - before.mean) - after.mean).abs() < 1e-6);

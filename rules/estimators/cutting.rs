@@ -25,7 +25,7 @@ pub struct Balance {
 /// Splits the power above no-load power, `excess_w = Pi - Pu`. `None` where no real cutting power gives this excess
 /// (negative discriminant) or where the loss would outgrow the cutting power (1 + a0 not positive).
 #[must_use]
-pub fn balance(excess_w: f64, linear: f64, quadratic_per_w: f64) -> Option<Balance> {
+pub fn solve_power_balance(excess_w: f64, linear: f64, quadratic_per_w: f64) -> Option<Balance> {
     let gain = 1.0 + linear;
     let discriminant = gain * gain + 4.0 * quadratic_per_w * excess_w;
     if !(gain > 0.0 && discriminant > 0.0) {
@@ -56,13 +56,13 @@ impl LoadLossLaw {
 
     /// a1 as stated for a spindle speed in rpm, as settings, scripts and the command line give it: 0 is the same at every speed.
     #[must_use]
-    pub fn stated(linear: f64, quadratic_per_w: f64, speed_rpm: f64) -> Self {
+    pub fn from_stated_speed(linear: f64, quadratic_per_w: f64, speed_rpm: f64) -> Self {
         Self { linear, quadratic_per_w, speed_rpm: Some(speed_rpm).filter(|rpm| *rpm > 0.0) }
     }
 
     /// The same coefficients at every speed, as the source of the method has them.
     #[must_use]
-    pub const fn constant(linear: f64, quadratic_per_w: f64) -> Self {
+    pub const fn with_constant_coefficients(linear: f64, quadratic_per_w: f64) -> Self {
         Self { linear, quadratic_per_w, speed_rpm: None }
     }
 
@@ -73,10 +73,10 @@ impl LoadLossLaw {
         self.quadratic_per_w * self.speed_rpm.map_or(1.0, share)
     }
 
-    /// Splits the power above no-load power at a spindle speed; see [`balance`].
+    /// Splits the power above no-load power at a spindle speed; see [`solve_power_balance`].
     #[must_use]
-    pub fn split(&self, excess_w: f64, speed_rpm: f64) -> Option<Balance> {
-        balance(excess_w, self.linear, self.quadratic_at(speed_rpm))
+    pub fn split_excess_power(&self, excess_w: f64, speed_rpm: f64) -> Option<Balance> {
+        solve_power_balance(excess_w, self.linear, self.quadratic_at(speed_rpm))
     }
 }
 
@@ -89,30 +89,34 @@ mod tests {
         let loss = LoadLossLaw { linear: 0.11, quadratic_per_w: 1.2e-4, speed_rpm: Some(800.0) };
         for (rpm, a1) in [(800.0, 1.2e-4), (-400.0, 4.8e-4), (1600.0, 3e-5), (200.0, 1.92e-3)] {
             let excess_w = 1.11 * 900.0 + a1 * 900.0 * 900.0;
-            let split = loss.split(excess_w, rpm).expect("a real root");
+            let split = loss.split_excess_power(excess_w, rpm).expect("a real root");
             assert!((split.cutting_power_w - 900.0).abs() < 1e-9, "{rpm}: {split:?}");
-            let same = LoadLossLaw::constant(0.11, 1.2e-4).split(excess_w, rpm);
-            assert_eq!(same, balance(excess_w, 0.11, 1.2e-4), "one a1 for every speed");
+            let same = LoadLossLaw::with_constant_coefficients(0.11, 1.2e-4).split_excess_power(excess_w, rpm);
+            assert_eq!(same, solve_power_balance(excess_w, 0.11, 1.2e-4), "one a1 for every speed");
         }
         for rpm in [0.0, 10.0, -199.0] {
             assert!((loss.quadratic_at(rpm) - 1.92e-3).abs() < 1e-12, "bounded at {rpm} rpm");
         }
-        assert_eq!(loss.split(100.0, f64::NAN), loss.split(100.0, 0.0), "no speed is a slow one");
+        assert_eq!(
+            loss.split_excess_power(100.0, f64::NAN),
+            loss.split_excess_power(100.0, 0.0),
+            "no speed is a slow one"
+        );
     }
 
     #[test]
     fn the_published_cut_splits_as_published() {
-        let split = balance(1460.0 - 500.0, 0.1807, 4e-5).expect("a real root");
+        let split = solve_power_balance(1460.0 - 500.0, 0.1807, 4e-5).expect("a real root");
         assert!((split.cutting_power_w - 791.84).abs() < 0.01, "{split:?}");
         assert!((split.load_loss_w - 168.16).abs() < 0.01, "{split:?}");
         assert!((split.cutting_power_w / 795.0 - 1.0).abs() < 0.005, "within 0.5 % of the publication");
-        let exact = balance(960.0, 0.1807, 3.377e-5).expect("a real root");
+        let exact = solve_power_balance(960.0, 0.1807, 3.377e-5).expect("a real root");
         assert!((exact.cutting_power_w - 795.0).abs() < 0.05, "{exact:?}");
     }
 
     #[test]
     fn constant_load_loss_gives_the_corrected_baseline_numbers() {
-        let with = |excess, a0| balance(excess, a0, 0.0).expect("a real root").cutting_power_w;
+        let with = |excess, a0| solve_power_balance(excess, a0, 0.0).expect("a real root").cutting_power_w;
         for (excess, a0, expected) in
             [(960.0, 0.15, 834.8), (955.0, 0.15, 830.4), (960.0, 0.25, 768.0), (955.0, 0.25, 764.0)]
         {
@@ -124,7 +128,7 @@ mod tests {
     fn the_load_loss_coefficient_spans_the_old_band() {
         let coefficient = |cut: f64| {
             let excess = cut * 1.1807 + 4e-5 * cut * cut;
-            let split = balance(excess, 0.1807, 4e-5).expect("a real root");
+            let split = solve_power_balance(excess, 0.1807, 4e-5).expect("a real root");
             split.load_loss_w / split.cutting_power_w
         };
         assert!((coefficient(1732.5) - 0.25).abs() < 1e-4);
@@ -133,13 +137,13 @@ mod tests {
 
     #[test]
     fn a_vanishing_quadratic_term_is_safe_and_negatives_are_defined() {
-        let split = balance(118.0, 0.18, 1e-18).expect("a real root");
+        let split = solve_power_balance(118.0, 0.18, 1e-18).expect("a real root");
         assert!((split.cutting_power_w - 100.0).abs() < 1e-9);
         assert!((split.slope - 1.0 / 1.18).abs() < 1e-12);
-        assert!(balance(-50.0, 0.18, 4e-5).expect("a real root").cutting_power_w < 0.0);
-        assert_eq!(balance(1e6, 0.18, -4e-5), None, "negative discriminant");
-        assert_eq!(balance(-1e6, 0.18, 4e-5), None, "negative discriminant");
-        assert_eq!(balance(0.0, -1.0, 0.0), None);
-        assert_eq!(balance(f64::NAN, 0.1, 1e-5), None);
+        assert!(solve_power_balance(-50.0, 0.18, 4e-5).expect("a real root").cutting_power_w < 0.0);
+        assert_eq!(solve_power_balance(1e6, 0.18, -4e-5), None, "negative discriminant");
+        assert_eq!(solve_power_balance(-1e6, 0.18, 4e-5), None, "negative discriminant");
+        assert_eq!(solve_power_balance(0.0, -1.0, 0.0), None);
+        assert_eq!(solve_power_balance(f64::NAN, 0.1, 1e-5), None);
     }
 }

@@ -20,7 +20,7 @@
 use super::basis::StateBasis;
 use super::estimate::{NoEstimate, NoLoadOrigin};
 use super::evidence::Evidence;
-use super::signals::{Feed, Pace, seconds};
+use super::signals::{Feed, Pace, seconds_between};
 use super::situation::{Situation, Tick};
 use super::state::State;
 use super::window::Means;
@@ -111,7 +111,7 @@ impl Detector {
     }
 
     /// Nothing is known of the past any more; what is learned elsewhere stays.
-    pub(super) fn interrupt(&mut self) {
+    pub(super) fn forget_past(&mut self) {
         self.phase = Phase::Fresh;
         self.evidence.clear();
         self.missing_since_ns = None;
@@ -119,18 +119,18 @@ impl Detector {
     }
 
     /// The speed or the gear stage changed.
-    pub(super) fn unsettle(&mut self, now_ns: TimeNs) {
+    pub(super) fn mark_speed_change(&mut self, now_ns: TimeNs) {
         if self.phase == Phase::Settled {
-            self.enter(Phase::Changing, now_ns);
+            self.enter_phase(Phase::Changing, now_ns);
         }
         self.evidence.clear();
     }
 
     /// Takes a tick and tells the state.
-    pub(super) fn step(&mut self, tick: &Tick<'_>) -> Detected {
+    pub(super) fn update_state(&mut self, tick: &Tick<'_>) -> Detected {
         // The first tick, or time has been set back.
         self.since_ns = self.since_ns.min(tick.inputs.at_ns);
-        let verdict = self.judge(tick);
+        let verdict = self.determine_state(tick);
         if verdict.state != self.state {
             self.state = verdict.state;
             self.since_ns = tick.inputs.at_ns;
@@ -138,11 +138,11 @@ impl Detector {
         verdict
     }
 
-    fn judge(&mut self, tick: &Tick<'_>) -> Detected {
+    fn determine_state(&mut self, tick: &Tick<'_>) -> Detected {
         self.notice_hidden_change(tick);
         let powered_before = self.powered;
-        self.powered = tick.powered().unwrap_or(powered_before);
-        let situation = tick.situation(self.crossing_zero(tick), powered_before);
+        self.powered = tick.is_powered().unwrap_or(powered_before);
+        let situation = tick.determine_situation(self.crossing_zero(tick), powered_before);
         if let Situation::Missing(reason) = situation {
             return self.without_input(tick, reason);
         }
@@ -150,7 +150,7 @@ impl Detector {
         match situation {
             Situation::Off => self.at_rest(State::Off, tick),
             Situation::Rest => self.at_rest(State::Standby, tick),
-            _ => self.turning(tick),
+            _ => self.judge_turning_spindle(tick),
         }
     }
 
@@ -164,71 +164,71 @@ impl Detector {
         }
         let since = *self.stands_since_ns.get_or_insert(now_ns);
         let turned = !matches!(self.phase, Phase::Rest | Phase::Fresh);
-        let fed = tick.inputs.feed.is_ok() && tick.feed() == Feed::On;
-        turned && fed && seconds(since, now_ns) < tick.settings.reversal_s
+        let fed = tick.inputs.feed.is_ok() && tick.classify_feed() == Feed::On;
+        turned && fed && seconds_between(since, now_ns) < tick.settings.reversal_s
     }
 
     fn without_input(&mut self, tick: &Tick<'_>, reason: NoEstimate) -> Detected {
         let since = *self.missing_since_ns.get_or_insert(tick.inputs.at_ns);
-        if seconds(since, tick.inputs.at_ns) < tick.settings.dropout_hold_s && self.state != State::Unknown {
-            return verdict(self.state);
+        if seconds_between(since, tick.inputs.at_ns) < tick.settings.dropout_hold_s && self.state != State::Unknown {
+            return report_state(self.state);
         }
-        unknown(reason)
+        report_unknown(reason)
     }
 
     fn at_rest(&mut self, state: State, tick: &Tick<'_>) -> Detected {
-        self.enter(Phase::Rest, tick.inputs.at_ns);
+        self.enter_phase(Phase::Rest, tick.inputs.at_ns);
         self.evidence.clear();
-        verdict(state)
+        report_state(state)
     }
 
-    fn enter(&mut self, phase: Phase, now_ns: TimeNs) {
+    fn enter_phase(&mut self, phase: Phase, now_ns: TimeNs) {
         if self.phase != phase {
             self.phase = phase;
             self.phase_since_ns = now_ns;
         }
     }
 
-    fn turning(&mut self, tick: &Tick<'_>) -> Detected {
+    fn judge_turning_spindle(&mut self, tick: &Tick<'_>) -> Detected {
         let now_ns = tick.inputs.at_ns;
         if self.phase == Phase::Rest {
-            self.enter(Phase::Starting, now_ns);
+            self.enter_phase(Phase::Starting, now_ns);
         }
-        match tick.signals.steady(self.pace(tick), tick.settings) {
+        match tick.signals.is_speed_steady(self.select_pace(tick), tick.settings) {
             Some(true) => {}
             Some(false) => {
                 if self.phase != Phase::Starting {
-                    self.enter(Phase::Changing, now_ns);
+                    self.enter_phase(Phase::Changing, now_ns);
                 }
                 self.evidence.clear();
-                return self.pending(tick);
+                return self.judge_unsettled_spindle(tick);
             }
             None if self.phase == Phase::Settled => {}
-            None => return self.pending(tick),
+            None => return self.judge_unsettled_spindle(tick),
         }
         match (tick.inputs.basis, self.phase) {
-            (StateBasis::Motion, _) => self.moving(tick),
-            (_, Phase::Settled) => self.loaded(tick),
-            _ => self.settle(tick),
+            (StateBasis::Motion, _) => self.judge_unmeasured_load(tick),
+            (_, Phase::Settled) => self.judge_settled_load(tick),
+            _ => self.attempt_settling(tick),
         }
     }
 
     /// A steady spindle whose load nobody measures.
-    fn moving(&mut self, tick: &Tick<'_>) -> Detected {
+    fn judge_unmeasured_load(&mut self, tick: &Tick<'_>) -> Detected {
         if self.phase != Phase::Settled {
-            self.enter(Phase::Settled, tick.inputs.at_ns);
+            self.enter_phase(Phase::Settled, tick.inputs.at_ns);
             self.settled_speed = None;
         }
-        match tick.feed() {
-            Feed::Off => verdict(State::Idle),
-            _ if tick.inputs.rapid => verdict(State::Rapid),
-            _ => unknown(NoEstimate::NoLoadMeasured),
+        match tick.classify_feed() {
+            Feed::Off => report_state(State::Idle),
+            _ if tick.inputs.rapid => report_state(State::Rapid),
+            _ => report_unknown(NoEstimate::NoLoadMeasured),
         }
     }
 
-    fn pace(&self, tick: &Tick<'_>) -> Pace {
+    fn select_pace(&self, tick: &Tick<'_>) -> Pace {
         match self.phase {
-            Phase::Settled if self.state == State::Cutting && tick.feed() != Feed::Off => Pace::Cutting,
+            Phase::Settled if self.state == State::Cutting && tick.classify_feed() != Feed::Off => Pace::Cutting,
             Phase::Settled => Pace::Idling,
             _ => Pace::Settling,
         }
@@ -241,30 +241,31 @@ impl Detector {
             return;
         }
         if let Some((then_ns, before)) = self.settled_speed.replace((now_ns, speed)) {
-            let pause_s = seconds(then_ns, now_ns);
+            let pause_s = seconds_between(then_ns, now_ns);
             let allowed_rpm = HIDDEN_CHANGE * speed.abs().max(before.abs());
             if (speed - before).abs() > allowed_rpm || pause_s > HIDDEN_STOP_S {
-                self.enter(Phase::Changing, now_ns);
+                self.enter_phase(Phase::Changing, now_ns);
                 self.evidence.clear();
             }
         }
     }
 
     /// Not settled yet.
-    fn pending(&self, tick: &Tick<'_>) -> Detected {
-        let overdue = tick.no_load.is_err() && seconds(self.phase_since_ns, tick.inputs.at_ns) > SETTLING_LIMIT_S;
+    fn judge_unsettled_spindle(&self, tick: &Tick<'_>) -> Detected {
+        let overdue =
+            tick.no_load.is_err() && seconds_between(self.phase_since_ns, tick.inputs.at_ns) > SETTLING_LIMIT_S;
         match self.phase {
-            Phase::Starting if !overdue || tick.feed() == Feed::Off => verdict(State::SpindleStart),
-            Phase::Changing if !overdue || tick.feed() == Feed::Off => verdict(State::SpeedChange),
-            _ => unknown(tick.no_load.err().unwrap_or(NoEstimate::NotSettled)),
+            Phase::Starting if !overdue || tick.classify_feed() == Feed::Off => report_state(State::SpindleStart),
+            Phase::Changing if !overdue || tick.classify_feed() == Feed::Off => report_state(State::SpeedChange),
+            _ => report_unknown(tick.no_load.err().unwrap_or(NoEstimate::NotSettled)),
         }
     }
 
-    fn settle(&mut self, tick: &Tick<'_>) -> Detected {
-        let Some(filtered_w) = tick.filtered_w else { return self.pending(tick) };
+    fn attempt_settling(&mut self, tick: &Tick<'_>) -> Detected {
+        let Some(filtered_w) = tick.filtered_w else { return self.judge_unsettled_spindle(tick) };
         let agreement_w = tick.signals.agreement_w(filtered_w, tick.settings);
-        let means = tick.signals.window.stationary(agreement_w, tick.settings);
-        let fed = tick.feed() != Feed::Off;
+        let means = tick.signals.window.find_stationary_means(agreement_w, tick.settings);
+        let fed = tick.classify_feed() != Feed::Off;
         let settled_at_w = match tick.no_load {
             Ok(known) => {
                 let widest_w = (WIDEST_BAND * known.power_w).max(tick.signals.noise.resolution_w());
@@ -272,9 +273,9 @@ impl Detector {
                 let at_known = known.is_estimate() && (filtered_w - known.power_w).abs() <= band_w;
                 // A cut can be too rough to be stationary: under feed it is enough that the start-up no longer decays.
                 let above = filtered_w > known.power_w;
-                let under_load = fed && above && tick.signals.window.falling(agreement_w) == Some(false);
+                let under_load = fed && above && tick.signals.window.is_falling(agreement_w) == Some(false);
                 if !(at_known || means.is_some() || under_load) {
-                    return self.pending(tick);
+                    return self.judge_unsettled_spindle(tick);
                 }
                 let unmeasured = !fed && known.origin != NoLoadOrigin::Measured && !at_known;
                 means.filter(|_| unmeasured).map(Means::lower_w)
@@ -282,31 +283,31 @@ impl Detector {
             Err(_) => match means {
                 Some(means) if !fed => Some(means.lower_w()),
                 Some(means) if self.phase == Phase::Starting => Some(tick.signals.least_level_w(means, tick.settings)),
-                _ => return self.pending(tick),
+                _ => return self.judge_unsettled_spindle(tick),
             },
         };
-        self.enter(Phase::Settled, tick.inputs.at_ns);
+        self.enter_phase(Phase::Settled, tick.inputs.at_ns);
         self.settled_speed = None;
         self.evidence.clear();
-        Detected { settled_at_w, ..self.loaded(tick) }
+        Detected { settled_at_w, ..self.judge_settled_load(tick) }
     }
 
-    fn loaded(&mut self, tick: &Tick<'_>) -> Detected {
-        self.weigh(tick);
+    fn judge_settled_load(&mut self, tick: &Tick<'_>) -> Detected {
+        self.accumulate_evidence(tick);
         let full = tick.settings.cutting_evidence;
-        let rested = seconds(self.since_ns, tick.inputs.at_ns) >= tick.settings.dwell_s;
-        match tick.feed() {
-            Feed::Off => verdict(State::Idle),
-            _ if tick.inputs.rapid => verdict(State::Rapid),
+        let rested = seconds_between(self.since_ns, tick.inputs.at_ns) >= tick.settings.dwell_s;
+        match tick.classify_feed() {
+            Feed::Off => report_state(State::Idle),
+            _ if tick.inputs.rapid => report_state(State::Rapid),
             _ => match (tick.no_load, self.state) {
-                (Err(_), _) if self.just_settled(tick) => verdict(State::Idle),
-                (Err(reason), _) => unknown(reason),
-                (Ok(_), State::Cutting) if !(rested && self.evidence.none()) => verdict(State::Cutting),
-                (Ok(_), State::Cutting) => verdict(State::Idle),
-                (Ok(_), before) if self.evidence.full(full) && (rested || before != State::Idle) => {
-                    verdict(State::Cutting)
+                (Err(_), _) if self.just_settled(tick) => report_state(State::Idle),
+                (Err(reason), _) => report_unknown(reason),
+                (Ok(_), State::Cutting) if !(rested && self.evidence.is_exhausted()) => report_state(State::Cutting),
+                (Ok(_), State::Cutting) => report_state(State::Idle),
+                (Ok(_), before) if self.evidence.is_sufficient(full) && (rested || before != State::Idle) => {
+                    report_state(State::Cutting)
                 }
-                _ => verdict(State::Idle),
+                _ => report_state(State::Idle),
             },
         }
     }
@@ -315,7 +316,7 @@ impl Detector {
         self.phase_since_ns == tick.inputs.at_ns
     }
 
-    fn weigh(&mut self, tick: &Tick<'_>) {
+    fn accumulate_evidence(&mut self, tick: &Tick<'_>) {
         let (Ok(power_w), Ok(no_load), Some(on_w)) = (tick.inputs.power, tick.no_load, tick.visible_excess_w()) else {
             self.evidence.clear();
             return;
@@ -336,10 +337,10 @@ impl Detector {
     }
 }
 
-fn verdict(state: State) -> Detected {
+fn report_state(state: State) -> Detected {
     Detected { state, because: None, settled_at_w: None }
 }
 
-fn unknown(reason: NoEstimate) -> Detected {
+fn report_unknown(reason: NoEstimate) -> Detected {
     Detected { state: State::Unknown, because: Some(reason), settled_at_w: None }
 }

@@ -83,7 +83,7 @@ pub enum NoEstimate {
 }
 
 impl NoEstimate {
-    /// Every word of [`NoEstimate::word`].
+    /// Every word of [`NoEstimate::as_word`].
     pub const WORDS: [&'static str; 24] = [
         "not_yet",
         "input_missing",
@@ -113,7 +113,7 @@ impl NoEstimate {
 
     /// The word used in `<quantity>_missing` columns, JSON and SQL.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::NotYet => "not_yet",
             Self::Input { .. } => "input_missing",
@@ -213,7 +213,7 @@ impl NoLoadOrigin {
 
     /// The word used in SQL, scripts, JSON and CSV.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::None => "none",
             Self::Measured => "measured",
@@ -244,7 +244,7 @@ impl Visibility {
 
     /// The word used in SQL, scripts, JSON and CSV.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::NotAsked => "not_asked",
             Self::Visible => "visible",
@@ -312,7 +312,7 @@ pub struct Estimates {
 impl Estimates {
     /// Before the first sample.
     #[must_use]
-    pub fn none(at_ns: TimeNs) -> Self {
+    pub fn without_samples(at_ns: TimeNs) -> Self {
         Self {
             at_ns,
             state: State::Unknown,
@@ -338,12 +338,12 @@ impl Estimates {
             visibility: Visibility::NotAsked,
             gear_stage: 0,
             loads: Loads::none(NoEstimate::NotYet),
-            part: PartFigures::none(),
+            part: PartFigures::without_parts(),
         }
     }
 
     /// Every quantity with its name (which ends in the unit), for scripts, storage and HTTP.
-    pub fn quantities(&self) -> [(&'static str, Estimated); 11] {
+    pub fn list_quantities(&self) -> [(&'static str, Estimated); 11] {
         [
             ("filtered_power_w", self.filtered_power_w),
             ("no_load_power_w", self.no_load_power_w),
@@ -373,7 +373,7 @@ impl Estimates {
 
     /// Is the no-load power extrapolated beyond the learned speeds?
     #[must_use]
-    pub fn extrapolated(&self) -> bool {
+    pub fn is_extrapolated(&self) -> bool {
         self.no_load_origin == NoLoadOrigin::Extrapolated
     }
 }

@@ -25,13 +25,13 @@ impl Evidence {
 
     /// Enough for load.
     #[must_use]
-    pub fn full(&self, full: f64) -> bool {
+    pub fn is_sufficient(&self, full: f64) -> bool {
         self.sum >= full
     }
 
     /// None left.
     #[must_use]
-    pub fn none(&self) -> bool {
+    pub fn is_exhausted(&self) -> bool {
         self.sum <= 0.0
     }
 
@@ -49,7 +49,7 @@ mod tests {
         let mut evidence = Evidence::default();
         (1..1000).find(|_| {
             evidence.add(excess, 3.0, 2.0, 5.0);
-            evidence.full(5.0)
+            evidence.is_sufficient(5.0)
         })
     }
 
@@ -63,7 +63,7 @@ mod tests {
         let mut evidence = Evidence::default();
         for excess in [0.0, 1e9, 1e9, 0.0, 0.0, 1e9, 1e9, 0.0] {
             evidence.add(excess, 3.0, 2.0, 5.0);
-            assert!(!evidence.full(5.0));
+            assert!(!evidence.is_sufficient(5.0));
         }
     }
 }

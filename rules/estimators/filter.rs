@@ -5,7 +5,7 @@
 //! One pulse in the window is removed exactly, two leak. The sums are formed anew every time: a running sum would drift.
 //! Values that are missing must not be pushed; the delay is that of a plain mean, (N - 1)/2 samples.
 
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use serde::{Deserialize, Serialize};
 
 /// The last N values and their anti-pulse mean.
@@ -54,7 +54,7 @@ impl AntiPulse {
     /// 0.322 for N = 10 (a fit within 1 % to the exact order statistics).
     #[must_use]
     pub fn noise_gain(&self) -> f64 {
-        let n = count(self.length);
+        let n = count_to_f64(self.length);
         (1.0 + 1.16 / n.powf(1.81)) / n.sqrt()
     }
 }
@@ -67,7 +67,7 @@ fn trimmed_mean(values: &[f64]) -> f64 {
         least = least.min(*value);
         greatest = greatest.max(*value);
     }
-    (sum - least - greatest) / count(values.len() - 2)
+    (sum - least - greatest) / count_to_f64(values.len() - 2)
 }
 
 #[cfg(test)]

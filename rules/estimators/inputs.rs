@@ -49,57 +49,57 @@ pub(super) struct TickInputs {
 impl InputChannels {
     pub(super) fn new() -> Self {
         Self {
-            power: ChannelId::of("spindle_power_w"),
-            total: ChannelId::of("total_power_w"),
-            speed: ChannelId::of("spindle_speed_rpm"),
-            feed: ChannelId::of("feed_mm_min"),
-            rapid: ChannelId::of("rapid"),
-            stage: ChannelId::of("gear_stage"),
-            voltage: ChannelId::of("supply_voltage_v"),
+            power: ChannelId::from_name("spindle_power_w"),
+            total: ChannelId::from_name("total_power_w"),
+            speed: ChannelId::from_name("spindle_speed_rpm"),
+            feed: ChannelId::from_name("feed_mm_min"),
+            rapid: ChannelId::from_name("rapid"),
+            stage: ChannelId::from_name("gear_stage"),
+            voltage: ChannelId::from_name("supply_voltage_v"),
         }
     }
 
     /// Reads the inputs. Without a channel for spindle power, total power above its standby level stands for it.
     pub(super) fn read(&self, sample: &Sample, standby_w: Option<f64>, settings: &Settings) -> TickInputs {
-        let total = number(sample, self.total);
-        let feed = number(sample, self.feed);
-        let basis = StateBasis::of(sample);
-        let stand_in = basis.stand_in().map(|(name, parts)| (ChannelId::of(name), parts));
-        let power = match (number(sample, self.power), total, standby_w, stand_in) {
-            (_, _, _, Some((channel, parts))) => number(sample, channel).map(|value| value.abs() * parts),
+        let total = read_number(sample, self.total);
+        let feed = read_number(sample, self.feed);
+        let basis = StateBasis::from_sample(sample);
+        let stand_in = basis.stand_in().map(|(name, parts)| (ChannelId::from_name(name), parts));
+        let power = match (read_number(sample, self.power), total, standby_w, stand_in) {
+            (_, _, _, Some((channel, parts))) => read_number(sample, channel).map(|value| value.abs() * parts),
             (Err(Absence::NotProvided), Ok(total), Some(standby_w), None) => Ok(total - standby_w),
             (power, ..) => power,
         };
-        let flagged = number(sample, self.rapid).is_ok_and(|rapid| rapid > 0.5);
+        let flagged = read_number(sample, self.rapid).is_ok_and(|rapid| rapid > 0.5);
         let fast = settings.rapid_feed_mm_min > 0.0 && feed.is_ok_and(|feed| feed > settings.rapid_feed_mm_min);
         TickInputs {
             at_ns: sample.at_ns,
             basis,
             power,
             total,
-            speed: number(sample, self.speed),
+            speed: read_number(sample, self.speed),
             feed,
             rapid: flagged || fast,
-            stage: stage(number(sample, self.stage)),
-            voltage: number(sample, self.voltage),
+            stage: to_gear_stage(read_number(sample, self.stage)),
+            voltage: read_number(sample, self.voltage),
             supply_log: 0.0,
             by_voltage_w: 0.0,
         }
     }
 }
 
-fn number(sample: &Sample, channel: Option<ChannelId>) -> Input {
+fn read_number(sample: &Sample, channel: Option<ChannelId>) -> Input {
     let channel = channel.ok_or(Absence::NotProvided)?;
     let number = sample.number(channel)?;
-    if channel.channel().holds(number) { Ok(number) } else { Err(Absence::OutOfRange) }
+    if channel.channel().accepts_number(number) { Ok(number) } else { Err(Absence::OutOfRange) }
 }
 
-fn stage(number: Input) -> Result<usize, Absence> {
+fn to_gear_stage(number: Input) -> Result<usize, Absence> {
     match number {
         Err(Absence::NotProvided) => Ok(0),
         Err(absence) => Err(absence),
-        Ok(number) => {
-            (0..STAGES).find(|stage| (number - crate::statistics::count(*stage)).abs() < 0.5).ok_or(Absence::OutOfRange)
-        }
+        Ok(number) => (0..STAGES)
+            .find(|stage| (number - crate::statistics::count_to_f64(*stage)).abs() < 0.5)
+            .ok_or(Absence::OutOfRange),
     }
 }

@@ -27,7 +27,7 @@ const NOISE_GAIN_OUTSIDE: f64 = 3.0 + 1e-9;
 
 /// Weights of the quadratic through three distinct speeds, at `speed_rpm`.
 #[must_use]
-pub fn lagrange(speeds_rpm: [f64; 3], speed_rpm: f64) -> [f64; 3] {
+pub fn lagrange_weights(speeds_rpm: [f64; 3], speed_rpm: f64) -> [f64; 3] {
     let [a, b, c] = speeds_rpm;
     let n = speed_rpm;
     [
@@ -45,7 +45,7 @@ pub fn noise_gain(weights: &[f64]) -> f64 {
 
 /// Position of the first of the three adjacent speeds to use, among at least three ascending ones.
 #[must_use]
-pub fn triple(speeds_rpm: &[f64], speed_rpm: f64) -> usize {
+pub fn select_adjacent_speeds(speeds_rpm: &[f64], speed_rpm: f64) -> usize {
     let distance = |first: usize| speeds_rpm[first..first + 3].iter().map(|s| (s - speed_rpm).abs()).sum::<f64>();
     let mut best = 0;
     for first in 1..speeds_rpm.len().saturating_sub(2) {
@@ -64,52 +64,52 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    pub(super) fn one(at: usize, weight: f64) -> Self {
+    pub(super) fn from_single_speed(at: usize, weight: f64) -> Self {
         Self { at: [at; 3], weight: [weight, 0.0, 0.0] }
     }
 
-    fn line(speeds_rpm: &[f64], first: usize, n: f64) -> Self {
-        Self::through(speeds_rpm, [first, first + 1], n)
+    fn from_interval(speeds_rpm: &[f64], first: usize, n: f64) -> Self {
+        Self::from_speed_pair(speeds_rpm, [first, first + 1], n)
     }
 
-    fn through(speeds_rpm: &[f64], [first, second]: [usize; 2], n: f64) -> Self {
+    fn from_speed_pair(speeds_rpm: &[f64], [first, second]: [usize; 2], n: f64) -> Self {
         let (a, b) = (speeds_rpm[first], speeds_rpm[second]);
         let share = (n - a) / (b - a);
         Self { at: [first, second, first], weight: [1.0 - share, share, 0.0] }
     }
 
-    fn quadratic(speeds_rpm: &[f64], first: usize, n: f64) -> Self {
+    fn from_speed_triple(speeds_rpm: &[f64], first: usize, n: f64) -> Self {
         let three = [speeds_rpm[first], speeds_rpm[first + 1], speeds_rpm[first + 2]];
-        Self { at: [first, first + 1, first + 2], weight: lagrange(three, n) }
+        Self { at: [first, first + 1, first + 2], weight: lagrange_weights(three, n) }
     }
 
-    pub(super) fn calm(&self) -> bool {
+    pub(super) fn is_noise_bounded(&self) -> bool {
         noise_gain(&self.weight) <= INSIDE_GAIN_LIMIT
     }
 
-    pub(super) fn of(&self, powers_w: &[f64]) -> f64 {
+    pub(super) fn weigh_powers(&self, powers_w: &[f64]) -> f64 {
         self.at.iter().zip(self.weight).map(|(at, weight)| powers_w[*at] * weight).sum()
     }
 }
 
 impl StagePowers {
     /// Weights for `n` and those of another form, whose difference is the doubt in the interpolation itself.
-    pub(super) fn forms(&self, n: f64) -> Option<(Weights, Weights)> {
+    pub(super) fn compute_weight_pair(&self, n: f64) -> Option<(Weights, Weights)> {
         let speeds = &self.speeds_rpm;
         let interval = speeds.partition_point(|known| *known < n).saturating_sub(1).min(self.len().checked_sub(2)?);
-        let line = Weights::line(speeds, interval, n);
+        let line = Weights::from_interval(speeds, interval, n);
         if self.len() == 2 {
             return Some((line, self.by_law(n)));
         }
-        if !self.inside(n) {
+        if !self.covers_speed(n) {
             return self.outside_forms(n);
         }
         // Both triples that hold the interval, the nearer one first; a tie goes to the slower speeds.
         let last = self.len() - 3;
         let (low, high) = (interval.saturating_sub(1), interval.min(last));
-        let nearer = low + triple(&speeds[low..high + 3], n);
+        let nearer = low + select_adjacent_speeds(&speeds[low..high + 3], n);
         let further = low + high - nearer;
-        let calm = |first: usize| Some(Weights::quadratic(speeds, first, n)).filter(Weights::calm);
+        let calm = |first: usize| Some(Weights::from_speed_triple(speeds, first, n)).filter(Weights::is_noise_bounded);
         match (calm(nearer), calm(further).filter(|_| further != nearer)) {
             (Some(quadratic), other) => Some((quadratic, other.unwrap_or(line))),
             (None, Some(quadratic)) => Some((quadratic, line)),
@@ -131,23 +131,24 @@ impl StagePowers {
             })
         };
         let Some(second) = next(first) else {
-            return Some((Weights::quadratic(speeds, triple(speeds, n), n), self.by_law(n)));
+            return Some((Weights::from_speed_triple(speeds, select_adjacent_speeds(speeds, n), n), self.by_law(n)));
         };
-        let line = Weights::through(speeds, [first, second], n);
+        let line = Weights::from_speed_pair(speeds, [first, second], n);
         let quadratic = match next(second) {
-            Some(third) => {
-                Weights { at: [first, second, third], weight: lagrange([first, second, third].map(|at| speeds[at]), n) }
-            }
-            None => Weights::quadratic(speeds, triple(speeds, n), n),
+            Some(third) => Weights {
+                at: [first, second, third],
+                weight: lagrange_weights([first, second, third].map(|at| speeds[at]), n),
+            },
+            None => Weights::from_speed_triple(speeds, select_adjacent_speeds(speeds, n), n),
         };
-        if noise_gain(&quadratic.weight) > NOISE_GAIN_OUTSIDE && line.calm() {
+        if noise_gain(&quadratic.weight) > NOISE_GAIN_OUTSIDE && line.is_noise_bounded() {
             return Some((line, self.by_law(n)));
         }
         Some((quadratic, line))
     }
 
     /// Position of the known speed nearest in ratio, and the logarithm of that ratio.
-    pub(super) fn nearest(&self, n: f64) -> Option<(usize, f64)> {
+    pub(super) fn find_nearest_speed(&self, n: f64) -> Option<(usize, f64)> {
         let distance = |at: usize| (self.speeds_rpm[at] / n).ln().abs();
         let ratios = (0..self.len()).map(|at| (at, distance(at)));
         ratios.min_by(|(_, a), (_, b)| a.total_cmp(b))
@@ -155,15 +156,15 @@ impl StagePowers {
 
     /// A power law through the nearest known power, with the exponent that the slowest and fastest known speeds show.
     pub(super) fn by_law(&self, n: f64) -> Weights {
-        let Some((nearest, _)) = self.nearest(n) else { return Weights::one(0, 0.0) };
+        let Some((nearest, _)) = self.find_nearest_speed(n) else { return Weights::from_single_speed(0, 0.0) };
         let last = self.len() - 1;
         let span = (self.speeds_rpm[last] / self.speeds_rpm[0]).ln();
         let shown = (self.powers_w[last] / self.powers_w[0]).ln() / span;
         let exponent = if span > EXPONENT_SPAN { shown.clamp(0.5, 2.5) } else { EXPONENT };
-        Weights::one(nearest, (n / self.speeds_rpm[nearest]).powf(exponent))
+        Weights::from_single_speed(nearest, (n / self.speeds_rpm[nearest]).powf(exponent))
     }
 
-    pub(super) fn inside(&self, n: f64) -> bool {
+    pub(super) fn covers_speed(&self, n: f64) -> bool {
         self.speeds_rpm.first().is_some_and(|first| *first <= n)
             && self.speeds_rpm.last().is_some_and(|last| n <= *last)
     }
@@ -185,26 +186,26 @@ mod tests {
         let speeds = [1200.0, 1230.0, 1260.0, 1300.0, 1600.0];
         let known = stage(&speeds.map(|speed| (speed, speed / 2.0)));
         for n in [1100.0, 1215.0, 1245.0, 1280.0, 1350.0, 1450.0, 1550.0] {
-            let (weights, other) = known.forms(n).expect("five speeds");
+            let (weights, other) = known.compute_weight_pair(n).expect("five speeds");
             assert!(noise_gain(&weights.weight) <= INSIDE_GAIN_LIMIT, "{n}: {weights:?}");
-            assert!((weights.of(&known.powers_w) - n / 2.0).abs() < 1e-9, "{n}: a straight line stays one");
-            assert!(other.of(&known.powers_w) > 0.0);
+            assert!((weights.weigh_powers(&known.powers_w) - n / 2.0).abs() < 1e-9, "{n}: a straight line stays one");
+            assert!(other.weigh_powers(&known.powers_w) > 0.0);
         }
-        let (far, _) = known.forms(1000.0).expect("five speeds");
+        let (far, _) = known.compute_weight_pair(1000.0).expect("five speeds");
         assert!(noise_gain(&far.weight) > 3.0, "too far for a straight line: the table refuses");
     }
 
     #[test]
     fn the_triple_holds_the_speed_between_its_own() {
         let known = stage(&[(1200.0, 700.0), (1240.0, 710.0), (1280.0, 720.0), (1600.0, 1000.0)]);
-        let (weights, _) = known.forms(1330.0).expect("four speeds");
+        let (weights, _) = known.compute_weight_pair(1330.0).expect("four speeds");
         let used: Vec<f64> = weights.at.iter().map(|at| known.speeds_rpm[*at]).collect();
         assert!(used.contains(&1280.0) && used.contains(&1600.0), "{used:?}");
     }
 
     #[test]
     fn one_speed_serves_only_itself() {
-        assert!(stage(&[(600.0, 400.0)]).forms(700.0).is_none());
-        assert!(stage(&[]).forms(700.0).is_none());
+        assert!(stage(&[(600.0, 400.0)]).compute_weight_pair(700.0).is_none());
+        assert!(stage(&[]).compute_weight_pair(700.0).is_none());
     }
 }

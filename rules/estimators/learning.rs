@@ -13,8 +13,8 @@ use super::estimate::NoLoadOrigin;
 use super::no_load::{NoLoad, NoLoadPoint};
 use super::noise::RelativeVariances;
 use super::settings::Settings;
-use super::signals::{length, seconds};
-use crate::statistics::count;
+use super::signals::{seconds_between, to_window_length};
+use crate::statistics::count_to_f64;
 use adapters::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -65,7 +65,7 @@ pub(super) struct Observation {
 
 impl Observation {
     /// Settled for certain: it agrees with the block before it, or comes from rapid traverse alone.
-    pub(super) fn settled(&self) -> bool {
+    pub(super) fn is_settled(&self) -> bool {
         self.confirmed || self.rapid
     }
 }
@@ -141,7 +141,7 @@ impl IdleBlock {
     fn clear_if_other(&mut self, tick: &IdleTick) {
         let other = self.first.is_some_and(|first| {
             let moved = (tick.speed_rpm.abs() - first.speed_rpm.abs()).abs() > SAME_SPEED * first.speed_rpm.abs();
-            let pause_s = seconds(first.at_ns, tick.at_ns);
+            let pause_s = seconds_between(first.at_ns, tick.at_ns);
             moved || tick.stage != first.stage || !(0.0..=BLOCK_LASTS_S).contains(&pause_s)
         });
         if other {
@@ -158,7 +158,7 @@ impl IdleBlock {
     /// Takes a tick and yields the observation of a full block.
     fn push(&mut self, tick: IdleTick, noise: &RelativeVariances) -> Option<Observation> {
         self.clear_if_other(&tick);
-        self.broken |= seconds(self.last_ns, tick.at_ns) > PAUSE_S;
+        self.broken |= seconds_between(self.last_ns, tick.at_ns) > PAUSE_S;
         self.last_ns = tick.at_ns;
         let first = *self.first.get_or_insert(tick);
         self.powers_w.push(tick.power_w);
@@ -168,13 +168,13 @@ impl IdleBlock {
             return None;
         }
         let power_w = mean_between(&mut self.powers_w, self.quantiles);
-        let seen = self.observe(power_w, first, tick.at_ns, noise);
+        let seen = self.build_observation(power_w, first, tick.at_ns, noise);
         self.clear();
         self.first = Some(IdleTick { at_ns: tick.at_ns, ..first });
         seen
     }
 
-    fn observe(
+    fn build_observation(
         &mut self,
         power_w: f64,
         first: IdleTick,
@@ -185,7 +185,7 @@ impl IdleBlock {
         let settling_w = (self.blocks > 0).then(|| power_w - self.means_w[0]);
         // Rounding does not average out of a level that stands still.
         let rounding_w = ROUNDED * noise.resolution_w();
-        let variance = MIDDLE_HALF * noise_w * noise_w / count(self.length)
+        let variance = MIDDLE_HALF * noise_w * noise_w / count_to_f64(self.length)
             + rounding_w * rounding_w
             + settling_w.map_or(0.0, |w| w * w / 2.0)
             + 1e-6 * power_w * power_w;
@@ -194,7 +194,7 @@ impl IdleBlock {
         self.unbroken = if std::mem::take(&mut self.broken) { 0 } else { self.unbroken + 1 };
         let point = NoLoadPoint { stage: first.stage, speed_rpm: first.speed_rpm.abs(), power_w };
         let agreement_w = (AGREEMENT * power_w).max(0.5 * noise.resolution_w());
-        let supply_log = self.supply_logs / count(self.length);
+        let supply_log = self.supply_logs / count_to_f64(self.length);
         let confirmed = settling_w.is_some_and(|w| w.abs() <= agreement_w);
         let seen = Observation { point, sd_w: variance.sqrt(), at_ns, confirmed, rapid: self.rapid, supply_log };
         (power_w > 0.0).then_some(seen)
@@ -203,63 +203,68 @@ impl IdleBlock {
 
 impl Learner {
     pub(super) fn new(settings: &Settings) -> Self {
-        let length = length(settings.window_samples);
+        let length = to_window_length(settings.window_samples);
         let (idle, fed) = (IdleBlock::new(length, MIDDLE), IdleBlock::new((3 * length / 4).max(5), UPPER));
         Self { idle, fed, waiting: VecDeque::with_capacity(WAITING), above_since_ns: None }
     }
 
     /// The spindle no longer idles: what has not been confirmed is dropped.
-    pub(super) fn stop(&mut self) {
+    pub(super) fn discard_unconfirmed(&mut self) {
         self.waiting.clear();
         self.above_since_ns = None;
     }
 
     /// A cut: what is being collected under feed is spoilt.
-    pub(super) fn cut(&mut self) {
-        self.stop();
+    pub(super) fn discard_feed_block(&mut self) {
+        self.discard_unconfirmed();
         self.fed.clear();
     }
 
     /// Nothing collected so far can be relied upon.
-    pub(super) fn forget(&mut self) {
-        self.stop();
+    pub(super) fn discard_collected(&mut self) {
+        self.discard_unconfirmed();
         self.idle.clear();
         self.fed.clear();
     }
 
     /// Takes a tick of idle power with the feed off or in rapid traverse; yields an observation to learn.
-    pub(super) fn idle(
+    pub(super) fn observe_idle_power(
         &mut self,
         tick: IdleTick,
         known: Option<NoLoad>,
         noise: &mut RelativeVariances,
         settings: &Settings,
     ) -> Option<Observation> {
-        let tick = if tick.rapid { Some(tick) } else { self.wait(tick, settings) };
+        let tick = if tick.rapid { Some(tick) } else { self.delay_tick(tick, settings) };
         self.fed.clear();
         let seen = self.idle.push(tick?, noise)?;
         if let Some(blocks_w) = self.idle.last_three_w() {
-            noise.push_blocks(blocks_w, count(self.idle.length));
+            noise.push_blocks(blocks_w, count_to_f64(self.idle.length));
         }
-        self.plausible(&seen, known, settings).then_some(seen)
+        self.is_plausible(&seen, known, settings).then_some(seen)
     }
 
     /// Through the queue: a tick comes out when it is as old as the guard time.
-    fn wait(&mut self, tick: IdleTick, settings: &Settings) -> Option<IdleTick> {
+    fn delay_tick(&mut self, tick: IdleTick, settings: &Settings) -> Option<IdleTick> {
         if self.waiting.len() == WAITING {
             self.waiting.pop_front();
         }
         self.waiting.push_back(tick);
-        let ripe = |oldest: &&IdleTick| seconds(oldest.at_ns, tick.at_ns) >= settings.learn_guard_s;
+        let ripe = |oldest: &&IdleTick| seconds_between(oldest.at_ns, tick.at_ns) >= settings.learn_guard_s;
         self.waiting.front().filter(ripe)?;
         self.waiting.pop_front()
     }
 
     /// Takes a tick of power under feed: no-load power cannot be above it. Yields an observation where it lies clearly
     /// below what is known. A block begins with the feed, so that the first holds the approach alone.
-    pub(super) fn fed(&mut self, tick: IdleTick, known: NoLoad, noise: &RelativeVariances) -> Option<Observation> {
+    pub(super) fn observe_power_under_feed(
+        &mut self,
+        tick: IdleTick,
+        known: NoLoad,
+        noise: &RelativeVariances,
+    ) -> Option<Observation> {
         let seen = self.fed.push(tick, noise)?;
-        let noise_w = noise.sd() * seen.point.power_w * (MIDDLE_HALF / count(self.fed.length)).sqrt();
+        let noise_w = noise.sd() * seen.point.power_w * (MIDDLE_HALF / count_to_f64(self.fed.length)).sqrt();
         let below_w = known.power_w - seen.point.power_w;
         // Far below is no drift: a spindle that brakes, or a meter that fails.
         let near = known.origin != NoLoadOrigin::Measured || below_w < FAR_BELOW * known.power_w;
@@ -267,7 +272,7 @@ impl Learner {
             return None;
         }
         let before = Normal { mean: known.power_w, sd: known.sd_w };
-        let after = bound::below(before, seen.point.power_w, noise_w);
+        let after = bound::condition_on_upper_bound(before, seen.point.power_w, noise_w);
         // A speed that is known already is updated, any other is taken over as it is.
         let Normal { mean, sd } =
             if known.origin == NoLoadOrigin::Measured { bound::as_measurement(before, after) } else { after };
@@ -275,7 +280,7 @@ impl Learner {
         (mean > 0.0).then_some(Observation { point, sd_w: sd, ..seen })
     }
 
-    fn plausible(&mut self, seen: &Observation, known: Option<NoLoad>, settings: &Settings) -> bool {
+    fn is_plausible(&mut self, seen: &Observation, known: Option<NoLoad>, settings: &Settings) -> bool {
         // What is known of other speeds says too little to contradict a settled power at this one. Rapid traverse is short,
         // so one block of it is enough: a start-up that still decayed is corrected from above.
         let Some(known) = known.filter(|known| known.origin == NoLoadOrigin::Measured) else {
@@ -288,7 +293,7 @@ impl Learner {
             return above_w >= -limit_w || seen.confirmed;
         }
         let since = *self.above_since_ns.get_or_insert(seen.at_ns);
-        seen.rapid && seen.confirmed || seconds(since, seen.at_ns) >= settings.relearn_up_s
+        seen.rapid && seen.confirmed || seconds_between(since, seen.at_ns) >= settings.relearn_up_s
     }
 }
 
@@ -296,9 +301,9 @@ impl Learner {
 fn mean_between(values: &mut [f64], (low, high): (f64, f64)) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let n = values.len();
-    let at = |quantile: f64| length(quantile * count(n) + 0.5).min(n);
+    let at = |quantile: f64| to_window_length(quantile * count_to_f64(n) + 0.5).min(n);
     let kept = values.get(at(low)..at(high)).filter(|kept| !kept.is_empty()).unwrap_or(values);
-    kept.iter().sum::<f64>() / count(kept.len().max(1))
+    kept.iter().sum::<f64>() / count_to_f64(kept.len().max(1))
 }
 
 #[cfg(test)]

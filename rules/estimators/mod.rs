@@ -1,6 +1,6 @@
 //! What is inferred: machine state, no-load power, cutting power, load loss, and what is too small to be seen.
 //!
-//! [`Inference::infer`] takes one [`adapters::Sample`] per tick and yields [`Estimates`]. Every tolerance and length is a
+//! [`Inference::update_with_sample`] takes one [`adapters::Sample`] per tick and yields [`Estimates`]. Every tolerance and length is a
 //! row of [`SETTINGS`]. Nothing here reads a clock: time is that of the sample.
 //!
 //! | file | what |
@@ -57,13 +57,13 @@ mod window;
 
 pub use basis::StateBasis;
 pub use evidence::Evidence;
-pub use window::{Means, PowerWindow, stationary};
+pub use window::{Means, PowerWindow, is_stationary};
 
-pub use cutting::{Balance, LoadLossLaw, balance};
+pub use cutting::{Balance, LoadLossLaw, solve_power_balance};
 pub use estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
 pub use filter::AntiPulse;
 pub use inference::{Inference, RestoreError};
-pub use interpolation::{lagrange, noise_gain, triple};
+pub use interpolation::{lagrange_weights, noise_gain, select_adjacent_speeds};
 pub use no_load::{NoLoad, NoLoadPoint, NoLoadTable};
 pub use part::PartFigures;
 pub use settings::{SETTINGS, SPEEDS_PER_STAGE, STAGES, Setting, SettingError, Settings};

@@ -9,7 +9,7 @@
 use super::estimate::{NoEstimate, NoLoadOrigin};
 use super::interpolation::{Weights, noise_gain};
 use super::settings::{SPEEDS_PER_STAGE, STAGES, Settings};
-use super::signals::seconds;
+use super::signals::seconds_between;
 use adapters::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
@@ -58,7 +58,7 @@ pub struct NoLoad {
 }
 
 impl NoLoad {
-    /// Not just the rough idea of [`NoLoadTable::rough`].
+    /// Not just the rough idea of [`NoLoadTable::estimate_rough_power`].
     #[must_use]
     pub fn is_estimate(&self) -> bool {
         self.origin != NoLoadOrigin::None
@@ -84,7 +84,7 @@ impl StagePowers {
         self.speeds_rpm.len()
     }
 
-    fn near(&self, speed_rpm: f64, tolerance: f64) -> Option<usize> {
+    fn find_speed_near(&self, speed_rpm: f64, tolerance: f64) -> Option<usize> {
         let distance = |at: &usize| (self.speeds_rpm[*at] - speed_rpm).abs();
         let nearest = (0..self.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         (distance(&nearest) <= tolerance * speed_rpm).then_some(nearest)
@@ -98,12 +98,12 @@ impl StagePowers {
 
     /// Relative variance that drift has added by now: grows with time and levels off at the whole drift.
     fn aged_variance(&self, now_ns: TimeNs, settings: &Settings) -> f64 {
-        let age_s = self.aged_ns.map_or(0.0, |then| seconds(then, now_ns).max(0.0));
+        let age_s = self.aged_ns.map_or(0.0, |then| seconds_between(then, now_ns).max(0.0));
         let drift = settings.no_load_drift;
         drift * drift * -(-age_s / settings.no_load_drift_time_s).exp_m1()
     }
 
-    fn inflate(&mut self, relative_variance: f64) {
+    fn inflate_variance(&mut self, relative_variance: f64) {
         let n = self.len();
         for i in 0..n {
             for j in 0..n {
@@ -112,8 +112,8 @@ impl StagePowers {
         }
     }
 
-    fn age(&mut self, now_ns: TimeNs, settings: &Settings) {
-        self.inflate(self.aged_variance(now_ns, settings));
+    fn apply_aging(&mut self, now_ns: TimeNs, settings: &Settings) {
+        self.inflate_variance(self.aged_variance(now_ns, settings));
         self.aged_ns = Some(now_ns);
     }
 
@@ -136,7 +136,7 @@ impl StagePowers {
 
     /// The exponent of the supply voltage is known better by `change`: powers were learned at a voltage, and are kept as they
     /// would be at its reference.
-    fn correct(&mut self, change: f64) {
+    fn correct_supply_exponent(&mut self, change: f64) {
         for (power_w, log) in self.powers_w.iter_mut().zip(&self.supply_logs) {
             *power_w *= (-change * log).exp();
         }
@@ -164,7 +164,7 @@ impl StagePowers {
         }
     }
 
-    fn update(&mut self, at: usize, power_w: f64, variance_w2: f64, supply_log: f64) {
+    fn update_power(&mut self, at: usize, power_w: f64, variance_w2: f64, supply_log: f64) {
         let n = self.len();
         self.supply_logs.resize(n, 0.0);
         let moved_w = (supply_log - self.supply_logs[at]) * self.powers_w[at];
@@ -172,7 +172,7 @@ impl StagePowers {
         let expected_w2 = self.covariance[at * n + at] + variance_w2;
         if innovation_w * innovation_w > SURPRISE_SD * SURPRISE_SD * expected_w2 {
             let relative = innovation_w / self.powers_w[at];
-            self.inflate(relative * relative);
+            self.inflate_variance(relative * relative);
         }
         let column: [f64; SPEEDS_PER_STAGE] =
             std::array::from_fn(|i| if i < n { self.covariance[i * n + at] } else { 0.0 });
@@ -200,24 +200,24 @@ impl StagePowers {
 
     /// At what supply voltage the powers behind these weights were learned, by their share.
     fn supply_log(&self, weights: &Weights) -> f64 {
-        let total_w = weights.of(&self.powers_w);
+        let total_w = weights.weigh_powers(&self.powers_w);
         let logs = weights.at.iter().zip(weights.weight);
         let sum = logs.map(|(at, weight)| weight * self.powers_w[*at] * self.supply_logs.get(*at).unwrap_or(&0.0));
         if total_w > 0.0 { sum.sum::<f64>() / total_w } else { 0.0 }
     }
 
     /// The power law alone, and its uncertainty; `None` too far from any known speed.
-    fn rough(&self, n: f64, now_ns: TimeNs, settings: &Settings) -> Option<(f64, f64, f64)> {
-        let (_, distance) = self.nearest(n).filter(|(_, distance)| *distance <= ROUGH_SPAN)?;
+    fn estimate_by_power_law(&self, n: f64, now_ns: TimeNs, settings: &Settings) -> Option<(f64, f64, f64)> {
+        let (_, distance) = self.find_nearest_speed(n).filter(|(_, distance)| *distance <= ROUGH_SPAN)?;
         let weights = self.by_law(n);
-        let power_w = weights.of(&self.powers_w);
+        let power_w = weights.weigh_powers(&self.powers_w);
         let law_w = EXPONENT_SD * distance * power_w;
         let sd_w = (self.variance_w2(&weights, now_ns, settings) + law_w * law_w).sqrt();
         Some((power_w, sd_w, self.supply_log(&weights)))
     }
 
     /// How far `n` lies outside the known speeds, relative to the span they cover.
-    fn beyond(&self, n: f64) -> f64 {
+    fn measure_extrapolation(&self, n: f64) -> f64 {
         match (self.speeds_rpm.first(), self.speeds_rpm.last()) {
             (Some(first), Some(last)) if last > first => (first - n).max(n - last).max(0.0) / (last - first),
             _ => 0.0,
@@ -239,7 +239,7 @@ impl NoLoadTable {
         for point in &settings.no_load_table {
             let sd_w = CONFIGURED_SD * point.power_w;
             let stage = &mut table.stages[point.stage.min(STAGES - 1)];
-            if stage.near(point.speed_rpm, settings.speed_tolerance).is_none() {
+            if stage.find_speed_near(point.speed_rpm, settings.speed_tolerance).is_none() {
                 stage.insert(point.speed_rpm, point.power_w, sd_w * sd_w, 0.0);
             }
         }
@@ -258,17 +258,17 @@ impl NoLoadTable {
     /// one (and by the shared drift the others), power going as speed over that small distance. Ignores what is not
     /// positive and finite. The power is that at the reference of the supply voltage, `supply_log` the logarithm of the
     /// voltage over that reference while it was measured.
-    pub fn learn(&mut self, point: NoLoadPoint, sd_w: f64, supply_log: f64, now_ns: TimeNs, settings: &Settings) {
+    pub fn learn_power(&mut self, point: NoLoadPoint, sd_w: f64, supply_log: f64, now_ns: TimeNs, settings: &Settings) {
         let NoLoadPoint { stage, speed_rpm, power_w } = point;
         let usable = |x: f64| x.is_finite() && x > 0.0;
         let Some(stage) = self.stages.get_mut(stage).filter(|_| usable(speed_rpm) && usable(power_w) && usable(sd_w))
         else {
             return;
         };
-        stage.age(now_ns, settings);
-        if let Some(at) = stage.near(speed_rpm, settings.speed_tolerance) {
+        stage.apply_aging(now_ns, settings);
+        if let Some(at) = stage.find_speed_near(speed_rpm, settings.speed_tolerance) {
             let to_node = stage.speeds_rpm[at] / speed_rpm;
-            stage.update(at, power_w * to_node, sd_w * sd_w, supply_log);
+            stage.update_power(at, power_w * to_node, sd_w * sd_w, supply_log);
         } else {
             stage.make_room();
             stage.insert(speed_rpm, power_w, sd_w * sd_w, supply_log);
@@ -277,7 +277,7 @@ impl NoLoadTable {
 
     /// The exponent of the supply voltage is known better by `change`.
     pub(super) fn correct_exponent(&mut self, change: f64) {
-        self.stages.iter_mut().for_each(|stage| stage.correct(change));
+        self.stages.iter_mut().for_each(|stage| stage.correct_supply_exponent(change));
     }
 
     /// No-load power at a speed of a gear stage. Extrapolation is flagged, and refused when it amplifies noise beyond
@@ -285,19 +285,26 @@ impl NoLoadTable {
     ///
     /// # Errors
     /// [`NoEstimate::NotLearned`] or [`NoEstimate::Extrapolated`].
-    pub fn at(&self, stage: usize, speed_rpm: f64, now_ns: TimeNs, settings: &Settings) -> Result<NoLoad, NoEstimate> {
+    pub fn estimate_power(
+        &self,
+        stage: usize,
+        speed_rpm: f64,
+        now_ns: TimeNs,
+        settings: &Settings,
+    ) -> Result<NoLoad, NoEstimate> {
         let n = speed_rpm.abs();
         let stage = self.stages.get(stage).ok_or(NoEstimate::NotLearned)?;
-        if let Some(at) = stage.near(n, settings.speed_tolerance) {
-            let weights = Weights::one(at, n / stage.speeds_rpm[at]);
-            let (power_w, sd_w) = (weights.of(&stage.powers_w), stage.variance_w2(&weights, now_ns, settings).sqrt());
+        if let Some(at) = stage.find_speed_near(n, settings.speed_tolerance) {
+            let weights = Weights::from_single_speed(at, n / stage.speeds_rpm[at]);
+            let (power_w, sd_w) =
+                (weights.weigh_powers(&stage.powers_w), stage.variance_w2(&weights, now_ns, settings).sqrt());
             let supply_log = stage.supply_log(&weights);
             return Ok(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::Measured, supply_log });
         }
-        let (weights, other) = stage.forms(n).ok_or(NoEstimate::NotLearned)?;
+        let (weights, other) = stage.compute_weight_pair(n).ok_or(NoEstimate::NotLearned)?;
         let noise_gain = noise_gain(&weights.weight);
-        let power_w = weights.of(&stage.powers_w);
-        let inside = stage.inside(n);
+        let power_w = weights.weigh_powers(&stage.powers_w);
+        let inside = stage.covers_speed(n);
         // The limit itself is allowed, whatever the last digit of the weights.
         if !inside && (noise_gain > settings.noise_gain_limit + 1e-9 || power_w <= 0.0) {
             return Err(NoEstimate::Extrapolated { noise_gain });
@@ -305,18 +312,25 @@ impl NoLoadTable {
         if power_w <= 0.0 {
             return Err(NoEstimate::NotLearned);
         }
-        let form_w = (power_w - other.of(&stage.powers_w)) / 3.0_f64.sqrt();
-        let beyond_w = BEYOND_SD * stage.beyond(n) * power_w;
+        let form_w = (power_w - other.weigh_powers(&stage.powers_w)) / 3.0_f64.sqrt();
+        let beyond_w = BEYOND_SD * stage.measure_extrapolation(n) * power_w;
         let sd_w = (stage.variance_w2(&weights, now_ns, settings) + form_w * form_w + beyond_w * beyond_w).sqrt();
         let origin = if inside { NoLoadOrigin::Interpolated } else { NoLoadOrigin::Extrapolated };
         Ok(NoLoad { power_w, sd_w, noise_gain, origin, supply_log: stage.supply_log(&weights) })
     }
 
-    /// A rough idea of no-load power where [`NoLoadTable::at`] refuses: good enough to tell a heavy cut from none, not to
+    /// A rough idea of no-load power where [`NoLoadTable::estimate_power`] refuses: good enough to tell a heavy cut from none, not to
     /// be called an estimate. `None` where the gear stage has no known power within a factor of two of the speed.
     #[must_use]
-    pub fn rough(&self, stage: usize, speed_rpm: f64, now_ns: TimeNs, settings: &Settings) -> Option<NoLoad> {
-        let (power_w, sd_w, supply_log) = self.stages.get(stage)?.rough(speed_rpm.abs(), now_ns, settings)?;
+    pub fn estimate_rough_power(
+        &self,
+        stage: usize,
+        speed_rpm: f64,
+        now_ns: TimeNs,
+        settings: &Settings,
+    ) -> Option<NoLoad> {
+        let (power_w, sd_w, supply_log) =
+            self.stages.get(stage)?.estimate_by_power_law(speed_rpm.abs(), now_ns, settings)?;
         Some(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::None, supply_log })
     }
 }
@@ -332,7 +346,7 @@ mod tests {
 
     fn learned(points: &[(f64, f64)], settings: &Settings) -> NoLoadTable {
         let mut table = NoLoadTable::new(settings);
-        points.iter().for_each(|(speed, power)| table.learn(point(*speed, *power), 2.0, 0.0, 0, settings));
+        points.iter().for_each(|(speed, power)| table.learn_power(point(*speed, *power), 2.0, 0.0, 0, settings));
         table
     }
 
@@ -341,8 +355,8 @@ mod tests {
         let settings = Settings::default();
         let mut table = learned(&[(600.0, 400.0), (1200.0, 800.0)], &settings);
         let later = 600 * SECOND_NS;
-        table.learn(point(600.0, 380.0), 2.0, 0.0, later, &settings);
-        let other = table.at(0, 1200.0, later, &settings).expect("known");
+        table.learn_power(point(600.0, 380.0), 2.0, 0.0, later, &settings);
+        let other = table.estimate_power(0, 1200.0, later, &settings).expect("known");
         assert!(other.power_w < 780.0 && other.power_w > 760.0, "{other:?}");
         assert!(other.sd_w > 10.0, "less sure than a measurement: {other:?}");
     }
@@ -351,7 +365,7 @@ mod tests {
     fn what_is_known_grows_old_but_not_without_bound() {
         let settings = Settings::default();
         let table = learned(&[(600.0, 400.0)], &settings);
-        let sd = |after_s: i64| table.at(0, 600.0, after_s * SECOND_NS, &settings).expect("known").sd_w;
+        let sd = |after_s: i64| table.estimate_power(0, 600.0, after_s * SECOND_NS, &settings).expect("known").sd_w;
         assert!(sd(0) < 2.1 && sd(60) > 4.0 && sd(3600) > 15.0);
         assert!(sd(1_000_000) < 1.01 * 400.0 * settings.no_load_drift.hypot(2.0 / 400.0));
     }
@@ -360,8 +374,8 @@ mod tests {
     fn a_changed_machine_is_believed() {
         let settings = Settings::default();
         let mut table = learned(&[(600.0, 400.0), (600.0, 401.0), (600.0, 399.0)], &settings);
-        table.learn(point(600.0, 520.0), 2.0, 0.0, SECOND_NS, &settings);
-        assert!((table.at(0, 600.0, SECOND_NS, &settings).expect("known").power_w - 520.0).abs() < 6.0);
+        table.learn_power(point(600.0, 520.0), 2.0, 0.0, SECOND_NS, &settings);
+        assert!((table.estimate_power(0, 600.0, SECOND_NS, &settings).expect("known").power_w - 520.0).abs() < 6.0);
     }
 
     #[test]
@@ -370,9 +384,9 @@ mod tests {
         let mut table = NoLoadTable::new(&settings);
         for k in 0..SPEEDS_PER_STAGE {
             let speed = 200.0 * 1.15_f64.powi(i32::try_from(k).expect("small"));
-            table.learn(point(speed, speed / 2.0), if k == 3 { 30.0 } else { 1.0 }, 0.0, 0, &settings);
+            table.learn_power(point(speed, speed / 2.0), if k == 3 { 30.0 } else { 1.0 }, 0.0, 0, &settings);
         }
-        table.learn(point(10_000.0, 9000.0), 5.0, 0.0, 0, &settings);
+        table.learn_power(point(10_000.0, 9000.0), 5.0, 0.0, 0, &settings);
         assert_eq!(table.points().count(), SPEEDS_PER_STAGE);
         let gone = 200.0 * 1.15_f64.powi(3);
         assert!(table.points().all(|known| (known.speed_rpm - gone).abs() > 1.0));
@@ -383,14 +397,14 @@ mod tests {
         let settings = Settings::default();
         let mut table = learned(&[(600.0, 400.0)], &settings);
         for (speed, power) in [(0.0, 1.0), (-600.0, 400.0), (600.0, f64::NAN), (700.0, -1.0), (f64::INFINITY, 1.0)] {
-            table.learn(point(speed, power), 1.0, 0.0, 0, &settings);
+            table.learn_power(point(speed, power), 1.0, 0.0, 0, &settings);
         }
         assert_eq!(table.points().count(), 1);
-        let rough = table.rough(0, 900.0, 0, &settings).expect("within a factor of two");
+        let rough = table.estimate_rough_power(0, 900.0, 0, &settings).expect("within a factor of two");
         assert!((rough.power_w - 400.0 * 1.5_f64.powf(1.3)).abs() < 1e-9 && rough.sd_w > 0.1 * rough.power_w);
         assert!(!rough.is_estimate());
-        assert_eq!(table.at(0, 900.0, 0, &settings), Err(NoEstimate::NotLearned));
-        assert_eq!(table.rough(0, 1300.0, 0, &settings), None);
-        assert_eq!(table.rough(1, 600.0, 0, &settings), None);
+        assert_eq!(table.estimate_power(0, 900.0, 0, &settings), Err(NoEstimate::NotLearned));
+        assert_eq!(table.estimate_rough_power(0, 1300.0, 0, &settings), None);
+        assert_eq!(table.estimate_rough_power(1, 600.0, 0, &settings), None);
     }
 }

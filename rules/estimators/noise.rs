@@ -42,11 +42,11 @@ impl RelativeVariances {
     }
 
     /// The measurement shows no smaller difference than this, W; 0 where noise is coarser.
-    pub(super) fn resolves(&mut self, resolution_w: f64) {
+    pub(super) fn set_resolution(&mut self, resolution_w: f64) {
         self.resolution_w = resolution_w;
     }
 
-    /// See [`RelativeVariances::resolves`].
+    /// See [`RelativeVariances::set_resolution`].
     pub(super) fn resolution_w(&self) -> f64 {
         self.resolution_w
     }
@@ -68,7 +68,7 @@ impl RelativeVariances {
     }
 
     /// The next value has no predecessor.
-    pub(super) fn interrupt(&mut self) {
+    pub(super) fn forget_last_values(&mut self) {
         self.last = [None; 2];
     }
 
@@ -82,11 +82,11 @@ impl RelativeVariances {
 
     /// Standard deviation of one sample, relative.
     pub(super) fn sd(&self) -> f64 {
-        self.fast.max(self.slow).sqrt().max(1e-3).max(self.rounding())
+        self.fast.max(self.slow).sqrt().max(1e-3).max(self.rounding_sd())
     }
 
     /// A level that is shown in whole steps does not seem to move at all, and is yet known to a part of a step only.
-    fn rounding(&self) -> f64 {
+    fn rounding_sd(&self) -> f64 {
         if self.resolution_w > 0.0 {
             ROUNDING_SD * self.resolution_w / self.level_w.max(self.resolution_w)
         } else {

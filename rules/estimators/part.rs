@@ -17,7 +17,7 @@ pub struct PartFigures {
 impl PartFigures {
     /// No part has been finished.
     #[must_use]
-    pub fn none() -> Self {
+    pub fn without_parts() -> Self {
         let none = Err(NoEstimate::NoPartYet);
         Self { energy_j: none, cutting_energy_j: none, idle_s: none }
     }

@@ -1,6 +1,6 @@
 //! Settings that have values of their own for one tool or one operation.
 
-use super::settings::{Setting, SettingError, Settings, row, unknown};
+use super::settings::{Setting, SettingError, Settings, find_setting, report_unknown_setting};
 use super::wear::tool_of;
 
 /// Values of one tool or operation.
@@ -15,10 +15,10 @@ impl Settings {
     /// A value for one operation, or else for one tool, in the place of the one for the machine. An operation goes before a tool.
     ///
     /// # Errors
-    /// As [`Settings::set`]; a setting of one gear stage has no value for a tool.
+    /// As [`Settings::set_value`]; a setting of one gear stage has no value for a tool.
     pub fn set_for(&mut self, (operation, place): (bool, &str), name: &str, value: f64) -> Result<(), SettingError> {
-        let setting = row(name).ok_or_else(|| unknown(name))?;
-        setting.check(name, value)?;
+        let setting = find_setting(name).ok_or_else(|| report_unknown_setting(name))?;
+        setting.check_value(name, value)?;
         let known = self.places.iter().position(|known| known.operation == operation && known.name == place);
         let at = known.unwrap_or_else(|| {
             self.places.push(PlaceValues { operation, name: place.to_owned(), values: Vec::new() });
@@ -35,7 +35,7 @@ impl Settings {
     }
 
     /// The settings for this tool (with or without its edge) and operation.
-    pub(super) fn at(&self, tool: &str, operation: &str) -> Self {
+    pub(super) fn resolve_for_place(&self, tool: &str, operation: &str) -> Self {
         let mut settings = self.clone();
         for of_operation in [false, true] {
             let here = |place: &&PlaceValues| {

@@ -4,7 +4,7 @@ use super::cutting::LoadLossLaw;
 use super::loads::LoadCurves;
 use super::no_load::NoLoadPoint;
 use super::place_settings::PlaceValues;
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use thiserror::Error;
@@ -208,11 +208,11 @@ impl Settings {
     /// The value of a setting, also `load_loss_linear_stage_3` and the like.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<f64> {
-        match staged(name) {
+        match split_stage_suffix(name) {
             Some(("load_loss_linear", stage)) => Some(self.load_loss(stage).linear),
             Some(("load_loss_quadratic_per_w", stage)) => Some(self.load_loss(stage).quadratic_per_w),
             Some(("load_loss_speed_rpm", stage)) => Some(self.load_loss(stage).speed_rpm.unwrap_or(0.0)),
-            _ => row(name).map(|setting| (setting.get)(self)),
+            _ => find_setting(name).map(|setting| (setting.get)(self)),
         }
     }
 
@@ -221,16 +221,16 @@ impl Settings {
     ///
     /// # Errors
     /// An unknown name or a value outside the range; the settings are unchanged then.
-    pub fn set(&mut self, name: &str, value: f64) -> Result<(), SettingError> {
-        let stage = staged(name);
+    pub fn set_value(&mut self, name: &str, value: f64) -> Result<(), SettingError> {
+        let stage = split_stage_suffix(name);
         let base = stage.map_or(name, |(base, _)| base);
-        let setting = row(base).ok_or_else(|| unknown(name))?;
-        setting.check(name, value)?;
+        let setting = find_setting(base).ok_or_else(|| report_unknown_setting(name))?;
+        setting.check_value(name, value)?;
         match stage {
             Some(("load_loss_linear", stage)) => self.stage_load_loss_linear[stage] = Some(value),
             Some(("load_loss_quadratic_per_w", stage)) => self.stage_load_loss_quadratic_per_w[stage] = Some(value),
             Some(("load_loss_speed_rpm", stage)) => self.stage_load_loss_speed_rpm[stage] = Some(value),
-            Some(_) => return Err(unknown(name)),
+            Some(_) => return Err(report_unknown_setting(name)),
             None => (setting.set)(self, value),
         }
         Ok(())
@@ -266,7 +266,7 @@ impl Settings {
 
     /// Everything that contradicts something else; empty when the settings can be used as they are.
     #[must_use]
-    pub fn contradictions(&self) -> Vec<SettingError> {
+    pub fn find_contradictions(&self) -> Vec<SettingError> {
         let mut found = Vec::new();
         if self.c2_off >= self.c2_on {
             let (off, on) = (self.c2_off, self.c2_on);
@@ -281,7 +281,7 @@ impl Settings {
     #[must_use]
     pub fn load_loss(&self, stage: usize) -> LoadLossLaw {
         let own = |values: &[Option<f64>; STAGES]| values.get(stage).copied().flatten();
-        LoadLossLaw::stated(
+        LoadLossLaw::from_stated_speed(
             own(&self.stage_load_loss_linear).unwrap_or(self.load_loss_linear),
             own(&self.stage_load_loss_quadratic_per_w).unwrap_or(self.load_loss_quadratic_per_w),
             own(&self.stage_load_loss_speed_rpm).unwrap_or(self.load_loss_speed_rpm),
@@ -290,7 +290,7 @@ impl Settings {
 }
 
 impl Setting {
-    pub(super) fn check(&self, name: &str, value: f64) -> Result<(), SettingError> {
+    pub(super) fn check_value(&self, name: &str, value: f64) -> Result<(), SettingError> {
         let (least, greatest) = self.range;
         if value >= least && value <= greatest && !(self.whole && value.fract() != 0.0) {
             return Ok(());
@@ -299,18 +299,18 @@ impl Setting {
     }
 }
 
-pub(super) fn row(name: &str) -> Option<&'static Setting> {
+pub(super) fn find_setting(name: &str) -> Option<&'static Setting> {
     SETTINGS.iter().find(|setting| setting.name == name)
 }
 
 /// `load_loss_linear_stage_3` as base name and stage.
-fn staged(name: &str) -> Option<(&str, usize)> {
+fn split_stage_suffix(name: &str) -> Option<(&str, usize)> {
     let (base, stage) = name.rsplit_once("_stage_")?;
     stage.parse().ok().filter(|stage| *stage < STAGES).map(|stage| (base, stage))
 }
 
-pub(super) fn unknown(name: &str) -> SettingError {
-    let nearest = nearest(name, SETTINGS.iter().map(|setting| setting.name));
+pub(super) fn report_unknown_setting(name: &str) -> SettingError {
+    let nearest = find_nearest_name(name, SETTINGS.iter().map(|setting| setting.name));
     SettingError::Unknown { name: name.to_owned(), nearest }
 }
 
@@ -322,33 +322,33 @@ mod tests {
     fn every_default_lies_in_its_range_and_can_be_set_by_name() {
         let mut settings = Settings::default();
         for setting in SETTINGS {
-            assert_eq!(settings.set(setting.name, setting.default), Ok(()));
+            assert_eq!(settings.set_value(setting.name, setting.default), Ok(()));
             assert_eq!(settings.get(setting.name), Some(setting.default));
             assert!(!setting.en.is_empty() && !setting.unit.is_empty());
         }
         assert_eq!(settings, Settings::default());
-        assert!(settings.contradictions().is_empty());
+        assert!(settings.find_contradictions().is_empty());
     }
 
     #[test]
     fn a_bad_name_or_value_says_what_was_meant() {
         let mut settings = Settings::default();
-        let unknown = settings.set("c2_onn", 0.1).expect_err("no such name").to_string();
+        let unknown = settings.set_value("c2_onn", 0.1).expect_err("no such name").to_string();
         assert!(unknown.contains("did you mean c2_on?"), "{unknown}");
-        let range = settings.set("window_samples", 10.5).expect_err("not whole").to_string();
+        let range = settings.set_value("window_samples", 10.5).expect_err("not whole").to_string();
         assert!(range.contains("5 to 100 samples or not a whole number"), "{range}");
-        assert!(settings.set("c1", f64::NAN).is_err());
-        assert!(settings.set("c1_stage_2", 0.1).is_err());
+        assert!(settings.set_value("c1", f64::NAN).is_err());
+        assert!(settings.set_value("c1_stage_2", 0.1).is_err());
         assert_eq!(settings, Settings::default());
     }
 
     #[test]
     fn a_gear_stage_may_have_its_own_load_loss() {
         let mut settings = Settings::default();
-        settings.set("load_loss_linear_stage_2", 0.25).expect("in range");
-        settings.set("load_loss_speed_rpm_stage_2", 640.0).expect("in range");
-        settings.set("load_loss_speed_rpm", 800.0).expect("in range");
-        settings.set("load_loss_speed_rpm_stage_3", 0.0).expect("the same at every speed");
+        settings.set_value("load_loss_linear_stage_2", 0.25).expect("in range");
+        settings.set_value("load_loss_speed_rpm_stage_2", 640.0).expect("in range");
+        settings.set_value("load_loss_speed_rpm", 800.0).expect("in range");
+        settings.set_value("load_loss_speed_rpm_stage_3", 0.0).expect("the same at every speed");
         let of = |linear: f64, speed_rpm: Option<f64>| LoadLossLaw { linear, quadratic_per_w: 0.0, speed_rpm };
         assert_eq!(settings.load_loss(2), of(0.25, Some(640.0)));
         assert_eq!(settings.load_loss(1), of(0.18, Some(800.0)));
@@ -359,7 +359,7 @@ mod tests {
     #[test]
     fn hysteresis_the_wrong_way_round_is_a_contradiction() {
         let mut settings = Settings::default();
-        settings.set("c2_off", 0.05).expect("in range");
-        assert_eq!(settings.contradictions().len(), 1);
+        settings.set_value("c2_off", 0.05).expect("in range");
+        assert_eq!(settings.find_contradictions().len(), 1);
     }
 }

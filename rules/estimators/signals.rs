@@ -5,7 +5,7 @@ use super::inputs::TickInputs;
 use super::noise::RelativeVariances;
 use super::settings::Settings;
 use super::window::{Means, PowerWindow};
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use adapters::clock::{SECOND_NS, TimeNs};
 use serde::{Deserialize, Serialize};
 
@@ -77,8 +77,8 @@ pub(super) struct Break {
 impl Signals {
     pub(super) fn new(settings: &Settings) -> Self {
         Self {
-            filter: AntiPulse::new(length(settings.filter_samples)),
-            window: PowerWindow::new(length(settings.window_samples)),
+            filter: AntiPulse::new(to_window_length(settings.filter_samples)),
+            window: PowerWindow::new(to_window_length(settings.window_samples)),
             noise: RelativeVariances::new(settings),
             speeds: [(0, 0.0); SPEEDS],
             speeds_seen: 0,
@@ -93,21 +93,21 @@ impl Signals {
     /// Takes the inputs of a tick.
     pub(super) fn push(&mut self, inputs: &TickInputs, settings: &Settings) -> Break {
         let gap = self.last_ns.is_some_and(|last| {
-            let pause_s = seconds(last, inputs.at_ns);
+            let pause_s = seconds_between(last, inputs.at_ns);
             pause_s < 0.0 || pause_s > settings.gap_s
         });
         if gap {
-            self.forget();
+            self.forget_history();
             self.fed_ns = None;
             self.worked_ns = None;
         }
         self.last_ns = Some(inputs.at_ns);
-        self.noise.resolves(inputs.basis.resolution());
-        self.window.resolves(inputs.basis.resolution());
+        self.noise.set_resolution(inputs.basis.resolution());
+        self.window.set_resolution(inputs.basis.resolution());
         let stage = inputs.stage.unwrap_or(self.stage);
         let changed = std::mem::replace(&mut self.stage, stage) != stage;
         if changed {
-            self.forget();
+            self.forget_history();
         }
         self.push_speed(inputs);
         if inputs.feed.is_ok_and(|feed| feed > settings.feed_min_mm_min) {
@@ -123,7 +123,7 @@ impl Signals {
     pub(super) fn push_power(&mut self, power_w: f64, settings: &Settings) -> Option<f64> {
         let filtered_w = self.filter.push(power_w)?;
         self.window.push(filtered_w);
-        if self.steady(Pace::Settling, settings) == Some(true) {
+        if self.is_speed_steady(Pace::Settling, settings) == Some(true) {
             self.least_w = Some(self.least_w.map_or(filtered_w, |least| least.min(filtered_w)));
         } else {
             self.least_w = None;
@@ -141,7 +141,7 @@ impl Signals {
     }
 
     /// Forgets the recent power and speed.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn forget_history(&mut self) {
         self.forget_power();
         self.speeds_seen = 0;
     }
@@ -150,7 +150,7 @@ impl Signals {
     pub(super) fn forget_power(&mut self) {
         self.filter.clear();
         self.window.clear();
-        self.noise.interrupt();
+        self.noise.forget_last_values();
         self.least_w = None;
     }
 
@@ -166,14 +166,14 @@ impl Signals {
     }
 
     /// Does the spindle hold its speed? `None` until enough samples are in.
-    pub(super) fn steady(&self, pace: Pace, settings: &Settings) -> Option<bool> {
+    pub(super) fn is_speed_steady(&self, pace: Pace, settings: &Settings) -> Option<bool> {
         let wanted = if pace == Pace::Settling { SPEEDS } else { LATEST_SPEEDS };
         let known = &self.speeds[SPEEDS - self.speeds_seen.min(wanted)..];
         let (least, greatest) =
             known.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, greatest), (_, speed)| {
                 (least.min(*speed), greatest.max(*speed))
             });
-        let span_s = seconds(known.first()?.0, known.last()?.0);
+        let span_s = seconds_between(known.first()?.0, known.last()?.0);
         let allowed = match pace {
             Pace::Settling => SETTLED_SPEED,
             Pace::Idling => settings.speed_rate_per_s * span_s,
@@ -191,14 +191,14 @@ impl Signals {
 
     /// How long ago the feed was on other than in rapid traverse, s; infinite where it never was.
     pub(super) fn worked_ago_s(&self, now_ns: TimeNs) -> f64 {
-        self.worked_ns.map_or(f64::INFINITY, |worked| seconds(worked, now_ns))
+        self.worked_ns.map_or(f64::INFINITY, |worked| seconds_between(worked, now_ns))
     }
 
     fn fed_ago_s(&self, now_ns: TimeNs) -> f64 {
-        self.fed_ns.map_or(f64::INFINITY, |fed| seconds(fed, now_ns))
+        self.fed_ns.map_or(f64::INFINITY, |fed| seconds_between(fed, now_ns))
     }
 
-    pub(super) fn feed(&self, inputs: &TickInputs, settings: &Settings) -> Feed {
+    pub(super) fn classify_feed(&self, inputs: &TickInputs, settings: &Settings) -> Feed {
         match inputs.feed {
             Ok(feed) if feed > settings.feed_min_mm_min => Feed::On,
             Ok(_) if self.fed_ago_s(inputs.at_ns) > settings.feed_debounce_s => Feed::Off,
@@ -217,11 +217,11 @@ impl Signals {
 
 /// Seconds from `from_ns` to `to_ns`, negative when time runs backwards.
 #[expect(clippy::cast_precision_loss, reason = "a duration in nanoseconds; microseconds suffice beyond 104 days")]
-pub(super) fn seconds(from_ns: TimeNs, to_ns: TimeNs) -> f64 {
+pub(super) fn seconds_between(from_ns: TimeNs, to_ns: TimeNs) -> f64 {
     to_ns.saturating_sub(from_ns) as f64 / SECOND_NS as f64
 }
 
 /// A setting that is a count, as a count.
-pub(super) fn length(setting: f64) -> usize {
-    (1..=100).take_while(|n| count(*n) <= setting).last().unwrap_or(1)
+pub(super) fn to_window_length(setting: f64) -> usize {
+    (1..=100).take_while(|n| count_to_f64(*n) <= setting).last().unwrap_or(1)
 }

@@ -27,23 +27,23 @@ pub(super) enum Situation {
 }
 
 impl Tick<'_> {
-    pub(super) fn feed(&self) -> Feed {
-        self.signals.feed(self.inputs, self.settings)
+    pub(super) fn classify_feed(&self) -> Feed {
+        self.signals.classify_feed(self.inputs, self.settings)
     }
 
-    pub(super) fn powered(&self) -> Option<bool> {
+    pub(super) fn is_powered(&self) -> Option<bool> {
         self.inputs.total.ok().map(|total| total.abs() >= self.settings.off_power_w)
     }
 
     /// `powered_before` keeps a single pulse of the meter from switching the machine on.
-    pub(super) fn situation(&self, crossing_zero: bool, powered_before: bool) -> Situation {
-        let no_power = self.powered() == Some(false);
-        let meter_is_on = self.powered() == Some(true) && powered_before;
+    pub(super) fn determine_situation(&self, crossing_zero: bool, powered_before: bool) -> Situation {
+        let no_power = self.is_powered() == Some(false);
+        let meter_is_on = self.is_powered() == Some(true) && powered_before;
         match self.inputs.speed {
             Err(Absence::MachineOff) if meter_is_on => Situation::Rest,
             Err(Absence::MachineOff) => Situation::Off,
             Err(_) if no_power => Situation::Off,
-            Err(absence) => missing("spindle_speed_rpm", absence),
+            Err(absence) => report_missing_input("spindle_speed_rpm", absence),
             Ok(speed) if speed.abs() < self.settings.spindle_min_rpm && !crossing_zero => {
                 if no_power {
                     Situation::Off
@@ -55,9 +55,9 @@ impl Tick<'_> {
             Ok(_) => match (self.inputs.power, self.inputs.stage) {
                 (Err(_), Ok(_)) if self.inputs.basis == StateBasis::Motion => Situation::Turning,
                 (Err(absence), _) => {
-                    missing(self.inputs.basis.stand_in().map_or("spindle_power_w", |it| it.0), absence)
+                    report_missing_input(self.inputs.basis.stand_in().map_or("spindle_power_w", |it| it.0), absence)
                 }
-                (_, Err(absence)) => missing("gear_stage", absence),
+                (_, Err(absence)) => report_missing_input("gear_stage", absence),
                 _ => Situation::Turning,
             },
         }
@@ -85,7 +85,7 @@ pub(super) fn visible_excess_w(no_load: NoLoad, signals: &Signals, settings: &Se
 /// may be the same.
 const VISIBLE_STEPS: f64 = 1.2;
 
-fn missing(channel: &str, absence: Absence) -> Situation {
+fn report_missing_input(channel: &str, absence: Absence) -> Situation {
     let reason = |channel| NoEstimate::Input { channel, absence };
-    Situation::Missing(ChannelId::of(channel).map_or(NoEstimate::NotYet, reason))
+    Situation::Missing(ChannelId::from_name(channel).map_or(NoEstimate::NotYet, reason))
 }

@@ -41,7 +41,7 @@ impl State {
 
     /// The word used in SQL, scripts, JSON and CSV.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Off => "off",
             Self::Standby => "standby",
@@ -57,12 +57,12 @@ impl State {
     /// The state written as `word`, if there is one.
     #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|state| state.word() == word)
+        Self::ALL.into_iter().find(|state| state.as_word() == word)
     }
 
     /// A small stable number for compact storage.
     #[must_use]
-    pub fn code(self) -> u8 {
+    pub fn to_code(self) -> u8 {
         self as u8
     }
 
@@ -85,7 +85,7 @@ impl State {
 
 impl fmt::Display for State {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.word())
+        f.write_str(self.as_word())
     }
 }
 
@@ -96,9 +96,9 @@ mod tests {
     #[test]
     fn every_state_survives_its_word_its_code_and_json() {
         for state in State::ALL {
-            assert_eq!(State::from_word(state.word()), Some(state));
-            assert_eq!(State::from_code(state.code()), Some(state));
-            assert_eq!(serde_json::to_value(state).expect("a word"), state.word());
+            assert_eq!(State::from_word(state.as_word()), Some(state));
+            assert_eq!(State::from_code(state.to_code()), Some(state));
+            assert_eq!(serde_json::to_value(state).expect("a word"), state.as_word());
         }
     }
 }

@@ -11,7 +11,7 @@
 use super::inputs::Input;
 use super::no_load::NoLoad;
 use super::settings::Settings;
-use super::signals::seconds;
+use super::signals::seconds_between;
 use adapters::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
@@ -82,7 +82,7 @@ impl Default for Supply {
 impl Supply {
     /// Takes the voltage of a tick and returns its logarithm over the reference; 0 where none was ever seen, the mean while
     /// the meter does not tell it.
-    pub(super) fn see(&mut self, voltage_v: Input) -> f64 {
+    pub(super) fn observe_voltage(&mut self, voltage_v: Input) -> f64 {
         let usable = |voltage_v: &f64| voltage_v.is_finite() && *voltage_v > 1.0;
         let Some(voltage_v) = voltage_v.ok().filter(usable) else { return self.mean_log };
         let log = (voltage_v / *self.reference_v.get_or_insert(voltage_v)).ln();
@@ -94,18 +94,18 @@ impl Supply {
     }
 
     /// No-load power at this voltage over that at the reference.
-    pub(super) fn ratio(&self, supply_log: f64) -> f64 {
+    pub(super) fn power_ratio(&self, supply_log: f64) -> f64 {
         (self.exponent * supply_log).exp()
     }
 
     /// The same no-load power, with the doubt that the exponent adds at a voltage other than that of its learning.
-    pub(super) fn doubted(&self, known: NoLoad, supply_log: f64) -> NoLoad {
+    pub(super) fn add_exponent_doubt(&self, known: NoLoad, supply_log: f64) -> NoLoad {
         let doubt_w = self.variance.sqrt() * (supply_log - known.supply_log).abs() * known.power_w;
         NoLoad { sd_w: known.sd_w.hypot(doubt_w), ..known }
     }
 
     /// Takes an idle power and compares it with the last one of this speed. Returns the change of the exponent.
-    pub(super) fn learn(&mut self, measured: MeasuredIdlePower, settings: &Settings) -> f64 {
+    pub(super) fn learn_exponent(&mut self, measured: MeasuredIdlePower, settings: &Settings) -> f64 {
         if self.reference_v.is_none() || measured.power_w <= 0.0 {
             return 0.0;
         }
@@ -126,7 +126,7 @@ impl Supply {
             return 0.0;
         };
         let Some(before) = self.idle[slot] else { return 0.0 };
-        let age_s = seconds(before.at_ns, now.at_ns);
+        let age_s = seconds_between(before.at_ns, now.at_ns);
         let step = now.supply_log - before.supply_log;
         if !(0.0..=OLDEST_S).contains(&age_s) {
             self.idle[slot] = Some(now);
@@ -138,11 +138,11 @@ impl Supply {
         self.idle[slot] = Some(now);
         let drift = settings.no_load_drift;
         let drifted = 2.0 * drift * drift * -(-age_s / settings.no_load_drift_time_s).exp_m1();
-        self.compare(now.power_log - before.power_log, step, now.variance + before.variance + drifted)
+        self.update_exponent(now.power_log - before.power_log, step, now.variance + before.variance + drifted)
     }
 
     /// Kalman update of the exponent by `change = (e - exponent) step`.
-    fn compare(&mut self, change: f64, step: f64, noise: f64) -> f64 {
+    fn update_exponent(&mut self, change: f64, step: f64, noise: f64) -> f64 {
         let expected = step * step * self.variance + noise;
         let gain = self.variance * step / expected;
         let limit = CLIP_SD * expected.sqrt();
@@ -168,10 +168,10 @@ mod tests {
         let (mut supply, settings) = (Supply::default(), Settings::default());
         for k in 0..60 {
             let voltage_v = 400.0 * (1.0 + 0.04 * (f64::from(k) / 3.0).sin());
-            let supply_log = supply.see(Ok(voltage_v));
-            let power_w = 500.0 * (exponent * supply_log).exp() / supply.ratio(supply_log);
+            let supply_log = supply.observe_voltage(Ok(voltage_v));
+            let power_w = 500.0 * (exponent * supply_log).exp() / supply.power_ratio(supply_log);
             let at_ns = 5 * i64::from(k) * SECOND_NS;
-            supply.learn(
+            supply.learn_exponent(
                 MeasuredIdlePower { at_ns, stage: 1, speed_rpm: 800.0, power_w, sd_w: 5.0, supply_log },
                 &settings,
             );
@@ -191,11 +191,11 @@ mod tests {
     #[test]
     fn without_a_voltage_nothing_changes_and_a_faulty_one_is_no_voltage() {
         let mut supply = Supply::default();
-        assert_eq!(supply.see(Err(Absence::NotProvided)), 0.0);
-        assert_eq!(supply.ratio(0.0), 1.0);
-        assert_eq!(supply.see(Ok(400.0)), 0.0);
+        assert_eq!(supply.observe_voltage(Err(Absence::NotProvided)), 0.0);
+        assert_eq!(supply.power_ratio(0.0), 1.0);
+        assert_eq!(supply.observe_voltage(Ok(400.0)), 0.0);
         for faulty in [0.0, f64::NAN, 12.0, 1000.0] {
-            assert_eq!(supply.see(Ok(faulty)), 0.0, "{faulty}");
+            assert_eq!(supply.observe_voltage(Ok(faulty)), 0.0, "{faulty}");
         }
     }
 }

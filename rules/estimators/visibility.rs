@@ -1,7 +1,7 @@
 //! Over a whole recording or shift: could cutting be seen at all?
 
 use super::estimate::{Estimates, Visibility};
-use super::signals::seconds;
+use super::signals::seconds_between;
 use adapters::clock::TimeNs;
 use std::fmt;
 
@@ -50,7 +50,7 @@ impl VisibilityTally {
     /// Takes the estimates of a tick; it stands for the time since the one before.
     pub fn add(&mut self, estimates: &Estimates) {
         let last_ns = self.last_ns.replace(estimates.at_ns).unwrap_or(estimates.at_ns);
-        let tick_s = seconds(last_ns, estimates.at_ns).clamp(0.0, LONGEST_TICK_S);
+        let tick_s = seconds_between(last_ns, estimates.at_ns).clamp(0.0, LONGEST_TICK_S);
         match estimates.visibility {
             Visibility::NotAsked => {}
             Visibility::Visible => self.visible_s += tick_s,
@@ -70,7 +70,7 @@ impl VisibilityTally {
 
     /// What the time amounts to.
     #[must_use]
-    pub fn verdict(&self) -> VisibilityVerdict {
+    pub fn judge_visibility(&self) -> VisibilityVerdict {
         let fed_s = self.visible_s + self.below_s + self.no_reference_s;
         if fed_s <= 0.0 {
             VisibilityVerdict::NothingToSee
@@ -90,7 +90,7 @@ impl VisibilityTally {
 impl VisibilityVerdict {
     /// The word used in SQL, JSON and scripts.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::NothingToSee => "nothing_to_see",
             Self::Visible { .. } => "visible",

@@ -5,7 +5,7 @@
 //! start-up still decays (bias up to 83 % at tau = 2 s), hence the second one and the slope between them.
 
 use super::settings::Settings;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -46,7 +46,7 @@ impl PowerWindow {
 
     /// The measurement shows no smaller difference than this, W: a power that goes from one step to the next and back is
     /// stationary.
-    pub fn resolves(&mut self, resolution_w: f64) {
+    pub fn set_resolution(&mut self, resolution_w: f64) {
         self.resolution_w = resolution_w;
     }
 
@@ -68,20 +68,20 @@ impl PowerWindow {
 
     /// The means of both windows, once both are full.
     #[must_use]
-    pub fn means(&self) -> Option<Means> {
-        let mean = |from: usize| self.values.range(from..from + self.length).sum::<f64>() / count(self.length);
+    pub fn compute_means(&self) -> Option<Means> {
+        let mean = |from: usize| self.values.range(from..from + self.length).sum::<f64>() / count_to_f64(self.length);
         (self.values.len() == 2 * self.length).then(|| Means { older_w: mean(0), newer_w: mean(self.length) })
     }
 
     /// The means of both windows if the power is stationary: each window within c1, and the means apart by no more
     /// than `agreement_w`, which also bounds the slope.
     #[must_use]
-    pub fn stationary(&self, agreement_w: f64, settings: &Settings) -> Option<Means> {
-        let means = self.means()?;
+    pub fn find_stationary_means(&self, agreement_w: f64, settings: &Settings) -> Option<Means> {
+        let means = self.compute_means()?;
         let agree = (means.older_w - means.newer_w).abs() <= agreement_w;
         let within = |from, mean| {
             let values = || self.values.range(from..from + self.length).copied();
-            stationary(values(), mean, settings) || self.is_one_step(values(), mean)
+            is_stationary(values(), mean, settings) || self.is_one_step(values(), mean)
         };
         (agree && within(0, means.older_w) && within(self.length, means.newer_w)).then_some(means)
     }
@@ -96,14 +96,14 @@ impl PowerWindow {
     /// Does the power still fall from the older to the newer window by more than `agreement_w`? `None` until both
     /// windows are full.
     #[must_use]
-    pub fn falling(&self, agreement_w: f64) -> Option<bool> {
-        self.means().map(|means| means.older_w - means.newer_w > agreement_w)
+    pub fn is_falling(&self, agreement_w: f64) -> Option<bool> {
+        self.compute_means().map(|means| means.older_w - means.newer_w > agreement_w)
     }
 }
 
 /// The source's test of one window, in the reading that the settings choose. A mean that is not positive fails.
 #[must_use]
-pub fn stationary(values: impl Iterator<Item = f64>, mean_w: f64, settings: &Settings) -> bool {
+pub fn is_stationary(values: impl Iterator<Item = f64>, mean_w: f64, settings: &Settings) -> bool {
     let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
     for value in values {
         least = least.min(value);
@@ -120,15 +120,15 @@ mod tests {
 
     fn settings(reading: f64, c1: f64) -> Settings {
         let mut settings = Settings::default();
-        settings.set("stationarity_reading", reading).expect("in range");
-        settings.set("c1", c1).expect("in range");
+        settings.set_value("stationarity_reading", reading).expect("in range");
+        settings.set_value("c1", c1).expect("in range");
         settings
     }
 
     #[test]
     fn both_readings_of_the_source() {
         let values = [480.0, 500.0, 500.0, 520.0];
-        let passes = |reading, c1| stationary(values.into_iter(), 500.0, &settings(reading, c1));
+        let passes = |reading, c1| is_stationary(values.into_iter(), 500.0, &settings(reading, c1));
         assert!(passes(1.0, 0.08) && !passes(1.0, 0.079));
         assert!(passes(2.0, 0.04) && !passes(2.0, 0.039));
     }
@@ -136,18 +136,18 @@ mod tests {
     #[test]
     fn a_slow_decay_that_one_window_accepts_is_refused_by_two() {
         let settings = settings(1.0, 0.15);
-        let power = |i: usize| 500.0 + 3000.0 * (-0.1 * count(i) / 2.0).exp();
+        let power = |i: usize| 500.0 + 3000.0 * (-0.1 * count_to_f64(i) / 2.0).exp();
         let mut window = PowerWindow::new(10);
         let (mut one, mut two) = (None, None);
         for i in 0..200 {
             window.push(power(i));
             let newest = window.values.iter().rev().take(10).copied();
             let mean = newest.clone().sum::<f64>() / 10.0;
-            if i >= 10 && one.is_none() && stationary(newest, mean, &settings) {
+            if i >= 10 && one.is_none() && is_stationary(newest, mean, &settings) {
                 one = Some(mean / 500.0 - 1.0);
             }
             if two.is_none()
-                && let Some(means) = window.stationary(5.0, &settings)
+                && let Some(means) = window.find_stationary_means(5.0, &settings)
             {
                 two = Some(means.newer_w / 500.0 - 1.0);
             }
@@ -161,11 +161,11 @@ mod tests {
         let settings = Settings::default();
         let mut window = PowerWindow::new(5);
         for i in 0..10 {
-            assert_eq!(window.stationary(1.0, &settings), None, "{i}");
+            assert_eq!(window.find_stationary_means(1.0, &settings), None, "{i}");
             window.push(100.0);
         }
-        assert!(window.stationary(1.0, &settings).is_some());
+        assert!(window.find_stationary_means(1.0, &settings).is_some());
         (0..10).for_each(|_| window.push(0.0));
-        assert_eq!(window.stationary(1.0, &settings), None);
+        assert_eq!(window.find_stationary_means(1.0, &settings), None);
     }
 }

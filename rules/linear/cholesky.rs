@@ -51,7 +51,7 @@ impl<const N: usize> NormalEquations<N> {
     /// The least squares solution.
     pub(crate) fn solve(&self) -> LinearSolution<N> {
         let length: Vec<f64> = (0..N).map(|i| self.xx[i][i].sqrt()).collect();
-        let (lower, used, half) = self.factor(&length);
+        let (lower, used, half) = self.factor_normal_matrix(&length);
         let mut coefficients = [0.0; N];
         for i in (0..N).rev().filter(|i| used[*i]) {
             let inner: f64 = (i + 1..N).map(|k| lower[k][i] * coefficients[k] * length[k]).sum();
@@ -64,7 +64,7 @@ impl<const N: usize> NormalEquations<N> {
     }
 
     /// Lower factor of the scaled `X'X`, which columns take part, and the forward solution of the scaled `X'y`.
-    fn factor(&self, length: &[f64]) -> ([[f64; N]; N], [bool; N], [f64; N]) {
+    fn factor_normal_matrix(&self, length: &[f64]) -> ([[f64; N]; N], [bool; N], [f64; N]) {
         let (mut lower, mut used, mut half) = ([[0.0; N]; N], [false; N], [0.0; N]);
         for i in (0..N).filter(|i| length[*i] > 0.0) {
             for j in (0..i).filter(|j| used[*j]) {

@@ -20,7 +20,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// `v -= factor * q`.
-pub fn subtract(v: &mut [f64], factor: f64, q: &[f64]) {
+pub fn subtract_scaled(v: &mut [f64], factor: f64, q: &[f64]) {
     v.iter_mut().zip(q).for_each(|(v, q)| *v -= factor * q);
 }
 
@@ -28,7 +28,7 @@ pub fn subtract(v: &mut [f64], factor: f64, q: &[f64]) {
 pub fn project_out(basis: &[Vec<f64>], v: &mut [f64]) {
     for q in basis {
         let along = dot(q, v);
-        subtract(v, along, q);
+        subtract_scaled(v, along, q);
     }
 }
 
@@ -81,7 +81,7 @@ pub fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Solution {
     }
     let mut residual = y.to_vec();
     let q_y: Vec<f64> = basis.iter().map(|q| dot(q, y)).collect();
-    basis.iter().zip(&q_y).for_each(|(q, along)| subtract(&mut residual, *along, q));
+    basis.iter().zip(&q_y).for_each(|(q, along)| subtract_scaled(&mut residual, *along, q));
     let inverse_r = invert_upper(&r);
     let mut coefficients = vec![0.0; count];
     let mut inverse = vec![vec![0.0; count]; count];

@@ -17,57 +17,57 @@ pub(crate) struct Factored {
     pub(crate) lengths: Vec<f64>,
 }
 
-pub(crate) fn product(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot_product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-pub(crate) fn length(a: &[f64]) -> f64 {
+pub(crate) fn euclidean_norm(a: &[f64]) -> f64 {
     let greatest = a.iter().fold(0.0_f64, |greatest, x| greatest.max(x.abs()));
     if greatest == 0.0 { 0.0 } else { greatest * a.iter().map(|x| (x / greatest).powi(2)).sum::<f64>().sqrt() }
 }
 
-fn reflect(v: &[f64], x: &mut [f64]) {
-    let twice = 2.0 * product(v, x);
+fn reflect_vector(v: &[f64], x: &mut [f64]) {
+    let twice = 2.0 * dot_product(v, x);
     x.iter_mut().zip(v).for_each(|(x, v)| *x -= twice * v);
 }
 
 /// Factors columns of equal height, at least as high as there are columns, none of length zero.
-pub(crate) fn factor(columns: &[Vec<f64>]) -> Factored {
-    let lengths: Vec<f64> = columns.iter().map(|column| length(column)).collect();
+pub(crate) fn factor_columns(columns: &[Vec<f64>]) -> Factored {
+    let lengths: Vec<f64> = columns.iter().map(|column| euclidean_norm(column)).collect();
     let mut a: MatrixColumns =
         columns.iter().zip(&lengths).map(|(column, length)| column.iter().map(|x| x / length).collect()).collect();
     let mut reflectors: MatrixColumns = Vec::with_capacity(a.len());
     for k in 0..a.len() {
-        let v = reflector(&a[k], k);
-        a.iter_mut().skip(k).for_each(|column| reflect(&v, column));
+        let v = build_reflector(&a[k], k);
+        a.iter_mut().skip(k).for_each(|column| reflect_vector(&v, column));
         reflectors.push(v);
     }
-    let q = (0..a.len()).map(|k| orthonormal(&reflectors, k)).collect();
-    let r = a.iter().enumerate().map(|(k, column)| upper(column, k, a.len())).collect();
+    let q = (0..a.len()).map(|k| build_orthonormal_column(&reflectors, k)).collect();
+    let r = a.iter().enumerate().map(|(k, column)| extract_upper_part(column, k, a.len())).collect();
     Factored { q, r, lengths }
 }
 
 /// The unit vector whose mirror turns rows `k..` of `x` into a multiple of the first of them.
-fn reflector(x: &[f64], k: usize) -> Vec<f64> {
+fn build_reflector(x: &[f64], k: usize) -> Vec<f64> {
     let mut v = vec![0.0; x.len()];
     v[k..].copy_from_slice(&x[k..]);
-    let size = length(&v);
+    let size = euclidean_norm(&v);
     v[k] += if v[k] < 0.0 { -size } else { size };
-    let size = length(&v);
+    let size = euclidean_norm(&v);
     if size > 0.0 {
         v.iter_mut().for_each(|x| *x /= size);
     }
     v
 }
 
-fn orthonormal(reflectors: &[Vec<f64>], k: usize) -> Vec<f64> {
+fn build_orthonormal_column(reflectors: &[Vec<f64>], k: usize) -> Vec<f64> {
     let mut column = vec![0.0; reflectors[k].len()];
     column[k] = 1.0;
-    reflectors.iter().rev().for_each(|v| reflect(v, &mut column));
+    reflectors.iter().rev().for_each(|v| reflect_vector(v, &mut column));
     column
 }
 
-fn upper(column: &[f64], k: usize, size: usize) -> Vec<f64> {
+fn extract_upper_part(column: &[f64], k: usize, size: usize) -> Vec<f64> {
     (0..size).map(|row| if row <= k { column[row] } else { 0.0 }).collect()
 }
 
@@ -82,7 +82,7 @@ pub(crate) fn back_substitute(r: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
 }
 
 /// Inverse of an upper triangle, column by column.
-pub(crate) fn inverse(r: &[Vec<f64>]) -> MatrixColumns {
+pub(crate) fn invert_upper_triangle(r: &[Vec<f64>]) -> MatrixColumns {
     let unit = |k| (0..r.len()).map(|i| if i == k { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
     (0..r.len()).map(|k| back_substitute(r, &unit(k))).collect()
 }
@@ -96,21 +96,21 @@ pub(crate) fn singular_values(matrix: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
         let mut turned = false;
         for p in 0..size {
             for q in p + 1..size {
-                turned |= rotate(&mut a, &mut v, p, q);
+                turned |= rotate_columns(&mut a, &mut v, p, q);
             }
         }
         if !turned {
             break;
         }
     }
-    let values: Vec<f64> = a.iter().map(|column| length(column)).collect();
+    let values: Vec<f64> = a.iter().map(|column| euclidean_norm(column)).collect();
     let least = (0..size).min_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
     (values, v.get(least).cloned().unwrap_or_default())
 }
 
 /// Makes columns `p` and `q` orthogonal; false when they were.
-fn rotate(a: &mut MatrixColumns, v: &mut MatrixColumns, p: usize, q: usize) -> bool {
-    let (pp, qq, pq) = (product(&a[p], &a[p]), product(&a[q], &a[q]), product(&a[p], &a[q]));
+fn rotate_columns(a: &mut MatrixColumns, v: &mut MatrixColumns, p: usize, q: usize) -> bool {
+    let (pp, qq, pq) = (dot_product(&a[p], &a[p]), dot_product(&a[q], &a[q]), dot_product(&a[p], &a[q]));
     if pq.abs() <= 1e-15 * (pp * qq).sqrt() {
         return false;
     }
@@ -135,7 +135,7 @@ mod tests {
     fn the_factors_give_the_matrix_and_q_is_orthonormal() {
         let x: Vec<f64> = (0..9).map(f64::from).collect();
         let columns = vec![vec![1.0; 9], x.clone(), x.iter().map(|x| x * x).collect()];
-        let factored = factor(&columns);
+        let factored = factor_columns(&columns);
         for (j, column) in columns.iter().enumerate() {
             for (i, value) in column.iter().enumerate() {
                 let product: f64 = (0..3).map(|k| factored.q[k][i] * factored.r[j][k]).sum();
@@ -143,7 +143,7 @@ mod tests {
             }
             for k in 0..3 {
                 let expected = if j == k { 1.0 } else { 0.0 };
-                assert!((product(&factored.q[j], &factored.q[k]) - expected).abs() < 1e-14);
+                assert!((dot_product(&factored.q[j], &factored.q[k]) - expected).abs() < 1e-14);
             }
         }
     }
@@ -153,7 +153,7 @@ mod tests {
         let (mut values, vector) = singular_values(&[vec![3.0, 4.0], vec![0.0, 5.0]]);
         values.sort_by(f64::total_cmp);
         assert!((values[0] - 5.0_f64.sqrt()).abs() < 1e-14 && (values[1] - 45.0_f64.sqrt()).abs() < 1e-14);
-        assert!((length(&vector) - 1.0).abs() < 1e-14);
+        assert!((euclidean_norm(&vector) - 1.0).abs() < 1e-14);
         let (values, _) = singular_values(&[vec![1.0, 1.0], vec![1.0, 1.0]]);
         assert!(values.iter().any(|value| *value < 1e-14));
     }

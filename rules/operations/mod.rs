@@ -14,8 +14,8 @@
 //! work_material = "45# steel"
 //! ```
 //!
-//! [`parse`] reads the text and tells everything that is wrong with it, [`Recipe::find`] looks a block up,
-//! [`Completion::apply`] fills in what the sources of a sample do not deliver. What was filled in says so: the channel
+//! [`parse`] reads the text and tells everything that is wrong with it, [`Recipe::find_operation`] looks a block up,
+//! [`Completion::apply_recipe`] fills in what the sources of a sample do not deliver. What was filled in says so: the channel
 //! `recipe` names the operation and the version of the table.
 
 mod complete;

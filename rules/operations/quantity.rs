@@ -48,7 +48,7 @@ const ENDINGS: [(&str, f64); 6] =
 impl OperationQuantity {
     /// Is the number one that is believed?
     #[must_use]
-    pub fn holds(&self, number: f64) -> bool {
+    pub fn is_credible(&self, number: f64) -> bool {
         number.is_finite()
             && number >= self.range.0
             && number <= self.range.1
@@ -61,17 +61,17 @@ impl OperationQuantity {
 
     /// What to do about a number that is not believed: the unit it was probably written in.
     #[must_use]
-    pub fn advice(&self, number: f64) -> String {
+    pub fn describe_correction(&self, number: f64) -> String {
         let (least, greatest) = self.range;
         let range = format!("{}: {least} to {greatest}", self.en);
         if !self.in_mm() {
             return format!("{range}, a whole number");
         }
         let units = [("micrometres", 1e-3), ("metres", 1000.0)];
-        let fitting = units.iter().find(|(_, scale)| self.holds(number * scale) && number > 0.0);
+        let fitting = units.iter().find(|(_, scale)| self.is_credible(number * scale) && number > 0.0);
         match fitting {
             Some((unit, scale)) => {
-                format!("in {unit}? then write {} = {}; {range} mm", self.key, rounded(number * scale))
+                format!("in {unit}? then write {} = {}; {range} mm", self.key, round_number(number * scale))
             }
             None => format!("{range} mm"),
         }
@@ -79,7 +79,7 @@ impl OperationQuantity {
 }
 
 /// What an unknown key was meant to be: the key, and the number in its unit where the key names another unit.
-pub(super) fn meant(key: &str, number: Option<f64>) -> Option<String> {
+pub(super) fn suggest_key(key: &str, number: Option<f64>) -> Option<String> {
     let lower = key.to_lowercase();
     let (stem, scale) = ENDINGS
         .iter()
@@ -90,13 +90,13 @@ pub(super) fn meant(key: &str, number: Option<f64>) -> Option<String> {
     })?;
     let converted = scale.zip(number).map(|(scale, number)| number * scale);
     Some(match converted {
-        Some(number) => format!("write {} = {}", quantity.key, rounded(number)),
+        Some(number) => format!("write {} = {}", quantity.key, round_number(number)),
         None if quantity.in_mm() => format!("write {} = ..., in millimetres", quantity.key),
         None => format!("write {} = ...", quantity.key),
     })
 }
 
 /// Without the noise of a conversion.
-fn rounded(number: f64) -> f64 {
+fn round_number(number: f64) -> f64 {
     (number * 1e9).round() / 1e9
 }

@@ -1,9 +1,9 @@
 //! From text to the table, with everything that is wrong at once.
 
-use super::quantity::{QUANTITIES, meant};
+use super::quantity::{QUANTITIES, suggest_key};
 use super::recipe::{Operation, Recipe};
 use crate::script::ScriptProblem;
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -37,9 +37,9 @@ const OTHER_NAMES: [(&str, &str); 8] = [
 /// # Errors
 /// Everything that is wrong, in the order of the file.
 pub fn parse(file: &str, text: &str) -> Result<Recipe, Vec<ScriptProblem>> {
-    let mut reader = RecipeReader { file, text, problems: Vec::new(), version: version(text) };
-    let operations = reader.operations();
-    reader.overlaps(&operations);
+    let mut reader = RecipeReader { file, text, problems: Vec::new(), version: compute_version(text) };
+    let operations = reader.read_operations();
+    reader.check_overlaps(&operations);
     reader.problems.sort_by_key(|problem| (problem.line.is_none(), problem.line, problem.column));
     match reader.problems.is_empty() {
         true => Ok(Recipe::new(operations, reader.version)),
@@ -48,7 +48,7 @@ pub fn parse(file: &str, text: &str) -> Result<Recipe, Vec<ScriptProblem>> {
 }
 
 /// FNV-1a over the text, eight digits: tells one version from another, keeps no secret.
-fn version(text: &str) -> Arc<str> {
+fn compute_version(text: &str) -> Arc<str> {
     let hash = text
         .bytes()
         .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
@@ -65,8 +65,8 @@ struct RecipeReader<'t> {
 }
 
 impl RecipeReader<'_> {
-    fn wrong(&mut self, offset: usize, what: impl Into<String>, next: impl Into<String>) {
-        let (line, column) = self.place(offset);
+    fn report_problem(&mut self, offset: usize, what: impl Into<String>, next: impl Into<String>) {
+        let (line, column) = self.locate_offset(offset);
         self.problems.push(ScriptProblem {
             file: self.file.to_owned(),
             line: Some(line),
@@ -77,68 +77,80 @@ impl RecipeReader<'_> {
     }
 
     /// Line and column of a byte offset, both from 1.
-    fn place(&self, offset: usize) -> (usize, usize) {
+    fn locate_offset(&self, offset: usize) -> (usize, usize) {
         let before = self.text.get(..offset).unwrap_or(self.text);
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
         (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
     }
 
-    fn operations(&mut self) -> Vec<Operation> {
+    fn read_operations(&mut self) -> Vec<Operation> {
         if self.text.len() > TEXT_MAX {
-            self.wrong(0, format!("the file is longer than {TEXT_MAX} bytes"), "one machine needs no more; split it");
+            self.report_problem(
+                0,
+                format!("the file is longer than {TEXT_MAX} bytes"),
+                "one machine needs no more; split it",
+            );
             return Vec::new();
         }
         let (table, errors) = DeTable::parse_recoverable(self.text);
         for error in &errors {
             let next = "write one `key = value` per line; text stands in \"quotes\"";
-            self.wrong(error.span().map_or(0, |span| span.start), format!("not TOML: {}", error.message()), next);
+            self.report_problem(
+                error.span().map_or(0, |span| span.start),
+                format!("not TOML: {}", error.message()),
+                next,
+            );
         }
         if !errors.is_empty() {
             return Vec::new();
         }
-        self.top(table.get_ref());
+        self.check_top_level(table.get_ref());
         let Some(entries) = table.get_ref().get("operation") else {
-            self.wrong(0, "there is no [[operation]]", "write one section [[operation]] for each stretch of a program");
+            self.report_problem(
+                0,
+                "there is no [[operation]]",
+                "write one section [[operation]] for each stretch of a program",
+            );
             return Vec::new();
         };
-        self.entries(entries)
+        self.read_entries(entries)
     }
 
-    fn top(&mut self, table: &DeTable<'_>) {
+    fn check_top_level(&mut self, table: &DeTable<'_>) {
         for (key, _) in table.iter().filter(|(key, _)| !["schema", "operation"].contains(&key.get_ref().as_ref())) {
             let next = "this file holds schema = \"operations/1\" and sections [[operation]]";
-            self.wrong(key.span().start, format!("there is no `{}` here", key.get_ref()), next);
+            self.report_problem(key.span().start, format!("there is no `{}` here", key.get_ref()), next);
         }
         match table.get("schema") {
             Some(schema) if schema.get_ref().as_str() == Some(SCHEMA) => {}
             Some(schema) => {
-                self.wrong(schema.span().start, "this schema is not known", "write schema = \"operations/1\"")
+                self.report_problem(schema.span().start, "this schema is not known", "write schema = \"operations/1\"")
             }
-            None => self.wrong(0, "the schema is missing", "begin the file with schema = \"operations/1\""),
+            None => self.report_problem(0, "the schema is missing", "begin the file with schema = \"operations/1\""),
         }
     }
 
-    fn entries(&mut self, entries: &Value<'_>) -> Vec<Operation> {
+    fn read_entries(&mut self, entries: &Value<'_>) -> Vec<Operation> {
         let Some(list) = entries.get_ref().as_array() else {
-            self.wrong(entries.span().start, "`operation` is not a list of sections", "write [[operation]]");
+            self.report_problem(entries.span().start, "`operation` is not a list of sections", "write [[operation]]");
             return Vec::new();
         };
         if list.len() > OPERATIONS_MAX {
             let what = format!("{} operations; at most {OPERATIONS_MAX} are read", list.len());
-            self.wrong(entries.span().start, what, "drop the programs that this machine no longer runs");
+            self.report_problem(entries.span().start, what, "drop the programs that this machine no longer runs");
             return Vec::new();
         }
         let mut operations = Vec::new();
         for entry in list.iter() {
             match entry.get_ref().as_table() {
-                Some(table) => operations.extend(self.operation(table, entry.span().start)),
-                None => self.wrong(entry.span().start, "an operation is a section", "write [[operation]]"),
+                Some(table) => operations.extend(self.read_operation(table, entry.span().start)),
+                None => self.report_problem(entry.span().start, "an operation is a section", "write [[operation]]"),
             }
         }
         operations
     }
 
-    fn operation(&mut self, table: &DeTable<'_>, offset: usize) -> Option<Operation> {
+    fn read_operation(&mut self, table: &DeTable<'_>, offset: usize) -> Option<Operation> {
         let before = self.problems.len();
         let mut numbers = BTreeMap::new();
         let mut texts = BTreeMap::new();
@@ -146,21 +158,21 @@ impl RecipeReader<'_> {
         for (key, value) in table.iter() {
             let name = key.get_ref().as_ref();
             if let Some(quantity) = QUANTITIES.iter().find(|quantity| quantity.key == name) {
-                numbers.extend(self.number(quantity, value).map(|number| (quantity.key, number)));
+                numbers.extend(self.read_number(quantity, value).map(|number| (quantity.key, number)));
             } else if let Some(known) = TEXTS.iter().find(|known| **known == name) {
-                texts.extend(self.name(known, value).map(|text| (*known, text)));
+                texts.extend(self.read_text(known, value).map(|text| (*known, text)));
             } else if name == "blocks" {
-                blocks = self.blocks(value);
+                blocks = self.read_blocks(value);
             } else {
-                self.unknown(name, key.span().start, value);
+                self.report_unknown_key(name, key.span().start, value);
             }
         }
-        self.required(&texts, table, offset);
-        self.plausible(&numbers, offset);
-        (self.problems.len() == before).then(|| self.built(&numbers, &texts, blocks, offset))?
+        self.check_required(&texts, table, offset);
+        self.check_plausibility(&numbers, offset);
+        (self.problems.len() == before).then(|| self.build_operation(&numbers, &texts, blocks, offset))?
     }
 
-    fn built(
+    fn build_operation(
         &self,
         numbers: &BTreeMap<&str, f64>,
         texts: &BTreeMap<&str, Arc<str>>,
@@ -180,51 +192,59 @@ impl RecipeReader<'_> {
             teeth: number("teeth"),
             tool: texts.get("tool").cloned(),
             work_material: texts.get("work_material").cloned(),
-            line: self.place(offset).0,
+            line: self.locate_offset(offset).0,
         })
     }
 
-    fn unknown(&mut self, name: &str, offset: usize, value: &Value<'_>) {
+    fn report_unknown_key(&mut self, name: &str, offset: usize, value: &Value<'_>) {
         let other = OTHER_NAMES.iter().find(|(other, _)| name.eq_ignore_ascii_case(other));
         let known = || TEXTS.into_iter().chain(QUANTITIES.iter().map(|quantity| quantity.key)).chain(["blocks"]);
-        let next = meant(name, plain_number(value.get_ref()))
+        let next = suggest_key(name, plain_number(value.get_ref()))
             .or_else(|| other.map(|(_, key)| format!("write {key} = ...")))
-            .or_else(|| nearest(name, known()).map(|near| format!("did you mean `{near}`?")))
+            .or_else(|| find_nearest_name(name, known()).map(|near| format!("did you mean `{near}`?")))
             .unwrap_or_else(|| format!("the keys are {}", known().collect::<Vec<_>>().join(", ")));
-        self.wrong(offset, format!("an operation has no `{name}`"), next);
+        self.report_problem(offset, format!("an operation has no `{name}`"), next);
     }
 
-    fn number(&mut self, quantity: &super::OperationQuantity, value: &Value<'_>) -> Option<f64> {
+    fn read_number(&mut self, quantity: &super::OperationQuantity, value: &Value<'_>) -> Option<f64> {
         let Some(number) = plain_number(value.get_ref()) else {
             let what = format!("`{}` is no number", quantity.key);
-            self.wrong(value.span().start, what, format!("{}, without quotes: {} = 1.0", quantity.en, quantity.key));
+            self.report_problem(
+                value.span().start,
+                what,
+                format!("{}, without quotes: {} = 1.0", quantity.en, quantity.key),
+            );
             return None;
         };
-        if quantity.holds(number) {
+        if quantity.is_credible(number) {
             return Some(number);
         }
         let what = format!("{} = {number} cannot be", quantity.key);
-        self.wrong(value.span().start, what, quantity.advice(number));
+        self.report_problem(value.span().start, what, quantity.describe_correction(number));
         None
     }
 
-    fn name(&mut self, key: &str, value: &Value<'_>) -> Option<Arc<str>> {
+    fn read_text(&mut self, key: &str, value: &Value<'_>) -> Option<Arc<str>> {
         let text = match value.get_ref() {
             DeValue::String(text) => text.trim(),
             _ => {
-                self.wrong(value.span().start, format!("`{key}` is no text"), format!("write {key} = \"...\""));
+                self.report_problem(
+                    value.span().start,
+                    format!("`{key}` is no text"),
+                    format!("write {key} = \"...\""),
+                );
                 return None;
             }
         };
         if text.is_empty() || text.chars().count() > NAME_MAX || text.chars().any(char::is_control) {
             let what = format!("`{key}` must have 1 to {NAME_MAX} printable characters");
-            self.wrong(value.span().start, what, "shorten it, or leave it out where it may be absent");
+            self.report_problem(value.span().start, what, "shorten it, or leave it out where it may be absent");
             return None;
         }
         Some(Arc::from(text))
     }
 
-    fn blocks(&mut self, value: &Value<'_>) -> Option<RangeInclusive<u32>> {
+    fn read_blocks(&mut self, value: &Value<'_>) -> Option<RangeInclusive<u32>> {
         let form = "write blocks = [10, 120]: the first and the last sequence number (N10 to N120)";
         let numbers: Option<Vec<u32>> = value.get_ref().as_array().and_then(|list| {
             list.iter().map(|one| plain_block(one.get_ref()).filter(|block| *block <= BLOCK_MAX)).collect()
@@ -233,32 +253,32 @@ impl RecipeReader<'_> {
             Some([first, last]) if first <= last => Some(*first..=*last),
             Some([first, last]) => {
                 let next = format!("write blocks = [{last}, {first}]");
-                self.wrong(value.span().start, format!("the blocks run backwards: {first} to {last}"), next);
+                self.report_problem(value.span().start, format!("the blocks run backwards: {first} to {last}"), next);
                 None
             }
             _ => {
-                self.wrong(value.span().start, "`blocks` is no pair of sequence numbers", form);
+                self.report_problem(value.span().start, "`blocks` is no pair of sequence numbers", form);
                 None
             }
         }
     }
 
-    fn required(&mut self, texts: &BTreeMap<&str, Arc<str>>, table: &DeTable<'_>, offset: usize) {
+    fn check_required(&mut self, texts: &BTreeMap<&str, Arc<str>>, table: &DeTable<'_>, offset: usize) {
         let missing = |key: &str| !texts.contains_key(key) && !table.iter().any(|(name, _)| name.get_ref() == key);
         if missing("program") {
-            self.wrong(
+            self.report_problem(
                 offset,
                 "the operation names no program",
                 "write program = \"O1234\", as the controller shows it",
             );
         }
         if missing("name") {
-            self.wrong(offset, "the operation has no name", "write name = \"rough turning\"");
+            self.report_problem(offset, "the operation has no name", "write name = \"rough turning\"");
         }
         if !table.iter().any(|(name, _)| says_of_cut(name.get_ref()))
-            && table.iter().all(|(name, _)| meant(name.get_ref(), None).is_none())
+            && table.iter().all(|(name, _)| suggest_key(name.get_ref(), None).is_none())
         {
-            self.wrong(
+            self.report_problem(
                 offset,
                 "the operation says nothing of the cut",
                 "write depth_of_cut_mm = ..., diameter_mm = ..., or at least work_material = \"...\"",
@@ -267,20 +287,24 @@ impl RecipeReader<'_> {
     }
 
     /// Numbers that are possible one by one and not together.
-    fn plausible(&mut self, numbers: &BTreeMap<&str, f64>, offset: usize) {
+    fn check_plausibility(&mut self, numbers: &BTreeMap<&str, f64>, offset: usize) {
         let number = |key: &str| numbers.get(key).copied();
         let (depth, width, diameter) = (number("depth_of_cut_mm"), number("width_of_cut_mm"), number("diameter_mm"));
         if let (Some(width), Some(diameter)) = (width, diameter)
             && width > diameter
         {
             let what = format!("a cut {width} mm wide is wider than the tool of {diameter} mm");
-            self.wrong(offset, what, "the diameter is that of the tool in milling; in turning leave the width out");
+            self.report_problem(
+                offset,
+                what,
+                "the diameter is that of the tool in milling; in turning leave the width out",
+            );
         }
         if let (Some(depth), None, Some(diameter)) = (depth, width, diameter)
             && 2.0 * depth > diameter
         {
             let what = format!("a cut {depth} mm deep goes beyond the centre of a work of {diameter} mm");
-            self.wrong(
+            self.report_problem(
                 offset,
                 what,
                 "the diameter is that of the work before the cut in turning; milling needs a width",
@@ -289,10 +313,10 @@ impl RecipeReader<'_> {
     }
 
     /// No block may belong to two operations.
-    fn overlaps(&mut self, operations: &[Operation]) {
+    fn check_overlaps(&mut self, operations: &[Operation]) {
         for (index, later) in operations.iter().enumerate() {
             let same = |earlier: &&Operation| {
-                earlier.program.eq_ignore_ascii_case(&later.program) && overlap(&earlier.blocks, &later.blocks)
+                earlier.program.eq_ignore_ascii_case(&later.program) && blocks_overlap(&earlier.blocks, &later.blocks)
             };
             if let Some(earlier) = operations[..index].iter().find(same) {
                 let what = match &later.blocks {
@@ -314,7 +338,7 @@ impl RecipeReader<'_> {
 }
 
 /// An operation of the whole program is what is left over and overlaps only with another one of its kind.
-fn overlap(a: &Option<RangeInclusive<u32>>, b: &Option<RangeInclusive<u32>>) -> bool {
+fn blocks_overlap(a: &Option<RangeInclusive<u32>>, b: &Option<RangeInclusive<u32>>) -> bool {
     match (a, b) {
         (Some(a), Some(b)) => a.start() <= b.end() && b.start() <= a.end(),
         (None, None) => true,

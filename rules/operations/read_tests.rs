@@ -3,32 +3,32 @@
 use super::super::Lookup;
 use super::*;
 
-fn table(entries: &str) -> String {
+fn format_table(entries: &str) -> String {
     format!("schema = \"operations/1\"\n{entries}")
 }
 
-fn entry(more: &str) -> String {
+fn format_entry(more: &str) -> String {
     format!("[[operation]]\nprogram = \"O1\"\nname = \"rough\"\ndepth_of_cut_mm = 1.0\n{more}\n")
 }
 
-fn entries(more: &[&str]) -> String {
-    table(&more.iter().map(|more| entry(more)).collect::<String>())
+fn format_entries(more: &[&str]) -> String {
+    format_table(&more.iter().map(|more| format_entry(more)).collect::<String>())
 }
 
-fn problems(text: &str) -> Vec<String> {
+fn list_problems(text: &str) -> Vec<String> {
     parse("operations.toml", text).err().unwrap_or_default().iter().map(ToString::to_string).collect()
 }
 
 #[test]
 fn a_table_is_read_and_looked_up() {
-    let text = entries(&["blocks = [10, 120]", "blocks = [\"N130\", \"N200\"]", "tool = \"T1\""]);
+    let text = format_entries(&["blocks = [10, 120]", "blocks = [\"N130\", \"N200\"]", "tool = \"T1\""]);
     let recipe = parse("operations.toml", &text).expect("a table");
-    let found = |block| match recipe.find(Some("O1"), block) {
+    let found = |block| match recipe.find_operation(Some("O1"), block) {
         Lookup::Found(operation) => operation.line,
         other => panic!("{other}"),
     };
     assert_eq!((found(Some("N10")), found(Some("200")), found(Some("125")), found(None)), (2, 7, 12, 12));
-    assert_eq!(recipe.find(None, Some("N10")), Lookup::ProgramUnknown);
+    assert_eq!(recipe.find_operation(None, Some("N10")), Lookup::ProgramUnknown);
     assert_eq!(recipe.version().len(), 8);
     assert_ne!(parse("f", &(text.clone() + "\n")).expect("a table").version(), recipe.version());
 }
@@ -39,7 +39,7 @@ fn every_mistake_is_told_at_once_with_its_line() {
                 [[operation]]\nprogram = \"O1\"\nname = \"\"\nap = 1.5\n\
                 [[operation]]\nname = \"finish\"\ndepth_of_cut_mm = 1500\nblocks = [50, 10]\nteeth = 2.5\n\
                 [[operation]]\nprogram = \"O2\"\nname = \"x\"\ndepth_of_cut_um = 800\nmaterial = \"steel\"\n";
-    let told = problems(text);
+    let told = list_problems(text);
     for part in [
         "operations.toml:1:10: this schema is not known",
         "operations.toml:2:1: there is no `machine` here",
@@ -59,19 +59,20 @@ fn every_mistake_is_told_at_once_with_its_line() {
 
 #[test]
 fn two_operations_may_not_claim_a_block() {
-    let told = problems(&entries(&["blocks = [10, 120]", "blocks = [120, 130]"]));
+    let told = list_problems(&format_entries(&["blocks = [10, 120]", "blocks = [120, 130]"]));
     assert_eq!(told.len(), 1, "{told:?}");
     assert!(told[0].contains(":7: \"rough\" and \"rough\" both claim blocks of O1") && told[0].contains("line 2"));
-    assert_eq!(problems(&entries(&["", ""])).len(), 1, "two of the whole program");
-    assert!(problems(&entries(&["", "blocks = [1, 2]"])).is_empty(), "the rest of the program");
+    assert_eq!(list_problems(&format_entries(&["", ""])).len(), 1, "two of the whole program");
+    assert!(list_problems(&format_entries(&["", "blocks = [1, 2]"])).is_empty(), "the rest of the program");
 }
 
 #[test]
 fn numbers_that_cannot_be_together_are_refused() {
-    let turned =
-        problems(&table("[[operation]]\nprogram = \"O1\"\nname = \"a\"\ndepth_of_cut_mm = 8\ndiameter_mm = 10\n"));
+    let turned = list_problems(&format_table(
+        "[[operation]]\nprogram = \"O1\"\nname = \"a\"\ndepth_of_cut_mm = 8\ndiameter_mm = 10\n",
+    ));
     assert!(turned.len() == 1 && turned[0].contains("beyond the centre"), "{turned:?}");
-    let milled = problems(&table(
+    let milled = list_problems(&format_table(
         "[[operation]]\nprogram = \"O1\"\nname = \"a\"\ndepth_of_cut_mm = 8\nwidth_of_cut_mm = 12\ndiameter_mm = 10\n",
     ));
     assert!(milled.len() == 1 && milled[0].contains("wider than the tool"), "{milled:?}");
@@ -82,11 +83,14 @@ fn what_is_no_table_is_told_and_nothing_panics() {
     for text in
         ["", "a", "operation = 3", "[[operation]]", "schema = \"operations/1\"\noperation = [1]", "\u{0}", "[[", "机"]
     {
-        assert!(!problems(text).is_empty(), "{text:?}");
+        assert!(!list_problems(text).is_empty(), "{text:?}");
     }
     let long = "#".repeat(TEXT_MAX + 1);
-    assert!(problems(&long)[0].contains("longer than"));
-    assert!(!problems(&table(&entry("diameter_mm = nan"))).is_empty());
-    assert!(!problems(&table(&entry("diameter_mm = \"79\""))).is_empty());
-    assert!(!problems(&table("[[operation]]\nprogram = \"O1\"\nname = \"a\"\ntool = \"T1\"")).is_empty(), "no cut");
+    assert!(list_problems(&long)[0].contains("longer than"));
+    assert!(!list_problems(&format_table(&format_entry("diameter_mm = nan"))).is_empty());
+    assert!(!list_problems(&format_table(&format_entry("diameter_mm = \"79\""))).is_empty());
+    assert!(
+        !list_problems(&format_table("[[operation]]\nprogram = \"O1\"\nname = \"a\"\ntool = \"T1\"")).is_empty(),
+        "no cut"
+    );
 }

@@ -34,7 +34,7 @@ pub struct Operation {
 impl Operation {
     /// The number of a quantity by its key.
     #[must_use]
-    pub fn quantity(&self, key: &str) -> Option<f64> {
+    pub fn find_quantity(&self, key: &str) -> Option<f64> {
         match key {
             "depth_of_cut_mm" => self.depth_of_cut_mm,
             "width_of_cut_mm" => self.width_of_cut_mm,
@@ -44,7 +44,7 @@ impl Operation {
         }
     }
 
-    fn covers(&self, block: Option<u32>) -> bool {
+    fn covers_block(&self, block: Option<u32>) -> bool {
         self.blocks.as_ref().is_none_or(|blocks| block.is_some_and(|block| blocks.contains(&block)))
     }
 }
@@ -67,7 +67,7 @@ pub enum Lookup<'a> {
 impl Lookup<'_> {
     /// Why there is no operation, where there is none.
     #[must_use]
-    pub fn missing(&self) -> Option<&'static str> {
+    pub fn explain_missing(&self) -> Option<&'static str> {
         Some(match self {
             Self::Found(_) => return None,
             Self::ProgramUnknown => "the controller does not say which program runs",
@@ -84,7 +84,7 @@ impl fmt::Display for Lookup<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Found(operation) => f.write_str(&operation.mark),
-            other => f.write_str(other.missing().unwrap_or_default()),
+            other => f.write_str(other.explain_missing().unwrap_or_default()),
         }
     }
 }
@@ -116,7 +116,7 @@ impl Recipe {
     /// The operation of a block. One that names the block goes before one that covers the whole program. Upper and lower
     /// case are one; `block` is a sequence number with or without its N.
     #[must_use]
-    pub fn find(&self, program: Option<&str>, block: Option<&str>) -> Lookup<'_> {
+    pub fn find_operation(&self, program: Option<&str>, block: Option<&str>) -> Lookup<'_> {
         let Some(program) = program.map(str::trim).filter(|program| !program.is_empty()) else {
             return Lookup::ProgramUnknown;
         };
@@ -126,7 +126,7 @@ impl Recipe {
         if of_program.peek().is_none() {
             return Lookup::NoProgram;
         }
-        let covering = of_program.filter(|operation| operation.covers(block));
+        let covering = of_program.filter(|operation| operation.covers_block(block));
         match covering.max_by_key(|operation| operation.blocks.is_some()) {
             Some(operation) => Lookup::Found(operation),
             None if block.is_none() => Lookup::BlockUnknown,

@@ -6,37 +6,39 @@ use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 /// Tool in the work, 0 to 1; 1 everywhere when no channel tells (then depth and feed must tell).
-pub(crate) fn engaged(scene: &Scene) -> Vec<f64> {
-    scene.role(Role::Engaged).map_or_else(|| vec![1.0; scene.rows()], <[f64]>::to_vec)
+pub(crate) fn read_engagement(scene: &Scene) -> Vec<f64> {
+    scene.role_values(Role::Engaged).map_or_else(|| vec![1.0; scene.rows()], <[f64]>::to_vec)
 }
 
 /// How hard the cut is, in the output's unit: the load, or else what the output usually has in the cut beyond what it
 /// has out of it, while the tool is in the work. `None` for displacements and without both.
-pub(crate) fn cut(scene: &Scene) -> Option<Cow<'_, [f64]>> {
+pub(crate) fn estimate_cut_load(scene: &Scene) -> Option<Cow<'_, [f64]>> {
     if scene.output_kind() == OutputKind::Displacement {
         return None;
     }
-    let usual = || scene.role(Role::Engaged).map(|engaged| engaged.iter().map(|x| x * scene.usual_cut()).collect());
+    let usual =
+        || scene.role_values(Role::Engaged).map(|engaged| engaged.iter().map(|x| x * scene.usual_cut()).collect());
     scene.load().map(Cow::Borrowed).or_else(usual)
 }
 
 /// Rows in which the tool cuts.
 pub(crate) fn cutting_rows(scene: &Scene) -> Vec<bool> {
-    match scene.role(Role::Engaged) {
+    match scene.role_values(Role::Engaged) {
         Some(engaged) => engaged.iter().map(|engaged| *engaged > 0.5).collect(),
-        None => cut(scene).map_or_else(|| vec![false; scene.rows()], |cut| cut.iter().map(|cut| *cut > 0.0).collect()),
+        None => estimate_cut_load(scene)
+            .map_or_else(|| vec![false; scene.rows()], |cut| cut.iter().map(|cut| *cut > 0.0).collect()),
     }
 }
 
 /// Cut times a factor of the row.
 pub(crate) fn cut_times(scene: &Scene, factor: impl Fn(usize) -> f64) -> Option<Vec<f64>> {
-    Some(cut(scene)?.iter().enumerate().map(|(row, cut)| cut * factor(row)).collect())
+    Some(estimate_cut_load(scene)?.iter().enumerate().map(|(row, cut)| cut * factor(row)).collect())
 }
 
 /// What a force in the cut means in the output: `area` is in mm2, or mm for a force along an edge.
 /// A power takes `area * vc / 60`, a torque `area * D / 2000`, a force `area` itself.
 pub(crate) fn in_output(scene: &Scene, area: &[f64]) -> Option<Vec<f64>> {
-    let lever: Vec<f64> = match Quantity::of(scene.output()) {
+    let lever: Vec<f64> = match Quantity::from_column_name(scene.output_name()) {
         Quantity::Force => return Some(area.to_vec()),
         Quantity::Torque => scene.column("diameter_mm")?.iter().map(|diameter| diameter / 2000.0).collect(),
         _ => scene.column("cutting_speed_m_min")?.iter().map(|speed| speed / 60.0).collect(),

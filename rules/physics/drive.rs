@@ -1,6 +1,6 @@
 //! Which drive an output belongs to, and how that drive moves, in SI units or thousands of revolutions.
 
-use super::excitation::greatest;
+use super::excitation::find_greatest_magnitude;
 use super::{OutputKind, Role, Scene};
 use adapters::channel::quantity::{is_of_spindle, unit_of};
 use std::f64::consts::PI;
@@ -15,11 +15,11 @@ const CREEP_KRPM: f64 = 0.05;
 
 /// Does the output belong to a feed axis rather than to the spindle or the whole machine?
 pub(crate) fn is_axis_output(scene: &Scene) -> bool {
-    let name = scene.output();
+    let name = scene.output_name();
     let lettered = ["x_", "y_", "z_"].iter().any(|letter| name.starts_with(letter));
     name.contains("axis")
         || lettered
-        || (!is_of_spindle(name) && !name.contains("total") && scene.role(Role::Speed).is_none())
+        || (!is_of_spindle(name) && !name.contains("total") && scene.role_values(Role::Speed).is_none())
 }
 
 /// Is the output a power, or something that adds up like one?
@@ -33,27 +33,27 @@ pub(crate) fn is_displacement(scene: &Scene) -> bool {
 }
 
 /// Spindle speed without its sign, in thousands of rpm.
-pub(crate) fn krpm(scene: &Scene) -> Option<Vec<f64>> {
-    Some(scene.role(Role::Speed)?.iter().map(|rpm| rpm.abs() / 1000.0).collect())
+pub(crate) fn read_speed_krpm(scene: &Scene) -> Option<Vec<f64>> {
+    Some(scene.role_values(Role::Speed)?.iter().map(|rpm| rpm.abs() / 1000.0).collect())
 }
 
 /// The same, where the output is a power or torque of the spindle or of the whole machine.
 pub(crate) fn driven_krpm(scene: &Scene) -> Option<Vec<f64>> {
-    (!is_displacement(scene) && !is_axis_output(scene)).then(|| krpm(scene))?
+    (!is_displacement(scene) && !is_axis_output(scene)).then(|| read_speed_krpm(scene))?
 }
 
 /// `(n / 1000 rpm)^exponent` in a power; one exponent less, with the sign of rotation, in a torque, current or load.
 pub(crate) fn speed_to_the(scene: &Scene, exponent: f64) -> Option<Vec<f64>> {
     let krpm = driven_krpm(scene)?;
     let signed = is_signed(scene);
-    let sides = scene.role(Role::Speed)?.iter().map(|rpm| side(*rpm, signed));
+    let sides = scene.role_values(Role::Speed)?.iter().map(|rpm| sign_of_motion(*rpm, signed));
     Some(pace_to_the(scene, &krpm, sides, exponent))
 }
 
 /// The same law of a feed drive over its velocity in m/s: in a power, or with the direction in a force.
 pub(crate) fn slide_to_the(scene: &Scene, velocity: &[f64], exponent: f64) -> Vec<f64> {
     let pace: Vec<f64> = velocity.iter().map(|v| v.abs()).collect();
-    pace_to_the(scene, &pace, directions(velocity), exponent)
+    pace_to_the(scene, &pace, compute_directions(velocity), exponent)
 }
 
 /// `pace^exponent` in a power; one exponent less, with the side of the motion, in a torque, force, current or load.
@@ -66,17 +66,17 @@ fn pace_to_the(scene: &Scene, pace: &[f64], sides: impl Iterator<Item = f64>, ex
 }
 
 /// The velocity of the slide in m/s where the output is that of its feed drive.
-pub(crate) fn sliding(scene: &Scene) -> Option<Vec<f64>> {
-    if turns(scene) { None } else { motion(scene) }
+pub(crate) fn read_slide_velocity(scene: &Scene) -> Option<Vec<f64>> {
+    if is_rotary_drive(scene) { None } else { read_motion(scene) }
 }
 
 /// Does the output change its sign with the direction of motion? A true rms current of the spindle does not.
 pub(crate) fn is_signed(scene: &Scene) -> bool {
-    !is_of_spindle(scene.output())
-        || scene.recorded().iter().zip(scene.usable()).any(|(value, usable)| *usable && *value < 0.0)
+    !is_of_spindle(scene.output_name())
+        || scene.recorded_output().iter().zip(scene.usable_rows()).any(|(value, usable)| *usable && *value < 0.0)
 }
 
-fn side(motion: f64, signed: bool) -> f64 {
+fn sign_of_motion(motion: f64, signed: bool) -> f64 {
     if signed && motion < 0.0 { -1.0 } else { 1.0 }
 }
 
@@ -91,9 +91,9 @@ pub(crate) fn torque_at_1000_rpm(scene: &Scene) -> Option<Vec<f64>> {
 const OPPOSES: f64 = -0.3;
 
 /// Is a force recorded as the one that opposes the motion, instead of the one that drives it?
-fn opposes(scene: &Scene, velocity: &[f64]) -> bool {
-    let rows = || (0..velocity.len()).filter(|row| scene.usable()[*row] && velocity[*row].is_finite());
-    let force = scene.recorded();
+fn is_force_opposing(scene: &Scene, velocity: &[f64]) -> bool {
+    let rows = || (0..velocity.len()).filter(|row| scene.usable_rows()[*row] && velocity[*row].is_finite());
+    let force = scene.recorded_output();
     let sum = |of: &dyn Fn(usize) -> f64| rows().map(of).sum::<f64>();
     let (along, force_2, speed_2) =
         (sum(&|row| force[row] * velocity[row]), sum(&|row| force[row].powi(2)), sum(&|row| velocity[row].powi(2)));
@@ -102,23 +102,23 @@ fn opposes(scene: &Scene, velocity: &[f64]) -> bool {
 
 /// How the drive of the output moves: axis velocity in m/s, or spindle speed in rad/s, with its sign; against it where the
 /// force is recorded as the one that opposes the motion, so that friction is positive in either convention.
-pub(crate) fn motion(scene: &Scene) -> Option<Vec<f64>> {
+pub(crate) fn read_motion(scene: &Scene) -> Option<Vec<f64>> {
     if is_displacement(scene) {
         return None;
     }
-    let role = if turns(scene) { Role::Speed } else { Role::Velocity };
+    let role = if is_rotary_drive(scene) { Role::Speed } else { Role::Velocity };
     let motion = in_si(scene, scene.role_name(role)?)?;
     let unsigned = scene.output_kind() == OutputKind::Force && !is_signed(scene);
     if unsigned {
         return Some(motion.iter().map(|v| v.abs()).collect());
     }
-    let opposes = scene.output_kind() == OutputKind::Force && opposes(scene, &motion);
+    let opposes = scene.output_kind() == OutputKind::Force && is_force_opposing(scene, &motion);
     Some(if opposes { motion.iter().map(|v| -v).collect() } else { motion })
 }
 
 /// Does the drive of the output turn (rad/s) rather than slide (m/s)?
-pub(crate) fn turns(scene: &Scene) -> bool {
-    !is_axis_output(scene) || scene.role(Role::Velocity).is_none()
+pub(crate) fn is_rotary_drive(scene: &Scene) -> bool {
+    !is_axis_output(scene) || scene.role_values(Role::Velocity).is_none()
 }
 
 /// A quantity in m, m/s, m/s2 or rad/s, by the unit at the end of its name.
@@ -144,7 +144,7 @@ pub(crate) fn axis_velocities(scene: &Scene) -> Vec<Vec<f64>> {
 }
 
 /// Rate of change per second: central difference within a run, one-sided at its ends.
-pub(crate) fn rate(scene: &Scene, values: &[f64]) -> Vec<f64> {
+pub(crate) fn compute_rate(scene: &Scene, values: &[f64]) -> Vec<f64> {
     let mut rates = vec![0.0; values.len()];
     for run in scene.runs() {
         for row in run.clone() {
@@ -162,7 +162,7 @@ pub(crate) fn spindle_rate_rpm_per_s(scene: &Scene) -> Option<Vec<f64>> {
     if let Some(recorded) = scene.column("spindle_acceleration_rpm_per_s") {
         return Some(recorded.to_vec());
     }
-    Some(rate(scene, scene.role(Role::Speed)?))
+    Some(compute_rate(scene, scene.role_values(Role::Speed)?))
 }
 
 /// Both directions are visited, each in at least a fiftieth of the rows.
@@ -174,14 +174,14 @@ pub(crate) fn goes_both_ways(motion: &[f64]) -> bool {
 }
 
 /// The direction of a motion, -1 to 1: a reversal passes through zero within a hundredth of the greatest velocity.
-pub(crate) fn directions(motion: &[f64]) -> impl Iterator<Item = f64> {
+pub(crate) fn compute_directions(motion: &[f64]) -> impl Iterator<Item = f64> {
     let width = rest_width(motion);
     motion.iter().map(move |v| soft_sign(*v, width))
 }
 
 /// Speed below which a motion counts as resting, in its own unit: a hundredth of the greatest.
 pub(crate) fn rest_width(motion: &[f64]) -> f64 {
-    0.01 * greatest(motion)
+    0.01 * find_greatest_magnitude(motion)
 }
 
 /// A sign that passes smoothly through zero within `width`.

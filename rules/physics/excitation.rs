@@ -4,23 +4,23 @@ use super::{Effect, Form, Scene};
 use std::collections::BTreeSet;
 
 /// Greatest magnitude; at least the smallest positive number, so that it can divide.
-pub(crate) fn greatest(values: &[f64]) -> f64 {
+pub(crate) fn find_greatest_magnitude(values: &[f64]) -> f64 {
     values.iter().fold(f64::MIN_POSITIVE, |top, value| top.max(value.abs()))
 }
 
 /// Do the values differ by more than a thousandth of the greatest?
-pub(crate) fn varies(values: &[f64]) -> bool {
-    spread(values) > 1e-3 * greatest(values)
+pub(crate) fn has_variation(values: &[f64]) -> bool {
+    compute_spread(values) > 1e-3 * find_greatest_magnitude(values)
 }
 
 /// The plain form of an effect where its first column varies in the recording; no form where nothing could tell it.
 pub(crate) fn plain_where_it_varies(effect: &dyn Effect, scene: &Scene) -> Vec<Form> {
-    let columns = effect.columns(scene, &Form::plain());
-    columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+    let columns = effect.compute_columns(scene, &Form::without_shape());
+    columns.filter(|columns| has_variation(&columns[0].1)).map(|_| Form::without_shape()).into_iter().collect()
 }
 
 /// Separate stretches of rows in which `holds`; a new run starts a new stretch.
-pub(crate) fn visits(scene: &Scene, holds: impl Fn(usize) -> bool) -> usize {
+pub(crate) fn count_visits(scene: &Scene, holds: impl Fn(usize) -> bool) -> usize {
     scene
         .runs()
         .iter()
@@ -35,7 +35,7 @@ const BAND_GAPS: f64 = 4.0;
 /// greatest, and at every such gap within a band that it passes through; at most `most` of them, as many rows between each.
 pub(crate) fn between_speeds(scene: &Scene, gap_share: f64, most: usize) -> Vec<f64> {
     let Some(speeds) = steady_speeds_rpm(scene) else { return Vec::new() };
-    let gap = gap_share * greatest(&speeds);
+    let gap = gap_share * find_greatest_magnitude(&speeds);
     let bands = speeds.chunk_by(|slower, faster| faster - slower <= gap);
     let levels: Vec<&[f64]> = bands.flat_map(|band| levels_of(band, gap)).collect();
     let mut rows = 0;
@@ -44,7 +44,7 @@ pub(crate) fn between_speeds(scene: &Scene, gap_share: f64, most: usize) -> Vec<
         // Chunks are never empty.
         (rows, 0.5 * (pair[0][pair[0].len() - 1] + pair[1][0]))
     });
-    thinned(&between.collect::<Vec<_>>(), speeds.len(), most)
+    thin_places(&between.collect::<Vec<_>>(), speeds.len(), most)
 }
 
 /// A band of speeds in rising order: one level, or one for every gap that it is wide.
@@ -63,7 +63,7 @@ fn levels_of(mut band: &[f64], gap: f64) -> Vec<&[f64]> {
 }
 
 /// Of places with the rows below each, in rising order, at most `most`, with as many of the rows between one and the next.
-fn thinned(places: &[(usize, f64)], rows: usize, most: usize) -> Vec<f64> {
+fn thin_places(places: &[(usize, f64)], rows: usize, most: usize) -> Vec<f64> {
     if places.len() <= most {
         return places.iter().map(|(_, place)| *place).collect();
     }
@@ -78,9 +78,9 @@ fn thinned(places: &[(usize, f64)], rows: usize, most: usize) -> Vec<f64> {
 
 /// Speeds of the rows in which the spindle turns and hardly accelerates, in rising order.
 fn steady_speeds_rpm(scene: &Scene) -> Option<Vec<f64>> {
-    let speed = scene.role(super::Role::Speed)?;
-    let rates = super::drive::rate(scene, speed);
-    let slow = 0.02 * greatest(speed);
+    let speed = scene.role_values(super::Role::Speed)?;
+    let rates = super::drive::compute_rate(scene, speed);
+    let slow = 0.02 * find_greatest_magnitude(speed);
     let mut steady: Vec<f64> =
         speed.iter().zip(&rates).filter(|(n, rate)| n.abs() > 1.0 && rate.abs() < slow).map(|(n, _)| n.abs()).collect();
     steady.sort_by(f64::total_cmp);
@@ -95,7 +95,7 @@ pub(crate) fn time_constants(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
 
 /// One form per time constant that this recording can tell.
 pub(crate) fn lag_forms(scene: &Scene, name: &'static str, grid_s: &[f64]) -> Vec<Form> {
-    let form = |tau_s| Form { name, ..Form::of(&[("tau_s", tau_s)]) };
+    let form = |tau_s| Form { name, ..Form::from_shape(&[("tau_s", tau_s)]) };
     time_constants(scene, grid_s).into_iter().map(form).collect()
 }
 
@@ -106,7 +106,7 @@ const DELAY_RATIO: f64 = 2.2;
 
 /// Delays worth trying, in seconds: those of the grid, none below a quarter of the sampling period; and shorter ones,
 /// down to part of a row, where the recording is fast enough to tell them.
-pub(crate) fn delays(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
+pub(crate) fn list_delays(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
     let (period_s, finest_s) = (scene.period_s(), grid_s.first().copied().unwrap_or(0.0));
     let short = |delay: &f64| Some(delay * DELAY_RATIO);
     let short = std::iter::successors(Some(SHORTEST_PERIODS * period_s), short);
@@ -168,7 +168,7 @@ const RUN_TO_RUN: &str = " to ";
 
 /// One form per word of a text column, where it has `2..=most` words.
 pub(crate) fn word_forms(scene: &Scene, name: &'static str, column: &str, most: usize) -> Vec<Form> {
-    let Some(words) = scene.words(column) else { return Vec::new() };
+    let Some(words) = scene.text_column(column) else { return Vec::new() };
     let words = words.words();
     if !(2..=most).contains(&words.len()) {
         return Vec::new();
@@ -181,7 +181,7 @@ pub(crate) fn word_forms(scene: &Scene, name: &'static str, column: &str, most: 
 
 /// One in the rows where the text column holds the word.
 pub(crate) fn where_word(scene: &Scene, column: &str, word: &str) -> Option<Vec<f64>> {
-    let words = scene.words(column)?;
+    let words = scene.text_column(column)?;
     Some((0..scene.rows()).map(|row| if words.get(row) == Some(word) { 1.0 } else { 0.0 }).collect())
 }
 
@@ -203,7 +203,7 @@ pub(crate) fn recording_elapsed_s(scene: &Scene) -> Vec<f64> {
 }
 
 /// Difference of the greatest and the least value.
-pub(crate) fn spread(values: &[f64]) -> f64 {
+pub(crate) fn compute_spread(values: &[f64]) -> f64 {
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     (high - low).max(0.0)
@@ -211,7 +211,7 @@ pub(crate) fn spread(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{levels_of, thinned};
+    use super::{levels_of, thin_places};
 
     #[test]
     fn speeds_that_are_held_are_levels_and_a_band_that_is_passed_through_is_cut() {
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn of_many_places_those_with_as_many_rows_between_are_kept() {
         let places: Vec<(usize, f64)> = (1..100).map(|place| (place * place, 10.0 * place as f64)).collect();
-        assert_eq!(thinned(&places, 10_000, 4), [350.0, 610.0, 790.0, 940.0]);
-        assert_eq!(thinned(&places[..3], 10_000, 4), [10.0, 20.0, 30.0]);
+        assert_eq!(thin_places(&places, 10_000, 4), [350.0, 610.0, 790.0, 940.0]);
+        assert_eq!(thin_places(&places[..3], 10_000, 4), [10.0, 20.0, 30.0]);
     }
 }

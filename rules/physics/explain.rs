@@ -1,7 +1,7 @@
 //! The catalogue in words and as JSON: what `effects list` and `effects show` print.
 
-use super::{CATALOGUE, EffectDoc, Entry, ParameterDoc, Texts, effect};
-use adapters::channel::nearest;
+use super::{CATALOGUE, EffectDoc, Entry, ParameterDoc, Texts, find_effect};
+use adapters::channel::find_nearest_name;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use thiserror::Error;
@@ -41,10 +41,10 @@ impl EffectDoc {
 ///
 /// # Errors
 /// [`UnknownEffect`] with the nearest name.
-pub fn find(kind: &str) -> Result<&'static EffectDoc, UnknownEffect> {
+pub fn find_effect_doc(kind: &str) -> Result<&'static EffectDoc, UnknownEffect> {
     let kinds = || CATALOGUE.iter().map(|effect| effect.doc().kind);
-    let near = || nearest(kind, kinds()).map(|near| format!("Did you mean {near}? "));
-    effect(kind).map(|effect| effect.doc()).ok_or_else(|| UnknownEffect {
+    let near = || find_nearest_name(kind, kinds()).map(|near| format!("Did you mean {near}? "));
+    find_effect(kind).map(|effect| effect.doc()).ok_or_else(|| UnknownEffect {
         kind: kind.to_owned(),
         hint: format!("{}`effects list` names all {}.", near().unwrap_or_default(), CATALOGUE.len()),
     })
@@ -52,7 +52,7 @@ pub fn find(kind: &str) -> Result<&'static EffectDoc, UnknownEffect> {
 
 /// One line per effect: kind, name and statement.
 #[must_use]
-pub fn list(language: Language) -> String {
+pub fn format_effect_list(language: Language) -> String {
     let widest = CATALOGUE.iter().map(|effect| effect.doc().kind.len()).max().unwrap_or(0);
     let mut lines = String::new();
     let mut family = "";
@@ -89,16 +89,16 @@ fn family_name(family: &'static str, language: Language) -> &'static str {
 ///
 /// # Errors
 /// [`UnknownEffect`] with the nearest name.
-pub fn explain(kind: &str, language: Language) -> Result<String, UnknownEffect> {
-    let doc = find(kind)?;
+pub fn explain_effect(kind: &str, language: Language) -> Result<String, UnknownEffect> {
+    let doc = find_effect_doc(kind)?;
     let texts = doc.texts(language);
-    let words = labels(language);
+    let words = select_labels(language);
     let mut text = format!("{} - {}\n{}\n\n", doc.kind, texts.name, texts.statement);
     let _ = writeln!(text, "{}\n  {}", words.law, doc.law);
     if !doc.parameters.is_empty() {
         let _ = writeln!(text, "{}", words.parameters);
         doc.parameters.iter().for_each(|parameter| text.push_str(&parameter_line(parameter, language)));
-        placeholders(doc, language).for_each(|note| text.push_str(&format!("  {note}\n")));
+        list_placeholder_notes(doc, language).for_each(|note| text.push_str(&format!("  {note}\n")));
     }
     let minutes = format!("{} ({} min)", texts.experiment, doc.experiment_minutes);
     let needs = if doc.needs.is_empty() { "-".to_owned() } else { doc.needs.join("; ") };
@@ -127,7 +127,7 @@ struct Labels {
     shape: &'static str,
 }
 
-fn labels(language: Language) -> &'static Labels {
+fn select_labels(language: Language) -> &'static Labels {
     match language {
         Language::En => &Labels {
             law: "Law",
@@ -155,7 +155,7 @@ fn labels(language: Language) -> &'static Labels {
 }
 
 /// What the words that stand for a unit mean, where the effect's parameters use them.
-fn placeholders(doc: &EffectDoc, language: Language) -> impl Iterator<Item = &'static str> {
+fn list_placeholder_notes(doc: &EffectDoc, language: Language) -> impl Iterator<Item = &'static str> {
     let notes = [
         ("output", "output: the unit of the simulated output", "output：仿真输出的单位"),
         ("velocity", "velocity: m/s, of a spindle rad/s", "velocity：m/s，主轴为rad/s"),
@@ -173,13 +173,13 @@ fn placeholders(doc: &EffectDoc, language: Language) -> impl Iterator<Item = &'s
 fn parameter_line(parameter: &ParameterDoc, language: Language) -> String {
     let shape = match parameter.entry {
         Entry::Linear => String::new(),
-        Entry::Shape => format!(" ({})", labels(language).shape),
+        Entry::Shape => format!(" ({})", select_labels(language).shape),
     };
     let meaning = if language == Language::En { parameter.en } else { parameter.zh };
-    format!("  {} [{}] {}{shape}: {meaning}\n", parameter.name, parameter.unit, range(parameter.range))
+    format!("  {} [{}] {}{shape}: {meaning}\n", parameter.name, parameter.unit, format_range(parameter.range))
 }
 
-fn range((low, high): (f64, f64)) -> String {
+fn format_range((low, high): (f64, f64)) -> String {
     match (low.is_finite(), high.is_finite()) {
         (true, true) => format!("{low} .. {high}"),
         (true, false) => format!(">= {low}"),
@@ -193,7 +193,7 @@ fn range((low, high): (f64, f64)) -> String {
 /// # Errors
 /// [`UnknownEffect`] with the nearest name.
 pub fn explain_json(kind: &str) -> Result<Value, UnknownEffect> {
-    find(kind).map(doc_json)
+    find_effect_doc(kind).map(doc_json)
 }
 
 /// The whole catalogue as JSON.
@@ -248,7 +248,7 @@ mod tests {
     fn every_effect_is_explained_in_both_languages() {
         for doc in CATALOGUE.iter().map(|effect| effect.doc()) {
             for language in [Language::En, Language::Zh] {
-                let text = explain(doc.kind, language).expect("known");
+                let text = explain_effect(doc.kind, language).expect("known");
                 let texts = doc.texts(language);
                 for part in [doc.law, doc.source, texts.statement, texts.absence, texts.experiment] {
                     assert!(text.contains(part), "{} lacks {part}", doc.kind);
@@ -257,7 +257,7 @@ mod tests {
                 let stands_in = doc.parameters.iter().any(|parameter| parameter.unit.contains("output"));
                 let note = if language == Language::En { "output: " } else { "output：" };
                 assert_eq!(text.contains(note), stands_in, "{}", doc.kind);
-                assert!(list(language).contains(texts.statement));
+                assert!(format_effect_list(language).contains(texts.statement));
             }
         }
     }
@@ -273,7 +273,7 @@ mod tests {
 
     #[test]
     fn a_misspelt_effect_finds_its_neighbour() {
-        let error = explain("flank_ware", Language::En).expect_err("unknown");
+        let error = explain_effect("flank_ware", Language::En).expect_err("unknown");
         assert!(error.to_string().contains("Did you mean flank_wear?"), "{error}");
     }
 }

@@ -15,7 +15,7 @@ mod tool_load;
 mod unit;
 
 use adapters::channel::quantity::Quantity;
-pub use catalogue::{CATALOGUE, effect};
+pub use catalogue::{CATALOGUE, find_effect};
 pub use scene::{LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError};
 pub use unit::{unit_in, unit_of_quantity};
 
@@ -49,7 +49,7 @@ pub struct ParameterDoc {
 impl ParameterDoc {
     /// A parameter that the contribution is proportional to: name, unit, range, and what it is in both languages.
     #[must_use]
-    pub const fn linear(
+    pub const fn new_linear(
         name: &'static str,
         unit: &'static str,
         range: (f64, f64),
@@ -61,7 +61,7 @@ impl ParameterDoc {
 
     /// A parameter that bends the shape of the contribution: name, unit, range, and what it is in both languages.
     #[must_use]
-    pub const fn shape(
+    pub const fn new_shape(
         name: &'static str,
         unit: &'static str,
         range: (f64, f64),
@@ -115,7 +115,7 @@ pub struct EffectDoc {
 impl EffectDoc {
     /// The parameter of this name.
     #[must_use]
-    pub fn parameter(&self, name: &str) -> Option<&'static ParameterDoc> {
+    pub fn find_parameter(&self, name: &str) -> Option<&'static ParameterDoc> {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 }
@@ -139,25 +139,25 @@ pub struct Form {
 impl Form {
     /// A form with these shape parameters.
     #[must_use]
-    pub fn of(shape: &[(&'static str, f64)]) -> Self {
+    pub fn from_shape(shape: &[(&'static str, f64)]) -> Self {
         Self { shape: shape.to_vec(), ..Self::default() }
     }
 
     /// The only form of an effect without shape parameters.
     #[must_use]
-    pub fn plain() -> Self {
+    pub fn without_shape() -> Self {
         Self::default()
     }
 
     /// The same form acting as a whole: its share is known to be one.
     #[must_use]
-    pub fn whole(self) -> Self {
+    pub fn with_full_share(self) -> Self {
         Self { known: vec![("share", 1.0)], ..self }
     }
 
     /// The value of a shape parameter.
     #[must_use]
-    pub fn value(&self, name: &str) -> Option<f64> {
+    pub fn shape_value(&self, name: &str) -> Option<f64> {
         self.shape.iter().find(|(known, _)| *known == name).map(|(_, value)| *value)
     }
 }
@@ -184,7 +184,7 @@ pub trait Effect: Sync + Send {
 
     /// The forms worth trying as a candidate in this scene, coarse in the shape parameters; empty when the scene lacks
     /// what the effect needs or never excites it.
-    fn forms(&self, scene: &Scene) -> Vec<Form>;
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form>;
 
     /// Least and greatest value of a parameter that is physically possible for this output.
     fn range(&self, _scene: &Scene, parameter: &ParameterDoc) -> (f64, f64) {
@@ -207,11 +207,11 @@ pub trait Effect: Sync + Send {
     }
 
     /// The columns of this form, `None` when the scene lacks an input.
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns>;
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns>;
 
     /// The form a model file means when it gives no form: its shape parameters are replaced by the file's.
     fn default_form(&self, scene: &Scene) -> Form {
-        self.forms(scene).into_iter().next().unwrap_or_default()
+        self.propose_forms(scene).into_iter().next().unwrap_or_default()
     }
 
     /// Do its columns change with the load that the cut simulates?

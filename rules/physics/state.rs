@@ -8,7 +8,7 @@ use super::Scene;
 pub fn first_order(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
     let mut state = vec![0.0; input.len()];
     for row in 1..input.len() {
-        state[row] = advance(scene, state[row - 1], input[row - 1], row, tau_s);
+        state[row] = advance_state(scene, state[row - 1], input[row - 1], row, tau_s);
     }
     state
 }
@@ -27,14 +27,14 @@ pub fn first_order_behind(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> 
     state
 }
 
-fn advance(scene: &Scene, x: f64, input: f64, row: usize, tau_s: f64) -> f64 {
+fn advance_state(scene: &Scene, x: f64, input: f64, row: usize, tau_s: f64) -> f64 {
     let dt_s = (scene.clock_s()[row] - scene.clock_s()[row - 1]).max(0.0);
     let driven_s = scene.driven_s(row).min(dt_s);
-    relaxed(relaxed(x, input, driven_s, tau_s), 0.0, dt_s - driven_s, tau_s)
+    relax_state(relax_state(x, input, driven_s, tau_s), 0.0, dt_s - driven_s, tau_s)
 }
 
 /// Where a first-order state has come after `dt_s` with a constant input.
-fn relaxed(x: f64, input: f64, dt_s: f64, tau_s: f64) -> f64 {
+fn relax_state(x: f64, input: f64, dt_s: f64, tau_s: f64) -> f64 {
     input + (x - input) * (-dt_s / tau_s).exp()
 }
 
@@ -46,7 +46,7 @@ pub fn first_order_in_each_pass(scene: &Scene, input: &[f64], tau_s: f64) -> Vec
     for pass in scene.passes() {
         for row in pass.clone().skip(1) {
             let dt_s = (scene.time_s()[row] - scene.time_s()[row - 1]).max(0.0);
-            state[row] = relaxed(state[row - 1], input[row], dt_s, tau_s);
+            state[row] = relax_state(state[row - 1], input[row], dt_s, tau_s);
         }
     }
     state
@@ -58,17 +58,17 @@ pub fn first_order_in_each_pass(scene: &Scene, input: &[f64], tau_s: f64) -> Vec
 pub fn bent_over_the_way(scene: &Scene, velocity: &[f64], way: f64) -> Vec<f64> {
     let mut state = vec![0.0; velocity.len()];
     for row in 1..velocity.len() {
-        let bent = |z: f64, dx: f64| relaxed(z, dx.signum(), dx.abs(), way);
-        state[row] = ways(scene, velocity, row).into_iter().fold(state[row - 1], bent);
+        let bent = |z: f64, dx: f64| relax_state(z, dx.signum(), dx.abs(), way);
+        state[row] = measure_ways(scene, velocity, row).into_iter().fold(state[row - 1], bent);
     }
     state
 }
 
 /// The ways between reversals, with their direction, in m or rad; none where the drive never moves.
 #[must_use]
-pub fn strokes(scene: &Scene, velocity: &[f64]) -> Vec<f64> {
+pub fn measure_strokes(scene: &Scene, velocity: &[f64]) -> Vec<f64> {
     let mut strokes: Vec<f64> = Vec::new();
-    for dx in (1..velocity.len()).flat_map(|row| ways(scene, velocity, row)).filter(|dx| *dx != 0.0) {
+    for dx in (1..velocity.len()).flat_map(|row| measure_ways(scene, velocity, row)).filter(|dx| *dx != 0.0) {
         match strokes.last_mut() {
             Some(stroke) if stroke.signum() == dx.signum() => *stroke += dx,
             _ => strokes.push(dx),
@@ -78,7 +78,7 @@ pub fn strokes(scene: &Scene, velocity: &[f64]) -> Vec<f64> {
 }
 
 /// The ways since the row before, one in each direction where it reverses in between.
-fn ways(scene: &Scene, velocity: &[f64], row: usize) -> [f64; 2] {
+fn measure_ways(scene: &Scene, velocity: &[f64], row: usize) -> [f64; 2] {
     let (before, now) = (velocity[row - 1], velocity[row]);
     let dt_s = (scene.clock_s()[row] - scene.clock_s()[row - 1]).max(0.0).min(scene.driven_s(row));
     let same = before * now >= 0.0;
@@ -88,7 +88,7 @@ fn ways(scene: &Scene, velocity: &[f64], row: usize) -> [f64; 2] {
 
 /// What is left of an initial state of one: `exp(-t / tau_s)` since the first row.
 #[must_use]
-pub fn decay(scene: &Scene, tau_s: f64) -> Vec<f64> {
+pub fn compute_decay(scene: &Scene, tau_s: f64) -> Vec<f64> {
     scene.clock_s().iter().map(|t| (-t / tau_s).exp()).collect()
 }
 
@@ -100,7 +100,7 @@ pub fn elapsed_s(scene: &Scene) -> Vec<f64> {
 
 /// The value of `values` at `time_s[row] - delay_s` within the run, linearly between rows; held beyond its ends.
 #[must_use]
-pub fn delayed(scene: &Scene, values: &[f64], delay_s: f64) -> Vec<f64> {
+pub fn delay_values(scene: &Scene, values: &[f64], delay_s: f64) -> Vec<f64> {
     let mut shifted = vec![0.0; values.len()];
     for run in scene.runs() {
         let time_s = &scene.time_s()[run.clone()];
@@ -114,13 +114,13 @@ pub fn delayed(scene: &Scene, values: &[f64], delay_s: f64) -> Vec<f64> {
             while at + 1 < time_s.len() && time_s[at + 1] <= wanted_s {
                 at += 1;
             }
-            shifted[run.start + index] = between(time_s, inside, at, wanted_s);
+            shifted[run.start + index] = interpolate_between(time_s, inside, at, wanted_s);
         }
     }
     shifted
 }
 
-fn between(time_s: &[f64], values: &[f64], at: usize, wanted_s: f64) -> f64 {
+fn interpolate_between(time_s: &[f64], values: &[f64], at: usize, wanted_s: f64) -> f64 {
     let Some(next) = time_s.get(at + 1) else { return values[at] };
     let span_s = next - time_s[at];
     if span_s <= 0.0 {

@@ -38,7 +38,7 @@ const BREAK_IN: f64 = 0.15;
 
 /// How worn an edge is, in growth of the feed load: break-in and steady wear with the root of the cutting time, and what
 /// the drive tells on top of it.
-pub(crate) fn wear(minutes: f64, growth: f64) -> f64 {
+pub(crate) fn estimate_wear(minutes: f64, growth: f64) -> f64 {
     BREAK_IN * minutes.max(0.0).sqrt() + growth
 }
 
@@ -50,11 +50,12 @@ fn is_feed_drive(name: &str) -> bool {
 
 /// Relative growth of the feed load since each tool's edge was new, per row, followed causally; `None` when no feed
 /// drive is recorded, or none whose load grows with the use of the tools.
-pub(crate) fn growth(scene: &Scene) -> Option<Vec<f64>> {
+pub(crate) fn estimate_growth(scene: &Scene) -> Option<Vec<f64>> {
     if scene.passes().len() < PASSES_MIN {
         return None;
     }
-    let names: Vec<&str> = scene.column_names().filter(|name| is_feed_drive(name) && *name != scene.output()).collect();
+    let names: Vec<&str> =
+        scene.column_names().filter(|name| is_feed_drive(name) && *name != scene.output_name()).collect();
     let grown = names.into_iter().filter_map(|name| of_channel(scene, scene.column(name)?));
     let best = grown.fold(None, |best: Option<(f64, Vec<f64>)>, next| match best {
         Some(best) if best.0 >= next.0 => Some(best),
@@ -81,8 +82,8 @@ fn of_channel(scene: &Scene, load: &[f64]) -> Option<(f64, Vec<f64>)> {
         row_variance: deviation * deviation * INFLATION,
         wander: 0.0,
     };
-    let still = filter.follow(scene, &relative);
-    let moving = WANDER.map(|wander| Filter { wander, ..filter }.follow(scene, &relative));
+    let still = filter.filter_scene(scene, &relative);
+    let moving = WANDER.map(|wander| Filter { wander, ..filter }.filter_scene(scene, &relative));
     let best = moving.into_iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
     let mean = mean_end(scene, &best.growth);
     (best.log_likelihood - still.log_likelihood >= GAIN_MIN && mean >= GROWTH_MIN).then_some((mean, best.growth))
@@ -91,22 +92,22 @@ fn of_channel(scene: &Scene, load: &[f64]) -> Option<(f64, Vec<f64>)> {
 /// Robust standard deviation of a pass's level, from neighbours of the same tool.
 fn pass_scatter(scene: &Scene, relative: &[f64]) -> Option<f64> {
     let level = |pass: &Range<usize>| quantile(relative[pass.clone()].iter().copied(), 0.5);
-    let same = |a: &Range<usize>, b: &Range<usize>| tool(scene, a.start) == tool(scene, b.start);
+    let same = |a: &Range<usize>, b: &Range<usize>| find_tool(scene, a.start) == find_tool(scene, b.start);
     let neighbours = scene.passes().windows(2).filter(|pair| same(&pair[0], &pair[1]));
     let steps = neighbours.filter_map(|pair| Some((level(&pair[1])? - level(&pair[0])?).abs()));
     Some(quantile(steps, 0.5)? / (0.6745 * std::f64::consts::SQRT_2))
 }
 
 /// The tool in a row: its name, or the run where tools have none.
-fn tool(scene: &Scene, row: usize) -> Option<&str> {
+fn find_tool(scene: &Scene, row: usize) -> Option<&str> {
     let run = || scene.runs().iter().position(|run| run.contains(&row)).map(|run| scene.run_names()[run].as_str());
-    scene.words("tool").and_then(|words| words.get(row)).or_else(run)
+    scene.text_column("tool").and_then(|words| words.get(row)).or_else(run)
 }
 
 /// Mean over the tools of the growth at their last row.
 fn mean_end(scene: &Scene, growth: &[f64]) -> f64 {
     let ends: BTreeMap<_, _> =
-        scene.passes().iter().map(|pass| (tool(scene, pass.start), growth[pass.end - 1])).collect();
+        scene.passes().iter().map(|pass| (find_tool(scene, pass.start), growth[pass.end - 1])).collect();
     ends.values().sum::<f64>() / (ends.len().max(1) as f64)
 }
 
@@ -137,37 +138,37 @@ struct Tool {
 }
 
 impl Filter {
-    fn follow(&self, scene: &Scene, relative: &[f64]) -> Followed {
+    fn filter_scene(&self, scene: &Scene, relative: &[f64]) -> Followed {
         let mut tools: BTreeMap<Option<&str>, Tool> = BTreeMap::new();
         let mut followed = Followed { growth: vec![0.0; relative.len()], log_likelihood: 0.0 };
         let mut done = 0;
         let mut last: BTreeMap<Option<&str>, f64> = BTreeMap::new();
         for pass in scene.passes() {
-            let name = tool(scene, pass.start);
-            let known = tools.entry(name).or_insert_with(|| self.fresh());
+            let name = find_tool(scene, pass.start);
+            let known = tools.entry(name).or_insert_with(|| self.build_fresh_tool());
             known.new_pass(self.pass_variance);
             // Out of the cut a tool is as worn as when it left it.
             (done..pass.start).for_each(|row| {
-                followed.growth[row] = last.get(&tool(scene, row)).copied().unwrap_or(0.0);
+                followed.growth[row] = last.get(&find_tool(scene, row)).copied().unwrap_or(0.0);
             });
-            followed.log_likelihood += self.through(scene, relative, pass, known, &mut followed.growth);
+            followed.log_likelihood += self.filter_pass(scene, relative, pass, known, &mut followed.growth);
             last.insert(name, known.mean[GROWTH]);
             done = pass.end;
         }
         (done..relative.len()).for_each(|row| {
-            followed.growth[row] = last.get(&tool(scene, row)).copied().unwrap_or(0.0);
+            followed.growth[row] = last.get(&find_tool(scene, row)).copied().unwrap_or(0.0);
         });
         followed
     }
 
-    fn fresh(&self) -> Tool {
+    fn build_fresh_tool(&self) -> Tool {
         let mut covariance = [[0.0; STATES]; STATES];
         let spread = [LEVEL_SPREAD, 0.0, 0.0, 0.0, SETTLING.1];
         (0..STATES).for_each(|i| covariance[i][i] = spread[i] * spread[i]);
         Tool { mean: [1.0, 0.0, 0.0, 0.0, SETTLING.0], covariance }
     }
 
-    fn through(
+    fn filter_pass(
         &self,
         scene: &Scene,
         relative: &[f64],
@@ -180,12 +181,12 @@ impl Filter {
         for row in pass.clone() {
             let before_s = if row == pass.start { time_s[row] - scene.period_s() } else { time_s[row - 1] };
             let dt_s = (time_s[row] - before_s).max(0.0);
-            known.advance(dt_s, self.wander);
+            known.predict_state(dt_s, self.wander);
             let in_pass_s = time_s[row] - time_s[pass.start];
             // The first row of a pass may still hold some of what was before.
-            if row > pass.start && scene.usable()[row] {
+            if row > pass.start && scene.usable_rows()[row] {
                 let sees = [1.0, 1.0, 1.0, 0.0, (-in_pass_s / SETTLING.2).exp()];
-                log_likelihood += known.observe(relative[row], sees, self.row_variance);
+                log_likelihood += known.update_with_measurement(relative[row], sees, self.row_variance);
             }
             growth[row] = known.mean[GROWTH];
         }
@@ -204,7 +205,7 @@ impl Tool {
     }
 
     /// Growth goes on at its rate, the rate wanders.
-    fn advance(&mut self, dt_s: f64, wander: f64) {
+    fn predict_state(&mut self, dt_s: f64, wander: f64) {
         self.mean[GROWTH] += self.mean[RATE] * dt_s;
         let c = &mut self.covariance;
         let rate = c[RATE];
@@ -216,7 +217,7 @@ impl Tool {
     }
 
     /// Takes in one row; returns its log-likelihood.
-    fn observe(&mut self, value: f64, sees: [f64; STATES], variance: f64) -> f64 {
+    fn update_with_measurement(&mut self, value: f64, sees: [f64; STATES], variance: f64) -> f64 {
         let along: [f64; STATES] = std::array::from_fn(|i| (0..STATES).map(|j| self.covariance[i][j] * sees[j]).sum());
         let expected: f64 = self.mean.iter().zip(sees).map(|(mean, sees)| mean * sees).sum();
         let total = variance + along.iter().zip(sees).map(|(along, sees)| along * sees).sum::<f64>();
@@ -239,7 +240,7 @@ const MOVED_SHARE: f64 = 0.1;
 /// Rows in which the load of an axis steps: it has been moved since the row before.
 pub(crate) fn moved_rows(scene: &Scene) -> Vec<bool> {
     let mut moved = Vec::new();
-    let drives = scene.column_names().filter(|name| is_feed_drive(name) && *name != scene.output());
+    let drives = scene.column_names().filter(|name| is_feed_drive(name) && *name != scene.output_name());
     for load in drives.filter_map(|name| scene.column(name)) {
         let steps: Vec<f64> = load.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
         let usual = quantile(steps.iter().copied(), 0.5).unwrap_or(0.0) / 0.6745;
@@ -299,7 +300,7 @@ mod tests {
     fn later_rows_do_not_change_what_was_said() {
         let (whole, spoilt) = (recording(0.4, usize::MAX), recording(0.4, 590));
         let filter = Filter { pass_variance: 1e-3, row_variance: 1e-3, wander: 1e-7 };
-        let follow = |scene: &Scene| filter.follow(scene, scene.column("z_torque_nm").expect("there")).growth;
+        let follow = |scene: &Scene| filter.filter_scene(scene, scene.column("z_torque_nm").expect("there")).growth;
         assert_eq!(follow(&whole)[..590], follow(&spoilt)[..590]);
     }
 }

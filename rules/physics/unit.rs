@@ -15,11 +15,11 @@ pub fn unit_of_quantity(name: &str) -> &str {
 #[must_use]
 pub fn unit_in(unit: &str, scene: &Scene) -> String {
     let power = scene.output_kind() != OutputKind::Force;
-    let velocity = if drive::turns(scene) { "rad/s" } else { "m/s" };
+    let velocity = if drive::is_rotary_drive(scene) { "rad/s" } else { "m/s" };
     let unit = unit.replace("friction/velocity", if power { "output/velocity2" } else { "output/velocity" });
     let unit =
         if unit == "velocity" { velocity.to_owned() } else { unit.replace("velocity", &format!("({velocity})")) };
-    in_newtons(&unit.replace("output", unit_of_quantity(scene.output())))
+    in_newtons(&unit.replace("output", unit_of_quantity(scene.output_name())))
 }
 
 /// Watts over a velocity are newtons, over an angular velocity newton metres.
@@ -43,7 +43,7 @@ mod tests {
     fn scene(output: &str, input: &str) -> Scene {
         let mut recording = Recording::new("test", vec![0.0, 1.0], None);
         for name in [output, input] {
-            recording.set_column(name, Cells::Numbers(Numbers::full(vec![1.0, -1.0])));
+            recording.set_column(name, Cells::Numbers(Numbers::from_values(vec![1.0, -1.0])));
         }
         Scene::new(&recording, output, &BTreeMap::new()).expect("recorded")
     }

@@ -1,14 +1,14 @@
 //! Everything that a script can see, call and set, as Markdown and as JSON: what `cnc-gateway rules api` prints.
 
 use super::functions::{Method, SUBJECTS, Subject};
-use super::vocabulary::vocabulary;
-use super::{FUNCTIONS, HANDLERS, RECORDS, words};
+use super::vocabulary::format_vocabulary;
+use super::{FUNCTIONS, HANDLERS, RECORDS, list_words};
 use crate::estimators::SETTINGS;
 use serde_json::{Value, json};
 
 /// The methods by subject, then variables, functions and settings, as Markdown.
 #[must_use]
-pub fn api(chinese: bool) -> String {
+pub fn format_api_reference(chinese: bool) -> String {
     let pick = |en: &'static str, zh: &'static str| if chinese { zh } else { en };
     let mut text = String::from("## Methods\n\n");
     text += pick(
@@ -22,15 +22,20 @@ pub fn api(chinese: bool) -> String {
         );
         for method in subject.methods {
             let what = pick(method.en, method.zh);
-            text += &format!("| `{}` | {} | {} | {what} |\n", method.signature(), takes(method), method.returns);
+            text += &format!(
+                "| `{}` | {} | {} | {what} |\n",
+                method.signature(),
+                format_parameter_units(method),
+                method.returns
+            );
         }
     }
     text.push('\n');
-    text.push_str(&vocabulary(chinese));
+    text.push_str(&format_vocabulary(chinese));
     text
 }
 
-fn takes(method: &Method) -> String {
+fn format_parameter_units(method: &Method) -> String {
     let units: Vec<&str> = method.parameters.iter().map(|parameter| parameter.unit).collect();
     units.join("; ")
 }
@@ -38,7 +43,7 @@ fn takes(method: &Method) -> String {
 /// The same as JSON, with the texts in both languages.
 #[must_use]
 pub fn api_json() -> Value {
-    let words = words().iter().map(
+    let words = list_words().iter().map(
         |word| json!({ "name": word.name, "unit": word.unit, "one_of": word.one_of, "en": word.en, "zh": word.zh }),
     );
     let functions = FUNCTIONS.iter().map(|it| json!({ "signature": it.signature, "en": it.en, "zh": it.zh }));
@@ -71,27 +76,27 @@ fn subject_json(subject: &Subject) -> Vec<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::script::functions::methods;
+    use crate::script::functions::list_methods;
     use std::collections::BTreeSet;
 
     #[test]
     fn every_method_is_told_in_both_languages_and_no_name_means_two_things() {
-        let (english, chinese) = (api(false), api(true));
-        for method in methods() {
+        let (english, chinese) = (format_api_reference(false), format_api_reference(true));
+        for method in list_methods() {
             assert!(english.contains(&format!("`{}`", method.signature())) && chinese.contains(method.zh));
             assert!(!method.en.is_empty() && !method.zh.is_empty() && !method.returns.is_empty());
             assert!(method.parameters.iter().all(|parameter| !parameter.unit.is_empty()));
         }
         let host = FUNCTIONS.iter().filter_map(crate::script::Function::name);
-        let taken: BTreeSet<&str> = words().iter().map(|it| it.name).chain(host).collect();
-        let names: BTreeSet<&str> = methods().map(|it| it.name).collect();
-        assert!(names.is_disjoint(&taken) && names.len() == methods().count());
+        let taken: BTreeSet<&str> = list_words().iter().map(|it| it.name).chain(host).collect();
+        let names: BTreeSet<&str> = list_methods().map(|it| it.name).collect();
+        assert!(names.is_disjoint(&taken) && names.len() == list_methods().count());
     }
 
     #[test]
     fn the_document_holds_every_table() {
         let json = api_json();
-        assert_eq!(json["methods"].as_array().map(Vec::len), Some(methods().count()));
+        assert_eq!(json["methods"].as_array().map(Vec::len), Some(list_methods().count()));
         assert_eq!(json["settings"].as_array().map(Vec::len), Some(SETTINGS.len()));
         assert_eq!(json["methods"][0]["parameters"][1]["unit"], "rpm");
     }

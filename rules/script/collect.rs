@@ -41,7 +41,7 @@ pub(super) struct RunOutput {
 
 impl RunOutput {
     /// Ready for the next run; keeps the buffers.
-    pub(super) fn begin(&mut self, now_ns: TimeNs) {
+    pub(super) fn begin_run(&mut self, now_ns: TimeNs) {
         self.now_ns = now_ns;
         self.request = None;
         self.follows = None;
@@ -56,33 +56,33 @@ impl RunOutput {
     }
 
     /// Looks through everything that was put away, which a loop could make long.
-    pub(super) fn forget(&mut self, beginning: &str) -> ScriptResult<()> {
+    pub(super) fn forget_numbers(&mut self, beginning: &str) -> ScriptResult<()> {
         self.forgotten += 1;
         if self.forgotten > FORGET_MAX {
             return Err(format!("forget was called more than {FORGET_MAX} times in one run").into());
         }
-        self.timers.forget(beginning);
+        self.timers.forget_numbers(beginning);
         Ok(())
     }
 
     /// A method had no answer in this run; the last reason of each counts.
-    pub(super) fn refused(&mut self, method: &'static str, reason: &str) {
+    pub(super) fn record_refusal(&mut self, method: &'static str, reason: &str) {
         self.refusals.retain(|(known, _)| *known != method);
         self.refusals.push((method, reason.to_owned()));
     }
 
     /// Why the method of this name last had no answer in this run; `()` where it had one.
-    pub(super) fn why(&self, method: &str) -> Dynamic {
+    pub(super) fn explain_refusal(&self, method: &str) -> Dynamic {
         let found = self.refusals.iter().find(|(known, _)| *known == method);
         found.map_or(Dynamic::UNIT, |(_, reason)| reason.into())
     }
 
     /// What methods refused in this run, for the operator.
-    pub(super) fn refusals(&self) -> impl Iterator<Item = String> {
+    pub(super) fn list_refusals(&self) -> impl Iterator<Item = String> {
         self.refusals.iter().map(|(method, reason)| format!("{method} has no value ({reason})"))
     }
 
-    pub(super) fn alarm(&mut self, name: ImmutableString, text: AlarmText) -> ScriptResult<()> {
+    pub(super) fn add_alarm(&mut self, name: ImmutableString, text: AlarmText) -> ScriptResult<()> {
         if let Some(known) = self.alarms.iter_mut().find(|(known, _)| *known == name) {
             known.1 = text;
         } else if self.alarms.len() < NAMES_MAX {
@@ -93,7 +93,7 @@ impl RunOutput {
         Ok(())
     }
 
-    pub(super) fn note(&mut self, text: ImmutableString) {
+    pub(super) fn add_note(&mut self, text: ImmutableString) {
         if self.notes.len() < NOTES_MAX {
             self.notes.push(text);
         }
@@ -108,7 +108,7 @@ impl RunOutput {
         text: AlarmText,
     ) -> ScriptResult<()> {
         let stands = self.timers.alarm_turning(&name, wanted, hold_s, self.now_ns)?;
-        if stands { self.alarm(name, text) } else { Ok(()) }
+        if stands { self.add_alarm(name, text) } else { Ok(()) }
     }
 
     /// What was learned of the load of this program is learned anew.
@@ -121,19 +121,19 @@ impl RunOutput {
     }
 
     /// The last reason given for each kind counts.
-    pub(super) fn stop(&mut self, stop: Stop, reason: ImmutableString) {
+    pub(super) fn request_stop(&mut self, stop: Stop, reason: ImmutableString) {
         self.stops.retain(|(known, _)| *known != stop);
         self.stops.push((stop, reason));
     }
 
     /// The last offset proposed for each axis counts.
-    pub(super) fn offset(&mut self, axis: Axis, asked: Asked) {
+    pub(super) fn propose_offset(&mut self, axis: Axis, asked: Asked) {
         self.offsets.retain(|(known, _)| *known != axis);
         self.offsets.push((axis, asked));
     }
 
     /// The last value of each channel counts.
-    pub(super) fn publish(&mut self, name: ImmutableString, value: Option<f64>) {
+    pub(super) fn publish_value(&mut self, name: ImmutableString, value: Option<f64>) {
         self.published.retain(|(known, _)| *known != name);
         self.published.push((name, value));
     }

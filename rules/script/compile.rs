@@ -4,13 +4,13 @@ use super::compiled::{Script, ScriptSet};
 use super::declared::{self, DeclarationPlace as Where, Declared, Force, FoundDeclaration, LiveValues, SettingValues};
 use super::engine::{self, OPERATIONS_MAX, Shared, TEXT_MAX};
 use super::examine::{Findings, ScriptPlace, Walk};
-use super::handlers::{Called, called};
+use super::handlers::{Called, find_called_functions};
 use super::order::{self, PublishedChannels};
 use super::problem::{self, ScriptProblem};
-use super::settings::{ChosenSetting, merge, read_choices};
-use super::trials::prove;
+use super::settings::{ChosenSetting, merge_settings, read_choices};
+use super::trials::prove_scripts;
 use super::variables::{self, ScriptBody};
-use super::vocabulary::find;
+use super::vocabulary::find_word;
 use adapters::clock::SECOND_NS;
 use rhai::{AST, Dynamic, Engine, ImmutableString, Map, Position, Scope};
 use std::collections::BTreeMap;
@@ -32,7 +32,7 @@ pub struct ScriptFile {
 ///
 /// # Errors
 /// Everything that is wrong in any of the files.
-pub fn compile(files: &[ScriptFile]) -> Result<ScriptSet, Vec<ScriptProblem>> {
+pub fn compile_scripts(files: &[ScriptFile]) -> Result<ScriptSet, Vec<ScriptProblem>> {
     compile_with(files, &SettingValues::default())
 }
 
@@ -45,7 +45,7 @@ pub fn compile_with(files: &[ScriptFile], values: &SettingValues) -> Result<Scri
     let mut problems = Vec::new();
     let mut scripts: BTreeMap<&str, Arc<Script>> = BTreeMap::new();
     for file in files {
-        match compiler.script(file, |found| Force::of(found, values)) {
+        match compiler.compile_script(file, |found| Force::from_values(found, values)) {
             Ok(script) => drop(scripts.insert(&file.name, Arc::new(script))),
             Err(found) => problems.extend(found),
         }
@@ -58,12 +58,12 @@ pub fn compile_with(files: &[ScriptFile], values: &SettingValues) -> Result<Scri
     if problems.is_empty() {
         let declared: Vec<&Declared> = scripts.values().flat_map(|script| &script.declared).collect();
         let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
-        problems.extend(values.check(&declared, &names));
+        problems.extend(values.list_problems(&declared, &names));
     }
     let scripts: Vec<_> = scripts.into_values().collect();
-    let settings = merge(&scripts, &mut problems);
+    let settings = merge_settings(&scripts, &mut problems);
     order::one_publisher(&scripts, &mut problems);
-    let scripts = order::ordered(scripts, &mut problems);
+    let scripts = order::order_by_dependency(scripts, &mut problems);
     let set = ScriptSet { scripts, settings, files: files.into(), values: Arc::new(values.clone()) };
     if problems.is_empty() { Ok(set) } else { Err(problems) }
 }
@@ -77,34 +77,34 @@ pub fn compile_one(
     files: &[ScriptFile],
     values: &SettingValues,
 ) -> Result<ScriptSet, Vec<ScriptProblem>> {
-    let script = Compiler::new(files).script(file, |found| Force::of(found, values))?;
+    let script = Compiler::new(files).compile_script(file, |found| Force::from_values(found, values))?;
     let scripts = vec![Arc::new(script)];
     let mut problems = Vec::new();
-    let settings = merge(&scripts, &mut problems);
+    let settings = merge_settings(&scripts, &mut problems);
     let set = ScriptSet { scripts, settings, files: files.into(), values: Arc::new(values.clone()) };
     if problems.is_empty() { Ok(set) } else { Err(problems) }
 }
 
 /// The script of this file with other values of its settings, all of them in the text: what its trials are run with.
-pub(super) fn variant(
+pub(super) fn compile_variant(
     set: &ScriptSet,
     script: &Script,
     values: &SettingValues,
     place: &Where,
 ) -> Result<Arc<Script>, Vec<ScriptProblem>> {
     let Some(file) = set.files.iter().find(|file| file.name == *script.file) else { return Err(Vec::new()) };
-    Compiler::new(&set.files).script(file, |found| Force::fixed(found, values, place)).map(Arc::new)
+    Compiler::new(&set.files).compile_script(file, |found| Force::with_fixed_values(found, values, place)).map(Arc::new)
 }
 
 /// Every setting that these files declare.
 ///
 /// # Errors
 /// Every declaration that cannot be read.
-pub fn declarations(files: &[ScriptFile]) -> Result<Vec<Declared>, Vec<ScriptProblem>> {
-    let engine = engine::engine(&Shared::default(), false);
+pub fn list_declarations(files: &[ScriptFile]) -> Result<Vec<Declared>, Vec<ScriptProblem>> {
+    let engine = engine::build_engine(&Shared::default(), false);
     let (mut all, mut problems) = (Vec::new(), Vec::new());
     for file in files.iter().filter(|file| file.text.len() <= TEXT_MAX) {
-        match declared::find(file, &engine) {
+        match declared::find_declarations(file, &engine) {
             Ok(found) => all.extend(found.into_iter().map(|it| it.declared)),
             Err(found) => problems.extend(found),
         }
@@ -116,17 +116,17 @@ pub fn declarations(files: &[ScriptFile]) -> Result<Vec<Declared>, Vec<ScriptPro
 ///
 /// # Errors
 /// Everything that is wrong in any of the files, or else everything that their trials found.
-pub fn prepare(files: &[ScriptFile]) -> Result<ScriptSet, Vec<ScriptProblem>> {
-    compile(files).and_then(prove)
+pub fn prepare_scripts(files: &[ScriptFile]) -> Result<ScriptSet, Vec<ScriptProblem>> {
+    compile_scripts(files).and_then(prove_scripts)
 }
 
 /// The same with these values of the settings. The trials run with the defaults, with the values of the machine, and with those of
 /// each tool and operation.
 ///
 /// # Errors
-/// As [`prepare`], and every value that cannot be used.
+/// As [`prepare_scripts`], and every value that cannot be used.
 pub fn prepare_with(files: &[ScriptFile], values: &SettingValues) -> Result<ScriptSet, Vec<ScriptProblem>> {
-    compile_with(files, values).and_then(prove)
+    compile_with(files, values).and_then(prove_scripts)
 }
 
 struct Compiler {
@@ -141,13 +141,13 @@ struct Compiler {
 impl Compiler {
     fn new(files: &[ScriptFile]) -> Self {
         let shared = Shared::default();
-        let checking = engine::engine(&shared, false);
-        let callable = engine::callable(&checking);
-        let running = engine::engine(&shared, true);
-        Self { shared, running, checking, callable, channels: PublishedChannels::of(files) }
+        let checking = engine::build_engine(&shared, false);
+        let callable = engine::list_callables(&checking);
+        let running = engine::build_engine(&shared, true);
+        Self { shared, running, checking, callable, channels: PublishedChannels::from_files(files) }
     }
 
-    fn script(
+    fn compile_script(
         &self,
         file: &ScriptFile,
         force: impl Fn(&[FoundDeclaration]) -> Force,
@@ -161,18 +161,18 @@ impl Compiler {
             |engine: &Engine, text: &str| engine.compile(text).map_err(|error| vec![problem::of_parse(name, &error)]);
         // As written first: an error is told before any value stands in the text.
         parse(&self.checking, &file.text)?;
-        let declarations = declared::find(file, &self.checking)?;
+        let declarations = declared::find_declarations(file, &self.checking)?;
         let force = force(&declarations);
         let filled = ScriptFile {
             name: file.name.clone(),
             text: declared::with_values(&file.text, &declarations, &force.texts),
         };
         let plain = parse(&self.checking, &filled.text)?;
-        let constants = constants(&plain);
+        let constants = list_constants(&plain);
         let mut problems = Vec::new();
-        let called = called(&filled, &plain, &self.checking, &mut problems);
+        let called = find_called_functions(&filled, &plain, &self.checking, &mut problems);
         let live: Vec<&str> = force.live.constants.iter().map(|(name, _)| name.as_str()).collect();
-        let mut found = self.examine(
+        let mut found = self.examine_script(
             (name, &filled.text),
             &plain,
             &called,
@@ -188,19 +188,20 @@ impl Compiler {
         }
         let ast = parse(&self.running, &filled.text)?;
         let choices = match &called.settings {
-            Some(settings) => self.choices(&filled, (settings, &ast), &constants, &force.live)?,
+            Some(settings) => self.evaluate_settings(&filled, (settings, &ast), &constants, &force.live)?,
             None => Vec::new(),
         };
-        let names = variables::names(&found, &constants, &force.live);
-        let body = ScriptBody::compile(&self.running, &filled.text, &names)
+        let names = variables::list_variables(&found, &constants, &force.live);
+        let body = ScriptBody::compile_behind_names(&self.running, &filled.text, &names)
             .map_err(|error| vec![problem::of_parse(name, &error)])?;
-        let handlers = called.ready(&self.running, &names).map_err(|error| vec![problem::of_parse(name, &error)])?;
+        let handlers =
+            called.compile_handlers(&self.running, &names).map_err(|error| vec![problem::of_parse(name, &error)])?;
         Ok(Script {
             file: file.name.as_str().into(),
             version: if force.chosen {
-                version(&format!("{}\n{:?}", file.text, force.texts))
+                compute_version(&format!("{}\n{:?}", file.text, force.texts))
             } else {
-                version(&file.text)
+                compute_version(&file.text)
             },
             every_ns,
             passive: plain.statements().is_empty(),
@@ -220,7 +221,7 @@ impl Compiler {
         })
     }
 
-    fn examine<'c>(
+    fn examine_script<'c>(
         &self,
         (file, text): (&str, &str),
         plain: &AST,
@@ -231,11 +232,11 @@ impl Compiler {
         let mut body = plain.clone();
         body.clear_functions();
         walk.read(&body, ScriptPlace::Body);
-        walk.read(&called.others(plain), ScriptPlace::Function);
+        walk.read(&called.extract_own_functions(plain), ScriptPlace::Function);
         let constants: Vec<ImmutableString> = constants.map(ImmutableString::from).collect();
         for handler in &called.handlers {
             let seen: Vec<ImmutableString> = handler.parameters.iter().chain(&constants).cloned().collect();
-            let like = find(handler.kind.like());
+            let like = find_word(handler.kind.vocabulary_word());
             let like: Vec<(&str, _)> =
                 like.iter().flat_map(|word| handler.parameters.iter().map(|name| (name.as_str(), *word))).collect();
             walk.read(&handler.plain, ScriptPlace::Handler(&seen, &like));
@@ -246,11 +247,11 @@ impl Compiler {
         for trial in &called.trials {
             walk.read(&trial.plain, ScriptPlace::Trial(&constants));
         }
-        walk.finish()
+        walk.into_findings()
     }
 
     /// Runs `fn settings()` once, and once more for each tool and operation with values of its own.
-    fn choices(
+    fn evaluate_settings(
         &self,
         file: &ScriptFile,
         (settings, functions): (&AST, &AST),
@@ -261,7 +262,7 @@ impl Compiler {
         whole.clear_statements();
         let ast = whole.merge(settings);
         let one = |place: &Where| {
-            let values = live.of(place);
+            let values = live.values_for_place(place);
             let mut scope = Scope::new();
             for (name, value) in constants {
                 scope.push_constant_dynamic(name.clone(), value.clone());
@@ -301,7 +302,7 @@ fn every_ns(file: &ScriptFile, ast: &AST) -> Result<i64, ScriptProblem> {
 }
 
 /// The constants at the top of the script that are plain values: what a page shows as thresholds.
-fn constants(ast: &AST) -> Vec<(String, Dynamic)> {
+fn list_constants(ast: &AST) -> Vec<(String, Dynamic)> {
     ast.iter_literal_variables(true, false).map(|(name, _, value)| (name.to_owned(), value)).collect()
 }
 
@@ -323,6 +324,6 @@ pub(super) fn position_of(text: &str, word: &str) -> Position {
 }
 
 /// FNV-1a over the text: the version that decisions are recorded with.
-pub(super) fn version(text: &str) -> u64 {
+pub(super) fn compute_version(text: &str) -> u64 {
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
 }

@@ -45,7 +45,7 @@ pub(super) struct Script {
 
 impl Script {
     /// Has it a handler for this?
-    pub(super) fn hears(&self, event: &Event) -> bool {
+    pub(super) fn has_handler_for(&self, event: &Event) -> bool {
         self.handlers.iter().any(|handler| handler.kind == event.kind())
     }
 }
@@ -73,7 +73,7 @@ impl ScriptSet {
     }
 
     /// The settings that the scripts declare.
-    pub fn declared(&self) -> impl Iterator<Item = &Declared> {
+    pub fn declared_settings(&self) -> impl Iterator<Item = &Declared> {
         self.scripts.iter().flat_map(|script| &script.declared)
     }
 
@@ -104,7 +104,7 @@ impl ScriptSet {
     /// what the whole does, so where a script reads a channel of another nothing is in common. Each part keeps the settings of its
     /// set; the common one those of this set.
     #[must_use]
-    pub fn split(self, other: Self) -> (Self, Self, Self) {
+    pub fn partition_with(self, other: Self) -> (Self, Self, Self) {
         let alone = |set: &Self| set.scripts.iter().all(|script| script.foreign.is_empty());
         let apart = alone(&self) && alone(&other);
         let has = |set: &Self, script: &Script| {

@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// Somebody who knows when a run has lasted too long.
 pub trait Deadline: Send + Sync {
     /// A run begins.
-    fn begin(&self);
+    fn begin_run(&self);
 
     /// Has the run lasted too long?
     fn is_over(&self) -> bool;
@@ -30,7 +30,7 @@ pub(super) const LATE_MAX: u8 = 3;
 #[derive(Debug, Clone, Copy)]
 struct DeadlinePassed;
 
-pub(super) fn watch(engine: &mut Engine, deadline: Arc<dyn Deadline>) {
+pub(super) fn watch_deadline(engine: &mut Engine, deadline: Arc<dyn Deadline>) {
     engine.on_progress(move |operations| {
         (operations.is_multiple_of(ASK_EVERY) && deadline.is_over()).then(|| Dynamic::from(DeadlinePassed))
     });

@@ -43,7 +43,7 @@ pub struct OverrideRequest {
 
 impl OverrideRequest {
     /// The least of several requests; one that is no number goes first, because the gate must see and refuse it.
-    pub fn least<'a>(requests: impl Iterator<Item = &'a Self>) -> Option<&'a Self> {
+    pub fn find_least<'a>(requests: impl Iterator<Item = &'a Self>) -> Option<&'a Self> {
         let key = |request: &Self| if request.pct.is_finite() { request.pct } else { f64::NEG_INFINITY };
         requests.min_by(|a, b| key(a).total_cmp(&key(b)))
     }
@@ -61,7 +61,7 @@ pub enum Stop {
 impl Stop {
     /// The word in the history and in JSON.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::FeedHold => "feed_hold",
             Self::ToolChange => "tool_change",
@@ -128,7 +128,7 @@ impl AlarmLevel {
 
     /// The word in scripts, in the history and in JSON.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Info => "info",
             Self::Warning => "warning",
@@ -138,8 +138,8 @@ impl AlarmLevel {
 
     /// The level of this word.
     #[must_use]
-    pub fn of(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|level| level.word() == word)
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|level| level.as_word() == word)
     }
 }
 
@@ -183,7 +183,7 @@ pub struct Alarm {
 impl Alarm {
     /// The change that begins it, or ends it.
     #[must_use]
-    pub(super) fn change(&self, raised: bool) -> AlarmChange {
+    pub(super) fn to_change(&self, raised: bool) -> AlarmChange {
         let Self { name, script, level, en, zh, .. } = self.clone();
         AlarmChange { name, script, level, en, zh, raised }
     }

@@ -43,16 +43,16 @@ impl Shared {
 }
 
 /// An interpreter whose functions leave their effects in `shared`.
-pub(super) fn engine(shared: &Shared, optimize: bool) -> Engine {
+pub(super) fn build_engine(shared: &Shared, optimize: bool) -> Engine {
     let mut engine = Engine::new_raw();
-    packages(&mut engine);
-    limits(&mut engine);
+    register_packages(&mut engine);
+    set_limits(&mut engine);
     for word in DISABLED {
         engine.disable_symbol(word);
     }
     engine.set_optimization_level(if optimize { OptimizationLevel::Simple } else { OptimizationLevel::None });
-    outcomes::register(&mut engine, shared);
-    functions::register(&mut engine, shared);
+    outcomes::register_outcomes(&mut engine, shared);
+    functions::register_methods(&mut engine, shared);
     // Registered functions go before those of the language.
     let asleep = || -> ScriptResult<()> { Err("a script may not sleep".into()) };
     engine.register_fn("sleep", move |_: i64| asleep());
@@ -60,7 +60,7 @@ pub(super) fn engine(shared: &Shared, optimize: bool) -> Engine {
     engine
 }
 
-fn packages(engine: &mut Engine) {
+fn register_packages(engine: &mut Engine) {
     LanguageCorePackage::new().register_into_engine(engine);
     ArithmeticPackage::new().register_into_engine(engine);
     LogicPackage::new().register_into_engine(engine);
@@ -73,7 +73,7 @@ fn packages(engine: &mut Engine) {
     BasicFnPackage::new().register_into_engine(engine);
 }
 
-fn limits(engine: &mut Engine) {
+fn set_limits(engine: &mut Engine) {
     engine.set_max_operations(OPERATIONS_MAX);
     engine.set_max_call_levels(CALLS_MAX);
     engine.set_max_expr_depths(DEPTH_MAX, DEPTH_MAX);
@@ -85,7 +85,7 @@ fn limits(engine: &mut Engine) {
 }
 
 /// Every function that can be called, by name and number of arguments.
-pub(super) fn callable(engine: &Engine) -> Vec<(String, usize)> {
+pub(super) fn list_callables(engine: &Engine) -> Vec<(String, usize)> {
     let pair = |it: rhai::FuncInfo<'_>| Some((it.metadata.name.to_string(), it.metadata.num_params));
     let mut known = engine.collect_fn_metadata(None, pair, true);
     known.retain(|(name, _)| !FORBIDDEN.contains(&name.as_str()));

@@ -5,7 +5,7 @@
 
 use super::problem::ScriptProblem;
 use crate::estimators::{Estimates, State};
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use adapters::{ChannelId, Sample};
 use rhai::{Dynamic, Position};
 use std::sync::Arc;
@@ -22,7 +22,7 @@ pub(super) enum EventKind {
 
 impl EventKind {
     /// The word of the vocabulary whose values the parameters of the handler have.
-    pub(super) fn like(self) -> &'static str {
+    pub(super) fn vocabulary_word(self) -> &'static str {
         match self {
             Self::State => "state",
             Self::Part => "part_count",
@@ -101,10 +101,10 @@ impl Event {
     }
 
     /// The values of the handler's parameters, in their order.
-    pub(super) fn values(&self) -> Vec<Dynamic> {
+    pub(super) fn to_parameter_values(&self) -> Vec<Dynamic> {
         let text = |text: &str| Dynamic::from(text.to_owned());
         match self {
-            Self::State(before, now) => vec![text(before.word()), text(now.word())],
+            Self::State(before, now) => vec![text(before.as_word()), text(now.as_word())],
             Self::Part(count) => vec![Dynamic::from_float(*count)],
             Self::Program(before, now) | Self::Tool(before, now) => vec![text(before), text(now)],
             Self::Alarm(shown) => vec![text(shown)],
@@ -134,9 +134,9 @@ struct EventChannels {
 
 impl Happenings {
     /// What has happened since the tick before.
-    pub(super) fn step(&mut self, sample: &Sample, estimates: &Estimates) -> &[Event] {
+    pub(super) fn detect_events(&mut self, sample: &Sample, estimates: &Estimates) -> &[Event] {
         self.events.clear();
-        let Some(channels) = self.channels.or_else(channels) else { return &self.events };
+        let Some(channels) = self.channels.or_else(find_channels) else { return &self.events };
         self.channels = Some(channels);
         if let Some(before) = self.state.replace(estimates.state).filter(|before| *before != estimates.state) {
             self.events.push(Event::State(before, estimates.state));
@@ -145,23 +145,23 @@ impl Happenings {
             let risen = self.count.replace(count).is_some_and(|before| count > before);
             self.events.extend(risen.then_some(Event::Part(count)));
         }
-        let program = changed(&mut self.program, sample.text(channels.program));
+        let program = detect_change(&mut self.program, sample.text(channels.program));
         self.events.extend(program.map(|(before, now)| Event::Program(before, now)));
-        let tool = changed(&mut self.tool, sample.text(channels.tool));
+        let tool = detect_change(&mut self.tool, sample.text(channels.tool));
         self.events.extend(tool.map(|(before, now)| Event::Tool(before, now)));
-        let alarm = changed(&mut self.alarm, sample.text(channels.alarm));
+        let alarm = detect_change(&mut self.alarm, sample.text(channels.alarm));
         self.events.extend(alarm.filter(|(_, now)| !now.is_empty()).map(|(_, now)| Event::Alarm(now)));
         &self.events
     }
 }
 
-fn channels() -> Option<EventChannels> {
-    let of = ChannelId::of;
+fn find_channels() -> Option<EventChannels> {
+    let of = ChannelId::from_name;
     Some(EventChannels { count: of("part_count")?, program: of("program")?, tool: of("tool")?, alarm: of("alarm")? })
 }
 
 /// Before and now, when `now` is another text than the one before.
-fn changed(last: &mut Option<Arc<str>>, now: Option<&str>) -> Option<(Arc<str>, Arc<str>)> {
+fn detect_change(last: &mut Option<Arc<str>>, now: Option<&str>) -> Option<(Arc<str>, Arc<str>)> {
     let now = now.filter(|now| last.as_deref() != Some(*now))?;
     let now: Arc<str> = Arc::from(now);
     let before = last.replace(now.clone())?;
@@ -170,7 +170,7 @@ fn changed(last: &mut Option<Arc<str>>, now: Option<&str>) -> Option<(Arc<str>, 
 
 /// The kind of event that a function of this name handles; a problem when its name or its parameters are wrong. Functions
 /// that do not begin with `on_` are the script's own.
-pub(super) fn handled(
+pub(super) fn classify_handler(
     file: &str,
     name: &str,
     parameters: usize,
@@ -181,7 +181,7 @@ pub(super) fn handled(
     }
     let name_of = |handler: &Handler| handler.signature.split('(').next().unwrap_or_default();
     let Some(handler) = HANDLERS.iter().find(|handler| name_of(handler) == name) else {
-        let near = nearest(name, HANDLERS.iter().map(name_of));
+        let near = find_nearest_name(name, HANDLERS.iter().map(name_of));
         let all: Vec<&str> = HANDLERS.iter().map(name_of).collect();
         let next = near
             .map_or_else(|| format!("these are called: {}", all.join(", ")), |near| format!("did you mean `{near}`?"));
@@ -201,11 +201,11 @@ mod tests {
     use adapters::{Absence, Slot, Value};
 
     fn sample(tool: Option<&str>, count: Option<f64>) -> Sample {
-        let mut sample = Sample::empty(0);
+        let mut sample = Sample::new_empty(0);
         let text = tool.map(|tool| Value::Text(tool.into())).ok_or(Absence::Timeout);
-        sample.set(ChannelId::of("tool").expect("a channel"), Slot { value: text, age_ns: 0 });
+        sample.set_slot(ChannelId::from_name("tool").expect("a channel"), Slot { value: text, age_ns: 0 });
         let number = count.map(Value::Number).ok_or(Absence::Timeout);
-        sample.set(ChannelId::of("part_count").expect("a channel"), Slot { value: number, age_ns: 0 });
+        sample.set_slot(ChannelId::from_name("part_count").expect("a channel"), Slot { value: number, age_ns: 0 });
         sample
     }
 
@@ -213,8 +213,8 @@ mod tests {
     fn the_first_value_and_silence_are_no_change() {
         let mut happenings = Happenings::default();
         let mut step = |tool, count, state| {
-            let estimates = Estimates { state, ..Estimates::none(0) };
-            happenings.step(&sample(tool, count), &estimates).to_vec()
+            let estimates = Estimates { state, ..Estimates::without_samples(0) };
+            happenings.detect_events(&sample(tool, count), &estimates).to_vec()
         };
         assert_eq!(step(Some("T1"), Some(3.0), State::Idle), []);
         assert_eq!(step(None, None, State::Idle), []);
@@ -226,10 +226,10 @@ mod tests {
 
     #[test]
     fn a_handler_that_nothing_calls_is_told() {
-        let problem = handled("a.rhai", "on_tool_chnage", 2, Position::NONE).expect_err("misspelt");
+        let problem = classify_handler("a.rhai", "on_tool_chnage", 2, Position::NONE).expect_err("misspelt");
         assert!(problem.to_string().contains("did you mean `on_tool_change`?"), "{problem}");
-        assert!(handled("a.rhai", "on_alarm", 3, Position::NONE).is_err());
-        assert_eq!(handled("a.rhai", "on_alarm", 0, Position::NONE), Ok(Some(EventKind::Alarm)));
-        assert_eq!(handled("a.rhai", "once", 0, Position::NONE), Ok(None));
+        assert!(classify_handler("a.rhai", "on_alarm", 3, Position::NONE).is_err());
+        assert_eq!(classify_handler("a.rhai", "on_alarm", 0, Position::NONE), Ok(Some(EventKind::Alarm)));
+        assert_eq!(classify_handler("a.rhai", "once", 0, Position::NONE), Ok(None));
     }
 }

@@ -9,8 +9,8 @@ use super::kinds::{self, KindMistake, LikeWords};
 use super::order::PublishedChannels;
 use super::problem::ScriptProblem;
 use super::trials::TRIAL_FUNCTIONS;
-use super::vocabulary::{Word, find, words};
-use adapters::channel::nearest;
+use super::vocabulary::{Word, find_word, list_words};
+use adapters::channel::find_nearest_name;
 use rhai::{AST, ASTNode, BinaryExpr, Expr, FnCallExpr, ImmutableString, Position, Stmt};
 
 /// Longest name of a channel of a script's own.
@@ -81,62 +81,63 @@ impl<'a> Walk<'a> {
 
     /// Looks through everything that stands in this place.
     pub(super) fn read(&mut self, ast: &AST, place: ScriptPlace<'_>) {
-        ast.walk(&mut |path| self.node(path, place));
+        ast.walk(&mut |path| self.examine_node(path, place));
     }
 
     /// Everything that was found, in the order of the text.
-    pub(super) fn finish(mut self) -> Findings {
-        let mistakes = self.alarms.mistakes();
-        self.mistakes(mistakes);
+    pub(super) fn into_findings(mut self) -> Findings {
+        let mistakes = self.alarms.list_mistakes();
+        self.report_mistakes(mistakes);
         self.found.problems.sort_by_key(|problem| (problem.line, problem.column));
         self.found.problems.dedup();
         self.found
     }
 
-    fn node(&mut self, path: &[ASTNode<'_>], place: ScriptPlace<'_>) -> bool {
+    fn examine_node(&mut self, path: &[ASTNode<'_>], place: ScriptPlace<'_>) -> bool {
         match path.last() {
             Some(ASTNode::Expr(Expr::FnCall(call, at)) | ASTNode::Stmt(Stmt::FnCall(call, at))) => {
-                self.call(call, call.args.len(), *at, place);
+                self.examine_call(call, call.args.len(), *at, place);
             }
-            Some(ASTNode::Expr(Expr::MethodCall(call, at))) => self.call(call, call.args.len() + 1, *at, place),
+            Some(ASTNode::Expr(Expr::MethodCall(call, at))) => self.examine_call(call, call.args.len() + 1, *at, place),
             Some(ASTNode::Expr(Expr::Variable(name, short, at))) if name.0.is_none() && short.is_none() => {
-                match fields::record(&name.1).filter(|_| !self.is_own(&name.1)) {
-                    Some(record) => self.record(record, path, *at, place),
-                    None => self.global(&name.1, *at, place),
+                match fields::find_record(&name.1).filter(|_| !self.is_own(&name.1)) {
+                    Some(record) => self.examine_record(record, path, *at, place),
+                    None => self.examine_global(&name.1, *at, place),
                 }
             }
-            Some(ASTNode::Stmt(Stmt::Assignment(assignment))) => self.assigned(&assignment.1.lhs),
+            Some(ASTNode::Stmt(Stmt::Assignment(assignment))) => self.examine_assignment(&assignment.1.lhs),
             _ => {}
         }
         if let Some(node) = path.last() {
-            self.values(node, place);
+            self.examine_values(node, place);
         }
         true
     }
 
     /// Values that can never be what they are compared with, or handed over as.
-    fn values(&mut self, node: &ASTNode<'_>, place: ScriptPlace<'_>) {
+    fn examine_values(&mut self, node: &ASTNode<'_>, place: ScriptPlace<'_>) {
         let like = if let ScriptPlace::Handler(_, like) = place { like } else { &[] };
-        let conditions = |all: &[Expr]| all.iter().filter_map(|expr| kinds::compare::condition(expr, like)).collect();
+        let conditions =
+            |all: &[Expr]| all.iter().filter_map(|expr| kinds::compare::find_condition_mistake(expr, like)).collect();
         let found: Vec<KindMistake> = match node {
             ASTNode::Expr(Expr::FnCall(call, at)) | ASTNode::Stmt(Stmt::FnCall(call, at)) => {
                 self.alarms.add(call);
-                let compared = kinds::compare::operator(call, *at, like);
-                compared.into_iter().chain(kinds::calls::arguments(call, like)).collect()
+                let compared = kinds::compare::find_operator_mistakes(call, *at, like);
+                compared.into_iter().chain(kinds::calls::find_call_mistakes(call, like)).collect()
             }
             ASTNode::Expr(Expr::And(all, _) | Expr::Or(all, _)) => conditions(all),
             ASTNode::Stmt(Stmt::If(flow, _) | Stmt::While(flow, _) | Stmt::Do(flow, ..)) => {
-                kinds::compare::condition(&flow.expr, like).into_iter().collect()
+                kinds::compare::find_condition_mistake(&flow.expr, like).into_iter().collect()
             }
-            ASTNode::Stmt(Stmt::Switch(switch, _)) => kinds::switch::cases(self.text, &switch.0, like),
+            ASTNode::Stmt(Stmt::Switch(switch, _)) => kinds::switch::find_case_mistakes(self.text, &switch.0, like),
             _ => Vec::new(),
         };
-        self.mistakes(found);
+        self.report_mistakes(found);
     }
 
-    fn mistakes(&mut self, found: Vec<KindMistake>) {
+    fn report_mistakes(&mut self, found: Vec<KindMistake>) {
         for (at, what, next) in found {
-            self.problem(at, what, next);
+            self.report_problem(at, what, next);
         }
     }
 
@@ -144,18 +145,22 @@ impl<'a> Walk<'a> {
         self.own.iter().any(|(own, _)| own == name)
     }
 
-    fn problem(&mut self, at: Position, what: String, next: impl Into<String>) {
+    fn report_problem(&mut self, at: Position, what: String, next: impl Into<String>) {
         self.found.problems.push(ScriptProblem::new(self.file, at, what, next));
     }
 
-    fn call(&mut self, call: &FnCallExpr, arguments: usize, at: Position, place: ScriptPlace<'_>) {
+    fn examine_call(&mut self, call: &FnCallExpr, arguments: usize, at: Position, place: ScriptPlace<'_>) {
         let name = call.name.as_str();
         if name == "publish" && call.args.len() == 3 {
-            self.publishes(&call.args[0], &call.args[2], at);
+            self.examine_publication(&call.args[0], &call.args[2], at);
         }
         if matches!(place, ScriptPlace::Handler(..)) && OF_THE_BODY.contains(&name) {
             let next = "raise_alarm and clear_alarm work here; or set memory.x here and ask for it in the body";
-            self.problem(at, format!("`{name}` lasts for one run of the body and does nothing in a handler"), next);
+            self.report_problem(
+                at,
+                format!("`{name}` lasts for one run of the body and does nothing in a handler"),
+                next,
+            );
         }
         let known = |(known, count): &(String, usize)| known == name && *count == arguments;
         if let Some(function) = of_trials(name) {
@@ -168,33 +173,33 @@ impl<'a> Walk<'a> {
             self.callable.iter().chain(&self.own).filter(|it| it.0 == name).map(|it| it.1.to_string()).collect();
         if !counts.is_empty() {
             let what = format!("`{name}` takes {} arguments, not {arguments}", counts.join(" or "));
-            return self.problem(at, what, usage(name));
+            return self.report_problem(at, what, describe_usage(name));
         }
         if name == "sleep" {
             let next = "it runs at every tick; held_s(name, condition) tells how long something has lasted";
-            return self.problem(at, "a script may not sleep".to_owned(), next);
+            return self.report_problem(at, "a script may not sleep".to_owned(), next);
         }
         let trials = TRIAL_FUNCTIONS.iter().filter_map(Function::name);
         let trials = trials.filter(|_| matches!(place, ScriptPlace::Trial(_)));
         let names = self.callable.iter().chain(&self.own).map(|it| it.0.as_str()).chain(trials);
         let names = names.filter(|name| name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
-        let next = suggestion(nearest(name, names));
-        self.problem(at, format!("there is no function `{name}`"), next);
+        let next = format_suggestion(find_nearest_name(name, names));
+        self.report_problem(at, format!("there is no function `{name}`"), next);
     }
 
     fn trial_call(&mut self, function: &Function, arguments: usize, at: Position, place: ScriptPlace<'_>) {
-        let wanted = parameters(function.signature);
+        let wanted = count_parameters(function.signature);
         let name = function.name().unwrap_or_default();
         if !matches!(place, ScriptPlace::Trial(_)) {
             let next = "write it into a function whose name begins with trial_";
-            self.problem(at, format!("only a trial can call `{name}`"), next);
+            self.report_problem(at, format!("only a trial can call `{name}`"), next);
         } else if arguments != wanted {
             let what = format!("`{name}` takes {wanted} arguments, not {arguments}");
-            self.problem(at, what, format!("write {}", function.signature));
+            self.report_problem(at, what, format!("write {}", function.signature));
         }
     }
 
-    fn global(&mut self, name: &str, at: Position, place: ScriptPlace<'_>) {
+    fn examine_global(&mut self, name: &str, at: Position, place: ScriptPlace<'_>) {
         let names = match place {
             ScriptPlace::Handler(names, _) | ScriptPlace::Trial(names) | ScriptPlace::Settings(names) => names,
             ScriptPlace::Body | ScriptPlace::Function => &[],
@@ -203,33 +208,33 @@ impl<'a> Walk<'a> {
         if known || self.is_own(name) {
             return;
         }
-        match (find(name), place) {
-            (Some(_), ScriptPlace::Function) => self.problem(
+        match (find_word(name), place) {
+            (Some(_), ScriptPlace::Function) => self.report_problem(
                 at,
                 format!("`{name}` is not visible inside a function"),
                 format!("hand it over: fn f({name}) {{ ... }} and call f({name})"),
             ),
-            (Some(_), ScriptPlace::Trial(_)) => self.problem(
+            (Some(_), ScriptPlace::Trial(_)) => self.report_problem(
                 at,
                 format!("a trial does not see `{name}`"),
                 format!("it sets what the script sees: given(#{{ {name}: ... }})"),
             ),
-            (Some(_), ScriptPlace::Settings(_)) => self.problem(
+            (Some(_), ScriptPlace::Settings(_)) => self.report_problem(
                 at,
                 format!("`settings` does not see `{name}`"),
                 "it is called once, when the file is loaded, and sees the constants of the script only",
             ),
-            (Some(word), _) => self.reads(word),
+            (Some(word), _) => self.record_read(word),
             (None, ScriptPlace::Function) => {
                 let next = "a function sees its own arguments and variables only; hand over what it needs";
-                self.problem(at, format!("there is no variable `{name}`"), next);
+                self.report_problem(at, format!("there is no variable `{name}`"), next);
             }
             (None, ScriptPlace::Trial(_) | ScriptPlace::Settings(_)) => self.no_variable(name, at),
-            (None, _) => match self.channels.publisher(name) {
+            (None, _) => match self.channels.find_publisher(name) {
                 Some(publisher) if publisher != self.file => self.reads_of_others(name),
                 Some(_) => {
                     let next = format!("keep it: let my_{name} = ...; publish(\"{name}\", my_{name}, ...)");
-                    self.problem(at, format!("`{name}` is published by this script itself"), next);
+                    self.report_problem(at, format!("`{name}` is published by this script itself"), next);
                 }
                 None => self.no_variable(name, at),
             },
@@ -237,13 +242,14 @@ impl<'a> Walk<'a> {
     }
 
     fn no_variable(&mut self, name: &str, at: Position) {
-        let names = words().iter().map(|word| word.name).chain(self.channels.names());
-        let shipped = || PublishedChannels::of(&super::shipped()).publisher(name).map(str::to_owned);
-        let next = match (nearest(name, names), shipped()) {
+        let names = list_words().iter().map(|word| word.name).chain(self.channels.names());
+        let shipped =
+            || PublishedChannels::from_files(&super::list_shipped_scripts()).find_publisher(name).map(str::to_owned);
+        let next = match (find_nearest_name(name, names), shipped()) {
             (_, Some(file)) => format!("{file}, which comes with the gateway, publishes it: put it among the scripts"),
-            (near, None) => suggestion(near),
+            (near, None) => format_suggestion(near),
         };
-        self.problem(at, format!("there is no variable `{name}`"), next);
+        self.report_problem(at, format!("there is no variable `{name}`"), next);
     }
 
     fn reads_of_others(&mut self, name: &str) {
@@ -253,71 +259,71 @@ impl<'a> Walk<'a> {
     }
 
     /// `sample.x`: the record is the left side of a dot, and the right side is a field of it.
-    fn record(&mut self, record: &'static Record, path: &[ASTNode<'_>], at: Position, place: ScriptPlace<'_>) {
+    fn examine_record(&mut self, record: &'static Record, path: &[ASTNode<'_>], at: Position, place: ScriptPlace<'_>) {
         let name = record.name;
         let dot = path.len().checked_sub(2).and_then(|parent| path.get(parent));
         let property = match dot {
-            Some(ASTNode::Expr(Expr::Dot(pair, ..))) if pair.lhs.position() == at => property(pair),
+            Some(ASTNode::Expr(Expr::Dot(pair, ..))) if pair.lhs.position() == at => find_property(pair),
             _ => None,
         };
         let Some((field, at_field)) = property else {
             let next = format!("write {}, with the channel that is meant", record.example);
-            return self.problem(at, format!("`{name}` is used as a whole"), next);
+            return self.report_problem(at, format!("`{name}` is used as a whole"), next);
         };
         if matches!(place, ScriptPlace::Function | ScriptPlace::Trial(_) | ScriptPlace::Settings(_)) {
             let what = format!("`{name}` is not visible inside a function");
-            return self.problem(at, what, format!("hand the value over: f({name}.{field})"));
+            return self.report_problem(at, what, format!("hand the value over: f({name}.{field})"));
         }
-        match record.field(field) {
+        match record.find_field(field) {
             Ok(found) => {
                 let same = |it: &Field| it.record.name == name && it.word.name == found.word.name;
                 if !self.found.fields.iter().any(same) {
                     self.found.fields.push(found);
                 }
             }
-            Err(next) => self.problem(at_field, format!("there is no `{name}.{field}`"), next),
+            Err(next) => self.report_problem(at_field, format!("there is no `{name}.{field}`"), next),
         }
     }
 
     /// A channel of the script's own is known before it runs.
-    fn publishes(&mut self, name: &Expr, unit: &Expr, at: Position) {
+    fn examine_publication(&mut self, name: &Expr, unit: &Expr, at: Position) {
         let (Expr::StringConstant(name, at_name), Expr::StringConstant(unit, _)) = (name, unit) else {
             let next = "write publish(\"my_channel_w\", x, \"W\")";
-            return self.problem(at, "name and unit of a channel are written as texts".to_owned(), next);
+            return self.report_problem(at, "name and unit of a channel are written as texts".to_owned(), next);
         };
         let letters = name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
         let begins = name.starts_with(|c: char| c.is_ascii_lowercase());
         if !letters || !begins || name.len() > CHANNEL_NAME_MAX {
             let what = format!("\"{name}\" cannot be the name of a channel");
             let next = format!("use a to z, 0 to 9 and _, beginning with a letter, at most {CHANNEL_NAME_MAX} of them");
-            return self.problem(*at_name, what, next);
+            return self.report_problem(*at_name, what, next);
         }
-        if find(name).is_some() {
+        if find_word(name).is_some() {
             let next = format!("choose another name, such as my_{name}");
-            return self.problem(*at_name, format!("`{name}` is a channel or an estimate already"), next);
+            return self.report_problem(*at_name, format!("`{name}` is a channel or an estimate already"), next);
         }
         match self.found.channels.iter().find(|(known, _)| known == name) {
             None => self.found.channels.push((name.clone(), unit.clone())),
             Some((_, other)) if other != unit => {
                 let what = format!("`{name}` is published in {other} and in {unit}");
-                self.problem(*at_name, what, "a channel has one unit");
+                self.report_problem(*at_name, what, "a channel has one unit");
             }
             Some(_) => {}
         }
     }
 
-    fn reads(&mut self, word: &'static Word) {
+    fn record_read(&mut self, word: &'static Word) {
         if !self.found.reads.iter().any(|known| known.name == word.name) {
             self.found.reads.push(word);
         }
     }
 
-    fn assigned(&mut self, left: &Expr) {
+    fn examine_assignment(&mut self, left: &Expr) {
         let Expr::Variable(name, short, at) = left else { return };
         let global = name.0.is_none() && short.is_none();
-        if let Some(word) = find(&name.1).filter(|word| global && !word.writable()) {
+        if let Some(word) = find_word(&name.1).filter(|word| global && !word.is_writable()) {
             let next = format!("use a name of your own: let my_{0} = {0};", word.name);
-            self.problem(*at, format!("`{}` is measured and cannot be set", word.name), next);
+            self.report_problem(*at, format!("`{}` is measured and cannot be set", word.name), next);
         }
     }
 }
@@ -327,13 +333,13 @@ fn of_trials(name: &str) -> Option<&'static Function> {
 }
 
 /// How many parameters a signature has.
-fn parameters(signature: &str) -> usize {
+fn count_parameters(signature: &str) -> usize {
     let inside = signature.split_once('(').map_or("", |(_, rest)| rest.trim_end_matches(')'));
     if inside.is_empty() { 0 } else { inside.matches(',').count() + 1 }
 }
 
 /// The name right of the dot, also where more follows it.
-fn property(dot: &BinaryExpr) -> Option<(&str, Position)> {
+fn find_property(dot: &BinaryExpr) -> Option<(&str, Position)> {
     match &dot.rhs {
         Expr::Property(property, at) => Some((property.2.as_str(), *at)),
         Expr::Dot(pair, ..) | Expr::Index(pair, ..) => match &pair.lhs {
@@ -344,16 +350,16 @@ fn property(dot: &BinaryExpr) -> Option<(&str, Position)> {
     }
 }
 
-fn suggestion(near: Option<&str>) -> String {
+fn format_suggestion(near: Option<&str>) -> String {
     match near {
         Some(near) => format!("did you mean `{near}`?"),
         None => "`cnc-gateway check --vocabulary` lists what there is; `let x = ...` makes a variable".to_owned(),
     }
 }
 
-fn usage(name: &str) -> String {
+fn describe_usage(name: &str) -> String {
     let own = FUNCTIONS.iter().find(|it| it.name() == Some(name));
-    let method = || super::functions::methods().find(|it| it.name == name).map(|it| it.signature());
+    let method = || super::functions::list_methods().find(|it| it.name == name).map(|it| it.signature());
     let signature = own.map(|it| it.signature.to_owned()).or_else(method);
     signature.map(|signature| format!("write {signature}")).unwrap_or_default()
 }

@@ -4,10 +4,10 @@
 //! A record holds only the fields that the script names, which are known before it runs: so a misspelt one is told when
 //! the file is loaded, and one that nobody reads costs nothing.
 
-use super::vocabulary::{View, Word, WordSource, WordValue, find, words};
+use super::vocabulary::{View, Word, WordSource, WordValue, find_word, list_words};
 use crate::estimators::NoEstimate;
 use adapters::Absence;
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use adapters::clock::SECOND_NS;
 
 /// What a record tells of its fields.
@@ -66,7 +66,7 @@ pub const RECORDS: [Record; 4] = [
 ];
 
 /// The record of this name.
-pub(super) fn record(name: &str) -> Option<&'static Record> {
+pub(super) fn find_record(name: &str) -> Option<&'static Record> {
     RECORDS.iter().find(|record| record.name == name)
 }
 
@@ -79,18 +79,19 @@ pub(super) struct Field {
 
 impl Field {
     /// The value in this run.
-    pub(super) fn see<'a>(&self, view: &View<'a>) -> WordValue<'a> {
+    pub(super) fn read_value<'a>(&self, view: &View<'a>) -> WordValue<'a> {
         match self.record.tells {
-            Tells::Channel | Tells::Estimate => self.word.see(view),
-            Tells::Age => age(self.word, view),
-            Tells::Absence => absence(self.word, view),
+            Tells::Channel | Tells::Estimate => self.word.read_value(view),
+            Tells::Age => read_age(self.word, view),
+            Tells::Absence => read_absence(self.word, view),
         }
     }
 
     /// The words that it can be, where it is the reason of an absence.
-    pub(super) fn reasons(&self) -> Option<Vec<&'static str>> {
+    pub(super) fn list_reasons(&self) -> Option<Vec<&'static str>> {
         let of_channel = matches!(self.word.source, WordSource::Channel(_) | WordSource::Tool(_));
-        let words = || if of_channel { Absence::ALL.map(Absence::word).to_vec() } else { NoEstimate::WORDS.to_vec() };
+        let words =
+            || if of_channel { Absence::ALL.map(Absence::as_word).to_vec() } else { NoEstimate::WORDS.to_vec() };
         (self.record.tells == Tells::Absence).then(words)
     }
 
@@ -100,28 +101,28 @@ impl Field {
     }
 }
 
-fn age<'a>(word: &Word, view: &View<'a>) -> WordValue<'a> {
+fn read_age<'a>(word: &Word, view: &View<'a>) -> WordValue<'a> {
     let (WordSource::Channel(id) | WordSource::Tool(id)) = word.source else { return WordValue::Absent };
     let slot = view.sample.slot(id);
     if slot.value.is_ok() { WordValue::Number(slot.age_ns as f64 / SECOND_NS as f64) } else { WordValue::Absent }
 }
 
-fn absence<'a>(word: &Word, view: &View<'a>) -> WordValue<'a> {
+fn read_absence<'a>(word: &Word, view: &View<'a>) -> WordValue<'a> {
     let reason = match word.source {
         WordSource::Channel(id) | WordSource::Tool(id) => {
-            view.sample.slot(id).value.as_ref().err().map(|absence| absence.word())
+            view.sample.slot(id).value.as_ref().err().map(|absence| absence.as_word())
         }
         WordSource::Quantity(read) | WordSource::Deviation(read) => {
-            read(view.estimates).err().map(|reason| reason.word())
+            read(view.estimates).err().map(|reason| reason.as_word())
         }
-        WordSource::Figure(read) => read(view.estimates).err().map(|reason| reason.word()),
+        WordSource::Figure(read) => read(view.estimates).err().map(|reason| reason.as_word()),
         _ => None,
     };
     reason.map_or(WordValue::Absent, WordValue::Text)
 }
 
 impl Record {
-    fn holds(&self, word: &Word) -> bool {
+    fn has_word(&self, word: &Word) -> bool {
         let channel = matches!(word.source, WordSource::Channel(_) | WordSource::Tool(_));
         let quantity =
             matches!(word.source, WordSource::Quantity(_) | WordSource::Deviation(_) | WordSource::Figure(_));
@@ -133,16 +134,16 @@ impl Record {
     }
 
     /// The field of this name, or what to write instead.
-    pub(super) fn field(&'static self, name: &str) -> Result<Field, String> {
-        let names = || words().iter().filter(|word| self.holds(word)).map(|word| word.name);
-        match find(name) {
-            Some(word) if self.holds(word) => Ok(Field { record: self, word }),
+    pub(super) fn find_field(&'static self, name: &str) -> Result<Field, String> {
+        let names = || list_words().iter().filter(|word| self.has_word(word)).map(|word| word.name);
+        match find_word(name) {
+            Some(word) if self.has_word(word) => Ok(Field { record: self, word }),
             Some(word) => {
-                let other = RECORDS.iter().find(|other| other.holds(word));
+                let other = RECORDS.iter().find(|other| other.has_word(word));
                 let there = other.map_or_else(|| name.to_owned(), |other| format!("{}.{name}", other.name));
                 Err(format!("write `{there}`"))
             }
-            None => match nearest(name, names()) {
+            None => match find_nearest_name(name, names()) {
                 Some(near) => Err(format!("did you mean `{}.{near}`?", self.name)),
                 None => Err("`cnc-gateway rules api` lists every channel and estimate".to_owned()),
             },
@@ -157,17 +158,17 @@ mod tests {
     use adapters::{ChannelId, Sample, Slot, Value};
 
     fn field(record_name: &str, name: &str) -> Result<Field, String> {
-        record(record_name).expect("a record").field(name)
+        find_record(record_name).expect("a record").find_field(name)
     }
 
     #[test]
     fn every_channel_and_estimate_is_a_field() {
-        for id in ChannelId::all() {
+        for id in ChannelId::list_all() {
             for record in ["sample", "age_s", "missing"] {
                 assert!(field(record, id.name()).is_ok(), "{record}.{id}");
             }
         }
-        for (name, _) in Estimates::none(0).quantities() {
+        for (name, _) in Estimates::without_samples(0).list_quantities() {
             assert!(field("estimates", name).is_ok() && field("missing", name).is_ok(), "{name}");
         }
         assert!(field("estimates", "state").is_ok());
@@ -184,19 +185,19 @@ mod tests {
 
     #[test]
     fn age_and_reason() {
-        let id = ChannelId::of("spindle_power_w").expect("a channel");
-        let (mut sample, estimates) = (Sample::empty(0), Estimates::none(0));
+        let id = ChannelId::from_name("spindle_power_w").expect("a channel");
+        let (mut sample, estimates) = (Sample::new_empty(0), Estimates::without_samples(0));
         let see = |sample: &Sample, record: &str| {
             let view = View { sample, estimates: &estimates, dt_s: 0.0 };
-            let seen = field(record, "spindle_power_w").expect("a field").see(&view);
+            let seen = field(record, "spindle_power_w").expect("a field").read_value(&view);
             format!("{seen:?}")
         };
-        sample.set(id, Slot { value: Ok(Value::Number(7.0)), age_ns: SECOND_NS / 2 });
+        sample.set_slot(id, Slot { value: Ok(Value::Number(7.0)), age_ns: SECOND_NS / 2 });
         assert_eq!(
             [see(&sample, "sample"), see(&sample, "age_s"), see(&sample, "missing")],
             ["Number(7.0)", "Number(0.5)", "Absent"]
         );
-        sample.set(id, Slot::absent(Absence::Timeout));
+        sample.set_slot(id, Slot::from_absence(Absence::Timeout));
         assert_eq!([see(&sample, "sample"), see(&sample, "age_s")], ["Absent", "Absent"]);
         assert!(see(&sample, "missing").contains("timeout"));
     }

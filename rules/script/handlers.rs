@@ -5,7 +5,7 @@
 //! file with everything else blanked out, which keeps line and column of every message.
 
 use super::compile::ScriptFile;
-use super::events::{EventKind, handled};
+use super::events::{EventKind, classify_handler};
 use super::problem::{self, ScriptProblem};
 use super::trials::{self, Trial};
 use super::variables::ScriptBody;
@@ -41,7 +41,12 @@ pub(super) struct Called {
 }
 
 /// Every handler and every trial of a file; `whole` is the file, compiled without optimization.
-pub(super) fn called(file: &ScriptFile, whole: &AST, checking: &Engine, problems: &mut Vec<ScriptProblem>) -> Called {
+pub(super) fn find_called_functions(
+    file: &ScriptFile,
+    whole: &AST,
+    checking: &Engine,
+    problems: &mut Vec<ScriptProblem>,
+) -> Called {
     let mut called = Called::default();
     for function in whole.iter_fn_def() {
         if let Err(problem) = called.add(file, function, checking) {
@@ -57,7 +62,7 @@ impl Called {
         let (begin, end) = (function.body.start_position(), function.body.end_position());
         let (name, parameters) = (function.name.clone(), function.params.to_vec());
         let trial = name.starts_with(trials::PREFIX);
-        let kind = handled(&file.name, &name, parameters.len(), begin)?;
+        let kind = classify_handler(&file.name, &name, parameters.len(), begin)?;
         let settings = name == SETTINGS_FUNCTION && parameters.is_empty();
         if !trial && kind.is_none() && !settings {
             return Ok(());
@@ -66,7 +71,7 @@ impl Called {
             let next = format!("write fn {name}() {{ ... }}");
             return Err(ScriptProblem::new(&file.name, begin, format!("the trial `{name}` has parameters"), next));
         }
-        let text = only(&file.text, begin, end);
+        let text = blank_outside(&file.text, begin, end);
         let plain = checking.compile(&text).map_err(|error| problem::of_parse(&file.name, &error))?;
         if settings {
             self.settings = Some(plain);
@@ -81,17 +86,17 @@ impl Called {
     }
 
     /// The handlers, compiled for the variables that they will find: `names`, then their own parameters.
-    pub(super) fn ready(&self, running: &Engine, names: &[String]) -> Result<Vec<Handling>, ParseError> {
+    pub(super) fn compile_handlers(&self, running: &Engine, names: &[String]) -> Result<Vec<Handling>, ParseError> {
         let one = |handler: &Written| {
             let parameters = handler.parameters.iter().map(ToString::to_string);
             let names: Vec<String> = names.iter().cloned().chain(parameters).collect();
-            let body = ScriptBody::compile(running, &handler.text, &names)?;
+            let body = ScriptBody::compile_behind_names(running, &handler.text, &names)?;
             Ok(Handling { kind: handler.kind, parameters: handler.parameters.clone(), body })
         };
         self.handlers.iter().map(one).collect()
     }
 
-    fn has(&self, name: &str) -> bool {
+    fn has_function(&self, name: &str) -> bool {
         let settings = self.settings.is_some() && name == SETTINGS_FUNCTION;
         settings
             || self.handlers.iter().any(|handler| handler.name == name)
@@ -99,15 +104,15 @@ impl Called {
     }
 
     /// The functions of the file that are the script's own.
-    pub(super) fn others(&self, whole: &AST) -> AST {
+    pub(super) fn extract_own_functions(&self, whole: &AST) -> AST {
         let mut functions = whole.clone_functions_only();
-        functions.retain_functions(|_, _, name, _| !self.has(name));
+        functions.retain_functions(|_, _, name, _| !self.has_function(name));
         functions
     }
 }
 
 /// The text between two positions, everything else blank; lines and columns stay.
-pub(super) fn only(text: &str, begin: Position, end: Position) -> String {
+pub(super) fn blank_outside(text: &str, begin: Position, end: Position) -> String {
     let key = |at: Position| (at.line().unwrap_or(usize::MAX), at.position().unwrap_or(0));
     let (begin, end, mut line, mut column) = (key(begin), key(end), 1, 0);
     let keep = |c: char| {
@@ -128,7 +133,7 @@ mod tests {
     #[test]
     fn what_is_left_stands_where_it_stood() {
         let text = "let x = 1; // 中文\nfn f() {\n  x\n}\nlet y;";
-        let left = only(text, Position::new(2, 8), Position::new(4, 1));
+        let left = blank_outside(text, Position::new(2, 8), Position::new(4, 1));
         assert_eq!(left.trim(), "x");
         assert_eq!(left.lines().nth(2), Some("  x"));
         assert_eq!(left.chars().count(), text.chars().count());

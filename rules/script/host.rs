@@ -1,14 +1,14 @@
 //! Runs the scripts, one tick at a time.
 
-use super::compile::{ScriptFile, compile};
+use super::compile::{ScriptFile, compile_scripts};
 use super::compiled::ScriptSet;
 use super::deadline::{self, Deadline};
 use super::decision::{Alarm, AlarmChange, Decision, OverrideRequest, Published};
 use super::declared::{Declared, SettingValues};
-use super::engine::{Shared, engine};
+use super::engine::{Shared, build_engine};
 use super::events::Happenings;
 use super::problem::ScriptProblem;
-use super::settings::merge;
+use super::settings::merge_settings;
 use super::slot::{Moment, Outputs, Slot};
 use super::status::{ScriptStatus, Status};
 use crate::estimators::{Estimates, Settings};
@@ -59,7 +59,7 @@ impl Host {
     pub fn new() -> Self {
         let shared = Shared::default();
         Self {
-            engine: engine(&shared, true),
+            engine: build_engine(&shared, true),
             shared,
             slots: Vec::new(),
             alarms: Vec::new(),
@@ -80,8 +80,8 @@ impl Host {
 
     /// From now on no run lasts longer than this allows, besides the limit on its operations. For live runs only: with a
     /// clock the same samples need not give the same decisions.
-    pub fn watch(&mut self, deadline: Arc<dyn Deadline>) {
-        deadline::watch(&mut self.engine, deadline.clone());
+    pub fn set_deadline(&mut self, deadline: Arc<dyn Deadline>) {
+        deadline::watch_deadline(&mut self.engine, deadline.clone());
         self.deadline = Some(deadline);
     }
 
@@ -89,14 +89,14 @@ impl Host {
     ///
     /// # Errors
     /// Everything that is wrong; [`Host::status`] tells it too until a set is accepted.
-    pub fn load(&mut self, files: &[ScriptFile]) -> Result<(), Vec<ScriptProblem>> {
-        match compile(files) {
+    pub fn load_scripts(&mut self, files: &[ScriptFile]) -> Result<(), Vec<ScriptProblem>> {
+        match compile_scripts(files) {
             Ok(set) => {
-                self.install(set);
+                self.install_set(set);
                 Ok(())
             }
             Err(problems) => {
-                self.refuse(problems.clone());
+                self.record_refusal(problems.clone());
                 Err(problems)
             }
         }
@@ -104,13 +104,13 @@ impl Host {
 
     /// Puts a compiled set in charge. Every script goes on with its memory and timers, also one whose text has changed; the
     /// version before it stays ready, with what it remembered.
-    pub fn install(&mut self, set: ScriptSet) {
+    pub fn install_set(&mut self, set: ScriptSet) {
         self.refused.clear();
         let mut old = std::mem::take(&mut self.slots);
         for script in set.scripts {
             let before = old.iter().position(|slot| slot.file() == &*script.file).map(|at| old.swap_remove(at));
             let remembered = self.remembered.remove(&*script.file);
-            self.slots.push(Slot::install(script, before, remembered.as_ref()));
+            self.slots.push(Slot::install_script(script, before, remembered.as_ref()));
         }
         self.settings = set.settings;
         self.files = set.files;
@@ -120,16 +120,17 @@ impl Host {
     }
 
     /// Remembers why a set was refused, so that [`Host::status`] says so.
-    pub fn refuse(&mut self, problems: Vec<ScriptProblem>) {
+    pub fn record_refusal(&mut self, problems: Vec<ScriptProblem>) {
         self.refused = problems;
     }
 
     /// Ends the alarms of scripts that are gone and the host's own of those that begin anew.
     fn drop_alarms(&mut self) {
         let slots = &self.slots;
-        let stays = |alarm: &Alarm| slots.iter().any(|slot| slot.file() == &*alarm.script && slot.keeps(&alarm.name));
+        let stays =
+            |alarm: &Alarm| slots.iter().any(|slot| slot.file() == &*alarm.script && slot.can_keep_alarm(&alarm.name));
         for alarm in self.alarms.iter().filter(|alarm| !stays(alarm)) {
-            self.pending.push(alarm.change(false));
+            self.pending.push(alarm.to_change(false));
         }
         self.alarms.retain(stays);
     }
@@ -148,7 +149,7 @@ impl Host {
     }
 
     /// The settings that the scripts in charge declare.
-    pub fn declared(&self) -> impl Iterator<Item = &Declared> {
+    pub fn declared_settings(&self) -> impl Iterator<Item = &Declared> {
         self.slots.iter().flat_map(|slot| &slot.script().declared)
     }
 
@@ -159,7 +160,7 @@ impl Host {
     }
 
     /// A script that is tried alone sees this in the place of another script's channel. False where it reads no such channel.
-    pub(super) fn give(&mut self, channel: &str, value: Option<f64>) -> bool {
+    pub(super) fn set_channel_value(&mut self, channel: &str, value: Option<f64>) -> bool {
         let reads = self.slots.iter().any(|slot| slot.script().foreign.iter().any(|name| *name == *channel));
         if reads {
             self.given.insert(channel.to_owned(), value);
@@ -180,7 +181,7 @@ impl Host {
     }
 
     /// Runs every script that is due.
-    pub fn tick(&mut self, sample: &Sample, estimates: &Estimates) -> &Decision {
+    pub fn run_due_scripts(&mut self, sample: &Sample, estimates: &Estimates) -> &Decision {
         let decision = &mut self.decision;
         decision.at_ns = sample.at_ns;
         decision.alarms.clear();
@@ -189,29 +190,29 @@ impl Host {
         decision.learn_anew.clear();
         decision.alarms.append(&mut self.pending);
         let mut outputs = Outputs { alarms: &mut self.alarms, decision };
-        let events = self.happenings.step(sample, estimates);
+        let events = self.happenings.detect_events(sample, estimates);
         let mut replaced = false;
         for at in 0..self.slots.len() {
             let (before, from_here) = self.slots.split_at_mut(at);
             let Some(slot) = from_here.first_mut() else { break };
             if let Some(deadline) = &self.deadline {
-                deadline.begin();
+                deadline.begin_run();
             }
             slot.look_at(before, &self.given, &mut self.foreign);
             let moment = Moment { sample, estimates, events, foreign: &self.foreign };
-            replaced |= slot.tick(&self.engine, &self.shared, &moment, &mut outputs);
+            replaced |= slot.run_tick(&self.engine, &self.shared, &moment, &mut outputs);
         }
-        self.gather();
+        self.gather_requests();
         if replaced {
-            self.replaced();
+            self.remerge_settings();
         }
         &self.decision
     }
 
     /// What the scripts ask for now.
-    fn gather(&mut self) {
+    fn gather_requests(&mut self) {
         let Decision { request, stops, offsets, .. } = &mut self.decision;
-        *request = OverrideRequest::least(self.slots.iter().flat_map(Slot::requests)).cloned();
+        *request = OverrideRequest::find_least(self.slots.iter().flat_map(Slot::requests)).cloned();
         stops.clear();
         offsets.clear();
         for slot in &self.slots {
@@ -229,10 +230,10 @@ impl Host {
     }
 
     /// An older version has come into charge: its settings count again.
-    fn replaced(&mut self) {
+    fn remerge_settings(&mut self) {
         let scripts: Vec<_> = self.slots.iter().map(|slot| Arc::clone(slot.script())).collect();
         let mut problems = Vec::new();
-        let settings = merge(&scripts, &mut problems);
+        let settings = merge_settings(&scripts, &mut problems);
         if problems.is_empty() {
             self.settings = settings;
         }
@@ -253,35 +254,36 @@ impl Host {
     }
 
     /// The channels of the scripts' own, each with its newest value.
-    pub fn published(&self) -> impl Iterator<Item = Published<'_>> {
-        self.slots.iter().flat_map(Slot::published)
+    pub fn published_channels(&self) -> impl Iterator<Item = Published<'_>> {
+        self.slots.iter().flat_map(Slot::published_channels)
     }
 
     /// What the scripts remember and would have to learn again: `scripts/1`.
     #[must_use]
-    pub fn snapshot(&self) -> Value {
-        let present = self.slots.iter().map(|slot| (slot.file().to_owned(), slot.snapshot()));
+    pub fn take_snapshot(&self) -> Value {
+        let present = self.slots.iter().map(|slot| (slot.file().to_owned(), slot.take_snapshot()));
         let absent = self.remembered.iter().take(ABSENT_MAX).map(|(file, kept)| (file.clone(), kept.clone()));
         json!({ "schema": "scripts/1", "scripts": absent.chain(present).collect::<Map<_, _>>() })
     }
 
-    /// Takes what [`Host::snapshot`] gave in an earlier process: each script gets its own when it next comes into charge for
+    /// Takes what [`Host::take_snapshot`] gave in an earlier process: each script gets its own when it next comes into charge for
     /// the first time. Whatever cannot be read is left out.
-    pub fn restore(&mut self, snapshot: &Value) {
+    pub fn restore_snapshot(&mut self, snapshot: &Value) {
         let scripts = snapshot["scripts"].as_object().into_iter().flatten().take(ABSENT_MAX);
         self.remembered = scripts.map(|(file, kept)| (file.clone(), kept.clone())).collect();
     }
 
     /// Adds an offset that the box itself proposes to the decision of this tick, unless a script proposes one for its axis.
-    pub fn propose(&mut self, proposal: super::decision::OffsetProposal) {
+    pub fn add_offset_proposal(&mut self, proposal: super::decision::OffsetProposal) {
         if !self.decision.offsets.iter().any(|known| known.axis == proposal.axis) {
             self.decision.offsets.push(proposal);
         }
     }
 
     /// Adds a request that comes from outside to the decision of this tick; the least of it and the scripts' counts.
-    pub fn request(&mut self, request: super::decision::OverrideRequest) {
-        let least = super::decision::OverrideRequest::least(self.decision.request.iter().chain([&request])).cloned();
+    pub fn add_override_request(&mut self, request: super::decision::OverrideRequest) {
+        let least =
+            super::decision::OverrideRequest::find_least(self.decision.request.iter().chain([&request])).cloned();
         self.decision.request = least;
     }
 
@@ -292,8 +294,8 @@ impl Host {
     }
 
     /// Every request ends, as when the tick loop has to go on without its scripts.
-    pub fn withdraw(&mut self, at_ns: TimeNs) {
+    pub fn withdraw_requests(&mut self, at_ns: TimeNs) {
         self.decision = Decision { at_ns, ..Decision::default() };
-        self.slots.iter_mut().for_each(Slot::withdraw);
+        self.slots.iter_mut().for_each(Slot::withdraw_requests);
     }
 }

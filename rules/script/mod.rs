@@ -1,6 +1,6 @@
 //! What the integrator decides: the host of rhai scripts.
 //!
-//! [`Host::tick`] takes a sample and the estimates and yields a [`Decision`]: alarms, notes, and a request to the gate.
+//! [`Host::run_due_scripts`] takes a sample and the estimates and yields a [`Decision`]: alarms, notes, and a request to the gate.
 //! A script can only ask; whether anything is written is decided elsewhere, by compiled code.
 //!
 //! - A script is a text that runs from top to bottom at every tick, or every `const EVERY_S = 1.0;` seconds. Functions with
@@ -10,7 +10,7 @@
 //!   asks, `x ?? 0.0` replaces, a comparison is false. A script that computes with a value that is not there waits: it asks
 //!   for nothing and runs again when it is due.
 //! - `fn settings() { #{ c1: 0.15 } }` is called once when the script is loaded and sets the estimators.
-//! - What it remembers outlives a changed text and the process ([`Host::snapshot`]).
+//! - What it remembers outlives a changed text and the process ([`Host::take_snapshot`]).
 //! - Everything is bounded: operations, depth, sizes, names, notes. A script that fails is replaced by its last good
 //!   version or suspended.
 //! - The same samples give the same decisions: there is no clock, no random number, no file and no network in reach.
@@ -64,9 +64,11 @@ mod trials;
 mod variables;
 mod vocabulary;
 
-pub use api::{api, api_json};
+pub use api::{api_json, format_api_reference};
 pub use callable::{FUNCTIONS, Function};
-pub use compile::{ScriptFile, compile, compile_one, compile_with, declarations, prepare, prepare_with};
+pub use compile::{
+    ScriptFile, compile_one, compile_scripts, compile_with, list_declarations, prepare_scripts, prepare_with,
+};
 pub use compiled::ScriptSet;
 pub use deadline::Deadline;
 pub use decision::{
@@ -79,8 +81,8 @@ pub use events::{HANDLERS, Handler};
 pub use fields::{RECORDS, Record};
 pub use host::Host;
 pub use problem::ScriptProblem;
-pub use recipes::{RECIPES, ScriptRecipe, recipe};
-pub use shipped::shipped;
+pub use recipes::{RECIPES, ScriptRecipe, find_recipe};
+pub use shipped::list_shipped_scripts;
 pub use status::{ScriptCondition, ScriptStatus, Status};
-pub use trials::{TRIAL_FUNCTIONS, TrialResult, prove, trials};
-pub use vocabulary::{Word, WordKind, vocabulary, words};
+pub use trials::{TRIAL_FUNCTIONS, TrialResult, prove_scripts, run_trials};
+pub use vocabulary::{Word, WordKind, format_vocabulary, list_words};

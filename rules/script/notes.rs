@@ -17,7 +17,7 @@ pub(super) struct NoteLimit {
 
 impl NoteLimit {
     /// The text when it may be written: not twice in a minute, not more than twenty; the last of them says so.
-    pub(super) fn admit(&mut self, text: &str, now_ns: TimeNs) -> Option<Arc<str>> {
+    pub(super) fn admit_note(&mut self, text: &str, now_ns: TimeNs) -> Option<Arc<str>> {
         let began_ns = *self.began_ns.get_or_insert(now_ns);
         if now_ns < began_ns || now_ns - began_ns >= MINUTE_NS {
             *self = Self { began_ns: Some(now_ns), ..Self::default() };
@@ -40,9 +40,9 @@ mod tests {
     #[test]
     fn twenty_different_notes_a_minute() {
         let mut limit = NoteLimit::default();
-        let admitted = (0..100).filter_map(|i| limit.admit(&format!("note {i}"), i)).count();
+        let admitted = (0..100).filter_map(|i| limit.admit_note(&format!("note {i}"), i)).count();
         assert_eq!(admitted, 20);
-        assert!(limit.admit("later", MINUTE_NS).is_some());
-        assert!(limit.admit("later", MINUTE_NS + 1).is_none());
+        assert!(limit.admit_note("later", MINUTE_NS).is_some());
+        assert!(limit.admit_note("later", MINUTE_NS + 1).is_none());
     }
 }

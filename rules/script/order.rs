@@ -6,7 +6,7 @@
 
 use super::compile::ScriptFile;
 use super::compiled::Script;
-use super::declared::scan::{calls, quoted};
+use super::declared::scan::{find_calls, read_quoted};
 use super::problem::ScriptProblem;
 use rhai::Position;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,11 +18,11 @@ pub(super) struct PublishedChannels(BTreeMap<String, String>);
 
 impl PublishedChannels {
     /// Those of these files.
-    pub(super) fn of(files: &[ScriptFile]) -> Self {
+    pub(super) fn from_files(files: &[ScriptFile]) -> Self {
         let mut channels = BTreeMap::new();
         for file in files.iter().filter(|file| file.text.len() <= super::TEXT_MAX) {
-            for call in calls(&file.text, "publish") {
-                if let Some(name) = quoted(&file.text[call.inside]) {
+            for call in find_calls(&file.text, "publish") {
+                if let Some(name) = read_quoted(&file.text[call.inside]) {
                     channels.insert(name.to_owned(), file.name.clone());
                 }
             }
@@ -31,7 +31,7 @@ impl PublishedChannels {
     }
 
     /// The file that publishes a channel of this name.
-    pub(super) fn publisher(&self, name: &str) -> Option<&str> {
+    pub(super) fn find_publisher(&self, name: &str) -> Option<&str> {
         self.0.get(name).map(String::as_str)
     }
 
@@ -55,7 +55,7 @@ pub(super) fn one_publisher(scripts: &[Arc<Script>], problems: &mut Vec<ScriptPr
 }
 
 /// Whoever publishes stands before whoever reads it; otherwise the scripts stay in the order of their names, in which they come.
-pub(super) fn ordered(scripts: Vec<Arc<Script>>, problems: &mut Vec<ScriptProblem>) -> Vec<Arc<Script>> {
+pub(super) fn order_by_dependency(scripts: Vec<Arc<Script>>, problems: &mut Vec<ScriptProblem>) -> Vec<Arc<Script>> {
     let publisher =
         |channel: &str| scripts.iter().position(|script| script.channels.iter().any(|(name, _)| **name == *channel));
     let needs: Vec<BTreeSet<usize>> =
@@ -64,7 +64,7 @@ pub(super) fn ordered(scripts: Vec<Arc<Script>>, problems: &mut Vec<ScriptProble
     while order.len() < scripts.len() {
         let ready = |at: &usize| !order.contains(at) && needs[*at].iter().all(|need| order.contains(need));
         let Some(next) = (0..scripts.len()).find(ready) else {
-            problems.push(circle(&scripts, &needs, &order));
+            problems.push(describe_circle(&scripts, &needs, &order));
             return scripts;
         };
         order.push(next);
@@ -73,7 +73,7 @@ pub(super) fn ordered(scripts: Vec<Arc<Script>>, problems: &mut Vec<ScriptProble
 }
 
 /// One circle among the scripts that have no place yet, in words.
-fn circle(scripts: &[Arc<Script>], needs: &[BTreeSet<usize>], order: &[usize]) -> ScriptProblem {
+fn describe_circle(scripts: &[Arc<Script>], needs: &[BTreeSet<usize>], order: &[usize]) -> ScriptProblem {
     let open = |at: &usize| !order.contains(at);
     let mut path: Vec<usize> = (0..scripts.len()).filter(open).take(1).collect();
     while let Some(next) = path.last().and_then(|at| needs[*at].iter().copied().find(open)) {

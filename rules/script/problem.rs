@@ -39,7 +39,7 @@ impl fmt::Display for ScriptProblem {
 pub(super) fn of_parse(file: &str, error: &ParseError) -> ScriptProblem {
     let (what, next) = match error.err_type() {
         ParseErrorType::Reserved(word) | ParseErrorType::BadInput(rhai::LexError::ImproperSymbol(word, _)) => {
-            reserved(word)
+            describe_reserved(word)
         }
         ParseErrorType::MissingToken(token, _) if token == ";" => {
             (error.err_type().to_string(), "end the statement before this place with `;`".to_owned())
@@ -61,7 +61,7 @@ pub(super) fn of_parse(file: &str, error: &ParseError) -> ScriptProblem {
     ScriptProblem::new(file, error.position(), what, next)
 }
 
-fn reserved(word: &str) -> (String, String) {
+fn describe_reserved(word: &str) -> (String, String) {
     let next = match word {
         "print" | "debug" => "note(\"...\") writes a line into the history",
         "import" | "export" => "each file stands on its own; alarms, notes and requests of all files are joined",
@@ -80,7 +80,7 @@ pub(super) fn of_run_behind(file: &str, error: &EvalAltResult, lines: usize) -> 
 
 /// An error while running. `file` is where it happened.
 pub(super) fn of_run(file: &str, error: &EvalAltResult, operations: u64) -> ScriptProblem {
-    let (inner, at) = innermost(error);
+    let (inner, at) = find_innermost(error);
     let (what, next) = match inner {
         EvalAltResult::ErrorTooManyOperations(_) => (
             format!("the script did not come to an end within {operations} operations and was stopped"),
@@ -132,10 +132,10 @@ fn not_found(signature: &str) -> (String, String) {
 }
 
 /// The error at the bottom of the calls, and where it happened.
-fn innermost(error: &EvalAltResult) -> (&EvalAltResult, Position) {
+fn find_innermost(error: &EvalAltResult) -> (&EvalAltResult, Position) {
     match error {
         EvalAltResult::ErrorInFunctionCall(_, _, inner, at) => {
-            let (inner, deeper) = innermost(inner);
+            let (inner, deeper) = find_innermost(inner);
             (inner, if deeper.is_none() { *at } else { deeper })
         }
         other => (other, other.position()),
@@ -144,7 +144,7 @@ fn innermost(error: &EvalAltResult) -> (&EvalAltResult, Position) {
 
 /// Did the script work on a value that was not there?
 pub(super) fn is_absence(error: &EvalAltResult) -> bool {
-    match innermost(error).0 {
+    match find_innermost(error).0 {
         EvalAltResult::ErrorFunctionNotFound(signature, _) => signature.contains("()"),
         EvalAltResult::ErrorRuntime(value, _) => value.is_unit(),
         _ => false,
@@ -152,7 +152,7 @@ pub(super) fn is_absence(error: &EvalAltResult) -> bool {
 }
 
 /// The type of a value, as a reader of the message calls it.
-pub(super) fn spoken(value: &Dynamic) -> &'static str {
+pub(super) fn describe_type(value: &Dynamic) -> &'static str {
     match value.type_name() {
         "i64" | "f64" => "a number",
         "string" | "char" => "text",

@@ -45,7 +45,7 @@ impl ScriptRecipe {
 
     /// The page: title, how to put it in charge, the script.
     #[must_use]
-    pub fn page(&self) -> String {
+    pub fn format_page(&self) -> String {
         let Self { name, text } = self;
         format!(
             "# {title}\n\nCopy it into the directory of the scripts, choose its numbers in `settings.toml` under `[{name}]`, and try it with \
@@ -57,13 +57,13 @@ impl ScriptRecipe {
 
     /// The script as a file.
     #[must_use]
-    pub fn file(&self) -> ScriptFile {
+    pub fn to_file(&self) -> ScriptFile {
         ScriptFile { name: format!("{}.rhai", self.name), text: self.text.to_owned() }
     }
 }
 
 /// The recipe of this name.
 #[must_use]
-pub fn recipe(name: &str) -> Option<&'static ScriptRecipe> {
+pub fn find_recipe(name: &str) -> Option<&'static ScriptRecipe> {
     RECIPES.iter().find(|recipe| recipe.name == name.trim_end_matches(".rhai"))
 }

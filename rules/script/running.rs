@@ -22,25 +22,25 @@ impl RunningScript {
         ast: &AST,
         functions: &AST,
     ) -> ScriptResult<()> {
-        self.begin(engine, functions);
-        self.run(engine, scope, functions, ast.statements())
+        self.begin_run(engine, functions);
+        self.run_statements(engine, scope, functions, ast.statements())
     }
 
     /// Operations are counted from here on. `ast` holds the functions of the script.
-    pub(super) fn begin(&mut self, engine: &Engine, ast: &AST) {
-        let (global, _) = self.kept.get_or_insert_with(|| begin(engine, ast));
+    pub(super) fn begin_run(&mut self, engine: &Engine, ast: &AST) {
+        let (global, _) = self.kept.get_or_insert_with(|| create_runtime(engine, ast));
         global.num_operations = 0;
     }
 
     /// Runs statements from top to bottom. After an error nothing is kept.
-    pub(super) fn run(
+    pub(super) fn run_statements(
         &mut self,
         engine: &Engine,
         scope: &mut Scope<'_>,
         functions: &AST,
         statements: &[Stmt],
     ) -> ScriptResult<()> {
-        let (mut global, mut caches) = self.kept.take().unwrap_or_else(|| begin(engine, functions));
+        let (mut global, mut caches) = self.kept.take().unwrap_or_else(|| create_runtime(engine, functions));
         #[expect(
             deprecated,
             reason = "the only call that takes caches; rhai offers no other before its next major version"
@@ -51,7 +51,7 @@ impl RunningScript {
     }
 }
 
-fn begin(engine: &Engine, ast: &AST) -> (GlobalRuntimeState, Caches) {
+fn create_runtime(engine: &Engine, ast: &AST) -> (GlobalRuntimeState, Caches) {
     let mut global = engine.new_global_runtime_state();
     global.lib.push(ast.shared_lib().clone());
     let mut caches = Caches::new();

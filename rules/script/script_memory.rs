@@ -13,16 +13,16 @@ pub(super) struct ScriptMemory {
 
 impl ScriptMemory {
     /// What outlives the process.
-    pub(super) fn snapshot(&self) -> Value {
-        let mut snapshot = self.timers.snapshot();
+    pub(super) fn take_snapshot(&self) -> Value {
+        let mut snapshot = self.timers.take_snapshot();
         snapshot["memory"] = serde_json::to_value(Dynamic::from_map(self.memory.clone())).unwrap_or_default();
         snapshot
     }
 
     /// From a snapshot; what cannot be read is left out.
-    pub(super) fn restore(snapshot: &Value) -> Self {
+    pub(super) fn from_snapshot(snapshot: &Value) -> Self {
         let memory = serde_json::from_value::<Dynamic>(snapshot["memory"].clone()).ok();
         let memory = memory.and_then(|memory| memory.try_cast::<Map>()).unwrap_or_default();
-        Self { memory, timers: Timers::restore(snapshot) }
+        Self { memory, timers: Timers::from_snapshot(snapshot) }
     }
 }

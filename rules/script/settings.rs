@@ -3,7 +3,7 @@
 use super::compile::{ScriptFile, position_of};
 use super::compiled::Script;
 use super::declared::DeclarationPlace;
-use super::problem::{ScriptProblem, spoken};
+use super::problem::{ScriptProblem, describe_type};
 use crate::estimators::loads::LoadCurves;
 use crate::estimators::{SettingError, Settings};
 use rhai::{Array, Dynamic, Map, Position};
@@ -50,12 +50,12 @@ pub(super) fn read_choices(
             let Some(chosen) = chosen else { return Ok(None) };
             let (line, column, place) = (at.line(), at.position(), place.clone());
             let choice = ChosenSetting { name: name.to_string(), value: chosen, place, line, column };
-            apply(&choice, &mut trial).map_err(|error| described(&error))?;
+            apply_choice(&choice, &mut trial).map_err(|error| describe_error(&error))?;
             Ok(Some(choice))
         });
         match read {
             Ok(choice) => choices.extend(choice),
-            Err(what) => problems.push(refusal(&file.name, at, what)),
+            Err(what) => problems.push(build_refusal(&file.name, at, what)),
         }
     }
     problems.sort_by_key(|problem| (problem.line, problem.column));
@@ -63,7 +63,7 @@ pub(super) fn read_choices(
 }
 
 /// The message of the estimators, without the unit of a pure number.
-fn described(error: &SettingError) -> String {
+fn describe_error(error: &SettingError) -> String {
     match error {
         SettingError::Range { name, value, unit: "1", least, greatest, whole: false } => {
             format!("{name} = {value} is outside {least} to {greatest}")
@@ -72,7 +72,7 @@ fn described(error: &SettingError) -> String {
     }
 }
 
-fn refusal(file: &str, at: Position, what: String) -> ScriptProblem {
+fn build_refusal(file: &str, at: Position, what: String) -> ScriptProblem {
     match what.split_once("; did you mean ") {
         Some((what, near)) => ScriptProblem::new(file, at, what, format!("did you mean {near}")),
         None => {
@@ -87,17 +87,17 @@ fn read_value(name: &str, value: &Dynamic) -> Result<Option<ChosenValue>, String
         return Ok(Some(ChosenValue::Number(number)));
     }
     if name == LOAD_CURVES {
-        return curves(value).map(|curves| curves.map(|curves| ChosenValue::Curves(Box::new(curves))));
+        return read_curves(value).map(|curves| curves.map(|curves| ChosenValue::Curves(Box::new(curves))));
     }
     let stage = name.strip_prefix("no_load_stage_").and_then(|stage| stage.parse().ok());
     match (stage, value.read_lock::<Array>()) {
         (Some(stage), Some(points)) => points
             .iter()
-            .map(pair)
+            .map(read_pair)
             .collect::<Option<Vec<_>>>()
             .map(|pairs| Some(ChosenValue::NoLoad(stage, pairs)))
             .ok_or_else(|| format!("{name} needs pairs of speed in rpm and power in W: [[500, 310.0], [1000, 420.0]]")),
-        _ => Err(format!("the setting {name} needs a number, not {}", spoken(value))),
+        _ => Err(format!("the setting {name} needs a number, not {}", describe_type(value))),
     }
 }
 
@@ -106,7 +106,7 @@ const LOAD_CURVES: &str = "constant_load_curves";
 
 /// `#{ quantity: "cutting_power_w", feed: "feed_mm_min", speed_rpm: 1000.0, tool: "", material: "", rows: [[...], ...] }`; none where
 /// there is no row.
-fn curves(value: &Dynamic) -> Result<Option<LoadCurves>, String> {
+fn read_curves(value: &Dynamic) -> Result<Option<LoadCurves>, String> {
     let wrong = |what: &str| format!("{LOAD_CURVES}: {what}");
     let map = value
         .read_lock::<Map>()
@@ -128,7 +128,7 @@ fn curves(value: &Dynamic) -> Result<Option<LoadCurves>, String> {
     LoadCurves::new((&quantity, &feed), speed_rpm, (&tool, &material), &rows).map(Some).map_err(|what| wrong(&what))
 }
 
-fn pair(value: &Dynamic) -> Option<(f64, f64)> {
+fn read_pair(value: &Dynamic) -> Option<(f64, f64)> {
     let pair = value.read_lock::<Array>()?;
     match pair.as_slice() {
         [speed_rpm, power_w] => Some((as_number(speed_rpm)?, as_number(power_w)?)),
@@ -140,10 +140,10 @@ fn as_number(value: &Dynamic) -> Option<f64> {
     value.as_float().ok().or_else(|| value.as_int().ok().map(|whole| whole as f64))
 }
 
-fn apply(choice: &ChosenSetting, settings: &mut Settings) -> Result<(), SettingError> {
+fn apply_choice(choice: &ChosenSetting, settings: &mut Settings) -> Result<(), SettingError> {
     let operation = matches!(choice.place, DeclarationPlace::Operation(_));
     match (&choice.value, &choice.place) {
-        (ChosenValue::Number(number), DeclarationPlace::Machine) => settings.set(&choice.name, *number),
+        (ChosenValue::Number(number), DeclarationPlace::Machine) => settings.set_value(&choice.name, *number),
         (ChosenValue::Number(number), place) => settings.set_for((operation, place.name()), &choice.name, *number),
         (ChosenValue::NoLoad(stage, pairs), _) => settings.set_no_load_table(*stage, pairs),
         (ChosenValue::Curves(curves), _) => {
@@ -155,29 +155,29 @@ fn apply(choice: &ChosenSetting, settings: &mut Settings) -> Result<(), SettingE
 
 /// The settings of all scripts together. One setting given by two scripts, and settings that contradict each other,
 /// are problems.
-pub(super) fn merge(scripts: &[Arc<Script>], problems: &mut Vec<ScriptProblem>) -> Settings {
+pub(super) fn merge_settings(scripts: &[Arc<Script>], problems: &mut Vec<ScriptProblem>) -> Settings {
     let mut settings = Settings::default();
     let mut given: Vec<(&str, &str)> = Vec::new();
     for script in scripts {
         for choice in &script.choices {
             let other = given.iter().find(|(name, file)| *name == choice.name && **file != *script.file);
             if let Some((_, other)) = other {
-                problems.push(twice(script, choice, other));
+                problems.push(report_duplicate(script, choice, other));
             }
             given.push((&choice.name, &script.file));
-            if let Err(error) = apply(choice, &mut settings) {
-                problems.push(refusal(&script.file, Position::NONE, described(&error)));
+            if let Err(error) = apply_choice(choice, &mut settings) {
+                problems.push(build_refusal(&script.file, Position::NONE, describe_error(&error)));
             }
         }
     }
     let file = given.first().map_or("scripts", |(_, file)| *file);
-    for contradiction in settings.contradictions() {
+    for contradiction in settings.find_contradictions() {
         problems.push(ScriptProblem::new(file, Position::NONE, contradiction.to_string(), ""));
     }
     settings
 }
 
-fn twice(script: &Script, choice: &ChosenSetting, other: &str) -> ScriptProblem {
+fn report_duplicate(script: &Script, choice: &ChosenSetting, other: &str) -> ScriptProblem {
     ScriptProblem {
         file: script.file.to_string(),
         line: choice.line,

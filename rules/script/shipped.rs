@@ -14,6 +14,6 @@ const SHIPPED: [(&str, &str); 7] = [
 
 /// Every script that comes with the gateway.
 #[must_use]
-pub fn shipped() -> Vec<ScriptFile> {
+pub fn list_shipped_scripts() -> Vec<ScriptFile> {
     SHIPPED.iter().map(|(name, text)| ScriptFile { name: (*name).to_owned(), text: (*text).to_owned() }).collect()
 }

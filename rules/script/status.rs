@@ -19,7 +19,7 @@ pub enum ScriptCondition {
 impl ScriptCondition {
     /// The word in JSON and on the page.
     #[must_use]
-    pub fn word(&self) -> &'static str {
+    pub fn as_word(&self) -> &'static str {
         match self {
             Self::Running => "running",
             Self::Waiting(_) => "waiting",
@@ -42,7 +42,7 @@ impl ScriptCondition {
         matches!(self, Self::Running | Self::Waiting(_))
     }
 
-    pub(super) fn suspended(&self) -> bool {
+    pub(super) fn is_suspended(&self) -> bool {
         matches!(self, Self::Suspended(_))
     }
 }
@@ -78,7 +78,7 @@ pub struct Status {
 impl Status {
     /// Is everything in charge that the user wrote?
     #[must_use]
-    pub fn well(&self) -> bool {
+    pub fn is_healthy(&self) -> bool {
         self.refused.is_empty() && self.scripts.iter().all(|script| script.condition.is_active())
     }
 }

@@ -25,7 +25,7 @@ pub(super) struct AlarmText {
 
 impl AlarmText {
     /// One text for both languages.
-    pub(super) fn of(text: ImmutableString) -> Self {
+    pub(super) fn from_text(text: ImmutableString) -> Self {
         Self { level: AlarmLevel::Warning, zh: text.clone(), en: text }
     }
 }
@@ -48,7 +48,7 @@ struct AlarmTimer {
 
 impl Timers {
     /// After a pause nothing is known of what happened in it: whatever was being timed begins anew.
-    pub(super) fn restart(&mut self) {
+    pub(super) fn restart_timing(&mut self) {
         self.held_since.clear();
         self.alarms.values_mut().for_each(|timer| timer.turning_since = None);
     }
@@ -61,11 +61,11 @@ impl Timers {
         hold_s: f64,
         now_ns: TimeNs,
     ) -> ScriptResult<bool> {
-        let timer = entry(&mut self.alarms, name, "alarms", NAMES_MAX)?;
+        let timer = find_or_insert(&mut self.alarms, name, "alarms", NAMES_MAX)?;
         match wanted {
             Some(wanted) if wanted != timer.active => {
                 let since = *timer.turning_since.get_or_insert(now_ns);
-                if seconds(now_ns - since) >= hold_s {
+                if to_seconds(now_ns - since) >= hold_s {
                     *timer = AlarmTimer { active: wanted, turning_since: None };
                 }
             }
@@ -80,7 +80,7 @@ impl Timers {
     }
 
     /// The alarm stands until it is cleared.
-    pub(super) fn raise(&mut self, name: ImmutableString, text: AlarmText) -> ScriptResult<()> {
+    pub(super) fn raise_alarm(&mut self, name: ImmutableString, text: AlarmText) -> ScriptResult<()> {
         if !self.latched.contains_key(name.as_str()) {
             if self.latched.len() >= NAMES_MAX {
                 return Err(too_many("alarms", NAMES_MAX));
@@ -99,7 +99,7 @@ impl Timers {
     }
 
     /// Alarms that stand until they are cleared.
-    pub(super) fn latched(&self) -> &BTreeMap<ImmutableString, AlarmText> {
+    pub(super) fn latched_alarms(&self) -> &BTreeMap<ImmutableString, AlarmText> {
         &self.latched
     }
 
@@ -110,19 +110,19 @@ impl Timers {
             return Ok(0.0);
         }
         if let Some(since) = self.held_since.get(name.as_str()) {
-            return Ok(seconds(now_ns - since));
+            return Ok(to_seconds(now_ns - since));
         }
-        *entry(&mut self.held_since, name, "timers", NAMES_MAX)? = now_ns;
+        *find_or_insert(&mut self.held_since, name, "timers", NAMES_MAX)? = now_ns;
         Ok(0.0)
     }
 
     /// Is `value` another one than the last? No value changes nothing.
-    pub(super) fn changed(&mut self, name: &ImmutableString, value: Dynamic) -> ScriptResult<bool> {
+    pub(super) fn detect_change(&mut self, name: &ImmutableString, value: Dynamic) -> ScriptResult<bool> {
         if value.is_unit() {
             return Ok(false);
         }
-        let last = entry(&mut self.last, name, "remembered values", NAMES_MAX)?;
-        if same(last, &value) {
+        let last = find_or_insert(&mut self.last, name, "remembered values", NAMES_MAX)?;
+        if are_equal(last, &value) {
             return Ok(false);
         }
         let first = last.is_unit();
@@ -131,38 +131,38 @@ impl Timers {
     }
 
     /// Puts a number away; `None` forgets it.
-    pub(super) fn remember(&mut self, name: &ImmutableString, value: Option<f64>) -> ScriptResult<()> {
+    pub(super) fn remember_number(&mut self, name: &ImmutableString, value: Option<f64>) -> ScriptResult<()> {
         if name.len() > KEPT_NAME_MAX {
             return Err(format!("the name of a number to remember has at most {KEPT_NAME_MAX} bytes").into());
         }
         match value {
-            Some(value) => *entry(&mut self.kept, name, "remembered numbers", KEPT_MAX)? = value,
+            Some(value) => *find_or_insert(&mut self.kept, name, "remembered numbers", KEPT_MAX)? = value,
             None => drop(self.kept.remove(name.as_str())),
         }
         Ok(())
     }
 
     /// A number put away before.
-    pub(super) fn recall(&self, name: &str) -> Dynamic {
+    pub(super) fn recall_number(&self, name: &str) -> Dynamic {
         self.kept.get(name).map_or(Dynamic::UNIT, |value| Dynamic::from_float(*value))
     }
 
     /// How many numbers are put away.
-    pub(super) fn remembered(&self) -> i64 {
+    pub(super) fn count_remembered(&self) -> i64 {
         i64::try_from(self.kept.len()).unwrap_or(i64::MAX)
     }
 
     /// Forgets every number whose name begins so.
-    pub(super) fn forget(&mut self, beginning: &str) {
+    pub(super) fn forget_numbers(&mut self, beginning: &str) {
         self.kept.retain(|name, _| !name.starts_with(beginning));
     }
 
     /// What outlives the process. What was being timed does not: nothing is known of the time in between.
-    pub(super) fn snapshot(&self) -> Value {
+    pub(super) fn take_snapshot(&self) -> Value {
         let last =
             self.last.iter().filter_map(|(name, value)| Some((name.to_string(), serde_json::to_value(value).ok()?)));
         let latched = self.latched.iter().map(|(name, text)| {
-            (name.to_string(), json!({ "level": text.level.word(), "en": text.en.as_str(), "zh": text.zh.as_str() }))
+            (name.to_string(), json!({ "level": text.level.as_word(), "en": text.en.as_str(), "zh": text.zh.as_str() }))
         });
         let kept = self.kept.iter().map(|(name, value)| (name.to_string(), json!(value)));
         json!({
@@ -173,7 +173,7 @@ impl Timers {
     }
 
     /// From a snapshot; what cannot be read is left out.
-    pub(super) fn restore(snapshot: &Value) -> Self {
+    pub(super) fn from_snapshot(snapshot: &Value) -> Self {
         let table = |name: &str| snapshot[name].as_object().into_iter().flatten();
         let mut timers = Self::default();
         for (name, value) in table("last").take(NAMES_MAX) {
@@ -184,7 +184,7 @@ impl Timers {
         for (name, text) in table("latched").take(NAMES_MAX) {
             let word = |key: &str| text[key].as_str().map(ImmutableString::from);
             if let (Some(level), Some(en), Some(zh)) =
-                (text["level"].as_str().and_then(AlarmLevel::of), word("en"), word("zh"))
+                (text["level"].as_str().and_then(AlarmLevel::from_word), word("en"), word("zh"))
             {
                 timers.latched.insert(name.as_str().into(), AlarmText { level, en, zh });
             }
@@ -196,7 +196,7 @@ impl Timers {
     }
 }
 
-fn same(a: &Dynamic, b: &Dynamic) -> bool {
+fn are_equal(a: &Dynamic, b: &Dynamic) -> bool {
     match (a.as_float(), b.as_float()) {
         (Ok(a), Ok(b)) => return a == b,
         (Ok(_), Err(_)) | (Err(_), Ok(_)) => return false,
@@ -208,7 +208,7 @@ fn same(a: &Dynamic, b: &Dynamic) -> bool {
     }
 }
 
-fn entry<'a, T: Default>(
+fn find_or_insert<'a, T: Default>(
     map: &'a mut BTreeMap<ImmutableString, T>,
     name: &ImmutableString,
     what: &str,
@@ -227,7 +227,7 @@ pub(super) fn too_many(what: &str, most: usize) -> Box<rhai::EvalAltResult> {
     format!("more than {most} {what} in one script; use the same name each time instead of building new ones").into()
 }
 
-pub(super) fn seconds(ns: i64) -> f64 {
+pub(super) fn to_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }
 
@@ -240,28 +240,30 @@ mod tests {
         let mut timers = Timers::default();
         let name = ImmutableString::from("worn");
         timers
-            .raise(name.clone(), AlarmText { level: AlarmLevel::Critical, en: "worn".into(), zh: "磨损".into() })
+            .raise_alarm(name.clone(), AlarmText { level: AlarmLevel::Critical, en: "worn".into(), zh: "磨损".into() })
             .expect("room");
-        timers.changed(&"tool".into(), "T1".into()).expect("room");
-        timers.changed(&"count".into(), 3.0.into()).expect("room");
-        timers.remember(&"O1/T1".into(), Some(0.1 + 0.2)).expect("room");
-        let mut back = Timers::restore(&timers.snapshot());
-        assert_eq!(back.latched(), timers.latched());
+        timers.detect_change(&"tool".into(), "T1".into()).expect("room");
+        timers.detect_change(&"count".into(), 3.0.into()).expect("room");
+        timers.remember_number(&"O1/T1".into(), Some(0.1 + 0.2)).expect("room");
+        let mut back = Timers::from_snapshot(&timers.take_snapshot());
+        assert_eq!(back.latched_alarms(), timers.latched_alarms());
         assert_eq!(back.kept, timers.kept);
-        assert_eq!(back.changed(&"tool".into(), "T1".into()).ok(), Some(false));
-        assert_eq!(back.changed(&"tool".into(), "T2".into()).ok(), Some(true));
-        assert_eq!(back.changed(&"count".into(), 3.0.into()).ok(), Some(false));
-        assert_eq!(Timers::restore(&json!({ "last": 5, "kept": { "a": "x" } })).kept.len(), 0);
+        assert_eq!(back.detect_change(&"tool".into(), "T1".into()).ok(), Some(false));
+        assert_eq!(back.detect_change(&"tool".into(), "T2".into()).ok(), Some(true));
+        assert_eq!(back.detect_change(&"count".into(), 3.0.into()).ok(), Some(false));
+        assert_eq!(Timers::from_snapshot(&json!({ "last": 5, "kept": { "a": "x" } })).kept.len(), 0);
     }
 
     #[test]
     fn no_table_grows_without_end() {
         let mut timers = Timers::default();
-        let last =
-            (0..10_000).map(|i| timers.remember(&format!("{i}").into(), Some(1.0)).is_ok()).filter(|ok| *ok).count();
+        let last = (0..10_000)
+            .map(|i| timers.remember_number(&format!("{i}").into(), Some(1.0)).is_ok())
+            .filter(|ok| *ok)
+            .count();
         assert_eq!(last, KEPT_MAX);
-        timers.forget("");
+        timers.forget_numbers("");
         assert!(timers.kept.is_empty());
-        assert!(timers.remember(&"x".repeat(200).into(), Some(1.0)).is_err());
+        assert!(timers.remember_number(&"x".repeat(200).into(), Some(1.0)).is_err());
     }
 }

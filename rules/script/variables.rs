@@ -12,18 +12,18 @@ use rhai::{AST, ASTFlags, Dynamic, Engine, ImmutableString, Map, ParseError, Sco
 
 /// The variables that the body and every handler find, in the order of [`scope_of`]: what never changes first. The interpreter looks
 /// a name up from the last one, so that those which are set before every run are found at once.
-pub(super) fn names(found: &Findings, constants: &[(String, Dynamic)], live: &LiveValues) -> Vec<String> {
+pub(super) fn list_variables(found: &Findings, constants: &[(String, Dynamic)], live: &LiveValues) -> Vec<String> {
     let mut names: Vec<String> = constants.iter().map(|(name, _)| name.clone()).collect();
     names.extend(live.constants.iter().map(|(name, _)| name.clone()));
     names.extend(found.foreign.iter().map(ToString::to_string));
     let records = super::fields::RECORDS.iter().map(|record| record.name);
     names.extend(records.filter(|name| found.fields.iter().any(|it| it.record.name == *name)).map(str::to_owned));
-    names.extend(found.reads.iter().filter(|word| !word.writable()).map(|word| word.name.to_owned()));
+    names.extend(found.reads.iter().filter(|word| !word.is_writable()).map(|word| word.name.to_owned()));
     names.push("memory".to_owned());
     names
 }
 
-/// Statements that run with the variables of [`names`] in the scope.
+/// Statements that run with the variables of [`list_variables`] in the scope.
 pub(super) struct ScriptBody {
     ast: AST,
     /// Declarations before the first statement of the script.
@@ -34,7 +34,7 @@ pub(super) struct ScriptBody {
 
 impl ScriptBody {
     /// Compiles a text behind declarations of these names.
-    pub(super) fn compile(engine: &Engine, text: &str, names: &[String]) -> Result<Self, ParseError> {
+    pub(super) fn compile_behind_names(engine: &Engine, text: &str, names: &[String]) -> Result<Self, ParseError> {
         let head: String = names.iter().map(|name| format!("let {name};")).collect();
         let ast = engine.compile(format!("{head}\n{text}"))?;
         let declared = |(stmt, name): (&Stmt, &String)| matches!(stmt, Stmt::Var(it, ..) if it.0.name == *name);
@@ -79,7 +79,7 @@ pub(super) fn scope_of(script: &Script, memory: Map) -> Scope<'static> {
             scope.push(record.name, map);
         }
     }
-    for word in script.reads.iter().filter(|word| !word.writable()) {
+    for word in script.reads.iter().filter(|word| !word.is_writable()) {
         scope.push_dynamic(word.name, Dynamic::UNIT);
     }
     scope.push("memory", memory);
@@ -87,27 +87,27 @@ pub(super) fn scope_of(script: &Script, memory: Map) -> Scope<'static> {
 }
 
 /// Sets every variable to what is seen now. `foreign` are the channels of other scripts, `live` the settings of this tool.
-pub(super) fn fill(
+pub(super) fn fill_scope(
     scope: &mut Scope<'static>,
     script: &Script,
     view: &View<'_>,
     (foreign, live): (&[Option<f64>], &[Dynamic]),
 ) {
-    for word in script.reads.iter().filter(|word| !word.writable()) {
+    for word in script.reads.iter().filter(|word| !word.is_writable()) {
         if let Some(place) = scope.get_mut(word.name) {
-            set(place, &word.see(view));
+            set_variable(place, &word.read_value(view));
         }
     }
     for field in &script.fields {
         let Some(record) = scope.get_mut(field.record.name) else { continue };
         let Some(mut map) = record.write_lock::<Map>() else { continue };
         if let Some(place) = map.get_mut(field.word.name) {
-            set(place, &field.see(view));
+            set_variable(place, &field.read_value(view));
         }
     }
     for (name, value) in script.foreign.iter().zip(foreign) {
         if let Some(place) = scope.get_mut(name) {
-            set(place, &value.map_or(WordValue::Absent, WordValue::Number));
+            set_variable(place, &value.map_or(WordValue::Absent, WordValue::Number));
         }
     }
     for (name, index) in &script.live.constants {
@@ -117,7 +117,7 @@ pub(super) fn fill(
     }
 }
 
-fn set(place: &mut Dynamic, seen: &WordValue<'_>) {
+fn set_variable(place: &mut Dynamic, seen: &WordValue<'_>) {
     match seen {
         WordValue::Number(number) => *place = Dynamic::from_float(*number),
         WordValue::Absent => *place = Dynamic::UNIT,
@@ -139,7 +139,7 @@ pub(super) fn has_absent(scope: &Scope<'_>, script: &Script) -> bool {
         let map = scope.get(record).and_then(|record| record.read_lock::<Map>());
         map.is_some_and(|map| map.get(name).is_some_and(Dynamic::is_unit))
     };
-    script.reads.iter().any(|word| !word.writable() && absent(word.name))
+    script.reads.iter().any(|word| !word.is_writable() && absent(word.name))
         || script.foreign.iter().any(|name| absent(name))
         || script.fields.iter().any(|it| field(it.record.name, it.word.name))
 }

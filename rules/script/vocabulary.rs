@@ -74,9 +74,9 @@ pub(super) enum WordValue<'a> {
 
 impl Word {
     /// The value in this run.
-    pub(super) fn see<'a>(&self, view: &View<'a>) -> WordValue<'a> {
+    pub(super) fn read_value<'a>(&self, view: &View<'a>) -> WordValue<'a> {
         match self.source {
-            WordSource::Channel(id) => channel(view.sample, id),
+            WordSource::Channel(id) => read_channel(view.sample, id),
             WordSource::Tool(id) => {
                 view.sample.text(id).map_or(WordValue::Absent, |name| WordValue::Text(tool_of(name)))
             }
@@ -113,12 +113,12 @@ impl Word {
     }
 
     /// May a script write to it?
-    pub(super) fn writable(&self) -> bool {
+    pub(super) fn is_writable(&self) -> bool {
         matches!(self.source, WordSource::Memory)
     }
 }
 
-fn channel(sample: &Sample, id: ChannelId) -> WordValue<'_> {
+fn read_channel(sample: &Sample, id: ChannelId) -> WordValue<'_> {
     match &sample.slot(id).value {
         Ok(value) => value
             .as_number()
@@ -129,7 +129,7 @@ fn channel(sample: &Sample, id: ChannelId) -> WordValue<'_> {
     }
 }
 
-const fn word(
+const fn define_word(
     name: &'static str,
     unit: &'static str,
     kind: WordKind,
@@ -144,50 +144,56 @@ const TOOL: &str = "tool";
 
 /// Words that are neither channels nor quantities.
 const OWN: [Word; 8] = [
-    word("state", "", WordKind::Text, ("State of the machine", "机床状态"), WordSource::Text(|it| it.state.word())),
-    word(
+    define_word(
+        "state",
+        "",
+        WordKind::Text,
+        ("State of the machine", "机床状态"),
+        WordSource::Text(|it| it.state.as_word()),
+    ),
+    define_word(
         "state_s",
         "s",
         WordKind::Number,
         ("How long the machine has been in this state", "当前状态持续时间"),
         WordSource::Number(|view| since_s(view.sample.at_ns, view.estimates.since_ns)),
     ),
-    word(
+    define_word(
         "visibility",
         "",
         WordKind::Text,
         ("Can cutting be seen in the power?", "切削是否可分辨"),
-        WordSource::Text(|it| it.visibility.word()),
+        WordSource::Text(|it| it.visibility.as_word()),
     ),
-    word(
+    define_word(
         "no_load_origin",
         "",
         WordKind::Text,
         ("Where the no-load power comes from", "空载功率的来源"),
-        WordSource::Text(|it| it.no_load_origin.word()),
+        WordSource::Text(|it| it.no_load_origin.as_word()),
     ),
-    word(
+    define_word(
         "load_held",
         "",
         WordKind::Text,
         ("Why constant load does not raise the feed; empty where nothing is in the way", "恒负荷不提高进给的原因"),
         WordSource::Text(|it| it.loads.load_held),
     ),
-    word(
+    define_word(
         "now_s",
         "s",
         WordKind::Number,
         ("Time of this tick, seconds since 1970", "当前时间"),
         WordSource::Number(|view| since_s(view.sample.at_ns, 0)),
     ),
-    word(
+    define_word(
         "dt_s",
         "s",
         WordKind::Number,
         ("Time since this script ran last; 0 at the first run and after a pause", "距上次运行的时间"),
         WordSource::Number(|view| view.dt_s),
     ),
-    word(
+    define_word(
         "memory",
         "",
         WordKind::Map,
@@ -203,9 +209,9 @@ fn since_s(now_ns: i64, then_ns: i64) -> f64 {
     now_ns.saturating_sub(then_ns) as f64 / SECOND_NS as f64
 }
 
-static STATES: LazyLock<Vec<&str>> = LazyLock::new(|| State::ALL.map(State::word).to_vec());
-static VISIBILITIES: LazyLock<Vec<&str>> = LazyLock::new(|| Visibility::ALL.map(Visibility::word).to_vec());
-static ORIGINS: LazyLock<Vec<&str>> = LazyLock::new(|| NoLoadOrigin::ALL.map(NoLoadOrigin::word).to_vec());
+static STATES: LazyLock<Vec<&str>> = LazyLock::new(|| State::ALL.map(State::as_word).to_vec());
+static VISIBILITIES: LazyLock<Vec<&str>> = LazyLock::new(|| Visibility::ALL.map(Visibility::as_word).to_vec());
+static ORIGINS: LazyLock<Vec<&str>> = LazyLock::new(|| NoLoadOrigin::ALL.map(NoLoadOrigin::as_word).to_vec());
 
 /// The words that a text of this name can be; empty where it can be any.
 fn one_of(name: &str) -> &'static [&'static str] {
@@ -220,24 +226,24 @@ fn one_of(name: &str) -> &'static [&'static str] {
 static WORDS: LazyLock<Vec<Word>> = LazyLock::new(|| {
     let mut words = OWN.to_vec();
     for (name, deviation, unit, en, zh, read) in QUANTITIES {
-        words.push(word(name, unit, WordKind::Number, (en, zh), WordSource::Quantity(read)));
+        words.push(define_word(name, unit, WordKind::Number, (en, zh), WordSource::Quantity(read)));
         let texts = ("One standard deviation of the quantity of this name", "标准不确定度");
-        words.push(word(deviation, unit, WordKind::Number, texts, WordSource::Deviation(read)));
+        words.push(define_word(deviation, unit, WordKind::Number, texts, WordSource::Deviation(read)));
     }
     for (name, unit, en, zh, read) in FIGURES {
-        words.push(word(name, unit, WordKind::Number, (en, zh), WordSource::Figure(read)));
+        words.push(define_word(name, unit, WordKind::Number, (en, zh), WordSource::Figure(read)));
     }
-    for id in ChannelId::all() {
+    for id in ChannelId::list_all() {
         let row = id.channel();
         let kind = if row.kind == adapters::channel::Kind::Text { WordKind::Text } else { WordKind::Number };
         if row.name != TOOL {
-            words.push(word(row.name, row.unit, kind, (row.en, row.zh), WordSource::Channel(id)));
+            words.push(define_word(row.name, row.unit, kind, (row.en, row.zh), WordSource::Channel(id)));
             continue;
         }
         let texts = ("Tool in use, without its edge: T1 for every edge of T1", "刀具（不含刀刃号）");
-        words.push(word(TOOL, "", kind, texts, WordSource::Tool(id)));
+        words.push(define_word(TOOL, "", kind, texts, WordSource::Tool(id)));
         let texts = ("Edge in use, as the controller names it: T1-2 is the second edge of T1", "刀刃（控制器名称）");
-        words.push(word("edge", "", kind, texts, WordSource::Channel(id)));
+        words.push(define_word("edge", "", kind, texts, WordSource::Channel(id)));
     }
     words.iter_mut().for_each(|word| word.one_of = one_of(word.name));
     words
@@ -245,7 +251,7 @@ static WORDS: LazyLock<Vec<Word>> = LazyLock::new(|| {
 
 /// Every word a script can use as a variable: its own, the estimates, the channels.
 #[must_use]
-pub fn words() -> &'static [Word] {
+pub fn list_words() -> &'static [Word] {
     &WORDS
 }
 
@@ -253,35 +259,35 @@ static PLACES: LazyLock<HashMap<&str, usize>> =
     LazyLock::new(|| WORDS.iter().enumerate().map(|(at, word)| (word.name, at)).collect());
 
 /// The word of this name.
-pub(super) fn find(name: &str) -> Option<&'static Word> {
+pub(super) fn find_word(name: &str) -> Option<&'static Word> {
     PLACES.get(name).and_then(|at| WORDS.get(*at))
 }
 
-fn table(first: &str, second: &str, rows: impl Iterator<Item = (&'static str, &'static str)>) -> String {
+fn format_table(first: &str, second: &str, rows: impl Iterator<Item = (&'static str, &'static str)>) -> String {
     let rows: String = rows.map(|(code, what)| format!("| `{code}` | {what} |\n")).collect();
     format!("| {first} | {second} |\n|---|---|\n{rows}")
 }
 
 /// The whole vocabulary as Markdown, in English or Chinese: what `check --vocabulary` prints.
 #[must_use]
-pub fn vocabulary(chinese: bool) -> String {
+pub fn format_vocabulary(chinese: bool) -> String {
     let pick = |en: &'static str, zh: &'static str| if chinese { zh } else { en };
     let mut text = String::from("## Variables\n\n| name | unit | what |\n|---|---|---|\n");
-    for word in words() {
+    for word in list_words() {
         let one_of = if word.one_of.is_empty() { String::new() } else { format!(": {}", word.one_of.join(", ")) };
         text += &format!("| `{}` | {} | {}{one_of} |\n", word.name, word.unit, pick(word.en, word.zh));
     }
     text += "\n## Records\n\n";
-    text += &table("name", "what", RECORDS.iter().map(|it| (it.example, pick(it.en, it.zh))));
+    text += &format_table("name", "what", RECORDS.iter().map(|it| (it.example, pick(it.en, it.zh))));
     text += "\n## Handlers\n\nFunctions that are called when something happens; they see constants, variables and `memory`.\n\n";
     text += "| function | when |\n|---|---|\n";
     for handler in HANDLERS {
         text += &format!("| `fn {}` | {} |\n", handler.signature, pick(handler.en, handler.zh));
     }
     text += "\n## Functions\n\n";
-    text += &table("function", "what", FUNCTIONS.iter().map(|it| (it.signature, pick(it.en, it.zh))));
+    text += &format_table("function", "what", FUNCTIONS.iter().map(|it| (it.signature, pick(it.en, it.zh))));
     text += "\n## Trials\n\nFunctions named `trial_...` in the file of the script; `cnc-gateway rules test` runs them. They call:\n\n";
-    text += &table("function", "what", TRIAL_FUNCTIONS.iter().map(|it| (it.signature, pick(it.en, it.zh))));
+    text += &format_table("function", "what", TRIAL_FUNCTIONS.iter().map(|it| (it.signature, pick(it.en, it.zh))));
     text += "\n`cnc-gateway rules api` lists the methods besides: power separation, curves, compensation, wear.\n";
     text +=
         "\n## Settings\n\nReturned by `fn settings() { #{ name: value } }`, read once when the script is loaded.\n\n";
@@ -301,18 +307,21 @@ mod tests {
 
     #[test]
     fn every_quantity_of_the_estimates_is_a_word() {
-        let mut estimates = Estimates::none(0);
+        let mut estimates = Estimates::without_samples(0);
         assert!(FIGURES.iter().all(|row| estimates.figure_mut(row.0).is_some()));
         let names: Vec<&str> = QUANTITIES.iter().map(|quantity| quantity.0).collect();
-        let expected: Vec<&str> = estimates.quantities().iter().map(|quantity| quantity.0).collect();
+        let expected: Vec<&str> = estimates.list_quantities().iter().map(|quantity| quantity.0).collect();
         assert_eq!(names, expected);
     }
 
     #[test]
     fn no_name_means_two_things_and_every_text_is_there() {
-        let names: BTreeSet<_> = words().iter().map(|word| word.name).collect();
-        assert_eq!(names.len(), words().len());
-        assert!(words().iter().all(|word| !word.en.is_empty() && !word.zh.is_empty()));
-        assert_eq!(words().len(), ChannelId::count() + 1 + OWN.len() + 2 * QUANTITIES.len() + FIGURES.len());
+        let names: BTreeSet<_> = list_words().iter().map(|word| word.name).collect();
+        assert_eq!(names.len(), list_words().len());
+        assert!(list_words().iter().all(|word| !word.en.is_empty() && !word.zh.is_empty()));
+        assert_eq!(
+            list_words().len(),
+            ChannelId::count_channels() + 1 + OWN.len() + 2 * QUANTITIES.len() + FIGURES.len()
+        );
     }
 }

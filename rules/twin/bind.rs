@@ -40,14 +40,14 @@ fn complete(part: &Part, scene: &Scene) -> Part {
     let known = |parameters: &[Parameter], name: &str| parameters.iter().any(|parameter| parameter.name == name);
     for (name, value) in &default.shape {
         if !known(&part.parameters, name) {
-            let doc = effect.doc().parameter(name);
+            let doc = effect.doc().find_parameter(name);
             part.parameters.push(added(name, *value, Entry::Shape, doc.map(|doc| (doc.range, doc.unit))));
         }
     }
     let shaped = crate::physics::Form { shape: default.shape.clone(), ..form.clone() };
-    for (name, _) in effect.columns(&stand_in, &shaped).unwrap_or_default() {
+    for (name, _) in effect.compute_columns(&stand_in, &shaped).unwrap_or_default() {
         if !known(&part.parameters, name) {
-            let doc = effect.doc().parameter(name);
+            let doc = effect.doc().find_parameter(name);
             part.parameters.push(added(name, 0.0, Entry::Linear, doc.map(|doc| (doc.range, doc.unit))));
         }
     }
@@ -61,8 +61,9 @@ fn added(name: &str, value: f64, entry: Entry, doc: Option<((f64, f64), &str)>) 
 
 /// Which of an effect's needs the recording does not meet, each with the channels that would.
 fn lacking(needs: &[&str], scene: &Scene) -> String {
-    let met =
-        |name: &str| scene.column(name).is_some() || Role::of(name).is_some_and(|role| scene.role(role).is_some());
+    let met = |name: &str| {
+        scene.column(name).is_some() || Role::from_name(name).is_some_and(|role| scene.role_values(role).is_some())
+    };
     let lacking: Vec<String> = needs
         .iter()
         .filter(|need| !need.split('|').any(|name| met(name.trim())))
@@ -73,7 +74,7 @@ fn lacking(needs: &[&str], scene: &Scene) -> String {
 
 /// The channels that provide what an effect calls by its role, or that it is computed from.
 fn channels(need: &str) -> String {
-    match (Role::of(need).and_then(|role| role.defaults().first()), need) {
+    match (Role::from_name(need).and_then(|role| role.default_channels().first()), need) {
         (Some(channel), _) => format!("{need} ({channel})"),
         (None, "cutting_speed_m_min") => format!("{need} (or diameter_mm and spindle_speed_rpm)"),
         (None, "feed_per_rev_mm") => format!("{need} (or feed_mm_min and spindle_speed_rpm)"),

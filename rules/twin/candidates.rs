@@ -3,7 +3,7 @@
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::term::Term;
 use crate::physics::{Effect, Role, Scene};
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 
 /// What a machine takes without a cut builds a model and is never a finding by itself.
 const BUILDING: &str = "no_load_power";
@@ -41,26 +41,26 @@ fn repeats_output(model: &Model, scene: &Scene) -> bool {
 /// Rows of which the row so many before, in the same run, is known too.
 fn known_after(scene: &Scene, by: usize) -> Vec<usize> {
     let rows = scene.runs().iter().flat_map(|run| run.start + by..run.end.max(run.start + by));
-    rows.filter(|row| scene.usable()[row - by] && scene.usable()[*row]).collect()
+    rows.filter(|row| scene.usable_rows()[row - by] && scene.usable_rows()[*row]).collect()
 }
 
 /// Does it hold for nearly all of these rows, of which there are some?
 fn holds_in_most(rows: &[usize], holds: impl Fn(usize) -> bool) -> bool {
-    let held = count(rows.iter().filter(|row| holds(**row)).count());
-    !rows.is_empty() && held >= REPEATED_SHARE * count(rows.len())
+    let held = count_to_f64(rows.iter().filter(|row| holds(**row)).count());
+    !rows.is_empty() && held >= REPEATED_SHARE * count_to_f64(rows.len())
 }
 
 /// Is a column the output of so many rows before?
 fn repeats(scene: &Scene, column: &[f64], by: usize) -> bool {
     let known = known_after(scene, by);
-    let equal = |row: usize| (column[row] - scene.recorded()[row - by]).abs() <= 1e-6 * column[row].abs();
-    let changes = known.iter().any(|row| column[*row] != scene.recorded()[*row]);
+    let equal = |row: usize| (column[row] - scene.recorded_output()[row - by]).abs() <= 1e-6 * column[row].abs();
+    let changes = known.iter().any(|row| column[*row] != scene.recorded_output()[*row]);
     holds_in_most(&known, equal) && changes
 }
 
 /// Is the output the difference quotient of a column, over the row before or the row after?
 fn is_rate_of(scene: &Scene, column: &[f64]) -> bool {
-    let (time_s, output) = (scene.time_s(), scene.recorded());
+    let (time_s, output) = (scene.time_s(), scene.recorded_output());
     let known = known_after(scene, 1);
     let rate = |row: usize| (column[row] - column[row - 1]) / (time_s[row] - time_s[row - 1]);
     let size = known.iter().map(|row| rate(*row)).fold(0.0_f64, |most, rate| most.max(rate.abs()));

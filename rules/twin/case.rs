@@ -46,7 +46,7 @@ impl<'a> Case<'a> {
     /// Rows that are fitted.
     pub(super) fn fitted(&self) -> Vec<usize> {
         let of = |(unit, rows): (usize, &Unit)| if self.held.contains(&unit) { 0..0 } else { rows.rows.clone() };
-        self.units.iter().enumerate().flat_map(of).filter(|row| self.scene.usable()[*row]).collect()
+        self.units.iter().enumerate().flat_map(of).filter(|row| self.scene.usable_rows()[*row]).collect()
     }
 
     /// What is needed, where the fitted rows cannot tell anything.
@@ -59,8 +59,8 @@ impl<'a> Case<'a> {
                 format!("至少{least}个含{output}且未留出的行"),
             ));
         }
-        let first = self.scene.recorded()[fitted[0]];
-        if fitted.iter().all(|row| self.scene.recorded()[*row] == first) {
+        let first = self.scene.recorded_output()[fitted[0]];
+        if fitted.iter().all(|row| self.scene.recorded_output()[*row] == first) {
             let output = &self.model.output;
             return Some(Bilingual::new(
                 format!("a recording in which {output} changes"),

@@ -1,6 +1,6 @@
 //! Channels by name: those of the recording, and those that nobody records but that formulas may be drawn over - the time in the run and in the cut, the direction of a slide, and what the model itself simulates.
 
-use crate::physics::drive::{directions, goes_both_ways, sliding};
+use crate::physics::drive::{compute_directions, goes_both_ways, read_slide_velocity};
 use crate::physics::state::{first_order, first_order_behind};
 use crate::physics::{Role, Scene};
 use adapters::channel::quantity::Quantity;
@@ -39,10 +39,10 @@ pub(super) fn channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s,
         TIME_IN_RUN => Some(Cow::Owned(time_in_run_s(scene))),
         TIME_IN_CUT => time_in_cut_s(scene).map(Cow::Owned),
         DIRECTION => direction(scene).map(Cow::Owned),
-        ACCELERATION => scene.role(Role::Acceleration).map(Cow::Borrowed),
+        ACCELERATION => scene.role_values(Role::Acceleration).map(Cow::Borrowed),
         SIMULATED_CUT => scene.load().map(Cow::Borrowed),
         SIMULATED_CUT_PER_KRPM => cut_per_krpm(scene).map(Cow::Owned),
-        SIMULATED_OUTPUT => scene.simulated().map(Cow::Borrowed),
+        SIMULATED_OUTPUT => scene.simulated_output().map(Cow::Borrowed),
         _ => scene.column(name).or_else(|| by_role(scene, name)).map(Cow::Borrowed).or_else(|| derived(scene, name)),
     }
 }
@@ -55,7 +55,7 @@ fn derived<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
     let (tau_s, column) = name.strip_prefix(LAG_OF)?.split_once(LAG_OF_WHAT)?;
     let tau_s = tau_s.parse().ok().filter(|tau_s: &f64| *tau_s > 0.0)?;
     let input = scene.column(column)?;
-    let is_there_always = Quantity::of(column) == Quantity::Temperature;
+    let is_there_always = Quantity::from_column_name(column) == Quantity::Temperature;
     let lag = if is_there_always { first_order_behind } else { first_order };
     Some(Cow::Owned(lag(scene, input, tau_s)))
 }
@@ -68,7 +68,7 @@ pub(super) fn is_simulated(name: &str) -> bool {
 /// The rows at which a column, of words or of numbers, has another value than in the row before; `None` without it.
 pub(super) fn changes_of(scene: &Scene, column: &str) -> Option<Vec<usize>> {
     let rows = 1..scene.rows();
-    if let Some(words) = scene.words(column) {
+    if let Some(words) = scene.text_column(column) {
         return Some(rows.filter(|row| words.get(*row) != words.get(row - 1)).collect());
     }
     let values = scene.column(column)?;
@@ -78,8 +78,8 @@ pub(super) fn changes_of(scene: &Scene, column: &str) -> Option<Vec<usize>> {
 /// What a recording may call otherwise.
 fn by_role<'s>(scene: &'s Scene, name: &str) -> Option<&'s [f64]> {
     match name {
-        "engaged" => scene.role(Role::Engaged),
-        "spindle_speed_rpm" => scene.role(Role::Speed),
+        "engaged" => scene.role_values(Role::Engaged),
+        "spindle_speed_rpm" => scene.role_values(Role::Speed),
         _ => None,
     }
 }
@@ -94,7 +94,7 @@ fn time_in_run_s(scene: &Scene) -> Vec<f64> {
 }
 
 fn time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
-    let engaged = scene.role(Role::Engaged)?;
+    let engaged = scene.role_values(Role::Engaged)?;
     let mut values = vec![0.0; scene.rows()];
     for run in scene.runs() {
         let mut since = None;
@@ -118,12 +118,12 @@ fn time_since_change_s(scene: &Scene, column: &str) -> Option<Vec<f64>> {
 }
 
 fn direction(scene: &Scene) -> Option<Vec<f64>> {
-    let velocity = sliding(scene).filter(|velocity| goes_both_ways(velocity))?;
-    Some(directions(&velocity).collect())
+    let velocity = read_slide_velocity(scene).filter(|velocity| goes_both_ways(velocity))?;
+    Some(compute_directions(&velocity).collect())
 }
 
 fn cut_per_krpm(scene: &Scene) -> Option<Vec<f64>> {
-    let (load, speed) = (scene.load()?, scene.role(Role::Speed)?);
+    let (load, speed) = (scene.load()?, scene.role_values(Role::Speed)?);
     let per_krpm = |(load, rpm): (&f64, &f64)| if rpm.abs() > 1.0 { 1000.0 * load / rpm.abs() } else { 0.0 };
     Some(load.iter().zip(speed).map(per_krpm).collect())
 }

@@ -6,7 +6,7 @@ use super::diagnosis::unit_of;
 use super::inputs::columns;
 use super::model::{Model, Part, simulate};
 use crate::physics::Scene;
-use crate::statistics::{count, median};
+use crate::statistics::{count_to_f64, median};
 use adapters::Recording;
 use adapters::channel::{ChannelId, Kind};
 use adapters::recording::Numbers;
@@ -37,7 +37,7 @@ pub struct Examination {
 pub fn examine(recording: &Recording, model: &Model) -> Examination {
     let mut found = Examination::default();
     for column in recording.columns() {
-        if let Some(numbers) = recording.numbers(&column.name) {
+        if let Some(numbers) = recording.find_numbers(&column.name) {
             range(&column.name, numbers, &mut found);
             kelvin(&column.name, numbers, &mut found);
         }
@@ -59,20 +59,20 @@ pub fn examine(recording: &Recording, model: &Model) -> Examination {
 /// Of a measured quantity only the size tells the unit: a current is recorded below zero where its meter has noise at rest or gives
 /// the direction, and its unit is right all the same.
 fn range(name: &str, numbers: &Numbers, found: &mut Examination) {
-    let Some(channel) = ChannelId::of(name).map(ChannelId::channel) else { return };
-    let outside = |x: &f64| !channel.holds(*x);
-    let outsiders = numbers.present().filter(outside).count();
+    let Some(channel) = ChannelId::from_name(name).map(ChannelId::channel) else { return };
+    let outside = |x: &f64| !channel.accepts_number(*x);
+    let outsiders = numbers.present_values().filter(outside).count();
     if outsiders == 0 {
         return;
     }
     let all = numbers.count_present();
-    let example = numbers.present().find(outside).unwrap_or_default();
+    let example = numbers.present_values().find(outside).unwrap_or_default();
     let (low, high) = channel.range;
     let unit = if channel.unit == "1" { String::new() } else { format!(" {}", channel.unit) };
     let text = format!("{name}: {outsiders} of {all} values lie outside {low} to {high}{unit}, such as {example}");
     let is_of_wrong_size = |x: &f64| outside(x) && (channel.kind == Kind::Held || x.abs() > low.abs().max(high.abs()));
-    let wrong = numbers.present().filter(is_of_wrong_size).count();
-    if count(wrong) > OUTSIDE_SHARE_MAX * count(all) {
+    let wrong = numbers.present_values().filter(is_of_wrong_size).count();
+    if count_to_f64(wrong) > OUTSIDE_SHARE_MAX * count_to_f64(all) {
         let next =
             if channel.unit == "1" { "check the scale".to_owned() } else { format!("record it in {}", channel.unit) };
         found.unusable.push(format!("{text}: wrong unit? {next}, or leave the column out"));
@@ -85,7 +85,7 @@ fn kelvin(name: &str, numbers: &Numbers, found: &mut Examination) {
     if !name.ends_with("temperature_c") {
         return;
     }
-    let Some(middle) = median(numbers.present().collect()) else { return };
+    let Some(middle) = median(numbers.present_values().collect()) else { return };
     if middle > KELVIN.0 && middle < KELVIN.1 {
         found.unusable.push(format!("{name}: a median of {middle} looks like kelvin; record degrees Celsius"));
     }
@@ -95,15 +95,15 @@ fn time(recording: &Recording, found: &mut Examination) {
     let steps = |rows: std::ops::Range<usize>| -> usize {
         recording.time_s[rows].windows(2).filter(|pair| pair[1] <= pair[0]).count()
     };
-    let standing: usize = recording.runs().into_iter().map(|run| steps(run.rows)).sum();
-    let rows = recording.rows();
-    if count(standing) > STANDING_SHARE_MAX * count(rows) {
+    let standing: usize = recording.list_runs().into_iter().map(|run| steps(run.rows)).sum();
+    let rows = recording.count_rows();
+    if count_to_f64(standing) > STANDING_SHARE_MAX * count_to_f64(rows) {
         found.unusable.push(format!(
             "time does not advance in {standing} of {rows} rows: record the time of each sample with its decimals \
              (stamps in whole seconds do not suffice for several samples per second)"
         ));
     }
-    let runs = recording.runs().len();
+    let runs = recording.list_runs().len();
     if runs < RUNS_MIN {
         found.notes.push(format!(
             "{runs} run{}: stretches are held out in place of runs; record at least {RUNS_MIN} runs (column run) for a \
@@ -119,7 +119,8 @@ fn consistent(recording: &Recording, found: &mut Examination) {
         ("feed_per_rev_mm", &[(60.0, "mm/s in feed_mm_min, or rev/s in spindle_speed_rpm")][..]),
         ("cutting_speed_m_min", &[(60.0, "m/s"), (1000.0, "mm/min")][..]),
     ] {
-        let (Some(given), Some(follows)) = (recording.numbers(name), adapters::recording::derived(recording, name))
+        let (Some(given), Some(follows)) =
+            (recording.find_numbers(name), adapters::recording::derive_quantity(recording, name))
         else {
             continue;
         };
@@ -158,10 +159,10 @@ fn comparable(parts: &[Part], scene: &mut Scene, found: &mut Examination) {
 }
 
 fn prefix(scene: &Scene, simulated: &[f64], found: &mut Examination) {
-    let usable = |row: &usize| scene.usable()[*row];
+    let usable = |row: &usize| scene.usable_rows()[*row];
     let typical = |values: &[f64]| median((0..values.len()).filter(usable).map(|row| values[row].abs()).collect());
-    let (Some(recorded), Some(simulated)) = (typical(scene.recorded()), typical(simulated)) else { return };
-    let (output, unit) = (scene.output(), unit_of(scene.output()));
+    let (Some(recorded), Some(simulated)) = (typical(scene.recorded_output()), typical(simulated)) else { return };
+    let (output, unit) = (scene.output_name(), unit_of(scene.output_name()));
     let inside = |ratio: f64| ratio > PREFIX.0 && ratio < PREFIX.1;
     if recorded > 0.0 && simulated > 0.0 && (inside(recorded / simulated) || inside(simulated / recorded)) {
         found.unusable.push(format!(

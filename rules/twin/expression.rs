@@ -88,7 +88,7 @@ impl Expression {
             columns.push(unit.iter().zip(&zero).map(|(unit, zero)| unit - zero).collect());
         }
         let mixtures: [&dyn Fn(usize) -> f64; 2] =
-            [&|index| 0.7 + 0.6 * crate::statistics::count(index), &|index| parameters[index].value * -1.3];
+            [&|index| 0.7 + 0.6 * crate::statistics::count_to_f64(index), &|index| parameters[index].value * -1.3];
         let linear = mixtures.iter().all(|values| {
             at(values).is_some_and(|got| {
                 got.iter().enumerate().all(|(row, got)| {

@@ -237,7 +237,7 @@ mod tests {
 
     fn fitted(level_n: f64, bounded: bool) -> Fit {
         let mut scene = scene(level_n);
-        let recorded = scene.recorded().to_vec();
+        let recorded = scene.recorded_output().to_vec();
         let parts = parse_model(MODEL).expect("fine").parts;
         let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), bounded };
         fit(&mut scene, &parts, &metric).expect("every input is recorded")
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn what_a_free_fit_has_moved_outside_comes_back() {
         let mut scene = scene(-20.0);
-        let recorded = scene.recorded().to_vec();
+        let recorded = scene.recorded_output().to_vec();
         let outside = fitted(-20.0, false).parts;
         let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), bounded: true };
         let held = fit(&mut scene, &outside, &metric).expect("every input is recorded");

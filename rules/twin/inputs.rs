@@ -35,10 +35,10 @@ fn columns_of(scene: &Scene, part: &Part) -> Vec<String> {
 #[must_use]
 pub fn rows_with_inputs(scene: &Scene, parts: &[Part]) -> Vec<bool> {
     let mut known = vec![true; scene.rows()];
-    let engaged = scene.role(Role::Engaged);
+    let engaged = scene.role_values(Role::Engaged);
     for part in parts {
         for name in columns(scene, std::slice::from_ref(part)) {
-            let Some(absent) = scene.absent(&name) else { continue };
+            let Some(absent) = scene.absent_rows(&name) else { continue };
             let mut since = 0;
             for row in 0..scene.rows() {
                 since = if absent[row] { since + 1 } else { 0 };
@@ -55,5 +55,5 @@ pub fn rows_with_inputs(scene: &Scene, parts: &[Part]) -> Vec<bool> {
 /// Takes rows whose inputs are absent out of the comparison.
 pub fn exclude_rows_without_inputs(scene: &mut Scene, parts: &[Part]) {
     let known = rows_with_inputs(scene, parts);
-    scene.exclude((0..known.len()).filter(|row| !known[*row]));
+    scene.exclude_rows((0..known.len()).filter(|row| !known[*row]));
 }

@@ -18,7 +18,7 @@ use super::fit::Fit;
 use super::linear::{dot, extend_basis, least_squares, project_out};
 use super::model::{Part, PartFunction};
 use crate::physics::{Entry, Scene, unit_in};
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 
 /// By how much of its value a parameter may be off because no machine follows a law to the letter, with a certainty of
 /// 95 %: a share that no amount of rows makes smaller (GUM, type B).
@@ -62,7 +62,7 @@ impl FittedRows<'_> {
         let innovations = (self.whiten)(&left);
         let white: Vec<Vec<f64>> = fit.tangents.iter().map(|tangent| (self.whiten)(tangent)).collect();
         let freedom = innovations.len().saturating_sub(fit.free.len()).max(1);
-        let variance = dot(&innovations, &innovations) / count(freedom);
+        let variance = dot(&innovations, &innovations) / count_to_f64(freedom);
         let inverse = least_squares(&white, &innovations).inverse;
         let among_units = disagreement(&white, &innovations, &inverse, &self.unit);
         let passed_on = self.passed_on(part);
@@ -129,7 +129,7 @@ fn disagreement(columns: &[Vec<f64>], innovations: &[f64], inverse: &[Vec<f64>],
     if scores.len() < UNITS_MIN {
         return vec![0.0; columns.len()];
     }
-    let few = count(scores.len()) / (count(scores.len()) - 1.0);
+    let few = count_to_f64(scores.len()) / (count_to_f64(scores.len()) - 1.0);
     let of = |line: &Vec<f64>| few * scores.iter().map(|score| dot(line, score).powi(2)).sum::<f64>();
     inverse.iter().map(of).collect()
 }
@@ -144,7 +144,8 @@ fn levels(column: &[f64]) -> Vec<Option<usize>> {
     let mut levels = vec![None; column.len()];
     let (mut sum, mut level, mut last) = (0.0, 0, f64::NEG_INFINITY);
     for row in rows {
-        let reached = (0..LEVELS).rev().find(|level| sum >= total * count(*level) / count(LEVELS)).unwrap_or(0);
+        let reached =
+            (0..LEVELS).rev().find(|level| sum >= total * count_to_f64(*level) / count_to_f64(LEVELS)).unwrap_or(0);
         if reached > level && column[row] - last > 1e-9 * top {
             level = reached;
         }
@@ -181,7 +182,7 @@ fn between_levels(own: &[f64], innovations: &[f64], levels: &[Option<usize>], va
 fn between(told: &[(f64, f64)], q: f64, variance: f64) -> f64 {
     let sum: f64 = told.iter().map(|(weight, _)| weight).sum();
     let squares: f64 = told.iter().map(|(weight, _)| weight * weight).sum();
-    ((q - count(told.len().saturating_sub(1))) * variance / (sum - squares / sum)).max(0.0)
+    ((q - count_to_f64(told.len().saturating_sub(1))) * variance / (sum - squares / sum)).max(0.0)
 }
 
 /// A parameter's whitened tangent with those of all others taken out.
@@ -221,7 +222,7 @@ mod tests {
 
     #[test]
     fn a_law_that_is_followed_has_one_coefficient_at_every_level() {
-        let column: Vec<f64> = (0..ROWS).map(|row| 3.0 * (count(row) * 0.37).sin()).collect();
+        let column: Vec<f64> = (0..ROWS).map(|row| 3.0 * (count_to_f64(row) * 0.37).sin()).collect();
         let mean = (0..20).map(|seed| {
             let y: Vec<f64> = column.iter().zip(noise(seed)).map(|(x, e)| 2.0 * x + e).collect();
             difference(&column, &y)
@@ -231,7 +232,7 @@ mod tests {
 
     #[test]
     fn what_is_more_upwards_than_downwards_differs_by_level() {
-        let column: Vec<f64> = (0..ROWS).map(|row| 3.0 * (count(row) * 0.37).sin()).collect();
+        let column: Vec<f64> = (0..ROWS).map(|row| 3.0 * (count_to_f64(row) * 0.37).sin()).collect();
         let law = |x: f64| if x > 0.0 { 2.2 * x } else { 1.8 * x };
         let y: Vec<f64> = column.iter().zip(noise(1)).map(|(x, e)| law(*x) + e).collect();
         let found = difference(&column, &y);
@@ -242,7 +243,7 @@ mod tests {
     fn a_switch_has_one_level_and_a_ramp_has_all() {
         let switch: Vec<f64> = (0..ROWS).map(|row| f64::from(u8::from(row % 3 == 0))).collect();
         assert!(levels(&switch).iter().flatten().all(|level| *level == 0));
-        let ramp: Vec<f64> = (0..ROWS).map(count).collect();
+        let ramp: Vec<f64> = (0..ROWS).map(count_to_f64).collect();
         let found = levels(&ramp);
         assert_eq!((found[0], found[ROWS - 1]), (None, Some(LEVELS - 1)));
         let squares = |wanted: usize| -> f64 {

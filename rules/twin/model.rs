@@ -113,7 +113,7 @@ impl Part {
                 Some((_, value)) => *value = parameter.value,
                 None => {
                     if let PartFunction::Effect(effect, _) = &self.body
-                        && let Some(doc) = effect.doc().parameter(&parameter.name)
+                        && let Some(doc) = effect.doc().find_parameter(&parameter.name)
                     {
                         form.shape.push((doc.name, parameter.value));
                     }
@@ -134,7 +134,7 @@ impl Part {
     pub fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
         match &self.body {
             PartFunction::Effect(effect, form) => {
-                let columns = effect.columns(scene, &self.form(form))?;
+                let columns = effect.compute_columns(scene, &self.form(form))?;
                 Some(columns.into_iter().map(|(name, column)| (name.to_owned(), column)).collect())
             }
             PartFunction::Linear(terms) => {
@@ -219,7 +219,7 @@ impl Part {
 }
 
 fn parameter(effect: &'static dyn Effect, name: &str, value: f64, entry: Entry) -> Parameter {
-    let doc: Option<&ParameterDoc> = effect.doc().parameter(name);
+    let doc: Option<&ParameterDoc> = effect.doc().find_parameter(name);
     Parameter {
         name: name.to_owned(),
         value,

@@ -4,8 +4,8 @@ use super::expression::Expression;
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::table::SpeedTable;
 use super::term::Term;
-use crate::physics::{CATALOGUE, Effect, Entry, Form, Role, effect};
-use adapters::channel::nearest;
+use crate::physics::{CATALOGUE, Effect, Entry, Form, Role, find_effect};
+use adapters::channel::find_nearest_name;
 use std::collections::BTreeMap;
 use std::fmt;
 use toml::Spanned;
@@ -226,7 +226,7 @@ impl<'t> Reader<'t> {
     }
 
     fn catalogue(&mut self, kind: &str, table: &Table<'_>, offset: usize) -> Option<Part> {
-        let Some(effect) = effect(kind) else {
+        let Some(effect) = find_effect(kind) else {
             let kinds = CATALOGUE.iter().map(|effect| effect.doc().kind).chain(["linear", "expression"]);
             let hint = suggestion(kind, kinds);
             self.wrong(offset, format!("unknown kind {kind}{hint}; `cnc-gateway effects list` shows every kind"));
@@ -235,7 +235,7 @@ impl<'t> Reader<'t> {
         let doc = effect.doc();
         let mut parameters = Vec::new();
         for (name, value, offset) in self.numbers(table, "parameters") {
-            let Some(known) = doc.parameter(&name) else {
+            let Some(known) = doc.find_parameter(&name) else {
                 let hint = suggestion(&name, doc.parameters.iter().map(|parameter| parameter.name));
                 self.wrong(offset, format!("{kind} has no parameter {name}{hint}"));
                 continue;
@@ -258,7 +258,7 @@ impl<'t> Reader<'t> {
     }
 
     fn form(&mut self, effect: &'static dyn Effect, table: &Table<'_>) -> Form {
-        let mut form = Form::plain();
+        let mut form = Form::without_shape();
         let chosen = table.get("form").or_else(|| table.get("process"));
         if let Some(name) = chosen.and_then(|name| name.get_ref().as_str()) {
             match effect.form_names().iter().find(|known| **known == name) {
@@ -307,7 +307,7 @@ impl<'t> Reader<'t> {
         };
         let entries: Vec<_> = entries.iter().map(read).collect();
         for (name, column, offset) in entries {
-            match (Role::of(&name), column) {
+            match (Role::from_name(&name), column) {
                 (Some(role), Some(column)) => {
                     roles.insert(role, column);
                 }
@@ -335,7 +335,7 @@ impl<'t> Reader<'t> {
                 .map(|kind| (kind.get_ref().as_str().unwrap_or_default().to_owned(), kind.span().start))
                 .collect();
             for (kind, offset) in &kinds {
-                if effect(kind).is_none() {
+                if find_effect(kind).is_none() {
                     let hint = suggestion(kind, CATALOGUE.iter().map(|effect| effect.doc().kind));
                     self.wrong(*offset, format!("unknown kind {kind}{hint}"));
                 }
@@ -370,7 +370,7 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
 }
 
 fn suggestion<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
-    nearest(name, known).map(|known| format!("; did you mean {known}?")).unwrap_or_default()
+    find_nearest_name(name, known).map(|known| format!("; did you mean {known}?")).unwrap_or_default()
 }
 
 /// Writes a model in the form in which it is read.
@@ -494,7 +494,7 @@ mod tests {
             for name in effect.form_names() {
                 let offset = "schema = \"model/1\"\noutput = \"y_w\"\n[[effect]]\nkind = \"offset\"\n";
                 let mut model = parse_model(offset).expect("reads");
-                model.parts = vec![Part::candidate(*effect, &Form { name, ..Form::plain() }, &linear)];
+                model.parts = vec![Part::candidate(*effect, &Form { name, ..Form::without_shape() }, &linear)];
                 let read = parse_model(&write_model(&model));
                 let read = read.unwrap_or_else(|problems| panic!("{}: {problems:?}", effect.doc().kind));
                 assert_eq!(read.parts[0].parameters.len(), linear.len());

@@ -2,7 +2,7 @@
 //! what has no name is asked for by the channel that its curve was found over.
 
 use super::diagnosis::{Alternative, Experiment};
-use crate::physics::effect;
+use crate::physics::find_effect;
 
 /// Minutes of an experiment over one channel: four levels of it, up and down, twice, half a minute each, and the way there.
 const CHANNEL_MINUTES: f64 = 10.0;
@@ -12,14 +12,14 @@ const GAIN_BOUNDS: (f64, f64) = (10.0, 100.0);
 
 /// The experiment of the first of these kinds that the catalogue holds.
 pub(super) fn of_effects<'a>(mut kinds: impl Iterator<Item = &'a str>, gain: f64) -> Option<Experiment> {
-    let doc = kinds.find_map(effect)?.doc();
+    let doc = kinds.find_map(find_effect)?.doc();
     Some(experiment(doc.en.experiment.to_owned(), doc.experiment_minutes, gain, doc.kind))
 }
 
 /// Another kind that this data cannot rule out, `delta_ic` units of information behind the one it would replace, with the
 /// experiment that separates them.
 pub(super) fn alternative(kind: &str, instead_of: &str, delta_ic: f64) -> Alternative {
-    let experiment = effect(kind).or_else(|| effect(instead_of)).map(|effect| effect.doc().en.experiment);
+    let experiment = find_effect(kind).or_else(|| find_effect(instead_of)).map(|effect| effect.doc().en.experiment);
     Alternative {
         effect: kind.to_owned(),
         instead_of: instead_of.to_owned(),

@@ -5,7 +5,7 @@
 use super::locate::Condition;
 use adapters::Recording;
 use adapters::channel::quantity::Quantity;
-use adapters::recording::{Words, derived};
+use adapters::recording::{Words, derive_quantity};
 
 /// Price of one condition, in shares of what is covered: a reader takes it in for a thirtieth. Lower: words that cover noise;
 /// higher: one condition where two are needed.
@@ -45,24 +45,24 @@ pub(super) struct PlaceSearch<'a> {
 impl<'a> PlaceSearch<'a> {
     /// Over what can be told of a recording of this output.
     pub(super) fn new(recording: &'a Recording, output: &str) -> Self {
-        let every = recording.rows().div_ceil(ROWS_MAX).max(1);
-        let rows: Vec<usize> = (0..recording.rows()).step_by(every).collect();
+        let every = recording.count_rows().div_ceil(ROWS_MAX).max(1);
+        let rows: Vec<usize> = (0..recording.count_rows()).step_by(every).collect();
         let mut columns = Vec::new();
         for column in recording.columns() {
             let name = column.name.as_str();
-            if let Some(numbers) = recording.numbers(name).filter(|_| tells_a_place(name, output)) {
+            if let Some(numbers) = recording.find_numbers(name).filter(|_| tells_a_place(name, output)) {
                 columns.push(PlaceColumn::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
             }
             if let Some(words) = recording
-                .words(name)
+                .find_words(name)
                 .filter(|words| words.words().len() > 1 && !name.ends_with("_missing") && name != "time_utc")
             {
                 columns.push(PlaceColumn::Words(name, words));
             }
         }
         for name in ["cutting_speed_m_min", "cutting_time_min", "feed_per_rev_mm"] {
-            if recording.numbers(name).is_none()
-                && let Some(numbers) = derived(recording, name)
+            if recording.find_numbers(name).is_none()
+                && let Some(numbers) = derive_quantity(recording, name)
             {
                 columns.push(PlaceColumn::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
             }
@@ -73,7 +73,7 @@ impl<'a> PlaceSearch<'a> {
                 rows.iter().map(|row| Some(recording.time_s[*row])).collect(),
             ));
         }
-        if recording.runs().len() > 1 {
+        if recording.list_runs().len() > 1 {
             columns.push(PlaceColumn::Numbers("time_in_run_s".to_owned(), time_in_run(recording, &rows)));
         }
         Self { rows, columns }
@@ -194,7 +194,7 @@ impl<'a> PlaceSearch<'a> {
     fn lists(&self, name: &str, words: &Words, inside: &[bool], affected: &[f64]) -> Vec<Condition> {
         let mut sums = vec![(0.0, 0.0); words.words().len()];
         for ((row, inside), affected) in self.rows.iter().zip(inside).zip(affected) {
-            if let Some(code) = words.code(*row).filter(|_| *inside) {
+            if let Some(code) = words.find_code(*row).filter(|_| *inside) {
                 sums[code as usize].0 += affected;
                 sums[code as usize].1 += 1.0;
             }
@@ -228,11 +228,11 @@ fn price(conditions: &[Condition]) -> f64 {
 fn tells_a_place(name: &str, output: &str) -> bool {
     let measured =
         [Quantity::Power, Quantity::Current, Quantity::Force, Quantity::Torque, Quantity::Load, Quantity::Displacement];
-    name != output && !name.starts_with("simulated_") && !measured.contains(&Quantity::of(name))
+    name != output && !name.starts_with("simulated_") && !measured.contains(&Quantity::from_column_name(name))
 }
 
 fn time_in_run(recording: &Recording, rows: &[usize]) -> Vec<Option<f64>> {
-    let runs = recording.runs();
+    let runs = recording.list_runs();
     let start = |row: usize| runs.get(runs.partition_point(|run| run.rows.end <= row)).map(|run| run.rows.start);
     rows.iter().map(|row| Some(recording.time_s[*row] - recording.time_s[start(*row)?])).collect()
 }
@@ -325,6 +325,6 @@ mod tests {
     fn what_acts_everywhere_needs_no_words() {
         let (recording, _) = recording();
         let search = PlaceSearch::new(&recording, "spindle_power_w");
-        assert!(search.conditions(&vec![true; recording.rows()]).is_empty());
+        assert!(search.conditions(&vec![true; recording.count_rows()]).is_empty());
     }
 }

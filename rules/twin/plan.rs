@@ -6,7 +6,7 @@
 use super::diagnosis::Diagnosis;
 use super::experiments::moves;
 use crate::physics::explain::Language;
-use crate::physics::{Role, Scene, effect};
+use crate::physics::{Role, Scene, find_effect};
 use crate::statistics::median;
 use adapters::Recording;
 use adapters::channel::quantity::is_of_spindle;
@@ -110,7 +110,7 @@ fn kinds(diagnosis: &Diagnosis) -> Vec<&str> {
     let open = diagnosis.alternatives.iter().flat_map(|other| [other.effect.as_str(), &other.instead_of]);
     let found = diagnosis.missing.iter().map(|missing| missing.effect.as_str());
     let first = diagnosis.alternatives.first().map(|other| other.instead_of.as_str());
-    let rivals = first.and_then(effect).map_or(&[][..], |effect| effect.doc().rivals);
+    let rivals = first.and_then(find_effect).map_or(&[][..], |effect| effect.doc().rivals);
     let usual = if diagnosis.alternatives.is_empty() { found.take(1).collect() } else { rivals.to_vec() };
     chosen(asked.chain(open).chain(usual))
 }
@@ -119,7 +119,7 @@ fn kinds(diagnosis: &Diagnosis) -> Vec<&str> {
 fn chosen<'a>(wanted: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut kinds: Vec<&str> = Vec::new();
     let mut minutes = 0.0;
-    for doc in wanted.filter_map(|kind| effect(kind).map(crate::physics::Effect::doc)) {
+    for doc in wanted.filter_map(|kind| find_effect(kind).map(crate::physics::Effect::doc)) {
         let fits = kinds.is_empty() || minutes + doc.experiment_minutes <= TOGETHER_MINUTES_MAX;
         if fits && !kinds.iter().any(|kind| moves::same(kind, doc.kind)) {
             kinds.push(doc.kind);
@@ -135,7 +135,7 @@ impl Envelope {
     pub fn of(recording: &Recording, diagnosis: &Diagnosis) -> Self {
         let scene = Scene::new(recording, &diagnosis.output, &diagnosis.model.roles).ok();
         let column = |name: &str| scene.as_ref().and_then(|scene| scene.column(name)).map(<[f64]>::to_vec);
-        let role = |role: Role| scene.as_ref().and_then(|scene| scene.role(role)).map(<[f64]>::to_vec);
+        let role = |role: Role| scene.as_ref().and_then(|scene| scene.role_values(role)).map(<[f64]>::to_vec);
         let engaged = role(Role::Engaged);
         let in_cut = |values: Option<Vec<f64>>| match (&engaged, values) {
             (Some(engaged), Some(values)) => {
@@ -247,8 +247,8 @@ mod tests {
             let csv = plan.csv(Language::En);
             let read = read_csv(csv.as_bytes(), doc.kind).unwrap_or_else(|error| panic!("{}: {error}", doc.kind));
             assert_eq!(read.refused, 0, "{}: {:?}", doc.kind, read.problems.first());
-            if let Some(speed) = read.recording.numbers("spindle_programmed_rpm") {
-                assert!(speed.present().all(|n| (0.0..=1500.0).contains(&n)), "{}", doc.kind);
+            if let Some(speed) = read.recording.find_numbers("spindle_programmed_rpm") {
+                assert!(speed.present_values().all(|n| (0.0..=1500.0).contains(&n)), "{}", doc.kind);
             }
             let asked = doc.experiment_minutes;
             assert!(plan.minutes() > 0.5 && plan.minutes() < 2.0 * asked + 6.0, "{}: {}", doc.kind, plan.minutes());

@@ -24,7 +24,7 @@ const HELD_ROWS: usize = 4;
 /// Notes faults and takes their rows out of the scene. `simulated` is the baseline's output.
 pub fn clean(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
     let mut faults = Vec::new();
-    let output = scene.output().to_owned();
+    let output = scene.output_name().to_owned();
     let mut note = |fault: &'static str, column: &str, rows: usize| {
         if rows > 0 {
             faults.push(Fault { fault, column: column.to_owned(), rows });
@@ -38,10 +38,10 @@ pub fn clean(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
     dropped.extend(held.iter().chain(&zeros));
     dropped.sort_unstable();
     dropped.dedup();
-    scene.exclude(dropped.iter().copied());
+    scene.exclude_rows(dropped.iter().copied());
     note("dropouts", &output, dropped.len());
     let spikes = spikes(scene, simulated);
-    scene.exclude(spikes.iter().copied());
+    scene.exclude_rows(spikes.iter().copied());
     note("spikes", &output, spikes.len());
     faults
 }
@@ -54,15 +54,15 @@ fn duplicates(scene: &Scene) -> usize {
 }
 
 fn absent(scene: &Scene) -> Vec<usize> {
-    (0..scene.rows()).filter(|row| !scene.usable()[*row]).collect()
+    (0..scene.rows()).filter(|row| !scene.usable_rows()[*row]).collect()
 }
 
 /// Rows in which the output stands at the end of its range again and again: for several rows at a time, more than once,
 /// and in few rows of all. Zero is what a meter reads that gives nothing.
 fn at_stop(scene: &Scene) -> Vec<bool> {
     let mut stands = vec![false; scene.rows()];
-    let recorded = scene.recorded();
-    let known = || (0..scene.rows()).filter(|row| scene.usable()[*row]);
+    let recorded = scene.recorded_output();
+    let known = || (0..scene.rows()).filter(|row| scene.usable_rows()[*row]);
     let low = known().map(|row| recorded[row]).fold(f64::INFINITY, f64::min);
     let high = known().map(|row| recorded[row]).fold(f64::NEG_INFINITY, f64::max);
     for end in [low, high].into_iter().filter(|end| *end != 0.0) {
@@ -84,7 +84,7 @@ fn at_stop(scene: &Scene) -> Vec<bool> {
 /// Rows in which the output repeats exactly, where that is unusual and nothing stands at a stop: what a full tank, a
 /// limit or a meter at its end holds is no dropout.
 fn held(scene: &Scene, at_stop: &[bool]) -> Vec<usize> {
-    let recorded = scene.recorded();
+    let recorded = scene.recorded_output();
     let equal = (1..scene.rows()).filter(|row| recorded[*row] == recorded[row - 1]).count();
     let mut rows = Vec::new();
     if equal * 10 > scene.rows() {
@@ -105,10 +105,11 @@ fn held(scene: &Scene, at_stop: &[bool]) -> Vec<usize> {
 
 /// Rows that read exactly zero although the simulation says otherwise and few rows do.
 fn zeros(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
-    let recorded = scene.recorded();
+    let recorded = scene.recorded_output();
     let sizes: Vec<f64> = recorded.iter().map(|x| x.abs()).collect();
     let typical = median(sizes).unwrap_or(0.0);
-    let zero = |row: &usize| scene.usable()[*row] && recorded[*row] == 0.0 && simulated[*row].abs() > 0.2 * typical;
+    let zero =
+        |row: &usize| scene.usable_rows()[*row] && recorded[*row] == 0.0 && simulated[*row].abs() > 0.2 * typical;
     let rows: Vec<usize> = (0..scene.rows()).filter(zero).collect();
     if rows.len() * 10 > scene.rows() { Vec::new() } else { rows }
 }
@@ -116,7 +117,7 @@ fn zeros(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
 /// Isolated rows far from their neighbours while the simulation is steady.
 fn spikes(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
     let residual: Vec<f64> =
-        scene.recorded().iter().zip(simulated).map(|(recorded, simulated)| recorded - simulated).collect();
+        scene.recorded_output().iter().zip(simulated).map(|(recorded, simulated)| recorded - simulated).collect();
     let jumps: Vec<(usize, f64, f64)> =
         scene.runs().iter().flat_map(|run| jumps_of(scene, &residual, simulated, run)).collect();
     let Some(spread) = robust_deviation(jumps.iter().map(|(_, jump, _)| *jump)) else {
@@ -134,7 +135,7 @@ fn jumps_of(
     simulated: &[f64],
     run: &std::ops::Range<usize>,
 ) -> Vec<(usize, f64, f64)> {
-    let usable: Vec<usize> = run.clone().filter(|row| scene.usable()[*row]).collect();
+    let usable: Vec<usize> = run.clone().filter(|row| scene.usable_rows()[*row]).collect();
     let judge = |at: usize| {
         let near = &usable[at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(usable.len())];
         let row = usable[at];
@@ -149,8 +150,13 @@ fn jumps_of(
 
 /// Rows on a coarse comb: the step between distinct values is a noticeable part of the spread between neighbours.
 fn quantised(scene: &Scene) -> usize {
-    let mut values: Vec<f64> =
-        scene.recorded().iter().zip(scene.usable()).filter(|(_, usable)| **usable).map(|(x, _)| *x).collect();
+    let mut values: Vec<f64> = scene
+        .recorded_output()
+        .iter()
+        .zip(scene.usable_rows())
+        .filter(|(_, usable)| **usable)
+        .map(|(x, _)| *x)
+        .collect();
     let rows = values.len();
     values.sort_by(f64::total_cmp);
     values.dedup();

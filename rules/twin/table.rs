@@ -14,7 +14,7 @@ pub struct SpeedTable {
 impl SpeedTable {
     /// One column per speed: the weight of that speed's power in each row. Beyond the ends the end value holds.
     pub(super) fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
-        let speed = scene.role(Role::Speed)?;
+        let speed = scene.role_values(Role::Speed)?;
         let stage = scene.column("gear_stage");
         let count = self.speeds_rpm.len();
         let mut columns = vec![vec![0.0; scene.rows()]; count];

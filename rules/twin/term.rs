@@ -1,7 +1,7 @@
 //! Terms of a `linear` part: a column, `one`, a power, a sign, an absolute value or a delay of a column.
 
 use crate::physics::Scene;
-use crate::physics::state::delayed;
+use crate::physics::state::delay_values;
 
 /// One term.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,7 +79,7 @@ impl Term {
             TermKind::Power(_, power) => values.iter().map(|x| x.powi(*power)).collect(),
             TermKind::Sign(_) => values.iter().map(|x| if *x == 0.0 { 0.0 } else { x.signum() }).collect(),
             TermKind::Abs(_) => values.iter().map(|x| x.abs()).collect(),
-            TermKind::Delay(_, delay_s) => delayed(scene, values, *delay_s),
+            TermKind::Delay(_, delay_s) => delay_values(scene, values, *delay_s),
         })
     }
 }

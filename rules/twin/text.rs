@@ -3,8 +3,8 @@
 use super::diagnosis::{Alternative, Diagnosis, Fits, Missing, ParameterEstimate, Shift, Verdict};
 use super::locate::{Condition, Region};
 use super::words;
-use crate::physics::effect;
 use crate::physics::explain::Language;
+use crate::physics::find_effect;
 use std::fmt::Write as _;
 
 /// Spans that are listed; the JSON holds all of them.
@@ -70,7 +70,7 @@ impl Say<'_> {
 
     /// The name of an effect: its kind, which `effects show` takes, and what it is called.
     fn name(&self, kind: &str) -> String {
-        let Some(effect) = effect(kind) else {
+        let Some(effect) = find_effect(kind) else {
             return if kind.starts_with("unknown") {
                 self.pick("unknown", "未知效应").to_owned()
             } else {
@@ -136,7 +136,7 @@ impl Say<'_> {
     }
 
     fn one_missing(&self, missing: &Missing) -> Vec<String> {
-        let statement = match (self.language, effect(&missing.effect)) {
+        let statement = match (self.language, find_effect(&missing.effect)) {
             (Language::Zh, Some(effect)) => effect.doc().zh.statement,
             (Language::Zh, None) => "效应库中没有能解释它的效应，仅描述其形状",
             (Language::En, _) => missing.statement.as_str(),
@@ -215,7 +215,7 @@ impl Say<'_> {
         if self.language == Language::En {
             return other.separating_experiment.clone();
         }
-        let known = effect(&other.effect).or_else(|| effect(&other.instead_of));
+        let known = find_effect(&other.effect).or_else(|| find_effect(&other.instead_of));
         known.map_or_else(|| other.separating_experiment.clone(), |effect| effect.doc().zh.experiment.to_owned())
     }
 
@@ -232,7 +232,7 @@ impl Say<'_> {
 
     fn next(&self, diagnosis: &Diagnosis) -> Vec<String> {
         let Some(experiment) = &diagnosis.next_experiment else { return Vec::new() };
-        let statement = match (self.language, effect(&experiment.effect)) {
+        let statement = match (self.language, find_effect(&experiment.effect)) {
             (Language::Zh, Some(effect)) => effect.doc().zh.experiment,
             _ => experiment.statement.as_str(),
         };

@@ -5,7 +5,7 @@
 //! repeats is held out as a whole where another choice exists.
 
 use crate::physics::Scene;
-use crate::statistics::{count, quantile};
+use crate::statistics::{count_to_f64, quantile};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -92,7 +92,7 @@ impl Random {
 /// Which units take no part: a quarter of those that have rows to compare, none of fewer than four.
 #[must_use]
 pub(super) fn held_out(scene: &Scene, units: &[Unit], seed: u64) -> BTreeSet<usize> {
-    let rows = |unit: usize| units[unit].rows.clone().filter(|row| scene.usable()[*row]).count();
+    let rows = |unit: usize| units[unit].rows.clone().filter(|row| scene.usable_rows()[*row]).count();
     let known: Vec<usize> = (0..units.len()).filter(|unit| rows(*unit) > 0).collect();
     if known.len() < FOLDS {
         return BTreeSet::new();
@@ -125,22 +125,24 @@ impl Features {
             known.iter().map(|unit| of(&values[units[*unit].rows.clone()])).collect()
         };
         let end = |values: &[f64], share: f64| quantile(values.iter().copied(), share).unwrap_or(0.0);
-        let names = scene.column_names().filter(|name| *name != scene.output());
-        for values in names.filter_map(|name| scene.column(name)).chain(scene.simulated()) {
+        let names = scene.column_names().filter(|name| *name != scene.output_name());
+        for values in names.filter_map(|name| scene.column(name)).chain(scene.simulated_output()) {
             columns.push(over_units(&crate::statistics::mean, values));
             // What is held out should lie within what is fitted.
             columns.push(over_units(&|values| end(values, ENDS), values));
             columns.push(over_units(&|values| end(values, 1.0 - ENDS), values));
         }
-        let place: Vec<f64> = (0..known.len()).map(count).collect();
-        columns.push(place.iter().map(|at| (at - 0.5 * count(known.len())).abs()).collect());
+        let place: Vec<f64> = (0..known.len()).map(count_to_f64).collect();
+        columns.push(place.iter().map(|at| (at - 0.5 * count_to_f64(known.len())).abs()).collect());
         columns.push(place);
         let mut holders = Vec::new();
         for name in WORDS {
-            let Some(words) = scene.words(name).filter(|words| words.words().len() <= WORDS_MAX) else { continue };
+            let Some(words) = scene.text_column(name).filter(|words| words.words().len() <= WORDS_MAX) else {
+                continue;
+            };
             let mut of_word: BTreeMap<u32, BTreeSet<usize>> = BTreeMap::new();
             for (index, unit) in known.iter().enumerate() {
-                let codes: BTreeSet<u32> = units[*unit].rows.clone().filter_map(|row| words.code(row)).collect();
+                let codes: BTreeSet<u32> = units[*unit].rows.clone().filter_map(|row| words.find_code(row)).collect();
                 codes.into_iter().for_each(|code| {
                     of_word.entry(code).or_default().insert(index);
                 });
@@ -154,19 +156,20 @@ impl Features {
 
     /// How unlike the whole a choice is.
     fn distance(&self, chosen: &BTreeSet<usize>) -> f64 {
-        let size = count(chosen.len());
+        let size = count_to_f64(chosen.len());
         let columns = self.of_unit.first().map_or(0, Vec::len);
         let mean = |column: usize| chosen.iter().map(|unit| self.of_unit[*unit][column]).sum::<f64>() / size;
         // The mean of so many independent units differs from that of all by one over their number.
-        let points: f64 = (0..columns).map(|column| size * mean(column).powi(2)).sum::<f64>() / count(columns.max(1));
-        let share = size / count(self.of_unit.len());
+        let points: f64 =
+            (0..columns).map(|column| size * mean(column).powi(2)).sum::<f64>() / count_to_f64(columns.max(1));
+        let share = size / count_to_f64(self.of_unit.len());
         let word = |holders: &BTreeSet<usize>| {
-            let held = count(holders.intersection(chosen).count());
-            let expected = share * count(holders.len());
-            let alone = if held >= count(holders.len()) { 10.0 } else { 0.0 };
+            let held = count_to_f64(holders.intersection(chosen).count());
+            let expected = share * count_to_f64(holders.len());
+            let alone = if held >= count_to_f64(holders.len()) { 10.0 } else { 0.0 };
             (held - expected).powi(2) / expected + alone
         };
-        let words: f64 = self.holders.iter().map(word).sum::<f64>() / count(self.holders.len().max(1));
+        let words: f64 = self.holders.iter().map(word).sum::<f64>() / count_to_f64(self.holders.len().max(1));
         points + words
     }
 }
@@ -187,7 +190,7 @@ mod tests {
     /// Runs of ten rows each: depth and tool by the number of the run.
     fn scene(runs: usize, depth: impl Fn(usize) -> f64, tool: impl Fn(usize) -> String) -> Scene {
         let rows = 10 * runs;
-        let mut recording = Recording::new("test", (0..rows).map(count).collect(), None);
+        let mut recording = Recording::new("test", (0..rows).map(count_to_f64).collect(), None);
         let words = |of: &dyn Fn(usize) -> String| {
             let all: Vec<String> = (0..rows).map(|row| of(row / 10)).collect();
             Cells::Words(all.iter().map(String::as_str).collect::<Words>())
@@ -195,14 +198,14 @@ mod tests {
         recording.set_column("run", words(&|run| run.to_string()));
         recording.set_column("tool", words(&tool));
         let depths = (0..rows).map(|row| depth(row / 10)).collect();
-        recording.set_column("depth_of_cut_mm", Cells::Numbers(Numbers::full(depths)));
-        recording.set_column("spindle_power_w", Cells::Numbers(Numbers::full(vec![1.0; rows])));
+        recording.set_column("depth_of_cut_mm", Cells::Numbers(Numbers::from_values(depths)));
+        recording.set_column("spindle_power_w", Cells::Numbers(Numbers::from_values(vec![1.0; rows])));
         Scene::new(&recording, "spindle_power_w", &BTreeMap::new()).expect("a scene")
     }
 
     #[test]
     fn no_place_of_a_plan_that_repeats_is_held_out_as_a_whole() {
-        let scene = scene(24, |run| count(run % 4), |_| "T1".to_owned());
+        let scene = scene(24, |run| count_to_f64(run % 4), |_| "T1".to_owned());
         let held = held_out(&scene, &units(&scene), 1);
         assert_eq!(held.len(), 6);
         for place in 0..4 {
@@ -222,7 +225,7 @@ mod tests {
 
     #[test]
     fn the_same_seed_gives_the_same_choice() {
-        let scene = scene(40, count, |run| format!("T{run}"));
+        let scene = scene(40, count_to_f64, |run| format!("T{run}"));
         let units = units(&scene);
         assert_eq!(held_out(&scene, &units, 3), held_out(&scene, &units, 3));
         assert_ne!(held_out(&scene, &units, 3), held_out(&scene, &units, 4));

@@ -3,7 +3,7 @@
 use super::diagnosis::{Diagnosis, Existence, UNKNOWN, Verdict};
 use super::locate::Condition;
 use super::text::short;
-use crate::physics::effect;
+use crate::physics::find_effect;
 use adapters::bilingual::Bilingual;
 
 /// One or two sentences for the machinist.
@@ -50,7 +50,7 @@ fn name(kind: &str) -> Bilingual {
     if kind == UNKNOWN {
         return Bilingual::new("a cause that is not in the catalogue", "效应库之外的原因");
     }
-    let zh = effect(kind).map_or(kind, |effect| effect.doc().zh.name);
+    let zh = find_effect(kind).map_or(kind, |effect| effect.doc().zh.name);
     Bilingual::new(kind.replace('_', " "), zh)
 }
 

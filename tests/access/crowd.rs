@@ -3,7 +3,7 @@
 
 use super::client::{Testbed, testbed};
 use super::process::{get, wait_for};
-use gateway::control::{Order, Reply, order};
+use gateway::control::{Order, Reply, send_order};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use serde_json::Value;
 use std::io::Write;
@@ -110,11 +110,12 @@ fn orders(testbed: &Testbed, count: usize, pause: Duration) -> Vec<Duration> {
     let mut disarmed = Vec::new();
     for _ in 0..count {
         let by = || "test".to_owned();
-        let armed: Reply = order(&data_dir, &Order::Arm { by: by(), for_s: Some(60.0) }).expect("the socket answers");
+        let armed: Reply =
+            send_order(&data_dir, &Order::Arm { by: by(), for_s: Some(60.0) }).expect("the socket answers");
         assert!(armed.done, "{}", armed.text);
         thread::sleep(pause);
         let began = Instant::now();
-        let reply = order(&data_dir, &Order::Disarm { by: by() }).expect("the socket answers");
+        let reply = send_order(&data_dir, &Order::Disarm { by: by() }).expect("the socket answers");
         disarmed.push(began.elapsed());
         assert!(reply.done && reply.text.contains("given back"), "{}", reply.text);
     }

@@ -3,7 +3,7 @@
 
 use super::client::{Client, Testbed, testbed};
 use gateway::access::Role;
-use gateway::http::{Needs, Route, described, description, routes};
+use gateway::http::{Needs, Route, description, list_operations, list_routes};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
@@ -28,13 +28,15 @@ fn takes_json(document: &Value, route: &Route) -> bool {
 #[test]
 fn the_description_and_the_table_tell_the_same_routes() {
     let document: Value = serde_json::from_str(description()).expect("JSON");
-    let in_document: BTreeSet<(String, String)> = described(&document).into_iter().collect();
+    let in_document: BTreeSet<(String, String)> = list_operations(&document).into_iter().collect();
     let in_table: BTreeSet<(String, String)> =
-        routes().map(|route| (route.verb().word().to_owned(), route.path().to_owned())).collect();
+        list_routes().map(|route| (route.verb().word().to_owned(), route.path().to_owned())).collect();
     assert_eq!(in_document, in_table);
-    assert_eq!(in_table.len(), routes().count(), "no row stands twice");
-    let open: Vec<&str> =
-        routes().filter(|it| it.changes() && !matches!(it.needs(), Needs::Role(_))).map(Route::path).collect();
+    assert_eq!(in_table.len(), list_routes().count(), "no row stands twice");
+    let open: Vec<&str> = list_routes()
+        .filter(|it| it.changes_state() && !matches!(it.needs(), Needs::Role(_)))
+        .map(Route::path)
+        .collect();
     assert_eq!(
         open,
         ["/api/v1/login"],
@@ -46,7 +48,7 @@ fn the_description_and_the_table_tell_the_same_routes() {
             assert!(schemas[name].is_object(), "no schema {name}");
         }
     }
-    for route in routes().filter(|route| route.changes()) {
+    for route in list_routes().filter(|route| route.changes_state()) {
         let operation = &document["paths"][route.path()][route.verb().word().to_ascii_lowercase()];
         for code in ["400", "403", "408", "413", "421"] {
             assert!(operation["responses"][code].is_object(), "{}: {code} is not described", route.path());
@@ -61,7 +63,7 @@ fn every_route_refuses_what_it_must() {
     let (nobody, admin) = (testbed.client(), testbed.admin());
     let mut viewer = testbed.client();
     assert_eq!(viewer.sign_in("Watch", &testbed.person("Watch", "viewer")).status, 200);
-    for route in routes() {
+    for route in list_routes() {
         refuses(route, &document, [&nobody, &viewer, &admin]);
     }
     slow(&admin, &nobody);
@@ -79,7 +81,7 @@ fn refuses(route: &Route, document: &Value, [nobody, viewer, admin]: [&Client; 3
     };
     told("for another host", &admin.send(verb, &path, "Host: evil.example\r\n", ""), 421);
     told("another method", &admin.send("PATCH", &path, JSON, "{}"), 405);
-    if !route.changes() {
+    if !route.changes_state() {
         return;
     }
     let at_length = |client: &Client| match route.body_max() {
@@ -113,7 +115,7 @@ fn refuses(route: &Route, document: &Value, [nobody, viewer, admin]: [&Client; 3
 fn slow(admin: &Client, nobody: &Client) {
     let began = Instant::now();
     let mut waiting: Vec<(String, TcpStream)> = Vec::new();
-    for route in routes().filter(|route| route.changes() && route.body_max() > 0) {
+    for route in list_routes().filter(|route| route.changes_state() && route.body_max() > 0) {
         let (verb, path, host, cookie) = (route.verb().word(), path(route), &admin.address, &admin.cookie);
         let head =
             format!("{verb} {path} HTTP/1.1\r\nHost: {host}\r\nCookie: {cookie}\r\n{JSON}Content-Length: 20\r\n\r\n{{");
@@ -145,7 +147,7 @@ fn walked(mut testbed: Testbed) {
     assert!(testbed.gateway.wait().success(), "{}", testbed.gateway.said());
     let audit = testbed.audit();
     let refused = super::client::rows(&audit, "request_refused", "refused", "");
-    let changes = routes().filter(|route| route.changes()).count();
+    let changes = list_routes().filter(|route| route.changes_state()).count();
     assert!(refused >= changes.min(50), "{refused} refusals of {changes} routes");
     assert!(refused <= 180, "{refused} refusals have a row of their own");
     assert!(super::client::rows(&audit, "request_refused", "refused", "evil.example") > 0);

@@ -10,7 +10,7 @@ use rules::estimators::spindle_current::{
     Cubic, CurveAtDepth, CurveFamily, FeatureKind, LowPassDesign, PhaseFeature, ThreePhase, WindowSpan,
 };
 use rules::estimators::thermal::{Path, Predictor, ThermalLaw, ThermalTerm};
-use rules::estimators::{Inference, Settings, balance};
+use rules::estimators::{Inference, Settings, solve_power_balance};
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
@@ -67,7 +67,7 @@ fn constant_load(criterion: &mut Criterion) {
     let family = CurveFamily::new([0.4, 0.8, 1.2, 1.6].map(curve).to_vec()).expect("a family");
     measure(criterion, "depth from feed and feature, feed for a wanted feature", |step| {
         let feature = 2.0 + 0.25 * (step % 7) as f64;
-        let feed = family.depth(1.1, feature, 0.02).and_then(|depth| family.feed(depth.depth_mm, 2.5));
+        let feed = family.infer_depth(1.1, feature, 0.02).and_then(|depth| family.find_feed(depth.depth_mm, 2.5));
         black_box(feed.expect("in the family"));
     });
 }
@@ -100,7 +100,7 @@ fn thermal(criterion: &mut Criterion) {
     measure(criterion, "thermal error from 13 points, lagged", |step| {
         temperatures[(step % 13) as usize] = Ok(20.0 + (step % 100) as f64 / 10.0);
         let at_ns = step as i64 * SECOND_NS;
-        black_box(predictor.predict(at_ns, black_box(&temperatures)).expect("every sensor answers"));
+        black_box(predictor.predict_error(at_ns, black_box(&temperatures)).expect("every sensor answers"));
     });
 }
 
@@ -108,8 +108,8 @@ fn thermal(criterion: &mut Criterion) {
 fn estimators(criterion: &mut Criterion) {
     let mut pipeline = Inference::new(Settings::default());
     let channels = ["spindle_speed_rpm", "spindle_power_w", "total_power_w", "feed_mm_min"]
-        .map(|name| ChannelId::of(name).expect("in the table"));
-    let mut sample = Sample::empty(0);
+        .map(|name| ChannelId::from_name(name).expect("in the table"));
+    let mut sample = Sample::new_empty(0);
     measure(criterion, "full set of estimators, one tick", |step| {
         // 40 s of idling, 20 s of cutting, over and over.
         let cutting = step % 600 >= 400;
@@ -118,15 +118,15 @@ fn estimators(criterion: &mut Criterion) {
         let values = [800.0, power_w, power_w + 700.0, if cutting { 120.0 } else { 0.0 }];
         sample.at_ns = step as i64 * SECOND_NS / 10;
         for (channel, value) in channels.into_iter().zip(values) {
-            sample.set(channel, Slot { value: Ok(Value::Number(value)), age_ns: 0 });
+            sample.set_slot(channel, Slot { value: Ok(Value::Number(value)), age_ns: 0 });
         }
-        black_box(pipeline.infer(black_box(&sample)));
+        black_box(pipeline.update_with_sample(black_box(&sample)));
     });
 }
 
 /// The split of one power.
 fn separation(criterion: &mut Criterion) {
     measure(criterion, "cutting power and load loss of one power", |step| {
-        black_box(balance(black_box(960.0 + (step % 100) as f64), 0.1807, 4e-5));
+        black_box(solve_power_balance(black_box(960.0 + (step % 100) as f64), 0.1807, 4e-5));
     });
 }

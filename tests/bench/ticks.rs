@@ -12,6 +12,6 @@ fn main() {
     let short = !std::env::args().any(|argument| argument == "--bench");
     let ticks = if short { bench::TICKS_MIN } else { 100_000 };
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let figures = bench::run(ticks, directory.path(), Some(ffi::allocations)).expect("the benchmark runs");
+    let figures = bench::measure_ticks(ticks, directory.path(), Some(ffi::allocations)).expect("the benchmark runs");
     println!("{figures}");
 }

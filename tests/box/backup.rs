@@ -3,7 +3,7 @@
 
 use super::process::{Gateway, run, stderr, stdout, text};
 use gateway::backup::BackupPaths;
-use gateway::backup::list::fate;
+use gateway::backup::list::find_fate;
 use gateway::history::Reader;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -62,13 +62,13 @@ fn an_empty_box_goes_on_from_a_backup_and_no_file_is_forgotten() {
     fine(&run(&["annotate", "flank-wear", "0.12", "--unit", "mm", "--at", "now", "--config", text(&config)]));
     run(&["commission", "--write", "--config", text(&config)]);
     let unknown: Vec<PathBuf> =
-        files(&old.join("data")).into_iter().filter(|path| fate(&places(&old), path).is_none()).collect();
+        files(&old.join("data")).into_iter().filter(|path| find_fate(&places(&old), path).is_none()).collect();
     assert_eq!(unknown, Vec::<PathBuf>::new(), "name them in gateway/backup/list.rs: in a backup, or why not");
-    assert_eq!(fate(&places(&old), &old.join("data/another.json")), None, "the list does not fit everything");
+    assert_eq!(find_fate(&places(&old), &old.join("data/another.json")), None, "the list does not fit everything");
 
     let (archive, copy) = (directory.path().join("box.tar.gz"), directory.path().join("copy.db"));
     fine(&run(&["backup", "--config", text(&config), "--out", text(&archive), "--history", text(&copy)]));
-    let rows = |path: &Path| Reader::open(path).and_then(|it| it.span()).expect("readable");
+    let rows = |path: &Path| Reader::open(path).and_then(|it| it.read_span()).expect("readable");
     assert_eq!(rows(&copy), rows(&old.join("data/history.db")));
 
     let again = furnish(&new);

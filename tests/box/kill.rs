@@ -33,7 +33,7 @@ fn in_order(database: &Path) {
         return;
     }
     let reader = gateway::history::Reader::open(database).expect("opens");
-    assert_eq!(reader.check().expect("can be checked"), Vec::<String>::new());
+    assert_eq!(reader.check_integrity().expect("can be checked"), Vec::<String>::new());
 }
 
 fn random() -> rand_pcg::Pcg64Mcg {

@@ -85,7 +85,7 @@ fn moments(browser: &mut Browser, wanted: usize) -> Vec<(i64, Value)> {
 
 /// One moment against `history query`.
 fn compare(database: &str, at_ms: i64, shown: &Value) {
-    let utc = |ms: i64| gateway::moment::utc(ms * 1_000_000);
+    let utc = |ms: i64| gateway::moment::format_utc(ms * 1_000_000);
     let (from, to) = (utc(at_ms), utc(at_ms + 1));
     let names = format!("machine_state,{}", SHOWN.join(","));
     let arguments =

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// Roughly what the cuts of the simulated lathe take, W.
 fn law(conditions: &CutConditions) -> f64 {
-    let [wear, speed, feed, depth] = conditions.vector();
+    let [wear, speed, feed, depth] = conditions.to_vector();
     (980.0 * feed.powf(0.75) * (speed / 150.0).powf(-0.08) + 22.0 + 190.0 * wear) * depth * speed / 60.0
 }
 
@@ -20,7 +20,7 @@ fn record(criterion_mm: f64) -> WearRecord {
     for (index, wear) in [0.0, 0.2, 0.4, 0.6].into_iter().enumerate() {
         for speed in [120.0, 190.0, 260.0] {
             for (feed, depth) in [(0.09, 0.3), (0.16, 1.0), (0.26, 2.0), (0.26, 0.3), (0.09, 2.0)] {
-                let conditions = CutConditions::of([wear, speed, feed, depth]);
+                let conditions = CutConditions::from_vector([wear, speed, feed, depth]);
                 let scatter = if (cuts.len() + index).is_multiple_of(2) { 4.0 } else { -4.0 };
                 cuts.push(Cut { conditions, cutting_power_w: law(&conditions) + scatter });
             }
@@ -100,7 +100,7 @@ fn table() -> String {
             for feed in [0.09, 0.16, 0.26] {
                 for depth in [0.3, 1.0, 2.0] {
                     let scatter = f64::from(rows * 7 % 5 - 2) * 2.0;
-                    let power = law(&CutConditions::of([wear, speed, feed, depth])) + scatter;
+                    let power = law(&CutConditions::from_vector([wear, speed, feed, depth])) + scatter;
                     text.push_str(&format!("{rows},{wear},{speed},{feed},{depth},{power}\n"));
                     rows += 1;
                 }

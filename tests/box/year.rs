@@ -92,18 +92,18 @@ fn make(path: &Path) -> i64 {
     let step_ms: i64 = std::env::var("CNC_GATEWAY_YEAR_STEP_MS").ok().and_then(|it| it.parse().ok()).unwrap_or(6000);
     let (began, from_ns) = (Instant::now(), now_ns - 365 * DAY_NS);
     let writer = Writer::open(path, Options { when_full: WhenFull::Wait, ..Options::default() }).expect("opens");
-    let ids = CHANNELS.map(|name| ChannelId::of(name).expect(name));
-    let (mut sample, mut at_ns, mut word, mut rows, mut part_ns) = (Sample::empty(0), from_ns, "", 0_u64, from_ns);
+    let ids = CHANNELS.map(|name| ChannelId::from_name(name).expect(name));
+    let (mut sample, mut at_ns, mut word, mut rows, mut part_ns) = (Sample::new_empty(0), from_ns, "", 0_u64, from_ns);
     while at_ns < now_ns - 2 * SECOND_NS {
         sample.at_ns = at_ns;
         for (index, id) in ids.iter().enumerate() {
-            sample.set(*id, Slot { value: Ok(Value::Number(value(at_ns, index))), age_ns: 0 });
+            sample.set_slot(*id, Slot { value: Ok(Value::Number(value(at_ns, index))), age_ns: 0 });
         }
-        writer.sample(&sample, &[]);
+        writer.queue_sample(&sample, &[]);
         let now = state(at_ns / SECOND_NS);
         if now != word {
             if word == "cutting" {
-                writer.record(Part {
+                writer.queue_record(Part {
                     began_ns: part_ns,
                     ended_ns: at_ns,
                     count: 1,
@@ -114,7 +114,7 @@ fn make(path: &Path) -> i64 {
                 part_ns = at_ns;
             }
             word = now;
-            writer.record(StateChange {
+            writer.queue_record(StateChange {
                 at_ns,
                 state: now.to_owned(),
                 program: "O1".to_owned(),
@@ -146,7 +146,7 @@ fn ranges(address: &str, now_ns: i64) {
         let resolution = LADDER.iter().find(|(most, _)| span_s <= *most).map_or(86_400, |(_, step)| *step);
         let latest_s = (now_ns / SECOND_NS) as f64;
         let to_s = latest_s - uniform(turn, 2) * (365.0 * 86_400.0 - span_s).max(0.0);
-        let utc = |s: f64| gateway::moment::utc((s * 1e9) as i64);
+        let utc = |s: f64| gateway::moment::format_utc((s * 1e9) as i64);
         let path = format!(
             "/api/v1/samples?from={}&to={}&channels={SHOWN}&resolution_s={resolution}",
             utc(to_s - span_s),
@@ -242,7 +242,7 @@ fn a_year_is_drawn_at_once() {
     ranges(&address, now_ns);
     if browser::is_there() {
         let mut browser = Browser::start(directory.path());
-        let utc = |back_ns: i64| gateway::moment::utc(now_ns - back_ns);
+        let utc = |back_ns: i64| gateway::moment::format_utc(now_ns - back_ns);
         first_plot(&mut browser, &address, &utc(365 * DAY_NS), &utc(0), "a year, cold");
         first_plot(&mut browser, &address, &utc(365 * DAY_NS), &utc(0), "a year, again");
         first_plot(&mut browser, &address, &utc(7 * DAY_NS), &utc(0), "a week");

@@ -63,7 +63,7 @@ impl Machine {
             while !stop.load(Ordering::SeqCst) {
                 let held = server.lock().expect("whole");
                 let pct = held.as_ref().and_then(|server| {
-                    server.with(|control| control.map(|control| 255 - control.memory.byte(Area::G, 12)))
+                    server.with(|control| control.map(|control| 255 - control.memory.read_byte(Area::G, 12)))
                 });
                 drop(held);
                 scanned |= pct.is_some_and(|pct| BAND.contains(&pct));

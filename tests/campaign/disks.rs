@@ -56,9 +56,9 @@ impl Running {
         let database = self.database.clone();
         self.gateway.stop();
         let reader = Reader::open(&database).expect("a history");
-        let findings = reader.check().unwrap_or_else(|error| vec![error.to_string()]);
+        let findings = reader.check_integrity().unwrap_or_else(|error| vec![error.to_string()]);
         row.must(findings.is_empty(), format!("{findings:?}"));
-        row.must(reader.info().is_ok_and(|info| info.samples > 0), "nothing in the new file");
+        row.must(reader.read_info().is_ok_and(|info| info.samples > 0), "nothing in the new file");
         row.n += 1;
     }
 }
@@ -217,14 +217,14 @@ pub(crate) fn full(scale: &Scale) -> Row {
     gateway.signal("KILL");
     gateway.wait();
     let reader = Reader::open(&copy.path().join("history.db")).expect("a history");
-    let findings = reader.check().unwrap_or_else(|error| vec![error.to_string()]);
+    let findings = reader.check_integrity().unwrap_or_else(|error| vec![error.to_string()]);
     row.must(findings.is_empty(), format!("{findings:?}"));
     let removed = queried(
         &copy.path().join("history.db"),
         "SELECT coalesce(sum(rows), 0) AS n FROM dropped WHERE kind = 'raw samples'",
     );
     let removed = removed[0]["n"].as_u64().unwrap_or(0);
-    let there = reader.info().map_or(0, |info| info.samples.unsigned_abs());
+    let there = reader.read_info().map_or(0, |info| info.samples.unsigned_abs());
     let lost = acknowledged.saturating_sub(there + removed);
     row.must(lost == 0, format!("{lost} acknowledged rows are gone and not accounted for"));
     row.lost = Some(lost);
@@ -269,7 +269,7 @@ pub(crate) fn fsync_fails(scale: &Scale) -> Row {
         row.must(!gateway.has_ended(), "the box ended");
         gateway.kill();
         let there = Reader::open(&data.join("history.db"))
-            .and_then(|reader| reader.info())
+            .and_then(|reader| reader.read_info())
             .map_or(0, |info| info.samples.unsigned_abs());
         lost += acknowledged.saturating_sub(there);
         row.n += 1;

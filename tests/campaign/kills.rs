@@ -30,11 +30,11 @@ pub(crate) fn queried(database: &Path, sql: &str) -> Value {
 /// Samples in the file, and everything that is wrong with it.
 fn checked(database: &Path, row: &mut Row) -> u64 {
     let Ok(reader) = Reader::open(database) else { return 0 };
-    let findings = reader.check().unwrap_or_else(|error| vec![error.to_string()]);
+    let findings = reader.check_integrity().unwrap_or_else(|error| vec![error.to_string()]);
     row.must(findings.is_empty(), format!("{findings:?}"));
     let audit = reader.verify_audit().map(|check| check.broken);
     row.must(matches!(audit, Ok(None)), format!("{audit:?}"));
-    reader.info().map_or(0, |info| info.samples.unsigned_abs())
+    reader.read_info().map_or(0, |info| info.samples.unsigned_abs())
 }
 
 fn kill_often(mut row: Row, count: usize, start: impl Fn(&Path) -> Gateway) -> Row {

@@ -38,17 +38,17 @@ struct DiskState {
 fn written(directory: &Path, parts: i64, rows_per_part: i64) -> Vec<DiskState> {
     let path = directory.join("h.db");
     let writer = Writer::open(&path, options()).expect("opens");
-    let power = ChannelId::of("spindle_power_w").expect("in the table");
+    let power = ChannelId::from_name("spindle_power_w").expect("in the table");
     let read = |end: &str| fs::read(format!("{}{end}", path.display())).unwrap_or_default();
     let mut states = Vec::new();
     for part in 0..parts {
         for row in part * rows_per_part..(part + 1) * rows_per_part {
-            let mut sample = Sample::empty(START_NS + row * TICK_NS);
-            sample.set(power, Slot { value: Ok(Value::Number(value(row))), age_ns: 0 });
-            writer.sample(&sample, &[]);
+            let mut sample = Sample::new_empty(START_NS + row * TICK_NS);
+            sample.set_slot(power, Slot { value: Ok(Value::Number(value(row))), age_ns: 0 });
+            writer.queue_sample(&sample, &[]);
         }
         let at_ns = START_NS + ((part + 1) * rows_per_part - 1) * TICK_NS;
-        writer.record(Event { at_ns, kind: "mark".into(), text: format!("{part}"), ..Event::default() });
+        writer.queue_record(Event { at_ns, kind: "mark".into(), text: format!("{part}"), ..Event::default() });
         writer.flush().expect("durable");
         states.push(DiskState { rows: (part + 1) * rows_per_part, file: read(""), log: read("-wal") });
     }
@@ -66,22 +66,22 @@ fn opened(directory: &Path, file: &[u8], log: &[u8], rows_per_part: i64) -> Resu
     let found = (|| {
         drop(Writer::open(&path, options()).map_err(|error| error.to_string())?);
         let reader = Reader::open(&path).map_err(|error| error.to_string())?;
-        let findings = reader.check().map_err(|error| error.to_string())?;
+        let findings = reader.check_integrity().map_err(|error| error.to_string())?;
         if !findings.is_empty() {
             return Err(format!("{findings:?}"));
         }
         let (mut rows, mut wrong) = (0, 0);
-        let walked = reader.samples(&Query::default().of(["spindle_power_w"]), |chunk| {
+        let walked = reader.for_each_chunk(&Query::default().with_series(["spindle_power_w"]), |chunk| {
             for row in 0..chunk.at_ns.len() {
-                let right =
-                    chunk.at_ns[row] == START_NS + rows * TICK_NS && chunk.columns[0].number(row) == Some(value(rows));
+                let right = chunk.at_ns[row] == START_NS + rows * TICK_NS
+                    && chunk.columns[0].number_at(row) == Some(value(rows));
                 wrong += u64::from(!right);
                 rows += 1;
             }
             ControlFlow::Continue(())
         });
         walked.map_err(|error| error.to_string())?;
-        let events = reader.events(RecordSpan::newest(100_000)).map_err(|error| error.to_string())?;
+        let events = reader.read_events(RecordSpan::newest(100_000)).map_err(|error| error.to_string())?;
         let marks = events.iter().filter(|event| event.kind == "mark").count() as i64;
         wrong += marks.abs_diff(rows / rows_per_part);
         Ok((rows, wrong))

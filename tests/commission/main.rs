@@ -254,7 +254,7 @@ fn newest_ns(person: &Person<'_>) -> TimeNs {
 fn true_wear_mm(machine: &str, seconds: f64) -> f64 {
     let address: Address = format!("simulated://{machine}{WORKING}").parse().expect("an address");
     let Target::Simulated(target) = address.target() else { panic!("a simulated machine") };
-    let machine = Simulated::new("simulated://lathe", SimulatedSettings::of(target), 0);
+    let machine = Simulated::new("simulated://lathe", SimulatedSettings::from_target(target), 0);
     machine.truth((seconds * SECOND_NS as f64) as i64).flank_wear_mm
 }
 

@@ -48,7 +48,7 @@ impl Bed {
     pub(crate) fn sample(&mut self, now: Now) -> Sample {
         self.at_ns += SECOND_NS / 10;
         self.tick += 1;
-        let mut sample = Sample::empty(self.at_ns);
+        let mut sample = Sample::new_empty(self.at_ns);
         let channels = [
             ("total_power_w", now.total_w),
             ("spindle_power_w", now.power_w.map(|power| power * (1.0 + self.noise()))),
@@ -59,7 +59,7 @@ impl Bed {
         ];
         for (name, value) in channels.into_iter().filter(|(name, _)| !self.lacks.contains(name)) {
             let slot = Slot { value: value.map(Value::Number).ok_or(self.reason), age_ns: 0 };
-            sample.set(ChannelId::of(name).expect("in the table"), slot);
+            sample.set_slot(ChannelId::from_name(name).expect("in the table"), slot);
         }
         sample
     }
@@ -71,13 +71,13 @@ impl Bed {
 
     pub(crate) fn tick(&mut self, now: Now) -> Estimates {
         let sample = self.sample(now);
-        *self.pipeline.infer(&sample)
+        *self.pipeline.update_with_sample(&sample)
     }
 
     /// Holds the inputs and returns the states that follow each other, and the last estimates.
     pub(crate) fn hold(&mut self, now: Now, seconds: f64) -> (Vec<State>, Estimates) {
         let mut states: Vec<State> = Vec::new();
-        let mut last = Estimates::none(0);
+        let mut last = Estimates::without_samples(0);
         for _ in 0..(seconds * 10.0).round() as usize {
             last = self.tick(now);
             if states.last() != Some(&last.state) {

@@ -5,7 +5,8 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Exp1, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use rules::estimators::{
-    AntiPulse, NoEstimate, NoLoadOrigin, NoLoadTable, Settings, balance, lagrange, noise_gain, stationary, triple,
+    AntiPulse, NoEstimate, NoLoadOrigin, NoLoadTable, Settings, is_stationary, lagrange_weights, noise_gain,
+    select_adjacent_speeds, solve_power_balance,
 };
 
 const SPEEDS: [f64; 7] = [100.0, 200.0, 300.0, 500.0, 600.0, 700.0, 900.0];
@@ -13,13 +14,13 @@ const SPEEDS: [f64; 7] = [100.0, 200.0, 300.0, 500.0, 600.0, 700.0, 900.0];
 #[test]
 fn lagrange_weights_and_their_noise_gain_are_those_of_the_table() {
     for (speed, expected_speeds, expected, gain) in WEIGHTS {
-        let first = triple(&SPEEDS, speed);
+        let first = select_adjacent_speeds(&SPEEDS, speed);
         let speeds = [SPEEDS[first], SPEEDS[first + 1], SPEEDS[first + 2]];
         // At a known speed every triple that holds it gives the same.
         if !SPEEDS.contains(&speed) {
             assert_eq!(speeds, expected_speeds, "{speed} rpm");
         }
-        let weights = lagrange(expected_speeds, speed);
+        let weights = lagrange_weights(expected_speeds, speed);
         assert!(weights.iter().zip(expected).all(|(is, should)| (is - should).abs() < 1e-6), "{speed}: {weights:?}");
         assert!((noise_gain(&weights) - gain).abs() < 1e-4, "{speed} rpm");
     }
@@ -37,23 +38,23 @@ fn machine() -> (NoLoadTable, Settings) {
 #[test]
 fn no_load_power_between_the_known_speeds_is_the_published_one() {
     let (table, settings) = machine();
-    let known = table.at(0, 800.0, 0, &settings).expect("known");
+    let known = table.estimate_power(0, 800.0, 0, &settings).expect("known");
     assert!((known.power_w - 500.0).abs() < 1e-9, "{known:?}");
     assert!((known.noise_gain - 1.106).abs() < 1e-3);
     assert_eq!(known.origin, NoLoadOrigin::Interpolated);
     assert!((known.power_w / 505.0 - 1.0).abs() < 0.01, "measured: 505 W");
-    assert_eq!(table.at(0, -800.0, 0, &settings), Ok(known), "either direction");
-    assert_eq!(table.at(1, 800.0, 0, &settings), Err(NoEstimate::NotLearned), "never across a gear stage");
+    assert_eq!(table.estimate_power(0, -800.0, 0, &settings), Ok(known), "either direction");
+    assert_eq!(table.estimate_power(1, 800.0, 0, &settings), Err(NoEstimate::NotLearned), "never across a gear stage");
 }
 
 #[test]
 fn extrapolation_is_flagged_up_to_a_noise_gain_of_three_and_refused_beyond() {
     let (table, settings) = machine();
-    let known = table.at(0, 1000.0, 0, &settings).expect("flagged");
+    let known = table.estimate_power(0, 1000.0, 0, &settings).expect("flagged");
     assert_eq!(known.origin, NoLoadOrigin::Extrapolated);
     assert!((known.noise_gain - 3.0).abs() < 1e-9 && known.sd_w > 3.0 * 0.03 * 300.0);
     for (speed, gain) in [(1200.0, 11.4455), (1500.0, 33.6006)] {
-        match table.at(0, speed, 0, &settings) {
+        match table.estimate_power(0, speed, 0, &settings) {
             Err(NoEstimate::Extrapolated { noise_gain }) => assert!((noise_gain - gain).abs() < 1e-3),
             other => panic!("{other:?}"),
         }
@@ -66,14 +67,14 @@ fn a_slope_break_errs_by_three_percent_and_says_so() {
     // Slope 0.5 W/rpm up to 700 rpm, 0.1 W/rpm beyond: the truth at 800 rpm is 420 W.
     let table = [(500.0, 310.0), (600.0, 360.0), (700.0, 410.0), (900.0, 430.0)];
     settings.set_no_load_table(0, &table).expect("a table");
-    let known = NoLoadTable::new(&settings).at(0, 800.0, 0, &settings).expect("known");
+    let known = NoLoadTable::new(&settings).estimate_power(0, 800.0, 0, &settings).expect("known");
     assert!((known.power_w - 433.3).abs() < 0.1, "{known:?}");
     assert!((known.power_w - 420.0).abs() < 2.0 * known.sd_w);
 }
 
 #[test]
 fn the_published_cut_has_the_published_shares() {
-    let split = balance(1460.0 - 500.0, 0.1807, 4e-5).expect("a real root");
+    let split = solve_power_balance(1460.0 - 500.0, 0.1807, 4e-5).expect("a real root");
     let share = |power: f64| (1000.0 * power / 1460.0).round() / 10.0;
     assert_eq!((share(500.0), share(795.0), share(165.0)), (34.2, 54.5, 11.3));
     assert!((split.cutting_power_w - 791.84).abs() < 0.01 && (split.load_loss_w - 168.16).abs() < 0.01);
@@ -81,7 +82,7 @@ fn the_published_cut_has_the_published_shares() {
 
 #[test]
 fn the_least_visible_cut_of_the_source_is_21_to_42_watts() {
-    let least = |c2: f64| balance(c2 * 500.0, 0.18, 0.0).expect("a real root").cutting_power_w;
+    let least = |c2: f64| solve_power_balance(c2 * 500.0, 0.18, 0.0).expect("a real root").cutting_power_w;
     assert_eq!((least(0.05).round(), least(0.10).round()), (21.0, 42.0));
 }
 
@@ -108,8 +109,8 @@ fn the_anti_pulse_mean_of_noise_is_as_computed() {
 
 fn reading(reading: f64, c1: f64) -> Settings {
     let mut settings = Settings::default();
-    settings.set("stationarity_reading", reading).expect("in range");
-    settings.set("c1", c1).expect("in range");
+    settings.set_value("stationarity_reading", reading).expect("in range");
+    settings.set_value("c1", c1).expect("in range");
     settings
 }
 
@@ -122,7 +123,7 @@ fn bias(tau_s: f64, settings: &Settings) -> f64 {
         .find_map(|end| {
             let window = (end - 20..end).map(power);
             let mean = window.clone().sum::<f64>() / 20.0;
-            stationary(window, mean, settings).then_some(mean / 500.0 - 1.0)
+            is_stationary(window, mean, settings).then_some(mean / 500.0 - 1.0)
         })
         .expect("it passes some time")
 }
@@ -148,7 +149,7 @@ fn noise_passes_one_window_up_to_the_computed_levels() {
                 let normal = |_| -> f64 { StandardNormal.sample(&mut dice) };
                 let window: Vec<f64> = (0..20).map(normal).map(|noise| 500.0 * (1.0 + sd * noise)).collect();
                 let mean = window.iter().sum::<f64>() / 20.0;
-                stationary(window.into_iter(), mean, &settings)
+                is_stationary(window.into_iter(), mean, &settings)
             })
             .count();
         let share = passed as f64 / 4000.0;
@@ -161,6 +162,6 @@ fn a_light_cut_that_begins_inside_the_window_is_absorbed_by_one_window() {
     let window = || (0..20).map(|i| if i < 10 { 500.0 } else { 600.0 });
     let mean = window().sum::<f64>() / 20.0;
     assert!((100.0_f64 / mean - 0.18).abs() < 0.005, "a step of 0.20 is a range of 0.18");
-    assert!(stationary(window(), mean, &reading(1.0, 0.25)));
+    assert!(is_stationary(window(), mean, &reading(1.0, 0.25)));
     assert!((mean / 500.0 - 1.1).abs() < 1e-12, "bias: half the step");
 }

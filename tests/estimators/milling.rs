@@ -22,11 +22,11 @@ fn replay(recording: &Recording) -> Vec<Estimates> {
     let mut merge =
         Lockstep::new(vec![Box::new(Replay::new("milling", recording, 0))], Delay::Fixed(Default::default()));
     let mut pipeline = Inference::new(Settings::default());
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     let mut estimates = Vec::new();
     while let Some(now_ns) = merge.next_ns() {
         merge.sample_into(&mut sample, now_ns);
-        estimates.push(*pipeline.infer(&sample));
+        estimates.push(*pipeline.update_with_sample(&sample));
     }
     estimates
 }
@@ -38,12 +38,12 @@ fn milling_every_edge_of_the_spindle_and_cutting_below_visibility() {
         return;
     };
     let estimates = replay(&recording);
-    assert_eq!(estimates.len(), recording.rows());
-    let speeds = recording.numbers("spindle_speed_rpm").expect("recorded");
+    assert_eq!(estimates.len(), recording.count_rows());
+    let speeds = recording.find_numbers("spindle_speed_rpm").expect("recorded");
     let turns: Vec<bool> = speeds.iter().map(|speed| speed.expect("complete").abs() >= 10.0).collect();
     let said: Vec<Option<bool>> = estimates.iter().map(|it| it.state.spindle_on().or(it.spindle_turns)).collect();
     let (mut edges, mut right) = (0, 0);
-    for run in recording.runs() {
+    for run in recording.list_runs() {
         for row in run.rows.start + 1..run.rows.end {
             if turns[row] != turns[row - 1] {
                 edges += 1;
@@ -55,23 +55,23 @@ fn milling_every_edge_of_the_spindle_and_cutting_below_visibility() {
     print_states(&recording, &estimates);
     let mut tally = VisibilityTally::default();
     estimates.iter().for_each(|it| tally.add(it));
-    println!("{tally:?}\n{}", tally.verdict());
+    println!("{tally:?}\n{}", tally.judge_visibility());
     let cutting = estimates.iter().filter(|it| it.state == State::Cutting).count();
     println!("rows called cutting: {cutting} of {}", estimates.len());
     assert_eq!((right, edges > 300), (edges, true));
-    assert!(matches!(tally.verdict(), VisibilityVerdict::BelowVisibility { .. }));
+    assert!(matches!(tally.judge_visibility(), VisibilityVerdict::BelowVisibility { .. }));
     assert!(cutting as f64 <= 0.002 * estimates.len() as f64);
 }
 
 /// Rows by the machine's own label and our state.
 fn print_states(recording: &Recording, estimates: &[Estimates]) {
-    let labels = recording.words("motion").expect("recorded");
+    let labels = recording.find_words("motion").expect("recorded");
     let mut counts: BTreeMap<&str, [usize; 8]> = BTreeMap::new();
     for (row, it) in estimates.iter().enumerate() {
-        counts.entry(labels.get(row).unwrap_or("")).or_default()[usize::from(it.state.code())] += 1;
+        counts.entry(labels.get(row).unwrap_or("")).or_default()[usize::from(it.state.to_code())] += 1;
     }
     print!("{:<14}", "motion");
-    State::ALL.iter().for_each(|state| print!(" {:>13}", state.word()));
+    State::ALL.iter().for_each(|state| print!(" {:>13}", state.as_word()));
     println!();
     for (label, row) in counts {
         print!("{label:<14}");

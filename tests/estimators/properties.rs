@@ -36,7 +36,7 @@ fn now() -> impl Strategy<Value = (Now, usize, f64)> {
 }
 
 fn check(estimates: &Estimates) -> Result<(), TestCaseError> {
-    for (name, estimated) in estimates.quantities() {
+    for (name, estimated) in estimates.list_quantities() {
         if let Ok(estimate) = estimated {
             prop_assert!(estimate.value.is_finite() && estimate.sd.is_finite(), "{name}: {estimate:?}");
             prop_assert!(estimate.sd >= 0.0, "{name}: {estimate:?}");
@@ -58,7 +58,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                 ("load_loss_linear", linear),
                 ("load_loss_quadratic_per_w", quadratic),
             ];
-            values.into_iter().for_each(|(name, value)| settings.set(name, value).expect("in range"));
+            values.into_iter().for_each(|(name, value)| settings.set_value(name, value).expect("in range"));
             settings
         },
     )
@@ -82,18 +82,18 @@ proptest! {
                 check(&bed.tick(now))?;
             }
         }
-        let text = bed.pipeline.snapshot().to_string();
+        let text = bed.pipeline.take_snapshot().to_string();
         let value = serde_json::from_str(&text).expect("a snapshot is JSON");
-        let mut restored = Inference::restore(settings, value).expect("its own snapshot");
+        let mut restored = Inference::from_snapshot(settings, value).expect("its own snapshot");
         for (now, ticks, pause_s) in after {
             bed.pause(pause_s);
             for _ in 0..ticks {
                 let sample = bed.sample(now);
-                let expected = *bed.pipeline.infer(&sample);
+                let expected = *bed.pipeline.update_with_sample(&sample);
                 check(&expected)?;
-                prop_assert_eq!(*restored.infer(&sample), expected);
+                prop_assert_eq!(*restored.update_with_sample(&sample), expected);
             }
         }
-        prop_assert_eq!(restored.snapshot(), bed.pipeline.snapshot());
+        prop_assert_eq!(restored.take_snapshot(), bed.pipeline.take_snapshot());
     }
 }

@@ -39,20 +39,20 @@ fn run_seeing(scenario: &Scenario, seed: u64, voltage: bool) -> (Vec<Judged>, Ve
     let sources = sources(&course, Disturbance::default(), scenario.dropouts, seed);
     let mut merge = Lockstep::new(sources, Delay::default());
     let (mut product, mut plain) = (Inference::new(Settings::default()), PlainReading::new());
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
-    let inputs = ["spindle_speed_rpm", "spindle_power_w"].map(|name| ChannelId::of(name).expect("in the table"));
-    let supply = ChannelId::of("supply_voltage_v").expect("in the table");
+    let inputs = ["spindle_speed_rpm", "spindle_power_w"].map(|name| ChannelId::from_name(name).expect("in the table"));
+    let supply = ChannelId::from_name("supply_voltage_v").expect("in the table");
     let mut now_ns = SECOND_NS;
     while merge.sample_into(&mut sample, now_ns) {
         now_ns += SECOND_NS / 10;
         if !voltage {
-            sample.set(supply, Slot { value: Err(Absence::NotProvided), age_ns: 0 });
+            sample.set_slot(supply, Slot { value: Err(Absence::NotProvided), age_ns: 0 });
         }
         let time_s = sample.at_ns as f64 / SECOND_NS as f64;
         let Some(moment) = course.at(time_s) else { break };
         let missing = inputs.iter().any(|channel| sample.number(*channel).is_err());
-        let estimates = *product.infer(&sample);
+        let estimates = *product.update_with_sample(&sample);
         plain.step(&sample);
         let judged = |said, said_no_load_w| Judged {
             time_s,

@@ -45,15 +45,15 @@ fn run(settings: SimulatedSettings, course_s: i64) -> (Vec<Judged>, Vec<Judged>)
 fn course(machine: &Simulated, sources: Vec<Box<dyn adapters::Pull>>, course_s: i64) -> (Vec<Judged>, Vec<Judged>) {
     let mut merge = Lockstep::new(sources, Delay::default());
     let (mut product, mut plain) = (Inference::new(Settings::default()), PlainReading::new());
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
-    let inputs = ["spindle_speed_rpm", "spindle_power_w"].map(|name| ChannelId::of(name).expect("in the table"));
+    let inputs = ["spindle_speed_rpm", "spindle_power_w"].map(|name| ChannelId::from_name(name).expect("in the table"));
     for tick in 10..course_s * 10 {
         merge.sample_into(&mut sample, tick * SECOND_NS / 10);
         let truth = machine.truth(sample.at_ns);
-        let state = State::from_word(truth.state.word()).expect("the same words");
+        let state = State::from_word(truth.state.as_word()).expect("the same words");
         let absent = inputs.iter().any(|channel| sample.number(*channel).is_err());
-        let estimates = *product.infer(&sample);
+        let estimates = *product.update_with_sample(&sample);
         plain.step(&sample);
         let judged = |said, said_no_load_w| Judged {
             time_s: sample.at_ns as f64 / SECOND_NS as f64,

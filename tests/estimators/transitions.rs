@@ -88,13 +88,13 @@ fn after_a_restart_in_mid_cut_cutting_is_claimed_only_against_a_table() {
 fn a_restart_with_a_snapshot_goes_on_where_it_stopped() {
     let mut bed = Bed::warmed_up();
     bed.hold(cut(), 3.0);
-    let text = bed.pipeline.snapshot().to_string();
+    let text = bed.pipeline.take_snapshot().to_string();
     let value = serde_json::from_str(&text).expect("a snapshot is JSON");
-    bed.pipeline = Inference::restore(Settings::default(), value).expect("its own snapshot");
+    bed.pipeline = Inference::from_snapshot(Settings::default(), value).expect("its own snapshot");
     assert_eq!(bed.hold(cut(), 3.0).0, [State::Cutting]);
     bed.pause(600.0);
     assert_eq!(bed.hold(cut(), 5.0).0, [State::Unknown, State::Idle, State::Cutting]);
-    assert!(Inference::restore(Settings::default(), serde_json::json!({"version": 1})).is_err());
+    assert!(Inference::from_snapshot(Settings::default(), serde_json::json!({"version": 1})).is_err());
 }
 
 #[test]
@@ -141,8 +141,8 @@ fn feed_hold_leaves_cutting_after_the_debounce_and_a_blink_does_not() {
 fn a_reversing_spindle_with_feed_is_not_standing_still() {
     let mut bed = Bed::warmed_up();
     let mut settings = Settings::default();
-    settings.set("reversal_s", 1.0).expect("in range");
-    bed.pipeline.reconfigure(settings);
+    settings.set_value("reversal_s", 1.0).expect("in range");
+    bed.pipeline.apply_settings(settings);
     bed.hold(cut(), 2.0);
     let mut states = Vec::new();
     for k in -8..=8 {

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 struct Counting(Controller, Instant);
 
 impl ServedControl for Counting {
-    fn now(&mut self) -> Option<&mut Controller> {
+    fn update_controller(&mut self) -> Option<&mut Controller> {
         self.0.sequence = self.1.elapsed().as_millis() as i32;
         Some(&mut self.0)
     }
@@ -56,7 +56,7 @@ impl Stand {
     fn new(sources: Vec<Box<dyn Source>>, began: Instant) -> Self {
         let clock = Arc::new(SystemClock::new());
         let began_ns = clock.now_ns() - began.elapsed().as_nanos() as i64;
-        let plans: Vec<SourcePlan> = sources.iter().map(|source| SourcePlan::of(source.as_ref())).collect();
+        let plans: Vec<SourcePlan> = sources.iter().map(|source| SourcePlan::from_source(source.as_ref())).collect();
         let merge = Merge::new(&plans, Delay::SlowestPeriod);
         let start = |source| Worker::start(source, clock.clone(), WorkerSettings::default()).expect("a thread");
         let workers = sources.into_iter().map(start).collect();
@@ -65,8 +65,8 @@ impl Stand {
 
     /// Looks until `done` says so; `truth` is the count that a delivered value stands for.
     fn look(&mut self, mut done: impl FnMut(&Seen, f64, bool) -> bool) -> Seen {
-        let block = ChannelId::of("block").expect("in the table");
-        let (mut seen, mut sample, from) = (Seen::default(), Sample::empty(0), self.began.elapsed());
+        let block = ChannelId::from_name("block").expect("in the table");
+        let (mut seen, mut sample, from) = (Seen::default(), Sample::new_empty(0), self.began.elapsed());
         loop {
             std::thread::sleep(TICK);
             for (index, worker) in self.workers.iter().enumerate() {
@@ -116,9 +116,9 @@ fn row(what: &str, fault: InjectedFault, seconds: f64, keys: &str) -> Seen {
     let server = Server::start(listener, Box::new(control), ServerSettings::default()).expect("threads");
     let mut stand = Stand::new(opened(&server, keys).sources, began);
     stand.settle();
-    server.fault(fault);
+    server.inject_fault(fault);
     let during = stand.look(|_, after_s, _| after_s >= seconds);
-    server.fault(InjectedFault::None);
+    server.inject_fault(InjectedFault::None);
     // What still waits in the control may be late; only a value from after the fault says that it is over.
     let over_ms = stand.began.elapsed().as_secs_f64() * 1e3;
     let after = stand.look(|seen, after_s, kept| assert_in_time(after_s, 40.0) && kept && seen.last_ms > over_ms);

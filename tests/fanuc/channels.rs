@@ -9,7 +9,7 @@ use crate::support::{number, poll, serve, text, value};
 use crate::vendor::opened_in;
 use adapters::address::Target;
 use adapters::clock::{Clock, SystemClock};
-use adapters::fanuc::open::{OpenedFanuc, native};
+use adapters::fanuc::open::{OpenedFanuc, open_native};
 use adapters::fanuc::server::{Controller, Data, Server, ServerSettings, SpindleState};
 use adapters::fanuc::wire::Number;
 use adapters::{Absence, Address, Reading};
@@ -20,20 +20,20 @@ fn turning_centre(version: u16) -> Controller {
     let names = ["X1", "Z1", "Y1", "C1", "A", "B", "W", "V"];
     let mut control = machine(version).with_axes(&names).with_path(&["X2", "Z2"]);
     for (place, axis) in (1..).zip(&mut control.axes) {
-        axis.positions = [10, 20, 30, 40].map(|which| Number::decimal(1000 * place + which, 3));
-        (axis.load, axis.current) = (Number::decimal(place, 0), Number::decimal(10 * place, 1));
+        axis.positions = [10, 20, 30, 40].map(|which| Number::from_decimal(1000 * place + which, 3));
+        (axis.load, axis.current) = (Number::from_decimal(place, 0), Number::from_decimal(10 * place, 1));
     }
-    let each = |from: i32| (0..8).map(|place| Number::decimal(from + place, 0)).collect::<Vec<_>>();
+    let each = |from: i32| (0..8).map(|place| Number::from_decimal(from + place, 0)).collect::<Vec<_>>();
     control.diagnosis_of_axes(308, 2, each(41));
     control.diagnosis_of_axes(309, 2, each(31));
     // C1, A and B turn.
-    let rotary = (0..8).map(|place| Number::decimal(i32::from((3..6).contains(&place)), 0)).collect();
+    let rotary = (0..8).map(|place| Number::from_decimal(i32::from((3..6).contains(&place)), 0)).collect();
     control.parameters.insert(1006, Data { kind: 0, values: rotary });
-    let second = [15, 4000, 1, 3000, 45, 3001].map(|value| Number::decimal(value, 0));
+    let second = [15, 4000, 1, 3000, 45, 3001].map(|value| Number::from_decimal(value, 0));
     control.spindles.push(SpindleState { quantities: second });
     control.opening.spindles = 2;
-    control.further[0].axes[1].positions[1] = Number::decimal(-77_000, 3);
-    control.further[0].parameters.insert(1006, Data { kind: 0, values: vec![Number::decimal(0, 0); 2] });
+    control.further[0].axes[1].positions[1] = Number::from_decimal(-77_000, 3);
+    control.further[0].parameters.insert(1006, Data { kind: 0, values: vec![Number::from_decimal(0, 0); 2] });
     control
 }
 
@@ -94,7 +94,7 @@ const KEYS: &str = "paths=1,2&axes=X1,Z1,Y1,C1,A,B,W,V,Z2@2&positions=absolute,r
 fn opened(server: &Server) -> OpenedFanuc {
     let address: Address = format!("fanuc://{}?{KEYS}", server.address()).parse().expect("usable");
     let Target::Fanuc { at, path, options, .. } = address.target() else { panic!("{address}") };
-    native(address.text(), at, *path, options)
+    open_native(address.text(), at, *path, options)
 }
 
 fn everything(opened: &mut OpenedFanuc) -> Vec<Reading> {
@@ -156,7 +156,7 @@ fn eight_axes_two_spindles_and_two_paths_by_their_names() {
 fn an_axis_of_the_other_kind_has_no_position() {
     let server = serve(turning_centre(4), ServerSettings::default());
     let address: Address = format!("fanuc://{}?axes=B:mm", server.address()).parse().expect("usable");
-    let mut opened = adapters::open::open(&address, SystemClock::new().now_ns()).expect("opens");
+    let mut opened = adapters::open::open_address(&address, SystemClock::new().now_ns()).expect("opens");
     let readings = poll(opened.sources[0].as_mut()).expect("answers");
     assert_eq!(value(&readings, "b_axis_position_mm"), Err(Absence::NotSupported), "B turns");
     assert_eq!(number(&readings, "b_axis_load_pct"), 6.0);

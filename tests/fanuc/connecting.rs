@@ -20,7 +20,7 @@ fn refusals_at_connecting_leave_no_wrong_value_and_nothing_behind() {
             for code in CODES {
                 let mut control = controller(version);
                 control.measure_in_inches(true);
-                control.axes[0].positions[1] = Number::decimal(20_000, 4);
+                control.axes[0].positions[1] = Number::from_decimal(20_000, 4);
                 control.refusals.insert(function, (code, 0));
                 let server = serve(control, ServerSettings::default());
                 let mut opened = opened(&server, "duty_pct=100");
@@ -43,7 +43,7 @@ fn refusals_at_connecting_leave_no_wrong_value_and_nothing_behind() {
                 assert_eq!(number(&readings, "spindle_programmed_rpm"), 1200.0, "{what}: one period after");
                 assert_eq!((number(&readings, "feed_mm_min"), number(&readings, "drive_on")), (240.0, 1.0), "{what}");
                 assert_eq!(text(&readings, "program"), "O1001", "{what}");
-                assert_eq!(server.opened(), 1, "{what}: on one connection");
+                assert_eq!(server.count_opened(), 1, "{what}: on one connection");
                 cases += 1;
             }
         }
@@ -58,13 +58,13 @@ fn answers_that_end_early_are_no_machine_that_is_off() {
     let source = opened.sources[0].as_mut();
     poll(source).expect("well");
     for fault in [InjectedFault::Truncated, InjectedFault::Reset] {
-        server.fault(fault);
+        server.inject_fault(fault);
         for _ in 0..3 {
             let error = poll(source).expect_err("nothing whole comes");
-            assert_ne!(error.absence(), Absence::MachineOff, "{fault:?}: {error}");
+            assert_ne!(error.to_absence(), Absence::MachineOff, "{fault:?}: {error}");
             assert!(error.to_string().contains("bytes"), "{fault:?}: {error}");
         }
     }
-    server.fault(InjectedFault::None);
+    server.inject_fault(InjectedFault::None);
     poll(source).expect("well again");
 }

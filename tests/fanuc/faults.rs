@@ -23,9 +23,9 @@ fn kind(result: &Result<Vec<adapters::Reading>, SourceError>) -> &'static str {
 
 fn after(fault: InjectedFault, source: &mut dyn Source, server: &adapters::fanuc::server::Server) -> &'static str {
     poll(source).expect("well before the fault");
-    server.fault(fault);
+    server.inject_fault(fault);
     let found = kind(&poll(source));
-    server.fault(InjectedFault::None);
+    server.inject_fault(InjectedFault::None);
     assert_eq!(number(&poll(source).expect("well after the fault"), "spindle_speed_rpm"), 1200.0, "{fault:?}");
     found
 }
@@ -51,7 +51,7 @@ fn every_fault_has_its_name_and_the_next_poll_is_well() {
     for (fault, name) in expected {
         assert_eq!(after(fault, source, &server), name, "{fault:?}");
     }
-    wait_for(|| server.sessions() == 1, "every given-up connection was closed");
+    wait_for(|| server.count_sessions() == 1, "every given-up connection was closed");
 }
 
 #[test]
@@ -80,12 +80,12 @@ fn a_machine_that_is_switched_off_is_off_and_comes_back() {
     let mut opened = opened(&server, "timeout_ms=500");
     let source = opened.sources[0].as_mut();
     poll(source).expect("on");
-    server.fault(InjectedFault::PowerOff);
+    server.inject_fault(InjectedFault::PowerOff);
     assert_eq!(kind(&poll(source)), "line", "the moment of power-off is a broken line");
     for _ in 0..5 {
         assert_eq!(kind(&poll(source)), "off");
     }
-    server.fault(InjectedFault::None);
+    server.inject_fault(InjectedFault::None);
     assert_eq!(kind(&poll(source)), "answered");
 }
 
@@ -118,13 +118,13 @@ fn seeded_flapping_gives_typed_results_and_leaves_nothing_open() {
             23 => InjectedFault::Delay(Duration::from_millis(90)),
             _ => InjectedFault::None,
         };
-        server.fault(fault);
+        server.inject_fault(fault);
         *kinds.entry(kind(&poll(source))).or_default() += 1;
     }
-    server.fault(InjectedFault::None);
+    server.inject_fault(InjectedFault::None);
     poll(source).expect("well again");
-    wait_for(|| server.sessions() == 1, "one connection is left");
+    wait_for(|| server.count_sessions() == 1, "one connection is left");
     wait_for(|| own().0 <= before.0 + 8 && own().1 <= before.1 + 8, "no open file and no thread is left");
-    println!("{POLLS} polls, {} connections: {kinds:?}", server.opened());
+    println!("{POLLS} polls, {} connections: {kinds:?}", server.count_opened());
     assert!(kinds["answered"] > POLLS / 2 && kinds.contains_key("no sense") && kinds.contains_key("off"));
 }

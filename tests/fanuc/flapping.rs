@@ -4,7 +4,7 @@
 use crate::support::{address, controller, serve};
 use adapters::address::Target;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
-use adapters::fanuc::open::native;
+use adapters::fanuc::open::open_native;
 use adapters::fanuc::server::{InjectedFault, Server, ServerSettings};
 use adapters::worker::{Worker, WorkerSettings, WorkerState};
 use adapters::{ChannelId, Reading, Source, SourceError};
@@ -65,7 +65,7 @@ impl Source for Flapping {
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         // A short fault every five minutes, so that most of the day is well.
         let (stretch, within_s) = (clock.now_ns() / (300 * SECOND_NS), clock.now_ns() / SECOND_NS % 300);
-        self.server.fault(if within_s < 30 { fault(stretch) } else { InjectedFault::None });
+        self.server.inject_fault(if within_s < 30 { fault(stretch) } else { InjectedFault::None });
         self.inner.read(clock, out)
     }
 }
@@ -74,7 +74,7 @@ fn day(hours: i64) {
     let server = Arc::new(serve(controller(4), ServerSettings::default()));
     let address = address(&server, "timeout_ms=50&period_ms=1000&duty_pct=100");
     let Target::Fanuc { at, path, options, .. } = address.target() else { panic!("{address}") };
-    let opened = native(address.text(), at, *path, options);
+    let opened = open_native(address.text(), at, *path, options);
     let (line, inner) = (opened.line, opened.sources.into_iter().next().expect("the quick group"));
     let clock = Arc::new(JumpingClock::default());
     let (began, files) = (Instant::now(), open_files());
@@ -102,7 +102,7 @@ fn day(hours: i64) {
     assert!(well * 10 > polls * 8, "most of the day was well: {well} of {polls}");
     assert!(counts.connections > 2 && counts.broken > 2);
     assert!(open_files() < files + 60, "no open file is left behind");
-    assert!(server.sessions() <= 2);
+    assert!(server.count_sessions() <= 2);
 }
 
 fn open_files() -> usize {

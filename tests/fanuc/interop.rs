@@ -48,25 +48,25 @@ pub(crate) fn machine(version: u16) -> Controller {
     control.system = System { series: "D4F1".into(), machine: "M".into(), ..control.system };
     control.status = Status { automatic: 1, run: 3, motion: 1, ..Status::default() };
     control.measure_in_inches(false);
-    control.feed_in(SpeedUnit::MmMin, Number::decimal(1200, 0));
+    control.feed_in(SpeedUnit::MmMin, Number::from_decimal(1200, 0));
     let quantities = [27, 6000, 2, 8000, 275, 8012];
-    control.spindles[0].quantities = quantities.map(|value| Number::decimal(value, 0));
-    control.spindles[0].quantities[4] = Number::decimal(275, 1);
+    control.spindles[0].quantities = quantities.map(|value| Number::from_decimal(value, 0));
+    control.spindles[0].quantities[4] = Number::from_decimal(275, 1);
     let values = [
         (-31, 12, [123_456, 223_456, 1000, 500]),
         (52, 34, [-98_765, -198_765, 2000, 0]),
         (118, 56, [10_500, -10_500, -3000, -250]),
     ];
     for (axis, (load, current, positions)) in control.axes.iter_mut().zip(values) {
-        (axis.load, axis.current) = (Number::decimal(load, 0), Number::decimal(current, 1));
-        axis.positions = positions.map(|position| Number::decimal(position, 3));
+        (axis.load, axis.current) = (Number::from_decimal(load, 0), Number::from_decimal(current, 1));
+        axis.positions = positions.map(|position| Number::from_decimal(position, 3));
     }
     (control.program, control.program_path) = ((1234, 1000), "//CNC_MEM/USER/PATH1/O1234".into());
     (control.sequence, control.blocks, control.alarm_bits) = (120, 77, 72);
     control.executed = (0, "N120 G01 X10.5 F1200\nN130 Z-2.\nM30\n%".into());
     control.clock = [2026, 11, 24, 21, 5, 9];
     control.timers = [(12345, 6000), (2345, 5000), (345, 4000), (45, 3000)];
-    control.modal([
+    control.set_modal_words([
         (BlockWord::F, 1200),
         (BlockWord::M, 3),
         (BlockWord::S, 8000),
@@ -75,7 +75,7 @@ pub(crate) fn machine(version: u16) -> Controller {
         (BlockWord::H, 7),
     ]);
     control.g_codes.extend(
-        [(0, 1), (1, 17), (13, 543)].map(|(group, code)| (group, Number::decimal(code, i16::from(code == 543)))),
+        [(0, 1), (1, 17), (13, 543)].map(|(group, code)| (group, Number::from_decimal(code, i16::from(code == 543)))),
     );
     texts(&mut control);
     variables(&mut control);
@@ -98,23 +98,23 @@ fn variables(control: &mut Controller) {
     for (number, kind, value) in
         [(6711, 3, 456), (6712, 3, 9456), (6713, 3, 500), (20, 1, 4), (3208, 0, 33), (3741, 3, 6000)]
     {
-        control.parameter(number, kind, Number::decimal(value, 0));
+        control.set_parameter(number, kind, Number::from_decimal(value, 0));
     }
-    [3106, 9936].into_iter().for_each(|number| control.parameter(number, 3, Number::decimal(0, 0)));
-    let each = |values: [i32; 3], places| values.map(|value| Number::decimal(value, places)).to_vec();
+    [3106, 9936].into_iter().for_each(|number| control.set_parameter(number, 3, Number::from_decimal(0, 0)));
+    let each = |values: [i32; 3], places| values.map(|value| Number::from_decimal(value, places)).to_vec();
     control.parameters.insert(3115, adapters::fanuc::server::Data { kind: 0, values: each([0; 3], 0) });
     control
         .parameters
         .insert(1420, adapters::fanuc::server::Data { kind: 3, values: each([24_000, 24_001, 24_002], 0) });
-    control.parameter(1410, 3, Number::decimal(3000, 0));
+    control.set_parameter(1410, 3, Number::from_decimal(3000, 0));
     control.diagnosis_of_axes(308, 2, each([41, 42, 43], 0));
     control.diagnosis_of_axes(301, 2, each([11, 12, 13], 0));
     control.tool_offsets.extend([((1, 0), -1234), ((1, 3), 98_765)]);
     control.work_offsets.extend([((0, 1), -250), ((1, 1), 10_000), ((1, 2), 20_000), ((1, 3), 30_000)]);
     control.tool_groups.insert(5, ToolGroup { tools: 3, life: 200, count: 17 });
     control.tool_group = [6, 5, 5];
-    control.memory.set(Area::G, 12, 0x9B);
-    (-123_456i32).to_le_bytes().iter().zip(100..).for_each(|(byte, at)| control.memory.set(Area::R, at, *byte));
+    control.memory.set_byte(Area::G, 12, 0x9B);
+    (-123_456i32).to_le_bytes().iter().zip(100..).for_each(|(byte, at)| control.memory.set_byte(Area::R, at, *byte));
 }
 
 const ALL: &[u16] = &[2, 3, 4];
@@ -312,7 +312,9 @@ fn interop_units_as_the_vendors_library_and_our_child_with_it_read_them() {
         for case in &CASES {
             for inch in [false, true] {
                 let mut control = control(version, case, inch);
-                [3106, 9936].into_iter().for_each(|number| control.parameter(number, 3, Number::decimal(0, 0)));
+                [3106, 9936]
+                    .into_iter()
+                    .for_each(|number| control.set_parameter(number, 3, Number::from_decimal(0, 0)));
                 let server = serve(control, ServerSettings::default());
                 let call: Call = ("cnc_rdspeed", json!([h(0), out(24)]), "<ihh", json!([]), ALL);
                 let told = ask_library(&library, &server, &[&call]).remove(0);

@@ -13,7 +13,7 @@ use adapters::fanuc::item::{BlockWord, FocasItem, Position, PositionFrame, Servo
 use adapters::fanuc::native::{Native, NativeSettings};
 use adapters::fanuc::server::{Controller, ServerSettings};
 use adapters::fanuc::wire::Number;
-use adapters::open::open;
+use adapters::open::open_address;
 use adapters::{Absence, Reading};
 use serde_json::json;
 use std::time::Duration;
@@ -55,7 +55,7 @@ fn cut(version: u16, modal: &str, group: u8) -> ByteControl {
 
 fn read(control: &ByteControl) -> Vec<Reading> {
     let address: Address = format!("fanuc://{}", control.address).parse().expect("usable");
-    poll(open(&address, 0).expect("opens").sources[0].as_mut()).expect("answers")
+    poll(open_address(&address, 0).expect("opens").sources[0].as_mut()).expect("answers")
 }
 
 fn found(readings: &[Reading], channel: &str) -> Result<f64, Absence> {
@@ -110,7 +110,7 @@ fn layouts_of_modal_words_are_served_with_the_decimals_in_the_last_byte() {
     {
         for version in VERSIONS {
             let mut control = Controller::new(version, &['X']);
-            control.modal_words.insert(BlockWord::F, Number::decimal(mantissa, places));
+            control.modal_words.insert(BlockWord::F, Number::from_decimal(mantissa, places));
             let server = serve(control, ServerSettings::default());
             let data = ask(server.address(), 1, 0x22, 5);
             assert_eq!((&data[..4], data[7], data.len()), (&bytes(number)[..], last, 8), "generation {version}");
@@ -198,7 +198,7 @@ fn layouts_of_marked_answers_are_read_as_the_library_reads_them() {
         let mut native =
             Native::connect(NativeSettings { at, path: 1, timeout: Duration::from_secs(5), encoding }).expect("opens");
         let mut out = Vec::new();
-        native.ask(&[item.on(1)], &mut out).expect("answers");
+        native.ask_questions(&[item.to_question(1)], &mut out).expect("answers");
         assert_eq!(out, [Ok(expected)], "{key} of generation {version}");
     }
 }
@@ -217,7 +217,7 @@ fn layouts_of_chinese_texts_keep_every_byte() {
         let status = bytes("0001 0000 0000 0000 0000 0001 0000");
         let control = bytes::serve(4, vec![("1/19", status), ("1/23", text)]);
         let address: Address = format!("fanuc://{}?{keys}", control.address).parse().expect("usable");
-        let readings = poll(open(&address, 0).expect("opens").sources[0].as_mut()).expect("answers");
+        let readings = poll(open_address(&address, 0).expect("opens").sources[0].as_mut()).expect("answers");
         assert_eq!(crate::support::text(&readings, "alarm"), expected, "{keys}");
     }
 }
@@ -238,7 +238,7 @@ fn layouts_of_positions_have_the_unit_that_the_control_says() {
         ];
         let control = bytes::serve(version, answers);
         let address: Address = format!("fanuc://{}?axes=B", control.address).parse().expect("usable");
-        let readings = poll(open(&address, 0).expect("opens").sources[0].as_mut()).expect("answers");
+        let readings = poll(open_address(&address, 0).expect("opens").sources[0].as_mut()).expect("answers");
         assert_eq!((number(&readings, "x_axis_position_mm"), number(&readings, "b_axis_position_deg")), (50.8, 90.0));
     }
 }
@@ -268,7 +268,7 @@ fn interop_layouts_the_vendors_library_still_says_so() {
         }
         for (mantissa, places) in [(5, 2), (250, 3), (1200, 0), (-200, 2)] {
             let mut control = Controller::new(version, &['X']);
-            control.modal_words.insert(BlockWord::F, Number::decimal(mantissa, places));
+            control.modal_words.insert(BlockWord::F, Number::from_decimal(mantissa, places));
             let server = serve(control, ServerSettings::default());
             let (host, port) = (server.address().ip().to_string(), server.address().port().to_string());
             let call = json!([{"call": "cnc_modal", "args": [["h", 103], ["h", 0], ["out", 260]], "read": "<hhixB"}]);

@@ -17,13 +17,13 @@ fn two_paths(version: u16) -> Controller {
     let mut control = controller(version).with_path(&['Z', 'X']);
     let second = &mut control.further[0];
     (second.status.run, second.status.automatic) = (2, 1);
-    second.feed = Number::decimal(35, 0);
-    second.spindles[0].quantities = [7, 4000, 1, 800, 7, 800].map(|value| Number::decimal(value, 0));
-    second.axes[0].positions[1] = Number::decimal(4_500, 3);
+    second.feed = Number::from_decimal(35, 0);
+    second.spindles[0].quantities = [7, 4000, 1, 800, 7, 800].map(|value| Number::from_decimal(value, 0));
+    second.axes[0].positions[1] = Number::from_decimal(4_500, 3);
     (second.program, second.sequence) = ((2001, 2001), 60);
-    second.modal([(BlockWord::F, 40), (BlockWord::S, 810), (BlockWord::T, 1212)]);
-    control.memory.set(Area::G, 1012, !60);
-    control.memory.set(Area::G, 1030, 90);
+    second.set_modal_words([(BlockWord::F, 40), (BlockWord::S, 810), (BlockWord::T, 1212)]);
+    control.memory.set_byte(Area::G, 1012, !60);
+    control.memory.set_byte(Area::G, 1030, 90);
     control
 }
 
@@ -34,10 +34,10 @@ fn two_paths_travel_in_one_frame_in_all_generations() {
         let mut opened = opened(&server, "paths=1,2");
         let source = opened.sources[0].as_mut();
         poll(source).expect("answers");
-        let before = server.frames();
+        let before = server.count_frames();
         let readings = poll(source).expect("answers");
-        let frames = server.frames() - before;
-        assert_eq!((frames, server.opened()), (1, 1), "frames per poll and connections of generation {version}");
+        let frames = server.count_frames() - before;
+        assert_eq!((frames, server.count_opened()), (1, 1), "frames per poll and connections of generation {version}");
         let both = [
             ("spindle_speed_rpm", 1200.0, 800.0),
             ("feed_mm_min", 240.0, 35.0),
@@ -72,9 +72,9 @@ fn an_alarm_belongs_to_its_path() {
         second.status.alarm = 1;
         second.alarms = vec![Alarm { number: 501, kind: 4, axis: 1, text: "OVERTRAVEL".into() }];
     });
-    let before = server.frames();
+    let before = server.count_frames();
     let readings = poll(opened.sources[0].as_mut()).expect("answers");
-    assert_eq!(server.frames() - before, 2, "one frame more, for the path that has an alarm");
+    assert_eq!(server.count_frames() - before, 2, "one frame more, for the path that has an alarm");
     assert_eq!(text(&readings, "alarm"), "");
     assert_eq!(text(&readings, "path2_alarm"), "OT0501 (Z) OVERTRAVEL", "the axis is named as path 2 names it");
 }

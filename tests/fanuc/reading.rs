@@ -5,7 +5,7 @@ use adapters::fanuc::answer::{Alarm, SpeedUnit};
 use adapters::fanuc::item::Area;
 use adapters::fanuc::server::ServerSettings;
 use adapters::fanuc::wire::Number;
-use adapters::open::open;
+use adapters::open::open_address;
 use adapters::{Absence, SourceError};
 
 #[test]
@@ -33,8 +33,8 @@ fn every_channel_of_a_cut_in_all_generations() {
         let slow = poll(opened.sources[1].as_mut()).expect("answers");
         assert_eq!((number(&slow, "part_count"), number(&slow, "gear_stage")), (17.0, 2.0));
         assert_eq!(number(&readings, "motor_temperature_c"), 48.0);
-        assert_eq!((server.opened(), server.sessions()), (1, 1), "both groups share one connection");
-        assert_eq!(server.frames(), 3, "the facts once, then one round trip per group");
+        assert_eq!((server.count_opened(), server.count_sessions()), (1, 1), "both groups share one connection");
+        assert_eq!(server.count_frames(), 3, "the facts once, then one round trip per group");
     }
 }
 
@@ -57,7 +57,7 @@ fn what_one_control_does_not_have_does_not_disturb_the_rest() {
 #[test]
 fn the_power_that_a_drive_shows_of_itself_is_read_where_the_address_says_so() {
     let mut control = controller(4);
-    control.diagnosis(4902, 2, Number::decimal(2350, 0));
+    control.set_diagnosis(4902, 2, Number::from_decimal(2350, 0));
     let server = serve(control, ServerSettings::default());
     let readings = poll(opened(&server, "power_diagnosis=4902").sources[0].as_mut()).expect("answers");
     assert_eq!(number(&readings, "spindle_power_w"), 2350.0);
@@ -71,8 +71,8 @@ fn the_power_that_a_drive_shows_of_itself_is_read_where_the_address_says_so() {
 fn inches_become_millimetres_and_feed_per_turn_becomes_feed() {
     let mut control = controller(4);
     control.measure_in_inches(true);
-    control.feed_in(SpeedUnit::InchRev, Number::decimal(8, 3));
-    control.axes[0].positions[1] = Number::decimal(20_000, 4);
+    control.feed_in(SpeedUnit::InchRev, Number::from_decimal(8, 3));
+    control.axes[0].positions[1] = Number::from_decimal(20_000, 4);
     let server = serve(control, ServerSettings::default());
     let mut opened = opened(&server, "");
     let readings = poll(opened.sources[0].as_mut()).expect("answers");
@@ -99,7 +99,7 @@ fn alarms_are_raised_and_cleared_and_states_follow() {
         let control = control.expect("on");
         (control.status.alarm, control.status.run, control.status.automatic) = (0, 3, 1);
         control.alarms.clear();
-        control.memory.set(Area::F, 2, 0x08);
+        control.memory.set_byte(Area::F, 2, 0x08);
     });
     let readings = poll(opened.sources[0].as_mut()).expect("answers");
     assert_eq!((text(&readings, "alarm"), text(&readings, "operation")), (String::new(), "threading".into()));
@@ -119,7 +119,7 @@ fn nobody_there_no_such_path_and_no_free_connection_are_told_apart() {
     let gone = address(&server, "");
     drop(server);
     std::thread::sleep(std::time::Duration::from_millis(150));
-    let mut nobody = open(&gone, 0).expect("an address");
+    let mut nobody = open_address(&gone, 0).expect("an address");
     let error = poll(nobody.sources[0].as_mut()).expect_err("nobody");
     assert!(matches!(error, SourceError::Line { .. }) && error.to_string().contains("8193"), "{error}");
 }

@@ -34,14 +34,14 @@ struct Seen {
 /// As the gateway does it: a thread per group, merged at 10 Hz.
 fn watched(opened: OpenedFanuc, seconds: f64) -> Seen {
     let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
-    let plans: Vec<SourcePlan> = opened.sources.iter().map(|source| SourcePlan::of(source.as_ref())).collect();
+    let plans: Vec<SourcePlan> = opened.sources.iter().map(|source| SourcePlan::from_source(source.as_ref())).collect();
     let mut merge = Merge::new(&plans, Delay::SlowestPeriod);
     let start = |source| Worker::start(source, clock.clone(), WorkerSettings::default()).expect("a thread");
     let workers: Vec<Worker> = opened.sources.into_iter().map(start).collect();
     let channels = ["feed_mm_min", "spindle_speed_rpm", "execution", "part_count"];
-    let channels = channels.map(|name| ChannelId::of(name).expect("in the table"));
+    let channels = channels.map(|name| ChannelId::from_name(name).expect("in the table"));
     let (mut known, mut stale, mut samples) = ([false; 4], 0, 0);
-    let (mut sample, begun_ns) = (Sample::empty(0), clock.now_ns());
+    let (mut sample, begun_ns) = (Sample::new_empty(0), clock.now_ns());
     let until_ns = begun_ns + (seconds * 1e9) as i64;
     let mut tick_ns = begun_ns;
     while tick_ns < until_ns {
@@ -84,10 +84,10 @@ fn fact(facts: &[adapters::Fact], name: &str) -> f64 {
 
 fn native(delay_ms: u64, seconds: f64) -> Seen {
     let server = serve(controller(4), ServerSettings::default());
-    server.fault(InjectedFault::Delay(Duration::from_millis(delay_ms)));
+    server.inject_fault(InjectedFault::Delay(Duration::from_millis(delay_ms)));
     let address: Address = format!("fanuc://{}", server.address()).parse().expect("usable");
     let Target::Fanuc { at, path, options, .. } = address.target() else { panic!("{address}") };
-    watched(open::native(address.text(), at, *path, options), seconds)
+    watched(open::open_native(address.text(), at, *path, options), seconds)
 }
 
 fn vendor(call_ms: u64, seconds: f64) -> Seen {
@@ -98,7 +98,7 @@ fn vendor(call_ms: u64, seconds: f64) -> Seen {
     let connect: Connect = Box::new(move || Ok(Box::new(Vendor::connect(settings.clone())?)));
     let address: Address = "fanuc://fake".parse().expect("usable");
     let Target::Fanuc { path, options, .. } = address.target() else { panic!("{address}") };
-    watched(open::opened(address.text(), connect, *path, options), seconds)
+    watched(open::open_controller(address.text(), connect, *path, options), seconds)
 }
 
 fn told(what: &str, seen: &Seen) {

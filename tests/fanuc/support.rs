@@ -5,7 +5,7 @@ use adapters::clock::{Clock, SystemClock};
 use adapters::fanuc::item::{Area, BlockWord};
 use adapters::fanuc::server::{Controller, Server, ServerSettings};
 use adapters::fanuc::wire::Number;
-use adapters::open::{Opened, open};
+use adapters::open::{Opened, open_address};
 use adapters::{Absence, Reading, Source, SourceError, Value};
 use std::net::TcpListener;
 
@@ -24,21 +24,21 @@ pub(crate) const CUT: [(&str, f64); 7] = [
 pub(crate) fn controller(version: u16) -> Controller {
     let mut control = Controller::new(version, &['X', 'Z']);
     (control.status.run, control.status.motion) = (3, 1);
-    control.feed = Number::decimal(240, 0);
-    control.spindles[0].quantities = [41, 4000, 2, 1200, 41, 1200].map(|value| Number::decimal(value, 0));
-    control.axes[0].positions[1] = Number::decimal(79_000, 3);
-    control.axes[1].positions[1] = Number::decimal(-12_345, 3);
-    control.axes[1].load = Number::decimal(-17, 0);
-    control.axes[1].current = Number::decimal(31, 1);
+    control.feed = Number::from_decimal(240, 0);
+    control.spindles[0].quantities = [41, 4000, 2, 1200, 41, 1200].map(|value| Number::from_decimal(value, 0));
+    control.axes[0].positions[1] = Number::from_decimal(79_000, 3);
+    control.axes[1].positions[1] = Number::from_decimal(-12_345, 3);
+    control.axes[1].load = Number::from_decimal(-17, 0);
+    control.axes[1].current = Number::from_decimal(31, 1);
     control.program = (1001, 1001);
     control.sequence = 120;
-    control.modal([(BlockWord::F, 250), (BlockWord::S, 1200), (BlockWord::T, 303)]);
-    control.parameter(6711, 3, Number::decimal(17, 0));
-    control.parameter(1001, 0, Number::decimal(0, 0));
-    control.diagnosis(403, 1, Number::decimal(48, 0));
-    control.memory.set(Area::G, 12, 0xAF);
-    control.memory.set(Area::G, 30, 100);
-    control.memory.set(Area::F, 0, 0x60);
+    control.set_modal_words([(BlockWord::F, 250), (BlockWord::S, 1200), (BlockWord::T, 303)]);
+    control.set_parameter(6711, 3, Number::from_decimal(17, 0));
+    control.set_parameter(1001, 0, Number::from_decimal(0, 0));
+    control.set_diagnosis(403, 1, Number::from_decimal(48, 0));
+    control.memory.set_byte(Area::G, 12, 0xAF);
+    control.memory.set_byte(Area::G, 30, 100);
+    control.memory.set_byte(Area::F, 0, 0x60);
     control
 }
 
@@ -52,7 +52,7 @@ pub(crate) fn address(server: &Server, keys: &str) -> Address {
 }
 
 pub(crate) fn opened(server: &Server, keys: &str) -> Opened {
-    open(&address(server, keys), SystemClock::new().now_ns()).expect("opens")
+    open_address(&address(server, keys), SystemClock::new().now_ns()).expect("opens")
 }
 
 /// One poll of a source.

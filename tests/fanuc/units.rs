@@ -9,7 +9,7 @@ use adapters::fanuc::answer::SpeedUnit;
 use adapters::fanuc::item::BlockWord;
 use adapters::fanuc::server::{Controller, Server, ServerSettings};
 use adapters::fanuc::wire::Number;
-use adapters::open::open;
+use adapters::open::open_address;
 use adapters::{Absence, Reading};
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -40,12 +40,12 @@ pub(crate) const CASES: [Case; 4] = [
 pub(crate) fn control(version: u16, case: &Case, inch: bool) -> Controller {
     let mut control = Controller::new(version, &['X', 'Z']);
     control.measure_in_inches(inch);
-    let shown = Number::decimal(case.shown.0, case.shown.1);
+    let shown = Number::from_decimal(case.shown.0, case.shown.1);
     control.feed_in(case.unit, shown);
     control.modal_words.insert(BlockWord::F, shown);
-    control.modal([(BlockWord::S, 1000), (BlockWord::T, 5), (BlockWord::R, 77)]);
-    control.spindles[0].quantities[3] = Number::decimal(1000, 0);
-    let place = if inch { Number::decimal(20_000, 4) } else { Number::decimal(50_800, 3) };
+    control.set_modal_words([(BlockWord::S, 1000), (BlockWord::T, 5), (BlockWord::R, 77)]);
+    control.spindles[0].quantities[3] = Number::from_decimal(1000, 0);
+    let place = if inch { Number::from_decimal(20_000, 4) } else { Number::from_decimal(50_800, 3) };
     control.axes[0].positions[1] = place;
     // F002.0 INCH: the program is in the unit of the feed.
     let inch_program = matches!(case.unit, SpeedUnit::InchMin | SpeedUnit::InchRev);
@@ -54,7 +54,7 @@ pub(crate) fn control(version: u16, case: &Case, inch: bool) -> Controller {
 }
 
 fn read(server: &Server) -> Vec<Reading> {
-    let mut opened = open(&address(server, ""), SystemClock::new().now_ns()).expect("opens");
+    let mut opened = open_address(&address(server, ""), SystemClock::new().now_ns()).expect("opens");
     poll(opened.sources[0].as_mut()).expect("answers")
 }
 
@@ -168,8 +168,8 @@ fn feed_per_revolution_that_is_shown_per_minute_is_told_apart_from_the_f_word() 
     // G95 F0.25 at 1000 rpm; the screen of this control shows 250 mm/min.
     for version in [2, 4] {
         let mut control = control(version, &CASES[2], false);
-        control.parameter(3107, 0, Number::decimal(0, 0));
-        (control.feed, control.feed_unit) = (Number::decimal(250, 0), SpeedUnit::MmMin);
+        control.set_parameter(3107, 0, Number::from_decimal(0, 0));
+        (control.feed, control.feed_unit) = (Number::from_decimal(250, 0), SpeedUnit::MmMin);
         let readings = read(&serve(control, ServerSettings::default()));
         near(&readings, "feed_mm_min", 250.0, "shown");
         near(&readings, "feed_programmed_mm_min", 250.0, "0.25 mm per revolution");

@@ -46,7 +46,7 @@ pub(crate) fn opened_in(settings: VendorSettings, address: &str) -> OpenedFanuc 
     let address: Address = address.parse().expect("usable");
     let Target::Fanuc { path, options, .. } = address.target() else { panic!("{address}") };
     let options = FanucOptions { duty_pct: 100, ..(**options).clone() };
-    open::opened(address.text(), connect, *path, &options)
+    open::open_controller(address.text(), connect, *path, &options)
 }
 
 fn cut(readings: &[Reading]) {
@@ -68,8 +68,8 @@ fn the_library_gives_the_values_that_the_wire_gives() {
     assert_eq!(value(&readings, "z_axis_current_a"), Err(Absence::NotSupported), "the function is not there");
     let slow = poll(opened.sources[1].as_mut()).expect("answers");
     assert_eq!((number(&slow, "part_count"), number(&slow, "gear_stage")), (17.0, 2.0));
-    let facts = opened.sources[0].facts();
-    assert!(facts.contains(&adapters::driver::Fact::text("series", "G421")), "{facts:?}");
+    let facts = opened.sources[0].collect_facts();
+    assert!(facts.contains(&adapters::driver::Fact::from_text("series", "G421")), "{facts:?}");
 
     let server = serve(controller(4), ServerSettings::default());
     let native = poll(crate::support::opened(&server, "").sources[0].as_mut()).expect("answers");
@@ -192,11 +192,13 @@ fn what_cannot_be_loaded_or_connected_says_so() {
 fn what_is_written_is_read_back_through_the_library() {
     let library = library(&[]);
     let mut vendor = Vendor::connect(settings(&library)).expect("connects");
-    let stretch = Stretch::bytes(Area::R, 900, 3);
+    let stretch = Stretch::from_byte_range(Area::R, 900, 3);
     vendor.write(&Write::Pmc { stretch, values: vec![0xA5, 80, 7] }).expect("written");
     vendor.write(&Write::Macro { number: 500, mantissa: -25, places: 1 }).expect("written");
     let mut out = Vec::new();
-    vendor.ask(&[FocasItem::Pmc(stretch).on(1), FocasItem::Macro(500).on(1)], &mut out).expect("answers");
+    vendor
+        .ask_questions(&[FocasItem::Pmc(stretch).to_question(1), FocasItem::Macro(500).to_question(1)], &mut out)
+        .expect("answers");
     let expected = [
         adapters::fanuc::answer::FocasAnswer::Memory(vec![0xA5, 80, 7]),
         adapters::fanuc::answer::FocasAnswer::Number(Some(-2.5)),

@@ -56,7 +56,7 @@ type Truth = BTreeMap<&'static str, (f64, f64)>;
 
 /// Records and sends six hours; a box that was off is opened again.
 fn record(story: &Story, hz: i64, address: &str) -> (Truth, tempfile::TempDir) {
-    let ids = CHANNELS.map(|name| ChannelId::of(name).expect("in the table"));
+    let ids = CHANNELS.map(|name| ChannelId::from_name(name).expect("in the table"));
     let tick = Duration::from_nanos(1_000_000_000 / hz.unsigned_abs());
     let mut rng = Pcg64::seed_from_u64(story.seed);
     let mut recorded = Recorded::start(story.machine, tick, address);
@@ -77,7 +77,7 @@ fn record(story: &Story, hz: i64, address: &str) -> (Truth, tempfile::TempDir) {
         if rng.random_bool(1.0 / (60.0 * hz as f64)) {
             cutting = !cutting;
             let state = if cutting { "cutting" } else { "standby" };
-            recorded.writer().record(StateChange { at_ns, state: state.to_owned(), ..StateChange::default() });
+            recorded.writer().queue_record(StateChange { at_ns, state: state.to_owned(), ..StateChange::default() });
         }
         let off = within(story.machine_off, second);
         for (place, value) in values.iter_mut().enumerate() {

@@ -33,7 +33,7 @@ fn duckdb(directory: &Path, statement: &str) -> Option<Vec<Vec<Json>>> {
 fn run_over_midnight(lake: &Path, machine: &str, effect: &str, own: &Path) {
     let path = own.join("history.db");
     let outbox = Outbox::new(machine, OutboxSettings::default(), ["lake".to_owned()]);
-    let extras = vec![ExtraSeries::text("machine_state", "state", "状态")];
+    let extras = vec![ExtraSeries::new_text("machine_state", "state", "状态")];
     let group_commit = Duration::from_millis(50);
     let options = Options { extras, group_commit, outbox: Some(outbox.clone()), ..Options::default() };
     let writer = Writer::open(&path, options).expect("opens");
@@ -41,17 +41,17 @@ fn run_over_midnight(lake: &Path, machine: &str, effect: &str, own: &Path) {
     let address: SinkAddress = format!("parquet:{}", text(lake)).parse().expect("an address");
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("threads");
     let sink = gateway::config::SinkConfig { name: "lake".to_owned(), address, allow_requests: false };
-    let (post, _inbox) = gateway::control::queue();
-    let sinks = runtime.block_on(async { drive::start(&[sink], &post, (&outbox, &board), &path) });
-    let power = ChannelId::of("spindle_power_w").expect("in the table");
+    let (post, _inbox) = gateway::control::create_queues();
+    let sinks = runtime.block_on(async { drive::start_sinks(&[sink], &post, (&outbox, &board), &path) });
+    let power = ChannelId::from_name("spindle_power_w").expect("in the table");
     for tick in -300..300 {
-        let mut sample = Sample::empty(MIDNIGHT_NS + tick * TICK_NS);
-        sample.set(power, Slot { value: Ok(Value::Number(1000.0 + tick as f64 / 10.0)), age_ns: 0 });
-        writer.sample(&sample, &[ExtraValue::Text("cutting")]);
+        let mut sample = Sample::new_empty(MIDNIGHT_NS + tick * TICK_NS);
+        sample.set_slot(power, Slot { value: Ok(Value::Number(1000.0 + tick as f64 / 10.0)), age_ns: 0 });
+        writer.queue_sample(&sample, &[ExtraValue::Text("cutting")]);
         if tick == -100 {
             let json = json!({"missing": [{"effect": effect}]}).to_string();
             let at_ns = MIDNIGHT_NS + tick * TICK_NS;
-            writer.record(Diagnosis { at_ns, verdict: "explained".to_owned(), json, ..Diagnosis::default() });
+            writer.queue_record(Diagnosis { at_ns, verdict: "explained".to_owned(), json, ..Diagnosis::default() });
         }
     }
     writer.flush().expect("durable");
@@ -59,9 +59,9 @@ fn run_over_midnight(lake: &Path, machine: &str, effect: &str, own: &Path) {
     let wanted = lake.join("samples");
     while !std::fs::read_dir(&wanted).is_ok_and(|mut machines| {
         machines.any(|found| found.is_ok_and(|found| found.path().display().to_string().contains(&machine[..4])))
-    }) || board.status()[0].behind_items > 0
+    }) || board.list_sinks()[0].behind_items > 0
     {
-        assert!(Instant::now() < until, "no partition: {:?}", board.status());
+        assert!(Instant::now() < until, "no partition: {:?}", board.list_sinks());
         std::thread::sleep(Duration::from_millis(20));
     }
     runtime.block_on(sinks.stop());

@@ -61,7 +61,7 @@ impl Recorded {
     pub(crate) fn again(directory: tempfile::TempDir, machine: &str, tick: Duration, address: &str) -> Self {
         let settings = OutboxSettings { tick, drain: Duration::from_secs(60), ..OutboxSettings::default() };
         let outbox = Outbox::new(machine, settings, ["fleet".to_owned()]);
-        let extras = vec![ExtraSeries::text("machine_state", "state", "状态")];
+        let extras = vec![ExtraSeries::new_text("machine_state", "state", "状态")];
         let options = Options {
             extras,
             group_commit: Duration::from_millis(100),
@@ -76,8 +76,8 @@ impl Recorded {
         let address = address.parse().expect("an address");
         let sink = gateway::config::SinkConfig { name: "fleet".to_owned(), address, allow_requests: false };
         let board = Board::new(outbox.clone(), [("fleet".to_owned(), "nats".to_owned())]);
-        let (post, _inbox) = gateway::control::queue();
-        let sinks = runtime.block_on(async { drive::start(&[sink], &post, (&outbox, &board), &path) });
+        let (post, _inbox) = gateway::control::create_queues();
+        let sinks = runtime.block_on(async { drive::start_sinks(&[sink], &post, (&outbox, &board), &path) });
         Self { directory, writer: Some(writer), board, sinks: Some(sinks), runtime }
     }
 
@@ -87,23 +87,23 @@ impl Recorded {
 
     /// A tick with these values; `Err` is why there is none.
     pub(crate) fn tick(&self, at_ns: i64, values: &[(ChannelId, Result<f64, Absence>)], state: &str) {
-        let mut sample = Sample::empty(at_ns);
+        let mut sample = Sample::new_empty(at_ns);
         for (channel, value) in values {
             let slot = match value {
                 Ok(number) => Slot { value: Ok(Value::Number(*number)), age_ns: 0 },
-                Err(reason) => Slot::absent(*reason),
+                Err(reason) => Slot::from_absence(*reason),
             };
-            sample.set(*channel, slot);
+            sample.set_slot(*channel, slot);
         }
-        self.writer().sample(&sample, &[ExtraValue::Text(state)]);
+        self.writer().queue_sample(&sample, &[ExtraValue::Text(state)]);
     }
 
     /// Ends as a box does: the last commit waits for the sink.
     pub(crate) fn stop(mut self) -> tempfile::TempDir {
         drop(self.writer.take());
-        let left = self.board.status()[0].behind_items;
+        let left = self.board.list_sinks()[0].behind_items;
         self.runtime.block_on(self.sinks.take().expect("running").stop());
-        assert_eq!(left, 0, "everything is delivered at a clean end: {:?}", self.board.status());
+        assert_eq!(left, 0, "everything is delivered at a clean end: {:?}", self.board.list_sinks());
         self.directory
     }
 }

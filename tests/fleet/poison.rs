@@ -3,7 +3,7 @@
 
 use crate::pipeline::Plant;
 use crate::process::{run, wait_for};
-use gateway::fleet::cluster;
+use gateway::fleet::parse_cluster;
 use gateway::nats::{Backlog, Connection, JetStreamFailure, Outgoing};
 use serde_json::{Value as Json, json};
 use std::time::{Duration, Instant};
@@ -88,7 +88,7 @@ fn records() -> Vec<Poison> {
 
 /// Publishes documents of three healthy boxes and, between them, everything that is poisoned.
 async fn publish(address: &str, rounds: u64, poison: &[Poison]) {
-    let (target, _) = cluster(address).expect("an address");
+    let (target, _) = parse_cluster(address).expect("an address");
     let mut connection = Connection::open(&target, 0, "test").await.expect("connected");
     let mut bad = poison.iter();
     for sequence in 1..=rounds {
@@ -109,7 +109,7 @@ async fn publish(address: &str, rounds: u64, poison: &[Poison]) {
 fn fifty_megabytes_are_refused_by_the_stream_itself_and_left_out() {
     let Some(plant) = Plant::with("max_payload: 64MB\nmax_pending: 256MB\n") else { return };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("threads");
-    let (target, _) = cluster(&plant.address).expect("an address");
+    let (target, _) = parse_cluster(&plant.address).expect("an address");
     runtime.block_on(async {
         let mut connection = Connection::open(&target, 0, "test").await.expect("connected");
         let messages = [
@@ -171,9 +171,9 @@ fn what_the_database_does_not_take_holds_up_nobody_and_lies_in_refused() {
 
 /// What the stream has still to give to its reader.
 async fn backlog(address: &str) -> Option<Backlog> {
-    let (target, _) = cluster(address).expect("an address");
+    let (target, _) = parse_cluster(address).expect("an address");
     let mut connection = Connection::open(&target, 0, "test").await.ok()?;
-    connection.backlog("CNC", "fleet").await.ok()
+    connection.read_backlog("CNC", "fleet").await.ok()
 }
 
 fn ingest_one(plant: &Plant) -> crate::process::Gateway {
@@ -197,7 +197,7 @@ fn a_machine_that_is_renamed_stays_one_box() {
         message("box-1", "sample", &format!("box-1-{sequence}"), document.to_string().into_bytes())
     };
     let start_ns = now_ns() - 3_600_000_000_000;
-    let (target, _) = cluster(&plant.address).expect("an address");
+    let (target, _) = parse_cluster(&plant.address).expect("an address");
     let names = ["Lathe 7", "Lathe 7", "车床七号", "车床七号", "Lathe 7"];
     let times = [0, 10, 20, 30, 5];
     runtime.block_on(async {

@@ -35,7 +35,7 @@ fn start_ns() -> i64 {
 /// A cycle of ten minutes: standby, idle, cutting; a part at its end. An alarm in every third.
 fn record(machine: &str, factor: f64, start_ns: i64, address: &str) -> Truth {
     let recorded = Recorded::start(machine, Duration::from_secs(1), address);
-    let power = ChannelId::of("spindle_power_w").expect("in the table");
+    let power = ChannelId::from_name("spindle_power_w").expect("in the table");
     let mut truth = Truth::default();
     let (mut state, mut sum) = ("", 0.0);
     for second in 0..SPAN_S {
@@ -54,7 +54,7 @@ fn record(machine: &str, factor: f64, start_ns: i64, address: &str) -> Truth {
             state = next;
             let change =
                 StateChange { at_ns, state: next.to_owned(), program: "O100".to_owned(), tool: "T1".to_owned() };
-            recorded.writer().record(change);
+            recorded.writer().queue_record(change);
         }
         *truth.seconds_by_state.entry(next).or_default() += 1.0;
         sum += watts;
@@ -62,18 +62,18 @@ fn record(machine: &str, factor: f64, start_ns: i64, address: &str) -> Truth {
         let cycle = second / 600;
         if cycle % 3 == 0 && place == 200 {
             let (code, source, severity) = ("overload".to_owned(), "own.rhai".to_owned(), "warning".to_owned());
-            recorded.writer().record(Alarm { at_ns, code, source, severity, ..Alarm::default() });
+            recorded.writer().queue_record(Alarm { at_ns, code, source, severity, ..Alarm::default() });
         }
         if cycle % 3 == 0 && place == 260 {
             let (code, source) = ("overload".to_owned(), "own.rhai".to_owned());
-            recorded.writer().record(AlarmClear { at_ns, code, source });
+            recorded.writer().queue_record(AlarmClear { at_ns, code, source });
             truth.alarm_s += 60.0;
         }
         if place == 599 {
             let energy_j = 300_000.0 * factor;
             let operations = json!([{"operation": "rough", "seconds": 300.0, "cutting_s": 290.0, "energy_j": 200_000.0 * factor, "mean_power_w": 666.0},
                 {"operation": "finish", "seconds": 200.0, "cutting_s": 180.0, "energy_j": 100_000.0 * factor, "mean_power_w": 500.0}]);
-            recorded.writer().record(Part {
+            recorded.writer().queue_record(Part {
                 began_ns: at_ns - 599 * SECOND_NS,
                 ended_ns: at_ns,
                 part: format!("{cycle}"),
@@ -92,7 +92,7 @@ fn record(machine: &str, factor: f64, start_ns: i64, address: &str) -> Truth {
     }
     let diagnosis = json!({"missing": [{"effect": "bearing_friction"}]}).to_string();
     let at_ns = start_ns + 100 * SECOND_NS;
-    recorded.writer().record(Diagnosis {
+    recorded.writer().queue_record(Diagnosis {
         at_ns,
         verdict: "explained".to_owned(),
         json: diagnosis,

@@ -6,7 +6,7 @@ use crate::pipeline::Plant;
 use crate::postgres::Postgres;
 use crate::process::{Gateway, program, run, stdout};
 use crate::process_status::status_figure;
-use gateway::fleet::cluster;
+use gateway::fleet::parse_cluster;
 use gateway::nats::{Connection, Outgoing};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -32,7 +32,7 @@ fn document(number: u64, sequence: u64, at_ns: i64, rng: &mut Pcg64) -> String {
 }
 
 async fn publish(address: &str, items: u64) {
-    let (target, _) = cluster(address).expect("an address");
+    let (target, _) = parse_cluster(address).expect("an address");
     let mut connection = Connection::open(&target, 0, "test").await.expect("connected");
     let mut rng = Pcg64::seed_from_u64(7);
     let start_ns = 1_769_900_000_000_000_000_i64;

@@ -2,7 +2,7 @@
 
 use crate::pipeline::Plant;
 use crate::process::{run, stderr, stdout};
-use gateway::fleet::cluster;
+use gateway::fleet::parse_cluster;
 use gateway::nats::{Connection, Outgoing};
 use serde_json::{Value as Json, json};
 use std::path::Path;
@@ -20,7 +20,7 @@ fn sample(sequence: u64, days_ago: i64) -> Outgoing {
 
 fn publish(plant: &Plant, messages: &[Outgoing]) {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("threads");
-    let (target, _) = cluster(&plant.address).expect("an address");
+    let (target, _) = parse_cluster(&plant.address).expect("an address");
     runtime.block_on(async {
         let mut connection = Connection::open(&target, 0, "test").await.expect("connected");
         connection.publish_all(messages).await.map_err(|(_, failure)| failure).expect("stored");

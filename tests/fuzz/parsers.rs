@@ -6,7 +6,7 @@ use adapters::fanuc::item::FocasItem;
 use adapters::fanuc::opening::{Generation, Opening};
 use adapters::fanuc::request;
 use adapters::fanuc::server::{Controller, answer_body};
-use adapters::fanuc::wire::{FocasFrame, FrameKind, frame, replies, request_body, requests};
+use adapters::fanuc::wire::{FocasFrame, FrameKind, encode_frame, parse_replies, parse_requests, request_body};
 use adapters::modbus::pdu::{self, RegisterTable};
 use adapters::modbus::profile;
 use adapters::nclink::model::Model;
@@ -15,7 +15,7 @@ use adapters::recording::{Mapping, read_csv, read_path};
 use adapters::waveform::WaveformHeader;
 use gateway::sinks::SinkAddress;
 use gateway::{archive, config, learned};
-use rules::script::{ScriptFile, prepare, shipped};
+use rules::script::{ScriptFile, list_shipped_scripts, prepare_scripts};
 use rules::twin::{parse_hypotheses, parse_model};
 use serde_json::json;
 use std::fs;
@@ -60,7 +60,7 @@ pub(crate) fn all() -> Vec<Parser> {
             },
         ),
         parser("script", scripts, |bytes| {
-            drop(prepare(&[ScriptFile { name: "own.rhai".to_owned(), text: text(bytes) }]))
+            drop(prepare_scripts(&[ScriptFile { name: "own.rhai".to_owned(), text: text(bytes) }]))
         }),
         parser("config", configs, |bytes| drop(config::parse("own.toml", &text(bytes), Path::new("."), []))),
         parser("address", addresses, |bytes| {
@@ -141,18 +141,19 @@ fn items() -> Vec<FocasItem> {
 const VERSIONS: [u16; 3] = [2, 3, 4];
 
 fn questions(version: u16) -> Vec<u8> {
-    let all: Vec<_> = items().into_iter().map(|item| request::reading(item, Generation::of(version))).collect();
+    let all: Vec<_> =
+        items().into_iter().map(|item| request::build_read_request(item, Generation::from_version(version))).collect();
     request_body(&all)
 }
 
 fn focas_questions() -> Vec<Vec<u8>> {
-    VERSIONS.into_iter().map(|version| frame(version, FrameKind::Request, &questions(version))).collect()
+    VERSIONS.into_iter().map(|version| encode_frame(version, FrameKind::Request, &questions(version))).collect()
 }
 
 /// The served control, asked by a client that is not in order.
 fn focas_question(bytes: &[u8]) {
-    let Ok(frame) = FocasFrame::of(bytes) else { return };
-    let Ok(requests) = requests(&frame.body) else { return };
+    let Ok(frame) = FocasFrame::from_bytes(bytes) else { return };
+    let Ok(requests) = parse_requests(&frame.body) else { return };
     for version in VERSIONS {
         drop(answer_body(&mut Controller::new(version, &["X", "Z"]), &requests));
     }
@@ -160,19 +161,19 @@ fn focas_question(bytes: &[u8]) {
 
 fn focas_answers() -> Vec<Vec<u8>> {
     let answers = |version: u16| {
-        let asked = requests(&questions(version)).expect("our own");
-        frame(version, FrameKind::Answer, &answer_body(&mut Controller::new(version, &["X", "Z"]), &asked))
+        let asked = parse_requests(&questions(version)).expect("our own");
+        encode_frame(version, FrameKind::Answer, &answer_body(&mut Controller::new(version, &["X", "Z"]), &asked))
     };
     VERSIONS.into_iter().map(answers).collect()
 }
 
 /// Our client, answered by a control that is not in order.
 fn focas_answer(bytes: &[u8]) {
-    let Ok(frame) = FocasFrame::of(bytes) else { return };
-    let Ok(replies) = replies(&frame.body) else { return };
-    let generation = Generation::of(frame.version);
+    let Ok(frame) = FocasFrame::from_bytes(bytes) else { return };
+    let Ok(replies) = parse_replies(&frame.body) else { return };
+    let generation = Generation::from_version(frame.version);
     for (item, reply) in items().into_iter().zip(&replies) {
-        drop(decode::answer(item, generation, reply.data));
+        drop(decode::read_answer(item, generation, reply.data));
     }
     drop(Opening::read(generation, &frame.body, 1));
 }
@@ -180,13 +181,17 @@ fn focas_answer(bytes: &[u8]) {
 fn modbus_frames() -> Vec<Vec<u8>> {
     let block = pdu::RegisterBlock { table: RegisterTable::Holding, start: 0, count: 20 };
     let registers: Vec<u16> = (0..20).collect();
-    vec![block.request().to_vec(), pdu::answer(RegisterTable::Input, &registers), pdu::refusal(3, 2)]
+    vec![
+        block.encode_request().to_vec(),
+        pdu::encode_answer(RegisterTable::Input, &registers),
+        pdu::encode_refusal(3, 2),
+    ]
 }
 
 fn modbus(bytes: &[u8]) {
-    let _block = pdu::understood(bytes);
+    let _block = pdu::parse_request(bytes);
     for (table, count) in [(RegisterTable::Holding, 20), (RegisterTable::Input, 20), (RegisterTable::Input, 125)] {
-        drop(pdu::RegisterBlock { table, start: 0, count }.registers(bytes));
+        drop(pdu::RegisterBlock { table, start: 0, count }.parse_answer(bytes));
     }
 }
 
@@ -208,8 +213,10 @@ fn nclink(bytes: &[u8]) {
 }
 
 fn waveform_headers() -> Vec<Vec<u8>> {
-    let currents = WaveformHeader::currents(12_800.0, &["r", "s", "t"], 40.0, 32_000);
-    [currents.line(), WaveformHeader::amplitude(200.0, 40.0, 32_000).line()].map(String::into_bytes).to_vec()
+    let currents = WaveformHeader::with_currents(12_800.0, &["r", "s", "t"], 40.0, 32_000);
+    [currents.encode_line(), WaveformHeader::with_amplitude(200.0, 40.0, 32_000).encode_line()]
+        .map(String::into_bytes)
+        .to_vec()
 }
 
 fn csv_files() -> Vec<Vec<u8>> {
@@ -225,12 +232,12 @@ fn maps() -> Vec<Vec<u8>> {
 }
 
 fn scripts() -> Vec<Vec<u8>> {
-    shipped().into_iter().map(|script| script.text.into_bytes()).collect()
+    list_shipped_scripts().into_iter().map(|script| script.text.into_bytes()).collect()
 }
 
 fn configs() -> Vec<Vec<u8>> {
     let mut all = files("gateway/demo", "toml");
-    all.extend([config::keys::example().into_bytes()]);
+    all.extend([config::keys::format_example().into_bytes()]);
     all.extend(files("tests/data/messages", "toml"));
     all
 }
@@ -259,6 +266,6 @@ fn archives() -> Vec<Vec<u8>> {
 fn learned_states() -> Vec<Vec<u8>> {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("wear.json");
-    learned::save(&path, "{\"edges\":[1,2,3]}").expect("saved");
+    learned::save_state(&path, "{\"edges\":[1,2,3]}").expect("saved");
     vec![fs::read(&path).expect("readable"), b"{\"edges\":[1]}".to_vec()]
 }

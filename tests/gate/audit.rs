@@ -21,7 +21,7 @@ fn row(number: i64) -> Audit {
 fn written(directory: &Path, numbers: std::ops::RangeInclusive<i64>) -> PathBuf {
     let path = directory.join("history.db");
     let writer = Writer::open(&path, Options::default()).expect("opens");
-    numbers.for_each(|number| assert!(writer.record(row(number)).is_some()));
+    numbers.for_each(|number| assert!(writer.queue_record(row(number)).is_some()));
     writer.flush().expect("durable");
     path
 }
@@ -73,7 +73,7 @@ fn rows_cannot_be_changed_or_removed_by_accident() {
         let refused = db.execute_batch(sql).expect_err("refused").to_string();
         assert!(refused.contains("only ever appended"), "{sql}: {refused}");
     }
-    let rows = Reader::open(&path).expect("opens").audit(i64::MIN, i64::MAX, 2).expect("read");
+    let rows = Reader::open(&path).expect("opens").read_audit(i64::MIN, i64::MAX, 2).expect("read");
     assert_eq!(rows.iter().map(|row| row.number).collect::<Vec<_>>(), [2, 3]);
     assert_eq!(rows[0].audit.asked, row(2).asked);
     assert_eq!((rows[0].audit.before, rows[0].audit.after), (None, Some(0.0)));

@@ -12,27 +12,27 @@ use std::path::Path;
 pub(crate) const TICK_NS: i64 = SECOND_NS / 10;
 
 pub(crate) fn id(name: &str) -> ChannelId {
-    ChannelId::of(name).expect("a channel")
+    ChannelId::from_name(name).expect("a channel")
 }
 
 pub(crate) fn set_number(sample: &mut Sample, name: &str, number: f64) {
-    sample.set(id(name), Slot { value: Value::number(number), age_ns: 0 });
+    sample.set_slot(id(name), Slot { value: Value::from_number(number), age_ns: 0 });
 }
 
 pub(crate) fn set_text(sample: &mut Sample, name: &str, text: &str) {
-    sample.set(id(name), Slot { value: Ok(Value::Text(text.into())), age_ns: 0 });
+    sample.set_slot(id(name), Slot { value: Ok(Value::Text(text.into())), age_ns: 0 });
 }
 
 /// A machine in the middle of an ordinary cut.
 pub(crate) fn cutting(at_ns: i64) -> (Sample, Estimates) {
-    let mut sample = Sample::empty(at_ns);
+    let mut sample = Sample::new_empty(at_ns);
     for (name, number) in [("feed_mm_min", 200.0), ("spindle_speed_rpm", 1000.0), ("spindle_power_w", 2000.0)] {
         set_number(&mut sample, name, number);
     }
     set_text(&mut sample, "mode", mode::AUTOMATIC);
     set_text(&mut sample, "execution", execution::ACTIVE);
     set_text(&mut sample, "alarm", "");
-    let mut estimates = Estimates::none(at_ns);
+    let mut estimates = Estimates::without_samples(at_ns);
     estimates.state = State::Cutting;
     (sample, estimates)
 }
@@ -62,14 +62,26 @@ pub(crate) fn common_cases() -> Vec<Case> {
         ("a mode nobody knows", |it, _| set_text(it, "mode", "AUTO?"), Hold::UnknownWord(id("mode"))),
         ("an execution nobody knows", |it, _| set_text(it, "execution", "RUN"), Hold::UnknownWord(id("execution"))),
         ("feed hold", |it, _| set_text(it, "execution", execution::FEED_HOLD), Hold::FeedHold),
-        ("no mode", |it, _| it.set(id("mode"), Slot::absent(Absence::Timeout)), missing("mode", Absence::Timeout)),
-        ("an old mode", |it, _| it.set(id("mode"), Slot::absent(Absence::Stale)), missing("mode", Absence::Stale)),
+        (
+            "no mode",
+            |it, _| it.set_slot(id("mode"), Slot::from_absence(Absence::Timeout)),
+            missing("mode", Absence::Timeout),
+        ),
+        (
+            "an old mode",
+            |it, _| it.set_slot(id("mode"), Slot::from_absence(Absence::Stale)),
+            missing("mode", Absence::Stale),
+        ),
         (
             "an old execution",
-            |it, _| it.set(id("execution"), Slot::absent(Absence::Stale)),
+            |it, _| it.set_slot(id("execution"), Slot::from_absence(Absence::Stale)),
             missing("execution", Absence::Stale),
         ),
-        ("a silent alarm", |it, _| it.set(id("alarm"), Slot::absent(Absence::Stale)), missing("alarm", Absence::Stale)),
+        (
+            "a silent alarm",
+            |it, _| it.set_slot(id("alarm"), Slot::from_absence(Absence::Stale)),
+            missing("alarm", Absence::Stale),
+        ),
     ]
 }
 
@@ -89,15 +101,19 @@ pub(crate) fn cases() -> Vec<Case> {
         ("ready", |it, _| set_text(it, "execution", execution::READY), Hold::NotRunning),
         (
             "no feed",
-            |it, _| it.set(id("feed_mm_min"), Slot::absent(Absence::Disconnected)),
+            |it, _| it.set_slot(id("feed_mm_min"), Slot::from_absence(Absence::Disconnected)),
             missing("feed_mm_min", Absence::Disconnected),
         ),
         (
             "old speed",
-            |it, _| it.set(id("spindle_speed_rpm"), Slot { value: Value::number(1000.0), age_ns: SECOND_NS }),
+            |it, _| it.set_slot(id("spindle_speed_rpm"), Slot { value: Value::from_number(1000.0), age_ns: SECOND_NS }),
             missing("spindle_speed_rpm", Absence::Stale),
         ),
-        ("no load", |it, _| it.set(id("spindle_power_w"), Slot::absent(Absence::Stale)), Hold::OnlyEstimated),
+        (
+            "no load",
+            |it, _| it.set_slot(id("spindle_power_w"), Slot::from_absence(Absence::Stale)),
+            Hold::OnlyEstimated,
+        ),
     ]);
     cases
 }

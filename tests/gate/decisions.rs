@@ -9,7 +9,7 @@ use gateway::config::{self, BUILT_IN_TEXT, GateMode};
 use gateway::gate::{
     ArmError, Bound, Disarmed, Fault, Gate, GateOutcome, Hold, OverrideWriter, UnexpectedReading, Verdict,
 };
-use rules::script::{Host, ScriptFile, shipped};
+use rules::script::{Host, ScriptFile, list_shipped_scripts};
 use std::path::Path;
 use std::time::Duration;
 
@@ -63,17 +63,17 @@ fn by_default_nothing_is_written_in_an_hour() {
     let mut host = Host::new();
     let greedy =
         ScriptFile { name: "greedy.rhai".to_owned(), text: "request_feed_override(60, \"greed\");".to_owned() };
-    let mut files = shipped();
+    let mut files = list_shipped_scripts();
     files.push(greedy);
-    host.load(&files).expect("they compile");
-    let clock = ManualClock::at(0);
+    host.load_scripts(&files).expect("they compile");
+    let clock = ManualClock::with_time(0);
     let mut permitted = Vec::new();
     for tick in 0..36_000 {
-        clock.set(tick * TICK_NS);
+        clock.set_time(tick * TICK_NS);
         let (sample, estimates) = cutting(tick * TICK_NS);
-        let decision = host.tick(&sample, &estimates);
-        let verdict = gate.decide(decision.request.as_ref(), &sample, &estimates);
-        assert_eq!(writer.step(&verdict, &clock), None);
+        let decision = host.run_due_scripts(&sample, &estimates);
+        let verdict = gate.decide_override(decision.request.as_ref(), &sample, &estimates);
+        assert_eq!(writer.write_verdict(&verdict, &clock), None);
         permitted.push(verdict.permitted.percent());
     }
     assert_eq!(writer.actuator().writes, [0_u8; 0], "the default configuration wrote to the machine");
@@ -83,23 +83,23 @@ fn by_default_nothing_is_written_in_an_hour() {
 #[test]
 fn arming_needs_the_configuration_a_person_and_ends_by_itself() {
     for mode in [GateMode::Off, GateMode::Shadow] {
-        assert_eq!(Gate::new(limits(mode)).arm("fitter", None, 0).err(), Some(ArmError::Mode(mode.word())));
+        assert_eq!(Gate::new(limits(mode)).arm("fitter", None, 0).err(), Some(ArmError::Mode(mode.as_word())));
     }
     let mut gate = Gate::new(limits(GateMode::Armed));
-    assert_eq!(gate.armed().err(), Some(Disarmed::Start), "disarmed after each start");
+    assert_eq!(gate.current_arming().err(), Some(Disarmed::Start), "disarmed after each start");
     assert_eq!(gate.arm("  ", None, 0).err(), Some(ArmError::Nobody));
     gate.arm("fitter", None, 0).expect("allowed");
     let lasts_ns = i64::try_from(limits(GateMode::Armed).armed_for.as_nanos()).expect("hours");
     for at_ns in (0..lasts_ns).step_by(9_000_000_000).chain([lasts_ns - 1]) {
         let (sample, estimates) = cutting(at_ns);
-        assert!(gate.decide(None, &sample, &estimates).armed);
+        assert!(gate.decide_override(None, &sample, &estimates).armed);
     }
     let (sample, estimates) = cutting(lasts_ns);
-    assert!(!gate.decide(None, &sample, &estimates).armed);
-    assert_eq!(gate.armed().err(), Some(Disarmed::Expired));
+    assert!(!gate.decide_override(None, &sample, &estimates).armed);
+    assert_eq!(gate.current_arming().err(), Some(Disarmed::Expired));
     gate.arm("fitter", None, lasts_ns).expect("again");
     let (sample, estimates) = cutting(5);
-    assert!(!gate.decide(None, &sample, &estimates).armed, "a clock that jumps back disarms");
+    assert!(!gate.decide_override(None, &sample, &estimates).armed, "a clock that jumps back disarms");
 }
 
 /// A process that was stopped and goes on sees fresh values at once, and has seen none for as long as it stood.
@@ -109,11 +109,11 @@ fn ten_seconds_without_a_tick_end_the_arming_like_ten_seconds_without_values() {
         let mut gate = Gate::new(limits(GateMode::Armed));
         gate.arm("fitter", None, 0).expect("allowed");
         let (sample, estimates) = cutting(TICK_NS);
-        assert!(gate.decide(None, &sample, &estimates).armed);
+        assert!(gate.decide_override(None, &sample, &estimates).armed);
         let (sample, estimates) = cutting(TICK_NS + pause_s * 1_000_000_000);
-        assert_eq!(gate.decide(None, &sample, &estimates).armed, armed, "{pause_s} s");
+        assert_eq!(gate.decide_override(None, &sample, &estimates).armed, armed, "{pause_s} s");
         let why = if pause_s > 3_600 { Disarmed::Expired } else { Disarmed::Silent };
-        assert_eq!(gate.armed().err(), (!armed).then_some(why), "{pause_s} s");
+        assert_eq!(gate.current_arming().err(), (!armed).then_some(why), "{pause_s} s");
     }
 }
 
@@ -123,17 +123,19 @@ fn every_hold_gives_the_programmed_feed_at_once_and_says_why() {
         let mut gate = armed_gate();
         for tick in 0..100 {
             let (sample, estimates) = cutting(tick * TICK_NS);
-            gate.decide(Some(&asking(60.0)), &sample, &estimates);
+            gate.decide_override(Some(&asking(60.0)), &sample, &estimates);
         }
         let (mut sample, mut estimates) = cutting(100 * TICK_NS);
-        let before = gate.decide(Some(&asking(60.0)), &sample, &estimates);
+        let before = gate.decide_override(Some(&asking(60.0)), &sample, &estimates);
         assert_eq!((before.permitted.percent(), before.outcome), (60, GateOutcome::Permitted), "{what}");
         sample.at_ns += TICK_NS;
         change(&mut sample, &mut estimates);
-        let verdict = gate.decide(Some(&asking(60.0)), &sample, &estimates);
+        let verdict = gate.decide_override(Some(&asking(60.0)), &sample, &estimates);
         assert_eq!((verdict.permitted.percent(), verdict.outcome), (100, GateOutcome::Held(hold)), "{what}");
-        assert!(verdict.reason().starts_with("no override, the dial counts: ") && !hold.zh().is_empty());
-        assert_eq!(verdict.word(), "held");
+        assert!(
+            verdict.reason().starts_with("no override, the dial counts: ") && !hold.describe_in_chinese().is_empty()
+        );
+        assert_eq!(verdict.as_word(), "held");
     }
 }
 
@@ -157,7 +159,7 @@ fn threads_in_nc_blocks_hold_until_another_motion() {
         let (mut sample, estimates) = cutting(0);
         set_text(&mut sample, "block", block);
         let mut decide =
-            |sample: &Sample| matches!(gate.decide(None, sample, &estimates).outcome, GateOutcome::Held(_));
+            |sample: &Sample| matches!(gate.decide_override(None, sample, &estimates).outcome, GateOutcome::Held(_));
         assert_eq!(decide(&sample), held, "{block}");
         set_text(&mut sample, "block", "X5");
         assert_eq!(decide(&sample), held, "{block}, next line");
@@ -170,7 +172,7 @@ fn threads_in_nc_blocks_hold_until_another_motion() {
 fn off_is_off() {
     let mut gate = Gate::new(limits(GateMode::Off));
     let (sample, estimates) = cutting(0);
-    assert_eq!(gate.decide(Some(&asking(80.0)), &sample, &estimates).outcome, GateOutcome::Held(Hold::Off));
+    assert_eq!(gate.decide_override(Some(&asking(80.0)), &sample, &estimates).outcome, GateOutcome::Held(Hold::Off));
 }
 
 #[test]
@@ -178,10 +180,10 @@ fn silence_of_the_machine_disarms_after_ten_seconds() {
     let mut gate = armed_gate();
     for tick in 0..=100 {
         let (mut sample, estimates) = cutting(tick * TICK_NS);
-        sample.set(id("mode"), Slot::absent(Absence::Disconnected));
-        assert_eq!(gate.decide(None, &sample, &estimates).armed, tick < 100, "tick {tick}");
+        sample.set_slot(id("mode"), Slot::from_absence(Absence::Disconnected));
+        assert_eq!(gate.decide_override(None, &sample, &estimates).armed, tick < 100, "tick {tick}");
     }
-    assert_eq!(gate.armed().err(), Some(Disarmed::Silent));
+    assert_eq!(gate.current_arming().err(), Some(Disarmed::Silent));
 }
 
 /// `GATE_CASES` sets the number of ticks; 100,000 otherwise.
@@ -201,7 +203,7 @@ fn whatever_is_asked_for_the_override_stays_in_the_band_and_moves_slowly() {
         if random.next().is_multiple_of(50) {
             cases[(random.next() % cases.len() as u64) as usize].1(&mut sample, &mut estimates);
         }
-        let verdict = gate.decide(random.request().as_ref(), &sample, &estimates);
+        let verdict = gate.decide_override(random.request().as_ref(), &sample, &estimates);
         let now = f64::from(verdict.permitted.percent());
         assert!(now >= limits.min_pct && now <= limits.max_pct, "{verdict:?}");
         let step_s = step_ns as f64 / SECOND_NS as f64;
@@ -228,7 +230,7 @@ fn the_pace_and_the_band_are_told() {
     let mut gate = Gate::new(config::GateConfig { above_dial: true, ..limits(GateMode::Armed) });
     let mut outcome_at = |tick: i64, pct: f64| {
         let (sample, estimates) = cutting(tick * TICK_NS);
-        gate.decide(Some(&asking(pct)), &sample, &estimates)
+        gate.decide_override(Some(&asking(pct)), &sample, &estimates)
     };
     let first = outcome_at(0, 55.0);
     assert_eq!((first.outcome, first.permitted.percent()), (GateOutcome::Limited(Bound::Slew), 100));
@@ -247,7 +249,7 @@ fn never_above_the_operators_dial_unless_configured() {
         for tick in 0..60 {
             let (mut sample, estimates) = cutting(tick * TICK_NS);
             dial.into_iter().for_each(|dial| set_number(&mut sample, "feed_override_dial_pct", dial));
-            last = Some(gate.decide(Some(&asking(115.0)), &sample, &estimates));
+            last = Some(gate.decide_override(Some(&asking(115.0)), &sample, &estimates));
         }
         last.map(|verdict| (verdict.permitted.percent(), verdict.outcome)).expect("decided")
     };
@@ -263,7 +265,7 @@ fn never_above_the_operators_dial_unless_configured() {
         let decide = |tick: i64| {
             let (mut sample, estimates) = cutting(tick * TICK_NS);
             set_number(&mut sample, "feed_override_dial_pct", dial);
-            gate.decide(Some(&asking(60.0)), &sample, &estimates)
+            gate.decide_override(Some(&asking(60.0)), &sample, &estimates)
         };
         (0..60).map(decide).last().map(|verdict| (verdict.permitted.percent(), verdict.outcome)).expect("decided")
     };
@@ -293,15 +295,15 @@ fn run(
     ticks: std::ops::Range<i64>,
     pct: f64,
 ) -> Vec<Option<Fault>> {
-    let clock = ManualClock::at(0);
+    let clock = ManualClock::with_time(0);
     let mut faults = Vec::new();
     for tick in ticks {
-        clock.set(tick * TICK_NS);
+        clock.set_time(tick * TICK_NS);
         let (sample, estimates) = cutting(tick * TICK_NS);
-        let verdict = gate.decide(Some(&asking(pct)), &sample, &estimates);
-        if let Some(written) = writer.step(&verdict, &clock) {
+        let verdict = gate.decide_override(Some(&asking(pct)), &sample, &estimates);
+        if let Some(written) = writer.write_verdict(&verdict, &clock) {
             if let Some(fault) = &written.fault {
-                gate.disarm(fault.disarmed());
+                gate.disarm(fault.disarm_reason());
             }
             faults.push(written.fault);
         }
@@ -338,14 +340,14 @@ fn a_machine_that_does_not_take_the_override_disarms_the_gate_once() {
         },
     };
     assert_eq!(told, [mismatch(37)], "once");
-    assert_eq!(gate.armed().err(), Some(Disarmed::ReadBack));
+    assert_eq!(gate.current_arming().err(), Some(Disarmed::ReadBack));
 
     let mut gate = armed_gate();
     let mut lagging = writer(Machine { shown: Some((0, 100)), ..Machine::new() });
     let faults = run(&mut gate, &mut lagging, 0..60, 80.0);
     let mismatches: Vec<_> = faults.into_iter().flatten().collect();
     assert_eq!(mismatches, [mismatch(100)]);
-    assert_eq!(gate.armed().err(), Some(Disarmed::ReadBack));
+    assert_eq!(gate.current_arming().err(), Some(Disarmed::ReadBack));
     assert_eq!(lagging.actuator().writes.last(), Some(&100), "the machine is given back");
     assert!(mismatches[0].to_string().contains("80 % was written and 100 % is in force"));
 }
@@ -356,32 +358,32 @@ fn a_broken_line_disarms_the_gate() {
     let mut writer = writer(Machine { refuses: true, ..Machine::new() });
     let faults = run(&mut gate, &mut writer, 0..20, 80.0);
     assert!(matches!(faults[0], Some(Fault::Line(_))));
-    assert_eq!(gate.armed().err(), Some(Disarmed::Line));
+    assert_eq!(gate.current_arming().err(), Some(Disarmed::Line));
     assert_eq!(writer.actuator().writes.len(), 2, "one attempt, and one to give the machine back");
 }
 
 #[test]
 fn the_simulated_machine_follows_an_armed_gate_and_returns_to_its_panel() {
     let machine = Simulated::new("simulated://lathe", SimulatedSettings::default(), 0);
-    let clock = ManualClock::at(0);
+    let clock = ManualClock::with_time(0);
     let cut_ns = (0..8 * 3600)
         .map(|second| second * SECOND_NS)
         .find(|at_ns| machine.truth(*at_ns).state == adapters::simulated::TrueState::Cutting)
         .expect("it cuts within a day");
-    clock.set(cut_ns);
+    clock.set_time(cut_ns);
     let mut gate = Gate::new(limits(GateMode::Armed));
     gate.arm("fitter", None, cut_ns).expect("allowed");
     let mut writer = writer(machine.feed_override());
     let mut last = None;
     for tick in 0..20 {
-        clock.set(cut_ns + tick * TICK_NS);
+        clock.set_time(cut_ns + tick * TICK_NS);
         let (sample, estimates) = cutting(cut_ns + tick * TICK_NS);
-        let verdict: Verdict = gate.decide(Some(&asking(80.0)), &sample, &estimates);
-        last = writer.step(&verdict, &clock).or(last);
+        let verdict: Verdict = gate.decide_override(Some(&asking(80.0)), &sample, &estimates);
+        last = writer.write_verdict(&verdict, &clock).or(last);
     }
     let last = last.expect("it has written");
     assert_eq!((last.fault, last.after.map(OverridePct::percent)), (None, Some(80)));
-    assert_eq!(writer.release(&clock).map(|given| given.asked), Some(OverridePct::FULL));
-    assert_eq!(writer.release(&clock), None);
+    assert_eq!(writer.release_machine(&clock).map(|given| given.asked), Some(OverridePct::FULL));
+    assert_eq!(writer.release_machine(&clock), None);
     assert!(gate.limits().stale <= Duration::from_secs(1));
 }

@@ -42,7 +42,7 @@ impl Stand {
         let mut gate = Gate::new(config::GateConfig { above_dial, armed_for, ..limits(GateMode::Armed) });
         gate.arm("fitter", None, 0).expect("allowed");
         let writer = OverrideWriter::new(Box::new(machine.feed_override()) as Box<dyn Actuator>, gate.limits());
-        Self { machine, gate, writer, clock: ManualClock::at(0), tick: 0 }
+        Self { machine, gate, writer, clock: ManualClock::with_time(0), tick: 0 }
     }
 
     fn turn(&mut self, dial: u8) {
@@ -53,16 +53,16 @@ impl Stand {
     fn tick(&mut self, request: Option<f64>) -> u8 {
         self.tick += 1;
         let at_ns = self.tick * TICK_NS;
-        self.clock.set(at_ns);
+        self.clock.set_time(at_ns);
         let dial = self.machine.moment(at_ns).panel.dial_pct;
         let (mut sample, estimates) = cutting(at_ns);
         set_number(&mut sample, "feed_override_dial_pct", f64::from(dial));
         let request = request.map(asking);
-        let verdict = self.gate.decide(request.as_ref(), &sample, &estimates);
-        if let Some(fault) = self.writer.step(&verdict, &self.clock).and_then(|written| written.fault) {
+        let verdict = self.gate.decide_override(request.as_ref(), &sample, &estimates);
+        if let Some(fault) = self.writer.write_verdict(&verdict, &self.clock).and_then(|written| written.fault) {
             panic!("{fault}");
         }
-        if let Some(Err(fault)) = self.writer.look(&self.clock) {
+        if let Some(Err(fault)) = self.writer.read_reaction(&self.clock) {
             panic!("{fault}");
         }
         self.machine.moment(at_ns).panel.feed_override_pct
@@ -82,7 +82,7 @@ fn armed_and_idle_for_an_hour_the_dial_counts_on_every_ladder() {
         stand.ticks(1.0, None);
         let mut seen = std::collections::BTreeSet::new();
         (0..36_000).for_each(|_| _ = seen.insert(stand.tick(None)));
-        let writes = stand.machine.written().writes();
+        let writes = stand.machine.written().count_writes();
         println!("{rule:?}: an hour armed and idle with the dial at 70 %: {seen:?} % in force, {writes} writes");
         assert_eq!((seen.into_iter().collect::<Vec<_>>(), writes), (vec![70], 0));
     }
@@ -93,7 +93,7 @@ fn on_a_ladder_that_replaces_the_dial_nothing_above_it_is_ever_in_force() {
     let mut stand = Stand::new(LadderRule::Replace);
     stand.turn(70);
     assert_eq!(stand.ticks(5.0, Some(90.0)), 70, "more than the dial is not asked for");
-    assert_eq!(stand.machine.written().writes(), 0);
+    assert_eq!(stand.machine.written().count_writes(), 0);
     assert_eq!(stand.ticks(5.0, Some(60.0)), 60, "less is");
     stand.turn(50);
     let late = (0..20).take_while(|_| stand.tick(Some(60.0)) > 50).count();
@@ -142,9 +142,9 @@ const DIAL: u16 = 140;
 
 impl Rungs {
     fn scan(&mut self, memory: &mut Memory, now_ns: i64) {
-        let byte = |memory: &Memory, offset| memory.byte(Area::D, MAILBOX + offset);
+        let byte = |memory: &Memory, offset| memory.read_byte(Area::D, MAILBOX + offset);
         if self.last_beat.is_none() {
-            memory.set(Area::D, MAILBOX, 0);
+            memory.set_byte(Area::D, MAILBOX, 0);
         }
         let beat = byte(memory, 2);
         if self.last_beat.replace(beat).is_some_and(|last| last != beat) {
@@ -152,29 +152,29 @@ impl Rungs {
         }
         let beat_lost = now_ns - self.timer_from_ns >= 1_500_000_000;
         let asked = byte(memory, 0) == 0xA5;
-        let allowed = memory.byte(Area::F, 2) & 0x08 == 0 && memory.byte(Area::F, 1) & 0x20 == 0;
+        let allowed = memory.read_byte(Area::F, 2) & 0x08 == 0 && memory.read_byte(Area::F, 1) & 0x20 == 0;
         let counts = asked && allowed && self.seen && !beat_lost;
         let wanted = byte(memory, 1);
         let limited = wanted.clamp(50, 120);
         let lesser = self.rule == LadderRule::Replace || limited < self.dial;
         let made = if counts && lesser { limited } else { self.dial };
-        memory.set(Area::G, 12, !made);
-        memory.set(Area::D, DIAL, self.dial);
-        memory.set(Area::D, MAILBOX + 3, if counts { limited } else { 100 });
+        memory.set_byte(Area::G, 12, !made);
+        memory.set_byte(Area::D, DIAL, self.dial);
+        memory.set_byte(Area::D, MAILBOX + 3, if counts { limited } else { 100 });
         let state = match (asked, self.seen && !beat_lost) {
             (false, _) => 0,
             (true, false) => 2,
             (true, true) => 1 + 2 * u8::from(limited != wanted),
         };
-        memory.set(Area::D, MAILBOX + 4, state);
+        memory.set_byte(Area::D, MAILBOX + 4, state);
     }
 }
 
 impl ServedControl for Built {
-    fn now(&mut self) -> Option<&mut Controller> {
+    fn update_controller(&mut self) -> Option<&mut Controller> {
         let now_ns = self.clock.now_ns();
         let Self { control, rungs, .. } = self;
-        let control = control.now()?;
+        let control = control.update_controller()?;
         // After the ladder of the served machine, whose mailbox nobody writes to.
         rungs.scan(&mut control.memory, now_ns);
         Some(control)
@@ -196,8 +196,9 @@ fn served(rule: LadderRule) -> Server {
 
 /// Feed override in force, and the enable byte of the mailbox.
 fn state(server: &Server) -> Option<(u8, u8)> {
-    let bytes =
-        |control: &mut Controller| (255 - control.memory.byte(Area::G, 12), control.memory.byte(Area::D, MAILBOX));
+    let bytes = |control: &mut Controller| {
+        (255 - control.memory.read_byte(Area::G, 12), control.memory.read_byte(Area::D, MAILBOX))
+    };
     server.with(|control| control.map(bytes))
 }
 

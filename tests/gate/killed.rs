@@ -32,7 +32,7 @@ fn served() -> Server {
 
 /// What the ladder has in force, from G012 (inverted).
 fn in_force(server: &Server) -> Option<u8> {
-    server.with(|control| control.map(|control| 255 - control.memory.byte(Area::G, 12)))
+    server.with(|control| control.map(|control| 255 - control.memory.read_byte(Area::G, 12)))
 }
 
 fn prepared(directory: &Path, server: &Server) -> PathBuf {

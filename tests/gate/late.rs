@@ -68,8 +68,8 @@ impl Actuator for Controller {
         Ok(OverridePct::new(state.shown.unwrap_or_else(last)).expect("not 255"))
     }
 
-    fn ask(&mut self, _: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
-        self.does(request.word().to_owned());
+    fn ask_ladder(&mut self, _: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        self.does(request.as_word().to_owned());
         Ok(())
     }
 }
@@ -79,7 +79,7 @@ impl OffsetSink for Controller {
         "test"
     }
 
-    fn called(&self) -> &'static str {
+    fn offset_name(&self) -> &'static str {
         "the offset"
     }
 
@@ -88,7 +88,7 @@ impl OffsetSink for Controller {
     }
 
     fn write(&mut self, _: &dyn Clock, axis: Axis, _: f64, wanted_um: f64) -> Result<f64, SourceError> {
-        self.does(format!("{} {wanted_um}", axis.word()));
+        self.does(format!("{} {wanted_um}", axis.as_word()));
         Ok(wanted_um)
     }
 }
@@ -122,7 +122,7 @@ fn told<T>(actuator_worker: &mut ActuatorWorker, mut of: impl FnMut(ActuatorRepo
     let until = Instant::now() + Duration::from_secs(20);
     loop {
         let mut found = None;
-        actuator_worker.listen(|said| found = found.take().or_else(|| of(said)));
+        actuator_worker.receive_reports(|said| found = found.take().or_else(|| of(said)));
         if let Some(found) = found {
             return found;
         }
@@ -133,7 +133,7 @@ fn told<T>(actuator_worker: &mut ActuatorWorker, mut of: impl FnMut(ActuatorRepo
 
 fn lay(actuator_worker: &mut ActuatorWorker, verdict: &Verdict, asks: &[ScriptRequest]) -> Vec<ActuatorReport> {
     let mut said = Vec::new();
-    actuator_worker.step(verdict, asks, 0, |it| said.push(it));
+    actuator_worker.submit_verdict(verdict, asks, 0, |it| said.push(it));
     said
 }
 
@@ -142,7 +142,7 @@ fn whoever_arms_finds_the_machine_at_its_dial_and_never_with_a_leap() {
     let mut gate = Gate::new(limits(GateMode::Armed));
     let decide = |gate: &mut Gate, tick: i64| {
         let (sample, estimates) = cutting(tick * TICK_NS);
-        gate.decide(Some(&asking(60.0)), &sample, &estimates)
+        gate.decide_override(Some(&asking(60.0)), &sample, &estimates)
     };
     (0..50).for_each(|tick| assert!(!decide(&mut gate, tick).armed));
     assert_eq!(decide(&mut gate, 50).permitted.percent(), 60, "decided while nobody writes");
@@ -160,35 +160,35 @@ fn whoever_arms_finds_the_machine_at_its_dial_and_never_with_a_leap() {
 
 #[test]
 fn after_a_fault_nothing_is_written_until_the_gate_has_let_go() {
-    let (controller, clock) = (Controller::default(), ManualClock::at(0));
+    let (controller, clock) = (Controller::default(), ManualClock::with_time(0));
     let mut writer = OverrideWriter::new(controller.clone(), &limits(GateMode::Armed));
-    writer.step(&verdict(90, true), &clock);
+    writer.write_verdict(&verdict(90, true), &clock);
     controller.set(|state| state.shown = Some(37));
-    clock.set(SECOND_NS / 2);
-    let fault = writer.step(&verdict(80, true), &clock).and_then(|written| written.fault);
+    clock.set_time(SECOND_NS / 2);
+    let fault = writer.write_verdict(&verdict(80, true), &clock).and_then(|written| written.fault);
     assert!(matches!(fault, Some(Fault::ReadBack { .. })), "{fault:?}");
-    clock.set(SECOND_NS);
-    assert_eq!(writer.step(&verdict(70, true), &clock), None, "laid down before the tick has heard of it");
-    writer.step(&verdict(100, false), &clock);
+    clock.set_time(SECOND_NS);
+    assert_eq!(writer.write_verdict(&verdict(70, true), &clock), None, "laid down before the tick has heard of it");
+    writer.write_verdict(&verdict(100, false), &clock);
     assert_eq!(controller.log(), ["90", "80", "100"]);
 }
 
 #[test]
 fn a_ladder_that_has_taken_the_dial_back_is_not_written_over() {
-    let (controller, clock) = (Controller::default(), ManualClock::at(0));
+    let (controller, clock) = (Controller::default(), ManualClock::with_time(0));
     let mut writer = OverrideWriter::new(controller.clone(), &limits(GateMode::Armed));
-    writer.step(&verdict(60, true), &clock);
+    writer.write_verdict(&verdict(60, true), &clock);
     controller.set(|state| state.shown = Some(100));
-    clock.set(2 * SECOND_NS);
-    let written = writer.step(&verdict(60, true), &clock).expect("a fault");
+    clock.set_time(2 * SECOND_NS);
+    let written = writer.write_verdict(&verdict(60, true), &clock).expect("a fault");
     assert_eq!(written.fault, Some(Fault::Late { silent_ms: 2000 }));
     assert_eq!(controller.log(), ["60"], "a leap from 100 to 60 % is not made");
     // The signs of life were late and the ladder has not minded.
     let mut writer = OverrideWriter::new(Controller::default(), &limits(GateMode::Armed));
-    clock.set(0);
-    writer.step(&verdict(60, true), &clock);
-    clock.set(2 * SECOND_NS);
-    assert_eq!(writer.step(&verdict(60, true), &clock).and_then(|written| written.fault), None);
+    clock.set_time(0);
+    writer.write_verdict(&verdict(60, true), &clock);
+    clock.set_time(2 * SECOND_NS);
+    assert_eq!(writer.write_verdict(&verdict(60, true), &clock).and_then(|written| written.fault), None);
 }
 
 #[test]
@@ -198,12 +198,12 @@ fn what_waits_for_a_slow_controller_goes_nowhere_once_the_gate_is_disarmed() {
     let stop =
         ScriptRequest { request: LadderRequest::Stop, reason: "worn".into(), script: "a.rhai".into(), version: 1 };
     lay(&mut actuator_worker, &verdict(80, true), &[stop]);
-    actuator_worker.shift(&[SHIFT], true, 0, |_| {});
+    actuator_worker.order_shifts(&[SHIFT], true, 0, |_| {});
     // Disarmed, by a person or because the time is over, while all that waits.
     let said = lay(&mut actuator_worker, &verdict(100, false), &[]);
     assert!(matches!(&said[..], [ActuatorReport::Asked(_, Some(why))] if why.contains("disarmed")), "{said:?}");
     let mut withdrawn = Vec::new();
-    actuator_worker.shift(&[], false, 0, |said| withdrawn.push(format!("{said:?}")));
+    actuator_worker.order_shifts(&[], false, 0, |said| withdrawn.push(format!("{said:?}")));
     assert!(withdrawn.len() == 1 && withdrawn[0].contains("Withdrawn"), "{withdrawn:?}");
     controller.set(|state| state.stuck = false);
     actuator_worker.close(|_| {});
@@ -215,7 +215,7 @@ fn what_has_waited_too_long_goes_nowhere_either() {
     let directory = tempfile::tempdir().expect("a directory");
     let (controller, mut actuator_worker) = stuck(&directory);
     lay(&mut actuator_worker, &verdict(80, true), &[]);
-    actuator_worker.shift(&[SHIFT], true, 0, |_| {});
+    actuator_worker.order_shifts(&[SHIFT], true, 0, |_| {});
     // The tick hangs from now on, and the controller for two seconds more.
     std::thread::sleep(Duration::from_millis(2300));
     controller.set(|state| state.stuck = false);
@@ -245,7 +245,7 @@ fn a_thread_that_dies_is_noticed() {
         ActuatorReport::Fault(fault) => Some(fault),
         _ => None,
     });
-    assert_eq!((fault.disarmed(), &fault), (Disarmed::Line, &Fault::Gone));
+    assert_eq!((fault.disarm_reason(), &fault), (Disarmed::Line, &Fault::Gone));
     assert!(fault.to_string().contains("Start the gateway again"));
 }
 
@@ -253,23 +253,23 @@ fn a_thread_that_dies_is_noticed() {
 fn every_write_says_which_script_of_which_version_asked_for_it_and_why() {
     let mut gate = Gate::new(limits(GateMode::Armed));
     gate.arm("fitter", None, 0).expect("allowed");
-    let (clock, mut trail) = (ManualClock::at(0), trail::Trail::default());
+    let (clock, mut trail) = (ManualClock::with_time(0), trail::Trail::default());
     let mut writer = OverrideWriter::new(Controller::default(), gate.limits());
     let mut rows = Vec::new();
     for tick in 0..20 {
-        clock.set(tick * TICK_NS);
+        clock.set_time(tick * TICK_NS);
         let (sample, estimates) = cutting(tick * TICK_NS);
         let request = asking(80.0);
-        let verdict = gate.decide(Some(&request), &sample, &estimates);
-        let _told = trail.request(Some(&request), &verdict);
-        let written = writer.step(&verdict, &clock);
-        rows.extend(written.and_then(|written| trail.command(&written, "lathe")));
+        let verdict = gate.decide_override(Some(&request), &sample, &estimates);
+        let _told = trail.audit_override(Some(&request), &verdict);
+        let written = writer.write_verdict(&verdict, &clock);
+        rows.extend(written.and_then(|written| trail.command_from_write(&written, "lathe")));
     }
     assert!(rows.len() > 2, "{rows:?}");
     for row in &rows {
         assert_eq!((row.script.as_str(), row.script_version.as_str()), ("test.rhai", "0000000000000001"), "{row:?}");
         assert!(row.reason.ends_with(": test") && row.before.is_some() && row.after.is_some(), "{row:?}");
     }
-    let released = writer.release(&clock).and_then(|written| trail.write(&written)).expect("given back");
+    let released = writer.release_machine(&clock).and_then(|written| trail.write(&written)).expect("given back");
     assert_eq!(released.script, "", "the gateway by itself");
 }

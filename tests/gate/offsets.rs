@@ -46,8 +46,8 @@ fn resting(at_ns: i64) -> (Sample, Estimates) {
 fn judged(gate: &mut Gate, at_ns: i64, um: Option<f64>) -> Option<OffsetVerdict> {
     let (sample, estimates) = resting(at_ns);
     let proposals: Vec<OffsetProposal> = um.map(|um| proposal(Axis::Z, um)).into_iter().collect();
-    gate.decide(None, &sample, &estimates);
-    gate.shift(&proposals, &sample, &estimates).pop()
+    gate.decide_override(None, &sample, &estimates);
+    gate.judge_offsets(&proposals, &sample, &estimates).pop()
 }
 
 fn answer(order: OffsetOrder, result: Result<Option<Shifted>, SourceError>) -> Moved {
@@ -59,7 +59,7 @@ fn obey(gate: &mut Gate, verdict: &OffsetVerdict) -> Option<f64> {
     let Some(OffsetOrder::Shift { wanted_um, .. }) = verdict.order else { return None };
     let (base_um, before_um, last) = (0.0, 0.0, LastWrite::InForce);
     let shifted = Shifted { before_um, base_um, asked_um: wanted_um, after_um: wanted_um, last };
-    gate.offsets_mut().answered(&answer(verdict.order?, Ok(Some(shifted))));
+    gate.offsets_mut().accept_answer(&answer(verdict.order?, Ok(Some(shifted))));
     Some(wanted_um)
 }
 
@@ -85,7 +85,7 @@ fn a_shift_is_made_by_steps_with_rests_and_never_beyond_the_total() {
     let verdict = judged(&mut gate, 700 * SECOND_NS, Some(30.4)).expect("decided");
     assert_eq!(verdict.outcome, OffsetOutcome::Limited(OffsetBound::Total));
     let (sample, estimates) = resting(701 * SECOND_NS);
-    assert!(!gate.decide(None, &sample, &estimates).armed, "armed for offsets only: no override is written");
+    assert!(!gate.decide_override(None, &sample, &estimates).armed, "armed for offsets only: no override is written");
 }
 
 #[test]
@@ -100,8 +100,8 @@ fn only_between_programs_with_fresh_values_and_no_alarm() {
         gate.arm("fitter", None, 0).expect("may be armed");
         let (mut sample, mut estimates) = resting(0);
         spoil(&mut sample, &mut estimates);
-        gate.decide(None, &sample, &estimates);
-        let verdict = gate.shift(&[proposal(Axis::Z, 3.0)], &sample, &estimates).pop().expect("decided");
+        gate.decide_override(None, &sample, &estimates);
+        let verdict = gate.judge_offsets(&[proposal(Axis::Z, 3.0)], &sample, &estimates).pop().expect("decided");
         assert_eq!((verdict.outcome, verdict.order), (OffsetOutcome::Held(hold), None), "{what}");
     }
 }
@@ -111,8 +111,8 @@ fn other_axes_and_what_is_no_number_move_nothing() {
     let mut gate = Gate::new(offset_limits(GateMode::Armed));
     gate.arm("fitter", None, 0).expect("may be armed");
     let (sample, estimates) = resting(0);
-    gate.decide(None, &sample, &estimates);
-    let verdict = gate.shift(&[proposal(Axis::X, 3.0)], &sample, &estimates).pop().expect("decided");
+    gate.decide_override(None, &sample, &estimates);
+    let verdict = gate.judge_offsets(&[proposal(Axis::X, 3.0)], &sample, &estimates).pop().expect("decided");
     assert_eq!((verdict.outcome, verdict.order), (OffsetOutcome::NotAllowed, None));
     for mistake in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let verdict = judged(&mut gate, 0, Some(mistake)).expect("decided");
@@ -134,7 +134,7 @@ fn in_shadow_and_before_arming_everything_is_decided_and_nothing_ordered() {
 #[test]
 fn without_a_proposal_the_shift_goes_back_by_steps_and_after_disarming_at_once() {
     let mut gate = Gate::new(offset_limits(GateMode::Armed));
-    gate.offsets_mut().resume(Axis::Z, 9.0);
+    gate.offsets_mut().resume_shift(Axis::Z, 9.0);
     gate.arm("fitter", None, 0).expect("may be armed");
     let mut written = Vec::new();
     for tick in 0..2000 {
@@ -142,7 +142,7 @@ fn without_a_proposal_the_shift_goes_back_by_steps_and_after_disarming_at_once()
         written.extend(verdict.and_then(|verdict| obey(&mut gate, &verdict)).map(|um| (tick / 10, um)));
     }
     assert_eq!(written, [(10, 4.0), (70, 0.0)], "after ten seconds without a proposal");
-    gate.offsets_mut().resume(Axis::Z, 9.0);
+    gate.offsets_mut().resume_shift(Axis::Z, 9.0);
     gate.disarm(Disarmed::Person);
     let verdict = judged(&mut gate, 400 * SECOND_NS, Some(9.0)).expect("decided");
     assert_eq!(verdict.order, Some(OffsetOrder::Restore(Axis::Z)));
@@ -151,7 +151,7 @@ fn without_a_proposal_the_shift_goes_back_by_steps_and_after_disarming_at_once()
         offset: config::OffsetConfig { restore: false, ..keeping.limits().offset.clone() },
         ..keeping.limits().clone()
     });
-    keeping.offsets_mut().resume(Axis::Z, 9.0);
+    keeping.offsets_mut().resume_shift(Axis::Z, 9.0);
     assert_eq!(judged(&mut keeping, 400 * SECOND_NS, Some(9.0)).expect("decided").order, None);
 }
 
@@ -162,7 +162,7 @@ fn stood(machine: &Simulated) -> ManualClock {
         panel.booted && panel.execution == execution::PROGRAM_COMPLETED
     };
     let s = (60..3600).find(rests).expect("a part is finished within the hour");
-    ManualClock::at(s * SECOND_NS)
+    ManualClock::with_time(s * SECOND_NS)
 }
 
 /// The machine between two parts, with this set by the operator, and what the gate holds of it.
@@ -204,8 +204,11 @@ fn the_simulated_control_counts_refuses_in_a_program_and_gives_back_what_the_ope
     let Bench { machine, clock, .. } = &bench;
     let running = (60..3600).find(|s| machine.moment(s * SECOND_NS).panel.execution == execution::ACTIVE);
     let mut account = bench.started();
-    let refused = account.carry_out(shift(0.0, 3.0), &ManualClock::at(running.expect("a program") * SECOND_NS));
-    assert!(refused.result.is_err() && refused.fault().is_none() && machine.written().writes() == 0, "{refused:?}");
+    let refused = account.carry_out(shift(0.0, 3.0), &ManualClock::with_time(running.expect("a program") * SECOND_NS));
+    assert!(
+        refused.result.is_err() && refused.fault().is_none() && machine.written().count_writes() == 0,
+        "{refused:?}"
+    );
     let shifted = done(&mut account, clock, shift(0.0, 3.4));
     assert_eq!((shifted.before_um, shifted.after_um, shifted.shift_um()), (40.0, 43.0, 3.0), "whole micrometres");
     // Another process of the gateway, which knows what this one has left.
@@ -215,7 +218,7 @@ fn the_simulated_control_counts_refuses_in_a_program_and_gives_back_what_the_ope
     assert_eq!(account.carry_out(OffsetOrder::Restore(Axis::Z), clock).result, Ok(None), "nothing is left");
     machine.protect_offsets(true);
     let held_back = account.carry_out(shift(0.0, 5.0), clock);
-    assert_eq!(held_back.fault().map(|fault| fault.disarmed()), Some(Disarmed::Offset), "{held_back:?}");
+    assert_eq!(held_back.fault().map(|fault| fault.disarm_reason()), Some(Disarmed::Offset), "{held_back:?}");
 }
 
 #[test]
@@ -246,8 +249,8 @@ impl OffsetSink for Broken {
         self.sink.name()
     }
 
-    fn called(&self) -> &'static str {
-        self.sink.called()
+    fn offset_name(&self) -> &'static str {
+        self.sink.offset_name()
     }
 
     fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
@@ -296,33 +299,33 @@ fn what_cannot_be_accounted_for_is_not_written() {
     let refused = account.carry_out(shift(0.0, 5.0), &bench.clock);
     let text = refused.result.as_ref().expect_err("refused").to_string();
     assert!(text.contains("could not be accounted for") && refused.fault().is_none() && !refused.is_open(), "{text}");
-    assert_eq!(bench.machine.written().writes(), 0);
+    assert_eq!(bench.machine.written().count_writes(), 0);
 }
 
 #[test]
 fn what_is_in_doubt_is_looked_at_before_anything_is_written_and_other_axes_are_given_back() {
     let mut gate = Gate::new(offset_limits(GateMode::Armed));
-    gate.offsets_mut().resume(Axis::X, 4.0);
-    gate.offsets_mut().resume(Axis::Z, 5.0);
-    gate.offsets_mut().unsettle(Axis::Z);
+    gate.offsets_mut().resume_shift(Axis::X, 4.0);
+    gate.offsets_mut().resume_shift(Axis::Z, 5.0);
+    gate.offsets_mut().mark_unsettled(Axis::Z);
     gate.arm("fitter", None, 0).expect("may be armed");
     let (sample, estimates) = resting(0);
-    gate.decide(None, &sample, &estimates);
+    gate.decide_override(None, &sample, &estimates);
     let orders = |gate: &mut Gate, at_ns| {
         let (sample, estimates) = resting(at_ns);
-        gate.decide(None, &sample, &estimates);
-        let verdicts = gate.shift(&[proposal(Axis::Z, 9.0), proposal(Axis::X, 9.0)], &sample, &estimates);
+        gate.decide_override(None, &sample, &estimates);
+        let verdicts = gate.judge_offsets(&[proposal(Axis::Z, 9.0), proposal(Axis::X, 9.0)], &sample, &estimates);
         let mut orders: Vec<OffsetOrder> = verdicts.into_iter().filter_map(|verdict| verdict.order).collect();
-        orders.extend(gate.looks(&sample, &estimates));
+        orders.extend(gate.collect_look_orders(&sample, &estimates));
         orders
     };
     assert_eq!(orders(&mut gate, 0), [OffsetOrder::Look(Axis::Z)]);
     assert_eq!(orders(&mut gate, 5 * SECOND_NS), [], "it has not been answered");
     let off = SourceError::Off { source_name: "test".to_owned() };
-    gate.offsets_mut().answered(&answer(OffsetOrder::Look(Axis::Z), Err(off)));
+    gate.offsets_mut().accept_answer(&answer(OffsetOrder::Look(Axis::Z), Err(off)));
     assert_eq!(orders(&mut gate, 6 * SECOND_NS), [OffsetOrder::Look(Axis::Z)], "again");
     let found = Shifted { before_um: 3.0, base_um: 0.0, asked_um: 3.0, after_um: 3.0, last: LastWrite::NotTaken };
-    gate.offsets_mut().answered(&answer(OffsetOrder::Look(Axis::Z), Ok(Some(found))));
+    gate.offsets_mut().accept_answer(&answer(OffsetOrder::Look(Axis::Z), Ok(Some(found))));
     assert_eq!(orders(&mut gate, 7 * SECOND_NS), [OffsetOrder::Shift { axis: Axis::Z, from_um: 3.0, wanted_um: 8.0 }]);
     assert_eq!(
         orders(&mut gate, 70 * SECOND_NS),

@@ -65,13 +65,13 @@ impl Actuator for Controller {
 
 fn host() -> Host {
     let mut host = Host::new();
-    host.load(&[ScriptFile { name: "mad.rhai".to_owned(), text: SCRIPT.to_owned() }]).expect("it compiles");
+    host.load_scripts(&[ScriptFile { name: "mad.rhai".to_owned(), text: SCRIPT.to_owned() }]).expect("it compiles");
     host
 }
 
 /// A host that has given up on the script is begun anew, so that every kind goes on being tried.
 fn renewed(host: Host) -> Host {
-    let gave_up = host.status().scripts.iter().any(|script| script.condition.word() != "running");
+    let gave_up = host.status().scripts.iter().any(|script| script.condition.as_word() != "running");
     if gave_up { self::host() } else { host }
 }
 
@@ -84,11 +84,11 @@ fn run(count: u64) -> (Vec<(TimeNs, u8)>, [u64; 3]) {
     });
     gate.arm("fitter", Some(std::time::Duration::from_secs(86_400 * 300)), 0).expect("allowed");
     let mut writer = OverrideWriter::new(Controller { writes: Vec::new() }, gate.limits());
-    let (mut host, clock, cases) = (host(), ManualClock::at(0), cases());
+    let (mut host, clock, cases) = (host(), ManualClock::with_time(0), cases());
     let (mut at_ns, mut told) = (0, [0_u64; 3]);
     for _ in 0..count {
         at_ns += TICK_NS / 2 + (random.next() % 100_000_000) as i64;
-        clock.set(at_ns);
+        clock.set_time(at_ns);
         let (mut sample, mut estimates) = cutting(at_ns);
         let kind = if random.next().is_multiple_of(2) { 0 } else { kind(&mut random) };
         set_number(&mut sample, "temperature_1_c", kind as f64);
@@ -96,13 +96,14 @@ fn run(count: u64) -> (Vec<(TimeNs, u8)>, [u64; 3]) {
         if random.next().is_multiple_of(100) {
             cases[(random.next() % cases.len() as u64) as usize].1(&mut sample, &mut estimates);
         }
-        let verdict = gate.decide(host.tick(&sample, &estimates).request.as_ref(), &sample, &estimates);
+        let verdict =
+            gate.decide_override(host.run_due_scripts(&sample, &estimates).request.as_ref(), &sample, &estimates);
         match verdict.outcome {
             GateOutcome::Held(_) => told[0] += 1,
             GateOutcome::Refused => told[1] += 1,
             _ => told[2] += 1,
         }
-        writer.step(&verdict, &clock);
+        writer.write_verdict(&verdict, &clock);
         host = renewed(host);
     }
     (std::mem::take(&mut writer_actuator(writer).writes), told)

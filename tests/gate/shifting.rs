@@ -5,7 +5,7 @@ use super::process::{Gateway, get, run, stderr, stdout, text, wait_for};
 use super::served::{Serving, prepared, started};
 use adapters::clock::SystemClock;
 use adapters::fanuc::item::FocasItem;
-use adapters::fanuc::{answer::FocasAnswer, open::native};
+use adapters::fanuc::{answer::FocasAnswer, open::open_native};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -20,10 +20,10 @@ const SCRIPT: &str =
 fn z_offset_um(address: &str) -> Option<f64> {
     let address: adapters::Address = address.parse().expect("an address");
     let adapters::address::Target::Fanuc { at, path, options, .. } = address.target() else { return None };
-    let line = native("test", at, *path, options).line;
+    let line = open_native("test", at, *path, options).line;
     let item = FocasItem::WorkOffset(0, 2);
-    let asked = line.ask(&SystemClock::new(), &[item]).ok()?;
-    match asked.of(item)? {
+    let asked = line.ask_items(&SystemClock::new(), &[item]).ok()?;
+    match asked.find_item_result(item)? {
         Ok(FocasAnswer::Number(Some(mm))) => Some(mm * 1000.0),
         _ => None,
     }

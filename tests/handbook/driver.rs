@@ -20,7 +20,7 @@ struct Thermometer<A> {
 
 impl<A: Ask> Thermometer<A> {
     fn new(address: &str, line: A) -> Self {
-        let bearing = ChannelId::of("bearing_temperature_c").expect("a row of the channel table");
+        let bearing = ChannelId::from_name("bearing_temperature_c").expect("a row of the channel table");
         Self { address: address.to_owned(), line, channels: [bearing] }
     }
 }
@@ -49,11 +49,11 @@ impl<A: Ask> Source for Thermometer<A> {
         let stamp = Stamp::of_request(began_ns, clock.now_ns());
         let [bearing] = self.channels;
         out.push(match answer.trim() {
-            "-" => Reading::absent(bearing, stamp, Absence::NotSupported),
+            "-" => Reading::from_absence(bearing, stamp, Absence::NotSupported),
             text => match text.parse() {
                 // Outside the range of the channel table it becomes an absence by itself.
-                Ok(degrees_c) => Reading::number(bearing, stamp, degrees_c),
-                Err(_) => Reading::absent(bearing, stamp, Absence::OutOfRange),
+                Ok(degrees_c) => Reading::from_number(bearing, stamp, degrees_c),
+                Err(_) => Reading::from_absence(bearing, stamp, Absence::OutOfRange),
             },
         });
         Ok(())
@@ -74,14 +74,14 @@ impl Ask for Script {
 
 #[test]
 fn a_driver_reads_and_the_merge_takes_it() {
-    let clock = ManualClock::at(SECOND_NS);
+    let clock = ManualClock::with_time(SECOND_NS);
     let mut source = Thermometer::new("thermometer:test", Script(vec!["41.5\n", "-", "900", "hot"]));
     let bearing = source.channels()[0];
-    let mut merge = Merge::new(&[SourcePlan::of(&source)], Delay::Fixed(Duration::ZERO));
+    let mut merge = Merge::new(&[SourcePlan::from_source(&source)], Delay::Fixed(Duration::ZERO));
     let mut readings = Vec::new();
     source.read(&clock, &mut readings).expect("answers");
     merge.push_all(SourceId(0), &mut readings);
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     merge.sample_into(&mut sample, SECOND_NS);
     assert_eq!(sample.slot(bearing).value.as_ref().ok().and_then(|value| value.as_number()), Some(41.5));
     for reason in [Absence::NotSupported, Absence::OutOfRange, Absence::OutOfRange] {
@@ -89,6 +89,6 @@ fn a_driver_reads_and_the_merge_takes_it() {
         assert_eq!(readings.pop().map(|reading| reading.value), Some(Err(reason)));
     }
     let error = source.read(&clock, &mut readings).expect_err("unplugged");
-    assert_eq!(error.absence(), Absence::Disconnected);
+    assert_eq!(error.to_absence(), Absence::Disconnected);
     assert!(readings.is_empty());
 }

@@ -17,7 +17,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "work_lamp",
     family: "auxiliary",
     law: "P = level while the spindle turns",
-    parameters: &[ParameterDoc::linear("level", "output", (0.0, f64::INFINITY), "power of the lamp", "灯的功率")],
+    parameters: &[ParameterDoc::new_linear("level", "output", (0.0, f64::INFINITY), "power of the lamp", "灯的功率")],
     needs: &["speed"],
     source: "a constant consumer, switched with the spindle",
     experiment_minutes: 2.0,
@@ -39,7 +39,7 @@ static DOC: EffectDoc = EffectDoc {
 };
 
 fn turning(scene: &Scene) -> Option<Vec<f64>> {
-    let speed = scene.role(Role::Speed)?;
+    let speed = scene.role_values(Role::Speed)?;
     Some(speed.iter().map(|rpm| f64::from(u8::from(rpm.abs() > TURNS_RPM))).collect())
 }
 
@@ -49,12 +49,12 @@ impl Effect for WorkLamp {
     }
 
     /// Offered only where the spindle both turned and stood; otherwise it is an offset.
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let told = turning(scene).is_some_and(|on| on.contains(&0.0) && on.contains(&1.0));
-        if told { vec![Form::plain()] } else { Vec::new() }
+        if told { vec![Form::without_shape()] } else { Vec::new() }
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         Some(vec![("level", turning(scene)?)])
     }
 }
@@ -62,19 +62,19 @@ impl Effect for WorkLamp {
 fn scene(speeds_rpm: &[f64]) -> Scene {
     let times_s = (0..speeds_rpm.len()).map(|row| f64::from(u32::try_from(row).expect("few rows"))).collect();
     let mut recording = Recording::new("template", times_s, None);
-    recording.set_column("spindle_speed_rpm", Cells::Numbers(Numbers::full(speeds_rpm.to_vec())));
+    recording.set_column("spindle_speed_rpm", Cells::Numbers(Numbers::from_values(speeds_rpm.to_vec())));
     let power_w = speeds_rpm.iter().map(|rpm| 100.0 + 0.2 * rpm).collect();
-    recording.set_column("spindle_power_w", Cells::Numbers(Numbers::full(power_w)));
+    recording.set_column("spindle_power_w", Cells::Numbers(Numbers::from_values(power_w)));
     Scene::new(&recording, "spindle_power_w", &BTreeMap::new()).expect("the output is recorded")
 }
 
 #[test]
 fn an_effect_is_offered_where_it_can_be_told_and_nowhere_else() {
     let rich = scene(&[0.0, 0.0, 800.0, 800.0, 1500.0]);
-    let forms = WorkLamp.forms(&rich);
-    assert_eq!(forms, [Form::plain()]);
-    let columns = WorkLamp.columns(&rich, &forms[0]).expect("the speed is recorded");
+    let forms = WorkLamp.propose_forms(&rich);
+    assert_eq!(forms, [Form::without_shape()]);
+    let columns = WorkLamp.compute_columns(&rich, &forms[0]).expect("the speed is recorded");
     assert_eq!(columns, [("level", vec![0.0, 0.0, 1.0, 1.0, 1.0])]);
-    assert!(columns.iter().all(|(name, _)| DOC.parameter(name).is_some()), "every column is a declared parameter");
-    assert!(WorkLamp.forms(&scene(&[800.0, 900.0])).is_empty(), "it never stands still");
+    assert!(columns.iter().all(|(name, _)| DOC.find_parameter(name).is_some()), "every column is a declared parameter");
+    assert!(WorkLamp.propose_forms(&scene(&[800.0, 900.0])).is_empty(), "it never stands still");
 }

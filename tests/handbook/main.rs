@@ -14,7 +14,7 @@ mod run;
 mod settings;
 
 use documents::{documents, root};
-use gateway::handbook::{CHAPTERS, chapter, contents, nearest_topic};
+use gateway::handbook::{CHAPTERS, find_chapter, list_contents, nearest_topic};
 use rules::physics::explain::Language;
 use std::collections::BTreeSet;
 
@@ -34,10 +34,10 @@ fn every_file_of_the_handbook_is_a_chapter() {
 
 #[test]
 fn a_chapter_is_found_by_its_topic() {
-    assert_eq!(chapter("Glossary").map(|found| found.title(Language::En)), Some("Glossary"));
-    assert_eq!(chapter("nothing"), None);
+    assert_eq!(find_chapter("Glossary").map(|found| found.title(Language::En)), Some("Glossary"));
+    assert_eq!(find_chapter("nothing"), None);
     assert_eq!(nearest_topic("configuraton"), Some("configuration"));
-    assert!(contents(Language::En).lines().count() == CHAPTERS.len());
+    assert!(list_contents(Language::En).lines().count() == CHAPTERS.len());
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn shape(text: &str) -> Vec<String> {
 fn chapters_for_the_shop_are_there_in_chinese_section_by_section() {
     let mut wrong = Vec::new();
     for topic in BOTH_LANGUAGES {
-        let found = chapter(topic).expect("a chapter");
+        let found = find_chapter(topic).expect("a chapter");
         match found.zh {
             None => wrong.push(format!("{topic}: not in Chinese (gateway/handbook/zh/{topic}.md)")),
             Some(zh) => {

@@ -19,7 +19,7 @@ fn problems(text: &str) -> Vec<String> {
 
 /// Is every part of it one of the configuration's sections? Other TOML, such as a profile of a meter, is not looked into.
 fn of_a_configuration(table: &toml::Table) -> bool {
-    let example: toml::Table = gateway::config::keys::example().parse().expect("the example is TOML");
+    let example: toml::Table = gateway::config::keys::format_example().parse().expect("the example is TOML");
     !table.is_empty() && table.iter().all(|(name, value)| !value.is_str() && example.contains_key(name))
 }
 
@@ -65,7 +65,7 @@ fn a_wrong_block_is_refused() {
 
 #[test]
 fn every_section_of_the_configuration_is_explained_in_its_chapter() {
-    let chapter = gateway::handbook::chapter("configuration").expect("the chapter");
+    let chapter = gateway::handbook::find_chapter("configuration").expect("the chapter");
     let name = |section: &gateway::config::keys::Section| match section.repeated {
         true => format!("[[{}]]", section.name),
         false => format!("[{}]", section.name),

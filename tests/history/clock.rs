@@ -29,21 +29,21 @@ fn run(path: &Path, rows: std::ops::Range<i64>, trust: &'static str, off_ns: i64
     let machine = Machine::new().with_gaps();
     let options = Options { clock: mark(trust, off_ns), outbox: Some(outbox()), ..options() };
     let writer = Writer::open(path, options).expect("opens");
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     for row in rows.clone() {
         machine.fill(row, &mut sample);
         sample.at_ns += off_ns;
-        writer.sample(&sample, &extra_values(row));
+        writer.queue_sample(&sample, &extra_values(row));
         let at_ns = sample.at_ns;
         if row % 100 == 0 {
             let state = if row % 200 == 0 { "cutting" } else { "idle" };
-            writer.record(StateChange { at_ns, state: state.into(), ..StateChange::default() });
-            writer.record(Event { at_ns, kind: "mark".into(), ..Event::default() });
+            writer.queue_record(StateChange { at_ns, state: state.into(), ..StateChange::default() });
+            writer.queue_record(Event { at_ns, kind: "mark".into(), ..Event::default() });
         }
         if row % 500 == 0 {
-            writer.record(Part { began_ns: at_ns - SECOND_NS, ended_ns: at_ns, count: 1, ..Part::default() });
-            writer.record(Alarm { at_ns, code: format!("a{row}"), source: "test".into(), ..Alarm::default() });
-            writer.record(Audit { at_ns, kind: "write".into(), asked: Some(row as f64), ..Audit::default() });
+            writer.queue_record(Part { began_ns: at_ns - SECOND_NS, ended_ns: at_ns, count: 1, ..Part::default() });
+            writer.queue_record(Alarm { at_ns, code: format!("a{row}"), source: "test".into(), ..Alarm::default() });
+            writer.queue_record(Audit { at_ns, kind: "write".into(), asked: Some(row as f64), ..Audit::default() });
         }
     }
     writer.flush().expect("durable");
@@ -55,7 +55,9 @@ fn told(path: &Path) -> String {
     let reader = Reader::open(path).expect("opens");
     let all = RecordSpan::newest(100_000);
     let overview = |width_s: i64| {
-        let overview = reader.overview(&Query::default().of(["total_power_w"]), width_s * SECOND_NS).expect("answers");
+        let overview = reader
+            .read_overview(&Query::default().with_series(["total_power_w"]), width_s * SECOND_NS)
+            .expect("answers");
         let Buckets::Numbers(buckets) = &overview.columns[0] else { panic!("a quantity") };
         // Means are sums in another order.
         let rounded: Vec<_> = buckets.iter().map(|it| (it.count, it.min, it.max, (it.mean * 1e6).round())).collect();
@@ -72,18 +74,18 @@ fn told(path: &Path) -> String {
     let stays = |text: &str| !text.contains("clock_went_back");
     // Gaps and means of a wrong time are not sent.
     let items = items.iter().filter(|item| item.is_live()).map(|item| {
-        let mut json = item.json();
+        let mut json = item.to_json();
         json["sequence"] = 0.into();
         (item.at_ns, json.to_string())
     });
     let items: Vec<_> = items.filter(|(_, text)| stays(text)).collect();
-    let events = reader.events(all).expect("reads").into_iter().filter(|event| stays(&event.kind));
+    let events = reader.read_events(all).expect("reads").into_iter().filter(|event| stays(&event.kind));
     [
-        format!("{:?}", reader.span().expect("reads")),
-        format!("{:?}", reader.states(all).expect("reads")),
+        format!("{:?}", reader.read_span().expect("reads")),
+        format!("{:?}", reader.read_states(all).expect("reads")),
         format!("{:?}", events.collect::<Vec<_>>()),
-        format!("{:?}", reader.parts(all).expect("reads")),
-        format!("{:?}", reader.alarms(all).expect("reads")),
+        format!("{:?}", reader.read_parts(all).expect("reads")),
+        format!("{:?}", reader.read_alarms(all).expect("reads")),
         format!("{hours:?}"),
         format!("{items:?}"),
         overview(60),
@@ -114,7 +116,7 @@ fn rows_of_a_wrong_clock_are_dated_anew_as_if_it_had_been_right() {
             run(path, 0..3_000, "confirmed", 0);
             run(path, 3_000..9_777, "unset", off_ns);
         }
-        let span = |path: &Path| Reader::open(path).and_then(|reader| reader.span()).expect("reads");
+        let span = |path: &Path| Reader::open(path).and_then(|reader| reader.read_span()).expect("reads");
         assert_ne!(span(&wrong), span(&right));
         let redated = set_clock(&wrong, &mark("plausible", 0), None).expect("done").expect("some");
         assert_eq!((redated.segments, redated.samples, redated.by_ns), (1, 6_777, (-leap_ns, -leap_ns)));
@@ -124,9 +126,9 @@ fn rows_of_a_wrong_clock_are_dated_anew_as_if_it_had_been_right() {
         let reader = Reader::open(&wrong).expect("opens");
         let check = reader.verify_audit().expect("checks");
         assert_eq!((check.broken, check.rows), (None, 20 + 1), "the chain is never changed, but goes on");
-        let note = reader.audit(i64::MIN, i64::MAX, 1).expect("reads").remove(0).audit;
+        let note = reader.read_audit(i64::MIN, i64::MAX, 1).expect("reads").remove(0).audit;
         assert!(note.kind == "clock" && note.reason.contains("rows 7 to 20"), "{note:?}");
-        assert_eq!(reader.check().expect("checks"), Vec::<String>::new());
+        assert_eq!(reader.check_integrity().expect("checks"), Vec::<String>::new());
         assert_eq!(set_clock(&wrong, &mark("plausible", 0), None).expect("done"), None, "once");
         run(&wrong, 9_777..10_000, "plausible", 0);
         assert_eq!(verify(&wrong, &Machine::new().with_gaps(), 0), 10_000);
@@ -162,10 +164,10 @@ fn what_is_certain_is_the_newest_row_under_a_confirmed_clock() {
     set_clock(&path, &mark("plausible", 0), Some(now_ns)).expect("done");
     assert_eq!(certain(), Some(now_ns), "it was decided that it is earlier than the rows say");
     let writer = Writer::open(&path, Options { clock: mark("plausible", 0), ..options() }).expect("opens");
-    writer.sample(&Sample::empty(now_ns + TICK_NS), &extra_values(0));
+    writer.queue_sample(&Sample::new_empty(now_ns + TICK_NS), &extra_values(0));
     writer.flush().expect("durable");
     writer.confirm_clock();
-    writer.sample(&Sample::empty(now_ns + 2 * TICK_NS), &extra_values(0));
+    writer.queue_sample(&Sample::new_empty(now_ns + 2 * TICK_NS), &extra_values(0));
     writer.flush().expect("durable");
     assert_eq!(certain(), Some(now_ns + 2 * TICK_NS));
 }
@@ -173,19 +175,19 @@ fn what_is_certain_is_the_newest_row_under_a_confirmed_clock() {
 /// Rows on so many days, a minute each, and a record of each kind per day.
 fn write_days(path: &Path, days: i64, retention: Retention) -> Writer {
     let writer = Writer::open(path, Options { retention, ..options() }).expect("opens");
-    let (machine, mut sample) = (Machine::new(), Sample::empty(0));
+    let (machine, mut sample) = (Machine::new(), Sample::new_empty(0));
     for day in 0..days {
         for row in 0..600 {
             machine.fill(row, &mut sample);
             sample.at_ns += day * DAY_NS;
-            writer.sample(&sample, &extra_values(row));
+            writer.queue_sample(&sample, &extra_values(row));
         }
         let at_ns = sample.at_ns;
-        writer.record(Audit { at_ns, kind: "write".into(), ..Audit::default() });
-        writer.record(Part { began_ns: at_ns - SECOND_NS, ended_ns: at_ns, count: 1, ..Part::default() });
+        writer.queue_record(Audit { at_ns, kind: "write".into(), ..Audit::default() });
+        writer.queue_record(Part { began_ns: at_ns - SECOND_NS, ended_ns: at_ns, count: 1, ..Part::default() });
         let (code, source) = (format!("d{day}"), "test".to_owned());
-        writer.record(Alarm { at_ns, code: code.clone(), source: source.clone(), ..Alarm::default() });
-        writer.record(gateway::history::AlarmClear { at_ns, code, source });
+        writer.queue_record(Alarm { at_ns, code: code.clone(), source: source.clone(), ..Alarm::default() });
+        writer.queue_record(gateway::history::AlarmClear { at_ns, code, source });
     }
     writer.flush().expect("durable");
     writer
@@ -195,8 +197,8 @@ fn write_days(path: &Path, days: i64, retention: Retention) -> Writer {
 fn counts(path: &Path) -> (i64, usize, usize, u64) {
     let reader = Reader::open(path).expect("opens");
     let all = RecordSpan::newest(100_000);
-    let (parts, alarms) = (reader.parts(all).expect("reads").len(), reader.alarms(all).expect("reads").len());
-    (reader.info().expect("reads").samples, parts, alarms, reader.verify_audit().expect("checks").rows)
+    let (parts, alarms) = (reader.read_parts(all).expect("reads").len(), reader.read_alarms(all).expect("reads").len());
+    (reader.read_info().expect("reads").samples, parts, alarms, reader.verify_audit().expect("checks").rows)
 }
 
 #[test]
@@ -223,7 +225,7 @@ fn a_wrong_time_that_was_believed_takes_days_and_not_the_history() {
         41 * 600,
         "what fewer than 40 days of samples have followed stays, whatever the clock says"
     );
-    writer.maintain(None);
+    writer.request_maintenance(None);
     writer.flush().expect("durable");
     assert_eq!(counts(&path).0, 41 * 600);
 }
@@ -265,14 +267,21 @@ fn ten_minutes_ago_is_not_counted_from_the_future() {
     run(&path, 1_000..1_500, "plausible", ahead_ns);
     run(&path, 1_500..2_000, "confirmed", 0);
     let reader = Reader::open(&path).expect("opens");
-    assert_eq!(reader.present().expect("reads"), Some((Machine::at_ns(0), Machine::at_ns(1_999))));
-    let future = reader.future(gateway::clock::now_ns()).expect("reads").expect("some");
+    assert_eq!(reader.read_present_span().expect("reads"), Some((Machine::at_ns(0), Machine::at_ns(1_999))));
+    let future = reader.find_future_rows(gateway::clock::now_ns()).expect("reads").expect("some");
     assert_eq!((future.samples, future.first_ns), (500, Machine::at_ns(1_000) + ahead_ns));
     let brought = dir.path().join("brought.db");
     let writer = Writer::open(&brought, options()).expect("opens");
-    writer.sample(&Sample::empty(ahead_ns + Machine::at_ns(0)), &extra_values(0));
+    writer.queue_sample(&Sample::new_empty(ahead_ns + Machine::at_ns(0)), &extra_values(0));
     writer.flush().expect("durable");
     let reader = Reader::open(&brought).expect("opens");
-    assert_eq!(reader.future(gateway::clock::now_ns()).expect("reads"), None, "the machine brought its own time");
-    assert_eq!(reader.present().expect("reads").map(|(_, present_ns)| present_ns), Some(ahead_ns + Machine::at_ns(0)));
+    assert_eq!(
+        reader.find_future_rows(gateway::clock::now_ns()).expect("reads"),
+        None,
+        "the machine brought its own time"
+    );
+    assert_eq!(
+        reader.read_present_span().expect("reads").map(|(_, present_ns)| present_ns),
+        Some(ahead_ns + Machine::at_ns(0))
+    );
 }

@@ -6,7 +6,7 @@ use crate::round_trip::{options, verify, write};
 use flate2::read::GzDecoder;
 use gateway::history::{
     Alarm, Audit, Buckets, Command, Decision, Diagnosis, Event, Model, Options, Outbox, OutboxReader, OutboxSettings,
-    Part, Query, ReactionTime, Reader, RecordSpan, StateChange, Writer, repair,
+    Part, Query, ReactionTime, Reader, RecordSpan, StateChange, Writer, repair_history,
 };
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -25,22 +25,32 @@ fn filled(path: &Path) {
         write(&writer, &machine, part * 200..(part + 1) * 200);
         let at_ns = Machine::at_ns(part * 200 + 199);
         let word = |what: &str| format!("{what} {part} {}", "x".repeat(60));
-        writer.record(StateChange { at_ns, state: word("state"), ..StateChange::default() });
-        writer.record(Event { at_ns, kind: "mark".into(), text: word("event"), ..Event::default() });
-        writer.record(Part {
+        writer.queue_record(StateChange { at_ns, state: word("state"), ..StateChange::default() });
+        writer.queue_record(Event { at_ns, kind: "mark".into(), text: word("event"), ..Event::default() });
+        writer.queue_record(Part {
             began_ns: at_ns - 5,
             ended_ns: at_ns,
             part: word("part"),
             count: part,
             ..Part::default()
         });
-        writer.record(Alarm { at_ns, code: word("alarm"), source: "test".into(), ..Alarm::default() });
-        writer.record(Decision { at_ns, script: word("script"), value: Some(part as f64), ..Decision::default() });
-        writer.record(Command { at_ns, command: word("command"), asked: Some(part as f64), ..Command::default() });
-        writer.record(ReactionTime { at_ns, asked_pct: part as f64, ..ReactionTime::default() });
-        writer.record(Model { at_ns, name: word("model"), toml: "t".repeat(200), ..Model::default() });
-        writer.record(Diagnosis { at_ns, from_ns: 1, to_ns: 2, json: "j".repeat(6_000), ..Diagnosis::default() });
-        writer.record(Audit { at_ns, kind: "write".into(), asked: Some(part as f64), ..Audit::default() });
+        writer.queue_record(Alarm { at_ns, code: word("alarm"), source: "test".into(), ..Alarm::default() });
+        writer.queue_record(Decision {
+            at_ns,
+            script: word("script"),
+            value: Some(part as f64),
+            ..Decision::default()
+        });
+        writer.queue_record(Command {
+            at_ns,
+            command: word("command"),
+            asked: Some(part as f64),
+            ..Command::default()
+        });
+        writer.queue_record(ReactionTime { at_ns, asked_pct: part as f64, ..ReactionTime::default() });
+        writer.queue_record(Model { at_ns, name: word("model"), toml: "t".repeat(200), ..Model::default() });
+        writer.queue_record(Diagnosis { at_ns, from_ns: 1, to_ns: 2, json: "j".repeat(6_000), ..Diagnosis::default() });
+        writer.queue_record(Audit { at_ns, kind: "write".into(), asked: Some(part as f64), ..Audit::default() });
     }
     writer.flush().expect("durable");
     writer.maintain_and_wait(Machine::at_ns(12_000), Duration::from_secs(30)).expect("compacts");
@@ -56,7 +66,7 @@ fn answers(path: &Path) -> Vec<(&'static str, Result<String, String>)> {
     let all = RecordSpan::newest(100_000);
     let text = |error: gateway::history::HistoryError| error.to_string();
     let overview = |width_s: i64| {
-        reader.overview(&Query::default(), width_s * 1_000_000_000).map(|overview| {
+        reader.read_overview(&Query::default(), width_s * 1_000_000_000).map(|overview| {
             let words = overview.columns.iter().map(|column| match column {
                 Buckets::Numbers(buckets) => format!("{buckets:?}"),
                 Buckets::Words(words) => format!("{words:?}"),
@@ -70,27 +80,27 @@ fn answers(path: &Path) -> Vec<(&'static str, Result<String, String>)> {
         };
     }
     vec![
-        answer!("series", reader.series()),
-        answer!("span", reader.span()),
+        answer!("series", reader.read_series()),
+        answer!("span", reader.read_span()),
         answer!("samples", samples(&reader)),
         answer!("minutes", overview(60)),
         answer!("hours", overview(3_600)),
         answer!("days", overview(86_400)),
-        answer!("states", reader.states(all)),
+        answer!("states", reader.read_states(all)),
         answer!("state hours", reader.state_hours(all)),
-        answer!("parts", reader.parts(all)),
-        answer!("events", reader.events(all)),
+        answer!("parts", reader.read_parts(all)),
+        answer!("events", reader.read_events(all)),
         answer!("events of a kind", reader.events_of("mark", all)),
-        answer!("alarms", reader.alarms(all)),
-        answer!("decisions", reader.decisions(all)),
-        answer!("commands", reader.commands(all)),
-        answer!("models", reader.models(all)),
-        answer!("diagnoses", reader.diagnoses(all)),
-        answer!("audit", reader.audit(i64::MIN, i64::MAX, u32::MAX)),
+        answer!("alarms", reader.read_alarms(all)),
+        answer!("decisions", reader.read_decisions(all)),
+        answer!("commands", reader.read_commands(all)),
+        answer!("models", reader.read_models(all)),
+        answer!("diagnoses", reader.read_diagnoses(all)),
+        answer!("audit", reader.read_audit(i64::MIN, i64::MAX, u32::MAX)),
         answer!("chain", reader.verify_audit().map(|check| (check.rows, check.head, check.broken))),
         answer!("sql", sql(&reader, "SELECT count(*), sum(asked_pct), sum(at_ns % 1000003) FROM reactions")),
         answer!("sql samples", sql(&reader, "SELECT count(*), sum(total_power_w), max(time_utc) FROM samples")),
-        answer!("dropped", reader.info().map(|info| (info.samples, info.dropped, info.segments))),
+        answer!("dropped", reader.read_info().map(|info| (info.samples, info.dropped, info.segments))),
         answer!("outbox", OutboxReader::open(path).and_then(|mut outbox| outbox.read(0, u64::MAX, usize::MAX))),
     ]
 }
@@ -99,7 +109,7 @@ fn answers(path: &Path) -> Vec<(&'static str, Result<String, String>)> {
 fn samples(reader: &Reader) -> Result<String, gateway::history::HistoryError> {
     let mut text = Vec::new();
     let exported = reader.export_csv(&Query::default(), &mut text, Path::new("out"));
-    let damaged = reader.damaged();
+    let damaged = reader.damaged_rows();
     if !damaged.is_empty() {
         return Err(gateway::history::HistoryError::Question(format!("left out: {damaged:?}")));
     }
@@ -108,7 +118,7 @@ fn samples(reader: &Reader) -> Result<String, gateway::history::HistoryError> {
 
 fn sql(reader: &Reader, statement: &str) -> Result<String, gateway::history::HistoryError> {
     let mut text = String::new();
-    reader.sql(statement, Duration::from_secs(60), |_, values| {
+    reader.run_sql(statement, Duration::from_secs(60), |_, values| {
         text += &format!("{values:?}");
         std::ops::ControlFlow::Continue(())
     })?;
@@ -216,7 +226,7 @@ fn what_is_whole_is_saved_and_what_is_lost_is_named() {
     filled(&path);
     let expected = answers(&path);
     let whole = fs::read(&path).expect("reads");
-    assert!(repair(&path, &new).expect("copies").is_whole());
+    assert!(repair_history(&path, &new).expect("copies").is_whole());
     for ((name, found), (_, truth)) in answers(&new).iter().zip(&expected) {
         assert!(found == truth, "{name} of a file that is whole: {:.300?}", found);
     }
@@ -227,10 +237,10 @@ fn what_is_whole_is_saved_and_what_is_lost_is_named() {
         bytes[page * PAGE + 100] ^= 4;
         fs::write(&path, &bytes).expect("writes");
         fs::remove_file(&new).expect("removes");
-        let repaired = repair(&path, &new).expect("saves what is whole");
+        let repaired = repair_history(&path, &new).expect("saves what is whole");
         let reader = Reader::open(&new).expect("opens");
-        assert_eq!(reader.check().expect("checks"), Vec::<String>::new(), "page {page}");
-        let info = reader.info().expect("reads");
+        assert_eq!(reader.check_integrity().expect("checks"), Vec::<String>::new(), "page {page}");
+        let info = reader.read_info().expect("reads");
         let lost: i64 = repaired.damaged.iter().map(|damaged| damaged.rows).sum();
         assert!(info.samples + lost >= 11_400 && info.samples <= 12_000, "page {page}: {info:?} {repaired:?}");
         rows.push(info.samples);
@@ -257,7 +267,7 @@ fn a_wrong_header_is_put_right_by_a_repair() {
     let error = Reader::open(&path).expect_err("refused");
     assert!(error.is_damage() && error.to_string().contains("history repair"), "{error}");
     assert!(Writer::open(&path, options()).expect_err("refused").is_damage());
-    repair(&path, &new).expect("saves");
+    repair_history(&path, &new).expect("saves");
     assert_eq!(verify(&new, &machine, 0), 3_000);
     assert_eq!(
         fs::read_dir(dir.path())
@@ -307,9 +317,9 @@ fn a_file_of_an_older_version_stays_readable_and_gets_its_checksums() {
     drop(db);
     let reader = Reader::open(&path).expect("opens");
     reader.export_csv(&Query::default(), Vec::new(), &path).expect("the rest");
-    assert_eq!(reader.damaged().len(), 1, "{:?}", reader.damaged());
+    assert_eq!(reader.damaged_rows().len(), 1, "{:?}", reader.damaged_rows());
     older(&path);
-    assert!(repair(&path, &new).expect("copies").is_whole());
+    assert!(repair_history(&path, &new).expect("copies").is_whole());
     assert_eq!(export(&new), OLDER_EXPORT, "with sums on its pages");
     let header = fs::read(&new).expect("reads");
     assert_eq!((header[20], &header[68..72]), (8, &b"cncs"[..]));

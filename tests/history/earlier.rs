@@ -24,12 +24,12 @@ fn a_copy_is_kept_before_the_tables_change_and_an_older_version_goes_back_to_it(
         .and_then(|db| db.query_row("PRAGMA user_version", [], |row| row.get(0)))
         .expect("reads");
     assert_eq!(schema, 4);
-    let told = Reader::open(&path).and_then(|reader| reader.events(RecordSpan::newest(10))).expect("reads");
+    let told = Reader::open(&path).and_then(|reader| reader.read_events(RecordSpan::newest(10))).expect("reads");
     let told: Vec<&str> =
         told.iter().filter(|event| event.kind == "history_schema").map(|event| &*event.text).collect();
     assert!(told.len() == 1 && told[0].contains("h.db.schema-4"), "{told:?}");
     drop(Writer::open(&path, Options::default()).expect("opens"));
-    let again = Reader::open(&path).and_then(|reader| reader.events(RecordSpan::newest(10))).expect("reads");
+    let again = Reader::open(&path).and_then(|reader| reader.read_events(RecordSpan::newest(10))).expect("reads");
     assert_eq!(again.iter().filter(|event| event.kind == "history_schema").count(), 1, "only once");
 
     // A week after a confirmed clock has met it first it is gone, not a day earlier.
@@ -56,7 +56,7 @@ fn an_older_version_goes_on_with_the_copy_and_uses_no_number_twice() {
         write(&writer, &Machine::new(), lines);
         writer.flush().expect("durable");
         drop(writer);
-        outbox.head().borrow().next_sequence
+        outbox.watch_head().borrow().next_sequence
     };
     let kept = next_number(0..500);
     fs::copy(&path, &copy).expect("copies");

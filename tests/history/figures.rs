@@ -63,10 +63,10 @@ fn row_per_sample(path: &Path, machine: &Machine, ticks: i64, batch: i64) {
 fn blocks(path: &Path, machine: &Machine, ticks: std::ops::Range<i64>, live_ticks: Option<i64>) {
     let options = Options { extras: Vec::new(), ..options() };
     let writer = Writer::open(path, options).expect("opens");
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     for row in ticks {
         machine.fill_quantities(row, &mut sample);
-        writer.sample(&sample, &[]);
+        writer.queue_sample(&sample, &[]);
         if live_ticks.is_some_and(|ticks| row % ticks == ticks - 1) {
             writer.flush().expect("durable");
         }
@@ -100,7 +100,7 @@ fn layouts() {
 }
 
 fn raw_bytes(path: &Path) -> f64 {
-    Reader::open(path).and_then(|reader| reader.info()).expect("reads").sample_bytes as f64
+    Reader::open(path).and_then(|reader| reader.read_info()).expect("reads").sample_bytes as f64
 }
 
 fn compact(path: &Path) {
@@ -141,7 +141,7 @@ fn speed() {
     for (what, machine) in [("quantised", Machine::new()), ("interpolated", Machine::new().interpolated())] {
         let samples: Vec<Sample> = (0..20_000)
             .map(|row| {
-                let mut sample = Sample::empty(0);
+                let mut sample = Sample::new_empty(0);
                 machine.fill(row, &mut sample);
                 sample
             })
@@ -157,7 +157,7 @@ fn speed() {
                 sample.clone_from(&samples[index]);
                 sample.at_ns = Machine::at_ns(tick as i64);
                 if let Some(writer) = writer {
-                    writer.sample(black_box(&sample), &extras[index]);
+                    writer.queue_sample(black_box(&sample), &extras[index]);
                 }
             }
             if let Some(writer) = writer {
@@ -210,19 +210,21 @@ fn queries() {
     row_per_sample(&rows, &machine, DAY, 1_000);
     let reader = Reader::open(&path).expect("opens");
     println!("30 days at 10 Hz, 20 quantities, {:.0} MB:", used_bytes(&path) / 1e6);
-    let one = Query::default().of(["spindle_power_w"]);
+    let one = Query::default().with_series(["spindle_power_w"]);
     let hour_ns = 3_600 * SECOND_NS;
-    timed("overview, all 20 quantities by day", 5, || reader.overview(&Query::default(), DAY_NS).expect("answers"));
+    timed("overview, all 20 quantities by day", 5, || {
+        reader.read_overview(&Query::default(), DAY_NS).expect("answers")
+    });
     timed("overview, all 20 quantities by hour (720 points)", 5, || {
-        reader.overview(&Query::default(), hour_ns).expect("answers")
+        reader.read_overview(&Query::default(), hour_ns).expect("answers")
     });
-    timed("overview, one quantity by hour", 5, || reader.overview(&one, hour_ns).expect("answers"));
+    timed("overview, one quantity by hour", 5, || reader.read_overview(&one, hour_ns).expect("answers"));
     timed("overview, one quantity by minute (43 200 points)", 3, || {
-        reader.overview(&one, 60 * SECOND_NS).expect("answers")
+        reader.read_overview(&one, 60 * SECOND_NS).expect("answers")
     });
-    let day = Query::between(START_NS + 10 * DAY_NS, START_NS + 11 * DAY_NS).of(["spindle_power_w"]);
+    let day = Query::between(START_NS + 10 * DAY_NS, START_NS + 11 * DAY_NS).with_series(["spindle_power_w"]);
     timed("one quantity of one day, raw (864 000 rows)", 3, || count(&reader, &day));
-    timed("the same by 10 s from the samples", 3, || reader.overview(&day, 10 * SECOND_NS).expect("answers"));
+    timed("the same by 10 s from the samples", 3, || reader.read_overview(&day, 10 * SECOND_NS).expect("answers"));
     timed("one quantity of 30 days, raw (25 920 000 rows)", 1, || count(&reader, &one));
     let hour = Query::between(START_NS + 10 * DAY_NS, START_NS + 10 * DAY_NS + hour_ns);
     timed("all quantities of one hour, raw (36 000 rows)", 3, || count(&reader, &hour));
@@ -232,7 +234,7 @@ fn queries() {
         START_NS + 11 * DAY_NS
     );
     timed("SQL over samples: mean of one quantity over one day", 1, || first_row(&reader, &select));
-    timed("info", 3, || reader.info().expect("reads"));
+    timed("info", 3, || reader.read_info().expect("reads"));
     let db = rusqlite::Connection::open(&rows).expect("opens");
     println!("row per sample, one day:");
     timed("GROUP BY hour, one quantity", 3, || grouped(&db, 3_600_000_000_000));
@@ -246,22 +248,26 @@ fn a_year() {
     let dir = tempfile::tempdir().expect("a directory");
     let (path, machine) = (dir.path().join("y.db"), Machine::new());
     let writer = Writer::open(&path, Options { extras: Vec::new(), ..options() }).expect("opens");
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     for tick in 0..365 * 8_640 {
         machine.fill_quantities(tick, &mut sample);
         sample.at_ns = START_NS + tick * 10 * SECOND_NS;
-        writer.sample(&sample, &[]);
+        writer.queue_sample(&sample, &[]);
     }
     drop(writer);
     let reader = Reader::open(&path).expect("opens");
     println!("365 days of summaries of 20 quantities, {:.0} MB:", used_bytes(&path) / 1e6);
-    let one = Query::default().of(["spindle_power_w"]);
+    let one = Query::default().with_series(["spindle_power_w"]);
     let hour_ns = 3_600 * SECOND_NS;
-    timed("the year by day, all 20 quantities", 5, || reader.overview(&Query::default(), DAY_NS).expect("answers"));
-    timed("the year by hour, one quantity (8 760 points)", 5, || reader.overview(&one, hour_ns).expect("answers"));
-    timed("the year by hour, all 20 quantities", 5, || reader.overview(&Query::default(), hour_ns).expect("answers"));
+    timed("the year by day, all 20 quantities", 5, || {
+        reader.read_overview(&Query::default(), DAY_NS).expect("answers")
+    });
+    timed("the year by hour, one quantity (8 760 points)", 5, || reader.read_overview(&one, hour_ns).expect("answers"));
+    timed("the year by hour, all 20 quantities", 5, || {
+        reader.read_overview(&Query::default(), hour_ns).expect("answers")
+    });
     timed("the year by minute, one quantity (525 600 points)", 1, || {
-        reader.overview(&one, 60 * SECOND_NS).expect("answers")
+        reader.read_overview(&one, 60 * SECOND_NS).expect("answers")
     });
     timed("the year by day in plain SQL (view day_summaries)", 3, || {
         first_row(&reader, "SELECT count(mean) FROM day_summaries WHERE name = 'spindle_power_w'")
@@ -280,7 +286,7 @@ fn grouped(db: &rusqlite::Connection, width_ns: i64) -> usize {
 fn count(reader: &Reader, query: &Query) -> usize {
     let mut rows = 0;
     reader
-        .samples(query, |chunk| {
+        .for_each_chunk(query, |chunk| {
             rows += black_box(chunk).at_ns.len();
             ControlFlow::Continue(())
         })
@@ -291,7 +297,7 @@ fn count(reader: &Reader, query: &Query) -> usize {
 fn first_row(reader: &Reader, select: &str) -> Vec<SqlValue> {
     let mut found = Vec::new();
     reader
-        .sql(select, std::time::Duration::from_secs(600), |_, row| {
+        .run_sql(select, std::time::Duration::from_secs(600), |_, row| {
             found = row.to_vec();
             ControlFlow::Break(())
         })

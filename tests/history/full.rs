@@ -94,7 +94,7 @@ fn full_disk() {
     for minute in 50..250 {
         let began = Instant::now();
         write(&writer, &machine, minute * 600..(minute + 1) * 600);
-        writer.record(alarm(minute)).expect("room");
+        writer.queue_record(alarm(minute)).expect("room");
         slowest = slowest.max(began.elapsed());
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -125,20 +125,20 @@ fn full_disk() {
 /// All alarms are there, and the newest rows without a hole up to `end`.
 fn check_full_disk(path: &Path, end: i64) {
     let reader = Reader::open(path).expect("opens");
-    assert_eq!(reader.alarms(RecordSpan::newest(1_000)).expect("reads").len(), 200);
+    assert_eq!(reader.read_alarms(RecordSpan::newest(1_000)).expect("reads").len(), 200);
     let mut rows = Vec::new();
     reader
-        .samples(&Query::default().of(["total_power_w"]), |chunk| {
+        .for_each_chunk(&Query::default().with_series(["total_power_w"]), |chunk| {
             rows.extend_from_slice(&chunk.at_ns);
             ControlFlow::Continue(())
         })
         .expect("reads");
     assert_eq!(rows.last(), Some(&Machine::at_ns(end - 1)));
     assert!(rows.windows(2).all(|pair| pair[1] - pair[0] == SECOND_NS / 10), "only the oldest went");
-    let info = reader.info().expect("reads");
+    let info = reader.read_info().expect("reads");
     let raw = info.dropped.iter().find(|dropped| dropped.kind == "raw samples").expect("counted");
     assert_eq!((raw.rows + rows.len() as i64, raw.because.as_str()), (end, "the disk is full"));
-    assert_eq!(reader.check().expect("checks"), Vec::<String>::new());
+    assert_eq!(reader.check_integrity().expect("checks"), Vec::<String>::new());
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn read_only_disk() {
         let error = Writer::open(&path, options()).expect_err("refused").to_string();
         assert!(error.contains("cannot be written") && error.contains("write permission"), "{error}");
     }
-    let info = Reader::open(&path).and_then(|reader| reader.info()).expect("readable");
+    let info = Reader::open(&path).and_then(|reader| reader.read_info()).expect("readable");
     assert_eq!(info.samples, 1_000);
     let error = Reader::open(&disk.join("copied/h.db")).expect_err("refused").to_string();
     assert!(error.contains("-wal to a writable directory"), "{error}");
@@ -188,16 +188,17 @@ fn the_size_limit_takes_the_oldest_raw_first() {
     let writer = Writer::open(&path, Options { retention, ..options() }).expect("opens");
     for hour in 0..6 {
         write(&writer, &machine, hour * 36_000..(hour + 1) * 36_000);
-        writer.record(alarm(hour));
+        writer.queue_record(alarm(hour));
         writer.flush().expect("durable");
     }
     let status = writer.close();
     assert!(status.bytes <= 1_500_000 && status.retired_samples > 0, "{status:?}");
     let reader = Reader::open(&path).expect("opens");
-    let (first_ns, last_ns) = reader.span().expect("reads").expect("rows");
+    let (first_ns, last_ns) = reader.read_span().expect("reads").expect("rows");
     assert!(first_ns > Machine::at_ns(0) && last_ns == Machine::at_ns(6 * 36_000 - 1));
-    assert_eq!(reader.alarms(RecordSpan::newest(100)).expect("reads").len(), 6);
-    let overview = reader.overview(&Query::default().of(["total_power_w"]), 60 * SECOND_NS).expect("answers");
+    assert_eq!(reader.read_alarms(RecordSpan::newest(100)).expect("reads").len(), 6);
+    let overview =
+        reader.read_overview(&Query::default().with_series(["total_power_w"]), 60 * SECOND_NS).expect("answers");
     assert_eq!(overview.start_ns.len(), 360, "every minute is still in the overview");
 }
 
@@ -212,8 +213,8 @@ fn ages_take_each_kind_at_its_time() {
     write(&writer, &machine, 0..4 * 36_000);
     for hour in 0..4 {
         let at_ns = Machine::at_ns(hour * 36_000 + 18_000);
-        writer.record(Event { at_ns, kind: "mark".into(), ..Event::default() });
-        writer.record(Alarm { at_ns, ..alarm(hour) });
+        writer.queue_record(Event { at_ns, kind: "mark".into(), ..Event::default() });
+        writer.queue_record(Alarm { at_ns, ..alarm(hour) });
     }
     writer.flush().expect("durable");
     writer.maintain_and_wait(Machine::at_ns(4 * 36_000), Duration::from_secs(30)).expect("done");
@@ -223,11 +224,11 @@ fn ages_take_each_kind_at_its_time() {
         db.query_row(&format!("SELECT count(*) FROM minute_summaries WHERE name = '{name}'"), [], |row| row.get(0))
             .expect("counts")
     };
-    let (first_ns, _) = reader.span().expect("reads").expect("rows");
+    let (first_ns, _) = reader.read_span().expect("reads").expect("rows");
     assert!((Machine::at_ns(3 * 36_000 - 6_000)..=Machine::at_ns(3 * 36_000)).contains(&first_ns));
     assert!((119..=121).contains(&minutes("total_power_w")), "{}", minutes("total_power_w"));
-    assert_eq!(reader.events(RecordSpan::newest(100)).expect("reads").len(), 3);
-    assert_eq!(reader.alarms(RecordSpan::newest(100)).expect("reads").len(), 4);
-    assert!(reader.info().expect("reads").dropped.len() >= 3);
+    assert_eq!(reader.read_events(RecordSpan::newest(100)).expect("reads").len(), 3);
+    assert_eq!(reader.read_alarms(RecordSpan::newest(100)).expect("reads").len(), 4);
+    assert!(reader.read_info().expect("reads").dropped.len() >= 3);
     assert_eq!(DAY_NS, 86_400 * SECOND_NS);
 }

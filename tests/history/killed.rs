@@ -19,7 +19,7 @@ const EVENT_EVERY: i64 = 50;
 const KILLS: i64 = 20;
 
 fn rows_in(path: &Path) -> i64 {
-    let span = Reader::open(path).and_then(|reader| reader.span()).ok().flatten();
+    let span = Reader::open(path).and_then(|reader| reader.read_span()).ok().flatten();
     span.map_or(0, |(_, last_ns)| (last_ns - START_NS) / TICK_NS + 1)
 }
 
@@ -34,13 +34,13 @@ fn child() {
     let options = Options { group_commit: Duration::from_millis(20), when_full, ..options() };
     let first = rows_in(path);
     let writer = Writer::open(path, options).expect("opens");
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     for row in first.. {
         machine.fill(row, &mut sample);
-        writer.sample(&sample, &extra_values(row));
+        writer.queue_sample(&sample, &extra_values(row));
         if row % EVENT_EVERY == 0 {
             let event = Event { at_ns: Machine::at_ns(row), kind: "mark".into(), ..Event::default() };
-            writer.record(event).expect("room");
+            writer.queue_record(event).expect("room");
         }
         if live {
             std::thread::sleep(Duration::from_micros(500));
@@ -96,8 +96,8 @@ fn twenty_kills_lose_nothing_acknowledged() {
         acknowledged = acknowledged.max(row);
         assert!(rows > acknowledged, "round {round}: {rows} rows, row {acknowledged} was acknowledged");
         let reader = Reader::open(&path).expect("opens");
-        assert_eq!(reader.check().expect("checks"), Vec::<String>::new(), "round {round}");
-        let marks = reader.events(RecordSpan::between(Machine::at_ns(first), i64::MAX, u32::MAX)).expect("reads");
+        assert_eq!(reader.check_integrity().expect("checks"), Vec::<String>::new(), "round {round}");
+        let marks = reader.read_events(RecordSpan::between(Machine::at_ns(first), i64::MAX, u32::MAX)).expect("reads");
         let marks = marks.iter().filter(|event| event.kind == "mark").count() as i64;
         assert!(marks >= events, "round {round}: {marks} events, {events} were acknowledged");
     }
@@ -138,7 +138,7 @@ fn every_prefix_of_the_log_opens_without_a_hole() {
 /// Opens a history as the next start would; how many rows it has, all of them the first ones.
 fn reopened(path: &Path, machine: &Machine) -> i64 {
     drop(Writer::open(path, options()).expect("opens"));
-    assert_eq!(Reader::open(path).and_then(|reader| reader.check()).expect("checks"), Vec::<String>::new());
+    assert_eq!(Reader::open(path).and_then(|reader| reader.check_integrity()).expect("checks"), Vec::<String>::new());
     verify(path, machine, 0)
 }
 
@@ -194,7 +194,7 @@ fn a_clock_that_goes_back_begins_a_segment() {
     let reader = Reader::open(&path).expect("opens");
     let mut order = Vec::new();
     reader
-        .samples(&Query::default().of(["total_power_w"]), |chunk| {
+        .for_each_chunk(&Query::default().with_series(["total_power_w"]), |chunk| {
             assert!(chunk.at_ns.is_sorted());
             order.extend(chunk.at_ns.iter().map(|at_ns| (chunk.segment, (at_ns - START_NS) / TICK_NS)));
             ControlFlow::Continue(())
@@ -203,16 +203,16 @@ fn a_clock_that_goes_back_begins_a_segment() {
     let expected: Vec<(i64, i64)> =
         (5_000..5_700).map(|row| (1, row)).chain((4_000..6_000).map(|row| (2, row))).collect();
     assert!(order == expected);
-    let events = reader.events(RecordSpan::newest(10)).expect("reads");
+    let events = reader.read_events(RecordSpan::newest(10)).expect("reads");
     assert_eq!(events.len(), 1);
     assert!(events[0].kind == "clock_went_back" && events[0].text.contains("169.9"), "{events:?}");
 
-    let recording = reader.recording(&Query::default()).expect("reads");
-    let runs: Vec<String> = recording.runs().into_iter().map(|run| run.name).collect();
+    let recording = reader.read_recording(&Query::default()).expect("reads");
+    let runs: Vec<String> = recording.list_runs().into_iter().map(|run| run.name).collect();
     assert_eq!((runs, recording.start_ns), (vec!["1".to_owned(), "2".to_owned()], None));
     let file = dir.path().join("r.csv");
-    reader.export(&Query::default(), &file).expect("writes");
+    reader.export_to_file(&Query::default(), &file).expect("writes");
     let back = adapters::recording::read_path(&file).expect("reads");
-    assert_eq!((back.refused, back.recording.rows()), (0, 2_700));
-    assert_eq!(reader.export(&Query::default(), &dir.path().join("r.parquet")).expect("writes"), 2_700);
+    assert_eq!((back.refused, back.recording.count_rows()), (0, 2_700));
+    assert_eq!(reader.export_to_file(&Query::default(), &dir.path().join("r.parquet")).expect("writes"), 2_700);
 }

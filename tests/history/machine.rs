@@ -60,7 +60,7 @@ fn noise(row: i64, channel: u64) -> f64 {
 }
 
 fn channel(name: &str) -> ChannelId {
-    ChannelId::of(name).expect("in the table of channels")
+    ChannelId::from_name(name).expect("in the table of channels")
 }
 
 impl Machine {
@@ -121,7 +121,7 @@ impl Machine {
         sample.at_ns = Self::at_ns(row);
         for (index, channel) in self.channels.iter().enumerate() {
             let value = self.missing(row, index).map_or_else(|| Ok(Value::Number(self.quantity(row, index))), Err);
-            sample.set(*channel, Slot { value, age_ns: 0 });
+            sample.set_slot(*channel, Slot { value, age_ns: 0 });
         }
     }
 
@@ -130,7 +130,7 @@ impl Machine {
         self.fill_quantities(row, sample);
         for (index, channel) in self.texts.iter().enumerate() {
             let value = self.word(row, index).map(|word| Value::Text(word.clone())).ok_or(Absence::Stale);
-            sample.set(*channel, Slot { value, age_ns: 0 });
+            sample.set_slot(*channel, Slot { value, age_ns: 0 });
         }
     }
 }
@@ -170,10 +170,10 @@ fn exact(row: i64, index: usize) -> f64 {
 /// The estimates stored beside the channels.
 pub(crate) fn extras() -> Vec<ExtraSeries> {
     vec![
-        ExtraSeries::text("machine_state", "State of the machine", "机床状态"),
-        ExtraSeries::number("no_load_power_w", "W", "No-load power", "空载功率"),
-        ExtraSeries::number("cutting_power_w", "W", "Cutting power", "切削功率"),
-        ExtraSeries::number("cutting_power_sd_w", "W", "Standard deviation of the cutting power", "切削功率标准差"),
+        ExtraSeries::new_text("machine_state", "State of the machine", "机床状态"),
+        ExtraSeries::new_number("no_load_power_w", "W", "No-load power", "空载功率"),
+        ExtraSeries::new_number("cutting_power_w", "W", "Cutting power", "切削功率"),
+        ExtraSeries::new_number("cutting_power_sd_w", "W", "Standard deviation of the cutting power", "切削功率标准差"),
     ]
 }
 

@@ -38,8 +38,8 @@ fn overviews_agree_with_the_samples_at_every_width() {
     let (_writer, machine) = history(&path);
     let reader = Reader::open(&path).expect("opens");
     for width_s in [1, 12, 60, 300, 3_600, 86_400] {
-        let query = Query::default().of(["spindle_power_w", "spindle_speed_rpm"]);
-        let overview = reader.overview(&query, width_s * SECOND_NS).expect("answers");
+        let query = Query::default().with_series(["spindle_power_w", "spindle_speed_rpm"]);
+        let overview = reader.read_overview(&query, width_s * SECOND_NS).expect("answers");
         let per_bucket = width_s * 10;
         assert_eq!(overview.start_ns.len() as i64, (90_123 + per_bucket - 1) / per_bucket, "{width_s} s");
         for (column, index) in [(0, 10), (1, 2)] {
@@ -52,9 +52,10 @@ fn overviews_agree_with_the_samples_at_every_width() {
             }
         }
     }
-    let error = reader.overview(&Query::default().of(["spindel_power_w"]), SECOND_NS).expect_err("refused");
+    let error =
+        reader.read_overview(&Query::default().with_series(["spindel_power_w"]), SECOND_NS).expect_err("refused");
     assert!(error.to_string().contains("did you mean spindle_power_w"), "{error}");
-    let all = reader.overview(&Query::default(), 3_600 * SECOND_NS).expect("answers");
+    let all = reader.read_overview(&Query::default(), 3_600 * SECOND_NS).expect("answers");
     assert_eq!(all.series.len(), 23, "twenty quantities and three estimates");
 }
 
@@ -67,19 +68,19 @@ fn filters_choose_rows() {
     let query = Query {
         state: Some("cutting".to_owned()),
         program: Some("O1234".to_owned()),
-        ..Query::between(Machine::at_ns(700), Machine::at_ns(88_000)).of(["spindle_power_w"])
+        ..Query::between(Machine::at_ns(700), Machine::at_ns(88_000)).with_series(["spindle_power_w"])
     };
     let right = |row: &i64| row.rem_euclid(600) < 420 && machine.word(*row, 0).is_some_and(|word| &**word == "O1234");
     let expected: Vec<i64> = (700..88_000).filter(right).map(Machine::at_ns).collect();
     let mut got = Vec::new();
     reader
-        .samples(&query, |chunk| {
+        .for_each_chunk(&query, |chunk| {
             got.extend_from_slice(&chunk.at_ns);
             ControlFlow::Continue(())
         })
         .expect("reads");
     assert!(got == expected, "{} rows, {} expected", got.len(), expected.len());
-    let coarse = reader.overview(&query, 3_600 * SECOND_NS).expect("answers");
+    let coarse = reader.read_overview(&query, 3_600 * SECOND_NS).expect("answers");
     let Buckets::Numbers(buckets) = &coarse.columns[0] else { panic!("numbers") };
     let missing = expected.iter().filter(|at_ns| machine.missing((*at_ns - START_NS) / 100_000_000, 10).is_some());
     let count: u64 = buckets.iter().map(|bucket| bucket.count).sum();
@@ -89,7 +90,7 @@ fn filters_choose_rows() {
 fn one_value(reader: &Reader, statement: &str) -> SqlValue {
     let mut found = None;
     reader
-        .sql(statement, LIMIT, |_, row| {
+        .run_sql(statement, LIMIT, |_, row| {
             found = row.first().cloned();
             ControlFlow::Break(())
         })
@@ -117,11 +118,12 @@ fn sql_sees_every_sample() {
     let statement = "SELECT count(*) FROM samples a JOIN samples b USING (at_ns) WHERE a.at_ns < 1767571201000000000";
     assert_eq!(one_value(&reader, statement), SqlValue::Integer(10));
     for bad in ["DELETE FROM blocks", "SELEC 1", "SELECT * FROM nothing", "ATTACH 'x.db' AS x"] {
-        assert!(reader.sql(bad, LIMIT, |_, _| ControlFlow::Continue(())).is_err(), "{bad}");
+        assert!(reader.run_sql(bad, LIMIT, |_, _| ControlFlow::Continue(())).is_err(), "{bad}");
     }
     let endless = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT count(*) FROM c";
     let began = Instant::now();
-    let error = reader.sql(endless, Duration::from_secs(1), |_, _| ControlFlow::Continue(())).expect_err("given up");
+    let error =
+        reader.run_sql(endless, Duration::from_secs(1), |_, _| ControlFlow::Continue(())).expect_err("given up");
     assert!(error.to_string().contains("not ended within 1 s"), "{error}");
     assert!(began.elapsed() < Duration::from_secs(5), "{:?}", began.elapsed());
 }
@@ -164,14 +166,14 @@ fn records_come_back() {
         program: "O1234".to_owned(),
         ..StateChange::default()
     };
-    writer.record(state(0, "standby"));
-    writer.record(state(3_000, "cutting"));
-    writer.record(state(4_200, "idle"));
+    writer.queue_record(state(0, "standby"));
+    writer.queue_record(state(3_000, "cutting"));
+    writer.queue_record(state(4_200, "idle"));
     let alarm = Alarm { at_ns: START_NS, code: "wear".into(), source: "tool.rhai".into(), ..Alarm::default() };
-    writer.record(alarm.clone());
-    writer.record(alarm);
+    writer.queue_record(alarm.clone());
+    writer.queue_record(alarm);
     let clear = AlarmClear { at_ns: START_NS + SECOND_NS, code: "wear".into(), source: "tool.rhai".into() };
-    writer.record(clear);
+    writer.queue_record(clear);
     let event = Event { at_ns: START_NS + 5, kind: "started".into(), text: "开始".into(), ..Event::default() };
     let decision =
         Decision { at_ns: START_NS + 6, value: Some(90.0), wanted: "feed_override_pct".into(), ..Decision::default() };
@@ -179,18 +181,18 @@ fn records_come_back() {
     let part = Part { began_ns: START_NS, ended_ns: START_NS + 8, count: 1, energy_j: Some(1.5), ..Part::default() };
     let model = Model { at_ns: START_NS + 9, name: "lathe".into(), toml: "a = 1".into(), ..Model::default() };
     let diagnosis = Diagnosis { at_ns: START_NS + 10, verdict: "explained".into(), ..Diagnosis::default() };
-    writer.record(event.clone());
-    writer.record(decision.clone());
-    writer.record(command.clone());
-    writer.record(part.clone());
-    writer.record(model.clone());
-    let ticket = writer.record(diagnosis.clone()).expect("room");
+    writer.queue_record(event.clone());
+    writer.queue_record(decision.clone());
+    writer.queue_record(command.clone());
+    writer.queue_record(part.clone());
+    writer.queue_record(model.clone());
+    let ticket = writer.queue_record(diagnosis.clone()).expect("room");
     writer.flush().expect("durable");
     assert_eq!((ticket, writer.acknowledged_record()), (12, 12));
 
     let reader = Reader::open(&path).expect("opens");
     let all = RecordSpan::newest(100);
-    let states = reader.states(all).expect("reads");
+    let states = reader.read_states(all).expect("reads");
     let words: Vec<&str> = states.iter().map(|state| state.state.as_str()).collect();
     assert_eq!(words, ["standby", "cutting", "idle"]);
     assert_eq!((states[0].until_ns, states[2].until_ns), (Some(START_NS + 3_000 * SECOND_NS), None));
@@ -198,15 +200,15 @@ fn records_come_back() {
     let seconds: Vec<(String, f64)> = hours.into_iter().map(|hour| (hour.state, hour.seconds)).collect();
     let expected = [("cutting", 600.0), ("standby", 3_000.0), ("cutting", 600.0)];
     assert_eq!(seconds, expected.map(|(state, seconds)| (state.to_owned(), seconds)));
-    let alarms = reader.alarms(all).expect("reads");
+    let alarms = reader.read_alarms(all).expect("reads");
     assert_eq!((alarms.len(), alarms[0].count, alarms[0].cleared_ns), (1, 2, Some(START_NS + SECOND_NS)));
-    assert_eq!(reader.events(all).expect("reads"), [event]);
-    assert_eq!(reader.decisions(all).expect("reads"), [decision]);
-    assert_eq!(reader.commands(all).expect("reads"), [command]);
-    assert_eq!(reader.parts(all).expect("reads"), [part]);
-    assert_eq!(reader.models(all).expect("reads"), [model]);
-    assert_eq!(reader.diagnoses(all).expect("reads"), [diagnosis]);
-    assert_eq!(reader.events(RecordSpan::between(0, START_NS, 9)).expect("reads"), []);
+    assert_eq!(reader.read_events(all).expect("reads"), [event]);
+    assert_eq!(reader.read_decisions(all).expect("reads"), [decision]);
+    assert_eq!(reader.read_commands(all).expect("reads"), [command]);
+    assert_eq!(reader.read_parts(all).expect("reads"), [part]);
+    assert_eq!(reader.read_models(all).expect("reads"), [model]);
+    assert_eq!(reader.read_diagnoses(all).expect("reads"), [diagnosis]);
+    assert_eq!(reader.read_events(RecordSpan::between(0, START_NS, 9)).expect("reads"), []);
 }
 
 #[test]
@@ -216,33 +218,33 @@ fn exports_are_recordings() {
     let (_writer, machine) = history(&path);
     let reader = Reader::open(&path).expect("opens");
     let query = Query::between(Machine::at_ns(1_000), Machine::at_ns(5_000));
-    let whole = reader.recording(&query).expect("reads");
-    assert_eq!((whole.rows(), whole.start_ns), (4_000, Some(Machine::at_ns(1_000))));
+    let whole = reader.read_recording(&query).expect("reads");
+    assert_eq!((whole.count_rows(), whole.start_ns), (4_000, Some(Machine::at_ns(1_000))));
     for name in ["r.csv", "r.csv.gz"] {
         let file = dir.path().join(name);
-        assert_eq!(reader.export(&query, &file).expect("writes"), 4_000);
+        assert_eq!(reader.export_to_file(&query, &file).expect("writes"), 4_000);
         let back = adapters::recording::read_path(&file).expect("reads");
-        assert_eq!((back.refused, back.recording.rows()), (0, 4_000));
+        assert_eq!((back.refused, back.recording.count_rows()), (0, 4_000));
         assert_eq!(back.recording.start_ns, whole.start_ns);
         assert_eq!(back.recording.time_s, whole.time_s);
         for column in whole.columns() {
-            assert_eq!(back.recording.numbers(&column.name), whole.numbers(&column.name), "{}", column.name);
+            assert_eq!(back.recording.find_numbers(&column.name), whole.find_numbers(&column.name), "{}", column.name);
             let words = |recording: &adapters::Recording| {
                 recording
-                    .words(&column.name)
+                    .find_words(&column.name)
                     .map(|words| (0..4_000).map(|row| words.get(row).map(str::to_owned)).collect::<Vec<_>>())
             };
             assert_eq!(words(&back.recording), words(&whole), "{}", column.name);
         }
     }
-    let power = whole.numbers("spindle_power_w").expect("there");
+    let power = whole.find_numbers("spindle_power_w").expect("there");
     let expected = |row: i64| machine.missing(row, 10).is_none().then(|| machine.quantity(row, 10));
     assert!((0..4_000).all(|row| power.get(row) == expected(1_000 + row as i64)));
-    let reasons = whole.words("spindle_power_w_missing").expect("there");
+    let reasons = whole.find_words("spindle_power_w_missing").expect("there");
     assert!((0..4_000).all(|row| reasons.get(row).is_some() == power.get(row).is_none()));
-    let none = reader.export(&Query::between(0, 5), &dir.path().join("n.csv")).expect_err("no rows");
+    let none = reader.export_to_file(&Query::between(0, 5), &dir.path().join("n.csv")).expect_err("no rows");
     assert!(none.to_string().contains("history info"), "{none}");
-    assert!(reader.export(&query, &dir.path().join("r.xls")).is_err());
+    assert!(reader.export_to_file(&query, &dir.path().join("r.xls")).is_err());
 }
 
 #[test]
@@ -254,8 +256,8 @@ fn parquet_holds_the_same() {
     let (_writer, machine) = history(&path);
     let reader = Reader::open(&path).expect("opens");
     let file = dir.path().join("r.parquet");
-    let query = Query::default().of(["total_power_w", "program"]);
-    assert_eq!(reader.export(&query, &file).expect("writes"), 90_123);
+    let query = Query::default().with_series(["total_power_w", "program"]);
+    assert_eq!(reader.export_to_file(&query, &file).expect("writes"), 90_123);
     let parquet = SerializedFileReader::new(std::fs::File::open(&file).expect("opens")).expect("is Parquet");
     assert_eq!((parquet.metadata().file_metadata().num_rows(), parquet.num_row_groups()), (90_123, 2));
     for (row, record) in parquet.get_row_iter(None).expect("reads").enumerate() {
@@ -270,7 +272,7 @@ fn info_tells_how_long_the_disk_lasts() {
     let dir = tempfile::tempdir().expect("a directory");
     let path = dir.path().join("h.db");
     let (_writer, _) = history(&path);
-    let info = Reader::open(&path).and_then(|reader| reader.info()).expect("reads");
+    let info = Reader::open(&path).and_then(|reader| reader.read_info()).expect("reads");
     assert_eq!((info.samples, info.segments), (90_123, 1));
     let lasts = info.disk_lasts_days.zip(info.limit_reached_days).expect("known");
     assert!(lasts.0 > 1.0 && lasts.1 > 1.0, "{lasts:?}");
@@ -284,11 +286,11 @@ fn estimates_go_out_as_they_came_in() {
     let path = dir.path().join("h.db");
     let (_writer, _) = history(&path);
     let reader = Reader::open(&path).expect("opens");
-    let series = reader.series().expect("reads");
+    let series = reader.read_series().expect("reads");
     let cutting = series.iter().find(|series| &*series.name == "cutting_power_w").expect("registered");
     assert!(cutting.estimated && &*cutting.unit == "W" && &*cutting.zh == "切削功率");
-    let recording = reader.recording(&Query::default().of(["cutting_power_w"])).expect("reads");
-    let numbers = recording.numbers("cutting_power_w").expect("there");
+    let recording = reader.read_recording(&Query::default().with_series(["cutting_power_w"])).expect("reads");
+    let numbers = recording.find_numbers("cutting_power_w").expect("there");
     for row in (0..90_123).step_by(331) {
         let expected = match extra_values(row)[2] {
             gateway::history::ExtraValue::Number(watts) => Some(watts),

@@ -14,10 +14,10 @@ pub(crate) fn options() -> Options {
 
 /// Writes rows `from..to` of `machine`.
 pub(crate) fn write(writer: &Writer, machine: &Machine, rows: std::ops::Range<i64>) {
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     for row in rows {
         machine.fill(row, &mut sample);
-        writer.sample(&sample, &extra_values(row));
+        writer.queue_sample(&sample, &extra_values(row));
     }
 }
 
@@ -25,10 +25,11 @@ pub(crate) fn write(writer: &Writer, machine: &Machine, rows: std::ops::Range<i6
 pub(crate) fn verify(path: &Path, machine: &Machine, first: i64) -> i64 {
     let reader = Reader::open(path).expect("opens");
     let names: Vec<&str> = QUANTITIES.iter().map(|(name, _)| *name).collect();
-    let query = Query::default().of(names.into_iter().chain(["program", "tool", "machine_state", "cutting_power_w"]));
+    let query =
+        Query::default().with_series(names.into_iter().chain(["program", "tool", "machine_state", "cutting_power_w"]));
     let mut next = first;
     reader
-        .samples(&query, |chunk| {
+        .for_each_chunk(&query, |chunk| {
             for row in 0..chunk.at_ns.len() {
                 verify_row(machine, chunk, row, next);
                 next += 1;
@@ -43,18 +44,22 @@ fn verify_row(machine: &Machine, chunk: &Chunk<'_>, row: usize, expected: i64) {
     assert_eq!(chunk.at_ns[row], Machine::at_ns(expected), "time of row {expected}");
     for (index, (name, _)) in QUANTITIES.iter().enumerate() {
         let missing = machine.missing(expected, index);
-        assert_eq!(chunk.missing(index, row), missing.map(|absence| absence.word()), "{name} in row {expected}");
+        assert_eq!(
+            chunk.missing_reason(index, row),
+            missing.map(|absence| absence.as_word()),
+            "{name} in row {expected}"
+        );
         let number = missing.is_none().then(|| machine.quantity(expected, index));
-        assert_eq!(chunk.columns[index].number(row), number, "{name} in row {expected}");
+        assert_eq!(chunk.columns[index].number_at(row), number, "{name} in row {expected}");
     }
     for index in 0..2 {
         let word = machine.word(expected, index).map(|word| &**word);
-        assert_eq!(chunk.columns[20 + index].word(row), word, "row {expected}");
+        assert_eq!(chunk.columns[20 + index].word_at(row), word, "row {expected}");
     }
     let expect_state = if expected.rem_euclid(600) < 420 { "cutting" } else { "idle" };
-    assert_eq!(chunk.columns[22].word(row), Some(expect_state));
+    assert_eq!(chunk.columns[22].word_at(row), Some(expect_state));
     let learned = expected.rem_euclid(3000) >= 100;
-    assert_eq!(chunk.missing(23, row), if learned { None } else { Some("not_learned") });
+    assert_eq!(chunk.missing_reason(23, row), if learned { None } else { Some("not_learned") });
 }
 
 #[test]
@@ -84,21 +89,21 @@ fn what_goes_in_comes_out() {
         .and_then(|db| db.query_row("SELECT count(*) FROM blocks", [], |row| row.get(0)))
         .expect("counts");
     assert!(blocks < 12, "{blocks} blocks instead of 36");
-    assert_eq!(Reader::open(&path).and_then(|reader| reader.check()).expect("checks"), Vec::<String>::new());
+    assert_eq!(Reader::open(&path).and_then(|reader| reader.check_integrity()).expect("checks"), Vec::<String>::new());
 }
 
 /// Every number of `series` in the file.
 fn numbers(path: &Path, series: &str) -> Vec<f64> {
     let reader = Reader::open(path).expect("opens");
-    let recording = reader.recording(&Query::default().of([series])).expect("reads");
-    recording.numbers(series).expect("a quantity").present().collect()
+    let recording = reader.read_recording(&Query::default().with_series([series])).expect("reads");
+    recording.find_numbers(series).expect("a quantity").present_values().collect()
 }
 
 #[test]
 fn long_fractions_are_rounded_once_or_kept_to_the_bit() {
     let dir = tempfile::tempdir().expect("a directory");
     let machine = Machine::new().interpolated();
-    let channel = adapters::ChannelId::of("spindle_power_w").expect("in the table");
+    let channel = adapters::ChannelId::from_name("spindle_power_w").expect("in the table");
     for (fidelity, name) in [(Fidelity::Resolution, "r.db"), (Fidelity::Exact, "e.db")] {
         let path = dir.path().join(name);
         let writer = Writer::open(&path, Options { fidelity, ..options() }).expect("opens");

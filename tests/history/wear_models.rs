@@ -2,7 +2,7 @@
 
 use crate::round_trip::options;
 use gateway::history::{Reader, Writer, store_wear_model};
-use rules::estimators::wear::{WearKey, WearModel, WearRecord, published};
+use rules::estimators::wear::{WearKey, WearModel, WearRecord, build_published_surface};
 use std::path::Path;
 
 fn record(tool: &str, criterion_mm: f64) -> WearRecord {
@@ -12,7 +12,12 @@ fn record(tool: &str, criterion_mm: f64) -> WearRecord {
         work_material: "45# steel".to_owned(),
         operation: "rough".to_owned(),
     };
-    WearRecord::new(key, criterion_mm, ("table.csv".to_owned(), 27, 0.9929), WearModel::Surface(published()))
+    WearRecord::new(
+        key,
+        criterion_mm,
+        ("table.csv".to_owned(), 27, 0.9929),
+        WearModel::Surface(build_published_surface()),
+    )
 }
 
 #[test]

@@ -24,19 +24,21 @@ struct Scripted {
 impl Scripted {
     fn start(port: u16, mut script: Script) -> Self {
         let client = MqttClient::connect(&Options::new("127.0.0.1", port, "scripted")).expect("the broker is there");
-        let asked = [Subject::Probe, Subject::Query, Subject::Set].map(|subject| subject.filter(SERIAL));
-        client.subscribe(&asked, Qos::AtMostOnce).expect("granted");
+        let asked = [Subject::Probe, Subject::Query, Subject::Set].map(|subject| subject.build_filter(SERIAL));
+        client.subscribe_filters(&asked, Qos::AtMostOnce).expect("granted");
         let stop = Arc::new(AtomicBool::new(false));
         let stopping = stop.clone();
         let thread = std::thread::spawn(move || {
             while !stopping.load(Ordering::SeqCst) {
-                let Some(message) = client.receive(Duration::from_millis(20)).expect("the broker stays") else {
+                let Some(message) = client.receive_message(Duration::from_millis(20)).expect("the broker stays") else {
                     continue;
                 };
-                let Some((subject, _)) = Subject::of(&message.topic, SERIAL) else { continue };
+                let Some((subject, _)) = Subject::from_topic(&message.topic, SERIAL) else { continue };
                 let said = serde_json::from_slice(&message.payload).expect("we send JSON");
                 for (subject, payload) in script(subject, &said) {
-                    client.publish(&subject.topic(SERIAL), &payload, Qos::AtMostOnce).expect("the broker stays");
+                    client
+                        .publish_message(&subject.build_topic(SERIAL), &payload, Qos::AtMostOnce)
+                        .expect("the broker stays");
                 }
             }
         });
@@ -201,5 +203,5 @@ fn events_and_samples_without_paths_are_taken() {
     // Interval and columns come from the model; the same time again is seen as such.
     let (name, track) = source.track().channels().next().expect("sampled");
     assert_eq!((name, track.instants % 2, track.missing), ("s", 0, 0));
-    assert_eq!((track.overlapping, source.track().unusable().0), (track.messages - 1, 0));
+    assert_eq!((track.overlapping, source.track().unusable_messages().0), (track.messages - 1, 0));
 }

@@ -118,14 +118,14 @@ fn units_places_and_character_sets_of_another_maker() {
         }
         assert_eq!(text(&readings, "program"), "O0100 精铣", "{encoding}");
         assert!(text(&readings, "alarm").contains("主轴过热"), "{encoding}: {}", text(&readings, "alarm"));
-        assert_eq!(source.identity()[0].1, "立式加工中心");
+        assert_eq!(source.query_identity()[0].1, "立式加工中心");
         // A furlong is no unit that is known, and a current in bar is none.
         for channel in ["z_axis_position_mm", "z_axis_current_a"] {
             assert_eq!(number(&readings, channel), Err(Absence::UnknownUnit), "{encoding}: {channel}");
         }
         assert_eq!(number(&readings, "spindle_override_pct"), Err(Absence::NotSupported), "two places: 120 or 80");
         let told: Vec<String> =
-            source.problems().into_iter().map(|problem| format!("{} | {}", problem.what, problem.next)).collect();
+            source.list_problems().into_iter().map(|problem| format!("{} | {}", problem.what, problem.next)).collect();
         for part in ["\"furlong\", which is no unit that is known", "\"bar\", which measures something else"] {
             assert!(told.iter().any(|line| line.contains(part)), "{part}: {told:?}");
         }
@@ -150,7 +150,7 @@ fn what_the_table_does_not_place_the_user_places() {
     let found = ["spindle_override_pct", "foreign_coolant_bar", "foreign_coolant_c", "foreign_pump_s"];
     assert_eq!(found.map(|channel| number(&readings, channel)), [Ok(80.0), Ok(25.0), Ok(25.0), Ok(5400.0)]);
     assert_eq!(number(&readings, "foreign_nothing_c"), Err(Absence::NotSupported));
-    let told = source.problems();
+    let told = source.list_problems();
     assert!(told.iter().any(|one| one.what.contains("no CONTROLLER/HEATER/TEMPERATURE")), "{told:?}");
 }
 

@@ -193,22 +193,22 @@ fn a_dead_link_ends_the_poll_after_one_call() {
 fn the_state_of_the_connection_comes_from_the_events() {
     let library = library(&[]);
     let line = line(&library);
-    let alive = line.alive().expect("connected");
+    let alive = line.query_connection().expect("connected");
     assert_eq!((alive.connected, alive.lost, alive.generation), (1, 0, 1));
-    line.end();
-    assert_eq!(line.alive().expect("connected again").generation, 2);
+    line.end_child();
+    assert_eq!(line.query_connection().expect("connected again").generation, 2);
 }
 
 #[test]
 fn what_cannot_be_loaded_listened_at_or_connected_says_so() {
     let library = library(&[]);
-    let said = |settings: HncSettings| HncLine::new(settings).alive().expect_err("it cannot").to_string();
+    let said = |settings: HncSettings| HncLine::new(settings).query_connection().expect_err("it cannot").to_string();
     let absent = HncSettings { vendor_library: "/does/not/exist.so".into(), ..settings(&library) };
     let text = said(absent);
     assert!(text.contains("/does/not/exist.so") && text.contains("library="), "{text}");
     let first = settings(&library);
     let holder = HncLine::new(first.clone());
-    holder.alive().expect("it listens");
+    holder.query_connection().expect("it listens");
     let text = said(first);
     assert!(text.contains("1009") && text.contains("local_port="), "{text}");
     library.fault("code HNC_NetConnect -1");
@@ -252,7 +252,7 @@ fn every_sampled_millisecond_comes_once() {
         std::thread::sleep(Duration::from_millis(100));
     }
     let blocks: Vec<_> = blocks.try_iter().collect();
-    let Sampled { instants, missing, repeated } = source.sampled().expect("it samples");
+    let Sampled { instants, missing, repeated } = source.sampling_counts().expect("it samples");
     assert_eq!((missing, repeated), (0, 0));
     assert!(instants > 2000, "{instants} ms of 3 s");
     for pair in blocks.windows(2) {

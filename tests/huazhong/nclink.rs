@@ -31,36 +31,36 @@ fn said_no(answer: &Option<NcLinkAnswer>, why: &str) -> bool {
 fn probe_query_and_set_with_the_simulated_device() {
     let Some(stand) = Stand::start() else { return };
     let mut client = stand.connect();
-    let model = client.probe().expect("a model");
+    let model = client.probe_model().expect("a model");
     assert_eq!(model.name, "simulated lathe");
     assert_eq!(model.samples.iter().map(|channel| channel.interval_ms).collect::<Vec<_>>(), [2000.0, 1.0]);
-    let d = model.find("CONTROLLER/VARIABLE@REG_D").expect("registers");
-    assert!(d.settable && !model.find("FEED_OVERRIDE").expect("there").settable);
+    let d = model.find_item("CONTROLLER/VARIABLE@REG_D").expect("registers");
+    assert!(d.settable && !model.find_item("FEED_OVERRIDE").expect("there").settable);
 
     let asks = [
-        RequestedItem::value("010305"),
-        RequestedItem::value("/CONTROLLER/PROGRAM"),
-        RequestedItem::value("nothing"),
-        RequestedItem::elements(&d.id, &[7]),
+        RequestedItem::from_id("010305"),
+        RequestedItem::from_id("/CONTROLLER/PROGRAM"),
+        RequestedItem::from_id("nothing"),
+        RequestedItem::with_elements(&d.id, &[7]),
     ];
-    let answers = client.query(&asks).expect("answered");
+    let answers = client.query_values(&asks).expect("answered");
     assert_eq!(answers[0], Some(Ok(vec![json!(100)])), "the override in force");
     assert!(matches!(&answers[1], Some(Ok(values)) if values[0].as_str().is_some_and(|name| name.contains("O"))));
     assert!(said_no(&answers[2], "NOT_FOUND"));
     assert_eq!(answers[3], Some(Ok(vec![json!(0)])));
 
     // Accepted, and read back; a bit on its own.
-    let set = client.set(&[RequestedItem::write(&d.id, 7, 40_000)]).expect("answered");
+    let set = client.set_values(&[RequestedItem::write(&d.id, 7, 40_000)]).expect("answered");
     assert_eq!(set, [Some(Ok(Vec::new()))]);
     let bit = Params { value: Some(json!(1)), index: Some(7), bit: Some(3), ..Params::default() };
-    client.set(&[RequestedItem { id: d.id.clone(), params: bit }]).expect("answered");
+    client.set_values(&[RequestedItem { id: d.id.clone(), params: bit }]).expect("answered");
     assert_eq!(
-        client.query(&[RequestedItem::elements(&d.id, &[7])]).expect("answered"),
+        client.query_values(&[RequestedItem::with_elements(&d.id, &[7])]).expect("answered"),
         [Some(Ok(vec![json!(40_008)]))]
     );
 
     // Refused, each for its own reason.
-    let f = model.find("CONTROLLER/VARIABLE@REG_F").expect("registers").id.clone();
+    let f = model.find_item("CONTROLLER/VARIABLE@REG_F").expect("registers").id.clone();
     let no_value = RequestedItem {
         id: d.id.clone(),
         params: Params { value: Some(json!("x")), index: Some(7), ..Params::default() },
@@ -71,7 +71,7 @@ fn probe_query_and_set_with_the_simulated_device() {
         RequestedItem::write(&d.id, 9999, 1),
         no_value,
     ];
-    let answers = client.set(&refused).expect("answered");
+    let answers = client.set_values(&refused).expect("answered");
     let reasons = ["NOT_SETABLE", "NOT_SETABLE", "INDEX_OUT_OF_RANGE", "NO_VALUE"];
     for (answer, reason) in answers.iter().zip(reasons) {
         assert!(said_no(answer, reason), "{answer:?} for {reason}");
@@ -111,7 +111,7 @@ fn a_killed_broker_is_a_failed_line_and_reading_goes_on_after_its_restart() {
     stand.broker.kill();
     let error = stand.read(&mut source).expect_err("no broker");
     assert!(matches!(&error, SourceError::Line { .. }), "{error}");
-    assert_eq!(error.absence(), Absence::Disconnected);
+    assert_eq!(error.to_absence(), Absence::Disconnected);
     let again = stand.read(&mut source).expect_err("still none");
     assert!(again.to_string().contains("no connection to the broker"), "{again}");
     stand.broker.run();
@@ -198,7 +198,7 @@ fn another_make_of_client_is_answered() {
     // Not JSON at all: no answer, and the device lives on.
     let bad = Command::new(&publish).args(["-p", &port, "-t", &format!("Set/Request/{SERIAL}"), "-m", "{"]).status();
     assert!(bad.expect("runs").success());
-    stand.connect().probe().expect("it lives");
+    stand.connect().probe_model().expect("it lives");
 }
 
 #[test]
@@ -206,15 +206,15 @@ fn how_long_an_answer_takes() {
     let Some(stand) = Stand::start() else { return };
     let mut client = stand.connect();
     let asks = [
-        RequestedItem::value("010303"),
-        RequestedItem::value("010305"),
-        RequestedItem::value("0103532102"),
-        RequestedItem::value("0103532103"),
+        RequestedItem::from_id("010303"),
+        RequestedItem::from_id("010305"),
+        RequestedItem::from_id("0103532102"),
+        RequestedItem::from_id("0103532103"),
     ];
     let mut took: Vec<Duration> = (0..500)
         .map(|_| {
             let began = Instant::now();
-            client.query(&asks).expect("answered");
+            client.query_values(&asks).expect("answered");
             began.elapsed()
         })
         .collect();
@@ -226,9 +226,10 @@ fn how_long_an_answer_takes() {
 
 #[test]
 fn what_cannot_be_opened_says_why() {
-    let error = adapters::open::open(&address(1, "?user=a&password_file=/does/not/exist"), 0).err().expect("no file");
+    let error =
+        adapters::open::open_address(&address(1, "?user=a&password_file=/does/not/exist"), 0).err().expect("no file");
     assert!(error.to_string().contains("/does/not/exist"), "{error}");
-    let opened = adapters::open::open(&address(1, "?period_ms=250"), 0).expect("opens without a connection");
+    let opened = adapters::open::open_address(&address(1, "?period_ms=250"), 0).expect("opens without a connection");
     assert_eq!(opened.sources[0].period(), Duration::from_millis(250));
     assert!(opened.actuator.is_none(), "nothing is written unless the address names a mailbox");
 }

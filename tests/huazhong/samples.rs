@@ -21,7 +21,7 @@ fn a_sample_channel_becomes_the_spindle_current_and_its_raw_samples_stay() {
     let Some(stand) = Stand::start() else { return };
     let directory = tempfile::tempdir().expect("a directory");
     let keep = format!("?sample=yes&keep={}&keep_above_a=0.05", directory.path().display());
-    let opened = gateway::waveform::opened(&address(stand.broker.port, &keep)).expect("sampled").expect("opens");
+    let opened = gateway::waveform::open_source(&address(stand.broker.port, &keep)).expect("sampled").expect("opens");
     let [mut samples, mut controller] = <[_; 2]>::try_from(opened.sources).ok().expect("samples before the controller");
     assert_eq!(samples.channels().len(), 1);
     let (mut readings, mut errors_a) = (Vec::<Reading>::new(), Vec::new());
@@ -39,7 +39,7 @@ fn a_sample_channel_becomes_the_spindle_current_and_its_raw_samples_stay() {
         std::thread::sleep(Duration::from_millis(100));
     }
     errors_a.sort_by(f64::total_cmp);
-    let (facts, middle_a) = (samples.facts(), errors_a[errors_a.len() / 2]);
+    let (facts, middle_a) = (samples.collect_facts(), errors_a[errors_a.len() / 2]);
     println!(
         "sampled current through the broker: {} readings, error in the middle {middle_a:.3} A, {} samples, {} missing, {} files",
         errors_a.len(),
@@ -57,7 +57,8 @@ fn a_sample_channel_becomes_the_spindle_current_and_its_raw_samples_stay() {
 #[test]
 fn samples_that_do_not_come_are_a_failure_and_not_an_old_value() {
     let Some(stand) = Stand::start() else { return };
-    let opened = gateway::waveform::opened(&address(stand.broker.port, "?sample=yes&spindle_axis=9")).expect("sampled");
+    let opened =
+        gateway::waveform::open_source(&address(stand.broker.port, "?sample=yes&spindle_axis=9")).expect("sampled");
     let mut sources = opened.expect("opens").sources;
     let (end, mut out) = (Instant::now() + Duration::from_secs(10), Vec::new());
     let error = loop {

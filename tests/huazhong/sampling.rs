@@ -22,7 +22,7 @@ fn sampled(stand: &Stand, duration: Duration) -> (Vec<(SampleBlock, Instant)>, S
         std::thread::sleep(Duration::from_millis(80));
     }
     let (_, track) = source.track().channels().find(|(name, _)| *name == "sample_channel1").expect("it was sampled");
-    assert_eq!((track.missing, track.overlapping, source.track().unusable().0), (0, 0, 0));
+    assert_eq!((track.missing, track.overlapping, source.track().unusable_messages().0), (0, 0, 0));
     let said =
         format!("{polls} polls, {} messages, {} instants, {} missing", track.messages, track.instants, track.missing);
     (blocks.try_iter().collect(), said)

@@ -36,14 +36,14 @@ fn between_programs_s() -> i64 {
 }
 
 fn offsets(port: u16, keys: &str) -> Box<dyn OffsetSink> {
-    let opened = adapters::open::open(&address(port, keys), 0).expect("opens");
+    let opened = adapters::open::open_address(&address(port, keys), 0).expect("opens");
     opened.offsets.expect("the address names registers")
 }
 
 /// The eight registers as any client sees them.
 fn words(connection: &mut Connection) -> Vec<Value> {
     let indexes: Vec<u32> = (110..118).collect();
-    let answers = connection.query(&[RequestedItem::elements(REGISTERS, &indexes)]).expect("answered");
+    let answers = connection.query_values(&[RequestedItem::with_elements(REGISTERS, &indexes)]).expect("answered");
     answers.into_iter().next().flatten().expect("an answer").expect("values")
 }
 
@@ -90,7 +90,7 @@ fn while_a_program_runs_no_register_of_a_device_is_written() {
 fn the_library_shifts_by_registers_of_the_ladder() {
     let (library, clock) = (library(&[]), SystemClock::new());
     let first = "D110".parse().expect("a register");
-    let mut sink = adapters::hnc::offsets(&line(&library), HncOffset::Registers(first));
+    let mut sink = adapters::hnc::build_offset_sink(&line(&library), HncOffset::Registers(first));
     let error = sink.write(&clock, Axis::Y, 0.0, -12.0).expect_err("the mill cuts").to_string();
     assert!(error.contains("a program runs"), "{error}");
     library.fault("deaf HNC_RegSetValue");
@@ -109,14 +109,15 @@ fn the_library_shifts_by_registers_of_the_ladder() {
 #[test]
 fn the_library_shifts_the_external_zero_offset_where_its_count_is_known() {
     let (known, clock) = (library(&[]), SystemClock::new());
-    let at_rest = |unit_um| adapters::hnc::offsets(&line(&known), HncOffset::Zero { unit_um }).at_rest(&clock, Axis::Z);
+    let at_rest =
+        |unit_um| adapters::hnc::build_offset_sink(&line(&known), HncOffset::Zero { unit_um }).at_rest(&clock, Axis::Z);
     let error = at_rest(0.01).expect_err("the mill cuts").to_string();
     assert!(error.contains("a program runs"), "{error}");
     known.fault("rest HNC_ChannelGetValue");
     let error = at_rest(1.0).expect_err("another unit").to_string();
     assert!(error.contains("0.01 µm for the control and 1 µm in the address"), "{error}");
     let line = line(&known);
-    let mut sink = adapters::hnc::offsets(&line, HncOffset::Zero { unit_um: 0.01 });
+    let mut sink = adapters::hnc::build_offset_sink(&line, HncOffset::Zero { unit_um: 0.01 });
     assert_eq!(sink.at_rest(&clock, Axis::Z), Ok(40.0));
     assert_eq!(sink.write(&clock, Axis::Z, 40.0, 45.0), Ok(45.0));
     line.write_zero(2, 10_000).expect("the operator sets it anew");
@@ -131,7 +132,7 @@ fn the_library_shifts_the_external_zero_offset_where_its_count_is_known() {
     assert!(error.contains("100.3 µm, which is not whole"), "{error}");
     let without = library(&["-DWITHOUT_CRDS"]);
     without.fault("rest HNC_ChannelGetValue");
-    let mut sink = adapters::hnc::offsets(&crate::hnc::line(&without), HncOffset::Zero { unit_um: 0.01 });
+    let mut sink = adapters::hnc::build_offset_sink(&crate::hnc::line(&without), HncOffset::Zero { unit_um: 0.01 });
     let error = sink.at_rest(&clock, Axis::Z).expect_err("an old library").to_string();
     assert!(error.contains("HNC_CrdsGetValue") && error.contains("offset=D110"), "{error}");
 }
@@ -139,12 +140,12 @@ fn the_library_shifts_the_external_zero_offset_where_its_count_is_known() {
 #[test]
 fn without_offset_in_the_address_there_is_no_way_to_shift_anything() {
     for text in ["nclink://127.0.0.1:1/A?write=mailbox", "hncnet://192.0.2.1?library=x.so&write=mailbox"] {
-        let opened = adapters::open::open(&text.parse::<Address>().expect("usable"), 0).expect("opens");
+        let opened = adapters::open::open_address(&text.parse::<Address>().expect("usable"), 0).expect("opens");
         assert!(opened.offsets.is_none() && opened.actuator.is_some(), "{text}");
     }
     let address: Address = "hncnet://192.0.2.1?library=x.so&offset=D110".parse().expect("usable");
     let Target::HncNet(target) = address.target() else { panic!("hncnet") };
-    assert!(adapters::hnc::open(&address, target).offsets.is_some());
+    assert!(adapters::hnc::open_address(&address, target).offsets.is_some());
 }
 
 const SCRIPT: &str = "propose_offset_um(\"z\", 7.3, \"thermal error\");";

@@ -6,7 +6,7 @@ use adapters::clock::{Clock, SystemClock};
 use adapters::mqtt::Options;
 use adapters::nclink::connection::{Connection, Link};
 use adapters::nclink::device::{DeviceEvent, NcLinkDevice};
-use adapters::nclink::{NcLinkSource, open};
+use adapters::nclink::{NcLinkSource, open_address};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use adapters::{Reading, Source};
 use std::sync::Arc;
@@ -136,6 +136,6 @@ pub(crate) fn address(port: u16, keys: &str) -> Address {
 pub(crate) fn source(port: u16, keys: &str) -> NcLinkSource {
     let address = address(port, keys);
     let adapters::address::Target::NcLink(target) = address.target() else { panic!("nclink") };
-    open(&address, target).expect("opens");
+    open_address(&address, target).expect("opens");
     NcLinkSource::new(address.text(), target, None)
 }

@@ -13,7 +13,7 @@ fn pct(percent: u8) -> OverridePct {
 }
 
 fn actuator(stand: &Stand, keys: &str) -> Box<dyn Actuator> {
-    let opened = adapters::open::open(&address(stand.broker.port, keys), 0).expect("opens");
+    let opened = adapters::open::open_address(&address(stand.broker.port, keys), 0).expect("opens");
     opened.actuator.expect("the address names a mailbox")
 }
 
@@ -43,11 +43,13 @@ fn an_override_goes_through_the_mailbox_and_is_read_back() {
     in_force(&stand, 100);
     assert_eq!(actuator.read_feed_override(clock.as_ref()), Ok(pct(100)));
     // The registers as any client sees them; the heartbeat has moved with every letter.
-    let words = stand.connect().query(&[RequestedItem::elements("/CONTROLLER/VARIABLE@REG_D", &[100, 101, 102, 103])]);
+    let words = stand
+        .connect()
+        .query_values(&[RequestedItem::with_elements("/CONTROLLER/VARIABLE@REG_D", &[100, 101, 102, 103])]);
     assert_eq!(words.expect("answered"), [Some(Ok(vec![json!(120), json!(1), json!(0), json!(2)]))]);
     actuator.write_feed_override(clock.as_ref(), pct(60)).expect("taken");
     in_force(&stand, 60);
-    actuator.release(clock.as_ref()).expect("taken");
+    actuator.release_override(clock.as_ref()).expect("taken");
     in_force(&stand, 100);
 }
 
@@ -70,7 +72,7 @@ fn without_a_heartbeat_the_ladder_falls_back_to_the_dial() {
 fn a_feed_hold_is_asked_for_once() {
     let Some(stand) = Stand::start() else { return };
     let mut actuator = actuator(&stand, "?write=mailbox");
-    actuator.ask(stand.clock.as_ref(), LadderRequest::FeedHold).expect("taken");
+    actuator.ask_ladder(stand.clock.as_ref(), LadderRequest::FeedHold).expect("taken");
     actuator.write_feed_override(stand.clock.as_ref(), pct(90)).expect("taken");
     let counts = until("the hold", || {
         let _now = stand.machine.moment(stand.clock.now_ns());

@@ -75,10 +75,10 @@ fn waveforms(seed: u64) -> Recording {
     let mut recording = Recording::new("currents", time_s, None);
     let constants = [("spindle_speed_rpm", 1000.0), ("depth_of_cut_mm", 1.2)];
     for (name, value) in constants {
-        recording.set_column(name, Cells::Numbers(Numbers::full(vec![value; rows])));
+        recording.set_column(name, Cells::Numbers(Numbers::from_values(vec![value; rows])));
     }
-    recording.set_column("feed_per_rev_mm", Cells::Numbers(Numbers::full(feed)));
-    recording.set_column("spindle_current_a", Cells::Numbers(Numbers::full(feature)));
+    recording.set_column("feed_per_rev_mm", Cells::Numbers(Numbers::from_values(feed)));
+    recording.set_column("spindle_current_a", Cells::Numbers(Numbers::from_values(feature)));
     recording
 }
 
@@ -132,8 +132,8 @@ fn left_out(repetitions: u64) {
     for seed in 1..=repetitions {
         let whole = turning(seed).recording;
         let is_out = |feed: f64| (feed / 150.0 - 1.0).abs() < 0.05;
-        let feeds = whole.numbers("feed_mm_min").expect("recorded");
-        let depths = whole.numbers("depth_of_cut_mm").expect("recorded").iter().zip(feeds.iter());
+        let feeds = whole.find_numbers("feed_mm_min").expect("recorded");
+        let depths = whole.find_numbers("depth_of_cut_mm").expect("recorded").iter().zip(feeds.iter());
         let kept = depths.map(|(depth, feed)| depth.filter(|_| !feed.is_some_and(is_out))).collect::<Numbers>();
         let mut rest = whole.clone();
         rest.set_column("depth_of_cut_mm", Cells::Numbers(kept));
@@ -142,7 +142,7 @@ fn left_out(repetitions: u64) {
         assert!(learned.plateaus.iter().all(|cut| !is_out(cut.feed)), "left out");
         for cut in all.plateaus.iter().filter(|cut| is_out(cut.feed)) {
             let curve = learned.curves.iter().find(|it| (it.depth_mm / cut.depth_mm - 1.0).abs() < 0.05).expect("both");
-            let (value, half) = (curve.curve.at(cut.feed), 2.0 * curve.sd);
+            let (value, half) = (curve.curve.evaluate_at(cut.feed), 2.0 * curve.sd);
             coverage.add((value - half, value + half), cut.level.mean);
         }
     }
@@ -164,14 +164,14 @@ fn a_cut_at_a_feed_left_out_lies_about_the_curve_200_times() {
 fn the_lathe_gives_a_family_and_a_script_that_runs() {
     let recorded = turning(1);
     let directory = tempfile::tempdir().expect("a directory");
-    std::fs::write(directory.path().join("cuts.csv"), execute::csv(&recorded.recording)).expect("written");
+    std::fs::write(directory.path().join("cuts.csv"), execute::format_csv(&recorded.recording)).expect("written");
     let arguments = ["identify", "feed-curve", "--recording", "cuts.csv", "--json", "--out", "load.rhai"];
     let told = gateway(directory.path(), &arguments);
     assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
     let json: serde_json::Value = serde_json::from_slice(&told.stdout).expect("JSON");
     assert_eq!(json["learned"]["curves"].as_array().map(Vec::len), Some(2), "{json:#}");
     let text = std::fs::read_to_string(directory.path().join("load.rhai")).expect("written");
-    Host::new().load(&[ScriptFile { name: "load.rhai".to_owned(), text }]).expect("a script that compiles");
+    Host::new().load_scripts(&[ScriptFile { name: "load.rhai".to_owned(), text }]).expect("a script that compiles");
     // What the script holds is said with the one who chose it.
     let told = |more: &[&str]| {
         let told = gateway(directory.path(), &[&["identify", "feed-curve", "--recording", "cuts.csv"], more].concat());
@@ -183,10 +183,10 @@ fn the_lathe_gives_a_family_and_a_script_that_runs() {
     let text = std::fs::read_to_string(directory.path().join("given.rhai")).expect("written");
     assert!(text.contains("setting(\"target_a\", 7.5,"), "{text}");
     let learned = identify_feed_curve(&recorded.recording, "feed_mm_min", "spindle_current_a").expect("curves");
-    let family = learned.family(900.0).expect("two curves that do not cross");
+    let family = learned.build_family(900.0).expect("two curves that do not cross");
     let truth = |at_s: f64| recorded.mean(at_s - 1.0, at_s + 1.0, |truth| truth.spindle_power_w);
     let cut = &learned.plateaus[0];
-    let depth = family.depth(cut.feed, cut.level.mean, cut.level.standard_error).expect("in the family");
+    let depth = family.infer_depth(cut.feed, cut.level.mean, cut.level.standard_error).expect("in the family");
     assert!(truth(0.5 * (cut.from_s + cut.to_s)) > 500.0, "in the cut");
     assert!((depth.depth_mm - cut.depth_mm).abs() < 3.0 * depth.sd_mm && depth.sd_mm < 0.1, "{depth:?} {cut:?}");
 }
@@ -199,7 +199,7 @@ fn what_makes_no_curve_is_refused() {
     let whole = waveforms(1);
     let with = |name: &str, of: &dyn Fn(f64) -> f64| {
         let mut changed = whole.clone();
-        let numbers = whole.numbers(name).expect("there").iter().map(|value| value.map(of)).collect::<Numbers>();
+        let numbers = whole.find_numbers(name).expect("there").iter().map(|value| value.map(of)).collect::<Numbers>();
         changed.set_column(name, Cells::Numbers(numbers));
         changed
     };
@@ -210,6 +210,6 @@ fn what_makes_no_curve_is_refused() {
     let milliamperes = told(&with("spindle_current_a", &|current| current * 1e3 + 2000.0));
     assert!(milliamperes.what.contains("looks like mA"), "{milliamperes}");
     let mut without = Recording::new("empty", whole.time_s.clone(), None);
-    without.set_column("spindle_speed_rpm", Cells::Numbers(Numbers::full(vec![1000.0; whole.rows()])));
+    without.set_column("spindle_speed_rpm", Cells::Numbers(Numbers::from_values(vec![1000.0; whole.count_rows()])));
     assert_eq!(told(&without).kind, RefusalKind::Missing);
 }

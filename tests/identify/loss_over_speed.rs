@@ -8,7 +8,7 @@ use adapters::simulated::{ExperimentCut, ExperimentStep};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rules::estimators::power_separation::{ReferenceChoice, StageLearned, identify_load_loss};
-use rules::script::{ScriptFile, compile};
+use rules::script::{ScriptFile, compile_scripts};
 use std::f64::consts::TAU;
 
 const SPEEDS_RPM: [f64; 3] = [480.0, 640.0, 800.0];
@@ -38,7 +38,7 @@ fn cuts(seed: u64) -> Recorded {
 
 /// The same machine as if its drive lost `0.11 Pc + 1.5e-4 Pc^2` at every speed.
 fn same_at_every_speed(mut recorded: Recorded) -> Recorded {
-    let power = recorded.recording.numbers("spindle_power_w").expect("a meter");
+    let power = recorded.recording.find_numbers("spindle_power_w").expect("a meter");
     let other = power.iter().zip(&recorded.truth).map(|(power, truth)| {
         let cutting_w = truth.cutting_power_w;
         Some(power? - truth.load_loss_w + TRUE_LINEAR * cutting_w + 1.5e-4 * cutting_w * cutting_w)
@@ -95,11 +95,13 @@ fn what_is_learned_over_speeds_is_said_and_separates_at_every_one_of_them() {
     assert!(text.contains("a1 over speed: (64") && text.contains("the same at every speed would leave"), "{text}");
     let left = stage.form_residuals.expect("three speeds");
     assert!(3.0 * left.with_torque_squared_w < left.same_at_every_speed_w, "{left:?}");
-    let set = compile(&[ScriptFile { name: "load_loss.rhai".to_owned(), text: told.script() }]).expect("settings");
+    let set = compile_scripts(&[ScriptFile { name: "load_loss.rhai".to_owned(), text: told.format_script() }])
+        .expect("settings");
     let loss = set.settings().load_loss(1);
     for rpm in SPEEDS_RPM {
         let a1 = true_quadratic_per_w(rpm);
-        let split = loss.split(1200.0 * (1.0 + TRUE_LINEAR) + a1 * 1200.0 * 1200.0, rpm).expect("a real root");
+        let split =
+            loss.split_excess_power(1200.0 * (1.0 + TRUE_LINEAR) + a1 * 1200.0 * 1200.0, rpm).expect("a real root");
         assert!((split.cutting_power_w / 1200.0 - 1.0).abs() < 0.015, "{rpm} rpm: {split:?}");
     }
 }

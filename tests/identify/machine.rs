@@ -49,10 +49,10 @@ pub(crate) fn record(settings: SimulatedSettings, steps: &[ExperimentStep], rate
     let machine = Simulated::experiment("simulated://machine", settings, ORIGIN_NS, steps);
     let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
     let mut lockstep = Lockstep::new(sources, Delay::SlowestPeriod);
-    let mut sample = Sample::empty(0);
+    let mut sample = Sample::new_empty(0);
     let (mut samples, mut truth) = (Vec::new(), Vec::new());
     let (program, speed) =
-        (ChannelId::of("program").expect("known"), ChannelId::of("spindle_speed_rpm").expect("known"));
+        (ChannelId::from_name("program").expect("known"), ChannelId::from_name("spindle_speed_rpm").expect("known"));
     let seconds: f64 = steps.iter().map(|step| step.seconds + 30.0).sum();
     for tick in 0..(rate_hz * (seconds + 60.0)) as i64 {
         lockstep.sample_into(&mut sample, ORIGIN_NS + (tick as f64 / rate_hz * SECOND_NS as f64) as i64);
@@ -70,7 +70,7 @@ fn table(samples: &[Sample]) -> Recording {
     let first_ns = samples.first().expect("the program ran").at_ns;
     let time_s = samples.iter().map(|sample| (sample.at_ns - first_ns) as f64 / SECOND_NS as f64).collect();
     let mut recording = Recording::new("simulated machine", time_s, None);
-    for id in ChannelId::all() {
+    for id in ChannelId::list_all() {
         let values = || samples.iter().map(|sample| sample.slot(id).value.as_ref().ok());
         if values().flatten().next().is_none() {
             continue;

@@ -12,7 +12,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use rules::estimators::power_separation::{ReferenceChoice, identify_load_loss, identify_no_load};
 use rules::estimators::regression::RefusalKind;
-use rules::script::{ScriptFile, compile};
+use rules::script::{ScriptFile, compile_scripts};
 use std::f64::consts::TAU;
 
 #[test]
@@ -20,7 +20,7 @@ fn no_load_powers_are_found_and_written_as_a_script_can_say_them() {
     let ladder = [300.0, 600.0, 900.0].map(|rpm| idle(40.0, rpm, 1));
     let recorded = record(lathe(1), &ladder, 5.0);
     let directory = tempfile::tempdir().expect("a directory");
-    std::fs::write(directory.path().join("idle.csv"), execute::csv(&recorded.recording)).expect("written");
+    std::fs::write(directory.path().join("idle.csv"), execute::format_csv(&recorded.recording)).expect("written");
     let arguments = ["identify", "no-load", "--recording", "idle.csv", "--json", "--out", "no_load.rhai"];
     let told = gateway(directory.path(), &arguments);
     assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
@@ -28,15 +28,15 @@ fn no_load_powers_are_found_and_written_as_a_script_can_say_them() {
     let speeds = json["learned"]["speeds"].as_array().expect("speeds");
     assert_eq!(speeds.len(), 3, "{json:#}");
     let text = std::fs::read_to_string(directory.path().join("no_load.rhai")).expect("written");
-    let set = compile(&[ScriptFile { name: "no_load.rhai".to_owned(), text }]).expect("a script of settings");
+    let set = compile_scripts(&[ScriptFile { name: "no_load.rhai".to_owned(), text }]).expect("a script of settings");
     assert_eq!(set.len(), 1);
 }
 
 #[test]
 fn a_recording_without_idling_is_refused() {
     let mut recording = record(lathe(1), &[idle(40.0, 600.0, 1)], 5.0).recording;
-    let rows = recording.rows();
-    recording.set_column("feed_mm_min", Cells::Numbers(Numbers::full(vec![120.0; rows])));
+    let rows = recording.count_rows();
+    recording.set_column("feed_mm_min", Cells::Numbers(Numbers::from_values(vec![120.0; rows])));
     let refusal = identify_no_load(&recording).expect_err("never idle");
     assert!(refusal.to_string().contains("let the spindle turn"), "{refusal}");
 }
@@ -45,7 +45,7 @@ fn a_recording_without_idling_is_refused() {
 fn a_refusal_is_told_as_one_and_ends_with_1() {
     let recording = record(lathe(1), &[idle(40.0, 600.0, 1)], 5.0).recording;
     let directory = tempfile::tempdir().expect("a directory");
-    std::fs::write(directory.path().join("idle.csv"), execute::csv(&recording)).expect("written");
+    std::fs::write(directory.path().join("idle.csv"), execute::format_csv(&recording)).expect("written");
     let arguments = ["identify", "load-loss", "--recording", "idle.csv", "--json", "--out", "never.rhai"];
     let told = gateway(directory.path(), &arguments);
     assert_eq!(told.status.code(), Some(1), "{}", String::from_utf8_lossy(&told.stderr));
@@ -61,7 +61,8 @@ fn power_that_is_none_gives_no_numbers() {
     let whole = record(lathe(1), &[idle(40.0, 600.0, 1)], 5.0).recording;
     for factor in [0.0, -1.0, 1e-3, 1e9] {
         let mut changed = whole.clone();
-        let scaled = whole.numbers("spindle_power_w").expect("there").iter().map(|power| power.map(|it| it * factor));
+        let scaled =
+            whole.find_numbers("spindle_power_w").expect("there").iter().map(|power| power.map(|it| it * factor));
         changed.set_column("spindle_power_w", Cells::Numbers(scaled.collect::<Numbers>()));
         let refusal = identify_no_load(&changed).expect_err("no power");
         println!("power times {factor}: {refusal}");
@@ -76,7 +77,7 @@ fn two_levels_at_one_speed_are_told_and_not_averaged() {
     let mut recording = record(lathe(1), &ladder, 5.0).recording;
     // From the middle on the other gear stage, and no column that says so.
     let half_s = 3.5 * 40.0;
-    let columns = recording.numbers("spindle_power_w").expect("there").iter().zip(recording.time_s.iter());
+    let columns = recording.find_numbers("spindle_power_w").expect("there").iter().zip(recording.time_s.iter());
     let powers = columns.map(|(power, time_s)| power.map(|it| if *time_s > half_s { 1.4 * it } else { it }));
     let powers = powers.collect::<Numbers>();
     recording.set_column("spindle_power_w", Cells::Numbers(powers));
@@ -301,7 +302,7 @@ fn load_loss_is_inside_its_intervals_under_zero_mean_noise() {
 fn load_loss_is_written_as_a_script_can_say_it_and_separates_what_it_was_learned_from() {
     let recorded = cuts(1, 1, 800.0, DEPTHS);
     let directory = tempfile::tempdir().expect("a directory");
-    std::fs::write(directory.path().join("cuts.csv"), execute::csv(&recorded.recording)).expect("written");
+    std::fs::write(directory.path().join("cuts.csv"), execute::format_csv(&recorded.recording)).expect("written");
     let arguments = ["identify", "load-loss", "--recording", "cuts.csv", "--out", "load_loss.rhai"];
     let told = gateway(directory.path(), &arguments);
     assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
@@ -311,7 +312,7 @@ fn load_loss_is_written_as_a_script_can_say_it_and_separates_what_it_was_learned
         "{said}"
     );
     let text = std::fs::read_to_string(directory.path().join("load_loss.rhai")).expect("written");
-    let set = compile(&[ScriptFile { name: "load_loss.rhai".to_owned(), text }]).expect("a script of settings");
+    let set = compile_scripts(&[ScriptFile { name: "load_loss.rhai".to_owned(), text }]).expect("a script of settings");
     let loss = set.settings().load_loss(1);
     let learned = identify_load_loss(&recorded.recording, &ReferenceChoice::default()).expect("coefficients");
     assert!((loss.linear - learned.stages[0].linear.value).abs() < 1e-5);
@@ -333,7 +334,7 @@ fn load_loss_that_cannot_be_told_is_refused_and_the_reason_given() {
     assert!(alone.kind == RefusalKind::NotIdentifiable && alone.what.contains("from power alone"), "{alone}");
     let with = |name: &str, factor: f64| {
         let mut changed = whole.clone();
-        let scaled = whole.numbers(name).expect("there").iter().map(|value| value.map(|value| value * factor));
+        let scaled = whole.find_numbers(name).expect("there").iter().map(|value| value.map(|value| value * factor));
         changed.set_column(name, Cells::Numbers(scaled.collect::<Numbers>()));
         changed
     };

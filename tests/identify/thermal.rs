@@ -6,7 +6,7 @@ use crate::thermal_machine::{Recorded, SENSORS, ThermalMachine};
 use crate::{Coverage, LONG, SHORT};
 use adapters::Absence;
 use rules::estimators::thermal::{Predictor, ThermalLaw};
-use rules::script::{ScriptFile, compile};
+use rules::script::{ScriptFile, compile_scripts};
 use serde_json::Value;
 
 fn text(output: &std::process::Output) -> String {
@@ -115,11 +115,11 @@ fn later(learned: &Value, law: &Value, tests: &Recorded) -> (f64, f64, f64) {
         let temperatures: Vec<Result<f64, Absence>> =
             tests.temperature_c.iter().map(|sensor| Ok(sensor[row])).collect();
         let at_ns = (tests.time_s[row] * 1e9) as i64;
-        let prediction = predictor.predict(at_ns, &temperatures).expect("every sensor answers");
+        let prediction = predictor.predict_error(at_ns, &temperatures).expect("every sensor answers");
         if !prediction.is_inside_range() {
             continue;
         }
-        let beside = prediction.beside(Ok(tests.error_um[row]));
+        let beside = prediction.compare_with_measured(Ok(tests.error_um[row]));
         let residual = beside.residual_um.expect("measured");
         raw += tests.error_um[row].powi(2);
         left += residual.value.powi(2);
@@ -186,7 +186,7 @@ fn the_script_that_is_written_compiles_and_the_words_are_for_people() {
     let script = std::fs::read_to_string(directory.path().join("thermal.rhai")).expect("written");
     println!("{script}");
     assert!(script.contains("first_order_c(memory.late_temperature_12_c"), "{script}");
-    let compiled = compile(&[ScriptFile { name: "thermal.rhai".to_owned(), text: script.clone() }]);
+    let compiled = compile_scripts(&[ScriptFile { name: "thermal.rhai".to_owned(), text: script.clone() }]);
     compiled.unwrap_or_else(|problems| panic!("{problems:?}\n{script}"));
 }
 

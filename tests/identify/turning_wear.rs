@@ -6,7 +6,7 @@
 //! table line of each signal takes the wear as it comes; the second knows the first reading of the edge and reports growth.
 
 use csv::Reader;
-use rules::estimators::regression::{Column, Intercept, Regression, fit};
+use rules::estimators::regression::{Column, Intercept, Regression, fit_unweighted};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -87,15 +87,16 @@ fn model(edges: &[&Edge], signal: &str) -> Regression {
         Column::new("spindle_speed_rpm^2", all(&|edge| powers(edge)[1].clone())),
         Column::new("flank_wear_um", all(&|edge| edge.wear_um.clone())),
     ];
-    fit(&Column::new(signal, all(&|edge| edge.column(signal).to_vec())), &columns, Intercept::Fitted).expect("a fit")
+    fit_unweighted(&Column::new(signal, all(&|edge| edge.column(signal).to_vec())), &columns, Intercept::Fitted)
+        .expect("a fit")
 }
 
 /// The wear that the signal means at each reading, um.
 fn inferred(edge: &Edge, model: &Regression, signal: &str) -> Vec<f64> {
     let ([speed, square], values) = (powers(edge), edge.column(signal));
-    let slope = model.value("flank_wear_um").expect("a column");
+    let slope = model.find_value("flank_wear_um").expect("a column");
     let one = |row: usize| {
-        let sharp = model.predict(&[speed[row], square[row], 0.0]).expect("finite").value;
+        let sharp = model.predict_value(&[speed[row], square[row], 0.0]).expect("finite").value;
         (values[row] - sharp) / slope
     };
     let reading = |row: &usize| edge.rows(*row).map(one).sum::<f64>() / edge.rows(*row).len() as f64;
@@ -126,7 +127,7 @@ fn left_out(edges: &[Edge], out: usize, signal: &str) -> (f64, f64, f64) {
     let truth: Vec<f64> = edge.read_at.iter().map(|row| edge.wear_um[*row]).collect();
     let plain = rms(wears.iter().zip(&truth).skip(1).map(|(x, y)| x - y));
     let growth = rms(wears.iter().skip(1).zip(edge.growth_um()).map(|(x, y)| x - wears[0] - y));
-    let half_um = 1.96 * model.residual_sd / model.value("flank_wear_um").expect("a column").abs();
+    let half_um = 1.96 * model.residual_sd / model.find_value("flank_wear_um").expect("a column").abs();
     (plain, growth, half_um)
 }
 

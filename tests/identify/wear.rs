@@ -9,8 +9,8 @@ use adapters::recording::{Cells, Numbers, Words};
 use adapters::simulated::{ExperimentCut, ExperimentStep};
 use gateway::diagnosis::execute;
 use rules::estimators::wear::{
-    Array, Cut, CutColumns, CutConditions, FACTORS, FactorLevels, FittedNumber, WearModel, WearOptions, estimate_wear,
-    fit_physical, gather, identify_tool_wear, plan, threshold,
+    Array, Cut, CutColumns, CutConditions, FACTORS, FactorLevels, FittedNumber, WearModel, WearOptions,
+    compute_power_limit, estimate_wear, fit_physical, gather_cuts, identify_tool_wear, plan_experiment,
 };
 
 const DIAMETER_MM: f64 = 60.0;
@@ -21,7 +21,7 @@ const CUT_S: f64 = 14.0;
 
 /// The cutting law of the simulated lathe at nominal hardness, W; W per mm of wear comes with it.
 fn law(conditions: &CutConditions) -> f64 {
-    let [wear, speed, feed, depth] = conditions.vector();
+    let [wear, speed, feed, depth] = conditions.to_vector();
     let force_n = (980.0 * feed.powf(0.75) * (speed / 150.0).powf(-0.08) + 22.0 + 190.0 * wear) * depth;
     force_n * speed / 60.0
 }
@@ -30,11 +30,11 @@ fn planned() -> Vec<CutConditions> {
     let levels = [WEARS_MM.to_vec(), vec![90.0, 120.0, 150.0], vec![0.1, 0.15, 0.2], vec![0.75, 1.25, 1.75]];
     let factors: Vec<FactorLevels> =
         FACTORS.iter().zip(levels).map(|(factor, values)| FactorLevels { factor, values }).collect();
-    let design = plan(Array::L27, &factors, 1).expect("a design");
+    let design = plan_experiment(Array::L27, &factors, 1).expect("a design");
     design
         .cuts
         .iter()
-        .map(|cut| CutConditions::of([cut.values[0], cut.values[1], cut.values[2], cut.values[3]]))
+        .map(|cut| CutConditions::from_vector([cut.values[0], cut.values[1], cut.values[2], cut.values[3]]))
         .collect()
 }
 
@@ -67,10 +67,10 @@ fn cuts_of(seed: u64, wear_mm: f64, cuts: &[CutConditions], table: &mut Table) {
         cuts.iter().flat_map(|cut| [idle(AIR_S, step(cut).spindle_rpm, 1), step(cut)]).collect();
     let recorded = record(settings, &steps, 5.0);
     let recording = &recorded.recording;
-    let number = |name: &str, row: usize| recording.numbers(name).and_then(|numbers| numbers.get(row));
-    let block = |row: usize| recording.words("block").and_then(|words| words.get(row)).unwrap_or_default();
+    let number = |name: &str, row: usize| recording.find_numbers(name).and_then(|numbers| numbers.get(row));
+    let block = |row: usize| recording.find_words("block").and_then(|words| words.get(row)).unwrap_or_default();
     for (index, cut) in cuts.iter().enumerate() {
-        let rows = |step: usize| (0..recording.rows()).filter(move |row| block(*row) == format!("N{step}"));
+        let rows = |step: usize| (0..recording.count_rows()).filter(move |row| block(*row) == format!("N{step}"));
         let air: Vec<usize> = rows(2 * index + 1).collect();
         // The first seconds still accelerate.
         let air: Vec<f64> = air[air.len() / 2..].iter().filter_map(|row| number("spindle_power_w", *row)).collect();
@@ -106,7 +106,7 @@ fn table(seed: u64) -> Recording {
         Recording::new("L27 on the simulated lathe", (0..rows).map(|row| row as f64 * 0.2).collect(), None);
     recording.set_column("run", Cells::Words(table.runs.iter().map(String::as_str).collect::<Words>()));
     for (name, values) in NAMES.iter().zip(table.numbers) {
-        recording.set_column(name, Cells::Numbers(Numbers::full(values)));
+        recording.set_column(name, Cells::Numbers(Numbers::from_values(values)));
     }
     recording
 }
@@ -123,9 +123,9 @@ fn coverage(repetitions: u64) {
     let mut numbers: Vec<Coverage> = truths.iter().map(|it| Coverage::new(format!("tool wear: {}", it.name))).collect();
     let mut limits = Coverage::new("tool wear: [Pc] of a single cut, W");
     let mut wears = Coverage::new("tool wear: wear from the power of a single cut, mm");
-    let free = CutConditions::of([0.24, 105.0, 0.125, 1.5]);
+    let free = CutConditions::from_vector([0.24, 105.0, 0.125, 1.5]);
     for seed in 1..=repetitions {
-        let gathered = gather(&table(seed), &CutColumns::default()).expect("cuts");
+        let gathered = gather_cuts(&table(seed), &CutColumns::default()).expect("cuts");
         assert_eq!(gathered.cuts.len(), 27);
         let found = fit_physical(&gathered.cuts, &[]).expect("a fit");
         for ((one, truth), count) in found.coefficients.iter().zip(&truths).zip(&mut numbers) {
@@ -135,7 +135,7 @@ fn coverage(repetitions: u64) {
             count.add(one.interval, truth.value * scale);
         }
         let model = WearModel::Physical(found.physical);
-        limits.add(threshold(&model, &free, 0.3).expect("a limit").interval_w, law(&free.with_wear(0.3)));
+        limits.add(compute_power_limit(&model, &free, 0.3).expect("a limit").interval_w, law(&free.with_wear(0.3)));
         let wear = estimate_wear(&model, &free, (law(&free), 0.0), 0.3).expect("a wear");
         wears.add(wear.interval_mm, free.flank_wear_mm);
     }
@@ -148,9 +148,9 @@ fn coverage(repetitions: u64) {
 fn reference_scale(reference: &[f64; 3]) -> f64 {
     let middle = |at: usize| {
         let cuts = planned();
-        (cuts.iter().map(|cut| cut.vector()[at].ln()).sum::<f64>() / cuts.len() as f64).exp()
+        (cuts.iter().map(|cut| cut.to_vector()[at].ln()).sum::<f64>() / cuts.len() as f64).exp()
     };
-    let sharp = |at: [f64; 3]| law(&CutConditions::of([0.0, at[0], at[1], at[2]]));
+    let sharp = |at: [f64; 3]| law(&CutConditions::from_vector([0.0, at[0], at[1], at[2]]));
     sharp(*reference) / sharp([middle(1), middle(2), middle(3)])
 }
 
@@ -168,7 +168,7 @@ fn the_numbers_of_the_physical_form_are_inside_their_intervals_200_times() {
 #[test]
 fn the_command_fits_both_forms_and_keeps_the_model_in_the_library() {
     let directory = tempfile::tempdir().expect("a directory");
-    std::fs::write(directory.path().join("l27.csv"), execute::csv(&table(1))).expect("written");
+    std::fs::write(directory.path().join("l27.csv"), execute::format_csv(&table(1))).expect("written");
     let arguments = [
         "identify",
         "tool-wear",
@@ -213,7 +213,7 @@ fn tables_that_cannot_tell_are_refused_with_what_is_needed() {
         format!("{good}{}", planned().iter().enumerate().map(line).collect::<String>())
     };
     let all = |cut: &CutConditions| {
-        let [wear, speed, feed, depth] = cut.vector();
+        let [wear, speed, feed, depth] = cut.to_vector();
         [wear, speed, feed, depth, law(cut)]
     };
     let cases: [(String, &str); 5] = [
@@ -290,7 +290,7 @@ fn a_work_list_is_printed_and_comes_back_as_a_table() {
         .map(|(at, line)| {
             let cells: Vec<f64> = line.split(',').skip(2).take(4).filter_map(|cell| cell.parse().ok()).collect();
             match cells[..] {
-                [a, b, c, d] if at > 0 => format!("{line}{}\n", law(&CutConditions::of([a, b, c, d]))),
+                [a, b, c, d] if at > 0 => format!("{line}{}\n", law(&CutConditions::from_vector([a, b, c, d]))),
                 _ => format!("{line}\n"),
             }
         })
@@ -302,7 +302,7 @@ fn a_work_list_is_printed_and_comes_back_as_a_table() {
 
 #[test]
 fn both_forms_are_compared_on_cuts_that_they_have_not_seen() {
-    let gathered = gather(&table(2), &CutColumns::default()).expect("cuts");
+    let gathered = gather_cuts(&table(2), &CutColumns::default()).expect("cuts");
     let learned = identify_tool_wear(gathered.cuts, &WearOptions::default()).expect("both");
     println!("{learned}");
     let [surface, physical] = &learned.comparison.forms;

@@ -5,7 +5,8 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
 use rules::estimators::wear::{
-    Array, Coding, Cut, CutConditions, FACTORS, FactorLevels, WearOptions, identify_tool_wear, plan, published_over,
+    Array, Coding, Cut, CutConditions, FACTORS, FactorLevels, WearOptions, identify_tool_wear, plan_experiment,
+    published_over,
 };
 
 /// Scatter of single cuts about the published surface, W.
@@ -17,12 +18,12 @@ fn cuts(seed: u64) -> Vec<Cut> {
     let levels = [vec![0.065, 0.195, 0.325], vec![90.0, 120.0, 150.0], vec![0.1, 0.15, 0.2], vec![0.75, 1.0, 1.25]];
     let factors: Vec<FactorLevels> =
         FACTORS.iter().zip(levels).map(|(factor, values)| FactorLevels { factor, values }).collect();
-    let design = plan(Array::L27, &factors, 1).expect("a design");
+    let design = plan_experiment(Array::L27, &factors, 1).expect("a design");
     let noise = Normal::new(0.0, RESIDUAL_W).expect("a deviation");
     let mut dice = Pcg64Mcg::seed_from_u64(seed);
     let mut cut = |values: &Vec<f64>| {
-        let conditions = CutConditions::of([values[0], values[1], values[2], values[3]]);
-        Cut { conditions, cutting_power_w: surface.predict(&conditions).power_w + noise.sample(&mut dice) }
+        let conditions = CutConditions::from_vector([values[0], values[1], values[2], values[3]]);
+        Cut { conditions, cutting_power_w: surface.predict_power(&conditions).power_w + noise.sample(&mut dice) }
     };
     design.cuts.iter().map(|planned| cut(&planned.values)).collect()
 }

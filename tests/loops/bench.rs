@@ -44,9 +44,9 @@ pub(crate) fn script(name: &str, text: impl Into<String>) -> ScriptFile {
 struct Finished(Vec<Part>);
 
 impl Store for Finished {
-    fn sample(&mut self, _: &Sample, _: &[ExtraValue<'_>]) {}
+    fn store_sample(&mut self, _: &Sample, _: &[ExtraValue<'_>]) {}
 
-    fn record(&mut self, record: Record) {
+    fn store_record(&mut self, record: Record) {
         if let Record::Part(part) = record {
             self.0.push(part);
         }
@@ -55,8 +55,8 @@ impl Store for Finished {
 
 /// As a recipe fills it in.
 fn name_material(sample: &mut Sample, material: &Arc<str>) {
-    let channel = ChannelId::of("work_material").expect("a channel");
-    sample.set(channel, Slot { value: Ok(Value::Text(material.clone())), age_ns: 0 });
+    let channel = ChannelId::from_name("work_material").expect("a channel");
+    sample.set_slot(channel, Slot { value: Ok(Value::Text(material.clone())), age_ns: 0 });
 }
 
 /// The mains of a hall in which others start and stop: two slow waves.
@@ -66,10 +66,10 @@ fn wander(sample: &mut Sample, share: f64, no_load_w: f64) {
     let factor = 1.0 + share * wave;
     let by_mains_w = 0.3 * no_load_w * (factor * factor - 1.0);
     let mut change = |name: &str, of: &dyn Fn(f64) -> f64| {
-        let id = ChannelId::of(name).expect("a channel");
+        let id = ChannelId::from_name(name).expect("a channel");
         if let Ok(value) = sample.number(id) {
             let age_ns = sample.slot(id).age_ns;
-            sample.set(id, Slot { value: Ok(Value::Number(of(value))), age_ns });
+            sample.set_slot(id, Slot { value: Ok(Value::Number(of(value))), age_ns });
         }
     };
     change("supply_voltage_v", &|volts| volts * factor);
@@ -124,7 +124,7 @@ impl Bench {
     fn of(machine: Simulated, scripts: &[ScriptFile], limits: &config::GateConfig) -> Self {
         let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
         let mut host = Host::new();
-        host.load(scripts).expect("the scripts are accepted");
+        host.load_scripts(scripts).expect("the scripts are accepted");
         let actuator: Box<dyn Actuator> = Box::new(machine.feed_override());
         let directory = tempfile::tempdir().expect("a directory");
         let book = OffsetJournal::open(directory.path(), "simulated://lathe").expect("none yet");
@@ -133,10 +133,13 @@ impl Bench {
         Self {
             lockstep: Lockstep::new(sources, Delay::SlowestPeriod),
             pipeline: Pipeline::new(estimators, host, Gate::new(limits.clone())),
-            actuator_worker: ActuatorWorker::inline(Tools { actuator: Some(actuator), offsets: Some(offsets) }, limits),
+            actuator_worker: ActuatorWorker::with_inline_writers(
+                Tools { actuator: Some(actuator), offsets: Some(offsets) },
+                limits,
+            ),
             _directory: directory,
             machine,
-            sample: Sample::empty(0),
+            sample: Sample::new_empty(0),
             now_ns: 0,
             work_material: None,
             mains: 0.0,
@@ -168,20 +171,21 @@ impl Bench {
             );
         }
         let mut finished = Finished::default();
-        self.pipeline.step(&self.sample, &mut finished);
+        self.pipeline.run_tick(&self.sample, &mut finished);
         self.parts.append(&mut finished.0);
         let verdict = *self.pipeline.verdict().expect("decided");
-        let asks: Vec<ScriptRequest> = self.pipeline.scripts().decision().stops.iter().map(ScriptRequest::of).collect();
+        let asks: Vec<ScriptRequest> =
+            self.pipeline.scripts().decision().stops.iter().map(ScriptRequest::from_stop).collect();
         let gate = self.pipeline.gate_mut();
-        let judged = gate.ask(&asks, &self.sample).into_iter();
+        let judged = gate.judge_requests(&asks, &self.sample).into_iter();
         let sent: Vec<ScriptRequest> =
             judged.filter(|(_, outcome)| *outcome == AskOutcome::Sent).map(|(ask, _)| ask).collect();
         let mut said = Vec::new();
-        self.actuator_worker.step(&verdict, &sent, self.now_ns, |it| said.push(it));
+        self.actuator_worker.submit_verdict(&verdict, &sent, self.now_ns, |it| said.push(it));
         let orders: Vec<OffsetOrder> =
-            self.pipeline.shift(&self.sample).iter().filter_map(|verdict| verdict.order).collect();
+            self.pipeline.judge_offsets(&self.sample).iter().filter_map(|verdict| verdict.order).collect();
         let gate = self.pipeline.gate_mut();
-        self.actuator_worker.shift(&orders, gate.writes_offsets(), self.now_ns, |it| said.push(it));
+        self.actuator_worker.order_shifts(&orders, gate.writes_offsets(), self.now_ns, |it| said.push(it));
         for it in said {
             let fault = match it {
                 ActuatorReport::Written(written) => written.fault,
@@ -191,13 +195,13 @@ impl Bench {
                     None
                 }
                 ActuatorReport::Moved(moved) => {
-                    gate.offsets_mut().answered(&moved);
+                    gate.offsets_mut().accept_answer(&moved);
                     let fault = moved.fault();
                     self.moves.push(*moved);
                     fault
                 }
                 ActuatorReport::Withdrawn(order) => {
-                    gate.offsets_mut().withdrawn(order);
+                    gate.offsets_mut().withdraw_order(order);
                     None
                 }
                 ActuatorReport::Asked(_, failed) => {
@@ -206,7 +210,7 @@ impl Bench {
                 }
             };
             if let Some(fault) = fault {
-                gate.disarm(fault.disarmed());
+                gate.disarm(fault.disarm_reason());
                 self.faults.push(fault.to_string());
             }
         }

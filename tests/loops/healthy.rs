@@ -10,7 +10,7 @@ use adapters::address::SimulatedMachine;
 use adapters::simulated::{DaySettings, LaterChange, SimulatedSettings};
 use gateway::config::{self, BUILT_IN_TEXT, GateConfig, GateMode};
 use rules::estimators::wear::WearRecord;
-use rules::script::{AlarmLevel, Decision, Stop, shipped};
+use rules::script::{AlarmLevel, Decision, Stop, list_shipped_scripts};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -81,7 +81,7 @@ fn shift(setup: &Setup, seed: u64) -> Counted {
         day: DaySettings { shift_s: setup.hours * 3600.0, ..DaySettings::default() },
         ..SimulatedSettings::default()
     };
-    let mut bench = Bench::at_work(settings, &shipped(), &as_delivered(setup.armed));
+    let mut bench = Bench::at_work(settings, &list_shipped_scripts(), &as_delivered(setup.armed));
     bench.pipeline.wear_mut().set_models("", setup.models.iter().cloned().map(Arc::new).collect());
     bench.work_material = (!setup.models.is_empty()).then(|| "C45".into());
     bench.mains = setup.mains;
@@ -89,7 +89,7 @@ fn shift(setup: &Setup, seed: u64) -> Counted {
     let mut before = Asked::default();
     while bench.now_s() < setup.hours * 3600.0 {
         bench.tick();
-        if setup.armed && bench.now_s() > 30.0 && bench.pipeline.gate().armed().is_err() {
+        if setup.armed && bench.now_s() > 30.0 && bench.pipeline.gate().current_arming().is_err() {
             bench.arm();
         }
         let decision = bench.pipeline.scripts().decision().clone();
@@ -178,7 +178,7 @@ fn score(setup: &Setup, shifts: &[Counted]) -> u32 {
     let sum = |of: fn(&Counted) -> u32| shifts.iter().map(of).sum::<u32>();
     let mut alarms = BTreeMap::<(&str, &str), u32>::new();
     for ((level, name), count) in shifts.iter().flat_map(|shift| &shift.alarms) {
-        *alarms.entry((level.word(), name)).or_default() += count;
+        *alarms.entry((level.as_word(), name)).or_default() += count;
     }
     let alarms: Vec<String> = alarms.iter().map(|((level, name), count)| format!("{level} {name} {count}")).collect();
     println!(

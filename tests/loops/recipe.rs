@@ -2,7 +2,7 @@
 
 use super::bench::{Bench, limits, script};
 use adapters::simulated::{DaySettings, LaterChange, SimulatedSettings, TrueState};
-use rules::script::{recipe, shipped};
+use rules::script::{find_recipe, list_shipped_scripts};
 
 /// For so long nothing is changed; from then on every cut takes so many times the power.
 const CHANGE_S: f64 = 2400.0;
@@ -41,11 +41,11 @@ impl Run {
 }
 
 fn bench(settings: SimulatedSettings) -> Bench {
-    let text = recipe("above_learned").expect("a recipe").text;
+    let text = find_recipe("above_learned").expect("a recipe").text;
     let every = text
         .replace("\"program\", \"O1234\"", "\"program\", \"\"")
         .replace("\"tool_name\", \"T3\"", "\"tool_name\", \"\"");
-    let teach = shipped().into_iter().find(|file| file.name == "teach.rhai").expect("shipped");
+    let teach = list_shipped_scripts().into_iter().find(|file| file.name == "teach.rhai").expect("shipped");
     let teach = script("teach.rhai", teach.text.replace("setting(\"ask\", 1,", "setting(\"ask\", 0,"));
     Bench::at_work(settings, &[script("above_learned.rhai", every), teach], &limits(50.0, 110.0))
 }

@@ -3,7 +3,7 @@
 use super::bench::{Bench, limits, script};
 use adapters::simulated::{LaterChange, SimulatedSettings};
 use adapters::words::execution;
-use rules::script::shipped;
+use rules::script::list_shipped_scripts;
 
 fn settings() -> SimulatedSettings {
     let mut settings = SimulatedSettings { seed: 5, ..SimulatedSettings::default() };
@@ -15,7 +15,7 @@ fn settings() -> SimulatedSettings {
 /// load stays above the learned peak, and after a second of that the feed hold is asked for, once.
 #[test]
 fn an_overload_at_the_least_feed_holds_the_feed_once() {
-    let teach = shipped().into_iter().filter(|file| file.name == "teach.rhai").collect::<Vec<_>>();
+    let teach = list_shipped_scripts().into_iter().filter(|file| file.name == "teach.rhai").collect::<Vec<_>>();
     assert_eq!(teach.len(), 1, "it is shipped");
     let mut settings = settings();
     settings.change = LaterChange { after_s: 900.0, cut: 2.9, ..settings.change };

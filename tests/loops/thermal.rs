@@ -16,7 +16,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use rules::estimators::thermal::{
     AxisSituation, CompensationSettings, Compensator, Decoder, EDGES_PER_PULSE, Lines, Path, Predictor, PulseInserter,
-    SelectionSettings, ThermalLaw, collect, learn,
+    SelectionSettings, ThermalLaw, collect_rows, learn_law,
 };
 use rules::script::ScriptFile;
 use std::time::Duration;
@@ -46,10 +46,10 @@ fn recorded(seed: u64, hours: i64) -> Recording {
     let rows: Vec<([f64; 3], f64)> = (0..hours * 60).map(|minute| look(&machine, minute * 60, &mut dice)).collect();
     let mut recording = Recording::new("a day", (0..rows.len()).map(|row| row as f64 * 60.0).collect(), None);
     for (at, name) in SENSORS.into_iter().enumerate() {
-        recording.set_column(name, Cells::Numbers(Numbers::full(rows.iter().map(|row| row.0[at]).collect())));
+        recording.set_column(name, Cells::Numbers(Numbers::from_values(rows.iter().map(|row| row.0[at]).collect())));
     }
     let gauge = rows.iter().map(|row| row.1 + 0.5 * dice.sample::<f64, _>(StandardNormal)).collect();
-    recording.set_column("thermal_error_um", Cells::Numbers(Numbers::full(gauge)));
+    recording.set_column("thermal_error_um", Cells::Numbers(Numbers::from_values(gauge)));
     recording
 }
 
@@ -69,7 +69,7 @@ struct Axis {
 
 impl Axis {
     fn new() -> Self {
-        let lines = Lines::at(0);
+        let lines = Lines::from_position(0);
         Self {
             inserter: PulseInserter::new(lines, 0, SPACING_NS),
             controller: Decoder::new(lines, 0),
@@ -80,15 +80,15 @@ impl Axis {
 
     /// Forty edges one way, forty back, with time for the pulses in between; then the offset, in pulses.
     fn traverse(&mut self, pulses: i64) -> i64 {
-        self.inserter.request(pulses);
+        self.inserter.request_pulses(pulses);
         for step in 0..80 {
             self.encoder_edges += if step < 40 { 1 } else { -1 };
             self.at_ns += 100_000;
             let mut left = Vec::new();
-            let lines = Lines::at(self.encoder_edges);
-            self.inserter.advance(self.at_ns, lines, |edge| left.push(edge)).expect("slow enough");
+            let lines = Lines::from_position(self.encoder_edges);
+            self.inserter.advance_to(self.at_ns, lines, |edge| left.push(edge)).expect("slow enough");
             for edge in left {
-                self.controller.see(edge.lines, edge.at_ns).expect("no edge is lost");
+                self.controller.decode_lines(edge.lines, edge.at_ns).expect("no edge is lost");
             }
         }
         (self.controller.position_edges() - self.encoder_edges) / EDGES_PER_PULSE
@@ -145,7 +145,7 @@ fn through_the_gate(law: &ThermalLaw, hours: i64) {
     for at_s in 1..=hours * 3600 {
         bench.tick();
         let moment = bench.machine.moment(at_s * SECOND_NS);
-        if moment.panel.booted && bench.pipeline.gate().armed().is_err() {
+        if moment.panel.booted && bench.pipeline.gate().current_arming().is_err() {
             bench.arm();
         }
         let offset_um = bench.machine.offset_um(MachineAxis::Z);
@@ -165,15 +165,15 @@ fn through_the_gate(law: &ThermalLaw, hours: i64) {
         counts.offsets, changes_in_programs
     );
     assert!(bench.faults.is_empty(), "{:?}", bench.faults);
-    assert_eq!(counts.writes(), counts.offsets, "nothing else is written");
+    assert_eq!(counts.count_writes(), counts.offsets, "nothing else is written");
     assert_eq!(changes_in_programs, 0, "between programs only");
     assert!(counts.offsets > 3 && a < 0.3 * b && a_max < b_max, "{b} {a}");
 }
 
 fn day(hours: i64) {
-    let collected = collect(&recorded(11, hours)).expect("usable");
-    let learned = learn(&collected.course, SelectionSettings::default(), None).expect("a law");
-    let law = learned.best().fit.law.clone();
+    let collected = collect_rows(&recorded(11, hours)).expect("usable");
+    let learned = learn_law(&collected.course, SelectionSettings::default(), None).expect("a law");
+    let law = learned.best_candidate().fit.law.clone();
     through_the_gate(&law, hours);
     println!("law: {} terms, late {:?} s, residual {:.2} um", law.terms.len(), law.tau_s, law.residual_sd_um);
     let settings = CompensationSettings { pulse_um: 1.0, limit_um: 150.0, ..CompensationSettings::default() };
@@ -187,10 +187,10 @@ fn day(hours: i64) {
         let (temperatures, error_um) = look(&machine, at_s, &mut dice);
         let off = !machine.moment(at_s * SECOND_NS).panel.booted;
         let read = temperatures.map(|value| if off { Err(Absence::MachineOff) } else { Ok(value) });
-        let prediction = predictor.predict(at_s * SECOND_NS, &read).ok();
+        let prediction = predictor.predict_error(at_s * SECOND_NS, &read).ok();
         let situation = AxisSituation::default();
-        let sink = offset.step(STEP_S as f64, prediction.as_ref(), situation);
-        let pulses = inserted.step(STEP_S as f64, prediction.as_ref(), situation).increment_pulses;
+        let sink = offset.advance_compensation(STEP_S as f64, prediction.as_ref(), situation);
+        let pulses = inserted.advance_compensation(STEP_S as f64, prediction.as_ref(), situation).increment_pulses;
         let counted = axis.traverse(pulses);
         if !off {
             before.push(error_um);
@@ -248,9 +248,9 @@ impl ColdDay {
                 continue;
             }
             let read = temperatures.map(Ok);
-            let prediction = predictor.predict(at_s * SECOND_NS, &read).ok();
-            let step = compensator.step(STEP_S as f64, prediction.as_ref(), AxisSituation::default());
-            let notice = watch.look(at_s * SECOND_NS, prediction.as_ref(), &step, &SENSORS);
+            let prediction = predictor.predict_error(at_s * SECOND_NS, &read).ok();
+            let step = compensator.advance_compensation(STEP_S as f64, prediction.as_ref(), AxisSituation::default());
+            let notice = watch.watch_step(at_s * SECOND_NS, prediction.as_ref(), &step, &SENSORS);
             told.extend(notice.map(|notice| format!("{:.2} h: {}", at_s as f64 / 3600.0, notice.operator)));
             before.push(error_um);
             after.push(error_um + step.sent_um);
@@ -263,8 +263,13 @@ impl ColdDay {
 /// `cargo test --test loops days_that_begin -- --nocapture`
 #[test]
 fn days_that_begin_outside_the_range_are_compensated_and_told() {
-    let collected = collect(&recorded(11, 8)).expect("usable");
-    let law = learn(&collected.course, SelectionSettings::default(), None).expect("a law").best().fit.law.clone();
+    let collected = collect_rows(&recorded(11, 8)).expect("usable");
+    let law = learn_law(&collected.course, SelectionSettings::default(), None)
+        .expect("a law")
+        .best_candidate()
+        .fit
+        .law
+        .clone();
     for whole_hall in [true, false] {
         for outside_k in [1.0, 3.0, 8.0] {
             let day = ColdDay { outside_k, hours: 8, whole_hall };

@@ -68,7 +68,7 @@ fn design(wear_mm: f64, seed: u64) -> Vec<Cut> {
     }
     let of = |(index, (rpm, feed_mm_min, depth_mm)): (usize, (f64, f64, f64))| {
         let (count, power, wear) = sums[2 * index + 3];
-        let conditions = CutConditions::of([wear / count, speed_m_min(rpm), feed_mm_min / rpm, depth_mm]);
+        let conditions = CutConditions::from_vector([wear / count, speed_m_min(rpm), feed_mm_min / rpm, depth_mm]);
         (count > 60.0).then_some(Cut { conditions, cutting_power_w: power / (count - 40.0) })
     };
     plan.into_iter().enumerate().filter_map(of).collect()
@@ -117,7 +117,7 @@ if state == "cutting" && state_s > 4.0 && known && feed_mm_min > 10.0 {{
 }}
 alarm_when("tool_worn", memory.worn ?? false, 0.0, "The edge is worn: change it 刀具磨损");
 "#,
-        model.short()
+        model.to_short_form()
     );
     script("tool_wear_limit.rhai", text)
 }

@@ -6,7 +6,7 @@ use adapters::address::SimulatedMachine;
 use adapters::simulated::{DaySettings, LaterChange, SimulatedSettings};
 use rules::estimators::State;
 use rules::estimators::wear::{Cut, CutConditions, WearKey, WearModel, WearRecord, fit_physical};
-use rules::script::shipped;
+use rules::script::list_shipped_scripts;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -56,7 +56,7 @@ impl Run {
 fn shift(run: &Run, seed: u64) -> Shift {
     let Run { machine, hours, models, .. } = run;
     let (machine, hours) = (*machine, *hours);
-    let scripts: Vec<_> = shipped().into_iter().filter(|file| file.name == "tool_wear.rhai").collect();
+    let scripts: Vec<_> = list_shipped_scripts().into_iter().filter(|file| file.name == "tool_wear.rhai").collect();
     let day = DaySettings { shift_s: hours * 3600.0, ..DaySettings::default() };
     let change = LaterChange { after_s: 0.5 * hours * 3600.0, cut: run.lot, friction: 1.0 };
     let settings = SimulatedSettings { machine, seed, day, change, ..SimulatedSettings::default() };
@@ -84,9 +84,9 @@ fn shift(run: &Run, seed: u64) -> Shift {
         if bench.now_s().fract() < 0.05 {
             let known = bench.pipeline.estimates();
             let growth = known.tool_growth_pct.map(|it| format!("{:.1} +- {:.1} %", it.value, it.sd));
-            let growth = growth.unwrap_or_else(|reason| reason.word().to_owned());
+            let growth = growth.unwrap_or_else(|reason| reason.as_word().to_owned());
             let probability = known.tool_worn_probability.map(|it| format!("{:.2}", it.value));
-            edge.believed = format!("{growth}, {}", probability.unwrap_or_else(|reason| reason.word().to_owned()));
+            edge.believed = format!("{growth}, {}", probability.unwrap_or_else(|reason| reason.as_word().to_owned()));
         }
         let stops = &bench.pipeline.scripts().decision().stops;
         shift.requests += usize::from(!asked && !stops.is_empty());
@@ -184,7 +184,7 @@ pub(crate) fn mill_records() -> Vec<WearRecord> {
                 *sum = (sum.0 + 1.0, sum.1 + power.value, sum.2 + moment.truth.flank_wear_mm);
                 let (speed, feed) = MILL_CUTS[usize::from(panel.tool) - 1];
                 let metres_min = std::f64::consts::PI * panel.diameter_mm * speed / 1000.0;
-                conditions.entry(panel.tool).or_insert(CutConditions::of([
+                conditions.entry(panel.tool).or_insert(CutConditions::from_vector([
                     0.0,
                     metres_min,
                     feed / speed,

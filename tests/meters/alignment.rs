@@ -5,7 +5,7 @@ use super::served::program;
 use adapters::clock::{Clock, ManualClock};
 use adapters::{ChannelId, Sample};
 use gateway::alignment::AlignmentStatus;
-use gateway::run::open::{MachineSpeed, sources};
+use gateway::run::open::{MachineSpeed, open_sources};
 use rules::estimators::{Inference, Settings};
 use serde_json::Value;
 use std::path::Path;
@@ -35,17 +35,17 @@ impl Outcome {
 /// Runs the box's own assembly and estimators as fast as possible for so many seconds of machine time.
 fn outcome(text: &str, machine_s: i64) -> Outcome {
     let config = gateway::config::parse("alignment.toml", text, Path::new("/nowhere"), []).expect("a configuration");
-    let clock: Arc<dyn Clock> = Arc::new(ManualClock::at(0));
-    let mut opened = sources(&config, MachineSpeed::Max, &clock, 1_000_000_000_000).expect("opens");
+    let clock: Arc<dyn Clock> = Arc::new(ManualClock::with_time(0));
+    let mut opened = open_sources(&config, MachineSpeed::Max, &clock, 1_000_000_000_000).expect("opens");
     let mut estimators = Inference::new(Settings::default());
-    let (mut sample, stop) = (Sample::empty(0), AtomicBool::new(false));
-    let power = ChannelId::of("spindle_power_w").expect("a channel");
+    let (mut sample, stop) = (Sample::new_empty(0), AtomicBool::new(false));
+    let power = ChannelId::from_name("spindle_power_w").expect("a channel");
     let mut outcome = Outcome { status: Vec::new(), errors_w: Vec::new(), fingerprint: 0, notices: Vec::new() };
     let (mut before_rpm, mut first_ns) = (0.0, None);
     while let Some(now_ns) = opened.pace.next_tick(&stop) {
         opened.feed.sample_into(&mut sample, now_ns);
-        let state = estimators.infer(&sample).state;
-        opened.feed.alignment_mut().told(sample.at_ns, state);
+        let state = estimators.update_with_sample(&sample).state;
+        opened.feed.alignment_mut().record_state(sample.at_ns, state);
         outcome.notices.extend(opened.feed.alignment_mut().take_notices().into_iter().map(|notice| notice.operator));
         let passed_s = (now_ns - *first_ns.get_or_insert(now_ns)) / 1_000_000_000;
         let truth = opened.machines[0].truth(sample.at_ns);
@@ -61,7 +61,7 @@ fn outcome(text: &str, machine_s: i64) -> Outcome {
             break;
         }
     }
-    outcome.status = opened.feed.alignment().status();
+    outcome.status = opened.feed.alignment().build_status();
     outcome
 }
 

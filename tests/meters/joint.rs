@@ -11,7 +11,7 @@ use adapters::nclink::device::NcLinkDevice;
 use adapters::simulated::{Moment, Simulated, SimulatedSettings};
 use adapters::waveform::{Producer, SimulatedCurrent};
 use adapters::{ChannelId, Sample};
-use gateway::run::open::{MachineSpeed, sources};
+use gateway::run::open::{MachineSpeed, open_sources};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -102,13 +102,13 @@ fn compared(speed: f64, machine_s: i64) -> Option<Vec<Errors>> {
     let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(speed));
     let address: Address = "simulated://lathe?dropouts_per_h=0&begun_s=1500".parse().expect("an address");
     let Target::Simulated(target) = address.target() else { panic!("simulated") };
-    let machine = Simulated::new(address.text(), SimulatedSettings::of(target), clock.now_ns());
+    let machine = Simulated::new(address.text(), SimulatedSettings::from_target(target), clock.now_ns());
     let stop = Arc::new(AtomicBool::new(false));
     let (mut device, stopping) = (NcLinkDevice::new("SIM1", &machine, clock.clone()), stop.clone());
     let options = Options::new("127.0.0.1", broker.1, "joint-device");
     let device = thread::spawn(move || device.run(&options, &stopping, |_| {}));
     let anywhere = SocketAddr::from(([127, 0, 0, 1], 0));
-    let map = profile::find("sdm630", None).expect("shipped");
+    let map = profile::find_profile("sdm630", None).expect("shipped");
     let meter = ModbusServer::start(anywhere, &machine, clock.clone(), map).expect("serves");
     let current = SimulatedCurrent::new(&machine, clock.clone(), 1000.0, 20);
     let current = Producer::start(anywhere, Box::new(current)).expect("serves");
@@ -120,12 +120,12 @@ fn compared(speed: f64, machine_s: i64) -> Option<Vec<Errors>> {
          [[source]]\naddress = \"modbus-tcp://{meter}?unit=2&profile=sdm630&circuit=spindle\"\n\
          [[source]]\naddress = \"modbus-tcp://{meter}?unit=1&profile=sdm630\"\n",
         broker.1,
-        current.at(),
-        meter = meter.at(),
+        current.listen_address(),
+        meter = meter.listen_address(),
     );
     let config = gateway::config::parse("joint.toml", &text, directory.path(), []).expect("a configuration");
-    let mut opened = sources(&config, MachineSpeed::Real, &clock, 0).expect("opens");
-    let (mut sample, began_ns) = (Sample::empty(0), clock.now_ns());
+    let mut opened = open_sources(&config, MachineSpeed::Real, &clock, 0).expect("opens");
+    let (mut sample, began_ns) = (Sample::new_empty(0), clock.now_ns());
     let mut errors: Vec<Errors> = COMPARED.iter().map(|_| Errors::default()).collect();
     while let Some(now_ns) = opened.pace.next_tick(&stop) {
         opened.feed.sample_into(&mut sample, now_ns);
@@ -137,7 +137,7 @@ fn compared(speed: f64, machine_s: i64) -> Option<Vec<Errors>> {
             compare(&machine, &sample, &mut errors);
         }
     }
-    for status in opened.feed.status(clock.now_ns()) {
+    for status in opened.feed.list_sources(clock.now_ns()) {
         println!(
             "{}: {} readings, {} failures, error {:?}",
             status.name, status.readings, status.failures, status.error
@@ -151,7 +151,7 @@ fn compared(speed: f64, machine_s: i64) -> Option<Vec<Errors>> {
 fn compare(machine: &Simulated, sample: &Sample, errors: &mut [Errors]) {
     let moment = machine.moment(sample.at_ns);
     for ((name, truth), errors) in COMPARED.iter().zip(errors) {
-        let (id, truth) = (ChannelId::of(name).expect("a channel"), truth(&moment));
+        let (id, truth) = (ChannelId::from_name(name).expect("a channel"), truth(&moment));
         errors.greatest_truth = errors.greatest_truth.max(truth.abs());
         match sample.number(id) {
             Ok(number) => errors.sizes.push((number - truth).abs()),

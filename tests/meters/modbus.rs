@@ -124,7 +124,7 @@ fn a_map_of_the_secondary_side_takes_the_transformers() {
     // 36060 is 3292 counts with the sign set.
     near(&readings, "total_power_w", -3292.0 * 0.375 * 20.0);
     near(&readings, "supply_voltage_v", 3.0_f64.sqrt() * 230.0);
-    let facts = format!("{:?}", meter.facts());
+    let facts = format!("{:?}", meter.collect_facts());
     assert!(facts.contains("to be confirmed"), "{facts}");
 }
 

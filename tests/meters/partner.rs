@@ -100,7 +100,7 @@ pub(crate) fn cable(directory: &Path) -> Cable {
 /// The only source of an address.
 pub(crate) fn source(address: &str) -> Box<dyn Source> {
     let address: Address = address.parse().unwrap_or_else(|error| panic!("{error}"));
-    let opened = adapters::open::open(&address, 0).unwrap_or_else(|error| panic!("{error}"));
+    let opened = adapters::open::open_address(&address, 0).unwrap_or_else(|error| panic!("{error}"));
     opened.sources.into_iter().next().expect("one source")
 }
 
@@ -112,7 +112,7 @@ pub(crate) fn poll(source: &mut dyn Source) -> Result<Vec<Reading>, SourceError>
 
 /// The number of a channel in a poll.
 pub(crate) fn number(readings: &[Reading], channel: &str) -> f64 {
-    let id = ChannelId::of(channel).expect("a channel");
+    let id = ChannelId::from_name(channel).expect("a channel");
     let reading = readings.iter().find(|reading| reading.channel == id);
     let reading = reading.unwrap_or_else(|| panic!("no {channel} in {readings:?}"));
     reading.value.as_ref().ok().and_then(|value| value.as_number()).unwrap_or_else(|| panic!("{reading:?}"))

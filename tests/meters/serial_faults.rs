@@ -96,7 +96,7 @@ fn no_answer_is_taken_for_that_to_another_request() {
             }
         }
     }
-    let facts = format!("{:?}", meter.facts());
+    let facts = format!("{:?}", meter.collect_facts());
     assert!(facts.contains("late_answers\", value: Number(1.0)") && facts.contains("wire_time_ms"), "{facts}");
 }
 
@@ -131,9 +131,9 @@ fn one_line_has_one_speed() {
     let parse = |text: &str| text.parse::<adapters::Address>().unwrap_or_else(|error| panic!("{error}"));
     let slow = parse("modbus-rtu:///dev/no-such-line?baud=9600&profile=pac");
     let fast = parse("modbus-rtu:///dev/no-such-line?baud=19200&profile=pac&unit=2");
-    let first = adapters::open::open(&slow, 0).expect("opens; the line is looked for at the first poll");
-    let error = adapters::open::open(&fast, 0).err().expect("another speed").to_string();
+    let first = adapters::open::open_address(&slow, 0).expect("opens; the line is looked for at the first poll");
+    let error = adapters::open::open_address(&fast, 0).err().expect("another speed").to_string();
     assert!(error.contains("baud"), "{error}");
     drop(first);
-    let _meter: fn(&adapters::Address, _, _) -> Result<ModbusMeter, String> = ModbusMeter::tcp;
+    let _meter: fn(&adapters::Address, _, _) -> Result<ModbusMeter, String> = ModbusMeter::with_tcp_line;
 }

@@ -108,10 +108,10 @@ fn a_meter_that_gives_fifty_registers_at_once_and_one_with_holes() {
             near(&readings, "spindle_current_a", 4.0);
             near(&readings, "supply_voltage_v", 398.371_686_5);
         }
-        let facts = meter.facts();
+        let facts = meter.collect_facts();
         let requests = facts.iter().find(|fact| fact.name == "requests_per_poll").map(|fact| fact.value.clone());
         println!("{what}: read right, {requests:?} requests per poll");
-        assert!(requests.is_some() && meter.problems().is_empty(), "{what}: {:?}", meter.problems());
+        assert!(requests.is_some() && meter.list_problems().is_empty(), "{what}: {:?}", meter.list_problems());
     }
 }
 
@@ -204,9 +204,9 @@ fn the_inputs_that_integrators_wrote_are_read_right_or_refused_with_the_reason()
 /// Samples of a meter at 50 Hz while it is polled every 100 ms, as the gateway makes them.
 fn merged(meter: &mut dyn Source, polls: u32, channel: &str) -> (Vec<f64>, u32, u32) {
     let clock = SystemClock::new();
-    let id = ChannelId::of(channel).expect("in the table");
-    let mut merge = Merge::new(&[SourcePlan::of(meter)], Delay::SlowestPeriod);
-    let (mut sample, mut seen, mut absent, mut doubted) = (Sample::empty(0), Vec::new(), 0, 0);
+    let id = ChannelId::from_name(channel).expect("in the table");
+    let mut merge = Merge::new(&[SourcePlan::from_source(meter)], Delay::SlowestPeriod);
+    let (mut sample, mut seen, mut absent, mut doubted) = (Sample::new_empty(0), Vec::new(), 0, 0);
     let begun_ns = clock.now_ns();
     for at in 0..polls * 5 {
         clock.sleep_until(begun_ns + i64::from(at) * 20_000_000);
@@ -265,17 +265,17 @@ fn the_wrong_profile_is_told_and_gives_no_value() {
         let mut meter = source(&address(port, &format!("profile={profile}")));
         let readings = readings(meter.as_mut());
         let values: Vec<&Reading> = readings.iter().filter(|reading| reading.value.is_ok()).collect();
-        let problems = meter.problems();
+        let problems = meter.list_problems();
         println!("{profile}: {} values, {problems:?}", values.len());
         assert!(values.is_empty() && !problems.is_empty(), "{profile}: {values:?}");
     }
     let mut zeros = source(&address(port, "profile=sdm630&unit=2"));
     let readings = readings(zeros.as_mut());
     assert!(readings.iter().all(|reading| reading.value.is_err()), "{readings:?}");
-    assert!(zeros.problems()[0].what.contains("no supply voltage"), "{:?}", zeros.problems());
+    assert!(zeros.list_problems()[0].what.contains("no supply voltage"), "{:?}", zeros.list_problems());
     // The right one among the shipped ones is found.
     let mut meter = source(&address(port, "profile=pac"));
-    let offers = meter.offers(&SystemClock::new()).expect("tries them");
+    let offers = meter.list_offers(&SystemClock::new()).expect("tries them");
     let fitting: Vec<&str> =
         offers.iter().filter(|offer| offer.says.is_ok()).map(|offer| offer.name.as_str()).collect();
     println!("profiles that fit: {fitting:?}");
@@ -299,7 +299,7 @@ fn own_channels_are_read_beside_a_profile() {
     );
     let config = gateway::config::parse("t.toml", &text, Path::new("."), [])
         .unwrap_or_else(|problems| panic!("{}", problems[0]));
-    let opened = adapters::open::open(&config.sources[0].address, 0).unwrap_or_else(|error| panic!("{error}"));
+    let opened = adapters::open::open_address(&config.sources[0].address, 0).unwrap_or_else(|error| panic!("{error}"));
     let mut meter = opened.sources.into_iter().next().expect("one");
     let readings = readings(meter.as_mut());
     near(&readings, "total_power_w", 1200.0);

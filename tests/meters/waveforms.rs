@@ -22,7 +22,7 @@ fn endpoint(at: SocketAddr) -> Endpoint {
 }
 
 fn header() -> WaveformHeader {
-    WaveformHeader::currents(1000.0, &["i_u", "i_v", "i_w"], 0.01, 32767)
+    WaveformHeader::with_currents(1000.0, &["i_u", "i_v", "i_w"], 0.01, 32767)
 }
 
 /// Three phases of 10 A rms at 47 Hz, from sample `from` on.
@@ -51,13 +51,13 @@ fn sends(bytes: Vec<u8>) -> Endpoint {
 #[test]
 fn gaps_and_clipped_samples_are_counted() {
     let frame = |sequence: u32, from: i32, samples: Vec<i16>| {
-        WaveformFrame { sequence, first_ns: i64::from(from) * 1_000_000 + 1_000_000_000, samples }.bytes(3)
+        WaveformFrame { sequence, first_ns: i64::from(from) * 1_000_000 + 1_000_000_000, samples }.to_bytes(3)
     };
     let mut clipped = sine(60, 20);
     (clipped[0], clipped[4]) = (32767, -32768);
     // Frame 2, samples 40 to 59, never comes.
     let bytes = [
-        header().line().into_bytes(),
+        header().encode_line().into_bytes(),
         frame(0, 0, sine(0, 20)),
         frame(1, 20, sine(20, 20)),
         frame(3, 60, clipped),
@@ -78,7 +78,7 @@ fn what_is_no_stream_is_told() {
     let http = sends(b"HTTP/1.1 200 OK\r\n\r\n".to_vec());
     let error = Receiver::new("waveform:test", &http).read(&clock).expect_err("no stream");
     assert!(matches!(error, SourceError::Decode { .. }), "{error}");
-    let derailed = sends([header().line().into_bytes(), vec![0x55; 64]].concat());
+    let derailed = sends([header().encode_line().into_bytes(), vec![0x55; 64]].concat());
     let error = Receiver::new("waveform:test", &derailed).read(&clock).expect_err("no frame");
     assert!(matches!(error, SourceError::Decode { .. }), "{error}");
     let port = super::port::free_port();
@@ -100,7 +100,7 @@ fn a_file_is_played_and_its_feature_is_read() {
     let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
     let sampler = Recorded::open(&file, 1000.0, 100.0, clock).expect("opens");
     let producer = Producer::start(anywhere(), Box::new(sampler)).expect("serves");
-    let mut source = SpindleCurrent::new("waveform:test", &endpoint(producer.at()), None);
+    let mut source = SpindleCurrent::new("waveform:test", &endpoint(producer.listen_address()), None);
     let mut found = Vec::new();
     while found.len() < 5 {
         let readings = poll(&mut source).unwrap_or_else(|error| panic!("{error}"));
@@ -133,7 +133,7 @@ impl Sampler for Fast {
 #[test]
 fn what_three_phases_at_1_khz_cost() {
     let producer = Producer::start(anywhere(), Box::new(Fast { left: 30_000 })).expect("serves");
-    let mut source = SpindleCurrent::new("waveform:test", &endpoint(producer.at()), None);
+    let mut source = SpindleCurrent::new("waveform:test", &endpoint(producer.listen_address()), None);
     poll(&mut source).unwrap_or_else(|error| panic!("{error}"));
     let (samples, began) = (samples(&source), Instant::now());
     while poll(&mut source).is_ok() {}
@@ -147,7 +147,7 @@ fn what_three_phases_at_1_khz_cost() {
 }
 
 fn samples(source: &SpindleCurrent) -> f64 {
-    let facts = source.facts();
+    let facts = source.collect_facts();
     let fact = facts.iter().find(|fact| fact.name == "waveform_samples").expect("counted");
     match fact.value {
         adapters::FactValue::Number(number) => number,

@@ -38,7 +38,7 @@ impl Stand {
     }
 
     fn open(&mut self) {
-        let extras = vec![ExtraSeries::text("machine_state", "state", "状态")];
+        let extras = vec![ExtraSeries::new_text("machine_state", "state", "状态")];
         let group_commit = Duration::from_millis(50);
         let outbox = Some(self.outbox.clone());
         let options = Options { extras, group_commit, outbox, ..Options::default() };
@@ -48,14 +48,14 @@ impl Stand {
     /// Every tick has another power; every tenth is followed by an event.
     fn write(&mut self, ticks: i64) {
         let writer = self.writer.as_ref().expect("open");
-        let power = ChannelId::of("spindle_power_w").expect("in the table");
+        let power = ChannelId::from_name("spindle_power_w").expect("in the table");
         for tick in self.ticks..self.ticks + ticks {
             let at_ns = BEGIN_NS + tick * TICK_NS;
-            let mut sample = Sample::empty(at_ns);
-            sample.set(power, Slot { value: Ok(Value::Number(tick as f64)), age_ns: 0 });
-            writer.sample(&sample, &[ExtraValue::Text("cutting")]);
+            let mut sample = Sample::new_empty(at_ns);
+            sample.set_slot(power, Slot { value: Ok(Value::Number(tick as f64)), age_ns: 0 });
+            writer.queue_sample(&sample, &[ExtraValue::Text("cutting")]);
             if tick % 10 == 9 {
-                writer.record(Event { at_ns, kind: "test".to_owned(), ..Event::default() });
+                writer.queue_record(Event { at_ns, kind: "test".to_owned(), ..Event::default() });
             }
         }
         self.ticks += ticks;
@@ -78,7 +78,7 @@ impl Stand {
 
     /// How many items there are by now: ticks and events, the means of minutes, and what a start and an end tell.
     fn items(&self) -> u64 {
-        self.outbox.head().borrow().next_sequence - 1
+        self.outbox.watch_head().borrow().next_sequence - 1
     }
 
     fn start(&self, sink: FakeSink) -> (Sinks, Board) {
@@ -150,14 +150,14 @@ fn every_item_arrives_once_however_the_receiver_comes_and_goes() {
         until("all delivered", || numbers(&seen).len() as u64 == stand.items());
         seen.lock().expect("whole").down = true;
         stand.write(30);
-        until("the failure is told", || board.status()[0].failing);
-        assert!(board.status()[0].error.as_ref().is_some_and(|error| error.contains("down")), "round {round}");
+        until("the failure is told", || board.list_sinks()[0].failing);
+        assert!(board.list_sinks()[0].error.as_ref().is_some_and(|error| error.contains("down")), "round {round}");
         seen.lock().expect("whole").down = false;
     }
     until("all delivered", || numbers(&seen).len() as u64 == stand.items());
     runtime.block_on(sinks.stop());
     assert_eq!(numbers(&seen), (1..=stand.items()).collect::<Vec<u64>>(), "0 lost, 0 twice");
-    let status = &board.status()[0];
+    let status = &board.list_sinks()[0];
     assert_eq!((status.behind_items, status.dropped, status.refused), (0, 0, 0), "{status:?}");
     // What is delivered is not kept: one row is left to number on from.
     std::thread::sleep(Duration::from_secs(5));
@@ -262,11 +262,11 @@ fn an_item_that_nobody_takes_is_left_out_and_counted() {
     let (sinks, board) = runtime.block_on(async { stand.start(fake(&seen)) });
     stand.write(40);
     until("the rest is delivered", || numbers(&seen).len() as u64 == stand.items() - 2);
-    until("both are counted", || board.status()[0].refused == 2);
+    until("both are counted", || board.list_sinks()[0].refused == 2);
     runtime.block_on(sinks.stop());
     let expected: Vec<u64> = (1..=stand.items()).filter(|number| ![5, 17].contains(number)).collect();
     assert_eq!(numbers(&seen), expected);
-    let status = &board.status()[0];
+    let status = &board.list_sinks()[0];
     assert!(status.refusal.as_ref().is_some_and(|refusal| refusal.contains("too large")), "{status:?}");
     assert_eq!(status.error, None, "nothing is wrong with the receiver");
 }
@@ -278,8 +278,8 @@ fn a_receiver_that_wants_no_history_gets_none() {
     let before = stand.items();
     let runtime = runtime();
     let (sinks, board) = runtime.block_on(async { stand.start(FakeSink { takes_history: false, ..fake(&seen) }) });
-    until("connected", || board.status()[0].state == "connected");
-    until("the gap is given up", || board.status()[0].dropped == before);
+    until("connected", || board.list_sinks()[0].state == "connected");
+    until("the gap is given up", || board.list_sinks()[0].dropped == before);
     stand.write(10);
     until("the new ones", || numbers(&seen).len() as u64 == stand.items() - before);
     runtime.block_on(sinks.stop());
@@ -296,21 +296,21 @@ fn the_outbox_stays_within_its_bounds_and_tells_what_it_dropped() {
     stand.write(1);
     let figures = stand.outbox.figures();
     assert!(figures.bytes <= bounded.max_bytes, "{figures:?}");
-    let dropped = stand.outbox.standing("plant").expect("configured").dropped;
+    let dropped = stand.outbox.delivery_state("plant").expect("configured").dropped;
     assert!(dropped > 0 && figures.outage_fits_h(&bounded).is_some(), "{dropped} {figures:?}");
     // It is remembered, and what is left arrives.
     stand.reopen(bounded);
-    let standing = stand.outbox.standing("plant").expect("configured");
-    let (before, dropped, left) = (dropped, standing.dropped, standing.position.waiting(stand.items() + 1));
+    let standing = stand.outbox.delivery_state("plant").expect("configured");
+    let (before, dropped, left) = (dropped, standing.dropped, standing.position.count_waiting(stand.items() + 1));
     assert!(dropped >= before, "what the end told has pushed out some more");
     assert_eq!(dropped + left, stand.items());
     let runtime = runtime();
     let (sinks, board) = runtime.block_on(async { stand.start(fake(&seen)) });
     // What the end told stands beyond the bound until the first commit, which may drop some more: every item has arrived or is counted.
-    let counted = || stand.outbox.standing("plant").expect("configured").dropped;
+    let counted = || stand.outbox.delivery_state("plant").expect("configured").dropped;
     until("what is left", || numbers(&seen).len() as u64 + counted() == stand.items());
     runtime.block_on(sinks.stop());
-    let after = board.status()[0].dropped;
+    let after = board.list_sinks()[0].dropped;
     assert!(after >= dropped && after - dropped <= left, "{after}, {dropped} before the start");
     println!("{dropped} of {} items dropped at 20 kB", stand.items());
 }
@@ -320,7 +320,7 @@ fn what_is_too_old_is_dropped() {
     let aged = OutboxSettings { max_age: Duration::from_secs(10), ..settings() };
     let mut stand = Stand::new(aged);
     (0..20).for_each(|_| stand.write(20));
-    let dropped = stand.outbox.standing("plant").expect("configured").dropped;
+    let dropped = stand.outbox.delivery_state("plant").expect("configured").dropped;
     let (kept, all) = (stand.items() - dropped, stand.items());
     assert!((110..=160).contains(&kept), "ten seconds are 110 items and what a commit holds: {kept} of {all}");
 }

@@ -25,7 +25,7 @@ pub(crate) struct FakeSink {
 }
 
 fn down() -> SinkError {
-    SinkError::line("the receiver is down", "wait")
+    SinkError::failed_line("the receiver is down", "wait")
 }
 
 impl Sink for FakeSink {
@@ -36,7 +36,7 @@ impl Sink for FakeSink {
         Box::pin(std::future::ready(result))
     }
 
-    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+    fn send_batch<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
         Box::pin(async move {
             assert!(!batch.items.is_empty() && batch.items.len() <= self.batch, "a batch of {}", batch.items.len());
             let mut seen = self.seen.lock().expect("whole");

@@ -152,7 +152,7 @@ fn what_an_agent_is_told_after_a_kill_comes_after_the_moment_of_the_kill() {
         let before = times(port, 20);
         sending.kill();
         // As an agent does it: unavailable, with the time of its own clock.
-        let killed = gateway::moment::utc(adapters::clock::Clock::now_ns(&adapters::clock::SystemClock::new()));
+        let killed = gateway::moment::format_utc(adapters::clock::Clock::now_ns(&adapters::clock::SystemClock::new()));
         sending.start();
         crate::process::wait_for("it listens again", Duration::from_secs(30), || {
             TcpStream::connect(("127.0.0.1", port)).ok()

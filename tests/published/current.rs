@@ -101,7 +101,7 @@ fn window() -> Vec<Row> {
 fn cubic() -> Vec<Row> {
     let cubic = Cubic { coefficients: [1.4612, 0.872, 0.4277, 0.0944], feed_min: 0.0, feed_max: 3.5 };
     let source = "001, n = 1000, h = 1.2 mm";
-    let rises = f64::from(u8::from(cubic.rises()));
+    let rises = f64::from(u8::from(cubic.is_rising()));
     let mut rows = vec![
         Row::new("discriminant of the derivative", -0.256, cubic.discriminant(), 5e-4, source),
         Row::new("rises throughout (1 = yes)", 1.0, rises, 0.0, source),

@@ -2,14 +2,14 @@
 
 use crate::Row;
 use crate::weights::WEIGHTS;
-use rules::estimators::{balance, lagrange, noise_gain};
+use rules::estimators::{lagrange_weights, noise_gain, solve_power_balance};
 
 const SOURCE: &str = "000";
 
 pub(crate) fn rows() -> Vec<Row> {
     let mut rows = balances();
     for (speed, speeds, weights, gain) in WEIGHTS {
-        let ours = lagrange(speeds, speed);
+        let ours = lagrange_weights(speeds, speed);
         for (at, (published, ours)) in weights.into_iter().zip(ours).enumerate() {
             let quantity = format!("Lagrange weight of {} rpm at {speed} rpm", speeds[at]);
             rows.push(Row::new(quantity, published, ours, 1e-6, SOURCE));
@@ -20,7 +20,7 @@ pub(crate) fn rows() -> Vec<Row> {
 }
 
 fn balances() -> Vec<Row> {
-    let split = |excess_w: f64, a0: f64, a1: f64| balance(excess_w, a0, a1).expect("a real root");
+    let split = |excess_w: f64, a0: f64, a1: f64| solve_power_balance(excess_w, a0, a1).expect("a real root");
     let cut = |excess_w, a0| split(excess_w, a0, 0.0).cutting_power_w;
     let (fitted, exact) = (split(960.0, 0.1807, 4e-5), split(960.0, 0.1807, 3.377e-5));
     let garbled = "printed 'Pad=4*10-5+1.807Pc' gives a loss above the input power; 0.1807 Pc + 4e-5 Pc^2 fits";

@@ -1,7 +1,7 @@
 //! Thermal error of a milling spindle with 13 temperature points: the order of the grey relational grades.
 
 use crate::Row;
-use rules::estimators::thermal::{Normalisation, RHO_USUAL, Series, grades};
+use rules::estimators::thermal::{Normalisation, RHO_USUAL, Series, compute_grades};
 
 /// Point, rank as published, and a warm-up that yields that order: start in °C, rise in K after three hours, time
 /// constant in minutes. The temperatures of the publication are lost; its grades rank points by relative rise.
@@ -33,7 +33,7 @@ pub(crate) fn rows() -> Vec<Row> {
     let temperatures = POINTS.map(|(_, _, course)| warm_up(course));
     let series: Vec<Series<'_>> =
         POINTS.iter().zip(&temperatures).map(|((name, ..), values)| Series { name, values }).collect();
-    let ranks = |normalisation| grades(&error_um, &series, normalisation, RHO_USUAL).expect("gradable").grades;
+    let ranks = |normalisation| compute_grades(&error_um, &series, normalisation, RHO_USUAL).expect("gradable").grades;
     let image = ranks(Normalisation::InitialImage);
     let mut rows: Vec<Row> = POINTS
         .iter()

@@ -2,7 +2,8 @@
 
 use crate::Row;
 use rules::estimators::wear::{
-    Array, Coding, Cut, CutConditions, SurfaceOptions, WearModel, estimate_wear, fit_surface, published, published_over,
+    Array, Coding, Cut, CutConditions, SurfaceOptions, WearModel, build_published_surface, estimate_wear, fit_surface,
+    published_over,
 };
 
 const SOURCE: &str = "004";
@@ -46,7 +47,7 @@ fn corner(index: usize) -> bool {
 }
 
 fn surface() -> Vec<Row> {
-    let surface = published();
+    let surface = build_published_surface();
     let at = |a: f64, b: f64, c: f64, d: f64| surface.power_at(&[a, b, c, d]);
     let worn = (0.3 - surface.coding.centre[0]) / surface.coding.half[0];
     let cube = |index: usize| at(side(index, 3), side(index, 2), side(index, 1), side(index, 0)) - CUBE[index];
@@ -76,10 +77,10 @@ fn surface() -> Vec<Row> {
 }
 
 fn sensitivities() -> Vec<Row> {
-    let surface = published();
+    let surface = build_published_surface();
     [(0.0, 0.0, 642.0), (1.0, 1.0, 659.0), (1.0, 0.0, 927.0), (1.0, -1.0, 1195.0), (-1.0, 1.0, 89.0)]
         .map(|(b, c, expected)| {
-            let slope = surface.wear_slope_w_per_mm(&surface.coding.decode([0.0, b, c, 0.0]));
+            let slope = surface.wear_slope_w_per_mm(&surface.coding.decode_conditions([0.0, b, c, 0.0]));
             Row::new(format!("sensitivity dP/dVB at b = {b}, c = {c}, W/mm"), expected, slope, 0.6, SOURCE)
         })
         .into()
@@ -94,11 +95,12 @@ fn coding() -> Coding {
 fn cuts(r2: f64) -> Vec<Cut> {
     let surface = published_over(coding());
     let exact = |noise: f64| -> Vec<Cut> {
-        let runs = Array::L27.runs();
+        let runs = Array::L27.list_runs();
         let each = runs.iter().enumerate().map(|(index, run)| {
-            let conditions = coding().decode([run[0], run[1], run[4], run[8]].map(|level| f64::from(level) - 1.0));
+            let conditions =
+                coding().decode_conditions([run[0], run[1], run[4], run[8]].map(|level| f64::from(level) - 1.0));
             let scatter = noise * (7.3 * index as f64).sin();
-            Cut { conditions, cutting_power_w: surface.predict(&conditions).power_w + scatter }
+            Cut { conditions, cutting_power_w: surface.predict_power(&conditions).power_w + scatter }
         });
         each.collect()
     };
@@ -116,7 +118,7 @@ fn fitted() -> Vec<Row> {
     let found = fit_surface(&cuts(0.9929), &SurfaceOptions::default()).expect("a fit");
     let terms = found.regression.coefficients.len() - 1;
     let coefficient = |name: &str, expected: f64| {
-        let ours = found.regression.value(name).unwrap_or(0.0);
+        let ours = found.regression.find_value(name).unwrap_or(0.0);
         Row::new(format!("refitted coefficient of {name}, W"), expected, ours, 1e-6, SOURCE)
     };
     vec![
@@ -133,8 +135,8 @@ fn fitted() -> Vec<Row> {
 fn inverse() -> Vec<Row> {
     let surface = published_over(coding());
     let model = WearModel::Surface(surface.clone());
-    let middle = CutConditions::of([0.0, 120.0, 0.15, 1.0]);
-    let power_w = surface.predict(&middle.with_wear(0.276)).power_w;
+    let middle = CutConditions::from_vector([0.0, 120.0, 0.15, 1.0]);
+    let power_w = surface.predict_power(&middle.with_wear(0.276)).power_w;
     let found = estimate_wear(&model, &middle, (power_w, 0.0), 0.3).expect("a wear");
     let slope = surface.wear_slope_w_per_mm(&middle);
     vec![
@@ -151,7 +153,7 @@ fn inverse() -> Vec<Row> {
 }
 
 fn misprints() -> Vec<Row> {
-    let surface = published();
+    let surface = build_published_surface();
     let worn = [0.807_692, 1.0, 1.0, 1.0];
     vec![
         Row::misprint(

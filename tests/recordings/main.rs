@@ -55,8 +55,8 @@ fn long(short: &str) -> &'static str {
 /// What differs from the clean recording; empty where nothing does.
 fn differences(clean: &Recording, read: &Recording, columns: &[&str]) -> Vec<String> {
     let mut found = Vec::new();
-    if clean.rows() != read.rows() {
-        found.push(format!("{} rows for {}", read.rows(), clean.rows()));
+    if clean.count_rows() != read.count_rows() {
+        found.push(format!("{} rows for {}", read.count_rows(), clean.count_rows()));
         return found;
     }
     let length =
@@ -65,15 +65,15 @@ fn differences(clean: &Recording, read: &Recording, columns: &[&str]) -> Vec<Str
         found.push(format!("{} s for {} s", length(read), length(clean)));
     }
     for name in columns {
-        if let (Some(a), Some(b)) = (clean.words(name), read.words(name)) {
+        if let (Some(a), Some(b)) = (clean.find_words(name), read.find_words(name)) {
             found.extend(
-                (0..clean.rows())
+                (0..clean.count_rows())
                     .find(|row| a.get(*row) != b.get(*row))
                     .map(|row| format!("{name} in row {row}: {:?}", b.get(row))),
             );
             continue;
         }
-        let (Some(a), Some(b)) = (clean.numbers(name), read.numbers(name)) else {
+        let (Some(a), Some(b)) = (clean.find_numbers(name), read.find_numbers(name)) else {
             found.push(format!("no {name}"));
             continue;
         };
@@ -83,7 +83,7 @@ fn differences(clean: &Recording, read: &Recording, columns: &[&str]) -> Vec<Str
             _ => false,
         };
         found.extend(
-            (0..clean.rows())
+            (0..clean.count_rows())
                 .find(wrong)
                 .map(|row| format!("{name} in row {row}: {:?} for {:?}", b.get(row), a.get(row))),
         );
@@ -116,13 +116,15 @@ fn files_of_strangers_come_to_the_numbers_of_the_clean_file() {
     for (name, truth) in truths() {
         let columns: Vec<&str> = truth.columns.iter().map(|column| long(column)).collect();
         match (read_path_as(&path(&name), &berlin()), &truth.refused) {
-            (Err(error), Some(word)) if error.to_string().contains(word.as_str()) && !error.zh().is_empty() => {
+            (Err(error), Some(word))
+                if error.to_string().contains(word.as_str()) && !error.describe_in_chinese().is_empty() =>
+            {
                 refused += 1
             }
             (Err(error), _) => wrong.push(format!("{name}: refused: {error}")),
             (Ok(read), Some(word)) if COLUMNS.iter().any(|(_, long)| long == word) => {
                 // Read, and what the name does not say is not guessed.
-                if read.recording.numbers(word).is_some() {
+                if read.recording.find_numbers(word).is_some() {
                     wrong.push(format!("{name}: {word} was guessed"))
                 } else {
                     refused += 1
@@ -166,7 +168,7 @@ fn files_of_strangers_come_to_the_numbers_of_the_clean_file() {
 #[test]
 fn what_was_assumed_is_said_in_both_languages() {
     let read = read_path_as(&path("excel_de.csv"), &berlin()).expect("readable");
-    let statement = read.statement();
+    let statement = read.describe_assumptions();
     for (text, words) in [
         (&statement.en, ["encoding windows-1252", "semicolon", "decimal comma", "local time Europe/Berlin"]),
         (&statement.zh, ["编码windows-1252", "分号分隔", "小数点为逗号", "当地时间Europe/Berlin"]),

@@ -35,7 +35,7 @@ fn machine(directory: &Path, seconds: u32, tick_hz: f64) {
     );
     fs::write(directory.join("cnc-gateway.toml"), config).expect("written");
     fs::create_dir_all(directory.join("data/scripts")).expect("created");
-    for file in rules::script::shipped() {
+    for file in rules::script::list_shipped_scripts() {
         fs::write(directory.join("data/scripts").join(file.name), "// not here\n").expect("written");
     }
     fs::write(directory.join("data/scripts/watch.rhai"), WATCH).expect("written");

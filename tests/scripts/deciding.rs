@@ -20,10 +20,10 @@ fn an_alarm_has_hysteresis_and_a_minimum_duration() {
 #[test]
 fn an_alarm_without_a_value_stays_as_it_is() {
     let mut host = host("alarm_above(\"hot\", spindle_load_pct, 100.0, 90.0, 0.0, \"hot\");");
-    assert_eq!(host.tick(&sample(0.0, &[("spindle_load_pct", 120.0)]), &cutting(0.0, 1.0)).alarms.len(), 1);
-    assert!(host.tick(&sample(0.1, &[]), &cutting(0.1, 1.0)).alarms.is_empty());
+    assert_eq!(host.run_due_scripts(&sample(0.0, &[("spindle_load_pct", 120.0)]), &cutting(0.0, 1.0)).alarms.len(), 1);
+    assert!(host.run_due_scripts(&sample(0.1, &[]), &cutting(0.1, 1.0)).alarms.is_empty());
     assert_eq!(host.alarms().len(), 1);
-    let cleared = &host.tick(&sample(0.2, &[("spindle_load_pct", 10.0)]), &cutting(0.2, 1.0)).alarms;
+    let cleared = &host.run_due_scripts(&sample(0.2, &[("spindle_load_pct", 10.0)]), &cutting(0.2, 1.0)).alarms;
     assert!(cleared.len() == 1 && !cleared[0].raised);
 }
 
@@ -36,7 +36,7 @@ fn a_plain_alarm_stands_while_its_line_is_reached() {
 #[test]
 fn a_comparison_with_a_missing_value_is_false_and_arithmetic_waits() {
     let mut quiet = host("if spindle_load_pct > 50.0 || spindle_load_pct < 50.0 { alarm(\"a\", \"\") }");
-    assert!(quiet.tick(&sample(0.0, &[]), &Estimates::none(0)).alarms.is_empty());
+    assert!(quiet.run_due_scripts(&sample(0.0, &[]), &Estimates::without_samples(0)).alarms.is_empty());
 
     let mut host = host("request_feed_override(150.0 - spindle_load_pct, \"load\");");
     assert_eq!(request(&mut host, 0.0, &[("spindle_load_pct", 70.0)]), Some(80.0));
@@ -49,15 +49,15 @@ fn a_comparison_with_a_missing_value_is_false_and_arithmetic_waits() {
          ask has(x) first, or write (x ?? 0.0) to use another number where x has no value"
     );
     assert_eq!(request(&mut host, 0.2, &[("spindle_load_pct", 60.0)]), Some(90.0), "it goes on by itself");
-    assert!(host.status().well());
+    assert!(host.status().is_healthy());
 }
 
 #[test]
 fn the_reason_of_absence_reaches_the_operator() {
     let mut host = host("note(`power ${spindle_power_w + 1.0}`);");
     let mut sample = sample(0.0, &[]);
-    sample.set(ChannelId::of("spindle_power_w").expect("a channel"), Slot::absent(Absence::Timeout));
-    host.tick(&sample, &Estimates::none(0));
+    sample.set_slot(ChannelId::from_name("spindle_power_w").expect("a channel"), Slot::from_absence(Absence::Timeout));
+    host.run_due_scripts(&sample, &Estimates::without_samples(0));
     assert!(format!("{:?}", host.status()).contains("spindle_power_w has no value (timeout)"));
 }
 
@@ -65,9 +65,9 @@ fn the_reason_of_absence_reaches_the_operator() {
 fn the_least_request_counts_and_no_number_goes_first() {
     let mut host = Host::new();
     let ask = |name: &str, pct: &str| file(name, &format!("request_feed_override({pct}, \"{name}\");"));
-    host.load(&[ask("a.rhai", "90"), ask("b.rhai", "80.5"), ask("c.rhai", "95")]).expect("they compile");
+    host.load_scripts(&[ask("a.rhai", "90"), ask("b.rhai", "80.5"), ask("c.rhai", "95")]).expect("they compile");
     assert_eq!(request(&mut host, 0.0, &[]), Some(80.5));
-    host.load(&[ask("a.rhai", "90"), ask("b.rhai", "0.0/0.0")]).expect("they compile");
+    host.load_scripts(&[ask("a.rhai", "90"), ask("b.rhai", "0.0/0.0")]).expect("they compile");
     assert!(request(&mut host, 0.1, &[]).is_some_and(f64::is_nan), "the gate must see and refuse it");
 }
 
@@ -83,7 +83,7 @@ fn memory_timers_and_pace() {
     let mut raised = Vec::new();
     for tick in 0..60 {
         let at_s = f64::from(tick) / 10.0;
-        let decision = host.tick(&sample(at_s, &[("spindle_load_pct", 60.0)]), &cutting(at_s, 1.0));
+        let decision = host.run_due_scripts(&sample(at_s, &[("spindle_load_pct", 60.0)]), &cutting(at_s, 1.0));
         notes.extend(decision.notes.iter().map(|note| note.text.to_string()));
         raised.extend(decision.alarms.iter().map(|_| at_s));
     }
@@ -96,10 +96,10 @@ fn memory_timers_and_pace() {
 #[test]
 fn a_pause_is_not_bridged() {
     let mut host = host("if held_s(\"on\", true) > 5.0 { alarm(\"long\", \"\") } note(`dt ${dt_s}`);");
-    host.tick(&sample(0.0, &[]), &Estimates::none(0));
-    let decision = host.tick(&sample(3600.0, &[]), &Estimates::none(0)).clone();
+    host.run_due_scripts(&sample(0.0, &[]), &Estimates::without_samples(0));
+    let decision = host.run_due_scripts(&sample(3600.0, &[]), &Estimates::without_samples(0)).clone();
     assert_eq!(&*decision.notes[0].text, "dt 0.0");
     assert!(decision.alarms.is_empty(), "an hour without ticks is not an hour in which the condition held");
-    let back = host.tick(&sample(10.0, &[]), &Estimates::none(0));
+    let back = host.run_due_scripts(&sample(10.0, &[]), &Estimates::without_samples(0));
     assert!(back.problems.is_empty() && back.alarms.is_empty());
 }

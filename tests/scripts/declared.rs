@@ -4,7 +4,8 @@ use super::*;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use rules::script::{
-    DeclarationPlace, SettingValue, SettingValues, compile_with, declarations, prepare, prepare_with, shipped, trials,
+    DeclarationPlace, SettingValue, SettingValues, compile_with, list_declarations, list_shipped_scripts,
+    prepare_scripts, prepare_with, run_trials,
 };
 
 /// What is wrong with one shipped script under these values; empty where nothing is.
@@ -20,8 +21,8 @@ fn wrong(script: &ScriptFile, values: &SettingValues) -> String {
 fn every_setting_at_the_ends_of_its_range_and_at_twenty_random_points_leaves_its_script_in_charge() {
     let (mut tried, mut failed) = (0, Vec::new());
     let mut random = Pcg64::seed_from_u64(33);
-    for script in shipped() {
-        let declared = declarations(std::slice::from_ref(&script)).expect("readable");
+    for script in list_shipped_scripts() {
+        let declared = list_declarations(std::slice::from_ref(&script)).expect("readable");
         let mut try_with = |values: &SettingValues, what: &str| {
             tried += 1;
             let found = wrong(&script, values);
@@ -32,7 +33,7 @@ fn every_setting_at_the_ends_of_its_range_and_at_twenty_random_points_leaves_its
         for setting in &declared {
             let mut put = |value: SettingValue| {
                 let mut values = SettingValues::default();
-                values.put(setting.section(), &setting.name, &DeclarationPlace::Machine, Some(value.clone()));
+                values.set_value(setting.section(), &setting.name, &DeclarationPlace::Machine, Some(value.clone()));
                 try_with(&values, &format!("{} = {value}", setting.path()));
             };
             match setting.range {
@@ -45,14 +46,14 @@ fn every_setting_at_the_ends_of_its_range_and_at_twenty_random_points_leaves_its
             for (setting, (least, greatest)) in declared.iter().filter_map(|it| Some((it, it.range?))) {
                 let number: f64 = random.random_range(least..=greatest);
                 let number = if setting.whole { number.round() } else { number };
-                values.put(
+                values.set_value(
                     setting.section(),
                     &setting.name,
                     &DeclarationPlace::Machine,
                     Some(SettingValue::Number(number)),
                 );
             }
-            try_with(&values, &values.text());
+            try_with(&values, &values.to_toml_text());
         }
     }
     println!("{tried} choices of settings, {} without a script in charge", failed.len());
@@ -89,13 +90,13 @@ fn a_value_that_cannot_be_used_is_told_with_line_range_unit_and_the_nearest_word
     assert!(refused("[one]\nx_w = [3]").contains("neither a number nor a text"));
     assert!(refused("[one\nx_w = 3").contains("not TOML"));
     assert_eq!(refused("[thermal]\nlimit_um = 3"), "", "a shipped script that was taken out");
-    let written = values("[one.tool.\"T 1\"]\nx_w = 7\n[one]\nx_w = 3").expect("fine").text();
+    let written = values("[one.tool.\"T 1\"]\nx_w = 7\n[one]\nx_w = 3").expect("fine").to_toml_text();
     assert_eq!(written, "[one]\nx_w = 3.0\n\n[one.tool.\"T 1\"]\nx_w = 7.0\n");
 }
 
 #[test]
 fn a_declaration_that_cannot_be_used_is_told() {
-    let told = |text: &str| told(&compile(&[file("one.rhai", text)]).err().unwrap_or_default());
+    let told = |text: &str| told(&compile_scripts(&[file("one.rhai", text)]).err().unwrap_or_default());
     assert!(
         told("let x = setting(\"x\", 50, #{ unit: \"W\", min: 0, max: 10, en: \"a\", zh: \"b\" });")
             .contains("the default is not allowed")
@@ -115,16 +116,16 @@ fn a_declaration_that_cannot_be_used_is_told() {
 fn the_tool_in_use_decides_where_it_has_a_value_of_its_own() {
     let values = values("[one]\nx_w = 3\n[one.tool.T7]\nx_w = 9").expect("fine");
     let set = prepare_with(&[file("one.rhai", ONE)], &values).unwrap_or_else(|problems| panic!("{}", told(&problems)));
-    assert_eq!(trials(&set).len(), 3, "the defaults, the machine, the tool");
+    assert_eq!(run_trials(&set).len(), 3, "the defaults, the machine, the tool");
     let mut host = Host::new();
-    host.install(set);
+    host.install_set(set);
     let mut over = |at_s: i64, tool: &str| {
-        let mut sample = Sample::empty(at_s * 1_000_000_000);
-        let id = ChannelId::of("tool").expect("a channel");
-        sample.set(id, Slot { value: Ok(Value::Text(tool.into())), age_ns: 0 });
-        let mut estimates = Estimates::none(sample.at_ns);
+        let mut sample = Sample::new_empty(at_s * 1_000_000_000);
+        let id = ChannelId::from_name("tool").expect("a channel");
+        sample.set_slot(id, Slot { value: Ok(Value::Text(tool.into())), age_ns: 0 });
+        let mut estimates = Estimates::without_samples(sample.at_ns);
         estimates.cutting_power_w = Ok(Estimate { value: 5.0, sd: 0.1 });
-        let notes = host.tick(&sample, &estimates).notes.clone();
+        let notes = host.run_due_scripts(&sample, &estimates).notes.clone();
         (host.alarms().len(), notes.first().map(|note| note.text.to_string()))
     };
     assert_eq!(over(1, "T1"), (1, None), "above the 3 W of the machine");
@@ -136,7 +137,8 @@ fn the_tool_in_use_decides_where_it_has_a_value_of_its_own() {
 fn two_tools_may_have_the_same_value() {
     let settings = |text: &str| {
         let values = values(&format!("[constant_load]\ntarget_w = 1000\n{text}")).expect("fine");
-        let set = prepare_with(&shipped(), &values).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+        let set =
+            prepare_with(&list_shipped_scripts(), &values).unwrap_or_else(|problems| panic!("{}", told(&problems)));
         set.settings().clone()
     };
     let (first, second) = ("[constant_load.tool.T1]\ntarget_w = 800\n", "[constant_load.tool.T2]\ntarget_w = 800\n");
@@ -154,24 +156,26 @@ fn what_one_script_publishes_another_reads_in_the_same_tick_and_circles_are_refu
         "a.rhai",
         "note(`${half_w}`);\nfn trial_it() { given(#{ half_w: 4.0 }); after_s(0.1); expect_note(\"4.0\"); }",
     );
-    let set = prepare(&[read.clone(), publish.clone()]).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+    let set =
+        prepare_scripts(&[read.clone(), publish.clone()]).unwrap_or_else(|problems| panic!("{}", told(&problems)));
     assert_eq!(set.versions().map(|it| it.0).collect::<Vec<_>>(), ["z.rhai", "a.rhai"]);
     let mut host = Host::new();
-    host.install(set);
-    let mut estimates = Estimates::none(0);
+    host.install_set(set);
+    let mut estimates = Estimates::without_samples(0);
     estimates.cutting_power_w = Ok(Estimate { value: 8.0, sd: 0.1 });
-    assert_eq!(&*host.tick(&Sample::empty(0), &estimates).notes[0].text, "4.0");
+    assert_eq!(&*host.run_due_scripts(&Sample::new_empty(0), &estimates).notes[0].text, "4.0");
     let circle = file("z.rhai", "publish(\"half_w\", twice_w, \"W\");");
     let other = file("a.rhai", "publish(\"twice_w\", half_w, \"W\");");
-    let told_of = told(&compile(&[circle, other]).err().expect("a circle"));
+    let told_of = told(&compile_scripts(&[circle, other]).err().expect("a circle"));
     assert!(told_of.contains("a.rhai reads half_w of z.rhai, z.rhai reads twice_w of a.rhai"), "{told_of}");
-    let alone = told(&compile(&[file("b.rhai", "note(`${part_energy_kwh}`);")]).err().expect("nobody publishes it"));
+    let alone =
+        told(&compile_scripts(&[file("b.rhai", "note(`${part_energy_kwh}`);")]).err().expect("nobody publishes it"));
     assert!(alone.contains("energy.rhai, which comes with the gateway, publishes it"), "{alone}");
 }
 
 #[test]
 fn a_script_without_trials_is_run_before_it_comes_into_charge() {
-    let told = |text: &str| told(&prepare(&[file("x.rhai", text)]).err().unwrap_or_default());
+    let told = |text: &str| told(&prepare_scripts(&[file("x.rhai", text)]).err().unwrap_or_default());
     assert!(told("loop {}").contains("did not come to an end"));
     assert!(
         told("if now_s < 0.0 { request_feed_override(\"90 %\", \"x\"); }")
@@ -185,20 +189,20 @@ fn a_script_without_trials_is_run_before_it_comes_into_charge() {
 #[test]
 fn an_edited_script_that_fails_after_days_gives_way_to_the_one_before_and_a_first_one_to_the_delivered() {
     let late = "if now_s > 5000.0 { let a = [1]; a[7] = 1; }\nrequest_feed_override(80, \"late\");";
-    let none = Estimates::none(0);
-    let at = |at_s: i64| Sample::empty(at_s * 1_000_000_000);
+    let none = Estimates::without_samples(0);
+    let at = |at_s: i64| Sample::new_empty(at_s * 1_000_000_000);
     let mut host = Host::new();
-    host.load(&[file("alarms.rhai", "request_feed_override(90, \"good\");")]).expect("compiles");
-    host.tick(&at(0), &none);
-    host.load(&[file("alarms.rhai", late)]).expect("compiles");
-    (1..300).for_each(|tick| drop(host.tick(&at(tick), &none).clone()));
-    assert!(host.tick(&at(6000), &none).problems.len() == 1);
-    assert_eq!(host.tick(&at(6001), &none).request.as_ref().map(|it| it.pct), Some(90.0));
+    host.load_scripts(&[file("alarms.rhai", "request_feed_override(90, \"good\");")]).expect("compiles");
+    host.run_due_scripts(&at(0), &none);
+    host.load_scripts(&[file("alarms.rhai", late)]).expect("compiles");
+    (1..300).for_each(|tick| drop(host.run_due_scripts(&at(tick), &none).clone()));
+    assert!(host.run_due_scripts(&at(6000), &none).problems.len() == 1);
+    assert_eq!(host.run_due_scripts(&at(6001), &none).request.as_ref().map(|it| it.pct), Some(90.0));
     let mut host = Host::new();
-    host.load(&[file("alarms.rhai", late)]).expect("compiles");
-    host.tick(&at(6000), &none);
-    host.tick(&at(6001), &none);
+    host.load_scripts(&[file("alarms.rhai", late)]).expect("compiles");
+    host.run_due_scripts(&at(6000), &none);
+    host.run_due_scripts(&at(6001), &none);
     let status = host.status();
-    assert_eq!(status.scripts[0].condition.word(), "reverted");
+    assert_eq!(status.scripts[0].condition.as_word(), "reverted");
     assert!(!status.scripts[0].reads.is_empty(), "the alarms as delivered");
 }

@@ -73,7 +73,7 @@ const RIGHT: [&str; 16] = [
 fn what_can_never_be_is_told_with_the_right_word() {
     let mut refused = 0;
     for (text, wanted) in MISTAKES {
-        let problems = compile(&[file("test.rhai", text)]).err().unwrap_or_default();
+        let problems = compile_scripts(&[file("test.rhai", text)]).err().unwrap_or_default();
         let told = told(&problems);
         assert!(told.contains(wanted) && told.contains("test.rhai:1:"), "{text}\n{told}");
         assert_eq!(problems.len(), 1, "one mistake, one message: {text}\n{told}");
@@ -85,6 +85,6 @@ fn what_can_never_be_is_told_with_the_right_word() {
 #[test]
 fn what_can_be_is_not_refused() {
     for text in RIGHT {
-        compile(&[file("test.rhai", text)]).unwrap_or_else(|problems| panic!("{text}\n{}", told(&problems)));
+        compile_scripts(&[file("test.rhai", text)]).unwrap_or_else(|problems| panic!("{text}\n{}", told(&problems)));
     }
 }

@@ -50,9 +50,10 @@ fn a_mad_script_is_stopped_and_told_and_the_next_tick_runs() {
     for (what, text) in MAD {
         let mut host = Host::new();
         let good = file("good.rhai", "request_feed_override(90, \"good\");");
-        host.load(&[file("mad.rhai", &format!("request_feed_override(10, \"mad\");\n{text}")), good]).expect(what);
+        host.load_scripts(&[file("mad.rhai", &format!("request_feed_override(10, \"mad\");\n{text}")), good])
+            .expect(what);
         let began = Instant::now();
-        let decision = host.tick(&sample(0.0, &[]), &Estimates::none(0)).clone();
+        let decision = host.run_due_scripts(&sample(0.0, &[]), &Estimates::without_samples(0)).clone();
         let took = began.elapsed();
         println!(
             "{what:24} {:8.3} ms  {}",
@@ -83,7 +84,7 @@ fn mad_scripts_take_less_than_fifty_milliseconds() {
         let run = || {
             let mut host = host(text);
             let began = processor_ns().expect("the system tells it");
-            host.tick(&sample(0.0, &[]), &Estimates::none(0));
+            host.run_due_scripts(&sample(0.0, &[]), &Estimates::without_samples(0));
             (processor_ns().expect("the system tells it") - began) as f64 / 1e6
         };
         let most_ms = (0..5).map(|_| run()).fold(0.0, f64::max);
@@ -107,13 +108,13 @@ fn nothing_outside_is_in_reach() {
         "let f = Fn(\"sleep\"); f.call(1)",
         "open(\"/etc/passwd\")",
     ] {
-        assert!(compile(&[file("x.rhai", text)]).is_err(), "{text} compiles");
+        assert!(compile_scripts(&[file("x.rhai", text)]).is_err(), "{text} compiles");
     }
     let mut by_name = host("[10].map(\"sleep\");");
-    assert_eq!(by_name.tick(&sample(0.0, &[]), &Estimates::none(0)).problems.len(), 1);
+    assert_eq!(by_name.run_due_scripts(&sample(0.0, &[]), &Estimates::without_samples(0)).problems.len(), 1);
     let deep = format!("let x = {}1{};", "(".repeat(5000), ")".repeat(5000));
-    assert!(compile(&[file("x.rhai", &deep)]).is_err());
-    assert!(compile(&[file("x.rhai", &"x".repeat(TEXT_MAX + 1))]).is_err());
+    assert!(compile_scripts(&[file("x.rhai", &deep)]).is_err());
+    assert!(compile_scripts(&[file("x.rhai", &"x".repeat(TEXT_MAX + 1))]).is_err());
 }
 
 proptest::proptest! {
@@ -121,10 +122,10 @@ proptest::proptest! {
     fn no_text_makes_the_compiler_panic(
         text in "(let |if |fn |settings|alarm|memory|state|\\(|\\)|\\{|\\}|#\\{|\\[|\\]|;|=|\"|`|\\$\\{|//|[a-z]{1,3}|[0-9.]{1,4}|\\+|\\||\n|\\PC){0,40}"
     ) {
-        if let Ok(set) = compile(&[file("x.rhai", &text)]) {
+        if let Ok(set) = compile_scripts(&[file("x.rhai", &text)]) {
             let mut host = Host::new();
-            host.install(set);
-            host.tick(&sample(0.0, &[]), &Estimates::none(0));
+            host.install_set(set);
+            host.run_due_scripts(&sample(0.0, &[]), &Estimates::without_samples(0));
         }
     }
 }
@@ -136,7 +137,7 @@ struct Impatient {
 }
 
 impl rules::script::Deadline for Impatient {
-    fn begin(&self) {
+    fn begin_run(&self) {
         self.asked.store(0, std::sync::atomic::Ordering::SeqCst);
     }
 
@@ -151,22 +152,22 @@ const LONG: &str = "request_feed_override(80, \"long\"); let i = 0; while i < 10
 fn a_run_that_lasts_too_long_by_the_clock_is_left_out_and_only_the_third_in_a_row_fails() {
     let mut host = host(LONG);
     assert_eq!(request(&mut host, 0.0, &[]), Some(80.0), "without a clock only operations count");
-    host.watch(std::sync::Arc::new(Impatient { asked: 0.into(), over: 5 }));
+    host.set_deadline(std::sync::Arc::new(Impatient { asked: 0.into(), over: 5 }));
     for tick in 1..=3 {
         let at_s = f64::from(tick) / 10.0;
-        let decision = host.tick(&sample(at_s, &[]), &Estimates::none(0)).clone();
+        let decision = host.run_due_scripts(&sample(at_s, &[]), &Estimates::without_samples(0)).clone();
         assert!(told(&decision.problems).contains("lasted too long by the clock"), "{}", told(&decision.problems));
         assert_eq!(decision.request, None, "a stopped run asks for nothing");
-        assert_eq!(host.status().well(), tick < 3, "two may be bad luck");
+        assert_eq!(host.status().is_healthy(), tick < 3, "two may be bad luck");
     }
 }
 
 #[test]
 fn the_clock_of_the_gateway_stops_what_operations_would_allow() {
     let mut host = host(LONG);
-    host.watch(std::sync::Arc::new(gateway::run::deadline::RunLimit::new(Duration::ZERO)));
-    let decision = host.tick(&sample(0.0, &[]), &Estimates::none(0)).clone();
+    host.set_deadline(std::sync::Arc::new(gateway::run::deadline::RunLimit::new(Duration::ZERO)));
+    let decision = host.run_due_scripts(&sample(0.0, &[]), &Estimates::without_samples(0)).clone();
     assert_eq!((decision.problems.len(), decision.request), (1, None));
-    host.watch(std::sync::Arc::new(gateway::run::deadline::RunLimit::new(Duration::from_secs(60))));
+    host.set_deadline(std::sync::Arc::new(gateway::run::deadline::RunLimit::new(Duration::from_secs(60))));
     assert_eq!(request(&mut host, 0.1, &[]), Some(80.0), "the next run begins anew");
 }

@@ -18,7 +18,7 @@ use adapters::clock::SECOND_NS;
 use adapters::{ChannelId, Sample, Slot, Value};
 use rules::estimators::loads::LoadEstimator;
 use rules::estimators::{Estimate, Estimates, State};
-use rules::script::{Host, ScriptCondition, ScriptFile, ScriptProblem, compile};
+use rules::script::{Host, ScriptCondition, ScriptFile, ScriptProblem, compile_scripts};
 
 fn file(name: &str, text: &str) -> ScriptFile {
     ScriptFile { name: name.to_owned(), text: text.to_owned() }
@@ -27,7 +27,7 @@ fn file(name: &str, text: &str) -> ScriptFile {
 /// A host in which one script is in charge.
 fn host(text: &str) -> Host {
     let mut host = Host::new();
-    host.load(&[file("test.rhai", text)]).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+    host.load_scripts(&[file("test.rhai", text)]).unwrap_or_else(|problems| panic!("{}", told(&problems)));
     host
 }
 
@@ -36,22 +36,22 @@ fn told(problems: &[ScriptProblem]) -> String {
 }
 
 fn sample(at_s: f64, values: &[(&str, f64)]) -> Sample {
-    let mut sample = Sample::empty((at_s * SECOND_NS as f64) as i64);
+    let mut sample = Sample::new_empty((at_s * SECOND_NS as f64) as i64);
     for (name, value) in values {
-        let id = ChannelId::of(name).expect("a channel");
-        sample.set(id, Slot { value: Value::number(*value), age_ns: 0 });
+        let id = ChannelId::from_name(name).expect("a channel");
+        sample.set_slot(id, Slot { value: Value::from_number(*value), age_ns: 0 });
     }
     sample
 }
 
 fn set_text(sample: &mut Sample, name: &str, text: &str) {
-    let id = ChannelId::of(name).expect("a channel");
-    sample.set(id, Slot { value: Ok(Value::Text(text.into())), age_ns: 0 });
+    let id = ChannelId::from_name(name).expect("a channel");
+    sample.set_slot(id, Slot { value: Ok(Value::Text(text.into())), age_ns: 0 });
 }
 
 fn cutting(at_s: f64, power_w: f64) -> Estimates {
     let at_ns = (at_s * SECOND_NS as f64) as i64;
-    let mut estimates = Estimates::none(at_ns);
+    let mut estimates = Estimates::without_samples(at_ns);
     estimates.state = State::Cutting;
     estimates.since_ns = 0;
     estimates.cutting_power_w = Ok(Estimate { value: power_w, sd: 5.0 });
@@ -63,7 +63,7 @@ fn alarms(host: &mut Host, channel: &str, values: &[f64]) -> Vec<String> {
     let mut changes = Vec::new();
     for (tick, value) in values.iter().enumerate() {
         let at_s = tick as f64 / 10.0;
-        let decision = host.tick(&sample(at_s, &[(channel, *value)]), &cutting(at_s, 100.0));
+        let decision = host.run_due_scripts(&sample(at_s, &[(channel, *value)]), &cutting(at_s, 100.0));
         assert!(decision.problems.is_empty(), "{}", told(&decision.problems));
         for change in &decision.alarms {
             changes.push(format!("{}{} at {at_s}", if change.raised { '+' } else { '-' }, change.name));
@@ -73,7 +73,7 @@ fn alarms(host: &mut Host, channel: &str, values: &[f64]) -> Vec<String> {
 }
 
 fn request(host: &mut Host, at_s: f64, values: &[(&str, f64)]) -> Option<f64> {
-    host.tick(&sample(at_s, values), &cutting(at_s, 100.0)).request.as_ref().map(|request| request.pct)
+    host.run_due_scripts(&sample(at_s, values), &cutting(at_s, 100.0)).request.as_ref().map(|request| request.pct)
 }
 
 /// The same where the estimators see the load too.
@@ -84,5 +84,5 @@ fn request_with_loads(
 ) -> Option<f64> {
     let (sample, mut estimates) = (sample(at_s, values), cutting(at_s, 100.0));
     loads.step(&sample, &mut estimates, host.settings());
-    host.tick(&sample, &estimates).request.as_ref().map(|request| request.pct)
+    host.run_due_scripts(&sample, &estimates).request.as_ref().map(|request| request.pct)
 }

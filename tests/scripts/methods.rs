@@ -2,13 +2,13 @@
 
 use super::{file, host, sample, told};
 use rules::estimators::Estimates;
-use rules::script::{Host, ScriptCondition, compile};
+use rules::script::{Host, ScriptCondition, compile_scripts};
 
 /// The notes of one run of a script.
 fn notes(text: &str, values: &[(&str, f64)]) -> Vec<String> {
     let mut host = host(text);
     let sample = sample(1.0, values);
-    let decision = host.tick(&sample, &Estimates::none(sample.at_ns));
+    let decision = host.run_due_scripts(&sample, &Estimates::without_samples(sample.at_ns));
     decision.notes.iter().map(|note| note.text.to_string()).collect()
 }
 
@@ -65,7 +65,7 @@ fn a_script_that_computes_with_the_missing_number_waits_and_says_why() {
     let mut host: Host =
         host("note(\"\" + 2.0 * interpolated_no_load_power_w([[600, 365], [700, 440], [900, 545]], 1500));");
     let sample = sample(1.0, &[]);
-    host.tick(&sample, &Estimates::none(sample.at_ns));
+    host.run_due_scripts(&sample, &Estimates::without_samples(sample.at_ns));
     let status = host.status();
     match &status.scripts[0].condition {
         ScriptCondition::Waiting(problem) => assert!(problem.what.contains("noise gain 33.6"), "{problem}"),
@@ -76,7 +76,7 @@ fn a_script_that_computes_with_the_missing_number_waits_and_says_why() {
 #[test]
 fn a_mistake_in_a_call_is_told_before_the_script_runs_or_stops_it() {
     let problems =
-        compile(&[file("wrong.rhai", "let x = separated_cutting_power_w(1.0, 2.0);")]).err().expect("refused");
+        compile_scripts(&[file("wrong.rhai", "let x = separated_cutting_power_w(1.0, 2.0);")]).err().expect("refused");
     assert!(
         told(&problems).contains("write separated_cutting_power_w(spindle_power_w, no_load_power_w"),
         "{}",
@@ -84,6 +84,6 @@ fn a_mistake_in_a_call_is_told_before_the_script_runs_or_stops_it() {
     );
     let mut host = host("let x = feed_curve_feed(7, 1.0, 2.0);");
     let sample = sample(1.0, &[]);
-    host.tick(&sample, &Estimates::none(sample.at_ns));
+    host.run_due_scripts(&sample, &Estimates::without_samples(sample.at_ns));
     assert!(matches!(host.status().scripts[0].condition, ScriptCondition::Suspended(Some(_))));
 }

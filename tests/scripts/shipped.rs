@@ -3,32 +3,37 @@
 use super::*;
 use gateway::pipeline::{Channels, CycleFollower};
 use rules::estimators::wear::WearEstimator;
-use rules::script::{shipped, words};
+use rules::script::{list_shipped_scripts, list_words};
 
 #[test]
 fn the_shipped_scripts_compile_and_run_with_and_without_values() {
     let mut host = Host::new();
-    host.load(&shipped()).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+    host.load_scripts(&list_shipped_scripts()).unwrap_or_else(|problems| panic!("{}", told(&problems)));
     assert_eq!(host.settings().get("c1"), Some(0.15));
-    let numbers: Vec<(&str, f64)> =
-        words().iter().filter(|word| ChannelId::of(word.name).is_some()).map(|word| (word.name, 1.0)).collect();
+    let numbers: Vec<(&str, f64)> = list_words()
+        .iter()
+        .filter(|word| ChannelId::from_name(word.name).is_some())
+        .map(|word| (word.name, 1.0))
+        .collect();
     let numbers: Vec<_> = numbers
         .into_iter()
-        .filter(|(name, _)| ChannelId::of(name).is_some_and(|id| id.channel().kind != adapters::channel::Kind::Text))
+        .filter(|(name, _)| {
+            ChannelId::from_name(name).is_some_and(|id| id.channel().kind != adapters::channel::Kind::Text)
+        })
         .collect();
     for tick in 0..600 {
         let at_s = f64::from(tick) / 10.0;
         let values: &[(&str, f64)] = if tick % 200 < 100 { &numbers } else { &[] };
-        let decision = host.tick(&sample(at_s, values), &cutting(at_s, 100.0));
+        let decision = host.run_due_scripts(&sample(at_s, values), &cutting(at_s, 100.0));
         assert!(decision.problems.is_empty(), "{}", told(&decision.problems));
     }
-    assert!(host.status().well(), "{:?}", host.status());
+    assert!(host.status().is_healthy(), "{:?}", host.status());
 }
 
 #[test]
 fn the_shipped_constant_load_slows_a_heavy_cut_and_lets_go_afterwards() {
     let (mut host, mut loads) = (Host::new(), LoadEstimator::default());
-    host.load(&shipped()).expect("they compile");
+    host.load_scripts(&list_shipped_scripts()).expect("they compile");
     let cut = [("spindle_load_pct", 95.0), ("feed_mm_min", 200.0), ("feed_programmed_mm_min", 200.0)];
     let at = |tick: i32| f64::from(tick) / 10.0;
     let heavy: Vec<Option<f64>> =
@@ -43,7 +48,7 @@ fn the_shipped_constant_load_slows_a_heavy_cut_and_lets_go_afterwards() {
 /// argument says. Gives the alarms of tool wear with the part in which each changed.
 fn parts(count: u32, worn: f64) -> Vec<String> {
     let mut host = Host::new();
-    host.load(&shipped()).expect("they compile");
+    host.load_scripts(&list_shipped_scripts()).expect("they compile");
     let mut wear = WearEstimator::default();
     let mut changes = Vec::new();
     for tick in 0..count * 1000 {
@@ -58,8 +63,8 @@ fn parts(count: u32, worn: f64) -> Vec<String> {
         set_text(&mut sample, "tool", tool);
         set_text(&mut sample, "program", "O1001");
         let mut estimates = cutting(at_s, factor * power_w);
-        wear.step(&sample, &mut estimates);
-        for change in &host.tick(&sample, &estimates).alarms {
+        wear.update_estimates(&sample, &mut estimates);
+        for change in &host.run_due_scripts(&sample, &estimates).alarms {
             if change.name.starts_with("tool_w") {
                 changes.push(format!("{}{} in part {part}", if change.raised { '+' } else { '-' }, change.name));
             }
@@ -83,16 +88,16 @@ fn the_shipped_tool_wear_tells_a_worn_edge() {
 #[test]
 fn the_shipped_energy_counts_what_it_should() {
     let (mut host, mut parts, channels) = (Host::new(), CycleFollower::default(), Channels::new());
-    host.load(&shipped()).expect("they compile");
+    host.load_scripts(&list_shipped_scripts()).expect("they compile");
     let mut notes = Vec::new();
     for tick in 0..=36_000_u32 {
         let at_s = f64::from(tick) / 10.0;
         let part = f64::from(tick / 36_000);
         let (sample, mut estimates) =
             (sample(at_s, &[("total_power_w", 2000.0), ("part_count", part)]), cutting(at_s, 500.0));
-        let _finished = parts.step(&channels, &sample, &estimates);
-        estimates.part = parts.figures();
-        let decision = host.tick(&sample, &estimates);
+        let _finished = parts.follow_tick(&channels, &sample, &estimates);
+        estimates.part = parts.last_figures();
+        let decision = host.run_due_scripts(&sample, &estimates);
         notes.extend(
             decision.notes.iter().filter(|note| &*note.script == "energy.rhai").map(|note| note.text.to_string()),
         );
@@ -102,9 +107,9 @@ fn the_shipped_energy_counts_what_it_should() {
 
 #[test]
 fn every_word_can_be_read() {
-    for word in words() {
+    for word in list_words() {
         let text = format!("let x = {};", word.name);
-        compile(&[file("word.rhai", &text)]).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+        compile_scripts(&[file("word.rhai", &text)]).unwrap_or_else(|problems| panic!("{}", told(&problems)));
     }
 }
 
@@ -112,7 +117,7 @@ fn every_word_can_be_read() {
 fn the_same_samples_give_the_same_decisions() {
     let run = || {
         let (mut host, mut loads) = (Host::new(), LoadEstimator::default());
-        host.load(&shipped()).expect("they compile");
+        host.load_scripts(&list_shipped_scripts()).expect("they compile");
         let mut text = String::new();
         let mut seed = 1_u64;
         for tick in 0..5000 {
@@ -130,7 +135,7 @@ fn the_same_samples_give_the_same_decisions() {
             let provided = if seed.is_multiple_of(7) { &values[1..] } else { &values[..] };
             let (sample, mut estimates) = (sample(at_s, provided), cutting(at_s, 900.0 * random));
             loads.step(&sample, &mut estimates, host.settings());
-            text += &format!("{:?}\n", host.tick(&sample, &estimates));
+            text += &format!("{:?}\n", host.run_due_scripts(&sample, &estimates));
         }
         text
     };

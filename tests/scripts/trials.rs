@@ -1,11 +1,11 @@
 //! Trials in script files: what passes, what fails, and where it is said.
 
 use super::*;
-use rules::script::{TrialResult, prove, trials};
+use rules::script::{TrialResult, prove_scripts, run_trials};
 
 fn results(text: &str) -> Vec<TrialResult> {
-    let set = compile(&[file("x.rhai", text)]).unwrap_or_else(|problems| panic!("{}", told(&problems)));
-    trials(&set)
+    let set = compile_scripts(&[file("x.rhai", text)]).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+    run_trials(&set)
 }
 
 const SLOWING: &str = "const LIMIT_PCT = 90.0;\n\
@@ -74,7 +74,7 @@ fn a_script_that_fails_in_a_trial_is_told_at_its_own_line() {
 
 #[test]
 fn what_is_wrong_with_a_trial_is_told_when_the_file_is_loaded() {
-    let refused = |text: &str| told(&compile(&[file("x.rhai", text)]).err().expect("refused"));
+    let refused = |text: &str| told(&compile_scripts(&[file("x.rhai", text)]).err().expect("refused"));
     assert!(refused("fn trial_it() { expect_alrm(\"a\"); }").contains("did you mean `expect_alarm`?"));
     assert!(refused("fn trial_it() { expect_alarm(); }").contains("write expect_alarm(name)"));
     assert!(refused("fn trial_it() { if state == \"idle\" { after_s(1) } }").contains("a trial does not see `state`"));
@@ -84,10 +84,12 @@ fn what_is_wrong_with_a_trial_is_told_when_the_file_is_loaded() {
 
 #[test]
 fn only_scripts_whose_trials_pass_may_come_into_charge() {
-    let good = compile(&[file("x.rhai", "fn trial_it() { after_s(1); expect_no_alarms(); }")]).expect("it compiles");
-    assert!(prove(good).is_ok());
-    let bad = compile(&[file("x.rhai", "alarm(\"a\", \"\");\nfn trial_it() { after_s(1); expect_no_alarms(); }")]);
-    let problems = prove(bad.expect("it compiles")).err().expect("refused");
+    let good =
+        compile_scripts(&[file("x.rhai", "fn trial_it() { after_s(1); expect_no_alarms(); }")]).expect("it compiles");
+    assert!(prove_scripts(good).is_ok());
+    let bad =
+        compile_scripts(&[file("x.rhai", "alarm(\"a\", \"\");\nfn trial_it() { after_s(1); expect_no_alarms(); }")]);
+    let problems = prove_scripts(bad.expect("it compiles")).err().expect("refused");
     assert!(
         told(&problems).contains("x.rhai:2:29: trial \"it\": after 1.0 s: expected no alarm; standing: a"),
         "{}",
@@ -99,8 +101,8 @@ fn only_scripts_whose_trials_pass_may_come_into_charge() {
 fn trials_leave_no_trace_in_the_script_that_runs() {
     let text =
         "memory.n = (memory.n ?? 0) + 1; note(`${memory.n}`);\nfn trial_it() { after_s(1); expect_note(\"10\"); }";
-    let set = prove(compile(&[file("x.rhai", text)]).expect("it compiles")).expect("the trial passes");
+    let set = prove_scripts(compile_scripts(&[file("x.rhai", text)]).expect("it compiles")).expect("the trial passes");
     let mut host = Host::new();
-    host.install(set);
-    assert_eq!(&*host.tick(&sample(0.0, &[]), &Estimates::none(0)).notes[0].text, "1");
+    host.install_set(set);
+    assert_eq!(&*host.run_due_scripts(&sample(0.0, &[]), &Estimates::without_samples(0)).notes[0].text, "1");
 }

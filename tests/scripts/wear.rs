@@ -20,7 +20,7 @@ fn notes(depth_mm: f64, power_w: f64) -> (Vec<String>, bool) {
         ("feed_per_rev_mm", 0.15),
         ("depth_of_cut_mm", depth_mm),
     ];
-    let decision = host.tick(&sample(0.0, &values), &cutting(0.0, power_w));
+    let decision = host.run_due_scripts(&sample(0.0, &values), &cutting(0.0, power_w));
     assert!(decision.problems.is_empty(), "{}", told(&decision.problems));
     let notes = decision.notes.iter().map(|note| note.text.to_string()).collect();
     (notes, !host.alarms().is_empty())

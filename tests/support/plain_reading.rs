@@ -6,7 +6,7 @@
 //! range in the text that serve it best: c1 = 0.15, c2 = 0.05.
 
 use adapters::{ChannelId, Sample};
-use rules::estimators::{AntiPulse, Settings, State, stationary};
+use rules::estimators::{AntiPulse, Settings, State, is_stationary};
 use std::collections::VecDeque;
 
 const WINDOW: usize = 20;
@@ -29,7 +29,7 @@ pub(crate) struct PlainReading {
 impl PlainReading {
     pub(crate) fn new() -> Self {
         let mut settings = Settings::default();
-        settings.set("c1", C1).expect("in range");
+        settings.set_value("c1", C1).expect("in range");
         let names = ["total_power_w", "spindle_speed_rpm", "feed_mm_min", "spindle_power_w"];
         Self {
             state: State::Off,
@@ -37,7 +37,7 @@ impl PlainReading {
             filter: AntiPulse::new(FILTER),
             window: VecDeque::new(),
             settings,
-            channels: names.map(|name| ChannelId::of(name).expect("in the table")),
+            channels: names.map(|name| ChannelId::from_name(name).expect("in the table")),
             last: [0.0; 4],
         }
     }
@@ -79,7 +79,7 @@ impl PlainReading {
 
     fn settle(&mut self) -> State {
         let mean_w = self.window.iter().sum::<f64>() / self.window.len() as f64;
-        if self.window.len() < WINDOW || !stationary(self.window.iter().copied(), mean_w, &self.settings) {
+        if self.window.len() < WINDOW || !is_stationary(self.window.iter().copied(), mean_w, &self.settings) {
             return State::SpindleStart;
         }
         self.no_load_w = Some(mean_w);

@@ -19,33 +19,34 @@ use super::item::{FocasItem, Write};
 use super::opening::Generation;
 use super::request;
 use super::server::{Controller, answer_body};
-use super::wire::{FocasFrame, FrameKind, Request, frame, replies, request_body, requests};
+use super::wire::{FocasFrame, FrameKind, Request, encode_frame, parse_replies, parse_requests, request_body};
 use rows::{CapturedCall, Says};
 
 const VERSIONS: [u16; 3] = [2, 3, 4];
 
-fn bytes(hex: &str) -> Vec<u8> {
+fn parse_hex_bytes(hex: &str) -> Vec<u8> {
     let digits: Vec<u32> = hex.chars().filter_map(|digit| digit.to_digit(16)).collect();
     digits.chunks(2).map(|pair| u8::try_from(pair[0] * 16 + pair[1]).expect("two digits")).collect()
 }
 
-fn word(number: usize) -> [u8; 2] {
+fn encode_word(number: usize) -> [u8; 2] {
     u16::try_from(number).expect("a word").to_be_bytes()
 }
 
-fn hex(text: &str) -> u32 {
+fn parse_hex(text: &str) -> u32 {
     u32::from_str_radix(text.trim_start_matches('-'), 16).expect("hexadecimal")
 }
 
 /// `1/40 4 -1` as the 28 bytes and more of a question.
-fn question(text: &str) -> (Vec<u8>, Vec<u8>) {
+fn parse_question(text: &str) -> (Vec<u8>, Vec<u8>) {
     let (head, written) = text.split_once('=').unwrap_or((text, ""));
-    let written = bytes(written);
+    let written = parse_hex_bytes(written);
     let mut parts = head.split_whitespace();
     let (device, function) = parts.next().expect("a function").split_once('/').expect("device/function");
-    let head = [&word(hex(device) as usize)[..], &[0, 1], &word(hex(function) as usize)].concat();
-    let mut block = [&word(28 + written.len())[..], &head].concat();
-    let mut arguments: Vec<u32> = parts.map(|text| if text == "-1" { u32::MAX } else { hex(text) }).collect();
+    let head =
+        [&encode_word(parse_hex(device) as usize)[..], &[0, 1], &encode_word(parse_hex(function) as usize)].concat();
+    let mut block = [&encode_word(28 + written.len())[..], &head].concat();
+    let mut arguments: Vec<u32> = parts.map(|text| if text == "-1" { u32::MAX } else { parse_hex(text) }).collect();
     arguments.resize(5, 0);
     if !written.is_empty() {
         arguments[4] = u32::try_from(written.len()).expect("short");
@@ -56,7 +57,7 @@ fn question(text: &str) -> (Vec<u8>, Vec<u8>) {
 }
 
 /// The data of an answer from its notation.
-fn data(text: &str) -> Vec<u8> {
+fn parse_data(text: &str) -> Vec<u8> {
     let mut data = Vec::new();
     for part in text.split_whitespace() {
         match part.strip_prefix("..").and_then(|fill| fill.split_once('x')) {
@@ -67,53 +68,58 @@ fn data(text: &str) -> Vec<u8> {
                 let zeros: usize = zeros.parse().expect("bytes");
                 data.resize(data.len() + zeros * count.parse::<usize>().expect("a count"), 0);
             }
-            None => data.extend(bytes(part)),
+            None => data.extend(parse_hex_bytes(part)),
         }
     }
     data
 }
 
-fn answer(text: &str, head: &[u8]) -> Vec<u8> {
+fn build_answer(text: &str, head: &[u8]) -> Vec<u8> {
     let (code, detail, data) = match text.strip_prefix('!').and_then(|refusal| refusal.split_once('.')) {
-        Some((code, detail)) => (hex(code), hex(detail), Vec::new()),
-        None => (0, 0, data(text)),
+        Some((code, detail)) => (parse_hex(code), parse_hex(detail), Vec::new()),
+        None => (0, 0, parse_data(text)),
     };
-    let codes = [word(code as usize), word(detail as usize), [0, 0], word(data.len())].concat();
-    [&word(16 + data.len())[..], head, &codes, &data].concat()
+    let codes = [encode_word(code as usize), encode_word(detail as usize), [0, 0], encode_word(data.len())].concat();
+    [&encode_word(16 + data.len())[..], head, &codes, &data].concat()
 }
 
-fn whole(version: u16, kind: &str, blocks: &[Vec<u8>]) -> Vec<u8> {
-    let body = [&word(blocks.len())[..], &blocks.concat()].concat();
-    [&[0xA0; 4][..], &version.to_be_bytes(), &bytes(kind), &word(body.len()), &body].concat()
+fn build_frame(version: u16, kind: &str, blocks: &[Vec<u8>]) -> Vec<u8> {
+    let body = [&encode_word(blocks.len())[..], &blocks.concat()].concat();
+    [&[0xA0; 4][..], &version.to_be_bytes(), &parse_hex_bytes(kind), &encode_word(body.len()), &body].concat()
 }
 
 /// The two captured frames of a row.
-fn captured(row: &CapturedCall, version: u16) -> (Vec<u8>, Vec<u8>) {
-    let questions: Vec<(Vec<u8>, Vec<u8>)> = row.asked.split('|').map(|text| question(text.trim())).collect();
+fn build_captured_frames(row: &CapturedCall, version: u16) -> (Vec<u8>, Vec<u8>) {
+    let questions: Vec<(Vec<u8>, Vec<u8>)> = row.asked.split('|').map(|text| parse_question(text.trim())).collect();
     let answers: Vec<&str> = row.answered.split('|').collect();
     assert_eq!(questions.len(), answers.len(), "{}", row.call);
-    let answers = questions.iter().zip(answers).map(|((_, head), text)| answer(text.trim(), head)).collect::<Vec<_>>();
+    let answers =
+        questions.iter().zip(answers).map(|((_, head), text)| build_answer(text.trim(), head)).collect::<Vec<_>>();
     let questions: Vec<Vec<u8>> = questions.into_iter().map(|(block, _)| block).collect();
-    (whole(1, "2101", &questions), whole(version, "2102", &answers))
+    (build_frame(1, "2101", &questions), build_frame(version, "2102", &answers))
 }
 
-fn asked(row: &CapturedCall, generation: Generation) -> Vec<Request> {
+fn build_requests(row: &CapturedCall, generation: Generation) -> Vec<Request> {
     match &row.says {
-        Says::Written(write) => vec![request::writing(write, generation)],
-        Says::Read(items, _) => items.iter().map(|item| request::reading(*item, generation)).collect(),
+        Says::Written(write) => vec![request::build_write_request(write, generation)],
+        Says::Read(items, _) => items.iter().map(|item| request::build_read_request(*item, generation)).collect(),
     }
 }
 
-fn rows(version: u16) -> impl Iterator<Item = CapturedCall> {
-    rows::all().into_iter().filter(move |row| row.versions.contains(&version))
+fn list_rows(version: u16) -> impl Iterator<Item = CapturedCall> {
+    rows::list_all_calls().into_iter().filter(move |row| row.versions.contains(&version))
 }
 
 #[test]
 fn the_client_asks_as_the_vendors_client() {
     for version in VERSIONS {
-        for row in rows(version) {
-            let ours = frame(1, FrameKind::Request, &request_body(&asked(&row, Generation::of(version))));
-            assert_eq!(ours, captured(&row, version).0, "{} of generation {version}", row.call);
+        for row in list_rows(version) {
+            let ours = encode_frame(
+                1,
+                FrameKind::Request,
+                &request_body(&build_requests(&row, Generation::from_version(version))),
+            );
+            assert_eq!(ours, build_captured_frames(&row, version).0, "{} of generation {version}", row.call);
         }
     }
 }
@@ -121,22 +127,23 @@ fn the_client_asks_as_the_vendors_client() {
 #[test]
 fn the_client_reads_the_same_values() {
     for version in VERSIONS {
-        for row in rows(version) {
+        for row in list_rows(version) {
             let Says::Read(items, expected) = &row.says else { continue };
-            let found = decoded(items, Generation::of(version), &captured(&row, version).1);
+            let found =
+                decode_answers(items, Generation::from_version(version), &build_captured_frames(&row, version).1);
             assert_eq!(&found, expected, "{} of generation {version}", row.call);
         }
     }
 }
 
-fn decoded(items: &[FocasItem], generation: Generation, bytes: &[u8]) -> Vec<FocasItemResult> {
-    let frame = FocasFrame::of(bytes).expect("a frame");
-    assert_eq!((frame.kind, Generation::of(frame.version)), (FrameKind::Answer, generation));
-    let replies = replies(&frame.body).expect("blocks");
+fn decode_answers(items: &[FocasItem], generation: Generation, bytes: &[u8]) -> Vec<FocasItemResult> {
+    let frame = FocasFrame::from_bytes(bytes).expect("a frame");
+    assert_eq!((frame.kind, Generation::from_version(frame.version)), (FrameKind::Answer, generation));
+    let replies = parse_replies(&frame.body).expect("blocks");
     let one = |(item, reply): (&FocasItem, &super::wire::Reply<'_>)| {
-        reply.answers(&request::reading(*item, generation)).expect("the answer to the question");
+        reply.check_request(&request::build_read_request(*item, generation)).expect("the answer to the question");
         match reply.code {
-            0 => decode::answer(*item, generation, reply.data)
+            0 => decode::read_answer(*item, generation, reply.data)
                 .map_err(|error| super::answer::FocasItemError::Malformed(error.to_string())),
             code => Err(super::answer::FocasItemError::Refused(super::answer::Refusal {
                 code: super::code::FocasReturnCode(code),
@@ -148,37 +155,37 @@ fn decoded(items: &[FocasItem], generation: Generation, bytes: &[u8]) -> Vec<Foc
     items.iter().zip(&replies).map(one).collect()
 }
 
-fn served(controller: &mut Controller, version: u16, bytes: &[u8]) -> Vec<u8> {
-    let request = FocasFrame::of(bytes).expect("a frame");
-    let asked = requests(&request.body).expect("blocks");
-    frame(version, FrameKind::Answer, &answer_body(controller, &asked))
+fn serve_request(controller: &mut Controller, version: u16, bytes: &[u8]) -> Vec<u8> {
+    let request = FocasFrame::from_bytes(bytes).expect("a frame");
+    let asked = parse_requests(&request.body).expect("blocks");
+    encode_frame(version, FrameKind::Answer, &answer_body(controller, &asked))
 }
 
 #[test]
 fn the_server_answers_as_the_captured_one() {
     for version in VERSIONS {
-        let mut controller = fixture::controller(version);
-        for row in rows(version) {
-            fixture::before(row.call, &mut controller);
-            let (question, answer) = captured(&row, version);
-            let ours = served(&mut controller, version, &question);
+        let mut controller = fixture::build_controller(version);
+        for row in list_rows(version) {
+            fixture::prepare_call(row.call, &mut controller);
+            let (question, answer) = build_captured_frames(&row, version);
+            let ours = serve_request(&mut controller, version, &question);
             assert_eq!(ours, answer, "{} of generation {version}", row.call);
         }
-        fixture::written(&controller);
+        fixture::assert_written(&controller);
     }
 }
 
 #[test]
 fn a_write_and_its_reading_agree_in_every_generation() {
     for version in VERSIONS {
-        let generation = Generation::of(version);
-        let mut controller = fixture::controller(version);
+        let generation = Generation::from_version(version);
+        let mut controller = fixture::build_controller(version);
         let write = Write::Macro { number: 512, mantissa: -25, places: 1 };
-        let body = request_body(&[request::writing(&write, generation)]);
-        served(&mut controller, version, &frame(1, FrameKind::Request, &body));
+        let body = request_body(&[request::build_write_request(&write, generation)]);
+        serve_request(&mut controller, version, &encode_frame(1, FrameKind::Request, &body));
         let items = [FocasItem::Macro(512)];
-        let body = request_body(&[request::reading(items[0], generation)]);
-        let answer = served(&mut controller, version, &frame(1, FrameKind::Request, &body));
-        assert_eq!(decoded(&items, generation, &answer), [Ok(super::answer::FocasAnswer::Number(Some(-2.5)))]);
+        let body = request_body(&[request::build_read_request(items[0], generation)]);
+        let answer = serve_request(&mut controller, version, &encode_frame(1, FrameKind::Request, &body));
+        assert_eq!(decode_answers(&items, generation, &answer), [Ok(super::answer::FocasAnswer::Number(Some(-2.5)))]);
     }
 }

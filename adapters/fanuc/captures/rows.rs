@@ -40,7 +40,7 @@ pub(super) fn write(call: &'static str, versions: &'static [u16], asked: &'stati
     CapturedCall { call, versions, asked, answered: "", says: Says::Written(write) }
 }
 
-pub(super) fn refused(
+pub(super) fn define_refusal(
     call: &'static str,
     asked: &'static str,
     answered: &'static str,
@@ -52,49 +52,49 @@ pub(super) fn refused(
     CapturedCall { call, versions: ALL, asked, answered, says: Says::Read(vec![item], vec![refusal]) }
 }
 
-pub(super) fn number(value: f64) -> FocasAnswer {
+pub(super) fn build_number(value: f64) -> FocasAnswer {
     FocasAnswer::Number(Some(value))
 }
 
-fn numbers(values: &[f64], places: usize) -> FocasAnswer {
+fn build_numbers(values: &[f64], places: usize) -> FocasAnswer {
     let mut values: Vec<Option<f64>> = values.iter().map(|value| Some(*value)).collect();
     values.resize(places.max(values.len()), Some(0.0));
     FocasAnswer::Numbers(values)
 }
 
-pub(super) fn data(kind: i16, value: f64) -> FocasAnswer {
+pub(super) fn build_data(kind: i16, value: f64) -> FocasAnswer {
     FocasAnswer::Data { kind, values: vec![Some(value)] }
 }
 
 /// One quantity of the only spindle.
-fn spindle(what: Spindle, value: f64) -> (FocasItem, FocasAnswer) {
-    (FocasItem::Spindles(what), numbers(&[value], 1))
+fn build_spindle(what: Spindle, value: f64) -> (FocasItem, FocasAnswer) {
+    (FocasItem::Spindles(what), build_numbers(&[value], 1))
 }
 
-fn count(which: i16, count: i32) -> (FocasItem, FocasAnswer) {
+fn build_count(which: i16, count: i32) -> (FocasItem, FocasAnswer) {
     (FocasItem::Count(which), FocasAnswer::Whole(count))
 }
 
-fn names(names: &[&str]) -> FocasAnswer {
+fn build_names(names: &[&str]) -> FocasAnswer {
     FocasAnswer::Names(names.iter().map(ToString::to_string).collect())
 }
 
-pub(super) fn modal(value: i32) -> FocasAnswer {
+pub(super) fn build_modal(value: i32) -> FocasAnswer {
     FocasAnswer::Modal { value, flag: 0, places: 0 }
 }
 
 /// Every captured call, in the order of the captures.
-pub(super) fn all() -> Vec<CapturedCall> {
-    let mut rows = state();
-    rows.extend(speeds());
-    rows.extend(meters());
-    rows.extend(program());
-    rows.extend(dynamic());
-    rows.extend(super::values::all());
+pub(super) fn list_all_calls() -> Vec<CapturedCall> {
+    let mut rows = list_state_calls();
+    rows.extend(list_speed_calls());
+    rows.extend(list_meter_calls());
+    rows.extend(list_program_calls());
+    rows.extend(list_dynamic_calls());
+    rows.extend(super::values::list_calls());
     rows
 }
 
-fn state() -> Vec<CapturedCall> {
+fn list_state_calls() -> Vec<CapturedCall> {
     use FocasAnswer::Whole;
     let status = Status { automatic: 1, run: 3, motion: 1, ..Status::default() };
     let system = |axes_max| {
@@ -142,32 +142,32 @@ fn state() -> Vec<CapturedCall> {
     ]
 }
 
-fn speeds() -> Vec<CapturedCall> {
-    let none = |parameter| (FocasItem::Parameter(parameter, 0), data(3, 0.0));
+fn list_speed_calls() -> Vec<CapturedCall> {
+    let none = |parameter| (FocasItem::Parameter(parameter, 0), build_data(3, 0.0));
     vec![
-        read("cnc_actf", ALL, "1/24", "000004b0000a0000", vec![(FocasItem::Feed, number(1200.0))]),
-        read("cnc_acts", ALL, "1/25", "00001f40000a0000", vec![(FocasItem::SpindleSpeed, number(8000.0))]),
+        read("cnc_actf", ALL, "1/24", "000004b0000a0000", vec![(FocasItem::Feed, build_number(1200.0))]),
+        read("cnc_acts", ALL, "1/25", "00001f40000a0000", vec![(FocasItem::SpindleSpeed, build_number(8000.0))]),
         read(
             "cnc_acts2",
             NEWER,
             "1/a4 1 | 1/40 3 -1 | 1/a4 1",
             "0001 | 00001f40000a0000 | 0001",
-            vec![count(1, 1), spindle(Spindle::Speed, 8000.0), count(1, 1)],
+            vec![build_count(1, 1), build_spindle(Spindle::Speed, 8000.0), build_count(1, 1)],
         ),
-        read("cnc_acts2", OLDER, "1/40 3 -1", "00001f40000a0000", vec![spindle(Spindle::Speed, 8000.0)]),
+        read("cnc_acts2", OLDER, "1/40 3 -1", "00001f40000a0000", vec![build_spindle(Spindle::Speed, 8000.0)]),
         read(
             "cnc_rdspeed",
             NEWER,
             "1/a4 3 | 1/8a 1 | 1/88 3 | 1/88 4 | 1/24 | 1/25 | 1/a4 3",
             "0001 | 53310000 | 0003 | 0003 | 000004b0000a0000 | 00001f40000a0000 | 0001",
             vec![
-                count(3, 1),
-                (FocasItem::SpindleNames(1), names(&["S1"])),
+                build_count(3, 1),
+                (FocasItem::SpindleNames(1), build_names(&["S1"])),
                 (FocasItem::FeedUnit, FocasAnswer::Unit(SpeedUnit::MmMin)),
                 (FocasItem::SpindleUnit, FocasAnswer::Unit(SpeedUnit::Rpm)),
-                (FocasItem::Feed, number(1200.0)),
-                (FocasItem::SpindleSpeed, number(8000.0)),
-                count(3, 1),
+                (FocasItem::Feed, build_number(1200.0)),
+                (FocasItem::SpindleSpeed, build_number(8000.0)),
+                build_count(3, 1),
             ],
         ),
         read(
@@ -177,22 +177,22 @@ fn speeds() -> Vec<CapturedCall> {
             "000004b0000a0000 | 00001f40000a0000 | 0000 | 00000c2200000003 ..4x8 | 00000c2300000003 ..4x8 \
              | 000026d000000003 ..4x8 | 0000 | 00",
             vec![
-                (FocasItem::Feed, number(1200.0)),
-                (FocasItem::SpindleSpeed, number(8000.0)),
+                (FocasItem::Feed, build_number(1200.0)),
+                (FocasItem::SpindleSpeed, build_number(8000.0)),
                 (FocasItem::FeedUnit, FocasAnswer::Unit(SpeedUnit::MmMin)),
                 none(3106),
                 none(3107),
                 none(9936),
                 (FocasItem::ModalGroup(4), FocasAnswer::Groups(vec![0])),
-                (FocasItem::Pmc(Stretch::bytes(Area::G, 28, 1)), FocasAnswer::Memory(vec![0])),
+                (FocasItem::Pmc(Stretch::from_byte_range(Area::G, 28, 1)), FocasAnswer::Memory(vec![0])),
             ],
         ),
     ]
 }
 
-fn meters() -> Vec<CapturedCall> {
-    let servo = (FocasItem::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 32));
-    let axis_names = (FocasItem::AxisNames, names(&["X", "Y", "Z"]));
+fn list_meter_calls() -> Vec<CapturedCall> {
+    let servo = (FocasItem::Servos(Servo::Load), build_numbers(&[-31.0, 52.0, 118.0], 32));
+    let axis_names = (FocasItem::AxisNames, build_names(&["X", "Y", "Z"]));
     vec![
         read(
             "cnc_rdspmeter",
@@ -200,11 +200,11 @@ fn meters() -> Vec<CapturedCall> {
             "1/a4 1 | 1/8a -1 | 1/40 4 -1 | 1/40 5 -1 | 1/a4 1",
             "0001 | 53310000 | 00000113000a0001 | 00001f4c000a0000 | 0001",
             vec![
-                count(1, 1),
-                (FocasItem::SpindleNames(-1), names(&["S1"])),
-                spindle(Spindle::Load, 27.5),
-                spindle(Spindle::MotorSpeed, 8012.0),
-                count(1, 1),
+                build_count(1, 1),
+                (FocasItem::SpindleNames(-1), build_names(&["S1"])),
+                build_spindle(Spindle::Load, 27.5),
+                build_spindle(Spindle::MotorSpeed, 8012.0),
+                build_count(1, 1),
             ],
         ),
         read(
@@ -213,9 +213,9 @@ fn meters() -> Vec<CapturedCall> {
             "1/40 4 -1 | 1/40 5 -1 | 1/8a",
             "00000113000a0001 | 00001f4c000a0000 | 53310000",
             vec![
-                spindle(Spindle::Load, 27.5),
-                spindle(Spindle::MotorSpeed, 8012.0),
-                (FocasItem::SpindleNames(0), names(&["S1"])),
+                build_spindle(Spindle::Load, 27.5),
+                build_spindle(Spindle::MotorSpeed, 8012.0),
+                (FocasItem::SpindleNames(0), build_names(&["S1"])),
             ],
         ),
         read(
@@ -223,27 +223,27 @@ fn meters() -> Vec<CapturedCall> {
             NEWER,
             "1/a4 1 | 1/40 0 -1 | 1/a4 1",
             "0001 | 0000001b000a0000 | 0001",
-            vec![count(1, 1), spindle(Spindle::PlainLoad, 27.0), count(1, 1)],
+            vec![build_count(1, 1), build_spindle(Spindle::PlainLoad, 27.0), build_count(1, 1)],
         ),
-        read("cnc_rdspload", OLDER, "1/40 0 -1", "0000001b000a0000", vec![spindle(Spindle::PlainLoad, 27.0)]),
+        read("cnc_rdspload", OLDER, "1/40 0 -1", "0000001b000a0000", vec![build_spindle(Spindle::PlainLoad, 27.0)]),
         read(
             "cnc_rdsvmeter",
             NEWER,
             "1/a4 2 | 1/89 | 1/56 1 | 1/a4 2",
             "0003 | 58000000590000005a000000 | ffffffe1000a0000 00000034000a0000 00000076000a0000 ..8x29 | 0003",
-            vec![count(2, 3), axis_names.clone(), servo, count(2, 3)],
+            vec![build_count(2, 3), axis_names.clone(), servo, build_count(2, 3)],
         ),
         read(
             "cnc_rdsvmeter",
             OLDER,
             "1/56 1 | 1/89",
             "ffffffe1000a0000 00000034000a0000 00000076000a0000 ..8x5 | 58000000590000005a000000",
-            vec![(FocasItem::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 8)), axis_names],
+            vec![(FocasItem::Servos(Servo::Load), build_numbers(&[-31.0, 52.0, 118.0], 8)), axis_names],
         ),
     ]
 }
 
-fn program() -> Vec<CapturedCall> {
+fn list_program_calls() -> Vec<CapturedCall> {
     let path = "//CNC_MEM/USER/PATH1/O1234";
     vec![
         read(
@@ -271,22 +271,25 @@ fn program() -> Vec<CapturedCall> {
     ]
 }
 
-fn dynamic() -> Vec<CapturedCall> {
+fn list_dynamic_calls() -> Vec<CapturedCall> {
     let head = || {
         vec![
             (FocasItem::AlarmBits, FocasAnswer::Whole(0)),
             (FocasItem::Program, FocasAnswer::Program { running: 1234, main: 1000 }),
             (FocasItem::Sequence, FocasAnswer::Whole(120)),
-            (FocasItem::Feed, number(1200.0)),
-            (FocasItem::SpindleSpeed, number(8000.0)),
+            (FocasItem::Feed, build_number(1200.0)),
+            (FocasItem::SpindleSpeed, build_number(8000.0)),
         ]
     };
     let kinds = [Position::Absolute, Position::Machine, Position::Relative, Position::ToGo];
-    let one =
-        kinds.iter().zip([123.456, 223.456, 1.0, 0.5]).map(|(kind, at)| (FocasItem::Position(*kind, 1), number(at)));
+    let one = kinds
+        .iter()
+        .zip([123.456, 223.456, 1.0, 0.5])
+        .map(|(kind, at)| (FocasItem::Position(*kind, 1), build_number(at)));
     let every = [[123.456, -98.765, 10.5], [223.456, -198.765, -10.5], [1.0, 2.0, -3.0], [0.5, 0.0, -0.25]];
     let all = |places| {
-        let position = move |(kind, at): (&Position, [f64; 3])| (FocasItem::Position(*kind, -1), numbers(&at, places));
+        let position =
+            move |(kind, at): (&Position, [f64; 3])| (FocasItem::Position(*kind, -1), build_numbers(&at, places));
         head().into_iter().chain(kinds.iter().zip(every).map(position)).collect::<Vec<_>>()
     };
     vec![

@@ -1,14 +1,19 @@
 //! The captured calls about modal values, alarms, variables, parameters, PMC memory, offsets and what is written.
 
-use super::rows::{ALL, CapturedCall, NEWER, OLDER, data, modal, number, read, refused, write};
+use super::rows::{
+    ALL, CapturedCall, NEWER, OLDER, build_data, build_modal, build_number, define_refusal, read, write,
+};
 use crate::fanuc::answer::{Alarm, FocasAnswer};
 use crate::fanuc::item::{Area, BlockWord, FocasItem, PmcWidth, Stretch, Timer, Write};
 
-pub(super) fn all() -> Vec<CapturedCall> {
-    [values(), variables(), parameters(), writes(), rest()].into_iter().flatten().collect()
+pub(super) fn list_calls() -> Vec<CapturedCall> {
+    [list_value_calls(), list_variable_calls(), list_parameter_calls(), list_write_calls(), list_remaining_calls()]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
-fn values() -> Vec<CapturedCall> {
+fn list_value_calls() -> Vec<CapturedCall> {
     let alarms = vec![
         Alarm { number: 100, kind: 3, axis: 0, text: "PARAMETER ENABLE SWITCH ON".into() },
         Alarm { number: 417, kind: 6, axis: 2, text: "SERVO ALARM".into() },
@@ -21,21 +26,21 @@ fn values() -> Vec<CapturedCall> {
             ALL,
             "1/22 5",
             "000004b0 00000000",
-            vec![(FocasItem::ModalWord(BlockWord::F), modal(1200))],
+            vec![(FocasItem::ModalWord(BlockWord::F), build_modal(1200))],
         ),
         read(
             "cnc_modal of M",
             ALL,
             "1/22 b",
             "00000003 00000000",
-            vec![(FocasItem::ModalWord(BlockWord::M), modal(3))],
+            vec![(FocasItem::ModalWord(BlockWord::M), build_modal(3))],
         ),
         read(
             "cnc_modal of T",
             ALL,
             "1/22 16",
             "0000000c 00000000",
-            vec![(FocasItem::ModalWord(BlockWord::T), modal(12))],
+            vec![(FocasItem::ModalWord(BlockWord::T), build_modal(12))],
         ),
         read(
             "cnc_rdalmmsg2",
@@ -46,8 +51,20 @@ fn values() -> Vec<CapturedCall> {
             vec![(FocasItem::Alarms(8), FocasAnswer::Alarms(alarms))],
         ),
         read("cnc_alarm2", ALL, "1/1a", "00000048", vec![(FocasItem::AlarmBits, FocasAnswer::Whole(72))]),
-        read("cnc_rdmacro", NEWER, "1/15 1f4 1f4", "000000fe000a0001", vec![(FocasItem::Macro(500), number(25.4))]),
-        read("cnc_rdmacro", OLDER, "1/15 1f4 1f4", "659999990002001a", vec![(FocasItem::Macro(500), number(nearly))]),
+        read(
+            "cnc_rdmacro",
+            NEWER,
+            "1/15 1f4 1f4",
+            "000000fe000a0001",
+            vec![(FocasItem::Macro(500), build_number(25.4))],
+        ),
+        read(
+            "cnc_rdmacro",
+            OLDER,
+            "1/15 1f4 1f4",
+            "659999990002001a",
+            vec![(FocasItem::Macro(500), build_number(nearly))],
+        ),
         read(
             "cnc_rdmacro vacant",
             ALL,
@@ -55,11 +72,11 @@ fn values() -> Vec<CapturedCall> {
             "00000000ffffffff",
             vec![(FocasItem::Macro(501), FocasAnswer::Number(None))],
         ),
-        refused("cnc_rdmacro of none", "1/15 1389 1389", "!3.0", FocasItem::Macro(5001), 3, 0),
+        define_refusal("cnc_rdmacro of none", "1/15 1389 1389", "!3.0", FocasItem::Macro(5001), 3, 0),
     ]
 }
 
-fn variables() -> Vec<CapturedCall> {
+fn list_variable_calls() -> Vec<CapturedCall> {
     vec![
         write(
             "cnc_wrmacro",
@@ -90,19 +107,19 @@ fn variables() -> Vec<CapturedCall> {
             NEWER,
             "1/15 1ff 1ff",
             "ffffffe7000a0001",
-            vec![(FocasItem::Macro(511), number(-2.5))],
+            vec![(FocasItem::Macro(511), build_number(-2.5))],
         ),
         read(
             "cnc_rdmacro of what was written",
             OLDER,
             "1/15 1ff 1ff",
             "b00000000002001d",
-            vec![(FocasItem::Macro(511), number(-2.5))],
+            vec![(FocasItem::Macro(511), build_number(-2.5))],
         ),
     ]
 }
 
-fn parameters() -> Vec<CapturedCall> {
+fn list_parameter_calls() -> Vec<CapturedCall> {
     let pmc = |area, from, to, width| Stretch { area, from, to, width };
     vec![
         read(
@@ -110,28 +127,28 @@ fn parameters() -> Vec<CapturedCall> {
             NEWER,
             "1/8d 1a37 1a37",
             "00001a37 0000 0003 000001c8000a0000 ..8x31",
-            vec![(FocasItem::Parameter(6711, 0), data(3, 456.0))],
+            vec![(FocasItem::Parameter(6711, 0), build_data(3, 456.0))],
         ),
         read(
             "cnc_rdparam",
             OLDER,
             "1/e 1a37 1a37",
             "00001a37 0000 0003 000001c8 ..4x7",
-            vec![(FocasItem::Parameter(6711, 0), data(3, 456.0))],
+            vec![(FocasItem::Parameter(6711, 0), build_data(3, 456.0))],
         ),
         read(
             "cnc_diagnoss",
             NEWER,
             "1/93 134 134 1",
             "00000134 0001 0002 00000029000a0000 ..8x31",
-            vec![(FocasItem::Diagnosis(308, 1), data(2, 41.0))],
+            vec![(FocasItem::Diagnosis(308, 1), build_data(2, 41.0))],
         ),
         read(
             "cnc_diagnoss",
             OLDER,
             "1/30 134 134 1",
             "00000134 0001 0002 00000029 ..4x7",
-            vec![(FocasItem::Diagnosis(308, 1), data(2, 41.0))],
+            vec![(FocasItem::Diagnosis(308, 1), build_data(2, 41.0))],
         ),
         read(
             "pmc_rdpmcrng of G12",
@@ -150,7 +167,7 @@ fn parameters() -> Vec<CapturedCall> {
     ]
 }
 
-fn writes() -> Vec<CapturedCall> {
+fn list_write_calls() -> Vec<CapturedCall> {
     let d900 = Stretch { area: Area::D, from: 900, to: 903, width: PmcWidth::Word };
     let mut signals = [0; 16];
     signals[5] = 8;
@@ -159,7 +176,7 @@ fn writes() -> Vec<CapturedCall> {
             "pmc_wrpmcrng of G12",
             ALL,
             "2/8002 c c = af",
-            Write::Pmc { stretch: Stretch::bytes(Area::G, 12, 1), values: vec![175] },
+            Write::Pmc { stretch: Stretch::from_byte_range(Area::G, 12, 1), values: vec![175] },
         ),
         write(
             "pmc_wrpmcrng of D900",
@@ -180,9 +197,21 @@ fn writes() -> Vec<CapturedCall> {
             "1/9 1 1 3e8 = fffffb2e0000ffff",
             Write::ToolOffset { number: 1, kind: 0, value: -1234 },
         ),
-        read("cnc_rdtofs", ALL, "1/8 1 1 3e8", "fffffb2e000a0003", vec![(FocasItem::ToolOffset(1, 0), number(-1.234))]),
+        read(
+            "cnc_rdtofs",
+            ALL,
+            "1/8 1 1 3e8",
+            "fffffb2e000a0003",
+            vec![(FocasItem::ToolOffset(1, 0), build_number(-1.234))],
+        ),
         write("cnc_wrzofs", ALL, "1/c 0 0 1 = ffffff060000ffff", Write::WorkOffset { number: 0, axis: 1, value: -250 }),
-        read("cnc_rdzofs", ALL, "1/b 0 0 1", "ffffff06000a0003", vec![(FocasItem::WorkOffset(0, 1), number(-0.25))]),
+        read(
+            "cnc_rdzofs",
+            ALL,
+            "1/b 0 0 1",
+            "ffffff06000a0003",
+            vec![(FocasItem::WorkOffset(0, 1), build_number(-0.25))],
+        ),
         write(
             "cnc_wropnlsgnl",
             ALL,
@@ -192,7 +221,7 @@ fn writes() -> Vec<CapturedCall> {
     ]
 }
 
-fn rest() -> Vec<CapturedCall> {
+fn list_remaining_calls() -> Vec<CapturedCall> {
     let text = "N120 G01 X10.5 F1200\nN130 Z-2.\nM30\n%";
     let mut signals = vec![0; 16];
     (signals[0], signals[5], signals[6]) = (1, 8, 5);
@@ -220,6 +249,6 @@ fn rest() -> Vec<CapturedCall> {
             "0001 0000 0000 0000 0000 0008 0005 ..18x1",
             vec![(FocasItem::PanelSignals(0x20), FocasAnswer::Signals(signals))],
         ),
-        refused("option missing", "1/24", "!6.2", FocasItem::Feed, 6, 2),
+        define_refusal("option missing", "1/24", "!6.2", FocasItem::Feed, 6, 2),
     ]
 }

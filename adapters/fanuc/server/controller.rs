@@ -34,7 +34,7 @@ impl ControllerAxis {
     /// A standing axis at zero. A, B and C turn, by custom.
     #[must_use]
     pub fn new(name: &str) -> Self {
-        let zero = Number::decimal(0, 0);
+        let zero = Number::from_decimal(0, 0);
         let rotary = name.starts_with(['A', 'B', 'C']);
         Self {
             name: name.to_owned(),
@@ -42,7 +42,7 @@ impl ControllerAxis {
             load: zero,
             speed: zero,
             current: zero,
-            positions: [Number::decimal(0, 3); 4],
+            positions: [Number::from_decimal(0, 3); 4],
         }
     }
 }
@@ -170,15 +170,15 @@ impl Controller {
     /// A control with these axes and one spindle, of the generation of this version word.
     #[must_use]
     pub fn new(version: u16, axes: &[impl ToString]) -> Self {
-        let generation = Generation::of(version);
+        let generation = Generation::from_version(version);
         let older = matches!(generation, Generation::Older(_));
         let (family, axes_max, spindles_max) = if older { (3, 8, 4) } else { (5, 32, 8) };
         let count = u16::try_from(axes.len()).unwrap_or(0);
         let opening = Opening { generation, family, axes_max, spindles_max, paths: 1, axes: count, spindles: 1 };
-        let zero = Number::decimal(0, 0);
+        let zero = Number::from_decimal(0, 0);
         Self {
             opening,
-            system: system(older, axes.len()),
+            system: build_system(older, axes.len()),
             id: [0x0001_0002, 0x0003_0004, 0x0005_0006, 0x0007_0008],
             inch: false,
             clock: [2026, 1, 1, 0, 0, 0],
@@ -236,7 +236,7 @@ impl Controller {
     }
 
     /// What a path from 1 has for itself.
-    pub(super) fn path(&mut self, path: u16) -> Option<&mut Self> {
+    pub(super) fn find_path(&mut self, path: u16) -> Option<&mut Self> {
         match usize::from(path).checked_sub(2) {
             Some(further) => self.further.get_mut(further),
             None => Some(self),
@@ -244,7 +244,7 @@ impl Controller {
     }
 
     /// The body of the answer to an opening.
-    pub(super) fn opened(&self) -> Vec<u8> {
+    pub(super) fn encode_opening(&self) -> Vec<u8> {
         let further = |path: u16| self.further.get(usize::from(path).checked_sub(2)?);
         self.opening.body_with(|path| {
             let own = further(path).map_or(&self.opening, |path| &path.opening);
@@ -259,19 +259,19 @@ impl Controller {
         let group = if unit.is_per_revolution() { poll::PER_REVOLUTION } else { 0 };
         self.modal_groups.insert(FEED_GROUP, group);
         let code = if unit.is_per_revolution() { 95 } else { 94 };
-        self.g_codes.insert(FEED_CODES, Number::decimal(code, 0));
-        self.parameter(FEED_SHOWN, 0, Number::decimal(8, 0));
+        self.g_codes.insert(FEED_CODES, Number::from_decimal(code, 0));
+        self.set_parameter(FEED_SHOWN, 0, Number::from_decimal(8, 0));
     }
 
     /// Puts modal words without decimals there.
-    pub fn modal(&mut self, words: impl IntoIterator<Item = (BlockWord, i32)>) {
-        self.modal_words.extend(words.into_iter().map(|(word, value)| (word, Number::decimal(value, 0))));
+    pub fn set_modal_words(&mut self, words: impl IntoIterator<Item = (BlockWord, i32)>) {
+        self.modal_words.extend(words.into_iter().map(|(word, value)| (word, Number::from_decimal(value, 0))));
     }
 
     /// Puts the machine into inches or millimetres, with the parameter that says so.
     pub fn measure_in_inches(&mut self, inch: bool) {
         self.inch = inch;
-        self.parameter(1001, 0, Number::decimal(i32::from(inch), 0));
+        self.set_parameter(1001, 0, Number::from_decimal(i32::from(inch), 0));
     }
 
     /// Puts a value of every axis into a diagnosis number.
@@ -280,17 +280,17 @@ impl Controller {
     }
 
     /// Puts a parameter without axes there.
-    pub fn parameter(&mut self, number: i32, kind: i16, value: Number) {
+    pub fn set_parameter(&mut self, number: i32, kind: i16, value: Number) {
         self.parameters.insert(number, Data { kind, values: vec![value] });
     }
 
     /// Puts a diagnosis number of one axis or spindle there.
-    pub fn diagnosis(&mut self, number: i32, kind: i16, value: Number) {
+    pub fn set_diagnosis(&mut self, number: i32, kind: i16, value: Number) {
         self.diagnoses.insert(number, Data { kind, values: vec![value] });
     }
 }
 
-fn system(older: bool, axes: usize) -> System {
+fn build_system(older: bool, axes: usize) -> System {
     let (kind, series, version) = if older { ("16", "B0F1", "21.0") } else { ("31", "G421", "27.0") };
     System {
         additional: 0x0402,

@@ -37,7 +37,7 @@ pub enum InjectedFault {
 impl InjectedFault {
     /// The bytes as they are spoiled.
     #[must_use]
-    pub(super) fn spoil(self, mut bytes: Vec<u8>) -> Vec<u8> {
+    pub(super) fn spoil_bytes(self, mut bytes: Vec<u8>) -> Vec<u8> {
         let at = |bytes: &mut Vec<u8>, index: usize, value: u8| {
             if let Some(byte) = bytes.get_mut(index) {
                 *byte = value;

@@ -35,7 +35,7 @@ use crate::clock::TimeNs;
 use crate::driver::{LadderRequest, LadderRule};
 use crate::fanuc::feed_override;
 use crate::fanuc::item::Area;
-use crate::fanuc::poll::signal;
+use crate::fanuc::poll::find_signal_address;
 use crate::units::OverridePct;
 
 /// Value of the first byte while an override is asked for.
@@ -126,35 +126,44 @@ impl PmcLadder {
     }
 
     /// One turn.
-    pub fn scan(&mut self, memory: &mut Memory, now_ns: TimeNs) {
+    pub fn scan_memory(&mut self, memory: &mut Memory, now_ns: TimeNs) {
         let (area, at) = self.mailbox;
-        let (taken, state) = self.taken(memory, now_ns);
-        memory.set(area, at + 3, taken);
-        memory.set(area, at + 4, state as u8);
-        memory.set(Area::G, signal(feed_override::AT, self.path), feed_override::encode(self.in_force(taken, state)));
-        let wanted = memory.byte(self.second.0, self.second.1);
-        let second = OverridePct::new(if wanted == 0 { 100 } else { limited(wanted) }).unwrap_or(OverridePct::FULL);
-        memory.set(Area::G, signal(feed_override::SECOND_AT, self.path), feed_override::encode(second));
-        self.latch(memory);
+        let (taken, state) = self.read_mailbox(memory, now_ns);
+        memory.set_byte(area, at + 3, taken);
+        memory.set_byte(area, at + 4, state as u8);
+        memory.set_byte(
+            Area::G,
+            find_signal_address(feed_override::AT, self.path),
+            feed_override::encode(self.in_force(taken, state)),
+        );
+        let wanted = memory.read_byte(self.second.0, self.second.1);
+        let second =
+            OverridePct::new(if wanted == 0 { 100 } else { limit_percent(wanted) }).unwrap_or(OverridePct::FULL);
+        memory.set_byte(
+            Area::G,
+            find_signal_address(feed_override::SECOND_AT, self.path),
+            feed_override::encode(second),
+        );
+        self.latch_requests(memory);
     }
 
     /// Without a request of the gateway the dial alone counts.
     fn in_force(&self, taken: u8, state: MailboxState) -> OverridePct {
         match (state, OverridePct::new(taken)) {
-            (MailboxState::Taken | MailboxState::Limited, Some(taken)) => self.rule.combine(self.dial, taken),
+            (MailboxState::Taken | MailboxState::Limited, Some(taken)) => self.rule.combine_overrides(self.dial, taken),
             _ => self.dial,
         }
     }
 
-    fn latch(&mut self, memory: &mut Memory) {
+    fn latch_requests(&mut self, memory: &mut Memory) {
         let (area, at) = self.requests;
-        let asked = memory.byte(area, at);
+        let asked = memory.read_byte(area, at);
         self.latched |= asked & !self.asked.unwrap_or(asked) & (1 | 2);
         self.asked = Some(asked);
-        memory.set(area, at + 1, self.latched);
-        memory.set(area, at + 2, self.dial.percent());
+        memory.set_byte(area, at + 1, self.latched);
+        memory.set_byte(area, at + 2, self.dial.percent());
         let interlocks = if self.is_latched(LadderRequest::FeedHold) { RUNNING & !FEED_HOLD } else { RUNNING };
-        memory.set(Area::G, signal(INTERLOCKS_AT, self.path), interlocks);
+        memory.set_byte(Area::G, find_signal_address(INTERLOCKS_AT, self.path), interlocks);
     }
 
     /// Does the machine have to stand because of this?
@@ -165,13 +174,13 @@ impl PmcLadder {
 
     /// The override that both bytes of its path make now, %.
     #[must_use]
-    pub fn makes(&self, memory: &Memory) -> OverridePct {
-        let byte = |at| feed_override::decode(memory.byte(Area::G, signal(at, self.path)));
-        LadderRule::Product.combine(byte(feed_override::AT), byte(feed_override::SECOND_AT))
+    pub fn compute_override(&self, memory: &Memory) -> OverridePct {
+        let byte = |at| feed_override::decode(memory.read_byte(Area::G, find_signal_address(at, self.path)));
+        LadderRule::Product.combine_overrides(byte(feed_override::AT), byte(feed_override::SECOND_AT))
     }
 
     /// The operator has seen to it.
-    pub fn acknowledge(&mut self, request: LadderRequest) {
+    pub fn acknowledge_request(&mut self, request: LadderRequest) {
         self.latched &= !request_bit(request);
     }
 
@@ -180,9 +189,9 @@ impl PmcLadder {
         (self.beat, self.asked, self.latched) = (None, None, 0);
     }
 
-    fn taken(&mut self, memory: &Memory, now_ns: TimeNs) -> (u8, MailboxState) {
+    fn read_mailbox(&mut self, memory: &Memory, now_ns: TimeNs) -> (u8, MailboxState) {
         let (area, at) = self.mailbox;
-        let byte = |offset| memory.byte(area, at + offset);
+        let byte = |offset| memory.read_byte(area, at + offset);
         let before = self.beat;
         match before {
             Some((beat, _)) if beat == byte(2) => {}
@@ -193,7 +202,7 @@ impl PmcLadder {
         }
         // The first number seen is no beat: it may be left over from a gateway that is gone.
         let alive = before.is_some() && self.beat.is_some_and(|(_, since_ns)| now_ns - since_ns <= SILENT_NS);
-        match (alive, limited(byte(1))) {
+        match (alive, limit_percent(byte(1))) {
             (false, _) => (100, MailboxState::HeartbeatLost),
             (true, taken) if taken == byte(1) => (taken, MailboxState::Taken),
             (true, taken) => (taken, MailboxState::Limited),
@@ -201,7 +210,7 @@ impl PmcLadder {
     }
 }
 
-fn limited(percent: u8) -> u8 {
+fn limit_percent(percent: u8) -> u8 {
     percent.clamp(LIMITS_PCT.0, LIMITS_PCT.1)
 }
 
@@ -212,14 +221,14 @@ mod tests {
     fn scans(ladder: &mut PmcLadder, memory: &mut Memory, from_ms: i64, to_ms: i64) -> u8 {
         let mut now_ns = from_ms * 1_000_000;
         while now_ns <= to_ms * 1_000_000 {
-            ladder.scan(memory, now_ns);
+            ladder.scan_memory(memory, now_ns);
             now_ns += SCAN_NS;
         }
-        feed_override::decode(memory.byte(Area::G, 12)).percent()
+        feed_override::decode(memory.read_byte(Area::G, 12)).percent()
     }
 
     fn ask(memory: &mut Memory, percent: u8, beat: u8) {
-        [ENABLED, percent, beat].into_iter().zip(900..).for_each(|(byte, at)| memory.set(Area::R, at, byte));
+        [ENABLED, percent, beat].into_iter().zip(900..).for_each(|(byte, at)| memory.set_byte(Area::R, at, byte));
     }
 
     #[test]
@@ -228,13 +237,13 @@ mod tests {
         assert_eq!(scans(&mut ladder, &mut memory, 0, 50), 100);
         ask(&mut memory, 80, 1);
         assert_eq!(scans(&mut ladder, &mut memory, 50, 100), 80);
-        assert_eq!((memory.byte(Area::R, 903), memory.byte(Area::R, 904)), (80, 1));
+        assert_eq!((memory.read_byte(Area::R, 903), memory.read_byte(Area::R, 904)), (80, 1));
         ask(&mut memory, 20, 2);
         assert_eq!(scans(&mut ladder, &mut memory, 100, 150), 50);
-        assert_eq!((memory.byte(Area::R, 903), memory.byte(Area::R, 904)), (50, 3));
+        assert_eq!((memory.read_byte(Area::R, 903), memory.read_byte(Area::R, 904)), (50, 3));
         assert_eq!(scans(&mut ladder, &mut memory, 150, 1550), 50, "within the time");
         assert_eq!(scans(&mut ladder, &mut memory, 1550, 1700), 100, "the heartbeat has stopped");
-        assert_eq!(memory.byte(Area::R, 904), 2);
+        assert_eq!(memory.read_byte(Area::R, 904), 2);
     }
 
     #[test]
@@ -259,25 +268,25 @@ mod tests {
             ask(&mut memory, wanted, wanted);
             assert_eq!(scans(&mut ladder, &mut memory, 60, 80), expected, "asked {wanted} %");
         }
-        assert_eq!(memory.byte(Area::R, 907), 80, "the dial is told apart from what is in force");
+        assert_eq!(memory.read_byte(Area::R, 907), 80, "the dial is told apart from what is in force");
     }
 
     #[test]
     fn a_request_is_latched_once_until_it_is_acknowledged() {
         let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
-        memory.set(Area::R, 905, 1);
+        memory.set_byte(Area::R, 905, 1);
         scans(&mut ladder, &mut memory, 0, 20);
-        assert_eq!(memory.byte(Area::R, 906), 0, "a leftover latches nothing");
+        assert_eq!(memory.read_byte(Area::R, 906), 0, "a leftover latches nothing");
         let mut bits = |bits: u8, ladder: &mut PmcLadder| {
-            memory.set(Area::R, 905, bits);
+            memory.set_byte(Area::R, 905, bits);
             scans(ladder, &mut memory, 20, 40);
-            (memory.byte(Area::R, 906), memory.byte(Area::G, 8))
+            (memory.read_byte(Area::R, 906), memory.read_byte(Area::G, 8))
         };
         assert_eq!(bits(0, &mut ladder), (0, 0x31));
         assert_eq!(bits(1, &mut ladder), (1, 0x11), "*SP is off");
         assert_eq!(bits(0, &mut ladder), (1, 0x11), "and stays off");
         assert_eq!(bits(2, &mut ladder), (3, 0x11));
-        ladder.acknowledge(LadderRequest::FeedHold);
+        ladder.acknowledge_request(LadderRequest::FeedHold);
         assert_eq!(bits(2, &mut ladder), (2, 0x31), "a bit that stays on asks once");
         assert_eq!(bits(0xFC, &mut ladder).0, 2, "other bits are nobody's");
     }
@@ -285,7 +294,7 @@ mod tests {
     #[test]
     fn a_direct_write_is_taken_back_in_the_next_scan() {
         let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
-        memory.set(Area::G, 12, feed_override::encode(OverridePct::new(50).expect("exists")));
+        memory.set_byte(Area::G, 12, feed_override::encode(OverridePct::new(50).expect("exists")));
         assert_eq!(scans(&mut ladder, &mut memory, 0, 8), 100);
     }
 
@@ -294,14 +303,14 @@ mod tests {
         let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
         ask(&mut memory, 80, 7);
         assert_eq!(scans(&mut ladder, &mut memory, 0, 0), 100);
-        assert_eq!(memory.byte(Area::R, 904), 2);
+        assert_eq!(memory.read_byte(Area::R, 904), 2);
     }
 
     #[test]
     fn the_second_override_goes_to_its_own_byte() {
         let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
-        memory.set(Area::R, 910, 70);
+        memory.set_byte(Area::R, 910, 70);
         assert_eq!(scans(&mut ladder, &mut memory, 0, 8), 100);
-        assert_eq!(feed_override::decode(memory.byte(Area::G, 13)).percent(), 70);
+        assert_eq!(feed_override::decode(memory.read_byte(Area::G, 13)).percent(), 70);
     }
 }

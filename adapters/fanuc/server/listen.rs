@@ -3,7 +3,7 @@
 use super::answer::answer_body;
 use super::controller::Controller;
 use super::fault::InjectedFault;
-use crate::fanuc::wire::{FocasFrame, FocasHeader, FrameKind, HEADER_LEN, frame, requests};
+use crate::fanuc::wire::{FocasFrame, FocasHeader, FrameKind, HEADER_LEN, encode_frame, parse_requests};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -13,11 +13,11 @@ use std::time::{Duration, Instant};
 /// A control that is served.
 pub trait ServedControl: Send {
     /// Brings the values up to date and shows them; `None` while the control is switched off.
-    fn now(&mut self) -> Option<&mut Controller>;
+    fn update_controller(&mut self) -> Option<&mut Controller>;
 }
 
 impl ServedControl for Controller {
-    fn now(&mut self) -> Option<&mut Controller> {
+    fn update_controller(&mut self) -> Option<&mut Controller> {
         Some(self)
     }
 }
@@ -81,7 +81,9 @@ impl Server {
             frames: AtomicU64::new(0),
         });
         let own = shared.clone();
-        std::thread::Builder::new().name("focas-listen".to_owned()).spawn(move || accept(listener, address, &own))?;
+        std::thread::Builder::new()
+            .name("focas-listen".to_owned())
+            .spawn(move || accept_connections(listener, address, &own))?;
         Ok(Self { shared, address })
     }
 
@@ -93,7 +95,7 @@ impl Server {
 
     /// From now on this goes wrong. Returns when a control that is to be off does not listen any more, and one that is to be on
     /// does.
-    pub fn fault(&self, fault: InjectedFault) {
+    pub fn inject_fault(&self, fault: InjectedFault) {
         *self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner) = fault;
         let until = Instant::now() + Duration::from_secs(2);
         while self.shared.listens.load(Ordering::SeqCst) == self.shared.is_off() && Instant::now() < until {
@@ -103,25 +105,25 @@ impl Server {
 
     /// Connections at this moment.
     #[must_use]
-    pub fn sessions(&self) -> usize {
+    pub fn count_sessions(&self) -> usize {
         self.shared.sessions.load(Ordering::SeqCst)
     }
 
     /// Connections ever opened.
     #[must_use]
-    pub fn opened(&self) -> u64 {
+    pub fn count_opened(&self) -> u64 {
         self.shared.opened.load(Ordering::SeqCst)
     }
 
     /// Requests answered.
     #[must_use]
-    pub fn frames(&self) -> u64 {
+    pub fn count_frames(&self) -> u64 {
         self.shared.frames.load(Ordering::SeqCst)
     }
 
     /// Looks at the control, or changes it.
     pub fn with<T>(&self, look: impl FnOnce(Option<&mut Controller>) -> T) -> T {
-        look(self.shared.served.lock().unwrap_or_else(PoisonError::into_inner).now())
+        look(self.shared.served.lock().unwrap_or_else(PoisonError::into_inner).update_controller())
     }
 }
 
@@ -141,11 +143,11 @@ impl ServerState {
     /// A computer that is switched off refuses connections.
     fn is_off(&self) -> bool {
         *self.fault.lock().unwrap_or_else(PoisonError::into_inner) == InjectedFault::PowerOff
-            || self.served.lock().unwrap_or_else(PoisonError::into_inner).now().is_none()
+            || self.served.lock().unwrap_or_else(PoisonError::into_inner).update_controller().is_none()
     }
 }
 
-fn accept(listener: TcpListener, address: SocketAddr, shared: &Arc<ServerState>) {
+fn accept_connections(listener: TcpListener, address: SocketAddr, shared: &Arc<ServerState>) {
     let (mut listener, mut looked, mut fault) = (Some(listener), Instant::now(), InjectedFault::None);
     while !shared.stop.load(Ordering::SeqCst) {
         let injected = *shared.fault.lock().unwrap_or_else(PoisonError::into_inner);
@@ -155,7 +157,7 @@ fn accept(listener: TcpListener, address: SocketAddr, shared: &Arc<ServerState>)
             shared.listens.store(listener.is_some(), Ordering::SeqCst);
         }
         match listener.as_ref().map(TcpListener::accept) {
-            Some(Ok((stream, _))) => begin(stream, shared),
+            Some(Ok((stream, _))) => begin_session(stream, shared),
             Some(Err(_)) | None => std::thread::sleep(ACCEPT_LOOK),
         }
     }
@@ -168,7 +170,7 @@ fn listen_again(address: SocketAddr) -> Option<TcpListener> {
     Some(listener)
 }
 
-fn begin(stream: TcpStream, shared: &Arc<ServerState>) {
+fn begin_session(stream: TcpStream, shared: &Arc<ServerState>) {
     let own = shared.clone();
     // Without a thread for it the connection is closed, which is what a busy controller does.
     let _no_thread = std::thread::Builder::new().name("focas-session".to_owned()).spawn(move || {
@@ -211,25 +213,25 @@ impl ClientSession {
         self.stream.set_read_timeout(Some(LOOK))?;
         self.stream.set_write_timeout(Some(Duration::from_secs(2)))?;
         loop {
-            let request = self.frame()?;
-            self.answer(&request)?;
+            let request = self.receive_frame()?;
+            self.answer_request(&request)?;
         }
     }
 
-    fn fault(&self) -> InjectedFault {
+    fn current_fault(&self) -> InjectedFault {
         *self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn frame(&mut self) -> Result<FocasFrame, End> {
+    fn receive_frame(&mut self) -> Result<FocasFrame, End> {
         let mut head = [0; HEADER_LEN];
-        self.fill(&mut head)?;
-        let header = FocasHeader::of(&head).map_err(|_| End::Closed)?;
+        self.fill_buffer(&mut head)?;
+        let header = FocasHeader::from_bytes(&head).map_err(|_| End::Closed)?;
         let mut body = vec![0; header.body_len];
-        self.fill(&mut body)?;
+        self.fill_buffer(&mut body)?;
         Ok(FocasFrame { version: header.version, kind: header.kind, body })
     }
 
-    fn fill(&mut self, mut buffer: &mut [u8]) -> Result<(), End> {
+    fn fill_buffer(&mut self, mut buffer: &mut [u8]) -> Result<(), End> {
         let mut waited = Duration::ZERO;
         while !buffer.is_empty() {
             match self.stream.read(buffer) {
@@ -237,7 +239,7 @@ impl ClientSession {
                 Ok(count) => buffer = &mut buffer[count..],
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
                     waited += LOOK;
-                    let over = waited >= self.shared.settings.idle || self.fault() == InjectedFault::PowerOff;
+                    let over = waited >= self.shared.settings.idle || self.current_fault() == InjectedFault::PowerOff;
                     if over || self.shared.stop.load(Ordering::SeqCst) {
                         return Err(End::Closed);
                     }
@@ -248,43 +250,45 @@ impl ClientSession {
         Ok(())
     }
 
-    fn answer(&mut self, request: &FocasFrame) -> Result<(), End> {
-        let fault = self.fault();
+    fn answer_request(&mut self, request: &FocasFrame) -> Result<(), End> {
+        let fault = self.current_fault();
         if fault == InjectedFault::PowerOff {
             return Err(End::Closed);
         }
         if fault == InjectedFault::Blackhole {
             return Ok(());
         }
-        let reply = self.reply(request)?;
+        let reply = self.build_reply(request)?;
         let opening = !matches!(request.kind, FrameKind::Request);
-        self.send(reply, if opening { InjectedFault::None } else { fault })?;
+        self.send_reply(reply, if opening { InjectedFault::None } else { fault })?;
         if matches!(request.kind, FrameKind::Close) { Err(End::Closed) } else { Ok(()) }
     }
 
-    fn reply(&mut self, request: &FocasFrame) -> Result<Vec<u8>, End> {
+    fn build_reply(&mut self, request: &FocasFrame) -> Result<Vec<u8>, End> {
         let shared = self.shared.clone();
         let mut served = shared.served.lock().unwrap_or_else(PoisonError::into_inner);
-        let controller = served.now().ok_or(End::Closed)?;
+        let controller = served.update_controller().ok_or(End::Closed)?;
         let version = controller.opening.generation.version();
         match request.kind {
             FrameKind::Open => {
                 let free = self.counted || self.take_place();
-                let body = if free { controller.opened() } else { Vec::new() };
-                Ok(frame(version, if free { FrameKind::Opened } else { FrameKind::OpenRefused }, &body))
+                let body = if free { controller.encode_opening() } else { Vec::new() };
+                Ok(encode_frame(version, if free { FrameKind::Opened } else { FrameKind::OpenRefused }, &body))
             }
-            FrameKind::Close => Ok(frame(version, FrameKind::Closed, &[])),
+            FrameKind::Close => Ok(encode_frame(version, FrameKind::Closed, &[])),
             FrameKind::Request if self.counted => {
                 shared.frames.fetch_add(1, Ordering::SeqCst);
-                let Ok(asked) = requests(&request.body) else { return Ok(frame(version, FrameKind::Error, &[])) };
-                Ok(frame(version, FrameKind::Answer, &answer_body(controller, &asked)))
+                let Ok(asked) = parse_requests(&request.body) else {
+                    return Ok(encode_frame(version, FrameKind::Error, &[]));
+                };
+                Ok(encode_frame(version, FrameKind::Answer, &answer_body(controller, &asked)))
             }
             _ => Err(End::Closed),
         }
     }
 
     fn take_place(&mut self) -> bool {
-        if self.fault() == InjectedFault::NoSession {
+        if self.current_fault() == InjectedFault::NoSession {
             return false;
         }
         let most = self.shared.settings.sessions_max;
@@ -294,8 +298,8 @@ impl ClientSession {
         self.counted
     }
 
-    fn send(&mut self, bytes: Vec<u8>, fault: InjectedFault) -> Result<(), End> {
-        let bytes = fault.spoil(bytes);
+    fn send_reply(&mut self, bytes: Vec<u8>, fault: InjectedFault) -> Result<(), End> {
+        let bytes = fault.spoil_bytes(bytes);
         match fault {
             InjectedFault::Silence => Ok(()),
             InjectedFault::Reset => {

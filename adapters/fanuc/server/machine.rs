@@ -52,9 +52,9 @@ impl SimulatedControl {
         controller.offsets_only_at_rest = true;
         controller.measure_in_inches(false);
         // What the vendor's library asks older controls for besides the feed.
-        [3106, 9936].into_iter().for_each(|number| controller.parameter(number, 3, Number::decimal(0, 0)));
-        controller.parameters.insert(3115, Data { kind: 0, values: vec![Number::decimal(0, 0); axes.len()] });
-        screen::parameters(&mut controller);
+        [3106, 9936].into_iter().for_each(|number| controller.set_parameter(number, 3, Number::from_decimal(0, 0)));
+        controller.parameters.insert(3115, Data { kind: 0, values: vec![Number::from_decimal(0, 0); axes.len()] });
+        screen::set_fixed_parameters(&mut controller);
         let scanned_ns = clock.now_ns();
         let (ladder, written) = (PmcLadder::default(), OverridePct::FULL);
         let requests = LadderRequest::ALL.map(|request| Requested { request, told: false, stood: false });
@@ -69,7 +69,7 @@ impl SimulatedControl {
         for control in &mut self.controller.further {
             control.offsets_only_at_rest = true;
             control.measure_in_inches(false);
-            screen::parameters(control);
+            screen::set_fixed_parameters(control);
         }
         let mut ladder = PmcLadder::of_path(2);
         (ladder.dial, ladder.rule) = (self.ladder.dial, self.ladder.rule);
@@ -80,29 +80,29 @@ impl SimulatedControl {
     /// How the ladder combines the operator's dial and the mailbox.
     #[must_use]
     pub fn with_rule(mut self, rule: LadderRule) -> Self {
-        self.every().for_each(|ladder| ladder.rule = rule);
+        self.iter_ladders().for_each(|ladder| ladder.rule = rule);
         self
     }
 
     /// The rungs of every path.
-    fn every(&mut self) -> impl Iterator<Item = &mut PmcLadder> {
+    fn iter_ladders(&mut self) -> impl Iterator<Item = &mut PmcLadder> {
         std::iter::once(&mut self.ladder).chain(&mut self.further)
     }
 
     /// The operator turns the dial of the feed override.
     pub fn turn_dial(&mut self, dial: OverridePct) {
-        self.every().for_each(|ladder| ladder.dial = dial);
+        self.iter_ladders().for_each(|ladder| ladder.dial = dial);
     }
 
     /// Every scan since the last look, and what they mean for the machine.
-    fn scan(&mut self, now_ns: TimeNs) {
+    fn run_scans(&mut self, now_ns: TimeNs) {
         self.scanned_ns = self.scanned_ns.max(now_ns - SCANS_MAX * SCAN_NS);
         while self.scanned_ns + SCAN_NS <= now_ns {
             self.scanned_ns += SCAN_NS;
             let ladders = std::iter::once(&mut self.ladder).chain(&mut self.further);
-            ladders.for_each(|ladder| ladder.scan(&mut self.controller.memory, self.scanned_ns));
+            ladders.for_each(|ladder| ladder.scan_memory(&mut self.controller.memory, self.scanned_ns));
         }
-        let wanted = self.ladder.makes(&self.controller.memory);
+        let wanted = self.ladder.compute_override(&self.controller.memory);
         // What this control's ladder has made of dial and mailbox is all that the machine below sees.
         if wanted != self.written {
             self.machine.turn_dial(now_ns, wanted);
@@ -111,7 +111,7 @@ impl SimulatedControl {
     }
 
     /// Tells the machine what the ladder has latched; the operator acknowledges at the machine.
-    fn requests(&mut self, panel: &Panel) {
+    fn forward_requests(&mut self, panel: &Panel) {
         for asked in &mut self.requests {
             let stands = match asked.request {
                 LadderRequest::FeedHold => panel.execution == execution::FEED_HOLD,
@@ -121,9 +121,9 @@ impl SimulatedControl {
                 (asked.told, asked.stood) = (false, false);
             } else if !asked.told {
                 // A machine that is off at this moment is told at the next look.
-                asked.told = self.machine.feed_override().ask(&*self.clock, asked.request).is_ok();
+                asked.told = self.machine.feed_override().ask_ladder(&*self.clock, asked.request).is_ok();
             } else if asked.stood && !stands {
-                self.ladder.acknowledge(asked.request);
+                self.ladder.acknowledge_request(asked.request);
             }
             asked.stood |= asked.told && stands;
         }
@@ -131,60 +131,61 @@ impl SimulatedControl {
 }
 
 impl ServedControl for SimulatedControl {
-    fn now(&mut self) -> Option<&mut Controller> {
+    fn update_controller(&mut self) -> Option<&mut Controller> {
         let now_ns = self.clock.now_ns();
         let moment = self.machine.moment(now_ns);
         if !moment.panel.booted {
             self.controller.memory.power_off();
-            self.every().for_each(PmcLadder::power_off);
+            self.iter_ladders().for_each(PmcLadder::power_off);
             self.scanned_ns = now_ns;
             return None;
         }
-        self.scan(now_ns);
-        self.requests(&moment.panel);
-        show(&mut self.controller, &moment);
-        screen::show(&mut self.controller, &moment, now_ns);
+        self.run_scans(now_ns);
+        self.forward_requests(&moment.panel);
+        show_moment(&mut self.controller, &moment);
+        screen::show_pages(&mut self.controller, &moment, now_ns);
         for (ladder, control) in self.further.iter_mut().zip(&mut self.controller.further) {
-            second_path::show(control, &mut self.controller.memory, ladder, &moment);
+            second_path::show_path(control, &mut self.controller.memory, ladder, &moment);
         }
         Some(&mut self.controller)
     }
 }
 
 /// The moment on the control's screen.
-fn show(control: &mut Controller, moment: &Moment) {
+fn show_moment(control: &mut Controller, moment: &Moment) {
     let panel = &moment.panel;
-    control.status = status(panel);
-    control.feed = whole(panel.feed_mm_min);
-    let load = whole(moment.electric.spindle_load_pct);
-    let speed = whole(panel.spindle_speed_rpm.abs());
-    let gear = Number::decimal(i32::from(panel.gear_stage), 0);
-    control.spindles[0].quantities = [load, whole(6000.0), gear, speed, load, speed];
-    axes(control, panel);
+    control.status = build_status(panel);
+    control.feed = round_to_number(panel.feed_mm_min);
+    let load = round_to_number(moment.electric.spindle_load_pct);
+    let speed = round_to_number(panel.spindle_speed_rpm.abs());
+    let gear = Number::from_decimal(i32::from(panel.gear_stage), 0);
+    control.spindles[0].quantities = [load, round_to_number(6000.0), gear, speed, load, speed];
+    show_axes(control, panel);
     control.program = (i32::from(panel.program), i32::from(panel.program));
     control.program_path = format!("//CNC_MEM/USER/PATH1/O{:04}", panel.program);
     control.sequence = i32::from(panel.block);
     control.executed = (i32::from(panel.block), format!("N{} F{:.0}\n%", panel.block, panel.feed_programmed_mm_min));
     let modal = [(BlockWord::F, panel.feed_programmed_mm_min), (BlockWord::S, panel.spindle_programmed_rpm.abs())];
-    control.modal_words.extend(modal.map(|(word, value)| (word, whole(value))));
-    control.modal([(BlockWord::T, i32::from(panel.tool))]);
+    control.modal_words.extend(modal.map(|(word, value)| (word, round_to_number(value))));
+    control.set_modal_words([(BlockWord::T, i32::from(panel.tool))]);
     let parts = i32::try_from(panel.part_count).unwrap_or(i32::MAX);
-    control.parameters.insert(6711, Data { kind: 3, values: vec![Number::decimal(parts, 0)] });
-    control.diagnosis(403, 1, whole(moment.electric.motor_temperature_c));
+    control.parameters.insert(6711, Data { kind: 3, values: vec![Number::from_decimal(parts, 0)] });
+    control.set_diagnosis(403, 1, round_to_number(moment.electric.motor_temperature_c));
     // What the drive shows of itself, in steps of ten watts.
-    let power = Number::decimal(whole(moment.truth.spindle_power_w / 10.0).mantissa.saturating_mul(10), 0);
-    control.diagnosis(4902, 2, power);
-    alarms(control, panel);
-    signals(control, panel);
+    let power =
+        Number::from_decimal(round_to_number(moment.truth.spindle_power_w / 10.0).mantissa.saturating_mul(10), 0);
+    control.set_diagnosis(4902, 2, power);
+    show_alarms(control, panel);
+    show_signals(control, panel);
 }
 
-pub(super) fn whole(value: f64) -> Number {
+pub(super) fn round_to_number(value: f64) -> Number {
     #[expect(clippy::cast_possible_truncation, reason = "saturates, which is what a display does")]
     let mantissa = value.round() as i32;
-    Number::decimal(mantissa, 0)
+    Number::from_decimal(mantissa, 0)
 }
 
-pub(super) fn status(panel: &Panel) -> Status {
+pub(super) fn build_status(panel: &Panel) -> Status {
     let automatic = match panel.mode {
         mode::MANUAL_DATA_INPUT => 0,
         mode::EDIT => 3,
@@ -202,23 +203,23 @@ pub(super) fn status(panel: &Panel) -> Status {
 }
 
 /// Positions in micrometres. The load of an axis is what its friction takes: 3 % and 1 % more per 200 mm/min.
-fn axes(control: &mut Controller, panel: &Panel) {
+fn show_axes(control: &mut Controller, panel: &Panel) {
     for axis in &mut control.axes {
         let index = match axis.name.as_str() {
             "X" => 0,
             "Y" => 1,
             _ => 2,
         };
-        let position = Number { exponent: 3, ..whole(panel.position_mm[index] * 1000.0) };
-        axis.positions = [position, position, position, Number::decimal(0, 3)];
+        let position = Number { exponent: 3, ..round_to_number(panel.position_mm[index] * 1000.0) };
+        axis.positions = [position, position, position, Number::from_decimal(0, 3)];
         let velocity = panel.velocity_mm_min[index];
         let load = if panel.drives_on { 3.0 + velocity.abs() / 200.0 } else { 0.0 };
-        axis.load = whole(load.min(150.0).copysign(velocity));
-        axis.current = Number { exponent: 1, ..whole(load.min(150.0)) };
+        axis.load = round_to_number(load.min(150.0).copysign(velocity));
+        axis.current = Number { exponent: 1, ..round_to_number(load.min(150.0)) };
     }
 }
 
-fn alarms(control: &mut Controller, panel: &Panel) {
+fn show_alarms(control: &mut Controller, panel: &Panel) {
     control.alarm_bits = i32::from(!panel.alarm.is_empty()) << 15;
     control.alarms.clear();
     if !panel.alarm.is_empty() {
@@ -226,7 +227,7 @@ fn alarms(control: &mut Controller, panel: &Panel) {
     }
 }
 
-fn signals(control: &mut Controller, panel: &Panel) {
+fn show_signals(control: &mut Controller, panel: &Panel) {
     let active = panel.execution == execution::ACTIVE;
     let thread = |word| active && panel.override_locked && panel.operation.contains(word);
     let tapping = thread(operation::TAPPING);
@@ -246,5 +247,5 @@ fn signals(control: &mut Controller, panel: &Panel) {
         (4, 3, panel.mode == mode::SEMI_AUTOMATIC),
     ];
     bits.into_iter().for_each(|(byte, bit, on)| control.memory.set_bit(Area::F, byte, bit, on));
-    control.memory.set(Area::G, 30, 100);
+    control.memory.set_byte(Area::G, 30, 100);
 }

@@ -33,12 +33,12 @@ impl Default for Memory {
 impl Memory {
     /// One byte; 0 beyond the end.
     #[must_use]
-    pub fn byte(&self, area: Area, at: u16) -> u8 {
+    pub fn read_byte(&self, area: Area, at: u16) -> u8 {
         self.areas.get(&area).and_then(|bytes| bytes.get(usize::from(at))).copied().unwrap_or(0)
     }
 
     /// Sets one byte, if it is there.
-    pub fn set(&mut self, area: Area, at: u16, byte: u8) {
+    pub fn set_byte(&mut self, area: Area, at: u16, byte: u8) {
         if let Some(place) = self.areas.get_mut(&area).and_then(|bytes| bytes.get_mut(usize::from(at))) {
             *place = byte;
         }
@@ -47,8 +47,8 @@ impl Memory {
     /// Sets one bit of a byte.
     pub fn set_bit(&mut self, area: Area, at: u16, bit: u8, on: bool) {
         let mask = 1u8.checked_shl(u32::from(bit)).unwrap_or(0);
-        let byte = self.byte(area, at);
-        self.set(area, at, if on { byte | mask } else { byte & !mask });
+        let byte = self.read_byte(area, at);
+        self.set_byte(area, at, if on { byte | mask } else { byte & !mask });
     }
 
     /// Forgets what is not battery-backed.
@@ -60,8 +60,8 @@ impl Memory {
         }
     }
 
-    fn stretch(&self, stretch: Stretch) -> Option<&[u8]> {
-        let whole = stretch.len().is_multiple_of(usize::from(stretch.width.bytes()));
+    fn find_stretch(&self, stretch: Stretch) -> Option<&[u8]> {
+        let whole = stretch.len().is_multiple_of(usize::from(stretch.width.byte_count()));
         let range = usize::from(stretch.from)..=usize::from(stretch.to);
         self.areas.get(&stretch.area)?.get(range).filter(|_| whole && !stretch.is_empty())
     }
@@ -69,20 +69,20 @@ impl Memory {
     /// A stretch as it travels: every element big-endian.
     #[must_use]
     pub fn read(&self, stretch: Stretch) -> Option<Vec<u8>> {
-        self.stretch(stretch).map(|bytes| swapped(bytes, stretch.width))
+        self.find_stretch(stretch).map(|bytes| swap_bytes(bytes, stretch.width))
     }
 
     /// Takes a stretch as it travels; `false` when it does not fit.
     pub fn write(&mut self, stretch: Stretch, data: &[u8]) -> bool {
-        if self.stretch(stretch).is_none_or(|bytes| bytes.len() != data.len()) {
+        if self.find_stretch(stretch).is_none_or(|bytes| bytes.len() != data.len()) {
             return false;
         }
         let range = usize::from(stretch.from)..=usize::from(stretch.to);
         let place = self.areas.get_mut(&stretch.area).and_then(|bytes| bytes.get_mut(range));
-        place.map(|place| place.copy_from_slice(&swapped(data, stretch.width))).is_some()
+        place.map(|place| place.copy_from_slice(&swap_bytes(data, stretch.width))).is_some()
     }
 }
 
-fn swapped(bytes: &[u8], width: PmcWidth) -> Vec<u8> {
-    bytes.chunks(usize::from(width.bytes())).flat_map(|element| element.iter().rev().copied()).collect()
+fn swap_bytes(bytes: &[u8], width: PmcWidth) -> Vec<u8> {
+    bytes.chunks(usize::from(width.byte_count())).flat_map(|element| element.iter().rev().copied()).collect()
 }

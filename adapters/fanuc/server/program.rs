@@ -2,7 +2,7 @@
 
 use super::answer::{ATTRIB, Data8, NUMBER};
 use super::controller::{Controller, ProgramFile};
-use super::encode::{long, longs, shorts, text};
+use super::encode::{clamp_to_i32, encode_longs, encode_shorts, encode_text};
 use crate::fanuc::item::BlockWord;
 use crate::fanuc::wire::{Number, Request};
 
@@ -18,28 +18,29 @@ const DECIMAL_POINT: u8 = 0x40;
 /// Bytes of memory for programs of which those that are there take their part.
 const MEMORY_BYTES: i32 = 512 * 1024;
 
-pub(super) fn name(controller: &Controller) -> Vec<u8> {
+pub(super) fn encode_name(controller: &Controller) -> Vec<u8> {
     let name = format!("O{}", controller.program.0);
-    [longs(&[controller.program.0]), text(&name, 36)].concat()
+    [encode_longs(&[controller.program.0]), encode_text(&name, 36)].concat()
 }
 
-pub(super) fn executed(controller: &Controller, most: i32) -> Vec<u8> {
+pub(super) fn encode_executed_text(controller: &Controller, most: i32) -> Vec<u8> {
     let most = usize::try_from(most).unwrap_or(0).min(controller.executed.1.len());
     let text = controller.executed.1.as_bytes().get(..most).unwrap_or_default();
-    [&longs(&[controller.executed.0])[..], text].concat()
+    [&encode_longs(&[controller.executed.0])[..], text].concat()
 }
 
 /// Programs from a number on; what there is besides the number follows from the kind.
-pub(super) fn list(controller: &Controller, first: i32, most: i32) -> Vec<u8> {
+pub(super) fn encode_list(controller: &Controller, first: i32, most: i32) -> Vec<u8> {
     let most = usize::try_from(most).unwrap_or(0).min(LISTED_MAX);
-    let record = |file: &ProgramFile| [longs(&[file.number, file.bytes]), text(&file.comment, 64)].concat();
+    let record =
+        |file: &ProgramFile| [encode_longs(&[file.number, file.bytes]), encode_text(&file.comment, 64)].concat();
     controller.programs.iter().filter(|file| file.number >= first).take(most).flat_map(record).collect()
 }
 
-pub(super) fn counts(controller: &Controller) -> Vec<u8> {
+pub(super) fn encode_counts(controller: &Controller) -> Vec<u8> {
     let used: i32 = controller.programs.iter().map(|file| file.bytes).sum();
-    let known = long(controller.programs.len());
-    longs(&[known, 400 - known.min(400), used, MEMORY_BYTES - used.min(MEMORY_BYTES)])
+    let known = clamp_to_i32(controller.programs.len());
+    encode_longs(&[known, 400 - known.min(400), used, MEMORY_BYTES - used.min(MEMORY_BYTES)])
 }
 
 /// The path that a request about a folder carries.
@@ -50,20 +51,20 @@ fn is_folder(request: &Request) -> bool {
 }
 
 pub(super) fn folder_counts(controller: &Controller, request: &Request) -> Data8 {
-    if is_folder(request) { Ok(longs(&[0, long(controller.programs.len())])) } else { Err(NUMBER) }
+    if is_folder(request) { Ok(encode_longs(&[0, clamp_to_i32(controller.programs.len())])) } else { Err(NUMBER) }
 }
 
 /// Files of the folder: kind, time, size, attributes, name, comment, and the time of the last run.
-pub(super) fn folder(controller: &Controller, request: &Request) -> Data8 {
+pub(super) fn encode_folder(controller: &Controller, request: &Request) -> Data8 {
     if !is_folder(request) {
         return Err(NUMBER);
     }
     let [first, most, ..] = request.arguments.map(|argument| usize::try_from(argument).unwrap_or(0));
     let entry = |file: &ProgramFile| {
-        let time = shorts(&controller.clock);
-        let sizes = longs(&[file.bytes, 0]);
-        let (name, comment) = (text(&format!("O{:04}", file.number), 36), text(&file.comment, 52));
-        [shorts(&[1]), time.clone(), vec![0; 6], sizes, name, comment, time].concat()
+        let time = encode_shorts(&controller.clock);
+        let sizes = encode_longs(&[file.bytes, 0]);
+        let (name, comment) = (encode_text(&format!("O{:04}", file.number), 36), encode_text(&file.comment, 52));
+        [encode_shorts(&[1]), time.clone(), vec![0; 6], sizes, name, comment, time].concat()
     };
     Ok(controller.programs.iter().skip(first).take(most.min(LISTED_MAX)).flat_map(entry).collect())
 }
@@ -73,10 +74,10 @@ pub(super) fn modal_word(controller: &Controller, number: i32) -> Data8 {
     let value = controller.modal_words.get(&word).ok_or(NUMBER)?;
     let places = u8::try_from(value.exponent).map_err(|_| NUMBER)?;
     let flag = if places > 0 { DECIMAL_POINT } else { 0 };
-    Ok([&longs(&[value.mantissa])[..], &[0, flag, 0, places]].concat())
+    Ok([&encode_longs(&[value.mantissa])[..], &[0, flag, 0, places]].concat())
 }
 
-pub(super) fn groups(controller: &Controller, group: i32) -> Data8 {
+pub(super) fn encode_modal_groups(controller: &Controller, group: i32) -> Data8 {
     if group == -1 {
         return Ok(controller.modal_groups.values().flat_map(|code| [*code, 0]).collect());
     }
@@ -86,7 +87,7 @@ pub(super) fn groups(controller: &Controller, group: i32) -> Data8 {
 /// G codes as the program writes them: group, flag, code with its places.
 pub(super) fn g_codes(controller: &Controller, group: i32) -> Data8 {
     let record = |(group, code): (&i16, &Number)| {
-        [shorts(&[*group, 1]), longs(&[code.mantissa]), shorts(&[0, code.exponent])].concat()
+        [encode_shorts(&[*group, 1]), encode_longs(&[code.mantissa]), encode_shorts(&[0, code.exponent])].concat()
     };
     let wanted: Vec<u8> = controller
         .g_codes
@@ -98,7 +99,7 @@ pub(super) fn g_codes(controller: &Controller, group: i32) -> Data8 {
 }
 
 /// Words of the block: letter, number of the M, flags, value, places. `which` counts the letters from A.
-pub(super) fn commands(controller: &Controller, which: i32) -> Data8 {
+pub(super) fn encode_commands(controller: &Controller, which: i32) -> Data8 {
     let letter = |word: BlockWord| format!("{word:?}").bytes().next().unwrap_or(b'?');
     let is_wanted = |word: BlockWord| which == -1 || i32::from(letter(word) - b'A') == which;
     let words = controller.modal_words.iter().filter(|(word, value)| {
@@ -108,7 +109,7 @@ pub(super) fn commands(controller: &Controller, which: i32) -> Data8 {
     });
     let record = |(word, value): (&BlockWord, &Number)| {
         let head = vec![letter(*word), 0, 0, 1];
-        [head, longs(&[value.mantissa, i32::from(value.exponent)])].concat()
+        [head, encode_longs(&[value.mantissa, i32::from(value.exponent)])].concat()
     };
     let found: Vec<u8> = words.flat_map(record).collect();
     if found.is_empty() && which != -1 { Err(ATTRIB) } else { Ok(found) }

@@ -2,7 +2,7 @@
 //! temperatures, and the parameters that integrators look at first.
 
 use super::controller::{Controller, Data, ProgramFile, ToolGroup};
-use super::machine::whole;
+use super::machine::round_to_number;
 use crate::clock::TimeNs;
 use crate::fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit};
 use crate::fanuc::item::BlockWord;
@@ -32,20 +32,20 @@ const TOOL_LIFE: i32 = 200;
 
 /// Parameters that do not change: I/O channel, feed of the dry run, rapid traverse of every axis, bits of the screen,
 /// greatest speed of the spindle, parts required.
-pub(super) fn parameters(control: &mut Controller) {
-    control.parameter(20, BYTE, Number::decimal(4, 0));
-    control.parameter(1410, REAL, Number::decimal(3000, 0));
-    control.parameter(3208, 0, Number::decimal(0, 0));
-    control.parameter(3741, LONG, Number::decimal(6000, 0));
-    control.parameter(6713, LONG, Number::decimal(500, 0));
+pub(super) fn set_fixed_parameters(control: &mut Controller) {
+    control.set_parameter(20, BYTE, Number::from_decimal(4, 0));
+    control.set_parameter(1410, REAL, Number::from_decimal(3000, 0));
+    control.set_parameter(3208, 0, Number::from_decimal(0, 0));
+    control.set_parameter(3741, LONG, Number::from_decimal(6000, 0));
+    control.set_parameter(6713, LONG, Number::from_decimal(500, 0));
     let axes = control.axes.len();
     let of_axes = |kind, value| Data { kind, values: vec![value; axes] };
-    control.parameters.insert(1420, of_axes(REAL, Number::decimal(24_000, 0)));
-    let rotary = control.axes.iter().map(|axis| Number::decimal(i32::from(axis.rotary), 0)).collect();
+    control.parameters.insert(1420, of_axes(REAL, Number::from_decimal(24_000, 0)));
+    let rotary = control.axes.iter().map(|axis| Number::from_decimal(i32::from(axis.rotary), 0)).collect();
     control.parameters.insert(1006, Data { kind: 0, values: rotary });
-    control.feed_in(SpeedUnit::MmMin, Number::decimal(0, 0));
+    control.feed_in(SpeedUnit::MmMin, Number::from_decimal(0, 0));
     control.g_codes = g_codes(control.system.machine == "T");
-    control.parameter(3107, 0, Number::decimal(0, 0));
+    control.set_parameter(3107, 0, Number::from_decimal(0, 0));
 }
 
 /// G codes that are in force from power-on, by their group.
@@ -54,27 +54,27 @@ fn g_codes(lathe: bool) -> std::collections::BTreeMap<i16, Number> {
         [(0, 1), (1, 17), (2, 90), (3, 22), (4, 94), (5, 21), (6, 40), (7, 49), (8, 80), (9, 98), (11, 67), (13, 54)];
     let turning = [(0, 1), (1, 97), (3, 69), (4, 98), (5, 21), (6, 40), (8, 22), (11, 67), (13, 54), (15, 18)];
     let codes: &[(i16, i32)] = if lathe { &turning } else { &mill };
-    codes.iter().map(|(group, code)| (*group, Number::decimal(*code, 0))).collect()
+    codes.iter().map(|(group, code)| (*group, Number::from_decimal(*code, 0))).collect()
 }
 
 /// The moment on the other pages of the screen.
-pub(super) fn show(control: &mut Controller, moment: &Moment, now_ns: TimeNs) {
+pub(super) fn show_pages(control: &mut Controller, moment: &Moment, now_ns: TimeNs) {
     let panel = &moment.panel;
-    if let Some(clock) = civil(now_ns) {
+    if let Some(clock) = to_civil_time(now_ns) {
         control.clock = clock;
     }
     let turning = panel.spindle_speed_rpm.abs() > 1.0;
-    control.modal([(BlockWord::M, if turning { 3 } else { 5 }), (BlockWord::H, i32::from(panel.tool))]);
-    control.g_codes.insert(0, Number::decimal(i32::from(!panel.rapid), 0));
-    control.parameter(6712, LONG, whole(f64::from(panel.part_count)));
-    temperatures(control, moment);
-    times(control, panel);
-    programs(control, panel);
-    tools(control, panel);
-    messages(control, panel);
+    control.set_modal_words([(BlockWord::M, if turning { 3 } else { 5 }), (BlockWord::H, i32::from(panel.tool))]);
+    control.g_codes.insert(0, Number::from_decimal(i32::from(!panel.rapid), 0));
+    control.set_parameter(6712, LONG, round_to_number(f64::from(panel.part_count)));
+    show_temperatures(control, moment);
+    show_times(control, panel);
+    show_programs(control, panel);
+    show_tools(control, panel);
+    show_messages(control, panel);
 }
 
-fn civil(now_ns: TimeNs) -> Option<[i16; 6]> {
+fn to_civil_time(now_ns: TimeNs) -> Option<[i16; 6]> {
     let time = Timestamp::from_nanosecond(i128::from(now_ns)).ok()?.to_zoned(TimeZone::UTC).datetime();
     let short = i16::from;
     Some([
@@ -89,22 +89,23 @@ fn civil(now_ns: TimeNs) -> Option<[i16; 6]> {
 
 /// Motors of the axes are a little warmer than the air with what they carry, their encoders cooler than the motors; the
 /// position errors follow the speed.
-fn temperatures(control: &mut Controller, moment: &Moment) {
+fn show_temperatures(control: &mut Controller, moment: &Moment) {
     let air = moment.electric.ambient_temperature_c;
     let load = |number: &Number| f64::from(number.mantissa.abs());
-    let motors: Vec<Number> = control.axes.iter().map(|axis| whole(air + load(&axis.load) / 4.0)).collect();
-    let encoders = control.axes.iter().map(|axis| whole(air + load(&axis.load) / 8.0)).collect();
+    let motors: Vec<Number> = control.axes.iter().map(|axis| round_to_number(air + load(&axis.load) / 4.0)).collect();
+    let encoders = control.axes.iter().map(|axis| round_to_number(air + load(&axis.load) / 8.0)).collect();
     control.diagnosis_of_axes(308, DIAGNOSIS_BYTE, motors);
     control.diagnosis_of_axes(309, DIAGNOSIS_BYTE, encoders);
     let errors = moment.panel.velocity_mm_min;
-    let error = |place: usize| Number { exponent: 3, ..whole(errors.get(place).copied().unwrap_or(0.0) / 3.0) };
+    let error =
+        |place: usize| Number { exponent: 3, ..round_to_number(errors.get(place).copied().unwrap_or(0.0) / 3.0) };
     let real = (0..control.axes.len()).map(error).collect();
     control.diagnosis_of_axes(301, DIAGNOSIS_REAL, real);
-    control.diagnosis(300, DIAGNOSIS_LONG, Number::decimal(0, 0));
+    control.set_diagnosis(300, DIAGNOSIS_LONG, Number::from_decimal(0, 0));
 }
 
 /// The meters of time follow from the parts that were made, so that they are the same in every run.
-fn times(control: &mut Controller, panel: &Panel) {
+fn show_times(control: &mut Controller, panel: &Panel) {
     let seconds = |seconds: i64| {
         let milliseconds = i32::try_from(seconds % 60 * 1000).unwrap_or(0);
         (i32::try_from(seconds / 60).unwrap_or(i32::MAX), milliseconds)
@@ -114,7 +115,7 @@ fn times(control: &mut Controller, panel: &Panel) {
     control.blocks = i32::from(panel.block);
 }
 
-fn programs(control: &mut Controller, panel: &Panel) {
+fn show_programs(control: &mut Controller, panel: &Panel) {
     let number = i32::from(panel.program);
     if number > 0 && control.programs.iter().all(|file| file.number != number) {
         control.programs.push(ProgramFile { number, bytes: 1024, comment: "SIMULATED".to_owned() });
@@ -123,7 +124,7 @@ fn programs(control: &mut Controller, panel: &Panel) {
 }
 
 /// A group per tool; every part uses each of them once.
-fn tools(control: &mut Controller, panel: &Panel) {
+fn show_tools(control: &mut Controller, panel: &Panel) {
     let group = i32::from(panel.tool);
     let used = i32::try_from(panel.part_count).unwrap_or(0) % TOOL_LIFE;
     let tools = i32::from(panel.edge).min(1000) + 1;
@@ -131,7 +132,7 @@ fn tools(control: &mut Controller, panel: &Panel) {
     control.tool_group = [group, group, group];
 }
 
-fn messages(control: &mut Controller, panel: &Panel) {
+fn show_messages(control: &mut Controller, panel: &Panel) {
     control.messages.clear();
     if panel.part_count > 0 && panel.part_count.is_multiple_of(BOX_OF_PARTS) {
         control.messages.push(OperatorMessage {

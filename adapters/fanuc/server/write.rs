@@ -1,6 +1,6 @@
 //! What a question writes.
 
-use super::answer::{ATTRIB, FUNC, LENGTH, NUMBER, stretch};
+use super::answer::{ATTRIB, FUNC, LENGTH, NUMBER, parse_stretch};
 use super::controller::Controller;
 use crate::fanuc::item::Area;
 use crate::fanuc::request::function as f;
@@ -9,38 +9,38 @@ use crate::fanuc::wire::{Cursor, Number, Request};
 /// Not now.
 const REJECT: i16 = 13;
 
-pub(super) fn take(controller: &mut Controller, request: &Request) -> Result<(), i16> {
+pub(super) fn apply_write(controller: &mut Controller, request: &Request) -> Result<(), i16> {
     let announced = usize::try_from(request.arguments[4]).unwrap_or(usize::MAX);
     if announced != request.data.len() {
         return Err(LENGTH);
     }
     let [first, _, third, ..] = request.arguments;
     match request.function {
-        f::PMC_WRITE => memory(controller, request),
+        f::PMC_WRITE => write_memory(controller, request),
         f::MACRO_WRITE => {
-            let value = number(request)?;
+            let value = read_number(request)?;
             let place = controller.macros.get_mut(&first).ok_or(NUMBER)?;
             *place = value.value();
             Ok(())
         }
         f::TOOL_OFFSET_WRITE => {
-            controller.tool_offsets.insert((first, third - 1000), number(request)?.mantissa);
+            controller.tool_offsets.insert((first, third - 1000), read_number(request)?.mantissa);
             Ok(())
         }
-        f::WORK_OFFSET_WRITE => work_offset(controller, first, third, number(request)?.mantissa),
-        f::PANEL_SIGNALS_WRITE => panel(controller, request),
+        f::WORK_OFFSET_WRITE => work_offset(controller, first, third, read_number(request)?.mantissa),
+        f::PANEL_SIGNALS_WRITE => write_panel_signals(controller, request),
         _ => Err(FUNC),
     }
 }
 
-fn number(request: &Request) -> Result<Number, i16> {
+fn read_number(request: &Request) -> Result<Number, i16> {
     let mut cursor = Cursor::new("written number", &request.data);
     let number = Number::read(&mut cursor).map_err(|_| LENGTH)?;
-    cursor.end().map(|()| number).map_err(|_| LENGTH)
+    cursor.check_end().map(|()| number).map_err(|_| LENGTH)
 }
 
-fn memory(controller: &mut Controller, request: &Request) -> Result<(), i16> {
-    let stretch = stretch(request)?;
+fn write_memory(controller: &mut Controller, request: &Request) -> Result<(), i16> {
+    let stretch = parse_stretch(request)?;
     if matches!(stretch.area, Area::F | Area::X) {
         return Err(ATTRIB);
     }
@@ -65,11 +65,11 @@ fn work_offset(controller: &mut Controller, number: i32, axis: i32, value: i32) 
 }
 
 /// Bit 5 of the mask is the feed override, which stands at the sixth place.
-fn panel(controller: &mut Controller, request: &Request) -> Result<(), i16> {
+fn write_panel_signals(controller: &mut Controller, request: &Request) -> Result<(), i16> {
     let mut cursor = Cursor::new("signals of the panel", &request.data);
     let mut signals = [0; 16];
     for signal in &mut signals {
-        *signal = cursor.i16().map_err(|_| LENGTH)?;
+        *signal = cursor.read_i16().map_err(|_| LENGTH)?;
     }
     for (bit, signal) in signals.into_iter().enumerate() {
         if request.arguments[0] >> bit & 1 == 1 {

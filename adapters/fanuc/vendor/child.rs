@@ -4,7 +4,7 @@ use super::dynamic;
 use super::ffi::Functions;
 use super::layout::{MAX_AXIS, ZOFS_LEN};
 use super::message::{FocasReply, FocasRequest};
-use super::structure::{Bytes, checked};
+use super::structure::{Bytes, check_code};
 use crate::child::{Guarded, Missing, serve_words};
 use crate::fanuc::answer::{FocasAnswer, FocasItemError, FocasItemResult, SpeedUnit};
 use crate::fanuc::code::{Consequence, FocasReturnCode};
@@ -20,16 +20,16 @@ use std::path::Path;
 ///
 /// # Errors
 /// The line to the parent failed.
-pub fn child() -> std::io::Result<()> {
+pub fn serve_parent() -> std::io::Result<()> {
     let mut session: Option<FocasSession> = None;
     serve_words(|ask: Result<FocasRequest, String>, tell| match (ask, &mut session) {
         (Ok(FocasRequest::Read(questions)), Some(session)) => session.read_each(&questions, tell),
-        (Ok(ask), _) => tell(&answer(&mut session, ask)),
+        (Ok(ask), _) => tell(&answer_request(&mut session, ask)),
         (Err(confused), _) => tell(&FocasReply::Confused(confused)),
     })
 }
 
-fn answer(session: &mut Option<FocasSession>, ask: FocasRequest) -> FocasReply {
+fn answer_request(session: &mut Option<FocasSession>, ask: FocasRequest) -> FocasReply {
     if let FocasRequest::Open { vendor_library, host, port, path, timeout_s, encoding } = ask {
         *session = None;
         return match FocasSession::open(&vendor_library, &host, port, path, timeout_s) {
@@ -48,7 +48,7 @@ fn answer(session: &mut Option<FocasSession>, ask: FocasRequest) -> FocasReply {
     }
 }
 
-fn without(name: &str) -> Box<FocasReply> {
+fn build_missing_reply(name: &str) -> Box<FocasReply> {
     Box::new(FocasReply::Unloadable(format!("the library has no {name}")))
 }
 
@@ -100,7 +100,7 @@ impl FocasSession {
         match functions.cnc_allclibhndl3(&host, port, timeout_s, &mut handle) {
             Ok(0) => {}
             Ok(code) => return Err(Box::new(FocasReply::Code(FocasReturnCode(code)))),
-            Err(Missing(name)) => return Err(without(name)),
+            Err(Missing(name)) => return Err(build_missing_reply(name)),
         }
         let mut session = Self {
             functions,
@@ -117,9 +117,9 @@ impl FocasSession {
         match session.turn_to(path) {
             Ok(0) => {}
             Ok(code) => return Err(Box::new(FocasReply::Code(FocasReturnCode(code)))),
-            Err(Missing(name)) => return Err(without(name)),
+            Err(Missing(name)) => return Err(build_missing_reply(name)),
         }
-        let opening = session.opening();
+        let opening = session.build_opening();
         session.axes_max = usize::from(opening.axes_max).min(MAX_AXIS);
         Ok((session, opening))
     }
@@ -137,8 +137,8 @@ impl FocasSession {
     }
 
     /// The library tells no version word; what is known comes from the series.
-    fn opening(&self) -> Opening {
-        let system = self.system().ok();
+    fn build_opening(&self) -> Opening {
+        let system = self.read_system().ok();
         let of = |text: Option<&str>| text.and_then(|text| text.trim().parse::<u16>().ok()).unwrap_or(0);
         let axes_max = system.as_ref().and_then(|system| u16::try_from(system.axes_max).ok()).unwrap_or(0);
         let axes = of(system.as_ref().map(|system| system.axes.as_str()));
@@ -168,12 +168,12 @@ impl FocasSession {
     }
 
     fn read_on(&mut self, question: Question) -> FocasItemResult {
-        checked(self.turn_to(question.path))?;
+        check_code(self.turn_to(question.path))?;
         if matches!(question.item, FocasItem::Position(_, -1)) && self.dynamic.is_none() {
             self.dynamic = Some(self.every_axis()?);
         }
         if matches!(question.item, FocasItem::Position(_, -1)) && !self.places.contains_key(&self.path) {
-            let places = self.figures()?;
+            let places = self.read_decimal_places()?;
             self.places.insert(self.path, places);
         }
         if matches!(question.item, FocasItem::Feed | FocasItem::FeedUnit) {
@@ -181,45 +181,47 @@ impl FocasSession {
                 Ok((_, unit)) if question.item == FocasItem::FeedUnit => return Ok(FocasAnswer::Unit(unit)),
                 Ok((feed, _)) => return Ok(FocasAnswer::Number(feed)),
                 // A control or library without this call tells the feed without its unit.
-                Err(error) if question.item == FocasItem::Feed && error.absence() == Absence::NotSupported => {}
+                Err(error) if question.item == FocasItem::Feed && error.to_absence() == Absence::NotSupported => {}
                 Err(error) => return Err(error),
             }
         }
         let places = self.places.get(&self.path).map_or(&[][..], Vec::as_slice);
-        let known =
-            self.dynamic.as_ref().and_then(|dynamic| dynamic::of(question.item, dynamic, self.axes_max, places));
+        let known = self
+            .dynamic
+            .as_ref()
+            .and_then(|dynamic| dynamic::decode_item(question.item, dynamic, self.axes_max, places));
         known.map_or_else(|| self.read(question.item), Ok)
     }
 
     fn write(&mut self, write: &Write) -> FocasReply {
         let turned = self.turn_to(self.own);
-        match turned.and_then(|code| if code == 0 { self.written(write) } else { Ok(code) }) {
+        match turned.and_then(|code| if code == 0 { self.call_write_function(write) } else { Ok(code) }) {
             Ok(0) => FocasReply::Written,
             Ok(code) => FocasReply::Code(FocasReturnCode(code)),
             Err(Missing(name)) => FocasReply::Confused(format!("the library has no {name}")),
         }
     }
 
-    fn written(&self, write: &Write) -> Result<i16, Missing> {
+    fn call_write_function(&self, write: &Write) -> Result<i16, Missing> {
         let (f, h) = (&self.functions, self.handle);
         let short = |number: u16| i16::try_from(number).unwrap_or(i16::MAX);
         match write {
             Write::Macro { number, mantissa, places } => f.cnc_wrmacro(h, short(*number), 10, *mantissa, *places),
             Write::Pmc { stretch, values } => {
                 let (area, width) = pmc_words(*stretch);
-                let step = usize::from(stretch.width.bytes());
+                let step = usize::from(stretch.width.byte_count());
                 let head =
                     [area.to_le_bytes(), width.to_le_bytes(), stretch.from.to_le_bytes(), stretch.to.to_le_bytes()];
                 let data = values.iter().flat_map(|value| value.to_le_bytes()[..step].to_vec());
                 let bytes: Vec<u8> = head.concat().into_iter().chain(data).collect();
                 let mut buffer = Guarded::new(bytes.len());
-                buffer.put(&bytes);
+                buffer.write_bytes(&bytes);
                 f.pmc_wrpmcrng(h, u16::try_from(bytes.len()).unwrap_or(u16::MAX), &mut buffer)
             }
             Write::WorkOffset { number, axis, value } => {
                 let head = [short(*number).to_le_bytes(), axis.to_le_bytes()].concat();
                 let mut buffer = Guarded::new(ZOFS_LEN);
-                buffer.put(&[head, value.to_le_bytes().to_vec()].concat());
+                buffer.write_bytes(&[head, value.to_le_bytes().to_vec()].concat());
                 f.cnc_wrzofs(h, 8, &mut buffer)
             }
             Write::ToolOffset { .. } => Err(Missing("cnc_wrtofs")),
@@ -234,5 +236,5 @@ fn is_dead(error: &FocasItemError) -> bool {
 
 pub(super) fn pmc_words(stretch: Stretch) -> (i16, i16) {
     let word = |number: i32| i16::try_from(number).unwrap_or(-1);
-    (word(stretch.area.number()), word(stretch.width.number()))
+    (word(stretch.area.wire_number()), word(stretch.width.wire_number()))
 }

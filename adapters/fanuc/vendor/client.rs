@@ -52,13 +52,13 @@ impl Vendor {
     /// # Errors
     /// See [`FocasError`].
     pub fn connect(settings: VendorSettings) -> Result<Self, FocasError> {
-        let patience = Duration::from_secs(u64::from(seconds(settings.timeout).unsigned_abs()));
+        let patience = Duration::from_secs(u64::from(round_up_seconds(settings.timeout).unsigned_abs()));
         let mut child = ChildSettings::new(KIND, &[], settings.deadline.unwrap_or(patience + GRACE));
         child.program.clone_from(&settings.program);
         child.environment.clone_from(&settings.environment);
         child.pause_min = Duration::ZERO;
         let mut child = ChildClient::new(child);
-        let opening = open(&mut child, &settings)?;
+        let opening = open_connection(&mut child, &settings)?;
         Ok(Self { child, settings, opening })
     }
 
@@ -75,17 +75,17 @@ impl Vendor {
     }
 
     /// Asks a child in which the connection is open; opens it in a new child.
-    fn request(&mut self, ask: &FocasRequest) -> Result<Result<FocasReply, ChildError>, FocasError> {
+    fn ask_child(&mut self, ask: &FocasRequest) -> Result<Result<FocasReply, ChildError>, FocasError> {
         if !self.child.is_running() {
-            self.opening = open(&mut self.child, &self.settings)?;
+            self.opening = open_connection(&mut self.child, &self.settings)?;
         }
-        Ok(self.child.told(ask))
+        Ok(self.child.request_answer(ask))
     }
 
     /// Reads as many of the questions as one child survives; the answers, in order, at least one.
     fn read(&mut self, questions: &[Question]) -> Result<Vec<FocasItemResult>, FocasError> {
         if !self.child.is_running() {
-            self.opening = open(&mut self.child, &self.settings)?;
+            self.opening = open_connection(&mut self.child, &self.settings)?;
         }
         let mut answers = Vec::with_capacity(questions.len());
         let take = |told| {
@@ -103,20 +103,20 @@ impl Vendor {
 }
 
 /// Whole seconds, at least one: zero would mean for ever.
-fn seconds(timeout: Duration) -> i32 {
+fn round_up_seconds(timeout: Duration) -> i32 {
     i32::try_from(timeout.as_secs_f64().ceil().max(1.0) as u32).unwrap_or(1)
 }
 
-fn open(child: &mut ChildClient<Question>, settings: &VendorSettings) -> Result<Opening, FocasError> {
+fn open_connection(child: &mut ChildClient<Question>, settings: &VendorSettings) -> Result<Opening, FocasError> {
     let ask = FocasRequest::Open {
         vendor_library: settings.vendor_library.clone(),
         host: settings.at.host.clone(),
         port: settings.at.port,
         path: settings.path,
-        timeout_s: seconds(settings.timeout),
+        timeout_s: round_up_seconds(settings.timeout),
         encoding: settings.encoding,
     };
-    let opened = match child.told(&ask).map_err(|error| FocasError::Library(error.to_string()))? {
+    let opened = match child.request_answer(&ask).map_err(|error| FocasError::Library(error.to_string()))? {
         FocasReply::Opened(opening) => return Ok(opening),
         FocasReply::Code(code @ FocasReturnCode::SOCKET) => no_socket(settings, code),
         FocasReply::Code(FocasReturnCode(-17)) => FocasError::NoSession,
@@ -124,13 +124,13 @@ fn open(child: &mut ChildClient<Question>, settings: &VendorSettings) -> Result<
         FocasReply::Unloadable(what) => FocasError::Unusable(format!("{}: {what}", settings.vendor_library.display())),
         other => FocasError::Library(format!("{other:?}")),
     };
-    child.end();
+    child.end_child();
     Err(opened)
 }
 
 /// What the library's one code for every failed connection means: a connection of our own tells.
 fn no_socket(settings: &VendorSettings, code: FocasReturnCode) -> FocasError {
-    match stream::connect(&settings.at, Instant::now() + settings.timeout) {
+    match stream::connect_host(&settings.at, Instant::now() + settings.timeout) {
         Ok(_) => FocasError::Timeout(settings.timeout),
         Err(error) if error.kind() == ErrorKind::ConnectionRefused => FocasError::NobodyThere(code.to_string()),
         Err(_) => FocasError::Unreachable(code.to_string()),
@@ -142,11 +142,11 @@ impl Focas for Vendor {
         &self.opening
     }
 
-    fn ask(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError> {
+    fn ask_questions(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError> {
         let before = out.len();
         let mut rest = questions;
         while !rest.is_empty() {
-            let answers = match self.child.survived(rest) {
+            let answers = match self.child.count_survived(rest) {
                 0 => vec![Err(FocasItemError::NotOffered)],
                 count => self.read(&rest[..count]).inspect_err(|_| out.truncate(before))?,
             };
@@ -157,7 +157,7 @@ impl Focas for Vendor {
     }
 
     fn write(&mut self, write: &Write) -> Result<(), FocasError> {
-        match self.request(&FocasRequest::Write(write.clone()))? {
+        match self.ask_child(&FocasRequest::Write(write.clone()))? {
             Ok(FocasReply::Written) => Ok(()),
             Ok(FocasReply::Code(code)) if code.consequence() == Consequence::Reconnect => {
                 Err(FocasError::Broken(code.to_string()))

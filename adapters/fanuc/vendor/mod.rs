@@ -36,7 +36,7 @@ mod message;
 mod structure;
 mod texts;
 
-pub use child::child;
+pub use child::serve_parent;
 pub use client::{Vendor, VendorSettings};
 
 /// What the hidden subcommand calls this child.

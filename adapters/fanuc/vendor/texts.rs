@@ -2,7 +2,7 @@
 //! tool life.
 
 use super::child::FocasSession;
-use super::structure::{Bytes, checked, filled};
+use super::structure::{Bytes, check_code, fill_structure};
 use crate::fanuc::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, OperatorMessage, PastAlarm};
 use crate::fanuc::item::FocasItem;
 use crate::text::TextEncoding;
@@ -20,12 +20,12 @@ const HISTORY_LEN: usize = 48;
 const HISTORY_MAX: u16 = 10;
 
 impl FocasSession {
-    pub(super) fn text(&self, item: FocasItem) -> FocasItemResult {
+    pub(super) fn read_text(&self, item: FocasItem) -> FocasItemResult {
         let (f, h) = (&self.functions, self.handle);
         match item {
             FocasItem::ExecutedText(most) => {
                 let (mut length, mut block) = (most.clamp(1, 1000), 0);
-                let bytes = filled(1024, |out| f.cnc_rdexecprog(h, &mut length, &mut block, out))?;
+                let bytes = fill_structure(1024, |out| f.cnc_rdexecprog(h, &mut length, &mut block, out))?;
                 Ok(FocasAnswer::Named {
                     number: i32::from(block),
                     name: bytes.text_in(0, usize::from(length), self.encoding),
@@ -33,36 +33,36 @@ impl FocasSession {
             }
             FocasItem::Messages(most) => {
                 let mut found = i16::try_from(most.clamp(1, 5)).unwrap_or(1);
-                let bytes = filled(MESSAGE_LEN * 5, |out| f.cnc_rdopmsg3(h, -1, &mut found, out))?;
+                let bytes = fill_structure(MESSAGE_LEN * 5, |out| f.cnc_rdopmsg3(h, -1, &mut found, out))?;
                 let count = usize::try_from(found).unwrap_or(0).min(5);
                 Ok(FocasAnswer::Messages(
-                    (0..count).map(|at| message(&bytes, at * MESSAGE_LEN, self.encoding)).collect(),
+                    (0..count).map(|at| decode_message(&bytes, at * MESSAGE_LEN, self.encoding)).collect(),
                 ))
             }
             FocasItem::GCodes => {
                 let mut found = G_CODES_MAX;
                 let room = G_CODE_LEN * usize::from(G_CODES_MAX.unsigned_abs());
-                let bytes = filled(room, |out| f.cnc_rdgcode(h, -1, 0, &mut found, out))?;
+                let bytes = fill_structure(room, |out| f.cnc_rdgcode(h, -1, 0, &mut found, out))?;
                 let count = usize::try_from(found.min(G_CODES_MAX)).unwrap_or(0);
-                Ok(FocasAnswer::Names((0..count).map(|at| bytes.text(at * G_CODE_LEN + 4, 8)).collect()))
+                Ok(FocasAnswer::Names((0..count).map(|at| bytes.read_text(at * G_CODE_LEN + 4, 8)).collect()))
             }
             _ => Err(FocasItemError::NotOffered),
         }
     }
 
-    pub(super) fn history(&self, item: FocasItem) -> FocasItemResult {
+    pub(super) fn read_history(&self, item: FocasItem) -> FocasItemResult {
         let (f, h) = (&self.functions, self.handle);
         match item {
             FocasItem::HistoryCount => {
                 let mut count = 0;
-                checked(f.cnc_rdalmhisno(h, &mut count)).map(|()| FocasAnswer::Whole(i32::from(count)))
+                check_code(f.cnc_rdalmhisno(h, &mut count)).map(|()| FocasAnswer::Whole(i32::from(count)))
             }
             FocasItem::AlarmHistory(first, last) => {
                 let last = last.min(first.saturating_add(HISTORY_MAX - 1));
                 let count = usize::from(last.saturating_sub(first)) + 1;
                 let length = HISTORY_HEAD_LEN + HISTORY_LEN * count;
                 let asked = u16::try_from(length).unwrap_or(u16::MAX);
-                let bytes = filled(length, |out| f.cnc_rdalmhistry(h, first, last, asked, out))?;
+                let bytes = fill_structure(length, |out| f.cnc_rdalmhistry(h, first, last, asked, out))?;
                 let record = |at: usize| past_alarm(&bytes, HISTORY_HEAD_LEN + at * HISTORY_LEN, self.encoding);
                 Ok(FocasAnswer::History((0..count).map(record).collect()))
             }
@@ -74,13 +74,13 @@ impl FocasSession {
         let (f, h) = (&self.functions, self.handle);
         match item {
             FocasItem::ToolGroup => {
-                filled(24, |out| f.cnc_rdtlusegrp(h, out)).map(|bytes| FocasAnswer::Whole(bytes.i32(4)))
+                fill_structure(24, |out| f.cnc_rdtlusegrp(h, out)).map(|bytes| FocasAnswer::Whole(bytes.read_i32(4)))
             }
             FocasItem::ToolLife(group) => {
                 let group = i16::try_from(group).map_err(|_| FocasItemError::NotOffered)?;
-                let life = filled(8, |out| f.cnc_rdlife(h, group, out))?.i32(4);
-                let count = filled(8, |out| f.cnc_rdcount(h, group, out))?.i32(4);
-                let tools = filled(8, |out| f.cnc_rdntool(h, group, out))?.i32(4);
+                let life = fill_structure(8, |out| f.cnc_rdlife(h, group, out))?.read_i32(4);
+                let count = fill_structure(8, |out| f.cnc_rdcount(h, group, out))?.read_i32(4);
+                let tools = fill_structure(8, |out| f.cnc_rdntool(h, group, out))?.read_i32(4);
                 Ok(FocasAnswer::Life { tools, life, count })
             }
             _ => Err(FocasItemError::NotOffered),
@@ -88,16 +88,16 @@ impl FocasSession {
     }
 }
 
-fn message(bytes: &Bytes, at: usize, encoding: TextEncoding) -> OperatorMessage {
-    let length = usize::try_from(bytes.i16(at + 4)).unwrap_or(0).min(256);
-    let (number, kind) = (i32::from(bytes.i16(at)), i32::from(bytes.i16(at + 2)));
+fn decode_message(bytes: &Bytes, at: usize, encoding: TextEncoding) -> OperatorMessage {
+    let length = usize::try_from(bytes.read_i16(at + 4)).unwrap_or(0).min(256);
+    let (number, kind) = (i32::from(bytes.read_i16(at)), i32::from(bytes.read_i16(at + 2)));
     OperatorMessage { number, kind, text: bytes.text_in(at + 6, length, encoding) }
 }
 
 fn past_alarm(bytes: &Bytes, at: usize, encoding: TextEncoding) -> PastAlarm {
-    let byte = |offset: usize| i16::from(bytes.array::<1>(at + offset)[0]);
-    let length = usize::try_from(bytes.i16(at + 12)).unwrap_or(0).min(32);
-    let (kind, number) = (i32::from(bytes.i16(at)), i32::from(bytes.i16(at + 2)));
+    let byte = |offset: usize| i16::from(bytes.read_array::<1>(at + offset)[0]);
+    let length = usize::try_from(bytes.read_i16(at + 12)).unwrap_or(0).min(32);
+    let (kind, number) = (i32::from(bytes.read_i16(at)), i32::from(bytes.read_i16(at + 2)));
     let alarm = Alarm { number, kind, axis: i32::from(byte(4)), text: bytes.text_in(at + 14, length, encoding) };
     PastAlarm { alarm, at: [byte(5), byte(6), byte(7), byte(8), byte(9), byte(10)] }
 }

@@ -17,14 +17,14 @@ pub enum CncOrPmc {
 }
 
 impl CncOrPmc {
-    fn number(self) -> u16 {
+    fn wire_number(self) -> u16 {
         match self {
             Self::Cnc => 1,
             Self::Pmc => 2,
         }
     }
 
-    fn of(number: u16) -> Result<Self, WireError> {
+    fn from_number(number: u16) -> Result<Self, WireError> {
         match number {
             1 => Ok(Self::Cnc),
             2 => Ok(Self::Pmc),
@@ -51,19 +51,19 @@ pub struct Request {
 impl Request {
     /// A question to the control with its first arguments, on path 1.
     #[must_use]
-    pub fn cnc(function: u16, first: &[i32]) -> Self {
-        Self { device: CncOrPmc::Cnc, path: 1, function, arguments: padded(first), data: Vec::new() }
+    pub fn new_cnc(function: u16, first: &[i32]) -> Self {
+        Self { device: CncOrPmc::Cnc, path: 1, function, arguments: pad_arguments(first), data: Vec::new() }
     }
 
     /// A question to the PMC.
     #[must_use]
-    pub fn pmc(function: u16, first: &[i32]) -> Self {
-        Self { device: CncOrPmc::Pmc, ..Self::cnc(function, first) }
+    pub fn new_pmc(function: u16, first: &[i32]) -> Self {
+        Self { device: CncOrPmc::Pmc, ..Self::new_cnc(function, first) }
     }
 
     /// The same, writing these bytes.
     #[must_use]
-    pub fn writing(mut self, data: Vec<u8>) -> Self {
+    pub fn with_data(mut self, data: Vec<u8>) -> Self {
         self.arguments[4] = i32::try_from(data.len()).unwrap_or(0);
         self.data = data;
         self
@@ -86,7 +86,7 @@ impl Request {
 
     fn write(&self, bytes: &mut Vec<u8>) {
         let length = u16::try_from(self.wire_len()).unwrap_or(u16::MAX);
-        for word in [length, self.device.number(), self.path, self.function] {
+        for word in [length, self.device.wire_number(), self.path, self.function] {
             bytes.extend_from_slice(&word.to_be_bytes());
         }
         self.arguments.iter().for_each(|argument| bytes.extend_from_slice(&argument.to_be_bytes()));
@@ -94,41 +94,42 @@ impl Request {
     }
 
     fn read(cursor: &mut Cursor<'_>) -> Result<Self, WireError> {
-        let length = usize::from(cursor.u16()?);
-        let data_len = inner("length of a question", length, REQUEST_LEN)?;
-        let (device, path, function) = (CncOrPmc::of(cursor.u16()?)?, cursor.u16()?, cursor.u16()?);
+        let length = usize::from(cursor.read_u16()?);
+        let data_len = compute_data_len("length of a question", length, REQUEST_LEN)?;
+        let (device, path, function) =
+            (CncOrPmc::from_number(cursor.read_u16()?)?, cursor.read_u16()?, cursor.read_u16()?);
         let mut arguments = [0; 5];
         for argument in &mut arguments {
-            *argument = cursor.i32()?;
+            *argument = cursor.read_i32()?;
         }
-        let data = cursor.bytes(data_len)?.to_vec();
+        let data = cursor.read_bytes(data_len)?.to_vec();
         Ok(Self { device, path, function, arguments, data })
     }
 }
 
-fn padded(first: &[i32]) -> [i32; 5] {
+fn pad_arguments(first: &[i32]) -> [i32; 5] {
     std::array::from_fn(|index| first.get(index).copied().unwrap_or(0))
 }
 
 /// Bytes of a block beyond its fixed part.
-fn inner(what: &'static str, length: usize, fixed: usize) -> Result<usize, WireError> {
-    let short = || WireError::Mismatch { what, expected: signed(fixed), found: signed(length) };
+fn compute_data_len(what: &'static str, length: usize, fixed: usize) -> Result<usize, WireError> {
+    let short = || WireError::Mismatch { what, expected: clamp_to_i64(fixed), found: clamp_to_i64(length) };
     length.checked_sub(fixed).ok_or_else(short)
 }
 
-fn signed(length: usize) -> i64 {
+fn clamp_to_i64(length: usize) -> i64 {
     i64::try_from(length).unwrap_or(i64::MAX)
 }
 
 /// The body of a request.
 #[must_use]
 pub fn request_body(requests: &[Request]) -> Vec<u8> {
-    let mut bytes = count(requests.len());
+    let mut bytes = encode_count(requests.len());
     requests.iter().for_each(|request| request.write(&mut bytes));
     bytes
 }
 
-fn count(blocks: usize) -> Vec<u8> {
+fn encode_count(blocks: usize) -> Vec<u8> {
     u16::try_from(blocks).unwrap_or(u16::MAX).to_be_bytes().to_vec()
 }
 
@@ -136,18 +137,18 @@ fn count(blocks: usize) -> Vec<u8> {
 ///
 /// # Errors
 /// The bytes contradict themselves.
-pub fn requests(body: &[u8]) -> Result<Vec<Request>, WireError> {
+pub fn parse_requests(body: &[u8]) -> Result<Vec<Request>, WireError> {
     let mut cursor = Cursor::new("questions", body);
-    let blocks = blocks(&mut cursor)?;
+    let blocks = read_block_count(&mut cursor)?;
     let requests = (0..blocks).map(|_| Request::read(&mut cursor)).collect::<Result<_, _>>()?;
-    cursor.end()?;
+    cursor.check_end()?;
     Ok(requests)
 }
 
-fn blocks(cursor: &mut Cursor<'_>) -> Result<usize, WireError> {
-    let blocks = usize::from(cursor.u16()?);
-    let most = signed(BLOCKS_MAX);
-    let many = WireError::Mismatch { what: "number of blocks", expected: most, found: signed(blocks) };
+fn read_block_count(cursor: &mut Cursor<'_>) -> Result<usize, WireError> {
+    let blocks = usize::from(cursor.read_u16()?);
+    let most = clamp_to_i64(BLOCKS_MAX);
+    let many = WireError::Mismatch { what: "number of blocks", expected: most, found: clamp_to_i64(blocks) };
     if blocks > BLOCKS_MAX { Err(many) } else { Ok(blocks) }
 }
 
@@ -170,28 +171,29 @@ pub struct Reply<'a> {
 
 impl<'a> Reply<'a> {
     fn read(cursor: &mut Cursor<'a>) -> Result<Self, WireError> {
-        let length = usize::from(cursor.u16()?);
-        let room = inner("length of an answer", length, REPLY_LEN)?;
-        let (device, path, function) = (CncOrPmc::of(cursor.u16()?)?, cursor.u16()?, cursor.u16()?);
-        let (code, detail, _unused) = (cursor.i16()?, cursor.i16()?, cursor.i16()?);
-        let data_len = usize::from(cursor.u16()?);
+        let length = usize::from(cursor.read_u16()?);
+        let room = compute_data_len("length of an answer", length, REPLY_LEN)?;
+        let (device, path, function) =
+            (CncOrPmc::from_number(cursor.read_u16()?)?, cursor.read_u16()?, cursor.read_u16()?);
+        let (code, detail, _unused) = (cursor.read_i16()?, cursor.read_i16()?, cursor.read_i16()?);
+        let data_len = usize::from(cursor.read_u16()?);
         if data_len != room {
             let what = "length of the data of an answer";
-            return Err(WireError::Mismatch { what, expected: signed(room), found: signed(data_len) });
+            return Err(WireError::Mismatch { what, expected: clamp_to_i64(room), found: clamp_to_i64(data_len) });
         }
-        Ok(Self { device, path, function, code, detail, data: cursor.bytes(data_len)? })
+        Ok(Self { device, path, function, code, detail, data: cursor.read_bytes(data_len)? })
     }
 
     /// Is this the answer to that question?
     ///
     /// # Errors
     /// It answers another one.
-    pub fn answers(&self, request: &Request) -> Result<(), WireError> {
+    pub fn check_request(&self, request: &Request) -> Result<(), WireError> {
         let differs = |what, expected: u16, found: u16| {
             let (expected, found) = (i64::from(expected), i64::from(found));
             if expected == found { Ok(()) } else { Err(WireError::Mismatch { what, expected, found }) }
         };
-        differs("device of an answer", request.device.number(), self.device.number())?;
+        differs("device of an answer", request.device.wire_number(), self.device.wire_number())?;
         differs("path of an answer", request.path, self.path)?;
         differs("function of an answer", request.function, self.function)
     }
@@ -201,11 +203,11 @@ impl<'a> Reply<'a> {
 ///
 /// # Errors
 /// The bytes contradict themselves.
-pub fn replies(body: &[u8]) -> Result<Vec<Reply<'_>>, WireError> {
+pub fn parse_replies(body: &[u8]) -> Result<Vec<Reply<'_>>, WireError> {
     let mut cursor = Cursor::new("answers", body);
-    let blocks = blocks(&mut cursor)?;
+    let blocks = read_block_count(&mut cursor)?;
     let replies = (0..blocks).map(|_| Reply::read(&mut cursor)).collect::<Result<_, _>>()?;
-    cursor.end()?;
+    cursor.check_end()?;
     Ok(replies)
 }
 
@@ -223,10 +225,10 @@ pub struct ReplyBlock {
 /// The body that answers these questions, block by block.
 #[must_use]
 pub fn reply_body(answers: &[(&Request, ReplyBlock)]) -> Vec<u8> {
-    let mut bytes = count(answers.len());
+    let mut bytes = encode_count(answers.len());
     for (request, answer) in answers {
         let length = u16::try_from(answer.data.len()).unwrap_or(0);
-        let head = [length.saturating_add(16), request.device.number(), request.path, request.function];
+        let head = [length.saturating_add(16), request.device.wire_number(), request.path, request.function];
         head.iter().for_each(|word| bytes.extend_from_slice(&word.to_be_bytes()));
         [answer.code, answer.detail, 0].iter().for_each(|word| bytes.extend_from_slice(&word.to_be_bytes()));
         bytes.extend_from_slice(&length.to_be_bytes());

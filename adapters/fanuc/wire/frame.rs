@@ -43,11 +43,11 @@ impl FrameKind {
 
     /// The number on the wire.
     #[must_use]
-    pub fn number(self) -> u16 {
+    pub fn wire_number(self) -> u16 {
         Self::ALL.iter().find(|(kind, _)| *kind == self).map_or(0, |(_, number)| *number)
     }
 
-    fn of(number: u16) -> Result<Self, WireError> {
+    fn from_number(number: u16) -> Result<Self, WireError> {
         let known = Self::ALL.iter().find(|(_, known)| *known == number);
         known.map(|(kind, _)| *kind).ok_or(WireError::Kind(number))
     }
@@ -69,15 +69,15 @@ impl FocasHeader {
     ///
     /// # Errors
     /// They are of something else, or announce more than is accepted.
-    pub fn of(bytes: &[u8; HEADER_LEN]) -> Result<Self, WireError> {
+    pub fn from_bytes(bytes: &[u8; HEADER_LEN]) -> Result<Self, WireError> {
         let [a, b, c, d, ..] = *bytes;
         if [a, b, c, d] != MAGIC {
             return Err(WireError::Magic([a, b, c, d]));
         }
         let mut rest = Cursor::new("header", &bytes[4..]);
-        let version = rest.u16()?;
-        let kind = FrameKind::of(rest.u16()?)?;
-        let body_len = usize::from(rest.u16()?);
+        let version = rest.read_u16()?;
+        let kind = FrameKind::from_number(rest.read_u16()?)?;
+        let body_len = usize::from(rest.read_u16()?);
         if body_len > BODY_MAX { Err(WireError::TooLong(body_len)) } else { Ok(Self { version, kind, body_len }) }
     }
 }
@@ -98,25 +98,25 @@ impl FocasFrame {
     ///
     /// # Errors
     /// The bytes are something else, too few or too many.
-    pub fn of(bytes: &[u8]) -> Result<Self, WireError> {
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, WireError> {
         let short = WireError::Short { what: "header", needed: HEADER_LEN, left: bytes.len() };
         let (head, body) = bytes.split_first_chunk::<HEADER_LEN>().ok_or(short)?;
-        let header = FocasHeader::of(head)?;
+        let header = FocasHeader::from_bytes(head)?;
         let mut rest = Cursor::new("body", body);
-        let body = rest.bytes(header.body_len)?.to_vec();
-        rest.end()?;
+        let body = rest.read_bytes(header.body_len)?.to_vec();
+        rest.check_end()?;
         Ok(Self { version: header.version, kind: header.kind, body })
     }
 }
 
 /// The bytes of a frame. A body beyond [`BODY_MAX`] is cut off there; no builder here makes one.
 #[must_use]
-pub fn frame(version: u16, kind: FrameKind, body: &[u8]) -> Vec<u8> {
+pub fn encode_frame(version: u16, kind: FrameKind, body: &[u8]) -> Vec<u8> {
     let body = &body[..body.len().min(BODY_MAX)];
     let mut bytes = Vec::with_capacity(HEADER_LEN + body.len());
     bytes.extend_from_slice(&MAGIC);
     bytes.extend_from_slice(&version.to_be_bytes());
-    bytes.extend_from_slice(&kind.number().to_be_bytes());
+    bytes.extend_from_slice(&kind.wire_number().to_be_bytes());
     bytes.extend_from_slice(&u16::try_from(body.len()).unwrap_or(u16::MAX).to_be_bytes());
     bytes.extend_from_slice(body);
     bytes

@@ -15,9 +15,9 @@ mod number;
 #[cfg(test)]
 mod tests;
 
-pub use block::{CncOrPmc, Reply, ReplyBlock, Request, replies, reply_body, request_body, requests};
+pub use block::{CncOrPmc, Reply, ReplyBlock, Request, parse_replies, parse_requests, reply_body, request_body};
 pub use cursor::Cursor;
-pub use frame::{FocasFrame, FocasHeader, FrameKind, HEADER_LEN, frame};
+pub use frame::{FocasFrame, FocasHeader, FrameKind, HEADER_LEN, encode_frame};
 pub use number::Number;
 
 use thiserror::Error;

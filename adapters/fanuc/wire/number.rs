@@ -22,13 +22,13 @@ impl Number {
 
     /// `mantissa / 10^places`.
     #[must_use]
-    pub fn decimal(mantissa: i32, places: i16) -> Self {
+    pub fn from_decimal(mantissa: i32, places: i16) -> Self {
         Self { mantissa, base: 10, exponent: places }
     }
 
     /// The base-2 form of `mantissa / 10^places` that older controllers use.
     #[must_use]
-    pub fn binary(mantissa: i32, places: i16) -> Self {
+    pub fn from_decimal_as_binary(mantissa: i32, places: i16) -> Self {
         Self::binary_of(f64::from(mantissa) / 10f64.powi(i32::from(places)))
     }
 
@@ -54,7 +54,7 @@ impl Number {
         let places = (0..=8).find(exact).unwrap_or_else(|| (0..=8).rev().find(fits).unwrap_or(0));
         #[expect(clippy::cast_possible_truncation, reason = "saturates, which is what a controller shows")]
         let mantissa = scaled(places).round() as i32;
-        Self::decimal(mantissa, places)
+        Self::from_decimal(mantissa, places)
     }
 
     /// Reads eight bytes.
@@ -62,12 +62,12 @@ impl Number {
     /// # Errors
     /// Fewer are left.
     pub fn read(cursor: &mut Cursor<'_>) -> Result<Self, WireError> {
-        Ok(Self { mantissa: cursor.i32()?, base: cursor.u16()?, exponent: cursor.i16()? })
+        Ok(Self { mantissa: cursor.read_i32()?, base: cursor.read_u16()?, exponent: cursor.read_i16()? })
     }
 
     /// The bytes.
     #[must_use]
-    pub fn bytes(self) -> [u8; Self::LEN] {
+    pub fn to_bytes(self) -> [u8; Self::LEN] {
         let mut bytes = [0; Self::LEN];
         bytes[..4].copy_from_slice(&self.mantissa.to_be_bytes());
         bytes[4..6].copy_from_slice(&self.base.to_be_bytes());
@@ -87,7 +87,7 @@ impl Number {
 
     /// The value of a measured quantity, whose base word is not to be trusted: the exponent counts decimals.
     #[must_use]
-    pub fn measured(self) -> Option<f64> {
+    pub fn measured_value(self) -> Option<f64> {
         Self { base: 10, ..self }.value()
     }
 }

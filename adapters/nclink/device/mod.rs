@@ -22,7 +22,7 @@ mod values;
 use super::model::Model;
 use super::topic::Subject;
 use crate::clock::Clock;
-use crate::mqtt::{MqttClient, MqttError, MqttMessage, Options, Qos, unique};
+use crate::mqtt::{MqttClient, MqttError, MqttMessage, Options, Qos, generate_unique_id};
 use crate::simulated::Simulated;
 use registers::SimulatedRegisters;
 use sampling::ChannelSampler;
@@ -67,7 +67,7 @@ impl NcLinkDevice {
     /// A device that lives by this clock.
     #[must_use]
     pub fn new(serial: &str, machine: &Simulated, clock: Arc<dyn Clock>) -> Self {
-        let tree = tree::of(machine.settings().machine, serial);
+        let tree = tree::build_tree(machine.settings().machine, serial);
         let model = Model::parse(&tree).unwrap_or_default();
         let samplers = model.samples.iter().filter_map(|channel| ChannelSampler::new(channel, &model)).collect();
         let registers = SimulatedRegisters::new(machine);
@@ -79,50 +79,50 @@ impl NcLinkDevice {
     pub fn run(&mut self, broker: &Options, stop: &AtomicBool, mut tell: impl FnMut(DeviceEvent)) {
         let mut failing = false;
         while !stop.load(Ordering::SeqCst) {
-            let outcome = self.serve(broker, stop, || tell(DeviceEvent::Connected));
+            let outcome = self.serve_broker(broker, stop, || tell(DeviceEvent::Connected));
             let Err(error) = outcome else { return };
             // An attempt that fails like the one before is not told again.
             if !(failing && matches!(error, MqttError::Unreachable { .. })) {
                 tell(DeviceEvent::Failed(error.clone()));
             }
             failing = matches!(error, MqttError::Unreachable { .. });
-            pause(stop);
+            pause_before_redial(stop);
         }
     }
 
-    fn serve(&mut self, broker: &Options, stop: &AtomicBool, mut up: impl FnMut()) -> Result<(), MqttError> {
+    fn serve_broker(&mut self, broker: &Options, stop: &AtomicBool, mut up: impl FnMut()) -> Result<(), MqttError> {
         let client = MqttClient::connect(broker)?;
         let asked = [Subject::Probe, Subject::Query, Subject::Set, Subject::Ping];
-        client.subscribe(&asked.map(|subject| subject.filter(&self.serial)), Qos::AtMostOnce)?;
-        let register = json!({"@id": unique(), "deviceid": self.serial}).to_string();
-        client.publish(&Subject::Register.topic(&self.serial), register.as_bytes(), Qos::AtLeastOnce)?;
+        client.subscribe_filters(&asked.map(|subject| subject.build_filter(&self.serial)), Qos::AtMostOnce)?;
+        let register = json!({"@id": generate_unique_id(), "deviceid": self.serial}).to_string();
+        client.publish_message(&Subject::Register.build_topic(&self.serial), register.as_bytes(), Qos::AtLeastOnce)?;
         let now_ns = self.clock.now_ns();
-        self.samplers.iter_mut().for_each(|sampler| sampler.begin(now_ns));
+        self.samplers.iter_mut().for_each(|sampler| sampler.begin_sampling(now_ns));
         up();
         while !stop.load(Ordering::SeqCst) {
-            if let Some(message) = client.receive(self.wait())? {
-                self.take(&client, &message)?;
+            if let Some(message) = client.receive_message(self.compute_wait())? {
+                self.answer_message(&client, &message)?;
             }
-            self.upload(&client)?;
-            self.event(&client)?;
+            self.upload_samples(&client)?;
+            self.publish_alarm_event(&client)?;
         }
         Ok(())
     }
 
     /// Until the next upload, at most [`LOOK`].
-    fn wait(&self) -> Duration {
+    fn compute_wait(&self) -> Duration {
         let due_ns = self.samplers.iter().map(ChannelSampler::due_ns).min().unwrap_or(i64::MAX);
         let left_ns = (due_ns - self.clock.now_ns()).max(0).unsigned_abs();
         Duration::from_nanos(left_ns).min(LOOK)
     }
 
-    fn take(&mut self, client: &MqttClient, message: &MqttMessage) -> Result<(), MqttError> {
-        let Some((subject, tail)) = Subject::of(&message.topic, &self.serial) else { return Ok(()) };
+    fn answer_message(&mut self, client: &MqttClient, message: &MqttMessage) -> Result<(), MqttError> {
+        let Some((subject, tail)) = Subject::from_topic(&message.topic, &self.serial) else { return Ok(()) };
         // Nothing at all counts as an empty request, as in other implementations.
         let said = if message.payload.is_empty() { Ok(json!({})) } else { serde_json::from_slice(&message.payload) };
         let (Some(topic), Ok(said)) = (self.answers_to(subject, tail), said) else { return Ok(()) };
-        let answer = self.answer(subject, &said);
-        client.publish(&topic, answer.to_string().as_bytes(), Qos::AtMostOnce)
+        let answer = self.answer_request(subject, &said);
+        client.publish_message(&topic, answer.to_string().as_bytes(), Qos::AtMostOnce)
     }
 
     /// Where the answer goes: a client that put its name behind the serial number gets it there.
@@ -134,23 +134,23 @@ impl NcLinkDevice {
             Subject::Ping => Subject::Pong,
             _ => return None,
         };
-        let topic = answer.topic(&self.serial);
+        let topic = answer.build_topic(&self.serial);
         Some(if tail.is_empty() { topic } else { format!("{topic}/{tail}") })
     }
 
-    fn upload(&mut self, client: &MqttClient) -> Result<(), MqttError> {
+    fn upload_samples(&mut self, client: &MqttClient) -> Result<(), MqttError> {
         let now_ns = self.clock.now_ns();
         for sampler in &mut self.samplers {
             while let Some(message) = sampler.next(now_ns, &self.machine) {
-                let topic = format!("{}/{}", Subject::Sample.topic(&self.serial), sampler.name());
-                client.publish(&topic, message.to_string().as_bytes(), Qos::AtMostOnce)?;
+                let topic = format!("{}/{}", Subject::Sample.build_topic(&self.serial), sampler.name());
+                client.publish_message(&topic, message.to_string().as_bytes(), Qos::AtMostOnce)?;
             }
         }
         Ok(())
     }
 
     /// An alarm that comes or goes is an event.
-    fn event(&mut self, client: &MqttClient) -> Result<(), MqttError> {
+    fn publish_alarm_event(&mut self, client: &MqttClient) -> Result<(), MqttError> {
         let now_ns = self.clock.now_ns();
         let alarm = self.machine.moment(now_ns).panel.alarm;
         if alarm == self.alarm {
@@ -158,18 +158,21 @@ impl NcLinkDevice {
         }
         self.alarm = alarm;
         let event = json!({"number": "1", "text": alarm, "active": !alarm.is_empty()});
-        let message =
-            json!({"@id": unique(), "id": "WARNING", "time": milliseconds(now_ns).to_string(), "event": event});
-        client.publish(&Subject::Event.topic(&self.serial), message.to_string().as_bytes(), Qos::AtLeastOnce)
+        let message = json!({"@id": generate_unique_id(), "id": "WARNING", "time": to_milliseconds(now_ns).to_string(), "event": event});
+        client.publish_message(
+            &Subject::Event.build_topic(&self.serial),
+            message.to_string().as_bytes(),
+            Qos::AtLeastOnce,
+        )
     }
 }
 
 /// Milliseconds since 1970.
-fn milliseconds(at_ns: i64) -> i64 {
+fn to_milliseconds(at_ns: i64) -> i64 {
     at_ns.div_euclid(1_000_000)
 }
 
-fn pause(stop: &AtomicBool) {
+fn pause_before_redial(stop: &AtomicBool) {
     let mut left = REDIAL;
     while !stop.load(Ordering::SeqCst) && !left.is_zero() {
         let part = left.min(LOOK);

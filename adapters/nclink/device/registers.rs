@@ -71,14 +71,14 @@ impl SimulatedRegisters {
     }
 
     /// What the ladder does after a client has written.
-    pub(super) fn scan(&mut self, clock: &dyn Clock) {
+    pub(super) fn scan_letters(&mut self, clock: &dyn Clock) {
         self.override_letter(clock);
         self.offset_letter(clock);
     }
 
     /// A letter with a new number is taken while no program runs, as far as the machine lets itself be shifted.
     fn offset_letter(&mut self, clock: &dyn Clock) {
-        let word = |offset| self.memory.get(&self.offset_mailbox.word(offset)).copied().unwrap_or(0);
+        let word = |offset| self.memory.get(&self.offset_mailbox.register_at(offset)).copied().unwrap_or(0);
         let words: Vec<i64> = (0..OffsetMailbox::LENGTH).map(word).collect();
         let Some(letters) = OffsetMailbox::read(&words).filter(|letters| letters.number != letters.taken) else {
             return;
@@ -98,24 +98,24 @@ impl SimulatedRegisters {
             }
             *in_force_um = wanted_um;
         }
-        self.memory.extend(self.offset_mailbox.taken(in_force_um, letters.number));
+        self.memory.extend(self.offset_mailbox.build_ladder_answer(in_force_um, letters.number));
     }
 
     /// A heartbeat that has moved delivers the letter about the override.
     fn override_letter(&mut self, clock: &dyn Clock) {
-        let word = |offset| self.memory.get(&self.mailbox.word(offset)).copied().unwrap_or(0);
+        let word = |offset| self.memory.get(&self.mailbox.register_at(offset)).copied().unwrap_or(0);
         let heartbeat = word(Mailbox::HEARTBEAT);
         if self.heartbeat == Some(heartbeat) || heartbeat == 0 {
             return;
         }
         self.heartbeat = Some(heartbeat);
         if let Some(request) = request_of(word(Mailbox::REQUEST)) {
-            let _off = self.ladder.ask(clock, request);
+            let _off = self.ladder.ask_ladder(clock, request);
         }
         // A machine that is off takes no letters; the client sees it by the override in force.
-        let _taken = match MailboxRequest::of(word(Mailbox::ENABLE), word(Mailbox::OVERRIDE)) {
+        let _taken = match MailboxRequest::from_registers(word(Mailbox::ENABLE), word(Mailbox::OVERRIDE)) {
             Some(MailboxRequest::Override(wanted)) => self.ladder.write_feed_override(clock, wanted),
-            Some(MailboxRequest::Release) | None => self.ladder.release(clock),
+            Some(MailboxRequest::Release) | None => self.ladder.release_override(clock),
         };
     }
 }

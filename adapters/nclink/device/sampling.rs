@@ -1,6 +1,6 @@
 //! Messages of a sample channel: a column per item, one value per interval.
 
-use super::{milliseconds, values};
+use super::{to_milliseconds, values};
 use crate::nclink::model::{Model, SampleChannel};
 use crate::simulated::Simulated;
 use serde_json::{Value, json};
@@ -22,9 +22,9 @@ pub(super) struct ChannelSampler {
 impl ChannelSampler {
     /// `None` for a channel whose times are not whole milliseconds or whose upload holds no value.
     pub(super) fn new(channel: &SampleChannel, model: &Model) -> Option<Self> {
-        let whole = |ms: f64| crate::nclink::liberal::integer(&json!(ms)).filter(|ms| *ms > 0);
+        let whole = |ms: f64| crate::nclink::liberal::parse_integer(&json!(ms)).filter(|ms| *ms > 0);
         let (interval_ms, upload_ms) = (whole(channel.interval_ms)?, whole(channel.upload_ms)?);
-        let path = |name: &String| model.find(name).map(|item| item.path.clone());
+        let path = |name: &String| model.find_item(name).map(|item| item.path.clone());
         let paths: Vec<String> = channel.items.iter().filter_map(path).collect();
         let names = channel.items.clone();
         (upload_ms >= interval_ms && paths.len() == names.len()).then(|| Self {
@@ -42,8 +42,8 @@ impl ChannelSampler {
     }
 
     /// The device is at the broker from now on.
-    pub(super) fn begin(&mut self, now_ns: i64) {
-        self.begin_ms = milliseconds(now_ns);
+    pub(super) fn begin_sampling(&mut self, now_ns: i64) {
+        self.begin_ms = to_milliseconds(now_ns);
     }
 
     /// When the next message is complete.
@@ -54,7 +54,7 @@ impl ChannelSampler {
     /// The next message, if it is complete by now.
     pub(super) fn next(&mut self, now_ns: i64, machine: &Simulated) -> Option<Value> {
         if now_ns - self.due_ns() > BEHIND_NS {
-            self.begin(now_ns);
+            self.begin_sampling(now_ns);
         }
         if now_ns < self.due_ns() {
             return None;
@@ -66,12 +66,12 @@ impl ChannelSampler {
         for instant in 0..instants {
             let moment = machine.moment((begin_ms + instant * self.interval_ms) * 1_000_000);
             for (column, path) in columns.iter_mut().zip(&self.paths) {
-                column.push(values::value(path, &moment).unwrap_or(Value::Null));
+                column.push(values::find_value(path, &moment).unwrap_or(Value::Null));
             }
         }
         let data: Vec<Value> = columns.into_iter().map(|column| json!({"data": column})).collect();
         Some(json!({
-            "@id": crate::mqtt::unique(), "paths": self.names, "id": self.name, "beginTime": begin_ms.to_string(),
+            "@id": crate::mqtt::generate_unique_id(), "paths": self.names, "id": self.name, "beginTime": begin_ms.to_string(),
             "data": data, "interval": self.interval_ms, "uploadInterval": self.upload_ms,
         }))
     }

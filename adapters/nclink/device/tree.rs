@@ -7,73 +7,86 @@ use serde_json::{Value, json};
 const SPINDLE: u32 = 5;
 
 /// The whole tree.
-pub(super) fn of(machine: SimulatedMachine, serial: &str) -> Value {
+pub(super) fn build_tree(machine: SimulatedMachine, serial: &str) -> Value {
     let (name, axes): (&str, &[(u32, &str)]) = match machine {
         SimulatedMachine::Lathe => ("simulated lathe", &[(0, "X"), (2, "Z")]),
         SimulatedMachine::Mill => ("simulated mill", &[(0, "X"), (1, "Y"), (2, "Z")]),
     };
-    let mut components: Vec<Value> = axes.iter().map(|(number, letter)| linear(*number, letter)).collect();
-    components.extend([spindle(), controller()]);
+    let mut components: Vec<Value> = axes.iter().map(|(number, letter)| build_linear_axis(*number, letter)).collect();
+    components.extend([build_spindle(), build_controller()]);
     json!({
         "id": "01", "type": "NC_LINK_ROOT", "name": name, "version": "1.0.0", "uniqueID": serial,
         "devices": [{
             "id": "0103", "type": "MACHINE", "name": name, "version": "1.0",
             "configs": sample_channels(axes),
             "dataItems": [
-                item("010302", "STATUS"), item("010303", "FEED_SPEED"), item("010305", "FEED_OVERRIDE"),
-                item("010306", "SPDL_OVERRIDE"), item("010307", "PART_COUNT"),
+                build_item("010302", "STATUS"), build_item("010303", "FEED_SPEED"), build_item("010305", "FEED_OVERRIDE"),
+                build_item("010306", "SPDL_OVERRIDE"), build_item("010307", "PART_COUNT"),
             ],
             "components": components,
         }],
     })
 }
 
-fn item(id: &str, kind: &str) -> Value {
+fn build_item(id: &str, kind: &str) -> Value {
     json!({"id": id, "type": kind})
 }
 
 /// The ids of one axis: `0103` + 50 + number, then the part, then the item.
-fn id(number: u32, rest: &str) -> String {
+fn build_id(number: u32, rest: &str) -> String {
     let axis = if number == SPINDLE { 53 } else { 50 + number };
     format!("0103{axis}{rest}")
 }
 
-fn axis(number: u32, letter: &str, kind: &str, components: &Value) -> Value {
+fn build_axis(number: u32, letter: &str, kind: &str, components: &Value) -> Value {
     json!({
-        "type": "AXIS", "number": number.to_string(), "id": id(number, ""), "name": letter,
+        "type": "AXIS", "number": number.to_string(), "id": build_id(number, ""), "name": letter,
         "configs": [
-            {"id": id(number, "01"), "type": "NAME", "value": letter},
-            {"id": id(number, "02"), "type": "NUMBER", "value": number},
-            {"id": id(number, "03"), "type": "TYPE", "value": kind},
+            {"id": build_id(number, "01"), "type": "NAME", "value": letter},
+            {"id": build_id(number, "02"), "type": "NUMBER", "value": number},
+            {"id": build_id(number, "03"), "type": "TYPE", "value": kind},
         ],
         "components": components,
     })
 }
 
-fn linear(number: u32, letter: &str) -> Value {
-    let part =
-        |kind: &str, own: &str, items: Vec<Value>| json!({"type": kind, "id": id(number, own), "dataItems": items});
-    axis(
+fn build_linear_axis(number: u32, letter: &str) -> Value {
+    let part = |kind: &str, own: &str, items: Vec<Value>| json!({"type": kind, "id": build_id(number, own), "dataItems": items});
+    build_axis(
         number,
         letter,
         "linear",
         &json!([
-            part("SERVO_DRIVER", "20", vec![item(&id(number, "2001"), "POSITION"), item(&id(number, "2003"), "SPEED")]),
-            part("SCREW", "22", vec![item(&id(number, "2201"), "POSITION"), item(&id(number, "2202"), "SPEED")]),
+            part(
+                "SERVO_DRIVER",
+                "20",
+                vec![build_item(&build_id(number, "2001"), "POSITION"), build_item(&build_id(number, "2003"), "SPEED")]
+            ),
+            part(
+                "SCREW",
+                "22",
+                vec![build_item(&build_id(number, "2201"), "POSITION"), build_item(&build_id(number, "2202"), "SPEED")]
+            ),
         ]),
     )
 }
 
-fn spindle() -> Value {
-    let part =
-        |kind: &str, own: &str, items: Vec<Value>| json!({"type": kind, "id": id(SPINDLE, own), "dataItems": items});
-    axis(
+fn build_spindle() -> Value {
+    let part = |kind: &str, own: &str, items: Vec<Value>| json!({"type": kind, "id": build_id(SPINDLE, own), "dataItems": items});
+    build_axis(
         SPINDLE,
         "C",
         "rotary",
         &json!([
-            part("SERVO_DRIVER", "20", vec![item(&id(SPINDLE, "2002"), "SPEED")]),
-            part("MOTOR", "21", vec![item(&id(SPINDLE, "2102"), "SPEED"), item(&id(SPINDLE, "2103"), "CURRENT")]),
+            part("SERVO_DRIVER", "20", vec![build_item(&build_id(SPINDLE, "2002"), "SPEED")]),
+            part(
+                "MOTOR",
+                "21",
+                vec![
+                    build_item(&build_id(SPINDLE, "2102"), "SPEED"),
+                    build_item(&build_id(SPINDLE, "2103"), "CURRENT")
+                ]
+            ),
         ]),
     )
 }
@@ -89,11 +102,11 @@ const REGISTERS: [(&str, &str, bool); 7] = [
     ("REG_P", "38", false),
 ];
 
-fn controller() -> Value {
+fn build_controller() -> Value {
     let mut items: Vec<Value> =
         [("09", "PROGRAM"), ("11", "LINE_NUMBER"), ("12", "WARNING"), ("13", "TOOL_NUMBER"), ("14", "PROGRAM_NUMBER")]
             .iter()
-            .map(|(own, kind)| item(&format!("010354{own}"), kind))
+            .map(|(own, kind)| build_item(&format!("010354{own}"), kind))
             .collect();
     let register = |(number, own, settable): &(&str, &str, bool)| json!({"id": format!("010354{own}"), "type": "VARIABLE", "number": number, "datatype": "LIST", "setable": settable});
     items.extend(REGISTERS.iter().map(register));
@@ -105,9 +118,9 @@ fn controller() -> Value {
 fn sample_channels(axes: &[(u32, &str)]) -> Value {
     let named = |ids: Vec<String>| ids.into_iter().map(|id| json!({"id": id})).collect::<Vec<Value>>();
     let slow = ["010302", "010303", "010305", "010306", "010307", "01035412"].map(str::to_owned).to_vec();
-    let of_axis = |(number, _): &(u32, &str)| ["2001", "2201", "2202"].map(|own| id(*number, own));
+    let of_axis = |(number, _): &(u32, &str)| ["2001", "2201", "2202"].map(|own| build_id(*number, own));
     let mut fast: Vec<String> = axes.iter().flat_map(of_axis).collect();
-    fast.extend(["2002", "2102", "2103"].map(|own| id(SPINDLE, own)));
+    fast.extend(["2002", "2102", "2103"].map(|own| build_id(SPINDLE, own)));
     fast.extend(["01035411", "01035413", "01035414", "010302"].map(str::to_owned));
     json!([
         {"id": "sample_channel0", "type": "SAMPLE_CHANNEL", "sampleInterval": 2000, "uploadInterval": 2000, "ids": named(slow)},

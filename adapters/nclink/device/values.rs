@@ -5,11 +5,11 @@ use crate::words::{execution, mode};
 use serde_json::{Value, json};
 
 /// The value of the item with this path; `None` when it is no single value of this machine.
-pub(super) fn value(path: &str, moment: &Moment) -> Option<Value> {
+pub(super) fn find_value(path: &str, moment: &Moment) -> Option<Value> {
     let panel = &moment.panel;
     Some(match path {
-        "STATUS" => json!(status(panel)),
-        "FEED_SPEED" => json!(tenth(panel.feed_mm_min)),
+        "STATUS" => json!(name_status(panel)),
+        "FEED_SPEED" => json!(round_to_tenth(panel.feed_mm_min)),
         "FEED_OVERRIDE" => json!(panel.feed_override_pct),
         "SPDL_OVERRIDE" => json!(100),
         "PART_COUNT" => json!(panel.part_count),
@@ -19,25 +19,25 @@ pub(super) fn value(path: &str, moment: &Moment) -> Option<Value> {
         "CONTROLLER/TOOL_NUMBER" => json!(panel.tool),
         "CONTROLLER/WARNING" if panel.alarm.is_empty() => json!([]),
         "CONTROLLER/WARNING" => json!([{"number": "1", "text": panel.alarm}]),
-        _ => axis(path.strip_prefix("AXIS@")?, moment)?,
+        _ => find_axis_value(path.strip_prefix("AXIS@")?, moment)?,
     })
 }
 
-fn axis(rest: &str, moment: &Moment) -> Option<Value> {
+fn find_axis_value(rest: &str, moment: &Moment) -> Option<Value> {
     let panel = &moment.panel;
     let (number, item) = rest.split_once('/')?;
     let number: usize = number.parse().ok()?;
     Some(match (number, item) {
-        (5, "SERVO_DRIVER/SPEED") => json!(tenth(panel.spindle_programmed_rpm)),
-        (5, "MOTOR/SPEED") => json!(tenth(panel.spindle_speed_rpm)),
-        (5, "MOTOR/CURRENT") => json!(thousandth(moment.electric.spindle_current_a)),
-        (0..=2, "SERVO_DRIVER/POSITION" | "SCREW/POSITION") => json!(thousandth(panel.position_mm[number])),
-        (0..=2, "SERVO_DRIVER/SPEED" | "SCREW/SPEED") => json!(tenth(panel.velocity_mm_min[number])),
+        (5, "SERVO_DRIVER/SPEED") => json!(round_to_tenth(panel.spindle_programmed_rpm)),
+        (5, "MOTOR/SPEED") => json!(round_to_tenth(panel.spindle_speed_rpm)),
+        (5, "MOTOR/CURRENT") => json!(round_to_thousandth(moment.electric.spindle_current_a)),
+        (0..=2, "SERVO_DRIVER/POSITION" | "SCREW/POSITION") => json!(round_to_thousandth(panel.position_mm[number])),
+        (0..=2, "SERVO_DRIVER/SPEED" | "SCREW/SPEED") => json!(round_to_tenth(panel.velocity_mm_min[number])),
         _ => return None,
     })
 }
 
-fn status(panel: &Panel) -> &'static str {
+fn name_status(panel: &Panel) -> &'static str {
     match panel.execution {
         _ if !panel.alarm.is_empty() => "alarm",
         execution::ACTIVE => "running",
@@ -62,10 +62,10 @@ pub(super) fn channel_word(panel: &Panel) -> i64 {
     bits.iter().filter(|(set, _)| *set).fold(mode, |word, (_, bit)| word | bit)
 }
 
-fn tenth(number: f64) -> f64 {
+fn round_to_tenth(number: f64) -> f64 {
     (number * 10.0).round() / 10.0
 }
 
-fn thousandth(number: f64) -> f64 {
+fn round_to_thousandth(number: f64) -> f64 {
     (number * 1000.0).round() / 1000.0
 }

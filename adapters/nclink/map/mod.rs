@@ -1,7 +1,7 @@
 //! Which data item feeds which channel. The paths are those of Huazhong's default model.
 
 use super::decode::{self, ChannelWord};
-use super::liberal::integer;
+use super::liberal::parse_integer;
 use super::message::{NcLinkAnswer, RequestedItem, first_number};
 use super::model::{Model, ModelItem};
 use super::own::OwnPath;
@@ -43,10 +43,10 @@ const FIXED: [ItemRow; 10] = [
     ("FEED_OVERRIDE", "feed_override_pct", How::Number),
     ("SPDL_OVERRIDE", "spindle_override_pct", How::Number),
     ("PART_COUNT", "part_count", How::Number),
-    ("CONTROLLER/PROGRAM", "program", How::Text(decode::program)),
-    ("CONTROLLER/LINE_NUMBER", "block", How::Text(line)),
-    ("CONTROLLER/TOOL_NUMBER", "tool", How::Text(tool)),
-    ("CONTROLLER/WARNING", "alarm", How::Text(alarm)),
+    ("CONTROLLER/PROGRAM", "program", How::Text(decode::parse_program_name)),
+    ("CONTROLLER/LINE_NUMBER", "block", How::Text(format_line)),
+    ("CONTROLLER/TOOL_NUMBER", "tool", How::Text(format_tool)),
+    ("CONTROLLER/WARNING", "alarm", How::Text(format_alarm)),
     ("STATUS", "execution", How::Status),
     ("CONTROLLER/VARIABLE@REG_F", "mode", How::ChannelWord),
 ];
@@ -64,27 +64,27 @@ const SPINDLE: [(&str, &str, &str); 3] = [
     ("MOTOR/CURRENT", "CURRENT", "spindle_current_a"),
 ];
 
-fn line(value: &Value) -> Option<String> {
-    integer(value).map(|line| format!("N{line}"))
+fn format_line(value: &Value) -> Option<String> {
+    parse_integer(value).map(|line| format!("N{line}"))
 }
 
-fn tool(value: &Value) -> Option<String> {
-    integer(value).map(|tool| format!("T{tool}"))
+fn format_tool(value: &Value) -> Option<String> {
+    parse_integer(value).map(|tool| format!("T{tool}"))
 }
 
-fn alarm(value: &Value) -> Option<String> {
-    Some(decode::alarm(value))
+fn format_alarm(value: &Value) -> Option<String> {
+    Some(decode::format_alarms(value))
 }
 
 /// Every channel that a device can feed, and the user's own; those that it has not are absent with a reason.
 #[must_use]
-pub(super) fn channels(own: &[Own<OwnPath>]) -> Vec<ChannelId> {
+pub(super) fn list_channels(own: &[Own<OwnPath>]) -> Vec<ChannelId> {
     let fixed = FIXED.iter().map(|(_, channel, _)| (*channel).to_owned());
     let axes =
         ["x", "y", "z"].into_iter().flat_map(|axis| LINEAR.iter().map(move |(.., name)| format!("{axis}_{name}")));
     let spindle = SPINDLE.iter().map(|(.., name)| (*name).to_owned());
     let names = fixed.chain(axes).chain(spindle).chain(["operation".to_owned()]);
-    let mut channels: Vec<ChannelId> = names.filter_map(|name| ChannelId::of(&name)).collect();
+    let mut channels: Vec<ChannelId> = names.filter_map(|name| ChannelId::from_name(&name)).collect();
     for own in own {
         if !channels.contains(&own.id) {
             channels.push(own.id);
@@ -121,9 +121,9 @@ pub(super) struct NcLinkPoll {
 
 impl NcLinkPoll {
     /// The plan for a device; its items are named by path or by node number.
-    pub(super) fn of(model: &Model, layout: NcLinkLayout, own: &[Own<OwnPath>], by_path: bool) -> Self {
+    pub(super) fn from_model(model: &Model, layout: NcLinkLayout, own: &[Own<OwnPath>], by_path: bool) -> Self {
         let named: Vec<ChannelId> = own.iter().map(|own| own.id).collect();
-        let computed = |name| ChannelId::of(name).filter(|channel| !named.contains(channel));
+        let computed = |name| ChannelId::from_name(name).filter(|channel| !named.contains(channel));
         let mut plan =
             Self { operation: computed("operation"), execution: computed("execution"), named, ..Self::default() };
         for (path, channel, how) in FIXED {
@@ -131,54 +131,56 @@ impl NcLinkPoll {
             plan.add(model, (path, channel, how), indexes, by_path);
         }
         plan.add(model, ("CONTROLLER/VARIABLE@CHAN_0", "operation", How::Tapping), &[RIGID_TAPPING], by_path);
-        for (number, letter) in axes(model, layout) {
+        for (number, letter) in list_axes(model, layout) {
             let (rows, beginning): (&[(&str, &str, &str)], _) = match letter {
                 Some(letter) => (&LINEAR, format!("{letter}_")),
                 None => (&SPINDLE, String::new()),
             };
             for (item, other, channel) in rows {
                 let path = [item, other].map(|item| format!("AXIS@{number}/{item}"));
-                let path = path.iter().find(|path| model.find(path).is_some()).unwrap_or(&path[0]);
+                let path = path.iter().find(|path| model.find_item(path).is_some()).unwrap_or(&path[0]);
                 plan.add(model, (path, &format!("{beginning}{channel}"), How::Number), &[], by_path);
             }
         }
         own.iter().for_each(|own| plan.add_own(model, own, by_path));
         let fed: Vec<ChannelId> = plan.entries.iter().map(|entry| entry.channel).collect();
-        plan.absent = channels(own).into_iter().filter(|channel| !fed.contains(channel)).collect();
+        plan.absent = list_channels(own).into_iter().filter(|channel| !fed.contains(channel)).collect();
         plan
     }
 
     fn add(&mut self, model: &Model, row: (&str, &str, How), indexes: &[u32], by_path: bool) {
         let (path, channel, how) = row;
         // Where the user has said what feeds a channel, that counts.
-        let Some(channel) = ChannelId::of(channel).filter(|channel| !self.named.contains(channel)) else { return };
-        let Some(item) = model.find(path).or_else(|| self.elsewhere(model, path, channel)) else { return };
+        let Some(channel) = ChannelId::from_name(channel).filter(|channel| !self.named.contains(channel)) else {
+            return;
+        };
+        let Some(item) = model.find_item(path).or_else(|| self.find_elsewhere(model, path, channel)) else { return };
         let conversion =
-            if matches!(how, How::Number) { self.conversion(item, channel) } else { Some(Conversion::NONE) };
-        self.asks.push(RequestedItem::elements(name(item, by_path).as_str(), indexes));
+            if matches!(how, How::Number) { self.find_conversion(item, channel) } else { Some(Conversion::NONE) };
+        self.asks.push(RequestedItem::with_elements(name_item(item, by_path).as_str(), indexes));
         self.entries.push(PolledItem { channel, how, conversion, own: None });
     }
 
     fn add_own(&mut self, model: &Model, own: &Own<OwnPath>, by_path: bool) {
-        let Some(item) = model.find(&own.item.name) else {
+        let Some(item) = model.find_item(&own.item.name) else {
             return self.problems.push(SourceProblem {
                 what: format!("{} has no value: the device's model has no {}", own.id, own.item.name),
                 next: "Write the path as doctor --all lists it".to_owned(),
             });
         };
         let is_text = own.channel.new.unit.is_empty();
-        let conversion = if is_text { Some(Conversion::NONE) } else { self.conversion(item, own.id) };
+        let conversion = if is_text { Some(Conversion::NONE) } else { self.find_conversion(item, own.id) };
         let indexes: Vec<u32> = own.item.index.into_iter().collect();
-        self.asks.push(RequestedItem::elements(name(item, by_path).as_str(), &indexes));
+        self.asks.push(RequestedItem::with_elements(name_item(item, by_path).as_str(), &indexes));
         self.entries.push(PolledItem { channel: own.id, how: How::Number, conversion, own: Some(own.clone()) });
     }
 
     /// The only item that ends in the same word, wherever it stands; with several, nobody knows which is meant.
-    fn elsewhere<'a>(&mut self, model: &'a Model, path: &'a str, channel: ChannelId) -> Option<&'a ModelItem> {
+    fn find_elsewhere<'a>(&mut self, model: &'a Model, path: &'a str, channel: ChannelId) -> Option<&'a ModelItem> {
         if path.starts_with("AXIS@") || path.contains("VARIABLE@") {
             return None;
         }
-        let found: Vec<&ModelItem> = model.elsewhere(path).collect();
+        let found: Vec<&ModelItem> = model.list_items_elsewhere(path).collect();
         if let [only] = found.as_slice() {
             return Some(only);
         }
@@ -196,10 +198,10 @@ impl NcLinkPoll {
     }
 
     /// From the unit that the model tells to that of the channel. A model without units means those of the channels.
-    fn conversion(&mut self, item: &ModelItem, channel: ChannelId) -> Option<Conversion> {
+    fn find_conversion(&mut self, item: &ModelItem, channel: ChannelId) -> Option<Conversion> {
         let Some(unit) = &item.unit else { return Some(Conversion::NONE) };
         let wanted = channel.channel().unit;
-        let found = conversion::between(unit, wanted);
+        let found = conversion::find_conversion(unit, wanted);
         if found.is_none() {
             let why = if conversion::is_known(unit) {
                 "which measures something else"
@@ -224,62 +226,64 @@ impl NcLinkPoll {
     }
 
     /// The channel that takes the item of this name and, of a list, any of its elements.
-    pub(super) fn takes(&self, id: &str) -> Option<ChannelId> {
+    pub(super) fn find_channel(&self, id: &str) -> Option<ChannelId> {
         let at = self.asks.iter().position(|ask| ask.id == id)?;
         self.entries.get(at).map(|entry| entry.channel)
     }
 
     /// One request for everything.
-    pub(super) fn asks(&self) -> &[RequestedItem] {
+    pub(super) fn requested_items(&self) -> &[RequestedItem] {
         &self.asks
     }
 
     /// The readings of one answer, with a reason for every channel that has none.
-    pub(super) fn readings(&self, answers: &[Option<NcLinkAnswer>], stamp: Stamp, out: &mut Vec<Reading>) {
+    pub(super) fn append_readings(&self, answers: &[Option<NcLinkAnswer>], stamp: Stamp, out: &mut Vec<Reading>) {
         let mut tapping = None;
         let mut word = None;
         for (entry, answer) in self.entries.iter().zip(answers) {
             match entry.how {
-                How::Tapping => tapping = entry.value(answer).ok().and_then(integer),
-                How::ChannelWord => word = entry.value(answer).ok().and_then(integer).map(ChannelWord),
+                How::Tapping => tapping = entry.find_value(answer).ok().and_then(parse_integer),
+                How::ChannelWord => word = entry.find_value(answer).ok().and_then(parse_integer).map(ChannelWord),
                 _ => {}
             }
         }
         for (entry, answer) in self.entries.iter().zip(answers) {
             let reading = match entry.how {
                 How::Tapping => continue,
-                How::ChannelWord => {
-                    entry.text(answer, stamp, |value| Some(ChannelWord(integer(value)?).mode().to_owned()))
-                }
+                How::ChannelWord => entry.build_text_reading(answer, stamp, |value| {
+                    Some(ChannelWord(parse_integer(value)?).name_mode().to_owned())
+                }),
                 // The channel's word says it better, where there is one.
                 How::Status if word.is_some() => continue,
-                How::Status => entry.text(answer, stamp, |value| decode::status_word(value).map(str::to_owned)),
-                How::Number => entry.number(answer, stamp),
-                How::Text(text) => entry.text(answer, stamp, text),
+                How::Status => {
+                    entry.build_text_reading(answer, stamp, |value| decode::status_word(value).map(str::to_owned))
+                }
+                How::Number => entry.build_number_reading(answer, stamp),
+                How::Text(text) => entry.build_text_reading(answer, stamp, text),
             };
             out.push(reading);
         }
         if let (Some(channel), Some(word)) = (self.execution, word) {
-            out.push(Reading::text(channel, stamp, Arc::from(word.execution())));
+            out.push(Reading::from_text(channel, stamp, Arc::from(word.name_execution())));
         }
-        self.operation(word, tapping, stamp, out);
-        let none = |channel: &ChannelId| Reading::absent(*channel, stamp, Absence::NotSupported);
+        self.append_operation(word, tapping, stamp, out);
+        let none = |channel: &ChannelId| Reading::from_absence(*channel, stamp, Absence::NotSupported);
         out.extend(self.absent.iter().filter(|channel| self.operation != Some(**channel)).map(none));
     }
 
     /// The device does not name operations; it only tells when the feed follows the spindle.
-    fn operation(&self, word: Option<ChannelWord>, tapping: Option<i64>, stamp: Stamp, out: &mut Vec<Reading>) {
+    fn append_operation(&self, word: Option<ChannelWord>, tapping: Option<i64>, stamp: Stamp, out: &mut Vec<Reading>) {
         let Some(channel) = self.operation else { return };
-        let threading = word.is_some_and(ChannelWord::threading);
+        let threading = word.is_some_and(ChannelWord::is_threading);
         out.push(match decode::locked_operation(threading, tapping.is_some_and(|flag| flag != 0)) {
-            Some(word) => Reading::text(channel, stamp, Arc::from(word)),
-            None => Reading::absent(channel, stamp, Absence::NotSupported),
+            Some(word) => Reading::from_text(channel, stamp, Arc::from(word)),
+            None => Reading::from_absence(channel, stamp, Absence::NotSupported),
         });
     }
 }
 
 impl PolledItem {
-    fn value<'a>(&self, answer: &'a Option<NcLinkAnswer>) -> Result<&'a Value, Absence> {
+    fn find_value<'a>(&self, answer: &'a Option<NcLinkAnswer>) -> Result<&'a Value, Absence> {
         match answer {
             Some(Ok(values)) => values.first().ok_or(Absence::NotYetRead),
             Some(Err(_)) => Err(Absence::Refused),
@@ -287,14 +291,15 @@ impl PolledItem {
         }
     }
 
-    fn number(&self, answer: &Option<NcLinkAnswer>, stamp: Stamp) -> Reading {
+    fn build_number_reading(&self, answer: &Option<NcLinkAnswer>, stamp: Stamp) -> Reading {
         let Some(conversion) = self.conversion else {
-            return Reading::absent(self.channel, stamp, Absence::UnknownUnit);
+            return Reading::from_absence(self.channel, stamp, Absence::UnknownUnit);
         };
         if let Some(own) = &self.own {
-            return own.reading(stamp, own.found(answer.as_ref()).map(|value| convert_value(value, conversion)));
+            return own
+                .to_reading(stamp, own.extract_value(answer.as_ref()).map(|value| convert_value(value, conversion)));
         }
-        let found = self.value(answer).and_then(|value| {
+        let found = self.find_value(answer).and_then(|value| {
             if value.is_null() {
                 Err(Absence::NotYetRead)
             } else {
@@ -302,58 +307,63 @@ impl PolledItem {
             }
         });
         match found {
-            Ok(number) => Reading::number(self.channel, stamp, conversion.of(number)),
-            Err(reason) => Reading::absent(self.channel, stamp, reason),
+            Ok(number) => Reading::from_number(self.channel, stamp, conversion.convert_number(number)),
+            Err(reason) => Reading::from_absence(self.channel, stamp, reason),
         }
     }
 
-    fn text(&self, answer: &Option<NcLinkAnswer>, stamp: Stamp, text: impl Fn(&Value) -> Option<String>) -> Reading {
+    fn build_text_reading(
+        &self,
+        answer: &Option<NcLinkAnswer>,
+        stamp: Stamp,
+        text: impl Fn(&Value) -> Option<String>,
+    ) -> Reading {
         // No value at all is the way in which some devices say that there is no alarm.
         let silent_alarm = matches!(answer, Some(Ok(values)) if values.is_empty()) && self.channel.name() == "alarm";
         let found = match silent_alarm {
             true => Ok(String::new()),
-            false => self.value(answer).and_then(|value| text(value).ok_or(Absence::OutOfRange)),
+            false => self.find_value(answer).and_then(|value| text(value).ok_or(Absence::OutOfRange)),
         };
         match found {
-            Ok(text) => Reading::text(self.channel, stamp, Arc::from(text)),
-            Err(reason) => Reading::absent(self.channel, stamp, reason),
+            Ok(text) => Reading::from_text(self.channel, stamp, Arc::from(text)),
+            Err(reason) => Reading::from_absence(self.channel, stamp, reason),
         }
     }
 }
 
 fn convert_value(value: Held, conversion: Conversion) -> Held {
     match value {
-        Held::Number(number) => Held::Number(conversion.of(number)),
+        Held::Number(number) => Held::Number(conversion.convert_number(number)),
         text @ Held::Text(_) => text,
     }
 }
 
 /// The name by which the device knows an item.
-pub(super) fn name(item: &ModelItem, by_path: bool) -> String {
+pub(super) fn name_item(item: &ModelItem, by_path: bool) -> String {
     if by_path { format!("/{}", item.path) } else { item.id.clone() }
 }
 
 /// The axes of the model that feed channels: X, Y and Z by their letters, the spindle without one.
-fn axes(model: &Model, layout: NcLinkLayout) -> Vec<(u32, Option<char>)> {
+fn list_axes(model: &Model, layout: NcLinkLayout) -> Vec<(u32, Option<char>)> {
     let number = |item: &ModelItem| item.path.strip_prefix("AXIS@")?.split('/').next()?.parse().ok();
     let mut numbers: Vec<u32> = model.items.iter().filter_map(number).collect();
     numbers.sort_unstable();
     numbers.dedup();
     let spindle = layout.spindle_axis.or_else(|| numbers.iter().copied().find(|number| *number == 5));
-    let spindle =
-        spindle.or_else(|| numbers.iter().copied().find(|number| matches!(letter(model, *number), Some('S' | 'C'))));
+    let spindle = spindle
+        .or_else(|| numbers.iter().copied().find(|number| matches!(find_axis_letter(model, *number), Some('S' | 'C'))));
     let linear = numbers.into_iter().filter(|number| Some(*number) != spindle);
     let linear = linear.filter_map(|number| {
-        let letter = letter(model, number)?.to_ascii_lowercase();
+        let letter = find_axis_letter(model, number)?.to_ascii_lowercase();
         matches!(letter, 'x' | 'y' | 'z').then_some((number, Some(letter)))
     });
     linear.chain(spindle.map(|number| (number, None))).collect()
 }
 
 /// The first letter of the axis' name; without a name 0, 1, 2 are X, Y, Z.
-fn letter(model: &Model, number: u32) -> Option<char> {
+fn find_axis_letter(model: &Model, number: u32) -> Option<char> {
     let named =
-        model.find(&format!("AXIS@{number}/NAME")).and_then(|item| item.value.as_ref()?.as_str()?.chars().next());
+        model.find_item(&format!("AXIS@{number}/NAME")).and_then(|item| item.value.as_ref()?.as_str()?.chars().next());
     named
         .or_else(|| ['X', 'Y', 'Z'].get(usize::try_from(number).ok()?).copied())
         .map(|letter| letter.to_ascii_uppercase())

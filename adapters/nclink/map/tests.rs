@@ -27,9 +27,9 @@ fn answered(plan: &NcLinkPoll, said: &[(&str, Value)]) -> Vec<Reading> {
         let value = said.iter().find(|(id, _)| *id == ask.id).map(|(_, value)| value.clone());
         Some(value.map_or_else(|| Err("NOT_FOUND".to_owned()), |value| Ok(vec![value])))
     };
-    let answers: Vec<Option<NcLinkAnswer>> = plan.asks().iter().map(answer).collect();
+    let answers: Vec<Option<NcLinkAnswer>> = plan.requested_items().iter().map(answer).collect();
     let mut out = Vec::new();
-    plan.readings(&answers, Stamp::exact(7), &mut out);
+    plan.append_readings(&answers, Stamp::from_exact_time(7), &mut out);
     out
 }
 
@@ -45,7 +45,7 @@ fn text(word: &str) -> Result<Held, Absence> {
 
 #[test]
 fn every_channel_gets_one_reading_or_a_reason() {
-    let plan = NcLinkPoll::of(&model(), LAYOUT, &[], false);
+    let plan = NcLinkPoll::from_model(&model(), LAYOUT, &[], false);
     let said = [
         ("02", json!("812.5")),
         ("03", json!([])),
@@ -58,7 +58,7 @@ fn every_channel_gets_one_reading_or_a_reason() {
     let readings = answered(&plan, &said);
     let mut names: Vec<&str> = readings.iter().map(|reading| reading.channel.name()).collect();
     names.sort_unstable();
-    let mut expected: Vec<&str> = channels(&[]).iter().map(|channel| channel.name()).collect();
+    let mut expected: Vec<&str> = list_channels(&[]).iter().map(|channel| channel.name()).collect();
     expected.sort_unstable();
     assert_eq!(names, expected);
     assert_eq!(of(&readings, "feed_mm_min"), Ok(Held::Number(812.5)));
@@ -75,7 +75,7 @@ fn every_channel_gets_one_reading_or_a_reason() {
 
 #[test]
 fn without_the_channel_word_the_status_speaks_where_it_is_a_word() {
-    let plan = NcLinkPoll::of(&model(), LAYOUT, &[], false);
+    let plan = NcLinkPoll::from_model(&model(), LAYOUT, &[], false);
     let readings = answered(&plan, &[("01", json!("running"))]);
     assert_eq!((of(&readings, "mode"), of(&readings, "execution")), (Err(Absence::Refused), text("ACTIVE")));
     assert_eq!(of(&answered(&plan, &[("01", json!(1))]), "execution"), Err(Absence::OutOfRange));
@@ -83,24 +83,27 @@ fn without_the_channel_word_the_status_speaks_where_it_is_a_word() {
 
 #[test]
 fn threads_and_taps_are_told_to_the_gate() {
-    let plan = NcLinkPoll::of(&model(), LAYOUT, &[], false);
+    let plan = NcLinkPoll::from_model(&model(), LAYOUT, &[], false);
     assert_eq!(of(&answered(&plan, &[("05", json!(0x221))]), "operation"), text("threading"));
     assert_eq!(of(&answered(&plan, &[("05", json!(0x21)), ("06", json!(1))]), "operation"), text("tapping"));
 }
 
 #[test]
 fn items_are_asked_for_as_the_device_names_them() {
-    let ids: Vec<String> =
-        NcLinkPoll::of(&model(), LAYOUT, &[], false).asks().iter().map(|ask| ask.id.clone()).collect();
+    let ids: Vec<String> = NcLinkPoll::from_model(&model(), LAYOUT, &[], false)
+        .requested_items()
+        .iter()
+        .map(|ask| ask.id.clone())
+        .collect();
     assert!(ids.contains(&"s5".to_owned()) && ids.contains(&"02".to_owned()), "{ids:?}");
-    let plan = NcLinkPoll::of(&model(), NcLinkLayout { f_channel: 6400, ..LAYOUT }, &[], true);
-    let word = plan.asks().iter().find(|ask| ask.id == "/CONTROLLER/VARIABLE@REG_F").expect("asked");
+    let plan = NcLinkPoll::from_model(&model(), NcLinkLayout { f_channel: 6400, ..LAYOUT }, &[], true);
+    let word = plan.requested_items().iter().find(|ask| ask.id == "/CONTROLLER/VARIABLE@REG_F").expect("asked");
     assert_eq!(word.params.indexes, ["6400"]);
 }
 
 #[test]
 fn another_spindle_can_be_named() {
-    let plan = NcLinkPoll::of(&model(), NcLinkLayout { spindle_axis: Some(0), ..LAYOUT }, &[], false);
+    let plan = NcLinkPoll::from_model(&model(), NcLinkLayout { spindle_axis: Some(0), ..LAYOUT }, &[], false);
     let readings = answered(&plan, &[("c0", json!(3.5)), ("c5", json!(9.0))]);
     assert_eq!(of(&readings, "spindle_current_a"), Ok(Held::Number(3.5)));
 }

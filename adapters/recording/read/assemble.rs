@@ -1,6 +1,6 @@
 //! The second way through a table: rows become a block under the plan, and whatever is not used is counted by column and line.
 
-use super::cell::{Cell, flag, is_absent, written_number};
+use super::cell::{Cell, is_absent, parse_flag, written_number};
 use super::convert::{
     is_nothing, join_date_and_time, moment_of_cell, number_of, show_cell, text_of, to_nanoseconds, unix_ns,
     utc_or_local,
@@ -12,7 +12,7 @@ use super::mapping::Mapping;
 use super::plan::{BlockPlan, Note, NoteKind, PlannedColumn, PlannedKind, ReadPlan, TimeKind};
 use super::survey::{fit_row, is_comment, repeats_header};
 use super::table::{Table, VisitStep};
-use super::time::{RawTime, resolve};
+use super::time::{RawTime, resolve_times};
 use crate::recording::{Cells, Numbers, Recording, Words};
 
 /// Lines after the data that are taken for sums and remarks; more of them are refused rows.
@@ -29,7 +29,7 @@ pub(super) struct Assembled {
 }
 
 impl Assembled {
-    fn refuse(&mut self, problem: RowProblem) {
+    fn record_refusal(&mut self, problem: RowProblem) {
         self.refused += 1;
         if self.problems.len() < DESCRIBED_MAX {
             self.problems.push(problem);
@@ -38,7 +38,7 @@ impl Assembled {
 }
 
 /// Goes through the table once more.
-pub(super) fn assemble(
+pub(super) fn assemble_recordings(
     table: &dyn Table,
     head: &Head,
     plan: &ReadPlan,
@@ -49,7 +49,7 @@ pub(super) fn assemble(
     let mut blocks: Vec<BlockBuilder<'_>> = plan.blocks.iter().map(BlockBuilder::new).collect();
     let short = table.may_be_short();
     let (mut repeated, mut comments) = (0_u64, 0_u64);
-    table.visit(&mut |row| {
+    table.visit_rows(&mut |row| {
         if row.line < head.data_line || row.cells.iter().all(|cell| *cell == Cell::Empty) {
             return Ok(VisitStep::Next);
         }
@@ -62,12 +62,12 @@ pub(super) fn assemble(
             return Ok(VisitStep::Next);
         }
         match fit_row(row, head, short) {
-            Some(cells) => blocks.iter_mut().for_each(|block| block.take(row.line, cells, &mut done)),
+            Some(cells) => blocks.iter_mut().for_each(|block| block.accept_row(row.line, cells, &mut done)),
             None => {
                 let one_more = row.cells.len() == head.names.len() + 1;
                 let hint = if one_more { "; a number with a decimal comma has to stand in quotes here" } else { "" };
                 let reason = format!("{} cells where the header has {}{hint}", row.cells.len(), head.names.len());
-                done.refuse(RowProblem { line: row.line, column: None, reason });
+                done.record_refusal(RowProblem { line: row.line, column: None, reason });
             }
         }
         blocks.iter().try_for_each(|block| block.within_limits(file))?;
@@ -80,7 +80,7 @@ pub(super) fn assemble(
     );
     count_note(comments, ("lines of remarks among the data left out", "行注释未读取"), &mut done.notes);
     for block in blocks {
-        let recording = block.finish(file, mapping, &mut done);
+        let recording = block.finish_recording(file, mapping, &mut done);
         done.blocks.push(recording);
     }
     done.problems.sort_by_key(|problem| problem.line);
@@ -137,7 +137,7 @@ impl<'p> BlockBuilder<'p> {
     }
 
     /// Takes the row as a whole or not at all.
-    fn take(&mut self, line: u64, cells: &[Cell<'_>], done: &mut Assembled) {
+    fn accept_row(&mut self, line: u64, cells: &[Cell<'_>], done: &mut Assembled) {
         let at = |index: usize| cells.get(index).copied().unwrap_or(Cell::Empty);
         let time = at(self.plan.time.index);
         // Of several clocks the shorter ones end earlier.
@@ -145,14 +145,14 @@ impl<'p> BlockBuilder<'p> {
             return;
         }
         let column = Some(self.plan.time.source.clone());
-        let time = match self.time(cells) {
+        let time = match self.parse_time(cells) {
             Ok(time) => time,
             Err(reason) => return self.waiting.push(RowProblem { line, column, reason }),
         };
-        std::mem::take(&mut self.waiting).into_iter().for_each(|problem| done.refuse(problem));
+        std::mem::take(&mut self.waiting).into_iter().for_each(|problem| done.record_refusal(problem));
         for builder in self.columns.iter().filter(|builder| builder.plan.strict) {
-            if let Err(reason) = builder.check(at(builder.plan.index)) {
-                return done.refuse(RowProblem { line, column: Some(builder.plan.source.clone()), reason });
+            if let Err(reason) = builder.check_cell(at(builder.plan.index)) {
+                return done.record_refusal(RowProblem { line, column: Some(builder.plan.source.clone()), reason });
             }
         }
         self.columns.iter_mut().for_each(|builder| builder.push(line, at(builder.plan.index)));
@@ -164,7 +164,7 @@ impl<'p> BlockBuilder<'p> {
         let cells = self.times.len() * (self.columns.len() + 1);
         if cells > CELLS_MAX {
             let rows = self.times.len();
-            return Err(RecordingError::format(
+            return Err(RecordingError::with_format_reason(
                 file,
                 format!(
                     "more than {CELLS_MAX} cells ({rows} rows so far): leave columns out in a map, or give the file in parts"
@@ -173,7 +173,7 @@ impl<'p> BlockBuilder<'p> {
             ));
         }
         match self.columns.iter().find(|column| column.words_bytes > WORDS_BYTES_MAX) {
-            Some(column) => Err(RecordingError::format(
+            Some(column) => Err(RecordingError::with_format_reason(
                 file,
                 format!(
                     "column {}: more than {} MB of different words: leave it out in a map",
@@ -186,18 +186,20 @@ impl<'p> BlockBuilder<'p> {
         }
     }
 
-    fn time(&self, cells: &[Cell<'_>]) -> Result<RawTime, String> {
+    fn parse_time(&self, cells: &[Cell<'_>]) -> Result<RawTime, String> {
         let plan = &self.plan.time;
         let at = |index: usize| cells.get(index).copied().unwrap_or(Cell::Empty);
         let cell = at(plan.index);
         let part_ns = plan.milliseconds.and_then(|index| number_of(at(index))).map_or(0, |ms| to_nanoseconds(ms / 1e3));
         let time = match plan.kind {
-            TimeKind::Seconds { factor, .. } => self.number(cell)?.map(|number| RawTime::Seconds(number * factor)),
+            TimeKind::Seconds { factor, .. } => {
+                self.parse_number(cell)?.map(|number| RawTime::Seconds(number * factor))
+            }
             TimeKind::Unix { factor, .. } => unix_ns(cell, factor)
-                .or(self.number(cell)?.map(|number| to_nanoseconds(number * factor)))
+                .or(self.parse_number(cell)?.map(|number| to_nanoseconds(number * factor)))
                 .map(RawTime::Utc),
             TimeKind::Days { .. } => {
-                self.number(cell)?.map(|days| RawTime::Local(to_nanoseconds((days - 25_569.0) * 86_400.0)))
+                self.parse_number(cell)?.map(|days| RawTime::Local(to_nanoseconds((days - 25_569.0) * 86_400.0)))
             }
             TimeKind::TimesOfDay => {
                 moment_of_cell(cell)?.and_then(|moment| moment.time_of_day_ns).map(|ns| RawTime::OfDay(ns + part_ns))
@@ -221,19 +223,19 @@ impl<'p> BlockBuilder<'p> {
         })
     }
 
-    fn number(&self, cell: Cell<'_>) -> Result<Option<f64>, String> {
+    fn parse_number(&self, cell: Cell<'_>) -> Result<Option<f64>, String> {
         let decimal = match self.plan.time.kind {
             TimeKind::Seconds { decimal, .. } | TimeKind::Unix { decimal, .. } | TimeKind::Days { decimal } => decimal,
             TimeKind::Moments { .. } | TimeKind::TimesOfDay => return Ok(None),
         };
         Ok(match cell {
             Cell::Number(number) => Some(number),
-            Cell::Text(text) => written_number(text).and_then(|number| number.value(decimal)),
+            Cell::Text(text) => written_number(text).and_then(|number| number.parse_value(decimal)),
             _ => None,
         })
     }
 
-    fn finish(self, file: &str, mapping: &Mapping, done: &mut Assembled) -> Recording {
+    fn finish_recording(self, file: &str, mapping: &Mapping, done: &mut Assembled) -> Recording {
         if self.waiting.len() <= FOOTER_MAX && !self.waiting.is_empty() && !self.times.is_empty() {
             let (lines, first) = (self.waiting.len(), self.waiting[0].line);
             done.notes.push(Note::new(
@@ -242,15 +244,15 @@ impl<'p> BlockBuilder<'p> {
                 format!("数据之后的{lines}行未读取（自第{first}行起）"),
             ));
         } else {
-            self.waiting.into_iter().for_each(|problem| done.refuse(problem));
+            self.waiting.into_iter().for_each(|problem| done.record_refusal(problem));
         }
         let runs = self.columns.iter().find(|column| column.plan.name == "run").map(|column| &column.words);
-        let timed = resolve(&self.times, runs, &mapping.time, &mut done.notes);
+        let timed = resolve_times(&self.times, runs, &mapping.time, &mut done.notes);
         let mut kept = vec![true; self.times.len()];
         for (row, reason) in timed.out_of_order {
             kept[row] = false;
             let line = u64::from(self.lines[row]);
-            done.refuse(RowProblem { line, column: Some(self.plan.time.source.clone()), reason });
+            done.record_refusal(RowProblem { line, column: Some(self.plan.time.source.clone()), reason });
         }
         let all = kept.iter().all(|kept| *kept);
         let first = kept.iter().position(|kept| *kept).unwrap_or(0);
@@ -265,17 +267,19 @@ impl<'p> BlockBuilder<'p> {
         for column in self.columns {
             column.loss_note(&mut done.notes);
             let name = column.plan.name.clone();
-            let cells = column.finish();
-            recording.set_column(&name, if all { cells } else { cells.only(&kept) });
+            let cells = column.into_cells();
+            recording.set_column(&name, if all { cells } else { cells.select_rows(&kept) });
         }
         recording
     }
 }
 
 impl ColumnBuilder<'_> {
-    fn check(&self, cell: Cell<'_>) -> Result<(), String> {
+    fn check_cell(&self, cell: Cell<'_>) -> Result<(), String> {
         match (self.plan.kind, cell) {
-            (PlannedKind::Numbers { .. }, Cell::Text(text)) if !is_absent(text) && self.number(cell).is_none() => {
+            (PlannedKind::Numbers { .. }, Cell::Text(text))
+                if !is_absent(text) && self.parse_number(cell).is_none() =>
+            {
                 Err(format!(
                     "{text:?} is not a finite number with a decimal point; leave the cell empty where there is no value"
                 ))
@@ -284,15 +288,15 @@ impl ColumnBuilder<'_> {
         }
     }
 
-    fn number(&self, cell: Cell<'_>) -> Option<f64> {
+    fn parse_number(&self, cell: Cell<'_>) -> Option<f64> {
         match (self.plan.kind, cell) {
-            (PlannedKind::Flags, Cell::Text(text)) => flag(text)
+            (PlannedKind::Flags, Cell::Text(text)) => parse_flag(text)
                 .map(|(_, yes)| f64::from(u8::from(yes)))
                 .or_else(|| text.parse().ok().filter(|x: &f64| x.is_finite())),
             (PlannedKind::Flags, Cell::Number(number)) => Some(number),
             (PlannedKind::Numbers { decimal, factor, offset }, Cell::Text(text)) => {
-                let value = written_number(text).and_then(|number| number.value(decimal));
-                let value = value.or_else(|| flag(text).map(|(_, yes)| f64::from(u8::from(yes))));
+                let value = written_number(text).and_then(|number| number.parse_value(decimal));
+                let value = value.or_else(|| parse_flag(text).map(|(_, yes)| f64::from(u8::from(yes))));
                 value.map(|value| value * factor + offset)
             }
             (PlannedKind::Numbers { factor, offset, .. }, Cell::Number(number)) => Some(number * factor + offset),
@@ -314,7 +318,7 @@ impl ColumnBuilder<'_> {
             }
             return;
         }
-        let number = self.number(cell);
+        let number = self.parse_number(cell);
         if number.is_none() && !is_nothing(cell) {
             self.loss.count += 1;
             if self.loss.lines.len() < 5 {
@@ -341,7 +345,7 @@ impl ColumnBuilder<'_> {
         ));
     }
 
-    fn finish(self) -> Cells {
+    fn into_cells(self) -> Cells {
         if self.plan.kind == PlannedKind::Words { Cells::Words(self.words) } else { Cells::Numbers(self.numbers) }
     }
 }

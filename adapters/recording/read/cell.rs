@@ -70,7 +70,7 @@ pub fn is_absent_number(text: &str) -> bool {
 
 /// The pair that a word belongs to, and whether it says yes.
 #[must_use]
-pub fn flag(text: &str) -> Option<(usize, bool)> {
+pub fn parse_flag(text: &str) -> Option<(usize, bool)> {
     if text.len() > 8 {
         return None;
     }
@@ -135,9 +135,12 @@ pub fn written_number(text: &str) -> Option<WrittenNumber<'_>> {
     let (digits, suffix) = split_suffix(text)?;
     let unsigned = digits.trim_start_matches(['+', '-', '\u{2212}']);
     let mantissa = unsigned.split(['e', 'E']).next().unwrap_or(unsigned);
-    let shape = shape(mantissa)?;
+    let shape = classify_shape(mantissa)?;
     let written = WrittenNumber { digits, suffix, shape };
-    [Decimal::Point, Decimal::Comma].into_iter().any(|decimal| written.value(decimal).is_some()).then_some(written)
+    [Decimal::Point, Decimal::Comma]
+        .into_iter()
+        .any(|decimal| written.parse_value(decimal).is_some())
+        .then_some(written)
 }
 
 /// Digits, signs, grouping and exponent from the start; the rest is a suffix, which must not begin with a digit again.
@@ -170,7 +173,7 @@ fn split_suffix(text: &str) -> Option<(&str, &str)> {
     (seen_digit && is_suffix).then(|| (&text[..end], suffix))
 }
 
-fn shape(mantissa: &str) -> Option<Shape> {
+fn classify_shape(mantissa: &str) -> Option<Shape> {
     let plain: String = mantissa.chars().filter(|c| !GROUPING.contains(c)).collect();
     let (points, commas) = (plain.matches('.').count(), plain.matches(',').count());
     let groups_of = |sign: char| {
@@ -198,7 +201,7 @@ fn shape(mantissa: &str) -> Option<Shape> {
 impl WrittenNumber<'_> {
     /// The number under this decimal sign; `None` where the signs do not suit it.
     #[must_use]
-    pub fn value(&self, decimal: Decimal) -> Option<f64> {
+    pub fn parse_value(&self, decimal: Decimal) -> Option<f64> {
         let text = self.digits;
         if decimal == Decimal::Point
             && let Ok(number) = text.parse::<f64>()
@@ -243,7 +246,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str, decimal: Decimal) -> Option<f64> {
-        written_number(text)?.value(decimal)
+        written_number(text)?.parse_value(decimal)
     }
 
     #[test]
@@ -289,16 +292,16 @@ mod tests {
                 && !is_absent("-")
                 && is_absent_number("-")
         );
-        assert_eq!(flag("EIN"), Some((4, true)));
-        assert_eq!(flag("关"), Some((7, false)));
-        assert_eq!(flag("only"), None);
+        assert_eq!(parse_flag("EIN"), Some((4, true)));
+        assert_eq!(parse_flag("关"), Some((7, false)));
+        assert_eq!(parse_flag("only"), None);
     }
 
     proptest::proptest! {
         #[test]
         fn no_text_makes_it_panic(text in "[0-9.,eE+\\- '%a−\u{a0}]{0,14}") {
             if let Some(number) = written_number(&text) {
-                let _ = (number.value(Decimal::Point), number.value(Decimal::Comma), number.has_groups(Decimal::Comma));
+                let _ = (number.parse_value(Decimal::Point), number.parse_value(Decimal::Comma), number.has_groups(Decimal::Comma));
             }
         }
     }

@@ -28,7 +28,7 @@ pub(super) struct ForeignColumns<'a> {
 }
 
 impl ForeignColumns<'_> {
-    pub(super) fn wrong(&self, en: String, zh: String) -> RecordingError {
+    pub(super) fn build_header_error(&self, en: String, zh: String) -> RecordingError {
         RecordingError::Header { file: self.file.to_owned(), line: self.head.line, reason: Bilingual::new(en, zh) }
     }
 
@@ -36,17 +36,17 @@ impl ForeignColumns<'_> {
     fn has_moments(&self, index: usize) -> bool {
         let survey = &self.surveys[index];
         let moments = survey.moments + survey.instants + survey.locals;
-        moments > 0 && 2 * moments > survey.filled()
+        moments > 0 && 2 * moments > survey.count_filled()
     }
 
     fn has_times_of_day(&self, index: usize) -> bool {
         let survey = &self.surveys[index];
-        survey.times_of_day > 0 && 2 * survey.times_of_day > survey.filled()
+        survey.times_of_day > 0 && 2 * survey.times_of_day > survey.count_filled()
     }
 
     fn has_numbers(&self, index: usize) -> bool {
         let survey = &self.surveys[index];
-        survey.numbers() > 0 && 2 * survey.numbers() > survey.filled()
+        survey.count_numbers() > 0 && 2 * survey.count_numbers() > survey.count_filled()
     }
 
     /// Holds dates only, or moments at midnight only.
@@ -55,51 +55,54 @@ impl ForeignColumns<'_> {
         self.has_moments(index) && survey.dates == survey.moments + survey.instants + survey.locals
     }
 
-    fn position(&self, name: &str) -> Option<usize> {
+    fn find_column(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|known| known.text == name)
     }
 
     /// The columns of time, the first being that of the first columns.
-    pub(super) fn clocks(&self, notes: &mut Vec<Note>) -> Result<Vec<TimePlan>, RecordingError> {
+    pub(super) fn find_clocks(&self, notes: &mut Vec<Note>) -> Result<Vec<TimePlan>, RecordingError> {
         let first = match &self.mapping.time.column {
-            Some(name) => self.given(name)?,
-            None => self.position("time_utc").or_else(|| self.position("time_s")).map_or_else(|| self.found(), Ok)?,
+            Some(name) => self.find_given_column(name)?,
+            None => self
+                .find_column("time_utc")
+                .or_else(|| self.find_column("time_s"))
+                .map_or_else(|| self.find_time_column(), Ok)?,
         };
-        let mut clocks = vec![self.plan(first, notes)?];
+        let mut clocks = vec![self.plan_time(first, notes)?];
         let again = |index: &usize| {
             *index != first && self.names[*index].text == self.names[first].text && !self.names[first].text.is_empty()
         };
         for index in (0..self.names.len()).filter(again) {
-            clocks.push(self.plan(index, notes)?);
+            clocks.push(self.plan_time(index, notes)?);
         }
         clocks.sort_by_key(|clock| clock.index);
         Ok(clocks)
     }
 
-    fn given(&self, name: &str) -> Result<usize, RecordingError> {
+    fn find_given_column(&self, name: &str) -> Result<usize, RecordingError> {
         let by_number = name.strip_prefix('#').and_then(|number| number.parse::<usize>().ok()?.checked_sub(1));
-        let index = self.position(name).or(by_number.filter(|index| *index < self.names.len()));
+        let index = self.find_column(name).or(by_number.filter(|index| *index < self.names.len()));
         index.ok_or_else(|| {
-            let known = self.listed();
-            self.wrong(
+            let known = self.list_column_names();
+            self.build_header_error(
                 format!("the map names {name} as the time; the columns are {known}"),
                 format!("映射文件指定{name}为时间列；现有列：{known}"),
             )
         })
     }
 
-    fn listed(&self) -> String {
+    fn list_column_names(&self) -> String {
         let names: Vec<&str> =
             self.names.iter().map(|name| name.text.as_str()).filter(|name| !name.is_empty()).take(30).collect();
         names.join(", ")
     }
 
     /// By name and content: moments before times of day before numbers; at last a first column of moments without a name.
-    fn found(&self) -> Result<usize, RecordingError> {
-        let named = |index: &usize| self.names[*index].is_time() && self.surveys[*index].filled() > 0;
+    fn find_time_column(&self) -> Result<usize, RecordingError> {
+        let named = |index: &usize| self.names[*index].is_time() && self.surveys[*index].count_filled() > 0;
         let all = || (0..self.names.len()).filter(named);
         let is_of_time = |index: &usize| {
-            let unit = self.names[*index].unit.as_deref().and_then(Unit::of);
+            let unit = self.names[*index].unit.as_deref().and_then(Unit::from_symbol);
             unit.is_none_or(|unit| unit.dimension == Dimension::Time)
         };
         let found = all()
@@ -111,8 +114,8 @@ impl ForeignColumns<'_> {
             .or_else(|| all().filter(is_of_time).find(|index| self.has_numbers(*index) || self.has_moments(*index)))
             .or_else(|| (0..self.names.len()).find(|index| self.has_moments(*index) && !self.has_dates_only(*index)));
         found.ok_or_else(|| {
-            let known = self.listed();
-            self.wrong(
+            let known = self.list_column_names();
+            self.build_header_error(
                 format!(
                     "no column of time: none is named time_s or time_utc, and none of the others ({known}) is known to hold it. Say in a map which \
                      one it is ([time] column), or add one"
@@ -122,17 +125,17 @@ impl ForeignColumns<'_> {
         })
     }
 
-    fn plan(&self, index: usize, notes: &mut Vec<Note>) -> Result<TimePlan, RecordingError> {
+    fn plan_time(&self, index: usize, notes: &mut Vec<Note>) -> Result<TimePlan, RecordingError> {
         let source =
             if self.names[index].text.is_empty() { format!("#{}", index + 1) } else { self.names[index].text.clone() };
         let mut plan = TimePlan { index, date: None, milliseconds: None, kind: TimeKind::TimesOfDay, source };
         let survey = &self.surveys[index];
         if self.has_moments(index) {
-            plan.kind = TimeKind::Moments { order: self.order(index)? };
+            plan.kind = TimeKind::Moments { order: self.find_date_order(index)? };
         } else if self.has_times_of_day(index) {
             plan.date = (0..self.names.len()).find(|other| self.names[*other].is_date() && self.has_moments(*other));
             if let Some(date) = plan.date {
-                plan.kind = TimeKind::Moments { order: self.order(date)? };
+                plan.kind = TimeKind::Moments { order: self.find_date_order(date)? };
             }
             plan.milliseconds = (0..self.names.len()).find(|other| {
                 *other != index
@@ -140,13 +143,13 @@ impl ForeignColumns<'_> {
                     && self.surveys[*other].range.is_some_and(|(low, high)| low >= 0.0 && high < 1000.0)
             });
         } else if self.has_numbers(index) {
-            plan.kind = self.numeric(index, notes)?;
+            plan.kind = self.plan_numeric_time(index, notes)?;
         } else {
             let example = survey
                 .word_examples
                 .first()
                 .map_or_else(String::new, |example| format!(" (line {}: {:?})", example.line, example.text));
-            return Err(self.wrong(
+            return Err(self.build_header_error(
                 format!("column {} holds no times{example}", plan.source),
                 format!("列{}中没有时间{example}", plan.source),
             ));
@@ -154,22 +157,22 @@ impl ForeignColumns<'_> {
         Ok(plan)
     }
 
-    fn order(&self, index: usize) -> Result<DateOrder, RecordingError> {
+    fn find_date_order(&self, index: usize) -> Result<DateOrder, RecordingError> {
         match self.mapping.time.order.as_deref() {
             Some("mdy") => return Ok(DateOrder::MonthFirst),
             Some(_) => return Ok(DateOrder::DayFirst),
             None => {}
         }
         let name = &self.names[index].text;
-        self.surveys[index].order.order().map_err(|()| {
-            self.wrong(
+        self.surveys[index].order.decide_order().map_err(|()| {
+            self.build_header_error(
                 format!("the dates of column {name} can be read with the day or with the month first: say which in a map ([time] order = \"dmy\" or \"mdy\")"),
                 format!("列{name}的日期既可按日在前也可按月在前理解：请在映射文件中指定（[time] order = \"dmy\"或\"mdy\"）"),
             )
         })
     }
 
-    fn numeric(&self, index: usize, notes: &mut Vec<Note>) -> Result<TimeKind, RecordingError> {
+    fn plan_numeric_time(&self, index: usize, notes: &mut Vec<Note>) -> Result<TimeKind, RecordingError> {
         let survey = &self.surveys[index];
         let name = &self.names[index];
         let decimal = super::understand::decimal_of(self, index)?.unwrap_or(Decimal::Point);
@@ -187,9 +190,9 @@ impl ForeignColumns<'_> {
             _ => {}
         }
         if let Some(unit) = unit {
-            let known = Unit::of(&unit).filter(|unit| unit.dimension == Dimension::Time);
+            let known = Unit::from_symbol(&unit).filter(|unit| unit.dimension == Dimension::Time);
             let known = known.ok_or_else(|| {
-                self.wrong(
+                self.build_header_error(
                     format!("the unit {unit} of the time column {} is none of time", name.text),
                     format!("时间列{}的单位{unit}不是时间单位", name.text),
                 )
@@ -217,14 +220,14 @@ impl ForeignColumns<'_> {
             ));
             return Ok(TimeKind::Unix { decimal, factor });
         }
-        if survey.step().is_some_and(|step| step >= LONG_STEP) {
-            return Err(self.wrong(
+        if survey.mean_step().is_some_and(|step| step >= LONG_STEP) {
+            return Err(self.build_header_error(
                 format!(
                     "{} has no unit and goes on by {} per row: say in a map whether these are s or ms ([time] unit = \"ms\")",
                     name.text,
-                    survey.step().unwrap_or_default()
+                    survey.mean_step().unwrap_or_default()
                 ),
-                format!("{}没有单位，每行递增{}：请在映射文件中指定单位（[time] unit = \"ms\"或\"s\"）", name.text, survey.step().unwrap_or_default()),
+                format!("{}没有单位，每行递增{}：请在映射文件中指定单位（[time] unit = \"ms\"或\"s\"）", name.text, survey.mean_step().unwrap_or_default()),
             ));
         }
         notes.push(Note::new(
@@ -238,7 +241,7 @@ impl ForeignColumns<'_> {
     /// Spreadsheet days: of this century, and their steps are round in seconds but not as they stand.
     fn looks_like_days(&self, index: usize) -> bool {
         let survey = &self.surveys[index];
-        let (Some((low, high)), Some(step)) = (survey.range, survey.step()) else { return false };
+        let (Some((low, high)), Some(step)) = (survey.range, survey.mean_step()) else { return false };
         let is_round = |step: f64| {
             let parts = step * 100.0;
             (parts - parts.round()).abs() < 0.02 && parts.round() >= 1.0

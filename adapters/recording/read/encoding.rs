@@ -19,10 +19,10 @@ pub(super) struct DetectedEncoding {
 }
 
 /// Looks at every byte of the file, unless a mark at its beginning says it.
-pub(super) fn detect(input: &Input) -> Result<DetectedEncoding, RecordingError> {
-    let head = input.head(4096)?;
+pub(super) fn detect_encoding(input: &Input) -> Result<DetectedEncoding, RecordingError> {
+    let head = input.read_head(4096)?;
     if head.starts_with(&[0xff, 0xfe, 0, 0]) || head.starts_with(&[0, 0, 0xfe, 0xff]) {
-        return Err(RecordingError::format(
+        return Err(RecordingError::with_format_reason(
             &input.file,
             "the text is UTF-32: save it as UTF-8",
             "文本为UTF-32编码，请另存为UTF-8",
@@ -40,17 +40,17 @@ pub(super) fn detect(input: &Input) -> Result<DetectedEncoding, RecordingError> 
     if head.len() > 20 && zeros(0) > many && zeros(1) == 0 {
         return Ok(DetectedEncoding { encoding: UTF_16BE, has_mark: false });
     }
-    Ok(DetectedEncoding { encoding: guess(input)?, has_mark: false })
+    Ok(DetectedEncoding { encoding: guess_encoding(input)?, has_mark: false })
 }
 
-fn guess(input: &Input) -> Result<&'static Encoding, RecordingError> {
+fn guess_encoding(input: &Input) -> Result<&'static Encoding, RecordingError> {
     let mut bytes = input.open()?;
     let mut detector = EncodingDetector::new(Iso2022JpDetection::Deny);
     let mut check = UTF_8.new_decoder_without_bom_handling();
     let mut is_utf8 = true;
     let (mut chunk, mut text) = (vec![0; CHUNK], vec![0; 3 * CHUNK + 16]);
     loop {
-        let length = bytes.read(&mut chunk).map_err(|error| input.broken(error))?;
+        let length = bytes.read(&mut chunk).map_err(|error| input.build_io_error(error))?;
         let last = length == 0;
         detector.feed(&chunk[..length], last);
         if is_utf8 {
@@ -58,13 +58,13 @@ fn guess(input: &Input) -> Result<&'static Encoding, RecordingError> {
             is_utf8 = !matches!(result, DecoderResult::Malformed(..));
         }
         if last {
-            return Ok(if is_utf8 { UTF_8 } else { legacy(&detector) });
+            return Ok(if is_utf8 { UTF_8 } else { guess_legacy_encoding(&detector) });
         }
     }
 }
 
 /// A few Chinese words look like Japanese or Korean ones as well; in a machine shop they are Chinese.
-fn legacy(detector: &EncodingDetector) -> &'static Encoding {
+fn guess_legacy_encoding(detector: &EncodingDetector) -> &'static Encoding {
     let first = detector.guess(None, Utf8Detection::Deny);
     let is_eastern =
         [encoding_rs::EUC_JP, encoding_rs::EUC_KR, encoding_rs::BIG5, encoding_rs::SHIFT_JIS].contains(&first);
@@ -119,8 +119,8 @@ mod tests {
     use super::*;
 
     fn text_of(bytes: &[u8]) -> (&'static str, String) {
-        let input = Input::memory(bytes.to_vec(), "t.csv");
-        let found = detect(&input).expect("readable");
+        let input = Input::from_memory(bytes.to_vec(), "t.csv");
+        let found = detect_encoding(&input).expect("readable");
         let mut text = String::new();
         Decoded::new(bytes, found).read_to_string(&mut text).expect("text");
         (found.encoding.name(), text)

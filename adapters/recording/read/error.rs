@@ -66,7 +66,7 @@ pub enum RecordingError {
         reason: Bilingual,
     },
     /// No usable row.
-    #[error("{file}: no usable row{}; a recording is a line of column names, with time_s or a clock among them, and rows of values", first(.problems))]
+    #[error("{file}: no usable row{}; a recording is a line of column names, with time_s or a clock among them, and rows of values", describe_first(.problems))]
     Empty {
         /// The file.
         file: String,
@@ -77,24 +77,27 @@ pub enum RecordingError {
 
 impl RecordingError {
     /// The format of this file cannot be read.
-    pub(super) fn format(file: &str, en: impl Into<String>, zh: impl Into<String>) -> Self {
+    pub(super) fn with_format_reason(file: &str, en: impl Into<String>, zh: impl Into<String>) -> Self {
         Self::Format { file: file.to_owned(), reason: Bilingual::new(en, zh) }
     }
 
     /// The same in Chinese, where it was written in Chinese.
     #[must_use]
-    pub fn zh(&self) -> String {
+    pub fn describe_in_chinese(&self) -> String {
         match self {
             Self::Header { file, line, reason } => format!("{file}，第{line}行：{}", reason.zh),
             Self::Format { file, reason } => format!("{file}：{}", reason.zh),
             Self::Empty { file, problems } => {
-                format!("{file}：没有可用的行{}；记录由一行列名（含time_s或时刻列）和数据行组成", first(problems))
+                format!(
+                    "{file}：没有可用的行{}；记录由一行列名（含time_s或时刻列）和数据行组成",
+                    describe_first(problems)
+                )
             }
             Self::Io { file, error } => format!("{file}：无法读取（{error}）"),
         }
     }
 }
 
-fn first(problems: &[RowProblem]) -> String {
+fn describe_first(problems: &[RowProblem]) -> String {
     problems.first().map(|problem| format!("; first problem: {problem}")).unwrap_or_default()
 }

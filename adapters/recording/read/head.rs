@@ -40,9 +40,9 @@ pub(super) struct GivenLines {
 }
 
 /// Looks at the first rows.
-pub(super) fn look(table: &dyn Table, given: GivenLines, file: &str) -> Result<Head, RecordingError> {
+pub(super) fn find_head(table: &dyn Table, given: GivenLines, file: &str) -> Result<Head, RecordingError> {
     let mut rows: Vec<HeadRow> = Vec::new();
-    table.visit(&mut |row| {
+    table.visit_rows(&mut |row| {
         let cells: Vec<OwnedCell> = row.cells.iter().map(to_owned_cell).collect();
         if cells.iter().any(|cell| *cell != OwnedCell::Empty) {
             rows.push((row.line, cells));
@@ -55,7 +55,7 @@ pub(super) fn look(table: &dyn Table, given: GivenLines, file: &str) -> Result<H
     let header = |line: u64, reason: Bilingual| RecordingError::Header { file: file.to_owned(), line, reason };
     // Our own names say themselves which line they are.
     let ours = rows.iter().find(|(_, cells)| {
-        texts(cells).iter().any(|name| ["time_s", "time_utc"].contains(&name.trim_start_matches(['#', ' '])))
+        extract_texts(cells).iter().any(|name| ["time_s", "time_utc"].contains(&name.trim_start_matches(['#', ' '])))
     });
     let given = match (given.names, ours) {
         (None, Some((line, _))) => {
@@ -83,7 +83,7 @@ pub(super) fn look(table: &dyn Table, given: GivenLines, file: &str) -> Result<H
     let width = rows[first..].first().map_or(0, |(_, cells)| cells.len());
     let mut head =
         Head { line: rows[names].0, data_line: rows.get(first).map_or(u64::MAX, |row| row.0), ..Head::default() };
-    head.names = paired_names(&rows[..first]).unwrap_or_else(|| texts(&rows[names].1));
+    head.names = paired_names(&rows[..first]).unwrap_or_else(|| extract_texts(&rows[names].1));
     strip_comment_sign(&mut head.names);
     let filled = head.names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
     head.names.truncate(filled.max(1));
@@ -95,7 +95,8 @@ pub(super) fn look(table: &dyn Table, given: GivenLines, file: &str) -> Result<H
     }
     head.has_units = units.is_some_and(|row| row != names);
     if let Some(row) = units.filter(|row| *row != names) {
-        head.units = texts(&rows[row].1).into_iter().map(|unit| Some(unit).filter(|unit| !unit.is_empty())).collect();
+        head.units =
+            extract_texts(&rows[row].1).into_iter().map(|unit| Some(unit).filter(|unit| !unit.is_empty())).collect();
     }
     head.units.resize(head.names.len(), None);
     head.other_lines = first - 1 - usize::from(head.has_units);
@@ -112,7 +113,7 @@ fn no_names() -> Bilingual {
 fn to_owned_cell(cell: &Cell<'_>) -> OwnedCell {
     match cell {
         Cell::Empty => OwnedCell::Empty,
-        Cell::Text(text) => OwnedCell::text(text),
+        Cell::Text(text) => OwnedCell::from_text(text),
         Cell::Number(number) => OwnedCell::Number(*number),
         Cell::Flag(flag) => OwnedCell::Flag(*flag),
         Cell::Instant(at_ns) => OwnedCell::Instant(*at_ns),
@@ -120,7 +121,7 @@ fn to_owned_cell(cell: &Cell<'_>) -> OwnedCell {
     }
 }
 
-fn texts(cells: &[OwnedCell]) -> Vec<String> {
+fn extract_texts(cells: &[OwnedCell]) -> Vec<String> {
     let text = |cell: &OwnedCell| match cell {
         OwnedCell::Text(text) => text.split_whitespace().collect::<Vec<_>>().join(" "),
         OwnedCell::Number(number) => number.to_string(),
@@ -183,14 +184,14 @@ fn first_data_row(rows: &[HeadRow]) -> usize {
 
 /// Does a line hold units? A word before them may say so.
 fn is_units(cells: &[OwnedCell]) -> bool {
-    let texts: Vec<String> = texts(cells);
+    let texts: Vec<String> = extract_texts(cells);
     let says_so = |text: &str| {
         matches!(text.to_lowercase().as_str(), "unit" | "units" | "einheit" | "einheiten" | "单位" | "y_unit_label")
     };
     let rest = if texts.first().is_some_and(|text| says_so(text)) { &texts[1..] } else { &texts[..] };
     let filled: Vec<&String> = rest.iter().filter(|text| !text.is_empty()).collect();
     let bare = |text: &str| text.trim_matches(['(', ')', '[', ']', '（', '）']).trim().to_owned();
-    !filled.is_empty() && filled.iter().all(|text| Unit::of(&bare(text)).is_some())
+    !filled.is_empty() && filled.iter().all(|text| Unit::from_symbol(&bare(text)).is_some())
 }
 
 /// The last line with two words or more that is not the line of units and no comment; else the last comment.
@@ -211,10 +212,10 @@ fn paired_names(rows: &[HeadRow]) -> Option<Vec<String>> {
             && cells.len().is_multiple_of(2)
             && cells.chunks(2).all(|pair| pair[0] == "Name" && !pair[1].is_empty())
     };
-    let names = rows.iter().map(|(_, cells)| texts(cells)).find(|cells| is_pair(cells))?;
+    let names = rows.iter().map(|(_, cells)| extract_texts(cells)).find(|cells| is_pair(cells))?;
     let step = rows
         .iter()
-        .map(|(_, cells)| texts(cells))
+        .map(|(_, cells)| extract_texts(cells))
         .find(|cells| cells.first().is_some_and(|text| text.starts_with("SampleTime")))?;
     let unit = step[0].trim_start_matches("SampleTime").trim_matches(['[', ']', '(', ')']).to_owned();
     Some(names.chunks(2).flat_map(|pair| [format!("Time [{unit}]"), pair[1].clone()]).collect())
@@ -237,8 +238,8 @@ mod tests {
     use super::*;
 
     fn head(text: &str) -> Head {
-        let table = TextTable::new(Input::memory(text.as_bytes().to_vec(), "t.csv"), None, None).expect("text");
-        look(&table, GivenLines::default(), "t.csv").expect("a head")
+        let table = TextTable::new(Input::from_memory(text.as_bytes().to_vec(), "t.csv"), None, None).expect("text");
+        find_head(&table, GivenLines::default(), "t.csv").expect("a head")
     }
 
     #[test]
@@ -269,8 +270,8 @@ mod tests {
 
     #[test]
     fn data_without_names_are_refused() {
-        let table = TextTable::new(Input::memory(b"0,1\n1,2\n2,3\n".to_vec(), "t.csv"), None, None).expect("text");
-        let error = look(&table, GivenLines::default(), "t.csv").expect_err("no names").to_string();
+        let table = TextTable::new(Input::from_memory(b"0,1\n1,2\n2,3\n".to_vec(), "t.csv"), None, None).expect("text");
+        let error = find_head(&table, GivenLines::default(), "t.csv").expect_err("no names").to_string();
         assert!(error.contains("line 1") && error.contains("header_line"), "{error}");
     }
 }

@@ -26,46 +26,47 @@ impl<T: Read + Seek> Seekable for T {}
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 impl Input {
-    pub(super) fn path(path: &Path) -> Self {
+    pub(super) fn from_path(path: &Path) -> Self {
         Self { file: path.display().to_string(), place: InputPlace::Path(path.to_owned()) }
     }
 
-    pub(super) fn memory(bytes: Vec<u8>, file: &str) -> Self {
+    pub(super) fn from_memory(bytes: Vec<u8>, file: &str) -> Self {
         Self { file: file.to_owned(), place: InputPlace::Memory(bytes) }
     }
 
-    pub(super) fn broken(&self, error: std::io::Error) -> RecordingError {
+    pub(super) fn build_io_error(&self, error: std::io::Error) -> RecordingError {
         RecordingError::Io { file: self.file.clone(), error }
     }
 
     /// As it is stored.
-    pub(super) fn raw(&self) -> Result<Box<dyn Seekable + '_>, RecordingError> {
+    pub(super) fn open_raw(&self) -> Result<Box<dyn Seekable + '_>, RecordingError> {
         Ok(match &self.place {
-            InputPlace::Path(path) => {
-                Box::new(BufReader::with_capacity(1 << 16, File::open(path).map_err(|error| self.broken(error))?))
-            }
+            InputPlace::Path(path) => Box::new(BufReader::with_capacity(
+                1 << 16,
+                File::open(path).map_err(|error| self.build_io_error(error))?,
+            )),
             InputPlace::Memory(bytes) => Box::new(Cursor::new(bytes.as_slice())),
         })
     }
 
     /// Unpacked where it is gzipped.
     pub(super) fn open(&self) -> Result<Box<dyn Read + '_>, RecordingError> {
-        let mut buffered = BufReader::with_capacity(1 << 16, self.raw()?);
-        let packed = buffered.fill_buf().map_err(|error| self.broken(error))?.starts_with(&GZIP);
+        let mut buffered = BufReader::with_capacity(1 << 16, self.open_raw()?);
+        let packed = buffered.fill_buf().map_err(|error| self.build_io_error(error))?.starts_with(&GZIP);
         Ok(if packed { Box::new(flate2::bufread::MultiGzDecoder::new(buffered)) } else { Box::new(buffered) })
     }
 
     /// The first bytes after unpacking, at most so many.
-    pub(super) fn head(&self, most: usize) -> Result<Vec<u8>, RecordingError> {
+    pub(super) fn read_head(&self, most: usize) -> Result<Vec<u8>, RecordingError> {
         let mut head = Vec::new();
-        self.open()?.take(most as u64).read_to_end(&mut head).map_err(|error| self.broken(error))?;
+        self.open()?.take(most as u64).read_to_end(&mut head).map_err(|error| self.build_io_error(error))?;
         Ok(head)
     }
 
     /// Everything after unpacking, for formats that jump about; `None` beyond this many bytes.
-    pub(super) fn whole(&self, most: u64) -> Result<Option<Vec<u8>>, RecordingError> {
+    pub(super) fn read_whole(&self, most: u64) -> Result<Option<Vec<u8>>, RecordingError> {
         let mut bytes = Vec::new();
-        self.open()?.take(most + 1).read_to_end(&mut bytes).map_err(|error| self.broken(error))?;
+        self.open()?.take(most + 1).read_to_end(&mut bytes).map_err(|error| self.build_io_error(error))?;
         Ok((bytes.len() as u64 <= most).then_some(bytes))
     }
 }

@@ -42,21 +42,21 @@ pub(super) fn turn_table(
 ) -> Result<Option<ColumnTable>, RecordingError> {
     let position = |known: &[&str]| head.names.iter().position(|name| known.contains(&squeeze_name(name).as_str()));
     let (Some(name), Some(value)) = (position(NAME), position(VALUE)) else { return Ok(None) };
-    let is_word = survey.columns[name].words * 2 > survey.columns[name].filled();
+    let is_word = survey.columns[name].words * 2 > survey.columns[name].count_filled();
     let moments = |index: usize| {
         let column = &survey.columns[index];
-        column.moments + column.instants + column.locals + column.numbers()
+        column.moments + column.instants + column.locals + column.count_numbers()
     };
     let time = (0..head.names.len()).find(|index| {
         ![name, value].contains(index)
-            && super::names::ForeignName::of(&head.names[*index], None).is_time()
+            && super::names::ForeignName::from_text(&head.names[*index], None).is_time()
             && moments(*index) > 0
     });
     let Some(time) = time.filter(|_| is_word) else { return Ok(None) };
     let mut series: Vec<(String, Vec<OwnedCell>, Vec<OwnedCell>)> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
     let mut cells = 0;
-    table.visit(&mut |row| {
+    table.visit_rows(&mut |row| {
         let Some(found) = fit_row(row, head, true).filter(|_| row.line >= head.data_line) else { return Ok(VisitStep::Next) };
         let at = |index: usize| found.get(index).copied().unwrap_or(Cell::Empty);
         let Cell::Text(text) = at(name) else { return Ok(VisitStep::Next) };
@@ -69,12 +69,12 @@ pub(super) fn turn_table(
         cells += 2;
         if cells > CELLS_IN_MEMORY_MAX || series.len() > COLUMNS_MAX {
             let en = format!("more than {CELLS_IN_MEMORY_MAX} values or {COLUMNS_MAX} names, one line for each: export them as columns");
-            return Err(RecordingError::format(file, en, format!("每行一个值，超过{CELLS_IN_MEMORY_MAX}个值或{COLUMNS_MAX}个名称：请按列导出")));
+            return Err(RecordingError::with_format_reason(file, en, format!("每行一个值，超过{CELLS_IN_MEMORY_MAX}个值或{COLUMNS_MAX}个名称：请按列导出")));
         }
         Ok(VisitStep::Next)
     })?;
     let label = head.names[time].clone();
-    let mut form = table.form();
+    let mut form = table.describe_form();
     form.push(Bilingual::new("one line for each value, turned into columns", "每行一个值，已转换为列"));
     let columns = series
         .into_iter()
@@ -87,7 +87,7 @@ pub(super) fn turn_table(
 
 fn to_owned_cell(cell: Cell<'_>) -> OwnedCell {
     match cell {
-        Cell::Text(text) if !is_absent(text) => OwnedCell::text(text),
+        Cell::Text(text) if !is_absent(text) => OwnedCell::from_text(text),
         Cell::Text(_) | Cell::Empty => OwnedCell::Empty,
         Cell::Number(number) => OwnedCell::Number(number),
         Cell::Flag(flag) => OwnedCell::Flag(flag),

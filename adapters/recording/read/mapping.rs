@@ -91,7 +91,7 @@ impl Mapping {
         if let Some(decimal) = mapping.decimal.filter(|decimal| !['.', ','].contains(decimal)) {
             return Err(wrong(format!("decimal = {decimal:?}: it is \".\" or \",\"")));
         }
-        if let Some(sign) = mapping.separator.as_deref().filter(|sign| Separator::named(sign).is_none()) {
+        if let Some(sign) = mapping.separator.as_deref().filter(|sign| Separator::from_text(sign).is_none()) {
             return Err(wrong(format!("separator = {sign:?}: it is one sign, \"tab\" or \"space\"")));
         }
         for (name, value, known) in [
@@ -147,7 +147,7 @@ impl Mapping {
 
     /// Where the map of a recording lies when nobody says another place: `week.csv.map.toml` beside `week.csv`.
     #[must_use]
-    pub fn beside(recording: &Path) -> PathBuf {
+    pub fn build_path_beside(recording: &Path) -> PathBuf {
         let mut name = recording.as_os_str().to_owned();
         name.push(".map.toml");
         PathBuf::from(name)
@@ -155,7 +155,7 @@ impl Mapping {
 
     /// What is said of the column of this name, the `index`th.
     #[must_use]
-    pub fn column(&self, name: &str, index: usize) -> Option<&ColumnMapping> {
+    pub fn find_column(&self, name: &str, index: usize) -> Option<&ColumnMapping> {
         let number = format!("#{}", index + 1);
         self.column.iter().find(|column| column.from == name || column.from == number)
     }
@@ -170,7 +170,7 @@ mod tests {
         let text = "schema = \"map/1\"\ndecimal = \",\"\n[time]\ncolumn = \"Zeit\"\nzone = \"Europe/Berlin\"\n\
                     [[column]]\nfrom = \"P1[W]\"\nto = \"spindle_power_w\"\nscale = 3.0\n";
         let map = Mapping::parse(text, "m").expect("fine");
-        assert_eq!(map.column("P1[W]", 4).map(|column| column.to.as_str()), Some("spindle_power_w"));
+        assert_eq!(map.find_column("P1[W]", 4).map(|column| column.to.as_str()), Some("spindle_power_w"));
         for (wrong, word) in [
             ("", "schema"),
             ("schema = \"map/1\"\ndecimal = \"x\"", "decimal"),

@@ -10,13 +10,13 @@ const SLOW_SHARE: usize = 10;
 const GAP_STEPS: f64 = 2.5;
 
 /// One recording of all of them. `together`: what stands in a row was measured together, whatever the clocks say.
-pub(super) fn merge(mut blocks: Vec<Recording>, together: bool, notes: &mut Vec<Note>) -> Recording {
+pub(super) fn merge_blocks(mut blocks: Vec<Recording>, together: bool, notes: &mut Vec<Note>) -> Recording {
     if blocks.len() < 2 {
         return blocks.pop().unwrap_or_default();
     }
     let same_clock =
         blocks.windows(2).all(|pair| pair[0].start_ns == pair[1].start_ns && pair[0].time_s == pair[1].time_s);
-    let same_rows = blocks.windows(2).all(|pair| pair[0].rows() == pair[1].rows());
+    let same_rows = blocks.windows(2).all(|pair| pair[0].count_rows() == pair[1].count_rows());
     if same_clock || together && same_rows {
         let mut first = blocks.remove(0);
         for column in blocks.iter().flat_map(|block| block.columns()) {
@@ -24,11 +24,11 @@ pub(super) fn merge(mut blocks: Vec<Recording>, together: bool, notes: &mut Vec<
         }
         return first;
     }
-    blocks.retain(|block| block.rows() > 0);
-    let most = blocks.iter().map(Recording::rows).max().unwrap_or(0);
+    blocks.retain(|block| block.count_rows() > 0);
+    let most = blocks.iter().map(Recording::count_rows).max().unwrap_or(0);
     let axis = (0..blocks.len())
-        .filter(|index| SLOW_SHARE * blocks[*index].rows() >= most)
-        .min_by_key(|index| blocks[*index].rows());
+        .filter(|index| SLOW_SHARE * blocks[*index].count_rows() >= most)
+        .min_by_key(|index| blocks[*index].count_rows());
     let Some(axis) = axis else { return Recording::default() };
     note_clocks(&blocks, axis, same_rows, notes);
     let mut merged = Recording::new(blocks[axis].source.clone(), blocks[axis].time_s.clone(), blocks[axis].start_ns);
@@ -91,7 +91,7 @@ fn bring_onto(axis: &[f64], block: &Recording, cells: &Cells, shift_s: f64) -> C
                 .for_each(|at_s| held.push(last_before(&times, *at_s).and_then(|row| words.get(row)).unwrap_or("")));
             Cells::Words(held)
         }
-        Cells::Numbers(numbers) => Cells::Numbers(resample(axis, &times, numbers)),
+        Cells::Numbers(numbers) => Cells::Numbers(resample_numbers(axis, &times, numbers)),
     }
 }
 
@@ -105,7 +105,7 @@ fn usual_step(times: &[f64]) -> f64 {
     steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
 
-fn resample(axis: &[f64], times: &[f64], numbers: &Numbers) -> Numbers {
+fn resample_numbers(axis: &[f64], times: &[f64], numbers: &Numbers) -> Numbers {
     let present: Vec<usize> = (0..times.len()).filter(|row| numbers.get(*row).is_some()).collect();
     let own: Vec<f64> = present.iter().map(|row| times[*row]).collect();
     let values: Vec<f64> = present.iter().filter_map(|row| numbers.get(*row)).collect();
@@ -138,7 +138,7 @@ mod tests {
 
     fn block(times: &[f64], name: &str, values: &[f64]) -> Recording {
         let mut recording = Recording::new("t", times.to_vec(), None);
-        recording.set_column(name, Cells::Numbers(Numbers::full(values.to_vec())));
+        recording.set_column(name, Cells::Numbers(Numbers::from_values(values.to_vec())));
         recording
     }
 
@@ -151,9 +151,9 @@ mod tests {
             &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0],
         );
         let mut notes = Vec::new();
-        let merged = merge(vec![fast, slow], false, &mut notes);
+        let merged = merge_blocks(vec![fast, slow], false, &mut notes);
         assert_eq!(merged.time_s, [0.0, 1.0, 2.0]);
-        let fast: Vec<_> = merged.numbers("fast").expect("kept").iter().flatten().collect();
+        let fast: Vec<_> = merged.find_numbers("fast").expect("kept").iter().flatten().collect();
         assert_eq!(fast, [0.0, 4.0, 8.0]);
         assert!(notes[0].text.en.contains("2 clocks"));
     }
@@ -163,10 +163,10 @@ mod tests {
         let a = block(&[0.0, 1.0], "a", &[1.0, 2.0]);
         let b = block(&[0.0, 1.0], "b", &[3.0, 4.0]);
         let mut notes = Vec::new();
-        assert_eq!(merge(vec![a, b], false, &mut notes).columns().len(), 2);
+        assert_eq!(merge_blocks(vec![a, b], false, &mut notes).columns().len(), 2);
         assert!(notes.is_empty());
         let a = block(&[0.0, 1.0], "a", &[1.0, 2.0]);
         let late = block(&[0.0, 1.1], "b", &[3.0, 4.0]);
-        assert_eq!(merge(vec![a, late], true, &mut notes).numbers("b").and_then(|b| b.get(1)), Some(4.0));
+        assert_eq!(merge_blocks(vec![a, late], true, &mut notes).find_numbers("b").and_then(|b| b.get(1)), Some(4.0));
     }
 }

@@ -41,7 +41,7 @@ mod time;
 mod understand;
 
 pub use error::{RecordingError, RowProblem};
-pub use preview::{ColumnPreview, Preview, preview, preview_rows};
+pub use preview::{ColumnPreview, Preview, preview_recording, preview_rows};
 
 use super::Recording;
 
@@ -69,7 +69,7 @@ pub struct ReadRecording {
 impl ReadRecording {
     /// How the file was taken to be written, in one line; empty where nothing had to be assumed.
     #[must_use]
-    pub fn statement(&self) -> Bilingual {
+    pub fn describe_assumptions(&self) -> Bilingual {
         let of = |pick: fn(&Bilingual) -> &str, between: &str| {
             let assumed = self.notes.iter().filter(|note| note.kind == NoteKind::Assumption);
             assumed.map(|note| pick(&note.text).to_owned()).collect::<Vec<_>>().join(between)
@@ -83,7 +83,7 @@ impl ReadRecording {
 /// # Errors
 /// See [`RecordingError`]; single bad rows are no error but listed beside the recording.
 pub fn read_path(path: &Path) -> Result<ReadRecording, RecordingError> {
-    let beside = Mapping::beside(path);
+    let beside = Mapping::build_path_beside(path);
     if !beside.is_file() {
         return read_path_as(path, &Mapping::default());
     }
@@ -102,7 +102,7 @@ pub fn read_path(path: &Path) -> Result<ReadRecording, RecordingError> {
 /// # Errors
 /// See [`RecordingError`].
 pub fn read_path_as(path: &Path, mapping: &Mapping) -> Result<ReadRecording, RecordingError> {
-    read_input(Input::path(path), mapping)
+    read_input(Input::from_path(path), mapping)
 }
 
 /// Reads a recording from CSV text; `file` is its name for messages.
@@ -112,18 +112,19 @@ pub fn read_path_as(path: &Path, mapping: &Mapping) -> Result<ReadRecording, Rec
 pub fn read_csv(mut input: impl Read, file: &str) -> Result<ReadRecording, RecordingError> {
     let mut bytes = Vec::new();
     input.read_to_end(&mut bytes).map_err(|error| RecordingError::Io { file: file.to_owned(), error })?;
-    read_input(Input::memory(bytes, file), &Mapping::default())
+    read_input(Input::from_memory(bytes, file), &Mapping::default())
 }
 
 fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, RecordingError> {
     let file = input.file.clone();
-    let table = formats::open(input, mapping)?;
+    let table = formats::open_table(input, mapping)?;
     let (head, plan, table) = plan_table(table, mapping, &file)?;
-    let mut done = assemble::assemble(table.as_ref(), &head, &plan, mapping, &file)?;
+    let mut done = assemble::assemble_recordings(table.as_ref(), &head, &plan, mapping, &file)?;
     let together = mapping.time.clocks.as_deref() == Some("rows");
-    let mut notes: Vec<Note> = table.form().into_iter().map(|text| Note { kind: NoteKind::Assumption, text }).collect();
+    let mut notes: Vec<Note> =
+        table.describe_form().into_iter().map(|text| Note { kind: NoteKind::Assumption, text }).collect();
     notes.extend(plan.notes);
-    let recording = merge::merge(std::mem::take(&mut done.blocks), together, &mut done.notes);
+    let recording = merge::merge_blocks(std::mem::take(&mut done.blocks), together, &mut done.notes);
     notes.extend(done.notes);
     // The same of every clock of the file is said once.
     let mut said: Vec<Note> = Vec::new();
@@ -132,7 +133,7 @@ fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, Recordin
             said.push(note);
         }
     }
-    if recording.rows() == 0 {
+    if recording.count_rows() == 0 {
         return Err(RecordingError::Empty { file, problems: done.problems });
     }
     Ok(ReadRecording { recording, problems: done.problems, refused: done.refused, notes: said })
@@ -145,15 +146,15 @@ fn plan_table(
     file: &str,
 ) -> Result<(head::Head, ReadPlan, Box<dyn Table>), RecordingError> {
     let given = head::GivenLines { names: mapping.header_line, units: mapping.units_line };
-    let head = head::look(table.as_ref(), given, file)?;
-    let survey = survey::survey(table.as_ref(), &head)?;
+    let head = head::find_head(table.as_ref(), given, file)?;
+    let survey = survey::survey_table(table.as_ref(), &head)?;
     if let Some(turned) = long::turn_table(table.as_ref(), &head, &survey, file)? {
-        let head = head::look(&turned, head::GivenLines::default(), file)?;
-        let survey = survey::survey(&turned, &head)?;
-        let plan = understand::understand(&head, &survey, mapping, file)?;
+        let head = head::find_head(&turned, head::GivenLines::default(), file)?;
+        let survey = survey::survey_table(&turned, &head)?;
+        let plan = understand::build_plan(&head, &survey, mapping, file)?;
         return Ok((head, plan, Box::new(turned)));
     }
-    let plan = understand::understand(&head, &survey, mapping, file)?;
+    let plan = understand::build_plan(&head, &survey, mapping, file)?;
     Ok((head, plan, table))
 }
 

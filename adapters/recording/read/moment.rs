@@ -38,7 +38,7 @@ struct Scanner<'a> {
 
 impl Scanner<'_> {
     /// The digits here, at most so many of them; how many there were.
-    fn number(&mut self, most: usize) -> Option<(i64, usize)> {
+    fn take_number(&mut self, most: usize) -> Option<(i64, usize)> {
         let length = self.rest.bytes().take_while(u8::is_ascii_digit).count();
         if length == 0 || length > most {
             return None;
@@ -48,13 +48,13 @@ impl Scanner<'_> {
         Some((number, length))
     }
 
-    fn take(&mut self, any_of: &[&str]) -> Option<usize> {
+    fn take_any(&mut self, any_of: &[&str]) -> Option<usize> {
         let index = any_of.iter().position(|text| self.rest.starts_with(text))?;
         self.rest = &self.rest[any_of[index].len()..];
         Some(index)
     }
 
-    fn spaces(&mut self) {
+    fn skip_spaces(&mut self) {
         self.rest = self.rest.trim_start();
     }
 }
@@ -67,29 +67,29 @@ pub(crate) fn written_moment(text: &str) -> Option<WrittenMoment> {
         return None;
     }
     let mut scanner = Scanner { rest: text };
-    let date = date(&mut scanner);
+    let date = parse_date(&mut scanner);
     if date.is_none() {
         scanner.rest = text;
     } else {
-        scanner.spaces();
-        let _between = scanner.take(&["T", "t", ",", "-", "_", ";"]);
-        scanner.spaces();
+        scanner.skip_spaces();
+        let _between = scanner.take_any(&["T", "t", ",", "-", "_", ";"]);
+        scanner.skip_spaces();
     }
     let time_of_day_ns =
         if date.is_some() && scanner.rest.is_empty() { None } else { Some(time_of_day(&mut scanner)?) };
-    let offset_s = if time_of_day_ns.is_some() { offset(&mut scanner)? } else { None };
-    scanner.spaces();
+    let offset_s = if time_of_day_ns.is_some() { parse_offset(&mut scanner)? } else { None };
+    scanner.skip_spaces();
     scanner.rest.is_empty().then_some(WrittenMoment { date, time_of_day_ns, offset_s })
 }
 
-fn date(scanner: &mut Scanner<'_>) -> Option<WrittenDate> {
-    let (first, digits) = scanner.number(4)?;
-    let sign = scanner.take(&["-", "/", ".", "年"])?;
-    let (second, _) = scanner.number(2)?;
-    scanner.take(&[["-"], ["/"], ["."], ["月"]][sign])?;
-    let (third, last_digits) = scanner.number(4)?;
+fn parse_date(scanner: &mut Scanner<'_>) -> Option<WrittenDate> {
+    let (first, digits) = scanner.take_number(4)?;
+    let sign = scanner.take_any(&["-", "/", ".", "年"])?;
+    let (second, _) = scanner.take_number(2)?;
+    scanner.take_any(&[["-"], ["/"], ["."], ["月"]][sign])?;
+    let (third, last_digits) = scanner.take_number(4)?;
     if sign == 3 {
-        scanner.take(&["日", "号"])?;
+        scanner.take_any(&["日", "号"])?;
     }
     let small = |number: i64| i8::try_from(number).ok();
     let year = |number: i64, digits: usize| i16::try_from(if digits == 2 { 2000 + number } else { number }).ok();
@@ -103,30 +103,30 @@ fn date(scanner: &mut Scanner<'_>) -> Option<WrittenDate> {
 }
 
 fn time_of_day(scanner: &mut Scanner<'_>) -> Option<i64> {
-    let (hour, _) = scanner.number(2)?;
-    let sign = scanner.take(&[":", "时", "h"])?;
-    let (minute, _) = scanner.number(2)?;
+    let (hour, _) = scanner.take_number(2)?;
+    let sign = scanner.take_any(&[":", "时", "h"])?;
+    let (minute, _) = scanner.take_number(2)?;
     let mut ns = 0;
     let mut second = 0;
     let more = match sign {
-        0 => scanner.take(&[":"]).is_some(),
-        1 => scanner.take(&["分"]).is_some() && !scanner.rest.is_empty(),
-        _ => scanner.take(&["m"]).is_some(),
+        0 => scanner.take_any(&[":"]).is_some(),
+        1 => scanner.take_any(&["分"]).is_some() && !scanner.rest.is_empty(),
+        _ => scanner.take_any(&["m"]).is_some(),
     };
     if more {
-        second = scanner.number(2)?.0;
-        if scanner.take(&[".", ",", ":"]).is_some() {
-            let (digits, length) = scanner.number(18)?;
+        second = scanner.take_number(2)?.0;
+        if scanner.take_any(&[".", ",", ":"]).is_some() {
+            let (digits, length) = scanner.take_number(18)?;
             ns = if length <= 9 {
                 digits * 10_i64.pow(u32::try_from(9 - length).ok()?)
             } else {
                 digits / 10_i64.pow(u32::try_from(length - 9).ok()?)
             };
         }
-        let _unit = scanner.take(&["秒", "s"]);
+        let _unit = scanner.take_any(&["秒", "s"]);
     }
-    scanner.spaces();
-    let half = scanner.take(&["AM", "PM", "am", "pm", "上午", "下午"]);
+    scanner.skip_spaces();
+    let half = scanner.take_any(&["AM", "PM", "am", "pm", "上午", "下午"]);
     let hour = match half {
         Some(index) if index % 2 == 0 => hour % 12,
         Some(_) => hour % 12 + 12,
@@ -137,17 +137,17 @@ fn time_of_day(scanner: &mut Scanner<'_>) -> Option<i64> {
 }
 
 /// `Some(None)`: none is written.
-fn offset(scanner: &mut Scanner<'_>) -> Option<Option<i32>> {
-    scanner.spaces();
-    if scanner.take(&["Z", "z", "UTC", "GMT"]).is_some() && scanner.rest.is_empty() {
+fn parse_offset(scanner: &mut Scanner<'_>) -> Option<Option<i32>> {
+    scanner.skip_spaces();
+    if scanner.take_any(&["Z", "z", "UTC", "GMT"]).is_some() && scanner.rest.is_empty() {
         return Some(Some(0));
     }
-    let Some(sign) = scanner.take(&["+", "-", "\u{2212}"]) else { return Some(None) };
-    let (hours, digits) = scanner.number(4)?;
+    let Some(sign) = scanner.take_any(&["+", "-", "\u{2212}"]) else { return Some(None) };
+    let (hours, digits) = scanner.take_number(4)?;
     let (hours, minutes) = if digits > 2 {
         (hours / 100, hours % 100)
-    } else if scanner.take(&[":"]).is_some() {
-        (hours, scanner.number(2)?.0)
+    } else if scanner.take_any(&[":"]).is_some() {
+        (hours, scanner.take_number(2)?.0)
     } else {
         (hours, 0)
     };
@@ -170,7 +170,7 @@ pub(crate) struct OrderEvidence {
 
 impl OrderEvidence {
     /// Takes a date into account.
-    pub(crate) fn see(&mut self, date: WrittenDate) {
+    pub(crate) fn record_date(&mut self, date: WrittenDate) {
         if let WrittenDate::YearLast(first, second, _, points) = date {
             self.year_last += 1;
             self.day_first += u64::from(first > 12);
@@ -183,7 +183,7 @@ impl OrderEvidence {
     ///
     /// # Errors
     /// Both numbers are months in every date, or the dates contradict one another.
-    pub(crate) fn order(&self) -> Result<DateOrder, ()> {
+    pub(crate) fn decide_order(&self) -> Result<DateOrder, ()> {
         match (self.day_first > 0, self.month_first > 0) {
             (true, false) => Ok(DateOrder::DayFirst),
             (false, true) => Ok(DateOrder::MonthFirst),
@@ -261,8 +261,8 @@ mod tests {
     fn the_order_follows_from_all_dates_together() {
         let order = |texts: &[&str]| {
             let mut evidence = OrderEvidence::default();
-            texts.iter().filter_map(|text| written_moment(text)?.date).for_each(|date| evidence.see(date));
-            evidence.order()
+            texts.iter().filter_map(|text| written_moment(text)?.date).for_each(|date| evidence.record_date(date));
+            evidence.decide_order()
         };
         assert_eq!(order(&["01/02/2026 10:00", "13/02/2026 10:00"]), Ok(DateOrder::DayFirst));
         assert_eq!(order(&["01/02/2026 10:00"]), Err(()));

@@ -174,12 +174,12 @@ pub fn squeeze_name(text: &str) -> String {
 impl ForeignName {
     /// Takes a name apart; `row_unit` is what a line of units says of its column.
     #[must_use]
-    pub fn of(text: &str, row_unit: Option<&str>) -> Self {
+    pub fn from_text(text: &str, row_unit: Option<&str>) -> Self {
         let (mut rest, mut unit) = (text.trim().to_owned(), None);
         // The last bracket that holds a unit; other brackets name an axis or a channel.
         for (open, close) in [('[', ']'), ('(', ')'), ('（', '）'), ('<', '>'), ('{', '}'), ('【', '】')] {
             if let Some((at, inner, end)) = last_bracket(&rest, open, close)
-                && Unit::of(inner).is_some()
+                && Unit::from_symbol(inner).is_some()
             {
                 unit = Some(inner.trim().to_owned());
                 rest = format!("{} {}", &rest[..at], &rest[end..]);
@@ -196,7 +196,7 @@ impl ForeignName {
             .map(|unit| unit.trim().trim_matches(['(', ')', '[', ']', '（', '）']).trim())
             .filter(|unit| !unit.is_empty());
         let unit = unit.or_else(|| row_unit.map(str::to_owned));
-        let words: Vec<String> = words(&without_brackets(&rest));
+        let words: Vec<String> = split_words(&without_brackets(&rest));
         let telling: Vec<&String> = words.iter().filter(|word| !NOISE.contains(&word.as_str())).collect();
         let kept: String = if telling.is_empty() { words.concat() } else { telling.into_iter().cloned().collect() };
         let kept = NOISE.iter().filter(|noise| !noise.is_ascii()).fold(kept, |kept, noise| {
@@ -226,19 +226,19 @@ impl ForeignName {
 
     /// The column that this name means beyond doubt, its unit permitting.
     #[must_use]
-    pub fn meaning(&self) -> Option<&'static str> {
+    pub fn find_meaning(&self) -> Option<&'static str> {
         let known = DICTIONARY.iter().find(|(column, words)| {
             let is_it = words.contains(&self.squeezed.as_str())
                 || words.iter().any(|word| word.len() > 14 && word.is_ascii() && self.whole.contains(word));
-            is_it && self.suits(column)
+            is_it && self.suits_column(column)
         });
         known.map(|(column, _)| *column)
     }
 
     /// Columns that it may mean, the likeliest first.
     #[must_use]
-    pub fn candidates(&self) -> Vec<&'static str> {
-        let mut found: Vec<&'static str> = self.meaning().into_iter().collect();
+    pub fn list_candidates(&self) -> Vec<&'static str> {
+        let mut found: Vec<&'static str> = self.find_meaning().into_iter().collect();
         let all = || DICTIONARY.iter().chain(UNSURE);
         let exact = all().filter(|(_, words)| words.contains(&self.squeezed.as_str()));
         let near = all()
@@ -253,33 +253,33 @@ impl ForeignName {
 
     /// The conversion to the unit of the column: factor and offset. `None`: no unit is known, or one of another quantity.
     #[must_use]
-    pub fn conversion(&self, column: &str) -> Option<(f64, f64)> {
-        conversion(self.unit.as_deref(), column)
+    pub fn find_conversion(&self, column: &str) -> Option<(f64, f64)> {
+        find_unit_conversion(self.unit.as_deref(), column)
     }
 
-    fn suits(&self, column: &str) -> bool {
-        self.conversion(column).is_some()
+    fn suits_column(&self, column: &str) -> bool {
+        self.find_conversion(column).is_some()
     }
 
     /// Not of another quantity.
     fn may_suit(&self, column: &str) -> bool {
-        self.unit.is_none() || self.suits(column)
+        self.unit.is_none() || self.suits_column(column)
     }
 }
 
 /// What turns a number of this unit into one of the column's: factor and offset. A column without a unit (a flag, a text) needs none.
 #[must_use]
-pub fn conversion(unit: Option<&str>, column: &str) -> Option<(f64, f64)> {
+pub fn find_unit_conversion(unit: Option<&str>, column: &str) -> Option<(f64, f64)> {
     let is_text = crate::recording::TEXT_COLUMNS.contains(&column)
-        || ChannelId::of(column).is_some_and(|id| id.channel().kind == Kind::Text);
+        || ChannelId::from_name(column).is_some_and(|id| id.channel().kind == Kind::Text);
     if is_text {
         return Some((1.0, 0.0));
     }
     let own = quantity::unit_of(column)?;
     let Some(unit) = unit else { return (own == "1").then_some((1.0, 0.0)) };
-    let (from, to) = (Unit::of(unit)?, Unit::of(own)?);
+    let (from, to) = (Unit::from_symbol(unit)?, Unit::from_symbol(own)?);
     // A feed per revolution is a length that goes with the revolution; a share is a hundredth.
-    from.to(to)
+    from.compute_conversion(to)
 }
 
 fn last_bracket(text: &str, open: char, close: char) -> Option<(usize, &str, usize)> {
@@ -306,7 +306,7 @@ fn without_brackets(text: &str) -> String {
 fn split_unit(text: &str) -> Option<(&str, &str)> {
     for between in [" in ", " / ", ", ", " - "] {
         if let Some((name, unit)) = text.rsplit_once(between)
-            && Unit::of(unit).is_some()
+            && Unit::from_symbol(unit).is_some()
         {
             return Some((name, unit));
         }
@@ -318,12 +318,12 @@ fn split_unit(text: &str) -> Option<(&str, &str)> {
         return Some((lower_end, unit));
     }
     let (name, unit) = text.rsplit_once(['_', ' '])?;
-    let is_unit = unit.len() < 8 && !unit.chars().all(|c| c.is_ascii_digit()) && Unit::of(unit).is_some();
+    let is_unit = unit.len() < 8 && !unit.chars().all(|c| c.is_ascii_digit()) && Unit::from_symbol(unit).is_some();
     is_unit.then_some((name, unit))
 }
 
 /// The words of a name: at spaces and signs, and where a small letter meets a capital.
-fn words(text: &str) -> Vec<String> {
+fn split_words(text: &str) -> Vec<String> {
     let mut parts: Vec<String> = Vec::new();
     let mut word = String::new();
     let mut before = ' ';
@@ -349,9 +349,9 @@ mod tests {
     use super::*;
 
     fn meaning(text: &str) -> Option<(&'static str, f64)> {
-        let name = ForeignName::of(text, None);
-        let column = name.meaning()?;
-        Some((column, name.conversion(column)?.0))
+        let name = ForeignName::from_text(text, None);
+        let column = name.find_meaning()?;
+        Some((column, name.find_conversion(column)?.0))
     }
 
     #[test]
@@ -372,7 +372,8 @@ mod tests {
         ] {
             assert_eq!(meaning(text), Some((column, factor)), "{text}");
         }
-        assert_eq!(ForeignName::of("Spindelleistung", Some("(kW)")).conversion("spindle_power_w"), Some((1000.0, 0.0)));
+        let power = ForeignName::from_text("Spindelleistung", Some("(kW)"));
+        assert_eq!(power.find_conversion("spindle_power_w"), Some((1000.0, 0.0)));
     }
 
     #[test]
@@ -380,8 +381,9 @@ mod tests {
         for text in ["Leistung [kW]", "Spindle speed", "Drehzahl [kW]", "Channel A (V)", "P1[W]"] {
             assert_eq!(meaning(text), None, "{text}");
         }
-        assert_eq!(ForeignName::of("Leistung [kW]", None).candidates(), ["spindle_power_w", "total_power_w"]);
-        assert_eq!(ForeignName::of("Spindle speed", None).candidates()[0], "spindle_speed_rpm");
+        let power = ForeignName::from_text("Leistung [kW]", None);
+        assert_eq!(power.list_candidates(), ["spindle_power_w", "total_power_w"]);
+        assert_eq!(ForeignName::from_text("Spindle speed", None).list_candidates()[0], "spindle_speed_rpm");
     }
 
     #[test]

@@ -38,11 +38,12 @@ pub struct Preview {
 ///
 /// # Errors
 /// Its columns cannot be told at all.
-pub fn preview(path: &Path, mapping: &Mapping) -> Result<Preview, RecordingError> {
-    let input = Input::path(path);
+pub fn preview_recording(path: &Path, mapping: &Mapping) -> Result<Preview, RecordingError> {
+    let input = Input::from_path(path);
     let file = input.file.clone();
-    let table = formats::open(input.clone(), mapping)?;
-    let head = head::look(table.as_ref(), GivenLines { names: mapping.header_line, units: mapping.units_line }, &file)?;
+    let table = formats::open_table(input.clone(), mapping)?;
+    let head =
+        head::find_head(table.as_ref(), GivenLines { names: mapping.header_line, units: mapping.units_line }, &file)?;
     let read = read_input(input, mapping);
     let recording = read.as_ref().ok().map(|read| &read.recording);
     let columns = head
@@ -51,18 +52,18 @@ pub fn preview(path: &Path, mapping: &Mapping) -> Result<Preview, RecordingError
         .zip(&head.units)
         .enumerate()
         .map(|(index, (text, unit))| {
-            let name = ForeignName::of(text, unit.as_deref());
-            let mapped = mapping.column(text, index);
+            let name = ForeignName::from_text(text, unit.as_deref());
+            let mapped = mapping.find_column(text, index);
             let to = match mapped {
                 Some(mapped) => Some(mapped.to.clone()).filter(|to| !to.is_empty()),
-                None => to(&name, recording),
+                None => find_target_column(&name, recording),
             };
             let is_time = mapping.time.column.as_ref().map_or(to.is_none() && name.is_time(), |column| column == text);
             ColumnPreview {
                 from: name.text.clone(),
                 unit: name.unit.clone(),
                 to,
-                candidates: name.candidates(),
+                candidates: name.list_candidates(),
                 is_time,
             }
         })
@@ -71,13 +72,13 @@ pub fn preview(path: &Path, mapping: &Mapping) -> Result<Preview, RecordingError
 }
 
 /// The column of the recording that a name has become.
-fn to(name: &ForeignName, recording: Option<&Recording>) -> Option<String> {
+fn find_target_column(name: &ForeignName, recording: Option<&Recording>) -> Option<String> {
     let recording = recording?;
     let has = |name: &str| recording.columns().iter().any(|column| column.name == name);
     if has(&name.text) {
         return Some(name.text.clone());
     }
-    name.meaning().filter(|ours| has(ours)).map(str::to_owned)
+    name.find_meaning().filter(|ours| has(ours)).map(str::to_owned)
 }
 
 /// The names of the columns, time first, and the first rows as text.
@@ -95,12 +96,12 @@ pub fn preview_rows(recording: &Recording, rows: usize) -> (Vec<String>, Vec<Vec
     };
     let row = |row: usize| {
         let cells = recording.columns().iter().map(|column| value(&column.cells, row));
-        std::iter::once(time(recording, row)).chain(cells).collect()
+        std::iter::once(format_time(recording, row)).chain(cells).collect()
     };
-    (head, (0..rows.min(recording.rows())).map(row).collect())
+    (head, (0..rows.min(recording.count_rows())).map(row).collect())
 }
 
-fn time(recording: &Recording, row: usize) -> String {
+fn format_time(recording: &Recording, row: usize) -> String {
     let since_s = recording.time_s[row];
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     let stamp = recording

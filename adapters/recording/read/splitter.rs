@@ -40,7 +40,12 @@ impl Splitter {
         Self { separator, csv: builder.build(), text, ends, filled: (0, 0), newlines: 0, spaced: Vec::new() }
     }
 
-    pub(super) fn feed(&mut self, bytes: &[u8], last: bool, see: &mut SeeTexts<'_>) -> Result<VisitStep, SplitError> {
+    pub(super) fn feed_bytes(
+        &mut self,
+        bytes: &[u8],
+        last: bool,
+        see: &mut SeeTexts<'_>,
+    ) -> Result<VisitStep, SplitError> {
         match self.separator {
             Separator::Sign(_) => {
                 let step = self.feed_csv(bytes, see)?;
@@ -77,7 +82,7 @@ impl Splitter {
                 ReadRecordResult::Record => {
                     // Before `\r\n` a row ends with the first of both, and at the end of the file with neither.
                     let end = self.newlines + u64::from(at_end || !taken.ends_with(b"\n"));
-                    let step = self.row(end, see)?;
+                    let step = self.emit_row(end, see)?;
                     self.filled = (0, 0);
                     if matches!(step, VisitStep::Enough) {
                         return Ok(VisitStep::Enough);
@@ -88,7 +93,7 @@ impl Splitter {
         }
     }
 
-    fn row(&self, end: u64, see: &mut SeeTexts<'_>) -> Result<VisitStep, SplitError> {
+    fn emit_row(&self, end: u64, see: &mut SeeTexts<'_>) -> Result<VisitStep, SplitError> {
         let (length, cells) = self.filled;
         let text = String::from_utf8_lossy(&self.text[..length]);
         // A cell of replaced characters would move the ends; the decoder gives UTF-8, so nothing is replaced.

@@ -1,6 +1,6 @@
 //! What stands in each column, counted over every row before anything is decided: one strange cell in the first row decides nothing.
 
-use super::cell::{Cell, Shape, flag, is_absent, is_absent_number, written_number};
+use super::cell::{Cell, Shape, is_absent, is_absent_number, parse_flag, written_number};
 use super::error::RecordingError;
 use super::head::Head;
 use super::moment::{OrderEvidence, written_moment};
@@ -60,28 +60,28 @@ pub(super) struct ColumnSurvey {
 }
 
 impl ColumnSurvey {
-    pub(super) fn numbers(&self) -> u64 {
+    pub(super) fn count_numbers(&self) -> u64 {
         self.typed + self.whole + self.point + self.comma + self.point_or_thousands + self.comma_or_thousands
     }
 
     /// Cells that have something to say.
-    pub(super) fn filled(&self) -> u64 {
-        self.numbers() + self.instants + self.locals + self.moments + self.times_of_day + self.flags + self.words
+    pub(super) fn count_filled(&self) -> u64 {
+        self.count_numbers() + self.instants + self.locals + self.moments + self.times_of_day + self.flags + self.words
     }
 
     /// Mean step from one number to the next.
-    pub(super) fn step(&self) -> Option<f64> {
+    pub(super) fn mean_step(&self) -> Option<f64> {
         let (first, last) = self.first.zip(self.last)?;
         #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
         (self.steps > 0).then(|| (last - first) / self.steps as f64)
     }
 
-    fn see(&mut self, line: u64, cell: Cell<'_>) {
+    fn record_cell(&mut self, line: u64, cell: Cell<'_>) {
         match cell {
             Cell::Empty => self.absent += 1,
             Cell::Number(number) if number.is_finite() => {
                 self.typed += 1;
-                self.size(number);
+                self.record_number(number);
             }
             Cell::Number(_) => self.absent += 1,
             Cell::Flag(_) => {
@@ -116,8 +116,8 @@ impl ColumnSurvey {
                 Shape::CommaOrThousands => self.comma_or_thousands += 1,
             }
             self.see_suffix(number.suffix);
-            if let Some(number) = number.value(super::cell::Decimal::Point) {
-                self.size(number);
+            if let Some(number) = number.parse_value(super::cell::Decimal::Point) {
+                self.record_number(number);
             }
         } else if let Some(moment) = written_moment(text) {
             match (moment.date, moment.time_of_day_ns) {
@@ -125,11 +125,11 @@ impl ColumnSurvey {
                 (Some(date), time) => {
                     self.moments += 1;
                     self.dates += u64::from(time.is_none());
-                    self.order.see(date);
+                    self.order.record_date(date);
                 }
             }
             self.zoned += u64::from(moment.offset_s.is_some());
-        } else if let Some((pair, _)) = flag(text) {
+        } else if let Some((pair, _)) = parse_flag(text) {
             self.flags += 1;
             self.see_pair(pair);
         } else if is_absent_number(text) {
@@ -166,7 +166,7 @@ impl ColumnSurvey {
     }
 
     #[expect(clippy::float_cmp, reason = "a row number is a whole number, exactly")]
-    fn size(&mut self, number: f64) {
+    fn record_number(&mut self, number: f64) {
         self.range = Some(self.range.map_or((number, number), |(low, high)| (low.min(number), high.max(number))));
         self.first.get_or_insert(number);
         if let Some(last) = self.last {
@@ -215,10 +215,10 @@ pub(super) fn fit_row<'a>(row: &Row<'a>, head: &Head, may_be_short: bool) -> Opt
 }
 
 /// Goes through the whole table.
-pub(super) fn survey(table: &dyn Table, head: &Head) -> Result<Survey, RecordingError> {
+pub(super) fn survey_table(table: &dyn Table, head: &Head) -> Result<Survey, RecordingError> {
     let mut found = Survey { columns: vec![ColumnSurvey::default(); head.names.len()], ..Survey::default() };
     let short = table.may_be_short();
-    table.visit(&mut |row| {
+    table.visit_rows(&mut |row| {
         if row.line < head.data_line {
             return Ok(VisitStep::Next);
         }
@@ -232,7 +232,7 @@ pub(super) fn survey(table: &dyn Table, head: &Head) -> Result<Survey, Recording
         };
         found.rows += 1;
         for (column, cell) in found.columns.iter_mut().zip(cells) {
-            column.see(row.line, *cell);
+            column.record_cell(row.line, *cell);
         }
         Ok(VisitStep::Next)
     })?;

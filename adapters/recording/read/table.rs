@@ -26,10 +26,10 @@ pub(super) type Visit<'v> = dyn FnMut(&Row<'_>) -> Result<VisitStep, RecordingEr
 /// See the [module](self).
 pub(super) trait Table {
     /// Every row in order.
-    fn visit(&self, see: &mut Visit<'_>) -> Result<(), RecordingError>;
+    fn visit_rows(&self, see: &mut Visit<'_>) -> Result<(), RecordingError>;
 
     /// How the file is written, for the statement: separator, encoding, sheet.
-    fn form(&self) -> Vec<Bilingual>;
+    fn describe_form(&self) -> Vec<Bilingual>;
 
     /// May a row be shorter than the header, because the format leaves out what is empty?
     fn may_be_short(&self) -> bool {
@@ -49,7 +49,7 @@ pub(super) enum OwnedCell {
 }
 
 impl OwnedCell {
-    pub(super) fn cell(&self) -> Cell<'_> {
+    pub(super) fn as_cell(&self) -> Cell<'_> {
         match self {
             Self::Empty => Cell::Empty,
             Self::Text(text) => Cell::Text(text),
@@ -60,7 +60,7 @@ impl OwnedCell {
         }
     }
 
-    pub(super) fn text(text: &str) -> Self {
+    pub(super) fn from_text(text: &str) -> Self {
         if text.is_empty() { Self::Empty } else { Self::Text(text.into()) }
     }
 }
@@ -70,16 +70,16 @@ impl OwnedCell {
 pub(super) struct MemoryTable {
     /// Line and cells of each row.
     pub(super) rows: Vec<(u64, Vec<OwnedCell>)>,
-    /// See [`Table::form`].
+    /// See [`Table::describe_form`].
     pub(super) form: Vec<Bilingual>,
 }
 
 impl Table for MemoryTable {
-    fn visit(&self, see: &mut Visit<'_>) -> Result<(), RecordingError> {
+    fn visit_rows(&self, see: &mut Visit<'_>) -> Result<(), RecordingError> {
         let mut cells = Vec::new();
         for (line, owned) in &self.rows {
             cells.clear();
-            cells.extend(owned.iter().map(OwnedCell::cell));
+            cells.extend(owned.iter().map(OwnedCell::as_cell));
             if matches!(see(&Row { line: *line, cells: &cells })?, VisitStep::Enough) {
                 return Ok(());
             }
@@ -87,7 +87,7 @@ impl Table for MemoryTable {
         Ok(())
     }
 
-    fn form(&self) -> Vec<Bilingual> {
+    fn describe_form(&self) -> Vec<Bilingual> {
         self.form.clone()
     }
 
@@ -101,7 +101,7 @@ impl Table for MemoryTable {
 pub(super) struct ColumnTable {
     /// Name and cells of each column.
     pub(super) columns: Vec<(String, ColumnCells)>,
-    /// See [`Table::form`].
+    /// See [`Table::describe_form`].
     pub(super) form: Vec<Bilingual>,
 }
 
@@ -122,19 +122,19 @@ impl ColumnCells {
         }
     }
 
-    fn cell(&self, row: usize) -> Cell<'_> {
+    fn read_cell(&self, row: usize) -> Cell<'_> {
         match self {
             Self::Numbers(numbers) => {
                 numbers.get(row).filter(|number| number.is_finite()).map_or(Cell::Empty, |number| Cell::Number(*number))
             }
             Self::Instants(instants) => instants.get(row).map_or(Cell::Empty, |at_ns| Cell::Instant(*at_ns)),
-            Self::Cells(cells) => cells.get(row).map_or(Cell::Empty, OwnedCell::cell),
+            Self::Cells(cells) => cells.get(row).map_or(Cell::Empty, OwnedCell::as_cell),
         }
     }
 }
 
 impl Table for ColumnTable {
-    fn visit(&self, see: &mut Visit<'_>) -> Result<(), RecordingError> {
+    fn visit_rows(&self, see: &mut Visit<'_>) -> Result<(), RecordingError> {
         let names: Vec<Cell<'_>> = self.columns.iter().map(|(name, _)| Cell::Text(name)).collect();
         if matches!(see(&Row { line: 1, cells: &names })?, VisitStep::Enough) {
             return Ok(());
@@ -143,7 +143,7 @@ impl Table for ColumnTable {
         let mut cells = Vec::with_capacity(names.len());
         for row in 0..rows {
             cells.clear();
-            cells.extend(self.columns.iter().map(|(_, column)| column.cell(row)));
+            cells.extend(self.columns.iter().map(|(_, column)| column.read_cell(row)));
             if matches!(see(&Row { line: row as u64 + 2, cells: &cells })?, VisitStep::Enough) {
                 return Ok(());
             }
@@ -151,7 +151,7 @@ impl Table for ColumnTable {
         Ok(())
     }
 
-    fn form(&self) -> Vec<Bilingual> {
+    fn describe_form(&self) -> Vec<Bilingual> {
         self.form.clone()
     }
 }

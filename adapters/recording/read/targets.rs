@@ -3,7 +3,7 @@
 use super::clock::ForeignColumns;
 use super::error::RecordingError;
 use super::mapping::ColumnMapping;
-use super::names::{ForeignName, conversion};
+use super::names::{ForeignName, find_unit_conversion};
 use super::plan::{Note, NoteKind, TimePlan};
 use super::survey::ColumnSurvey;
 use crate::channel::unit::Unit;
@@ -49,14 +49,14 @@ pub(super) struct ColumnTarget {
 fn unknown_mappings(columns: &ForeignColumns<'_>) -> Result<(), RecordingError> {
     let has = |mapped: &&ColumnMapping| {
         columns.names.iter().enumerate().any(|(index, name)| {
-            columns.mapping.column(&name.text, index).is_some_and(|found| found.from == mapped.from)
+            columns.mapping.find_column(&name.text, index).is_some_and(|found| found.from == mapped.from)
         })
     };
     let Some(lost) = columns.mapping.column.iter().find(|mapped| !has(mapped)) else { return Ok(()) };
     let known: Vec<&str> = columns.names.iter().map(|name| name.text.as_str()).collect();
-    let near = crate::channel::nearest(&lost.from, known);
+    let near = crate::channel::find_nearest_name(&lost.from, known);
     let hint = near.map_or_else(String::new, |near| format!("; did you mean {near}?"));
-    Err(columns.wrong(
+    Err(columns.build_header_error(
         format!("the map names a column {:?}, which the file does not have{hint}", lost.from),
         format!("映射文件中的列{:?}在文件中不存在", lost.from),
     ))
@@ -70,11 +70,11 @@ fn find_target(
 ) -> Result<Option<ColumnTarget>, RecordingError> {
     let name = &columns.names[index];
     let survey = &columns.surveys[index];
-    if let Some(mapped) = columns.mapping.column(&name.text, index) {
+    if let Some(mapped) = columns.mapping.find_column(&name.text, index) {
         return mapped_target(columns, index, mapped);
     }
     if name.text.is_empty() {
-        if survey.filled() > 0 && !survey.counts_rows {
+        if survey.count_filled() > 0 && !survey.counts_rows {
             notes.push(Note::new(
                 NoteKind::Loss,
                 format!("column {} has no name and is left out", index + 1),
@@ -84,16 +84,16 @@ fn find_target(
         return Ok(None);
     }
     let own = ColumnTarget { name: name.text.clone(), factor: 1.0, offset: 0.0, is_guess: false };
-    let is_ours = ChannelId::of(&name.text).is_some() || TEXT_COLUMNS.contains(&name.text.as_str());
+    let is_ours = ChannelId::from_name(&name.text).is_some() || TEXT_COLUMNS.contains(&name.text.as_str());
     if is_ours || is_contract {
-        if ChannelId::of(&name.text).is_some() {
+        if ChannelId::from_name(&name.text).is_some() {
             unit_agrees(columns, index)?;
         }
         return Ok(Some(own));
     }
-    match name.meaning() {
+    match name.find_meaning() {
         Some(ours) => {
-            let (factor, offset) = name.conversion(ours).unwrap_or((1.0, 0.0));
+            let (factor, offset) = name.find_conversion(ours).unwrap_or((1.0, 0.0));
             Ok(Some(ColumnTarget { name: ours.to_owned(), factor, offset, is_guess: true }))
         }
         None => {
@@ -106,15 +106,17 @@ fn find_target(
 /// One of ours whose line of units says another unit.
 fn unit_agrees(columns: &ForeignColumns<'_>, index: usize) -> Result<(), RecordingError> {
     let (name, said) = (&columns.names[index].text, &columns.head.units[index]);
-    let (Some(own), Some(said)) = (quantity::unit_of(name).and_then(Unit::of), said.as_deref()) else { return Ok(()) };
+    let (Some(own), Some(said)) = (quantity::unit_of(name).and_then(Unit::from_symbol), said.as_deref()) else {
+        return Ok(());
+    };
     let bare = said.trim_matches(['(', ')', '[', ']']);
-    match Unit::of(bare).and_then(|said| said.to(own)) {
+    match Unit::from_symbol(bare).and_then(|said| said.compute_conversion(own)) {
         Some((factor, offset)) if (factor - 1.0).abs() < 1e-9 && offset.abs() < 1e-9 => Ok(()),
         // A feed per revolution is often written as a length.
         None if quantity::unit_of(name) == Some("mm/rev") && bare == "mm" || bare == "-" || bare == "1" => Ok(()),
         _ => {
             let own = quantity::unit_of(name).unwrap_or_default();
-            Err(columns.wrong(
+            Err(columns.build_header_error(
                 format!("column {name}: its name says {own}, the line of units says {bare}: rename the column, or say the unit in a map"),
                 format!("列{name}：列名表示单位{own}，单位行为{bare}：请改列名，或在映射文件中指定单位"),
             ))
@@ -133,11 +135,11 @@ fn mapped_target(
     let name = &columns.names[index];
     let unit = mapped.unit.as_deref().or(name.unit.as_deref());
     let own = quantity::unit_of(&mapped.to);
-    let (factor, offset) = match (conversion(unit, &mapped.to), unit, own) {
+    let (factor, offset) = match (find_unit_conversion(unit, &mapped.to), unit, own) {
         (Some(found), ..) => found,
         (None, None, _) | (None, Some(_), None) => (1.0, 0.0),
         (None, Some(unit), Some(own)) => {
-            return Err(columns.wrong(
+            return Err(columns.build_header_error(
                 format!("column {}: {unit} cannot become {} in {own}: these are different quantities, or a unit that is not known", name.text, mapped.to),
                 format!("列{}：单位{unit}无法换算为{}（{own}）：物理量不同或单位未知", name.text, mapped.to),
             ));
@@ -155,8 +157,8 @@ fn mapped_target(
 
 /// A name that may mean one of ours: a person has to say.
 fn note_doubt(name: &ForeignName, survey: &ColumnSurvey, notes: &mut Vec<Note>) {
-    let candidates = name.candidates();
-    let Some(first) = candidates.first().filter(|_| survey.filled() > 0) else { return };
+    let candidates = name.list_candidates();
+    let Some(first) = candidates.first().filter(|_| survey.count_filled() > 0) else { return };
     let list = candidates.iter().take(3).copied().collect::<Vec<_>>();
     let why = if name.unit.is_none() && candidates.len() == 1 { "it has no unit" } else { "that is not sure" };
     notes.push(Note::new(
@@ -188,7 +190,7 @@ fn resolve_duplicates(
     for (name, places) in by_name.into_iter().filter(|(_, places)| places.len() > 1) {
         let sure: Vec<usize> = places.iter().copied().filter(|place| !all[*place].1.is_guess).collect();
         if sure.len() > 1 {
-            return Err(columns.wrong(
+            return Err(columns.build_header_error(
                 format!("column {name} appears twice: rename one of them, or leave one out in a map (from = \"#{}\", to = \"\")", all[sure[1]].0 + 1),
                 format!("列{name}出现两次：请改名，或在映射文件中去掉一个（from = \"#{}\", to = \"\"）", all[sure[1]].0 + 1),
             ));
@@ -214,9 +216,10 @@ fn resolve_duplicates(
     let mut seen: Vec<&str> = Vec::new();
     for (_, target) in all.iter() {
         if seen.contains(&target.name.as_str()) {
-            return Err(
-                columns.wrong(format!("column {} appears twice", target.name), format!("列{}出现两次", target.name))
-            );
+            return Err(columns.build_header_error(
+                format!("column {} appears twice", target.name),
+                format!("列{}出现两次", target.name),
+            ));
         }
         seen.push(&target.name);
     }

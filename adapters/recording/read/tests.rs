@@ -9,7 +9,7 @@ fn read(text: &str) -> Result<ReadRecording, RecordingError> {
 
 fn under(text: &str, map: &str) -> Result<ReadRecording, RecordingError> {
     let mapping = Mapping::parse(&format!("schema = \"map/1\"\n{map}"), "map").expect("a map");
-    read_input(Input::memory(text.as_bytes().to_vec(), "t.csv"), &mapping)
+    read_input(Input::from_memory(text.as_bytes().to_vec(), "t.csv"), &mapping)
 }
 
 fn told(read: &ReadRecording) -> String {
@@ -17,24 +17,24 @@ fn told(read: &ReadRecording) -> String {
 }
 
 fn column(recording: &Recording, name: &str) -> Vec<Option<f64>> {
-    recording.numbers(name).unwrap_or_else(|| panic!("no column {name}")).iter().collect()
+    recording.find_numbers(name).unwrap_or_else(|| panic!("no column {name}")).iter().collect()
 }
 
 #[test]
 fn a_bad_cell_refuses_its_row_with_line_and_column() {
     let got = read("time_s,spindle_power_w\n0,1\n1,abc\n2,\n").expect("readable");
-    assert_eq!(got.recording.rows(), 2);
+    assert_eq!(got.recording.count_rows(), 2);
     assert_eq!(got.refused, 1);
     let problem = got.problems[0].to_string();
     assert!(problem.starts_with("line 3, column spindle_power_w: \"abc\""), "{problem}");
-    assert_eq!(got.recording.numbers("spindle_power_w").map(|n| n.get(1)), Some(None));
+    assert_eq!(got.recording.find_numbers("spindle_power_w").map(|n| n.get(1)), Some(None));
 }
 
 #[test]
 fn time_may_restart_only_at_a_new_run() {
     let got = read("time_s,run,engaged\n0,a,1\n1,a,1\n0,a,1\n0,b,1\n").expect("readable");
-    assert_eq!((got.recording.rows(), got.refused), (3, 1));
-    assert_eq!(got.recording.runs().len(), 2);
+    assert_eq!((got.recording.count_rows(), got.refused), (3, 1));
+    assert_eq!(got.recording.list_runs().len(), 2);
     assert!(!got.recording.pauses_known());
 }
 
@@ -50,9 +50,9 @@ fn utc_times_are_seconds_since_the_first_row() {
 fn numbers_in_text_columns_stay_text_and_unknown_columns_are_kept() {
     let got = read("time_s,run,pump_v,note\n0,1,,\n1,1,3.5,door open\n").expect("readable");
     let recording = got.recording;
-    assert_eq!(recording.words("run").and_then(|words| words.get(0)), Some("1"));
-    assert_eq!(recording.numbers("pump_v").and_then(|numbers| numbers.get(1)), Some(3.5));
-    assert_eq!(recording.words("note").and_then(|words| words.get(1)), Some("door open"));
+    assert_eq!(recording.find_words("run").and_then(|words| words.get(0)), Some("1"));
+    assert_eq!(recording.find_numbers("pump_v").and_then(|numbers| numbers.get(1)), Some(3.5));
+    assert_eq!(recording.find_words("note").and_then(|words| words.get(1)), Some("door open"));
 }
 
 #[test]
@@ -84,14 +84,14 @@ fn no_single_cell_decides_what_a_column_is() {
 fn absent_words_are_absent_in_columns_of_the_contract_too() {
     let got = read("time_s,spindle_power_w,tool\n0,NaN,T1\n1,2,NA\n2,UNAVAILABLE,T1\n").expect("readable");
     assert_eq!(column(&got.recording, "spindle_power_w"), [None, Some(2.0), None]);
-    assert_eq!(got.recording.words("tool").and_then(|tool| tool.get(1)), None);
+    assert_eq!(got.recording.find_words("tool").and_then(|tool| tool.get(1)), None);
     assert_eq!(got.refused, 0);
 }
 
 #[test]
 fn a_column_of_words_with_numbers_in_it_is_told() {
     let got = read("time_s,state_of_pump,x_w\n0,idle,1\n1,12,1\n2,busy,1\n").expect("readable");
-    assert_eq!(got.recording.words("state_of_pump").and_then(|words| words.get(1)), Some("12"));
+    assert_eq!(got.recording.find_words("state_of_pump").and_then(|words| words.get(1)), Some("12"));
     assert!(told(&got).contains("state_of_pump is read as words"), "{}", told(&got));
 }
 
@@ -128,7 +128,7 @@ fn a_german_file_is_read_and_every_assumption_said() {
 fn two_candidates_for_one_column_are_neither() {
     let text = "Zeit [s],Drehzahl [1/min],Speed [rpm],Spindelleistung [W]\n0,1,2,3\n1,2,2,3\n";
     let got = read(text).expect("readable");
-    assert!(got.recording.numbers("spindle_speed_rpm").is_none());
+    assert!(got.recording.find_numbers("spindle_speed_rpm").is_none());
     assert!(told(&got).contains("Drehzahl [1/min] and Speed [rpm] could all be spindle_speed_rpm"), "{}", told(&got));
     let got = under(text, "[[column]]\nfrom = \"Speed [rpm]\"\nto = \"spindle_speed_rpm\"").expect("readable");
     assert_eq!(column(&got.recording, "spindle_speed_rpm"), [Some(2.0), Some(2.0)]);
@@ -158,7 +158,7 @@ fn what_cannot_be_told_is_refused_with_line_and_cure() {
 fn footers_repeated_headers_and_remarks_are_left_out_and_told() {
     let text = "# logger 2\ntime_s,x_w\n0,1\n1,2\n# pause\ntime_s,x_w\n2,3\nMax,3\nMin,1\n";
     let got = read(text).expect("readable");
-    assert_eq!(got.recording.rows(), 3);
+    assert_eq!(got.recording.count_rows(), 3);
     assert_eq!(got.refused, 0);
     let told = told(&got);
     for word in
@@ -177,7 +177,8 @@ fn a_file_of_another_kind_is_refused_by_its_name() {
         (b"\0\0\0\0\x01\x02\x03\0\0\0\0\0\0\0\0\0", "no format that is known"),
         (b"", "no usable row"),
     ] {
-        let error = read_input(Input::memory(bytes.to_vec(), "f"), &Mapping::default()).expect_err(word).to_string();
+        let error =
+            read_input(Input::from_memory(bytes.to_vec(), "f"), &Mapping::default()).expect_err(word).to_string();
         assert!(error.contains(word), "{error}");
     }
 }
@@ -192,6 +193,6 @@ proptest::proptest! {
     fn no_bytes_make_it_panic(start in 0..6_usize, bytes in proptest::collection::vec(proptest::num::u8::ANY, 0..300)) {
         let starts: [&[u8]; 6] = [b"TDSm\x0e\0\0\0\x69\x12\0\0", b"MATLAB 5.0 MAT-file", b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", b"<MTConnectStreams>", b"LabVIEW Measurement\t\n"];
         let all: Vec<u8> = starts[start].iter().copied().chain(bytes).collect();
-        let _ = read_input(Input::memory(all, "f"), &Mapping::default());
+        let _ = read_input(Input::from_memory(all, "f"), &Mapping::default());
     }
 }

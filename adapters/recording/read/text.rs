@@ -1,7 +1,7 @@
 //! A table written as text: the separator found, quotes understood, lines counted, every row bounded.
 
-use super::cell::{Cell, flag, is_absent, written_number};
-use super::encoding::{Decoded, DetectedEncoding, detect};
+use super::cell::{Cell, is_absent, parse_flag, written_number};
+use super::encoding::{Decoded, DetectedEncoding, detect_encoding};
 use super::error::RecordingError;
 use super::input::Input;
 use super::limits::{COLUMNS_MAX, HEAD_BYTES, ROW_BYTES_MAX};
@@ -28,7 +28,7 @@ const CANDIDATES: [Separator; 5] =
 const JUDGED_ROWS: usize = 400;
 
 impl Separator {
-    fn words(self) -> Bilingual {
+    fn to_bilingual(self) -> Bilingual {
         match self {
             Self::Sign(b',') => Bilingual::new("comma", "逗号分隔"),
             Self::Sign(b';') => Bilingual::new("semicolon", "分号分隔"),
@@ -43,7 +43,7 @@ impl Separator {
     }
 
     /// From the text of a map; `None`: no separator.
-    pub(super) fn named(text: &str) -> Option<Self> {
+    pub(super) fn from_text(text: &str) -> Option<Self> {
         match text {
             "space" | " " => Some(Self::Space),
             "tab" => Some(Self::Sign(b'\t')),
@@ -78,10 +78,10 @@ impl TextTable {
     ) -> Result<Self, RecordingError> {
         let encoding = match encoding {
             Some(encoding) => DetectedEncoding { encoding, has_mark: false },
-            None => detect(&input)?,
+            None => detect_encoding(&input)?,
         };
         let mut table = Self { input, encoding, separator: Separator::Sign(b','), separator_line: false, short: false };
-        let head = table.head()?;
+        let head = table.read_head()?;
         let told = told_separator(&head);
         table.separator_line = told.is_some();
         table.separator = match separator.or(told) {
@@ -92,9 +92,9 @@ impl TextTable {
     }
 
     /// The first characters, up to the end of a line.
-    pub(super) fn head(&self) -> Result<String, RecordingError> {
+    pub(super) fn read_head(&self) -> Result<String, RecordingError> {
         let mut head = Vec::new();
-        let broken = |error| self.input.broken(error);
+        let broken = |error| self.input.build_io_error(error);
         Decoded::new(self.input.open()?, self.encoding)
             .take(HEAD_BYTES as u64)
             .read_to_end(&mut head)
@@ -130,13 +130,13 @@ impl TextTable {
 fn told_separator(head: &str) -> Option<Separator> {
     let line = head.lines().next()?.trim_matches('"');
     let sign = line.strip_prefix("sep=").or_else(|| line.strip_prefix("SEP="))?;
-    Separator::named(sign)
+    Separator::from_text(sign)
 }
 
 fn best_separator(head: &str) -> Separator {
     let mut best = (0.0, Separator::Sign(b','));
     for separator in CANDIDATES {
-        let score = score(head, separator);
+        let score = score_separator(head, separator);
         if score > best.0 + 0.02 {
             best = (score, separator);
         }
@@ -146,10 +146,10 @@ fn best_separator(head: &str) -> Separator {
 
 /// How well a separator divides the text: the share of rows with the usual number of cells, times the share of their cells that mean
 /// something. Zero where no row is divided.
-fn score(head: &str, separator: Separator) -> f64 {
+fn score_separator(head: &str, separator: Separator) -> f64 {
     let mut rows: Vec<Vec<bool>> = Vec::new();
     let mut splitter = Splitter::new(separator);
-    let done = splitter.feed(head.as_bytes(), true, &mut |_, cells| {
+    let done = splitter.feed_bytes(head.as_bytes(), true, &mut |_, cells| {
         rows.push(cells.iter().map(|cell| is_meant(cell)).collect());
         Ok(if rows.len() < JUDGED_ROWS { VisitStep::Next } else { VisitStep::Enough })
     });
@@ -176,20 +176,20 @@ fn is_meant(cell: &str) -> bool {
     is_absent(cell)
         || written_number(cell).is_some()
         || written_moment(cell).is_some()
-        || flag(cell).is_some()
+        || parse_flag(cell).is_some()
         || !cell.contains([',', ';', '\t', '|'])
 }
 
 impl Table for TextTable {
-    fn visit(&self, see: &mut Visit<'_>) -> Result<(), RecordingError> {
+    fn visit_rows(&self, see: &mut Visit<'_>) -> Result<(), RecordingError> {
         let mut text = Decoded::new(self.input.open()?, self.encoding);
         let mut splitter = Splitter::new(self.separator);
         let mut chunk = vec![0; 64 << 10];
         let mut cells: Vec<Cell<'static>> = Vec::new();
         let mut skip = self.separator_line;
         loop {
-            let length = text.read(&mut chunk).map_err(|error| self.input.broken(error))?;
-            let fed = splitter.feed(&chunk[..length], length == 0, &mut |line, texts| {
+            let length = text.read(&mut chunk).map_err(|error| self.input.build_io_error(error))?;
+            let fed = splitter.feed_bytes(&chunk[..length], length == 0, &mut |line, texts| {
                 if std::mem::take(&mut skip) {
                     return Ok(VisitStep::Next);
                 }
@@ -209,14 +209,14 @@ impl Table for TextTable {
         }
     }
 
-    fn form(&self) -> Vec<Bilingual> {
+    fn describe_form(&self) -> Vec<Bilingual> {
         let mut form = Vec::new();
         let encoding = self.encoding.encoding;
         if encoding != encoding_rs::UTF_8 {
             form.push(Bilingual::new(format!("encoding {}", encoding.name()), format!("编码{}", encoding.name())));
         }
         if self.separator != Separator::Sign(b',') {
-            form.push(self.separator.words());
+            form.push(self.separator.to_bilingual());
         }
         form
     }
@@ -237,10 +237,10 @@ mod tests {
     use super::*;
 
     fn rows(text: &str) -> (Separator, Vec<(u64, Vec<String>)>) {
-        let table = TextTable::new(Input::memory(text.as_bytes().to_vec(), "t.csv"), None, None).expect("text");
+        let table = TextTable::new(Input::from_memory(text.as_bytes().to_vec(), "t.csv"), None, None).expect("text");
         let mut rows = Vec::new();
         table
-            .visit(&mut |row| {
+            .visit_rows(&mut |row| {
                 let cells = row
                     .cells
                     .iter()
@@ -275,9 +275,9 @@ mod tests {
         let endless = format!("time_s,a\n0,\"{}", "x".repeat(ROW_BYTES_MAX + 10));
         let wide = format!("time_s{}\n", ",a".repeat(COLUMNS_MAX + 5));
         for (text, line) in [(endless, "line 2"), (wide, "line 1")] {
-            let input = Input::memory(text.into_bytes(), "t.csv");
+            let input = Input::from_memory(text.into_bytes(), "t.csv");
             let table = TextTable::new(input, None, Some(Separator::Sign(b','))).expect("text");
-            let error = table.visit(&mut |_| Ok(VisitStep::Next)).expect_err("too long").to_string();
+            let error = table.visit_rows(&mut |_| Ok(VisitStep::Next)).expect_err("too long").to_string();
             assert!(error.contains(line) && error.contains("4 MB"), "{error}");
         }
     }

@@ -36,7 +36,12 @@ const REPEATED_SHARE: f64 = 0.6;
 const CLOCK_CHANGE_S: f64 = 3600.0;
 
 /// Turns the cells of a whole column into time.
-pub(super) fn resolve(raw: &[RawTime], runs: Option<&Words>, mapping: &TimeMapping, notes: &mut Vec<Note>) -> Timed {
+pub(super) fn resolve_times(
+    raw: &[RawTime],
+    runs: Option<&Words>,
+    mapping: &TimeMapping,
+    notes: &mut Vec<Note>,
+) -> Timed {
     let mut timed = if raw.iter().any(|time| matches!(time, RawTime::Utc(_) | RawTime::Local(_))) {
         resolve_moments(raw, mapping, notes)
     } else {
@@ -61,7 +66,7 @@ fn time_stretches(rows: usize, runs: Option<&Words>) -> Vec<std::ops::Range<usiz
     let mut found: Vec<std::ops::Range<usize>> = Vec::new();
     for row in 0..rows {
         match found.last_mut() {
-            Some(stretch) if runs.is_none_or(|runs| runs.code(stretch.start) == runs.code(row)) => {
+            Some(stretch) if runs.is_none_or(|runs| runs.find_code(stretch.start) == runs.find_code(row)) => {
                 stretch.end = row + 1
             }
             _ => found.push(row..row + 1),
@@ -108,7 +113,7 @@ fn resolve_moments(raw: &[RawTime], mapping: &TimeMapping, notes: &mut Vec<Note>
         .iter()
         .map(|time| match time {
             RawTime::Utc(at_ns) => *at_ns,
-            RawTime::Local(at_ns) => local.utc(*at_ns),
+            RawTime::Local(at_ns) => local.resolve_utc(*at_ns),
             RawTime::Seconds(_) | RawTime::OfDay(_) => 0,
         })
         .collect();
@@ -137,7 +142,7 @@ struct LocalClock {
 
 impl LocalClock {
     /// In the hour that comes twice, the second one is taken once time would go back otherwise.
-    fn utc(&mut self, local_ns: TimeNs) -> TimeNs {
+    fn resolve_utc(&mut self, local_ns: TimeNs) -> TimeNs {
         let quarter = local_ns.div_euclid(900 * SECOND_NS);
         let minus = |offset_s: i32| local_ns.saturating_sub(i64::from(offset_s) * SECOND_NS);
         if let Some(offset_s) = self.known.get(&quarter) {
@@ -327,7 +332,7 @@ mod tests {
 
     fn resolved(raw: &[RawTime], mapping: &TimeMapping) -> (Timed, String) {
         let mut notes = Vec::new();
-        let timed = resolve(raw, None, mapping, &mut notes);
+        let timed = resolve_times(raw, None, mapping, &mut notes);
         (timed, notes.iter().map(|note| note.text.en.clone()).collect::<Vec<_>>().join("; "))
     }
 

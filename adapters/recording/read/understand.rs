@@ -15,14 +15,14 @@ use crate::channel::{ChannelId, Kind};
 use crate::recording::TEXT_COLUMNS;
 
 /// Makes the plan.
-pub(super) fn understand(
+pub(super) fn build_plan(
     head: &Head,
     survey: &Survey,
     mapping: &Mapping,
     file: &str,
 ) -> Result<ReadPlan, RecordingError> {
     let names: Vec<ForeignName> =
-        head.names.iter().zip(&head.units).map(|(name, unit)| ForeignName::of(name, unit.as_deref())).collect();
+        head.names.iter().zip(&head.units).map(|(name, unit)| ForeignName::from_text(name, unit.as_deref())).collect();
     let mut columns = ForeignColumns {
         file,
         head,
@@ -35,7 +35,7 @@ pub(super) fn understand(
     let is_contract = head.names.iter().any(|name| ["time_s", "time_utc"].contains(&name.as_str()));
     let mut notes = Vec::new();
     form_notes(head, &columns, survey, &mut notes);
-    let clocks = columns.clocks(&mut notes)?;
+    let clocks = columns.find_clocks(&mut notes)?;
     let targets = find_targets(&columns, &clocks, is_contract, &mut notes)?;
     let mut blocks: Vec<BlockPlan> = clocks.into_iter().map(|time| BlockPlan { time, columns: Vec::new() }).collect();
     for (index, target) in targets {
@@ -46,7 +46,8 @@ pub(super) fn understand(
     }
     blocks.retain(|block| !block.columns.is_empty());
     if blocks.is_empty() {
-        return Err(columns.wrong("there is no column besides the time".to_owned(), "除时间外没有其他列".to_owned()));
+        return Err(columns
+            .build_header_error("there is no column besides the time".to_owned(), "除时间外没有其他列".to_owned()));
     }
     Ok(ReadPlan { blocks, is_contract, notes })
 }
@@ -100,7 +101,7 @@ pub(super) fn decimal_of(columns: &ForeignColumns<'_>, index: usize) -> Result<O
             (Some(decimal), ..) => Ok(Some(decimal)),
             // 1.250 and nothing that speaks against a point: as the contract writes it.
             (None, true, false) => Ok(Some(Decimal::Point)),
-            _ => Err(columns.wrong(
+            _ => Err(columns.build_header_error(
                 format!("column {name}: 1,250 may be one and a quarter or twelve hundred and fifty: say which sign is the decimal one in a map (decimal = \",\" or \".\")"),
                 format!("列{name}：1,250可能是一又四分之一，也可能是一千二百五十：请在映射文件中指定小数符号（decimal = \",\"或\".\"）"),
             )),
@@ -152,9 +153,9 @@ fn plan_column(
     let source = columns.names[index].text.clone();
     let is_text = TEXT_COLUMNS.contains(&target.name.as_str())
         || target.name.ends_with("_missing")
-        || ChannelId::of(&target.name).is_some_and(|id| id.channel().kind == Kind::Text);
-    let known = ChannelId::of(&target.name).is_some() && !is_text;
-    let numbers = survey.numbers();
+        || ChannelId::from_name(&target.name).is_some_and(|id| id.channel().kind == Kind::Text);
+    let known = ChannelId::from_name(&target.name).is_some() && !is_text;
+    let numbers = survey.count_numbers();
     let others = survey.words + survey.moments + survey.times_of_day + survey.instants + survey.locals;
     let kind = if is_text {
         PlannedKind::Words
@@ -196,7 +197,7 @@ fn plan_column(
             ),
         });
     }
-    if target.is_guess || columns.mapping.column(&source, index).is_some() && source != target.name {
+    if target.is_guess || columns.mapping.find_column(&source, index).is_some() && source != target.name {
         notes.push(note_change(&columns.names[index], &target));
     }
     let strict = is_contract && known;

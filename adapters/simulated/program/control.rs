@@ -109,7 +109,7 @@ impl Control {
     }
 
     /// Has the control finished starting?
-    pub(in super::super) fn booted(&self) -> bool {
+    pub(in super::super) fn has_booted(&self) -> bool {
         self.demand.powered && self.since_boot_s >= BOOT_S
     }
 
@@ -119,28 +119,28 @@ impl Control {
     }
 
     /// Moves on by `dt_s` with the override in force.
-    pub(in super::super) fn step(&mut self, plant: &Plant, override_pct: u8, since_s: f64, dt_s: f64) {
+    pub(in super::super) fn run_step(&mut self, plant: &Plant, override_pct: u8, since_s: f64, dt_s: f64) {
         self.since_boot_s = if self.demand.powered { self.since_boot_s + dt_s } else { 0.0 };
         // Instant blocks follow each other at once; a limit guards against a plan without any duration.
         for _ in 0..64 {
-            let block = self.current(since_s);
-            if !self.work(&block.action, plant, override_pct, dt_s) {
+            let block = self.fetch_block(since_s);
+            if !self.execute_action(&block.action, plant, override_pct, dt_s) {
                 break;
             }
             self.block = None;
         }
     }
 
-    fn current(&mut self, since_s: f64) -> NcBlock {
+    fn fetch_block(&mut self, since_s: f64) -> NcBlock {
         if let Some(block) = self.block {
             return block;
         }
-        if let Some(block) = self.standing() {
+        if let Some(block) = self.build_stop_block() {
             return block;
         }
         if self.blocks.is_empty() {
             let worst = self.worst_edge();
-            self.planner.refill(&mut self.blocks, since_s, worst);
+            self.planner.refill_blocks(&mut self.blocks, since_s, worst);
         }
         let idle = NcBlock {
             mode: mode::MANUAL,
@@ -151,13 +151,13 @@ impl Control {
             action: Action::Wait(1.0),
         };
         let block = self.blocks.pop_front().unwrap_or(idle);
-        self.begin(&block.action);
+        self.begin_action(&block.action);
         self.block = Some(block);
         block
     }
 
     /// Between two parts, when the ladder wants the program to stand: until the operator has changed the edge.
-    fn standing(&mut self) -> Option<NcBlock> {
+    fn build_stop_block(&mut self) -> Option<NcBlock> {
         if self.attended {
             (self.attended, self.stood_s) = (false, None);
             self.worst_edge().into_iter().for_each(|(tool, _)| self.fresh_edge(usize::from(tool)));
@@ -185,7 +185,7 @@ impl Control {
         edges.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    fn begin(&mut self, action: &Action) {
+    fn begin_action(&mut self, action: &Action) {
         self.waited_s = 0.0;
         self.path = None;
         self.hold_at_mm = None;
@@ -212,22 +212,22 @@ impl Control {
     }
 
     /// Works on an action; true when it is finished.
-    fn work(&mut self, action: &Action, plant: &Plant, override_pct: u8, dt_s: f64) -> bool {
+    fn execute_action(&mut self, action: &Action, plant: &Plant, override_pct: u8, dt_s: f64) -> bool {
         self.motion = Motion::None;
         self.holding = false;
-        self.stand();
+        self.stop_axes();
         match *action {
             Action::Mains(on) => self.demand.powered = on,
             Action::Drives(on) => self.demand.drives_on = on,
             Action::Hydraulics(on) => self.demand.hydraulics_on = on,
             Action::Coolant(on) => self.demand.coolant_on = on,
-            Action::Wait(seconds) => return self.wait(seconds, dt_s),
+            Action::Wait(seconds) => return self.advance_wait(seconds, dt_s),
             // A fifth of a second passes between reaching the speed and going on.
-            Action::Spindle(..) => return plant.at_speed() && self.wait(0.2, dt_s),
+            Action::Spindle(..) => return plant.at_speed() && self.advance_wait(0.2, dt_s),
             Action::Stop => return plant.speed_rpm == 0.0,
-            Action::Rapid(_) => return self.rapid(dt_s),
+            Action::Rapid(_) => return self.advance_rapid(dt_s),
             Action::Feed { rate, cut, locked, .. } => {
-                return self.feed(rate, cut, locked, plant.speed_rpm, override_pct, dt_s);
+                return self.advance_feed(rate, cut, locked, plant.speed_rpm, override_pct, dt_s);
             }
             Action::ToolChange(tool) => return self.change_tool(tool, dt_s),
             Action::NewEdge => self.new_edge(),
@@ -239,13 +239,13 @@ impl Control {
         true
     }
 
-    fn stand(&mut self) {
+    fn stop_axes(&mut self) {
         self.feed_mm_min = 0.0;
         self.velocity_mm_min = [0.0; 3];
         self.demand.axis_mm_min = 0.0;
     }
 
-    fn wait(&mut self, seconds: f64, dt_s: f64) -> bool {
+    fn advance_wait(&mut self, seconds: f64, dt_s: f64) -> bool {
         self.waited_s += dt_s;
         self.waited_s >= seconds
     }
@@ -254,7 +254,7 @@ impl Control {
         if tool == self.tool {
             return true;
         }
-        let done = self.wait(TOOL_CHANGE_S, dt_s);
+        let done = self.advance_wait(TOOL_CHANGE_S, dt_s);
         if done {
             self.tool = tool;
         }
@@ -270,16 +270,16 @@ impl Control {
         self.wear_mm[index] = FRESH_EDGE_MM;
     }
 
-    fn rapid(&mut self, dt_s: f64) -> bool {
+    fn advance_rapid(&mut self, dt_s: f64) -> bool {
         self.motion = Motion::Rapid;
         if self.hold_asked {
             self.holding = true;
             return false;
         }
-        self.advance(self.rapid_mm_min, dt_s)
+        self.advance_path(self.rapid_mm_min, dt_s)
     }
 
-    fn feed(
+    fn advance_feed(
         &mut self,
         rate: Rate,
         cut: Option<Cut>,
@@ -293,15 +293,15 @@ impl Control {
             Rate::PerTurn(feed) => (feed * self.demand.spindle_rpm.abs(), feed * speed_rpm.abs()),
         };
         self.motion = Motion::Feed { cut, locked, programmed_mm_min: programmed };
-        if self.held(dt_s) {
+        if self.update_feed_hold(dt_s) {
             return false;
         }
         let share = if locked { 1.0 } else { f64::from(override_pct) / 100.0 };
-        self.advance(commanded * share, dt_s)
+        self.advance_path(commanded * share, dt_s)
     }
 
     /// Somebody pressed feed hold, and later start.
-    fn held(&mut self, dt_s: f64) -> bool {
+    fn update_feed_hold(&mut self, dt_s: f64) -> bool {
         let done_mm = self.path.map_or(0.0, |path| path.done_mm);
         if self.hold_at_mm.is_some_and(|at_mm| done_mm >= at_mm) {
             self.hold_at_mm = None;
@@ -312,7 +312,7 @@ impl Control {
         self.holding
     }
 
-    fn advance(&mut self, feed_mm_min: f64, dt_s: f64) -> bool {
+    fn advance_path(&mut self, feed_mm_min: f64, dt_s: f64) -> bool {
         let Some(path) = &mut self.path else { return true };
         path.done_mm = (path.done_mm + feed_mm_min / 60.0 * dt_s).min(path.length_mm);
         let share = if path.length_mm > 0.0 { path.done_mm / path.length_mm } else { 1.0 };
@@ -330,7 +330,7 @@ impl Control {
     }
 
     /// The cut in progress with the share of its path that is done, where the tool is in the work.
-    pub(in super::super) fn contact(&self) -> Option<(Cut, f64)> {
+    pub(in super::super) fn find_contact(&self) -> Option<(Cut, f64)> {
         let Motion::Feed { cut: Some(cut), .. } = self.motion else { return None };
         let path = self.path?;
         let inside = path.done_mm >= cut.air_mm && path.done_mm < path.length_mm;

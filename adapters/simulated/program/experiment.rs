@@ -51,12 +51,12 @@ pub(super) fn write(out: &mut ProgramWriter<'_>, steps: &[ExperimentStep]) {
         return;
     }
     (out.mode, out.execution) = (mode::MANUAL, execution::READY);
-    out.put(Action::Mains(true)).put(Action::Wait(START_S)).put(Action::Drives(true));
+    out.append_action(Action::Mains(true)).append_action(Action::Wait(START_S)).append_action(Action::Drives(true));
     (out.mode, out.execution, out.program, out.operation) =
         (mode::AUTOMATIC, execution::ACTIVE, EXPERIMENT_PROGRAM, "experiment");
     let mut place = Place { stage: 1, z_mm: 160.0 };
     for (index, step) in steps.iter().enumerate() {
-        out.renumber(u16::try_from(index + 1).unwrap_or(u16::MAX));
+        out.set_number(u16::try_from(index + 1).unwrap_or(u16::MAX));
         write_step(out, step, &mut place);
     }
 }
@@ -68,30 +68,30 @@ struct Place {
 }
 
 fn write_step(out: &mut ProgramWriter<'_>, step: &ExperimentStep, place: &mut Place) {
-    out.same(Action::Hydraulics(step.hydraulics_on)).same(Action::Coolant(step.coolant_on));
-    out.same(Action::Override(step.override_pct));
+    out.append_to_block(Action::Hydraulics(step.hydraulics_on)).append_to_block(Action::Coolant(step.coolant_on));
+    out.append_to_block(Action::Override(step.override_pct));
     if step.new_edge {
-        out.same(Action::NewEdge);
+        out.append_to_block(Action::NewEdge);
     }
     let wanted = step.gear_stage.unwrap_or(if step.spindle_rpm.abs() <= 1000.0 { 1 } else { 2 });
     if step.spindle_rpm == 0.0 {
-        out.same(Action::Stop);
+        out.append_to_block(Action::Stop);
     } else {
         if wanted != place.stage {
-            out.same(Action::Stop);
+            out.append_to_block(Action::Stop);
             place.stage = wanted;
         }
-        out.same(Action::Spindle(step.spindle_rpm, wanted));
+        out.append_to_block(Action::Spindle(step.spindle_rpm, wanted));
     }
     match step.cut {
         Some(cut) => place.z_mm = write_cut(out, &cut, step, place.z_mm),
         None if step.axis_mm_min != 0.0 => {
             let rate = Rate::PerMinute(step.axis_mm_min.abs());
             place.z_mm += step.axis_mm_min / 60.0 * step.seconds;
-            out.same(Action::Feed { to: [200.0, 0.0, place.z_mm], rate, cut: None, locked: false });
+            out.append_to_block(Action::Feed { to: [200.0, 0.0, place.z_mm], rate, cut: None, locked: false });
         }
         None => {
-            out.same(Action::Wait(step.seconds));
+            out.append_to_block(Action::Wait(step.seconds));
         }
     }
 }
@@ -101,7 +101,7 @@ fn write_cut(out: &mut ProgramWriter<'_>, cut: &ExperimentCut, step: &Experiment
     let length_mm = cut.feed_mm_min * f64::from(step.override_pct) / 100.0 * step.seconds / 60.0;
     let begins_mm = if cut.onward { z_mm } else { 0.0 };
     if !cut.onward {
-        out.same(Action::Rapid([cut.diameter_mm, 0.0, 0.0]));
+        out.append_to_block(Action::Rapid([cut.diameter_mm, 0.0, 0.0]));
     }
     let planned = Cut {
         depth_mm: cut.depth_mm,
@@ -111,6 +111,6 @@ fn write_cut(out: &mut ProgramWriter<'_>, cut: &ExperimentCut, step: &Experiment
     };
     let rate = Rate::PerMinute(cut.feed_mm_min);
     let ends_mm = begins_mm - length_mm;
-    out.same(Action::Feed { to: [cut.diameter_mm, 0.0, ends_mm], rate, cut: Some(planned), locked: false });
+    out.append_to_block(Action::Feed { to: [cut.diameter_mm, 0.0, ends_mm], rate, cut: Some(planned), locked: false });
     ends_mm
 }

@@ -87,41 +87,41 @@ const FINISHER: u8 = 2;
 const THREADER: u8 = 3;
 
 /// Writes the program of lot number `lot`. `vary` gives factors about 1 for the speed of each pass.
-pub(super) fn part(out: &mut ProgramWriter<'_>, lot: usize, vary: &mut dyn FnMut() -> f64) {
-    turn(out, &PARTS[lot % PARTS.len()], vary);
+pub(super) fn write_part(out: &mut ProgramWriter<'_>, lot: usize, vary: &mut dyn FnMut() -> f64) {
+    write_shaft(out, &PARTS[lot % PARTS.len()], vary);
 }
 
 /// The same for the short part.
-pub(super) fn pin(out: &mut ProgramWriter<'_>) {
-    turn(out, &PIN, &mut || 1.0);
+pub(super) fn write_pin(out: &mut ProgramWriter<'_>) {
+    write_shaft(out, &PIN, &mut || 1.0);
 }
 
-fn turn(out: &mut ProgramWriter<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
+fn write_shaft(out: &mut ProgramWriter<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
     out.program = part.program;
     out.operation = "facing";
-    out.put(Action::ToolChange(ROUGHER));
-    out.put(Action::Spindle(round(part.rough_rpm * 0.75), stage_for(part.rough_rpm)));
-    out.put(Action::Coolant(true));
-    face(out, part);
+    out.append_action(Action::ToolChange(ROUGHER));
+    out.append_action(Action::Spindle(round_speed(part.rough_rpm * 0.75), stage_for(part.rough_rpm)));
+    out.append_action(Action::Coolant(true));
+    write_facing(out, part);
     out.operation = "roughing";
-    rough(out, part, part.stock_mm, part.large_mm + 0.8, part.large_length_mm + part.small_length_mm, vary);
-    rough(out, part, part.large_mm + 0.8, part.small_mm + 0.8, part.small_length_mm, vary);
+    write_roughing(out, part, part.stock_mm, part.large_mm + 0.8, part.large_length_mm + part.small_length_mm, vary);
+    write_roughing(out, part, part.large_mm + 0.8, part.small_mm + 0.8, part.small_length_mm, vary);
     out.operation = "finishing";
-    out.put(Action::Rapid([part.stock_mm + 120.0, 0.0, 160.0]));
+    out.append_action(Action::Rapid([part.stock_mm + 120.0, 0.0, 160.0]));
     change_stage(out, part.rough_rpm, part.finish_rpm);
-    out.put(Action::ToolChange(FINISHER));
-    finish(out, part, vary);
+    out.append_action(Action::ToolChange(FINISHER));
+    write_finishing(out, part, vary);
     if let Some(pitch_mm) = part.thread_pitch_mm {
         out.operation = operation::THREADING;
-        thread(out, part, pitch_mm);
+        write_threading(out, part, pitch_mm);
     }
     out.operation = "";
-    out.put(Action::Coolant(false));
-    out.put(Action::Rapid([part.stock_mm + 120.0, 0.0, 160.0]));
-    out.put(Action::Stop);
+    out.append_action(Action::Coolant(false));
+    out.append_action(Action::Rapid([part.stock_mm + 120.0, 0.0, 160.0]));
+    out.append_action(Action::Stop);
 }
 
-fn round(speed_rpm: f64) -> f64 {
+fn round_speed(speed_rpm: f64) -> f64 {
     (speed_rpm / 10.0).round() * 10.0
 }
 
@@ -133,23 +133,23 @@ fn stage_for(speed_rpm: f64) -> u8 {
 /// Another stage is engaged at rest only.
 fn change_stage(out: &mut ProgramWriter<'_>, from_rpm: f64, to_rpm: f64) {
     if stage_for(from_rpm) != stage_for(to_rpm) {
-        out.put(Action::Stop);
+        out.append_action(Action::Stop);
     }
 }
 
-fn turning(depth_mm: f64, from_mm: f64, to_mm: f64, air_mm: f64) -> Option<Cut> {
+fn build_turning_cut(depth_mm: f64, from_mm: f64, to_mm: f64, air_mm: f64) -> Option<Cut> {
     Some(Cut { depth_mm, diameter_from_mm: from_mm, diameter_to_mm: to_mm, air_mm, ..Cut::default() })
 }
 
-fn face(out: &mut ProgramWriter<'_>, part: &Shaft) {
-    out.put(Action::Rapid([part.stock_mm + 6.0, 0.0, -0.8]));
-    let cut = turning(0.8, part.stock_mm, part.small_mm * 0.4, 3.0);
+fn write_facing(out: &mut ProgramWriter<'_>, part: &Shaft) {
+    out.append_action(Action::Rapid([part.stock_mm + 6.0, 0.0, -0.8]));
+    let cut = build_turning_cut(0.8, part.stock_mm, part.small_mm * 0.4, 3.0);
     let to = [part.small_mm * 0.4 - 2.0, 0.0, -0.8];
-    out.put(Action::Feed { to, rate: Rate::PerTurn(0.16), cut, locked: false });
-    out.put(Action::Rapid([part.stock_mm + 6.0, 0.0, 2.0]));
+    out.append_action(Action::Feed { to, rate: Rate::PerTurn(0.16), cut, locked: false });
+    out.append_action(Action::Rapid([part.stock_mm + 6.0, 0.0, 2.0]));
 }
 
-fn rough(
+fn write_roughing(
     out: &mut ProgramWriter<'_>,
     part: &Shaft,
     from_mm: f64,
@@ -160,13 +160,13 @@ fn rough(
     let mut diameter_mm = from_mm;
     while diameter_mm > to_mm + 0.01 {
         let depth_mm = part.rough_depth_mm.min((diameter_mm - to_mm) / 2.0);
-        out.put(Action::Spindle(round(part.rough_rpm * vary()), stage_for(part.rough_rpm)));
+        out.append_action(Action::Spindle(round_speed(part.rough_rpm * vary()), stage_for(part.rough_rpm)));
         diameter_mm -= 2.0 * depth_mm;
-        out.put(Action::Rapid([diameter_mm, 0.0, 3.0]));
-        let cut = turning(depth_mm, diameter_mm + depth_mm, diameter_mm + depth_mm, 3.0);
+        out.append_action(Action::Rapid([diameter_mm, 0.0, 3.0]));
+        let cut = build_turning_cut(depth_mm, diameter_mm + depth_mm, diameter_mm + depth_mm, 3.0);
         let rate = Rate::PerTurn(part.rough_feed_mm);
-        out.put(Action::Feed { to: [diameter_mm, 0.0, -length_mm], rate, cut, locked: false });
-        out.put(Action::Feed {
+        out.append_action(Action::Feed { to: [diameter_mm, 0.0, -length_mm], rate, cut, locked: false });
+        out.append_action(Action::Feed {
             to: [diameter_mm + 2.0, 0.0, -length_mm + 1.0],
             rate: Rate::PerMinute(900.0),
             cut: None,
@@ -175,7 +175,7 @@ fn rough(
     }
 }
 
-fn finish(out: &mut ProgramWriter<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
+fn write_finishing(out: &mut ProgramWriter<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
     let stage = stage_for(part.finish_rpm);
     let passes = [
         (part.small_mm, 3.0, part.small_length_mm, part.finish_rpm),
@@ -187,25 +187,25 @@ fn finish(out: &mut ProgramWriter<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f
         ),
     ];
     for (diameter_mm, from_z_mm, to_z_mm, speed_rpm) in passes {
-        out.put(Action::Spindle(round(speed_rpm * vary()), stage));
-        out.put(Action::Rapid([diameter_mm, 0.0, from_z_mm]));
-        let cut = turning(0.4, diameter_mm, diameter_mm, 2.0);
+        out.append_action(Action::Spindle(round_speed(speed_rpm * vary()), stage));
+        out.append_action(Action::Rapid([diameter_mm, 0.0, from_z_mm]));
+        let cut = build_turning_cut(0.4, diameter_mm, diameter_mm, 2.0);
         let rate = Rate::PerTurn(part.finish_feed_mm);
-        out.put(Action::Feed { to: [diameter_mm, 0.0, -to_z_mm], rate, cut, locked: false });
-        out.put(Action::Rapid([diameter_mm + 6.0, 0.0, -to_z_mm]));
+        out.append_action(Action::Feed { to: [diameter_mm, 0.0, -to_z_mm], rate, cut, locked: false });
+        out.append_action(Action::Rapid([diameter_mm + 6.0, 0.0, -to_z_mm]));
     }
 }
 
-fn thread(out: &mut ProgramWriter<'_>, part: &Shaft, pitch_mm: f64) {
-    out.put(Action::Rapid([part.stock_mm + 120.0, 0.0, 160.0]));
+fn write_threading(out: &mut ProgramWriter<'_>, part: &Shaft, pitch_mm: f64) {
+    out.append_action(Action::Rapid([part.stock_mm + 120.0, 0.0, 160.0]));
     change_stage(out, part.finish_rpm, 500.0);
-    out.put(Action::ToolChange(THREADER)).put(Action::Spindle(500.0, 1));
+    out.append_action(Action::ToolChange(THREADER)).append_action(Action::Spindle(500.0, 1));
     for pass in 1..=5 {
         let diameter_mm = part.small_mm - 0.36 * f64::from(pass);
-        out.put(Action::Rapid([diameter_mm, 0.0, 4.0]));
-        let cut = turning(0.18, part.small_mm, part.small_mm, 4.0);
+        out.append_action(Action::Rapid([diameter_mm, 0.0, 4.0]));
+        let cut = build_turning_cut(0.18, part.small_mm, part.small_mm, 4.0);
         let (to, rate) = ([diameter_mm, 0.0, -part.small_length_mm], Rate::PerTurn(pitch_mm));
-        out.put(Action::Feed { to, rate, cut, locked: true });
-        out.put(Action::Rapid([part.small_mm + 4.0, 0.0, -part.small_length_mm]));
+        out.append_action(Action::Feed { to, rate, cut, locked: true });
+        out.append_action(Action::Rapid([part.small_mm + 4.0, 0.0, -part.small_length_mm]));
     }
 }

@@ -98,25 +98,25 @@ impl<'a> ProgramWriter<'a> {
     }
 
     /// The next blocks have this number.
-    pub(super) fn renumber(&mut self, number: u16) {
+    pub(super) fn set_number(&mut self, number: u16) {
         self.number = number;
     }
 
     /// Appends an action under the present block number.
-    pub(super) fn same(&mut self, action: Action) -> &mut Self {
+    pub(super) fn append_to_block(&mut self, action: Action) -> &mut Self {
         let (mode, execution, program, number) = (self.mode, self.execution, self.program, self.number);
         self.blocks.push_back(NcBlock { mode, execution, program, number, operation: self.operation, action });
         self
     }
 
     /// Appends an action; the block number grows by ten.
-    pub(super) fn put(&mut self, action: Action) -> &mut Self {
+    pub(super) fn append_action(&mut self, action: Action) -> &mut Self {
         self.number += 10;
-        self.same(action)
+        self.append_to_block(action)
     }
 
     /// Appends an action that no program has: the operator, or the machine itself.
-    pub(super) fn aside(&mut self, mode: &'static str, execution: &'static str, action: Action) -> &mut Self {
+    pub(super) fn append_aside(&mut self, mode: &'static str, execution: &'static str, action: Action) -> &mut Self {
         let (program, number) = (self.program, self.number);
         self.blocks.push_back(NcBlock { mode, execution, program, number, operation: "", action });
         self

@@ -17,11 +17,11 @@ pub(super) struct FeedCurveArguments {
     #[arg(long, value_name = "COLUMN", default_value = "feed_mm_min")]
     feed: String,
     /// What the script holds, in the unit of the feature; without it the mean of the recorded cuts.
-    #[arg(long, value_name = "VALUE", value_parser = positive)]
+    #[arg(long, value_name = "VALUE", value_parser = parse_positive)]
     target: Option<f64>,
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+fn parse_positive(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| format!("{text:?} is no number"))?;
     if value.is_finite() && value > 0.0 { Ok(value) } else { Err("a target is greater than 0".to_owned()) }
 }
@@ -31,7 +31,7 @@ pub(super) fn run(arguments: &FeedCurveArguments) -> CommandResult {
     let learned = identify_feed_curve(&recording, &arguments.feed, &arguments.feature).map(|learned| IdentifyOutput {
         text: format!("{learned}{}", learned.target_text(arguments.target)),
         json: json!(learned),
-        file: learned.script(arguments.target),
+        file: learned.format_script(arguments.target),
     });
-    arguments.reading.finish("feed-curve", learned)
+    arguments.reading.report_result("feed-curve", learned)
 }

@@ -30,7 +30,7 @@ pub(super) fn run(arguments: &LoadLossArguments) -> CommandResult {
     let learned = identify_load_loss(&recording, &choice).map(|learned| IdentifyOutput {
         text: learned.to_string(),
         json: json!(learned),
-        file: Some(learned.script()),
+        file: Some(learned.format_script()),
     });
-    arguments.reading.finish("load-loss", learned)
+    arguments.reading.report_result("load-loss", learned)
 }

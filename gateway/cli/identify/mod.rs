@@ -10,8 +10,8 @@ mod thermal;
 mod tool_wear;
 
 use super::diagnose::cannot_use;
-use super::{CannotRun, CommandOutcome, CommandResult, configuration, print, print_json};
-use crate::diagnosis::{put, read_recordings};
+use super::{CannotRun, CommandOutcome, CommandResult, load_configuration, print_json, print_text};
+use crate::diagnosis::{read_recordings, write_output};
 use crate::identified;
 use adapters::Recording;
 use clap::{Args, Subcommand};
@@ -68,15 +68,20 @@ struct ShownBy {
 impl ShownBy {
     /// Keeps the answer on this subject, and says where. Without a box that is named nothing is kept: recordings may be of any machine.
     /// `history`: a history that the model is stored in; its directory is that of the box where none is named.
-    fn keep(&self, subject: &str, learned: &mut IdentifyOutput, history: Option<&Path>) -> Result<(), CannotRun> {
+    fn store_answer(
+        &self,
+        subject: &str,
+        learned: &mut IdentifyOutput,
+        history: Option<&Path>,
+    ) -> Result<(), CannotRun> {
         let named = match (&self.data_dir, &self.config) {
             (Some(directory), _) => Some(directory.clone()),
-            (None, Some(config)) => Some(configuration(Some(config))?.gateway.data_dir),
+            (None, Some(config)) => Some(load_configuration(Some(config))?.gateway.data_dir),
             (None, None) => history.and_then(Path::parent).map(Path::to_owned),
         };
         let Some(directory) = named else { return Ok(()) };
-        let path =
-            identified::keep(&directory, subject, &learned.json).map_err(|problem| CannotRun::new(problem, ""))?;
+        let path = identified::save_answer(&directory, subject, &learned.json)
+            .map_err(|problem| CannotRun::new(problem, ""))?;
         learned.text += &format!("\nfor the page of the box: {}\n", path.display());
         Ok(())
     }
@@ -101,22 +106,24 @@ impl IdentifyFiles {
     }
 
     /// Prints the result or the refusal, and writes the file.
-    fn finish(&self, what: &str, learned: Result<IdentifyOutput, Refusal>) -> CommandResult {
+    fn report_result(&self, what: &str, learned: Result<IdentifyOutput, Refusal>) -> CommandResult {
         match learned {
             Ok(learned) => {
                 match (&self.out, &learned.file) {
-                    (Some(path), Some(file)) => put(path, file).map_err(|problem| CannotRun::new(problem, ""))?,
+                    (Some(path), Some(file)) => {
+                        write_output(path, file).map_err(|problem| CannotRun::new(problem, ""))?
+                    }
                     (Some(path), None) => eprintln!(
                         "note: nothing was written to {}: nothing in it is of use to the gateway",
                         path.display()
                     ),
                     (None, _) => {}
                 }
-                let document = identified::answer(what, &learned.json);
+                let document = identified::build_answer(what, &learned.json);
                 if self.json {
                     print_json(&document)
                 } else {
-                    print(&learned.text)
+                    print_text(&learned.text)
                 }
                 Ok(CommandOutcome::Fine)
             }
@@ -125,7 +132,7 @@ impl IdentifyFiles {
                 if self.json {
                     print_json(&document)
                 } else {
-                    print(&format!("cannot tell: {refusal}\n"))
+                    print_text(&format!("cannot tell: {refusal}\n"))
                 }
                 Ok(CommandOutcome::No)
             }
@@ -134,7 +141,7 @@ impl IdentifyFiles {
 }
 
 /// Learns, prints, writes.
-pub(super) fn identify(arguments: &IdentifyArguments) -> CommandResult {
+pub(super) fn run_identification(arguments: &IdentifyArguments) -> CommandResult {
     match &arguments.what {
         IdentifyCommand::NoLoad(arguments) => no_load::run(arguments),
         IdentifyCommand::LoadLoss(arguments) => load_loss::run(arguments),

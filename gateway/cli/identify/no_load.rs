@@ -17,7 +17,7 @@ pub(super) fn run(arguments: &NoLoadArguments) -> CommandResult {
     let learned = identify_no_load(&recording).map(|learned| IdentifyOutput {
         text: learned.to_string(),
         json: json!(learned),
-        file: Some(learned.script()),
+        file: Some(learned.format_script()),
     });
-    arguments.reading.finish("no-load", learned)
+    arguments.reading.report_result("no-load", learned)
 }

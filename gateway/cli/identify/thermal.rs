@@ -2,12 +2,14 @@
 
 use super::{IdentifyFiles, IdentifyOutput, ShownBy};
 use crate::cli::{CannotRun, CommandResult};
-use crate::diagnosis::put;
+use crate::diagnosis::write_output;
 use crate::identified::{self, THERMAL};
 use adapters::Recording;
 use clap::Args;
 use rules::estimators::regression::{Refusal, RefusalKind};
-use rules::estimators::thermal::{LeftOut, POINTS_MAX, RHO_USUAL, SelectionSettings, ThermalModel, collect, learn};
+use rules::estimators::thermal::{
+    LeftOut, POINTS_MAX, RHO_USUAL, SelectionSettings, ThermalModel, collect_rows, learn_law,
+};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -38,39 +40,43 @@ pub(super) struct ThermalArguments {
 
 pub(super) fn run(arguments: &ThermalArguments) -> CommandResult {
     let recording = arguments.reading.read()?;
-    let learned = identify(&recording, arguments).and_then(|(learned, model)| {
-        let text = model.text().map_err(|what| Refusal::new(RefusalKind::NotFinite, what, ""))?;
+    let learned = identify_law(&recording, arguments).and_then(|(learned, model)| {
+        let text = model.to_json_text().map_err(|what| Refusal::new(RefusalKind::NotFinite, what, ""))?;
         Ok((learned, text))
     });
     if let (Some(path), Ok((_, model))) = (&arguments.model, &learned) {
-        put(path, model).map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(path, model).map_err(|problem| CannotRun::new(problem, ""))?;
     }
     let mut learned = learned.map(|(learned, _)| learned);
     if let Ok(learned) = &mut learned {
-        arguments.shown_by.keep(THERMAL, learned, None)?;
+        arguments.shown_by.store_answer(THERMAL, learned, None)?;
     }
-    arguments.reading.finish(THERMAL, learned)
+    arguments.reading.report_result(THERMAL, learned)
 }
 
-fn identify(recording: &Recording, arguments: &ThermalArguments) -> Result<(IdentifyOutput, ThermalModel), Refusal> {
-    let settings = settings(arguments)?;
-    let collected = collect(recording)?;
-    let learned = learn(&collected.course, settings, arguments.sensors.as_deref())?;
+fn identify_law(
+    recording: &Recording,
+    arguments: &ThermalArguments,
+) -> Result<(IdentifyOutput, ThermalModel), Refusal> {
+    let settings = build_settings(arguments)?;
+    let collected = collect_rows(recording)?;
+    let learned = learn_law(&collected.course, settings, arguments.sensors.as_deref())?;
     let text = format!("{}{learned}", left_out(&collected.left_out));
-    let model = ThermalModel::new(arguments.machine.clone(), learned.best().fit.law.clone());
+    let model = ThermalModel::new(arguments.machine.clone(), learned.best_candidate().fit.law.clone());
     let json = identified::of_thermal(&learned, &collected.left_out);
-    Ok((IdentifyOutput { text, json, file: Some(learned.script()) }, model))
+    Ok((IdentifyOutput { text, json, file: Some(learned.format_script()) }, model))
 }
 
-fn settings(arguments: &ThermalArguments) -> Result<SelectionSettings, Refusal> {
+fn build_settings(arguments: &ThermalArguments) -> Result<SelectionSettings, Refusal> {
     let given = SelectionSettings {
         sensors_max: arguments.sensors_max,
         inflation_max: arguments.inflation_max,
         rho: arguments.rho,
         ..SelectionSettings::default()
     };
-    let refuse =
-        |option: &str, what: String, next: &str| Err(Refusal::new(RefusalKind::OutOfRange, what, next).at(option));
+    let refuse = |option: &str, what: String, next: &str| {
+        Err(Refusal::new(RefusalKind::OutOfRange, what, next).with_place(option))
+    };
     if given.sensors_max == 0 || given.sensors_max > POINTS_MAX {
         let next = format!("choose 1 to {POINTS_MAX}");
         return refuse("--sensors-max", format!("{} sensors", given.sensors_max), &next);

@@ -1,7 +1,7 @@
 //! `cnc-gateway serve fanuc`: the simulated machine behind a control that answers FOCAS2/Ethernet.
 
 use super::{Common, RunningMachine, until_stopped};
-use crate::cli::{CannotRun, CommandResult, print};
+use crate::cli::{CannotRun, CommandResult, print_text};
 use adapters::LadderRule;
 use adapters::clock::Clock;
 use adapters::fanuc::server::{Server, ServerSettings, SimulatedControl};
@@ -73,7 +73,7 @@ impl Generation {
     }
 }
 
-fn control(arguments: &FanucArguments, machine: Simulated, clock: Arc<dyn Clock>) -> SimulatedControl {
+fn build_control(arguments: &FanucArguments, machine: Simulated, clock: Arc<dyn Clock>) -> SimulatedControl {
     let rule = match arguments.ladder {
         Rule::Least => LadderRule::Least,
         Rule::Product => LadderRule::Product,
@@ -86,16 +86,16 @@ fn control(arguments: &FanucArguments, machine: Simulated, clock: Arc<dyn Clock>
 
 /// Serves until told to stop.
 pub(super) fn serve(arguments: &FanucArguments) -> CommandResult {
-    let at = arguments.common.listen(8193);
+    let at = arguments.common.listen_address(8193);
     let next = "stop the other program, or choose another port with --listen";
     let listener = TcpListener::bind(at).map_err(|error| CannotRun::new(format!("{at}: {error}"), next))?;
-    let RunningMachine { machine, clock } = arguments.common.machine()?;
-    let control = control(arguments, machine, clock);
+    let RunningMachine { machine, clock } = arguments.common.start_machine()?;
+    let control = build_control(arguments, machine, clock);
     let settings = ServerSettings { sessions_max: usize::from(arguments.connections), ..ServerSettings::default() };
     let no_threads = |error| CannotRun::new(format!("no threads to serve with: {error}"), "");
     let server = Server::start(listener, Box::new(control), settings).map_err(no_threads)?;
     let further = if arguments.paths > 1 { "; those of path 2 are 20 higher" } else { "" };
-    print(&format!(
+    print_text(&format!(
         "fanuc://{} answers; the ladder's mailbox is at R900, requests at R905, the dial at R907, its second override \
          at R910{further}\n",
         server.address()

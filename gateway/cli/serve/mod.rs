@@ -53,12 +53,12 @@ struct RunningMachine {
 
 impl Common {
     /// Where to listen; `port` unless given.
-    fn listen(&self, port: u16) -> SocketAddr {
+    fn listen_address(&self, port: u16) -> SocketAddr {
         self.listen.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], port)))
     }
 
     /// Starts the machine.
-    fn machine(&self) -> Result<RunningMachine, CannotRun> {
+    fn start_machine(&self) -> Result<RunningMachine, CannotRun> {
         let whole = self.machine.contains(':');
         let text = if whole { self.machine.clone() } else { format!("simulated://{}", self.machine) };
         let address: Address = text.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
@@ -71,8 +71,8 @@ impl Common {
         let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(speed));
         // A partner answers from its first moment: the machine has been switched on and its control has started.
         let target = SimulatedTarget { begun_s: target.begun_s.max(STARTED_S), ..*target };
-        let begun_ns = adapters::open::begun(&target, clock.now_ns());
-        let machine = Simulated::new(address.text(), SimulatedSettings::of(&target), begun_ns);
+        let begun_ns = adapters::open::compute_day_start_ns(&target, clock.now_ns());
+        let machine = Simulated::new(address.text(), SimulatedSettings::from_target(&target), begun_ns);
         Ok(RunningMachine { machine, clock })
     }
 }
@@ -106,8 +106,8 @@ fn until_stopped() -> CommandResult {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let runtime = runtime.map_err(|error| CannotRun::new(format!("no signals can be heard: {error}"), ""))?;
     runtime.block_on(async {
-        let mut signals =
-            Signals::listen().map_err(|error| CannotRun::new(format!("no signals can be heard: {error}"), ""))?;
+        let mut signals = Signals::start_listening()
+            .map_err(|error| CannotRun::new(format!("no signals can be heard: {error}"), ""))?;
         while signals.next().await != SignalRequest::Stop {}
         Ok(CommandOutcome::Fine)
     })

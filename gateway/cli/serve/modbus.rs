@@ -1,7 +1,7 @@
 //! `cnc-gateway serve modbus`: the simulated machine's meters.
 
 use super::{CannotRun, CommandResult, Common, until_stopped};
-use crate::cli::print;
+use crate::cli::print_text;
 use adapters::modbus::profile;
 use adapters::modbus::server::ModbusServer;
 use clap::Args;
@@ -22,10 +22,10 @@ pub(in crate::cli) struct ModbusArguments {
 
 /// Serves until told to stop.
 pub(super) fn serve(arguments: &ModbusArguments) -> CommandResult {
-    let profile = profile::find(&arguments.profile, arguments.profiles.as_deref());
+    let profile = profile::find_profile(&arguments.profile, arguments.profiles.as_deref());
     let profile = profile.map_err(|error| CannotRun::new(error.to_string(), ""))?;
-    let running = arguments.common.machine()?;
-    let listen = arguments.common.listen(5020);
+    let running = arguments.common.start_machine()?;
+    let listen = arguments.common.listen_address(5020);
     let (meter, name) = (profile.meter.clone(), profile.name.clone());
     let server = ModbusServer::start(listen, &running.machine, running.clock.clone(), profile).map_err(|error| {
         CannotRun::new(
@@ -33,8 +33,8 @@ pub(super) fn serve(arguments: &ModbusArguments) -> CommandResult {
             "choose another port with --listen 127.0.0.1:5021",
         )
     })?;
-    let at = server.at();
-    print(&format!(
+    let at = server.listen_address();
+    print_text(&format!(
         "serving {meter} over Modbus TCP on {at}\n  \
          the machine:       modbus-tcp://{at}?unit=1&profile={name}\n  \
          its spindle drive: modbus-tcp://{at}?unit=2&profile={name}&circuit=spindle\n"

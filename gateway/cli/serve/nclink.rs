@@ -1,7 +1,7 @@
 //! `cnc-gateway serve nclink`: the simulated machine as an NC-Link device. A device does not listen; it dials a broker.
 
 use super::{Common, RunningMachine, until_stopped};
-use crate::cli::{CannotRun, CommandResult, print};
+use crate::cli::{CannotRun, CommandResult, print_text};
 use adapters::mqtt::Options;
 use adapters::nclink::device::{DeviceEvent, MAILBOX, NcLinkDevice, OFFSETS};
 use clap::Args;
@@ -17,11 +17,11 @@ pub(in crate::cli) struct NclinkArguments {
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:1883")]
     broker: String,
     /// Serial number: the last part of every topic of the device.
-    #[arg(long, value_name = "SERIAL", default_value = "SIM0001", value_parser = serial)]
+    #[arg(long, value_name = "SERIAL", default_value = "SIM0001", value_parser = parse_serial)]
     serial: String,
 }
 
-fn serial(text: &str) -> Result<String, String> {
+fn parse_serial(text: &str) -> Result<String, String> {
     match text.is_empty() || text.contains(['/', '+', '#', '?']) {
         true => Err("give letters and digits without / + # ?".to_owned()),
         false => Ok(text.to_owned()),
@@ -36,12 +36,12 @@ pub(super) fn serve(arguments: &NclinkArguments) -> CommandResult {
             "give --broker HOST:PORT in place of --listen",
         ));
     }
-    let options = broker(&arguments.broker)?;
-    let RunningMachine { machine, clock } = arguments.common.machine()?;
+    let options = parse_broker(&arguments.broker)?;
+    let RunningMachine { machine, clock } = arguments.common.start_machine()?;
     let mut device = NcLinkDevice::new(&arguments.serial, &machine, clock);
     let stop = Arc::new(AtomicBool::new(false));
     let (stopping, name) = (stop.clone(), format!("nclink://{}/{}", arguments.broker, arguments.serial));
-    let run = move || device.run(&options, &stopping, |said| print(&line(&name, &said)));
+    let run = move || device.run(&options, &stopping, |said| print_text(&format_event(&name, &said)));
     let thread = std::thread::Builder::new().name("device".to_owned()).spawn(run);
     let thread = thread.map_err(|error| CannotRun::new(format!("no thread for the device: {error}"), ""))?;
     let outcome = until_stopped();
@@ -51,7 +51,7 @@ pub(super) fn serve(arguments: &NclinkArguments) -> CommandResult {
     outcome
 }
 
-fn broker(text: &str) -> Result<Options, CannotRun> {
+fn parse_broker(text: &str) -> Result<Options, CannotRun> {
     let wrong = || CannotRun::new(format!("--broker {text}: this is no HOST:PORT"), "write it like 127.0.0.1:1883");
     let (host, port) = text.rsplit_once(':').ok_or_else(wrong)?;
     let host = host.trim_start_matches('[').trim_end_matches(']');
@@ -59,7 +59,7 @@ fn broker(text: &str) -> Result<Options, CannotRun> {
     Ok(Options::new(host, port, "cnc-gateway-device"))
 }
 
-fn line(name: &str, said: &DeviceEvent) -> String {
+fn format_event(name: &str, said: &DeviceEvent) -> String {
     match said {
         DeviceEvent::Connected => {
             format!("serving {name} (mailbox for the feed override: {MAILBOX}, for offsets: {OFFSETS})\n")

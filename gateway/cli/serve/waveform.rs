@@ -1,7 +1,7 @@
 //! `cnc-gateway serve waveform`: a sampler's stream: the simulated spindle current, a file, or a Linux IIO device.
 
 use super::{CannotRun, CommandResult, Common};
-use crate::cli::{CommandOutcome, print};
+use crate::cli::{CommandOutcome, print_text};
 use adapters::clock::{Clock, SystemClock};
 use adapters::waveform::{Iio, Producer, Recorded, Sampler, SimulatedCurrent};
 use clap::Args;
@@ -32,7 +32,7 @@ pub(in crate::cli) struct WaveformArguments {
 }
 
 impl WaveformArguments {
-    fn sampler(&self) -> Result<Box<dyn Sampler>, CannotRun> {
+    fn build_sampler(&self) -> Result<Box<dyn Sampler>, CannotRun> {
         let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
         if let Some(device) = &self.iio {
             let name = device.rsplit('/').next().unwrap_or(device);
@@ -49,7 +49,7 @@ impl WaveformArguments {
         if !(10.0..=100_000.0).contains(&self.rate_hz) {
             return Err(CannotRun::new(format!("{} samples per second", self.rate_hz), "give 10 to 100000"));
         }
-        let running = self.common.machine()?;
+        let running = self.common.start_machine()?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 2000")]
         let block = (self.rate_hz / 50.0).ceil() as u16;
         Ok(box_sampler(SimulatedCurrent::new(&running.machine, running.clock.clone(), self.rate_hz, block)))
@@ -62,8 +62,8 @@ fn box_sampler<S: Sampler + 'static>(sampler: S) -> Box<dyn Sampler> {
 
 /// Serves until told to stop, or until the sampler has come to its end.
 pub(super) fn serve(arguments: &WaveformArguments) -> CommandResult {
-    let sampler = arguments.sampler()?;
-    let listen = arguments.common.listen(5030);
+    let sampler = arguments.build_sampler()?;
+    let listen = arguments.common.listen_address(5030);
     let header = sampler.header();
     let producer = Producer::start(listen, sampler).map_err(|error| {
         CannotRun::new(
@@ -71,14 +71,14 @@ pub(super) fn serve(arguments: &WaveformArguments) -> CommandResult {
             "choose another port with --listen 127.0.0.1:5031",
         )
     })?;
-    let (at, names) = (producer.at(), header.channels.join(", "));
-    print(&format!("serving {names} at {} Hz: waveform://{at}\n", header.rate_hz));
+    let (at, names) = (producer.listen_address(), header.channels.join(", "));
+    print_text(&format!("serving {names} at {} Hz: waveform://{at}\n", header.rate_hz));
     let stopping = super::stop_flag()?;
     while !producer.is_finished() && !stopping() {
         std::thread::sleep(Duration::from_millis(100));
     }
     producer
-        .end()
+        .stop_sampling()
         .map(|()| CommandOutcome::Fine)
         .map_err(|error| CannotRun::new(format!("the sampler failed: {error}"), ""))
 }

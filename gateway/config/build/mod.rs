@@ -14,44 +14,44 @@ use super::{
 use crate::log::LogFormat;
 use adapters::Axis;
 use adapters::address::{Target, WriteMethod};
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// The configuration, or `None` where a value is missing; the problem has been reported then.
-pub(super) fn build(reading: &mut ConfigInput<'_>, base: &Path) -> Option<Config> {
+pub(super) fn build_config(reading: &mut ConfigInput<'_>, base: &Path) -> Option<Config> {
     let sources: Option<Vec<SourceConfig>> = reading.sources.iter().map(source).collect();
     check_names(reading);
     check_gate(reading);
-    http::check(reading);
+    http::check_http(reading);
     backup::check_backup(reading);
     let sources = sources.map(|mut sources| {
         let written = reading.sources.clone();
         sources.iter_mut().zip(&written).for_each(|(source, values)| channels::add(reading, source, values));
         sources
     });
-    let sinks = outputs::sinks(reading);
-    let outbox = outputs::outbox(reading);
-    let gateway = gateway(reading, base)?;
+    let sinks = outputs::build_sinks(reading);
+    let outbox = outputs::build_outbox(reading);
+    let gateway = build_gateway(reading, base)?;
     let in_force = super::in_force::in_force(reading);
     Some(Config {
         in_force,
         alignment: AlignmentConfig {
-            spindle_power: alignment_use(&text(reading, "alignment", "spindle_power")?),
-            total_power: alignment_use(&text(reading, "alignment", "total_power")?),
+            spindle_power: alignment_use(&find_text(reading, "alignment", "spindle_power")?),
+            total_power: alignment_use(&find_text(reading, "alignment", "total_power")?),
         },
-        scripts: scripts(reading, &gateway.data_dir)?,
-        operations: OperationsConfig { path: text(reading, "operations", "path").map(|path| base.join(path)) },
-        gate: gate(reading)?,
-        history: history(reading, &gateway.data_dir)?,
+        scripts: build_scripts(reading, &gateway.data_dir)?,
+        operations: OperationsConfig { path: find_text(reading, "operations", "path").map(|path| base.join(path)) },
+        gate: build_gate(reading)?,
+        history: build_history(reading, &gateway.data_dir)?,
         sinks: sinks?,
         outbox: outbox?,
-        http: http::http(reading, base)?,
-        twin: TwinConfig { model: text(reading, "twin", "model").map(|path| base.join(path)) },
-        thermal: thermal::thermal(reading, base)?,
+        http: http::build_http(reading, base)?,
+        twin: TwinConfig { model: find_text(reading, "twin", "model").map(|path| base.join(path)) },
+        thermal: thermal::build_thermal(reading, base)?,
         backup: backup::read_backup(reading, base)?,
-        log: log(reading)?,
+        log: build_log(reading)?,
         gateway,
         sources: sources?,
     })
@@ -65,78 +65,78 @@ fn alignment_use(word: &str) -> AlignmentUse {
     }
 }
 
-fn log(reading: &ConfigInput<'_>) -> Option<LogConfig> {
-    let format = match text(reading, "log", "format")?.as_str() {
+fn build_log(reading: &ConfigInput<'_>) -> Option<LogConfig> {
+    let format = match find_text(reading, "log", "format")?.as_str() {
         "text" => LogFormat::Text,
         "json" => LogFormat::Json,
         _ => LogFormat::Off,
     };
     // The words of the key are those of the levels.
-    Some(LogConfig { level: text(reading, "log", "level")?.parse().ok()?, format })
+    Some(LogConfig { level: find_text(reading, "log", "level")?.parse().ok()?, format })
 }
 
-fn gateway(reading: &ConfigInput<'_>, base: &Path) -> Option<GatewayConfig> {
+fn build_gateway(reading: &ConfigInput<'_>, base: &Path) -> Option<GatewayConfig> {
     Some(GatewayConfig {
-        name: text(reading, "gateway", "name")?,
-        tick_hz: number(reading, "gateway", "tick_hz")?,
-        clock_confirm: seconds(reading, "gateway", "clock_confirm_s")?,
-        language: match text(reading, "gateway", "language")?.as_str() {
+        name: find_text(reading, "gateway", "name")?,
+        tick_hz: find_number(reading, "gateway", "tick_hz")?,
+        clock_confirm: find_seconds(reading, "gateway", "clock_confirm_s")?,
+        language: match find_text(reading, "gateway", "language")?.as_str() {
             "en" => Some(Language::En),
             "zh" => Some(Language::Zh),
             _ => None,
         },
-        data_dir: base.join(text(reading, "gateway", "data_dir")?),
+        data_dir: base.join(find_text(reading, "gateway", "data_dir")?),
     })
 }
 
-fn scripts(reading: &ConfigInput<'_>, data_dir: &Path) -> Option<ScriptsConfig> {
+fn build_scripts(reading: &ConfigInput<'_>, data_dir: &Path) -> Option<ScriptsConfig> {
     Some(ScriptsConfig {
-        directory: data_dir.join(text(reading, "scripts", "directory")?),
-        reload: flag(reading, "scripts", "reload")?,
+        directory: data_dir.join(find_text(reading, "scripts", "directory")?),
+        reload: find_flag(reading, "scripts", "reload")?,
     })
 }
 
-fn gate(reading: &ConfigInput<'_>) -> Option<GateConfig> {
+fn build_gate(reading: &ConfigInput<'_>) -> Option<GateConfig> {
     Some(GateConfig {
-        mode: mode(&text(reading, "gate", "mode")?),
-        source: text(reading, "gate", "source"),
-        min_pct: number(reading, "gate", "min_pct")?,
-        max_pct: number(reading, "gate", "max_pct")?,
-        slew_up_pct_per_s: number(reading, "gate", "slew_up_pct_per_s")?,
-        slew_down_pct_per_s: number(reading, "gate", "slew_down_pct_per_s")?,
-        above_dial: flag(reading, "gate", "above_dial")?,
-        dead_band_pct: number(reading, "gate", "dead_band_pct")?,
-        min_interval: seconds(reading, "gate", "min_interval_s")?,
-        heartbeat: seconds(reading, "gate", "heartbeat_s")?,
-        stale: seconds(reading, "gate", "stale_s")?,
-        armed_for: seconds(reading, "gate", "armed_for_s")?,
-        offset: offset(reading)?,
+        mode: parse_mode(&find_text(reading, "gate", "mode")?),
+        source: find_text(reading, "gate", "source"),
+        min_pct: find_number(reading, "gate", "min_pct")?,
+        max_pct: find_number(reading, "gate", "max_pct")?,
+        slew_up_pct_per_s: find_number(reading, "gate", "slew_up_pct_per_s")?,
+        slew_down_pct_per_s: find_number(reading, "gate", "slew_down_pct_per_s")?,
+        above_dial: find_flag(reading, "gate", "above_dial")?,
+        dead_band_pct: find_number(reading, "gate", "dead_band_pct")?,
+        min_interval: find_seconds(reading, "gate", "min_interval_s")?,
+        heartbeat: find_seconds(reading, "gate", "heartbeat_s")?,
+        stale: find_seconds(reading, "gate", "stale_s")?,
+        armed_for: find_seconds(reading, "gate", "armed_for_s")?,
+        offset: build_offset(reading)?,
     })
 }
 
-fn offset(reading: &ConfigInput<'_>) -> Option<OffsetConfig> {
+fn build_offset(reading: &ConfigInput<'_>) -> Option<OffsetConfig> {
     const SECTION: &str = "gate.offset";
     Some(OffsetConfig {
-        mode: mode(&text(reading, SECTION, "mode")?),
-        source: text(reading, SECTION, "source").or_else(|| text(reading, "gate", "source")),
-        axes: axes(&text(reading, SECTION, "axes").unwrap_or_default()).unwrap_or_default(),
-        step_um: number(reading, SECTION, "step_um")?,
-        total_um: number(reading, SECTION, "total_um")?,
-        min_interval: seconds(reading, SECTION, "min_interval_s")?,
-        restore: text(reading, SECTION, "on_disarm")? == "restore",
+        mode: parse_mode(&find_text(reading, SECTION, "mode")?),
+        source: find_text(reading, SECTION, "source").or_else(|| find_text(reading, "gate", "source")),
+        axes: parse_axes(&find_text(reading, SECTION, "axes").unwrap_or_default()).unwrap_or_default(),
+        step_um: find_number(reading, SECTION, "step_um")?,
+        total_um: find_number(reading, SECTION, "total_um")?,
+        min_interval: find_seconds(reading, SECTION, "min_interval_s")?,
+        restore: find_text(reading, SECTION, "on_disarm")? == "restore",
     })
 }
 
 /// `x z` or `x,z`, each once.
-fn axes(text: &str) -> Result<Vec<Axis>, String> {
+fn parse_axes(text: &str) -> Result<Vec<Axis>, String> {
     let words = text.split([' ', ',']).filter(|word| !word.is_empty());
-    let mut axes = words.map(|word| Axis::of(word).ok_or(word.to_owned())).collect::<Result<Vec<_>, _>>()?;
+    let mut axes = words.map(|word| Axis::from_word(word).ok_or(word.to_owned())).collect::<Result<Vec<_>, _>>()?;
     axes.sort_unstable();
     axes.dedup();
     Ok(axes)
 }
 
-fn mode(word: &str) -> GateMode {
+fn parse_mode(word: &str) -> GateMode {
     match word {
         "off" => GateMode::Off,
         "armed" => GateMode::Armed,
@@ -144,12 +144,12 @@ fn mode(word: &str) -> GateMode {
     }
 }
 
-fn history(reading: &ConfigInput<'_>, data_dir: &Path) -> Option<HistoryConfig> {
+fn build_history(reading: &ConfigInput<'_>, data_dir: &Path) -> Option<HistoryConfig> {
     Some(HistoryConfig {
-        path: data_dir.join(PathBuf::from(text(reading, "history", "path")?)),
-        retention_days: number(reading, "history", "retention_days")?,
-        max_gb: number(reading, "history", "max_gb")?,
-        commit: seconds(reading, "history", "commit_s")?,
+        path: data_dir.join(PathBuf::from(find_text(reading, "history", "path")?)),
+        retention_days: find_number(reading, "history", "retention_days")?,
+        max_gb: find_number(reading, "history", "max_gb")?,
+        commit: find_seconds(reading, "history", "commit_s")?,
     })
 }
 
@@ -173,14 +173,14 @@ pub(super) fn source_name(values: &SectionValues) -> Option<String> {
 fn check_names(reading: &mut ConfigInput<'_>) {
     if reading.sources.is_empty() {
         let next = "write [[source]] with address = \"simulated://lathe\" to begin with";
-        return reading.problem(&Origin::Default, "there is no source to read", next);
+        return reading.add_problem(&Origin::Default, "there is no source to read", next);
     }
     let names: Vec<Option<String>> = reading.sources.iter().map(source_name).collect();
     for (index, name) in names.iter().enumerate().filter(|(_, name)| name.is_some()) {
         if names[..index].contains(name) {
             let origin = origin_of_name(&reading.sources[index]);
             let what = format!("there are two sources named {:?}", name.clone().unwrap_or_default());
-            reading.problem(&origin, what, "give each [[source]] its own `name`");
+            reading.add_problem(&origin, what, "give each [[source]] its own `name`");
         }
     }
 }
@@ -193,14 +193,14 @@ pub(super) fn origin_of_name(values: &SectionValues) -> Origin {
 /// What is armed has somewhere to write to.
 fn check_gate(reading: &mut ConfigInput<'_>) {
     check_offsets(reading);
-    let armed = text(reading, "gate", "mode").as_deref() == Some("armed");
+    let armed = find_text(reading, "gate", "mode").as_deref() == Some("armed");
     let origin = |key: &str| reading.get("gate", key).map_or(Origin::Default, |found| found.origin.clone());
     let names: Vec<String> = reading.sources.iter().filter_map(source_name).collect();
-    match text(reading, "gate", "source") {
+    match find_text(reading, "gate", "source") {
         None if armed => {
             let (at, next) =
                 (origin("mode"), format!("write source = ... under [gate]; there is {}", quote_names(&names)));
-            reading.problem(&at, "the gate may be armed, but `source` does not say what it writes to", next);
+            reading.add_problem(&at, "the gate may be armed, but `source` does not say what it writes to", next);
         }
         Some(name) => {
             check_source(reading, &names, &name, &origin("source"));
@@ -222,7 +222,7 @@ fn check_dial(reading: &mut ConfigInput<'_>, name: &str) {
     if address.is_some_and(|address| lacks_dial(address.target())) {
         let what = "the gate may be armed, but the address does not name the byte in which the operator's dial stands";
         let next = "add dial=R907, or whichever byte the ladder copies the dial to (see the handbook, chapter gate)";
-        reading.problem(&origin, what, next);
+        reading.add_problem(&origin, what, next);
     }
 }
 
@@ -237,11 +237,11 @@ fn check_source(reading: &mut ConfigInput<'_>, names: &[String], name: &str, at:
     if names.iter().any(|known| known == name) || names.is_empty() {
         return;
     }
-    let next = match nearest(name, names.iter().map(String::as_str)) {
+    let next = match find_nearest_name(name, names.iter().map(String::as_str)) {
         Some(near) => format!("did you mean {near:?}?"),
         None => format!("there is {}", quote_names(names)),
     };
-    reading.problem(at, format!("no source is named {name:?}"), next);
+    reading.add_problem(at, format!("no source is named {name:?}"), next);
 }
 
 /// What may shift an axis says which one, and where.
@@ -250,26 +250,28 @@ fn check_offsets(reading: &mut ConfigInput<'_>) {
     let origin = |reading: &ConfigInput<'_>, key: &str| {
         reading.get(SECTION, key).map_or(Origin::Default, |found| found.origin.clone())
     };
-    let on = text(reading, SECTION, "mode").is_some_and(|mode| mode != "off");
+    let on = find_text(reading, SECTION, "mode").is_some_and(|mode| mode != "off");
     let (at_mode, at_axes) = (origin(reading, "mode"), origin(reading, "axes"));
-    match axes(&text(reading, SECTION, "axes").unwrap_or_default()) {
+    match parse_axes(&find_text(reading, SECTION, "axes").unwrap_or_default()) {
         Err(word) => {
             let next = "write \"x\", \"y\", \"z\", or several: \"x z\"";
-            reading.problem(&at_axes, format!("`axes` names {word:?}, which is no axis"), next);
+            reading.add_problem(&at_axes, format!("`axes` names {word:?}, which is no axis"), next);
         }
         Ok(axes) if axes.is_empty() && on => {
             let next = "write axes = \"z\" under [gate.offset]";
-            reading.problem(&at_mode, "offsets are to be decided about, but `axes` names none", next);
+            reading.add_problem(&at_mode, "offsets are to be decided about, but `axes` names none", next);
         }
         Ok(_) => {}
     }
     let names: Vec<String> = reading.sources.iter().filter_map(source_name).collect();
     let at = origin(reading, "source");
-    if let Some(name) = text(reading, SECTION, "source") {
+    if let Some(name) = find_text(reading, SECTION, "source") {
         check_source(reading, &names, &name, &at);
-    } else if text(reading, SECTION, "mode").as_deref() == Some("armed") && text(reading, "gate", "source").is_none() {
+    } else if find_text(reading, SECTION, "mode").as_deref() == Some("armed")
+        && find_text(reading, "gate", "source").is_none()
+    {
         let next = format!("write source = ... under [gate.offset]; there is {}", quote_names(&names));
-        reading.problem(&at_mode, "offsets may be written, but `source` does not say where to", next);
+        reading.add_problem(&at_mode, "offsets may be written, but `source` does not say where to", next);
     }
 }
 
@@ -291,19 +293,19 @@ fn as_number(found: &LocatedValue) -> Option<f64> {
     }
 }
 
-pub(super) fn text(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<String> {
+pub(super) fn find_text(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<String> {
     reading.get(section, key).and_then(as_text).map(str::to_owned)
 }
 
-pub(super) fn number(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<f64> {
+pub(super) fn find_number(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<f64> {
     reading.get(section, key).and_then(as_number)
 }
 
-pub(super) fn seconds(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<Duration> {
-    number(reading, section, key).map(Duration::from_secs_f64)
+pub(super) fn find_seconds(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<Duration> {
+    find_number(reading, section, key).map(Duration::from_secs_f64)
 }
 
-pub(super) fn flag(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<bool> {
+pub(super) fn find_flag(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<bool> {
     match reading.get(section, key).map(|found| &found.value) {
         Some(Scalar::Flag(flag)) => Some(*flag),
         _ => None,

@@ -1,20 +1,20 @@
 //! `[thermal]`.
 
-use super::{flag, number, text};
+use super::{find_flag, find_number, find_text};
 use crate::config::ThermalConfig;
 use crate::config::read::ConfigInput;
 use adapters::Axis;
 use rules::estimators::thermal::CompensationSettings;
 use std::path::Path;
 
-pub(super) fn thermal(reading: &ConfigInput<'_>, base: &Path) -> Option<ThermalConfig> {
+pub(super) fn build_thermal(reading: &ConfigInput<'_>, base: &Path) -> Option<ThermalConfig> {
     const SECTION: &str = "thermal";
-    let number = |key| number(reading, SECTION, key);
+    let number = |key| find_number(reading, SECTION, key);
     Some(ThermalConfig {
-        model: text(reading, SECTION, "model").map(|path| base.join(path)),
-        axis: Axis::of(&text(reading, SECTION, "axis")?)?,
-        propose: flag(reading, SECTION, "propose")?,
-        learn: flag(reading, SECTION, "learn")?,
+        model: find_text(reading, SECTION, "model").map(|path| base.join(path)),
+        axis: Axis::from_word(&find_text(reading, SECTION, "axis")?)?,
+        propose: find_flag(reading, SECTION, "propose")?,
+        learn: find_flag(reading, SECTION, "learn")?,
         step_um: number("step_um")?,
         total_um: number("total_um")?,
         compensation: CompensationSettings {

@@ -15,7 +15,7 @@ mod refitted;
 mod relations;
 mod sizes;
 
-pub use refitted::parameters;
+pub use refitted::find_parameter_doubts;
 
 use adapters::Recording;
 use adapters::bilingual::Bilingual;
@@ -40,10 +40,12 @@ impl UnitDoubt {
 
 /// Everything that is doubtful before the model is fitted, one sentence for each column.
 #[must_use]
-pub fn inputs(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
+pub fn find_input_doubts(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
     let mut found: Vec<UnitDoubt> = Vec::new();
-    for doubt in
-        relations::find(recording).into_iter().chain(sizes::find(recording)).chain(nominal::find(recording, model))
+    for doubt in relations::find_doubts(recording)
+        .into_iter()
+        .chain(sizes::find_doubts(recording))
+        .chain(nominal::find_doubts(recording, model))
     {
         if found.iter().all(|known| known.about != doubt.about) {
             found.push(doubt);
@@ -54,9 +56,10 @@ pub fn inputs(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
 
 /// Units that a column might be in by mistake, with the factor that turns its numbers into the unit that its name says. The same quantity only, and
 /// only what differs enough to be seen.
-fn mistakes(column: &str) -> Vec<(&'static str, f64)> {
-    let Some(own) = unit_of(column).and_then(Unit::of) else { return Vec::new() };
-    let factor = |unit: Unit| unit.to(own).filter(|(_, offset)| *offset == 0.0).map(|(factor, _)| factor);
+fn list_possible_units(column: &str) -> Vec<(&'static str, f64)> {
+    let Some(own) = unit_of(column).and_then(Unit::from_symbol) else { return Vec::new() };
+    let factor =
+        |unit: Unit| unit.compute_conversion(own).filter(|(_, offset)| *offset == 0.0).map(|(factor, _)| factor);
     let mut all: Vec<(&'static str, f64)> = units_of(own.dimension)
         .filter_map(|(symbol, unit)| Some((symbol, factor(unit)?)))
         .filter(|(_, factor)| factor.ln().abs() > 0.6)
@@ -66,9 +69,9 @@ fn mistakes(column: &str) -> Vec<(&'static str, f64)> {
 }
 
 /// The unit whose factor is nearest to this one, within so much of its logarithm.
-fn nearest(column: &str, factor: f64, within: f64) -> Option<(&'static str, f64)> {
+fn find_nearest_unit(column: &str, factor: f64, within: f64) -> Option<(&'static str, f64)> {
     let distance = |known: &(&'static str, f64)| (factor / known.1).ln().abs();
-    mistakes(column)
+    list_possible_units(column)
         .into_iter()
         .filter(|known| distance(known) < within)
         .min_by(|a, b| distance(a).total_cmp(&distance(b)))

@@ -1,7 +1,7 @@
 //! The model as it was given, over the recording as it is and under each unit that one of its columns might be in. Where the model misses the output by
 //! half of it, and one unit makes it fit, that unit is asked for.
 
-use super::{UnitDoubt, mistakes};
+use super::{UnitDoubt, list_possible_units};
 use crate::diagnosis::simulation;
 use adapters::Recording;
 use adapters::channel::quantity::unit_of;
@@ -38,20 +38,21 @@ const INPUTS: [&str; 13] = [
     "supply_voltage_v",
 ];
 
-pub(super) fn find(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
+pub(super) fn find_doubts(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
     // Coefficients of columns that the user chose mean what the user says.
     let is_physical =
         model.parts.iter().any(|part| matches!(part.body, PartFunction::Effect(..) | PartFunction::Table(_)));
     let thin = thin_rows(recording);
-    let Some(given) = error(&thin, model).filter(|_| is_physical) else { return Vec::new() };
+    let Some(given) = relative_error(&thin, model).filter(|_| is_physical) else { return Vec::new() };
     if given < POOR {
         return Vec::new();
     }
     let mut found: Vec<UnitHypothesis> = Vec::new();
-    let columns = INPUTS.iter().copied().filter(|name| thin.numbers(name).is_some()).chain([model.output.as_str()]);
+    let columns =
+        INPUTS.iter().copied().filter(|name| thin.find_numbers(name).is_some()).chain([model.output.as_str()]);
     for column in columns {
-        for (unit, factor) in mistakes(column) {
-            let Some(under) = error(&scale_column(&thin, column, factor), model) else { continue };
+        for (unit, factor) in list_possible_units(column) {
+            let Some(under) = relative_error(&scale_column(&thin, column, factor), model) else { continue };
             if under < GOOD && under < BETTER * given {
                 found.push(UnitHypothesis { error: under, column: column.to_owned(), unit, factor });
             }
@@ -61,7 +62,7 @@ pub(super) fn find(recording: &Recording, model: &Model) -> Vec<UnitDoubt> {
     let Some(limit) = found.first().map(|best| best.error + ALIKE) else { return Vec::new() };
     found.retain(|hypothesis| hypothesis.error <= limit);
     found.truncate(TOLD_MAX);
-    vec![describe(&model.output, given, &found)]
+    vec![describe_doubt(&model.output, given, &found)]
 }
 
 /// A column taken to be in another unit.
@@ -74,7 +75,7 @@ struct UnitHypothesis {
     factor: f64,
 }
 
-fn describe(output: &str, given: f64, found: &[UnitHypothesis]) -> UnitDoubt {
+fn describe_doubt(output: &str, given: f64, found: &[UnitHypothesis]) -> UnitDoubt {
     let (mut en, mut zh, mut ask_en, mut ask_zh) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for UnitHypothesis { error, column, unit, factor } in found {
         let (after, factor, own) = (short(100.0 * error), short(*factor), unit_of(column).unwrap_or(""));
@@ -92,28 +93,29 @@ fn describe(output: &str, given: f64, found: &[UnitHypothesis]) -> UnitDoubt {
 }
 
 /// Error of the model as given over the size of the output, its root mean square.
-fn error(recording: &Recording, model: &Model) -> Option<f64> {
+fn relative_error(recording: &Recording, model: &Model) -> Option<f64> {
     let simulation = simulation::run(recording, model).ok()?;
     let (rmse, _) = simulation.rmse()?;
-    let numbers = recording.numbers(&model.output)?;
-    let (sum, count) = numbers.present().fold((0.0, 0.0), |(sum, count), x| (sum + x * x, count + 1.0));
+    let numbers = recording.find_numbers(&model.output)?;
+    let (sum, count) = numbers.present_values().fold((0.0, 0.0), |(sum, count), x| (sum + x * x, count + 1.0));
     let size = (sum / f64::max(count, 1.0)).sqrt();
     (size > 0.0 && rmse.is_finite()).then(|| rmse / size)
 }
 
 fn thin_rows(recording: &Recording) -> Recording {
-    let every = recording.rows().div_ceil(ROWS_MAX).max(1);
+    let every = recording.count_rows().div_ceil(ROWS_MAX).max(1);
     if every == 1 {
         return recording.clone();
     }
-    let kept: Vec<bool> = (0..recording.rows()).map(|row| row.is_multiple_of(every)).collect();
-    recording.only(&kept)
+    let kept: Vec<bool> = (0..recording.count_rows()).map(|row| row.is_multiple_of(every)).collect();
+    recording.select_rows(&kept)
 }
 
 fn scale_column(recording: &Recording, column: &str, factor: f64) -> Recording {
     let mut other = recording.clone();
-    let cells =
-        recording.numbers(column).map(|numbers| numbers.iter().map(|x| x.map(|x| x * factor)).collect::<Numbers>());
+    let cells = recording
+        .find_numbers(column)
+        .map(|numbers| numbers.iter().map(|x| x.map(|x| x * factor)).collect::<Numbers>());
     if let Some(cells) = cells {
         other.set_column(column, Cells::Numbers(cells));
     }

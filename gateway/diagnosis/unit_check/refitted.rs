@@ -1,6 +1,6 @@
 //! Refitted parameters beside the nominal ones: one that is many times its nominal value is not this machine's, or its column is in another unit.
 
-use super::{UnitDoubt, mistakes};
+use super::{UnitDoubt, list_possible_units};
 use rules::physics::Entry;
 use rules::twin::text::short;
 use rules::twin::{Model, Parameter, Part, PartFunction};
@@ -22,7 +22,7 @@ const COLUMNS: [(&str, &str); 6] = [
 
 /// Parameters of the nominal model whose refitted value is far from it.
 #[must_use]
-pub fn parameters(nominal: &Model, refitted: &Model) -> Vec<UnitDoubt> {
+pub fn find_parameter_doubts(nominal: &Model, refitted: &Model) -> Vec<UnitDoubt> {
     let mut found = Vec::new();
     for part in nominal.parts.iter().filter(|part| matches!(part.body, PartFunction::Effect(..))) {
         let Some(other) = refitted.parts.iter().find(|other| other.label() == part.label()) else { continue };
@@ -31,13 +31,13 @@ pub fn parameters(nominal: &Model, refitted: &Model) -> Vec<UnitDoubt> {
             .iter()
             .filter(|parameter| parameter.entry == Entry::Linear && !parameter.fixed && parameter.value != 0.0)
         {
-            found.extend(other.parameter(&parameter.name).and_then(|now| doubt(part, parameter, now)));
+            found.extend(other.parameter(&parameter.name).and_then(|now| compare_parameter(part, parameter, now)));
         }
     }
     found
 }
 
-fn doubt(part: &Part, nominal: &Parameter, now: &Parameter) -> Option<UnitDoubt> {
+fn compare_parameter(part: &Part, nominal: &Parameter, now: &Parameter) -> Option<UnitDoubt> {
     let ratio = now.value / nominal.value;
     let (low, high) = nominal.range;
     let outside = now.value < low || now.value > high;
@@ -48,7 +48,7 @@ fn doubt(part: &Part, nominal: &Parameter, now: &Parameter) -> Option<UnitDoubt>
     let name = format!("{}.{}", part.label(), nominal.name);
     let column = COLUMNS.iter().find(|(word, _)| nominal.name.contains(word)).map(|(_, column)| *column);
     let unit = column.filter(|column| !column.contains(' ')).and_then(|column| {
-        let known = mistakes(column).into_iter().find(|(_, factor)| {
+        let known = list_possible_units(column).into_iter().find(|(_, factor)| {
             (ratio.abs() / factor).ln().abs() < SAME || (ratio.abs().sqrt() / factor).ln().abs() < SAME / 2.0
         });
         known.map(|(unit, _)| format!("{column} in {unit}"))

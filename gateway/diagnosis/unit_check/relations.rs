@@ -1,8 +1,8 @@
 //! Columns of which one follows from others: a constant factor between both is a unit.
 
-use super::{UnitDoubt, median, nearest};
+use super::{UnitDoubt, find_nearest_unit, median};
 use adapters::Recording;
-use adapters::recording::derived;
+use adapters::recording::derive_quantity;
 use rules::twin::text::short;
 
 /// Two courses that belong together keep their ratio within this share of it in half of the rows.
@@ -15,26 +15,28 @@ const SAME: f64 = 0.12;
 const ROWS_MIN: usize = 20;
 
 /// Columns that do not fit one another.
-pub(super) fn find(recording: &Recording) -> Vec<UnitDoubt> {
+pub(super) fn find_doubts(recording: &Recording) -> Vec<UnitDoubt> {
     let mut found = Vec::new();
     for (name, others) in [
         ("feed_per_rev_mm", &["feed_mm_min", "spindle_speed_rpm"][..]),
         ("cutting_speed_m_min", &["spindle_speed_rpm", "diameter_mm"]),
         ("removal_rate_cm3_min", &["depth_of_cut_mm", "width_of_cut_mm", "feed_mm_min"]),
     ] {
-        let (Some(given), Some(follows)) = (recording.numbers(name), derived(recording, name)) else { continue };
+        let (Some(given), Some(follows)) = (recording.find_numbers(name), derive_quantity(recording, name)) else {
+            continue;
+        };
         let pairs = given.iter().zip(follows.iter()).filter_map(|(given, follows)| Some((given?, follows?)));
-        found.extend(doubt(name, others, pairs.collect()));
+        found.extend(find_relation_doubt(name, others, pairs.collect()));
     }
     for prefix in ["", "x_", "y_", "z_"] {
-        found.extend(position(recording, prefix));
+        found.extend(find_position_doubt(recording, prefix));
     }
-    found.extend(power(recording));
+    found.extend(find_power_doubts(recording));
     found
 }
 
 /// One column and those that it follows from; pairs are given and computed.
-fn doubt(name: &str, others: &[&str], pairs: Vec<(f64, f64)>) -> Option<UnitDoubt> {
+fn find_relation_doubt(name: &str, others: &[&str], pairs: Vec<(f64, f64)>) -> Option<UnitDoubt> {
     let ratios: Vec<f64> =
         pairs.into_iter().filter(|(a, b)| a.abs() > 1e-9 && b.abs() > 1e-9).map(|(a, b)| (a / b).abs()).collect();
     if ratios.len() < ROWS_MIN {
@@ -46,9 +48,9 @@ fn doubt(name: &str, others: &[&str], pairs: Vec<(f64, f64)>) -> Option<UnitDoub
         return None;
     }
     // The column itself may be in another unit, or one of those that it follows from.
-    let own = nearest(name, 1.0 / middle, SAME).map(|(unit, _)| (name, unit));
+    let own = find_nearest_unit(name, 1.0 / middle, SAME).map(|(unit, _)| (name, unit));
     let of_others = others.iter().filter_map(|other| {
-        let up = nearest(other, middle, SAME).or_else(|| nearest(other, 1.0 / middle, SAME));
+        let up = find_nearest_unit(other, middle, SAME).or_else(|| find_nearest_unit(other, 1.0 / middle, SAME));
         up.map(|(unit, _)| (*other, unit))
     });
     let guesses: Vec<(&str, &str)> = own.into_iter().chain(of_others).collect();
@@ -68,11 +70,11 @@ fn doubt(name: &str, others: &[&str], pairs: Vec<(f64, f64)>) -> Option<UnitDoub
 }
 
 /// How the position changes is the velocity.
-fn position(recording: &Recording, prefix: &str) -> Option<UnitDoubt> {
+fn find_position_doubt(recording: &Recording, prefix: &str) -> Option<UnitDoubt> {
     let (position, velocity) = (format!("{prefix}axis_position_mm"), format!("{prefix}axis_velocity_mm_min"));
-    let (places, speeds) = (recording.numbers(&position)?, recording.numbers(&velocity)?);
+    let (places, speeds) = (recording.find_numbers(&position)?, recording.find_numbers(&velocity)?);
     let mut pairs = Vec::new();
-    for run in recording.runs() {
+    for run in recording.list_runs() {
         for row in run.rows.clone().skip(1) {
             let dt_s = recording.time_s[row] - recording.time_s[row - 1];
             let step = |row: usize| {
@@ -99,13 +101,13 @@ fn position(recording: &Recording, prefix: &str) -> Option<UnitDoubt> {
     let mut guesses: Vec<(String, String)> = Vec::new();
     let mut add =
         |column: &str, unit: &str| guesses.push((format!("{column} in {unit}"), format!("{column}以{unit}为单位")));
-    if let Some((unit, _)) = nearest(&position, 1.0 / middle, SAME) {
+    if let Some((unit, _)) = find_nearest_unit(&position, 1.0 / middle, SAME) {
         add(&position, unit);
     }
-    if let Some((unit, _)) = nearest(&velocity, middle, SAME) {
+    if let Some((unit, _)) = find_nearest_unit(&velocity, middle, SAME) {
         add(&velocity, unit);
     }
-    if let Some((unit, _)) = nearest("time_s", middle, SAME) {
+    if let Some((unit, _)) = find_nearest_unit("time_s", middle, SAME) {
         add("time_s", unit);
     }
     let (en, zh): (Vec<String>, Vec<String>) = guesses.into_iter().unzip();
@@ -127,9 +129,9 @@ fn or_another(list: &str, none: &str) -> String {
 }
 
 /// The spindle is a part of the machine; torque times speed is power.
-fn power(recording: &Recording) -> Vec<UnitDoubt> {
+fn find_power_doubts(recording: &Recording) -> Vec<UnitDoubt> {
     let mut found = Vec::new();
-    let number = |name: &str| recording.numbers(name);
+    let number = |name: &str| recording.find_numbers(name);
     let typical = |a: &str, b: &str| -> Option<f64> {
         let (a, b) = (number(a)?, number(b)?);
         let ratios: Vec<f64> = a

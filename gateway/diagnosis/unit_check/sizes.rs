@@ -48,22 +48,22 @@ const SHORT_CUT_S: f64 = 1.0;
 /// So many changes make an average.
 const LEAST_CHANGES: usize = 10;
 
-pub(super) fn find(recording: &Recording) -> Vec<UnitDoubt> {
-    let mut found: Vec<UnitDoubt> = SIZES.iter().filter_map(|size| doubt(recording, size)).collect();
-    found.extend(temperatures(recording));
-    found.extend(time(recording));
+pub(super) fn find_doubts(recording: &Recording) -> Vec<UnitDoubt> {
+    let mut found: Vec<UnitDoubt> = SIZES.iter().filter_map(|size| find_size_doubt(recording, size)).collect();
+    found.extend(find_temperature_doubts(recording));
+    found.extend(find_time_doubt(recording));
     found
 }
 
 /// The value that one in twenty of those that are not zero exceeds.
-fn great(numbers: &Numbers) -> Option<f64> {
-    let mut sizes: Vec<f64> = numbers.present().map(f64::abs).filter(|size| *size > 0.0).collect();
+fn upper_quantile(numbers: &Numbers) -> Option<f64> {
+    let mut sizes: Vec<f64> = numbers.present_values().map(f64::abs).filter(|size| *size > 0.0).collect();
     sizes.sort_by(f64::total_cmp);
     sizes.get(sizes.len() * 19 / 20).copied()
 }
 
-fn doubt(recording: &Recording, (name, (low, high), smaller, greater): &Size) -> Option<UnitDoubt> {
-    let great = great(recording.numbers(name)?)?;
+fn find_size_doubt(recording: &Recording, (name, (low, high), smaller, greater): &Size) -> Option<UnitDoubt> {
+    let great = upper_quantile(recording.find_numbers(name)?)?;
     let unit = if great < *low {
         smaller
     } else if great > *high {
@@ -79,8 +79,9 @@ fn doubt(recording: &Recording, (name, (low, high), smaller, greater): &Size) ->
     ))
 }
 
-fn temperatures(recording: &Recording) -> Vec<UnitDoubt> {
-    let middle = |name: &str| recording.numbers(name).and_then(|numbers| median(numbers.present().collect()));
+fn find_temperature_doubts(recording: &Recording) -> Vec<UnitDoubt> {
+    let middle =
+        |name: &str| recording.find_numbers(name).and_then(|numbers| median(numbers.present_values().collect()));
     let names =
         recording.columns().iter().map(|column| column.name.as_str()).filter(|name| name.ends_with("temperature_c"));
     let is_air =
@@ -108,7 +109,7 @@ fn temperatures(recording: &Recording) -> Vec<UnitDoubt> {
 }
 
 /// Steps of time that are not round in seconds and are so in another unit; rows that last longer than the cuts in them.
-fn time(recording: &Recording) -> Option<UnitDoubt> {
+fn find_time_doubt(recording: &Recording) -> Option<UnitDoubt> {
     let mut steps: Vec<f64> =
         recording.time_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
@@ -144,20 +145,20 @@ fn is_round(parts: f64) -> bool {
 /// How long speed and cut stay as they are, on average.
 fn seconds_per_change(recording: &Recording) -> Option<f64> {
     let span_s = recording.time_s.last()? - recording.time_s.first()?;
-    let changes = changes(recording);
+    let changes = count_changes(recording);
     (changes >= LEAST_CHANGES).then(|| span_s / changes as f64)
 }
 
 /// Do the speed or the cut change so often that a row cannot last minutes?
 fn changes_often(recording: &Recording) -> bool {
-    recording.rows() >= 60 && 40 * changes(recording) > recording.rows()
+    recording.count_rows() >= 60 && 40 * count_changes(recording) > recording.count_rows()
 }
 
 /// How often the speed or the cut becomes another.
-fn changes(recording: &Recording) -> usize {
+fn count_changes(recording: &Recording) -> usize {
     let of = |name: &str| {
-        recording.numbers(name).map_or(0, |numbers| {
-            let values: Vec<f64> = numbers.present().collect();
+        recording.find_numbers(name).map_or(0, |numbers| {
+            let values: Vec<f64> = numbers.present_values().collect();
             values.windows(2).filter(|pair| (pair[1] - pair[0]).abs() > 0.05 * pair[0].abs().max(pair[1].abs())).count()
         })
     };

@@ -42,7 +42,7 @@ fn lathe() -> Recording {
 /// With everything else that a machine may deliver.
 fn rich() -> Recording {
     let mut recording = lathe();
-    let speed = recording.numbers("spindle_speed_rpm").cloned().expect("there");
+    let speed = recording.find_numbers("spindle_speed_rpm").cloned().expect("there");
     let speed = |row: usize| speed.get(row).unwrap_or(0.0);
     let engaged = |row: usize| f64::from(u8::from(row % 20 >= 6));
     recording.set_column("feed_per_rev_mm", numbers(|_| 0.2));
@@ -73,7 +73,7 @@ fn axis() -> Recording {
 }
 
 fn told(recording: &Recording, model: &str) -> Vec<String> {
-    inputs(recording, &parse_model(model).expect("a model")).into_iter().map(|doubt| doubt.text.en).collect()
+    find_input_doubts(recording, &parse_model(model).expect("a model")).into_iter().map(|doubt| doubt.text.en).collect()
 }
 
 fn with(mut recording: Recording, column: &str, factor: f64, offset: f64) -> Recording {
@@ -81,8 +81,12 @@ fn with(mut recording: Recording, column: &str, factor: f64, offset: f64) -> Rec
         recording.time_s.iter_mut().for_each(|time_s| *time_s *= factor);
         return recording;
     }
-    let cells =
-        recording.numbers(column).expect(column).iter().map(|x| x.map(|x| x * factor + offset)).collect::<Numbers>();
+    let cells = recording
+        .find_numbers(column)
+        .expect(column)
+        .iter()
+        .map(|x| x.map(|x| x * factor + offset))
+        .collect::<Numbers>();
     recording.set_column(column, Cells::Numbers(cells));
     recording
 }
@@ -147,7 +151,7 @@ fn thirty_mistakes_are_told() {
         }
     };
     for (column, factor, offset, unit) in MISTAKES {
-        let base = if lathe().numbers(column).is_some() || column == "time_s" { lathe() } else { rich() };
+        let base = if lathe().find_numbers(column).is_some() || column == "time_s" { lathe() } else { rich() };
         check(with(base, column, factor, offset), LATHE, column, unit);
     }
     for (column, factor, unit) in AXIS_MISTAKES {
@@ -162,7 +166,7 @@ fn a_parameter_far_from_its_nominal_value_is_asked_for() {
     let nominal = parse_model(LATHE).expect("a model");
     let mut refitted = nominal.clone();
     refitted.parts[0].parameters[1].value *= 60.0;
-    let doubts = parameters(&nominal, &refitted);
+    let doubts = find_parameter_doubts(&nominal, &refitted);
     assert_eq!(doubts.len(), 1);
     let text = &doubts[0].text.en;
     assert!(
@@ -170,5 +174,5 @@ fn a_parameter_far_from_its_nominal_value_is_asked_for() {
             && text.contains("spindle_speed_rpm in 1/s"),
         "{text}"
     );
-    assert!(parameters(&nominal, &nominal).is_empty());
+    assert!(find_parameter_doubts(&nominal, &nominal).is_empty());
 }

@@ -9,7 +9,7 @@ use super::book::OffsetJournal;
 use super::order::{Moved, OffsetOrder, Shifted};
 use adapters::SourceError;
 use adapters::clock::Clock;
-use adapters::offset::{Axis, LastWrite, Left, OffsetShares, OffsetSink, same};
+use adapters::offset::{Axis, LastWrite, Left, OffsetShares, OffsetSink, is_same_offset};
 
 /// No gate may ask for a greater shift than this, whatever its configuration says.
 const MOST_UM: f64 = 1000.0;
@@ -25,7 +25,7 @@ impl OffsetAccount {
     /// With what the book knows of this control.
     #[must_use]
     pub fn new(sink: Box<dyn OffsetSink>, book: OffsetJournal) -> Self {
-        let ledgers = Axis::ALL.map(|axis| OffsetShares::with(book.left(axis)));
+        let ledgers = Axis::ALL.map(|axis| OffsetShares::with(book.find_leftover(axis)));
         Self { sink, ledgers, book }
     }
 
@@ -33,32 +33,32 @@ impl OffsetAccount {
     pub fn carry_out(&mut self, order: OffsetOrder, clock: &dyn Clock) -> Moved {
         let at_ns = clock.now_ns();
         let axis = order.axis();
-        let result = self.result(order, clock);
-        let left = self.left(axis);
+        let result = self.execute_order(order, clock);
+        let left = self.find_leftover(axis);
         // An open intent is in the book already.
-        let kept = if result.is_ok() { self.book.keep(axis, left) } else { Ok(()) };
+        let kept = if result.is_ok() { self.book.store_leftover(axis, left) } else { Ok(()) };
         Moved { at_ns, order, result, left, kept: kept.map_err(|error| error.to_string()) }
     }
 
-    fn left(&self, axis: Axis) -> Option<Left> {
-        self.ledgers[axis.index()].left()
+    fn find_leftover(&self, axis: Axis) -> Option<Left> {
+        self.ledgers[axis.index()].leftover_offset()
     }
 
-    fn result(&mut self, order: OffsetOrder, clock: &dyn Clock) -> Result<Option<Shifted>, SourceError> {
+    fn execute_order(&mut self, order: OffsetOrder, clock: &dyn Clock) -> Result<Option<Shifted>, SourceError> {
         let axis = order.axis();
-        if matches!(order, OffsetOrder::Restore(_)) && self.left(axis).is_none() {
+        if matches!(order, OffsetOrder::Restore(_)) && self.find_leftover(axis).is_none() {
             return Ok(None);
         }
         let before_um = self.sink.at_rest(clock, axis)?;
-        let (base_um, last) = self.ledgers[axis.index()].settle(before_um);
+        let (base_um, last) = self.ledgers[axis.index()].reconcile_offset(before_um);
         let asked_um = match order {
             OffsetOrder::Look(_) => before_um,
             _ if last == LastWrite::Replaced => before_um,
-            OffsetOrder::Shift { from_um, .. } if !same(from_um, before_um - base_um) => before_um,
+            OffsetOrder::Shift { from_um, .. } if !is_same_offset(from_um, before_um - base_um) => before_um,
             OffsetOrder::Shift { wanted_um, .. } => base_um + wanted_um.round().clamp(-MOST_UM, MOST_UM),
             OffsetOrder::Restore(_) => base_um,
         };
-        let after_um = match same(asked_um, before_um) {
+        let after_um = match is_same_offset(asked_um, before_um) {
             true => before_um,
             false => self.write(clock, axis, [base_um, before_um, asked_um])?,
         };
@@ -72,20 +72,20 @@ impl OffsetAccount {
         [base_um, before_um, asked_um]: [f64; 3],
     ) -> Result<f64, SourceError> {
         let settled = self.ledgers[axis.index()];
-        self.ledgers[axis.index()].intend(base_um, before_um, asked_um);
-        if let Err(error) = self.book.keep(axis, self.left(axis)) {
+        self.ledgers[axis.index()].record_intended_write(base_um, before_um, asked_um);
+        if let Err(error) = self.book.store_leftover(axis, self.find_leftover(axis)) {
             self.ledgers[axis.index()] = settled;
             return Err(self.accounting_error(axis, &error));
         }
         let after_um = self.sink.write(clock, axis, before_um, asked_um)?;
-        self.ledgers[axis.index()].note(base_um, after_um);
+        self.ledgers[axis.index()].record_offset(base_um, after_um);
         Ok(after_um)
     }
 
     fn accounting_error(&self, axis: Axis, error: &std::io::Error) -> SourceError {
         SourceError::Refused {
             source_name: self.sink.name().to_owned(),
-            request: format!("the external offset of {}", axis.word()),
+            request: format!("the external offset of {}", axis.as_word()),
             what: format!("it could not be accounted for in {}: {error}", self.book.path().display()),
             next: "Nothing is written before that; free some room, or look at the permissions".to_owned(),
         }

@@ -74,26 +74,26 @@ impl OffsetJournal {
 
     /// What is left of this axis in this control.
     #[must_use]
-    pub fn left(&self, axis: Axis) -> Option<Left> {
-        self.content.controls.get(&self.target)?.get(axis.word()).copied()
+    pub fn find_leftover(&self, axis: Axis) -> Option<Left> {
+        self.content.controls.get(&self.target)?.get(axis.as_word()).copied()
     }
 
     /// What is left in every control: its address, the axis, and what it is.
-    pub fn all(&self) -> impl Iterator<Item = (&str, Axis, Left)> {
+    pub fn list_leftovers(&self) -> impl Iterator<Item = (&str, Axis, Left)> {
         let each = self.content.controls.iter().flat_map(|(target, axes)| axes.iter().map(move |it| (target, it)));
-        each.filter_map(|(target, (axis, left))| Some((target.as_str(), Axis::of(axis)?, *left)))
+        each.filter_map(|(target, (axis, left))| Some((target.as_str(), Axis::from_word(axis)?, *left)))
     }
 
     /// Keeps what is left of this axis; returns when it would survive a power cut.
     ///
     /// # Errors
     /// It cannot be written; the book stays as it was.
-    pub fn keep(&mut self, axis: Axis, left: Option<Left>) -> io::Result<()> {
+    pub fn store_leftover(&mut self, axis: Axis, left: Option<Left>) -> io::Result<()> {
         let mut content = self.content.clone();
         let axes = content.controls.entry(self.target.clone()).or_default();
         match left {
-            Some(left) => drop(axes.insert(axis.word().to_owned(), left)),
-            None => drop(axes.remove(axis.word())),
+            Some(left) => drop(axes.insert(axis.as_word().to_owned(), left)),
+            None => drop(axes.remove(axis.as_word())),
         }
         content.controls.retain(|_, axes| !axes.is_empty());
         if content == self.content {
@@ -124,13 +124,13 @@ mod tests {
     fn what_is_left_in_another_control_stays_in_the_book() {
         let directory = tempfile::tempdir().expect("a directory");
         let mut book = OffsetJournal::open(directory.path(), "fanuc://a").expect("none yet");
-        book.keep(Axis::Z, Some(LEFT)).expect("written");
+        book.store_leftover(Axis::Z, Some(LEFT)).expect("written");
         let mut other = OffsetJournal::open(directory.path(), "fanuc://b").expect("readable");
-        assert_eq!(other.left(Axis::Z), None);
-        other.keep(Axis::X, Some(LEFT)).expect("written");
-        other.keep(Axis::X, None).expect("written");
+        assert_eq!(other.find_leftover(Axis::Z), None);
+        other.store_leftover(Axis::X, Some(LEFT)).expect("written");
+        other.store_leftover(Axis::X, None).expect("written");
         let book = OffsetJournal::open(directory.path(), "fanuc://a").expect("readable");
-        assert_eq!(book.all().collect::<Vec<_>>(), [("fanuc://a", Axis::Z, LEFT)]);
+        assert_eq!(book.list_leftovers().collect::<Vec<_>>(), [("fanuc://a", Axis::Z, LEFT)]);
     }
 
     #[test]
@@ -140,10 +140,10 @@ mod tests {
         let first = r#"{"schema":"offsets/1","target":"fanuc://a","axes":{"z":{"base_um":40.0,"written_um":45.0}}}"#;
         std::fs::write(&path, first).expect("written");
         let book = OffsetJournal::open(directory.path(), "fanuc://a").expect("readable");
-        assert_eq!(book.left(Axis::Z), Some(Left { intended_um: None, ..LEFT }));
+        assert_eq!(book.find_leftover(Axis::Z), Some(Left { intended_um: None, ..LEFT }));
         std::fs::write(&path, &first[..30]).expect("written");
         assert!(OffsetJournal::open(directory.path(), "fanuc://a").is_err());
         let (book, aside) = OffsetJournal::begin_anew(directory.path(), "fanuc://a").expect("put aside");
-        assert!(aside.is_file() && book.all().next().is_none());
+        assert!(aside.is_file() && book.list_leftovers().next().is_none());
     }
 }

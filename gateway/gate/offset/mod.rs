@@ -125,19 +125,19 @@ impl Offsets {
     }
 
     /// An earlier run has left this shift. One of an axis that the configuration no longer names is given back.
-    pub fn resume(&mut self, axis: Axis, shift_um: f64) {
+    pub fn resume_shift(&mut self, axis: Axis, shift_um: f64) {
         if !self.slides.iter().any(|slide| slide.axis == axis) {
             self.slides.push(Slide { retired: true, ..Slide::new(axis) });
         }
-        self.of(axis, |slide| slide.shift_um = shift_um);
+        self.change_slide(axis, |slide| slide.shift_um = shift_um);
     }
 
     /// What is in force is not known for sure: it is looked at before anything is written.
-    pub fn unsettle(&mut self, axis: Axis) {
-        self.of(axis, |slide| slide.unsettled = true);
+    pub fn mark_unsettled(&mut self, axis: Axis) {
+        self.change_slide(axis, |slide| slide.unsettled = true);
     }
 
-    fn of(&mut self, axis: Axis, change: impl FnMut(&mut Slide)) {
+    fn change_slide(&mut self, axis: Axis, change: impl FnMut(&mut Slide)) {
         self.slides.iter_mut().filter(|slide| slide.axis == axis).for_each(change);
     }
 
@@ -147,8 +147,8 @@ impl Offsets {
     }
 
     /// What is to be looked at now, while nothing stands in the way.
-    pub(super) fn looks(&mut self, at_ns: TimeNs) -> Vec<OffsetOrder> {
-        self.slides.iter_mut().filter_map(|slide| slide.look(at_ns)).collect()
+    pub(super) fn collect_look_orders(&mut self, at_ns: TimeNs) -> Vec<OffsetOrder> {
+        self.slides.iter_mut().filter_map(|slide| slide.next_look_order(at_ns)).collect()
     }
 
     /// Is there anything to decide about?
@@ -168,7 +168,7 @@ impl Offsets {
     }
 
     /// Decides about every axis that is proposed for or shifted.
-    pub(super) fn decide(&mut self, proposals: &[OffsetProposal], now: Circumstances) -> Vec<OffsetVerdict> {
+    pub(super) fn decide_offsets(&mut self, proposals: &[OffsetProposal], now: Circumstances) -> Vec<OffsetVerdict> {
         let strange = proposals.iter().filter(|it| !self.slides.iter().any(|slide| slide.axis == it.axis));
         let mut verdicts: Vec<OffsetVerdict> = strange.map(|it| not_allowed(it, now)).collect();
         let rested = self.ordered_ns.is_none_or(|ordered_ns| {
@@ -178,12 +178,12 @@ impl Offsets {
         for slide in &mut self.slides {
             let of_slide = |it: &&OffsetProposal| it.axis == slide.axis && !slide.retired;
             let wanted_um = proposals.iter().find(of_slide).map(|it| it.offset_um);
-            if slide.rests(wanted_um.is_some(), now.at_ns) {
+            if slide.update_rest(wanted_um.is_some(), now.at_ns) {
                 continue;
             }
-            let mut verdict = slide.judge(wanted_um, &self.limits, now);
+            let mut verdict = slide.judge_shift(wanted_um, &self.limits, now);
             if rested && now.hold.is_none() && slide.may_order() && self.limits.mode == GateMode::Armed {
-                verdict.order = slide.order(&verdict, &self.limits);
+                verdict.order = slide.plan_order(&verdict, &self.limits);
                 slide.waiting = verdict.order.is_some();
             }
             if verdict.order.is_some() {
@@ -195,8 +195,8 @@ impl Offsets {
     }
 
     /// The answer to an order: what is in force now, where that is known.
-    pub fn answered(&mut self, moved: &Moved) {
-        self.of(moved.order.axis(), |slide| {
+    pub fn accept_answer(&mut self, moved: &Moved) {
+        self.change_slide(moved.order.axis(), |slide| {
             slide.waiting = false;
             slide.unsettled = moved.is_open() || (slide.unsettled && moved.result.is_err());
             if let Ok(shifted) = &moved.result {
@@ -206,13 +206,13 @@ impl Offsets {
     }
 
     /// An order that was not carried out.
-    pub fn withdrawn(&mut self, order: OffsetOrder) {
-        self.of(order.axis(), |slide| slide.waiting = false);
+    pub fn withdraw_order(&mut self, order: OffsetOrder) {
+        self.change_slide(order.axis(), |slide| slide.waiting = false);
     }
 
     /// What is to be given back at the end.
     #[must_use]
-    pub fn farewell(&self) -> Vec<OffsetOrder> {
+    pub fn list_restore_orders(&self) -> Vec<OffsetOrder> {
         let restore = self.limits.restore && self.limits.mode == GateMode::Armed;
         let shifted = self.slides.iter().filter(|slide| restore && slide.shift_um != 0.0);
         shifted.map(|slide| OffsetOrder::Restore(slide.axis)).collect()
@@ -250,7 +250,7 @@ impl Slide {
         !self.waiting && !self.unsettled
     }
 
-    fn look(&mut self, at_ns: TimeNs) -> Option<OffsetOrder> {
+    fn next_look_order(&mut self, at_ns: TimeNs) -> Option<OffsetOrder> {
         let since_ns = |looked_ns: TimeNs| at_ns - looked_ns;
         let rested = self.looked_ns.is_none_or(|looked_ns| !(0..LOOK_EVERY_NS).contains(&since_ns(looked_ns)));
         let looks = self.unsettled && !self.waiting && rested;
@@ -261,7 +261,7 @@ impl Slide {
     }
 
     /// Nothing is proposed, and nothing to be given back yet.
-    fn rests(&mut self, proposed: bool, at_ns: TimeNs) -> bool {
+    fn update_rest(&mut self, proposed: bool, at_ns: TimeNs) -> bool {
         if proposed {
             self.proposed_ns = Some(at_ns);
             return false;
@@ -270,7 +270,7 @@ impl Slide {
         self.shift_um == 0.0 || (0..MISSING_NS).contains(&since_ns)
     }
 
-    fn judge(&self, wanted_um: Option<f64>, limits: &config::OffsetConfig, now: Circumstances) -> OffsetVerdict {
+    fn judge_shift(&self, wanted_um: Option<f64>, limits: &config::OffsetConfig, now: Circumstances) -> OffsetVerdict {
         let finite = wanted_um.is_none_or(f64::is_finite);
         // Controls count in whole micrometres.
         let target_um =
@@ -290,7 +290,7 @@ impl Slide {
     }
 
     /// What is to be written: a step while armed; afterwards everything back, where that is configured.
-    fn order(&self, verdict: &OffsetVerdict, limits: &config::OffsetConfig) -> Option<OffsetOrder> {
+    fn plan_order(&self, verdict: &OffsetVerdict, limits: &config::OffsetConfig) -> Option<OffsetOrder> {
         if verdict.armed && !self.retired {
             let (axis, from_um, wanted_um) = (self.axis, self.shift_um, verdict.permitted_um);
             let step = OffsetOrder::Shift { axis, from_um, wanted_um };

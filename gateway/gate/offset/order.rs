@@ -3,7 +3,7 @@
 use crate::gate::Fault;
 use adapters::SourceError;
 use adapters::clock::TimeNs;
-use adapters::offset::{Axis, LastWrite, Left, same};
+use adapters::offset::{Axis, LastWrite, Left, is_same_offset};
 
 /// What is to be done at the control.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,13 +58,13 @@ impl Shifted {
     /// Is in force what was written?
     #[must_use]
     pub fn is_taken(&self) -> bool {
-        same(self.asked_um, self.after_um)
+        is_same_offset(self.asked_um, self.after_um)
     }
 
     /// Was anything written?
     #[must_use]
     pub fn is_written(&self) -> bool {
-        !same(self.asked_um, self.before_um)
+        !is_same_offset(self.asked_um, self.before_um)
     }
 }
 

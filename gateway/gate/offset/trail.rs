@@ -3,7 +3,7 @@
 use super::order::{Moved, OffsetOrder, Shifted};
 use super::{OffsetBound, OffsetOutcome, OffsetVerdict};
 use crate::config;
-use crate::gate::trail::{Author, RowRate, words};
+use crate::gate::trail::{Author, RowRate, truncate_text};
 use crate::history::Audit;
 use adapters::offset::{Axis, LastWrite};
 use rules::script::OffsetProposal;
@@ -28,7 +28,7 @@ pub struct OffsetTrail {
 
 impl OffsetTrail {
     /// The row of this axis at this tick, if the proposal or its fate is another than before.
-    pub fn proposal(
+    pub fn audit_proposal(
         &mut self,
         proposal: Option<&OffsetProposal>,
         verdict: &OffsetVerdict,
@@ -51,22 +51,22 @@ impl OffsetTrail {
         }
         *last = Some(known);
         let left_out = self.pace.may_tell(verdict.at_ns)?;
-        let wanted = proposal.map_or("nothing is proposed any more".to_owned(), |it| words(&it.reason));
+        let wanted = proposal.map_or("nothing is proposed any more".to_owned(), |it| truncate_text(&it.reason));
         Some(Audit {
-            outcome: outcome(verdict).to_owned(),
+            outcome: outcome_word(verdict).to_owned(),
             before: Some(verdict.shift_um),
             asked: verdict.wanted_um,
             after: Some(verdict.permitted_um),
-            reason: format!("{wanted}: {}{left_out}", reason(verdict, limits)),
-            script: proposal.map_or(String::new(), |it| words(&it.script)),
+            reason: format!("{wanted}: {}{left_out}", describe_reason(verdict, limits)),
+            script: proposal.map_or(String::new(), |it| truncate_text(&it.script)),
             script_version: proposal.map_or(String::new(), |it| format!("{:016x}", it.version)),
-            ..row("request", verdict.axis, verdict.at_ns)
+            ..new_row("request", verdict.axis, verdict.at_ns)
         })
     }
 
     /// The row of an order that was carried out, or could not be. One that changed nothing and found nothing is no news.
     #[must_use]
-    pub fn moved(&self, moved: &Moved) -> Option<Audit> {
+    pub fn audit_move(&self, moved: &Moved) -> Option<Audit> {
         let axis = moved.order.axis();
         let author = &self.authors[axis.index()];
         let (script, script_version) = match moved.order {
@@ -76,19 +76,23 @@ impl OffsetTrail {
         let signed = |row: Audit| Audit { script, script_version, ..row };
         match &moved.result {
             Ok(None) => None,
-            Ok(Some(shifted)) if shifted.is_written() => Some(signed(written(moved, shifted, &author.reason))),
-            Ok(Some(shifted)) => found(moved, shifted),
+            Ok(Some(shifted)) if shifted.is_written() => Some(signed(audit_write(moved, shifted, &author.reason))),
+            Ok(Some(shifted)) => audit_finding(moved, shifted),
             Err(error) => {
                 let outcome = if moved.fault().is_some() { "failed" } else { "refused" };
                 let open = if moved.is_open() { "; whether it was taken is looked at next" } else { "" };
-                let reason = format!("{}{open}", words(&error.to_string()));
-                Some(signed(Audit { outcome: outcome.to_owned(), reason, ..row(verb(moved.order), axis, moved.at_ns) }))
+                let reason = format!("{}{open}", truncate_text(&error.to_string()));
+                Some(signed(Audit {
+                    outcome: outcome.to_owned(),
+                    reason,
+                    ..new_row(order_verb(moved.order), axis, moved.at_ns)
+                }))
             }
         }
     }
 }
 
-fn verb(order: OffsetOrder) -> &'static str {
+fn order_verb(order: OffsetOrder) -> &'static str {
     match order {
         OffsetOrder::Shift { .. } => "write",
         OffsetOrder::Restore(_) => "restore",
@@ -96,7 +100,7 @@ fn verb(order: OffsetOrder) -> &'static str {
     }
 }
 
-fn written(moved: &Moved, shifted: &Shifted, why: &str) -> Audit {
+fn audit_write(moved: &Moved, shifted: &Shifted, why: &str) -> Audit {
     let (base_um, shift_um) = (shifted.base_um, shifted.shift_um());
     let taken = if shifted.is_taken() { "" } else { "; the control shows something else than was written" };
     let why = if why.is_empty() || matches!(moved.order, OffsetOrder::Restore(_)) {
@@ -110,12 +114,12 @@ fn written(moved: &Moved, shifted: &Shifted, why: &str) -> Audit {
         asked: Some(shifted.asked_um),
         after: Some(shifted.after_um),
         reason: format!("{why}shift {shift_um:+.0} um from {base_um:.0} um set by the operator{taken}"),
-        ..row(verb(moved.order), moved.order.axis(), moved.at_ns)
+        ..new_row(order_verb(moved.order), moved.order.axis(), moved.at_ns)
     }
 }
 
 /// Nothing was written; what was found may be news.
-fn found(moved: &Moved, shifted: &Shifted) -> Option<Audit> {
+fn audit_finding(moved: &Moved, shifted: &Shifted) -> Option<Audit> {
     let (outcome, of_last) = match shifted.last {
         LastWrite::InForce if !matches!(moved.order, OffsetOrder::Look(_)) => return None,
         LastWrite::InForce => ("settled", "as was known"),
@@ -129,16 +133,16 @@ fn found(moved: &Moved, shifted: &Shifted) -> Option<Audit> {
         before: Some(shifted.before_um),
         after: Some(shifted.after_um),
         reason: format!("shift {shift_um:+.0} um from {base_um:.0} um set by the operator; {of_last}"),
-        ..row("found", moved.order.axis(), moved.at_ns)
+        ..new_row("found", moved.order.axis(), moved.at_ns)
     })
 }
 
 /// `z_offset_request` and the like.
-fn row(what: &str, axis: Axis, at_ns: adapters::clock::TimeNs) -> Audit {
-    Audit { at_ns, kind: format!("{}_offset_{what}", axis.word()), unit: "um".to_owned(), ..Audit::default() }
+fn new_row(what: &str, axis: Axis, at_ns: adapters::clock::TimeNs) -> Audit {
+    Audit { at_ns, kind: format!("{}_offset_{what}", axis.as_word()), unit: "um".to_owned(), ..Audit::default() }
 }
 
-fn outcome(verdict: &OffsetVerdict) -> &'static str {
+fn outcome_word(verdict: &OffsetVerdict) -> &'static str {
     match verdict.outcome {
         OffsetOutcome::Held(_) => "held",
         OffsetOutcome::Refused | OffsetOutcome::NotAllowed => "refused",
@@ -149,7 +153,7 @@ fn outcome(verdict: &OffsetVerdict) -> &'static str {
 }
 
 /// Why, for the operator.
-fn reason(verdict: &OffsetVerdict, limits: &config::OffsetConfig) -> String {
+fn describe_reason(verdict: &OffsetVerdict, limits: &config::OffsetConfig) -> String {
     match verdict.outcome {
         OffsetOutcome::Permitted if verdict.armed => "as proposed".to_owned(),
         OffsetOutcome::Permitted => "the gate is not armed for offsets: recorded, not written".to_owned(),

@@ -37,7 +37,7 @@ pub enum Occasion {
 impl Occasion {
     /// In the words of the history.
     #[must_use]
-    pub fn words(self) -> &'static str {
+    pub fn as_words(self) -> &'static str {
         match self {
             Self::Change => "the override was changed",
             Self::SignOfLife => "the sign of life",
@@ -136,7 +136,7 @@ impl<A: Actuator> OverrideWriter<A> {
             dials: VecDeque::new(),
             dial_is_known: false,
             holding: false,
-            owed: Some(Owed::leftover()),
+            owed: Some(Owed::from_leftover()),
             failed: false,
             looked_ns: None,
             changed_ns: None,
@@ -152,37 +152,39 @@ impl<A: Actuator> OverrideWriter<A> {
     /// Writes what an armed verdict asks for, when it has changed or the sign of life is due. The first verdict that is not
     /// armed any more, or asks for nothing, gives the machine back to its dial. Anything else writes nothing; neither does an
     /// armed verdict after a fault, until one that is not armed has been seen.
-    pub fn step(&mut self, verdict: &Verdict, clock: &dyn Clock) -> Option<WriteRecord> {
+    pub fn write_verdict(&mut self, verdict: &Verdict, clock: &dyn Clock) -> Option<WriteRecord> {
         if !verdict.armed {
             self.failed = false;
-            return self.release(clock);
+            return self.release_machine(clock);
         }
         if self.failed {
             return None;
         }
-        let idle = !verdict.asks() || self.dial_is_below(verdict.permitted);
+        let idle = !verdict.has_request() || self.dial_is_below(verdict.permitted);
         if idle || self.owed.is_some() {
-            let written = self.noted(|writer| writer.release(clock));
+            let written = self.track_failure(|writer| writer.release_machine(clock));
             if idle || written.is_some() || self.owed.is_some() {
                 return written;
             }
         }
         let at_ns = clock.now_ns();
-        let occasion = self.due(verdict, at_ns)?;
+        let occasion = self.find_due_occasion(verdict, at_ns)?;
         let failed = |fault| {
             let (asked, sample_ns) = (verdict.permitted, verdict.at_ns);
             WriteRecord { at_ns, sample_ns, occasion, before: None, asked, after: None, fault: Some(fault) }
         };
         let begins = if self.holding { Ok(true) } else { self.may_begin(verdict.permitted, clock) };
-        match (begins, self.interrupted(at_ns, clock)) {
+        match (begins, self.find_interruption(at_ns, clock)) {
             (Ok(false), _) => None,
-            (Err(fault), _) | (Ok(true), Some(fault)) => self.noted(|_| Some(failed(fault))),
-            (Ok(true), None) => self.noted(|writer| writer.write(occasion, verdict.permitted, verdict.at_ns, clock)),
+            (Err(fault), _) | (Ok(true), Some(fault)) => self.track_failure(|_| Some(failed(fault))),
+            (Ok(true), None) => {
+                self.track_failure(|writer| writer.write(occasion, verdict.permitted, verdict.at_ns, clock))
+            }
         }
     }
 
     /// Nothing more is written after a fault.
-    fn noted(&mut self, act: impl FnOnce(&mut Self) -> Option<WriteRecord>) -> Option<WriteRecord> {
+    fn track_failure(&mut self, act: impl FnOnce(&mut Self) -> Option<WriteRecord>) -> Option<WriteRecord> {
         let written = act(self)?;
         self.failed = written.fault.is_some();
         Some(written)
@@ -227,11 +229,11 @@ impl<A: Actuator> OverrideWriter<A> {
 
     /// Signs of life have failed for longer than the ladder waits, and it has taken the dial back: going on from there
     /// would be a leap.
-    fn interrupted(&mut self, now_ns: TimeNs, clock: &dyn Clock) -> Option<Fault> {
+    fn find_interruption(&mut self, now_ns: TimeNs, clock: &dyn Clock) -> Option<Fault> {
         let (at_ns, asked) = *self.recent.back().filter(|_| self.holding)?;
-        let silent = self.late(at_ns, now_ns)?;
+        let silent = self.find_delay(at_ns, now_ns)?;
         let fallen_back = match self.read(clock) {
-            Ok(found) => self.mismatch(asked, found, now_ns).is_some(),
+            Ok(found) => self.find_mismatch(asked, found, now_ns).is_some(),
             // Writing meets it too, and knows what it means.
             Err(SourceError::Off { .. }) => false,
             Err(_) => true,
@@ -240,7 +242,7 @@ impl<A: Actuator> OverrideWriter<A> {
     }
 
     /// More time than the ladder has patience for has passed.
-    fn late(&self, from_ns: TimeNs, to_ns: TimeNs) -> Option<Fault> {
+    fn find_delay(&self, from_ns: TimeNs, to_ns: TimeNs) -> Option<Fault> {
         let silent_ns = to_ns - from_ns;
         let patience_ns = self.pace.heartbeat_ns.saturating_mul(HEARTBEATS_PATIENCE);
         (silent_ns > patience_ns).then_some(Fault::Late { silent_ms: silent_ns / 1_000_000 })
@@ -256,8 +258,8 @@ impl<A: Actuator> OverrideWriter<A> {
     ///
     /// # Errors
     /// What the driver says.
-    pub fn ask(&mut self, request: LadderRequest, clock: &dyn Clock) -> Result<(), SourceError> {
-        self.actuator.ask(clock, request)
+    pub fn send_request(&mut self, request: LadderRequest, clock: &dyn Clock) -> Result<(), SourceError> {
+        self.actuator.ask_ladder(clock, request)
     }
 
     /// Is a change still to be seen in force?
@@ -267,7 +269,7 @@ impl<A: Actuator> OverrideWriter<A> {
     }
 
     /// Reads back whether the last change is in force. `None` while the machine may still need its time.
-    pub fn look(&mut self, clock: &dyn Clock) -> Option<Result<Reaction, Fault>> {
+    pub fn read_reaction(&mut self, clock: &dyn Clock) -> Option<Result<Reaction, Fault>> {
         let pending = self.pending?;
         let found = match self.read(clock) {
             Ok(found) => found,
@@ -278,7 +280,7 @@ impl<A: Actuator> OverrideWriter<A> {
             Err(error) => return self.give_up(Fault::Line(error)),
         };
         let now_ns = clock.now_ns();
-        let makes = |dial| pending.asked.map_or(dial, |asked| self.pace.rule.combine(dial, asked));
+        let makes = |dial| pending.asked.map_or(dial, |asked| self.pace.rule.combine_overrides(dial, asked));
         if self.dials.iter().any(|(_, dial)| makes(*dial) == found) {
             self.pending = None;
             let PendingWrite { asked, sample_ns, issued_ns } = pending;
@@ -288,8 +290,8 @@ impl<A: Actuator> OverrideWriter<A> {
         let over = now_ns - pending.issued_ns >= self.settle_ns;
         let fault = match (pending.asked, over) {
             (Some(asked), true) => Some(self.read_back(asked, found)),
-            (Some(asked), false) => self.mismatch(asked, found, now_ns),
-            (None, true) => Some(Fault::StillInForce(self.shown(found))),
+            (Some(asked), false) => self.find_mismatch(asked, found, now_ns),
+            (None, true) => Some(Fault::StillInForce(self.to_unexpected_reading(found))),
             (None, false) => None,
         };
         fault.and_then(|fault| self.give_up(fault))
@@ -301,7 +303,7 @@ impl<A: Actuator> OverrideWriter<A> {
     }
 
     /// Going back to 100 % does not wait for the least interval between two changes.
-    fn due(&self, verdict: &Verdict, now_ns: TimeNs) -> Option<Occasion> {
+    fn find_due_occasion(&self, verdict: &Verdict, now_ns: TimeNs) -> Option<Occasion> {
         let Some((at_ns, pct)) = self.recent.back().filter(|_| self.holding) else { return Some(Occasion::Change) };
         let back = matches!(verdict.outcome, GateOutcome::Held(_) | GateOutcome::Refused);
         let rested = self.changed_ns.is_none_or(|changed_ns| now_ns - changed_ns >= self.pace.interval_ns);
@@ -336,12 +338,12 @@ impl<A: Actuator> OverrideWriter<A> {
             self.changed_ns = Some(at_ns);
             self.pending = Some(PendingWrite { asked: Some(asked), sample_ns, issued_ns: at_ns });
         }
-        let late = self.late(at_ns, clock.now_ns());
+        let late = self.find_delay(at_ns, clock.now_ns());
         let (after, fault) = match sent.and_then(|()| self.read(clock)) {
-            Ok(found) => (Some(found), self.mismatch(asked, found, at_ns).or(late)),
+            Ok(found) => (Some(found), self.find_mismatch(asked, found, at_ns).or(late)),
             Err(SourceError::Off { .. }) => {
                 self.begin_anew();
-                self.owed = Some(Owed::unreached(at_ns));
+                self.owed = Some(Owed::from_unreached(at_ns));
                 return None;
             }
             Err(error) => (None, Some(Fault::Line(error))),
@@ -363,12 +365,12 @@ impl<A: Actuator> OverrideWriter<A> {
         if self.dials.back().is_none_or(|(_, last)| *last != dial) {
             self.dials.push_back((now_ns, dial));
         }
-        self.forget(now_ns);
+        self.remove_settled(now_ns);
         Ok(found)
     }
 
     /// The newest of what is older than the settling time is still allowed: it was in force when that time began.
-    fn forget(&mut self, now_ns: TimeNs) {
+    fn remove_settled(&mut self, now_ns: TimeNs) {
         let old = |line: &VecDeque<(TimeNs, OverridePct)>| {
             line.get(1).is_some_and(|(next_ns, _)| now_ns - next_ns >= self.settle_ns)
         };
@@ -380,19 +382,21 @@ impl<A: Actuator> OverrideWriter<A> {
         }
     }
 
-    fn mismatch(&mut self, asked: OverridePct, found: OverridePct, now_ns: TimeNs) -> Option<Fault> {
-        self.forget(now_ns);
+    fn find_mismatch(&mut self, asked: OverridePct, found: OverridePct, now_ns: TimeNs) -> Option<Fault> {
+        self.remove_settled(now_ns);
         let rule = self.pace.rule;
-        let known =
-            self.recent.iter().any(|(_, pct)| self.dials.iter().any(|(_, dial)| rule.combine(*dial, *pct) == found));
+        let known = self
+            .recent
+            .iter()
+            .any(|(_, pct)| self.dials.iter().any(|(_, dial)| rule.combine_overrides(*dial, *pct) == found));
         (!known).then(|| self.read_back(asked, found))
     }
 
     fn read_back(&self, asked: OverridePct, found: OverridePct) -> Fault {
-        Fault::ReadBack { asked, shown: self.shown(found) }
+        Fault::ReadBack { asked, shown: self.to_unexpected_reading(found) }
     }
 
-    fn shown(&self, found: OverridePct) -> UnexpectedReading {
+    fn to_unexpected_reading(&self, found: OverridePct) -> UnexpectedReading {
         let dial = self.dials.back().map(|(_, dial)| *dial).filter(|_| self.dial_is_known);
         UnexpectedReading { found, dial, rule: self.pace.rule }
     }

@@ -25,29 +25,29 @@ pub(super) struct Owed {
 
 impl Owed {
     /// Nobody knows what an earlier run has left.
-    pub(super) fn leftover() -> Self {
+    pub(super) fn from_leftover() -> Self {
         Self { leftover: true, next_ns: TimeNs::MIN, told: false }
     }
 
     /// An override of this run is enabled.
     fn at_once() -> Self {
-        Self { leftover: false, ..Self::leftover() }
+        Self { leftover: false, ..Self::from_leftover() }
     }
 
     /// The same, and the machine could not be reached at this moment.
-    pub(super) fn unreached(at_ns: TimeNs) -> Self {
+    pub(super) fn from_unreached(at_ns: TimeNs) -> Self {
         Self { next_ns: at_ns.saturating_add(UNREACHED_AGAIN_NS), ..Self::at_once() }
     }
 }
 
 impl<A: Actuator> OverrideWriter<A> {
     /// Gives the machine back to its dial, if an override of ours is enabled or its withdrawal has failed before.
-    pub fn release(&mut self, clock: &dyn Clock) -> Option<WriteRecord> {
+    pub fn release_machine(&mut self, clock: &dyn Clock) -> Option<WriteRecord> {
         if std::mem::take(&mut self.holding) {
             self.owed = Some(Owed::at_once());
         }
         let owed = self.owed.filter(|owed| owed.next_ns <= clock.now_ns())?;
-        self.withdraw(owed, clock)
+        self.withdraw_override(owed, clock)
     }
 
     /// An override of this run is enabled and could not be withdrawn yet.
@@ -56,13 +56,13 @@ impl<A: Actuator> OverrideWriter<A> {
         self.holding || self.owed.is_some_and(|owed| !owed.leftover)
     }
 
-    fn withdraw(&mut self, owed: Owed, clock: &dyn Clock) -> Option<WriteRecord> {
+    fn withdraw_override(&mut self, owed: Owed, clock: &dyn Clock) -> Option<WriteRecord> {
         let at_ns = clock.now_ns();
         let before = self.recent.back().map(|(_, pct)| *pct);
         let occasion = if owed.leftover { Occasion::Leftover } else { Occasion::Release };
         let sent = match owed.leftover {
             true => self.actuator.withdraw_leftover(clock),
-            false => self.actuator.release(clock).map(|()| true),
+            false => self.actuator.release_override(clock).map(|()| true),
         };
         let written = |after, fault| {
             let asked = OverridePct::FULL;
@@ -99,7 +99,7 @@ impl<A: Actuator> OverrideWriter<A> {
         let told = match found {
             // Where the dial is not known, nobody can say what has to be in force.
             Ok(found) if !self.dial_is_known => (Some(found), None),
-            Ok(found) => (Some(found), self.mismatch(OverridePct::FULL, found, at_ns)),
+            Ok(found) => (Some(found), self.find_mismatch(OverridePct::FULL, found, at_ns)),
             Err(SourceError::Off { .. }) => (None, None),
             Err(error) => (None, Some(Fault::Line(error))),
         };

@@ -5,10 +5,10 @@
 //! runs of (rows, word or reason).
 
 use super::super::reason::PRESENT;
-use super::super::rounding::{TEN, nearest, places_of, rounded};
+use super::super::rounding::{TEN, places_of, round_to_decimals, round_to_integer};
 use super::super::rows::{Column, Word};
 use super::integers;
-use super::varint::{Bytes, put, put_text};
+use super::varint::{Bytes, append_varint, put_text};
 use std::sync::Arc;
 
 /// How the values of a series are written.
@@ -36,7 +36,7 @@ pub struct ValueSummary {
 }
 
 impl ValueSummary {
-    pub(crate) fn of(values: &[f64]) -> Self {
+    pub(crate) fn from_values(values: &[f64]) -> Self {
         if values.is_empty() {
             return Self::default();
         }
@@ -48,7 +48,7 @@ impl ValueSummary {
 
     /// Both together, the means weighted by their counts.
     #[must_use]
-    pub fn and(self, other: Self) -> Self {
+    pub fn merge_with(self, other: Self) -> Self {
         if self.count == 0 || other.count == 0 {
             return if self.count == 0 { other } else { self };
         }
@@ -73,7 +73,7 @@ pub(crate) struct Scratch {
 }
 
 /// Appends the cells of `column` to `out`; numbers are rounded to `decimals` places first unless that is `None`.
-pub(crate) fn encode(
+pub(crate) fn encode_column(
     column: &Column,
     rows: usize,
     decimals: Option<u8>,
@@ -103,14 +103,14 @@ fn encode_numbers(
         present.extend_from_slice(values);
     }
     if let Some(decimals) = decimals {
-        present.iter_mut().for_each(|value| *value = rounded(*value, decimals));
+        present.iter_mut().for_each(|value| *value = round_to_decimals(*value, decimals));
     }
     let encoding = match places_of(present) {
         Some(places) => {
             let scale = TEN[usize::from(places)];
             scratch.integers.clear();
-            scratch.integers.extend(present.iter().map(|value| nearest(value * scale) as i64));
-            integers::encode(&scratch.integers, out);
+            scratch.integers.extend(present.iter().map(|value| round_to_integer(value * scale) as i64));
+            integers::encode_integers(&scratch.integers, out);
             Encoding::Scaled(places)
         }
         None => {
@@ -118,14 +118,14 @@ fn encode_numbers(
             Encoding::Planes
         }
     };
-    SeriesWritten { encoding, summary: ValueSummary::of(present), any_missing }
+    SeriesWritten { encoding, summary: ValueSummary::from_values(present), any_missing }
 }
 
 fn put_runs(codes: &[u8], out: &mut Vec<u8>) {
     let runs = codes.chunk_by(|a, b| a == b);
-    put(out, runs.clone().count() as u64);
+    append_varint(out, runs.clone().count() as u64);
     for run in runs {
-        put(out, run.len() as u64);
+        append_varint(out, run.len() as u64);
         out.push(run[0]);
     }
 }
@@ -142,24 +142,24 @@ fn encode_words(changes: &[(u32, Word)], rows: usize, out: &mut Vec<u8>) -> Seri
     let mut count = 0u64;
     for (index, (row, word)) in changes.iter().enumerate() {
         let end = changes.get(index + 1).map_or(rows, |(next, _)| *next as usize);
-        put(&mut runs, end.saturating_sub(*row as usize) as u64);
+        append_varint(&mut runs, end.saturating_sub(*row as usize) as u64);
         match word {
             Word::Missing(code) => runs.extend([0, *code]),
             Word::Is(text) => {
                 count += end.saturating_sub(*row as usize) as u64;
-                put(&mut runs, 1 + position(&mut words, text) as u64);
+                append_varint(&mut runs, 1 + intern_word(&mut words, text) as u64);
             }
         }
     }
-    put(out, words.len() as u64);
+    append_varint(out, words.len() as u64);
     words.iter().for_each(|word| put_text(out, word));
-    put(out, changes.len() as u64);
+    append_varint(out, changes.len() as u64);
     out.extend_from_slice(&runs);
     let any_missing = count < rows as u64;
     SeriesWritten { encoding: Encoding::Words, summary: ValueSummary { count, ..ValueSummary::default() }, any_missing }
 }
 
-fn position<'a>(words: &mut Vec<&'a str>, text: &'a str) -> usize {
+fn intern_word<'a>(words: &mut Vec<&'a str>, text: &'a str) -> usize {
     words.iter().rposition(|word| *word == text).unwrap_or_else(|| {
         words.push(text);
         words.len() - 1
@@ -195,8 +195,8 @@ pub enum Cells {
     Words(WordCells),
 }
 
-/// Reads what [`encode`] wrote; `None` when the bytes do not fit.
-pub(crate) fn decode(
+/// Reads what [`encode_column`] wrote; `None` when the bytes do not fit.
+pub(crate) fn decode_cells(
     bytes: &[u8],
     rows: usize,
     encoding: Encoding,
@@ -211,7 +211,7 @@ pub(crate) fn decode(
     let values = match encoding {
         Encoding::Scaled(places) => {
             let scale = *TEN.get(usize::from(places))?;
-            integers::decode(&mut bytes, present)?.into_iter().map(|value| value as f64 / scale).collect()
+            integers::decode_integers(&mut bytes, present)?.into_iter().map(|value| value as f64 / scale).collect()
         }
         _ => take_planes(&mut bytes, present)?,
     };
@@ -225,27 +225,27 @@ pub(crate) fn decode(
 
 fn take_runs(bytes: &mut Bytes<'_>, rows: usize) -> Option<Vec<u8>> {
     let mut codes = Vec::with_capacity(rows);
-    for _ in 0..bytes.count()? {
-        let end = codes.len().checked_add(bytes.count()?).filter(|end| *end <= rows)?;
-        codes.resize(end, bytes.byte()?);
+    for _ in 0..bytes.read_count()? {
+        let end = codes.len().checked_add(bytes.read_count()?).filter(|end| *end <= rows)?;
+        codes.resize(end, bytes.read_byte()?);
     }
     (codes.len() == rows).then_some(codes)
 }
 
 fn take_planes(bytes: &mut Bytes<'_>, count: usize) -> Option<Vec<f64>> {
-    let planes = bytes.take(count.checked_mul(8)?)?;
+    let planes = bytes.read_bytes(count.checked_mul(8)?)?;
     let value = |row: usize| f64::from_le_bytes(std::array::from_fn(|plane| planes[plane * count + row]));
     Some((0..count).map(value).collect())
 }
 
 fn decode_words(bytes: &mut Bytes<'_>, rows: usize) -> Option<WordCells> {
-    let count = bytes.count()?;
-    let words: Vec<Arc<str>> = (0..count).map(|_| bytes.text().map(Arc::from)).collect::<Option<_>>()?;
+    let count = bytes.read_count()?;
+    let words: Vec<Arc<str>> = (0..count).map(|_| bytes.read_text().map(Arc::from)).collect::<Option<_>>()?;
     let mut cells = WordCells { words, codes: Vec::with_capacity(rows), missing: Vec::with_capacity(rows) };
-    for _ in 0..bytes.count()? {
-        let end = cells.codes.len().checked_add(bytes.count()?).filter(|end| *end <= rows)?;
-        let (code, missing) = match bytes.count()? {
-            0 => (0, bytes.byte()?),
+    for _ in 0..bytes.read_count()? {
+        let end = cells.codes.len().checked_add(bytes.read_count()?).filter(|end| *end <= rows)?;
+        let (code, missing) = match bytes.read_count()? {
+            0 => (0, bytes.read_byte()?),
             word if word <= cells.words.len() => (u32::try_from(word - 1).ok()?, PRESENT),
             _ => return None,
         };

@@ -31,14 +31,14 @@ impl BlockKey {
     }
 
     /// Appends the sums to a directory.
-    pub(crate) fn seal(&self, directory: &mut Vec<u8>, columns: &[u8]) {
+    pub(crate) fn append_checksums(&self, directory: &mut Vec<u8>, columns: &[u8]) {
         directory.extend_from_slice(&crc32fast::hash(columns).to_le_bytes());
         let sum = self.sum(directory);
         directory.extend_from_slice(&sum.to_le_bytes());
     }
 
     /// The directory without its sums, if it is as it was written.
-    pub(crate) fn unsealed<'a>(&self, directory: &'a [u8]) -> Option<&'a [u8]> {
+    pub(crate) fn strip_checksums<'a>(&self, directory: &'a [u8]) -> Option<&'a [u8]> {
         let (summed, sum) = directory.split_last_chunk::<4>()?;
         let body = summed.len().checked_sub(SUMS - 4)?;
         (self.sum(summed) == u32::from_le_bytes(*sum)).then(|| &summed[..body])
@@ -46,7 +46,7 @@ impl BlockKey {
 }
 
 /// Are these the columns that belong to a sealed directory?
-pub(crate) fn fits(directory: &[u8], columns: &[u8]) -> bool {
-    let sum = directory.len().checked_sub(SUMS).and_then(|at| Bytes(&directory[at..]).take(4));
+pub(crate) fn matches_columns(directory: &[u8], columns: &[u8]) -> bool {
+    let sum = directory.len().checked_sub(SUMS).and_then(|at| Bytes(&directory[at..]).read_bytes(4));
     sum.is_some_and(|sum| sum == crc32fast::hash(columns).to_le_bytes())
 }

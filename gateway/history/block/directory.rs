@@ -2,9 +2,9 @@
 //! that deciding whether a block is wanted does not read the samples.
 
 use super::super::reason::Reasons;
-use super::super::rounding::{TEN, nearest};
+use super::super::rounding::{TEN, round_to_integer};
 use super::cells::{Encoding, ValueSummary};
-use super::varint::{Bytes, put, put_text, unzigzag, zigzag};
+use super::varint::{Bytes, append_varint, put_text, unzigzag, zigzag};
 
 /// Version of the block format, the first byte. From 2 on checksums follow the directory: see [`checksum`](super::checksum).
 const VERSION: u8 = 2;
@@ -45,18 +45,18 @@ pub(crate) struct Directory {
 }
 
 impl Directory {
-    pub(crate) fn entry(&self, series: i64) -> Option<&SeriesEntry> {
+    pub(crate) fn find_entry(&self, series: i64) -> Option<&SeriesEntry> {
         self.entries.iter().find(|entry| entry.series == series)
     }
 
     /// The directory as bytes. Offsets follow from the lengths and are not written.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let mut out = vec![VERSION];
-        put(&mut out, self.rows as u64);
+        append_varint(&mut out, self.rows as u64);
         put_span(&mut out, self.times);
-        put(&mut out, self.entries.len() as u64);
+        append_varint(&mut out, self.entries.len() as u64);
         self.entries.iter().for_each(|entry| put_entry(&mut out, entry));
-        put(&mut out, self.words.len() as u64);
+        append_varint(&mut out, self.words.len() as u64);
         for (code, word) in &self.words {
             out.push(*code);
             put_text(&mut out, word);
@@ -67,19 +67,19 @@ impl Directory {
     /// The directory in `bytes`, without its checksums; `None` when it is of another version or damaged.
     pub(crate) fn parse(bytes: &[u8]) -> Option<Self> {
         let mut bytes = Bytes(bytes);
-        if ![VERSION, VERSION_UNSEALED].contains(&bytes.byte()?) {
+        if ![VERSION, VERSION_UNSEALED].contains(&bytes.read_byte()?) {
             return None;
         }
-        let rows = bytes.count().filter(|rows| *rows <= ROWS_MAX)?;
+        let rows = bytes.read_count().filter(|rows| *rows <= ROWS_MAX)?;
         let mut offset = 0;
         let times = take_span(&mut bytes, &mut offset)?;
         let mut entries = Vec::new();
-        for _ in 0..bytes.count()? {
+        for _ in 0..bytes.read_count()? {
             entries.push(take_entry(&mut bytes, &mut offset)?);
         }
         let mut words = Vec::new();
-        for _ in 0..bytes.count()? {
-            words.push((bytes.byte()?, bytes.text()?.to_owned()));
+        for _ in 0..bytes.read_count()? {
+            words.push((bytes.read_byte()?, bytes.read_text()?.to_owned()));
         }
         Some(Self { rows, times, entries, words })
     }
@@ -87,7 +87,7 @@ impl Directory {
     /// Notes which own reasons may occur, with their words.
     pub(crate) fn note_words(&mut self, codes: &[bool; 256], reasons: &Reasons) {
         let used = (0..=u8::MAX).filter(|code| codes[usize::from(*code)] && Reasons::is_own(*code));
-        self.words = used.filter_map(|code| Some((code, reasons.word(code)?.to_owned()))).collect();
+        self.words = used.filter_map(|code| Some((code, reasons.find_word(code)?.to_owned()))).collect();
     }
 }
 
@@ -98,25 +98,25 @@ pub(crate) fn is_sealed(bytes: &[u8]) -> bool {
 }
 
 fn put_span(out: &mut Vec<u8>, span: ByteSpan) {
-    put(out, span.stored as u64);
-    put(out, span.unpacked as u64);
+    append_varint(out, span.stored as u64);
+    append_varint(out, span.unpacked as u64);
 }
 
 fn take_span(bytes: &mut Bytes<'_>, offset: &mut usize) -> Option<ByteSpan> {
-    let span = ByteSpan { offset: *offset, stored: bytes.count()?, unpacked: bytes.count()? };
+    let span = ByteSpan { offset: *offset, stored: bytes.read_count()?, unpacked: bytes.read_count()? };
     *offset = offset.checked_add(span.stored)?;
     Some(span)
 }
 
 fn put_entry(out: &mut Vec<u8>, entry: &SeriesEntry) {
-    put(out, zigzag(entry.series));
+    append_varint(out, zigzag(entry.series));
     let encoding = match entry.encoding {
         Encoding::Scaled(places) => places,
         Encoding::Planes => PLANES,
         Encoding::Words => WORDS,
     };
     out.push(encoding | if entry.any_missing { MISSING } else { 0 });
-    put(out, entry.summary.count);
+    append_varint(out, entry.summary.count);
     if entry.summary.count > 0 {
         put_summary(out, entry);
     }
@@ -129,7 +129,7 @@ fn put_summary(out: &mut Vec<u8>, entry: &SeriesEntry) {
         Encoding::Words => {}
         Encoding::Scaled(places) => {
             let scale = TEN[usize::from(places)];
-            [min, max].iter().for_each(|value| put(out, zigzag(nearest(value * scale) as i64)));
+            [min, max].iter().for_each(|value| append_varint(out, zigzag(round_to_integer(value * scale) as i64)));
             out.extend_from_slice(&mean.to_le_bytes());
         }
         Encoding::Planes => [min, max, mean].iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes())),
@@ -137,15 +137,15 @@ fn put_summary(out: &mut Vec<u8>, entry: &SeriesEntry) {
 }
 
 fn take_entry(bytes: &mut Bytes<'_>, offset: &mut usize) -> Option<SeriesEntry> {
-    let series = unzigzag(bytes.varint()?);
-    let byte = bytes.byte()?;
+    let series = unzigzag(bytes.read_varint()?);
+    let byte = bytes.read_byte()?;
     let encoding = match byte & !MISSING {
         PLANES => Encoding::Planes,
         WORDS => Encoding::Words,
         places if usize::from(places) < TEN.len() => Encoding::Scaled(places),
         _ => return None,
     };
-    let mut summary = ValueSummary { count: bytes.varint()?, ..ValueSummary::default() };
+    let mut summary = ValueSummary { count: bytes.read_varint()?, ..ValueSummary::default() };
     if summary.count > 0 {
         take_summary(bytes, encoding, &mut summary)?;
     }
@@ -158,14 +158,14 @@ fn take_summary(bytes: &mut Bytes<'_>, encoding: Encoding, summary: &mut ValueSu
         Encoding::Words => return Some(()),
         Encoding::Scaled(places) => {
             let scale = TEN[usize::from(places)];
-            summary.min = unzigzag(bytes.varint()?) as f64 / scale;
-            summary.max = unzigzag(bytes.varint()?) as f64 / scale;
+            summary.min = unzigzag(bytes.read_varint()?) as f64 / scale;
+            summary.max = unzigzag(bytes.read_varint()?) as f64 / scale;
         }
         Encoding::Planes => {
-            summary.min = bytes.f64()?;
-            summary.max = bytes.f64()?;
+            summary.min = bytes.read_f64()?;
+            summary.max = bytes.read_f64()?;
         }
     }
-    summary.mean = bytes.f64()?;
+    summary.mean = bytes.read_f64()?;
     Some(())
 }

@@ -48,7 +48,7 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    pub(crate) fn bytes(&self) -> usize {
+    pub(crate) fn size_bytes(&self) -> usize {
         self.directory.len() + self.columns.len()
     }
 }
@@ -70,7 +70,7 @@ impl Encoder {
     }
 
     /// The block of `rows`, which must not be empty. Series without a single value or reason take no room.
-    pub(crate) fn encode(
+    pub(crate) fn encode_block(
         &mut self,
         rows: &SeriesRows,
         series: &[Series],
@@ -81,11 +81,11 @@ impl Encoder {
         let mut directory = Directory { rows: rows.len(), ..Directory::default() };
         let mut columns;
         let mut summaries = Vec::new();
-        (directory.times, columns) = self.times(&rows.at_ns);
+        (directory.times, columns) = self.encode_times(&rows.at_ns);
         for (series, column) in series.iter().zip(&rows.columns).filter(|(_, column)| !column.is_unused()) {
             self.plain.clear();
-            let written = cells::encode(column, rows.len(), series.decimals, &mut self.scratch, &mut self.plain);
-            let span = self.pack(&mut columns);
+            let written = cells::encode_column(column, rows.len(), series.decimals, &mut self.scratch, &mut self.plain);
+            let span = self.pack_plain(&mut columns);
             if written.encoding != Encoding::Words && written.summary.count > 0 {
                 summaries.push((series.id, written.summary));
             }
@@ -101,22 +101,22 @@ impl Encoder {
             end_ns: rows.at_ns.last().copied().unwrap_or_default(),
         };
         let mut directory = directory.to_bytes();
-        key.seal(&mut directory, &columns);
+        key.append_checksums(&mut directory, &columns);
         Block { key, directory, columns, summaries }
     }
 
     /// The first stream of a block: the times of its rows.
-    pub(crate) fn times(&mut self, at_ns: &[TimeNs]) -> (ByteSpan, Vec<u8>) {
+    pub(crate) fn encode_times(&mut self, at_ns: &[TimeNs]) -> (ByteSpan, Vec<u8>) {
         self.plain.clear();
         self.integers.clear();
         self.integers.extend_from_slice(at_ns);
-        integers::encode(&self.integers, &mut self.plain);
+        integers::encode_integers(&self.integers, &mut self.plain);
         let mut columns = Vec::new();
-        (self.pack(&mut columns), columns)
+        (self.pack_plain(&mut columns), columns)
     }
 
     /// Appends `plain` to `columns`, compressed when that is shorter.
-    fn pack(&mut self, columns: &mut Vec<u8>) -> ByteSpan {
+    fn pack_plain(&mut self, columns: &mut Vec<u8>) -> ByteSpan {
         let (offset, unpacked) = (columns.len(), self.plain.len());
         let packed = (unpacked >= PACK_FROM).then(|| self.zstd.compress(&self.plain).ok()).flatten();
         match packed.filter(|packed| packed.len() < unpacked) {
@@ -152,19 +152,19 @@ impl Decoder {
     }
 
     /// The times of the rows; `None` when the block is damaged.
-    pub(crate) fn times(&mut self, directory: &Directory, columns: &[u8]) -> Option<Vec<TimeNs>> {
-        let plain = self.unpack(directory.times, columns)?;
-        integers::decode(&mut Bytes(&plain), directory.rows)
+    pub(crate) fn decode_times(&mut self, directory: &Directory, columns: &[u8]) -> Option<Vec<TimeNs>> {
+        let plain = self.unpack_span(directory.times, columns)?;
+        integers::decode_integers(&mut Bytes(&plain), directory.rows)
     }
 
     /// The cells of one series; `None` when the block is damaged.
-    pub(crate) fn cells(&mut self, directory: &Directory, entry: &SeriesEntry, columns: &[u8]) -> Option<Cells> {
-        let plain = self.unpack(entry.span, columns)?;
+    pub(crate) fn decode_cells(&mut self, directory: &Directory, entry: &SeriesEntry, columns: &[u8]) -> Option<Cells> {
+        let plain = self.unpack_span(entry.span, columns)?;
         let present = usize::try_from(entry.summary.count).ok().filter(|count| *count <= directory.rows)?;
-        cells::decode(&plain, directory.rows, entry.encoding, entry.any_missing, present)
+        cells::decode_cells(&plain, directory.rows, entry.encoding, entry.any_missing, present)
     }
 
-    fn unpack<'a>(&mut self, span: ByteSpan, columns: &'a [u8]) -> Option<std::borrow::Cow<'a, [u8]>> {
+    fn unpack_span<'a>(&mut self, span: ByteSpan, columns: &'a [u8]) -> Option<std::borrow::Cow<'a, [u8]>> {
         let stored = columns.get(span.offset..span.offset.checked_add(span.stored)?)?;
         if span.stored == span.unpacked {
             return Some(stored.into());

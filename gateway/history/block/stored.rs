@@ -1,6 +1,6 @@
 //! A block as it lies in its row.
 
-use super::checksum::{BlockKey, fits};
+use super::checksum::{BlockKey, matches_columns};
 use super::directory::{Directory, is_sealed};
 use super::{Decoder, Encoder};
 use rusqlite::Row;
@@ -31,10 +31,10 @@ impl StoredBlock {
 
     /// The directory, if the block is as it was written. A block of an older version has no checksum: there the directory alone
     /// has to make sense.
-    pub(crate) fn checked(&self) -> Option<Directory> {
+    pub(crate) fn verify_directory(&self) -> Option<Directory> {
         let (key, bytes) = (&self.key, self.directory.as_slice());
         let directory = if is_sealed(bytes) {
-            Directory::parse(key.unsealed(bytes)?).filter(|_| fits(bytes, &self.columns))?
+            Directory::parse(key.strip_checksums(bytes)?).filter(|_| matches_columns(bytes, &self.columns))?
         } else {
             Directory::parse(bytes)?
         };
@@ -42,13 +42,13 @@ impl StoredBlock {
     }
 
     /// The same samples `by_ns` later, with checksums; `None` when the block is damaged.
-    pub(crate) fn moved(&self, by_ns: i64, encoder: &mut Encoder, decoder: &mut Decoder) -> Option<Self> {
-        let mut directory = self.checked()?;
-        let mut times = decoder.times(&directory, &self.columns)?;
+    pub(crate) fn with_shifted_times(&self, by_ns: i64, encoder: &mut Encoder, decoder: &mut Decoder) -> Option<Self> {
+        let mut directory = self.verify_directory()?;
+        let mut times = decoder.decode_times(&directory, &self.columns)?;
         times.iter_mut().for_each(|at_ns| *at_ns = at_ns.saturating_add(by_ns));
         // The times come first, and places follow from the lengths: what comes after them stays as it is.
         let rest = self.columns.get(directory.times.stored..)?;
-        let (span, mut columns) = encoder.times(&times);
+        let (span, mut columns) = encoder.encode_times(&times);
         columns.extend_from_slice(rest);
         directory.times = span;
         let key = BlockKey {
@@ -57,20 +57,20 @@ impl StoredBlock {
             ..self.key
         };
         let mut directory = directory.to_bytes();
-        key.seal(&mut directory, &columns);
+        key.append_checksums(&mut directory, &columns);
         Some(Self { key, directory, columns })
     }
 
     /// The same with checksums, where it has none; `None` when it does not decode.
-    pub(crate) fn sealed(&self, decoder: &mut Decoder) -> Option<Self> {
-        let directory = self.checked()?;
-        decoder.times(&directory, &self.columns)?;
-        let whole = |entry| decoder.cells(&directory, entry, &self.columns).is_some();
+    pub(crate) fn with_checksums(&self, decoder: &mut Decoder) -> Option<Self> {
+        let directory = self.verify_directory()?;
+        decoder.decode_times(&directory, &self.columns)?;
+        let whole = |entry| decoder.decode_cells(&directory, entry, &self.columns).is_some();
         if !directory.entries.iter().all(whole) {
             return None;
         }
         let mut bytes = directory.to_bytes();
-        self.key.seal(&mut bytes, &self.columns);
+        self.key.append_checksums(&mut bytes, &self.columns);
         Some(Self { directory: bytes, ..self.clone() })
     }
 

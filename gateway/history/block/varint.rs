@@ -3,7 +3,7 @@
 
 /// Appends `value`.
 #[inline]
-pub(crate) fn put(out: &mut Vec<u8>, mut value: u64) {
+pub(crate) fn append_varint(out: &mut Vec<u8>, mut value: u64) {
     while value >= 0x80 {
         out.push(value as u8 | 0x80);
         value >>= 7;
@@ -29,21 +29,21 @@ pub(crate) struct Bytes<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Bytes<'a> {
     #[inline]
-    pub(crate) fn byte(&mut self) -> Option<u8> {
+    pub(crate) fn read_byte(&mut self) -> Option<u8> {
         let (first, rest) = self.0.split_first()?;
         self.0 = rest;
         Some(*first)
     }
 
     #[inline]
-    pub(crate) fn varint(&mut self) -> Option<u64> {
-        let first = self.byte()?;
+    pub(crate) fn read_varint(&mut self) -> Option<u64> {
+        let first = self.read_byte()?;
         if first < 0x80 {
             return Some(u64::from(first));
         }
         let mut value = u64::from(first & 0x7f);
         for shift in (7..64).step_by(7) {
-            let byte = self.byte()?;
+            let byte = self.read_byte()?;
             value |= u64::from(byte & 0x7f) << shift;
             if byte < 0x80 {
                 return Some(value);
@@ -53,29 +53,29 @@ impl<'a> Bytes<'a> {
     }
 
     /// A count or length; `None` also when it does not fit into memory.
-    pub(crate) fn count(&mut self) -> Option<usize> {
-        usize::try_from(self.varint()?).ok()
+    pub(crate) fn read_count(&mut self) -> Option<usize> {
+        usize::try_from(self.read_varint()?).ok()
     }
 
-    pub(crate) fn take(&mut self, length: usize) -> Option<&'a [u8]> {
+    pub(crate) fn read_bytes(&mut self, length: usize) -> Option<&'a [u8]> {
         let (taken, rest) = self.0.split_at_checked(length)?;
         self.0 = rest;
         Some(taken)
     }
 
-    pub(crate) fn f64(&mut self) -> Option<f64> {
-        Some(f64::from_le_bytes(self.take(8)?.try_into().ok()?))
+    pub(crate) fn read_f64(&mut self) -> Option<f64> {
+        Some(f64::from_le_bytes(self.read_bytes(8)?.try_into().ok()?))
     }
 
-    pub(crate) fn text(&mut self) -> Option<&'a str> {
-        let length = self.count()?;
-        std::str::from_utf8(self.take(length)?).ok()
+    pub(crate) fn read_text(&mut self) -> Option<&'a str> {
+        let length = self.read_count()?;
+        std::str::from_utf8(self.read_bytes(length)?).ok()
     }
 }
 
 /// Appends text with its length.
 pub(crate) fn put_text(out: &mut Vec<u8>, text: &str) {
-    put(out, text.len() as u64);
+    append_varint(out, text.len() as u64);
     out.extend_from_slice(text.as_bytes());
 }
 
@@ -88,18 +88,18 @@ mod tests {
         #[test]
         fn every_integer_survives(values in prop::collection::vec(any::<i64>(), 0..50)) {
             let mut out = Vec::new();
-            values.iter().for_each(|value| put(&mut out, zigzag(*value)));
+            values.iter().for_each(|value| append_varint(&mut out, zigzag(*value)));
             let mut bytes = Bytes(&out);
             for value in values {
-                prop_assert_eq!(bytes.varint().map(unzigzag), Some(value));
+                prop_assert_eq!(bytes.read_varint().map(unzigzag), Some(value));
             }
-            prop_assert_eq!(bytes.varint(), None);
+            prop_assert_eq!(bytes.read_varint(), None);
         }
 
         #[test]
         fn no_bytes_make_it_panic(input in prop::collection::vec(any::<u8>(), 0..40)) {
             let mut bytes = Bytes(&input);
-            while bytes.varint().is_some() || bytes.text().is_some() || bytes.f64().is_some() {}
+            while bytes.read_varint().is_some() || bytes.read_text().is_some() || bytes.read_f64().is_some() {}
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A time range as CSV.
 
-use super::super::error::{HistoryError, at};
-use super::super::info::utc;
+use super::super::error::{HistoryError, add_path};
+use super::super::info::format_utc;
 use super::super::query::{Chunk, Query};
 use super::super::reader::Reader;
 use super::{ColumnPlan, RUN, run_text};
@@ -21,7 +21,7 @@ pub(super) fn write_gzip(
 ) -> Result<u64, HistoryError> {
     let mut gzip = GzEncoder::new(out, Compression::default());
     let rows = write(reader, query, plan, &mut gzip, path)?;
-    gzip.finish().and_then(|mut out| out.flush()).map_err(at(path))?;
+    gzip.finish().and_then(|mut out| out.flush()).map_err(add_path(path))?;
     Ok(rows)
 }
 
@@ -34,12 +34,12 @@ pub(super) fn write(
     path: &Path,
 ) -> Result<u64, HistoryError> {
     let mut out = ::csv::Writer::from_writer(out);
-    let mut problem = out.write_record(header(plan)).err();
+    let mut problem = out.write_record(format_header(plan)).err();
     let mut rows = 0;
-    let all = Query { series: plan.names(), ..query.clone() };
-    reader.samples(&all, |chunk| {
+    let all = Query { series: plan.series_names(), ..query.clone() };
+    reader.for_each_chunk(&all, |chunk| {
         for row in 0..chunk.at_ns.len() {
-            problem = problem.take().or(out.write_record(cells(plan, chunk, row)).err());
+            problem = problem.take().or(out.write_record(format_cells(plan, chunk, row)).err());
             if problem.is_some() {
                 return ControlFlow::Break(());
             }
@@ -48,8 +48,8 @@ pub(super) fn write(
         ControlFlow::Continue(())
     })?;
     match problem {
-        Some(error) => Err(at(path)(std::io::Error::other(error))),
-        None => out.flush().map(|()| rows).map_err(at(path)),
+        Some(error) => Err(add_path(path)(std::io::Error::other(error))),
+        None => out.flush().map(|()| rows).map_err(add_path(path)),
     }
 }
 
@@ -61,7 +61,7 @@ pub fn plain_cell(text: &str) -> String {
     if formula { format!("'{text}") } else { text.to_owned() }
 }
 
-fn header(plan: &ColumnPlan) -> Vec<String> {
+fn format_header(plan: &ColumnPlan) -> Vec<String> {
     let mut names = vec![if plan.monotone { "time_utc" } else { "time_s" }.to_owned()];
     if !plan.monotone && !plan.has_run() {
         names.push(RUN.to_owned());
@@ -75,20 +75,20 @@ fn header(plan: &ColumnPlan) -> Vec<String> {
     names
 }
 
-fn cells(plan: &ColumnPlan, chunk: &Chunk<'_>, row: usize) -> Vec<String> {
+fn format_cells(plan: &ColumnPlan, chunk: &Chunk<'_>, row: usize) -> Vec<String> {
     let at_ns = chunk.at_ns[row];
-    let mut cells = vec![if plan.monotone { utc(at_ns) } else { plan.seconds(at_ns).to_string() }];
+    let mut cells = vec![if plan.monotone { format_utc(at_ns) } else { plan.seconds_since_start(at_ns).to_string() }];
     if !plan.monotone && !plan.has_run() {
         cells.push(run_text(chunk.segment, None));
     }
     for (index, (series, missing)) in plan.series.iter().enumerate() {
         let column = &chunk.columns[index];
-        let number = column.number(row).map(|number| number.to_string());
-        let text = number.or_else(|| column.word(row).map(plain_cell));
+        let number = column.number_at(row).map(|number| number.to_string());
+        let text = number.or_else(|| column.word_at(row).map(plain_cell));
         let run = !plan.monotone && &*series.name == RUN;
         cells.push(if run { run_text(chunk.segment, text.as_deref()) } else { text.unwrap_or_default() });
         if *missing {
-            let reason = chunk.missing(index, row).filter(|word| *word != "not_provided");
+            let reason = chunk.missing_reason(index, row).filter(|word| *word != "not_provided");
             cells.push(reason.unwrap_or_default().to_owned());
         }
     }

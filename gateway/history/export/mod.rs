@@ -11,7 +11,7 @@ mod recording;
 pub use csv::plain_cell;
 pub use partitions::{DayWritten, day_of};
 
-use super::error::{Doing, HistoryError, at};
+use super::error::{Doing, HistoryError, add_path};
 use super::query::Query;
 use super::reader::Reader;
 use super::series::Series;
@@ -41,7 +41,7 @@ impl Format {
     ///
     /// # Errors
     /// [`HistoryError::Question`] for another ending.
-    pub fn of(path: &Path) -> Result<Self, HistoryError> {
+    pub fn from_path(path: &Path) -> Result<Self, HistoryError> {
         let name = path.to_string_lossy().to_lowercase();
         match name {
             name if name.ends_with(".csv") => Ok(Self::Csv),
@@ -69,12 +69,12 @@ impl ColumnPlan {
         self.series.iter().any(|(series, _)| &*series.name == RUN)
     }
 
-    fn names(&self) -> Vec<String> {
+    fn series_names(&self) -> Vec<String> {
         self.series.iter().map(|(series, _)| series.name.to_string()).collect()
     }
 
     /// Seconds since the first row.
-    fn seconds(&self, at_ns: TimeNs) -> f64 {
+    fn seconds_since_start(&self, at_ns: TimeNs) -> f64 {
         (at_ns - self.first_ns) as f64 / 1e9
     }
 }
@@ -89,11 +89,11 @@ impl Reader {
     ///
     /// # Errors
     /// [`HistoryError::Question`] when there are no rows or the format is unknown, [`HistoryError::Io`], and what
-    /// [`Reader::samples`] says.
-    pub fn export(&self, query: &Query, path: &Path) -> Result<u64, HistoryError> {
-        let format = Format::of(path)?;
-        let plan = self.plan(query)?;
-        let file = File::create(path).map_err(at(path))?;
+    /// [`Reader::for_each_chunk`] says.
+    pub fn export_to_file(&self, query: &Query, path: &Path) -> Result<u64, HistoryError> {
+        let format = Format::from_path(path)?;
+        let plan = self.plan_columns(query)?;
+        let file = File::create(path).map_err(add_path(path))?;
         let out = BufWriter::with_capacity(1 << 16, file);
         match format {
             Format::Csv => csv::write(self, query, &plan, out, path),
@@ -105,23 +105,23 @@ impl Reader {
     /// Writes the answer to `query` as CSV to `out`; how many rows. `name` stands for `out` in messages.
     ///
     /// # Errors
-    /// As [`Reader::export`].
+    /// As [`Reader::export_to_file`].
     pub fn export_csv(&self, query: &Query, out: impl std::io::Write, name: &Path) -> Result<u64, HistoryError> {
-        let plan = self.plan(query)?;
+        let plan = self.plan_columns(query)?;
         csv::write(self, query, &plan, out, name)
     }
 
-    fn plan(&self, query: &Query) -> Result<ColumnPlan, HistoryError> {
-        let known: Arc<[Series]> = self.series()?.into();
-        let mut series = self.delivered(query, &known)?;
+    fn plan_columns(&self, query: &Query) -> Result<ColumnPlan, HistoryError> {
+        let known: Arc<[Series]> = self.read_series()?.into();
+        let mut series = self.find_delivered(query, &known)?;
         if !query.series.is_empty() {
-            let wanted = self.wanted(query, &known)?;
+            let wanted = self.resolve_series(query, &known)?;
             let missing = |id| series.iter().any(|(series, missing)| series.id == id && *missing);
             series = wanted.into_iter().map(|series| (series.clone(), missing(series.id))).collect();
         }
         let mut first_ns = None;
         let one = known.first().map(|series| series.name.to_string());
-        self.samples(&Query { series: one.into_iter().collect(), ..query.clone() }, |chunk| {
+        self.for_each_chunk(&Query { series: one.into_iter().collect(), ..query.clone() }, |chunk| {
             first_ns = chunk.at_ns.first().copied();
             std::ops::ControlFlow::Break(())
         })?;
@@ -140,11 +140,12 @@ impl Reader {
         let mut ends = self
             .db
             .prepare_cached("SELECT start_ns, end_ns FROM blocks WHERE first_row = ?1")
-            .doing("reading the order of blocks")?;
+            .with_activity("reading the order of blocks")?;
         let mut last_ns = TimeNs::MIN;
         for key in keys {
-            let (start_ns, end_ns): (TimeNs, TimeNs) =
-                ends.query_row([key], |row| Ok((row.get(0)?, row.get(1)?))).doing("reading the order of blocks")?;
+            let (start_ns, end_ns): (TimeNs, TimeNs) = ends
+                .query_row([key], |row| Ok((row.get(0)?, row.get(1)?)))
+                .with_activity("reading the order of blocks")?;
             if start_ns < last_ns {
                 return Ok(false);
             }
@@ -158,7 +159,7 @@ impl Reader {
                 [query.range().start, query.range().end],
                 |row| row.get(0),
             )
-            .doing("reading the order of the crash tail")?;
+            .with_activity("reading the order of the crash tail")?;
         Ok(tail.is_none_or(|start_ns| start_ns >= last_ns))
     }
 }

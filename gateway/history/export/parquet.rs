@@ -1,6 +1,6 @@
 //! A time range as Parquet: one column per series, values optional, zstd.
 
-use super::super::error::{HistoryError, at};
+use super::super::error::{HistoryError, add_path};
 use super::super::options::SeriesKind;
 use super::super::query::{Chunk, Query};
 use super::super::reader::Reader;
@@ -37,16 +37,16 @@ pub(super) fn write(
     out: impl Write + Send,
     path: &Path,
 ) -> Result<u64, HistoryError> {
-    let say = |error: ParquetError| at(path)(std::io::Error::other(error));
+    let say = |error: ParquetError| add_path(path)(std::io::Error::other(error));
     let mut group = Group::new(plan);
     let numbers = plan.series.iter().filter(|(series, _)| series.kind == SeriesKind::Number);
     let units = numbers.map(|(series, _)| (format!("unit.{}", series.name), series.unit.to_string()));
-    let schema = schema(plan).map_err(say)?;
-    let properties = properties(about.iter().cloned().chain(units));
+    let schema = build_schema(plan).map_err(say)?;
+    let properties = build_properties(about.iter().cloned().chain(units));
     let mut file = SerializedFileWriter::new(out, schema, properties).map_err(say)?;
     let mut problem = None;
     let mut rows = 0;
-    reader.samples(&Query { series: plan.names(), ..query.clone() }, |chunk| {
+    reader.for_each_chunk(&Query { series: plan.series_names(), ..query.clone() }, |chunk| {
         group.add(chunk);
         rows += chunk.at_ns.len() as u64;
         if group.rows >= GROUP_ROWS {
@@ -60,12 +60,12 @@ pub(super) fn write(
         None => {}
     }
     file.finish().map_err(say)?;
-    file.inner_mut().flush().map_err(at(path))?;
+    file.inner_mut().flush().map_err(add_path(path))?;
     Ok(rows)
 }
 
 /// Compressed, with these pairs in the metadata of the file.
-fn properties(pairs: impl Iterator<Item = (String, String)>) -> Arc<WriterProperties> {
+fn build_properties(pairs: impl Iterator<Item = (String, String)>) -> Arc<WriterProperties> {
     let pairs = pairs.map(|(key, value)| KeyValue::new(key, value)).collect();
     let properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
@@ -81,7 +81,7 @@ pub(super) fn write_diagnoses(
     out: impl Write + Send,
     path: &Path,
 ) -> Result<u64, HistoryError> {
-    let say = |error: ParquetError| at(path)(std::io::Error::other(error));
+    let say = |error: ParquetError| add_path(path)(std::io::Error::other(error));
     let fields = || -> Result<Vec<TypePtr>, ParquetError> {
         let times = ["time_utc", "from_utc", "to_utc"].map(utc_field);
         let texts = ["verdict", "summary", "diagnosis"].map(text_field);
@@ -89,24 +89,24 @@ pub(super) fn write_diagnoses(
     };
     let schema = fields().and_then(|fields| Type::group_type_builder("diagnoses").with_fields(fields).build());
     let about = [("machine".to_owned(), machine.to_owned())];
-    let properties = properties(about.into_iter());
+    let properties = build_properties(about.into_iter());
     let mut file = SerializedFileWriter::new(out, Arc::new(schema.map_err(say)?), properties).map_err(say)?;
     let mut group = file.next_row_group().map_err(say)?;
     let mut index = 0;
     while let Some(column) = group.next_column().map_err(say)? {
         if index < 3 {
             let times: Vec<i64> = rows.iter().map(|row| [row.at_ns, row.from_ns, row.to_ns][index]).collect();
-            put::<Int64Type>(column, &times, None).map_err(say)?;
+            write_column::<Int64Type>(column, &times, None).map_err(say)?;
         } else {
             let texts: Vec<ByteArray> =
                 rows.iter().map(|row| [&row.verdict, &row.summary, &row.json][index - 3].as_str().into()).collect();
-            put::<ByteArrayType>(column, &texts, Some(&vec![1; rows.len()])).map_err(say)?;
+            write_column::<ByteArrayType>(column, &texts, Some(&vec![1; rows.len()])).map_err(say)?;
         }
         index += 1;
     }
     group.close().map_err(say)?;
     file.finish().map_err(say)?;
-    file.inner_mut().flush().map_err(at(path))?;
+    file.inner_mut().flush().map_err(add_path(path))?;
     Ok(rows.len() as u64)
 }
 
@@ -116,7 +116,7 @@ fn utc_field(name: &str) -> Result<TypePtr, ParquetError> {
     field.with_repetition(Repetition::REQUIRED).build().map(Arc::new)
 }
 
-fn schema(plan: &ColumnPlan) -> Result<TypePtr, ParquetError> {
+fn build_schema(plan: &ColumnPlan) -> Result<TypePtr, ParquetError> {
     let mut fields = vec![time_field(plan)?];
     if !plan.monotone && !plan.has_run() {
         fields.push(text_field(RUN)?);
@@ -164,7 +164,7 @@ struct Group<'a> {
 
 impl<'a> Group<'a> {
     fn new(plan: &'a ColumnPlan) -> Self {
-        Self { plan, columns: empty(plan), rows: 0 }
+        Self { plan, columns: build_empty_columns(plan), rows: 0 }
     }
 
     fn add(&mut self, chunk: &Chunk<'_>) {
@@ -180,7 +180,7 @@ impl<'a> Group<'a> {
         if plan.monotone {
             fill(&|row| ParquetCell::Time(chunk.at_ns[row]));
         } else {
-            fill(&|row| ParquetCell::Number(Some(plan.seconds(chunk.at_ns[row]))));
+            fill(&|row| ParquetCell::Number(Some(plan.seconds_since_start(chunk.at_ns[row]))));
         }
         if !plan.monotone && !plan.has_run() {
             fill(&|_| ParquetCell::Text(Some(run_text(chunk.segment, None))));
@@ -188,14 +188,14 @@ impl<'a> Group<'a> {
         for (index, (series, missing)) in plan.series.iter().enumerate() {
             let column = &chunk.columns[index];
             match series.kind {
-                SeriesKind::Number => fill(&|row| ParquetCell::Number(column.number(row))),
+                SeriesKind::Number => fill(&|row| ParquetCell::Number(column.number_at(row))),
                 SeriesKind::Text if !plan.monotone && &*series.name == RUN => {
-                    fill(&|row| ParquetCell::Text(Some(run_text(chunk.segment, column.word(row)))));
+                    fill(&|row| ParquetCell::Text(Some(run_text(chunk.segment, column.word_at(row)))));
                 }
-                SeriesKind::Text => fill(&|row| ParquetCell::Text(column.word(row).map(str::to_owned))),
+                SeriesKind::Text => fill(&|row| ParquetCell::Text(column.word_at(row).map(str::to_owned))),
             }
             if *missing {
-                let reason = |row| chunk.missing(index, row).filter(|word| *word != "not_provided");
+                let reason = |row| chunk.missing_reason(index, row).filter(|word| *word != "not_provided");
                 fill(&|row| ParquetCell::Text(reason(row).map(str::to_owned)));
             }
         }
@@ -206,18 +206,22 @@ impl<'a> Group<'a> {
         for values in &self.columns {
             let Some(column) = group.next_column()? else { break };
             match values {
-                ColumnValues::Times(times) => put::<Int64Type>(column, times, None)?,
-                ColumnValues::Numbers(numbers, levels) => put::<DoubleType>(column, numbers, self.levels(levels))?,
-                ColumnValues::Texts(texts, levels) => put::<ByteArrayType>(column, texts, self.levels(levels))?,
+                ColumnValues::Times(times) => write_column::<Int64Type>(column, times, None)?,
+                ColumnValues::Numbers(numbers, levels) => {
+                    write_column::<DoubleType>(column, numbers, self.levels_if_optional(levels))?
+                }
+                ColumnValues::Texts(texts, levels) => {
+                    write_column::<ByteArrayType>(column, texts, self.levels_if_optional(levels))?
+                }
             }
         }
         group.close()?;
-        (self.columns, self.rows) = (empty(self.plan), 0);
+        (self.columns, self.rows) = (build_empty_columns(self.plan), 0);
         Ok(())
     }
 
     /// The levels of an optional column; the required `time_s` keeps none.
-    fn levels<'b>(&self, levels: &'b [i16]) -> Option<&'b [i16]> {
+    fn levels_if_optional<'b>(&self, levels: &'b [i16]) -> Option<&'b [i16]> {
         (!levels.is_empty()).then_some(levels)
     }
 }
@@ -245,7 +249,7 @@ impl ColumnValues {
     }
 }
 
-fn empty(plan: &ColumnPlan) -> Vec<ColumnValues> {
+fn build_empty_columns(plan: &ColumnPlan) -> Vec<ColumnValues> {
     let texts = || ColumnValues::Texts(Vec::new(), Vec::new());
     let numbers = || ColumnValues::Numbers(Vec::new(), Vec::new());
     let mut columns = vec![if plan.monotone { ColumnValues::Times(Vec::new()) } else { numbers() }];
@@ -261,7 +265,7 @@ fn empty(plan: &ColumnPlan) -> Vec<ColumnValues> {
     columns
 }
 
-fn put<T: DataType>(
+fn write_column<T: DataType>(
     mut column: SerializedColumnWriter<'_>,
     values: &[T::T],
     levels: Option<&[i16]>,

@@ -6,7 +6,7 @@
 //! not at all: it is written under another name first. Units and the name of the machine stand in the metadata of the file as
 //! `unit.<column>` and `machine`.
 
-use super::super::error::{HistoryError, at};
+use super::super::error::{HistoryError, add_path};
 use super::super::list::RecordSpan;
 use super::super::options::DAY_NS;
 use super::super::outbox::known_box_id;
@@ -41,7 +41,7 @@ fn escape_name(name: &str) -> String {
 
 /// The file of a machine, box and day for one kind of rows.
 fn day_file(root: &Path, kind: &str, (machine, box_id): (&str, &str), day_ns: TimeNs) -> PathBuf {
-    let date: String = crate::moment::utc(day_ns).chars().take(10).collect();
+    let date: String = crate::moment::format_utc(day_ns).chars().take(10).collect();
     root.join(kind)
         .join(format!("machine={}", escape_name(machine)))
         .join(format!("date={date}"))
@@ -66,30 +66,31 @@ impl Reader {
     /// is no file of samples, without a diagnosis none of diagnoses.
     ///
     /// # Errors
-    /// As [`Reader::export`].
+    /// As [`Reader::export_to_file`].
     pub fn export_day(&self, root: &Path, machine: &str, day_ns: TimeNs) -> Result<DayWritten, HistoryError> {
         let mut written = DayWritten::default();
         let box_id = self.box_name()?;
         let file = |kind: &str| day_file(root, kind, (machine, &box_id), day_ns);
         let query = Query::between(day_ns, day_ns + DAY_NS);
         if self.has_samples(&query)? {
-            let plan = self.plan(&query)?;
+            let plan = self.plan_columns(&query)?;
             let about = [("machine".to_owned(), machine.to_owned())];
             written.samples =
-                whole(&file("samples"), |out, path| parquet::write(self, &query, &plan, &about, out, path))?;
+                write_whole_file(&file("samples"), |out, path| parquet::write(self, &query, &plan, &about, out, path))?;
         }
-        let diagnoses = self.diagnoses(RecordSpan { from_ns: day_ns, to_ns: day_ns + DAY_NS, limit: u32::MAX })?;
+        let diagnoses = self.read_diagnoses(RecordSpan { from_ns: day_ns, to_ns: day_ns + DAY_NS, limit: u32::MAX })?;
         if !diagnoses.is_empty() {
-            written.diagnoses =
-                whole(&file("diagnoses"), |out, path| parquet::write_diagnoses(&diagnoses, machine, out, path))?;
+            written.diagnoses = write_whole_file(&file("diagnoses"), |out, path| {
+                parquet::write_diagnoses(&diagnoses, machine, out, path)
+            })?;
         }
         Ok(written)
     }
 
     fn has_samples(&self, query: &Query) -> Result<bool, HistoryError> {
         let mut found = false;
-        let one = self.series()?.first().map(|series| series.name.to_string());
-        self.samples(&Query { series: one.into_iter().collect(), ..query.clone() }, |chunk| {
+        let one = self.read_series()?.first().map(|series| series.name.to_string());
+        self.for_each_chunk(&Query { series: one.into_iter().collect(), ..query.clone() }, |chunk| {
             found = !chunk.at_ns.is_empty();
             std::ops::ControlFlow::Break(())
         })?;
@@ -98,17 +99,17 @@ impl Reader {
 }
 
 /// Writes a file under another name, and gives it its own when it is complete.
-fn whole(
+fn write_whole_file(
     path: &Path,
     write: impl FnOnce(BufWriter<File>, &Path) -> Result<u64, HistoryError>,
 ) -> Result<u64, HistoryError> {
     let directory = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(directory).map_err(at(directory))?;
+    fs::create_dir_all(directory).map_err(add_path(directory))?;
     let beside = path.with_extension("part");
-    let file = File::create(&beside).map_err(at(&beside))?;
+    let file = File::create(&beside).map_err(add_path(&beside))?;
     let rows = write(BufWriter::with_capacity(1 << 16, file), &beside)?;
-    File::open(&beside).and_then(|file| file.sync_all()).map_err(at(&beside))?;
-    fs::rename(&beside, path).map_err(at(path))?;
+    File::open(&beside).and_then(|file| file.sync_all()).map_err(add_path(&beside))?;
+    fs::rename(&beside, path).map_err(add_path(path))?;
     Ok(rows)
 }
 

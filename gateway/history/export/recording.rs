@@ -23,15 +23,15 @@ impl Reader {
     /// The answer to `query` as a recording: the series as columns, `<series>_missing` beside those with absent values.
     ///
     /// # Errors
-    /// [`HistoryError::Question`] when there are no rows, and what [`Reader::samples`] says.
-    pub fn recording(&self, query: &Query) -> Result<Recording, HistoryError> {
-        let plan = self.plan(query)?;
+    /// [`HistoryError::Question`] when there are no rows, and what [`Reader::for_each_chunk`] says.
+    pub fn read_recording(&self, query: &Query) -> Result<Recording, HistoryError> {
+        let plan = self.plan_columns(query)?;
         let mut building = ColumnBuilder::new(&plan);
-        self.samples(&Query { series: plan.names(), ..query.clone() }, |chunk| {
+        self.for_each_chunk(&Query { series: plan.series_names(), ..query.clone() }, |chunk| {
             building.add(chunk);
             ControlFlow::Continue(())
         })?;
-        Ok(building.finish(self.path.display().to_string()))
+        Ok(building.into_recording(self.path.display().to_string()))
     }
 }
 
@@ -52,26 +52,26 @@ impl<'a> ColumnBuilder<'a> {
 
     fn add(&mut self, chunk: &Chunk<'_>) {
         let plan = self.plan;
-        self.time_s.extend(chunk.at_ns.iter().map(|at_ns| plan.seconds(*at_ns)));
+        self.time_s.extend(chunk.at_ns.iter().map(|at_ns| plan.seconds_since_start(*at_ns)));
         let run = plan.series.iter().position(|(series, _)| &*series.name == RUN);
         for row in 0..chunk.at_ns.len() {
             if !plan.monotone {
-                let run = run.and_then(|index| chunk.columns[index].word(row));
+                let run = run.and_then(|index| chunk.columns[index].word_at(row));
                 self.runs.push(&run_text(chunk.segment, run));
             }
             for (index, column) in self.columns.iter_mut().enumerate() {
                 match column {
-                    Cells::Numbers(numbers) => numbers.push(chunk.columns[index].number(row)),
-                    Cells::Words(words) => words.push(chunk.columns[index].word(row).unwrap_or("")),
+                    Cells::Numbers(numbers) => numbers.push(chunk.columns[index].number_at(row)),
+                    Cells::Words(words) => words.push(chunk.columns[index].word_at(row).unwrap_or("")),
                 }
                 if let Some(words) = &mut self.missing[index] {
-                    words.push(chunk.missing(index, row).filter(|word| *word != "not_provided").unwrap_or(""));
+                    words.push(chunk.missing_reason(index, row).filter(|word| *word != "not_provided").unwrap_or(""));
                 }
             }
         }
     }
 
-    fn finish(self, source: String) -> Recording {
+    fn into_recording(self, source: String) -> Recording {
         let start_ns = self.plan.monotone.then_some(self.plan.first_ns);
         let mut recording = Recording::new(source, self.time_s, start_ns);
         for ((series, _), (cells, missing)) in self.plan.series.iter().zip(self.columns.into_iter().zip(self.missing)) {

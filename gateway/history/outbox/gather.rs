@@ -1,7 +1,7 @@
 //! On the writer thread: lines of ticks wait here until the commit that makes their rows durable gives them their
 //! numbers.
 
-use super::item::{SeriesInfo, leaves};
+use super::item::{SeriesInfo, is_deliverable};
 use super::line;
 use super::means::{self, MeanSchedule};
 use super::report::{OutboxReport, OutboxSettings};
@@ -72,7 +72,7 @@ pub(crate) struct TransactionWork {
     means: MeanSchedule,
 }
 
-fn info(series: &Series, settings: &OutboxSettings) -> SeriesInfo {
+fn build_series_info(series: &Series, settings: &OutboxSettings) -> SeriesInfo {
     let info = SeriesInfo::from(series);
     SeriesInfo { range: settings.range_of(&info), ..info }
 }
@@ -86,10 +86,10 @@ impl Gatherer {
         series: &[Series],
         newest_ns: Option<TimeNs>,
     ) -> Result<Self, HistoryError> {
-        let stored = store::open(db, &outbox)?;
+        let stored = store::open_outbox(db, &outbox)?;
         let gatherer = Self {
             report: OutboxReport::new(outbox.settings(), series),
-            known: series.iter().map(|series| Arc::new(info(series, outbox.settings()))).collect(),
+            known: series.iter().map(|series| Arc::new(build_series_info(series, outbox.settings()))).collect(),
             waiting: VecDeque::new(),
             bytes: 0,
             lost: 0,
@@ -100,13 +100,13 @@ impl Gatherer {
             means: MeanSchedule::new(newest_ns),
             outbox,
         };
-        gatherer.tell(&Reasons::default());
+        gatherer.publish_state(&Reasons::default());
         Ok(gatherer)
     }
 
     /// Takes on a batch of ticks whose first has the number `first_row`.
-    pub(crate) fn gather(&mut self, rows: &SeriesRows, first_row: i64, series: &[Series], reasons: &Reasons) {
-        let gaps = self.gaps(rows);
+    pub(crate) fn gather_rows(&mut self, rows: &SeriesRows, first_row: i64, series: &[Series], reasons: &Reasons) {
+        let gaps = self.find_gaps(rows);
         let Self { report, waiting, bytes, .. } = self;
         let mut put = |index: usize, at_ns: TimeNs, text: String| {
             *bytes += text.len();
@@ -117,7 +117,7 @@ impl Gatherer {
                 put(row, *from_ns, line::of_gap(*from_ns, Some(*at_ns), reason));
                 report.begin_anew();
             }
-            if let Some(text) = report.tick(rows, row, series, reasons) {
+            if let Some(text) = report.report_tick(rows, row, series, reasons) {
                 put(row, *at_ns, text);
             }
         }
@@ -129,7 +129,7 @@ impl Gatherer {
     }
 
     /// Which of these rows come after a gap: index of the row, where the gap begins, and why.
-    fn gaps(&mut self, rows: &SeriesRows) -> Vec<(usize, TimeNs, &'static str)> {
+    fn find_gaps(&mut self, rows: &SeriesRows) -> Vec<(usize, TimeNs, &'static str)> {
         let tick_ns = i64::try_from(self.outbox.settings().tick.as_nanos()).unwrap_or(i64::MAX);
         let greatest_ns = (GAP.as_nanos() as i64).max(tick_ns.saturating_mul(3));
         let mut gaps = Vec::new();
@@ -161,24 +161,26 @@ impl Gatherer {
         while Instant::now() < until && !self.outbox.is_drained(self.stored.next_sequence) {
             std::thread::sleep(LOOK_EVERY);
         }
-        store::note(db, &self.outbox, &[])
+        store::note_deliveries(db, &self.outbox, &[])
     }
 
     /// The last items: the hour and the day that are running, and that there are no samples from here on.
     fn tell_end(&mut self, db: &mut Connection, reasons: &Reasons) -> Result<(), HistoryError> {
         let Some((last_ns, "no_samples")) = self.last else { return Ok(()) };
         let tick = self.outbox.settings().tick;
-        let ending = db.transaction().doing("ending the outbox")?;
-        let running = self.means.running().collect();
-        let mut lines: Vec<(TimeNs, Cow<'_, str>)> =
-            means::lines(&ending, &running, tick)?.into_iter().map(|(at_ns, text)| (at_ns, text.into())).collect();
+        let ending = db.transaction().with_activity("ending the outbox")?;
+        let running = self.means.current_buckets().collect();
+        let mut lines: Vec<(TimeNs, Cow<'_, str>)> = means::format_lines(&ending, &running, tick)?
+            .into_iter()
+            .map(|(at_ns, text)| (at_ns, text.into()))
+            .collect();
         let from_ns = last_ns.saturating_add(i64::try_from(tick.as_nanos()).unwrap_or(0));
         lines.push((from_ns, line::of_gap(from_ns, None, "stopped").into()));
-        let put = store::put(&ending, &self.outbox, &self.stored, &lines, (false, false))?;
-        ending.commit().doing("ending the outbox")?;
+        let put = store::store_lines(&ending, &self.outbox, &self.stored, &lines, (false, false))?;
+        ending.commit().with_activity("ending the outbox")?;
         self.stored = put.stored;
-        self.outbox.noted(&put.dropped);
-        self.tell(reasons);
+        self.outbox.mark_dropped(&put.dropped);
+        self.publish_state(reasons);
         Ok(())
     }
 
@@ -186,7 +188,7 @@ impl Gatherer {
     /// after as many rows from `opened_row` on as they say, and the means that the stored blocks complete, which begin at these
     /// times; then drops what the bounds do not allow (`ages`: the bound of age too, which only a certain clock can tell), and now
     /// and then notes what the sinks have delivered.
-    pub(crate) fn put<'a>(
+    pub(crate) fn store_items<'a>(
         &self,
         db: &Connection,
         records: impl Iterator<Item = &'a QueuedRecord>,
@@ -195,7 +197,7 @@ impl Gatherer {
     ) -> Result<TransactionWork, HistoryError> {
         let mut lines: Vec<(TimeNs, Cow<'_, str>)> = Vec::new();
         let mut ticks = self.waiting.iter().take_while(|line| line.row < end_row).peekable();
-        for posted in records.filter(|posted| leaves(&posted.record)) {
+        for posted in records.filter(|posted| is_deliverable(&posted.record)) {
             let before = opened_row.saturating_add_unsigned(posted.after_rows);
             while let Some(tick) = ticks.next_if(|tick| tick.row < before) {
                 lines.push((tick.at_ns, tick.text.as_str().into()));
@@ -204,37 +206,37 @@ impl Gatherer {
         }
         lines.extend(ticks.map(|tick| (tick.at_ns, tick.text.as_str().into())));
         let mut means = self.means;
-        let due = means.take(blocks);
-        let told = means::lines(db, &due, self.outbox.settings().tick)?;
+        let due = means.collect_due_buckets(blocks);
+        let told = means::format_lines(db, &due, self.outbox.settings().tick)?;
         lines.extend(told.into_iter().map(|(at_ns, text)| (at_ns, text.into())));
         let ticks = self.waiting.iter().take_while(|line| line.row < end_row).count();
         let tidy = self.outbox.has_news() && self.is_due();
-        let put = store::put(db, &self.outbox, &self.stored, &lines, (tidy, ages))?;
+        let put = store::store_lines(db, &self.outbox, &self.stored, &lines, (tidy, ages))?;
         Ok(TransactionWork { ticks, put, tidy, means })
     }
 
     /// What was put is durable.
-    pub(crate) fn committed(&mut self, taken: TransactionWork, reasons: &Reasons) {
+    pub(crate) fn confirm_commit(&mut self, taken: TransactionWork, reasons: &Reasons) {
         for line in self.waiting.drain(..taken.ticks) {
             self.bytes -= line.text.len();
         }
         self.stored = taken.put.stored;
         self.means = taken.means;
-        self.outbox.noted(&taken.put.dropped);
+        self.outbox.mark_dropped(&taken.put.dropped);
         if taken.tidy {
             self.tidied = Instant::now();
             self.tidy_after = (2 * self.tidy_after).clamp(TIDY_FIRST, TIDY_EVERY);
             self.outbox.connections_noted();
         }
-        self.tell(reasons);
+        self.publish_state(reasons);
     }
 
-    fn tell(&self, reasons: &Reasons) {
+    fn publish_state(&self, reasons: &Reasons) {
         let OutboxContents { next_sequence, newest_ns, .. } = self.stored;
-        self.outbox.publish(
+        self.outbox.publish_state(
             OutboxHead { next_sequence, newest_ns, ready: true },
-            self.stored.figures(self.lost),
-            self.report.latest(&self.known, reasons),
+            self.stored.to_figures(self.lost),
+            self.report.latest_readings(&self.known, reasons),
         );
     }
 }

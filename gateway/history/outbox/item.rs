@@ -46,7 +46,7 @@ pub struct SeriesInfo {
 
 impl From<&Series> for SeriesInfo {
     fn from(series: &Series) -> Self {
-        let channel = ChannelId::of(&series.name).filter(|_| !series.estimated).map(ChannelId::channel);
+        let channel = ChannelId::from_name(&series.name).filter(|_| !series.estimated).map(ChannelId::channel);
         Self {
             id: series.id,
             name: series.name.clone(),
@@ -155,21 +155,21 @@ impl Item {
     /// The item as a document (`item/1`): `sequence`, `time_utc`, `at_ns`, `kind`, and `values` (each with its unit) or
     /// `record`; of means also `width_s`.
     #[must_use]
-    pub fn json(&self) -> Json {
+    pub fn to_json(&self) -> Json {
         let mut document = json!({
             "schema": "item/1",
             "sequence": self.sequence,
-            "time_utc": moment::utc(self.at_ns),
+            "time_utc": moment::format_utc(self.at_ns),
             "at_ns": self.at_ns,
             "kind": self.kind(),
         });
         let (key, value) = match &self.content {
-            Content::Sample(readings) => ("values", readings.iter().map(Reading::json).collect()),
+            Content::Sample(readings) => ("values", readings.iter().map(Reading::to_json).collect()),
             Content::Record(record) => ("record", record_json(record)),
             Content::Gap(Gap { until_ns, reason }) => ("record", json!({"until_ns": until_ns, "reason": &**reason})),
             Content::Means { width_s, means } => {
                 document["width_s"] = Json::from(*width_s);
-                ("values", means.iter().map(SeriesMean::json).collect())
+                ("values", means.iter().map(SeriesMean::to_json).collect())
             }
         };
         document[key] = value;
@@ -180,7 +180,7 @@ impl Item {
 impl Reading {
     /// `{"name", "value", "unit"}`, with `missing` where the value is null.
     #[must_use]
-    pub fn json(&self) -> Json {
+    pub fn to_json(&self) -> Json {
         let name = &*self.series.name;
         match &self.value {
             Cell::Number(number) => json!({"name": name, "value": number, "unit": &*self.series.unit}),
@@ -193,7 +193,7 @@ impl Reading {
 }
 
 impl SeriesMean {
-    fn json(&self) -> Json {
+    fn to_json(&self) -> Json {
         let Self { series, seconds, mean, least, greatest } = self;
         json!({"name": &*series.name, "unit": &*series.unit, "mean": mean, "least": least, "greatest": greatest, "seconds": seconds})
     }
@@ -222,11 +222,11 @@ const NESTED: [&str; 2] = ["detail", "json"];
 fn record_json(record: &Record) -> Json {
     let tagged = serde_json::to_value(record).unwrap_or(Json::Null);
     let Json::Object(tagged) = tagged else { return tagged };
-    tagged.into_iter().next().map_or(Json::Null, |(_, fields)| unnested(fields))
+    tagged.into_iter().next().map_or(Json::Null, |(_, fields)| parse_nested_json(fields))
 }
 
 /// The fields of a record with what is JSON in a text as JSON. A detail that is plain words stays a text.
-pub(crate) fn unnested(mut fields: Json) -> Json {
+pub(crate) fn parse_nested_json(mut fields: Json) -> Json {
     for name in NESTED {
         let Some(Json::String(text)) = fields.get(name) else { continue };
         let nested = if text.is_empty() { Some(Json::Null) } else { serde_json::from_str(text).ok() };
@@ -238,7 +238,7 @@ pub(crate) fn unnested(mut fields: Json) -> Json {
 }
 
 /// Is this a record that leaves the box? The audit, commands and models stay where they can be verified.
-pub(super) fn leaves(record: &Record) -> bool {
+pub(super) fn is_deliverable(record: &Record) -> bool {
     matches!(
         record,
         Record::Event(_)

@@ -6,7 +6,7 @@
 
 use super::item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 use crate::history::record::Record;
-use crate::history::tail::{comma, put_number};
+use crate::history::tail::{append_comma, put_number};
 use adapters::clock::TimeNs;
 use serde::Deserialize;
 use serde_json::{Map, Value as Json, json};
@@ -53,11 +53,11 @@ pub(super) fn of_gap(from_ns: TimeNs, until_ns: Option<TimeNs>, reason: &str) ->
 pub(super) fn of_means(start_ns: TimeNs, width_s: u32, means: &[(i64, [f64; 4])]) -> String {
     let mut text = format!("{{\"t\":{start_ns},\"w\":{width_s},\"m\":{{");
     for (index, (series, numbers)) in means.iter().enumerate() {
-        comma(&mut text, index);
+        append_comma(&mut text, index);
         // Writing to a string cannot fail.
         let _ = write!(text, "\"{series}\":[");
         for (index, number) in numbers.iter().enumerate() {
-            comma(&mut text, index);
+            append_comma(&mut text, index);
             put_number(&mut text, *number);
         }
         text.push(']');
@@ -79,11 +79,11 @@ pub(super) fn of_record(record: &Record) -> String {
 
 /// The same line, so much later; one that this version cannot read stays as it is. Gaps and means of a wrong time are of other
 /// minutes than those of the right one: they become an empty line, which keeps its number and is passed over.
-pub(super) fn moved(text: &str, by_ns: i64) -> String {
+pub(super) fn shift_line(text: &str, by_ns: i64) -> String {
     let Some(Parsed(line)) = parse(text) else { return text.to_owned() };
     match (line.s, line.r) {
         (_, Some(mut record)) => {
-            record.shift(by_ns);
+            record.shift_times(by_ns);
             of_record(&record)
         }
         (Some(cells), None) => json!({ "t": line.t.saturating_add(by_ns), "s": cells }).to_string(),
@@ -112,15 +112,15 @@ impl Parsed {
     }
 
     /// The item; values of unknown series are left out.
-    pub(super) fn item(self, sequence: u64, known: &SeriesByNumber) -> Item {
+    pub(super) fn into_item(self, sequence: u64, known: &SeriesByNumber) -> Item {
         let OutboxLine { t, s, r, g, w, m } = self.0;
         let readings =
-            |cells: Map<String, Json>| cells.iter().filter_map(|(id, cell)| reading(id, cell, known)).collect();
+            |cells: Map<String, Json>| cells.iter().filter_map(|(id, cell)| parse_reading(id, cell, known)).collect();
         let content = match (r, g, m) {
             (Some(record), ..) => Content::Record(Box::new(record)),
             (_, Some(GapLine { u, r }), _) => Content::Gap(Gap { until_ns: u, reason: r.into() }),
             (.., Some(numbers)) => {
-                let mean = |(id, numbers)| mean(id, numbers, known);
+                let mean = |(id, numbers)| build_mean(id, numbers, known);
                 Content::Means { width_s: w, means: numbers.into_iter().filter_map(mean).collect() }
             }
             _ => Content::Sample(s.map(readings).unwrap_or_default()),
@@ -129,11 +129,11 @@ impl Parsed {
     }
 }
 
-fn mean(id: i64, [seconds, mean, least, greatest]: [f64; 4], known: &SeriesByNumber) -> Option<SeriesMean> {
+fn build_mean(id: i64, [seconds, mean, least, greatest]: [f64; 4], known: &SeriesByNumber) -> Option<SeriesMean> {
     Some(SeriesMean { series: known.get(&id)?.clone(), seconds, mean, least, greatest })
 }
 
-fn reading(id: &str, cell: &Json, known: &SeriesByNumber) -> Option<Reading> {
+fn parse_reading(id: &str, cell: &Json, known: &SeriesByNumber) -> Option<Reading> {
     let series = known.get(&id.parse().ok()?)?.clone();
     let value = match cell {
         Json::Number(number) => Cell::Number(number.as_f64()?),

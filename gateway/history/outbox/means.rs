@@ -32,30 +32,31 @@ impl MeanSchedule {
     }
 
     /// The buckets that are over when blocks that begin at these times are stored.
-    pub(super) fn take(&mut self, blocks: impl Iterator<Item = TimeNs>) -> BTreeSet<Bucket> {
+    pub(super) fn collect_due_buckets(&mut self, blocks: impl Iterator<Item = TimeNs>) -> BTreeSet<Bucket> {
         let mut due = BTreeSet::new();
         if std::mem::take(&mut self.opened) {
-            due.extend(self.running());
+            due.extend(self.current_buckets());
         }
         for start_ns in blocks {
-            let over = |(level, bucket): &Bucket| *level > 0 && LEVELS[*level].bucket(start_ns) != *bucket;
-            due.extend(self.running().filter(over));
+            let over = |(level, bucket): &Bucket| *level > 0 && LEVELS[*level].bucket_at(start_ns) != *bucket;
+            due.extend(self.current_buckets().filter(over));
             self.newest_ns = Some(start_ns);
-            due.insert((0, LEVELS[0].bucket(start_ns)));
+            due.insert((0, LEVELS[0].bucket_at(start_ns)));
         }
         due
     }
 
     /// The buckets that hold the newest block.
-    pub(super) fn running(&self) -> impl Iterator<Item = Bucket> + use<> {
+    pub(super) fn current_buckets(&self) -> impl Iterator<Item = Bucket> + use<> {
         let newest_ns = self.newest_ns;
-        let bucket = move |(index, level): (usize, &Level)| newest_ns.map(|newest_ns| (index, level.bucket(newest_ns)));
+        let bucket =
+            move |(index, level): (usize, &Level)| newest_ns.map(|newest_ns| (index, level.bucket_at(newest_ns)));
         LEVELS.iter().enumerate().filter_map(bucket)
     }
 }
 
 /// The lines of these buckets. A tick stands for `tick`: so many ticks with a value are so many seconds.
-pub(super) fn lines(
+pub(super) fn format_lines(
     db: &Connection,
     due: &BTreeSet<Bucket>,
     tick: Duration,
@@ -63,7 +64,7 @@ pub(super) fn lines(
     let mut lines = Vec::with_capacity(due.len());
     for (index, bucket) in due {
         let level = &LEVELS[*index];
-        let means = read(db, level, *bucket, tick).doing("reading the summaries")?;
+        let means = read(db, level, *bucket, tick).with_activity("reading the summaries")?;
         let start_ns = bucket.saturating_mul(level.width_ns);
         if !means.is_empty() {
             lines.push((start_ns, line::of_means(start_ns, level.width_s(), &means)));
@@ -79,13 +80,13 @@ fn read(db: &Connection, level: &Level, bucket: i64, tick: Duration) -> Result<V
     let mut select = db.prepare_cached(&question)?;
     let rows = select.query_map([bucket], |row| {
         let seconds = (row.get::<_, i64>(1)? as f64 * tick.as_secs_f64()).min(longest_s);
-        Ok((row.get(0)?, [digits(seconds), digits(row.get(2)?), row.get(3)?, row.get(4)?]))
+        Ok((row.get(0)?, [round_digits(seconds), round_digits(row.get(2)?), row.get(3)?, row.get(4)?]))
     });
     rows?.collect()
 }
 
 /// With nine significant digits: a mean has no more, and each costs room on every line.
-fn digits(number: f64) -> f64 {
+fn round_digits(number: f64) -> f64 {
     format!("{number:.8e}").parse().unwrap_or(number)
 }
 
@@ -99,16 +100,19 @@ mod tests {
     fn a_minute_is_told_with_its_block_and_an_hour_when_the_next_begins() {
         let mut schedule = MeanSchedule::new(None);
         let minute = |hour: i64, minute: i64| hour * HOUR_NS + minute * 60 * SECOND_NS;
-        assert_eq!(schedule.take([minute(5, 0), minute(5, 1)].into_iter()), BTreeSet::from([(0, 300), (0, 301)]));
-        assert_eq!(schedule.take([minute(6, 0)].into_iter()), BTreeSet::from([(0, 360), (1, 5)]));
-        assert_eq!(schedule.take(std::iter::empty()), BTreeSet::new());
-        assert_eq!(schedule.running().collect::<Vec<_>>(), [(0, 360), (1, 6), (2, 0)]);
+        assert_eq!(
+            schedule.collect_due_buckets([minute(5, 0), minute(5, 1)].into_iter()),
+            BTreeSet::from([(0, 300), (0, 301)])
+        );
+        assert_eq!(schedule.collect_due_buckets([minute(6, 0)].into_iter()), BTreeSet::from([(0, 360), (1, 5)]));
+        assert_eq!(schedule.collect_due_buckets(std::iter::empty()), BTreeSet::new());
+        assert_eq!(schedule.current_buckets().collect::<Vec<_>>(), [(0, 360), (1, 6), (2, 0)]);
     }
 
     #[test]
     fn what_opening_has_added_is_told_once() {
         let mut schedule = MeanSchedule::new(Some(25 * HOUR_NS));
-        assert_eq!(schedule.take(std::iter::empty()), BTreeSet::from([(0, 1500), (1, 25), (2, 1)]));
-        assert_eq!(schedule.take(std::iter::empty()), BTreeSet::new());
+        assert_eq!(schedule.collect_due_buckets(std::iter::empty()), BTreeSet::from([(0, 1500), (1, 25), (2, 1)]));
+        assert_eq!(schedule.collect_due_buckets(std::iter::empty()), BTreeSet::new());
     }
 }

@@ -34,11 +34,11 @@ mod shared;
 mod store;
 
 pub(crate) use gather::Gatherer;
-pub(crate) use item::unnested;
+pub(crate) use item::parse_nested_json;
 pub use item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 pub use position::Position;
 pub use reader::{OutboxReader, OutboxStretch};
-pub(crate) use redate::redate;
+pub(crate) use redate::redate_items;
 pub use report::OutboxSettings;
 pub use shared::{DeliveryState, Outbox, OutboxFigures, OutboxHead};
 pub use store::box_id;

@@ -18,7 +18,7 @@ pub struct Position {
 impl Position {
     /// Everything before `next` is delivered.
     #[must_use]
-    pub fn at(next: u64) -> Self {
+    pub fn from_next(next: u64) -> Self {
         Self { gaps: Vec::new(), next }
     }
 
@@ -36,19 +36,19 @@ impl Position {
 
     /// The lowest number that is not delivered.
     #[must_use]
-    pub fn lowest(&self) -> u64 {
+    pub fn lowest_undelivered(&self) -> u64 {
         self.gaps.first().map_or(self.next, |(from, _)| *from)
     }
 
     /// How many items are not delivered, when `head` is the number of the next item that will be made.
     #[must_use]
-    pub fn waiting(&self, head: u64) -> u64 {
-        self.within(0, head)
+    pub fn count_waiting(&self, head: u64) -> u64 {
+        self.count_within(0, head)
     }
 
     /// How many of the items `from..to` are not delivered.
     #[must_use]
-    pub fn within(&self, from: u64, to: u64) -> u64 {
+    pub fn count_within(&self, from: u64, to: u64) -> u64 {
         let open = (self.next, u64::MAX);
         let overlap = |(start, end): (u64, u64)| end.min(to).saturating_sub(start.max(from));
         self.gaps.iter().copied().chain([open]).map(overlap).sum()
@@ -56,7 +56,7 @@ impl Position {
 
     /// Live data begins at `head`; what lies between becomes a gap. False, and nothing changed, when there are too many
     /// gaps already.
-    pub fn jump(&mut self, head: u64) -> bool {
+    pub fn jump_to_head(&mut self, head: u64) -> bool {
         if head <= self.next {
             return true;
         }
@@ -71,7 +71,7 @@ impl Position {
     }
 
     /// The items `from..to` are delivered, or are not there any more.
-    pub fn done(&mut self, from: u64, to: u64) {
+    pub fn mark_delivered(&mut self, from: u64, to: u64) {
         let cut = |(start, end): (u64, u64)| [(start, end.min(from)), (start.max(to), end)];
         let left = |(start, end): &(u64, u64)| start < end;
         self.gaps = self.gaps.iter().copied().flat_map(cut).filter(left).collect();
@@ -89,50 +89,50 @@ mod tests {
 
     #[test]
     fn an_outage_becomes_a_gap_that_is_closed_piece_by_piece() {
-        let mut position = Position::at(1);
-        position.done(1, 11);
-        assert!(position.jump(101));
-        position.done(101, 111);
-        assert_eq!((position.oldest_gap(), position.next(), position.waiting(121)), (Some((11, 101)), 111, 100));
-        position.done(11, 100);
-        assert_eq!((position.lowest(), position.waiting(111)), (100, 1));
-        position.done(100, 101);
-        assert_eq!((position.oldest_gap(), position.lowest()), (None, 111));
+        let mut position = Position::from_next(1);
+        position.mark_delivered(1, 11);
+        assert!(position.jump_to_head(101));
+        position.mark_delivered(101, 111);
+        assert_eq!((position.oldest_gap(), position.next(), position.count_waiting(121)), (Some((11, 101)), 111, 100));
+        position.mark_delivered(11, 100);
+        assert_eq!((position.lowest_undelivered(), position.count_waiting(111)), (100, 1));
+        position.mark_delivered(100, 101);
+        assert_eq!((position.oldest_gap(), position.lowest_undelivered()), (None, 111));
     }
 
     #[test]
     fn the_number_of_gaps_is_bounded_and_nothing_is_forgotten() {
-        let mut position = Position::at(1);
+        let mut position = Position::from_next(1);
         let mut head = 1;
-        while position.jump(head + 2) {
+        while position.jump_to_head(head + 2) {
             head += 2;
-            position.done(head, head + 1);
+            position.mark_delivered(head, head + 1);
             head += 1;
         }
         assert_eq!(position.gaps.len(), GAPS_MAX);
-        assert_eq!(position.waiting(head), 2 * GAPS_MAX as u64);
-        position.done(1, 3);
-        assert!(position.jump(head + 2));
+        assert_eq!(position.count_waiting(head), 2 * GAPS_MAX as u64);
+        position.mark_delivered(1, 3);
+        assert!(position.jump_to_head(head + 2));
     }
 
     proptest! {
         #[test]
         fn it_counts_as_a_set_of_numbers_does(steps in proptest::collection::vec((0u8..3, 1u64..40, 1u64..12), 1..60)) {
-            let (mut position, mut open, mut head) = (Position::at(1), BTreeSet::new(), 1u64);
+            let (mut position, mut open, mut head) = (Position::from_next(1), BTreeSet::new(), 1u64);
             for (step, from, count) in steps {
                 match step {
                     0 => { open.extend(head..head + count); head += count; }
-                    1 => { position.jump(head); }
+                    1 => { position.jump_to_head(head); }
                     _ => {
                         // A sink delivers from the beginning of its gap or of its live data.
                         let from = position.oldest_gap().filter(|_| from % 2 == 0).map_or(position.next(), |gap| gap.0);
                         let to = (from + count).min(head);
-                        position.done(from, to);
+                        position.mark_delivered(from, to);
                         open.retain(|number| *number < from || *number >= to);
                     }
                 }
-                prop_assert_eq!(position.waiting(head), open.len() as u64);
-                prop_assert_eq!(position.lowest().min(head), open.first().copied().unwrap_or(head));
+                prop_assert_eq!(position.count_waiting(head), open.len() as u64);
+                prop_assert_eq!(position.lowest_undelivered().min(head), open.first().copied().unwrap_or(head));
             }
         }
     }

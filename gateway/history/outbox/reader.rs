@@ -35,11 +35,11 @@ impl OutboxReader {
     /// As [`Reader::open`](crate::history::Reader::open).
     pub fn open(path: &Path) -> Result<Self, HistoryError> {
         let mut feed = Self { db: open_for_reading(path)?, known: SeriesByNumber::new() };
-        feed.learn()?;
+        feed.load_series()?;
         Ok(feed)
     }
 
-    fn learn(&mut self) -> Result<(), HistoryError> {
+    fn load_series(&mut self) -> Result<(), HistoryError> {
         let series = known_series(&self.db)?;
         self.known = series.iter().map(|series| (series.id, Arc::new(SeriesInfo::from(series)))).collect();
         Ok(())
@@ -53,14 +53,14 @@ impl OutboxReader {
         let mut stretch = OutboxStretch { items: Vec::new(), to: from };
         while stretch.to < to && stretch.items.len() < items_max {
             match self.row_at(stretch.to, to)? {
-                Some(row) => self.take(&mut stretch, &row, to, items_max)?,
+                Some(row) => self.append_items(&mut stretch, &row, to, items_max)?,
                 None => stretch.to = to,
             }
         }
         Ok(stretch)
     }
 
-    fn take(
+    fn append_items(
         &mut self,
         stretch: &mut OutboxStretch,
         row: &OutboxRow,
@@ -68,7 +68,7 @@ impl OutboxReader {
         items_max: usize,
     ) -> Result<(), HistoryError> {
         // A body that cannot be read is passed over: its items are lost, those after it are not.
-        let text = unpacked(&row.body).unwrap_or_default();
+        let text = unpack_lines(&row.body).unwrap_or_default();
         stretch.to = stretch.to.max(row.first);
         for (sequence, text) in (row.first..).zip(text.lines()) {
             if sequence < stretch.to {
@@ -80,9 +80,9 @@ impl OutboxReader {
             stretch.to = sequence + 1;
             let Some(parsed) = line::parse(text) else { continue };
             if parsed.names_unknown(&self.known) {
-                self.learn()?;
+                self.load_series()?;
             }
-            stretch.items.push(parsed.item(sequence, &self.known));
+            stretch.items.push(parsed.into_item(sequence, &self.known));
         }
         stretch.to = stretch.to.max((row.first + row.items).min(to));
         Ok(())
@@ -99,12 +99,12 @@ impl OutboxReader {
                    AND first_sequence + items > ?1 AND first_sequence < ?2
                  ORDER BY first_sequence LIMIT 1",
             )
-            .doing("reading the outbox")?;
+            .with_activity("reading the outbox")?;
         let unsigned = |number: i64| u64::try_from(number).unwrap_or(0);
         let row = select.query_map([from, to], |row| {
             Ok(OutboxRow { first: unsigned(row.get(0)?), items: unsigned(row.get(1)?), body: row.get(2)? })
         });
-        row.and_then(|mut rows| rows.next().transpose()).doing("reading the outbox")
+        row.and_then(|mut rows| rows.next().transpose()).with_activity("reading the outbox")
     }
 }
 
@@ -116,7 +116,7 @@ struct OutboxRow {
 }
 
 /// The lines of a row; `None` when they are not as they were written.
-pub(super) fn unpacked(body: &[u8]) -> Option<String> {
+pub(super) fn unpack_lines(body: &[u8]) -> Option<String> {
     let bytes = zstd::stream::decode_all(body).ok().filter(|bytes| bytes.len() <= BODY_BYTES_MAX)?;
     String::from_utf8(bytes).ok()
 }

@@ -3,10 +3,10 @@
 
 use super::item::{Cell, Reading, SeriesInfo};
 use crate::history::reason::{NOT_PROVIDED, PRESENT, Reasons};
-use crate::history::rounding::rounded;
+use crate::history::rounding::round_to_decimals;
 use crate::history::rows::{Column, SeriesRows, Word};
 use crate::history::series::Series;
-use crate::history::tail::{comma, put_missing, put_number};
+use crate::history::tail::{append_comma, put_missing, put_number};
 use adapters::clock::TimeNs;
 use serde_json::Value as Json;
 use std::fmt::Write;
@@ -101,7 +101,7 @@ impl OutboxReport {
     }
 
     /// The line of a tick, where it has something to tell.
-    pub(super) fn tick(
+    pub(super) fn report_tick(
         &mut self,
         rows: &SeriesRows,
         row: usize,
@@ -119,10 +119,10 @@ impl OutboxReport {
         if whole {
             self.whole_at = Some(at_ns);
         }
-        self.line(rows, row, whole, series, reasons)
+        self.format_line(rows, row, whole, series, reasons)
     }
 
-    fn line(
+    fn format_line(
         &mut self,
         rows: &SeriesRows,
         row: usize,
@@ -133,30 +133,30 @@ impl OutboxReport {
         let mut out = String::new();
         let mut count = 0;
         for (index, (series, column)) in series.iter().zip(&rows.columns).enumerate() {
-            let now = cell(column, row, series.decimals);
+            let now = read_cell(column, row, series.decimals);
             let known = &self.last[index];
             let same = is_same(known, &now, self.bands[index]);
             let never = matches!(now, Last::Missing(NOT_PROVIDED));
             if same && (!whole || never) {
                 continue;
             }
-            comma(&mut out, count);
+            append_comma(&mut out, count);
             count += 1;
             // Writing to a string cannot fail, here and below.
             let _ = write!(out, "\"{}\":", series.id);
-            put(&mut out, &now, reasons);
+            put_cell(&mut out, &now, reasons);
             self.last[index] = now;
         }
         (count > 0).then(|| format!("{{\"t\":{},\"s\":{{{out}}}}}", rows.at_ns[row]))
     }
 
     /// What a receiver of everything knows by now.
-    pub(super) fn latest(&self, known: &[Arc<SeriesInfo>], reasons: &Reasons) -> Vec<Reading> {
+    pub(super) fn latest_readings(&self, known: &[Arc<SeriesInfo>], reasons: &Reasons) -> Vec<Reading> {
         let reading = |(series, last): (&Arc<SeriesInfo>, &Last)| {
             let value = match last {
                 Last::Number(number) => Cell::Number(*number),
                 Last::Text(text) => Cell::Text(text.clone()),
-                Last::Missing(code) => Cell::Missing(reasons.word(*code).unwrap_or("not_provided").into()),
+                Last::Missing(code) => Cell::Missing(reasons.find_word(*code).unwrap_or("not_provided").into()),
             };
             Reading { series: series.clone(), value }
         };
@@ -164,10 +164,12 @@ impl OutboxReport {
     }
 }
 
-fn cell(column: &Column, row: usize, decimals: Option<u8>) -> Last {
+fn read_cell(column: &Column, row: usize, decimals: Option<u8>) -> Last {
     match column {
         Column::Numbers { values, missing } => match missing.get(row) {
-            Some(&PRESENT) => Last::Number(decimals.map_or(values[row], |places| rounded(values[row], places))),
+            Some(&PRESENT) => {
+                Last::Number(decimals.map_or(values[row], |places| round_to_decimals(values[row], places)))
+            }
             Some(code) => Last::Missing(*code),
             None => Last::Missing(NOT_PROVIDED),
         },
@@ -189,7 +191,7 @@ fn is_same(known: &Last, now: &Last, band: f64) -> bool {
     }
 }
 
-fn put(out: &mut String, cell: &Last, reasons: &Reasons) {
+fn put_cell(out: &mut String, cell: &Last, reasons: &Reasons) {
     match cell {
         Last::Number(number) => put_number(out, *number),
         Last::Text(text) => {
@@ -207,7 +209,7 @@ mod tests {
     use adapters::{Absence, ChannelId, Sample, Slot, Value};
 
     fn series() -> Vec<Series> {
-        let extras = vec![ExtraSeries::text("state", "", "")];
+        let extras = vec![ExtraSeries::new_text("state", "", "")];
         let mut series = stored_series(&Options { extras, ..Options::default() }).expect("fine");
         (1..).zip(&mut series).for_each(|(id, series)| series.id = id);
         series
@@ -215,14 +217,16 @@ mod tests {
 
     /// Power 100.0, 100.0, 100.4, stale, 100.4, ... a tenth of a second apart, and a state that changes once.
     fn rows(powers: &[Option<f64>]) -> SeriesRows {
-        let mut rows = SeriesRows::of(&series());
+        let mut rows = SeriesRows::for_series(&series());
         let mut reasons = Reasons::default();
-        let power = ChannelId::of("spindle_power_w").expect("in the table");
+        let power = ChannelId::from_name("spindle_power_w").expect("in the table");
         for (row, watts) in powers.iter().enumerate() {
-            let mut sample = Sample::empty(row as i64 * 100_000_000);
-            let slot =
-                watts.map_or(Slot::absent(Absence::Stale), |watts| Slot { value: Ok(Value::Number(watts)), age_ns: 0 });
-            sample.set(power, slot);
+            let mut sample = Sample::new_empty(row as i64 * 100_000_000);
+            let slot = watts.map_or(Slot::from_absence(Absence::Stale), |watts| Slot {
+                value: Ok(Value::Number(watts)),
+                age_ns: 0,
+            });
+            sample.set_slot(power, slot);
             let state = if row < 2 { "idle" } else { "cutting" };
             rows.push(&sample, &[ExtraValue::Text(state)], &mut reasons);
         }
@@ -235,7 +239,7 @@ mod tests {
         let mut report = OutboxReport::new(settings, &series);
         let rows = rows(powers);
         for row in 0..rows.len() {
-            let Some(line) = report.tick(&rows, row, &series, &Reasons::default()) else { continue };
+            let Some(line) = report.report_tick(&rows, row, &series, &Reasons::default()) else { continue };
             let line: Json = serde_json::from_str(&line).expect("JSON");
             found.push((row, line["s"].clone()));
         }

@@ -60,8 +60,8 @@ pub struct DeliveryState {
 impl DeliveryState {
     /// Nothing before `next` is to be delivered any more, and nothing has happened yet.
     #[must_use]
-    pub fn at(next: u64) -> Self {
-        Self { position: Position::at(next), dropped: 0, connections: 0, linked: false }
+    pub fn from_next(next: u64) -> Self {
+        Self { position: Position::from_next(next), dropped: 0, connections: 0, linked: false }
     }
 }
 
@@ -107,7 +107,7 @@ impl Outbox {
     /// The outbox of a machine for these sinks. Hand it to [`Options::outbox`](crate::history::Options::outbox).
     #[must_use]
     pub fn new(machine: &str, settings: OutboxSettings, sinks: impl IntoIterator<Item = String>) -> Self {
-        let standing = || DeliveryState::at(1);
+        let standing = || DeliveryState::from_next(1);
         let shared = SharedOutbox {
             machine: machine.to_owned(),
             settings,
@@ -143,7 +143,7 @@ impl Outbox {
 
     /// How far it is now, and every change of that.
     #[must_use]
-    pub fn head(&self) -> watch::Receiver<OutboxHead> {
+    pub fn watch_head(&self) -> watch::Receiver<OutboxHead> {
         self.shared.head.subscribe()
     }
 
@@ -156,26 +156,26 @@ impl Outbox {
     /// Every series with what a receiver of all items knows by now; empty until the history is open. All values are
     /// missing until the first commit.
     #[must_use]
-    pub fn latest(&self) -> Arc<Vec<Reading>> {
+    pub fn latest_readings(&self) -> Arc<Vec<Reading>> {
         lock_mutex(&self.shared.state).latest.clone()
     }
 
     /// What sink `name` has delivered; `None` for a name that is not configured.
     #[must_use]
-    pub fn standing(&self, name: &str) -> Option<DeliveryState> {
+    pub fn delivery_state(&self, name: &str) -> Option<DeliveryState> {
         lock_mutex(&self.shared.sinks).get(name).cloned()
     }
 
     /// Sink `name` has delivered the items `from..to`. Becomes durable with the next commit.
-    pub fn delivered(&self, name: &str, from: u64, to: u64) {
-        self.change(name, |standing| standing.position.done(from, to));
+    pub fn mark_delivered(&self, name: &str, from: u64, to: u64) {
+        self.change_state(name, |standing| standing.position.mark_delivered(from, to));
     }
 
     /// Sink `name` will never deliver what is left of the items `from..to`; they count as dropped.
     pub fn give_up(&self, name: &str, from: u64, to: u64) {
-        self.change(name, |standing| {
-            standing.dropped += standing.position.within(from, to);
-            standing.position.done(from, to);
+        self.change_state(name, |standing| {
+            standing.dropped += standing.position.count_within(from, to);
+            standing.position.mark_delivered(from, to);
         });
     }
 
@@ -185,7 +185,7 @@ impl Outbox {
         let mut noted = self.shared.noted.subscribe();
         let twice = *noted.borrow() + 2;
         let mut number = 0;
-        self.change(name, |standing| {
+        self.change_state(name, |standing| {
             number = standing.connections;
             standing.connections += 1;
         });
@@ -209,11 +209,11 @@ impl Outbox {
     }
 
     /// Sink `name` goes on with live data; what it has not delivered before the head becomes a gap. See
-    /// [`Position::jump`].
-    pub fn jump(&self, name: &str) -> bool {
+    /// [`Position::jump_to_head`].
+    pub fn jump_to_head(&self, name: &str) -> bool {
         let head = self.shared.head.borrow().next_sequence;
         let mut jumped = false;
-        self.change(name, |standing| jumped = standing.position.jump(head));
+        self.change_state(name, |standing| jumped = standing.position.jump_to_head(head));
         jumped
     }
 
@@ -229,7 +229,7 @@ impl Outbox {
         self.shared.hurried.store(hurried, Ordering::Release);
     }
 
-    fn change(&self, name: &str, change: impl FnOnce(&mut DeliveryState)) {
+    fn change_state(&self, name: &str, change: impl FnOnce(&mut DeliveryState)) {
         if let Some(standing) = lock_mutex(&self.shared.sinks).get_mut(name) {
             change(standing);
             self.shared.news.store(true, Ordering::Release);
@@ -242,13 +242,17 @@ impl Outbox {
     }
 
     /// The writer's side: the names of the sinks.
-    pub(super) fn names(&self) -> Vec<String> {
+    pub(super) fn sink_names(&self) -> Vec<String> {
         lock_mutex(&self.shared.sinks).keys().cloned().collect()
     }
 
     /// The writer's side: the lowest number that some sink has not delivered.
-    pub(super) fn lowest(&self) -> u64 {
-        lock_mutex(&self.shared.sinks).values().map(|standing| standing.position.lowest()).min().unwrap_or(u64::MAX)
+    pub(super) fn lowest_undelivered(&self) -> u64 {
+        lock_mutex(&self.shared.sinks)
+            .values()
+            .map(|standing| standing.position.lowest_undelivered())
+            .min()
+            .unwrap_or(u64::MAX)
     }
 
     /// The writer's side: looks at every sink, and may change it. What has been delivered until here is noted.
@@ -267,14 +271,14 @@ impl Outbox {
     }
 
     /// The writer's side: these stretches are durably gone, delivered or not.
-    pub(super) fn noted(&self, dropped: &[(u64, u64)]) {
+    pub(super) fn mark_dropped(&self, dropped: &[(u64, u64)]) {
         if dropped.is_empty() {
             return;
         }
         for standing in lock_mutex(&self.shared.sinks).values_mut() {
             for (from, to) in dropped {
-                standing.dropped += standing.position.within(*from, *to);
-                standing.position.done(*from, *to);
+                standing.dropped += standing.position.count_within(*from, *to);
+                standing.position.mark_delivered(*from, *to);
             }
         }
     }
@@ -289,11 +293,11 @@ impl Outbox {
         self.shared.hurried.load(Ordering::Acquire)
             || lock_mutex(&self.shared.sinks)
                 .values()
-                .all(|standing| !standing.linked || standing.position.waiting(next) == 0)
+                .all(|standing| !standing.linked || standing.position.count_waiting(next) == 0)
     }
 
     /// The writer's side: what is durable now.
-    pub(super) fn publish(&self, head: OutboxHead, figures: OutboxFigures, latest: Vec<Reading>) {
+    pub(super) fn publish_state(&self, head: OutboxHead, figures: OutboxFigures, latest: Vec<Reading>) {
         let mut state = lock_mutex(&self.shared.state);
         state.figures = figures;
         state.latest = Arc::new(latest);

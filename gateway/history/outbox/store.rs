@@ -49,7 +49,7 @@ pub(super) struct OutboxContents {
 }
 
 impl OutboxContents {
-    pub(super) fn figures(&self, lost: u64) -> OutboxFigures {
+    pub(super) fn to_figures(&self, lost: u64) -> OutboxFigures {
         let seconds =
             self.newest_ns.zip(self.first_ns).map(|(newest, first)| (newest - first) as f64 / SECOND_NS as f64);
         let rate = seconds.filter(|seconds| *seconds >= 60.0).map(|seconds| self.added_bytes as f64 / seconds);
@@ -66,31 +66,31 @@ fn to_signed(number: u64) -> i64 {
 }
 
 /// Creates the tables, takes up what each sink still has to deliver, and forgets sinks that are configured no more.
-pub(super) fn open(db: &mut Connection, outbox: &Outbox) -> Result<OutboxContents, HistoryError> {
-    let opening = db.transaction().doing("opening the outbox")?;
-    opening.execute_batch(TABLES).doing("creating the outbox")?;
+pub(super) fn open_outbox(db: &mut Connection, outbox: &Outbox) -> Result<OutboxContents, HistoryError> {
+    let opening = db.transaction().with_activity("opening the outbox")?;
+    opening.execute_batch(TABLES).with_activity("creating the outbox")?;
     if opening.prepare("SELECT connections FROM outbox_sinks").is_err() {
         opening
             .execute_batch("ALTER TABLE outbox_sinks ADD COLUMN connections INTEGER NOT NULL DEFAULT 0")
-            .doing("extending the outbox")?;
+            .with_activity("extending the outbox")?;
     }
     outbox.name_box(box_name(&opening, outbox.machine())?);
     let next = next_sequence(&opening)?;
-    outbox.for_each_sink(|name, standing| load(&opening, name, next, standing))?;
-    let names = outbox.names();
-    let mut statement = opening.prepare("SELECT name FROM outbox_sinks").doing("reading the sinks")?;
+    outbox.for_each_sink(|name, standing| load_delivery_state(&opening, name, next, standing))?;
+    let names = outbox.sink_names();
+    let mut statement = opening.prepare("SELECT name FROM outbox_sinks").with_activity("reading the sinks")?;
     let known: Vec<String> =
-        statement.query_map([], |row| row.get(0)).and_then(Iterator::collect).doing("reading the sinks")?;
+        statement.query_map([], |row| row.get(0)).and_then(Iterator::collect).with_activity("reading the sinks")?;
     drop(statement);
     for gone in known.iter().filter(|name| !names.contains(name)) {
-        opening.execute("DELETE FROM outbox_sinks WHERE name = ?1", [gone]).doing("forgetting a sink")?;
+        opening.execute("DELETE FROM outbox_sinks WHERE name = ?1", [gone]).with_activity("forgetting a sink")?;
     }
-    let stored = measure(&opening, next)?;
-    opening.commit().doing("opening the outbox")?;
+    let stored = measure_outbox(&opening, next)?;
+    opening.commit().with_activity("opening the outbox")?;
     Ok(stored)
 }
 
-fn measure(db: &Connection, next_sequence: u64) -> Result<OutboxContents, HistoryError> {
+fn measure_outbox(db: &Connection, next_sequence: u64) -> Result<OutboxContents, HistoryError> {
     // The newest is the last that was stored: an earlier one may be dated by a clock that was ahead.
     let newest = "SELECT end_ns FROM outbox ORDER BY first_sequence DESC LIMIT 1";
     let select = format!("SELECT coalesce(sum(bytes), 0), min(start_ns), ({newest}) FROM outbox");
@@ -104,7 +104,7 @@ fn measure(db: &Connection, next_sequence: u64) -> Result<OutboxContents, Histor
             first_ns: None,
         })
     })
-    .doing("measuring the outbox")
+    .with_activity("measuring the outbox")
 }
 
 /// Items that a box makes in a week at most: a hundred a second.
@@ -116,8 +116,8 @@ const NUMBERS_FROM: &str = "outbox_numbers_from";
 fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
     let stored: u64 = db
         .query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| row.get(0).map(to_unsigned))
-        .doing("numbering the outbox")?;
-    let from = property(db, NUMBERS_FROM)?.and_then(|text| text.parse().ok()).unwrap_or(1);
+        .with_activity("numbering the outbox")?;
+    let from = read_property(db, NUMBERS_FROM)?.and_then(|text| text.parse().ok()).unwrap_or(1);
     Ok(stored.max(from))
 }
 
@@ -128,31 +128,31 @@ fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
 /// The file cannot be opened or written.
 pub(crate) fn skip_numbers(path: &Path) -> Result<(), HistoryError> {
     let db = open_for_writing(path)?;
-    if !exists(&db)? {
+    if !has_tables(&db)? {
         return Ok(());
     }
     let from = next_sequence(&db)?.saturating_add(SKIPPED).to_string();
     db.execute("INSERT OR REPLACE INTO meta (key, value) VALUES (?1, ?2)", [NUMBERS_FROM, &from])
-        .doing("numbering the outbox")
+        .with_activity("numbering the outbox")
         .map(drop)
 }
 
 /// The number of the next item; 0 where there is no outbox.
 pub(crate) fn next_sequence_of(db: &Connection) -> Result<u64, HistoryError> {
-    if exists(db)? { next_sequence(db) } else { Ok(0) }
+    if has_tables(db)? { next_sequence(db) } else { Ok(0) }
 }
 
 /// Creates the tables in `to` where `from` has them.
 pub(crate) fn create_like(from: &Connection, to: &Connection) -> Result<(), HistoryError> {
-    if exists(from)? { to.execute_batch(TABLES).doing("creating the outbox") } else { Ok(()) }
+    if has_tables(from)? { to.execute_batch(TABLES).with_activity("creating the outbox") } else { Ok(()) }
 }
 
 /// Does the file have the tables?
-pub(super) fn exists(db: &Connection) -> Result<bool, HistoryError> {
+pub(super) fn has_tables(db: &Connection) -> Result<bool, HistoryError> {
     db.query_row("SELECT 1 FROM sqlite_schema WHERE name = 'outbox_sinks'", [], |_| Ok(()))
         .optional()
         .map(|found| found.is_some())
-        .doing("looking for the outbox")
+        .with_activity("looking for the outbox")
 }
 
 /// The name of this box, made once: a machine that is renamed stays the same box. The digits tell boxes apart whose machines
@@ -162,9 +162,11 @@ fn box_name(db: &Connection, machine: &str) -> Result<String, HistoryError> {
         return Ok(name);
     }
     // Histories of before had six digits, and the name of the machine as it was at each start.
-    let mark = property(db, "outbox_box")?.unwrap_or_else(|| adapters::mqtt::unique()[..10].to_owned());
+    let mark =
+        read_property(db, "outbox_box")?.unwrap_or_else(|| adapters::mqtt::generate_unique_id()[..10].to_owned());
     let name = format!("{}-{mark}", letters_of(machine));
-    db.execute("INSERT INTO meta (key, value) VALUES ('outbox_box_id', ?1)", [&name]).doing("naming the outbox")?;
+    db.execute("INSERT INTO meta (key, value) VALUES ('outbox_box_id', ?1)", [&name])
+        .with_activity("naming the outbox")?;
     Ok(name)
 }
 
@@ -181,21 +183,21 @@ pub fn box_id(path: &Path, machine: &str) -> Result<String, HistoryError> {
         std::fs::create_dir_all(parent).map_err(|error| HistoryError::Io { path: parent.to_owned(), error })?;
     }
     let mut db = open_for_writing(path)?;
-    let naming = db.transaction_with_behavior(TransactionBehavior::Immediate).doing("naming the outbox")?;
+    let naming = db.transaction_with_behavior(TransactionBehavior::Immediate).with_activity("naming the outbox")?;
     let name = box_name(&naming, machine)?;
-    naming.commit().doing("naming the outbox")?;
+    naming.commit().with_activity("naming the outbox")?;
     Ok(name)
 }
 
 /// The name of the box of an open history, where it has one.
 pub(crate) fn known_box_id(db: &Connection) -> Result<Option<String>, HistoryError> {
-    property(db, "outbox_box_id")
+    read_property(db, "outbox_box_id")
 }
 
-fn property(db: &Connection, key: &str) -> Result<Option<String>, HistoryError> {
+fn read_property(db: &Connection, key: &str) -> Result<Option<String>, HistoryError> {
     db.query_row("SELECT CAST(value AS TEXT) FROM meta WHERE key = ?1", [key], |row| row.get(0))
         .optional()
-        .doing("reading the outbox")
+        .with_activity("reading the outbox")
 }
 
 /// Letters, digits and `-` of a machine's name, `box` where there are none.
@@ -207,29 +209,34 @@ fn letters_of(machine: &str) -> String {
 }
 
 /// A sink that is new begins with what is made from now on.
-fn load(db: &Connection, name: &str, next: u64, standing: &mut DeliveryState) -> Result<(), HistoryError> {
+fn load_delivery_state(
+    db: &Connection,
+    name: &str,
+    next: u64,
+    standing: &mut DeliveryState,
+) -> Result<(), HistoryError> {
     let found: Option<(String, i64, i64)> = db
         .query_row("SELECT position, dropped, connections FROM outbox_sinks WHERE name = ?1", [name], |row| {
             Ok((row.get(0)?, row.get(1)?, row.get(2)?))
         })
         .optional()
-        .doing("reading what a sink has delivered")?;
+        .with_activity("reading what a sink has delivered")?;
     match found {
         Some((text, dropped, connections)) => {
             // A text that this version cannot read begins anew rather than sending everything twice.
-            standing.position = serde_json::from_str(&text).unwrap_or(Position::at(next));
+            standing.position = serde_json::from_str(&text).unwrap_or(Position::from_next(next));
             standing.dropped = to_unsigned(dropped);
             standing.connections = to_unsigned(connections);
         }
         None => {
-            *standing = DeliveryState { linked: standing.linked, ..DeliveryState::at(next) };
-            save(db, name, standing)?;
+            *standing = DeliveryState { linked: standing.linked, ..DeliveryState::from_next(next) };
+            save_delivery_state(db, name, standing)?;
         }
     }
     Ok(())
 }
 
-fn save(db: &Connection, name: &str, standing: &DeliveryState) -> Result<(), HistoryError> {
+fn save_delivery_state(db: &Connection, name: &str, standing: &DeliveryState) -> Result<(), HistoryError> {
     let position = serde_json::to_string(&standing.position).unwrap_or_default();
     db.prepare_cached(
         "INSERT OR REPLACE INTO outbox_sinks (name, position, dropped, connections) VALUES (?1, ?2, ?3, ?4)",
@@ -238,7 +245,7 @@ fn save(db: &Connection, name: &str, standing: &DeliveryState) -> Result<(), His
         save.execute(params![name, position, to_signed(standing.dropped), to_signed(standing.connections)])
     })
     .map(drop)
-    .doing("noting what a sink has delivered")
+    .with_activity("noting what a sink has delivered")
 }
 
 /// What a transaction did to the outbox.
@@ -250,7 +257,7 @@ pub(super) struct Put {
 
 /// Adds these lines and removes what is beyond the bounds, `ages` by its age too; `tidy`, it removes what is delivered too, and notes what each
 /// sink has delivered.
-pub(super) fn put(
+pub(super) fn store_lines(
     db: &Connection,
     outbox: &Outbox,
     before: &OutboxContents,
@@ -263,20 +270,20 @@ pub(super) fn put(
     }
     let dropped = remove(db, outbox, &mut stored, (tidy, ages))?;
     if tidy || !dropped.is_empty() {
-        note(db, outbox, &dropped)?;
+        note_deliveries(db, outbox, &dropped)?;
     }
     Ok(Put { stored, dropped })
 }
 
 /// Notes what each sink has delivered, as if these stretches had been dropped already.
-pub(super) fn note(db: &Connection, outbox: &Outbox, dropped: &[(u64, u64)]) -> Result<(), HistoryError> {
+pub(super) fn note_deliveries(db: &Connection, outbox: &Outbox, dropped: &[(u64, u64)]) -> Result<(), HistoryError> {
     outbox.for_each_sink(|name, standing| {
         let mut after = standing.clone();
         for (from, to) in dropped {
-            after.dropped += after.position.within(*from, *to);
-            after.position.done(*from, *to);
+            after.dropped += after.position.count_within(*from, *to);
+            after.position.mark_delivered(*from, *to);
         }
-        save(db, name, &after)
+        save_delivery_state(db, name, &after)
     })
 }
 
@@ -294,7 +301,7 @@ fn add(db: &Connection, stored: &mut OutboxContents, lines: &[(TimeNs, Cow<'_, s
         let first = to_signed(stored.next_sequence);
         insert.execute(params![first, lines.len() as i64, start_ns, end_ns, to_signed(bytes), body])
     })
-    .doing("storing the outbox")?;
+    .with_activity("storing the outbox")?;
     stored.next_sequence += lines.len() as u64;
     stored.bytes += bytes;
     stored.added_bytes += bytes;
@@ -313,7 +320,7 @@ fn remove(
     stored: &mut OutboxContents,
     (tidy, ages): (bool, bool),
 ) -> Result<Vec<(u64, u64)>, HistoryError> {
-    let (settings, lowest) = (outbox.settings(), outbox.lowest().min(stored.next_sequence));
+    let (settings, lowest) = (outbox.settings(), outbox.lowest_undelivered().min(stored.next_sequence));
     let max_age_ns = i64::try_from(settings.max_age.as_nanos()).unwrap_or(i64::MAX);
     let horizon_ns =
         stored.newest_ns.filter(|_| ages).map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(max_age_ns));
@@ -322,7 +329,7 @@ fn remove(
     }
     let mut dropped = Vec::new();
     for _ in 0..ROWS_REMOVED_MAX {
-        let Some((first, items, end_ns, bytes)) = oldest(db)? else {
+        let Some((first, items, end_ns, bytes)) = find_oldest_row(db)? else {
             stored.oldest_ns = None;
             break;
         };
@@ -335,7 +342,7 @@ fn remove(
         }
         db.prepare_cached("DELETE FROM outbox WHERE first_sequence = ?1")
             .and_then(|mut delete| delete.execute([to_signed(first)]))
-            .doing("shortening the outbox")?;
+            .with_activity("shortening the outbox")?;
         stored.bytes = stored.bytes.saturating_sub(bytes);
         if !delivered {
             dropped.push((first, end));
@@ -354,17 +361,17 @@ fn remove_delivered(db: &Connection, lowest: u64, stored: &mut OutboxContents) -
                WHERE first_sequence < ?1 AND first_sequence + items <= ?1 ORDER BY first_sequence LIMIT ?2)",
         )
         .and_then(|mut select| select.query_row([end, DELIVERED_REMOVED_MAX], |row| Ok((row.get(0)?, row.get(1)?))))
-        .doing("looking for what is delivered")?;
+        .with_activity("looking for what is delivered")?;
     let Some(last) = last else { return Ok(()) };
     db.prepare_cached("DELETE FROM outbox WHERE first_sequence <= ?1")
         .and_then(|mut delete| delete.execute([last]))
-        .doing("shortening the outbox")?;
+        .with_activity("shortening the outbox")?;
     stored.bytes = stored.bytes.saturating_sub(to_unsigned(bytes));
     Ok(())
 }
 
 /// First number, items, time of the newest, bytes.
-fn oldest(db: &Connection) -> Result<Option<(u64, u64, TimeNs, u64)>, HistoryError> {
+fn find_oldest_row(db: &Connection) -> Result<Option<(u64, u64, TimeNs, u64)>, HistoryError> {
     db.prepare_cached("SELECT first_sequence, items, end_ns, bytes FROM outbox ORDER BY first_sequence LIMIT 1")
         .and_then(|mut select| {
             let row = |row: &rusqlite::Row<'_>| {
@@ -372,5 +379,5 @@ fn oldest(db: &Connection) -> Result<Option<(u64, u64, TimeNs, u64)>, HistoryErr
             };
             select.query_row([], row).optional()
         })
-        .doing("looking for the oldest of the outbox")
+        .with_activity("looking for the oldest of the outbox")
 }

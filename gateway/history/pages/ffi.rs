@@ -38,7 +38,7 @@ const OWN: usize = size_of::<SealedFile>().next_multiple_of(16);
 ///
 /// # Errors
 /// The code of `SQLite`: there is no layer of the system to lie over.
-pub(in crate::history) fn register() -> Result<(), c_int> {
+pub(in crate::history) fn register_layer() -> Result<(), c_int> {
     static DONE: OnceLock<c_int> = OnceLock::new();
     // SAFETY: the layer of the system lives as long as the process. Ours is a copy of it that is leaked, so it does too; the
     // functions that are taken over look at no field of it but the longest name of a path, which the copy has.
@@ -102,7 +102,7 @@ unsafe extern "C" fn open(
         let mut bytes = [0; HEADER];
         // A file that is shorter than its header is new: its first page says what it will be.
         if real_read(real, bytes.as_mut_ptr().cast(), HEADER as c_int, 0) == ffi::SQLITE_OK {
-            (*own).header = FileHeader::of(&bytes, SEALED_APPLICATION);
+            (*own).header = FileHeader::from_header(&bytes, SEALED_APPLICATION);
         }
         ffi::SQLITE_OK
     }
@@ -136,7 +136,7 @@ unsafe fn real_read(real: *mut ffi::sqlite3_file, to: *mut c_void, length: c_int
     }
 }
 
-fn damaged(number: u32) -> c_int {
+fn note_damaged_page(number: u32) -> c_int {
     DAMAGED.store(number, Ordering::Relaxed);
     ffi::SQLITE_IOERR_DATA
 }
@@ -153,8 +153,8 @@ unsafe extern "C" fn read(file: *mut ffi::sqlite3_file, to: *mut c_void, length:
         }
         let target = std::slice::from_raw_parts_mut(to.cast::<u8>(), bytes);
         if sum::is_page(bytes, place) {
-            let number = sum::number(bytes, place);
-            return if sum::open(target, number) { code } else { damaged(number) };
+            let number = sum::page_number(bytes, place);
+            return if sum::unseal_page(target, number) { code } else { note_damaged_page(number) };
         }
         check_around(real, header.page, bytes as u64, place)
     }
@@ -174,9 +174,9 @@ unsafe fn check_around(real: *mut ffi::sqlite3_file, page: usize, bytes: u64, pl
         if code != ffi::SQLITE_OK {
             return code;
         }
-        let number = sum::number(page, index * length);
-        if !sum::open(&mut whole, number) {
-            return damaged(number);
+        let number = sum::page_number(page, index * length);
+        if !sum::unseal_page(&mut whole, number) {
+            return note_damaged_page(number);
         }
     }
     ffi::SQLITE_OK
@@ -191,7 +191,7 @@ unsafe extern "C" fn write(file: *mut ffi::sqlite3_file, from: *const c_void, le
     let place = u64::try_from(offset).unwrap_or(u64::MAX);
     if let Some(header) = source.first_chunk::<HEADER>().filter(|_| place == 0) {
         // SAFETY: `SQLite` calls only with files that `open` has made.
-        unsafe { (*file.cast::<SealedFile>()).header = FileHeader::of(header, SEALED_APPLICATION) };
+        unsafe { (*file.cast::<SealedFile>()).header = FileHeader::from_header(header, SEALED_APPLICATION) };
     }
     // SAFETY: as above.
     let sealed = unsafe { (*file.cast::<SealedFile>()).header.sealed };
@@ -199,7 +199,7 @@ unsafe extern "C" fn write(file: *mut ffi::sqlite3_file, from: *const c_void, le
         return system!(file, xWrite, from, length, offset);
     }
     let mut page = source.to_vec();
-    sum::seal(&mut page, sum::number(source.len(), place));
+    sum::seal_page(&mut page, sum::page_number(source.len(), place));
     system!(file, xWrite, page.as_ptr().cast(), length, offset)
 }
 

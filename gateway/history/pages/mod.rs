@@ -25,9 +25,9 @@
 mod ffi;
 mod sum;
 
-pub(super) use ffi::{VFS, damaged_page, register, reserve_room};
+pub(super) use ffi::{VFS, damaged_page, register_layer, reserve_room};
 
 /// Has the page of this number a sum, and is it right?
 pub(super) fn is_sealed_page(page: &mut [u8], number: u32) -> bool {
-    sum::is_sealed(page) && sum::open(page, number)
+    sum::is_sealed(page) && sum::unseal_page(page, number)
 }

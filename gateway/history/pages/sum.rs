@@ -11,7 +11,7 @@ pub(super) fn is_page(length: usize, offset: u64) -> bool {
 }
 
 /// The number of a page, from 1.
-pub(super) fn number(length: usize, offset: u64) -> u32 {
+pub(super) fn page_number(length: usize, offset: u64) -> u32 {
     u32::try_from(offset / length as u64 + 1).unwrap_or(u32::MAX)
 }
 
@@ -23,7 +23,7 @@ fn sum(body: &[u8], number: u32) -> u32 {
 }
 
 /// Writes the sum at the end of the page.
-pub(super) fn seal(page: &mut [u8], number: u32) {
+pub(super) fn seal_page(page: &mut [u8], number: u32) {
     let Some(at) = page.len().checked_sub(ROOM) else { return };
     let (body, room) = page.split_at_mut(at);
     let (first, second) = room.split_at_mut(4);
@@ -37,7 +37,7 @@ pub(super) fn is_sealed(page: &[u8]) -> bool {
 }
 
 /// Is the page as it was written, as far as it says? Takes the sum out: a page that is copied from here has none.
-pub(super) fn open(page: &mut [u8], number: u32) -> bool {
+pub(super) fn unseal_page(page: &mut [u8], number: u32) -> bool {
     let Some((body, room)) = page.split_last_chunk_mut::<ROOM>() else { return true };
     if *room == [0; ROOM] {
         // Nobody has sealed it.
@@ -63,7 +63,7 @@ pub(super) const HEADER: usize = 100;
 
 impl FileHeader {
     /// Two places say that pages have sums, so that one changed bit cannot switch the check off.
-    pub(super) fn of(header: &[u8; HEADER], application: u32) -> Self {
+    pub(super) fn from_header(header: &[u8; HEADER], application: u32) -> Self {
         let room = usize::from(header[20]) == ROOM;
         let named = header[68..72] == application.to_be_bytes();
         let page = usize::from(header[16]) << 8 | usize::from(header[17]) << 16;
@@ -85,16 +85,16 @@ mod tests {
             bit in 0usize..512 * 8,
         ) {
             let mut page = [body, vec![0; ROOM]].concat();
-            seal(&mut page, number);
+            seal_page(&mut page, number);
             let sealed = page.clone();
-            prop_assert!(open(&mut page, number));
+            prop_assert!(unseal_page(&mut page, number));
             prop_assert_eq!(&page[504..], &[0; ROOM]);
-            prop_assert!(open(&mut page, number), "one that nobody has sealed");
+            prop_assert!(unseal_page(&mut page, number), "one that nobody has sealed");
             let mut flipped = sealed.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);
-            prop_assert!(!open(&mut flipped, number));
+            prop_assert!(!unseal_page(&mut flipped, number));
             let mut moved = sealed;
-            prop_assert!(!open(&mut moved, number + 1));
+            prop_assert!(!unseal_page(&mut moved, number + 1));
         }
     }
 
@@ -102,6 +102,6 @@ mod tests {
     fn pages_are_told_from_other_reads() {
         assert!(is_page(4_096, 8_192) && is_page(512, 0) && is_page(65_536, 65_536));
         assert!(!is_page(4_096, 100) && !is_page(100, 0) && !is_page(16, 24) && !is_page(4_095, 0));
-        assert_eq!((number(4_096, 0), number(4_096, 8_192)), (1, 3));
+        assert_eq!((page_number(4_096, 0), page_number(4_096, 8_192)), (1, 3));
     }
 }

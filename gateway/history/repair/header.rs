@@ -1,7 +1,7 @@
 //! A file whose header is damaged is copied, and gets the header that every history has: the rest of it may be whole.
 
-use super::super::error::{Doing, HistoryError, at};
-use super::super::lock::beside;
+use super::super::error::{Doing, HistoryError, add_path};
+use super::super::lock::append_suffix;
 use super::super::{damage, pages, schema};
 use rusqlite::{Connection, OpenFlags};
 use std::fs::{self, OpenOptions};
@@ -24,7 +24,7 @@ pub(super) struct Source {
 impl Drop for Source {
     fn drop(&mut self) {
         if let Some(copy) = &self.copy {
-            for file in [copy.clone(), beside(copy, "-wal"), beside(copy, "-shm")] {
+            for file in [copy.clone(), append_suffix(copy, "-wal"), append_suffix(copy, "-shm")] {
                 // One that is left behind is only in the way.
                 let _gone = fs::remove_file(file);
             }
@@ -36,10 +36,10 @@ impl Drop for Source {
 ///
 /// # Errors
 /// It is none, or not even a new header helps.
-pub(super) fn readable(from: &Path, to: &Path) -> Result<Source, HistoryError> {
+pub(super) fn open_source(from: &Path, to: &Path) -> Result<Source, HistoryError> {
     match schema::open_for_reading(from) {
         Ok(checked) => {
-            let unchecked = unchecked(from).ok();
+            let unchecked = open_unchecked(from).ok();
             Ok(Source { checked, unchecked, copy: None })
         }
         Err(error) if error.is_damage() && damage::was_ours(from) => with_header(from, to),
@@ -47,19 +47,19 @@ pub(super) fn readable(from: &Path, to: &Path) -> Result<Source, HistoryError> {
     }
 }
 
-fn unchecked(path: &Path) -> Result<Connection, HistoryError> {
+fn open_unchecked(path: &Path) -> Result<Connection, HistoryError> {
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    Connection::open_with_flags(path, flags).doing("opening the file without checks")
+    Connection::open_with_flags(path, flags).with_activity("opening the file without checks")
 }
 
 fn with_header(from: &Path, to: &Path) -> Result<Source, HistoryError> {
-    let copy = beside(to, ".source");
-    fs::copy(from, &copy).map_err(at(&copy))?;
-    if beside(from, "-wal").exists() {
-        fs::copy(beside(from, "-wal"), beside(&copy, "-wal")).map_err(at(&copy))?;
+    let copy = append_suffix(to, ".source");
+    fs::copy(from, &copy).map_err(add_path(&copy))?;
+    if append_suffix(from, "-wal").exists() {
+        fs::copy(append_suffix(from, "-wal"), append_suffix(&copy, "-wal")).map_err(add_path(&copy))?;
     }
-    put_header(&copy).map_err(at(&copy))?;
-    let opened = schema::open_for_reading(&copy).and_then(|checked| Ok((checked, unchecked(&copy)?)));
+    put_header(&copy).map_err(add_path(&copy))?;
+    let opened = schema::open_for_reading(&copy).and_then(|checked| Ok((checked, open_unchecked(&copy)?)));
     match opened {
         Ok((checked, unchecked)) => Ok(Source { checked, unchecked: Some(unchecked), copy: Some(copy) }),
         Err(error) => {

@@ -79,23 +79,23 @@ const SUMMARIES: [(&str, i64); 3] = [("minutes", 1), ("hours", 60), ("days", 1_4
 ///
 /// # Errors
 /// There is something at `to`, it cannot be written, or nothing at all can be read from `from`.
-pub fn repair(from: &Path, to: &Path) -> Result<Repaired, HistoryError> {
+pub fn repair_history(from: &Path, to: &Path) -> Result<Repaired, HistoryError> {
     if to.exists() {
         return Err(HistoryError::Question(format!("{} is there already; name another file", to.display())));
     }
-    let source = header::readable(from, to)?;
+    let source = header::open_source(from, to)?;
     let new = schema::open_for_writing(to)?;
-    new.pragma_update(None, "synchronous", "OFF").doing("writing the new file")?;
+    new.pragma_update(None, "synchronous", "OFF").with_activity("writing the new file")?;
     outbox::create_like(&source.checked, &new)?;
     let mut repaired = Repaired { tables: Vec::new(), damaged: Vec::new() };
     for (table, keys) in TABLES {
-        let copied = copy(&source, &new, table, keys)?;
+        let copied = copy_table(&source, &new, table, keys)?;
         repaired.damaged.extend(copied.damaged);
         repaired.tables.extend(copied.table);
     }
     renew_summaries(&new, &repaired.tables)?;
-    new.pragma_update(None, "synchronous", "FULL").doing("writing the new file")?;
-    new.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).doing("writing the new file")?;
+    new.pragma_update(None, "synchronous", "FULL").with_activity("writing the new file")?;
+    new.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).with_activity("writing the new file")?;
     Ok(repaired)
 }
 
@@ -105,14 +105,14 @@ struct CopiedTable {
     damaged: Vec<DamagedRows>,
 }
 
-fn copy(
+fn copy_table(
     source: &header::Source,
     new: &Connection,
     table: &'static str,
     keys: Keys,
 ) -> Result<CopiedTable, HistoryError> {
-    let copying = new.unchecked_transaction().doing("writing the new file")?;
-    let Some(mut copy) = TableCopy::of(&source.checked, &copying, table, keys)? else {
+    let copying = new.unchecked_transaction().with_activity("writing the new file")?;
+    let Some(mut copy) = TableCopy::for_table(&source.checked, &copying, table, keys)? else {
         return Ok(CopiedTable { table: None, damaged: Vec::new() });
     };
     copy.run(&source.checked, &copying, |_| true)?;
@@ -128,7 +128,7 @@ fn copy(
         }
         lost = Vec::new();
     }
-    copying.commit().doing("writing the new file")?;
+    copying.commit().with_activity("writing the new file")?;
     Ok(CopiedTable { table: Some(RepairedTable { table, saved, lost }), damaged })
 }
 
@@ -137,18 +137,18 @@ fn check_blocks(new: &Connection) -> Result<Vec<DamagedRows>, HistoryError> {
     let mut damaged = Vec::new();
     let mut select = new
         .prepare(&format!("SELECT {} FROM blocks ORDER BY first_row", super::block::BLOCK_COLUMNS))
-        .doing("checking blocks")?;
-    let mut rows = select.query([]).doing("checking blocks")?;
-    while let Some(row) = rows.next().doing("checking blocks")? {
+        .with_activity("checking blocks")?;
+    let mut rows = select.query([]).with_activity("checking blocks")?;
+    while let Some(row) = rows.next().with_activity("checking blocks")? {
         let stored = StoredBlock::of_row(row);
-        if stored.as_ref().is_ok_and(|stored| stored.checked().is_some()) {
+        if stored.as_ref().is_ok_and(|stored| stored.verify_directory().is_some()) {
             continue;
         }
-        let first_row: i64 = row.get(1).doing("checking blocks")?;
+        let first_row: i64 = row.get(1).with_activity("checking blocks")?;
         damaged.push(DamagedRows::of_block(new, first_row));
     }
     for one in &damaged {
-        new.execute("DELETE FROM blocks WHERE first_row = ?1", [one.first_row]).doing("checking blocks")?;
+        new.execute("DELETE FROM blocks WHERE first_row = ?1", [one.first_row]).with_activity("checking blocks")?;
     }
     Ok(damaged)
 }
@@ -160,11 +160,12 @@ fn unchecked_blocks(
     (after, before): (i64, i64),
 ) -> Result<(u64, Vec<DamagedRows>), HistoryError> {
     let Some(unchecked) = &source.unchecked else { return Ok((0, vec![lost_between(new, after)?])) };
-    let Some(mut copy) = TableCopy::of(unchecked, new, "blocks", Keys::Number("first_row"))? else {
+    let Some(mut copy) = TableCopy::for_table(unchecked, new, "blocks", Keys::Number("first_row"))? else {
         return Ok((0, Vec::new()));
     };
-    copy.within(after, before);
-    let whole = |row: &rusqlite::Row<'_>| rows::block(row).is_some_and(|stored| stored.checked().is_some());
+    copy.limit_range(after, before);
+    let whole =
+        |row: &rusqlite::Row<'_>| rows::read_block(row).is_some_and(|stored| stored.verify_directory().is_some());
     copy.run(unchecked, new, whole)?;
     let mut damaged = Vec::new();
     for refused in copy.refused.iter().copied() {
@@ -187,7 +188,7 @@ fn lost_between(new: &Connection, after: i64) -> Result<DamagedRows, HistoryErro
             [after],
             |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)),
         )
-        .doing("looking for what is lost")?;
+        .with_activity("looking for what is lost")?;
     let first_row = bounds.0.unwrap_or(0);
     let rows = bounds.2.map_or(0, |next| next - first_row);
     Ok(DamagedRows { first_row, rows, span_ns: bounds.1.zip(bounds.3) })
@@ -199,7 +200,7 @@ fn renew_summaries(new: &Connection, tables: &[RepairedTable]) -> Result<(), His
         let lost = tables.iter().filter(|table| table.table == name).flat_map(|table| &table.lost);
         for (after, before) in lost {
             let range = after.saturating_mul(minutes)..before.saturating_add(1).saturating_mul(minutes);
-            pyramid::renew(new, pyramid::with_blocks(new, range)?)?;
+            pyramid::renew_buckets(new, pyramid::with_blocks(new, range)?)?;
         }
     }
     Ok(())

@@ -32,7 +32,7 @@ pub(super) struct TableCopy {
 }
 
 /// The block of a row of all columns of its table, in the order of the table.
-pub(super) fn block(row: &Row<'_>) -> Option<StoredBlock> {
+pub(super) fn read_block(row: &Row<'_>) -> Option<StoredBlock> {
     let number = |name: &str| row.get::<_, i64>(name).ok();
     let key = BlockKey {
         segment: number("segment")?,
@@ -44,22 +44,23 @@ pub(super) fn block(row: &Row<'_>) -> Option<StoredBlock> {
     Some(StoredBlock { key, directory: row.get("directory").ok()?, columns: row.get("columns").ok()? })
 }
 
-fn columns(db: &Connection, table: &str) -> Result<Vec<String>, HistoryError> {
-    let mut select = db.prepare(&format!("PRAGMA table_info({table})")).doing("looking at the tables")?;
+fn read_column_names(db: &Connection, table: &str) -> Result<Vec<String>, HistoryError> {
+    let mut select = db.prepare(&format!("PRAGMA table_info({table})")).with_activity("looking at the tables")?;
     let names = select.query_map([], |row| row.get(1));
-    names.and_then(Iterator::collect).doing("looking at the tables")
+    names.and_then(Iterator::collect).with_activity("looking at the tables")
 }
 
 impl TableCopy {
     /// Of this table; `None` where one of the files does not have it.
-    pub(super) fn of(
+    pub(super) fn for_table(
         from: &Connection,
         to: &Connection,
         table: &'static str,
         keys: Keys,
     ) -> Result<Option<Self>, HistoryError> {
-        let known = columns(to, table)?;
-        let names: Vec<String> = columns(from, table)?.into_iter().filter(|name| known.contains(name)).collect();
+        let known = read_column_names(to, table)?;
+        let names: Vec<String> =
+            read_column_names(from, table)?.into_iter().filter(|name| known.contains(name)).collect();
         if names.is_empty() {
             return Ok(None);
         }
@@ -79,7 +80,7 @@ impl TableCopy {
     }
 
     /// Only the keys after the first and before the second.
-    pub(super) fn within(&mut self, after: i64, before: i64) {
+    pub(super) fn limit_range(&mut self, after: i64, before: i64) {
         self.range = (after, before);
     }
 
@@ -107,7 +108,7 @@ impl TableCopy {
                     after = key;
                 }
                 Err(error) if error.is_damage() => {
-                    let found = self.beyond(from, after, before)?;
+                    let found = self.find_beyond(from, after, before)?;
                     self.note_lost(after, found.map_or(before, |found| found.saturating_add(1)));
                     let Some(found) = found else { return Ok(()) };
                     after = found;
@@ -128,11 +129,11 @@ impl TableCopy {
         let found = from
             .prepare_cached(&self.next)
             .and_then(|mut select| select.query_row([after, before], |row| row.get(0)).optional());
-        found.doing("looking for the next row")
+        found.with_activity("looking for the next row")
     }
 
     /// The smallest number after `after` behind which the next key can be found again; `None`: there is none.
-    fn beyond(&self, from: &Connection, after: i64, before: i64) -> Result<Option<i64>, HistoryError> {
+    fn find_beyond(&self, from: &Connection, after: i64, before: i64) -> Result<Option<i64>, HistoryError> {
         let readable = |key: i64| match self.next_key(from, key, before) {
             Ok(found) => Ok(found.is_some()),
             Err(error) if error.is_damage() => Ok(false),
@@ -168,15 +169,15 @@ impl TableCopy {
     ) -> Result<bool, HistoryError> {
         let mut select = match from.prepare_cached(&self.select) {
             Err(error) if is_of_disk(&error) => return Ok(false),
-            select => select.doing("reading rows")?,
+            select => select.with_activity("reading rows")?,
         };
-        let mut rows = select.query(params_from_iter(key)).doing("reading rows")?;
+        let mut rows = select.query(params_from_iter(key)).with_activity("reading rows")?;
         loop {
             let row = match rows.next() {
                 Ok(Some(row)) => row,
                 Ok(None) => return Ok(true),
                 Err(error) if is_of_disk(&error) => return Ok(false),
-                Err(error) => return Err(error).doing("reading rows"),
+                Err(error) => return Err(error).with_activity("reading rows"),
             };
             if !wanted(row) {
                 self.refused.extend(key);
@@ -184,14 +185,14 @@ impl TableCopy {
             }
             let values = (0..self.columns).map(|column| row.get::<_, Value>(column));
             let Ok(values) = values.collect::<Result<Vec<Value>, _>>() else { return Ok(false) };
-            let mut insert = to.prepare_cached(&self.insert).doing("writing the new file")?;
+            let mut insert = to.prepare_cached(&self.insert).with_activity("writing the new file")?;
             match insert.execute(params_from_iter(values)) {
                 Ok(_) => self.saved += 1,
                 // A rule of the table is broken: what was read is not what was written.
                 Err(error) if error.sqlite_error_code() == Some(rusqlite::ErrorCode::ConstraintViolation) => {
                     return Ok(false);
                 }
-                Err(error) => return Err(error).doing("writing the new file"),
+                Err(error) => return Err(error).with_activity("writing the new file"),
             }
         }
     }

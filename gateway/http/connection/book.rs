@@ -42,28 +42,28 @@ impl ConnectionActivity {
     }
 
     /// A request is complete as far as its head goes.
-    pub(super) fn answers(&self) {
+    pub(super) fn mark_answering(&self) {
         self.requests.fetch_add(1, Ordering::Relaxed);
         self.since_ms.store(self.now_ms(), Ordering::Relaxed);
         self.answering.store(true, Ordering::Release);
     }
 
     /// The answer has gone, or nobody wants it.
-    pub(super) fn waits(&self) {
+    pub(super) fn mark_waiting(&self) {
         self.first_byte_ms.store(0, Ordering::Relaxed);
         self.since_ms.store(self.now_ms(), Ordering::Relaxed);
         self.answering.store(false, Ordering::Release);
     }
 
     /// Something came.
-    pub(super) fn heard(&self) {
+    pub(super) fn note_first_byte(&self) {
         if !self.answering.load(Ordering::Acquire) && self.first_byte_ms.load(Ordering::Relaxed) == 0 {
             self.first_byte_ms.store(self.now_ms(), Ordering::Relaxed);
         }
     }
 
     /// What it waits for.
-    pub(super) fn state(&self) -> Waits {
+    pub(super) fn wait_state(&self) -> Waits {
         if self.answering.load(Ordering::Acquire) {
             return Waits::No;
         }
@@ -108,7 +108,7 @@ pub(super) struct ConnectionEntry {
 
 impl Drop for ConnectionEntry {
     fn drop(&mut self) {
-        self.book.lock().by_number.remove(&self.number);
+        self.book.lock_lines().by_number.remove(&self.number);
     }
 }
 
@@ -118,13 +118,13 @@ impl ConnectionTable {
         Self { opened: Instant::now(), most, of_one, lines: Arc::default() }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Lines> {
+    fn lock_lines(&self) -> MutexGuard<'_, Lines> {
         self.lines.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Another connection of this address. One that waits goes for it where there is no room; `None` where none waits.
-    pub(super) fn enter(&self, from: IpAddr) -> Option<ConnectionEntry> {
-        let mut lines = self.lock();
+    pub(super) fn register_connection(&self, from: IpAddr) -> Option<ConnectionEntry> {
+        let mut lines = self.lock_lines();
         let own = lines.by_number.values().filter(|line| line.from == from).count();
         if own >= self.of_one {
             lines.close_one(|line| line.from == from)?;
@@ -141,7 +141,7 @@ impl ConnectionTable {
             requests: AtomicU64::new(0),
             go: Notify::new(),
         });
-        line.waits();
+        line.mark_waiting();
         let number = lines.next;
         lines.next += 1;
         lines.by_number.insert(number, line.clone());
@@ -153,14 +153,14 @@ impl Lines {
     /// The address with most connections that wait.
     fn most_waiting(&self) -> Option<IpAddr> {
         let mut counts: HashMap<IpAddr, usize> = HashMap::new();
-        let waiting = self.by_number.values().filter(|line| line.state() != Waits::No);
+        let waiting = self.by_number.values().filter(|line| line.wait_state() != Waits::No);
         waiting.for_each(|line| *counts.entry(line.from).or_default() += 1);
         counts.into_iter().max_by_key(|(_, count)| *count).map(|(from, _)| from)
     }
 
     /// Closes the oldest of these that wait.
     fn close_one(&mut self, which: impl Fn(&ConnectionActivity) -> bool) -> Option<()> {
-        let waiting = self.by_number.iter().filter(|(_, line)| which(line) && line.state() != Waits::No);
+        let waiting = self.by_number.iter().filter(|(_, line)| which(line) && line.wait_state() != Waits::No);
         let oldest = waiting.min_by_key(|(number, line)| (line.since_ms.load(Ordering::Relaxed), **number));
         let number = oldest.map(|(number, _)| *number)?;
         self.by_number.remove(&number)?.go.notify_one();
@@ -176,32 +176,36 @@ mod tests {
     fn whoever_only_waits_goes_for_another_and_whoever_is_answered_stays() {
         let address = |n: u8| IpAddr::from([10, 0, 0, n]);
         let book = ConnectionTable::new(10, 6);
-        let mut of_one: Vec<ConnectionEntry> = (0..100).filter_map(|_| book.enter(address(1))).collect();
+        let mut of_one: Vec<ConnectionEntry> = (0..100).filter_map(|_| book.register_connection(address(1))).collect();
         assert_eq!(of_one.len(), 100, "each finds a place");
-        assert_eq!(book.lock().by_number.len(), 6, "and of each address there are only so many");
+        assert_eq!(book.lock_lines().by_number.len(), 6, "and of each address there are only so many");
         of_one.drain(..94);
-        let mut others: Vec<ConnectionEntry> = (2..6).filter_map(|n| book.enter(address(n))).collect();
-        assert_eq!(book.lock().by_number.len(), 10);
-        others.extend(book.enter(address(7)));
-        assert_eq!(book.lock().by_number.values().filter(|line| line.from == address(1)).count(), 5, "the crowd pays");
-        book.lock().by_number.values().for_each(|line| line.answers());
-        assert!(book.enter(address(9)).is_none(), "nobody waits");
-        others[0].line.waits();
-        assert!(book.enter(address(9)).is_some());
+        let mut others: Vec<ConnectionEntry> = (2..6).filter_map(|n| book.register_connection(address(n))).collect();
+        assert_eq!(book.lock_lines().by_number.len(), 10);
+        others.extend(book.register_connection(address(7)));
+        assert_eq!(
+            book.lock_lines().by_number.values().filter(|line| line.from == address(1)).count(),
+            5,
+            "the crowd pays"
+        );
+        book.lock_lines().by_number.values().for_each(|line| line.mark_answering());
+        assert!(book.register_connection(address(9)).is_none(), "nobody waits");
+        others[0].line.mark_waiting();
+        assert!(book.register_connection(address(9)).is_some());
         drop((of_one, others));
-        assert!(book.lock().by_number.is_empty());
+        assert!(book.lock_lines().by_number.is_empty());
     }
 
     #[test]
     fn a_line_tells_what_it_waits_for() {
-        let entry = ConnectionTable::new(1, 1).enter(IpAddr::from([10, 0, 0, 1])).expect("room");
+        let entry = ConnectionTable::new(1, 1).register_connection(IpAddr::from([10, 0, 0, 1])).expect("room");
         let line = &entry.line;
-        assert!(matches!(line.state(), Waits::First(_)));
-        line.heard();
-        assert!(matches!(line.state(), Waits::Rest(_)));
-        line.answers();
-        assert_eq!(line.state(), Waits::No);
-        line.waits();
-        assert!(matches!(line.state(), Waits::Next(_)));
+        assert!(matches!(line.wait_state(), Waits::First(_)));
+        line.note_first_byte();
+        assert!(matches!(line.wait_state(), Waits::Rest(_)));
+        line.mark_answering();
+        assert_eq!(line.wait_state(), Waits::No);
+        line.mark_waiting();
+        assert!(matches!(line.wait_state(), Waits::Next(_)));
     }
 }

@@ -47,7 +47,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 const CLOSE_WITHIN: Duration = Duration::from_millis(1500);
 
 /// Lets the process open as many files as the system allows it, and gives how many connections that leaves room for.
-fn room() -> usize {
+fn raise_connection_limit() -> usize {
     let limit = getrlimit(Resource::Nofile);
     // Where the limit cannot be raised, what there is has to do.
     let _as_it_is = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, maximum: limit.maximum });
@@ -57,13 +57,13 @@ fn room() -> usize {
 }
 
 /// Serves until `stopped` says so.
-pub(super) async fn serve(
+pub(super) async fn serve_connections(
     listener: TcpListener,
     tls: Option<TlsAcceptor>,
     router: Router,
     mut stopped: watch::Receiver<bool>,
 ) {
-    let most = room();
+    let most = raise_connection_limit();
     let (book, files) =
         (ConnectionTable::new(most, OF_ONE_MAX.min(most)), Arc::new(Semaphore::new(most + CLOSING_MAX)));
     let mut tasks = JoinSet::new();
@@ -78,7 +78,7 @@ pub(super) async fn serve(
             continue;
         };
         while tasks.try_join_next().is_some() {}
-        let Some(entry) = book.enter(from.ip().to_canonical()) else {
+        let Some(entry) = book.register_connection(from.ip().to_canonical()) else {
             turn_away(stream);
             continue;
         };
@@ -96,12 +96,12 @@ pub(super) async fn serve(
 fn turn_away(stream: TcpStream) {
     let problem = ApiProblem::unavailable("the box talks to as many clients as it can", "close a page, or try again");
     if let Ok(mut stream) = stream.into_std() {
-        let _gone = stream.write_all(raw(&problem, "503 Service Unavailable").as_bytes());
+        let _gone = stream.write_all(format_response(&problem, "503 Service Unavailable").as_bytes());
     }
 }
 
 /// A problem as the text of a whole answer, for where there is no request to answer.
-fn raw(problem: &ApiProblem, status: &str) -> String {
+fn format_response(problem: &ApiProblem, status: &str) -> String {
     let body = serde_json::to_string(problem).unwrap_or_default();
     let length = body.len();
     format!(

@@ -1,8 +1,8 @@
 //! One connection: encrypted where that is wanted, one request after another, each with its head in time.
 
 use super::book::{ConnectionActivity, ConnectionEntry, Waits};
+use super::format_response;
 use super::paced::Paced;
-use super::raw;
 use crate::http::ApiProblem;
 use crate::http::peer::Peer;
 use axum::Router;
@@ -53,11 +53,11 @@ impl Talk {
         let peer = Peer::new(from, to, self.tls.is_some());
         let talk = async {
             match self.tls.clone() {
-                None => self.speak(Paced::new(stream, line.clone()), peer, &line).await,
+                None => self.serve_requests(Paced::new(stream, line.clone()), peer, &line).await,
                 Some(acceptor) => {
                     let greeted = tokio::time::timeout(HEAD_WITHIN, acceptor.accept(stream)).await;
                     if let Ok(Ok(stream)) = greeted {
-                        self.speak(Paced::new(stream, line.clone()), peer, &line).await;
+                        self.serve_requests(Paced::new(stream, line.clone()), peer, &line).await;
                     }
                 }
             }
@@ -69,11 +69,16 @@ impl Talk {
         drop(entry);
     }
 
-    async fn speak<S: AsyncRead + AsyncWrite + Unpin>(&self, stream: S, peer: Peer, line: &Arc<ConnectionActivity>) {
+    async fn serve_requests<S: AsyncRead + AsyncWrite + Unpin>(
+        &self,
+        stream: S,
+        peer: Peer,
+        line: &Arc<ConnectionActivity>,
+    ) {
         let service = hyper::service::service_fn(|request: Request<Incoming>| {
-            line.answers();
+            line.mark_answering();
             let (line, router) = (line.clone(), self.router.clone());
-            async move { Ok::<_, Infallible>(answer(router, request, peer, line).await) }
+            async move { Ok::<_, Infallible>(answer_request(router, request, peer, line).await) }
         });
         let mut connection = http1::Builder::new()
             .max_headers(HEADERS_MAX)
@@ -90,9 +95,9 @@ impl Talk {
                     Pin::new(&mut connection).graceful_shutdown();
                 }
             }
-            match line.state() {
+            match line.wait_state() {
                 Waits::Rest(waited) if waited >= HEAD_WITHIN => {
-                    return farewell(connection.into_parts().io.into_inner()).await;
+                    return send_timeout(connection.into_parts().io.into_inner()).await;
                 }
                 Waits::First(waited) if waited >= HEAD_WITHIN => return,
                 Waits::Next(waited) if waited >= NEXT_WITHIN => return,
@@ -108,8 +113,8 @@ pub(super) async fn until_stopped(stopped: &mut watch::Receiver<bool>) {
 }
 
 /// The head did not come in time.
-async fn farewell<S: AsyncWrite + Unpin>(mut stream: S) {
-    let text = raw(&ApiProblem::slow(HEAD_WITHIN), "408 Request Timeout");
+async fn send_timeout<S: AsyncWrite + Unpin>(mut stream: S) {
+    let text = format_response(&ApiProblem::request_timeout(HEAD_WITHIN), "408 Request Timeout");
     let _gone = tokio::time::timeout(FAREWELL_WITHIN, async {
         stream.write_all(text.as_bytes()).await?;
         stream.shutdown().await
@@ -117,7 +122,7 @@ async fn farewell<S: AsyncWrite + Unpin>(mut stream: S) {
     .await;
 }
 
-async fn answer(
+async fn answer_request(
     router: Router,
     request: Request<Incoming>,
     peer: Peer,
@@ -134,7 +139,7 @@ struct Answering(Arc<ConnectionActivity>);
 
 impl Drop for Answering {
     fn drop(&mut self) {
-        self.0.waits();
+        self.0.mark_waiting();
     }
 }
 

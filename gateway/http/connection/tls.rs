@@ -65,7 +65,7 @@ impl Certificate {
         let chain = CertificateDer::pem_file_iter(certificate).and_then(Iterator::collect::<Result<Vec<_>, _>>);
         let chain = chain.map_err(|error| bad(certificate, error.to_string()))?;
         let first = chain.first().ok_or_else(|| bad(certificate, "there is no certificate in it".to_owned()))?;
-        let fingerprint = fingerprint(first);
+        let fingerprint = compute_fingerprint(first);
         let key = PrivateKeyDer::from_pem_file(key).map_err(|error| bad(key, error.to_string()))?;
         let provider = Arc::new(rustls::crypto::ring::default_provider());
         let server = rustls::ServerConfig::builder_with_provider(provider)
@@ -82,12 +82,12 @@ impl Certificate {
     ///
     /// # Errors
     /// It cannot be made, written or read.
-    pub fn own(directory: &Path, listen: SocketAddr, names: &[String]) -> Result<Self, CertificateError> {
+    pub fn load_or_create(directory: &Path, listen: SocketAddr, names: &[String]) -> Result<Self, CertificateError> {
         let (certificate, key) = (directory.join("certificate.pem"), directory.join("key.pem"));
         let made = directory.join(MADE);
         let now = CertificateTimes::of_box();
         if !certificate.is_file() || !key.is_file() || now.asks_for_another(made_ns(&made, &certificate)) {
-            let (chain, secret) = make(listen, names, now.now_ns)?;
+            let (chain, secret) = create_certificate(listen, names, now.now_ns)?;
             let trouble = |error: std::io::Error| CertificateError::Make(format!("{}: {error}", directory.display()));
             files::replace_privately(&key, &secret).map_err(trouble)?;
             files::replace_durably(&certificate, &chain).map_err(trouble)?;
@@ -135,10 +135,14 @@ fn made_ns(noted: &Path, certificate: &Path) -> TimeNs {
     noted.or_else(of_file).unwrap_or(0)
 }
 
-fn make(listen: SocketAddr, names: &[String], now_ns: TimeNs) -> Result<(String, String), CertificateError> {
+fn create_certificate(
+    listen: SocketAddr,
+    names: &[String],
+    now_ns: TimeNs,
+) -> Result<(String, String), CertificateError> {
     let bad = |error: rcgen::Error| CertificateError::Make(error.to_string());
     let mut all = vec!["localhost".to_owned(), "127.0.0.1".to_owned()];
-    all.extend(addresses(listen).iter().map(IpAddr::to_string));
+    all.extend(find_addresses(listen).iter().map(IpAddr::to_string));
     all.extend(std::fs::read_to_string("/etc/hostname").ok().map(|name| name.trim().to_lowercase()));
     all.extend(names.iter().cloned());
     all.retain(|name| !name.is_empty());
@@ -149,21 +153,22 @@ fn make(listen: SocketAddr, names: &[String], now_ns: TimeNs) -> Result<(String,
     params.distinguished_name.push(DnType::CommonName, "cnc-gateway");
     params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth];
     let at = |(year, month, day)| date_time_ymd(year, month, day);
-    (params.not_before, params.not_after) = (at(day(now_ns, -1)), at(day(now_ns, i64::from(LASTS_DAYS) - 1)));
+    (params.not_before, params.not_after) =
+        (at(compute_date(now_ns, -1)), at(compute_date(now_ns, i64::from(LASTS_DAYS) - 1)));
     let key = KeyPair::generate().map_err(bad)?;
     let certificate = params.self_signed(&key).map_err(bad)?;
     Ok((certificate.pem(), key.serialize_pem()))
 }
 
 /// Year, month and day of the day that lies so many days after this time.
-fn day(now_ns: TimeNs, days: i64) -> (i32, u8, u8) {
+fn compute_date(now_ns: TimeNs, days: i64) -> (i32, u8, u8) {
     let at = jiff::Timestamp::from_nanosecond(i128::from(now_ns.saturating_add(days.saturating_mul(DAY_NS))));
     let date = at.map(|at| at.to_zoned(jiff::tz::TimeZone::UTC).date());
     date.map_or((2000, 1, 1), |date| (date.year().into(), date.month().unsigned_abs(), date.day().unsigned_abs()))
 }
 
 /// The addresses by which others reach the box: the one it listens on, or the one by which it would reach others.
-fn addresses(listen: SocketAddr) -> Vec<IpAddr> {
+fn find_addresses(listen: SocketAddr) -> Vec<IpAddr> {
     if !listen.ip().is_unspecified() {
         return vec![listen.ip()];
     }
@@ -176,7 +181,7 @@ fn addresses(listen: SocketAddr) -> Vec<IpAddr> {
     [way("0.0.0.0:0", "192.0.2.1:9"), way("[::]:0", "[2001:db8::1]:9")].into_iter().flatten().collect()
 }
 
-fn fingerprint(certificate: &CertificateDer<'_>) -> String {
+fn compute_fingerprint(certificate: &CertificateDer<'_>) -> String {
     let digest = Sha256::digest(certificate.as_ref());
     digest.iter().enumerate().fold(String::with_capacity(95), |mut text, (index, byte)| {
         let _infallible = write!(text, "{}{byte:02X}", if index == 0 { "" } else { ":" });
@@ -194,9 +199,9 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let listen = "0.0.0.0:0".parse().expect("one");
         let names = ["gateway.local".to_owned()];
-        let made = Certificate::own(directory.path(), listen, &names).expect("made");
+        let made = Certificate::load_or_create(directory.path(), listen, &names).expect("made");
         assert_eq!(made.fingerprint.len(), 95);
-        let again = Certificate::own(directory.path(), listen, &names).expect("read");
+        let again = Certificate::load_or_create(directory.path(), listen, &names).expect("read");
         assert_eq!(made.fingerprint, again.fingerprint);
         let mode = std::fs::metadata(directory.path().join("key.pem")).expect("there").permissions().mode();
         assert_eq!(mode & 0o777, 0o600);
@@ -210,7 +215,7 @@ mod tests {
         assert!(asks(800, 800, false), "it certainly ends soon");
         assert!(asks(-400, -500, false) && !asks(-400, -500, true), "it was made by a clock that was ahead");
         let other = tempfile::tempdir().expect("a directory");
-        Certificate::own(other.path(), listen, &names).expect("made");
+        Certificate::load_or_create(other.path(), listen, &names).expect("made");
         let mixed = Certificate::read(&file, &other.path().join("key.pem"));
         assert!(matches!(mixed, Err(CertificateError::Pair(_))), "{mixed:?}");
         assert!(matches!(Certificate::read(&file, &file), Err(CertificateError::File(..))));

@@ -60,7 +60,7 @@ pub struct HistoryStore {
 /// Which file lies under a name: device and number on it.
 type FileIdentity = (u64, u64);
 
-fn identity(path: &Path) -> Option<FileIdentity> {
+fn read_identity(path: &Path) -> Option<FileIdentity> {
     std::fs::metadata(path).ok().map(|file| (file.dev(), file.ino()))
 }
 
@@ -79,7 +79,7 @@ impl HistoryStore {
     ) -> Result<Self, HistoryError> {
         let mut history_store = Self {
             path: config.path.clone(),
-            options: Options { clock, ..options(config, beside, outbox) },
+            options: Options { clock, ..build_options(config, beside, outbox) },
             writer: None,
             recent: None,
             closed: None,
@@ -99,7 +99,7 @@ impl HistoryStore {
         match history_store.try_open() {
             Ok(()) => {}
             Err(error @ HistoryError::NewerSchema { .. }) => history_store.go_back(error)?,
-            Err(error) if foreign(&error) => return Err(error),
+            Err(error) if is_foreign_file(&error) => return Err(error),
             Err(error) => history_store.opening_failed(&error),
         }
         history_store.set_aside = history::damaged_files(&history_store.path);
@@ -108,17 +108,17 @@ impl HistoryStore {
 
     fn try_open(&mut self) -> Result<(), HistoryError> {
         let writer = Writer::open(&self.path, self.options.clone())?;
-        self.file = identity(&self.path);
+        self.file = read_identity(&self.path);
         self.handed = 0;
-        let rows = recent::recover(&self.path, &writer);
+        let rows = recent::recover_rows(&self.path, &writer);
         if rows > 0 {
             let text = format!("{rows} rows of the audit that the last end had cut off are in the history now");
-            Notice::new(Severity::Info, "audit_recovered", text).say();
+            Notice::new(Severity::Info, "audit_recovered", text).write_to_logs();
         }
         self.recent = Some(Recent::start(&self.path));
         self.rows_before = rows_in(&self.path);
         end_alarms(&self.path, &writer);
-        self.bytes_before = size(&self.path);
+        self.bytes_before = file_size_bytes(&self.path);
         self.writer = Some(writer);
         self.closed = None;
         Ok(())
@@ -134,7 +134,7 @@ impl HistoryStore {
         if self.closed.is_none() {
             let operator =
                 format!("nothing is being stored: {text} Polling goes on; trying again every {} s", RETRY.as_secs());
-            Notice::new(Severity::Error, "history_closed", operator).detail(format!("{error:?}")).say();
+            Notice::new(Severity::Error, "history_closed", operator).with_detail(format!("{error:?}")).write_to_logs();
         }
         self.closed = Some((text, Instant::now() + RETRY));
     }
@@ -142,17 +142,17 @@ impl HistoryStore {
     /// Time of the newest sample in the file.
     #[must_use]
     pub fn newest_ns(&self) -> Option<TimeNs> {
-        Reader::open(&self.path).ok()?.span().ok()?.map(|(_, newest_ns)| newest_ns)
+        Reader::open(&self.path).ok()?.read_span().ok()?.map(|(_, newest_ns)| newest_ns)
     }
 
     /// Tries again to open, and tells what the writer has to say. Call it about once per second.
-    pub fn look(&mut self) {
+    pub fn look_at_condition(&mut self) {
         if self.closed.as_ref().is_some_and(|(_, again)| Instant::now() >= *again) {
             match self.try_open() {
                 Ok(()) => {
                     let text =
                         format!("storing again in {}; {} samples were not stored", self.path.display(), self.lost);
-                    Notice::new(Severity::Info, "history_open", text).say();
+                    Notice::new(Severity::Info, "history_open", text).write_to_logs();
                 }
                 Err(error) => self.opening_failed(&error),
             }
@@ -160,11 +160,12 @@ impl HistoryStore {
         self.look_at_file();
         self.look_at_damage();
         self.look_at_log();
-        let trouble = self.writer.as_ref().and_then(|writer| trouble(&writer.status()));
+        let trouble = self.writer.as_ref().and_then(|writer| describe_trouble(&writer.status()));
         if trouble != self.told {
             match &trouble {
-                Some(text) => Notice::new(Severity::Error, "history_degraded", text.clone()).say(),
-                None => Notice::new(Severity::Info, "history_recovered", "the history is being written as usual").say(),
+                Some(text) => Notice::new(Severity::Error, "history_degraded", text.clone()).write_to_logs(),
+                None => Notice::new(Severity::Info, "history_recovered", "the history is being written as usual")
+                    .write_to_logs(),
             }
             self.told = trouble;
         }
@@ -172,7 +173,7 @@ impl HistoryStore {
 
     /// Does it take what is handed in, and make it durable?
     #[must_use]
-    pub fn stores(&self) -> bool {
+    pub fn is_storing(&self) -> bool {
         self.writer.as_ref().is_some_and(|writer| writer.status().degraded.is_none())
     }
 
@@ -183,25 +184,25 @@ impl HistoryStore {
     }
 
     /// Hands in a row of the audit; false when it will not be stored.
-    pub fn audit(&mut self, row: Audit) -> bool {
-        let stored = self.writer.as_ref().is_some_and(|writer| writer.record(row.clone()).is_some());
+    pub fn append_audit(&mut self, row: Audit) -> bool {
+        let stored = self.writer.as_ref().is_some_and(|writer| writer.queue_record(row.clone()).is_some());
         if let Some(recent) = self.recent.as_ref().filter(|_| stored) {
-            recent.put(row);
+            recent.keep_row(row);
         }
         stored
     }
 
     /// Compacts and removes what is too old at this time, which a confirmed clock says, in the background.
-    pub fn maintain(&self, now_ns: TimeNs) {
+    pub fn maintain_file(&self, now_ns: TimeNs) {
         if let Some(writer) = &self.writer {
-            writer.maintain(Some(now_ns));
+            writer.request_maintenance(Some(now_ns));
         }
         history::remove_old_copies(&self.path, now_ns);
     }
 
     /// The clock of the rows since opening is confirmed.
     pub fn confirm_clock(&mut self) {
-        self.options.clock.trust = Trust::Confirmed.word();
+        self.options.clock.trust = Trust::Confirmed.as_word();
         if let Some(writer) = &self.writer {
             writer.confirm_clock();
         }
@@ -216,18 +217,18 @@ impl HistoryStore {
         match status.degraded {
             None => {
                 let text = format!("history closed: {rows} samples in {}", self.path.display());
-                Notice::new(Severity::Info, "history_closed", text).say();
+                Notice::new(Severity::Info, "history_closed", text).write_to_logs();
             }
             Some(reason) => {
                 let text = format!("the last samples could not be stored: {reason}");
-                Notice::new(Severity::Error, "history_closed", text).say();
+                Notice::new(Severity::Error, "history_closed", text).write_to_logs();
             }
         }
     }
 
     /// For the status.
     #[must_use]
-    pub fn status(&self) -> HistoryStatus {
+    pub fn build_status(&self) -> HistoryStatus {
         let writer = self.writer.as_ref().map(Writer::status).unwrap_or_default();
         let closed = self.closed.as_ref().map(|(text, _)| text.clone());
         HistoryStatus {
@@ -236,7 +237,7 @@ impl HistoryStore {
             bytes: writer.bytes,
             lasts_days: self.lasts_days(writer.bytes),
             lost: self.lost + writer.dropped_samples + writer.lost_samples,
-            error: closed.or_else(|| trouble(&writer)),
+            error: closed.or_else(|| describe_trouble(&writer)),
             log_bytes: writer.log_bytes,
             set_aside: self.set_aside.clone(),
         }
@@ -247,33 +248,33 @@ impl HistoryStore {
     fn lasts_days(&self, bytes: u64) -> Option<f64> {
         let seconds = (self.last_ns - self.first_ns?) as f64 / 1e9;
         let grown = bytes.checked_sub(self.bytes_before)? as f64;
-        let room = room(&self.path, &self.options.retention, bytes)? as f64;
+        let room = usable_bytes(&self.path, &self.options.retention, bytes)? as f64;
         (seconds >= RATE_AFTER_S && grown > 0.0).then(|| room / (grown / seconds) / 86_400.0)
     }
 }
 
 impl Store for HistoryStore {
-    fn sample(&mut self, sample: &Sample, extras: &[crate::history::ExtraValue<'_>]) {
+    fn store_sample(&mut self, sample: &Sample, extras: &[crate::history::ExtraValue<'_>]) {
         self.first_ns.get_or_insert(sample.at_ns);
         self.last_ns = sample.at_ns;
         match &self.writer {
             Some(writer) => {
                 self.handed += 1;
-                writer.sample(sample, extras);
+                writer.queue_sample(sample, extras);
             }
             None => self.lost += 1,
         }
     }
 
-    fn record(&mut self, record: Record) {
+    fn store_record(&mut self, record: Record) {
         if let Some(writer) = &self.writer {
-            writer.record(record);
+            writer.queue_record(record);
         }
     }
 }
 
 /// What the writer has to tell: nothing becomes durable, or only at the cost of what is old.
-fn trouble(status: &history::HistoryFigures) -> Option<String> {
+fn describe_trouble(status: &history::HistoryFigures) -> Option<String> {
     let short = || status.short_of_room.then(|| SHORT.to_owned());
     status.degraded.clone().or_else(short)
 }
@@ -281,20 +282,20 @@ fn trouble(status: &history::HistoryFigures) -> Option<String> {
 /// Alarms that stood when the box stopped end then; what still holds is raised again.
 fn end_alarms(path: &Path, writer: &Writer) {
     let Ok(reader) = Reader::open(path) else { return };
-    let Ok(Some((_, newest_ns))) = reader.present() else { return };
-    for alarm in reader.alarms(RecordSpan::newest(ALARMS_MAX)).unwrap_or_default() {
+    let Ok(Some((_, newest_ns))) = reader.read_present_span() else { return };
+    for alarm in reader.read_alarms(RecordSpan::newest(ALARMS_MAX)).unwrap_or_default() {
         if alarm.cleared_ns.is_none() {
-            writer.record(AlarmClear { at_ns: newest_ns, code: alarm.code, source: alarm.source });
+            writer.queue_record(AlarmClear { at_ns: newest_ns, code: alarm.code, source: alarm.source });
         }
     }
 }
 
 /// Does the file belong to somebody else? Then nothing may be written to it, now or later.
-fn foreign(error: &HistoryError) -> bool {
+fn is_foreign_file(error: &HistoryError) -> bool {
     matches!(error, HistoryError::InUse { .. } | HistoryError::NewerSchema { .. } | HistoryError::NotAHistory { .. })
 }
 
-fn options(config: &config::HistoryConfig, beside: Vec<ExtraSeries>, outbox: Option<Outbox>) -> Options {
+fn build_options(config: &config::HistoryConfig, beside: Vec<ExtraSeries>, outbox: Option<Outbox>) -> Options {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -308,17 +309,17 @@ fn options(config: &config::HistoryConfig, beside: Vec<ExtraSeries>, outbox: Opt
 }
 
 /// Bytes that may still be used.
-fn room(path: &Path, retention: &Retention, bytes: u64) -> Option<u64> {
+fn usable_bytes(path: &Path, retention: &Retention, bytes: u64) -> Option<u64> {
     let DiskRoom { free, .. } = disk_room(path)?;
     Some(free.saturating_sub(retention.keep_free_bytes).min(retention.max_bytes.saturating_sub(bytes)))
 }
 
-fn size(path: &Path) -> u64 {
+fn file_size_bytes(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |metadata| metadata.len())
 }
 
 /// Samples in the file.
 fn rows_in(path: &Path) -> u64 {
-    let info = Reader::open(path).and_then(|reader| reader.info());
+    let info = Reader::open(path).and_then(|reader| reader.read_info());
     info.ok().and_then(|info| u64::try_from(info.samples).ok()).unwrap_or(0)
 }

@@ -1,6 +1,6 @@
 //! What befalls the file of the history while the box runs: it is gone, another one, damaged, or its log does not end.
 
-use super::{HistoryStore, identity};
+use super::{HistoryStore, read_identity};
 use crate::clock;
 use crate::history::{self, Aside, Audit, Event, HistoryError};
 use crate::log::{Notice, Severity};
@@ -27,9 +27,9 @@ impl HistoryStore {
         let text =
             format!("the history was damaged and is kept as {}; storing goes on in a new one. {why}", aside.display());
         let notice = Notice::new(Severity::Error, "history_set_aside", text);
-        notice.say();
+        notice.write_to_logs();
         match self.try_open() {
-            Ok(()) => self.remember(&notice),
+            Ok(()) => self.record_notice(&notice),
             Err(error) => self.put_off(&error),
         }
         self.set_aside = history::damaged_files(&self.path);
@@ -46,10 +46,10 @@ impl HistoryStore {
              since is in {}, which the newer version reads",
             newer.display()
         );
-        let notice = Notice::new(Severity::Warning, "history_went_back", text).detail(error.to_string());
-        notice.say();
+        let notice = Notice::new(Severity::Warning, "history_went_back", text).with_detail(error.to_string());
+        notice.write_to_logs();
         match self.try_open() {
-            Ok(()) => self.remember(&notice),
+            Ok(()) => self.record_notice(&notice),
             Err(error) => self.opening_failed(&error),
         }
         Ok(())
@@ -68,16 +68,16 @@ impl HistoryStore {
                 (Severity::Error, format!("the copy of before cannot take the place of the history: {error}"))
             }
         };
-        Notice::new(severity, "history_went_back", text).say();
+        Notice::new(severity, "history_went_back", text).write_to_logs();
     }
 
     /// As an event of the history, and as a row of its audit: the chain before is in another file.
-    pub(super) fn remember(&self, Notice { code, operator, .. }: &Notice) {
+    pub(super) fn record_notice(&self, Notice { code, operator, .. }: &Notice) {
         let Some(writer) = &self.writer else { return };
         let (at_ns, kind, source) = (clock::now_ns(), (*code).to_owned(), "history".to_owned());
-        writer.record(Event { at_ns, kind: kind.clone(), source, text: operator.clone(), detail: String::new() });
+        writer.queue_record(Event { at_ns, kind: kind.clone(), source, text: operator.clone(), detail: String::new() });
         let outcome = "done".to_owned();
-        writer.record(Audit {
+        writer.queue_record(Audit {
             at_ns,
             kind: "history".to_owned(),
             outcome,
@@ -88,21 +88,21 @@ impl HistoryStore {
 
     /// The file is not there any more, or it is another one: what is written goes nowhere.
     pub(super) fn look_at_file(&mut self) {
-        if self.writer.is_none() || identity(&self.path) == self.file {
+        if self.writer.is_none() || read_identity(&self.path) == self.file {
             return;
         }
         let now_there = if self.path.exists() { "another file lies in its place" } else { "somebody has removed it" };
-        let stored = self.leave();
+        let stored = self.end_writer();
         let text = format!(
             "{} is not the file any more that the box writes to: {now_there}. {stored} samples since the start may be lost with \
              it; storing goes on in what is there now",
             self.path.display()
         );
         let notice = Notice::new(Severity::Error, "history_gone", text);
-        notice.say();
+        notice.write_to_logs();
         self.lost += stored;
         match self.try_open() {
-            Ok(()) => self.remember(&notice),
+            Ok(()) => self.record_notice(&notice),
             Err(error) => self.opening_failed(&error),
         }
     }
@@ -118,24 +118,24 @@ impl HistoryStore {
             true => Notice::new(Severity::Warning, "history_log_long", long_log(bytes)),
             false => Notice::new(Severity::Info, "history_log_right", "the log beside the history is short again"),
         };
-        notice.say();
+        notice.write_to_logs();
         if let Some(writer) = &self.writer {
             let (kind, source) = (notice.code.to_owned(), "history".to_owned());
             let (at_ns, text, detail) = (clock::now_ns(), notice.operator.clone(), String::new());
-            writer.record(Event { at_ns, kind, source, text, detail });
+            writer.queue_record(Event { at_ns, kind, source, text, detail });
         }
     }
 
     /// The writer found that the disk has changed the file.
     pub(super) fn look_at_damage(&mut self) {
         let Some(why) = self.writer.as_ref().and_then(|writer| writer.status().damaged) else { return };
-        let stored = self.leave();
+        let stored = self.end_writer();
         self.lost += self.handed.saturating_sub(stored);
         self.begin_anew(&HistoryError::Question(why));
     }
 
     /// Ends the writer; gives how many samples it had made durable. This is the thread of the tick: the sinks are not waited for.
-    pub(super) fn leave(&mut self) -> u64 {
+    pub(super) fn end_writer(&mut self) -> u64 {
         let Some(writer) = self.writer.take() else { return 0 };
         self.recent = None;
         let set_hurried = |hurried| self.options.outbox.iter().for_each(|outbox| outbox.set_hurried(hurried));

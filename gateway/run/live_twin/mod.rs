@@ -85,14 +85,14 @@ impl Twin {
     /// The twin of the configuration; `None` where no model is named. A model that cannot be used is told, and the
     /// worker waits for a better one.
     #[must_use]
-    pub fn of(config: &Config) -> Option<Self> {
+    pub fn from_config(config: &Config) -> Option<Self> {
         let model = config.twin.model.clone()?;
         let data_dir = &config.gateway.data_dir;
         let places = WorkerPaths {
             model,
             history: config.history.path.clone(),
             improved: data_dir.join("model-improved.toml"),
-            kept: DiagnosisStore::below(data_dir),
+            kept: DiagnosisStore::from_data_dir(data_dir),
         };
         let mut twin = Self {
             places,
@@ -111,20 +111,20 @@ impl Twin {
             saved: Instant::now(),
             raised: false,
         };
-        twin.begin();
+        twin.start_comparison();
         twin.stored = twin.active.is_some();
         Some(twin)
     }
 
-    fn begin(&mut self) {
+    fn start_comparison(&mut self) {
         let loaded = worker::read(&self.places.model);
         let known = loaded.as_ref().map(|loaded| loaded.toml.clone()).unwrap_or_default();
         match loaded {
             Ok(loaded) => {
-                let remembered = recall(&self.memory, &mut self.told);
+                let remembered = restore_learned(&self.memory, &mut self.told);
                 self.put_in_charge(loaded, remembered);
             }
-            Err(problem) => self.refuse(problem),
+            Err(problem) => self.refuse_model(problem),
         }
         match Worker::start(self.places.clone(), known) {
             Ok(worker) => {
@@ -140,7 +140,7 @@ impl Twin {
 
     /// Where diagnoses are asked for; `None` where there is no thread for them.
     #[must_use]
-    pub fn diagnoses(&self) -> Option<DiagnosisHandle> {
+    pub fn diagnosis_handle(&self) -> Option<DiagnosisHandle> {
         self.worker.as_ref().map(|worker| worker.diagnoses().clone())
     }
 
@@ -164,7 +164,7 @@ impl Twin {
         self.active = Some(ActiveModel { live: Live::new(loaded.model.clone(), memory), loaded });
     }
 
-    fn refuse(&mut self, problem: String) {
+    fn refuse_model(&mut self, problem: String) {
         let consequence = if self.active.is_some() { "the one before stays in charge" } else { "nothing is compared" };
         let text = format!("the model cannot be used, {consequence}:\n  {}", problem.replace('\n', "\n  "));
         self.told.push(Notice::new(Severity::Warning, "twin_refused", text));
@@ -173,20 +173,20 @@ impl Twin {
 
     /// What is stored beside the channels.
     #[must_use]
-    pub fn series(&self) -> Vec<ExtraSeries> {
+    pub fn extra_series(&self) -> Vec<ExtraSeries> {
         let Some(ActiveModel { loaded, .. }) = &self.active else { return Vec::new() };
         let unit = unit_of(&loaded.model.output);
-        let series = |name: &str, en, zh| ExtraSeries::number(&format!("{name}_{}", self.suffix), unit, en, zh);
+        let series = |name: &str, en, zh| ExtraSeries::new_number(&format!("{name}_{}", self.suffix), unit, en, zh);
         vec![
             series("twin_expected", "Expected by the simulation", "仿真值"),
             series("twin_residual", "Recorded minus simulated", "实测与仿真之差"),
         ]
     }
 
-    /// The newest values of [`Twin::series`]: both, or neither. A mean over a minute of which the meter was silent for a part would
+    /// The newest values of [`Twin::extra_series`]: both, or neither. A mean over a minute of which the meter was silent for a part would
     /// otherwise be one over other seconds for the simulation than for the difference, and what was recorded would not be their sum.
     #[must_use]
-    pub fn values(&self) -> [ExtraValue<'static>; 2] {
+    pub fn extra_values(&self) -> [ExtraValue<'static>; 2] {
         let same_unit = |loaded: &LoadedModel| loaded.model.output.ends_with(&self.suffix);
         let compared = match &self.active {
             Some(ActiveModel { live, loaded }) if same_unit(loaded) => live.compared(),
@@ -197,17 +197,17 @@ impl Twin {
     }
 
     /// Takes one tick, after the pipeline has.
-    pub fn step(&mut self, sample: &Sample, pipeline: &Pipeline, health: &mut Health) {
+    pub fn compare_tick(&mut self, sample: &Sample, pipeline: &Pipeline, health: &mut Health) {
         let now_ns = sample.at_ns;
-        self.listen(health, now_ns);
-        self.told.drain(..).for_each(|notice| health.event(now_ns, SOURCE, &notice));
+        self.receive_report(health, now_ns);
+        self.told.drain(..).for_each(|notice| health.record_event(now_ns, SOURCE, &notice));
         if let Some(LoadedModel { model, toml }) = self.new.take() {
             let origin = self.places.model.display().to_string();
-            health.keep(history::Model { at_ns: now_ns, name: model.name, origin, toml }.into());
+            health.keep_record(history::Model { at_ns: now_ns, name: model.name, origin, toml }.into());
         }
         // What differed before the restart still does; the history has ended its alarms.
         if !std::mem::replace(&mut self.raised, true) {
-            self.mismatches().iter().for_each(|mismatch| self.raise(mismatch, health, now_ns));
+            self.list_mismatches().iter().for_each(|mismatch| self.raise_alarm(mismatch, health, now_ns));
             self.tell_onsets();
         }
         let Some(ActiveModel { live, .. }) = &mut self.active else { return };
@@ -216,69 +216,69 @@ impl Twin {
             None => {}
             Some(live::Notice::Learned(regime)) => {
                 let text = format!("what is usual {} has been learned; it is watched from now on", regime.words().0);
-                health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "twin_learned", text));
-                self.save(health);
+                health.record_event(now_ns, SOURCE, &Notice::new(Severity::Info, "twin_learned", text));
+                self.save_learned(health);
             }
-            Some(live::Notice::Begins(mismatch)) => self.differs(&mismatch, health, now_ns),
-            Some(live::Notice::Ends(regime)) => self.agrees(regime, health, now_ns),
+            Some(live::Notice::Begins(mismatch)) => self.report_mismatch(&mismatch, health, now_ns),
+            Some(live::Notice::Ends(regime)) => self.report_agreement(regime, health, now_ns),
         }
         self.ask_when_due(now_ns, health);
         if self.saved.elapsed() >= SAVE_EVERY {
-            self.save(health);
+            self.save_learned(health);
         }
         if self.stored {
-            health.beside(self.values());
+            health.set_twin_values(self.extra_values());
         }
     }
 
-    fn quantity(&self) -> (&'static str, &'static str) {
+    fn output_names(&self) -> (&'static str, &'static str) {
         let output = self.active.as_ref().map_or("", |active| active.loaded.model.output.as_str());
-        let channel = ChannelId::of(output).map(|id| id.channel());
+        let channel = ChannelId::from_name(output).map(|id| id.channel());
         channel.map_or(("the output", "输出"), |channel| (channel.en, channel.zh))
     }
 
-    fn unit(&self) -> &'static str {
+    fn output_unit(&self) -> &'static str {
         self.active.as_ref().map_or("", |active| unit_of(&active.loaded.model.output))
     }
 
-    fn differs(&mut self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
-        let (en, _) = words::mismatch_since(mismatch, self.quantity(), self.unit());
-        health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "twin_mismatch", en));
-        self.raise(mismatch, health, now_ns);
-        let onset = mismatch.onset.map(|onset| (words::nanoseconds(onset.at_s), words::nanoseconds(onset.low_s)));
+    fn report_mismatch(&mut self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
+        let (en, _) = words::mismatch_since(mismatch, self.output_names(), self.output_unit());
+        health.record_event(now_ns, SOURCE, &Notice::new(Severity::Warning, "twin_mismatch", en));
+        self.raise_alarm(mismatch, health, now_ns);
+        let onset = mismatch.onset.map(|onset| (words::to_nanoseconds(onset.at_s), words::to_nanoseconds(onset.low_s)));
         let (at_ns, low_ns) = onset.unwrap_or((now_ns - AFTER_NS, now_ns - AFTER_NS));
         let earliest_ns = self.begun_ns.map_or(now_ns, |begun_ns| begun_ns + APART_NS);
         let at_ns = (at_ns + AFTER_NS).max(now_ns).max(earliest_ns);
         self.due.get_or_insert(Due { at_ns, from_ns: low_ns - BEFORE_NS });
         self.tell_onsets();
-        self.save(health);
+        self.save_learned(health);
     }
 
     /// A diagnosis is held against what the watch has seen, from the same moment on.
     fn tell_onsets(&self) {
-        let onset = |it: Mismatch| Some((it.regime, words::nanoseconds(it.onset?.at_s)));
-        let onsets = self.mismatches().into_iter().filter_map(onset).collect();
+        let onset = |it: Mismatch| Some((it.regime, words::to_nanoseconds(it.onset?.at_s)));
+        let onsets = self.list_mismatches().into_iter().filter_map(onset).collect();
         self.worker.iter().for_each(|worker| worker.diagnoses().set_onsets(Vec::clone(&onsets)));
     }
 
-    fn raise(&self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
-        let (en, zh) = words::mismatch_since(mismatch, self.quantity(), self.unit());
-        let (code, source, severity) = (code(mismatch.regime), SOURCE.to_owned(), "warning".to_owned());
-        health.keep(Alarm { at_ns: now_ns, code, source, severity, en, zh }.into());
+    fn raise_alarm(&self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
+        let (en, zh) = words::mismatch_since(mismatch, self.output_names(), self.output_unit());
+        let (code, source, severity) = (alarm_code(mismatch.regime), SOURCE.to_owned(), "warning".to_owned());
+        health.keep_record(Alarm { at_ns: now_ns, code, source, severity, en, zh }.into());
     }
 
-    fn agrees(&mut self, regime: Regime, health: &mut Health, now_ns: TimeNs) {
-        let (en, _) = words::agreement(regime, self.quantity());
-        health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "twin_agrees", en));
-        health.keep(AlarmClear { at_ns: now_ns, code: code(regime), source: SOURCE.to_owned() }.into());
-        if self.mismatches().is_empty() && !self.diagnosing {
+    fn report_agreement(&mut self, regime: Regime, health: &mut Health, now_ns: TimeNs) {
+        let (en, _) = words::describe_agreement(regime, self.output_names());
+        health.record_event(now_ns, SOURCE, &Notice::new(Severity::Info, "twin_agrees", en));
+        health.keep_record(AlarmClear { at_ns: now_ns, code: alarm_code(regime), source: SOURCE.to_owned() }.into());
+        if self.list_mismatches().is_empty() && !self.diagnosing {
             self.due = None;
         }
         self.tell_onsets();
-        self.save(health);
+        self.save_learned(health);
     }
 
-    fn mismatches(&self) -> Vec<Mismatch> {
+    fn list_mismatches(&self) -> Vec<Mismatch> {
         let stages = self.active.iter().flat_map(|active| active.live.stages());
         let differing = |(_, stage)| if let RegimeStage::Differing(mismatch) = stage { Some(mismatch) } else { None };
         stages.filter_map(differing).collect()
@@ -288,30 +288,30 @@ impl Twin {
         let Some(Due { from_ns, .. }) = self.due.filter(|due| now_ns >= due.at_ns && !self.diagnosing) else { return };
         let Some(worker) = &self.worker else { return };
         // While a person's diagnosis is under way, this one waits.
-        if worker.diagnoses().ask(None, from_ns, now_ns).is_ok() {
+        if worker.diagnoses().request_diagnosis(None, from_ns, now_ns).is_ok() {
             (self.begun_ns, self.diagnosing) = (Some(now_ns), true);
             let text = "a diagnosis of the difference between machine and simulation has begun in the background";
-            health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_begun", text));
+            health.record_event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_begun", text));
         }
     }
 
     /// Takes what the worker has to tell.
-    fn listen(&mut self, health: &mut Health, now_ns: TimeNs) {
-        let Some(report) = self.worker.as_ref().and_then(Worker::take) else { return };
+    fn receive_report(&mut self, health: &mut Health, now_ns: TimeNs) {
+        let Some(report) = self.worker.as_ref().and_then(Worker::take_report) else { return };
         match report {
-            WorkerReport::Model(loaded) => self.replace(*loaded, health, now_ns),
-            WorkerReport::Refused(problem) => self.refuse(problem),
+            WorkerReport::Model(loaded) => self.replace_model(*loaded, health, now_ns),
+            WorkerReport::Refused(problem) => self.refuse_model(problem),
             WorkerReport::NotDiagnosed(problem, by) => {
                 self.was_due(by.as_deref());
                 let text = format!("{} could not be made: {problem}", diagnosis_of(by.as_deref()));
-                health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "diagnosis_failed", text));
+                health.record_event(now_ns, SOURCE, &Notice::new(Severity::Warning, "diagnosis_failed", text));
             }
             WorkerReport::Diagnosed(mut finished) => {
                 self.was_due(finished.by.as_deref());
                 finished.record.at_ns = now_ns;
                 let text = format!("{}: {}", diagnosis_of(finished.by.as_deref()), finished.record.summary);
-                health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_finished", text));
-                health.keep(finished.record.clone().into());
+                health.record_event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_finished", text));
+                health.keep_record(finished.record.clone().into());
                 self.finished = Some(*finished);
             }
         }
@@ -325,18 +325,18 @@ impl Twin {
     }
 
     /// Another model: what the old one differed in is no alarm any more.
-    fn replace(&mut self, loaded: LoadedModel, health: &mut Health, now_ns: TimeNs) {
-        for mismatch in self.mismatches() {
-            let code = code(mismatch.regime);
-            health.keep(AlarmClear { at_ns: now_ns, code, source: SOURCE.to_owned() }.into());
+    fn replace_model(&mut self, loaded: LoadedModel, health: &mut Health, now_ns: TimeNs) {
+        for mismatch in self.list_mismatches() {
+            let code = alarm_code(mismatch.regime);
+            health.keep_record(AlarmClear { at_ns: now_ns, code, source: SOURCE.to_owned() }.into());
         }
         let memory = self.active.take().map(|before| before.live.memory()).unwrap_or_default();
         self.put_in_charge(loaded, Remembered { toml: String::new(), memory, due: None });
-        self.save(health);
+        self.save_learned(health);
     }
 
     /// Saves what was learned, beside the tick: a slow disk delays neither it nor the sign of life at the machine.
-    pub fn save(&mut self, health: &Health) {
+    pub fn save_learned(&mut self, health: &Health) {
         self.saved = Instant::now();
         let Some(ActiveModel { live, loaded }) = &self.active else { return };
         let remembered = Remembered { toml: loaded.toml.clone(), memory: live.memory(), due: self.due };
@@ -352,12 +352,12 @@ fn diagnosis_of(by: Option<&str>) -> String {
     by.map_or_else(|| "diagnosis".to_owned(), |by| format!("diagnosis asked for by {by}"))
 }
 
-fn code(regime: Regime) -> String {
+fn alarm_code(regime: Regime) -> String {
     format!("twin_mismatch_{regime}")
 }
 
 /// What was learned before; nothing where that cannot be read.
-fn recall(path: &Path, told: &mut Vec<Notice>) -> Remembered {
+fn restore_learned(path: &Path, told: &mut Vec<Notice>) -> Remembered {
     let Some(state) = learned::read(path, |notice| told.push(notice)) else { return Remembered::default() };
     serde_json::from_str(&state).unwrap_or_else(|error| {
         let text = format!("{}: what the twin had learned cannot be read ({error}); it learns anew", path.display());

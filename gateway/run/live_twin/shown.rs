@@ -1,6 +1,6 @@
 //! The twin in the status document: differences that stand, what is compared, what was found.
 
-use super::{Twin, code};
+use super::{Twin, alarm_code};
 use crate::diagnosis::status::{DiagnosisStatus, RegimeStatus, TwinStatus};
 use crate::diagnosis::words;
 use crate::diagnosis::worker::Finished;
@@ -10,27 +10,27 @@ use rules::twin::live::{self, ComparedSecond, Live, Mismatch, Regime, RegimeStag
 impl Twin {
     /// Differences that stand.
     #[must_use]
-    pub fn alarms(&self) -> Vec<AlarmStatus> {
+    pub fn list_alarms(&self) -> Vec<AlarmStatus> {
         let alarm = |mismatch: &Mismatch| {
-            let (text, zh) = words::mismatch(mismatch, self.quantity(), self.unit());
+            let (text, zh) = words::describe_mismatch(mismatch, self.output_names(), self.output_unit());
             AlarmStatus {
-                code: code(mismatch.regime),
+                code: alarm_code(mismatch.regime),
                 severity: "warning".to_owned(),
                 text,
                 zh,
-                since_ms: mismatch.onset.map_or(0, |onset| milliseconds(onset.at_s)),
+                since_ms: mismatch.onset.map_or(0, |onset| to_milliseconds(onset.at_s)),
             }
         };
-        self.mismatches().iter().map(alarm).collect()
+        self.list_mismatches().iter().map(alarm).collect()
     }
 
-    fn differing(&self, mismatch: &Mismatch, none: RegimeStatus) -> RegimeStatus {
-        let (text, zh) = words::mismatch(mismatch, self.quantity(), self.unit());
+    fn build_mismatch_status(&self, mismatch: &Mismatch, none: RegimeStatus) -> RegimeStatus {
+        let (text, zh) = words::describe_mismatch(mismatch, self.output_names(), self.output_unit());
         RegimeStatus {
             stage: "differing",
             difference: Some(mismatch.mean),
             difference_pct: mismatch.percent(),
-            since_ms: mismatch.onset.map(|onset| [onset.at_s, onset.low_s, onset.high_s].map(milliseconds)),
+            since_ms: mismatch.onset.map(|onset| [onset.at_s, onset.low_s, onset.high_s].map(to_milliseconds)),
             text: Some(text),
             zh: Some(zh),
             ..none
@@ -39,7 +39,7 @@ impl Twin {
 
     /// For the status document.
     #[must_use]
-    pub fn status(&self) -> TwinStatus {
+    pub fn build_status(&self) -> TwinStatus {
         let active = self.active.as_ref();
         let compared = active.map_or(ComparedSecond::none(live::NoTwin::NotYet), |active| active.live.compared());
         let why = active.and_then(|active| active.live.why().map(str::to_owned));
@@ -48,7 +48,7 @@ impl Twin {
             model: active.map(|active| active.loaded.model.name.clone()).unwrap_or_default(),
             file: self.places.model.display().to_string(),
             output: active.map(|active| active.loaded.model.output.clone()).unwrap_or_default(),
-            unit: self.unit(),
+            unit: self.output_unit(),
             second_ms: active.and_then(|active| active.live.compared_at_ns()).map(|ns| ns.div_euclid(1_000_000)),
             // Of the same second, so that recorded less expected is the residual.
             twin_recorded: compared.expected.ok().zip(compared.residual.ok()).map(|(expected, rest)| expected + rest),
@@ -56,14 +56,14 @@ impl Twin {
             twin_residual: compared.residual.ok(),
             missing: reason.map(live::NoTwin::word),
             why: reason.map(|reason| why.unwrap_or_else(|| reason.to_string())),
-            regimes: active.map_or_else(Vec::new, |active| self.regimes(&active.live)),
+            regimes: active.map_or_else(Vec::new, |active| self.list_regimes(&active.live)),
             diagnosing_since_ms: self.begun_ns.filter(|_| self.diagnosing).map(|ns| ns.div_euclid(1_000_000)),
-            diagnosis: self.finished.as_ref().map(|finished| self.diagnosis(finished)),
+            diagnosis: self.finished.as_ref().map(|finished| self.build_diagnosis_status(finished)),
             problem: self.problem.clone(),
         }
     }
 
-    fn regimes(&self, live: &Live) -> Vec<RegimeStatus> {
+    fn list_regimes(&self, live: &Live) -> Vec<RegimeStatus> {
         let status = |(regime, stage): (Regime, RegimeStage)| {
             let none = RegimeStatus {
                 regime: regime.word(),
@@ -79,13 +79,13 @@ impl Twin {
             match stage {
                 RegimeStage::Learning(blocks, needed) => RegimeStatus { learned: Some((blocks, needed)), ..none },
                 RegimeStage::Watching(usual) => RegimeStatus { stage: "watching", usual: Some(usual), ..none },
-                RegimeStage::Differing(mismatch) => self.differing(&mismatch, none),
+                RegimeStage::Differing(mismatch) => self.build_mismatch_status(&mismatch, none),
             }
         };
         live.stages().map(status).collect()
     }
 
-    fn diagnosis(&self, finished: &Finished) -> DiagnosisStatus {
+    fn build_diagnosis_status(&self, finished: &Finished) -> DiagnosisStatus {
         let record = &finished.record;
         let accept = finished
             .improved
@@ -103,6 +103,6 @@ impl Twin {
     }
 }
 
-fn milliseconds(at_s: f64) -> i64 {
-    words::nanoseconds(at_s).div_euclid(1_000_000)
+fn to_milliseconds(at_s: f64) -> i64 {
+    words::to_nanoseconds(at_s).div_euclid(1_000_000)
 }

@@ -47,15 +47,15 @@ impl fmt::Display for Granted {
 
 impl Granted {
     /// Tells the operator.
-    pub fn tell(self) {
-        Notice::new(Severity::Info, "priority", self.to_string()).say();
+    pub fn tell_operator(self) {
+        Notice::new(Severity::Info, "priority", self.to_string()).write_to_logs();
     }
 }
 
 /// Asks for the calling thread; what it starts afterwards inherits nothing of it.
 #[cfg(target_os = "linux")]
 #[must_use]
-pub fn ask() -> Granted {
+pub fn request_priority() -> Granted {
     use ffi::{SchedAttr, set_attr, set_timer_slack};
     const FIFO: u32 = 1;
     const RESET_ON_FORK: u64 = 1;
@@ -76,7 +76,7 @@ pub fn ask() -> Granted {
 /// Elsewhere nothing is asked for.
 #[cfg(not(target_os = "linux"))]
 #[must_use]
-pub fn ask() -> Granted {
+pub fn request_priority() -> Granted {
     Granted::Nothing
 }
 
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn whatever_is_granted_the_thread_goes_on() {
-        let granted = std::thread::spawn(|| (ask(), 1 + 1)).join().expect("no panic");
+        let granted = std::thread::spawn(|| (request_priority(), 1 + 1)).join().expect("no panic");
         println!("{}", granted.0);
         assert_eq!(granted.1, 2);
     }

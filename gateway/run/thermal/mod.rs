@@ -60,19 +60,21 @@ impl Thermal {
     ///
     /// # Errors
     /// A file that cannot be read, a law of another machine, a sensor that no channel is.
-    pub fn of(config: &Config) -> Result<Option<Self>, CannotRun> {
+    pub fn from_config(config: &Config) -> Result<Option<Self>, CannotRun> {
         let Some(path) = &config.thermal.model else { return Ok(None) };
         let next = "write the model anew with `cnc-gateway identify thermal --model`";
         let refused = |what: String| CannotRun::new(format!("{} {what}", path.display()), next);
         let text = std::fs::read_to_string(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
         let model = ThermalModel::read(&text, &config.gateway.name).map_err(refused)?;
         let names: Vec<&str> = model.law.terms.iter().map(|term| term.sensor.as_str()).collect();
-        let channel =
-            |name: &&str| ChannelId::of(name).ok_or_else(|| refused(format!("names {name:?}, which no channel is")));
+        let channel = |name: &&str| {
+            ChannelId::from_name(name).ok_or_else(|| refused(format!("names {name:?}, which no channel is")))
+        };
         let sensors = names.iter().map(channel).collect::<Result<Vec<_>, _>>()?;
-        let error = ChannelId::of("thermal_error_um").ok_or_else(|| refused("needs thermal_error_um".to_owned()))?;
+        let error =
+            ChannelId::from_name("thermal_error_um").ok_or_else(|| refused("needs thermal_error_um".to_owned()))?;
         let memory = config.gateway.data_dir.join(MEMORY);
-        let (corrected, told) = remembered(&memory, &model);
+        let (corrected, told) = restore_corrections(&memory, &model);
         let bounds = FollowSettings { step_um: config.thermal.step_um, total_um: config.thermal.total_um };
         let follower =
             ThermalFollower::new(corrected, &names, bounds).map_err(|refusal| refused(refusal.to_string()))?;
@@ -100,38 +102,43 @@ impl Thermal {
 
     /// What is stored beside the channels.
     #[must_use]
-    pub fn series(&self) -> Vec<ExtraSeries> {
-        let um = |name, en, zh| ExtraSeries::number(name, "um", en, zh);
+    pub fn extra_series(&self) -> Vec<ExtraSeries> {
+        let um = |name, en, zh| ExtraSeries::new_number(name, "um", en, zh);
         vec![
             um("thermal_predicted_um", "Thermal error that the law predicts", "热误差预测值"),
             um("thermal_predicted_sd_um", "Standard deviation of the predicted thermal error", "热误差预测标准差"),
             um("thermal_residual_um", "Measured minus predicted thermal error", "热误差残差"),
             um("thermal_offset_um", "Offset against the predicted thermal error", "热误差补偿量"),
-            ExtraSeries::number(
+            ExtraSeries::new_number(
                 "thermal_pulses",
                 "1",
                 "Pulses to insert since the last reference return",
                 "应插入脉冲总数",
             ),
-            ExtraSeries::number("thermal_readings", "1", "Readings that have corrected the law", "修正模型的读数次数"),
+            ExtraSeries::new_number(
+                "thermal_readings",
+                "1",
+                "Readings that have corrected the law",
+                "修正模型的读数次数",
+            ),
         ]
     }
 
     /// What is to be said at the start.
-    pub fn begin(&mut self, health: &mut Health, at_ns: TimeNs) {
+    pub fn report_notices(&mut self, health: &mut Health, at_ns: TimeNs) {
         for notice in self.told.drain(..) {
-            health.event(at_ns, SOURCE, &notice);
+            health.record_event(at_ns, SOURCE, &notice);
         }
-        health.thermal(&self.values);
+        health.set_thermal_values(&self.values);
     }
 
     /// Takes one tick; the offset to propose, where that is configured.
-    pub fn step(&mut self, sample: &Sample, health: &mut Health) -> Option<OffsetProposal> {
+    pub fn propose_offset(&mut self, sample: &Sample, health: &mut Health) -> Option<OffsetProposal> {
         let dt_ns = self.last_ns.map(|last_ns| sample.at_ns - last_ns);
         if dt_ns.is_none_or(|dt_ns| !(0..EVERY_NS).contains(&dt_ns)) {
             self.last_ns = Some(sample.at_ns);
-            self.look(sample, dt_ns.unwrap_or(0).max(0), health);
-            health.thermal(&self.values);
+            self.update_prediction(sample, dt_ns.unwrap_or(0).max(0), health);
+            health.set_thermal_values(&self.values);
         }
         let ExtraValue::Number(offset_um) = self.values[3] else { return None };
         self.settings.propose.then(|| OffsetProposal {
@@ -143,24 +150,24 @@ impl Thermal {
         })
     }
 
-    fn look(&mut self, sample: &Sample, dt_ns: i64, health: &mut Health) {
+    fn update_prediction(&mut self, sample: &Sample, dt_ns: i64, health: &mut Health) {
         self.temperatures_c.clear();
         self.temperatures_c.extend(self.sensors.iter().map(|channel| sample.number(*channel)));
-        let predicted = self.follower.predictor().predict(sample.at_ns, &self.temperatures_c);
+        let predicted = self.follower.predictor_mut().predict_error(sample.at_ns, &self.temperatures_c);
         let residual = match &predicted {
-            Ok(prediction) => self.residual(prediction, sample, health),
+            Ok(prediction) => self.compare_with_reading(prediction, sample, health),
             Err(_) => ExtraValue::Missing("no_prediction"),
         };
         let dt_s = dt_ns as f64 / SECOND_NS as f64;
-        let step = self.compensator.step(dt_s, predicted.as_ref().ok(), AxisSituation::default());
+        let step = self.compensator.advance_compensation(dt_s, predicted.as_ref().ok(), AxisSituation::default());
         let names: Vec<&str> = self.sensors.iter().map(|channel| channel.name()).collect();
-        if let Some(notice) = self.outside.look(sample.at_ns, predicted.as_ref().ok(), &step, &names) {
-            health.event(sample.at_ns, SOURCE, &notice);
+        if let Some(notice) = self.outside.watch_step(sample.at_ns, predicted.as_ref().ok(), &step, &names) {
+            health.record_event(sample.at_ns, SOURCE, &notice);
         }
         self.pulses += step.increment_pulses;
         let of = |value: fn(&ThermalPrediction) -> f64| match &predicted {
             Ok(prediction) => ExtraValue::Number(value(prediction)),
-            Err(reason) => ExtraValue::Missing(reason.word()),
+            Err(reason) => ExtraValue::Missing(reason.as_word()),
         };
         #[expect(clippy::cast_precision_loss, reason = "pulses and readings are few")]
         let (pulses, readings) = (self.pulses as f64, self.follower.readings() as f64);
@@ -175,22 +182,22 @@ impl Thermal {
     }
 
     /// Measured less predicted at this moment; a reading corrects the law.
-    fn residual(
+    fn compare_with_reading(
         &mut self,
         prediction: &ThermalPrediction,
         sample: &Sample,
         health: &mut Health,
     ) -> ExtraValue<'static> {
         let measured_um = sample.number(self.error);
-        let residual = match prediction.beside(measured_um).residual_um {
+        let residual = match prediction.compare_with_measured(measured_um).residual_um {
             Ok(residual) => ExtraValue::Number(residual.value),
             Err(_) => return ExtraValue::Missing("no_reading"),
         };
         let soon = self.read_ns.is_some_and(|then_ns| (0..READING_EVERY_NS).contains(&(sample.at_ns - then_ns)));
         if self.settings.learn && !soon {
             self.read_ns = Some(sample.at_ns);
-            let correction = self.follower.take(prediction, measured_um);
-            if let Ok(text) = serde_json::to_string(&self.follower.corrected()) {
+            let correction = self.follower.correct_with_reading(prediction, measured_um);
+            if let Ok(text) = serde_json::to_string(&self.follower.to_corrected_law()) {
                 health.put_learned(&self.memory, text);
             }
             if correction.held != self.held && correction.held == Some(HoldReason::Total) {
@@ -198,7 +205,11 @@ impl Thermal {
                     "readings have moved the thermal law by {} um, as far as they may: run `cnc-gateway identify thermal` again",
                     self.settings.total_um
                 );
-                health.event(sample.at_ns, SOURCE, &Notice::new(Severity::Warning, "thermal_law_outdated", text));
+                health.record_event(
+                    sample.at_ns,
+                    SOURCE,
+                    &Notice::new(Severity::Warning, "thermal_law_outdated", text),
+                );
             }
             self.held = correction.held;
         }
@@ -207,7 +218,7 @@ impl Thermal {
 }
 
 /// What readings have taught the law before, if it is still the same law.
-fn remembered(memory: &Path, model: &ThermalModel) -> (Corrected, Vec<Notice>) {
+fn restore_corrections(memory: &Path, model: &ThermalModel) -> (Corrected, Vec<Notice>) {
     let mut told = Vec::new();
     let fresh = || Corrected { identified: model.law.clone(), law: model.law.clone(), readings: 0 };
     let Some(state) = learned::read(memory, |notice| told.push(notice)) else { return (fresh(), told) };

@@ -17,7 +17,7 @@ pub struct OutsideWatch {
 
 impl OutsideWatch {
     /// What is to be told of this step.
-    pub fn look(
+    pub fn watch_step(
         &mut self,
         at_ns: TimeNs,
         prediction: Option<&ThermalPrediction>,
@@ -25,14 +25,14 @@ impl OutsideWatch {
         sensors: &[&str],
     ) -> Option<Notice> {
         let prediction = prediction?;
-        let Some(outside) = prediction.outside else { return self.inside(at_ns) };
+        let Some(outside) = prediction.outside else { return self.report_return(at_ns) };
         self.inside_since_ns = None;
         // What is worse than what was told is told; what is better waits for the inside.
-        if self.told.is_some_and(|told| rank(told) >= rank(step.standing)) {
+        if self.told.is_some_and(|told| rank_standing(told) >= rank_standing(step.standing)) {
             return None;
         }
         self.told = Some(step.standing);
-        let (where_to, sd_um) = (place(outside, sensors), prediction.error_um.sd);
+        let (where_to, sd_um) = (describe_outside(outside, sensors), prediction.error_um.sd);
         let what = match step.standing {
             Standing::AtTheEdge => format!(
                 "the law goes on to half of its range beyond it, and the offset is that of this edge ({:.1} um, uncertain by {sd_um:.1} um)",
@@ -49,7 +49,7 @@ impl OutsideWatch {
         Some(Notice::new(Severity::Warning, "thermal_outside", text))
     }
 
-    fn inside(&mut self, at_ns: TimeNs) -> Option<Notice> {
+    fn report_return(&mut self, at_ns: TimeNs) -> Option<Notice> {
         self.told?;
         let since_ns = *self.inside_since_ns.get_or_insert(at_ns);
         if (0..INSIDE_NS).contains(&(at_ns - since_ns)) {
@@ -61,7 +61,7 @@ impl OutsideWatch {
     }
 }
 
-fn rank(standing: Standing) -> u8 {
+fn rank_standing(standing: Standing) -> u8 {
     match standing {
         Standing::Doubted => 2,
         Standing::AtTheEdge => 1,
@@ -69,7 +69,7 @@ fn rank(standing: Standing) -> u8 {
     }
 }
 
-fn place(outside: Outside, sensors: &[&str]) -> String {
+fn describe_outside(outside: Outside, sensors: &[&str]) -> String {
     match outside {
         Outside::Sensor { sensor, temperature_c, range_c: (least, greatest) } => {
             let by_k = (least - temperature_c).max(temperature_c - greatest);

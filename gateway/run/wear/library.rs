@@ -25,7 +25,7 @@ pub(super) struct Library {
 
 impl Library {
     /// Begins to watch; a notice where that is not possible.
-    pub(super) fn watch(history: &Path) -> (Self, Option<Notice>) {
+    pub(super) fn watch_history(history: &Path) -> (Self, Option<Notice>) {
         let (send, newest) = sync_channel(1);
         let (ends, ended) = channel();
         let history = history.to_owned();
@@ -41,7 +41,7 @@ impl Library {
     }
 
     /// Takes what was found since the last call. True when the models are others than before.
-    pub(super) fn take(&mut self) -> bool {
+    pub(super) fn take_newest(&mut self) -> bool {
         match self.newest.as_ref().and_then(|newest| newest.try_recv().ok()) {
             None => false,
             Some(Ok(models)) => {
@@ -56,7 +56,7 @@ impl Library {
     }
 
     /// What went wrong, once.
-    pub(super) fn problem(&mut self) -> Option<Notice> {
+    pub(super) fn take_problem(&mut self) -> Option<Notice> {
         let problem = self.problem.take()?;
         let text = format!("the wear models cannot be read, the ones before stay in force: {problem}");
         Some(Notice::new(Severity::Warning, "wear_models_refused", text))
@@ -72,7 +72,7 @@ fn look_again(history: &Path, send: &SyncSender<WearRecords>, ended: &Receiver<(
     let mut known = 0;
     let mut said = None;
     loop {
-        let found = newer(history, &mut known);
+        let found = read_newer_models(history, &mut known);
         let news = match &found {
             Ok(None) => false,
             Ok(Some(_)) => true,
@@ -93,7 +93,7 @@ fn look_again(history: &Path, send: &SyncSender<WearRecords>, ended: &Receiver<(
 }
 
 /// The models in force, when a newer one was stored than is `known`. A history that is not there yet has none.
-fn newer(history: &Path, known: &mut i64) -> Result<Option<Vec<Arc<WearRecord>>>, String> {
+fn read_newer_models(history: &Path, known: &mut i64) -> Result<Option<Vec<Arc<WearRecord>>>, String> {
     if !history.exists() {
         return Ok(None);
     }

@@ -26,30 +26,30 @@ pub struct Wear {
 impl Wear {
     /// Watches the library of this history.
     #[must_use]
-    pub fn of(config: &Config) -> Self {
-        let (model_library, told) = Library::watch(&config.history.path);
+    pub fn from_config(config: &Config) -> Self {
+        let (model_library, told) = Library::watch_history(&config.history.path);
         Self { machine: config.gateway.name.clone(), model_library, told }
     }
 
     /// Gives the pipeline what is new in the library; before the tick.
-    pub fn supply(&mut self, pipeline: &mut Pipeline, at_ns: TimeNs, health: &mut Health) {
+    pub fn supply_models(&mut self, pipeline: &mut Pipeline, at_ns: TimeNs, health: &mut Health) {
         if let Some(notice) = self.told.take() {
-            health.event(at_ns, SOURCE, &notice);
+            health.record_event(at_ns, SOURCE, &notice);
         }
-        if self.model_library.take() {
+        if self.model_library.take_newest() {
             pipeline.wear_mut().set_models(&self.machine, self.model_library.models().to_vec());
         }
-        if let Some(problem) = self.model_library.problem() {
-            health.event(at_ns, SOURCE, &problem);
+        if let Some(problem) = self.model_library.take_problem() {
+            health.record_event(at_ns, SOURCE, &problem);
         }
     }
 }
 
 /// What the page shows of the edge in use; `None` without a model for its cut. What is known without one stands with the estimates.
 #[must_use]
-pub fn status(pipeline: &Pipeline) -> Option<WearStatus> {
+pub fn build_status(pipeline: &Pipeline) -> Option<WearStatus> {
     let wear = pipeline.wear();
-    let (model, outlook) = (wear.model(), wear.outlook());
+    let (model, outlook) = (wear.model(), wear.current_outlook());
     let model = model?;
     let limit = wear.limit().and_then(|limit| limit.as_ref().ok());
     let learned = outlook.filter(|(reference, _)| *reference == WorkReference::Model).map(|(_, outlook)| outlook);
@@ -77,7 +77,7 @@ pub fn status(pipeline: &Pipeline) -> Option<WearStatus> {
                 true => Observability::Observable,
                 false => Observability::NotObservableHere,
             }))
-            .map(Observability::word),
+            .map(Observability::as_word),
         extrapolated: limit.map_or(Vec::new(), |limit| limit.extrapolated.clone()),
         why,
     })

@@ -12,7 +12,7 @@ const CLASSES: [(&str, &str); 6] =
     [("W", "power"), ("A", "current"), ("V", "voltage"), ("°C", "temperature"), ("s", "duration"), ("J", "energy")];
 
 /// The document of a series whose values stand on `PREFIX/NAME`.
-pub(super) fn sensor(outbox: &Outbox, prefix: &str, reading: &Reading) -> Outgoing {
+pub(super) fn build_sensor_document(outbox: &Outbox, prefix: &str, reading: &Reading) -> Outgoing {
     let (series, box_id) = (&reading.series, outbox.box_id());
     let mut document = json!({
         "name": &*series.en,

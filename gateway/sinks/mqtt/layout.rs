@@ -2,12 +2,12 @@
 //!
 //! | layout | topic | payload |
 //! |---|---|---|
-//! | `items` | `PREFIX/KIND` | the document of the item ([`Item::json`]) with `machine`, `box` and `historical` |
+//! | `items` | `PREFIX/KIND` | the document of the item ([`Item::to_json`]) with `machine`, `box` and `historical` |
 //! | `flat` | `PREFIX/KIND` | one object: `ts` (milliseconds since 1970), `machine`, `box`, `sequence`, `historical`, and every value or field by its name; a missing value is null |
 //! | `topics` | `PREFIX/NAME` for each value | the value alone, as text; nothing for a missing one. Records and means as in `flat` |
 //!
 //! What a subscriber that comes late must know is retained: the newest state, part and diagnosis, with `topics` the newest value of
-//! each channel, and in every layout `PREFIX/latest` ([`latest`]).
+//! each channel, and in every layout `PREFIX/latest` ([`build_latest_message`]).
 
 use crate::history::{Cell, Content, Gap, Item, Outbox, Reading, SeriesMean};
 use crate::moment;
@@ -30,8 +30,8 @@ pub enum Layout {
 const RETAINED: [&str; 3] = ["state", "part", "diagnosis"];
 
 /// The document of an item, with who made it and whether it comes late.
-pub(in crate::sinks) fn document(outbox: &Outbox, item: &Item, historical: bool) -> Json {
-    let mut document = item.json();
+pub(in crate::sinks) fn build_document(outbox: &Outbox, item: &Item, historical: bool) -> Json {
+    let mut document = item.to_json();
     document["machine"] = Json::from(outbox.machine());
     document["box"] = Json::from(outbox.box_id());
     document["historical"] = Json::from(historical);
@@ -39,24 +39,30 @@ pub(in crate::sinks) fn document(outbox: &Outbox, item: &Item, historical: bool)
 }
 
 /// The messages of an item under this prefix.
-pub(super) fn messages(layout: Layout, outbox: &Outbox, prefix: &str, item: &Item, historical: bool) -> Vec<Outgoing> {
+pub(super) fn build_messages(
+    layout: Layout,
+    outbox: &Outbox,
+    prefix: &str,
+    item: &Item,
+    historical: bool,
+) -> Vec<Outgoing> {
     let whole = |document: Json| Outgoing {
         topic: format!("{prefix}/{}", item.kind()),
         payload: document.to_string().into_bytes(),
         retain: !historical && RETAINED.contains(&item.kind()),
     };
     match (layout, &item.content) {
-        (Layout::Items, _) => vec![whole(document(outbox, item, historical))],
+        (Layout::Items, _) => vec![whole(build_document(outbox, item, historical))],
         // An old value must not take the place of a newer one that the broker keeps.
         (Layout::Topics, Content::Sample(readings)) if !historical => {
-            readings.iter().map(|reading| value(prefix, reading)).collect()
+            readings.iter().map(|reading| build_value_message(prefix, reading)).collect()
         }
-        _ => vec![whole(flat(outbox, item, historical))],
+        _ => vec![whole(build_flat_document(outbox, item, historical))],
     }
 }
 
 /// The newest value of a channel on its own topic.
-pub(super) fn value(prefix: &str, reading: &Reading) -> Outgoing {
+pub(super) fn build_value_message(prefix: &str, reading: &Reading) -> Outgoing {
     let payload = match &reading.value {
         Cell::Number(number) => number.to_string(),
         Cell::Text(text) => text.to_string(),
@@ -66,14 +72,14 @@ pub(super) fn value(prefix: &str, reading: &Reading) -> Outgoing {
     Outgoing { topic: format!("{prefix}/{}", reading.series.name), payload: payload.into_bytes(), retain: true }
 }
 
-fn flat(outbox: &Outbox, item: &Item, historical: bool) -> Json {
-    let mut fields = begun(outbox, item.at_ns);
+fn build_flat_document(outbox: &Outbox, item: &Item, historical: bool) -> Json {
+    let mut fields = build_common_fields(outbox, item.at_ns);
     fields.insert("sequence".to_owned(), json!(item.sequence));
     fields.insert("historical".to_owned(), json!(historical));
     match &item.content {
-        Content::Sample(readings) => fields.extend(readings.iter().map(named)),
+        Content::Sample(readings) => fields.extend(readings.iter().map(to_named_value)),
         Content::Record(_) => {
-            if let Json::Object(record) = item.json()["record"].take() {
+            if let Json::Object(record) = item.to_json()["record"].take() {
                 fields.extend(record.into_iter().filter(|(name, _)| name != "at_ns"));
             }
         }
@@ -89,7 +95,7 @@ fn flat(outbox: &Outbox, item: &Item, historical: bool) -> Json {
     Json::Object(fields)
 }
 
-fn begun(outbox: &Outbox, at_ns: TimeNs) -> Map<String, Json> {
+fn build_common_fields(outbox: &Outbox, at_ns: TimeNs) -> Map<String, Json> {
     let fields = [
         ("ts", json!(at_ns.div_euclid(1_000_000))),
         ("machine", json!(outbox.machine())),
@@ -98,7 +104,7 @@ fn begun(outbox: &Outbox, at_ns: TimeNs) -> Map<String, Json> {
     fields.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
 }
 
-fn named(reading: &Reading) -> (String, Json) {
+fn to_named_value(reading: &Reading) -> (String, Json) {
     let value = match &reading.value {
         Cell::Number(number) => json!(number),
         Cell::Text(text) => json!(&**text),
@@ -109,19 +115,23 @@ fn named(reading: &Reading) -> (String, Json) {
 
 /// Everything that is known now, retained on `PREFIX/latest`: `values` by name, `missing` with the reason, and the codes of the
 /// alarms that stand.
-pub(super) fn latest<'a>(outbox: &Outbox, prefix: &str, alarms: impl Iterator<Item = &'a String>) -> Outgoing {
-    let at_ns = outbox.head().borrow().newest_ns.unwrap_or(0);
-    let readings = outbox.latest();
+pub(super) fn build_latest_message<'a>(
+    outbox: &Outbox,
+    prefix: &str,
+    alarms: impl Iterator<Item = &'a String>,
+) -> Outgoing {
+    let at_ns = outbox.watch_head().borrow().newest_ns.unwrap_or(0);
+    let readings = outbox.latest_readings();
     let delivered = |reading: &&Reading| !is_unprovided(reading);
     let is_missing = |reading: &&Reading| matches!(reading.value, Cell::Missing(_));
     let reason = |reading: &Reading| match &reading.value {
         Cell::Missing(reason) => Some((reading.series.name.to_string(), json!(&**reason))),
         _ => None,
     };
-    let mut document = begun(outbox, at_ns);
+    let mut document = build_common_fields(outbox, at_ns);
     let present = readings.iter().filter(|reading| !is_missing(reading));
-    document.insert("time_utc".to_owned(), json!(moment::utc(at_ns)));
-    document.insert("values".to_owned(), Json::Object(present.map(named).collect()));
+    document.insert("time_utc".to_owned(), json!(moment::format_utc(at_ns)));
+    document.insert("values".to_owned(), Json::Object(present.map(to_named_value).collect()));
     document.insert("missing".to_owned(), Json::Object(readings.iter().filter(delivered).filter_map(reason).collect()));
     document.insert("alarms".to_owned(), alarms.map(|code| json!(code)).collect());
     Outgoing {

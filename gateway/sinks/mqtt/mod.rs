@@ -13,7 +13,7 @@ mod request;
 
 pub use layout::Layout;
 
-pub(super) use layout::document;
+pub(super) use layout::build_document;
 
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
@@ -47,13 +47,13 @@ pub struct MqttTarget {
 
 impl MqttTarget {
     pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, String> {
-        let qos = keys.choice("qos", &[("1", Qos::AtLeastOnce), ("0", Qos::AtMostOnce)]);
+        let qos = keys.take_choice("qos", &[("1", Qos::AtLeastOnce), ("0", Qos::AtMostOnce)]);
         let layouts = [("items", Layout::Items), ("flat", Layout::Flat), ("topics", Layout::Topics)];
-        let layout = keys.choice("layout", &layouts);
-        let latest = Duration::from_secs_f64(keys.number("latest_s", 2.0, 0.0, 3600.0));
-        let discovery = keys.choice("discovery", &[("none", false), ("homeassistant", true)]);
+        let layout = keys.take_choice("layout", &layouts);
+        let latest = Duration::from_secs_f64(keys.take_number("latest_s", 2.0, 0.0, 3600.0));
+        let discovery = keys.take_choice("discovery", &[("none", false), ("homeassistant", true)]);
         if discovery && layout != Layout::Topics {
-            keys.problem("discovery=homeassistant needs layout=topics beside it".to_owned());
+            keys.add_problem("discovery=homeassistant needs layout=topics beside it".to_owned());
         }
         let (broker, prefix) = BrokerTarget::parse(body, keys, secured)?;
         if prefix.contains(['+', '#']) || prefix.starts_with('$') {
@@ -101,45 +101,45 @@ impl MqttSink {
     }
 
     /// Hands a message to the gate and publishes what became of it.
-    async fn answer(&mut self, message: MqttMessage) -> Result<(), SinkError> {
+    async fn answer_request(&mut self, message: MqttMessage) -> Result<(), SinkError> {
         let document = match message.retained {
             true => Err(request::RETAINED.to_owned()),
             false => request::document_of(&message.payload),
         };
         let id = document.as_ref().map_or(Json::Null, |document| document.id.clone().map_or(Json::Null, Json::from));
-        let change = document.and_then(RequestDocument::change);
-        let Some(Reply { done, text }) = self.requests.ask(change).await else { return Ok(()) };
+        let change = document.and_then(RequestDocument::into_change);
+        let Some(Reply { done, text }) = self.requests.submit_change(change).await else { return Ok(()) };
         let says = json!({"done": done, "text": text, "id": id});
-        let topic = self.topic("request/answer");
+        let topic = self.format_topic("request/answer");
         let answer = Outgoing { topic, payload: says.to_string().into_bytes(), retain: false };
-        self.publish(vec![answer], Qos::AtMostOnce).await
+        self.publish_messages(vec![answer], Qos::AtMostOnce).await
     }
 
-    fn prefix(&self) -> String {
+    fn topic_prefix(&self) -> String {
         match self.target.prefix.as_str() {
             "" => self.outbox.box_id(),
             prefix => prefix.to_owned(),
         }
     }
 
-    fn topic(&self, kind: &str) -> String {
-        format!("{}/{kind}", self.prefix())
+    fn format_topic(&self, kind: &str) -> String {
+        format!("{}/{kind}", self.topic_prefix())
     }
 
-    fn online(&self, online: bool) -> Outgoing {
+    fn build_online_message(&self, online: bool) -> Outgoing {
         let says = json!({"machine": self.outbox.machine(), "box": self.outbox.box_id(), "online": online});
-        Outgoing { topic: self.topic("online"), payload: says.to_string().into_bytes(), retain: true }
+        Outgoing { topic: self.format_topic("online"), payload: says.to_string().into_bytes(), retain: true }
     }
 
     /// Messages of the box itself, which are no items. One that the broker will never take is left out, which is told once.
-    async fn publish(&mut self, mut messages: Vec<Outgoing>, qos: Qos) -> Result<(), SinkError> {
+    async fn publish_messages(&mut self, mut messages: Vec<Outgoing>, qos: Qos) -> Result<(), SinkError> {
         while !messages.is_empty() {
-            let sent = self.link.publish(messages.clone(), qos, &self.target.broker).await;
+            let sent = self.link.publish_messages(messages.clone(), qos, &self.target.broker).await;
             let Err((index, failure)) = sent else { return Ok(()) };
             let BrokerFailure::Message(what) = failure else { return Err(failure.of_item(None)) };
             if !std::mem::replace(&mut self.left_out, true) {
                 let text = format!("sink {}: a message beside the items is left out: {what}", self.name);
-                Notice::new(Severity::Warning, "sink_refused", text).say();
+                Notice::new(Severity::Warning, "sink_refused", text).write_to_logs();
             }
             messages.drain(..=index);
         }
@@ -147,56 +147,57 @@ impl MqttSink {
     }
 
     /// When everything that is known is to be written again; `None` while nothing has changed.
-    fn due(&self) -> Option<Instant> {
+    fn latest_due_time(&self) -> Option<Instant> {
         let next = || self.told.map_or_else(Instant::now, |told| told + self.target.latest);
         (self.changed && !self.target.latest.is_zero()).then(next)
     }
 
     /// Writes everything that is known, if it is time.
     async fn tell_latest(&mut self) -> Result<(), SinkError> {
-        if self.due().is_none_or(|due| Instant::now() < due) {
+        if self.latest_due_time().is_none_or(|due| Instant::now() < due) {
             return Ok(());
         }
         (self.told, self.changed) = (Some(Instant::now()), false);
-        let message = layout::latest(&self.outbox, &self.prefix(), self.alarms.iter());
-        self.publish(vec![message], Qos::AtLeastOnce).await
+        let message = layout::build_latest_message(&self.outbox, &self.topic_prefix(), self.alarms.iter());
+        self.publish_messages(vec![message], Qos::AtLeastOnce).await
     }
 
     /// What a subscriber that was there before this connection does not know.
-    async fn greet(&mut self) -> Result<(), SinkError> {
-        let prefix = self.prefix();
-        let mut messages = vec![self.online(true)];
+    async fn publish_initial_state(&mut self) -> Result<(), SinkError> {
+        let prefix = self.topic_prefix();
+        let mut messages = vec![self.build_online_message(true)];
         if self.target.layout == Layout::Topics {
-            let latest = self.outbox.latest();
+            let latest = self.outbox.latest_readings();
             let provided = latest.iter().filter(|reading| !layout::is_unprovided(reading));
-            messages.extend(provided.map(|reading| layout::value(&prefix, reading)));
+            messages.extend(provided.map(|reading| layout::build_value_message(&prefix, reading)));
         }
         (self.told, self.changed) = (None, true);
-        self.publish(messages, Qos::AtLeastOnce).await?;
-        self.describe().await?;
+        self.publish_messages(messages, Qos::AtLeastOnce).await?;
+        self.publish_discovery().await?;
         self.tell_latest().await
     }
 
     /// Describes what is not described yet.
-    async fn describe(&mut self) -> Result<(), SinkError> {
+    async fn publish_discovery(&mut self) -> Result<(), SinkError> {
         if !self.target.discovery {
             return Ok(());
         }
-        let (latest, prefix) = (self.outbox.latest(), self.prefix());
+        let (latest, prefix) = (self.outbox.latest_readings(), self.topic_prefix());
         let fresh: Vec<_> = latest
             .iter()
             .filter(|reading| !layout::is_unprovided(reading) && !self.described.contains(&reading.series.id))
             .collect();
-        let messages: Vec<_> = fresh.iter().map(|reading| discovery::sensor(&self.outbox, &prefix, reading)).collect();
+        let messages: Vec<_> =
+            fresh.iter().map(|reading| discovery::build_sensor_document(&self.outbox, &prefix, reading)).collect();
         if messages.is_empty() {
             return Ok(());
         }
-        self.publish(messages, Qos::AtLeastOnce).await?;
+        self.publish_messages(messages, Qos::AtLeastOnce).await?;
         self.described.extend(fresh.iter().map(|reading| reading.series.id));
         Ok(())
     }
 
-    fn remember(&mut self, item: &Item) {
+    fn track_alarms(&mut self, item: &Item) {
         let Content::Record(record) = &item.content else { return };
         match &**record {
             Record::Alarm(alarm) => drop(self.alarms.insert(alarm.code.clone())),
@@ -205,22 +206,22 @@ impl MqttSink {
         }
     }
 
-    async fn deliver(&mut self, batch: Batch<'_>) -> Result<(), SinkError> {
-        let prefix = self.prefix();
+    async fn deliver_batch(&mut self, batch: Batch<'_>) -> Result<(), SinkError> {
+        let prefix = self.topic_prefix();
         let (mut messages, mut owners) = (Vec::new(), Vec::new());
         for item in batch.items {
-            self.remember(item);
-            let of_item = layout::messages(self.target.layout, &self.outbox, &prefix, item, batch.historical);
+            self.track_alarms(item);
+            let of_item = layout::build_messages(self.target.layout, &self.outbox, &prefix, item, batch.historical);
             owners.extend(of_item.iter().map(|_| item.sequence));
             messages.extend(of_item);
         }
-        let sent = self.link.publish(messages, self.target.qos, &self.target.broker).await;
+        let sent = self.link.publish_messages(messages, self.target.qos, &self.target.broker).await;
         sent.map_err(|(index, failure)| failure.of_item(owners.get(index).copied()))?;
         if batch.historical {
             return Ok(());
         }
         self.changed = true;
-        self.describe().await?;
+        self.publish_discovery().await?;
         self.tell_latest().await
     }
 }
@@ -228,28 +229,28 @@ impl MqttSink {
 impl Sink for MqttSink {
     fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
-            let Outgoing { topic, payload, retain } = self.online(false);
+            let Outgoing { topic, payload, retain } = self.build_online_message(false);
             let will = Will { topic, payload, qos: Qos::AtLeastOnce, retain, at_leave: false };
             let name = client_name(&self.outbox.box_id(), &self.name);
             self.link.connect(&self.target.broker, &name, Some(will)).await?;
             self.asked = None;
             self.described.clear();
-            if self.requests.allowed() {
-                let filter = vec![self.topic("request")];
-                self.link.subscribe(filter, Qos::AtLeastOnce, &self.target.broker).await?;
+            if self.requests.is_allowed() {
+                let filter = vec![self.format_topic("request")];
+                self.link.subscribe_to(filter, Qos::AtLeastOnce, &self.target.broker).await?;
             }
-            self.greet().await
+            self.publish_initial_state().await
         })
     }
 
-    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
-        Box::pin(self.deliver(batch))
+    fn send_batch<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+        Box::pin(self.deliver_batch(batch))
     }
 
-    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn wait_for_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         // Without `allow_requests` nothing is subscribed.
         Box::pin(async move {
-            let due = self.due();
+            let due = self.latest_due_time();
             let until_due = async {
                 match due {
                     Some(due) => tokio::time::sleep_until(due).await,
@@ -264,26 +265,26 @@ impl Sink for MqttSink {
         })
     }
 
-    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn serve_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
             self.tell_latest().await?;
-            match self.asked.take().filter(|message| message.topic == self.topic("request")) {
-                Some(message) => self.answer(message).await,
+            match self.asked.take().filter(|message| message.topic == self.format_topic("request")) {
+                Some(message) => self.answer_request(message).await,
                 None => Ok(()),
             }
         })
     }
 
-    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(self.link.probe(&self.target.broker))
+    fn probe_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.link.probe_broker(&self.target.broker))
     }
 
     fn close(&mut self) -> Pending<'_, ()> {
         Box::pin(async move {
             // Where this does not go through, the will says the same.
-            let gone = vec![self.online(false)];
-            let _told = self.publish(gone, Qos::AtLeastOnce).await;
-            self.link.leave().await;
+            let gone = vec![self.build_online_message(false)];
+            let _told = self.publish_messages(gone, Qos::AtLeastOnce).await;
+            self.link.disconnect_client().await;
         })
     }
 }

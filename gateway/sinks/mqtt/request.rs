@@ -36,7 +36,7 @@ const FORMS: &str = "write {\"request\":\"feed_override\",\"pct\":80}, {\"reques
                      {\"request\":\"acknowledge_alarm\",\"code\":\"...\"}";
 
 impl RequestDocument {
-    pub(super) fn change(self) -> Result<RequestedChange, String> {
+    pub(super) fn into_change(self) -> Result<RequestedChange, String> {
         match (self.request.as_str(), self.pct, self.code) {
             ("feed_override", Some(pct), None) => RequestedChange::feed_override(pct, &self.reason.unwrap_or_default()),
             ("withdraw", None, None) => Ok(RequestedChange::Withdraw),

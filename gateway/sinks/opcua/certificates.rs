@@ -1,7 +1,7 @@
 //! The directory of the certificates: `own`, `trusted`, `rejected`.
 
 use super::SinkError;
-use super::server::failed;
+use super::server::server_error;
 use opcua::crypto::{CertificateStore, X509Data};
 use opcua::types::{ApplicationDescription, ApplicationType, LocalizedText, UAString};
 use std::fs::Permissions;
@@ -18,10 +18,10 @@ const REJECTED_MAX: usize = 32;
 const VALID_DAYS: u32 = 3650;
 
 /// Makes the directory, and at the first start the box's own certificate for an application of this URI on this host.
-pub(super) fn prepare(directory: &Path, uri: &str, host: &str) -> Result<(), SinkError> {
+pub(super) fn prepare_directory(directory: &Path, uri: &str, host: &str) -> Result<(), SinkError> {
     // The private key lies in it.
     let made = std::fs::DirBuilder::new().recursive(true).mode(0o700).create(directory.join("own"));
-    made.map_err(|error| failed(format!("{} cannot be made: {error}", directory.display())))?;
+    made.map_err(|error| server_error(format!("{} cannot be made: {error}", directory.display())))?;
     let application = ApplicationDescription {
         application_uri: UAString::from(uri),
         product_uri: UAString::from(super::PRODUCT),
@@ -40,14 +40,14 @@ pub(super) fn prepare(directory: &Path, uri: &str, host: &str) -> Result<(), Sin
         Some(described),
     );
     if certificate.is_none() || private.is_none() {
-        return Err(failed(format!("{} and {} can neither be read nor made", own.display(), key.display())));
+        return Err(server_error(format!("{} and {} can neither be read nor made", own.display(), key.display())));
     }
     let closed = std::fs::set_permissions(&key, Permissions::from_mode(0o600));
-    closed.map_err(|error| failed(format!("{} cannot be closed to others: {error}", key.display())))
+    closed.map_err(|error| server_error(format!("{} cannot be closed to others: {error}", key.display())))
 }
 
 /// Where the certificates of strangers are.
-pub(super) fn rejected(directory: &Path) -> PathBuf {
+pub(super) fn rejected_directory(directory: &Path) -> PathBuf {
     directory.join("rejected")
 }
 
@@ -71,12 +71,12 @@ mod tests {
     #[test]
     fn the_certificate_is_made_once_and_its_key_is_closed_to_others() {
         let directory = tempfile::tempdir().expect("a directory");
-        prepare(directory.path(), "urn:cnc-gateway:box", "127.0.0.1").expect("made");
+        prepare_directory(directory.path(), "urn:cnc-gateway:box", "127.0.0.1").expect("made");
         let key = directory.path().join(KEY);
         let mode = std::fs::metadata(&key).expect("it is there").permissions().mode();
         assert_eq!(mode & 0o777, 0o600);
         let first = std::fs::read(directory.path().join(OWN)).expect("it is there");
-        prepare(directory.path(), "urn:cnc-gateway:box", "127.0.0.1").expect("read");
+        prepare_directory(directory.path(), "urn:cnc-gateway:box", "127.0.0.1").expect("read");
         assert_eq!(std::fs::read(directory.path().join(OWN)).expect("it is there"), first);
     }
 

@@ -2,7 +2,7 @@
 
 use super::layout;
 use super::space::Numbers;
-use super::values::time;
+use super::values::to_opcua_time;
 use crate::history::Alarm;
 use adapters::clock::TimeNs;
 use opcua::nodes::{BaseEventType, Event, EventField};
@@ -23,7 +23,7 @@ pub(super) struct AlarmEvent {
 
 impl AlarmEvent {
     /// The alarm begins.
-    pub(super) fn raised(numbers: Numbers, alarm: &Alarm) -> Self {
+    pub(super) fn from_raised_alarm(numbers: Numbers, alarm: &Alarm) -> Self {
         let severity = match alarm.severity.as_str() {
             "critical" => CRITICAL,
             "warning" => WARNING,
@@ -33,7 +33,7 @@ impl AlarmEvent {
     }
 
     /// The alarm of this code and source has ended.
-    pub(super) fn cleared(numbers: Numbers, code: &str, source: &str, at_ns: TimeNs) -> Self {
+    pub(super) fn from_cleared_alarm(numbers: Numbers, code: &str, source: &str, at_ns: TimeNs) -> Self {
         Self::new(numbers, (code, source), (&format!("{code}: cleared"), ENDED), at_ns)
     }
 
@@ -43,7 +43,7 @@ impl AlarmEvent {
             event_type: NodeId::new(numbers.own, layout::MESSAGE_EVENT),
             source_node: NodeId::new(numbers.own, layout::MESSAGES),
             source_name: source.into(),
-            time: time(at_ns),
+            time: to_opcua_time(at_ns),
             receive_time: DateTime::now(),
             message: LocalizedText::new("en", text),
             severity,

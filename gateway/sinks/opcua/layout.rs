@@ -128,7 +128,7 @@ pub(super) const PROPERTIES: [(&str, &str, &str, Form); 2] = [
 const STANDS_RPM: f64 = 1.0;
 
 /// Does a spindle of this speed turn?
-pub(super) fn rotates(speed_rpm: f64) -> bool {
+pub(super) fn is_rotating(speed_rpm: f64) -> bool {
     speed_rpm.abs() >= STANDS_RPM
 }
 
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn every_variable_is_of_a_channel_and_in_an_object() {
         for (object, name, channel, _) in VARIABLES {
-            assert!(ChannelId::of(channel).is_some(), "{channel}");
+            assert!(ChannelId::from_name(channel).is_some(), "{channel}");
             assert!(OBJECTS.iter().any(|(path, _)| *path == object), "{object}/{name}");
         }
         for (path, kind) in OBJECTS {

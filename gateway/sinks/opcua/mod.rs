@@ -24,7 +24,7 @@ mod values;
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
 use crate::history::{Content, Item, Outbox, Record};
-use adapters::address::{Endpoint, Keys, Login, endpoint};
+use adapters::address::{Endpoint, Keys, Login, parse_endpoint};
 use server::Running;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -68,7 +68,7 @@ struct MachineIdentity {
 }
 
 impl MachineIdentity {
-    fn of(target: &OpcuaTarget, outbox: &Outbox) -> Self {
+    fn from_target(target: &OpcuaTarget, outbox: &Outbox) -> Self {
         let [manufacturer, model, serial_number] = target.plate.clone();
         Self { machine: outbox.machine().to_owned(), box_id: outbox.box_id(), manufacturer, model, serial_number }
     }
@@ -81,19 +81,19 @@ impl MachineIdentity {
 
 impl OpcuaTarget {
     pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, String> {
-        let login = Login::of(keys);
-        let anonymous = keys.choice("anonymous", &[("no", false), ("yes", true)]);
-        let certificates = keys.text("certificates").map(PathBuf::from);
-        let plate = ["manufacturer", "model", "serial_number"].map(|key| keys.text(key));
+        let login = Login::from_keys(keys);
+        let anonymous = keys.take_choice("anonymous", &[("no", false), ("yes", true)]);
+        let certificates = keys.take_text("certificates").map(PathBuf::from);
+        let plate = ["manufacturer", "model", "serial_number"].map(|key| keys.take_text(key));
         if !anonymous && login.user.is_none() {
             return Err("nobody could sign in: write user= and password_file=, or anonymous=yes".to_owned());
         }
-        Ok(Self { at: endpoint(body, Some(PORT))?, login, anonymous, certificates, plate })
+        Ok(Self { at: parse_endpoint(body, Some(PORT))?, login, anonymous, certificates, plate })
     }
 
     /// What is wrong with the files that the address names, each with what to do.
     #[must_use]
-    pub fn check(&self) -> Vec<(String, String)> {
+    pub fn find_file_problems(&self) -> Vec<(String, String)> {
         super::broker::broker_files(None, &self.login)
     }
 }
@@ -127,33 +127,33 @@ impl OpcuaSink {
         }
     }
 
-    async fn begin(&mut self) -> Result<(), SinkError> {
+    async fn start_server(&mut self) -> Result<(), SinkError> {
         self.stop();
         let listener = listen_on(&self.target.at).await?;
         let running = Running::start(&self.target, &self.outbox, self.directory.clone(), listener).await?;
         // A server that begins again has forgotten which alarms stand.
-        running.tell_alarms(&self.standing(), self.outbox.head().borrow().newest_ns.unwrap_or(0));
+        running.tell_alarms(&self.standing_alarms(), self.outbox.watch_head().borrow().newest_ns.unwrap_or(0));
         self.running = Some(running);
         (self.heard, self.silent) = (Instant::now(), false);
         Ok(())
     }
 
-    fn take(&mut self, item: &Item) {
+    fn accept_item(&mut self, item: &Item) {
         let Some(running) = &self.running else { return };
         match &item.content {
             Content::Sample(readings) => {
                 if std::mem::replace(&mut self.silent, false) {
                     // The item holds only what has changed.
-                    running.tell(&self.outbox.latest(), item.at_ns);
-                    running.tell_alarms(&self.standing(), item.at_ns);
+                    running.tell_readings(&self.outbox.latest_readings(), item.at_ns);
+                    running.tell_alarms(&self.standing_alarms(), item.at_ns);
                 }
                 self.heard = Instant::now();
-                running.tell(readings, item.at_ns);
+                running.tell_readings(readings, item.at_ns);
             }
             Content::Record(record) => {
                 match &**record {
                     Record::Alarm(alarm) => {
-                        running.raise(alarm);
+                        running.raise_alarm(alarm);
                         self.alarms.insert(alarm.code.clone(), format!("{}: {}", alarm.code, alarm.en));
                     }
                     Record::AlarmClear(clear) => {
@@ -162,19 +162,19 @@ impl OpcuaSink {
                     }
                     _ => return,
                 }
-                running.tell_alarms(&self.standing(), item.at_ns);
+                running.tell_alarms(&self.standing_alarms(), item.at_ns);
             }
             Content::Gap(_) | Content::Means { .. } => {}
         }
     }
 
-    fn standing(&self) -> Vec<String> {
+    fn standing_alarms(&self) -> Vec<String> {
         self.alarms.values().cloned().collect()
     }
 
     /// Takes the values away when nothing has come for too long; an error when the server has ended.
-    fn look(&mut self) -> Result<(), SinkError> {
-        let Some(running) = &self.running else { return Err(SinkError::line("the box does not listen", "")) };
+    fn check_server(&mut self) -> Result<(), SinkError> {
+        let Some(running) = &self.running else { return Err(SinkError::failed_line("the box does not listen", "")) };
         running.look_after()?;
         if !self.silent && self.heard.elapsed() > self.outbox.settings().refresh + LATE {
             running.tell_nothing();
@@ -190,28 +190,28 @@ impl OpcuaSink {
 
 impl Sink for OpcuaSink {
     fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(self.begin())
+        Box::pin(self.start_server())
     }
 
-    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+    fn send_batch<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
         for item in batch.items {
-            self.take(item);
+            self.accept_item(item);
         }
-        Box::pin(std::future::ready(self.look()))
+        Box::pin(std::future::ready(self.check_server()))
     }
 
-    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn wait_for_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async {
             tokio::time::sleep(LOOK_EVERY).await;
             Ok(())
         })
     }
 
-    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(std::future::ready(self.look()))
+    fn serve_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(std::future::ready(self.check_server()))
     }
 
-    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn probe_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move { listen_on(&self.target.at).await.map(drop) })
     }
 
@@ -233,7 +233,7 @@ mod tests {
     /// A server on a free port, for everybody.
     fn anonymous(directory: &Path) -> OpcuaSink {
         let outbox = Outbox::new("Lathe 7", OutboxSettings::default(), []);
-        let mut keys = Keys::of("anonymous=yes");
+        let mut keys = Keys::from_query("anonymous=yes");
         let mut target = OpcuaTarget::parse("//127.0.0.1", &mut keys).expect("an address");
         target.at.port = 0;
         OpcuaSink::new(target, &outbox, &directory.join("history.db"))
@@ -245,9 +245,9 @@ mod tests {
         let mut sink = anonymous(directory.path());
         sink.alarms.insert("coolant".to_owned(), "coolant: the level is low".to_owned());
         for _ in 0..2 {
-            sink.begin().await.expect("it listens");
-            let told = sink.running.as_ref().expect("it runs").alarms().value;
-            assert_eq!(told, Some(opcua::types::Variant::from(sink.standing())));
+            sink.start_server().await.expect("it listens");
+            let told = sink.running.as_ref().expect("it runs").read_alarms().value;
+            assert_eq!(told, Some(opcua::types::Variant::from(sink.standing_alarms())));
         }
     }
 
@@ -255,16 +255,16 @@ mod tests {
     async fn values_that_are_not_renewed_are_taken_away() {
         let directory = tempfile::tempdir().expect("a directory");
         let mut sink = anonymous(directory.path());
-        sink.begin().await.expect("it listens");
-        sink.look().expect("it runs");
+        sink.start_server().await.expect("it listens");
+        sink.check_server().expect("it runs");
         assert!(!sink.silent);
         let running = sink.running.as_ref().expect("it runs");
-        assert!(running.alarms().status.is_some_and(|status| status.is_good()));
+        assert!(running.read_alarms().status.is_some_and(|status| status.is_good()));
         let limit = sink.outbox.settings().refresh + LATE;
         sink.heard = Instant::now().checked_sub(limit + LATE).expect("the computer has run for longer");
-        sink.look().expect("it runs");
+        sink.check_server().expect("it runs");
         assert!(sink.silent);
-        let alarms = sink.running.as_ref().expect("it runs").alarms();
+        let alarms = sink.running.as_ref().expect("it runs").read_alarms();
         assert!(alarms.status.is_some_and(|status| status.is_bad()));
     }
 }

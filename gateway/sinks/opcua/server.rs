@@ -42,8 +42,8 @@ impl Drop for Running {
     }
 }
 
-pub(super) fn failed(what: impl Into<String>) -> SinkError {
-    SinkError::line(what, "look at the directory of the certificates and at the log")
+pub(super) fn server_error(what: impl Into<String>) -> SinkError {
+    SinkError::failed_line(what, "look at the directory of the certificates and at the log")
 }
 
 impl Running {
@@ -55,14 +55,14 @@ impl Running {
         listener: TcpListener,
     ) -> Result<Self, SinkError> {
         let (own, box_id) = (target.clone(), outbox.box_id());
-        let rejected = certificates::rejected(&directory);
+        let rejected = certificates::rejected_directory(&directory);
         // Making the first certificate takes a moment of one core.
-        let built = tokio::task::spawn_blocking(move || build(&own, &box_id, &directory)).await;
-        let (server, handle) = built.map_err(|error| failed(error.to_string()))??;
+        let built = tokio::task::spawn_blocking(move || build_server(&own, &box_id, &directory)).await;
+        let (server, handle) = built.map_err(|error| server_error(error.to_string()))??;
         let manager = handle.node_managers().get_of_type::<SimpleNodeManager>();
-        let manager = manager.ok_or_else(|| failed("the OPC UA server has no nodes"))?;
+        let manager = manager.ok_or_else(|| server_error("the OPC UA server has no nodes"))?;
         let number = |name: &str| {
-            handle.get_namespace_index(name).ok_or_else(|| failed(format!("the namespace {name} has no number")))
+            handle.get_namespace_index(name).ok_or_else(|| server_error(format!("the namespace {name} has no number")))
         };
         let numbers = Numbers {
             own: number(layout::OWN)?,
@@ -70,68 +70,68 @@ impl Running {
             machinery: number(layout::MACHINERY)?,
             machine_tool: number(layout::MACHINE_TOOL)?,
         };
-        let (latest, identity) = (outbox.latest(), MachineIdentity::of(target, outbox));
+        let (latest, identity) = (outbox.latest_readings(), MachineIdentity::from_target(target, outbox));
         let shown = {
             let mut space = manager.address_space().write();
-            let shown = space::build(&mut space, numbers, &identity, &latest);
+            let shown = space::build_nodes(&mut space, numbers, &identity, &latest);
             space.load_into_type_tree(&mut handle.type_tree().write());
             shown
         };
         let task = tokio::spawn(server.run_with(listener));
         let running = Self { handle, manager, shown, numbers, task, rejected, counted: Mutex::new(Instant::now()) };
-        let at_ns = outbox.head().borrow().newest_ns.unwrap_or(0);
-        running.tell(&latest, at_ns);
+        let at_ns = outbox.watch_head().borrow().newest_ns.unwrap_or(0);
+        running.tell_readings(&latest, at_ns);
         Ok(running)
     }
 
     /// These values are in force since this moment.
-    pub(super) fn tell(&self, readings: &[Reading], at_ns: TimeNs) {
-        self.put(&self.shown.values(readings, at_ns));
+    pub(super) fn tell_readings(&self, readings: &[Reading], at_ns: TimeNs) {
+        self.write_values(&self.shown.build_node_values(readings, at_ns));
     }
 
     /// No value is known any more: what a client reads is absent instead of old.
     pub(super) fn tell_nothing(&self) {
-        self.put(&self.shown.nothing());
+        self.write_values(&self.shown.list_unavailable_values());
     }
 
     /// These alarms stand since this moment.
     pub(super) fn tell_alarms(&self, alarms: &[String], at_ns: TimeNs) {
-        self.put(&[self.shown.alarms(alarms, at_ns)]);
+        self.write_values(&[self.shown.build_alarms_value(alarms, at_ns)]);
     }
 
     /// An alarm begins: an event for whoever has subscribed to the messages, or to everything that the server sends.
-    pub(super) fn raise(&self, alarm: &Alarm) {
-        self.send(&AlarmEvent::raised(self.numbers, alarm));
+    pub(super) fn raise_alarm(&self, alarm: &Alarm) {
+        self.send_event(&AlarmEvent::from_raised_alarm(self.numbers, alarm));
     }
 
     /// An alarm has ended.
     pub(super) fn clear(&self, code: &str, source: &str, at_ns: TimeNs) {
-        self.send(&AlarmEvent::cleared(self.numbers, code, source, at_ns));
+        self.send_event(&AlarmEvent::from_cleared_alarm(self.numbers, code, source, at_ns));
     }
 
-    fn send(&self, event: &AlarmEvent) {
+    fn send_event(&self, event: &AlarmEvent) {
         let from = [NodeId::new(self.numbers.own, layout::MESSAGES), ObjectId::Server.into()];
         let event: &dyn opcua::nodes::Event = event;
         self.handle.subscriptions().notify_events(from.iter().map(|node| (event, node)));
     }
 
-    fn put(&self, values: &[(NodeId, DataValue)]) {
+    fn write_values(&self, values: &[(NodeId, DataValue)]) {
         let each = values.iter().map(|(node, value)| (node, None, value.clone()));
-        // Every node of the list was made by `space::build`.
+        // Every node of the list was made by `space::build_nodes`.
         let _known = self.manager.set_values(self.handle.subscriptions(), each);
     }
 
     /// What a client reads of the alarms.
     #[cfg(test)]
-    pub(super) fn alarms(&self) -> DataValue {
-        let node = self.shown.alarms(&[], 0).0;
+    pub(super) fn read_alarms(&self) -> DataValue {
+        let node = self.shown.build_alarms_value(&[], 0).0;
         super::values::read(&self.manager.address_space().read(), &node).expect("made with the others")
     }
 
     /// An error when the server has ended; keeps the number of strangers' certificates bounded.
     pub(super) fn look_after(&self) -> Result<(), SinkError> {
         if self.task.is_finished() {
-            return Err(failed("the OPC UA server has ended"));
+            return Err(server_error("the OPC UA server has ended"));
         }
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         if counted.elapsed() >= COUNT_EVERY {
@@ -150,13 +150,12 @@ fn told_host(target: &OpcuaTarget) -> String {
     Some(host.to_owned()).filter(|_| !all).or_else(own).unwrap_or_else(|| "localhost".to_owned())
 }
 
-fn build(target: &OpcuaTarget, box_id: &str, directory: &Path) -> Result<(Server, ServerHandle), SinkError> {
+fn build_server(target: &OpcuaTarget, box_id: &str, directory: &Path) -> Result<(Server, ServerHandle), SinkError> {
     let (uri, host) = (format!("{PRODUCT}:{box_id}"), told_host(target));
-    certificates::prepare(directory, &uri, &host)?;
-    let login = target
-        .login
-        .read()
-        .map_err(|(file, error)| failed(format!("the password file {} cannot be read: {error}", file.display())))?;
+    certificates::prepare_directory(directory, &uri, &host)?;
+    let login = target.login.read().map_err(|(file, error)| {
+        server_error(format!("the password file {} cannot be read: {error}", file.display()))
+    })?;
     let mut users = Vec::new();
     let mut builder = ServerBuilder::new()
         .application_name(APPLICATION)
@@ -183,5 +182,5 @@ fn build(target: &OpcuaTarget, box_id: &str, directory: &Path) -> Result<(Server
     }
     let endpoint =
         ServerEndpoint::new("/", SecurityPolicy::Basic256Sha256, MessageSecurityMode::SignAndEncrypt, &users);
-    builder.add_endpoint("encrypted", endpoint).default_endpoint("encrypted").build().map_err(failed)
+    builder.add_endpoint("encrypted", endpoint).default_endpoint("encrypted").build().map_err(server_error)
 }

@@ -46,14 +46,14 @@ pub(super) struct Numbers {
 }
 
 /// Builds the nodes of the machine of this name and box, with one for each series.
-pub(super) fn build(
+pub(super) fn build_nodes(
     space: &mut AddressSpace,
     numbers: Numbers,
     identity: &MachineIdentity,
     series: &[Reading],
 ) -> Shown {
     let machine = identity.machine.as_str();
-    types(space, numbers);
+    add_types(space, numbers);
     let machines = NodeId::new(numbers.machinery, layout::MACHINES);
     ObjectBuilder::new(&machines, QualifiedName::new(numbers.machinery, "Machines"), "Machines")
         .is_folder()
@@ -74,8 +74,8 @@ pub(super) fn build(
         let sends = if path == layout::MESSAGES { EventNotifier::SUBSCRIBE_TO_EVENTS } else { EventNotifier::empty() };
         object.event_notifier(sends).insert(space);
     }
-    identification(space, numbers, identity);
-    let mut shown = Shown::new(numbers, alarms(space, numbers));
+    add_identification(space, numbers, identity);
+    let mut shown = Shown::new(numbers, add_alarms_node(space, numbers));
     for (object, name, channel, form) in layout::VARIABLES {
         let Some(reading) = series.iter().find(|reading| &*reading.series.name == channel) else { continue };
         let node = NodeId::new(numbers.own, format!("{object}/{name}"));
@@ -94,12 +94,12 @@ pub(super) fn build(
         insert_typed_variable(space, numbers, property, &reading.series, Some(form));
         shown.add(&reading.series.name, node, Some(form));
     }
-    values(space, numbers, series, &mut shown);
+    add_series_nodes(space, numbers, series, &mut shown);
     shown
 }
 
 /// Every series under its own name.
-fn values(space: &mut AddressSpace, numbers: Numbers, series: &[Reading], shown: &mut Shown) {
+fn add_series_nodes(space: &mut AddressSpace, numbers: Numbers, series: &[Reading], shown: &mut Shown) {
     let folder = NodeId::new(numbers.own, "Values");
     ObjectBuilder::new(&folder, QualifiedName::new(numbers.own, "Values"), "Values")
         .is_folder()
@@ -149,7 +149,7 @@ fn insert_typed_variable(
         }
         _ if series.kind == SeriesKind::Number => {
             variable.data_type(DataTypeId::Double).has_type_definition(VariableTypeId::AnalogUnitType).insert(space);
-            unit(space, numbers, &node, series);
+            add_unit_properties(space, numbers, &node, series);
         }
         _ => {
             let variable = variable.data_type(DataTypeId::String);
@@ -160,8 +160,8 @@ fn insert_typed_variable(
 }
 
 /// `EngineeringUnits`, and `EURange` where the range is known.
-fn unit(space: &mut AddressSpace, numbers: Numbers, node: &NodeId, series: &SeriesInfo) {
-    let information = units::information(&series.unit);
+fn add_unit_properties(space: &mut AddressSpace, numbers: Numbers, node: &NodeId, series: &SeriesInfo) {
+    let information = units::to_unit_information(&series.unit);
     let mut property = |name: &str, kind: DataTypeId, value: ExtensionObject| {
         let own = NodeId::new(numbers.own, format!("{}/{name}", node.identifier));
         VariableBuilder::new(&own, name, name)
@@ -178,7 +178,7 @@ fn unit(space: &mut AddressSpace, numbers: Numbers, node: &NodeId, series: &Seri
 }
 
 /// The alarms of the gateway that stand: the specification has none of a list, so it is in the box's own namespace.
-fn alarms(space: &mut AddressSpace, numbers: Numbers) -> NodeId {
+fn add_alarms_node(space: &mut AddressSpace, numbers: Numbers) -> NodeId {
     let node = NodeId::new(numbers.own, "Notification/Messages/GatewayAlarms");
     VariableBuilder::new(&node, QualifiedName::new(numbers.own, "GatewayAlarms"), "GatewayAlarms")
         .data_type(DataTypeId::String)
@@ -191,7 +191,7 @@ fn alarms(space: &mut AddressSpace, numbers: Numbers) -> NodeId {
 }
 
 /// What is known of the machine's identity: no controller tells its maker and serial number, so a person has to.
-fn identification(space: &mut AddressSpace, numbers: Numbers, identity: &MachineIdentity) {
+fn add_identification(space: &mut AddressSpace, numbers: Numbers, identity: &MachineIdentity) {
     let localized = |text: &String| Variant::from(LocalizedText::new("", text));
     let rows = [
         ("Manufacturer", DataTypeId::LocalizedText, identity.manufacturer.as_ref().map(localized)),
@@ -216,7 +216,7 @@ fn identification(space: &mut AddressSpace, numbers: Numbers, identity: &Machine
 }
 
 /// The names of the types that the objects have.
-fn types(space: &mut AddressSpace, numbers: Numbers) {
+fn add_types(space: &mut AddressSpace, numbers: Numbers) {
     for (number, name) in layout::TYPES {
         let node = NodeId::new(numbers.machine_tool, number);
         ObjectTypeBuilder::new(&node, QualifiedName::new(numbers.machine_tool, name), name)

@@ -31,16 +31,16 @@ const CODES: [(&str, &str); 17] = [
 ];
 
 /// The unit of this symbol.
-pub(super) fn information(symbol: &str) -> EUInformation {
+pub(super) fn to_unit_information(symbol: &str) -> EUInformation {
     EUInformation {
         namespace_uri: UNITS.into(),
-        unit_id: number(symbol),
+        unit_id: find_unit_id(symbol),
         display_name: LocalizedText::from(symbol),
         description: LocalizedText::from(symbol),
     }
 }
 
-fn number(symbol: &str) -> i32 {
+fn find_unit_id(symbol: &str) -> i32 {
     let code = CODES.iter().find(|(known, _)| *known == symbol);
     code.map_or(NO_CODE, |(_, code)| code.bytes().fold(0, |number, byte| (number << 8) | i32::from(byte)))
 }
@@ -52,10 +52,10 @@ mod tests {
     #[test]
     fn codes_are_those_of_the_published_table() {
         // OPC 10000-8, UNECE_to_OPCUA.csv
-        assert_eq!(number("%"), 20529);
-        assert_eq!(number("°C"), 4_408_652);
-        assert_eq!(number("A"), 4_279_632);
-        assert_eq!(number("mm"), 5_066_068);
-        assert_eq!(number("cm3/min"), NO_CODE);
+        assert_eq!(find_unit_id("%"), 20529);
+        assert_eq!(find_unit_id("°C"), 4_408_652);
+        assert_eq!(find_unit_id("A"), 4_279_632);
+        assert_eq!(find_unit_id("mm"), 5_066_068);
+        assert_eq!(find_unit_id("cm3/min"), NO_CODE);
     }
 }

@@ -31,40 +31,41 @@ impl Shown {
     }
 
     /// The nodes of these readings with their new values.
-    pub(super) fn values(&self, readings: &[Reading], at_ns: TimeNs) -> Vec<(NodeId, DataValue)> {
+    pub(super) fn build_node_values(&self, readings: &[Reading], at_ns: TimeNs) -> Vec<(NodeId, DataValue)> {
         let of = |reading: &Reading| {
             let nodes = self.nodes.get(&reading.series.name).into_iter().flatten();
-            let value =
-                |(node, form): &(NodeId, Option<Form>)| (node.clone(), self.value(&reading.value, *form, at_ns));
+            let value = |(node, form): &(NodeId, Option<Form>)| {
+                (node.clone(), self.to_data_value(&reading.value, *form, at_ns))
+            };
             nodes.map(value).collect::<Vec<_>>()
         };
         readings.iter().flat_map(of).collect()
     }
 
     /// All of them without a value: nothing has come for too long.
-    pub(super) fn nothing(&self) -> Vec<(NodeId, DataValue)> {
+    pub(super) fn list_unavailable_values(&self) -> Vec<(NodeId, DataValue)> {
         let all = self.nodes.values().flatten().map(|(node, _)| node).chain([&self.alarms]);
-        all.map(|node| (node.clone(), missing(StatusCode::BadNoCommunication))).collect()
+        all.map(|node| (node.clone(), build_missing_value(StatusCode::BadNoCommunication))).collect()
     }
 
-    fn value(&self, cell: &Cell, form: Option<Form>, at_ns: TimeNs) -> DataValue {
+    fn to_data_value(&self, cell: &Cell, form: Option<Form>, at_ns: TimeNs) -> DataValue {
         let variant = match (cell, form) {
-            (Cell::Number(number), Some(Form::Rotating)) => Ok(Variant::from(layout::rotates(*number))),
+            (Cell::Number(number), Some(Form::Rotating)) => Ok(Variant::from(layout::is_rotating(*number))),
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, which is meant")]
             (Cell::Number(number), Some(Form::Hours)) => Ok(Variant::from((number / 3600.0) as u32)),
             (Cell::Number(number), _) => Ok(Variant::from(*number)),
             (Cell::Text(word), Some(Form::Word(_, number))) => Ok(Variant::from(number(word))),
-            (Cell::Text(word), Some(Form::State(part))) => Ok(self.state(layout::program_state(word), part)),
+            (Cell::Text(word), Some(Form::State(part))) => Ok(self.to_state_variant(layout::program_state(word), part)),
             (Cell::Text(text), _) => Ok(Variant::from(&**text)),
-            (Cell::Missing(reason), _) => Err(absent(reason)),
+            (Cell::Missing(reason), _) => Err(to_status_code(reason)),
         };
         match variant {
-            Ok(variant) => known(variant, at_ns),
-            Err(status) => DataValue { source_timestamp: Some(time(at_ns)), ..missing(status) },
+            Ok(variant) => build_good_value(variant, at_ns),
+            Err(status) => DataValue { source_timestamp: Some(to_opcua_time(at_ns)), ..build_missing_value(status) },
         }
     }
 
-    fn state(&self, state: ProgramState, part: StatePart) -> Variant {
+    fn to_state_variant(&self, state: ProgramState, part: StatePart) -> Variant {
         match part {
             StatePart::Name => Variant::from(LocalizedText::new("en", state.name)),
             StatePart::Node => Variant::from(NodeId::new(self.numbers.machine_tool, state.node)),
@@ -73,22 +74,22 @@ impl Shown {
     }
 
     /// The node of the alarms of the gateway with those that stand.
-    pub(super) fn alarms(&self, standing: &[String], at_ns: TimeNs) -> (NodeId, DataValue) {
-        (self.alarms.clone(), known(Variant::from(standing.to_vec()), at_ns))
+    pub(super) fn build_alarms_value(&self, standing: &[String], at_ns: TimeNs) -> (NodeId, DataValue) {
+        (self.alarms.clone(), build_good_value(Variant::from(standing.to_vec()), at_ns))
     }
 }
 
-fn known(variant: Variant, at_ns: TimeNs) -> DataValue {
+fn build_good_value(variant: Variant, at_ns: TimeNs) -> DataValue {
     DataValue {
         value: Some(variant),
         status: Some(StatusCode::Good),
-        source_timestamp: Some(time(at_ns)),
+        source_timestamp: Some(to_opcua_time(at_ns)),
         server_timestamp: Some(DateTime::now()),
         ..DataValue::default()
     }
 }
 
-fn missing(status: StatusCode) -> DataValue {
+fn build_missing_value(status: StatusCode) -> DataValue {
     DataValue {
         // Not `None`: a node of the library forgets the status of a value that is not there, and then it would be read as good.
         value: Some(Variant::Empty),
@@ -100,16 +101,16 @@ fn missing(status: StatusCode) -> DataValue {
 
 pub(super) fn set_missing(space: &mut AddressSpace, node: &NodeId, status: StatusCode) {
     if let Some(opcua::nodes::NodeType::Variable(variable)) = space.find_mut(node) {
-        variable.set_data_value(missing(status));
+        variable.set_data_value(build_missing_value(status));
     }
 }
 
-pub(super) fn time(at_ns: TimeNs) -> DateTime {
+pub(super) fn to_opcua_time(at_ns: TimeNs) -> DateTime {
     DateTime::from(at_ns.div_euclid(100).saturating_add(EPOCH_TICKS))
 }
 
 /// The status that says why there is no value.
-fn absent(reason: &str) -> StatusCode {
+fn to_status_code(reason: &str) -> StatusCode {
     match reason {
         "not_provided" | "not_supported" => StatusCode::BadNotSupported,
         "machine_off" | "disconnected" | "timeout" | "stale" => StatusCode::BadNoCommunication,
@@ -140,7 +141,7 @@ mod tests {
         let node = NodeId::new(1, "it");
         VariableBuilder::new(&node, "it", "it").value(1.0).data_type(DataTypeId::Double).insert(&mut space);
         for reason in ["not_provided", "timeout", "not_yet_read", "out_of_range", "stale", "not_learned"] {
-            let status = absent(reason);
+            let status = to_status_code(reason);
             assert!(status.is_bad(), "{reason}");
             set_missing(&mut space, &node, status);
             assert_eq!(read(&space, &node).and_then(|value| value.status), Some(status), "{reason}");

@@ -28,7 +28,7 @@ pub fn devices_xml(
     delivered: impl Fn(&str) -> bool,
     others: &[(String, String)],
 ) -> Result<String, String> {
-    let mut devices = vec![device(described, delivered)];
+    let mut devices = vec![write_device(described, delivered)];
     for (name, text) in others {
         let found = devices_of(text);
         if found.is_empty() {
@@ -76,7 +76,7 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
-    fn put(&mut self, indent: usize, line: &str) {
+    fn write_line(&mut self, indent: usize, line: &str) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.out, "{:indent$}{line}", "");
     }
@@ -89,9 +89,9 @@ impl Tree<'_> {
         let conditions = conditions::ALL.iter().filter(|condition| condition.component == component);
         let lines: Vec<String> =
             items.into_iter().chain(conditions.map(|condition| condition_item(prefix, condition))).collect();
-        self.put(indent, "<DataItems>");
-        lines.iter().for_each(|line| self.put(indent + 2, line));
-        self.put(indent, "</DataItems>");
+        self.write_line(indent, "<DataItems>");
+        lines.iter().for_each(|line| self.write_line(indent + 2, line));
+        self.write_line(indent, "</DataItems>");
     }
 
     fn is_empty(&self, component: Component) -> bool {
@@ -99,35 +99,35 @@ impl Tree<'_> {
             && !conditions::ALL.iter().any(|condition| condition.component == component)
     }
 
-    fn open(&mut self, indent: usize, tag: &str, id: &str, name: &str) {
+    fn open_element(&mut self, indent: usize, tag: &str, id: &str, name: &str) {
         let prefix = self.prefix;
-        self.put(indent, &format!("<{tag} id=\"{prefix}{id}\" name=\"{name}\">"));
+        self.write_line(indent, &format!("<{tag} id=\"{prefix}{id}\" name=\"{name}\">"));
     }
 
-    fn leaf(&mut self, indent: usize, (component, tag, id, name): DevicePart) {
+    fn write_leaf(&mut self, indent: usize, (component, tag, id, name): DevicePart) {
         if self.is_empty(component) {
             return;
         }
-        self.open(indent, tag, id, name);
+        self.open_element(indent, tag, id, name);
         self.data_items(indent + 2, component);
-        self.put(indent, &format!("</{tag}>"));
+        self.write_line(indent, &format!("</{tag}>"));
     }
 
     /// A component that holds others, and what stands at itself.
-    fn group(&mut self, (own, tag, id): (Option<Component>, &str, &str), parts: &[DevicePart]) {
+    fn write_group(&mut self, (own, tag, id): (Option<Component>, &str, &str), parts: &[DevicePart]) {
         if own.is_none() && parts.iter().all(|(component, ..)| self.is_empty(*component)) {
             return;
         }
-        self.open(8, tag, id, id);
+        self.open_element(8, tag, id, id);
         if let Some(own) = own {
             self.data_items(10, own);
         }
         if parts.iter().any(|(component, ..)| !self.is_empty(*component)) {
-            self.put(10, "<Components>");
-            parts.iter().for_each(|part| self.leaf(12, *part));
-            self.put(10, "</Components>");
+            self.write_line(10, "<Components>");
+            parts.iter().for_each(|part| self.write_leaf(12, *part));
+            self.write_line(10, "</Components>");
         }
-        self.put(8, &format!("</{tag}>"));
+        self.write_line(8, &format!("</{tag}>"));
     }
 }
 
@@ -143,24 +143,27 @@ const AXES: [DevicePart; 4] = [
 const SYSTEMS: [DevicePart; 2] =
     [(Component::Electric, "Electric", "electric", "electric"), (Component::Coolant, "Coolant", "coolant", "coolant")];
 
-fn device(described: Described<'_>, delivered: impl Fn(&str) -> bool) -> String {
+fn write_device(described: Described<'_>, delivered: impl Fn(&str) -> bool) -> String {
     let Described { machine, box_id, prefix } = described;
     let items = ITEMS.iter().filter(|item| delivered(item.channel)).collect();
     let mut tree = Tree { out: String::new(), prefix, items };
-    tree.put(4, &format!("<Device id=\"{prefix}machine\" name=\"{box_id}\" uuid=\"{box_id}\">"));
-    tree.put(6, &format!("<Description>{}</Description>", escape_text(machine)));
-    tree.put(6, "<DataItems>");
+    tree.write_line(4, &format!("<Device id=\"{prefix}machine\" name=\"{box_id}\" uuid=\"{box_id}\">"));
+    tree.write_line(6, &format!("<Description>{}</Description>", escape_text(machine)));
+    tree.write_line(6, "<DataItems>");
     let availability = format!("id=\"{prefix}{AVAILABILITY}\" name=\"{AVAILABILITY}\" category=\"EVENT\"");
-    tree.put(8, &format!("<DataItem {availability} type=\"AVAILABILITY\"/>"));
-    tree.put(6, "</DataItems>");
-    tree.put(6, "<Components>");
-    tree.group((Some(Component::Axes), "Axes", "axes"), &AXES);
-    tree.group((Some(Component::Controller), "Controller", "controller"), &[(Component::Path, "Path", "path", "path")]);
-    tree.group((None, "Systems", "systems"), &SYSTEMS);
+    tree.write_line(8, &format!("<DataItem {availability} type=\"AVAILABILITY\"/>"));
+    tree.write_line(6, "</DataItems>");
+    tree.write_line(6, "<Components>");
+    tree.write_group((Some(Component::Axes), "Axes", "axes"), &AXES);
+    tree.write_group(
+        (Some(Component::Controller), "Controller", "controller"),
+        &[(Component::Path, "Path", "path", "path")],
+    );
+    tree.write_group((None, "Systems", "systems"), &SYSTEMS);
     // The standard has a component of its own for it from 1.6 on.
-    tree.leaf(8, (Component::Environment, "Sensor", "environment", "environment"));
-    tree.put(6, "</Components>");
-    tree.put(4, END);
+    tree.write_leaf(8, (Component::Environment, "Sensor", "environment", "environment"));
+    tree.write_line(6, "</Components>");
+    tree.write_line(4, END);
     tree.out
 }
 

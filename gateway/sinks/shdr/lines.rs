@@ -18,11 +18,11 @@ pub(super) struct Line {
 
 /// The lines with their times. Each agent is told times that never go back, from `least_ns` on: an agent that has lost its
 /// adapter notes every value as unavailable with the time of its own clock, and what it is told then must come after that.
-pub(super) fn stamped(lines: &[Line], least_ns: &mut TimeNs) -> String {
+pub(super) fn format_lines(lines: &[Line], least_ns: &mut TimeNs) -> String {
     let mut text = String::new();
     for Line { at_ns, body } in lines {
         *least_ns = (*least_ns).max(*at_ns);
-        text += &moment::utc(*least_ns);
+        text += &moment::format_utc(*least_ns);
         text.push('|');
         text += body;
         text.push('\n');
@@ -46,75 +46,75 @@ pub(super) struct Machine {
 impl Machine {
     pub(super) fn new(box_id: &str, latest: &[Reading], at_ns: TimeNs) -> Self {
         let mut machine = Self { box_id: box_id.to_owned(), at_ns, ..Self::default() };
-        machine.take(latest);
+        machine.update_values(latest);
         machine
     }
 
     /// Everything that an agent must know at the beginning, as of `now_ns`.
-    pub(super) fn greeting(&self, now_ns: TimeNs) -> Vec<Line> {
+    pub(super) fn build_initial_lines(&self, now_ns: TimeNs) -> Vec<Line> {
         let at_ns = self.at_ns.max(now_ns);
         let line = |body| Line { at_ns, body };
         let mut lines = vec![line(format!("{AVAILABILITY}|AVAILABLE"))];
-        let values = cells(self.values.iter().map(|(name, value)| (*name, value.as_str())));
+        let values = join_cells(self.values.iter().map(|(name, value)| (*name, value.as_str())));
         lines.extend(values.map(line));
-        lines.extend(self.standing().into_iter().map(line));
-        lines.extend(self.tools.iter().map(|tool| line(self.asset(tool, at_ns))));
+        lines.extend(self.list_conditions().into_iter().map(line));
+        lines.extend(self.tools.iter().map(|tool| line(self.format_tool_asset(tool, at_ns))));
         lines
     }
 
     /// Every condition as it stands.
-    fn standing(&self) -> Vec<String> {
+    fn list_conditions(&self) -> Vec<String> {
         let level = if self.alarms_known { "NORMAL" } else { UNAVAILABLE };
         let basis = conditions::ALL.iter().map(|condition| {
             let level = if *condition == OWN { "NORMAL" } else { level };
             format!("{}|{level}||||", condition.name)
         });
-        basis.chain(self.alarms.values().flat_map(raised)).collect()
+        basis.chain(self.alarms.values().flat_map(build_alarm_lines)).collect()
     }
 
     /// The lines of an item; none where the standard has no counterpart.
-    pub(super) fn lines(&mut self, item: &Item) -> Vec<Line> {
+    pub(super) fn build_item_lines(&mut self, item: &Item) -> Vec<Line> {
         self.at_ns = self.at_ns.max(item.at_ns);
         let bodies = match &item.content {
-            Content::Sample(readings) => self.sample(readings, item.at_ns),
+            Content::Sample(readings) => self.build_sample_lines(readings, item.at_ns),
             Content::Record(record) => match &**record {
                 Record::Alarm(alarm) => {
                     self.alarms.insert((alarm.source.clone(), alarm.code.clone()), alarm.clone());
-                    raised(alarm)
+                    build_alarm_lines(alarm)
                 }
                 Record::AlarmClear(clear) => {
                     self.alarms.remove(&(clear.source.clone(), clear.code.clone()));
                     let normal = |(condition, code, _): (&AlarmKind, String, String)| {
                         format!("{}|NORMAL|{code}|||", condition.name)
                     };
-                    conditions::parts(&clear.source, &clear.code, "").map(normal).collect()
+                    conditions::split_alarm(&clear.source, &clear.code, "").map(normal).collect()
                 }
                 _ => Vec::new(),
             },
-            Content::Gap(_) => self.forget(),
+            Content::Gap(_) => self.clear_values(),
             Content::Means { .. } => Vec::new(),
         };
         bodies.into_iter().map(|body| Line { at_ns: item.at_ns, body }).collect()
     }
 
-    fn sample(&mut self, readings: &[Reading], at_ns: TimeNs) -> Vec<String> {
+    fn build_sample_lines(&mut self, readings: &[Reading], at_ns: TimeNs) -> Vec<String> {
         let known = self.alarms_known;
-        let (changed, tool) = (self.take(readings), self.new_tool(readings));
-        let mut lines: Vec<String> = cells(changed.iter().map(|(name, value)| (*name, value.as_str()))).collect();
+        let (changed, tool) = (self.update_values(readings), self.new_tool(readings));
+        let mut lines: Vec<String> = join_cells(changed.iter().map(|(name, value)| (*name, value.as_str()))).collect();
         if known != self.alarms_known {
-            lines.extend(self.standing());
+            lines.extend(self.list_conditions());
         }
-        lines.extend(tool.map(|tool| self.asset(&tool, at_ns)));
+        lines.extend(tool.map(|tool| self.format_tool_asset(&tool, at_ns)));
         lines
     }
 
     /// There were no samples from here on.
-    fn forget(&mut self) -> Vec<String> {
+    fn clear_values(&mut self) -> Vec<String> {
         self.values.values_mut().for_each(|value| UNAVAILABLE.clone_into(value));
-        cells(self.values.iter().map(|(name, value)| (*name, value.as_str()))).collect()
+        join_cells(self.values.iter().map(|(name, value)| (*name, value.as_str()))).collect()
     }
 
-    fn take(&mut self, readings: &[Reading]) -> Vec<(&'static str, String)> {
+    fn update_values(&mut self, readings: &[Reading]) -> Vec<(&'static str, String)> {
         let mut changed = Vec::new();
         for reading in readings.iter().filter(|reading| !reading.series.estimated) {
             if &*reading.series.name == "alarm" {
@@ -124,7 +124,7 @@ impl Machine {
             // What the machine has never delivered need not stand in its `devices.xml`.
             let never = matches!(&reading.value, Cell::Missing(reason) if **reason == *"not_provided");
             if self.values.contains_key(item.channel) || !never {
-                changed.push((item.channel, item.form.shown(&reading.value)));
+                changed.push((item.channel, item.form.format_value(&reading.value)));
             }
         }
         self.values.extend(changed.iter().cloned());
@@ -140,8 +140,8 @@ impl Machine {
     }
 
     /// A tool that was in use, as an asset of the standard.
-    fn asset(&self, tool: &str, at_ns: TimeNs) -> String {
-        let (at, device, tool) = (moment::utc(at_ns), &self.box_id, attribute(tool));
+    fn format_tool_asset(&self, tool: &str, at_ns: TimeNs) -> String {
+        let (at, device, tool) = (moment::format_utc(at_ns), &self.box_id, escape_attribute(tool));
         let id = format!("{device}.{tool}");
         format!(
             "@ASSET@|{id}|CuttingTool|<CuttingTool serialNumber=\"{tool}\" toolId=\"{tool}\" timestamp=\"{at}\" \
@@ -152,29 +152,29 @@ impl Machine {
 }
 
 /// Names and values on one line; none for no values.
-fn cells<'a>(values: impl Iterator<Item = (&'a str, &'a str)>) -> impl Iterator<Item = String> {
+fn join_cells<'a>(values: impl Iterator<Item = (&'a str, &'a str)>) -> impl Iterator<Item = String> {
     let cells: Vec<String> = values.map(|(name, value)| format!("{name}|{value}")).collect();
     Some(cells.join("|")).filter(|line| !line.is_empty()).into_iter()
 }
 
 /// An alarm is one condition for each alarm of the control that it names.
-fn raised(alarm: &Alarm) -> Vec<String> {
+fn build_alarm_lines(alarm: &Alarm) -> Vec<String> {
     let level = if alarm.severity == "critical" { "FAULT" } else { "WARNING" };
-    let severity = plain(&alarm.severity);
+    let severity = replace_separators(&alarm.severity);
     let line = |(condition, code, text): (&AlarmKind, String, String)| {
         format!("{}|{level}|{code}|{severity}||{text}", condition.name)
     };
-    conditions::parts(&alarm.source, &alarm.code, &alarm.en).map(line).collect()
+    conditions::split_alarm(&alarm.source, &alarm.code, &alarm.en).map(line).collect()
 }
 
 /// Bars and ends of lines have a meaning of their own.
-pub(super) fn plain(text: &str) -> String {
+pub(super) fn replace_separators(text: &str) -> String {
     text.replace(|letter: char| letter == '|' || letter.is_control(), " ")
 }
 
 /// Text within an attribute of XML.
-fn attribute(text: &str) -> String {
-    plain(text).replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+fn escape_attribute(text: &str) -> String {
+    replace_separators(text).replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -187,7 +187,7 @@ mod tests {
         let lines: Vec<Line> =
             [5, 9, 7].map(|second| Line { at_ns: second * 1_000_000_000, body: "a|1".to_owned() }).into();
         let mut least_ns = 6_000_000_000;
-        let text = stamped(&lines, &mut least_ns);
+        let text = format_lines(&lines, &mut least_ns);
         let seconds: Vec<&str> = text.lines().map(|line| &line[17..19]).collect();
         assert_eq!((seconds, least_ns), (vec!["06", "09", "09"], 9_000_000_000));
     }
@@ -206,19 +206,19 @@ mod tests {
         let bodies = |lines: Vec<Line>| lines.into_iter().map(|line| line.body).collect::<Vec<_>>();
         let item = |record| Item { sequence: 1, at_ns: 5, content: Content::Record(Box::new(record)) };
         assert_eq!(
-            bodies(machine.lines(&item(alarm.into()))),
+            bodies(machine.build_item_lines(&item(alarm.into()))),
             ["servo|FAULT|SV0417|critical||(Y) SERVO ALARM", "motion_program|FAULT|PS0010|critical||IMPROPER G-CODE"]
         );
         let clear = AlarmClear { code, source: "controller".to_owned(), at_ns: 6 };
         assert_eq!(
-            bodies(machine.lines(&item(clear.into()))),
+            bodies(machine.build_item_lines(&item(clear.into()))),
             ["servo|NORMAL|SV0417|||", "motion_program|NORMAL|PS0010|||"]
         );
-        let greeting = bodies(machine.greeting(9));
+        let greeting = bodies(machine.build_initial_lines(9));
         assert!(greeting.contains(&"servo|UNAVAILABLE||||".to_owned()), "nobody tells of alarms: {greeting:?}");
         assert!(greeting.contains(&"alarms|NORMAL||||".to_owned()), "{greeting:?}");
         let gap =
             Item { sequence: 2, at_ns: 8, content: Content::Gap(Gap { until_ns: None, reason: "stopped".into() }) };
-        assert_eq!(machine.lines(&gap), [], "there were no values");
+        assert_eq!(machine.build_item_lines(&gap), [], "there were no values");
     }
 }

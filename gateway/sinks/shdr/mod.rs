@@ -19,9 +19,9 @@ use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
 use crate::clock;
 use crate::history::Outbox;
-use adapters::address::{Endpoint, Keys, endpoint};
+use adapters::address::{Endpoint, Keys, parse_endpoint};
 use adapters::clock::TimeNs;
-use lines::{Line, Machine, stamped};
+use lines::{Line, Machine, format_lines};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
@@ -52,8 +52,8 @@ pub struct ShdrTarget {
 
 impl ShdrTarget {
     pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, String> {
-        let heartbeat = Duration::from_secs(keys.number("heartbeat_s", 10, 1, 600));
-        Ok(Self { at: endpoint(body, Some(PORT))?, heartbeat })
+        let heartbeat = Duration::from_secs(keys.take_number("heartbeat_s", 10, 1, 600));
+        Ok(Self { at: parse_endpoint(body, Some(PORT))?, heartbeat })
     }
 }
 
@@ -85,24 +85,24 @@ impl ShdrSink {
         self.shared = None;
     }
 
-    async fn begin(&mut self) -> Result<(), SinkError> {
+    async fn start_listening(&mut self) -> Result<(), SinkError> {
         self.stop();
         let listener = listen_on(&self.target.at).await?;
-        let at_ns = self.outbox.head().borrow().newest_ns.unwrap_or(0);
-        let machine = Machine::new(&self.outbox.box_id(), &self.outbox.latest(), at_ns);
+        let at_ns = self.outbox.watch_head().borrow().newest_ns.unwrap_or(0);
+        let machine = Machine::new(&self.outbox.box_id(), &self.outbox.latest_readings(), at_ns);
         let shared = Arc::new(AgentContext {
             machine: Mutex::new(machine),
             lines: broadcast::Sender::new(WAITING_MAX),
             heartbeat_ms: self.target.heartbeat.as_millis(),
         });
-        self.listening = Some(tokio::spawn(listen(listener, shared.clone())).abort_handle());
+        self.listening = Some(tokio::spawn(accept_agents(listener, shared.clone())).abort_handle());
         self.shared = Some(shared);
         Ok(())
     }
 }
 
 /// Takes agents on; they end with it.
-async fn listen(listener: TcpListener, shared: Arc<AgentContext>) {
+async fn accept_agents(listener: TcpListener, shared: Arc<AgentContext>) {
     let mut agents = JoinSet::new();
     loop {
         let Ok((stream, _)) = listener.accept().await else {
@@ -111,21 +111,21 @@ async fn listen(listener: TcpListener, shared: Arc<AgentContext>) {
         };
         while agents.try_join_next().is_some() {}
         if agents.len() < AGENTS_MAX {
-            agents.spawn(serve(stream, shared.clone()));
+            agents.spawn(serve_agent(stream, shared.clone()));
         }
     }
 }
 
 /// One agent, until it goes or is too slow. What is wrong with it concerns nobody else.
-async fn serve(stream: TcpStream, shared: Arc<AgentContext>) -> std::io::Result<()> {
+async fn serve_agent(stream: TcpStream, shared: Arc<AgentContext>) -> std::io::Result<()> {
     stream.set_nodelay(true)?;
     let (reading, mut writing) = stream.into_split();
     let (greeting, mut lines) = {
         let machine = shared.machine.lock().unwrap_or_else(PoisonError::into_inner);
-        (machine.greeting(clock::now_ns()), shared.lines.subscribe())
+        (machine.build_initial_lines(clock::now_ns()), shared.lines.subscribe())
     };
     let mut least_ns = TimeNs::MIN;
-    put(&mut writing, &stamped(&greeting, &mut least_ns)).await?;
+    write_text(&mut writing, &format_lines(&greeting, &mut least_ns)).await?;
     let mut asked = BufReader::new(tokio::io::AsyncReadExt::take(reading, LINE_MAX));
     let mut question = String::new();
     loop {
@@ -136,34 +136,34 @@ async fn serve(stream: TcpStream, shared: Arc<AgentContext>) -> std::io::Result<
                 }
                 asked.get_mut().set_limit(LINE_MAX);
                 if question.trim() == "* PING" {
-                    put(&mut writing, &format!("* PONG {}\n", shared.heartbeat_ms)).await?;
+                    write_text(&mut writing, &format!("* PONG {}\n", shared.heartbeat_ms)).await?;
                 }
                 question.clear();
             }
             line = lines.recv() => match line {
-                Ok(lines) => put(&mut writing, &stamped(&lines, &mut least_ns)).await?,
+                Ok(lines) => write_text(&mut writing, &format_lines(&lines, &mut least_ns)).await?,
                 Err(RecvError::Lagged(_) | RecvError::Closed) => return Ok(()),
             },
         }
     }
 }
 
-async fn put(writing: &mut (impl AsyncWriteExt + Unpin), text: &str) -> std::io::Result<()> {
+async fn write_text(writing: &mut (impl AsyncWriteExt + Unpin), text: &str) -> std::io::Result<()> {
     timeout(WRITE_WITHIN, writing.write_all(text.as_bytes())).await.map_err(std::io::Error::from)?
 }
 
 impl Sink for ShdrSink {
     fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(self.begin())
+        Box::pin(self.start_listening())
     }
 
-    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+    fn send_batch<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
         let Some(shared) = &self.shared else {
-            return Box::pin(std::future::ready(Err(SinkError::line("the box does not listen", ""))));
+            return Box::pin(std::future::ready(Err(SinkError::failed_line("the box does not listen", ""))));
         };
         // An agent that connects meanwhile gets each line once: in its greeting or after it.
         let mut machine = shared.machine.lock().unwrap_or_else(PoisonError::into_inner);
-        let lines: Arc<[Line]> = batch.items.iter().flat_map(|item| machine.lines(item)).collect();
+        let lines: Arc<[Line]> = batch.items.iter().flat_map(|item| machine.build_item_lines(item)).collect();
         if !lines.is_empty() {
             // Without an agent nobody hears it.
             let _agents = shared.lines.send(lines);
@@ -171,7 +171,7 @@ impl Sink for ShdrSink {
         Box::pin(std::future::ready(Ok(())))
     }
 
-    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn probe_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move { listen_on(&self.target.at).await.map(drop) })
     }
 

@@ -5,7 +5,7 @@
 //!
 //! Source: MTConnect Standard 1.4, Part 2 (devices), tables of data items and units. Newer agents read it as well.
 
-use super::lines::plain;
+use super::lines::replace_separators;
 use crate::history::Cell;
 
 /// A data item.
@@ -37,16 +37,16 @@ pub(super) enum ValueForm {
 }
 
 impl ValueForm {
-    pub(super) fn shown(self, value: &Cell) -> String {
+    pub(super) fn format_value(self, value: &Cell) -> String {
         match (self, value) {
             (Self::Words(off, on), Cell::Number(number)) => if *number == 0.0 { off } else { on }.to_owned(),
             (Self::Number, Cell::Text(text)) => {
                 let digits = text.trim_start_matches(|letter: char| !letter.is_ascii_digit());
-                if digits.is_empty() { UNAVAILABLE.to_owned() } else { plain(digits) }
+                if digits.is_empty() { UNAVAILABLE.to_owned() } else { replace_separators(digits) }
             }
             (_, Cell::Number(number)) => number.to_string(),
             // An empty word is a value that the agent would take for none.
-            (_, Cell::Text(text)) if !text.is_empty() => plain(text),
+            (_, Cell::Text(text)) if !text.is_empty() => replace_separators(text),
             (_, Cell::Text(_) | Cell::Missing(_)) => UNAVAILABLE.to_owned(),
         }
     }
@@ -75,7 +75,7 @@ pub(super) enum Component {
     Environment,
 }
 
-const fn sample(
+const fn define_sample(
     channel: &'static str,
     component: Component,
     kind: &'static str,
@@ -95,7 +95,7 @@ const fn sample(
     }
 }
 
-const fn native(item: DataItem, unit: &'static str) -> DataItem {
+const fn with_native_units(item: DataItem, unit: &'static str) -> DataItem {
     DataItem { native_units: Some(unit), ..item }
 }
 
@@ -103,7 +103,7 @@ const fn with_form(item: DataItem, form: ValueForm) -> DataItem {
     DataItem { form, ..item }
 }
 
-const fn event(
+const fn define_event(
     channel: &'static str,
     component: Component,
     kind: &'static str,
@@ -123,41 +123,44 @@ const PROGRAMMED: Option<&str> = Some("PROGRAMMED");
 
 /// Every data item. Channels that are not here have no counterpart in the standard and are not sent.
 pub(super) const ITEMS: &[DataItem] = &[
-    sample("spindle_speed_rpm", Spindle, "ROTARY_VELOCITY", ACTUAL, RPM),
-    sample("spindle_programmed_rpm", Spindle, "ROTARY_VELOCITY", PROGRAMMED, RPM),
-    event("spindle_override_pct", Spindle, "ROTARY_VELOCITY_OVERRIDE", None),
-    sample("spindle_load_pct", Spindle, "LOAD", None, "PERCENT"),
-    sample("spindle_power_w", Spindle, "WATTAGE", ACTUAL, "WATT"),
-    sample("spindle_current_a", Spindle, "AMPERAGE", None, "AMPERE"),
-    sample("bearing_temperature_c", Spindle, "TEMPERATURE", None, "CELSIUS"),
-    sample("x_axis_position_mm", X, "POSITION", ACTUAL, "MILLIMETER"),
-    native(sample("x_axis_velocity_mm_min", X, "VELOCITY", None, MM_PER_S), MM_PER_MIN),
-    sample("x_axis_load_pct", X, "LOAD", None, "PERCENT"),
-    sample("x_axis_current_a", X, "AMPERAGE", None, "AMPERE"),
-    sample("y_axis_position_mm", Y, "POSITION", ACTUAL, "MILLIMETER"),
-    native(sample("y_axis_velocity_mm_min", Y, "VELOCITY", None, MM_PER_S), MM_PER_MIN),
-    sample("y_axis_load_pct", Y, "LOAD", None, "PERCENT"),
-    sample("y_axis_current_a", Y, "AMPERAGE", None, "AMPERE"),
-    sample("z_axis_position_mm", Z, "POSITION", ACTUAL, "MILLIMETER"),
-    native(sample("z_axis_velocity_mm_min", Z, "VELOCITY", None, MM_PER_S), MM_PER_MIN),
-    sample("z_axis_load_pct", Z, "LOAD", None, "PERCENT"),
-    sample("z_axis_current_a", Z, "AMPERAGE", None, "AMPERE"),
-    event("mode", Controller, "CONTROLLER_MODE", None),
-    with_form(event("emergency_stop", Controller, "EMERGENCY_STOP", None), ValueForm::Words("ARMED", "TRIGGERED")),
-    event("execution", Path, "EXECUTION", None),
-    event("program", Path, "PROGRAM", None),
-    with_form(event("block", Path, "LINE_NUMBER", None), ValueForm::Number),
-    event("block_text", Path, "BLOCK", None),
-    event("tool", Path, "TOOL_NUMBER", None),
-    event("part", Path, "PART_ID", None),
-    event("part_count", Path, "PART_COUNT", None),
-    native(sample("feed_mm_min", Path, "PATH_FEEDRATE", ACTUAL, MM_PER_S), MM_PER_MIN),
-    native(sample("feed_programmed_mm_min", Path, "PATH_FEEDRATE", PROGRAMMED, MM_PER_S), MM_PER_MIN),
-    event("feed_override_pct", Path, "PATH_FEEDRATE_OVERRIDE", PROGRAMMED),
-    sample("total_power_w", Electric, "WATTAGE", ACTUAL, "WATT"),
-    sample("supply_voltage_v", Electric, "VOLTAGE", None, "VOLT"),
-    sample("coolant_temperature_c", Coolant, "TEMPERATURE", None, "CELSIUS"),
-    sample("ambient_temperature_c", Environment, "TEMPERATURE", None, "CELSIUS"),
+    define_sample("spindle_speed_rpm", Spindle, "ROTARY_VELOCITY", ACTUAL, RPM),
+    define_sample("spindle_programmed_rpm", Spindle, "ROTARY_VELOCITY", PROGRAMMED, RPM),
+    define_event("spindle_override_pct", Spindle, "ROTARY_VELOCITY_OVERRIDE", None),
+    define_sample("spindle_load_pct", Spindle, "LOAD", None, "PERCENT"),
+    define_sample("spindle_power_w", Spindle, "WATTAGE", ACTUAL, "WATT"),
+    define_sample("spindle_current_a", Spindle, "AMPERAGE", None, "AMPERE"),
+    define_sample("bearing_temperature_c", Spindle, "TEMPERATURE", None, "CELSIUS"),
+    define_sample("x_axis_position_mm", X, "POSITION", ACTUAL, "MILLIMETER"),
+    with_native_units(define_sample("x_axis_velocity_mm_min", X, "VELOCITY", None, MM_PER_S), MM_PER_MIN),
+    define_sample("x_axis_load_pct", X, "LOAD", None, "PERCENT"),
+    define_sample("x_axis_current_a", X, "AMPERAGE", None, "AMPERE"),
+    define_sample("y_axis_position_mm", Y, "POSITION", ACTUAL, "MILLIMETER"),
+    with_native_units(define_sample("y_axis_velocity_mm_min", Y, "VELOCITY", None, MM_PER_S), MM_PER_MIN),
+    define_sample("y_axis_load_pct", Y, "LOAD", None, "PERCENT"),
+    define_sample("y_axis_current_a", Y, "AMPERAGE", None, "AMPERE"),
+    define_sample("z_axis_position_mm", Z, "POSITION", ACTUAL, "MILLIMETER"),
+    with_native_units(define_sample("z_axis_velocity_mm_min", Z, "VELOCITY", None, MM_PER_S), MM_PER_MIN),
+    define_sample("z_axis_load_pct", Z, "LOAD", None, "PERCENT"),
+    define_sample("z_axis_current_a", Z, "AMPERAGE", None, "AMPERE"),
+    define_event("mode", Controller, "CONTROLLER_MODE", None),
+    with_form(
+        define_event("emergency_stop", Controller, "EMERGENCY_STOP", None),
+        ValueForm::Words("ARMED", "TRIGGERED"),
+    ),
+    define_event("execution", Path, "EXECUTION", None),
+    define_event("program", Path, "PROGRAM", None),
+    with_form(define_event("block", Path, "LINE_NUMBER", None), ValueForm::Number),
+    define_event("block_text", Path, "BLOCK", None),
+    define_event("tool", Path, "TOOL_NUMBER", None),
+    define_event("part", Path, "PART_ID", None),
+    define_event("part_count", Path, "PART_COUNT", None),
+    with_native_units(define_sample("feed_mm_min", Path, "PATH_FEEDRATE", ACTUAL, MM_PER_S), MM_PER_MIN),
+    with_native_units(define_sample("feed_programmed_mm_min", Path, "PATH_FEEDRATE", PROGRAMMED, MM_PER_S), MM_PER_MIN),
+    define_event("feed_override_pct", Path, "PATH_FEEDRATE_OVERRIDE", PROGRAMMED),
+    define_sample("total_power_w", Electric, "WATTAGE", ACTUAL, "WATT"),
+    define_sample("supply_voltage_v", Electric, "VOLTAGE", None, "VOLT"),
+    define_sample("coolant_temperature_c", Coolant, "TEMPERATURE", None, "CELSIUS"),
+    define_sample("ambient_temperature_c", Environment, "TEMPERATURE", None, "CELSIUS"),
 ];
 
 /// The event that tells whether the box is there.
@@ -178,7 +181,7 @@ mod tests {
 
     #[test]
     fn every_data_item_is_a_channel_and_stands_once() {
-        assert!(ITEMS.iter().all(|item| ChannelId::of(item.channel).is_some()));
+        assert!(ITEMS.iter().all(|item| ChannelId::from_name(item.channel).is_some()));
         let names: BTreeSet<&str> = ITEMS.iter().map(|item| item.channel).collect();
         assert_eq!(names.len(), ITEMS.len());
         let same =

@@ -35,38 +35,38 @@ const BAD: u32 = 0;
 const STALE: u32 = 500;
 
 /// Milliseconds since 1970, as payloads have them.
-pub(super) fn milliseconds(at_ns: TimeNs) -> u64 {
+pub(super) fn to_milliseconds(at_ns: TimeNs) -> u64 {
     u64::try_from(at_ns.div_euclid(1_000_000)).unwrap_or(0)
 }
 
 /// What stands behind the will: a death is matched to its birth by this number.
 pub(super) fn birth_death(number: u8, at_ms: u64) -> Metric {
-    Metric::named(BIRTH_DEATH, datatype::INT64, at_ms, MetricValue::Long(number.into()))
+    Metric::with_name(BIRTH_DEATH, datatype::INT64, at_ms, MetricValue::Long(number.into()))
 }
 
 /// Death of the node: no sequence number, the number of its birth.
-pub(super) fn death(number: u8, at_ms: u64) -> Payload {
+pub(super) fn build_death(number: u8, at_ms: u64) -> Payload {
     Payload { timestamp: Some(at_ms), metrics: vec![birth_death(number, at_ms)], seq: None }
 }
 
 /// What is only of the node: the number of its birth and the way to ask for another one.
-pub(super) fn node(number: u8, at_ms: u64) -> Vec<Metric> {
-    vec![birth_death(number, at_ms), Metric::named(REBIRTH, datatype::BOOLEAN, at_ms, MetricValue::Boolean(false))]
+pub(super) fn build_node_metrics(number: u8, at_ms: u64) -> Vec<Metric> {
+    vec![birth_death(number, at_ms), Metric::with_name(REBIRTH, datatype::BOOLEAN, at_ms, MetricValue::Boolean(false))]
 }
 
 /// Every metric of the machine with its last value; `known` is filled with the series that have one.
-pub(super) fn machine(latest: &[Reading], known: &mut BTreeSet<i64>, at_ms: u64) -> Vec<Metric> {
+pub(super) fn build_machine_metrics(latest: &[Reading], known: &mut BTreeSet<i64>, at_ms: u64) -> Vec<Metric> {
     let of_item = Metric {
         alias: Some(SEQUENCE.1),
         value: None,
         is_null: Some(true),
-        ..Metric::named(SEQUENCE.0, datatype::UINT64, at_ms, MetricValue::Long(0))
+        ..Metric::with_name(SEQUENCE.0, datatype::UINT64, at_ms, MetricValue::Long(0))
     };
     let of_record = |(name, alias): &(&str, u64)| Metric {
         alias: Some(*alias),
         value: None,
         is_null: Some(true),
-        ..Metric::named(name, datatype::STRING, at_ms, MetricValue::Text(String::new()))
+        ..Metric::with_name(name, datatype::STRING, at_ms, MetricValue::Text(String::new()))
     };
     let provided = |reading: &&Reading| known.contains(&reading.series.id) || !is_unprovided(&reading.value);
     let readings: Vec<&Reading> = latest.iter().filter(provided).collect();
@@ -83,19 +83,19 @@ fn is_unprovided(value: &Cell) -> bool {
 fn build_birth_metric(reading: &Reading, at_ms: u64) -> Metric {
     let SeriesInfo { name, unit, range, en, zh, estimated, .. } = &*reading.series;
     let mut metric = build_data_metric(reading, at_ms);
-    metric.datatype = Some(kind(&reading.series));
+    metric.datatype = Some(choose_datatype(&reading.series));
     metric.name = Some(name.to_string());
     let mut properties = PropertySet::default();
     if reading.series.kind == SeriesKind::Number && **unit != *"1" {
-        properties.put("engUnit", Property::Text(unit.to_string()));
+        properties.add_property("engUnit", Property::Text(unit.to_string()));
     }
     if let Some((least, greatest)) = range {
-        properties.put("engLow", Property::Double(*least));
-        properties.put("engHigh", Property::Double(*greatest));
+        properties.add_property("engLow", Property::Double(*least));
+        properties.add_property("engHigh", Property::Double(*greatest));
     }
-    properties.put("description", Property::Text(en.to_string()));
-    properties.put("description_zh", Property::Text(zh.to_string()));
-    properties.put("estimated", Property::Boolean(*estimated));
+    properties.add_property("description", Property::Text(en.to_string()));
+    properties.add_property("description_zh", Property::Text(zh.to_string()));
+    properties.add_property("estimated", Property::Boolean(*estimated));
     let quality = metric.properties.take().unwrap_or_default();
     properties.keys.extend(quality.keys);
     properties.values.extend(quality.values);
@@ -103,7 +103,7 @@ fn build_birth_metric(reading: &Reading, at_ms: u64) -> Metric {
     metric
 }
 
-fn kind(series: &SeriesInfo) -> u32 {
+fn choose_datatype(series: &SeriesInfo) -> u32 {
     match (series.kind, series.form) {
         (SeriesKind::Text, _) => datatype::STRING,
         (SeriesKind::Number, Form::Flag) => datatype::BOOLEAN,
@@ -113,7 +113,7 @@ fn kind(series: &SeriesInfo) -> u32 {
 }
 
 /// A number as the type of its series has it.
-fn numeric(series: &SeriesInfo, number: f64) -> MetricValue {
+fn to_metric_value(series: &SeriesInfo, number: f64) -> MetricValue {
     match series.form {
         Form::Flag => MetricValue::Boolean(number != 0.0),
         #[expect(
@@ -128,27 +128,27 @@ fn numeric(series: &SeriesInfo, number: f64) -> MetricValue {
 
 /// A metric as data has it: alias and value. Its type stands in the birth.
 fn build_data_metric(reading: &Reading, at_ms: u64) -> Metric {
-    let mut metric = Metric { alias: Some(alias(&reading.series)), timestamp: Some(at_ms), ..Metric::default() };
+    let mut metric = Metric { alias: Some(to_alias(&reading.series)), timestamp: Some(at_ms), ..Metric::default() };
     match &reading.value {
-        Cell::Number(number) => metric.value = Some(numeric(&reading.series, *number)),
+        Cell::Number(number) => metric.value = Some(to_metric_value(&reading.series, *number)),
         Cell::Text(text) => metric.value = Some(MetricValue::Text(text.to_string())),
         Cell::Missing(reason) => {
             let mut quality = PropertySet::default();
-            quality.put("Quality", Property::Int(if **reason == *"stale" { STALE } else { BAD }));
-            quality.put("missing", Property::Text(reason.to_string()));
+            quality.add_property("Quality", Property::Int(if **reason == *"stale" { STALE } else { BAD }));
+            quality.add_property("missing", Property::Text(reason.to_string()));
             (metric.is_null, metric.properties) = (Some(true), Some(quality));
         }
     }
     metric
 }
 
-fn alias(series: &SeriesInfo) -> u64 {
+fn to_alias(series: &SeriesInfo) -> u64 {
     SERIES_FROM + u64::try_from(series.id).unwrap_or(0)
 }
 
 /// The metrics of an item.
-pub(super) fn data(item: &Item, historical: bool) -> Vec<Metric> {
-    let at_ms = milliseconds(item.at_ns);
+pub(super) fn build_item_metrics(item: &Item, historical: bool) -> Vec<Metric> {
+    let at_ms = to_milliseconds(item.at_ns);
     let sequence = Metric {
         alias: Some(SEQUENCE.1),
         timestamp: Some(at_ms),
@@ -158,7 +158,7 @@ pub(super) fn data(item: &Item, historical: bool) -> Vec<Metric> {
     let mut metrics = vec![sequence];
     match &item.content {
         Content::Sample(readings) => metrics.extend(readings.iter().map(|reading| build_data_metric(reading, at_ms))),
-        Content::Record(_) => metrics.extend(record(item, at_ms)),
+        Content::Record(_) => metrics.extend(build_record_metric(item, at_ms)),
         // Sparkplug has no word for them; the number of the item tells that nothing is missing.
         Content::Gap(_) | Content::Means { .. } => {}
     }
@@ -168,12 +168,12 @@ pub(super) fn data(item: &Item, historical: bool) -> Vec<Metric> {
     metrics
 }
 
-fn record(item: &Item, at_ms: u64) -> Option<Metric> {
+fn build_record_metric(item: &Item, at_ms: u64) -> Option<Metric> {
     let (_, alias) = RECORDS.iter().find(|(name, _)| name.strip_prefix("record/") == Some(item.kind()))?;
     Some(Metric {
         alias: Some(*alias),
         timestamp: Some(at_ms),
-        value: Some(MetricValue::Text(item.json()["record"].to_string())),
+        value: Some(MetricValue::Text(item.to_json()["record"].to_string())),
         ..Metric::default()
     })
 }

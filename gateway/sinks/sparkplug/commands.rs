@@ -20,12 +20,12 @@ const ANSWER: (&str, u64) = ("request/answer", 11);
 const CHANGES_MAX: usize = 4;
 
 /// What a birth says of them: where requests are not allowed, only the answer, because a refusal is told too.
-pub(super) fn metrics(allowed: bool, at_ms: u64) -> Vec<Metric> {
+pub(super) fn build_request_metrics(allowed: bool, at_ms: u64) -> Vec<Metric> {
     let null = |(name, alias): (&str, u64), datatype| Metric {
         alias: Some(alias),
         value: None,
         is_null: Some(true),
-        ..Metric::named(name, datatype, at_ms, MetricValue::Boolean(false))
+        ..Metric::with_name(name, datatype, at_ms, MetricValue::Boolean(false))
     };
     let asked = [null(FEED_OVERRIDE, datatype::DOUBLE), null(ACKNOWLEDGE_ALARM, datatype::STRING)];
     let asked = asked.into_iter().filter(|_| allowed);
@@ -33,7 +33,7 @@ pub(super) fn metrics(allowed: bool, at_ms: u64) -> Vec<Metric> {
 }
 
 /// What became of a request.
-pub(super) fn answer(done: bool, text: &str, at_ms: u64) -> Metric {
+pub(super) fn build_answer_metric(done: bool, text: &str, at_ms: u64) -> Metric {
     Metric {
         alias: Some(ANSWER.1),
         timestamp: Some(at_ms),
@@ -44,8 +44,8 @@ pub(super) fn answer(done: bool, text: &str, at_ms: u64) -> Metric {
 
 /// What a command asks for; empty where it asks for nothing that is known here. A message that the broker has kept is refused:
 /// it would come again at every connection.
-pub(super) fn changes(payload: &Payload, retained: bool) -> Vec<Result<RequestedChange, String>> {
-    let changes = payload.metrics.iter().filter_map(change).take(CHANGES_MAX);
+pub(super) fn parse_changes(payload: &Payload, retained: bool) -> Vec<Result<RequestedChange, String>> {
+    let changes = payload.metrics.iter().filter_map(parse_change).take(CHANGES_MAX);
     let fresh = |change: Result<RequestedChange, String>| match retained {
         true => Err("a retained command is no request: publish it without the retain flag".to_owned()),
         false => change,
@@ -53,7 +53,7 @@ pub(super) fn changes(payload: &Payload, retained: bool) -> Vec<Result<Requested
     changes.map(fresh).collect()
 }
 
-fn change(metric: &Metric) -> Option<Result<RequestedChange, String>> {
+fn parse_change(metric: &Metric) -> Option<Result<RequestedChange, String>> {
     let is = |(name, alias): (&str, u64)| match &metric.name {
         Some(named) if !named.is_empty() => named == name,
         _ => metric.alias == Some(alias),
@@ -61,7 +61,7 @@ fn change(metric: &Metric) -> Option<Result<RequestedChange, String>> {
     if is(FEED_OVERRIDE) {
         return Some(match (&metric.value, metric.is_null) {
             (None, _) | (_, Some(true)) => Ok(RequestedChange::Withdraw),
-            (Some(value), _) => number(value).map_or_else(
+            (Some(value), _) => to_number(value).map_or_else(
                 || Err("request/feed_override_pct is no number".to_owned()),
                 |pct| RequestedChange::feed_override(pct, ""),
             ),
@@ -74,7 +74,7 @@ fn change(metric: &Metric) -> Option<Result<RequestedChange, String>> {
 }
 
 /// Whole numbers are without sign in the payload: a negative one is far above what can be asked for, and refused there.
-fn number(value: &MetricValue) -> Option<f64> {
+fn to_number(value: &MetricValue) -> Option<f64> {
     match value {
         MetricValue::Int(number) => Some(f64::from(*number)),
         MetricValue::Long(number) => Some(*number as f64),
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn a_request_is_known_by_name_or_alias_and_everything_else_is_passed_over() {
-        let named = |name: &str, value| Metric::named(name, datatype::DOUBLE, 0, value);
+        let named = |name: &str, value| Metric::with_name(name, datatype::DOUBLE, 0, value);
         let by_alias = Metric { alias: Some(9), value: Some(MetricValue::Int(70)), ..Metric::default() };
         let all = payload(vec![
             named("request/feed_override_pct", MetricValue::Double(80.0)),
@@ -108,15 +108,15 @@ mod tests {
             RequestedChange::feed_override(70.0, ""),
             Ok(RequestedChange::acknowledge_alarm("overload")),
         ];
-        assert_eq!(changes(&all, false), expected);
-        assert!(changes(&all, true).iter().all(Result::is_err), "retained");
+        assert_eq!(parse_changes(&all, false), expected);
+        assert!(parse_changes(&all, true).iter().all(Result::is_err), "retained");
     }
 
     #[test]
     fn what_is_no_number_is_refused_and_null_withdraws() {
         let of = |value: Option<MetricValue>| {
             let metric = Metric { name: Some(FEED_OVERRIDE.0.to_owned()), value, ..Metric::default() };
-            changes(&payload(vec![metric]), false).remove(0)
+            parse_changes(&payload(vec![metric]), false).remove(0)
         };
         assert_eq!(of(None), Ok(RequestedChange::Withdraw));
         for bad in [

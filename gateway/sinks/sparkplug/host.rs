@@ -28,7 +28,7 @@ impl PrimaryHost {
     }
 
     /// Takes a message of the host; one that is older than the last, such as the will of a connection before, does not count.
-    pub(super) fn hear(&mut self, payload: &[u8]) {
+    pub(super) fn accept_message(&mut self, payload: &[u8]) {
         let Ok(state) = serde_json::from_slice::<HostState>(payload) else { return };
         if self.timestamp.is_none_or(|last| state.timestamp >= last) {
             *self = Self { timestamp: Some(state.timestamp), online: state.online };
@@ -43,13 +43,13 @@ mod tests {
     #[test]
     fn an_older_message_changes_nothing() {
         let mut host = PrimaryHost::default();
-        host.hear(b"{\"online\":true,\"timestamp\":50}");
+        host.accept_message(b"{\"online\":true,\"timestamp\":50}");
         assert!(host.online);
-        host.hear(b"{\"online\":false,\"timestamp\":49}");
+        host.accept_message(b"{\"online\":false,\"timestamp\":49}");
         assert!(host.online, "the will of an older connection");
-        host.hear(b"nonsense");
+        host.accept_message(b"nonsense");
         assert!(host.online);
-        host.hear(b"{\"online\":false,\"timestamp\":50}");
+        host.accept_message(b"{\"online\":false,\"timestamp\":50}");
         assert!(!host.online);
     }
 }

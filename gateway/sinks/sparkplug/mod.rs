@@ -64,7 +64,7 @@ pub struct SparkplugTarget {
 
 impl SparkplugTarget {
     pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, String> {
-        let host = keys.text("host").filter(|host| !host.contains(['+', '#', '/']));
+        let host = keys.take_text("host").filter(|host| !host.contains(['+', '#', '/']));
         let (broker, rest) = BrokerTarget::parse(body, keys, secured)?;
         let parts: Vec<&str> = rest.split('/').collect();
         let (group, node, device) = match parts[..] {
@@ -79,7 +79,7 @@ impl SparkplugTarget {
         Ok(Self { broker, group: group.to_owned(), node: node.to_owned(), device, host })
     }
 
-    fn topic(&self, kind: &str) -> String {
+    fn format_topic(&self, kind: &str) -> String {
         let Self { group, node, .. } = self;
         match self.device.as_ref().filter(|_| kind.starts_with('D')) {
             Some(device) => format!("spBv1.0/{group}/{kind}/{node}/{device}"),
@@ -128,61 +128,62 @@ impl SparkplugSink {
     }
 
     /// Takes what a message of the network asks for; true when there is something to attend to.
-    fn hear(&mut self, message: &adapters::mqtt::MqttMessage) -> bool {
-        let of_node = message.topic == self.target.topic("NCMD");
-        if !of_node && message.topic != self.target.topic("DCMD") {
+    fn accept_message(&mut self, message: &adapters::mqtt::MqttMessage) -> bool {
+        let of_node = message.topic == self.target.format_topic("NCMD");
+        if !of_node && message.topic != self.target.format_topic("DCMD") {
             return false;
         }
         let Ok(payload) = Payload::decode(&message.payload[..]) else { return false };
         self.rebirth |= of_node && births::asks_rebirth(&payload);
-        self.asked = commands::changes(&payload, message.retained);
+        self.asked = commands::parse_changes(&payload, message.retained);
         self.rebirth || !self.asked.is_empty()
     }
 
     /// Hands to the gate what was asked for, and tells what became of it.
-    async fn answer(&mut self) -> Result<(), SinkError> {
+    async fn answer_requests(&mut self) -> Result<(), SinkError> {
         for change in std::mem::take(&mut self.asked) {
-            let Some(Reply { done, text }) = self.requests.ask(change).await else { continue };
-            let (at_ms, kind) = (now_ms(), self.data());
-            let told = self.message(kind, vec![commands::answer(done, &text, at_ms)], at_ms);
-            self.publish(vec![told]).await.map_err(|(_, failure)| failure.of_item(None))?;
+            let Some(Reply { done, text }) = self.requests.submit_change(change).await else { continue };
+            let (at_ms, kind) = (now_ms(), self.data_kind());
+            let told = self.build_message(kind, vec![commands::build_answer_metric(done, &text, at_ms)], at_ms);
+            self.publish_messages(vec![told]).await.map_err(|(_, failure)| failure.of_item(None))?;
         }
         Ok(())
     }
 
-    fn data(&self) -> &'static str {
+    fn data_kind(&self) -> &'static str {
         if self.target.device.is_some() { "DDATA" } else { "NDATA" }
     }
 
     /// The next message of the node, with its number.
-    fn message(&mut self, kind: &str, metrics: Vec<payload::Metric>, at_ms: u64) -> Outgoing {
+    fn build_message(&mut self, kind: &str, metrics: Vec<payload::Metric>, at_ms: u64) -> Outgoing {
         let payload = Payload { timestamp: Some(at_ms), metrics, seq: Some(self.next.into()) };
         self.next = self.next.wrapping_add(1);
-        Outgoing { topic: self.target.topic(kind), payload: payload.encode_to_vec(), retain: false }
+        Outgoing { topic: self.target.format_topic(kind), payload: payload.encode_to_vec(), retain: false }
     }
 
-    async fn birth(&mut self) -> Result<(), SinkError> {
+    async fn publish_birth(&mut self) -> Result<(), SinkError> {
         (self.next, self.rebirth, self.dead) = (0, false, false);
         let at_ms = now_ms();
-        let latest = self.outbox.latest();
-        let mut machine = births::machine(&latest, &mut self.known, at_ms);
-        machine.extend(commands::metrics(self.requests.allowed(), at_ms));
-        let node = births::node(self.number, at_ms);
+        let latest = self.outbox.latest_readings();
+        let mut machine = births::build_machine_metrics(&latest, &mut self.known, at_ms);
+        machine.extend(commands::build_request_metrics(self.requests.is_allowed(), at_ms));
+        let node = births::build_node_metrics(self.number, at_ms);
         let messages = if self.target.device.is_some() {
-            vec![self.message("NBIRTH", node, at_ms), self.message("DBIRTH", machine, at_ms)]
+            vec![self.build_message("NBIRTH", node, at_ms), self.build_message("DBIRTH", machine, at_ms)]
         } else {
-            vec![self.message("NBIRTH", [node, machine].concat(), at_ms)]
+            vec![self.build_message("NBIRTH", [node, machine].concat(), at_ms)]
         };
-        self.publish(messages).await.map_err(|(_, failure)| failure.of_item(None))
+        self.publish_messages(messages).await.map_err(|(_, failure)| failure.of_item(None))
     }
 
-    async fn publish(&self, messages: Vec<Outgoing>) -> Result<(), (usize, BrokerFailure)> {
-        self.link.publish(messages, Qos::AtMostOnce, &self.target.broker).await
+    async fn publish_messages(&self, messages: Vec<Outgoing>) -> Result<(), (usize, BrokerFailure)> {
+        self.link.publish_messages(messages, Qos::AtMostOnce, &self.target.broker).await
     }
 
     async fn first_values(&self) {
-        let has_some = || self.outbox.latest().iter().any(|reading| !matches!(reading.value, Cell::Missing(_)));
-        let mut head = self.outbox.head();
+        let has_some =
+            || self.outbox.latest_readings().iter().any(|reading| !matches!(reading.value, Cell::Missing(_)));
+        let mut head = self.outbox.watch_head();
         let waiting = async { while !has_some() && head.changed().await.is_ok() {} };
         // A machine that is off gets a birth of missing values.
         let _late = tokio::time::timeout(FIRST_VALUES, waiting).await;
@@ -201,7 +202,7 @@ impl SparkplugSink {
             loop {
                 let message = self.link.next(&self.target.broker).await?;
                 if message.topic == topic {
-                    host.hear(&message.payload);
+                    host.accept_message(&message.payload);
                 }
                 if host.online {
                     return Ok(());
@@ -220,49 +221,54 @@ impl SparkplugSink {
     }
 
     async fn say_death(&mut self) {
-        let payload = births::death(self.number, now_ms()).encode_to_vec();
-        let death = Outgoing { topic: self.target.topic("NDEATH"), payload, retain: false };
+        let payload = births::build_death(self.number, now_ms()).encode_to_vec();
+        let death = Outgoing { topic: self.target.format_topic("NDEATH"), payload, retain: false };
         // Where this does not go through, the will says the same.
-        let _gone = self.link.publish(vec![death], Qos::AtLeastOnce, &self.target.broker).await;
-        self.link.leave().await;
+        let _gone = self.link.publish_messages(vec![death], Qos::AtLeastOnce, &self.target.broker).await;
+        self.link.disconnect_client().await;
     }
 
     /// The device dies when no source delivers anything, and lives as soon as one does.
     async fn say_device_death(&mut self) -> Result<(), SinkError> {
-        let lives = self.outbox.latest().iter().any(births::is_read);
+        let lives = self.outbox.latest_readings().iter().any(births::is_read);
         if self.target.device.is_none() || self.dead || lives {
             return Ok(());
         }
         self.dead = true;
-        let death = self.message("DDEATH", Vec::new(), now_ms());
-        self.publish(vec![death]).await.map_err(|(_, failure)| failure.of_item(None))
+        let death = self.build_message("DDEATH", Vec::new(), now_ms());
+        self.publish_messages(vec![death]).await.map_err(|(_, failure)| failure.of_item(None))
     }
 
     fn no_host(&self) -> SinkError {
         let host = self.target.host.as_deref().unwrap_or_default();
         let next = "start it, or leave host= out of the address; everything is kept meanwhile";
-        SinkError::line(format!("the primary host {host} is not online"), next)
+        SinkError::failed_line(format!("the primary host {host} is not online"), next)
     }
 
-    async fn begin(&mut self) -> Result<(), SinkError> {
+    async fn open_connection(&mut self) -> Result<(), SinkError> {
         self.first_values().await;
         // Kept over restarts (specification, 6.4.19): the death of a connection before must not match this birth.
         let number = self.outbox.begin_connection(&self.name, NOTED_WITHIN).await;
         self.number = u8::try_from(number % 256).unwrap_or(0);
-        let payload = births::death(self.number, now_ms()).encode_to_vec();
-        let will =
-            Will { topic: self.target.topic("NDEATH"), payload, qos: Qos::AtLeastOnce, retain: false, at_leave: true };
+        let payload = births::build_death(self.number, now_ms()).encode_to_vec();
+        let will = Will {
+            topic: self.target.format_topic("NDEATH"),
+            payload,
+            qos: Qos::AtLeastOnce,
+            retain: false,
+            at_leave: true,
+        };
         let name = client_name(&self.outbox.box_id(), &self.name);
         self.link.connect(&self.target.broker, &name, Some(will)).await?;
-        let mut commands = vec![self.target.topic("NCMD")];
-        commands.extend(self.target.device.as_ref().map(|_| self.target.topic("DCMD")));
+        let mut commands = vec![self.target.format_topic("NCMD")];
+        commands.extend(self.target.device.as_ref().map(|_| self.target.format_topic("DCMD")));
         commands.extend(self.state_topic());
-        self.link.subscribe(commands, Qos::AtLeastOnce, &self.target.broker).await?;
+        self.link.subscribe_to(commands, Qos::AtLeastOnce, &self.target.broker).await?;
         self.wait_for_host().await?;
-        self.birth().await
+        self.publish_birth().await
     }
 
-    async fn deliver(&mut self, batch: Batch<'_>) -> Result<(), SinkError> {
+    async fn deliver_batch(&mut self, batch: Batch<'_>) -> Result<(), SinkError> {
         if self.dead && !batch.items.iter().any(births::is_of_living) {
             return Ok(());
         }
@@ -270,14 +276,17 @@ impl SparkplugSink {
             let told = |item| births::is_unknown(item, &self.known);
             let unknown: Vec<_> = batch.items.iter().filter(|item| told(item)).flat_map(series_of).collect();
             self.known.extend(unknown);
-            self.birth().await?;
+            self.publish_birth().await?;
         }
         let first = self.next;
-        let kind = self.data();
+        let kind = self.data_kind();
         let now = now_ms();
-        let messages: Vec<Outgoing> =
-            batch.items.iter().map(|item| self.message(kind, births::data(item, batch.historical), now)).collect();
-        let sent = self.publish(messages).await;
+        let messages: Vec<Outgoing> = batch
+            .items
+            .iter()
+            .map(|item| self.build_message(kind, births::build_item_metrics(item, batch.historical), now))
+            .collect();
+        let sent = self.publish_messages(messages).await;
         sent.map_err(|(index, failure)| {
             // Those after it did not go out; their numbers are used again.
             self.next = first.wrapping_add(u8::try_from(index % 256).unwrap_or(0));
@@ -296,27 +305,27 @@ fn series_of(item: &crate::history::Item) -> Vec<i64> {
 }
 
 fn now_ms() -> u64 {
-    births::milliseconds(clock::now_ns())
+    births::to_milliseconds(clock::now_ns())
 }
 
 impl Sink for SparkplugSink {
     fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(self.begin())
+        Box::pin(self.open_connection())
     }
 
-    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
-        Box::pin(self.deliver(batch))
+    fn send_batch<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+        Box::pin(self.deliver_batch(batch))
     }
 
-    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn wait_for_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
             loop {
                 let message = self.link.next(&self.target.broker).await?;
-                if self.hear(&message) {
+                if self.accept_message(&message) {
                     return Ok(());
                 }
                 if self.state_topic().is_some_and(|topic| topic == message.topic) {
-                    self.host.hear(&message.payload);
+                    self.host.accept_message(&message.payload);
                     if !self.host.online {
                         return Ok(());
                     }
@@ -326,27 +335,27 @@ impl Sink for SparkplugSink {
         })
     }
 
-    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
+    fn serve_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
             if self.target.host.is_some() && !self.host.online {
                 return Err(self.lose_host().await);
             }
             if self.rebirth {
-                self.birth().await?;
+                self.publish_birth().await?;
             }
-            self.answer().await
+            self.answer_requests().await
         })
     }
 
-    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(self.link.probe(&self.target.broker))
+    fn probe_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.link.probe_broker(&self.target.broker))
     }
 
     fn close(&mut self) -> Pending<'_, ()> {
         Box::pin(async move {
             if self.target.device.is_some() && !self.dead {
-                let death = self.message("DDEATH", Vec::new(), now_ms());
-                let _gone = self.publish(vec![death]).await;
+                let death = self.build_message("DDEATH", Vec::new(), now_ms());
+                let _gone = self.publish_messages(vec![death]).await;
             }
             self.say_death().await;
         })

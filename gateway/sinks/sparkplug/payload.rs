@@ -102,7 +102,7 @@ pub(super) enum Property {
 }
 
 impl PropertySet {
-    pub(super) fn put(&mut self, key: &str, value: Property) {
+    pub(super) fn add_property(&mut self, key: &str, value: Property) {
         let kind = match value {
             Property::Int(_) => datatype::INT32,
             Property::Double(_) => datatype::DOUBLE,
@@ -116,7 +116,7 @@ impl PropertySet {
 
 impl Metric {
     /// A metric by name, with a value whose type is known from it.
-    pub(super) fn named(name: &str, datatype: u32, timestamp: u64, value: MetricValue) -> Self {
+    pub(super) fn with_name(name: &str, datatype: u32, timestamp: u64, value: MetricValue) -> Self {
         Self {
             name: Some(name.to_owned()),
             timestamp: Some(timestamp),
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn a_payload_is_what_the_schema_says() {
-        let metric = Metric::named("a", datatype::DOUBLE, 5, MetricValue::Double(1.0));
+        let metric = Metric::with_name("a", datatype::DOUBLE, 5, MetricValue::Double(1.0));
         let payload = Payload { timestamp: Some(1), metrics: vec![metric], seq: Some(0) };
         let expected = b"\x08\x01\x12\x10\x0a\x01a\x18\x05\x20\x0a\x69\0\0\0\0\0\0\xf0\x3f\x18\x00";
         assert_eq!(payload.encode_to_vec(), expected);

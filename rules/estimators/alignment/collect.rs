@@ -58,7 +58,7 @@ impl Collector {
 
     /// At this time the machine cut, or may have. Told at every tick at which it does, within four seconds; what was
     /// measured about then is not used.
-    pub fn cutting(&mut self, time_s: f64) {
+    pub fn record_cutting(&mut self, time_s: f64) {
         match self.cuts.back_mut().filter(|cut| (cut.0 - CUT_JOIN_S..=cut.1 + CUT_JOIN_S).contains(&time_s)) {
             Some(cut) => *cut = (cut.0.min(time_s), cut.1.max(time_s)),
             None => self.cuts.push_back((time_s, time_s)),
@@ -70,40 +70,40 @@ impl Collector {
 
     /// Takes a reading of the spindle speed. Readings come in the order of their stamps; one that goes back, or comes after
     /// a gap, begins anew.
-    pub fn speed(&mut self, point: SpeedPoint) {
+    pub fn record_speed(&mut self, point: SpeedPoint) {
         let since_s = self.speed.back().map(|last| point.time_s - last.time_s);
         if since_s.is_some_and(|since_s| since_s <= 0.0 || since_s > GAP_S) {
-            self.interrupt();
+            self.discard_collected();
         }
         let past = self.speed.iter().rev().find(|past| past.time_s <= point.time_s - 0.5).copied();
-        let moved = past.is_some_and(|past| changed(past.speed_rpm, point.speed_rpm));
+        let moved = past.is_some_and(|past| is_speed_change(past.speed_rpm, point.speed_rpm));
         if moved {
             let from_s = self.changed_s.map_or(point.time_s - 0.5, |(from_s, _)| from_s);
             self.changed_s = Some((from_s, point.time_s));
         }
         self.speed.push_back(point);
-        trim(&mut self.speed, |point| point.time_s, self.changed_s.map_or(point.time_s, |(from_s, _)| from_s));
-        self.finish(point.time_s);
+        trim_readings(&mut self.speed, |point| point.time_s, self.changed_s.map_or(point.time_s, |(from_s, _)| from_s));
+        self.finish_transient(point.time_s);
     }
 
     /// Takes a reading of the power.
-    pub fn power(&mut self, point: PowerPoint) {
+    pub fn record_power(&mut self, point: PowerPoint) {
         if self.power.back().is_some_and(|last| point.time_s <= last.time_s) {
             return;
         }
         self.power.push_back(point);
-        trim(&mut self.power, |point| point.time_s, self.changed_s.map_or(point.time_s, |(from_s, _)| from_s));
+        trim_readings(&mut self.power, |point| point.time_s, self.changed_s.map_or(point.time_s, |(from_s, _)| from_s));
     }
 
     /// A source failed: what is half collected is of no use.
-    pub fn interrupt(&mut self) {
+    pub fn discard_collected(&mut self) {
         self.speed.clear();
         self.power.clear();
         self.changed_s = None;
     }
 
     /// The change is over and its surroundings are complete.
-    fn finish(&mut self, now_s: f64) {
+    fn finish_transient(&mut self, now_s: f64) {
         let Some((from_s, to_s)) = self.changed_s else { return };
         let too_long = now_s - from_s > LONGEST_S;
         if !(now_s - to_s > BEHIND_S || too_long) {
@@ -119,7 +119,7 @@ impl Collector {
         let of_change =
             |points: usize, point: &PowerPoint| points + usize::from((from_s..=to_s).contains(&point.time_s));
         let (all, left) = (self.power.iter().fold(0, of_change), free.iter().fold(0, of_change));
-        if count(left) < LEFT_SHARE * count(all) {
+        if count_to_f64(left) < LEFT_SHARE * count_to_f64(all) {
             self.gathered.while_cutting += 1;
             return;
         }
@@ -136,7 +136,7 @@ impl Collector {
     }
 
     /// What there is; `new` is then false until the next transient.
-    pub fn gathered(&mut self) -> AlignmentData {
+    pub fn take_gathered_data(&mut self) -> AlignmentData {
         let gathered = AlignmentData { transients: self.kept.len(), ..self.gathered };
         self.gathered.new = false;
         gathered
@@ -148,15 +148,15 @@ impl Collector {
     }
 }
 
-fn changed(from_rpm: f64, to_rpm: f64) -> bool {
+fn is_speed_change(from_rpm: f64, to_rpm: f64) -> bool {
     (to_rpm - from_rpm).abs() > CHANGE_RPM.max(CHANGE_SHARE * from_rpm.abs().max(to_rpm.abs()))
 }
 
-fn count(number: usize) -> f64 {
+fn count_to_f64(number: usize) -> f64 {
     f64::from(u32::try_from(number).unwrap_or(u32::MAX))
 }
 
-fn trim<T>(points: &mut VecDeque<T>, time_s: impl Fn(&T) -> f64, from_s: f64) {
+fn trim_readings<T>(points: &mut VecDeque<T>, time_s: impl Fn(&T) -> f64, from_s: f64) {
     while points.len() > READINGS_MAX || points.front().is_some_and(|point| time_s(point) < from_s - BEFORE_S - 1.0) {
         points.pop_front();
     }

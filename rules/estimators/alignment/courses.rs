@@ -8,7 +8,7 @@
 //! fit in many places. Cuts of different length and power, or an idle stretch of its own length, tell them apart.
 
 use crate::estimators::regression::{Refusal, RefusalKind};
-use crate::statistics::correlation;
+use crate::statistics::correlate_pairs;
 
 /// Step of the coarse grid, s.
 const COARSE_S: f64 = 1.0;
@@ -54,7 +54,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn of(course: &[(f64, f64)], step_s: f64) -> Self {
+    fn from_course(course: &[(f64, f64)], step_s: f64) -> Self {
         let begin_s = course.first().map_or(0.0, |first| first.0);
         let end_s = course.last().map_or(0.0, |last| last.0);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded by the caller")]
@@ -70,12 +70,12 @@ impl Grid {
     }
 
     /// Correlation with another grid of the same step whose beginning lies at this place, and how many points overlap.
-    fn correlation(&self, other: &Self, place: i64) -> (f64, usize) {
+    fn correlate_shifted(&self, other: &Self, place: i64) -> (f64, usize) {
         let pairs = other.values.iter().enumerate().filter_map(|(index, y)| {
             let at = i64::try_from(index).unwrap_or(i64::MAX).saturating_add(place);
             Some((self.values.get(usize::try_from(at).ok()?).copied().flatten()?, (*y)?))
         });
-        let (correlation, n) = correlation(pairs);
+        let (correlation, n) = correlate_pairs(pairs);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
         (correlation, n as usize)
     }
@@ -87,10 +87,10 @@ impl Grid {
 /// # Errors
 /// A [`Refusal`]: too little of a course, no lag at which they agree, or several.
 pub fn match_courses(first: &[(f64, f64)], second: &[(f64, f64)]) -> Result<Matched, Refusal> {
-    check(first)?;
-    check(second)?;
-    let (one, other) = (Grid::of(first, COARSE_S), Grid::of(second, COARSE_S));
-    let (place, correlation, rival) = coarse(&one, &other)?;
+    check_course(first)?;
+    check_course(second)?;
+    let (one, other) = (Grid::from_course(first, COARSE_S), Grid::from_course(second, COARSE_S));
+    let (place, correlation, rival) = search_coarse_lag(&one, &other)?;
     if correlation.abs() < CORRELATION_MIN {
         let what = format!("at no lag do the two courses agree: the best correlation is {:.2}", correlation.abs());
         return Err(Refusal::new(
@@ -108,20 +108,20 @@ pub fn match_courses(first: &[(f64, f64)], second: &[(f64, f64)]) -> Result<Matc
     let about_s = one.begin_s - other.begin_s + place as f64 * COARSE_S;
     let middle_s = 0.5 * (second[0].0 + second[second.len() - 1].0);
     let (early, late): (Vec<_>, Vec<_>) = second.iter().copied().partition(|(time_s, _)| *time_s < middle_s);
-    let lag_s = fine(first, second, about_s);
-    let halves = (fine(first, &early, about_s), fine(first, &late, about_s));
-    let apart_s = middle(&late) - middle(&early);
+    let lag_s = refine_lag(first, second, about_s);
+    let halves = (refine_lag(first, &early, about_s), refine_lag(first, &late, about_s));
+    let apart_s = middle_time_s(&late) - middle_time_s(&early);
     let drift = if apart_s > 60.0 { (halves.1 - halves.0) / apart_s } else { 0.0 };
     // A clock that is off by more than 1 part in 1000 is no clock: then the halves hold too little.
     let drift = if drift.abs() < 1e-3 { drift } else { 0.0 };
     Ok(Matched { lag_s, drift, middle_s, correlation: correlation.abs(), rival })
 }
 
-fn middle(course: &[(f64, f64)]) -> f64 {
+fn middle_time_s(course: &[(f64, f64)]) -> f64 {
     course.first().zip(course.last()).map_or(0.0, |(first, last)| 0.5 * (first.0 + last.0))
 }
 
-fn check(course: &[(f64, f64)]) -> Result<(), Refusal> {
+fn check_course(course: &[(f64, f64)]) -> Result<(), Refusal> {
     let ordered = course.windows(2).all(|pair| pair[1].0 >= pair[0].0);
     let finite = course.iter().all(|(time_s, value)| time_s.is_finite() && value.is_finite());
     let length_s = course.first().zip(course.last()).map_or(0.0, |(first, last)| last.0 - first.0);
@@ -139,14 +139,14 @@ fn check(course: &[(f64, f64)]) -> Result<(), Refusal> {
 }
 
 /// Place of the highest magnitude of correlation, that correlation, and the highest magnitude anywhere else.
-fn coarse(one: &Grid, other: &Grid) -> Result<(i64, f64, f64), Refusal> {
+fn search_coarse_lag(one: &Grid, other: &Grid) -> Result<(i64, f64, f64), Refusal> {
     let known = |grid: &Grid| grid.values.iter().flatten().count();
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
     let least = (OVERLAP_MIN * known(one).min(known(other)) as f64) as usize;
     let length = |grid: &Grid| i64::try_from(grid.values.len()).unwrap_or(i64::MAX);
     let tried: Vec<(i64, f64)> = (-length(other)..=length(one))
         .filter_map(|place| {
-            let (correlation, overlap) = one.correlation(other, place);
+            let (correlation, overlap) = one.correlate_shifted(other, place);
             (overlap >= least.max(10)).then_some((place, correlation))
         })
         .collect();
@@ -162,10 +162,10 @@ fn coarse(one: &Grid, other: &Grid) -> Result<(i64, f64, f64), Refusal> {
 }
 
 /// The lag about `about_s` at which the second course, looked up in the first, agrees best.
-fn fine(first: &[(f64, f64)], second: &[(f64, f64)], about_s: f64) -> f64 {
+fn refine_lag(first: &[(f64, f64)], second: &[(f64, f64)], about_s: f64) -> f64 {
     let agreement = |lag_s: f64| {
-        let pairs = second.iter().filter_map(|(time_s, y)| Some((interpolated(first, time_s + lag_s)?, *y)));
-        correlation(pairs).0.abs()
+        let pairs = second.iter().filter_map(|(time_s, y)| Some((interpolate_course(first, time_s + lag_s)?, *y)));
+        correlate_pairs(pairs).0.abs()
     };
     let mut best = (about_s, agreement(about_s));
     for step_s in [0.5, 0.1, 0.02] {
@@ -182,7 +182,7 @@ fn fine(first: &[(f64, f64)], second: &[(f64, f64)], about_s: f64) -> f64 {
 }
 
 /// The first course at a time, in a straight line between its points; `None` outside and over gaps of more than 2 s.
-fn interpolated(first: &[(f64, f64)], time_s: f64) -> Option<f64> {
+fn interpolate_course(first: &[(f64, f64)], time_s: f64) -> Option<f64> {
     let next = first.partition_point(|(at_s, _)| *at_s < time_s);
     let (after, before) = (first.get(next)?, first.get(next.checked_sub(1)?)?);
     let span_s = after.0 - before.0;

@@ -1,7 +1,7 @@
 //! Lag, width, drift and window over all transients, or why they cannot be known.
 
-use super::fit::{FittedLag, PowerModel, PredictorSet, Ready, fit, residual};
-use super::profile::{Best, lowest, search, search_at};
+use super::fit::{FittedLag, PowerModel, PredictorSet, Ready, fit_transients, residual_sum_of_squares};
+use super::profile::{Best, find_minimum, search_at, search_lags};
 use super::speed::Transient;
 use std::fmt;
 
@@ -79,7 +79,7 @@ pub struct Lag {
 impl Lag {
     /// The lag at another time, with its drift if that is known to be different from 0.
     #[must_use]
-    pub fn at(&self, time_s: f64) -> f64 {
+    pub fn predict_lag(&self, time_s: f64) -> f64 {
         let drift = self.drift.filter(|drift| drift.ppm.abs() > drift.uncertainty_ppm);
         self.lag_s + drift.map_or(0.0, |drift| 1e-6 * drift.ppm * (time_s - self.at_s))
     }
@@ -127,7 +127,7 @@ pub enum NotIdentifiable {
 impl NotIdentifiable {
     /// A stable word for programs.
     #[must_use]
-    pub fn word(&self) -> &'static str {
+    pub fn as_word(&self) -> &'static str {
         match self {
             Self::TooFewTransients { .. } => "too_few_transients",
             Self::Unexplained { .. } => "unexplained",
@@ -197,12 +197,12 @@ const Z95: f64 = 1.96;
 ///
 /// # Errors
 /// [`NotIdentifiable`]: why it cannot be known, and what to do.
-pub fn align(transients: &[Transient], settings: &LagSettings) -> Result<Lag, NotIdentifiable> {
+pub fn estimate_lag(transients: &[Transient], settings: &LagSettings) -> Result<Lag, NotIdentifiable> {
     let usable: Vec<&Transient> = transients.iter().filter(|transient| is_usable(transient, settings)).collect();
     if usable.len() < settings.transients_min {
         return Err(NotIdentifiable::TooFewTransients { found: usable.len(), wanted: settings.transients_min });
     }
-    let (ready, best) = joint(&usable, settings);
+    let (ready, best) = fit_jointly(&usable, settings);
     let explained = 1.0 - best.fitted.rss / best.fitted.total.max(f64::MIN_POSITIVE);
     if explained < settings.explained_min || best.fitted.model[INERTIA] <= 0.0 {
         return Err(NotIdentifiable::Unexplained { explained });
@@ -214,8 +214,8 @@ pub fn align(transients: &[Transient], settings: &LagSettings) -> Result<Lag, No
     if best.at_end {
         return Err(NotIdentifiable::OutOfRange { lag_s: best.lag_s });
     }
-    let lags = each(&ready, &best);
-    let line = Line::through(&lags);
+    let lags = fit_each_transient(&ready, &best);
+    let line = Line::fit_weighted_lags(&lags);
     let of_noise_s = line.uncertainty.max(curvature_s(&ready, &best, lags.len()));
     let uncertainty_s = of_noise_s.max(of_model_s(&ready, &best)).hypot(SAMPLING_S);
     if let Some((rival_s, _)) = best.rival.filter(|(_, rss)| as_good(*rss, &best.fitted)) {
@@ -231,7 +231,7 @@ pub fn align(transients: &[Transient], settings: &LagSettings) -> Result<Lag, No
         drift: line.drift,
         window_s: best.window_s,
         model: best.fitted.power_model(),
-        residual_w: (best.fitted.rss / count(best.fitted.rows)).sqrt(),
+        residual_w: (best.fitted.rss / count_to_f64(best.fitted.rows)).sqrt(),
         explained,
         inertia_share,
         transients: lags.len(),
@@ -245,14 +245,21 @@ fn is_usable(transient: &Transient, settings: &LagSettings) -> bool {
 }
 
 /// The best lag and window, with the excess of a run-up where it is really there.
-fn joint(usable: &[&Transient], settings: &LagSettings) -> (Vec<Ready>, Best) {
+fn fit_jointly(usable: &[&Transient], settings: &LagSettings) -> (Vec<Ready>, Best) {
     let top_rpm = usable.iter().map(|transient| transient.range_rpm().1).fold(0.0, f64::max);
     let make = |tau_s: f64| -> Vec<Ready> {
-        usable.iter().map(|one| Ready::of(one, top_rpm, tau_s, settings.lags_s, settings.window_max_s)).collect()
+        usable
+            .iter()
+            .map(|one| Ready::from_transient(one, top_rpm, tau_s, settings.lags_s, settings.window_max_s))
+            .collect()
     };
     let plain = make(1.0);
-    let best =
-        search(&plain, settings.lags_s, settings.window_max_s, PredictorSet { excess: false, ..PredictorSet::WHOLE });
+    let best = search_lags(
+        &plain,
+        settings.lags_s,
+        settings.window_max_s,
+        PredictorSet { excess: false, ..PredictorSet::WHOLE },
+    );
     let with_excess = EXCESS_TAU_S.into_iter().map(|tau_s| {
         let (ready, shape) = (make(tau_s), PredictorSet::WHOLE);
         let best = search_at(&ready, settings.lags_s, &[best.window_s], shape, settings.window_max_s);
@@ -265,33 +272,34 @@ fn joint(usable: &[&Transient], settings: &LagSettings) -> (Vec<Ready>, Best) {
     }
 }
 
-fn shape(best: &Best) -> PredictorSet {
+fn select_predictors(best: &Best) -> PredictorSet {
     PredictorSet { excess: best.fitted.model[EXCESS] != 0.0, ..PredictorSet::WHOLE }
 }
 
 /// Share of the power's variance that only changing the speed explains.
 fn inertia_share(ready: &[Ready], best: &Best) -> f64 {
-    let without = fit(ready, best.lag_s, best.window_s, PredictorSet { inertia: false, ..shape(best) });
+    let without =
+        fit_transients(ready, best.lag_s, best.window_s, PredictorSet { inertia: false, ..select_predictors(best) });
     (without.rss - best.fitted.rss) / best.fitted.total.max(f64::MIN_POSITIVE)
 }
 
 /// How far the lag moves when a term of the no-load power is left out: what an imperfect law may do to it.
 fn of_model_s(ready: &[Ready], best: &Best) -> f64 {
     let moved_s = |without: PredictorSet| {
-        let rss = |lag_s: f64| fit(ready, lag_s, best.window_s, without).rss;
-        let lag_s = lowest(best.lag_s, 0.05, (best.lag_s - 0.5, best.lag_s + 0.5), rss);
+        let rss = |lag_s: f64| fit_transients(ready, lag_s, best.window_s, without).rss;
+        let lag_s = find_minimum(best.lag_s, 0.05, (best.lag_s - 0.5, best.lag_s + 0.5), rss);
         (lag_s - best.lag_s).abs()
     };
-    moved_s(PredictorSet { cube: false, ..shape(best) })
-        .max(0.5 * moved_s(PredictorSet { turning: false, ..shape(best) }))
+    moved_s(PredictorSet { cube: false, ..select_predictors(best) })
+        .max(0.5 * moved_s(PredictorSet { turning: false, ..select_predictors(best) }))
 }
 
 /// Time and lag of each transient under the common model, with the weight of its residual's curvature.
-fn each(ready: &[Ready], best: &Best) -> Vec<(f64, f64, f64)> {
+fn fit_each_transient(ready: &[Ready], best: &Best) -> Vec<(f64, f64, f64)> {
     let model = &best.fitted.model;
     let of_one = |one: &Ready| {
-        let rss = |lag_s: f64| residual(one, model, lag_s, best.window_s);
-        let lag_s = lowest(best.lag_s, 0.04, (best.lag_s - 0.3, best.lag_s + 0.3), rss);
+        let rss = |lag_s: f64| residual_sum_of_squares(one, model, lag_s, best.window_s);
+        let lag_s = find_minimum(best.lag_s, 0.04, (best.lag_s - 0.3, best.lag_s + 0.3), rss);
         let step_s = 0.05;
         let bend = rss(lag_s + step_s) + rss(lag_s - step_s) - 2.0 * rss(lag_s);
         (one.middle_s, lag_s, bend.max(0.0))
@@ -301,22 +309,22 @@ fn each(ready: &[Ready], best: &Best) -> Vec<(f64, f64, f64)> {
 
 /// A residual that noise alone could make as small as the least one (F-like bound, generous for correlated residuals).
 fn as_good(rss: f64, fitted: &FittedLag) -> bool {
-    let freedom = (count(fitted.rows) / 4.0 - 8.0).max(4.0);
+    let freedom = (count_to_f64(fitted.rows) / 4.0 - 8.0).max(4.0);
     rss <= fitted.rss * (1.0 + 8.0 / freedom)
 }
 
 /// Half the 95 % interval from the curvature of the common residual, the noise taken as remembered over four readings.
 fn curvature_s(ready: &[Ready], best: &Best, transients: usize) -> f64 {
-    let (step_s, shape) = (0.03, shape(best));
-    let rss = |lag_s: f64| fit(ready, lag_s, best.window_s, shape).rss;
+    let (step_s, shape) = (0.03, select_predictors(best));
+    let rss = |lag_s: f64| fit_transients(ready, lag_s, best.window_s, shape).rss;
     let bend = (rss(best.lag_s + step_s) + rss(best.lag_s - step_s) - 2.0 * best.fitted.rss) / (step_s * step_s);
-    let freedom = (count(best.fitted.rows) - 8.0).max(1.0);
+    let freedom = (count_to_f64(best.fitted.rows) - 8.0).max(1.0);
     let variance = best.fitted.rss / freedom;
-    let student = 1.0 + 2.5 / count(transients).max(2.0);
+    let student = 1.0 + 2.5 / count_to_f64(transients).max(2.0);
     if bend > 0.0 { student * Z95 * (2.0 * 4.0 * variance / bend).sqrt() } else { f64::INFINITY }
 }
 
-fn count(number: usize) -> f64 {
+fn count_to_f64(number: usize) -> f64 {
     f64::from(u32::try_from(number).unwrap_or(u32::MAX))
 }
 
@@ -329,7 +337,7 @@ struct Line {
 }
 
 impl Line {
-    fn through(lags: &[(f64, f64, f64)]) -> Self {
+    fn fit_weighted_lags(lags: &[(f64, f64, f64)]) -> Self {
         let weight: f64 = lags.iter().map(|(.., weight)| weight).sum();
         let mean = |of: &dyn Fn(&(f64, f64, f64)) -> f64| lags.iter().map(|lag| lag.2 * of(lag)).sum::<f64>() / weight;
         let (at_s, level) = (mean(&|lag| lag.0), mean(&|lag| lag.1));

@@ -1,7 +1,7 @@
 //! The power model at one lag and window, and its residual.
 
 use super::speed::{PREDICTORS, RunningIntegrals, Transient};
-use super::steady::steadied;
+use super::steady::regularize_stamps;
 use crate::linear::cholesky::{LinearSolution, NormalEquations};
 
 /// Constant, and every predictor.
@@ -39,10 +39,17 @@ pub(super) struct Ready {
 impl Ready {
     /// Power readings for which every lag up to `reach_s` and window up to `window_s` lies within the course of speed, so
     /// that all are judged by the same rows.
-    pub(super) fn of(transient: &Transient, top_rpm: f64, tau_s: f64, reach_s: (f64, f64), window_s: f64) -> Self {
-        let running = RunningIntegrals::of(&steadied(&transient.speed), top_rpm, tau_s);
+    pub(super) fn from_transient(
+        transient: &Transient,
+        top_rpm: f64,
+        tau_s: f64,
+        reach_s: (f64, f64),
+        window_s: f64,
+    ) -> Self {
+        let running = RunningIntegrals::from_speeds(&regularize_stamps(&transient.speed), top_rpm, tau_s);
         let inside = |time_s: f64| {
-            running.mean(time_s - reach_s.0, window_s).is_some() && running.mean(time_s - reach_s.1, window_s).is_some()
+            running.average_window(time_s - reach_s.0, window_s).is_some()
+                && running.average_window(time_s - reach_s.1, window_s).is_some()
         };
         let rows = transient.power.iter().filter(|point| point.power_w.is_finite() && inside(point.time_s));
         let power = rows.map(|point| (point.time_s, point.power_w)).collect();
@@ -99,12 +106,12 @@ impl PredictorSet {
 }
 
 /// Fits all transients together at one lag and window; a predictor that takes no part has the coefficient 0.
-pub(super) fn fit(ready: &[Ready], lag_s: f64, window_s: f64, shape: PredictorSet) -> FittedLag {
+pub(super) fn fit_transients(ready: &[Ready], lag_s: f64, window_s: f64, shape: PredictorSet) -> FittedLag {
     let mut sums = NormalEquations::<COLUMNS>::new();
     for one in ready {
         for (time_s, power_w) in &one.power {
-            let Some(mean) = one.running.mean(time_s - lag_s, window_s) else { continue };
-            sums.add(&row(&mean, shape), *power_w);
+            let Some(mean) = one.running.average_window(time_s - lag_s, window_s) else { continue };
+            sums.add(&build_regressor_row(&mean, shape), *power_w);
         }
     }
     let LinearSolution { coefficients, rss, total, rows } = sums.solve();
@@ -112,16 +119,16 @@ pub(super) fn fit(ready: &[Ready], lag_s: f64, window_s: f64, shape: PredictorSe
 }
 
 /// Residual sum of squares of one transient under a given model.
-pub(super) fn residual(one: &Ready, model: &[f64; COLUMNS], lag_s: f64, window_s: f64) -> f64 {
+pub(super) fn residual_sum_of_squares(one: &Ready, model: &[f64; COLUMNS], lag_s: f64, window_s: f64) -> f64 {
     let each = one.power.iter().filter_map(|(time_s, power_w)| {
-        let mean = one.running.mean(time_s - lag_s, window_s)?;
-        let said: f64 = row(&mean, PredictorSet::WHOLE).iter().zip(model).map(|(x, c)| x * c).sum();
+        let mean = one.running.average_window(time_s - lag_s, window_s)?;
+        let said: f64 = build_regressor_row(&mean, PredictorSet::WHOLE).iter().zip(model).map(|(x, c)| x * c).sum();
         Some((power_w - said).powi(2))
     });
     each.sum()
 }
 
-fn row(mean: &[f64; PREDICTORS], shape: PredictorSet) -> [f64; COLUMNS] {
+fn build_regressor_row(mean: &[f64; PREDICTORS], shape: PredictorSet) -> [f64; COLUMNS] {
     let [linear, square, cube, up, down, start, turning] = *mean;
     let with = |takes_part: bool, value: f64| if takes_part { value } else { 0.0 };
     let (up, down) = (with(shape.inertia, up), with(shape.inertia, down));

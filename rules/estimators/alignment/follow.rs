@@ -21,8 +21,8 @@ pub struct LagFollower {
 
 impl LagFollower {
     /// Aims at a new estimate as of `at_s`. The aim when it has moved enough to be told.
-    pub fn aim(&mut self, lag: &Lag, at_s: f64) -> Option<f64> {
-        let wanted_s = lag.at(at_s);
+    pub fn aim_at_estimate(&mut self, lag: &Lag, at_s: f64) -> Option<f64> {
+        let wanted_s = lag.predict_lag(at_s);
         let aim_s = self.aim_s.map_or(wanted_s, |aim_s| aim_s + (wanted_s - aim_s).clamp(-STEP_MAX_S, STEP_MAX_S));
         self.aim_s = Some(aim_s);
         let worth = self.told_s.is_none_or(|told_s| (aim_s - told_s).abs() >= WORTH_TELLING_S);
@@ -30,7 +30,7 @@ impl LagFollower {
     }
 
     /// `passed_s` later; what is in force now, s. Frozen while it cuts.
-    pub fn step(&mut self, passed_s: f64, cutting: bool) -> f64 {
+    pub fn step_lag(&mut self, passed_s: f64, cutting: bool) -> f64 {
         if let Some(aim_s) = self.aim_s.filter(|_| !cutting) {
             let most_s = RATE * passed_s.max(0.0);
             self.applied_s += (aim_s - self.applied_s).clamp(-most_s, most_s);
@@ -78,19 +78,19 @@ mod tests {
     #[test]
     fn it_is_taken_up_slowly_and_stands_still_while_cutting() {
         let mut follower = LagFollower::default();
-        assert_eq!(follower.step(100.0, false), 0.0, "nothing is known yet");
-        assert_eq!(follower.aim(&lag(0.2), 0.0), Some(0.2));
-        assert!((follower.step(1.0, false) - 0.05).abs() < 1e-12);
-        assert!((follower.step(60.0, true) - 0.05).abs() < 1e-12, "frozen");
-        assert!((follower.step(60.0, false) - 0.2).abs() < 1e-12);
+        assert_eq!(follower.step_lag(100.0, false), 0.0, "nothing is known yet");
+        assert_eq!(follower.aim_at_estimate(&lag(0.2), 0.0), Some(0.2));
+        assert!((follower.step_lag(1.0, false) - 0.05).abs() < 1e-12);
+        assert!((follower.step_lag(60.0, true) - 0.05).abs() < 1e-12, "frozen");
+        assert!((follower.step_lag(60.0, false) - 0.2).abs() < 1e-12);
     }
 
     #[test]
     fn an_estimate_that_jumps_is_followed_in_steps() {
         let mut follower = LagFollower::default();
-        follower.aim(&lag(0.2), 0.0);
-        assert_eq!(follower.aim(&lag(0.201), 0.0), None, "not worth a word");
-        let told = follower.aim(&lag(0.8), 0.0).expect("a step");
+        follower.aim_at_estimate(&lag(0.2), 0.0);
+        assert_eq!(follower.aim_at_estimate(&lag(0.201), 0.0), None, "not worth a word");
+        let told = follower.aim_at_estimate(&lag(0.8), 0.0).expect("a step");
         assert!((told - 0.25).abs() < 0.002, "{told}");
     }
 }

@@ -43,7 +43,7 @@ mod tests;
 
 pub use collect::{AlignmentData, Collector};
 pub use courses::{Matched, match_courses};
-pub use estimate::{Drift, Lag, LagSettings, NotIdentifiable, align};
+pub use estimate::{Drift, Lag, LagSettings, NotIdentifiable, estimate_lag};
 pub use fit::PowerModel;
 pub use follow::LagFollower;
 pub use speed::{PowerPoint, SpeedPoint, Transient};

@@ -1,6 +1,6 @@
 //! The residual over lag and window: its minimum, and whether another lag does as well.
 
-use super::fit::{FittedLag, PredictorSet, Ready, fit};
+use super::fit::{FittedLag, PredictorSet, Ready, fit_transients};
 
 /// Windows that are tried before the best one is refined, s.
 const WINDOWS_S: [f64; 6] = [0.03, 0.1, 0.2, 0.4, 0.7, 1.2];
@@ -20,7 +20,7 @@ pub(super) struct Best {
 }
 
 /// Residuals over all lags at the window that is best for each.
-pub(super) fn search(ready: &[Ready], lags_s: (f64, f64), window_max_s: f64, shape: PredictorSet) -> Best {
+pub(super) fn search_lags(ready: &[Ready], lags_s: (f64, f64), window_max_s: f64, shape: PredictorSet) -> Best {
     let windows: Vec<f64> = WINDOWS_S.into_iter().filter(|window| *window <= window_max_s).collect();
     search_at(ready, lags_s, &windows, shape, window_max_s)
 }
@@ -33,21 +33,21 @@ pub(super) fn search_at(
     shape: PredictorSet,
     window_max_s: f64,
 ) -> Best {
-    let course: Vec<(f64, f64, f64)> = lags(lags_s)
+    let course: Vec<(f64, f64, f64)> = list_lags(lags_s)
         .map(|lag_s| {
-            let tried = windows.iter().map(|window_s| (fit(ready, lag_s, *window_s, shape).rss, *window_s));
+            let tried = windows.iter().map(|window_s| (fit_transients(ready, lag_s, *window_s, shape).rss, *window_s));
             let (rss, window_s) = tried.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0.02));
             (lag_s, window_s, rss)
         })
         .collect();
     let at = (0..course.len()).min_by(|a, b| course[*a].2.total_cmp(&course[*b].2)).unwrap_or(0);
     let (lag_s, window_s, _) = course[at];
-    let (lag_s, window_s) = refine(ready, lag_s, window_s, window_max_s, shape);
-    let fitted = fit(ready, lag_s, window_s, shape);
-    Best { lag_s, window_s, fitted, rival: rival(&course, at), at_end: at == 0 || at + 1 == course.len() }
+    let (lag_s, window_s) = refine_lag_and_window(ready, lag_s, window_s, window_max_s, shape);
+    let fitted = fit_transients(ready, lag_s, window_s, shape);
+    Best { lag_s, window_s, fitted, rival: find_rival_minimum(&course, at), at_end: at == 0 || at + 1 == course.len() }
 }
 
-fn lags((from_s, to_s): (f64, f64)) -> impl Iterator<Item = f64> {
+fn list_lags((from_s, to_s): (f64, f64)) -> impl Iterator<Item = f64> {
     let mut next_s = from_s;
     std::iter::from_fn(move || {
         let lag_s = next_s;
@@ -57,19 +57,25 @@ fn lags((from_s, to_s): (f64, f64)) -> impl Iterator<Item = f64> {
 }
 
 /// Lag and window in turn, each by a search that halves its step.
-fn refine(ready: &[Ready], lag_s: f64, window_s: f64, window_max_s: f64, shape: PredictorSet) -> (f64, f64) {
+fn refine_lag_and_window(
+    ready: &[Ready],
+    lag_s: f64,
+    window_s: f64,
+    window_max_s: f64,
+    shape: PredictorSet,
+) -> (f64, f64) {
     let (mut lag_s, mut window_s) = (lag_s, window_s);
     for _ in 0..2 {
-        let of_window = |window_s: f64| fit(ready, lag_s, window_s, shape).rss;
-        window_s = lowest(window_s, 0.4 * window_s + 0.02, (0.01, window_max_s), of_window);
-        let of_lag = |lag_s: f64| fit(ready, lag_s, window_s, shape).rss;
-        lag_s = lowest(lag_s, STEP_S, (lag_s - 2.0 * STEP_S, lag_s + 2.0 * STEP_S), of_lag);
+        let of_window = |window_s: f64| fit_transients(ready, lag_s, window_s, shape).rss;
+        window_s = find_minimum(window_s, 0.4 * window_s + 0.02, (0.01, window_max_s), of_window);
+        let of_lag = |lag_s: f64| fit_transients(ready, lag_s, window_s, shape).rss;
+        lag_s = find_minimum(lag_s, STEP_S, (lag_s - 2.0 * STEP_S, lag_s + 2.0 * STEP_S), of_lag);
     }
     (lag_s, window_s)
 }
 
 /// A minimum near `start`, to a 64th of the step.
-pub(super) fn lowest(start: f64, step: f64, limits: (f64, f64), value: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn find_minimum(start: f64, step: f64, limits: (f64, f64), value: impl Fn(f64) -> f64) -> f64 {
     let (mut at, mut step) = (start, step);
     let mut best = value(at);
     for _ in 0..14 {
@@ -84,7 +90,7 @@ pub(super) fn lowest(start: f64, step: f64, limits: (f64, f64), value: impl Fn(f
 }
 
 /// The deepest other minimum of the course.
-fn rival(course: &[(f64, f64, f64)], best: usize) -> Option<(f64, f64)> {
+fn find_rival_minimum(course: &[(f64, f64, f64)], best: usize) -> Option<(f64, f64)> {
     let rss = |at: usize| course[at].2;
     let minimum = |at: usize| (at == 0 || rss(at) <= rss(at - 1)) && (at + 1 == course.len() || rss(at) <= rss(at + 1));
     let others = (0..course.len()).filter(|at| at.abs_diff(best) > 2 && minimum(*at));

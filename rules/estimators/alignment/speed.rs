@@ -49,7 +49,7 @@ pub(super) struct RunningIntegrals {
 
 impl RunningIntegrals {
     /// `tau_s`: how fast the excess of a run-up dies away.
-    pub(super) fn of(speed: &[SpeedPoint], top_rpm: f64, tau_s: f64) -> Self {
+    pub(super) fn from_speeds(speed: &[SpeedPoint], top_rpm: f64, tau_s: f64) -> Self {
         let krpm: Vec<f64> = speed.iter().map(|point| point.speed_rpm.abs() / 1000.0).collect();
         let (mut times_s, mut sums) = (Vec::with_capacity(speed.len()), Vec::with_capacity(speed.len()));
         let (mut sum, mut excess) = ([0.0; PREDICTORS], 0.0);
@@ -58,7 +58,7 @@ impl RunningIntegrals {
                 let dt_s = (speed[index].time_s - speed[index - 1].time_s).max(0.0);
                 add_levels(&mut sum, krpm[index - 1], krpm[index], dt_s);
                 add_energy(&mut sum, &krpm, index, NOISE_SHARE * top_rpm / 1000.0);
-                let since_s = if starts(&krpm, index, top_rpm) {
+                let since_s = if is_run_up_start(&krpm, index, top_rpm) {
                     excess = 1.0;
                     running_s(speed, index)
                 } else {
@@ -75,15 +75,16 @@ impl RunningIntegrals {
     }
 
     /// Means over `[middle - window / 2, middle + window / 2]`; `None` beyond the course.
-    pub(super) fn mean(&self, middle_s: f64, window_s: f64) -> Option<[f64; PREDICTORS]> {
+    pub(super) fn average_window(&self, middle_s: f64, window_s: f64) -> Option<[f64; PREDICTORS]> {
         let half_s = 0.5 * window_s.max(1e-3);
-        let (from, to) = (self.at(middle_s - half_s)?, self.at(middle_s + half_s)?);
+        let (from, to) =
+            (self.interpolate_integrals(middle_s - half_s)?, self.interpolate_integrals(middle_s + half_s)?);
         let mut mean = [0.0; PREDICTORS];
         mean.iter_mut().zip(from.iter().zip(to)).for_each(|(mean, (from, to))| *mean = (to - from) / (2.0 * half_s));
         Some(mean)
     }
 
-    fn at(&self, time_s: f64) -> Option<[f64; PREDICTORS]> {
+    fn interpolate_integrals(&self, time_s: f64) -> Option<[f64; PREDICTORS]> {
         let after = self.times_s.partition_point(|known_s| *known_s <= time_s);
         let before = after.checked_sub(1)?;
         if after == self.times_s.len() {
@@ -129,7 +130,7 @@ fn running_s(speed: &[SpeedPoint], index: usize) -> f64 {
 }
 
 /// Does a run-up begin with this point?
-fn starts(krpm: &[f64], index: usize, top_rpm: f64) -> bool {
+fn is_run_up_start(krpm: &[f64], index: usize, top_rpm: f64) -> bool {
     let rise = |at: usize| krpm[at] - krpm[at - 1];
     let least = 0.01 * top_rpm / 1000.0;
     rise(index) > least && (index < 2 || rise(index - 1) <= least) && (index < 3 || rise(index - 2) <= least)
@@ -167,13 +168,13 @@ mod tests {
         // 0 to 3000 rpm in 3 s.
         let speed: Vec<SpeedPoint> =
             (0..=30).map(|k| SpeedPoint { time_s: 0.1 * f64::from(k), speed_rpm: 100.0 * f64::from(k) }).collect();
-        let running = RunningIntegrals::of(&speed, 1e-9, 1.0);
-        let mean = running.mean(1.5, 1.0).expect("inside");
+        let running = RunningIntegrals::from_speeds(&speed, 1e-9, 1.0);
+        let mean = running.average_window(1.5, 1.0).expect("inside");
         let rad_s2 = TAU * 1000.0 / 60.0;
         let per_inertia = 0.5 * rad_s2 * rad_s2 * (4.0 - 1.0);
         assert!((mean[0] - 1.5).abs() < 1e-9 && (mean[1] - (8.0 - 1.0) / 3.0).abs() < 1e-9);
         assert!((mean[3] - per_inertia).abs() < 1e-6 * per_inertia && mean[4] == 0.0);
-        assert_eq!(running.mean(2.9, 1.0), None);
+        assert_eq!(running.average_window(2.9, 1.0), None);
     }
 
     #[test]
@@ -181,7 +182,7 @@ mod tests {
         let speed: Vec<SpeedPoint> = (0..200)
             .map(|k| SpeedPoint { time_s: 0.05 * f64::from(k), speed_rpm: 3000.0 + f64::from(k % 3) })
             .collect();
-        let mean = RunningIntegrals::of(&speed, 3000.0, 1.0).mean(5.0, 8.0).expect("inside");
+        let mean = RunningIntegrals::from_speeds(&speed, 3000.0, 1.0).average_window(5.0, 8.0).expect("inside");
         assert!(mean[3] < 1e-9 && mean[4] > -1e-9);
     }
 }

@@ -18,7 +18,7 @@ const PAUSES_MAX: f64 = 2.5;
 const STEEP_SHARE: f64 = 0.5;
 
 /// The same readings with stamps on the beat, where that brings them nearer to straight ramps; else as they are.
-pub(super) fn steadied(speed: &[SpeedPoint]) -> Vec<SpeedPoint> {
+pub(super) fn regularize_stamps(speed: &[SpeedPoint]) -> Vec<SpeedPoint> {
     let as_it_is = || speed.to_vec();
     let Some(before_s) = scatter_s(speed).filter(|scatter_s| *scatter_s > SCATTER_MIN_S) else { return as_it_is() };
     let beat: Vec<SpeedPoint> =
@@ -30,13 +30,13 @@ pub(super) fn steadied(speed: &[SpeedPoint]) -> Vec<SpeedPoint> {
 
 /// Where the straight line through the stamps around a reading puts it, s.
 fn on_beat(speed: &[SpeedPoint], at: usize) -> f64 {
-    let usual_s = (speed[speed.len() - 1].time_s - speed[0].time_s) / count(speed.len() - 1).max(1.0);
+    let usual_s = (speed[speed.len() - 1].time_s - speed[0].time_s) / count_to_f64(speed.len() - 1).max(1.0);
     let pause = |a: usize, b: usize| speed[b].time_s - speed[a].time_s > PAUSES_MAX * usual_s;
     // As far to one side as to the other, so that the ends are not bent.
     let reach = REACH.min(at).min(speed.len() - 1 - at);
     let whole = (1..=reach).take_while(|far| !pause(at - far, at - far + 1) && !pause(at + far - 1, at + far)).count();
     let around = &speed[at - whole..=at + whole];
-    around.iter().map(|point| point.time_s).sum::<f64>() / count(around.len())
+    around.iter().map(|point| point.time_s).sum::<f64>() / count_to_f64(around.len())
 }
 
 /// How far stamps scatter on steep ramps, standard deviation by the median, s; `None` without a ramp.
@@ -57,7 +57,7 @@ fn scatter_s(speed: &[SpeedPoint]) -> Option<f64> {
     offs_s.get(offs_s.len() / 2).map(|median_s| median_s / 0.6745)
 }
 
-fn count(number: usize) -> f64 {
+fn count_to_f64(number: usize) -> f64 {
     f64::from(u32::try_from(number).unwrap_or(u32::MAX))
 }
 
@@ -86,7 +86,7 @@ mod tests {
         let point = |k: i32| SpeedPoint { time_s: true_s(k) + wrong_s(k), speed_rpm: ramp(true_s(k)) };
         let mut speed: Vec<SpeedPoint> = (0..80).map(point).collect();
         speed.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        let steady = steadied(&speed);
+        let steady = regularize_stamps(&speed);
         assert!(most_wrong_s(&speed) > 0.04 && most_wrong_s(&steady) < 0.025, "{}", most_wrong_s(&steady));
     }
 
@@ -96,7 +96,7 @@ mod tests {
         let mut speed: Vec<SpeedPoint> =
             (0..80).map(|k| SpeedPoint { time_s: true_s(k), speed_rpm: ramp(true_s(k)) }).collect();
         speed.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        assert_eq!(steadied(&speed), speed);
-        assert_eq!(steadied(&[]), []);
+        assert_eq!(regularize_stamps(&speed), speed);
+        assert_eq!(regularize_stamps(&[]), []);
     }
 }

@@ -95,12 +95,12 @@ fn gather(speed: &[SpeedPoint], power: &[PowerPoint], cutting: impl Fn(f64) -> b
     let (mut collector, mut power) = (Collector::new(), power.iter().peekable());
     for point in speed {
         while let Some(earlier) = power.next_if(|power| power.time_s < point.time_s) {
-            collector.power(*earlier);
+            collector.record_power(*earlier);
         }
         if cutting(point.time_s) {
-            collector.cutting(point.time_s);
+            collector.record_cutting(point.time_s);
         }
-        collector.speed(*point);
+        collector.record_speed(*point);
     }
     collector.transients().to_vec()
 }
@@ -152,7 +152,7 @@ fn score(seeds: u64, bench: Bench) -> Score {
     for seed in 0..seeds {
         let transients = transients(seed, bench);
         score.naive_near += usize::from((naive(&transients) - TRUE_LAG_S).abs() <= 0.02);
-        match align(&transients, &LagSettings::default()) {
+        match estimate_lag(&transients, &LagSettings::default()) {
             Ok(lag) => {
                 let error_s = (lag.lag_s - TRUE_LAG_S).abs();
                 score.near += usize::from(error_s <= 0.02);
@@ -202,7 +202,7 @@ fn changes_that_are_too_slow_are_no_answer() {
 
 #[test]
 fn a_spindle_at_one_speed_and_the_meter_of_another_machine_are_no_answer() {
-    let none = align(&[], &LagSettings::default()).expect_err("nothing to go by");
+    let none = estimate_lag(&[], &LagSettings::default()).expect_err("nothing to go by");
     assert_eq!(none, NotIdentifiable::TooFewTransients { found: 0, wanted: 4 });
     assert!(none.to_string().contains("start and stop the spindle"));
     let bench = Bench { back: 0.7, slower: 1.0, changes: 12 };
@@ -212,7 +212,7 @@ fn a_spindle_at_one_speed_and_the_meter_of_another_machine_are_no_answer() {
         let moved = |p: &PowerPoint| PowerPoint { time_s: p.time_s + shift_s + 1.9, power_w: 900.0 + p.power_w % 7.0 };
         mine.power = foreign.power.iter().map(moved).collect();
     }
-    let error = align(&one, &LagSettings::default()).expect_err("power that has nothing to do with this speed");
+    let error = estimate_lag(&one, &LagSettings::default()).expect_err("power that has nothing to do with this speed");
     assert!(matches!(error, NotIdentifiable::Unexplained { .. }), "{error}");
 }
 
@@ -247,10 +247,10 @@ fn a_drift_of_the_meters_clock_is_told_with_its_width() {
     for point in transients.iter_mut().flat_map(|one| one.power.iter_mut()) {
         point.time_s *= 1.0 + 500e-6;
     }
-    let lag = align(&transients, &LagSettings::default()).expect("known");
+    let lag = estimate_lag(&transients, &LagSettings::default()).expect("known");
     let drift = lag.drift.expect("four minutes are enough");
     assert!((drift.ppm - 500.0).abs() <= drift.uncertainty_ppm.max(150.0), "{drift:?}");
     assert!(drift.ppm > drift.uncertainty_ppm, "{drift:?}");
     let middle_s = lag.at_s;
-    assert!((lag.at(middle_s + 100.0) - lag.at(middle_s) - 1e-4 * drift.ppm).abs() < 1e-9);
+    assert!((lag.predict_lag(middle_s + 100.0) - lag.predict_lag(middle_s) - 1e-4 * drift.ppm).abs() < 1e-9);
 }

@@ -79,60 +79,60 @@ impl InferenceState {
 
 impl Inference {
     /// A pipeline that knows nothing but its settings. Where settings contradict each other (see
-    /// [`Settings::contradictions`]) the stricter one holds.
+    /// [`Settings::find_contradictions`]) the stricter one holds.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let memory = InferenceState::new(&settings);
-        Self { settings, channels: InputChannels::new(), memory, estimates: Estimates::none(0) }
+        Self { settings, channels: InputChannels::new(), memory, estimates: Estimates::without_samples(0) }
     }
 
     /// Takes one sample; samples come in the order of time.
-    pub fn infer(&mut self, sample: &Sample) -> &Estimates {
+    pub fn update_with_sample(&mut self, sample: &Sample) -> &Estimates {
         let mut inputs = self.channels.read(sample, self.memory.standby_w, &self.settings);
         self.follow_basis(inputs.basis);
         let broken = self.memory.signals.push(&inputs, &self.settings);
         if broken.gap {
-            self.memory.detector.interrupt();
+            self.memory.detector.forget_past();
         }
         if broken.stage {
-            self.memory.detector.unsettle(inputs.at_ns);
+            self.memory.detector.mark_speed_change(inputs.at_ns);
         }
         if broken.gap || broken.stage {
-            self.memory.learner.forget();
+            self.memory.learner.discard_collected();
         }
         self.take_to_reference_voltage(&mut inputs);
         let filtered_w = inputs.power.ok().and_then(|power| self.memory.signals.push_power(power, &self.settings));
-        let mut no_load = self.reference(&inputs);
+        let mut no_load = self.select_no_load_reference(&inputs);
         let tick =
             Tick { inputs: &inputs, signals: &self.memory.signals, settings: &self.settings, filtered_w, no_load };
-        let feed = self.memory.signals.feed(&inputs, &self.settings);
-        let verdict = self.memory.detector.step(&tick);
+        let feed = self.memory.signals.classify_feed(&inputs, &self.settings);
+        let verdict = self.memory.detector.update_state(&tick);
         if let Some(power_w) = verdict.settled_at_w {
             self.settled_at(power_w, feed, &inputs);
-            no_load = self.reference(&inputs);
+            no_load = self.select_no_load_reference(&inputs);
         }
-        self.follow(&inputs, filtered_w, no_load, &verdict);
-        self.estimates = self.estimate(&inputs, filtered_w, no_load, &verdict);
+        self.update_memory(&inputs, filtered_w, no_load, &verdict);
+        self.estimates = self.build_estimates(&inputs, filtered_w, no_load, &verdict);
         self.memory.loads.step(sample, &mut self.estimates, &self.settings);
         &self.estimates
     }
 
     /// No-load power at the speed of this tick: learned; or else an upper bound at this very speed; or else a rough idea,
     /// which serves the detector alone.
-    fn reference(&self, inputs: &TickInputs) -> Result<NoLoad, NoEstimate> {
-        let speed_rpm = inputs.speed.map_err(|absence| self.input(self.channels.speed, absence))?.abs();
+    fn select_no_load_reference(&self, inputs: &TickInputs) -> Result<NoLoad, NoEstimate> {
+        let speed_rpm = inputs.speed.map_err(|absence| self.explain_missing_input(self.channels.speed, absence))?.abs();
         if speed_rpm < self.settings.spindle_min_rpm {
             return Err(NoEstimate::SpindleStopped);
         }
         let (memory, settings) = (&self.memory, &self.settings);
         let stage = memory.signals.stage();
-        let learned = memory.no_load.at(stage, speed_rpm, inputs.at_ns, settings);
-        let rough = || memory.no_load.rough(stage, speed_rpm, inputs.at_ns, settings);
-        let known = learned.or_else(|reason| self.bound(stage, speed_rpm).or_else(rough).ok_or(reason));
-        known.map(|known| memory.supply.doubted(known, inputs.supply_log))
+        let learned = memory.no_load.estimate_power(stage, speed_rpm, inputs.at_ns, settings);
+        let rough = || memory.no_load.estimate_rough_power(stage, speed_rpm, inputs.at_ns, settings);
+        let known = learned.or_else(|reason| self.find_upper_bound(stage, speed_rpm).or_else(rough).ok_or(reason));
+        known.map(|known| memory.supply.add_exponent_doubt(known, inputs.supply_log))
     }
 
-    fn bound(&self, stage: usize, speed_rpm: f64) -> Option<NoLoad> {
+    fn find_upper_bound(&self, stage: usize, speed_rpm: f64) -> Option<NoLoad> {
         let bound = self.memory.upper_bound.filter(|bound| {
             let near = (bound.speed_rpm - speed_rpm).abs() <= self.settings.speed_tolerance * speed_rpm;
             near && bound.stage == stage
@@ -147,7 +147,7 @@ impl Inference {
         })
     }
 
-    fn input(&self, channel: Option<ChannelId>, absence: adapters::Absence) -> NoEstimate {
+    fn explain_missing_input(&self, channel: Option<ChannelId>, absence: adapters::Absence) -> NoEstimate {
         channel.map_or(NoEstimate::NotYet, |channel| NoEstimate::Input { channel, absence })
     }
 
@@ -157,14 +157,14 @@ impl Inference {
         let point = NoLoadPoint { stage: self.memory.signals.stage(), speed_rpm: speed.abs(), power_w };
         if feed == Feed::Off {
             let sd_w = power_w * self.settings.c2_on.hypot(self.memory.signals.noise.sd()) / 2.0;
-            self.memory.no_load.learn(point, sd_w, inputs.supply_log, inputs.at_ns, &self.settings);
+            self.memory.no_load.learn_power(point, sd_w, inputs.supply_log, inputs.at_ns, &self.settings);
         } else if power_w > 0.0 {
             self.memory.upper_bound = Some(point);
         }
     }
 
     /// Noise, standby power, upper bound and idle learning follow the state.
-    fn follow(
+    fn update_memory(
         &mut self,
         inputs: &TickInputs,
         filtered_w: Option<f64>,
@@ -179,12 +179,12 @@ impl Inference {
         let absent =
             matches!(verdict.because, Some(NoEstimate::Input { .. } | NoEstimate::Contradiction | NoEstimate::NotYet));
         let turning = verdict.state.spindle_on() != Some(false) && !absent;
-        let steady = memory.signals.steady(Pace::Settling, &self.settings) == Some(true);
+        let steady = memory.signals.is_speed_steady(Pace::Settling, &self.settings) == Some(true);
         match (inputs.power, filtered_w) {
             (Ok(power_w), Some(level_w)) if turning && steady && verdict.state != State::Cutting => {
                 memory.signals.noise.push(power_w, level_w);
             }
-            _ => memory.signals.noise.interrupt(),
+            _ => memory.signals.noise.forget_last_values(),
         }
         if !turning {
             memory.signals.forget_power();
@@ -192,7 +192,7 @@ impl Inference {
         if no_load.is_ok_and(|known| known.origin == NoLoadOrigin::UpperBound) {
             self.lower_bound(filtered_w);
         }
-        self.learn(inputs, no_load, verdict);
+        self.learn_idle_power(inputs, no_load, verdict);
     }
 
     /// A stationary level visibly below the upper bound is a better one.
@@ -200,7 +200,7 @@ impl Inference {
         let (signals, settings) = (&self.memory.signals, &self.settings);
         let (Some(bound), Some(level_w)) = (&mut self.memory.upper_bound, filtered_w) else { return };
         let agreement_w = signals.agreement_w(level_w, settings);
-        if let Some(means) = signals.window.stationary(agreement_w, settings) {
+        if let Some(means) = signals.window.find_stationary_means(agreement_w, settings) {
             let level_w = means.older_w.max(means.newer_w);
             if level_w > 0.0 && level_w < bound.power_w * (1.0 - settings.c2_off) {
                 bound.power_w = level_w;
@@ -208,12 +208,12 @@ impl Inference {
         }
     }
 
-    fn learn(&mut self, inputs: &TickInputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) {
+    fn learn_idle_power(&mut self, inputs: &TickInputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) {
         let memory = &mut self.memory;
         let rested = memory.signals.worked_ago_s(inputs.at_ns) >= self.settings.learn_guard_s && inputs.feed.is_ok();
         let running = matches!(verdict.state, State::Idle | State::Rapid | State::Cutting);
         let (Ok(power_w), Ok(speed_rpm), true) = (inputs.power, inputs.speed, running) else {
-            memory.learner.stop();
+            memory.learner.discard_unconfirmed();
             return;
         };
         let rapid = verdict.state == State::Rapid;
@@ -228,23 +228,23 @@ impl Inference {
         let known = no_load.ok().filter(|known| known.origin != NoLoadOrigin::UpperBound);
         let noise = &mut memory.signals.noise;
         let seen = if verdict.state == State::Cutting {
-            memory.learner.cut();
+            memory.learner.discard_feed_block();
             None
         } else if rested {
-            memory.learner.idle(tick, known, noise, &self.settings)
+            memory.learner.observe_idle_power(tick, known, noise, &self.settings)
         } else {
-            memory.learner.stop();
-            known.and_then(|known| memory.learner.fed(tick, known, noise))
+            memory.learner.discard_unconfirmed();
+            known.and_then(|known| memory.learner.observe_power_under_feed(tick, known, noise))
         };
         if let Some(seen) = seen {
-            memory.no_load.learn(seen.point, seen.sd_w, seen.supply_log, seen.at_ns, &self.settings);
+            memory.no_load.learn_power(seen.point, seen.sd_w, seen.supply_log, seen.at_ns, &self.settings);
             if rested && verdict.state != State::Cutting {
                 memory.follow_voltage(&seen, &self.settings);
             }
         }
     }
 
-    fn estimate(
+    fn build_estimates(
         &self,
         inputs: &TickInputs,
         filtered_w: Option<f64>,
@@ -252,21 +252,21 @@ impl Inference {
         verdict: &Detected,
     ) -> Estimates {
         let detector = &self.memory.detector;
-        let steady = self.steady(inputs, verdict);
-        let power = inputs.power.map_err(|absence| self.input(self.channels.power, absence));
+        let steady = self.check_steadiness(inputs, verdict);
+        let power = inputs.power.map_err(|absence| self.explain_missing_input(self.channels.power, absence));
         let filtered = power.and(filtered_w.ok_or(NoEstimate::NotSettled)).map(|value| Estimate {
             value: value + inputs.by_voltage_w,
             sd: self.memory.signals.filter.noise_gain() * self.memory.signals.noise.sd() * value.abs(),
         });
         let reference = match (steady, no_load) {
             (Err(NoEstimate::MachineOff), _) => Err(NoEstimate::MachineOff),
-            (_, Ok(rough)) if !rough.is_estimate() => Err(self.refusal(inputs)),
+            (_, Ok(rough)) if !rough.is_estimate() => Err(self.explain_refusal(inputs)),
             (_, known) => known,
         }
         .map(|known| self.at_voltage(known, inputs));
         // Where a no-load power is known, a speed is.
         let speed_rpm = inputs.speed.unwrap_or(0.0);
-        let (cutting_power_w, load_loss_w) = self.split(filtered, steady.and(reference), speed_rpm);
+        let (cutting_power_w, load_loss_w) = self.split_power(filtered, steady.and(reference), speed_rpm);
         let estimates = Estimates {
             at_ns: inputs.at_ns,
             state: verdict.state,
@@ -281,35 +281,35 @@ impl Inference {
             visible_cutting_power_w: self.least_visible(reference.and(no_load), speed_rpm),
             no_load_origin: reference.map_or(NoLoadOrigin::None, |known| known.origin),
             noise_gain: reference.map_or(0.0, |known| known.noise_gain),
-            visibility: self.visibility(inputs, no_load, verdict),
+            visibility: self.classify_visibility(inputs, no_load, verdict),
             gear_stage: u8::try_from(self.memory.signals.stage()).unwrap_or(0),
-            ..Estimates::none(inputs.at_ns)
+            ..Estimates::without_samples(inputs.at_ns)
         };
         if inputs.basis.in_watts() { estimates } else { self.without_watts(estimates) }
     }
 
     /// Why the table gives no estimate at this speed.
-    fn refusal(&self, inputs: &TickInputs) -> NoEstimate {
+    fn explain_refusal(&self, inputs: &TickInputs) -> NoEstimate {
         let speed_rpm = inputs.speed.unwrap_or(0.0);
         let table = &self.memory.no_load;
-        let refused = table.at(self.memory.signals.stage(), speed_rpm, inputs.at_ns, &self.settings);
+        let refused = table.estimate_power(self.memory.signals.stage(), speed_rpm, inputs.at_ns, &self.settings);
         refused.err().unwrap_or(NoEstimate::NotLearned)
     }
 
     /// Does the balance of a steady spindle hold at this tick?
-    fn steady(&self, inputs: &TickInputs, verdict: &Detected) -> Result<(), NoEstimate> {
+    fn check_steadiness(&self, inputs: &TickInputs, verdict: &Detected) -> Result<(), NoEstimate> {
         match verdict.state {
             State::Off => Err(NoEstimate::MachineOff),
             State::Standby => Err(NoEstimate::SpindleStopped),
             State::SpindleStart | State::SpeedChange => Err(NoEstimate::SpeedChanging),
             State::Unknown => Err(verdict.because.unwrap_or(NoEstimate::NotSettled)),
             State::Idle | State::Cutting | State::Rapid => {
-                inputs.power.map(|_| ()).map_err(|absence| self.input(self.channels.power, absence))
+                inputs.power.map(|_| ()).map_err(|absence| self.explain_missing_input(self.channels.power, absence))
             }
         }
     }
 
-    fn split(
+    fn split_power(
         &self,
         filtered: Estimated,
         no_load: Result<NoLoad, NoEstimate>,
@@ -329,7 +329,7 @@ impl Inference {
             return (Err(NoEstimate::BelowNoLoad), Err(NoEstimate::BelowNoLoad));
         }
         // Noise below no-load power is no negative cutting power.
-        let Some(split) = load_loss.split(excess_w.max(0.0), speed_rpm) else {
+        let Some(split) = load_loss.split_excess_power(excess_w.max(0.0), speed_rpm) else {
             return (Err(NoEstimate::Imbalance), Err(NoEstimate::Imbalance));
         };
         let by_linear_w = split.slope * split.cutting_power_w * self.settings.load_loss_sd;
@@ -349,12 +349,17 @@ impl Inference {
         let excess_w = visible_excess_w(known, signals, &self.settings)
             + self.settings.cutting_evidence * noise_w / self.settings.window_samples;
         let load_loss = self.settings.load_loss(signals.stage());
-        let split = load_loss.split(excess_w, speed_rpm).ok_or(NoEstimate::Imbalance)?;
+        let split = load_loss.split_excess_power(excess_w, speed_rpm).ok_or(NoEstimate::Imbalance)?;
         Ok(Estimate { value: split.cutting_power_w, sd: split.slope * known.sd_w })
     }
 
-    fn visibility(&self, inputs: &TickInputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) -> Visibility {
-        let fed = self.memory.signals.feed(inputs, &self.settings) == Feed::On;
+    fn classify_visibility(
+        &self,
+        inputs: &TickInputs,
+        no_load: Result<NoLoad, NoEstimate>,
+        verdict: &Detected,
+    ) -> Visibility {
+        let fed = self.memory.signals.classify_feed(inputs, &self.settings) == Feed::On;
         match verdict.state {
             State::Cutting => Visibility::Visible,
             State::Idle if fed && no_load.is_ok() => Visibility::BelowVisibility,

@@ -9,14 +9,14 @@ use crate::estimators::signals::Signals;
 impl Inference {
     /// Takes new settings and keeps what was learned; the recent past begins anew where a length changed. No-load
     /// powers that the settings newly give replace what was learned at their speeds.
-    pub fn reconfigure(&mut self, settings: Settings) {
+    pub fn apply_settings(&mut self, settings: Settings) {
         let lengths = |settings: &Settings| (settings.filter_samples, settings.window_samples);
         if lengths(&settings) != lengths(&self.settings) {
             let noise = self.memory.signals.noise;
             self.memory.signals = Signals::new(&settings);
             self.memory.signals.noise = noise;
             self.memory.learner = Learner::new(&settings);
-            self.memory.detector.interrupt();
+            self.memory.detector.forget_past();
         }
         if settings.no_load_table != self.settings.no_load_table && self.estimates.basis.in_watts() {
             self.memory.no_load = NoLoadTable::new(&settings);

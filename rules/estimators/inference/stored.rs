@@ -4,9 +4,9 @@ use super::{Inference, InferenceState, RestoreError};
 use crate::estimators::settings::Settings;
 
 impl Inference {
-    /// Everything remembered, to be stored and given to [`Inference::restore`] after a restart.
+    /// Everything remembered, to be stored and given to [`Inference::from_snapshot`] after a restart.
     #[must_use]
-    pub fn snapshot(&self) -> serde_json::Value {
+    pub fn take_snapshot(&self) -> serde_json::Value {
         serde_json::to_value(&self.memory).unwrap_or(serde_json::Value::Null)
     }
 
@@ -15,7 +15,7 @@ impl Inference {
     ///
     /// # Errors
     /// The snapshot is not one of this version.
-    pub fn restore(settings: Settings, snapshot: serde_json::Value) -> Result<Self, RestoreError> {
+    pub fn from_snapshot(settings: Settings, snapshot: serde_json::Value) -> Result<Self, RestoreError> {
         let memory: InferenceState = serde_json::from_value(snapshot)?;
         Ok(Self { memory, ..Self::new(settings) })
     }

@@ -22,28 +22,28 @@ pub(super) struct ConstantLoad {
 }
 
 impl ConstantLoad {
-    pub(super) fn step(&mut self, now: &LoadMoment<'_>, limits: &ConstantLimits, loads: &mut Loads) {
-        let (load, target) = aim(now, limits);
+    pub(super) fn update_loads(&mut self, now: &LoadMoment<'_>, limits: &ConstantLimits, loads: &mut Loads) {
+        let (load, target) = select_load_and_target(now, limits);
         loads.load_share = match load {
             _ if target <= 0.0 => Err(NoEstimate::NoTarget),
             None => Err(NoEstimate::LoadUnknown),
             Some(load) => Ok(load / target),
         };
-        loads.load_override_pct = self.wanted(now, limits, (load, target), loads);
+        loads.load_override_pct = self.compute_wanted_override(now, limits, (load, target), loads);
     }
 
-    fn wanted(
+    fn compute_wanted_override(
         &mut self,
         now: &LoadMoment<'_>,
         limits: &ConstantLimits,
         (load, target): (Option<f64>, f64),
         loads: &mut Loads,
     ) -> super::Figure {
-        let feeds = feeds(now, limits).filter(|(feed, programmed)| *feed > 0.0 && *programmed > 0.0);
+        let feeds = select_feeds(now, limits).filter(|(feed, programmed)| *feed > 0.0 && *programmed > 0.0);
         let known = load.zip(feeds).zip(now.step_s);
         let in_cut = now.cutting && now.state_s >= limits.entry_s && target > 0.0;
         let Some(((load, (feed, programmed)), step_s)) = known.filter(|_| in_cut) else {
-            self.follower.rest();
+            self.follower.reset_cut();
             self.loaded = false;
             return Err(match (load, feeds) {
                 _ if !now.cutting => NoEstimate::NotCutting,
@@ -59,14 +59,14 @@ impl ConstantLoad {
         let pct = if self.loaded {
             let now_at =
                 FedShare { at_ns: now.at_ns, step_s, share, feed: feed / programmed, exponent: limits.exponent };
-            self.follow(now, limits, now_at, (target, programmed), loads)
+            self.step_override(now, limits, now_at, (target, programmed), loads)
         } else {
             self.follower.let_go()
         };
         if (pct - 100.0).abs() < 1e-9 { Err(NoEstimate::NothingToChange) } else { Ok(pct) }
     }
 
-    fn follow(
+    fn step_override(
         &mut self,
         now: &LoadMoment<'_>,
         limits: &ConstantLimits,
@@ -75,26 +75,29 @@ impl ConstantLoad {
         loads: &mut Loads,
     ) -> f64 {
         let by_exponent = |share: f64| 100.0 * share.max(1e-6).powf(-1.0 / limits.exponent);
-        let Some(curves) = &limits.curves else { return self.follower.step(at, &limits.range, by_exponent) };
-        let unfit = curves.unfit(now).or_else(|| match curves.told(at.feed * programmed, at.share * target, target) {
-            Told::Nothing(why) => Some(why),
-            _ => None,
+        let Some(curves) = &limits.curves else { return self.follower.step_override(at, &limits.range, by_exponent) };
+        let unfit = curves.explain_unfitness(now).or_else(|| {
+            match curves.find_feed_for_target(at.feed * programmed, at.share * target, target) {
+                Told::Nothing(why) => Some(why),
+                _ => None,
+            }
         });
         loads.load_held = unfit.unwrap_or_default();
         if unfit.is_some() {
             // Without a curve the exponent may lower the feed; nothing may raise it.
-            let asked = self.follower.pct();
-            return self.follower.step(at, &limits.range, |share| by_exponent(share).min(asked));
+            let asked = self.follower.requested_pct();
+            return self.follower.step_override(at, &limits.range, |share| by_exponent(share).min(asked));
         }
-        self.follower
-            .step(at, &limits.range, |share| by_curves(curves, share, (at, target, programmed), by_exponent(share)))
+        self.follower.step_override(at, &limits.range, |share| {
+            by_curves(curves, share, (at, target, programmed), by_exponent(share))
+        })
     }
 }
 
 /// The override that the curves give for this share at the programmed feed, %.
 fn by_curves(curves: &LoadCurves, share: f64, (at, target, programmed): (FedShare, f64, f64), by_exponent: f64) -> f64 {
     let load = share * at.feed.powf(at.exponent) * target;
-    match curves.told(at.feed * programmed, load, target) {
+    match curves.find_feed_for_target(at.feed * programmed, load, target) {
         Told::Feed(feed) => 100.0 * feed / programmed,
         Told::Below => 100.0,
         Told::Nothing(_) => by_exponent.min(100.0),
@@ -102,7 +105,7 @@ fn by_curves(curves: &LoadCurves, share: f64, (at, target, programmed): (FedShar
 }
 
 /// The load, and what it should be.
-fn aim(now: &LoadMoment<'_>, limits: &ConstantLimits) -> (Option<f64>, f64) {
+fn select_load_and_target(now: &LoadMoment<'_>, limits: &ConstantLimits) -> (Option<f64>, f64) {
     let cutting_w = now.cutting_power_w.map(|(power_w, _)| power_w);
     match limits.curves.as_ref().map(|curves| curves.quantity) {
         Some(LoadQuantity::CuttingPower) => (cutting_w, limits.target_w),
@@ -115,6 +118,6 @@ fn aim(now: &LoadMoment<'_>, limits: &ConstantLimits) -> (Option<f64>, f64) {
 }
 
 /// Feed in force and programmed feed.
-fn feeds(now: &LoadMoment<'_>, limits: &ConstantLimits) -> Option<(f64, f64)> {
-    limits.curves.as_ref().map_or_else(|| now.feed_mm_min.zip(now.programmed_mm_min), |curves| curves.feeds(now))
+fn select_feeds(now: &LoadMoment<'_>, limits: &ConstantLimits) -> Option<(f64, f64)> {
+    limits.curves.as_ref().map_or_else(|| now.feed_mm_min.zip(now.programmed_mm_min), |curves| curves.select_feeds(now))
 }

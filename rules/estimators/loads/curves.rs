@@ -6,7 +6,7 @@
 use super::in_force::LoadMoment;
 use crate::estimators::regression::Refusal;
 use crate::estimators::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 
 /// Curves hold at speeds this near to their own, as a share.
 const SPEED_SHARE: f64 = 0.02;
@@ -66,7 +66,9 @@ impl LoadCurves {
         let known = QUANTITIES.iter().find(|(name, _)| *name == quantity).map(|(_, quantity)| *quantity);
         let names = || QUANTITIES.iter().map(|(name, _)| *name);
         let Some(known) = known else {
-            let near = nearest(quantity, names()).map(|near| format!("; did you mean \"{near}\"?")).unwrap_or_default();
+            let near = find_nearest_name(quantity, names())
+                .map(|near| format!("; did you mean \"{near}\"?"))
+                .unwrap_or_default();
             let all: Vec<&str> = names().collect();
             return Err(format!(
                 "curves of \"{quantity}\" cannot be followed: identify them of {}{near}",
@@ -92,7 +94,7 @@ impl LoadCurves {
     }
 
     /// Feed in force and programmed feed, in the unit of the curves.
-    pub(super) fn feeds(&self, now: &LoadMoment<'_>) -> Option<(f64, f64)> {
+    pub(super) fn select_feeds(&self, now: &LoadMoment<'_>) -> Option<(f64, f64)> {
         if !self.per_rev {
             return now.feed_mm_min.zip(now.programmed_mm_min);
         }
@@ -101,7 +103,7 @@ impl LoadCurves {
     }
 
     /// Why the curves say nothing here: power grows with speed, current does not tell power, another tool cuts otherwise.
-    pub(super) fn unfit(&self, now: &LoadMoment<'_>) -> Option<&'static str> {
+    pub(super) fn explain_unfitness(&self, now: &LoadMoment<'_>) -> Option<&'static str> {
         let Some(speed_rpm) = now.speed_rpm.map(f64::abs) else { return Some("the spindle speed is not known") };
         if (speed_rpm / self.speed_rpm - 1.0).abs() > SPEED_SHARE {
             return Some("the curves are of another spindle speed");
@@ -114,22 +116,22 @@ impl LoadCurves {
     }
 
     /// What they say of this feed and load.
-    pub(super) fn told(&self, feed: f64, load: f64, target: f64) -> Told {
+    pub(super) fn find_feed_for_target(&self, feed: f64, load: f64, target: f64) -> Told {
         let Some(shallow) = self.family.curves().first() else { return Told::Nothing("there is no curve") };
         if !(shallow.curve.feed_min..=shallow.curve.feed_max).contains(&feed) {
             return Told::Nothing("the feed is outside the curves");
         }
-        let least = shallow.curve.at(feed);
+        let least = shallow.curve.evaluate_at(feed);
         if load < least - BELOW_SD * shallow.sd {
             return Told::Below;
         }
-        let depth_mm = match self.family.depth(feed, load, 0.0) {
+        let depth_mm = match self.family.infer_depth(feed, load, 0.0) {
             Ok(inferred) => inferred.depth_mm,
             // One curve tells no depth: it holds while the load is what it says.
             Err(_) if self.family.curves().len() == 1 && load <= least + BELOW_SD * shallow.sd => shallow.depth_mm,
             Err(_) => return Told::Nothing("the load is above every curve"),
         };
         let nearest = || if load > target { 0.0 } else { shallow.curve.feed_max };
-        Told::Feed(self.family.feed(depth_mm, target).map_or_else(|_| nearest(), |found| found.feed))
+        Told::Feed(self.family.find_feed(depth_mm, target).map_or_else(|_| nearest(), |found| found.feed))
     }
 }

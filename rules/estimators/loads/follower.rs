@@ -72,27 +72,27 @@ pub(super) struct FedShare {
 
 impl OverrideFollower {
     /// The cut is over.
-    pub(super) fn rest(&mut self) {
+    pub(super) fn reset_cut(&mut self) {
         (self.smooth, self.pct) = (None, None);
         self.shares.clear();
         self.feeds.clear();
     }
 
     /// What is asked for, %.
-    pub(super) fn pct(&self) -> f64 {
+    pub(super) fn requested_pct(&self) -> f64 {
         self.pct.unwrap_or(100.0)
     }
 
     /// Nothing that would raise the feed is known: what is asked for may stay below the programmed feed, not above it.
     pub(super) fn let_go(&mut self) -> f64 {
         self.shares.clear();
-        let pct = self.pct().min(100.0);
+        let pct = self.requested_pct().min(100.0);
         self.pct = Some(pct);
         pct
     }
 
     /// Takes a moment of the cut; `wanted` gives the override for a share at the programmed feed. Gives what is asked for, %.
-    pub(super) fn step(&mut self, now: FedShare, range: &OverrideRange, wanted: impl Fn(f64) -> f64) -> f64 {
+    pub(super) fn step_override(&mut self, now: FedShare, range: &OverrideRange, wanted: impl Fn(f64) -> f64) -> f64 {
         push(&mut self.feeds, (now.at_ns, now.feed), LAG_NS);
         let greatest = self.feeds.iter().map(|(_, feed)| *feed).fold(now.feed, f64::max).max(1e-3);
         let share = now.share / now.feed.max(1e-3).powf(now.exponent);
@@ -100,17 +100,20 @@ impl OverrideFollower {
         let smooth = smooth + now.step_s / (now.step_s + SMOOTH_S) * (share - smooth);
         self.smooth = Some(smooth);
         push(&mut self.shares, (now.at_ns, smooth), span_ns(range.steady_s));
-        let Some(sure) = self.sure(range) else { return self.pct() };
+        let Some(sure) = self.find_sustained_share(range) else { return self.requested_pct() };
         let least = sure.min(smooth) * (now.feed.max(1e-3) / greatest).powf(now.exponent);
-        let pct = self.pct();
+        let pct = self.requested_pct();
         let target = |share: f64| wanted(share).clamp(range.min_pct, range.max_pct.max(range.min_pct));
-        let pct = self.lower(pct, least, range, &target).or_else(|| self.raise(pct, range, &target)).unwrap_or(pct);
+        let pct = self
+            .compute_lower_override(pct, least, range, &target)
+            .or_else(|| self.compute_raised_override(pct, range, &target))
+            .unwrap_or(pct);
         self.pct = Some(pct);
         pct
     }
 
     /// The least share of the time for which an excess has to stand; `None` before that time is over.
-    fn sure(&self, range: &OverrideRange) -> Option<f64> {
+    fn find_sustained_share(&self, range: &OverrideRange) -> Option<f64> {
         let (first_ns, newest_ns) = (self.shares.front()?.0, self.shares.back()?.0);
         let span_ns = span_ns(range.sure_s.min(range.steady_s));
         let within = self.shares.iter().rev().take_while(|(at_ns, _)| newest_ns - at_ns <= span_ns);
@@ -118,7 +121,13 @@ impl OverrideFollower {
         (newest_ns - first_ns >= span_ns - span_ns / 20).then_some(least)
     }
 
-    fn lower(&self, pct: f64, least: f64, range: &OverrideRange, target: &impl Fn(f64) -> f64) -> Option<f64> {
+    fn compute_lower_override(
+        &self,
+        pct: f64,
+        least: f64,
+        range: &OverrideRange,
+        target: &impl Fn(f64) -> f64,
+    ) -> Option<f64> {
         let now = target(least);
         let to_the_end = now <= range.min_pct && pct > range.min_pct;
         if to_the_end || now < pct - CLEAR * range.dead_band_pct.max(1.0) {
@@ -131,12 +140,17 @@ impl OverrideFollower {
         (whole && least_of < pct - range.dead_band_pct).then_some(least_of)
     }
 
-    fn raise(&mut self, pct: f64, range: &OverrideRange, target: &impl Fn(f64) -> f64) -> Option<f64> {
+    fn compute_raised_override(
+        &mut self,
+        pct: f64,
+        range: &OverrideRange,
+        target: &impl Fn(f64) -> f64,
+    ) -> Option<f64> {
         // Whoever is at the top has nothing to find out.
         if pct >= range.max_pct || target(self.smooth?) <= pct {
             return None;
         }
-        let up = target(self.steady(span_ns(range.steady_s))?);
+        let up = target(self.find_steady_load(span_ns(range.steady_s))?);
         let worth = up > pct + range.dead_band_pct || (up > pct && (up >= range.max_pct || up == 100.0));
         if !worth {
             return None;
@@ -147,7 +161,7 @@ impl OverrideFollower {
     }
 
     /// The load of a steady stretch: the greater one of the means of its halves.
-    fn steady(&self, span_ns: i64) -> Option<f64> {
+    fn find_steady_load(&self, span_ns: i64) -> Option<f64> {
         let (first_ns, newest_ns) = (self.shares.front()?.0, self.shares.back()?.0);
         // A tick may come a little early.
         if newest_ns - first_ns < span_ns - span_ns / 20 {

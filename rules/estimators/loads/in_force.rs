@@ -1,6 +1,6 @@
 //! What is needed of a sample: the loads, the feed and the feed override in force.
 
-use crate::estimators::signals::seconds;
+use crate::estimators::signals::seconds_between;
 use crate::estimators::{Estimates, State};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
@@ -32,7 +32,7 @@ pub(super) struct LoadChannels {
 
 impl Default for LoadChannels {
     fn default() -> Self {
-        let of = |name| ChannelId::of(name).expect("the name stands in the table, which a test checks");
+        let of = |name| ChannelId::from_name(name).expect("the name stands in the table, which a test checks");
         Self {
             override_pct: of("feed_override_pct"),
             feed: of("feed_mm_min"),
@@ -81,7 +81,7 @@ pub(super) struct LoadMoment<'a> {
 }
 
 impl LoadChannels {
-    pub(super) fn moment<'a>(
+    pub(super) fn read_moment<'a>(
         &self,
         sample: &'a Sample,
         estimates: &Estimates,
@@ -93,9 +93,9 @@ impl LoadChannels {
         let by_feed = feed.zip(programmed.filter(|programmed| *programmed > 0.0)).map(|(feed, of)| 100.0 * feed / of);
         LoadMoment {
             at_ns: sample.at_ns,
-            step_s: last_ns.map(|last_ns| seconds(last_ns, sample.at_ns)),
+            step_s: last_ns.map(|last_ns| seconds_between(last_ns, sample.at_ns)),
             cutting: estimates.state == State::Cutting,
-            state_s: seconds(estimates.since_ns, sample.at_ns),
+            state_s: seconds_between(estimates.since_ns, sample.at_ns),
             cutting_power_w: estimates.cutting_power_w.ok().map(|it| (it.value, it.sd)),
             spindle_power_w: number(self.spindle_power),
             spindle_current_a: number(self.current),

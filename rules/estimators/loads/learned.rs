@@ -42,13 +42,13 @@ pub(super) struct LearnedLoad {
 }
 
 impl LearnedLoad {
-    pub(super) fn forget(&mut self, program: &str) {
+    pub(super) fn forget_program(&mut self, program: &str) {
         let beginning = format!("{program}/");
         self.places.retain(|key, _| !key.starts_with(&beginning));
-        self.follower.rest();
+        self.follower.reset_cut();
     }
 
-    pub(super) fn step(
+    pub(super) fn update_loads(
         &mut self,
         now: &LoadMoment<'_>,
         sample: &Sample,
@@ -60,7 +60,7 @@ impl LearnedLoad {
         self.follow_place(sample, channels);
         let power = now.cutting_power_w.filter(|_| now.cutting);
         let (Some((power_w, sd_w)), Some(key), Some(step_s)) = (power, &self.key, now.step_s) else {
-            self.follower.rest();
+            self.follower.reset_cut();
             return;
         };
         // Along the path where the feed is known, otherwise along the time, as far as the place goes.
@@ -72,30 +72,30 @@ impl LearnedLoad {
         match place {
             Some(place) if learned => {
                 let place = place.clone();
-                self.compare(&place, now, (power_w, sd_w, step_s, feed), limits, loads);
+                self.compare_with_place(&place, now, (power_w, sd_w, step_s, feed), limits, loads);
                 return;
             }
             Some(place) if now.state_s >= limits.entry_s => {
                 // A counter that was reset begins anew; what was seen before counts on.
                 place.first_part = place.first_part.min(part);
-                place.learn(self.path_mm, power_w, feed, step_s);
+                place.learn_moment(self.path_mm, power_w, feed, step_s);
             }
             None if now.state_s >= limits.entry_s => {
                 let (key, used) = (key.clone(), self.changes);
                 self.make_room();
                 let mut place = Place::new(part, used);
-                place.learn(self.path_mm, power_w, feed, step_s);
+                place.learn_moment(self.path_mm, power_w, feed, step_s);
                 self.places.insert(key, place);
             }
             _ => {}
         }
-        self.follower.rest();
+        self.follower.reset_cut();
         let none = Err(NoEstimate::PlaceNotLearned);
         (loads.learned_power_w, loads.learned_band_w, loads.learned_peak_w) = (none, none, none);
         loads.learned_override_pct = none;
     }
 
-    fn compare(
+    fn compare_with_place(
         &mut self,
         place: &Place,
         now: &LoadMoment<'_>,
@@ -103,14 +103,14 @@ impl LearnedLoad {
         limits: &LearnedLimits,
         loads: &mut Loads,
     ) {
-        let expected = place.expected(self.path_mm);
-        let feed = place.relative(feed);
+        let expected = place.predict_power(self.path_mm);
+        let feed = place.to_relative_feed(feed);
         let by_feed = feed.powf(limits.exponent);
         loads.learned_power_w = Ok(expected.power_w * by_feed);
         loads.learned_band_w = Ok(expected.band_w * by_feed);
         loads.learned_peak_w = Ok(place.peak_w);
         if now.state_s < limits.entry_s {
-            self.follower.rest();
+            self.follower.reset_cut();
             return;
         }
         // The shares between which nothing is asked for; what the meter cannot tell is inside.
@@ -124,7 +124,7 @@ impl LearnedLoad {
         };
         let share = power_w / expected.power_w;
         let at = FedShare { at_ns: now.at_ns, step_s, share, feed, exponent: limits.exponent };
-        let pct = self.follower.step(at, &limits.range, wanted);
+        let pct = self.follower.step_override(at, &limits.range, wanted);
         loads.learned_override_pct =
             if (pct - 100.0).abs() < 1e-9 { Err(NoEstimate::NothingToChange) } else { Ok(pct) };
     }

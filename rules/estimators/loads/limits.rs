@@ -46,12 +46,12 @@ pub(super) struct LoadSettings {
 }
 
 impl LoadSettings {
-    pub(super) fn of(settings: &Settings, sample: &Sample, channels: &LoadChannels) -> Self {
+    pub(super) fn from_settings(settings: &Settings, sample: &Sample, channels: &LoadChannels) -> Self {
         let text = |channel| sample.text(channel).unwrap_or_default();
         let (tool, operation) = (text(channels.tool), text(channels.operation));
         let own;
         let settings = if settings.has_places() {
-            own = settings.at(tool, operation);
+            own = settings.resolve_for_place(tool, operation);
             &own
         } else {
             settings
@@ -90,7 +90,7 @@ impl LoadSettings {
     }
 
     /// Do they hold for this sample?
-    pub(super) fn holds(&self, sample: &Sample, channels: &LoadChannels) -> bool {
+    pub(super) fn applies_to_sample(&self, sample: &Sample, channels: &LoadChannels) -> bool {
         let text = |channel| sample.text(channel).unwrap_or_default();
         self.tool == text(channels.tool) && self.operation == text(channels.operation)
     }

@@ -115,18 +115,18 @@ impl LoadEstimator {
 
     /// Everything that was learned of this program is learned anew.
     pub fn learn_anew(&mut self, program: &str) {
-        self.learned.forget(program);
+        self.learned.forget_program(program);
     }
 
     /// Takes one tick: after state and cutting power are known, fills in what is known of the load.
     pub fn step(&mut self, sample: &Sample, estimates: &mut Estimates, settings: &Settings) {
-        let moment = self.channels.moment(sample, estimates, self.last_ns.replace(sample.at_ns));
-        let known = self.in_force.take().filter(|known| known.holds(sample, &self.channels));
-        let limits = known.unwrap_or_else(|| LoadSettings::of(settings, sample, &self.channels));
+        let moment = self.channels.read_moment(sample, estimates, self.last_ns.replace(sample.at_ns));
+        let known = self.in_force.take().filter(|known| known.applies_to_sample(sample, &self.channels));
+        let limits = known.unwrap_or_else(|| LoadSettings::from_settings(settings, sample, &self.channels));
         let mut loads = Loads::none(NoEstimate::NotCutting);
         loads.feed_in_force_pct = moment.in_force_pct.ok_or(NoEstimate::FeedUnknown);
-        self.constant.step(&moment, &limits.constant, &mut loads);
-        self.learned.step(&moment, sample, &self.channels, &limits.learned, &mut loads);
+        self.constant.update_loads(&moment, &limits.constant, &mut loads);
+        self.learned.update_loads(&moment, sample, &self.channels, &limits.learned, &mut loads);
         self.in_force = Some(limits);
         estimates.loads = loads;
     }

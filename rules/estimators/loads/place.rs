@@ -64,7 +64,7 @@ impl Place {
     }
 
     /// One more moment, weighted by its time; `feed` is the override in force, as a share.
-    pub(super) fn learn(&mut self, path_mm: f64, power_w: f64, feed: f64, step_s: f64) {
+    pub(super) fn learn_moment(&mut self, path_mm: f64, power_w: f64, feed: f64, step_s: f64) {
         let (off_path, off_power) = (path_mm - self.path_mm, power_w - self.power_w);
         self.seconds += step_s;
         let share = step_s / self.seconds;
@@ -78,7 +78,7 @@ impl Place {
     }
 
     /// What it takes at this path, at the feed that it was learned at.
-    pub(super) fn expected(&self, path_mm: f64) -> Expected {
+    pub(super) fn predict_power(&self, path_mm: f64) -> Expected {
         let (mut slope, mut off, mut left, mut doubt) = (0.0, 0.0, self.power_square, ALIKE_S / self.seconds);
         if self.path_square > 0.0 {
             let half = PATH_SD * (self.path_square / self.seconds).sqrt();
@@ -93,7 +93,7 @@ impl Place {
     }
 
     /// This override, as a share of the one that it was learned at.
-    pub(super) fn relative(&self, feed: f64) -> f64 {
+    pub(super) fn to_relative_feed(&self, feed: f64) -> f64 {
         feed.max(1e-3) / self.feed.max(1e-3)
     }
 

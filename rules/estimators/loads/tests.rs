@@ -27,7 +27,7 @@ struct Loop {
 
 impl Loop {
     fn new(seed: u64, noise: f64, settings: Settings) -> Self {
-        let (estimates, sample) = (Estimates::none(0), Sample::empty(0));
+        let (estimates, sample) = (Estimates::without_samples(0), Sample::new_empty(0));
         let rng = Pcg64Mcg::seed_from_u64(seed);
         let powers = VecDeque::from(vec![0.0; 5]);
         Self {
@@ -44,7 +44,7 @@ impl Loop {
     }
 
     fn set(&mut self, name: &str, value: Value) {
-        self.sample.set(ChannelId::of(name).expect("a channel"), Slot { value: Ok(value), age_ns: 0 });
+        self.sample.set_slot(ChannelId::from_name(name).expect("a channel"), Slot { value: Ok(value), age_ns: 0 });
     }
 
     /// One tick; `heaviness` is the cutting power at the programmed feed, W. Gives what is asked for, %.
@@ -76,8 +76,8 @@ impl Loop {
 
 fn settings(target_w: f64, most_pct: f64) -> Settings {
     let mut settings = Settings::default();
-    settings.set("constant_load_target_w", target_w).expect("in range");
-    settings.set("constant_load_max_pct", most_pct).expect("in range");
+    settings.set_value("constant_load_target_w", target_w).expect("in range");
+    settings.set_value("constant_load_max_pct", most_pct).expect("in range");
     settings
 }
 

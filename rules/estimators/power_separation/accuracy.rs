@@ -5,10 +5,10 @@
 //! practice, 0.15 and 0.25 of the cutting power, would have told from the same power and the same no-load power.
 
 use super::cuts::SteadyPoint;
-use super::forms::fitted;
-use super::load_loss::near;
+use super::forms::fit_best_form;
+use super::load_loss::is_same_speed;
 use crate::estimators::LoadLossLaw;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use serde::Serialize;
 
 /// Fixed load losses that were usual before: shares of the cutting power.
@@ -45,13 +45,13 @@ pub struct Accuracy {
 }
 
 /// Accuracy of the separation on these points of one gear stage; `None` where too few cuts are left to learn from without one.
-pub(super) fn accuracy(points: &[&SteadyPoint], speeds: &[f64]) -> Option<Accuracy> {
+pub(super) fn evaluate_accuracy(points: &[&SteadyPoint], speeds: &[f64]) -> Option<Accuracy> {
     let groups: Vec<GroupAccuracy> =
-        points.iter().filter(|point| point.cut).filter_map(|cut| group(points, speeds, cut)).collect();
+        points.iter().filter(|point| point.cut).filter_map(|cut| evaluate_cut(points, speeds, cut)).collect();
     if groups.is_empty() {
         return None;
     }
-    let mean = |of: &dyn Fn(&GroupAccuracy) -> f64| groups.iter().map(of).sum::<f64>() / count(groups.len());
+    let mean = |of: &dyn Fn(&GroupAccuracy) -> f64| groups.iter().map(of).sum::<f64>() / count_to_f64(groups.len());
     Some(Accuracy {
         mean: mean(&|it| it.error),
         greatest: groups.iter().map(|it| it.error).fold(0.0, f64::max),
@@ -60,20 +60,21 @@ pub(super) fn accuracy(points: &[&SteadyPoint], speeds: &[f64]) -> Option<Accura
     })
 }
 
-fn group(points: &[&SteadyPoint], speeds: &[f64], cut: &SteadyPoint) -> Option<GroupAccuracy> {
+fn evaluate_cut(points: &[&SteadyPoint], speeds: &[f64], cut: &SteadyPoint) -> Option<GroupAccuracy> {
     let others: Vec<&SteadyPoint> = points.iter().copied().filter(|it| !std::ptr::eq(*it, cut)).collect();
-    let at_speed = |point: &&&SteadyPoint| near(point.speed_rpm, cut.speed_rpm);
-    let cuts_left = others.iter().filter(|it| it.cut && near(it.speed_rpm, cut.speed_rpm)).count();
+    let at_speed = |point: &&&SteadyPoint| is_same_speed(point.speed_rpm, cut.speed_rpm);
+    let cuts_left = others.iter().filter(|it| it.cut && is_same_speed(it.speed_rpm, cut.speed_rpm)).count();
     if cuts_left == 0 || cut.cutting_power_w <= 0.0 {
         return None;
     }
     let idle: Vec<f64> = others.iter().filter(at_speed).filter(|it| !it.cut).map(|it| it.power.mean).collect();
-    let no_load_w = idle.iter().sum::<f64>() / count(idle.len());
-    let estimated =
-        |loss: LoadLossLaw| loss.split(cut.power.mean - no_load_w, cut.speed_rpm).map(|split| split.cutting_power_w);
+    let no_load_w = idle.iter().sum::<f64>() / count_to_f64(idle.len());
+    let estimated = |loss: LoadLossLaw| {
+        loss.split_excess_power(cut.power.mean - no_load_w, cut.speed_rpm).map(|split| split.cutting_power_w)
+    };
     let error = |estimated_w: f64| (estimated_w - cut.cutting_power_w).abs() / cut.cutting_power_w;
-    let estimated_w = estimated(fitted(&others, speeds).ok()?.load_loss())?;
-    let [first, second] = FIXED_LOSSES.map(|share| LoadLossLaw::constant(share, 0.0));
+    let estimated_w = estimated(fit_best_form(&others, speeds).ok()?.load_loss())?;
+    let [first, second] = FIXED_LOSSES.map(|share| LoadLossLaw::with_constant_coefficients(share, 0.0));
     Some(GroupAccuracy {
         at_s: cut.at_s,
         speed_rpm: cut.speed_rpm,

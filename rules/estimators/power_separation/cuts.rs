@@ -4,8 +4,8 @@ use super::reference::Referenced;
 use super::rows::MachineRow;
 use super::stretches::{SAME_SPEED, Stretch, settled_from};
 use crate::estimators::State;
-use crate::estimators::regression::{SteadyLevel, level, without_pulses};
-use crate::statistics::count;
+use crate::estimators::regression::{SteadyLevel, estimate_level, without_pulses};
+use crate::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 
@@ -41,7 +41,7 @@ struct ConstantConditions {
 }
 
 /// The idle stretches and the steady cuts, in the order of time.
-pub(super) fn points(
+pub(super) fn collect_points(
     recording: &Recording,
     rows: &[MachineRow],
     idle: &[Stretch],
@@ -51,16 +51,16 @@ pub(super) fn points(
     let mut open: Vec<usize> = Vec::new();
     for (at, row) in rows.iter().enumerate() {
         let usable = row.state == State::Cutting && row.power_w.is_some() && reference.power_w[at].is_some();
-        let goes_on = usable && open.first().is_none_or(|first| same(recording, &rows[*first], row));
+        let goes_on = usable && open.first().is_none_or(|first| have_same_conditions(recording, &rows[*first], row));
         if !goes_on {
-            found.extend(close(rows, &open, reference));
+            found.extend(close_cut(rows, &open, reference));
             open.clear();
         }
         if usable {
             open.push(at);
         }
     }
-    found.extend(close(rows, &open, reference));
+    found.extend(close_cut(rows, &open, reference));
     subtract_idle(&mut found, rows, idle, reference);
     found.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     found
@@ -72,8 +72,8 @@ fn of_idle(stretch: &Stretch) -> SteadyPoint {
     SteadyPoint { stage, speed_rpm, at_s, power, cutting_power_w: 0.0, cut: false }
 }
 
-fn conditions(recording: &Recording, row: &MachineRow) -> ConstantConditions {
-    let number = |name: &str| recording.numbers(name).and_then(|numbers| numbers.get(row.row)).unwrap_or(0.0);
+fn read_conditions(recording: &Recording, row: &MachineRow) -> ConstantConditions {
+    let number = |name: &str| recording.find_numbers(name).and_then(|numbers| numbers.get(row.row)).unwrap_or(0.0);
     ConstantConditions {
         stage: row.stage,
         speed_rpm: row.speed_rpm.unwrap_or(0.0),
@@ -82,13 +82,13 @@ fn conditions(recording: &Recording, row: &MachineRow) -> ConstantConditions {
     }
 }
 
-fn same(recording: &Recording, a: &MachineRow, b: &MachineRow) -> bool {
-    let (a, b) = (conditions(recording, a), conditions(recording, b));
+fn have_same_conditions(recording: &Recording, a: &MachineRow, b: &MachineRow) -> bool {
+    let (a, b) = (read_conditions(recording, a), read_conditions(recording, b));
     let near = |a: f64, b: f64| (a - b).abs() <= SAME_SPEED * a.abs().max(b.abs());
     a.stage == b.stage && near(a.speed_rpm, b.speed_rpm) && near(a.feed, b.feed) && near(a.depth, b.depth)
 }
 
-fn close(rows: &[MachineRow], open: &[usize], reference: &Referenced) -> Option<SteadyPoint> {
+fn close_cut(rows: &[MachineRow], open: &[usize], reference: &Referenced) -> Option<SteadyPoint> {
     let (begin_s, end_s) = (rows[*open.first()?].time_s + GUARD_S, rows[*open.last()?].time_s - GUARD_S);
     let inner: Vec<usize> =
         open.iter().copied().filter(|at| rows[*at].time_s >= begin_s && rows[*at].time_s <= end_s).collect();
@@ -101,13 +101,14 @@ fn close(rows: &[MachineRow], open: &[usize], reference: &Referenced) -> Option<
     }
     let (kept_s, kept_w) = without_pulses(&time_s[settled..], &power_w[settled..]);
     let kept = &inner[settled..];
-    let mean =
-        |of: &dyn Fn(usize) -> Option<f64>| kept.iter().filter_map(|at| of(*at)).sum::<f64>() / count(kept.len());
+    let mean = |of: &dyn Fn(usize) -> Option<f64>| {
+        kept.iter().filter_map(|at| of(*at)).sum::<f64>() / count_to_f64(kept.len())
+    };
     Some(SteadyPoint {
         stage: rows[kept[0]].stage,
         speed_rpm: mean(&|at| rows[at].speed_rpm),
         at_s: 0.5 * (from_s + to_s),
-        power: level(&kept_s, &kept_w)?,
+        power: estimate_level(&kept_s, &kept_w)?,
         cutting_power_w: mean(&|at| reference.power_w[at]),
         cut: true,
     })
@@ -125,7 +126,7 @@ fn subtract_idle(points: &mut [SteadyPoint], rows: &[MachineRow], idle: &[Stretc
             .filter(|(row, _)| inside(row))
             .filter_map(|(_, power)| *power)
             .collect();
-        (!values.is_empty()).then(|| values.iter().sum::<f64>() / count(values.len()))
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / count_to_f64(values.len()))
     };
     let of_stretch: Vec<Option<f64>> = idle.iter().map(shown).collect();
     // Idle stretches come first, in their order.
@@ -142,7 +143,7 @@ fn subtract_idle(points: &mut [SteadyPoint], rows: &[MachineRow], idle: &[Stretc
         };
         let own: Vec<f64> = shown.iter().filter(near).map(|(.., power)| *power).collect();
         if !own.is_empty() {
-            point.cutting_power_w -= own.iter().sum::<f64>() / count(own.len());
+            point.cutting_power_w -= own.iter().sum::<f64>() / count_to_f64(own.len());
         }
     }
 }

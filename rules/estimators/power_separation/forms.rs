@@ -11,10 +11,10 @@
 //! ([`UnequalScatter`]).
 
 use super::cuts::SteadyPoint;
-use super::load_loss::near;
+use super::load_loss::is_same_speed;
 use crate::estimators::LoadLossLaw;
-use crate::estimators::regression::{Column, FTest, Intercept, Refusal, Regression, UnequalScatter, fit};
-use crate::statistics::count;
+use crate::estimators::regression::{Column, FTest, Intercept, Refusal, Regression, UnequalScatter, fit_unweighted};
+use crate::statistics::count_to_f64;
 use serde::Serialize;
 
 /// What each form leaves, residual standard deviation, W.
@@ -54,11 +54,11 @@ impl FittedLoss {
 ///
 /// # Errors
 /// Columns that cannot be told apart, too few points.
-pub(super) fn fitted(points: &[&SteadyPoint], speeds: &[f64]) -> Result<FittedLoss, Refusal> {
+pub(super) fn fit_best_form(points: &[&SteadyPoint], speeds: &[f64]) -> Result<FittedLoss, Refusal> {
     let at = speeds.len();
     let of_form = |speed_rpm: Option<f64>| {
-        let (power, columns) = design(points, speeds, speed_rpm, false);
-        let regression = fit(&power, &columns, Intercept::None)?;
+        let (power, columns) = build_design(points, speeds, speed_rpm, false);
+        let regression = fit_unweighted(&power, &columns, Intercept::None)?;
         let scatter = UnequalScatter::new(&regression, &columns, &[at, at + 1]);
         Ok::<_, Refusal>(FittedLoss { regression, speed_rpm, residuals: None, scatter, at })
     };
@@ -66,7 +66,7 @@ pub(super) fn fitted(points: &[&SteadyPoint], speeds: &[f64]) -> Result<FittedLo
     if at < 2 {
         return Ok(same);
     }
-    let torque = of_form(Some(speeds.iter().sum::<f64>() / count(at)))?;
+    let torque = of_form(Some(speeds.iter().sum::<f64>() / count_to_f64(at)))?;
     let (same_sd_w, torque_sd_w) = (same.regression.residual_sd, torque.regression.residual_sd);
     let residuals = Some(FormResiduals { same_at_every_speed_w: same_sd_w, with_torque_squared_w: torque_sd_w });
     // Where both leave the same, the source's form holds.
@@ -81,24 +81,24 @@ pub(super) fn by_speed(points: &[&SteadyPoint], speeds: &[f64], together: &Fitte
         return None;
     }
     let cuts: Vec<&SteadyPoint> = points.iter().copied().filter(|point| point.cut).collect();
-    let (mut power, shorter) = design(&cuts, speeds, together.speed_rpm, false);
-    let (_, longer) = design(&cuts, speeds, None, true);
+    let (mut power, shorter) = build_design(&cuts, speeds, together.speed_rpm, false);
+    let (_, longer) = build_design(&cuts, speeds, None, true);
     for (power_w, cut) in power.values.iter_mut().zip(&cuts) {
-        let at = speeds.iter().position(|speed| near(*speed, cut.speed_rpm))?;
+        let at = speeds.iter().position(|speed| is_same_speed(*speed, cut.speed_rpm))?;
         *power_w -= together.regression.coefficients[at].value;
     }
-    let fit_of = |columns: &[Column]| fit(&power, &columns[speeds.len()..], Intercept::None).ok();
-    fit_of(&longer)?.against(&fit_of(&shorter)?)
+    let fit_of = |columns: &[Column]| fit_unweighted(&power, &columns[speeds.len()..], Intercept::None).ok();
+    fit_of(&longer)?.test_against(&fit_of(&shorter)?)
 }
 
 /// The spindle power, and the columns: no-load power of each speed, then Pc and Pc^2, for all speeds together or for each. `speed_rpm`: where a1 is stated, if it
 /// goes with 1/n^2.
-fn design(points: &[&SteadyPoint], speeds: &[f64], speed_rpm: Option<f64>, each: bool) -> (Column, Vec<Column>) {
+fn build_design(points: &[&SteadyPoint], speeds: &[f64], speed_rpm: Option<f64>, each: bool) -> (Column, Vec<Column>) {
     let used: Vec<&&SteadyPoint> =
-        points.iter().filter(|point| speeds.iter().any(|it| near(*it, point.speed_rpm))).collect();
+        points.iter().filter(|point| speeds.iter().any(|it| is_same_speed(*it, point.speed_rpm))).collect();
     let column =
         |name: String, of: &dyn Fn(&SteadyPoint) -> f64| Column::new(name, used.iter().map(|it| of(it)).collect());
-    let at = |speed: f64, point: &SteadyPoint| f64::from(u8::from(near(speed, point.speed_rpm)));
+    let at = |speed: f64, point: &SteadyPoint| f64::from(u8::from(is_same_speed(speed, point.speed_rpm)));
     let unit = LoadLossLaw { linear: 0.0, quadratic_per_w: 1.0, speed_rpm };
     let y = column("spindle_power_w".to_owned(), &|point| point.power.mean);
     let mut columns: Vec<Column> =

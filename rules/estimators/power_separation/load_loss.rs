@@ -3,15 +3,15 @@
 //! Every speed has a no-load power of its own, fitted along with a0 and a1, so that its error is in their intervals. Over several
 //! speeds a1 has one of two [`forms`](super::forms); from one speed alone, nothing tells which, and the result says so.
 
-use super::accuracy::{Accuracy, accuracy};
-use super::cuts::{SteadyPoint, points};
-use super::forms::{FittedLoss, FormResiduals, by_speed, fitted};
-use super::reference::{PowerReference, ReferenceChoice, referenced};
-use super::rows::rows;
-use super::stretches::{SAME_SPEED, stretches};
+use super::accuracy::{Accuracy, evaluate_accuracy};
+use super::cuts::{SteadyPoint, collect_points};
+use super::forms::{FittedLoss, FormResiduals, by_speed, fit_best_form};
+use super::reference::{PowerReference, ReferenceChoice, select_reference};
+use super::rows::classify_rows;
+use super::stretches::{SAME_SPEED, find_stretches};
 use crate::estimators::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, UnequalScatter, t_quantile};
 use crate::estimators::{LoadLossLaw, STAGES};
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 
@@ -105,9 +105,9 @@ pub struct LoadLossLearned {
 /// # Errors
 /// A [`Refusal`] where nothing tells the cutting power, or no stage has cuts that differ enough.
 pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Result<LoadLossLearned, Refusal> {
-    let rows = rows(recording)?;
-    let reference = referenced(recording, &rows, choice)?;
-    let points = points(recording, &rows, &stretches(&rows, IDLE_S), &reference);
+    let rows = classify_rows(recording)?;
+    let reference = select_reference(recording, &rows, choice)?;
+    let points = collect_points(recording, &rows, &find_stretches(&rows, IDLE_S), &reference);
     let mut learned = LoadLossLearned {
         reference: reference.reference,
         stages: Vec::new(),
@@ -120,14 +120,14 @@ pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Re
         if own.iter().any(|point| point.cut) {
             match of_stage(&own, reference.reference) {
                 Ok(found) => learned.stages.push(found),
-                Err(refusal) => learned.refused.push(refusal.at(format!("gear stage {stage}"))),
+                Err(refusal) => learned.refused.push(refusal.with_place(format!("gear stage {stage}"))),
             }
         }
     }
     if learned.stages.is_empty() {
-        return Err(learned.refused.into_iter().next().unwrap_or_else(nothing));
+        return Err(learned.refused.into_iter().next().unwrap_or_else(refuse_without_cuts));
     }
-    learned.notes = learned.stages.iter().flat_map(notes).collect();
+    learned.notes = learned.stages.iter().flat_map(list_notes).collect();
     learned.points = points;
     Ok(learned)
 }
@@ -137,14 +137,14 @@ pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Re
 fn beside_cuts<'a>(points: &[&'a SteadyPoint]) -> Vec<&'a SteadyPoint> {
     let mut used = vec![false; points.len()];
     for (at, cut) in points.iter().enumerate().filter(|(_, point)| point.cut) {
-        let idle = |other: &usize| !points[*other].cut && near(points[*other].speed_rpm, cut.speed_rpm);
+        let idle = |other: &usize| !points[*other].cut && is_same_speed(points[*other].speed_rpm, cut.speed_rpm);
         let (before, after) = ((0..at).rev().find(idle), (at + 1..points.len()).find(idle));
         [Some(at), before, after].into_iter().flatten().for_each(|kept| used[kept] = true);
     }
     points.iter().zip(used).filter_map(|(point, used)| used.then_some(*point)).collect()
 }
 
-fn nothing() -> Refusal {
+fn refuse_without_cuts() -> Refusal {
     let what = "no steady cut of 5 s or longer in which both power and reference are known";
     Refusal::new(
         RefusalKind::TooFew,
@@ -155,59 +155,59 @@ fn nothing() -> Refusal {
 
 fn of_stage(points: &[&SteadyPoint], reference: PowerReference) -> Result<StageLearned, Refusal> {
     let cuts: Vec<f64> = points.iter().filter(|point| point.cut).map(|point| point.cutting_power_w).collect();
-    let speeds = speeds(points);
+    let speeds = list_cut_speeds(points);
     check_span(&cuts)?;
     check_idle(points, &speeds)?;
-    let fitted = fitted(points, &speeds)?;
+    let fitted = fit_best_form(points, &speeds)?;
     let regression = &fitted.regression;
     check_share(points, regression, &speeds)?;
-    let mean = cuts.iter().sum::<f64>() / count(cuts.len());
-    let own = Widening::of(&fitted, speeds.len(), reference);
+    let mean = cuts.iter().sum::<f64>() / count_to_f64(cuts.len());
+    let own = Widening::from_fit(&fitted, speeds.len(), reference);
     let stage = StageLearned {
         stage: points[0].stage,
-        linear: own.told(-1.0, 1.0, 0.0),
-        quadratic_per_w: own.told(0.0, 0.0, 1.0),
+        linear: own.combine_coefficients(-1.0, 1.0, 0.0),
+        quadratic_per_w: own.combine_coefficients(0.0, 0.0, 1.0),
         speed_rpm: fitted.speed_rpm,
         form_residuals: fitted.residuals,
-        share_at_mean: own.told(-1.0, 1.0, mean),
-        cutting_power_w: (least(&cuts), greatest(&cuts), mean),
+        share_at_mean: own.combine_coefficients(-1.0, 1.0, mean),
+        cutting_power_w: (find_least(&cuts), find_greatest(&cuts), mean),
         speeds_rpm: speeds.clone(),
         cuts: cuts.len(),
         idle: points.len() - cuts.len(),
         residual_sd_w: regression.residual_sd,
         variance_inflation: regression.coefficients[speeds.len()].variance_inflation.unwrap_or(1.0),
         by_speed: by_speed(points, &speeds, &fitted),
-        accuracy: accuracy(points, &speeds),
+        accuracy: evaluate_accuracy(points, &speeds),
     };
-    credible(&stage)?;
+    check_credibility(&stage)?;
     Ok(stage)
 }
 
-fn least(values: &[f64]) -> f64 {
+fn find_least(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-fn greatest(values: &[f64]) -> f64 {
+fn find_greatest(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Speeds that have cuts.
-fn speeds(points: &[&SteadyPoint]) -> Vec<f64> {
+fn list_cut_speeds(points: &[&SteadyPoint]) -> Vec<f64> {
     let mut speeds: Vec<f64> = Vec::new();
     for point in points.iter().filter(|point| point.cut) {
-        if !speeds.iter().any(|known| near(*known, point.speed_rpm)) {
+        if !speeds.iter().any(|known| is_same_speed(*known, point.speed_rpm)) {
             speeds.push(point.speed_rpm);
         }
     }
     speeds
 }
 
-pub(super) fn near(a: f64, b: f64) -> bool {
+pub(super) fn is_same_speed(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED
 }
 
 fn check_span(cuts: &[f64]) -> Result<(), Refusal> {
-    let (low, high) = (least(cuts), greatest(cuts));
+    let (low, high) = (find_least(cuts), find_greatest(cuts));
     let mut sorted = cuts.to_vec();
     sorted.sort_by(f64::total_cmp);
     let levels = 1 + sorted.windows(2).filter(|pair| pair[1] > pair[0] + 0.05 * high.abs()).count();
@@ -227,7 +227,7 @@ fn check_span(cuts: &[f64]) -> Result<(), Refusal> {
 }
 
 fn check_idle(points: &[&SteadyPoint], speeds: &[f64]) -> Result<(), Refusal> {
-    let idles = |speed: &&f64| points.iter().any(|point| !point.cut && near(**speed, point.speed_rpm));
+    let idles = |speed: &&f64| points.iter().any(|point| !point.cut && is_same_speed(**speed, point.speed_rpm));
     match speeds.iter().find(|speed| !idles(speed)) {
         None => Ok(()),
         Some(speed) => {
@@ -241,7 +241,7 @@ fn check_idle(points: &[&SteadyPoint], speeds: &[f64]) -> Result<(), Refusal> {
 /// Cutting power and spindle power must be of one size.
 fn check_share(points: &[&SteadyPoint], regression: &Regression, speeds: &[f64]) -> Result<(), Refusal> {
     let no_load = |point: &SteadyPoint| {
-        let at = speeds.iter().position(|speed| near(*speed, point.speed_rpm)).unwrap_or(0);
+        let at = speeds.iter().position(|speed| is_same_speed(*speed, point.speed_rpm)).unwrap_or(0);
         regression.coefficients[at].value
     };
     let cuts = || points.iter().filter(|point| point.cut);
@@ -267,7 +267,7 @@ struct Widening<'a> {
 }
 
 impl<'a> Widening<'a> {
-    fn of(fitted: &'a FittedLoss, at: usize, reference: PowerReference) -> Self {
+    fn from_fit(fitted: &'a FittedLoss, at: usize, reference: PowerReference) -> Self {
         let value = |at: usize| fitted.regression.coefficients[at].value;
         let scale = match reference {
             PowerReference::Removal { relative_sd } => relative_sd * relative_sd,
@@ -277,9 +277,9 @@ impl<'a> Widening<'a> {
     }
 
     /// `offset + a (1 + a0) + b a1`.
-    fn told(&self, offset: f64, a: f64, b: f64) -> IntervalEstimate {
+    fn combine_coefficients(&self, offset: f64, a: f64, b: f64) -> IntervalEstimate {
         let value = offset + a * self.gain + b * self.quadratic;
-        let (scatter, degrees_of_freedom) = self.scatter.of(&[a, b]);
+        let (scatter, degrees_of_freedom) = self.scatter.compute_variance(&[a, b]);
         let by_scale = self.scale * (a * self.gain + 2.0 * b * self.quadratic).powi(2);
         let standard_error = (scatter + by_scale).sqrt();
         let half = t_quantile(0.5 + 0.5 * CONFIDENCE, degrees_of_freedom) * standard_error;
@@ -287,7 +287,7 @@ impl<'a> Widening<'a> {
     }
 }
 
-fn credible(stage: &StageLearned) -> Result<(), Refusal> {
+fn check_credibility(stage: &StageLearned) -> Result<(), Refusal> {
     let inside = |value: f64, range: (f64, f64)| (range.0..=range.1).contains(&value);
     if inside(stage.linear.value, LINEAR_RANGE) && inside(stage.quadratic_per_w.value, QUADRATIC_RANGE) {
         return Ok(());
@@ -297,8 +297,8 @@ fn credible(stage: &StageLearned) -> Result<(), Refusal> {
     Err(Refusal::new(RefusalKind::Contradiction, what, "look at reference and meter, and record heavier cuts"))
 }
 
-fn notes(stage: &StageLearned) -> impl Iterator<Item = String> {
-    by_speed_told(stage).into_iter().chain(one_speed(stage)).chain(negative(stage))
+fn list_notes(stage: &StageLearned) -> impl Iterator<Item = String> {
+    by_speed_told(stage).into_iter().chain(one_speed(stage)).chain(note_negative_loss(stage))
 }
 
 /// a1 from one speed holds at this speed; what it is elsewhere depends on what loses the power.
@@ -321,7 +321,7 @@ fn one_speed(stage: &StageLearned) -> Option<String> {
 
 /// A load takes power; a loss below 0 means that the cutting power of the reference is too great. Its doubt is not in the interval,
 /// where it is the same for all cuts.
-fn negative(stage: &StageLearned) -> Option<String> {
+fn note_negative_loss(stage: &StageLearned) -> Option<String> {
     let share = stage.share_at_mean.value;
     (share < 0.0).then(|| {
         format!(

@@ -1,12 +1,12 @@
 //! No-load power per gear stage and speed, several visits put together.
 
-use super::rows::rows;
-use super::stretches::{SAME_SPEED, Stretch, stretches};
+use super::rows::classify_rows;
+use super::stretches::{SAME_SPEED, Stretch, find_stretches};
 use crate::estimators::regression::{
-    CONFIDENCE, Coefficient, Column, Intercept, Refusal, RefusalKind, fit, t_quantile,
+    CONFIDENCE, Coefficient, Column, Intercept, Refusal, RefusalKind, fit_unweighted, t_quantile,
 };
 use crate::estimators::{SPEEDS_PER_STAGE, STAGES};
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 
@@ -63,7 +63,7 @@ pub struct NoLoadLearned {
 /// # Errors
 /// A [`Refusal`] where the recording has no settled idling, or a column or unit is wrong.
 pub fn identify_no_load(recording: &Recording) -> Result<NoLoadLearned, Refusal> {
-    let stretches = stretches(&rows(recording)?, f64::INFINITY);
+    let stretches = find_stretches(&classify_rows(recording)?, f64::INFINITY);
     if stretches.is_empty() {
         return Err(Refusal::new(
             RefusalKind::TooFew,
@@ -72,13 +72,13 @@ pub fn identify_no_load(recording: &Recording) -> Result<NoLoadLearned, Refusal>
         ));
     }
     let mut speeds: Vec<SpeedLearned> = Vec::new();
-    let (groups, left_out) = without_warm_up(grouped(&stretches));
+    let (groups, left_out) = without_warm_up(group_by_speed(&stretches));
     let (groups, refused) = of_one_level(groups)?;
-    let between = Between::of(&groups);
+    let between = Between::from_groups(&groups);
     for visits in &groups {
-        speeds.push(pooled(visits, between.as_ref())?);
+        speeds.push(pool_visits(visits, between.as_ref())?);
     }
-    let mut notes = notes(&speeds, &groups);
+    let mut notes = list_notes(&speeds, &groups);
     notes.extend(refused.iter().map(|refusal| format!("left out: {refusal}")));
     if left_out > 0 {
         notes.push(format!("{left_out} visits in which the power drifted by more than 2 % are left out: warming up"));
@@ -88,7 +88,7 @@ pub fn identify_no_load(recording: &Recording) -> Result<NoLoadLearned, Refusal>
 }
 
 /// Visits of the same stage and speed.
-fn grouped(stretches: &[Stretch]) -> Vec<Vec<&Stretch>> {
+fn group_by_speed(stretches: &[Stretch]) -> Vec<Vec<&Stretch>> {
     let mut sorted: Vec<&Stretch> = stretches.iter().collect();
     sorted.sort_by(|a, b| a.stage.cmp(&b.stage).then(a.speed_rpm.total_cmp(&b.speed_rpm)));
     let mut groups: Vec<Vec<&Stretch>> = Vec::new();
@@ -107,7 +107,7 @@ fn grouped(stretches: &[Stretch]) -> Vec<Vec<&Stretch>> {
 
 /// Leaves out the visits in which the power drifts far, where a speed has others; how many those are.
 fn without_warm_up(mut groups: Vec<Vec<&Stretch>>) -> (Vec<Vec<&Stretch>>, usize) {
-    let far = |visit: &&Stretch| visit.drifts() && visit.drift_w().abs() > WARM_UP * visit.level.mean.abs();
+    let far = |visit: &&Stretch| visit.is_drifting() && visit.drift_w().abs() > WARM_UP * visit.level.mean.abs();
     let mut left_out = 0;
     for visits in &mut groups {
         let drifting = visits.iter().filter(|visit| far(visit)).count();
@@ -131,7 +131,7 @@ fn two_levels(visits: &[&Stretch]) -> Option<(f64, f64)> {
         return None;
     }
     let range = (lower[at - 1] - lower[0]).max(upper[upper.len() - 1] - upper[0]);
-    let apart = jump(&at) > (TWO_LEVELS_SHARE * mean(visits).abs()).max(TWO_LEVELS_SCATTER * range);
+    let apart = jump(&at) > (TWO_LEVELS_SHARE * average_power_w(visits).abs()).max(TWO_LEVELS_SCATTER * range);
     apart.then(|| (lower[at - 1], upper[0]))
 }
 
@@ -149,7 +149,7 @@ fn of_one_level(groups: Vec<Vec<&Stretch>>) -> Result<(Vec<Vec<&Stretch>>, Vec<R
         let what = format!("two levels at one speed, {lower_w:.0} W and {upper_w:.0} W");
         let next = "two gear stages or two directions lie in one column: record gear_stage, or identify each by itself";
         let place = format!("gear stage {}, {:.0} rpm", visits[0].stage, visits[0].speed_rpm);
-        refused.push(Refusal::new(RefusalKind::Ambiguous, what, next).at(place));
+        refused.push(Refusal::new(RefusalKind::Ambiguous, what, next).with_place(place));
     }
     match refused.first() {
         Some(first) if kept.is_empty() => Err(first.clone()),
@@ -166,52 +166,53 @@ struct Between {
 }
 
 impl Between {
-    fn of(groups: &[Vec<&Stretch>]) -> Option<Self> {
-        let freedom = groups.iter().map(|visits| count(visits.len()) - 1.0).sum::<f64>();
-        let absolute: f64 = groups.iter().map(|visits| scatter(visits)).sum();
-        let relative: f64 = groups.iter().map(|visits| scatter(visits) / mean(visits).powi(2)).sum();
+    fn from_groups(groups: &[Vec<&Stretch>]) -> Option<Self> {
+        let freedom = groups.iter().map(|visits| count_to_f64(visits.len()) - 1.0).sum::<f64>();
+        let absolute: f64 = groups.iter().map(|visits| sum_squared_deviations(visits)).sum();
+        let relative: f64 =
+            groups.iter().map(|visits| sum_squared_deviations(visits) / average_power_w(visits).powi(2)).sum();
         let of = |sum: f64| sum / freedom;
         (freedom >= 1.0).then(|| Self { relative: of(relative), absolute_w2: of(absolute), freedom })
     }
 
     /// Variance of one visit at this power, W2.
-    fn at(&self, power_w: f64) -> f64 {
+    fn visit_variance_w2(&self, power_w: f64) -> f64 {
         self.absolute_w2.max(self.relative * power_w * power_w)
     }
 }
 
-fn mean(visits: &[&Stretch]) -> f64 {
-    visits.iter().map(|visit| visit.level.mean).sum::<f64>() / count(visits.len())
+fn average_power_w(visits: &[&Stretch]) -> f64 {
+    visits.iter().map(|visit| visit.level.mean).sum::<f64>() / count_to_f64(visits.len())
 }
 
 /// Sum of squares of the levels about their mean.
-fn scatter(visits: &[&Stretch]) -> f64 {
-    let middle = mean(visits);
+fn sum_squared_deviations(visits: &[&Stretch]) -> f64 {
+    let middle = average_power_w(visits);
     visits.iter().map(|visit| (visit.level.mean - middle).powi(2)).sum()
 }
 
 /// The mean of the visits. Its variance is that from visit to visit, over the number of visits: by this speed's own
 /// visits where there are enough, by those of all speeds together where there are not, and by the noise within the only
 /// visit where no speed was visited again.
-fn pooled(visits: &[&Stretch], between: Option<&Between>) -> Result<SpeedLearned, Refusal> {
-    let visited = count(visits.len());
-    let power_w = mean(visits);
+fn pool_visits(visits: &[&Stretch], between: Option<&Between>) -> Result<SpeedLearned, Refusal> {
+    let visited = count_to_f64(visits.len());
+    let power_w = average_power_w(visits);
     let speed_rpm = visits.iter().map(|visit| visit.speed_rpm).sum::<f64>() / visited;
     if power_w <= 0.0 {
         let what = format!("the spindle idles at {power_w:.1} W");
         let next = "no-load power is positive: look at the sign and the wiring of the meter";
         let place = format!("gear stage {}, {speed_rpm:.0} rpm", visits[0].stage);
-        return Err(Refusal::new(RefusalKind::Contradiction, what, next).at(place));
+        return Err(Refusal::new(RefusalKind::Contradiction, what, next).with_place(place));
     }
     let within = visits.iter().map(|visit| visit.level.standard_error.powi(2)).sum::<f64>() / visited;
     let (one, freedom) = match between {
-        _ if visits.len() >= OWN_VISITS => (scatter(visits) / (visited - 1.0), visited - 1.0),
-        Some(between) => (between.at(power_w), between.freedom),
+        _ if visits.len() >= OWN_VISITS => (sum_squared_deviations(visits) / (visited - 1.0), visited - 1.0),
+        Some(between) => (between.visit_variance_w2(power_w), between.freedom),
         None => (within, (visits[0].level.independent - 1.0).max(1.0)),
     };
     let standard_error_w = (one.max(within) / visited).sqrt();
     let half = t_quantile(0.5 + 0.5 * CONFIDENCE, freedom) * standard_error_w;
-    let drifts = visits.iter().filter(|visit| visit.drifts()).map(|visit| visit.drift_w());
+    let drifts = visits.iter().filter(|visit| visit.is_drifting()).map(|visit| visit.drift_w());
     Ok(SpeedLearned {
         stage: visits[0].stage,
         speed_rpm,
@@ -229,16 +230,16 @@ fn pooled(visits: &[&Stretch], between: Option<&Between>) -> Result<SpeedLearned
 fn warm_up(groups: &[Vec<&Stretch>]) -> Option<Coefficient> {
     let again = groups.iter().filter(|visits| visits.len() > 1);
     let deviations = again.flat_map(|visits| {
-        let middle = mean(visits);
+        let middle = average_power_w(visits);
         visits.iter().map(move |visit| (0.5 * (visit.from_s + visit.to_s) / 3600.0, visit.level.mean / middle - 1.0))
     });
     let (hours, deviations): (Vec<f64>, Vec<f64>) = deviations.unzip();
     let time = Column::new("hours", hours);
-    let fitted = fit(&Column::new("deviation", deviations), &[time], Intercept::Fitted).ok()?;
-    fitted.coefficient("hours").filter(|slope| slope.p < 0.01).cloned()
+    let fitted = fit_unweighted(&Column::new("deviation", deviations), &[time], Intercept::Fitted).ok()?;
+    fitted.find_coefficient("hours").filter(|slope| slope.p < 0.01).cloned()
 }
 
-fn notes(speeds: &[SpeedLearned], groups: &[Vec<&Stretch>]) -> Vec<String> {
+fn list_notes(speeds: &[SpeedLearned], groups: &[Vec<&Stretch>]) -> Vec<String> {
     let mut notes = Vec::new();
     for stage in 0..STAGES {
         let known = speeds.iter().filter(|speed| speed.stage == stage).count();

@@ -50,42 +50,42 @@ pub(super) struct Referenced {
 ///
 /// # Errors
 /// No reference, or a unit that was mistaken.
-pub(super) fn referenced(
+pub(super) fn select_reference(
     recording: &Recording,
     rows: &[MachineRow],
     choice: &ReferenceChoice,
 ) -> Result<Referenced, Refusal> {
-    let column = |name: &str| recording.numbers(name);
+    let column = |name: &str| recording.find_numbers(name);
     let per_row = |of: &dyn Fn(&MachineRow) -> Option<f64>| rows.iter().map(of).collect::<Vec<Option<f64>>>();
     if let Some(torque) = column(&choice.torque_column) {
         Plausible::TORQUE_NM
-            .check(cutting(rows, |row| torque.get(row.row)))
-            .map_err(|it| it.at(&choice.torque_column))?;
+            .check_values(filter_cutting_values(rows, |row| torque.get(row.row)))
+            .map_err(|it| it.with_place(&choice.torque_column))?;
         let power = |row: &MachineRow| Some(torque.get(row.row)? * row.speed_rpm? * TAU / 60.0);
-        return Ok(Referenced { reference: PowerReference::Torque, power_w: oriented(rows, per_row(&power)) });
+        return Ok(Referenced { reference: PowerReference::Torque, power_w: orient_powers(rows, per_row(&power)) });
     }
     if let (Some(force), Some(diameter)) = (column("cutting_force_n"), column("diameter_mm")) {
         Plausible::CUTTING_FORCE_N
-            .check(cutting(rows, |row| force.get(row.row)))
-            .map_err(|it| it.at("cutting_force_n"))?;
+            .check_values(filter_cutting_values(rows, |row| force.get(row.row)))
+            .map_err(|it| it.with_place("cutting_force_n"))?;
         let power =
             |row: &MachineRow| Some(force.get(row.row)? * PI * diameter.get(row.row)? / 1000.0 * row.speed_rpm? / 60.0);
-        return Ok(Referenced { reference: PowerReference::Force, power_w: oriented(rows, per_row(&power)) });
+        return Ok(Referenced { reference: PowerReference::Force, power_w: orient_powers(rows, per_row(&power)) });
     }
     let removal = adapters::recording::with_derived(recording.clone());
-    match (removal.numbers("removal_rate_cm3_min"), choice.specific_energy_j_mm3) {
+    match (removal.find_numbers("removal_rate_cm3_min"), choice.specific_energy_j_mm3) {
         (Some(removal), Some((energy_j_mm3, sd))) if energy_j_mm3 > 0.0 && sd >= 0.0 => {
             let power = |row: &MachineRow| Some(removal.get(row.row)? * 1000.0 / 60.0 * energy_j_mm3);
             let reference = PowerReference::Removal { relative_sd: sd / energy_j_mm3 };
             Ok(Referenced { reference, power_w: per_row(&power) })
         }
-        (Some(_), _) => Err(alone("the removal rate is known, the cutting energy of the material is not")),
-        (None, _) => Err(alone("there is no torque, no force and no removal rate")),
+        (Some(_), _) => Err(refuse_power_alone("the removal rate is known, the cutting energy of the material is not")),
+        (None, _) => Err(refuse_power_alone("there is no torque, no force and no removal rate")),
     }
 }
 
 /// The same powers with the sign that makes cuts positive, settled for each direction of rotation.
-fn oriented(rows: &[MachineRow], mut power_w: Vec<Option<f64>>) -> Vec<Option<f64>> {
+fn orient_powers(rows: &[MachineRow], mut power_w: Vec<Option<f64>>) -> Vec<Option<f64>> {
     for backward in [false, true] {
         let mean = |state: State| {
             let own = rows.iter().zip(&power_w).filter(|(row, _)| row.backward == backward && row.state == state);
@@ -101,11 +101,14 @@ fn oriented(rows: &[MachineRow], mut power_w: Vec<Option<f64>>) -> Vec<Option<f6
     power_w
 }
 
-fn cutting<'a>(rows: &'a [MachineRow], of: impl Fn(&MachineRow) -> Option<f64> + 'a) -> impl Iterator<Item = f64> + 'a {
+fn filter_cutting_values<'a>(
+    rows: &'a [MachineRow],
+    of: impl Fn(&MachineRow) -> Option<f64> + 'a,
+) -> impl Iterator<Item = f64> + 'a {
     rows.iter().filter(|row| row.state == State::Cutting).filter_map(of)
 }
 
-fn alone(why: &str) -> Refusal {
+fn refuse_power_alone(why: &str) -> Refusal {
     let what = format!(
         "load loss cannot be told from power alone ({why}): with cutting power k Q the power above no-load is \
          (1 + a0) k Q + a1 k^2 Q^2, and every k gives the same curve with other a0 and a1"

@@ -37,16 +37,16 @@ pub(super) struct MachineRow {
 ///
 /// # Errors
 /// A column that is missing, a unit that was mistaken, a recording too slow to show states.
-pub(super) fn rows(recording: &Recording) -> Result<Vec<MachineRow>, Refusal> {
-    check(recording)?;
+pub(super) fn classify_rows(recording: &Recording) -> Result<Vec<MachineRow>, Refusal> {
+    check_recording(recording)?;
     let period_s = period_s(recording)?;
     let mut settings = Settings::default();
     // A pause is several periods of this recording, whatever its pace.
     let gap_s = (3.0 * period_s).max(2.0);
-    settings.set("gap_s", gap_s).map_err(|error| Refusal::new(RefusalKind::OutOfRange, error.to_string(), ""))?;
+    settings.set_value("gap_s", gap_s).map_err(|error| Refusal::new(RefusalKind::OutOfRange, error.to_string(), ""))?;
     let mut pipeline = Inference::new(settings);
-    let runs = recording.runs();
-    let mut rows = Vec::with_capacity(recording.rows());
+    let runs = recording.list_runs();
+    let mut rows = Vec::with_capacity(recording.count_rows());
     let mut shift_s = 0.0;
     let mut last_s = f64::NEG_INFINITY;
     for run in runs {
@@ -57,28 +57,30 @@ pub(super) fn rows(recording: &Recording) -> Result<Vec<MachineRow>, Refusal> {
         }
         for row in run.rows {
             last_s = recording.time_s[row] + shift_s;
-            let sample = sample(recording, row, last_s);
-            let state = pipeline.infer(&sample).state;
-            rows.push(seen(recording, row, last_s, state, pipeline.settings()));
+            let sample = build_sample(recording, row, last_s);
+            let state = pipeline.update_with_sample(&sample).state;
+            rows.push(build_machine_row(recording, row, last_s, state, pipeline.settings()));
         }
     }
     Ok(rows)
 }
 
-fn check(recording: &Recording) -> Result<(), Refusal> {
+fn check_recording(recording: &Recording) -> Result<(), Refusal> {
     let missing = |name: &str| {
         let what = format!("the recording has no column {name}");
         Refusal::new(RefusalKind::Missing, what, "record it; the recording format names the columns")
     };
-    let speed = recording.numbers("spindle_speed_rpm").ok_or_else(|| missing("spindle_speed_rpm"))?;
-    let power = recording.numbers("spindle_power_w").or_else(|| recording.numbers("total_power_w"));
+    let speed = recording.find_numbers("spindle_speed_rpm").ok_or_else(|| missing("spindle_speed_rpm"))?;
+    let power = recording.find_numbers("spindle_power_w").or_else(|| recording.find_numbers("total_power_w"));
     let power = power.ok_or_else(|| missing("spindle_power_w"))?;
-    recording.numbers("feed_mm_min").ok_or_else(|| missing("feed_mm_min"))?;
-    Plausible::SPINDLE_SPEED_RPM.check(speed.present()).map_err(|refusal| refusal.at("spindle_speed_rpm"))?;
+    recording.find_numbers("feed_mm_min").ok_or_else(|| missing("feed_mm_min"))?;
+    Plausible::SPINDLE_SPEED_RPM
+        .check_values(speed.present_values())
+        .map_err(|refusal| refusal.with_place("spindle_speed_rpm"))?;
     let turning = power.iter().zip(speed.iter()).filter(|(_, speed)| speed.is_some_and(|speed| speed.abs() > 10.0));
     Plausible::SPINDLE_POWER_W
-        .check(turning.filter_map(|(power, _)| power))
-        .map_err(|refusal| refusal.at("spindle power"))
+        .check_values(turning.filter_map(|(power, _)| power))
+        .map_err(|refusal| refusal.with_place("spindle power"))
 }
 
 fn period_s(recording: &Recording) -> Result<f64, Refusal> {
@@ -93,21 +95,21 @@ fn period_s(recording: &Recording) -> Result<f64, Refusal> {
     Err(Refusal::new(RefusalKind::TooFew, what, "record at least one row per second"))
 }
 
-fn sample(recording: &Recording, row: usize, time_s: f64) -> Sample {
+fn build_sample(recording: &Recording, row: usize, time_s: f64) -> Sample {
     #[expect(clippy::cast_possible_truncation, reason = "seconds of a recording are far below 2^63 ns")]
-    let mut sample = Sample::empty((time_s * SECOND_NS as f64) as i64);
+    let mut sample = Sample::new_empty((time_s * SECOND_NS as f64) as i64);
     for name in LOOKED_AT {
-        if let (Some(numbers), Some(channel)) = (recording.numbers(name), ChannelId::of(name)) {
+        if let (Some(numbers), Some(channel)) = (recording.find_numbers(name), ChannelId::from_name(name)) {
             let value = numbers.get(row).map(Value::Number).ok_or(Absence::NotRecorded);
-            sample.set(channel, Slot { value, age_ns: 0 });
+            sample.set_slot(channel, Slot { value, age_ns: 0 });
         }
     }
     sample
 }
 
-fn seen(recording: &Recording, row: usize, time_s: f64, state: State, settings: &Settings) -> MachineRow {
-    let number = |name: &str| recording.numbers(name).and_then(|numbers| numbers.get(row));
-    let own = recording.numbers("spindle_power_w").is_some();
+fn build_machine_row(recording: &Recording, row: usize, time_s: f64, state: State, settings: &Settings) -> MachineRow {
+    let number = |name: &str| recording.find_numbers(name).and_then(|numbers| numbers.get(row));
+    let own = recording.find_numbers("spindle_power_w").is_some();
     let feed = number("feed_mm_min").unwrap_or(f64::INFINITY);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to what a machine has")]
     let stage = number("gear_stage").map_or(0, |stage| stage.clamp(0.0, 7.0).round() as usize);

@@ -2,8 +2,8 @@
 
 use super::rows::MachineRow;
 use crate::estimators::State;
-use crate::estimators::regression::{SteadyLevel, level, without_pulses};
-use crate::statistics::{count, mean};
+use crate::estimators::regression::{SteadyLevel, estimate_level, without_pulses};
+use crate::statistics::{count_to_f64, mean};
 use serde::Serialize;
 
 /// Speeds closer than this share are one speed.
@@ -43,19 +43,19 @@ impl Stretch {
 
     /// Does the power drift by more than noise explains?
     #[must_use]
-    pub fn drifts(&self) -> bool {
+    pub fn is_drifting(&self) -> bool {
         self.level.slope_per_s.abs() > 3.0 * self.level.slope_standard_error
             && self.drift_w().abs() > 0.005 * self.level.mean.abs()
     }
 }
 
 /// The settled idle stretches of a recording, in the order of time; what idles for longer than `longest_s` comes in pieces.
-pub(super) fn stretches(rows: &[MachineRow], longest_s: f64) -> Vec<Stretch> {
+pub(super) fn find_stretches(rows: &[MachineRow], longest_s: f64) -> Vec<Stretch> {
     let mut found = Vec::new();
     let mut open: Vec<(f64, f64, f64)> = Vec::new();
     let mut stage = 0;
     for row in rows {
-        let idle = idle(row);
+        let idle = read_idle_row(row);
         let goes_on = idle.is_some_and(|(speed_rpm, _)| {
             open.last().is_none_or(|last| row.time_s - last.0 < 30.0 && stage == row.stage)
                 && open.first().is_none_or(|first| {
@@ -63,7 +63,7 @@ pub(super) fn stretches(rows: &[MachineRow], longest_s: f64) -> Vec<Stretch> {
                 })
         });
         if !goes_on {
-            found.extend(close(&open, stage));
+            found.extend(close_stretch(&open, stage));
             open.clear();
         }
         if let Some((speed_rpm, power_w)) = idle {
@@ -71,30 +71,37 @@ pub(super) fn stretches(rows: &[MachineRow], longest_s: f64) -> Vec<Stretch> {
             stage = row.stage;
         }
     }
-    found.extend(close(&open, stage));
+    found.extend(close_stretch(&open, stage));
     found
 }
 
 /// Speed and power of a row in which the spindle idles without any axis moving.
-fn idle(row: &MachineRow) -> Option<(f64, f64)> {
+fn read_idle_row(row: &MachineRow) -> Option<(f64, f64)> {
     let idling = row.state == State::Idle && !row.feeding;
     Some((row.speed_rpm.filter(|_| idling)?, row.power_w?))
 }
 
-fn close(open: &[(f64, f64, f64)], stage: usize) -> Option<Stretch> {
+fn close_stretch(open: &[(f64, f64, f64)], stage: usize) -> Option<Stretch> {
     let (begin_s, end_s) = (open.first()?.0 + GUARD_S, open.last()?.0 - GUARD_S);
     let inner: Vec<&(f64, f64, f64)> = open.iter().filter(|it| it.0 >= begin_s && it.0 <= end_s).collect();
     let time_s: Vec<f64> = inner.iter().map(|it| it.0).collect();
     let power_w: Vec<f64> = inner.iter().map(|it| it.2).collect();
     let settled = settled_from(&time_s, &power_w);
     let speeds: Vec<f64> = inner[settled..].iter().map(|it| it.1).collect();
-    let speed_rpm = speeds.iter().sum::<f64>() / count(speeds.len().max(1));
+    let speed_rpm = speeds.iter().sum::<f64>() / count_to_f64(speeds.len().max(1));
     let (time_s, power_w) = without_pulses(&time_s[settled..], &power_w[settled..]);
     let (from_s, to_s) = (*time_s.first()?, *time_s.last()?);
     if time_s.len() < LEAST_SAMPLES || to_s - from_s < LEAST_S {
         return None;
     }
-    Some(Stretch { stage, speed_rpm, from_s, to_s, settling_s: from_s - begin_s, level: level(&time_s, &power_w)? })
+    Some(Stretch {
+        stage,
+        speed_rpm,
+        from_s,
+        to_s,
+        settling_s: from_s - begin_s,
+        level: estimate_level(&time_s, &power_w)?,
+    })
 }
 
 /// Where the level is settled: leading twelfths are left out while they lie apart from what follows, at most half of all.
@@ -103,8 +110,8 @@ pub(in crate::estimators) fn settled_from(time_s: &[f64], power_w: &[f64]) -> us
     let mut from = 0;
     while block >= 2 && from + block <= time_s.len() / 2 {
         let head = mean(&power_w[from..from + block]);
-        let Some(rest) = level(&time_s[from + block..], &power_w[from + block..]) else { break };
-        let samples = count(block).min(rest.independent);
+        let Some(rest) = estimate_level(&time_s[from + block..], &power_w[from + block..]) else { break };
+        let samples = count_to_f64(block).min(rest.independent);
         // The rest may drift; the head is compared with where the drift began.
         let begun = rest.mean - 0.5 * rest.slope_per_s * (time_s[time_s.len() - 1] - time_s[from]);
         if (head - begun).abs() <= SETTLED_SD * rest.sd / samples.sqrt() {

@@ -9,12 +9,12 @@ use std::fmt::{self, Write as _};
 impl NoLoadLearned {
     /// The powers as settings that a script returns; the file can stand beside the other scripts as it is.
     #[must_use]
-    pub fn script(&self) -> String {
+    pub fn format_script(&self) -> String {
         let mut text = String::from(
             "// No-load power by gear stage, identified from recordings: pairs of speed in rpm and power in W. 空载功率\n\nfn settings() {\n    #{\n",
         );
         for stage in 0..STAGES {
-            let own = spread(self.speeds.iter().filter(|speed| speed.stage == stage).collect());
+            let own = select_spread_speeds(self.speeds.iter().filter(|speed| speed.stage == stage).collect());
             if own.is_empty() {
                 continue;
             }
@@ -30,7 +30,7 @@ impl NoLoadLearned {
 }
 
 /// As many speeds as the gateway keeps, from the slowest to the fastest.
-fn spread(speeds: Vec<&SpeedLearned>) -> Vec<&SpeedLearned> {
+fn select_spread_speeds(speeds: Vec<&SpeedLearned>) -> Vec<&SpeedLearned> {
     let (last, kept) = (speeds.len().saturating_sub(1), SPEEDS_PER_STAGE - 1);
     if last <= kept {
         return speeds;
@@ -63,7 +63,7 @@ impl fmt::Display for NoLoadLearned {
 impl LoadLossLearned {
     /// The coefficients as settings that a script returns; the file can stand beside the other scripts as it is.
     #[must_use]
-    pub fn script(&self) -> String {
+    pub fn format_script(&self) -> String {
         let mut text = String::from(
             "// Load loss by gear stage, identified from recordings: Pad = a0 Pc + a1 Pc^2. 附加载荷损耗系数\n\
              // load_loss_speed_rpm: the speed at which a1 is as given; elsewhere it goes with 1/n^2. 0: the same at every speed. a1 对应的转速\n\n\
@@ -81,7 +81,7 @@ impl LoadLossLearned {
 }
 
 /// How a1 goes with the speed, and what the other form would leave.
-fn form(stage: &StageLearned) -> String {
+fn describe_form(stage: &StageLearned) -> String {
     match (stage.form_residuals, stage.speed_rpm) {
         (None, _) => "not known, the cuts were made at one speed; taken as the same at every speed".to_owned(),
         (Some(left), Some(speed_rpm)) => format!(
@@ -96,7 +96,7 @@ fn form(stage: &StageLearned) -> String {
 }
 
 /// E of every cut, in percent.
-fn table(f: &mut fmt::Formatter<'_>, accuracy: &Accuracy) -> fmt::Result {
+fn write_accuracy_table(f: &mut fmt::Formatter<'_>, accuracy: &Accuracy) -> fmt::Result {
     let [first, second] = FIXED_LOSSES;
     writeln!(
         f,
@@ -134,8 +134,8 @@ impl fmt::Display for LoadLossLearned {
             ] {
                 writeln!(f, "  {name} = {:.6e}   95 % {:.6e} to {:.6e}", told.value, told.interval.0, told.interval.1)?;
             }
-            writeln!(f, "  a1 over speed: {}", form(stage))?;
-            stage.accuracy.iter().try_for_each(|accuracy| table(f, accuracy))?;
+            writeln!(f, "  a1 over speed: {}", describe_form(stage))?;
+            stage.accuracy.iter().try_for_each(|accuracy| write_accuracy_table(f, accuracy))?;
         }
         self.refused.iter().try_for_each(|refusal| writeln!(f, "cannot tell: {refusal}"))?;
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))

@@ -32,14 +32,14 @@ fn beta_share(a: f64, b: f64, x: f64) -> f64 {
     let front = (ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b) + a * x.ln() + b * (-x).ln_1p()).exp();
     // The fraction converges fast only on this side of the mean.
     if x < (a + 1.0) / (a + b + 2.0) {
-        front * fraction(a, b, x) / a
+        front * beta_continued_fraction(a, b, x) / a
     } else {
-        1.0 - front * fraction(b, a, 1.0 - x) / b
+        1.0 - front * beta_continued_fraction(b, a, 1.0 - x) / b
     }
 }
 
 /// The continued fraction of the incomplete beta function by Lentz' method.
-fn fraction(a: f64, b: f64, x: f64) -> f64 {
+fn beta_continued_fraction(a: f64, b: f64, x: f64) -> f64 {
     let away = |value: f64| if value.abs() < 1e-300 { 1e-300 } else { value };
     let mut c = 1.0;
     let mut d = 1.0 / away(1.0 - (a + b) * x / (a + 1.0));
@@ -78,7 +78,7 @@ pub fn t_quantile(p: f64, df: f64) -> f64 {
         return 0.0;
     }
     let tail = 2.0 * p.min(1.0 - p);
-    let size = root(|t| t_two_sided(t, df) < tail);
+    let size = find_root(|t| t_two_sided(t, df) < tail);
     if p < 0.5 { -size } else { size }
 }
 
@@ -94,11 +94,11 @@ pub fn f_upper_tail(f: f64, df1: f64, df2: f64) -> f64 {
 /// The F that is not exceeded with probability `p` (0 < p < 1).
 #[must_use]
 pub fn f_quantile(p: f64, df1: f64, df2: f64) -> f64 {
-    root(|f| f_upper_tail(f, df1, df2) < 1.0 - p)
+    find_root(|f| f_upper_tail(f, df1, df2) < 1.0 - p)
 }
 
 /// The least positive x beyond which `beyond` holds, by bisection of the exponent and then of the value.
-fn root(beyond: impl Fn(f64) -> bool) -> f64 {
+fn find_root(beyond: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     while !beyond(high) && high < 1e150 {
         (low, high) = (high, high * 4.0);

@@ -18,11 +18,11 @@ mod series;
 mod unequal;
 
 pub use distributions::{f_quantile, f_upper_tail, t_quantile, t_two_sided};
-pub use least_squares::{Coefficient, Column, Intercept, Regression, fit, fit_weighted};
+pub use least_squares::{Coefficient, Column, Intercept, Regression, fit_unweighted, fit_weighted};
 pub use plausible::{Mistake, Plausible};
 pub use prediction::{FTest, FitPrediction};
 pub use refusal::{Refusal, RefusalKind};
-pub use series::{SteadyLevel, integrated_autocorrelation, level, without_pulses};
+pub use series::{SteadyLevel, estimate_level, integrated_autocorrelation, without_pulses};
 pub use unequal::UnequalScatter;
 
 /// The probability that every stated interval covers.

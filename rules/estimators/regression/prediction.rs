@@ -39,7 +39,7 @@ impl Regression {
     /// The value at a point: one number per column, without the constant. `None` for a wrong number of them, or one that
     /// is not finite.
     #[must_use]
-    pub fn predict(&self, point: &[f64]) -> Option<FitPrediction> {
+    pub fn predict_value(&self, point: &[f64]) -> Option<FitPrediction> {
         let ones = (self.intercept == Intercept::Fitted).then_some(1.0);
         let x: Vec<f64> = ones.into_iter().chain(point.iter().copied()).collect();
         if x.len() != self.coefficients.len() || x.iter().any(|x| !x.is_finite()) {
@@ -71,7 +71,7 @@ impl Regression {
 
     /// Tests this law against a shorter one of the same rows. `None` where it is no longer.
     #[must_use]
-    pub fn against(&self, shorter: &Self) -> Option<FTest> {
+    pub fn test_against(&self, shorter: &Self) -> Option<FTest> {
         let df1 = shorter.degrees_of_freedom - self.degrees_of_freedom;
         if df1 < 1.0 || self.rows != shorter.rows {
             return None;

@@ -34,7 +34,7 @@ pub enum RefusalKind {
 impl RefusalKind {
     /// The word used in JSON, scripts and SQL.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::NotFinite => "not_finite",
             Self::Mismatch => "mismatch",
@@ -73,7 +73,7 @@ impl Refusal {
 
     /// The same with the place; an outer place stands before an inner one.
     #[must_use]
-    pub fn at(mut self, place: impl Into<String>) -> Self {
+    pub fn with_place(mut self, place: impl Into<String>) -> Self {
         let place = place.into();
         self.place = if self.place.is_empty() { place } else { format!("{place}, {}", self.place) };
         self
@@ -98,10 +98,11 @@ mod tests {
 
     #[test]
     fn a_refusal_reads_as_a_sentence() {
-        let refusal =
-            Refusal::new(RefusalKind::TooFew, "2 speeds", "record at 3 speeds").at("gear stage 1").at("lathe");
+        let refusal = Refusal::new(RefusalKind::TooFew, "2 speeds", "record at 3 speeds")
+            .with_place("gear stage 1")
+            .with_place("lathe");
         assert_eq!(refusal.to_string(), "lathe, gear stage 1: 2 speeds; record at 3 speeds");
         let json = serde_json::to_value(&refusal).expect("JSON");
-        assert_eq!(json["kind"], refusal.kind.word());
+        assert_eq!(json["kind"], refusal.kind.as_word());
     }
 }

@@ -3,8 +3,8 @@
 //! The number of independent samples follows from the integrated autocorrelation time, summed while the sums of pairs are
 //! positive and falling. Source: Geyer, Practical Markov Chain Monte Carlo, Statistical Science 7 (1992) 473, section 3.3.
 
-use crate::linear::orthogonal::product;
-use crate::statistics::{count, median, robust_deviation};
+use crate::linear::orthogonal::dot_product;
+use crate::statistics::{count_to_f64, median, robust_deviation};
 use serde::Serialize;
 
 /// What a trend leaves of slow noise is corrected by no more than the inverse of this.
@@ -33,21 +33,21 @@ pub struct SteadyLevel {
 /// Level and trend of samples at times in seconds. `None` for fewer than 4 samples, times that do not increase, or numbers
 /// that are not finite.
 #[must_use]
-pub fn level(time_s: &[f64], values: &[f64]) -> Option<SteadyLevel> {
+pub fn estimate_level(time_s: &[f64], values: &[f64]) -> Option<SteadyLevel> {
     let n = values.len();
     let increasing = time_s.windows(2).all(|pair| pair[1] > pair[0]);
     if n < 4 || time_s.len() != n || !increasing || values.iter().chain(time_s).any(|value| !value.is_finite()) {
         return None;
     }
-    let count = count(n);
+    let count = count_to_f64(n);
     let mean = values.iter().sum::<f64>() / count;
     let middle_s = time_s.iter().sum::<f64>() / count;
     let about: Vec<f64> = time_s.iter().map(|time_s| time_s - middle_s).collect();
     let deviations: Vec<f64> = values.iter().map(|value| value - mean).collect();
-    let spread = product(&about, &about);
-    let slope_per_s = product(&about, &deviations) / spread;
+    let spread = dot_product(&about, &about);
+    let slope_per_s = dot_product(&about, &deviations) / spread;
     let residuals: Vec<f64> = deviations.iter().zip(&about).map(|(d, t)| d - slope_per_s * t).collect();
-    let sd = (product(&residuals, &residuals) / (count - 2.0)).sqrt();
+    let sd = (dot_product(&residuals, &residuals) / (count - 2.0)).sqrt();
     let memory = integrated_autocorrelation(&residuals);
     let independent = (count / memory).max(1.0);
     Some(SteadyLevel {
@@ -75,11 +75,11 @@ pub fn without_pulses(time_s: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
 /// `2 (2 M + 1) / n`, as the variance of `n` values about their mean lacks `1 / n`.
 #[must_use]
 pub fn integrated_autocorrelation(residuals: &[f64]) -> f64 {
-    let power = product(residuals, residuals);
+    let power = dot_product(residuals, residuals);
     if power <= 0.0 {
         return 1.0;
     }
-    let at = |lag: usize| product(&residuals[..residuals.len() - lag], &residuals[lag..]) / power;
+    let at = |lag: usize| dot_product(&residuals[..residuals.len() - lag], &residuals[lag..]) / power;
     let mut sum = -1.0;
     let mut last = f64::INFINITY;
     let mut lags = 0;
@@ -92,7 +92,7 @@ pub fn integrated_autocorrelation(residuals: &[f64]) -> f64 {
         last = pair;
         lags = lag + 1;
     }
-    let taken = 2.0 * count(2 * lags + 1) / count(residuals.len());
+    let taken = 2.0 * count_to_f64(2 * lags + 1) / count_to_f64(residuals.len());
     (sum / (1.0 - taken).max(LEFT_MIN)).max(1.0)
 }
 
@@ -118,8 +118,9 @@ mod tests {
         let mut dice = Pcg64Mcg::seed_from_u64(3);
         let time_s: Vec<f64> = (0..400_i32).map(|i| 0.1 * f64::from(i)).collect();
         for keep in [0.0_f64, 0.6, 0.9] {
-            let levels: Vec<SteadyLevel> =
-                (0..400).map(|_| level(&time_s, &remembering(&mut dice, keep, 400)).expect("a level")).collect();
+            let levels: Vec<SteadyLevel> = (0..400)
+                .map(|_| estimate_level(&time_s, &remembering(&mut dice, keep, 400)).expect("a level"))
+                .collect();
             let inside = levels.iter().filter(|it| it.mean.abs() < 2.0 * it.standard_error).count();
             let trends = levels.iter().filter(|it| it.slope_per_s.abs() < 2.0 * it.slope_standard_error).count();
             let said = levels.iter().map(|it| it.independent).sum::<f64>() / 400.0;
@@ -144,10 +145,10 @@ mod tests {
 
     #[test]
     fn what_is_no_series_has_no_level() {
-        assert_eq!(level(&[0.0, 1.0, 2.0], &[1.0; 3]), None);
-        assert_eq!(level(&[0.0, 1.0, 1.0, 2.0], &[1.0; 4]), None);
-        assert_eq!(level(&[0.0, 1.0, 2.0, 3.0], &[1.0, f64::NAN, 1.0, 1.0]), None);
-        let steady = level(&[0.0, 1.0, 2.0, 3.0], &[5.0; 4]).expect("a level");
+        assert_eq!(estimate_level(&[0.0, 1.0, 2.0], &[1.0; 3]), None);
+        assert_eq!(estimate_level(&[0.0, 1.0, 1.0, 2.0], &[1.0; 4]), None);
+        assert_eq!(estimate_level(&[0.0, 1.0, 2.0, 3.0], &[1.0, f64::NAN, 1.0, 1.0]), None);
+        let steady = estimate_level(&[0.0, 1.0, 2.0, 3.0], &[5.0; 4]).expect("a level");
         assert_eq!((steady.mean, steady.standard_error), (5.0, 0.0));
     }
 }

@@ -41,7 +41,7 @@ impl UnequalScatter {
 
     /// Variance and degrees of freedom of a combination with these weights, one for each coefficient.
     #[must_use]
-    pub fn of(&self, weights: &[f64]) -> (f64, f64) {
+    pub fn compute_variance(&self, weights: &[f64]) -> (f64, f64) {
         let influence: Vec<f64> = (0..self.square.len())
             .map(|point| weights.iter().zip(&self.influence).map(|(weight, own)| weight * own[point]).sum())
             .collect();
@@ -51,14 +51,14 @@ impl UnequalScatter {
         let mut of_squares = 0.0;
         for (a, of_a) in each.iter().enumerate() {
             for (b, of_b) in each.iter().enumerate() {
-                of_squares += of_a * of_b * self.left(a, b).powi(2);
+                of_squares += of_a * of_b * self.compute_residual_influence(a, b).powi(2);
             }
         }
         (variance, (sum * sum / of_squares.max(f64::MIN_POSITIVE)).max(1.0))
     }
 
     /// How far the error of one point reaches into the residual of another.
-    fn left(&self, a: usize, b: usize) -> f64 {
+    fn compute_residual_influence(&self, a: usize, b: usize) -> f64 {
         let (on_inverse, rows) = &self.projection;
         let projected: f64 = on_inverse[a].iter().zip(&rows[b]).map(|(a, b)| a * b).sum();
         if a == b { self.kept[a] } else { -projected }
@@ -68,15 +68,17 @@ impl UnequalScatter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::regression::{Intercept, fit};
+    use crate::estimators::regression::{Intercept, fit_unweighted};
 
     #[test]
     fn of_a_mean_it_is_the_usual_variance_with_the_usual_degrees_of_freedom() {
         let values = vec![1.0, 2.0, 4.0, 3.0, 5.0];
         let column = Column::new("one".to_owned(), vec![1.0; 5]);
         let regression =
-            fit(&Column::new("y".to_owned(), values), std::slice::from_ref(&column), Intercept::None).expect("a fit");
-        let (variance, freedom) = UnequalScatter::new(&regression, std::slice::from_ref(&column), &[0]).of(&[1.0]);
+            fit_unweighted(&Column::new("y".to_owned(), values), std::slice::from_ref(&column), Intercept::None)
+                .expect("a fit");
+        let (variance, freedom) =
+            UnequalScatter::new(&regression, std::slice::from_ref(&column), &[0]).compute_variance(&[1.0]);
         assert!((variance - 0.5).abs() < 1e-9, "variance 2.5 of five points: {variance}");
         assert!((freedom - 4.0).abs() < 1e-6, "{freedom}");
     }
@@ -87,8 +89,10 @@ mod tests {
         let y = vec![1.1, 1.0, 1.0, 0.9, 10.4];
         let column = Column::new("x".to_owned(), x);
         let regression =
-            fit(&Column::new("y".to_owned(), y), std::slice::from_ref(&column), Intercept::None).expect("a fit");
-        let (variance, freedom) = UnequalScatter::new(&regression, std::slice::from_ref(&column), &[0]).of(&[1.0]);
+            fit_unweighted(&Column::new("y".to_owned(), y), std::slice::from_ref(&column), Intercept::None)
+                .expect("a fit");
+        let (variance, freedom) =
+            UnequalScatter::new(&regression, std::slice::from_ref(&column), &[0]).compute_variance(&[1.0]);
         assert!(variance > 0.0 && freedom < 2.0, "{variance} {freedom}");
     }
 }

@@ -46,7 +46,7 @@ impl LowPassDesign {
         }
         let k = (PI * share).tan();
         // Poles far from the circle first; the gain of all sections stands in the first.
-        let mut sections = [1.0, 3.0].map(|odd: f64| section(k, 2.0 * (PI * odd / 8.0).cos()));
+        let mut sections = [1.0, 3.0].map(|odd: f64| compute_section(k, 2.0 * (PI * odd / 8.0).cos()));
         let gain: f64 = sections.iter().map(|(gain, _)| gain).product();
         sections[0].0 = gain;
         sections[1].0 = 1.0;
@@ -83,7 +83,7 @@ impl LowPassDesign {
     /// Gain at a frequency, dB.
     #[must_use]
     pub fn gain_db(&self, hz: f64) -> f64 {
-        let size = |c: [f64; 3]| response(c, hz / self.rate_hz).0;
+        let size = |c: [f64; 3]| evaluate_response(c, hz / self.rate_hz).0;
         let gain = |s: &Section| size(s.b) / size([1.0, s.a[0], s.a[1]]);
         20.0 * self.sections.iter().map(gain).product::<f64>().log10()
     }
@@ -98,19 +98,19 @@ impl LowPassDesign {
 
     /// A filter at rest.
     #[must_use]
-    pub fn filter(&self) -> LowPass {
+    pub fn build_filter(&self) -> LowPass {
         LowPass { sections: self.sections, states: [[0.0; 2]; SECTIONS] }
     }
 }
 
 /// Square of the prewarped cutoff over `d`, and the two denominator coefficients.
-fn section(k: f64, per_q: f64) -> (f64, [f64; 2]) {
+fn compute_section(k: f64, per_q: f64) -> (f64, [f64; 2]) {
     let d = 1.0 + k * per_q + k * k;
     (k * k / d, [2.0 * (k * k - 1.0) / d, (1.0 - k * per_q + k * k) / d])
 }
 
 /// Size and phase of `c0 + c1 z^-1 + c2 z^-2` on the unit circle.
-fn response(c: [f64; 3], share: f64) -> (f64, f64) {
+fn evaluate_response(c: [f64; 3], share: f64) -> (f64, f64) {
     let w = TAU * share;
     let real = c[0] + c[1] * w.cos() + c[2] * (2.0 * w).cos();
     let imaginary = -(c[1] * w.sin() + c[2] * (2.0 * w).sin());
@@ -129,26 +129,26 @@ impl LowPass {
     /// not stay in it for ever.
     pub fn push(&mut self, sample: f64) -> Option<f64> {
         if !sample.is_finite() {
-            self.rest();
+            self.reset_state();
             return None;
         }
         let mut x = sample;
         for (section, state) in self.sections.iter().zip(&mut self.states) {
             let y = section.b[0] * x + state[0];
-            state[0] = quiet(section.b[1] * x - section.a[0] * y + state[1]);
-            state[1] = quiet(section.b[2] * x - section.a[1] * y);
+            state[0] = flush_small_state(section.b[1] * x - section.a[0] * y + state[1]);
+            state[1] = flush_small_state(section.b[2] * x - section.a[1] * y);
             x = y;
         }
         Some(x)
     }
 
     /// Forgets everything.
-    pub fn rest(&mut self) {
+    pub fn reset_state(&mut self) {
         self.states = [[0.0; 2]; SECTIONS];
     }
 }
 
-fn quiet(state: f64) -> f64 {
+fn flush_small_state(state: f64) -> f64 {
     if state.abs() < SILENT { 0.0 } else { state }
 }
 
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn the_running_filter_is_the_difference_equation_of_the_polynomials() {
         let (b, a) = source().polynomials();
-        let mut filter = source().filter();
+        let mut filter = source().build_filter();
         let input = |n: i64| if n < 0 { 0.0 } else { ((n * n % 17) as f64 - 8.0) / 3.0 };
         let mut out: Vec<f64> = Vec::new();
         for n in 0..200_i64 {
@@ -197,10 +197,10 @@ mod tests {
 
     #[test]
     fn a_bad_sample_is_forgotten_and_bad_designs_are_refused() {
-        let mut filter = source().filter();
+        let mut filter = source().build_filter();
         (0..50).for_each(|_| assert!(filter.push(5.0).is_some()));
         assert_eq!(filter.push(f64::NAN), None);
-        assert_eq!(filter, source().filter());
+        assert_eq!(filter, source().build_filter());
         let settled = (0..200).filter_map(|_| filter.push(5.0)).last().expect("samples");
         assert!((settled - 5.0).abs() < 1e-12, "no gain at rest");
         for (cutoff, rate) in [(500.0, 1000.0), (0.0, 1000.0), (350.0, 0.0), (f64::NAN, 1000.0), (350.0, f64::INFINITY)]

@@ -26,7 +26,7 @@ pub struct Inversion {
 impl Cubic {
     /// The feature at a feed.
     #[must_use]
-    pub fn at(&self, feed: f64) -> f64 {
+    pub fn evaluate_at(&self, feed: f64) -> f64 {
         self.coefficients.iter().rev().fold(0.0, |sum, c| sum * feed + c)
     }
 
@@ -45,18 +45,21 @@ impl Cubic {
     }
 
     /// Feeds within the range where the slope is zero.
-    pub(super) fn turning(&self) -> impl Iterator<Item = f64> {
+    pub(super) fn find_turning_points(&self) -> impl Iterator<Item = f64> {
         let [_, c1, c2, c3] = self.coefficients;
         let (least, greatest) = (self.feed_min, self.feed_max);
-        roots(3.0 * c3, 2.0 * c2, c1).into_iter().flatten().filter(move |feed| *feed > least && *feed < greatest)
+        quadratic_roots(3.0 * c3, 2.0 * c2, c1)
+            .into_iter()
+            .flatten()
+            .filter(move |feed| *feed > least && *feed < greatest)
     }
 
     /// Does the feature rise with feed in the whole range?
     #[must_use]
-    pub fn rises(&self) -> bool {
+    pub fn is_rising(&self) -> bool {
         let middle = self.slope(0.5 * (self.feed_min + self.feed_max));
         middle > 0.0
-            && self.turning().next().is_none()
+            && self.find_turning_points().next().is_none()
             && self.slope(self.feed_min) >= 0.0
             && self.slope(self.feed_max) >= 0.0
     }
@@ -67,24 +70,24 @@ impl Cubic {
     /// A feature below that at the least feed (no feed gives it: the spindle takes as much without cutting) or above that
     /// at the greatest; a cubic that does not rise throughout, where several feeds may give it.
     pub fn feed_for(&self, feature: f64) -> Result<Inversion, Refusal> {
-        if !self.rises() {
+        if !self.is_rising() {
             let what = "the feature does not rise with feed everywhere, so that more than one feed may give it";
             return Err(Refusal::new(RefusalKind::Ambiguous, what, "identify the curve again with more feeds"));
         }
-        let (low, high) = (self.at(self.feed_min), self.at(self.feed_max));
+        let (low, high) = (self.evaluate_at(self.feed_min), self.evaluate_at(self.feed_max));
         if !(low..=high).contains(&feature) {
-            return Err(outside(feature, (low, high), (self.feed_min, self.feed_max)));
+            return Err(refuse_out_of_range(feature, (low, high), (self.feed_min, self.feed_max)));
         }
-        let feed = self.solve(feature);
+        let feed = self.solve_for_feed(feature);
         Ok(Inversion { feed, feed_per_feature: 1.0 / self.slope(feed).max(f64::MIN_POSITIVE) })
     }
 
     /// Newton's method kept between bounds that close in.
-    fn solve(&self, feature: f64) -> f64 {
+    fn solve_for_feed(&self, feature: f64) -> f64 {
         let (mut low, mut high) = (self.feed_min, self.feed_max);
         let mut feed = 0.5 * (low + high);
         for _ in 0..200 {
-            let off = self.at(feed) - feature;
+            let off = self.evaluate_at(feed) - feature;
             if off > 0.0 {
                 high = feed
             } else {
@@ -101,7 +104,7 @@ impl Cubic {
     }
 }
 
-fn outside(feature: f64, (low, high): (f64, f64), (feed_min, feed_max): (f64, f64)) -> Refusal {
+fn refuse_out_of_range(feature: f64, (low, high): (f64, f64), (feed_min, feed_max): (f64, f64)) -> Refusal {
     if feature < low {
         let what = format!("{feature:.4} lies below {low:.4}, what the spindle takes at the least feed {feed_min:.4}");
         return Refusal::new(RefusalKind::OutOfRange, what, "no feed in the range gives so little; aim higher");
@@ -111,7 +114,7 @@ fn outside(feature: f64, (low, high): (f64, f64), (feed_min, feed_max): (f64, f6
 }
 
 /// Real roots of `a x^2 + b x + c`.
-fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
+fn quadratic_roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
     if a == 0.0 {
         return [(b != 0.0).then(|| -c / b), None];
     }
@@ -134,9 +137,9 @@ mod tests {
 
     #[test]
     fn the_inverse_is_the_inverse() {
-        assert!(source().rises() && (source().discriminant() + 0.256).abs() < 5e-4);
+        assert!(source().is_rising() && (source().discriminant() + 0.256).abs() < 5e-4);
         for feed in [0.0, 1e-9, 0.3, 1.7, 3.5] {
-            let found = source().feed_for(source().at(feed)).expect("in range");
+            let found = source().feed_for(source().evaluate_at(feed)).expect("in range");
             assert!((found.feed - feed).abs() < 1e-12, "{feed}: {found:?}");
         }
     }
@@ -150,6 +153,6 @@ mod tests {
         let hump = Cubic { coefficients: [1.0, 1.0, -0.5, 0.01], feed_min: 0.0, feed_max: 3.0 };
         assert_eq!(hump.feed_for(1.2).expect_err("two feeds").kind, RefusalKind::Ambiguous);
         let falling = Cubic { coefficients: [5.0, -1.0, 0.0, 0.0], ..hump };
-        assert!(!falling.rises());
+        assert!(!falling.is_rising());
     }
 }

@@ -54,10 +54,10 @@ impl CurveFamily {
             let what = format!("curves at {} depths", curves.len());
             return Err(Refusal::new(RefusalKind::TooFew, what, "identify curves at 1 to 64 depths of cut"));
         }
-        curves.iter().try_for_each(check)?;
-        curves.windows(2).try_for_each(|pair| apart(&pair[0], &pair[1]))?;
+        curves.iter().try_for_each(check_curve)?;
+        curves.windows(2).try_for_each(|pair| check_separation(&pair[0], &pair[1]))?;
         let family = Self { curves };
-        let (least, greatest) = family.feeds();
+        let (least, greatest) = family.common_feed_range();
         if least < greatest {
             return Ok(family);
         }
@@ -76,7 +76,7 @@ impl CurveFamily {
 
     /// The range of feeds that all curves have.
     #[must_use]
-    pub fn feeds(&self) -> (f64, f64) {
+    pub fn common_feed_range(&self) -> (f64, f64) {
         let fold = |of: fn(&Cubic) -> f64, pick: fn(f64, f64) -> f64, from: f64| {
             self.curves.iter().map(|it| of(&it.curve)).fold(from, pick)
         };
@@ -88,8 +88,8 @@ impl CurveFamily {
     /// # Errors
     /// One curve only; a feed outside the common range; a feature below the shallowest curve (an air cut looks like that) or above the
     /// deepest.
-    pub fn depth(&self, feed: f64, feature: f64, feature_sd: f64) -> Result<Inferred, Refusal> {
-        let (least, greatest) = self.feeds();
+    pub fn infer_depth(&self, feed: f64, feature: f64, feature_sd: f64) -> Result<Inferred, Refusal> {
+        let (least, greatest) = self.common_feed_range();
         if self.curves.len() < 2 {
             let next = "identify curves at two depths of cut or more";
             return Err(Refusal::new(RefusalKind::TooFew, "one curve does not tell the depth", next));
@@ -98,12 +98,12 @@ impl CurveFamily {
             let what = format!("a feed of {feed} lies outside {least} to {greatest}");
             return Err(Refusal::new(RefusalKind::OutOfRange, what, "identify the curves over this feed too"));
         }
-        let value = |at: usize| self.curves[at].curve.at(feed);
+        let value = |at: usize| self.curves[at].curve.evaluate_at(feed);
         let last = self.curves.len() - 1;
         // At the shallowest and the deepest curve half of all cuts lie outside by chance.
         let chance = |at: usize| EDGE_SD * self.curves[at].sd.hypot(feature_sd);
         if !(value(0) - chance(0)..=value(last) + chance(last)).contains(&feature) {
-            return Err(self.beyond(feature, value(0), value(last)));
+            return Err(self.refuse_out_of_range(feature, value(0), value(last)));
         }
         let feature = feature.clamp(value(0), value(last));
         let at = (0..last).find(|at| feature <= value(at + 1)).unwrap_or(last - 1);
@@ -111,12 +111,12 @@ impl CurveFamily {
         let rise = (value(at + 1) - value(at)) / (deep.depth_mm - shallow.depth_mm);
         let share = (feature - value(at)) / (value(at + 1) - value(at));
         let curve_sd = ((1.0 - share) * shallow.sd).hypot(share * deep.sd);
-        let sd_mm = (feature_sd.abs().hypot(curve_sd) / rise).hypot(self.bend(at, value, share));
+        let sd_mm = (feature_sd.abs().hypot(curve_sd) / rise).hypot(self.estimate_bend_mm(at, value, share));
         Ok(Inferred { depth_mm: shallow.depth_mm + share * (deep.depth_mm - shallow.depth_mm), sd_mm })
     }
 
     /// How far a parabola through three depths lies from the straight line between two of them, mm.
-    fn bend(&self, at: usize, value: impl Fn(usize) -> f64, share: f64) -> f64 {
+    fn estimate_bend_mm(&self, at: usize, value: impl Fn(usize) -> f64, share: f64) -> f64 {
         let third = if at + 2 < self.curves.len() { Some(at + 2) } else { at.checked_sub(1) };
         let Some(third) = third else { return 0.0 };
         let [h0, h1, h2] = [at, at + 1, third].map(|at| self.curves[at].depth_mm);
@@ -125,7 +125,7 @@ impl CurveFamily {
         (curvature * share * (1.0 - share) * (v1 - v0) * (v1 - v0)).abs()
     }
 
-    fn beyond(&self, feature: f64, least: f64, greatest: f64) -> Refusal {
+    fn refuse_out_of_range(&self, feature: f64, least: f64, greatest: f64) -> Refusal {
         let (shallow, deep) = (self.curves[0].depth_mm, self.curves[self.curves.len() - 1].depth_mm);
         if feature > greatest {
             let what = format!("{feature:.4} lies above {greatest:.4}, the deepest curve ({deep} mm) at this feed");
@@ -143,7 +143,7 @@ impl CurveFamily {
     ///
     /// # Errors
     /// A depth outside.
-    pub fn curve(&self, depth_mm: f64) -> Result<Cubic, Refusal> {
+    pub fn interpolate_curve(&self, depth_mm: f64) -> Result<Cubic, Refusal> {
         let last = self.curves.len() - 1;
         let (least, greatest) = (self.curves[0].depth_mm, self.curves[last].depth_mm);
         if last == 0 && depth_mm == least {
@@ -156,7 +156,7 @@ impl CurveFamily {
         let at = self.curves.windows(2).position(|pair| depth_mm <= pair[1].depth_mm).unwrap_or(last - 1);
         let (shallow, deep) = (&self.curves[at], &self.curves[at + 1]);
         let share = (depth_mm - shallow.depth_mm) / (deep.depth_mm - shallow.depth_mm);
-        let (feed_min, feed_max) = self.feeds();
+        let (feed_min, feed_max) = self.common_feed_range();
         let mixed = |k: usize| (1.0 - share) * shallow.curve.coefficients[k] + share * deep.curve.coefficients[k];
         Ok(Cubic { coefficients: [mixed(0), mixed(1), mixed(2), mixed(3)], feed_min, feed_max })
     }
@@ -165,18 +165,22 @@ impl CurveFamily {
     ///
     /// # Errors
     /// A depth outside the family, or a feature that no feed of the common range gives at this depth.
-    pub fn feed(&self, depth_mm: f64, wanted: f64) -> Result<Inversion, Refusal> {
-        self.curve(depth_mm)?.feed_for(wanted).map_err(|refusal| refusal.at(format!("depth {depth_mm:.2} mm")))
+    pub fn find_feed(&self, depth_mm: f64, wanted: f64) -> Result<Inversion, Refusal> {
+        self.interpolate_curve(depth_mm)?
+            .feed_for(wanted)
+            .map_err(|refusal| refusal.with_place(format!("depth {depth_mm:.2} mm")))
     }
 }
 
-fn check(it: &CurveAtDepth) -> Result<(), Refusal> {
+fn check_curve(it: &CurveAtDepth) -> Result<(), Refusal> {
     let finite = it.curve.coefficients.iter().chain([&it.depth_mm, &it.sd]).all(|value| value.is_finite());
     if !finite || it.depth_mm <= 0.0 || it.curve.feed_min >= it.curve.feed_max {
         let what = "a number that is none, a depth that is not positive, or an empty range of feeds";
-        return Err(Refusal::new(RefusalKind::NotFinite, what, "look at the curve").at(format!("{} mm", it.depth_mm)));
+        return Err(
+            Refusal::new(RefusalKind::NotFinite, what, "look at the curve").with_place(format!("{} mm", it.depth_mm))
+        );
     }
-    if it.curve.rises() {
+    if it.curve.is_rising() {
         return Ok(());
     }
     let refusal = Refusal::new(
@@ -184,11 +188,11 @@ fn check(it: &CurveAtDepth) -> Result<(), Refusal> {
         "the feature does not rise with feed everywhere",
         "identify this curve again with more feeds, or over a narrower range",
     );
-    Err(refusal.at(format!("{} mm", it.depth_mm)))
+    Err(refusal.with_place(format!("{} mm", it.depth_mm)))
 }
 
 /// A deeper cut takes more at every feed both curves have.
-fn apart(shallow: &CurveAtDepth, deep: &CurveAtDepth) -> Result<(), Refusal> {
+fn check_separation(shallow: &CurveAtDepth, deep: &CurveAtDepth) -> Result<(), Refusal> {
     let difference = |k: usize| deep.curve.coefficients[k] - shallow.curve.coefficients[k];
     let between = Cubic {
         coefficients: [difference(0), difference(1), difference(2), difference(3)],
@@ -197,7 +201,7 @@ fn apart(shallow: &CurveAtDepth, deep: &CurveAtDepth) -> Result<(), Refusal> {
     };
     let span = between.feed_max - between.feed_min;
     let grid = (0..=COMPARED).map(|k| between.feed_min + span * f64::from(k) / f64::from(COMPARED));
-    let crossing = grid.chain(between.turning()).find(|feed| between.at(*feed) <= 0.0);
+    let crossing = grid.chain(between.find_turning_points()).find(|feed| between.evaluate_at(*feed) <= 0.0);
     match crossing {
         Some(feed) if span >= 0.0 => {
             let (shallow, deep) = (shallow.depth_mm, deep.depth_mm);
@@ -225,11 +229,11 @@ mod tests {
     fn depth_and_feed_are_found_back() {
         let family = CurveFamily::new([1.6, 0.4, 0.8, 1.2].map(curve).to_vec()).expect("apart");
         for depth in [0.4, 0.7, 1.2, 1.55] {
-            let feature = curve(depth).curve.at(1.3);
-            let found = family.depth(1.3, feature, 0.02).expect("in the family");
+            let feature = curve(depth).curve.evaluate_at(1.3);
+            let found = family.infer_depth(1.3, feature, 0.02).expect("in the family");
             assert!((found.depth_mm - depth).abs() < 1e-9, "{depth}: {found:?}");
             assert!(found.sd_mm > 0.0 && found.sd_mm < 0.05);
-            let feed = family.feed(depth, feature).expect("a feed").feed;
+            let feed = family.find_feed(depth, feature).expect("a feed").feed;
             assert!((feed - 1.3).abs() < 1e-9);
         }
     }
@@ -238,12 +242,12 @@ mod tests {
     fn what_is_not_in_the_family_is_refused() {
         let family = CurveFamily::new([0.4, 1.2].map(curve).to_vec()).expect("apart");
         let told = |refusal: Refusal| refusal.to_string();
-        assert!(told(family.depth(1.3, 1.42, 0.02).expect_err("air")).contains("in the air"));
-        assert!(told(family.depth(1.3, 9.0, 0.02).expect_err("too heavy")).contains("slow down"));
-        assert!(told(family.depth(4.0, 3.0, 0.02).expect_err("feed")).contains("outside 0.2 to 3"));
-        assert!(told(family.feed(2.0, 3.0).expect_err("depth")).contains("outside 0.4 to 1.2 mm"));
-        assert!(told(family.feed(1.2, 1.3).expect_err("below no load")).contains("aim higher"));
-        assert!(family.depth(1.3, f64::NAN, 0.0).is_err() && family.depth(f64::NAN, 2.0, 0.0).is_err());
+        assert!(told(family.infer_depth(1.3, 1.42, 0.02).expect_err("air")).contains("in the air"));
+        assert!(told(family.infer_depth(1.3, 9.0, 0.02).expect_err("too heavy")).contains("slow down"));
+        assert!(told(family.infer_depth(4.0, 3.0, 0.02).expect_err("feed")).contains("outside 0.2 to 3"));
+        assert!(told(family.find_feed(2.0, 3.0).expect_err("depth")).contains("outside 0.4 to 1.2 mm"));
+        assert!(told(family.find_feed(1.2, 1.3).expect_err("below no load")).contains("aim higher"));
+        assert!(family.infer_depth(1.3, f64::NAN, 0.0).is_err() && family.infer_depth(f64::NAN, 2.0, 0.0).is_err());
     }
 
     #[test]
@@ -253,7 +257,11 @@ mod tests {
         let refusal = CurveFamily::new(vec![curve(0.8), crossing]).expect_err("they cross");
         assert!(refusal.kind == RefusalKind::Ambiguous && refusal.what.contains("0.8 mm and 1.2 mm"), "{refusal}");
         let one = CurveFamily::new(vec![curve(0.8)]).expect("one curve gives feeds");
-        assert!(one.depth(1.0, 2.0, 0.1).is_err() && one.feed(0.8, 2.0).is_ok() && one.feed(0.9, 2.0).is_err());
+        assert!(
+            one.infer_depth(1.0, 2.0, 0.1).is_err()
+                && one.find_feed(0.8, 2.0).is_ok()
+                && one.find_feed(0.9, 2.0).is_err()
+        );
         assert!(CurveFamily::new(Vec::new()).is_err());
         assert!(CurveFamily::new(vec![curve(0.8), curve(0.8)]).is_err(), "a depth twice");
     }

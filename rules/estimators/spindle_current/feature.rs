@@ -116,25 +116,25 @@ impl PhaseFeature {
     /// Takes a sample, A; the feature when a window has ended. A sample that is no number begins the window anew.
     pub fn push(&mut self, sample_a: f64) -> Option<Feature> {
         if !sample_a.is_finite() {
-            self.restart();
+            self.restart_window();
             return None;
         }
         match self.span {
-            WindowSpan::Crossings { least_a } => self.crossing(sample_a, least_a),
-            WindowSpan::Known { hz } => self.known(sample_a, hz),
+            WindowSpan::Crossings { least_a } => self.push_by_crossings(sample_a, least_a),
+            WindowSpan::Known { hz } => self.push_by_frequency(sample_a, hz),
         }
     }
 
     /// Begins a window anew.
-    pub fn restart(&mut self) {
+    pub fn restart_window(&mut self) {
         (self.splitter, self.window, self.filled, self.waited) = (Splitter::new(), CurrentSums::default(), 0, 0.0);
         self.level_a = 0.0;
     }
 
-    fn crossing(&mut self, sample_a: f64, least_a: f64) -> Option<Feature> {
+    fn push_by_crossings(&mut self, sample_a: f64, least_a: f64) -> Option<Feature> {
         self.waited += 1.0;
         if self.waited > PATIENCE_S * self.rate_hz {
-            self.restart();
+            self.restart_window();
         }
         let half = self.splitter.push(sample_a, least_a.max(THRESHOLD_SHARE * self.level_a))?;
         self.waited = 0.0;
@@ -143,13 +143,13 @@ impl PhaseFeature {
         self.level_a += weight * (mean_a - self.level_a);
         self.window.add(half);
         self.filled += 1;
-        (self.filled == self.halves).then(|| self.finish())
+        (self.filled == self.halves).then(|| self.finish_window())
     }
 
     /// Rectangles of one sample each; the last one is split between this window and the next.
-    fn known(&mut self, sample_a: f64, hz: f64) -> Option<Feature> {
+    fn push_by_frequency(&mut self, sample_a: f64, hz: f64) -> Option<Feature> {
         let one = CurrentSums { samples: 1.0, absolute: sample_a.abs(), square: sample_a * sample_a };
-        let length = crate::statistics::count(self.halves) * 0.5 * self.rate_hz / hz;
+        let length = crate::statistics::count_to_f64(self.halves) * 0.5 * self.rate_hz / hz;
         let rest = length - self.window.samples;
         if rest > 1.0 {
             self.window.add(one);
@@ -158,12 +158,12 @@ impl PhaseFeature {
         let part =
             |share: f64| CurrentSums { samples: share, absolute: one.absolute * share, square: one.square * share };
         self.window.add(part(rest));
-        let feature = self.finish();
+        let feature = self.finish_window();
         self.window = part(1.0 - rest);
         Some(feature)
     }
 
-    fn finish(&mut self) -> Feature {
+    fn finish_window(&mut self) -> Feature {
         let CurrentSums { samples, absolute, square } = std::mem::take(&mut self.window);
         self.filled = 0;
         let window_s = samples / self.rate_hz;
@@ -172,7 +172,7 @@ impl PhaseFeature {
             FeatureKind::Rms => (square / samples).sqrt(),
             FeatureKind::AbsoluteIntegral => absolute / self.rate_hz,
         };
-        Feature { value, window_s, frequency_hz: crate::statistics::count(self.halves) / (2.0 * window_s) }
+        Feature { value, window_s, frequency_hz: crate::statistics::count_to_f64(self.halves) / (2.0 * window_s) }
     }
 }
 
@@ -188,7 +188,7 @@ impl ThreePhase {
     /// The same filter and feature for each phase.
     #[must_use]
     pub fn new(design: &LowPassDesign, phase: PhaseFeature) -> Self {
-        Self { filters: [design.filter(); 3], phases: [phase; 3], last: [None; 3] }
+        Self { filters: [design.build_filter(); 3], phases: [phase; 3], last: [None; 3] }
     }
 
     /// Takes one sample of each phase, A. The mean feature of the three phases whenever the first one's window has ended
@@ -203,14 +203,14 @@ impl ThreePhase {
                         ended |= at == 0;
                     }
                 }
-                None => self.lose(at),
+                None => self.drop_phase(at),
             }
         }
-        if ended { self.mean() } else { None }
+        if ended { self.average_phases() } else { None }
     }
 
-    fn lose(&mut self, at: usize) {
-        self.phases[at].restart();
+    fn drop_phase(&mut self, at: usize) {
+        self.phases[at].restart_window();
         self.last[at] = None;
     }
 
@@ -224,12 +224,12 @@ impl ThreePhase {
     /// a lost phase. `None` until all have a feature.
     #[must_use]
     pub fn unbalance(&self) -> Option<f64> {
-        let mean = self.mean()?.value;
+        let mean = self.average_phases()?.value;
         let off = self.last.iter().flatten().map(|feature| (feature.value - mean).abs()).fold(0.0, f64::max);
         (mean > 0.0).then(|| off / mean)
     }
 
-    fn mean(&self) -> Option<Feature> {
+    fn average_phases(&self) -> Option<Feature> {
         let [Some(a), Some(b), Some(c)] = self.last else { return None };
         Some(Feature {
             value: (a.value + b.value + c.value) / 3.0,

@@ -5,11 +5,11 @@
 
 use super::cubic::Cubic;
 use super::family::{CurveAtDepth, CurveFamily};
-use super::plateaus::{Plateau, SAME, plateaus};
+use super::plateaus::{Plateau, SAME, find_plateaus};
 use crate::estimators::regression::{
     Coefficient, Column, FTest, Intercept, Refusal, RefusalKind, Regression, f_upper_tail, fit_weighted,
 };
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 
@@ -92,7 +92,7 @@ impl FeedCurves {
     ///
     /// # Errors
     /// See [`CurveFamily::new`].
-    pub fn family(&self, speed_rpm: f64) -> Result<CurveFamily, Refusal> {
+    pub fn build_family(&self, speed_rpm: f64) -> Result<CurveFamily, Refusal> {
         let near = |curve: &&CurveLearned| (curve.speed_rpm / speed_rpm - 1.0).abs() <= SAME;
         let at = |curve: &CurveLearned| CurveAtDepth { depth_mm: curve.depth_mm, curve: curve.curve, sd: curve.sd };
         CurveFamily::new(self.curves.iter().filter(near).map(at).collect())
@@ -117,7 +117,7 @@ impl FeedCurves {
 /// # Errors
 /// A [`Refusal`] where no group of cuts makes a curve, or a column or unit is wrong.
 pub fn identify_feed_curve(recording: &Recording, feed: &str, feature: &str) -> Result<FeedCurves, Refusal> {
-    let plateaus = plateaus(recording, feed, feature)?;
+    let plateaus = find_plateaus(recording, feed, feature)?;
     let mut learned = FeedCurves {
         feed: feed.to_owned(),
         feature: feature.to_owned(),
@@ -127,20 +127,20 @@ pub fn identify_feed_curve(recording: &Recording, feed: &str, feature: &str) -> 
         refused: Vec::new(),
         notes: Vec::new(),
     };
-    for group in grouped(&plateaus) {
+    for group in group_plateaus(&plateaus) {
         let place = format!("{:.0} rpm, depth {:.2} mm", group[0].speed_rpm, group[0].depth_mm);
         learned.notes.extend(mixed_tools(&group).map(|tools| format!("{place}: tools {tools} are mixed")));
-        match curve(&group, feature) {
+        match fit_curve(&group, feature) {
             Ok(curve) => learned.curves.push(curve),
-            Err(refusal) => learned.refused.push(refusal.at(place)),
+            Err(refusal) => learned.refused.push(refusal.with_place(place)),
         }
     }
     if learned.curves.is_empty() {
-        return Err(learned.refused.into_iter().next().unwrap_or_else(nothing));
+        return Err(learned.refused.into_iter().next().unwrap_or_else(refuse_without_cuts));
     }
     for speed_rpm in learned.speeds_rpm() {
-        if let Err(refusal) = learned.family(speed_rpm) {
-            learned.refused.push(refusal.at(format!("{speed_rpm:.0} rpm")));
+        if let Err(refusal) = learned.build_family(speed_rpm) {
+            learned.refused.push(refusal.with_place(format!("{speed_rpm:.0} rpm")));
         }
     }
     learned.plateaus = plateaus;
@@ -149,13 +149,13 @@ pub fn identify_feed_curve(recording: &Recording, feed: &str, feature: &str) -> 
 
 /// The word that every row of a column has that has one.
 fn one_word(recording: &Recording, column: &str) -> Option<String> {
-    let words = recording.words(column)?;
-    let mut found = (0..recording.rows()).filter_map(|row| words.get(row)).filter(|word| !word.is_empty());
+    let words = recording.find_words(column)?;
+    let mut found = (0..recording.count_rows()).filter_map(|row| words.get(row)).filter(|word| !word.is_empty());
     let first = found.next()?;
     found.all(|word| word == first).then(|| first.to_owned())
 }
 
-fn nothing() -> Refusal {
+fn refuse_without_cuts() -> Refusal {
     Refusal::new(
         RefusalKind::TooFew,
         "no cut of constant speed, depth and feed that lasts 4 s or longer",
@@ -164,7 +164,7 @@ fn nothing() -> Refusal {
 }
 
 /// Plateaus of one speed and depth.
-fn grouped(plateaus: &[Plateau]) -> Vec<Vec<&Plateau>> {
+fn group_plateaus(plateaus: &[Plateau]) -> Vec<Vec<&Plateau>> {
     let same = |a: f64, b: f64| (a - b).abs() <= SAME * b.abs();
     let mut groups: Vec<Vec<&Plateau>> = Vec::new();
     for plateau in plateaus {
@@ -187,7 +187,7 @@ fn mixed_tools(group: &[&Plateau]) -> Option<String> {
     (tools.len() > 1).then(|| tools.join(", "))
 }
 
-fn curve(group: &[&Plateau], feature: &str) -> Result<CurveLearned, Refusal> {
+fn fit_curve(group: &[&Plateau], feature: &str) -> Result<CurveLearned, Refusal> {
     let mut sorted: Vec<&Plateau> = group.to_vec();
     sorted.sort_by(|a, b| a.feed.total_cmp(&b.feed));
     let feeds: Vec<f64> = sorted.iter().map(|plateau| plateau.feed).collect();
@@ -199,15 +199,15 @@ fn curve(group: &[&Plateau], feature: &str) -> Result<CurveLearned, Refusal> {
     }
     let scale = feeds[feeds.len() - 1];
     let y = Column::new(feature, sorted.iter().map(|plateau| plateau.level.mean).collect());
-    let (scatter, weights) = weights(&y, &feeds, scale)?;
-    let (regression, highest_term) = chosen(&y, &feeds, scale, &weights)?;
+    let (scatter, weights) = choose_weights(&y, &feeds, scale)?;
+    let (regression, highest_term) = choose_degree(&y, &feeds, scale, &weights)?;
     let degree = regression.coefficients.len() - 1;
-    let coefficients = coefficients(&regression, scale);
+    let coefficients = rescale_coefficients(&regression, scale);
     let value = |k: usize| coefficients.get(k).map_or(0.0, |coefficient| coefficient.value);
     let curve = Cubic { coefficients: [value(0), value(1), value(2), value(3)], feed_min: feeds[0], feed_max: scale };
     Ok(CurveLearned {
-        speed_rpm: mean(group, |plateau| plateau.speed_rpm),
-        depth_mm: mean(group, |plateau| plateau.depth_mm),
+        speed_rpm: average_over_group(group, |plateau| plateau.speed_rpm),
+        depth_mm: average_over_group(group, |plateau| plateau.depth_mm),
         plateaus: group.len(),
         feeds: levels.len(),
         degree,
@@ -218,15 +218,15 @@ fn curve(group: &[&Plateau], feature: &str) -> Result<CurveLearned, Refusal> {
         lack_of_fit_p: lack_of_fit(&levels, &regression, &weights),
         sd: greatest_sd(&regression, &curve, scatter),
         scatter,
-        rises: curve.rises(),
+        rises: curve.is_rising(),
         discriminant: curve.discriminant(),
         coefficients,
         curve,
     })
 }
 
-fn mean(group: &[&Plateau], of: fn(&Plateau) -> f64) -> f64 {
-    group.iter().map(|plateau| of(plateau)).sum::<f64>() / count(group.len())
+fn average_over_group(group: &[&Plateau], of: fn(&Plateau) -> f64) -> f64 {
+    group.iter().map(|plateau| of(plateau)).sum::<f64>() / count_to_f64(group.len())
 }
 
 fn of_degree(y: &Column, feeds: &[f64], scale: f64, weights: &[f64], degree: i32) -> Result<Regression, Refusal> {
@@ -235,7 +235,7 @@ fn of_degree(y: &Column, feeds: &[f64], scale: f64, weights: &[f64], degree: i32
 }
 
 /// The likelier scatter about a cubic, and the weight of each cut.
-fn weights(y: &Column, feeds: &[f64], scale: f64) -> Result<(Scatter, Vec<f64>), Refusal> {
+fn choose_weights(y: &Column, feeds: &[f64], scale: f64) -> Result<(Scatter, Vec<f64>), Refusal> {
     let equal = vec![1.0; feeds.len()];
     let plain = of_degree(y, feeds, scale, &equal, 3)?;
     if plain.fitted.iter().any(|fitted| *fitted <= 0.0) {
@@ -244,19 +244,19 @@ fn weights(y: &Column, feeds: &[f64], scale: f64) -> Result<(Scatter, Vec<f64>),
     let inverse: Vec<f64> = plain.fitted.iter().map(|fitted| fitted.powi(-2)).collect();
     let weighed = of_degree(y, feeds, scale, &inverse, 3)?;
     // Minus twice the logarithm of the likelihood, without what both have in common.
-    let rows = count(feeds.len());
+    let rows = count_to_f64(feeds.len());
     let log_sizes: f64 = plain.fitted.iter().map(|fitted| 2.0 * fitted.ln()).sum();
     let (constant, proportional) = (rows * plain.rss.ln(), rows * weighed.rss.ln() + log_sizes);
     Ok(if proportional < constant { (Scatter::Proportional, inverse) } else { (Scatter::Constant, equal) })
 }
 
 /// The fit of the degree that the data bear, and the test of the highest term of each degree tried.
-fn chosen(y: &Column, feeds: &[f64], scale: f64, weights: &[f64]) -> Result<(Regression, Vec<FTest>), Refusal> {
+fn choose_degree(y: &Column, feeds: &[f64], scale: f64, weights: &[f64]) -> Result<(Regression, Vec<FTest>), Refusal> {
     let mut tests = Vec::new();
     let mut longer = of_degree(y, feeds, scale, weights, 3)?;
     for degree in (1..3).rev() {
         let shorter = of_degree(y, feeds, scale, weights, degree)?;
-        let Some(test) = longer.against(&shorter) else { break };
+        let Some(test) = longer.test_against(&shorter) else { break };
         tests.push(test);
         let predicts = longer.predicted_r2 > shorter.predicted_r2;
         if test.p <= CHANCE || (predicts && test.p <= 2.0 * CHANCE) {
@@ -268,7 +268,7 @@ fn chosen(y: &Column, feeds: &[f64], scale: f64, weights: &[f64]) -> Result<(Reg
 }
 
 /// Coefficients of the feed itself.
-fn coefficients(regression: &Regression, scale: f64) -> Vec<Coefficient> {
+fn rescale_coefficients(regression: &Regression, scale: f64) -> Vec<Coefficient> {
     let mut unit = 1.0;
     let mut found = Vec::new();
     for (power, scaled) in regression.coefficients.iter().enumerate() {
@@ -295,7 +295,7 @@ fn lack_of_fit(levels: &[&[&Plateau]], regression: &Regression, weights: &[f64])
         pure += own[0] * about_mean(level);
         rest = after;
     }
-    let pure_df = count(regression.rows) - count(levels.len());
+    let pure_df = count_to_f64(regression.rows) - count_to_f64(levels.len());
     let df = regression.degrees_of_freedom - pure_df;
     if pure_df < 1.0 || df < 1.0 || pure <= 0.0 {
         return None;
@@ -305,7 +305,7 @@ fn lack_of_fit(levels: &[&[&Plateau]], regression: &Regression, weights: &[f64])
 }
 
 fn about_mean(level: &[&Plateau]) -> f64 {
-    let middle = mean(level, |plateau| plateau.level.mean);
+    let middle = average_over_group(level, |plateau| plateau.level.mean);
     level.iter().map(|plateau| (plateau.level.mean - middle).powi(2)).sum()
 }
 
@@ -315,8 +315,8 @@ fn greatest_sd(regression: &Regression, curve: &Cubic, scatter: Scatter) -> f64 
         let feed = curve.feed_min + (curve.feed_max - curve.feed_min) * f64::from(step) / f64::from(POINTS);
         let share = feed / curve.feed_max;
         let point: Vec<f64> = std::iter::successors(Some(share), |power| Some(power * share)).take(degree).collect();
-        let size = if scatter == Scatter::Proportional { curve.at(feed).abs() } else { 1.0 };
-        let error = regression.predict(&point).map_or(0.0, |prediction| prediction.standard_error);
+        let size = if scatter == Scatter::Proportional { curve.evaluate_at(feed).abs() } else { 1.0 };
+        let error = regression.predict_value(&point).map_or(0.0, |prediction| prediction.standard_error);
         error.hypot(size * regression.residual_sd)
     };
     (0..=POINTS).map(at).fold(0.0, f64::max)

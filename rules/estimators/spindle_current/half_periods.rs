@@ -14,7 +14,7 @@ pub(super) struct CurrentSums {
 }
 
 impl CurrentSums {
-    fn plus(self, other: Self) -> Self {
+    fn sum_with(self, other: Self) -> Self {
         Self {
             samples: self.samples + other.samples,
             absolute: self.absolute + other.absolute,
@@ -22,16 +22,16 @@ impl CurrentSums {
         }
     }
 
-    fn minus(self, other: Self) -> Self {
-        self.plus(other.times(-1.0))
+    fn subtract_sums(self, other: Self) -> Self {
+        self.sum_with(other.scale_by(-1.0))
     }
 
-    fn times(self, factor: f64) -> Self {
+    fn scale_by(self, factor: f64) -> Self {
         Self { samples: self.samples * factor, absolute: self.absolute * factor, square: self.square * factor }
     }
 
     pub(super) fn add(&mut self, other: Self) {
-        *self = self.plus(other);
+        *self = self.sum_with(other);
     }
 }
 
@@ -58,9 +58,9 @@ impl Splitter {
     pub(super) fn push(&mut self, sample: f64, threshold: f64) -> Option<CurrentSums> {
         let last = self.last.replace(sample)?;
         if last * sample < 0.0 || (last == 0.0 && sample != 0.0) {
-            self.pass(last, sample);
+            self.pass_zero_crossing(last, sample);
         } else {
-            self.open.add(panel(last, sample));
+            self.open.add(integrate_trapezoid(last, sample));
         }
         if sample.abs() < threshold || sample * self.side > 0.0 {
             // Back on the old side beyond the threshold: what looked like a passage was noise.
@@ -69,31 +69,31 @@ impl Splitter {
             }
             return None;
         }
-        self.turn(sample.signum())
+        self.end_half_period(sample.signum())
     }
 
     /// The current passes zero between two samples.
-    fn pass(&mut self, last: f64, sample: f64) {
+    fn pass_zero_crossing(&mut self, last: f64, sample: f64) {
         let slope = (sample - last).abs();
         let share = last.abs() / slope;
-        self.open.add(triangle(share, slope));
+        self.open.add(integrate_triangle(share, slope));
         let (first, _) = *self.candidates.get_or_insert((self.open, self.open));
         self.candidates = Some((first, self.open));
-        self.open.add(triangle(1.0 - share, slope));
+        self.open.add(integrate_triangle(1.0 - share, slope));
     }
 
     /// The current has gone beyond the threshold on the other side.
-    fn turn(&mut self, side: f64) -> Option<CurrentSums> {
+    fn end_half_period(&mut self, side: f64) -> Option<CurrentSums> {
         self.side = side;
         let (first, last) = self.candidates.take()?;
-        let ended = first.plus(last).times(0.5);
-        self.open = self.open.minus(ended);
+        let ended = first.sum_with(last).scale_by(0.5);
+        self.open = self.open.subtract_sums(ended);
         std::mem::replace(&mut self.whole, true).then_some(ended)
     }
 }
 
 /// Trapezoid between two samples of one sign.
-fn panel(last: f64, sample: f64) -> CurrentSums {
+fn integrate_trapezoid(last: f64, sample: f64) -> CurrentSums {
     CurrentSums {
         samples: 1.0,
         absolute: 0.5 * (last.abs() + sample.abs()),
@@ -102,7 +102,7 @@ fn panel(last: f64, sample: f64) -> CurrentSums {
 }
 
 /// From zero over a `share` of a sample with this slope, and the correction for the slope where the trapezoids begin.
-fn triangle(share: f64, slope: f64) -> CurrentSums {
+fn integrate_triangle(share: f64, slope: f64) -> CurrentSums {
     let end = share * slope;
     CurrentSums {
         samples: share,

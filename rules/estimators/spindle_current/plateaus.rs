@@ -1,8 +1,8 @@
 //! Stretches of constant speed, depth and feed in a recording, and the level of the feature in each.
 
 use crate::estimators::power_separation::settled_from;
-use crate::estimators::regression::{Plausible, Refusal, RefusalKind, SteadyLevel, level, without_pulses};
-use crate::statistics::count;
+use crate::estimators::regression::{Plausible, Refusal, RefusalKind, SteadyLevel, estimate_level, without_pulses};
+use crate::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 
@@ -46,39 +46,39 @@ struct Cutting {
 ///
 /// # Errors
 /// A column that is missing or whose unit was mistaken.
-pub(super) fn plateaus(recording: &Recording, feed: &str, feature: &str) -> Result<Vec<Plateau>, Refusal> {
-    check(recording, feed, feature)?;
+pub(super) fn find_plateaus(recording: &Recording, feed: &str, feature: &str) -> Result<Vec<Plateau>, Refusal> {
+    check_recording(recording, feed, feature)?;
     let mut found = Vec::new();
-    for run in recording.runs() {
+    for run in recording.list_runs() {
         let mut open: Vec<Cutting> = Vec::new();
         let mut tool = None;
         for row in run.rows {
-            let now = cutting(recording, row, feed, feature);
+            let now = read_cutting_row(recording, row, feed, feature);
             if !now.is_some_and(|now| open.last().is_none_or(|last| goes_on(&open[0], last, &now))) {
-                found.extend(close(&open, tool.take()));
+                found.extend(close_plateau(&open, tool.take()));
                 open.clear();
             }
             if let Some(now) = now {
                 open.push(now);
-                tool = recording.words("tool").and_then(|words| words.get(row)).map(str::to_owned);
+                tool = recording.find_words("tool").and_then(|words| words.get(row)).map(str::to_owned);
             }
         }
-        found.extend(close(&open, tool));
+        found.extend(close_plateau(&open, tool));
     }
     Ok(found)
 }
 
-fn check(recording: &Recording, feed: &str, feature: &str) -> Result<(), Refusal> {
+fn check_recording(recording: &Recording, feed: &str, feature: &str) -> Result<(), Refusal> {
     for name in [feed, feature, "spindle_speed_rpm", "depth_of_cut_mm"] {
-        if recording.numbers(name).is_none() {
+        if recording.find_numbers(name).is_none() {
             let what = format!("the recording has no column {name}");
             let next = "record it; what the program is annotated with (depth of cut) can be added as a column";
             return Err(Refusal::new(RefusalKind::Missing, what, next));
         }
     }
     let test = |name: &str, plausible: Plausible| {
-        let values = recording.numbers(name).into_iter().flat_map(|numbers| numbers.present());
-        plausible.check(values).map_err(|refusal| refusal.at(name))
+        let values = recording.find_numbers(name).into_iter().flat_map(|numbers| numbers.present_values());
+        plausible.check_values(values).map_err(|refusal| refusal.with_place(name))
     };
     test("spindle_speed_rpm", Plausible::SPINDLE_SPEED_RPM)?;
     if feed == "feed_mm_min" {
@@ -87,9 +87,9 @@ fn check(recording: &Recording, feed: &str, feature: &str) -> Result<(), Refusal
     if feature.ends_with("_a") { test(feature, Plausible::SPINDLE_CURRENT_A) } else { Ok(()) }
 }
 
-fn cutting(recording: &Recording, row: usize, feed: &str, feature: &str) -> Option<Cutting> {
-    let number = |name: &str| recording.numbers(name).and_then(|numbers| numbers.get(row));
-    let engaged = recording.numbers("engaged").is_none_or(|numbers| numbers.get(row).is_some_and(|it| it > 0.5));
+fn read_cutting_row(recording: &Recording, row: usize, feed: &str, feature: &str) -> Option<Cutting> {
+    let number = |name: &str| recording.find_numbers(name).and_then(|numbers| numbers.get(row));
+    let engaged = recording.find_numbers("engaged").is_none_or(|numbers| numbers.get(row).is_some_and(|it| it > 0.5));
     let rapid = number("rapid").unwrap_or(0.0) > 0.5;
     let speed_rpm = number("spindle_speed_rpm")?.abs();
     let (depth_mm, feed) = (number("depth_of_cut_mm")?, number(feed)?);
@@ -107,7 +107,7 @@ fn goes_on(first: &Cutting, last: &Cutting, now: &Cutting) -> bool {
         && same(now.feed, first.feed)
 }
 
-fn close(open: &[Cutting], tool: Option<String>) -> Option<Plateau> {
+fn close_plateau(open: &[Cutting], tool: Option<String>) -> Option<Plateau> {
     let (begin_s, end_s) = (open.first()?.time_s + GUARD_S, open.last()?.time_s - GUARD_S);
     let inner: Vec<&Cutting> = open.iter().filter(|it| it.time_s >= begin_s && it.time_s <= end_s).collect();
     let time_s: Vec<f64> = inner.iter().map(|it| it.time_s).collect();
@@ -117,8 +117,9 @@ fn close(open: &[Cutting], tool: Option<String>) -> Option<Plateau> {
     if to_s - from_s < LEAST_S {
         return None;
     }
-    let mean =
-        |of: fn(&Cutting) -> f64| inner[settled..].iter().map(|it| of(it)).sum::<f64>() / count(inner.len() - settled);
+    let mean = |of: fn(&Cutting) -> f64| {
+        inner[settled..].iter().map(|it| of(it)).sum::<f64>() / count_to_f64(inner.len() - settled)
+    };
     let (kept_s, kept) = without_pulses(&time_s[settled..], &feature[settled..]);
     Some(Plateau {
         speed_rpm: mean(|it| it.speed_rpm),
@@ -127,6 +128,6 @@ fn close(open: &[Cutting], tool: Option<String>) -> Option<Plateau> {
         from_s,
         to_s,
         tool,
-        level: level(&kept_s, &kept)?,
+        level: estimate_level(&kept_s, &kept)?,
     })
 }

@@ -17,8 +17,8 @@ impl FeedCurves {
     ///
     /// `None` where no speed has a usable family.
     #[must_use]
-    pub fn script(&self, target: Option<f64>) -> Option<String> {
-        let usable = self.speeds_rpm().into_iter().filter_map(|speed| Some((speed, self.family(speed).ok()?)));
+    pub fn format_script(&self, target: Option<f64>) -> Option<String> {
+        let usable = self.speeds_rpm().into_iter().filter_map(|speed| Some((speed, self.build_family(speed).ok()?)));
         let (speed_rpm, family) = usable.max_by_key(|(_, family)| family.curves().len())?;
         let begin = LAW.find(CURVES)?;
         let end = begin + LAW[begin..].find(";\n")?;
@@ -32,7 +32,7 @@ impl FeedCurves {
         let mut rows = String::new();
         for it in family.curves() {
             let [c0, c1, c2, c3] = it.curve.coefficients;
-            let numbers = [it.depth_mm, it.curve.feed_min, it.curve.feed_max, c0, c1, c2, c3, it.sd].map(float);
+            let numbers = [it.depth_mm, it.curve.feed_min, it.curve.feed_max, c0, c1, c2, c3, it.sd].map(format_float);
             let _infallible = writeln!(rows, "    [{}],", numbers.join(", "));
         }
         let near = |plateau: &&super::plateaus::Plateau| (plateau.speed_rpm / speed_rpm - 1.0).abs() <= SAME;
@@ -44,10 +44,10 @@ impl FeedCurves {
         format!(
             "#{{ quantity: {:?}, unit: {:?}, feed: {:?}, speed_rpm: {}, tool: {tool:?}, material: {material:?}, rows: [\n{rows}] }}",
             self.feature,
-            unit(&self.feature),
+            unit_of_column(&self.feature),
             self.feed,
             // A mean of measured speeds; a tenth of a turn is finer than any of them.
-            float((10.0 * speed_rpm).round() / 10.0),
+            format_float((10.0 * speed_rpm).round() / 10.0),
         )
     }
 
@@ -55,13 +55,13 @@ impl FeedCurves {
     #[must_use]
     pub fn mean_level(&self) -> f64 {
         let levels = self.plateaus.iter().map(|plateau| plateau.level.mean);
-        levels.clone().sum::<f64>() / crate::statistics::count(levels.count().max(1))
+        levels.clone().sum::<f64>() / crate::statistics::count_to_f64(levels.count().max(1))
     }
 
     /// What the script holds, and who chose it.
     #[must_use]
     pub fn target_text(&self, target: Option<f64>) -> String {
-        let unit = unit(&self.feature);
+        let unit = unit_of_column(&self.feature);
         match target {
             Some(target) => format!("target of the script: {target} {unit}, as given\n"),
             None => format!(
@@ -76,7 +76,7 @@ impl FeedCurves {
     /// A target as the default of the setting in the unit of the curves.
     fn with_target(&self, text: &str, target: Option<f64>) -> String {
         let wanted = target.unwrap_or_else(|| self.mean_level());
-        let (setting, default) = match unit(&self.feature) {
+        let (setting, default) = match unit_of_column(&self.feature) {
             "W" => ("target_w", "0.0"),
             "A" => ("target_a", "0.0"),
             _ => ("target_load_pct", "70.0"),
@@ -88,7 +88,7 @@ impl FeedCurves {
 }
 
 /// The unit at the end of a column's name.
-fn unit(column: &str) -> &'static str {
+fn unit_of_column(column: &str) -> &'static str {
     match column.rsplit('_').next() {
         Some("w") => "W",
         Some("a") => "A",
@@ -98,7 +98,7 @@ fn unit(column: &str) -> &'static str {
 }
 
 /// A number that a script reads as one, with a point in it and without an exponent.
-fn float(value: f64) -> String {
+fn format_float(value: f64) -> String {
     let text = format!("{value:.12}");
     let text = text.trim_end_matches('0');
     if text.ends_with('.') { format!("{text}0") } else { text.to_owned() }
@@ -107,13 +107,13 @@ fn float(value: f64) -> String {
 impl fmt::Display for FeedCurves {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} over {}, {} cuts", self.feature, self.feed, self.plateaus.len())?;
-        self.curves.iter().try_for_each(|curve| one(f, curve))?;
+        self.curves.iter().try_for_each(|curve| write_curve(f, curve))?;
         self.refused.iter().try_for_each(|refusal| writeln!(f, "cannot tell: {refusal}"))?;
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
     }
 }
 
-fn one(f: &mut fmt::Formatter<'_>, curve: &CurveLearned) -> fmt::Result {
+fn write_curve(f: &mut fmt::Formatter<'_>, curve: &CurveLearned) -> fmt::Result {
     writeln!(
         f,
         "{:.0} rpm, depth {:.3} mm: degree {}, {} cuts at {} feeds from {:.4} to {:.4}, residual {:.4}{}, R2 {:.4}, predicted {}",

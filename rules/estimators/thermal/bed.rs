@@ -1,7 +1,7 @@
 //! A spindle for tests: heat from random speeds, six temperature points with their own time constants, slow noise.
 
 use super::course::{Course, Sensor};
-use super::lagged::late;
+use super::lagged::compute_lagged_states;
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -27,11 +27,11 @@ pub(super) struct Rough {
 
 pub(super) const ROUGH: Rough = Rough { slow_um: 1.5, memory_s: 1200.0, white_um: 0.3 };
 
-pub(super) fn random(seed: u64) -> Pcg64 {
+pub(super) fn create_random(seed: u64) -> Pcg64 {
     Pcg64::seed_from_u64(seed)
 }
 
-fn normal(random: &mut Pcg64) -> f64 {
+fn sample_normal(random: &mut Pcg64) -> f64 {
     StandardNormal.sample(random)
 }
 
@@ -54,7 +54,7 @@ pub(super) fn warm_ups(random: &mut Pcg64, runs: usize, rows: usize) -> Course {
         for (at, (_, rise, tau)) in POINTS.iter().enumerate() {
             heats[at] += (heat - heats[at]) * (1.0 - (-1.0 / tau).exp());
             if !resting {
-                values[at].push(ambient + rise * heats[at] + 0.03 * normal(random));
+                values[at].push(ambient + rise * heats[at] + 0.03 * sample_normal(random));
             }
         }
         if !resting {
@@ -78,14 +78,15 @@ pub(super) fn with_error(
     let mut error = vec![law.0; course.rows()];
     for (name, um_per_k) in law.1 {
         let sensor = course.sensors().iter().find(|sensor| sensor.name == *name).expect("a sensor");
-        let seen = if tau_s > 0.0 { late(course, &sensor.values, tau_s) } else { sensor.values.clone() };
+        let seen =
+            if tau_s > 0.0 { compute_lagged_states(course, &sensor.values, tau_s) } else { sensor.values.clone() };
         error.iter_mut().zip(seen).for_each(|(error, value)| *error += um_per_k * value);
     }
-    let mut slow = rough.slow_um * normal(random);
+    let mut slow = rough.slow_um * sample_normal(random);
     for (row, error) in error.iter_mut().enumerate() {
         let decay = course.since_s(row).map_or(0.0, |dt_s| (-dt_s / rough.memory_s).exp());
-        slow = decay * slow + (1.0 - decay * decay).sqrt() * rough.slow_um * normal(random);
-        *error += slow + rough.white_um * normal(random);
+        slow = decay * slow + (1.0 - decay * decay).sqrt() * rough.slow_um * sample_normal(random);
+        *error += slow + rough.white_um * sample_normal(random);
     }
     let runs = course.runs().to_vec();
     Course::new(course.clock_s().to_vec(), runs, course.pauses_known(), error, course.sensors().to_vec())

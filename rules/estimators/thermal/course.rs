@@ -47,32 +47,32 @@ impl Course {
     ///
     /// # Errors
     /// The first obstacle: time that goes back within a run, and all that is wrong with a series.
-    pub fn check(&self, sensors: &[usize]) -> Result<(), Refusal> {
-        let series: Vec<Series<'_>> = sensors.iter().map(|at| self.sensors[*at].series()).collect();
-        quantities::check(&self.error_um, &series)?;
+    pub fn check_sensors(&self, sensors: &[usize]) -> Result<(), Refusal> {
+        let series: Vec<Series<'_>> = sensors.iter().map(|at| self.sensors[*at].as_series()).collect();
+        quantities::check_series(&self.error_um, &series)?;
         let back = (1..self.rows()).find(|row| self.since_s(*row).is_some_and(|dt_s| dt_s.is_nan() || dt_s <= 0.0));
         let Some(row) = back else { return Ok(()) };
         let what = format!("does not increase in row {}", row + 1);
         let next = "sort the rows, or give each warm-up a run of its own";
-        Err(Refusal::new(RefusalKind::Contradiction, what, next).at("time_s"))
+        Err(Refusal::new(RefusalKind::Contradiction, what, next).with_place("time_s"))
     }
 
     /// Positions of the sensors that can be used; those that did not change cannot.
     ///
     /// # Errors
     /// A sensor that is wrong in another way, its unit among them; or the first obstacle where none can be used.
-    pub fn usable(&self) -> Result<Vec<usize>, Refusal> {
+    pub fn find_usable_sensors(&self) -> Result<Vec<usize>, Refusal> {
         quantities::enough_rows(self.rows())?;
         let mut usable = Vec::new();
         let mut refused = None;
         for (at, sensor) in self.sensors.iter().enumerate() {
-            match quantities::temperature_is_usable(sensor.series(), self.rows()) {
+            match quantities::temperature_is_usable(sensor.as_series(), self.rows()) {
                 Ok(()) => usable.push(at),
                 Err(refusal) if refusal.kind == RefusalKind::Constant => refused = refused.or(Some(refusal)),
                 Err(refusal) => return Err(refusal),
             }
         }
-        self.check(&usable).map_err(|refusal| match refusal.kind {
+        self.check_sensors(&usable).map_err(|refusal| match refusal.kind {
             RefusalKind::Missing => refused.unwrap_or(refusal),
             _ => refusal,
         })?;
@@ -139,7 +139,7 @@ impl Course {
 
     /// Rows that are left out together: whole runs where there are three or more, contiguous blocks otherwise.
     #[must_use]
-    pub fn blocks(&self) -> Vec<Range<usize>> {
+    pub fn split_into_blocks(&self) -> Vec<Range<usize>> {
         if self.runs.len() < RUNS_MIN {
             let rows = self.rows();
             return (0..BLOCKS).map(|at| at * rows / BLOCKS..(at + 1) * rows / BLOCKS).collect();
@@ -149,7 +149,7 @@ impl Course {
         (0..groups).map(|at| first(at)..if at + 1 == groups { self.rows() } else { first(at + 1) }).collect()
     }
 
-    /// Are the blocks of [`Course::blocks`] whole runs?
+    /// Are the blocks of [`Course::split_into_blocks`] whole runs?
     #[must_use]
     pub fn blocks_are_runs(&self) -> bool {
         self.runs.len() >= RUNS_MIN
@@ -158,7 +158,7 @@ impl Course {
     /// The same with several neighbouring rows of a run averaged into one, so that at most about `rows_max` remain;
     /// `columns` are averaged alike.
     #[must_use]
-    pub(super) fn condensed(&self, columns: &[Column], rows_max: usize) -> (Self, Vec<Column>) {
+    pub(super) fn condense_rows(&self, columns: &[Column], rows_max: usize) -> (Self, Vec<Column>) {
         let group = self.rows().div_ceil(rows_max.max(1)).max(1);
         if group == 1 {
             return (self.clone(), columns.to_vec());
@@ -192,7 +192,7 @@ impl Sensor {
 
     /// As a series.
     #[must_use]
-    pub fn series(&self) -> Series<'_> {
+    pub fn as_series(&self) -> Series<'_> {
         Series { name: &self.name, values: &self.values }
     }
 }
@@ -214,16 +214,16 @@ mod tests {
 
     #[test]
     fn blocks_are_runs_from_three_on() {
-        assert_eq!(course(vec![0..5, 5..9, 9..12], true).blocks(), [0..5, 5..9, 9..12]);
-        assert_eq!(course(one(12), true).blocks().len(), BLOCKS);
-        let many = course((0..20).map(|at| 3 * at..3 * at + 3).collect(), true).blocks();
+        assert_eq!(course(vec![0..5, 5..9, 9..12], true).split_into_blocks(), [0..5, 5..9, 9..12]);
+        assert_eq!(course(one(12), true).split_into_blocks().len(), BLOCKS);
+        let many = course((0..20).map(|at| 3 * at..3 * at + 3).collect(), true).split_into_blocks();
         assert_eq!((many.len(), many[0].start, many[RUNS_MAX - 1].end), (RUNS_MAX, 0, 60));
         assert!(many.windows(2).all(|pair| pair[0].end == pair[1].start));
     }
 
     #[test]
     fn rows_are_averaged_within_runs_only() {
-        let (short, columns) = course(vec![0..5, 5..12], true).condensed(&[Column::new("x", vec![1.0; 12])], 6);
+        let (short, columns) = course(vec![0..5, 5..12], true).condense_rows(&[Column::new("x", vec![1.0; 12])], 6);
         assert_eq!(short.runs(), [0..3, 3..7]);
         assert_eq!(short.clock_s()[..4], [0.5, 2.5, 4.0, 5.5]);
         assert_eq!(columns[0].values, [1.0; 7]);
@@ -235,6 +235,6 @@ mod tests {
         assert_eq!(course(vec![0..5, 5..9], false).since_s(5), None);
         let mut wrong = course(one(9), true);
         wrong.clock_s[4] = 3.0;
-        assert_eq!(wrong.check(&[0]).expect_err("time stands").place, "time_s");
+        assert_eq!(wrong.check_sensors(&[0]).expect_err("time stands").place, "time_s");
     }
 }

@@ -4,7 +4,7 @@
 //! 40:913 (blocked cross-validation for data with structure).
 
 use super::quantities::THERMAL_ERROR;
-use crate::estimators::regression::{Column, Intercept, Refusal, fit};
+use crate::estimators::regression::{Column, Intercept, Refusal, fit_unweighted};
 use serde::Serialize;
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ pub struct HeldOut {
 
 impl HeldOut {
     /// From the squared errors of each block.
-    pub(super) fn of(squares: &[Vec<f64>]) -> Self {
+    pub(super) fn from_squares(squares: &[Vec<f64>]) -> Self {
         let all: Vec<f64> = squares.concat();
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         Self {
@@ -35,7 +35,7 @@ impl HeldOut {
     /// Is this clearly better than `other`: by the share `least` of its root mean square, and in the blocks on average by
     /// more than the standard error of the difference?
     #[must_use]
-    pub fn beats(&self, other: &Self, least: f64) -> bool {
+    pub fn is_better_than(&self, other: &Self, least: f64) -> bool {
         let gains: Vec<f64> = other.blocks.iter().zip(&self.blocks).map(|(theirs, ours)| theirs - ours).collect();
         let count = gains.len().max(2) as f64;
         let mean = gains.iter().sum::<f64>() / count;
@@ -50,31 +50,37 @@ impl HeldOut {
 /// As the regression of the rows that remain.
 pub(super) fn held_out(columns: &[Column], y: &[f64], blocks: &[Range<usize>]) -> Result<HeldOut, Refusal> {
     let squares = blocks.iter().map(|block| left_out(columns, y, block)).collect::<Result<Vec<_>, Refusal>>()?;
-    Ok(HeldOut::of(&squares))
+    Ok(HeldOut::from_squares(&squares))
 }
 
 fn left_out(columns: &[Column], y: &[f64], block: &Range<usize>) -> Result<Vec<f64>, Refusal> {
-    let coefficients = trained(columns, y, block)?;
-    Ok(squares(&coefficients, columns, y, block))
+    let coefficients = train_outside_block(columns, y, block)?;
+    Ok(compute_squared_errors(&coefficients, columns, y, block))
 }
 
 /// Rows outside of the block.
-pub(super) fn outside(values: &[f64], block: &Range<usize>) -> Vec<f64> {
+pub(super) fn exclude_block(values: &[f64], block: &Range<usize>) -> Vec<f64> {
     values[..block.start].iter().chain(&values[block.end..]).copied().collect()
 }
 
 /// Constant and coefficients from the rows outside of the block.
-pub(super) fn trained(columns: &[Column], y: &[f64], block: &Range<usize>) -> Result<Vec<f64>, Refusal> {
-    let target = outside(y, block);
+pub(super) fn train_outside_block(columns: &[Column], y: &[f64], block: &Range<usize>) -> Result<Vec<f64>, Refusal> {
+    let target = exclude_block(y, block);
     if columns.is_empty() {
         return Ok(vec![target.iter().sum::<f64>() / target.len().max(1) as f64]);
     }
-    let train: Vec<Column> = columns.iter().map(|c| Column::new(c.name.as_str(), outside(&c.values, block))).collect();
-    Ok(fit(&Column::new(THERMAL_ERROR, target), &train, Intercept::Fitted)?.values())
+    let train: Vec<Column> =
+        columns.iter().map(|c| Column::new(c.name.as_str(), exclude_block(&c.values, block))).collect();
+    Ok(fit_unweighted(&Column::new(THERMAL_ERROR, target), &train, Intercept::Fitted)?.values())
 }
 
 /// Squared errors of constant and coefficients in the rows of the block.
-pub(super) fn squares(coefficients: &[f64], columns: &[Column], y: &[f64], block: &Range<usize>) -> Vec<f64> {
+pub(super) fn compute_squared_errors(
+    coefficients: &[f64],
+    columns: &[Column],
+    y: &[f64],
+    block: &Range<usize>,
+) -> Vec<f64> {
     let predicted = |row: usize| {
         coefficients[0] + coefficients[1..].iter().zip(columns).map(|(b, c)| b * c.values[row]).sum::<f64>()
     };
@@ -93,6 +99,6 @@ mod tests {
         let right = held_out(&[Column::new("x", x)], &y, &blocks).expect("a law");
         let mean = held_out(&[], &y, &blocks).expect("a mean");
         assert!(right.rms_um < 1e-9 && mean.rms_um > 9.0, "{right:?} {mean:?}");
-        assert!(right.beats(&mean, 0.05) && !mean.beats(&right, 0.05));
+        assert!(right.is_better_than(&mean, 0.05) && !mean.is_better_than(&right, 0.05));
     }
 }

@@ -66,7 +66,7 @@ pub enum HoldReason {
 impl HoldReason {
     /// The word used in JSON and events.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::NoReading => "no_reading",
             Self::Outside => "outside",
@@ -96,19 +96,19 @@ impl ThermalFollower {
         sensors: &[&str],
         settings: FollowSettings,
     ) -> Result<Self, crate::estimators::regression::Refusal> {
-        corrected.identified.check()?;
+        corrected.identified.check_consistency()?;
         let predictor = Predictor::new(corrected.law, sensors)?;
         Ok(Self { predictor, identified: corrected.identified, readings: corrected.readings, settings })
     }
 
     /// The predictor, to take the temperatures of a tick.
-    pub fn predictor(&mut self) -> &mut Predictor {
+    pub fn predictor_mut(&mut self) -> &mut Predictor {
         &mut self.predictor
     }
 
     /// What is to be stored.
     #[must_use]
-    pub fn corrected(&self) -> Corrected {
+    pub fn to_corrected_law(&self) -> Corrected {
         let law = self.predictor.law().clone();
         Corrected { identified: self.identified.clone(), law, readings: self.readings }
     }
@@ -120,20 +120,24 @@ impl ThermalFollower {
     }
 
     /// Takes a reading of the error that belongs to `prediction`, the last one of the predictor.
-    pub fn take(&mut self, prediction: &ThermalPrediction, measured_um: Result<f64, Absence>) -> Correction {
-        let compared = prediction.beside(measured_um);
+    pub fn correct_with_reading(
+        &mut self,
+        prediction: &ThermalPrediction,
+        measured_um: Result<f64, Absence>,
+    ) -> Correction {
+        let compared = prediction.compare_with_measured(measured_um);
         let nothing = |held| Correction { compared, change_um: 0.0, held: Some(held) };
         let Ok(residual) = compared.residual_um else { return nothing(HoldReason::NoReading) };
         if !prediction.is_inside_range() {
             return nothing(HoldReason::Outside);
         }
-        if self.predictor.unsettled() > SETTLED {
+        if self.predictor.unsettled_share() > SETTLED {
             return nothing(HoldReason::Unsettled);
         }
         let point = self.predictor.point.clone();
         let law = self.predictor.law();
         let moved_um = law.error_um(&point) - self.identified.error_um(&point);
-        let (gain, product, through) = gain(law, &point);
+        let (gain, product, through) = compute_gain(law, &point);
         let full_um = through * residual.value;
         let step_um = full_um.clamp(-self.settings.step_um, self.settings.step_um);
         let total_um = self.settings.total_um;
@@ -148,14 +152,14 @@ impl ThermalFollower {
         // The level that wanders is no sign of strange temperatures: what counts as outside is judged with its doubt added.
         let known_um = self.identified.law_sd_max_um.hypot(self.identified.residual_sd_um);
         self.predictor.law_mut().law_sd_max_um = known_um;
-        correct(self.predictor.law_mut(), &gain, &product, share);
+        correct_law(self.predictor.law_mut(), &gain, &product, share);
         self.readings += 1;
         Correction { compared, change_um, held }
     }
 }
 
 /// Gain of every coefficient, covariance times point, and the change of the prediction per micrometre of residual.
-fn gain(law: &ThermalLaw, point: &[f64]) -> (Vec<f64>, Vec<f64>, f64) {
+fn compute_gain(law: &ThermalLaw, point: &[f64]) -> (Vec<f64>, Vec<f64>, f64) {
     let wander = WANDERS * law.residual_sd_um;
     let product = |row: usize| {
         let known: f64 = law.covariance[row].iter().zip(point).map(|(entry, x)| entry * x).sum();
@@ -169,7 +173,7 @@ fn gain(law: &ThermalLaw, point: &[f64]) -> (Vec<f64>, Vec<f64>, f64) {
 }
 
 /// `residual_um` is that of the reading, or less of it where the step is bounded.
-fn correct(law: &mut ThermalLaw, gain: &[f64], product: &[f64], residual_um: f64) {
+fn correct_law(law: &mut ThermalLaw, gain: &[f64], product: &[f64], residual_um: f64) {
     let wander = WANDERS * law.residual_sd_um;
     law.intercept_um += gain[0] * residual_um;
     for (term, gain) in law.terms.iter_mut().zip(&gain[1..]) {
@@ -221,9 +225,10 @@ mod tests {
         let mut last = 0.0;
         for k in 0..readings {
             let temperature_c = 35.0 + 10.0 * (k as f64 * 0.9).sin();
-            let prediction = follower.predictor().predict(k * 600 * SECOND_NS, &[Ok(temperature_c)]).expect("there");
+            let prediction =
+                follower.predictor_mut().predict_error(k * 600 * SECOND_NS, &[Ok(temperature_c)]).expect("there");
             let truth = scale * (2.0 * temperature_c - 40.0) + shift_um;
-            last = follower.take(&prediction, Ok(truth)).compared.residual_um.expect("a reading").value;
+            last = follower.correct_with_reading(&prediction, Ok(truth)).compared.residual_um.expect("a reading").value;
         }
         last
     }
@@ -251,10 +256,10 @@ mod tests {
     #[test]
     fn one_wrong_reading_moves_the_law_by_a_step() {
         let mut follower = follower(2.0, 40.0);
-        let prediction = follower.predictor().predict(0, &[Ok(30.0)]).expect("there");
-        let correction = follower.take(&prediction, Ok(prediction.error_um.value + 500.0));
+        let prediction = follower.predictor_mut().predict_error(0, &[Ok(30.0)]).expect("there");
+        let correction = follower.correct_with_reading(&prediction, Ok(prediction.error_um.value + 500.0));
         assert_eq!((correction.held, correction.change_um.round()), (Some(HoldReason::Step), 2.0));
-        let after = follower.predictor().predict(SECOND_NS, &[Ok(30.0)]).expect("there");
+        let after = follower.predictor_mut().predict_error(SECOND_NS, &[Ok(30.0)]).expect("there");
         assert!((after.error_um.value - prediction.error_um.value - 2.0).abs() < 1e-9);
     }
 
@@ -263,10 +268,14 @@ mod tests {
         let mut follower = follower(2.0, 5.0);
         read(&mut follower, 60, 1.0, 100.0);
         let moved =
-            follower.predictor().predict(60 * 600 * SECOND_NS, &[Ok(35.0)]).expect("there").error_um.value - 30.0;
+            follower.predictor_mut().predict_error(60 * 600 * SECOND_NS, &[Ok(35.0)]).expect("there").error_um.value
+                - 30.0;
         assert!(moved < 7.0, "{moved}");
-        let outside = follower.predictor().predict(70 * 600 * SECOND_NS, &[Ok(80.0)]).expect("there");
-        assert_eq!(follower.take(&outside, Ok(0.0)).held, Some(HoldReason::Outside));
-        assert_eq!(follower.take(&outside, Err(Absence::NotRecorded)).held, Some(HoldReason::NoReading));
+        let outside = follower.predictor_mut().predict_error(70 * 600 * SECOND_NS, &[Ok(80.0)]).expect("there");
+        assert_eq!(follower.correct_with_reading(&outside, Ok(0.0)).held, Some(HoldReason::Outside));
+        assert_eq!(
+            follower.correct_with_reading(&outside, Err(Absence::NotRecorded)).held,
+            Some(HoldReason::NoReading)
+        );
     }
 }

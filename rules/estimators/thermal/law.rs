@@ -66,9 +66,9 @@ impl ThermalLaw {
     ///
     /// # Errors
     /// What is wrong and where.
-    pub fn check(&self) -> Result<(), Refusal> {
+    pub fn check_consistency(&self) -> Result<(), Refusal> {
         let wrong = |kind, what: String, place: &str| {
-            Err(Refusal::new(kind, what, "identify the law again, or copy it whole").at(place))
+            Err(Refusal::new(kind, what, "identify the law again, or copy it whole").with_place(place))
         };
         let size = self.terms.len() + 1;
         if self.terms.is_empty() || self.terms.len() > TERMS_MAX {

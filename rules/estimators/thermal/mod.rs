@@ -52,14 +52,14 @@ pub use compensation::{
 pub use course::{Course, Sensor};
 pub use cross_validation::HeldOut;
 pub use follow::{Corrected, Correction, FollowSettings, HoldReason, ThermalFollower};
-pub use grey::{Grade, Grades, Normalisation, RHO_USUAL, grades};
+pub use grey::{Grade, Grades, Normalisation, RHO_USUAL, compute_grades};
 pub use law::{POINTS_MAX, Path, TERMS_MAX, ThermalLaw, ThermalTerm, first_order};
-pub use learn::{CandidateLaw, ThermalLearned, learn};
+pub use learn::{CandidateLaw, ThermalLearned, learn_law};
 pub use model::{SCHEMA as MODEL_SCHEMA, ThermalModel};
 pub use predictor::{NoPrediction, Outside, PredictedAndMeasured, Predictor, ThermalPrediction};
 pub use pulse_insertion::{InsertionFault, PulseInserter, SignalEdge};
 pub use quadrature::{Decoder, EDGES_PER_PULSE, IllegalTransition, Lines};
 pub use quantities::Series;
-pub use recording::{LeftOut, ThermalRows, collect};
+pub use recording::{LeftOut, ThermalRows, collect_rows};
 pub use regression::{Autocorrelation, ThermalCoefficient, ThermalFit, fit_static};
-pub use selection::{GradeChoice, Selection, SelectionSettings, SensorVerdict, select};
+pub use selection::{GradeChoice, Selection, SelectionSettings, SensorVerdict, select_sensors};

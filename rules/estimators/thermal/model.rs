@@ -39,7 +39,7 @@ impl ThermalModel {
         if !model.machine.is_empty() && model.machine != machine {
             return Err(format!("was identified for machine {:?}, this is {machine:?}", model.machine));
         }
-        model.law.check().map_err(|refusal| refusal.to_string())?;
+        model.law.check_consistency().map_err(|refusal| refusal.to_string())?;
         Ok(model)
     }
 
@@ -47,7 +47,7 @@ impl ThermalModel {
     ///
     /// # Errors
     /// A number that JSON cannot hold.
-    pub fn text(&self) -> Result<String, String> {
+    pub fn to_json_text(&self) -> Result<String, String> {
         serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(|error| error.to_string())
     }
 }

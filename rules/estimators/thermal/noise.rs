@@ -13,7 +13,7 @@
 //! under V: Greene, Econometric Analysis, 9.2.
 
 use super::course::Course;
-use crate::estimators::regression::{Column, Intercept, Refusal, Regression, fit};
+use crate::estimators::regression::{Column, Intercept, Refusal, Regression, fit_unweighted};
 
 /// Memory and share of white noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +34,7 @@ const MEMORIES_MAX: i32 = 24;
 const WHITE_SHARES: [f64; 5] = [0.01, 0.1, 0.3, 0.6, 0.85];
 
 /// Every noise that is weighed for these rows: from the spacing of the rows to the length of the longest run.
-pub(super) fn grid(course: &Course) -> Vec<ThermalNoise> {
+pub(super) fn list_noise_candidates(course: &Course) -> Vec<ThermalNoise> {
     let (shortest, longest) = (course.period_s(), course.longest_s());
     let memories = (0..MEMORIES_MAX).map(|step| shortest * MEMORY_STEP.powi(step));
     let memories = memories.take_while(|memory_s| *memory_s <= longest);
@@ -76,7 +76,7 @@ impl Whitener {
         filter
     }
 
-    pub(super) fn whiten(&self, column: &[f64]) -> Vec<f64> {
+    pub(super) fn whiten_column(&self, column: &[f64]) -> Vec<f64> {
         let mut state = 0.0;
         let rows = column.iter().zip(&self.decay).zip(self.gain.iter().zip(&self.deviation));
         rows.map(|((value, decay), (gain, deviation))| {
@@ -102,15 +102,21 @@ pub(super) struct Weighed {
 }
 
 /// Regresses y on the columns (the constant is one of them) under one noise.
-pub(super) fn weigh(course: &Course, columns: &[Column], y: &[f64], noise: ThermalNoise) -> Result<Weighed, Refusal> {
+pub(super) fn fit_under_noise(
+    course: &Course,
+    columns: &[Column],
+    y: &[f64],
+    noise: ThermalNoise,
+) -> Result<Weighed, Refusal> {
     let filter = Whitener::new(course, noise);
-    let white: Vec<Column> = columns.iter().map(|c| Column::new(c.name.as_str(), filter.whiten(&c.values))).collect();
-    let target = Column::new(super::quantities::THERMAL_ERROR, filter.whiten(y));
-    let regression = fit(&target, &white, Intercept::None)?;
+    let white: Vec<Column> =
+        columns.iter().map(|c| Column::new(c.name.as_str(), filter.whiten_column(&c.values))).collect();
+    let target = Column::new(super::quantities::THERMAL_ERROR, filter.whiten_column(y));
+    let regression = fit_unweighted(&target, &white, Intercept::None)?;
     let rows = course.rows() as f64;
     let free = regression.degrees_of_freedom;
     let scale = |divisor: f64| (regression.rss / divisor).max(f64::MIN_POSITIVE).ln();
-    let ones = filter.whiten(&vec![1.0; course.rows()]);
+    let ones = filter.whiten_column(&vec![1.0; course.rows()]);
     Ok(Weighed {
         noise,
         restricted: -0.5 * (free * scale(free) + filter.log_determinant - log_determinant(&regression.inverse)),
@@ -153,9 +159,10 @@ pub(super) struct Averaged {
 ///
 /// # Errors
 /// As the regression.
-pub(super) fn average(course: &Course, columns: &[Column], y: &[f64]) -> Result<Averaged, Refusal> {
-    let ordinary = fit(&Column::new(super::quantities::THERMAL_ERROR, y.to_vec()), columns, Intercept::None)?;
-    let all = grid(course).into_iter().map(|noise| weigh(course, columns, y, noise));
+pub(super) fn average_over_noises(course: &Course, columns: &[Column], y: &[f64]) -> Result<Averaged, Refusal> {
+    let ordinary =
+        fit_unweighted(&Column::new(super::quantities::THERMAL_ERROR, y.to_vec()), columns, Intercept::None)?;
+    let all = list_noise_candidates(course).into_iter().map(|noise| fit_under_noise(course, columns, y, noise));
     let all = all.collect::<Result<Vec<Weighed>, Refusal>>()?;
     let best = all.iter().map(|it| it.restricted).fold(f64::MIN, f64::max);
     let weights: Vec<f64> = all.iter().map(|it| (it.restricted - best).exp()).collect();
@@ -169,7 +176,7 @@ pub(super) fn average(course: &Course, columns: &[Column], y: &[f64]) -> Result<
     }
     Ok(Averaged {
         values: ordinary.values(),
-        covariance: sandwich(&ordinary.inverse, &middle),
+        covariance: sandwich_product(&ordinary.inverse, &middle),
         degrees_of_freedom: ordinary.degrees_of_freedom,
         memory_s: mean(&|it| it.noise.memory_s),
         white: mean(&|it| it.noise.white),
@@ -184,7 +191,7 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// Adds `scale X'VX`.
 fn add_spread(middle: &mut [Vec<f64>], course: &Course, columns: &[Column], noise: ThermalNoise, scale: f64) {
     for (j, column) in columns.iter().enumerate() {
-        let spread = spread(course, &column.values, noise);
+        let spread = apply_covariance(course, &column.values, noise);
         for (i, other) in columns.iter().enumerate() {
             middle[i][j] += scale * other.values.iter().zip(&spread).map(|(x, v)| x * v).sum::<f64>();
         }
@@ -192,7 +199,7 @@ fn add_spread(middle: &mut [Vec<f64>], course: &Course, columns: &[Column], nois
 }
 
 /// `V x`, by one pass forwards and one backwards.
-fn spread(course: &Course, x: &[f64], noise: ThermalNoise) -> Vec<f64> {
+fn apply_covariance(course: &Course, x: &[f64], noise: ThermalNoise) -> Vec<f64> {
     let slow = 1.0 - noise.white;
     let decay = |row: usize| course.since_s(row).filter(|_| slow > 0.0).map_or(0.0, |s| (-s / noise.memory_s).exp());
     let mut sum: Vec<f64> = x.iter().map(|x| noise.white * x).collect();
@@ -210,7 +217,7 @@ fn spread(course: &Course, x: &[f64], noise: ThermalNoise) -> Vec<f64> {
 }
 
 /// `A M A` of symmetric matrices.
-fn sandwich(outer: &[Vec<f64>], middle: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn sandwich_product(outer: &[Vec<f64>], middle: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let times = |a: &[Vec<f64>], b: &[Vec<f64>]| -> Vec<Vec<f64>> {
         let entry = |i: usize, j: usize| (0..a.len()).map(|k| a[i][k] * b[k][j]).sum();
         (0..a.len()).map(|i| (0..a.len()).map(|j| entry(i, j)).collect()).collect()
@@ -240,7 +247,7 @@ mod tests {
         let v: Vec<Vec<f64>> = (0..25).map(|i| (0..25).map(|k| entry(i, k)).collect()).collect();
         assert!((log_determinant(&v) - filter.log_determinant).abs() < 1e-9);
         // Whitening the columns of V and taking products gives V back: W V W' = I means W V = W'^-1.
-        let whitened: Vec<Vec<f64>> = v.iter().map(|column| filter.whiten(column)).collect();
+        let whitened: Vec<Vec<f64>> = v.iter().map(|column| filter.whiten_column(column)).collect();
         for i in 0..25 {
             for k in 0..25 {
                 let product: f64 = whitened[i].iter().zip(&whitened[k]).map(|(a, b)| a * b).sum();
@@ -254,7 +261,7 @@ mod tests {
         let course = course(25);
         let noise = ThermalNoise { memory_s: 240.0, white: 0.2 };
         let x: Vec<f64> = (0..25).map(|row| f64::from(row % 7)).collect();
-        for (i, got) in spread(&course, &x, noise).into_iter().enumerate() {
+        for (i, got) in apply_covariance(&course, &x, noise).into_iter().enumerate() {
             let dt = |k: usize| (course.clock_s()[i] - course.clock_s()[k]).abs();
             let dense: f64 = (0..25).map(|k| 0.8 * (-dt(k) / 240.0_f64).exp() * x[k]).sum::<f64>() + 0.2 * x[i];
             assert!((got - dense).abs() < 1e-9, "{i}: {got} {dense}");
@@ -265,6 +272,6 @@ mod tests {
     fn white_noise_changes_nothing() {
         let course = course(12);
         let column: Vec<f64> = (0..12).map(f64::from).collect();
-        assert_eq!(Whitener::new(&course, ThermalNoise::WHITE).whiten(&column), column);
+        assert_eq!(Whitener::new(&course, ThermalNoise::WHITE).whiten_column(&column), column);
     }
 }

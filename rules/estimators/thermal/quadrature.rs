@@ -23,7 +23,7 @@ impl Lines {
 
     /// The levels at an encoder position in edges; position 0 is both low.
     #[must_use]
-    pub fn at(position_edges: i64) -> Self {
+    pub fn from_position(position_edges: i64) -> Self {
         let phase = position_edges.rem_euclid(EDGES_PER_PULSE);
         Self { a: phase == 1 || phase == 2, b: phase == 2 || phase == 3 }
     }
@@ -61,7 +61,7 @@ impl Decoder {
     ///
     /// # Errors
     /// [`IllegalTransition`] when both lines changed; the position is then no longer known to within two edges.
-    pub fn see(&mut self, lines: Lines, at_ns: u64) -> Result<i64, IllegalTransition> {
+    pub fn decode_lines(&mut self, lines: Lines, at_ns: u64) -> Result<i64, IllegalTransition> {
         let before = std::mem::replace(&mut self.lines, lines);
         let step = match (before.a != lines.a, before.b != lines.b) {
             (false, false) => 0,
@@ -95,17 +95,17 @@ mod tests {
     fn a_before_b_counts_up_and_b_before_a_counts_down() {
         let mut decoder = Decoder::default();
         for position in (1..=9).chain((-6..9).rev()) {
-            decoder.see(Lines::at(position), 0).expect("one line at a time");
+            decoder.decode_lines(Lines::from_position(position), 0).expect("one line at a time");
             assert_eq!(decoder.position_edges(), position);
         }
-        assert!(Lines::at(1).a && !Lines::at(1).b, "A rises first on the way up");
-        assert!(Lines::at(-1).b && !Lines::at(-1).a, "B rises first on the way down");
+        assert!(Lines::from_position(1).a && !Lines::from_position(1).b, "A rises first on the way up");
+        assert!(Lines::from_position(-1).b && !Lines::from_position(-1).a, "B rises first on the way down");
     }
 
     #[test]
     fn two_lines_at_once_are_refused_with_the_time() {
         let mut decoder = Decoder::default();
-        assert_eq!(decoder.see(Lines::at(2), 77), Err(IllegalTransition { at_ns: 77 }));
+        assert_eq!(decoder.decode_lines(Lines::from_position(2), 77), Err(IllegalTransition { at_ns: 77 }));
         assert_eq!(decoder.position_edges(), 0);
     }
 }

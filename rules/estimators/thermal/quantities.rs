@@ -38,7 +38,7 @@ const ERROR_SPAN_UM: Plausible = Plausible {
 ///
 /// # Errors
 /// The first obstacle, with the series that it is in.
-pub(super) fn check(error_um: &[f64], sensors: &[Series<'_>]) -> Result<(), Refusal> {
+pub(super) fn check_series(error_um: &[f64], sensors: &[Series<'_>]) -> Result<(), Refusal> {
     let rows = error_um.len();
     if sensors.is_empty() {
         let next = "record temperatures as temperature_1_c, temperature_2_c, ... or bearing_temperature_c";
@@ -49,69 +49,71 @@ pub(super) fn check(error_um: &[f64], sensors: &[Series<'_>]) -> Result<(), Refu
     sensors.iter().try_for_each(|sensor| temperature_is_usable(*sensor, rows))
 }
 
-/// The part of [`check`] that concerns the number of rows.
+/// The part of [`check_series`] that concerns the number of rows.
 ///
 /// # Errors
-/// See [`check`].
+/// See [`check_series`].
 pub(super) fn enough_rows(rows: usize) -> Result<(), Refusal> {
     if rows >= ROWS_MIN {
         return Ok(());
     }
     let next = format!("record at least {ROWS_MIN} rows, better an hour of warm-up at one a minute");
-    Err(Refusal::new(RefusalKind::TooFew, format!("{rows} rows"), next).at(THERMAL_ERROR))
+    Err(Refusal::new(RefusalKind::TooFew, format!("{rows} rows"), next).with_place(THERMAL_ERROR))
 }
 
-/// The part of [`check`] that concerns the error.
+/// The part of [`check_series`] that concerns the error.
 ///
 /// # Errors
-/// See [`check`].
+/// See [`check_series`].
 pub(super) fn error_is_usable(error_um: &[f64]) -> Result<(), Refusal> {
-    finite(THERMAL_ERROR, error_um)?;
-    let (least, greatest) = extremes(error_um);
+    check_finite(THERMAL_ERROR, error_um)?;
+    let (least, greatest) = find_extremes(error_um);
     if greatest <= least {
         let next = "let the machine warm up while the gauge measures, and check the gauge";
         let what = format!("is {least} um in every row");
-        return Err(Refusal::new(RefusalKind::Constant, what, next).at(THERMAL_ERROR));
+        return Err(Refusal::new(RefusalKind::Constant, what, next).with_place(THERMAL_ERROR));
     }
-    ERROR_SPAN_UM.check([greatest - least]).map_err(|refusal| refusal.at(THERMAL_ERROR))
+    ERROR_SPAN_UM.check_values([greatest - least]).map_err(|refusal| refusal.with_place(THERMAL_ERROR))
 }
 
-/// The part of [`check`] that concerns one temperature.
+/// The part of [`check_series`] that concerns one temperature.
 ///
 /// # Errors
-/// See [`check`].
+/// See [`check_series`].
 pub(super) fn temperature_is_usable(sensor: Series<'_>, rows: usize) -> Result<(), Refusal> {
     if sensor.values.len() != rows {
         let what = format!("{} rows where the error has {rows}", sensor.values.len());
-        return Err(Refusal::new(RefusalKind::Mismatch, what, "give one temperature per row").at(sensor.name));
+        return Err(Refusal::new(RefusalKind::Mismatch, what, "give one temperature per row").with_place(sensor.name));
     }
-    finite(sensor.name, sensor.values)?;
-    Plausible::TEMPERATURE_C.check(sensor.values.iter().copied()).map_err(|refusal| refusal.at(sensor.name))?;
-    let (least, greatest) = extremes(sensor.values);
+    check_finite(sensor.name, sensor.values)?;
+    Plausible::TEMPERATURE_C
+        .check_values(sensor.values.iter().copied())
+        .map_err(|refusal| refusal.with_place(sensor.name))?;
+    let (least, greatest) = find_extremes(sensor.values);
     if greatest - least < CHANGE_MIN_K {
         let what = format!("changes by {:.3} K only", greatest - least);
         let next = "record a warm-up or cool-down that this sensor sees, or leave it out";
-        return Err(Refusal::new(RefusalKind::Constant, what, next).at(sensor.name));
+        return Err(Refusal::new(RefusalKind::Constant, what, next).with_place(sensor.name));
     }
     Ok(())
 }
 
-fn finite(name: &str, values: &[f64]) -> Result<(), Refusal> {
+fn check_finite(name: &str, values: &[f64]) -> Result<(), Refusal> {
     let Some(row) = values.iter().position(|value| !value.is_finite()) else { return Ok(()) };
     let what = format!("no number in row {}", row + 1);
-    Err(Refusal::new(RefusalKind::NotFinite, what, "leave rows without a value out").at(name))
+    Err(Refusal::new(RefusalKind::NotFinite, what, "leave rows without a value out").with_place(name))
 }
 
 /// Least and greatest of finite values; zeros for none.
 #[must_use]
-pub(super) fn extremes(values: &[f64]) -> (f64, f64) {
+pub(super) fn find_extremes(values: &[f64]) -> (f64, f64) {
     let Some(first) = values.first() else { return (0.0, 0.0) };
     values.iter().fold((*first, *first), |(least, greatest), value| (least.min(*value), greatest.max(*value)))
 }
 
 /// Pearson's correlation of two series of the same length; 0 where one of them is constant.
 #[must_use]
-pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn correlate_series(a: &[f64], b: &[f64]) -> f64 {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let (mean_a, mean_b) = (mean(a), mean(b));
     let sum = |f: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(x, y)| f(x - mean_a, y - mean_b)).sum::<f64>();
@@ -125,7 +127,7 @@ mod tests {
 
     fn refused(error_um: &[f64], temperature_c: &[f64]) -> Refusal {
         let sensors = [Series { name: "temperature_1_c", values: temperature_c }];
-        check(error_um, &sensors).expect_err("nothing can be learned from it")
+        check_series(error_um, &sensors).expect_err("nothing can be learned from it")
     }
 
     fn ramp(from: f64, to: f64) -> Vec<f64> {
@@ -150,6 +152,6 @@ mod tests {
         let mut holed = ramp(20.0, 37.0);
         holed[3] = f64::NAN;
         assert_eq!(refused(&ramp(0.0, 40.0), &holed).kind, RefusalKind::NotFinite);
-        assert_eq!(check(&ramp(0.0, 40.0), &[]).expect_err("none").kind, RefusalKind::Missing);
+        assert_eq!(check_series(&ramp(0.0, 40.0), &[]).expect_err("none").kind, RefusalKind::Missing);
     }
 }

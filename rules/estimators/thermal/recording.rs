@@ -38,9 +38,9 @@ fn is_temperature(name: &str) -> bool {
 ///
 /// # Errors
 /// A [`Refusal`] where the error or every temperature is missing, or was recorded under the name of another unit.
-pub fn collect(recording: &Recording) -> Result<ThermalRows, Refusal> {
-    let error = recording.numbers(THERMAL_ERROR).ok_or_else(|| no_error(recording))?;
-    let with_error: Vec<usize> = (0..recording.rows()).filter(|row| error.get(*row).is_some()).collect();
+pub fn collect_rows(recording: &Recording) -> Result<ThermalRows, Refusal> {
+    let error = recording.find_numbers(THERMAL_ERROR).ok_or_else(|| no_error(recording))?;
+    let with_error: Vec<usize> = (0..recording.count_rows()).filter(|row| error.get(*row).is_some()).collect();
     let temperatures: Vec<(&str, &Numbers)> = recording
         .columns()
         .iter()
@@ -60,14 +60,14 @@ pub fn collect(recording: &Recording) -> Result<ThermalRows, Refusal> {
     let rows: Vec<usize> = with_error.into_iter().filter(complete).collect();
     let of = |numbers: &Numbers| rows.iter().filter_map(|row| numbers.get(*row)).collect::<Vec<f64>>();
     let sensors = kept.iter().map(|(name, numbers)| Sensor::new(*name, of(numbers))).collect();
-    let runs = recording.runs().into_iter().map(|run| {
+    let runs = recording.list_runs().into_iter().map(|run| {
         let position = |row: usize| rows.partition_point(|kept| *kept < row);
         position(run.rows.start)..position(run.rows.end)
     });
     let runs = runs.filter(|run| !run.is_empty()).collect();
     let clock_s = rows.iter().map(|row| recording.time_s[*row]).collect();
     let left_out = LeftOut {
-        rows: recording.rows() - rows.len(),
+        rows: recording.count_rows() - rows.len(),
         sensors: out.iter().map(|(name, _)| (*name).to_owned()).collect(),
     };
     Ok(ThermalRows { course: Course::new(clock_s, runs, recording.pauses_known(), of(error), sensors), left_out })
@@ -87,19 +87,18 @@ fn no_error(recording: &Recording) -> Refusal {
             "record the displacement of the tool against the work beside the temperatures, in micrometres",
         ),
     }
-    .at(THERMAL_ERROR)
+    .with_place(THERMAL_ERROR)
 }
 
 fn no_temperature(recording: &Recording, out: &[(&str, &Numbers)]) -> Refusal {
     if let Some((name, _)) = out.first() {
         let next = "record with every sensor connected";
-        return Refusal::new(RefusalKind::Missing, "has no value in most rows", next).at(*name);
+        return Refusal::new(RefusalKind::Missing, "has no value in most rows", next).with_place(*name);
     }
     let kelvin = |name: &str| name.ends_with("_k") && has_word(name, "temperature");
     match recording.columns().iter().find(|column| kelvin(&column.name)) {
-        Some(column) => {
-            Refusal::new(RefusalKind::Unit, "is in kelvin", "give temperatures in °C, named .._c").at(&column.name)
-        }
+        Some(column) => Refusal::new(RefusalKind::Unit, "is in kelvin", "give temperatures in °C, named .._c")
+            .with_place(&column.name),
         None => Refusal::new(
             RefusalKind::Missing,
             "there is no temperature in the recording",
@@ -141,7 +140,7 @@ mod tests {
             ("temperature_7_c", empty),
             ("spindle_speed_rpm", ramp(20)),
         ]);
-        let collected = collect(&given).expect("enough");
+        let collected = collect_rows(&given).expect("enough");
         let names: Vec<&str> = collected.course.sensors().iter().map(|sensor| sensor.name.as_str()).collect();
         assert_eq!(names, ["temperature_1_c", "oil_temperature_c"]);
         assert_eq!(collected.course.runs(), [0..9, 9..19]);
@@ -151,7 +150,7 @@ mod tests {
     #[test]
     fn what_is_missing_or_in_another_unit_is_said() {
         let told =
-            |columns: &[(&str, Vec<Option<f64>>)]| collect(&recording(columns)).expect_err("refused").to_string();
+            |columns: &[(&str, Vec<Option<f64>>)]| collect_rows(&recording(columns)).expect_err("refused").to_string();
         assert!(told(&[("temperature_1_c", ramp(9))]).starts_with("thermal_error_um: is not in the recording"));
         assert!(told(&[("thermal_error_mm", ramp(9))]).contains("recorded as thermal_error_mm"));
         assert!(told(&[("thermal_error_um", ramp(9))]).contains("temperature_1_c, temperature_2_c"));

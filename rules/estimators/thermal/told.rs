@@ -14,18 +14,18 @@ impl fmt::Display for ThermalLearned {
             rows => format!(" (means over {rows} rows)"),
         };
         writeln!(f, "\nErrors in {} {kind} that were left out one at a time, um{means}:", self.blocks)?;
-        line(f, "mean of the others", self.selection.held_out_mean.rms_um, None)?;
-        line(f, "law without lag", self.without_lag.held_out.rms_um, self.without_lag.hysteresis_um)?;
+        write_line(f, "mean of the others", self.selection.held_out_mean.rms_um, None)?;
+        write_line(f, "law without lag", self.without_lag.held_out.rms_um, self.without_lag.hysteresis_um)?;
         match &self.with_lag {
-            Ok(late) => line(f, "law with lag", late.held_out.rms_um, late.hysteresis_um)?,
+            Ok(late) => write_line(f, "law with lag", late.held_out.rms_um, late.hysteresis_um)?,
             Err(refusal) => writeln!(f, "  law with lag            none: {refusal}")?,
         }
         writeln!(f, "Chosen: {}\n", self.reason)?;
-        write!(f, "{}", self.best())
+        write!(f, "{}", self.best_candidate())
     }
 }
 
-fn line(f: &mut fmt::Formatter<'_>, name: &str, rms_um: f64, loop_um: Option<f64>) -> fmt::Result {
+fn write_line(f: &mut fmt::Formatter<'_>, name: &str, rms_um: f64, loop_um: Option<f64>) -> fmt::Result {
     let hysteresis = loop_um.map_or_else(String::new, |um| format!("   loop warming against cooling {um:+.2}"));
     writeln!(f, "  {name:<22} {rms_um:>8.2}{hysteresis}")
 }
@@ -39,7 +39,7 @@ impl fmt::Display for Selection {
     }
 }
 
-fn number(value: Option<f64>, decimals: usize) -> String {
+fn format_number(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
@@ -50,10 +50,10 @@ impl fmt::Display for SensorVerdict {
             "{:<28} {:<4} {:>6}  {:>11}  {:>5}  {:>10}  {}",
             self.sensor,
             if self.chosen { "yes" } else { "no" },
-            number(self.correlation, 3),
-            number(self.grade_initial_image, 3),
-            number(self.grade_range, 3),
-            number(self.variance_inflation, 1),
+            format_number(self.correlation, 3),
+            format_number(self.grade_initial_image, 3),
+            format_number(self.grade_range, 3),
+            format_number(self.variance_inflation, 1),
             self.reason
         )
     }
@@ -65,9 +65,9 @@ impl fmt::Display for GradeChoice {
             f,
             "Grades alone would choose {}: inflation {}, condition {}, blocks left out {} um",
             self.sensors.join(", "),
-            number(self.variance_inflation, 0),
-            number(self.condition_number, 0),
-            number(self.held_out_rms_um, 2)
+            format_number(self.variance_inflation, 0),
+            format_number(self.condition_number, 0),
+            format_number(self.held_out_rms_um, 2)
         )
     }
 }

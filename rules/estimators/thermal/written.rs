@@ -8,17 +8,17 @@ impl ThermalLearned {
     /// A script with the chosen law: predicted error, residual where the error is measured, and alarms where the
     /// temperatures leave the range of identification or the law is contradicted.
     #[must_use]
-    pub fn script(&self) -> String {
-        let law = &self.best().fit.law;
-        let mut text = heading(self, law);
-        text.push_str(&states(law));
-        text.push_str(&prediction(law));
+    pub fn format_script(&self) -> String {
+        let law = &self.best_candidate().fit.law;
+        let mut text = format_heading(self, law);
+        text.push_str(&format_lag_states(law));
+        text.push_str(&format_prediction(law));
         text
     }
 }
 
 /// Names of the channels, each once.
-fn sensors(law: &ThermalLaw) -> Vec<&str> {
+fn list_sensors(law: &ThermalLaw) -> Vec<&str> {
     let mut names: Vec<&str> = Vec::new();
     for term in &law.terms {
         if !names.contains(&term.sensor.as_str()) {
@@ -28,8 +28,8 @@ fn sensors(law: &ThermalLaw) -> Vec<&str> {
     names
 }
 
-fn heading(learned: &ThermalLearned, law: &ThermalLaw) -> String {
-    let best = learned.best();
+fn format_heading(learned: &ThermalLearned, law: &ThermalLaw) -> String {
+    let best = learned.best_candidate();
     let mut text =
         String::from("// Thermal error from temperatures, identified from recordings. 热误差预测（由记录辨识）\n");
     let _ = writeln!(
@@ -42,14 +42,14 @@ fn heading(learned: &ThermalLearned, law: &ThermalLaw) -> String {
         let (least, greatest) = term.interval;
         let _ = writeln!(text, "// {}: {late}{least:.3} to {greatest:.3} um/K", term.sensor);
     }
-    let present: Vec<String> = sensors(law).iter().map(|name| format!("has({name})")).collect();
+    let present: Vec<String> = list_sensors(law).iter().map(|name| format!("has({name})")).collect();
     let _ = writeln!(text, "\nif {} {{", present.join(" && "));
     text
 }
 
 /// The state of every lagged sensor, kept from run to run; at the beginning and after a pause it stands at the temperature,
 /// and nothing is judged until that is forgotten.
-fn states(law: &ThermalLaw) -> String {
+fn format_lag_states(law: &ThermalLaw) -> String {
     let Some(tau_s) = law.tau_s else { return String::new() };
     let lagged = || law.terms.iter().filter(|term| term.path == Path::Lagged).map(|term| &term.sensor);
     let mut text = String::from("    if dt_s == 0.0 {\n        memory.seen_s = 0.0;\n");
@@ -69,7 +69,7 @@ fn states(law: &ThermalLaw) -> String {
 /// How long a state remembers that its beginning was guessed, in time constants.
 const SETTLED_TAUS: f64 = 3.0;
 
-fn prediction(law: &ThermalLaw) -> String {
+fn format_prediction(law: &ThermalLaw) -> String {
     let value = |at: usize| match law.terms[at].path {
         Path::Direct => law.terms[at].sensor.clone(),
         Path::Lagged => format!("memory.late_{}", law.terms[at].sensor),

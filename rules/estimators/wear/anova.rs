@@ -4,7 +4,7 @@
 
 use super::conditions::Cut;
 use crate::estimators::regression::{Regression, f_upper_tail};
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use serde::Serialize;
 
 /// One row of the table.
@@ -39,29 +39,30 @@ pub struct Anova {
 
 /// The table of a regression with a constant.
 #[must_use]
-pub(super) fn anova(cuts: &[Cut], regression: &Regression) -> Anova {
+pub(super) fn build_anova(cuts: &[Cut], regression: &Regression) -> Anova {
     let residual = (regression.rss, regression.degrees_of_freedom);
     let terms = regression.coefficients.len() - 1;
-    let mut sources = vec![tested("model", regression.explained, count(terms), residual)];
+    let mut sources = vec![build_tested_row("model", regression.explained, count_to_f64(terms), residual)];
     for coefficient in regression.coefficients.iter().skip(1) {
         let t = coefficient.value / coefficient.standard_error.max(f64::MIN_POSITIVE);
         let squares = t * t * regression.residual_sd.powi(2);
-        sources.push(tested(&coefficient.name, squares, 1.0, residual));
+        sources.push(build_tested_row(&coefficient.name, squares, 1.0, residual));
     }
-    sources.push(plain("residual", residual));
+    sources.push(build_untested_row("residual", residual));
     sources.extend(lack_of_fit(cuts, regression));
-    sources.push(plain("total", (regression.explained + regression.rss, count(regression.rows - 1))));
+    sources
+        .push(build_untested_row("total", (regression.explained + regression.rss, count_to_f64(regression.rows - 1))));
     let Regression { r2, adjusted_r2, predicted_r2, .. } = *regression;
     Anova { sources, r2, adjusted_r2, predicted_r2 }
 }
 
-fn plain(source: &str, (sum_of_squares, degrees_of_freedom): (f64, f64)) -> AnovaRow {
+fn build_untested_row(source: &str, (sum_of_squares, degrees_of_freedom): (f64, f64)) -> AnovaRow {
     let mean_square = sum_of_squares / degrees_of_freedom;
     AnovaRow { source: source.to_owned(), sum_of_squares, degrees_of_freedom, mean_square, f: None, p: None }
 }
 
-fn tested(source: &str, squares: f64, df: f64, (rest, rest_df): (f64, f64)) -> AnovaRow {
-    let row = plain(source, (squares, df));
+fn build_tested_row(source: &str, squares: f64, df: f64, (rest, rest_df): (f64, f64)) -> AnovaRow {
+    let row = build_untested_row(source, (squares, df));
     // A perfect fit leaves nothing to compare with.
     let f = (rest > 0.0).then(|| row.mean_square / (rest / rest_df)).filter(|f| f.is_finite());
     AnovaRow { f, p: f.map(|f| f_upper_tail(f, df, rest_df)), ..row }
@@ -77,14 +78,17 @@ fn lack_of_fit(cuts: &[Cut], regression: &Regression) -> Vec<AnovaRow> {
         }
         let same: Vec<usize> = (at..cuts.len()).filter(|it| cuts[*it].conditions == cuts[at].conditions).collect();
         same.iter().for_each(|it| seen[*it] = true);
-        let mean = same.iter().map(|it| cuts[*it].cutting_power_w).sum::<f64>() / count(same.len());
+        let mean = same.iter().map(|it| cuts[*it].cutting_power_w).sum::<f64>() / count_to_f64(same.len());
         pure += same.iter().map(|it| (cuts[*it].cutting_power_w - mean).powi(2)).sum::<f64>();
-        repeats += count(same.len() - 1);
+        repeats += count_to_f64(same.len() - 1);
     }
     let missed_df = regression.degrees_of_freedom - repeats;
     if repeats < 1.0 || missed_df < 1.0 {
         return Vec::new();
     }
     let missed = (regression.rss - pure).max(0.0);
-    vec![tested("lack of fit", missed, missed_df, (pure, repeats)), plain("pure error", (pure, repeats))]
+    vec![
+        build_tested_row("lack of fit", missed, missed_df, (pure, repeats)),
+        build_untested_row("pure error", (pure, repeats)),
+    ]
 }

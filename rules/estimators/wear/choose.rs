@@ -16,7 +16,7 @@ impl WearKey {
     /// How well a model with this key fits a cut; `None` when it names something else than the cut. An empty text of the model
     /// fits everything; a model of a tool fits all edges of it.
     #[must_use]
-    pub fn fits(&self, cut: &Self) -> Option<u8> {
+    pub fn rank_fit(&self, cut: &Self) -> Option<u8> {
         let agrees = |mine: &str, theirs: &str| mine.is_empty() || mine == theirs;
         let edge = !self.tool.is_empty() && self.tool == cut.tool;
         let tool = edge || self.tool == tool_of(&cut.tool);
@@ -35,8 +35,12 @@ impl WearKey {
 }
 
 /// The best model for a cut; of equals the last, which is the newest. `key` reads what a model is for.
-pub fn choose<'a, R>(models: &'a [R], cut: &WearKey, key: impl Fn(&R) -> &WearRecord) -> Option<ChosenModel<'a, R>> {
-    let fitting = models.iter().filter_map(|model| Some((key(model).key.fits(cut)?, model)));
+pub fn choose_model<'a, R>(
+    models: &'a [R],
+    cut: &WearKey,
+    key: impl Fn(&R) -> &WearRecord,
+) -> Option<ChosenModel<'a, R>> {
+    let fitting = models.iter().filter_map(|model| Some((key(model).key.rank_fit(cut)?, model)));
     let (rank, record) = fitting.max_by_key(|(rank, _)| *rank)?;
     let words = ["any", "machine", "work material", "operation", "tool", "edge"];
     let highest = usize::try_from(u8::BITS - rank.leading_zeros()).unwrap_or(0);
@@ -46,7 +50,7 @@ pub fn choose<'a, R>(models: &'a [R], cut: &WearKey, key: impl Fn(&R) -> &WearRe
 #[cfg(test)]
 mod tests {
     use super::super::model::WearModel;
-    use super::super::surface::published;
+    use super::super::surface::build_published_surface;
     use super::*;
 
     fn key(texts: [&str; 4]) -> WearKey {
@@ -55,7 +59,7 @@ mod tests {
     }
 
     fn record(texts: [&str; 4]) -> WearRecord {
-        WearRecord::new(key(texts), 0.3, ("test".to_owned(), 27, 0.99), WearModel::Surface(published()))
+        WearRecord::new(key(texts), 0.3, ("test".to_owned(), 27, 0.99), WearModel::Surface(build_published_surface()))
     }
 
     #[test]
@@ -70,21 +74,25 @@ mod tests {
         ]
         .map(record);
         let by = |models: &[WearRecord], tool: &str, material: &str, operation: &str| {
-            let found = choose(models, &key(["m", tool, material, operation]), |it| it).expect("a model");
+            let found = choose_model(models, &key(["m", tool, material, operation]), |it| it).expect("a model");
             (found.record.key.clone(), found.by)
         };
         let words: Vec<&str> = (0..6).map(|from| by(&models[from..], "T1-2", "steel", "rough").1).collect();
         assert_eq!(words, ["edge", "tool", "operation", "work material", "machine", "any"]);
         assert_eq!(by(&models, "T1-3", "steel", "rough").0.tool, "T1", "a new edge of a known tool");
         assert_eq!(by(&models, "T2", "brass", "bore"), (key(["m", "", "", ""]), "machine"));
-        assert_eq!(choose(&models[..1], &key(["m", "T1", "", ""]), |it| it), None, "another edge is not this one");
-        assert_eq!(choose(&models[..5], &key(["n", "T1", "", ""]), |it| it), None, "another machine");
+        assert_eq!(
+            choose_model(&models[..1], &key(["m", "T1", "", ""]), |it| it),
+            None,
+            "another edge is not this one"
+        );
+        assert_eq!(choose_model(&models[..5], &key(["n", "T1", "", ""]), |it| it), None, "another machine");
     }
 
     #[test]
     fn of_equals_the_newest_counts() {
         let models = [record(["", "T1", "", ""]), record(["", "T1", "", ""])];
-        let found = choose(&models, &key(["m", "T1", "", ""]), |it| it).expect("a model");
+        let found = choose_model(&models, &key(["m", "T1", "", ""]), |it| it).expect("a model");
         assert!(std::ptr::eq(found.record, &raw const models[1]));
     }
 }

@@ -20,10 +20,10 @@ pub struct Range {
 impl Range {
     /// The range of some cuts.
     #[must_use]
-    pub fn of(cuts: &[Cut]) -> Self {
+    pub fn from_cuts(cuts: &[Cut]) -> Self {
         let fold = |start: f64, pick: fn(f64, f64) -> f64| {
             cuts.iter().fold([start; 4], |best, cut| {
-                let values = cut.conditions.vector();
+                let values = cut.conditions.to_vector();
                 std::array::from_fn(|at| pick(best[at], values[at]))
             })
         };
@@ -38,15 +38,15 @@ impl Range {
 
     /// Was the factor changed at all?
     #[must_use]
-    pub fn varies(&self, factor: usize) -> bool {
+    pub fn is_varied(&self, factor: usize) -> bool {
         self.width(factor) > 1e-9 * self.greatest[factor].abs()
     }
 
     /// The factors whose value lies outside what was recorded.
     #[must_use]
-    pub fn outside(&self, conditions: &CutConditions) -> Vec<&'static ConditionFactor> {
+    pub fn find_factors_outside(&self, conditions: &CutConditions) -> Vec<&'static ConditionFactor> {
         let beyond = |at: &usize| {
-            let value = conditions.vector()[*at];
+            let value = conditions.to_vector()[*at];
             let margin = MARGIN * self.width(*at).max(MARGIN * self.greatest[*at].abs());
             value < self.least[*at] - margin || value > self.greatest[*at] + margin
         };
@@ -66,25 +66,25 @@ pub struct Coding {
 impl Coding {
     /// The coding of a range.
     #[must_use]
-    pub fn of(range: &Range) -> Self {
+    pub fn from_range(range: &Range) -> Self {
         Self {
             centre: std::array::from_fn(|at| 0.5 * (range.least[at] + range.greatest[at])),
-            half: std::array::from_fn(|at| if range.varies(at) { 0.5 * range.width(at) } else { 0.0 }),
+            half: std::array::from_fn(|at| if range.is_varied(at) { 0.5 * range.width(at) } else { 0.0 }),
         }
     }
 
     /// The coded variables; 0 where the factor was held.
     #[must_use]
-    pub fn code(&self, conditions: &CutConditions) -> [f64; 4] {
-        let values = conditions.vector();
+    pub fn encode_conditions(&self, conditions: &CutConditions) -> [f64; 4] {
+        let values = conditions.to_vector();
         let coded = |at: usize| (values[at] - self.centre[at]) / self.half[at];
         std::array::from_fn(|at| if self.half[at] > 0.0 { coded(at) } else { 0.0 })
     }
 
     /// The conditions of coded variables.
     #[must_use]
-    pub fn decode(&self, coded: [f64; 4]) -> CutConditions {
-        CutConditions::of(std::array::from_fn(|at| self.centre[at] + coded[at] * self.half[at]))
+    pub fn decode_conditions(&self, coded: [f64; 4]) -> CutConditions {
+        CutConditions::from_vector(std::array::from_fn(|at| self.centre[at] + coded[at] * self.half[at]))
     }
 }
 
@@ -93,7 +93,7 @@ impl Coding {
 /// # Errors
 /// The factors that are constant.
 pub(super) fn check_varied(range: &Range, held: &[&str]) -> Result<(), Refusal> {
-    let constant = |at: &usize| !range.varies(*at) && !held.contains(&FACTORS[*at].name);
+    let constant = |at: &usize| !range.is_varied(*at) && !held.contains(&FACTORS[*at].name);
     let still: Vec<&ConditionFactor> = (0..FACTORS.len()).filter(constant).map(|at| &FACTORS[at]).collect();
     if still.is_empty() {
         return Ok(());
@@ -115,32 +115,35 @@ mod tests {
 
     fn cuts() -> Vec<Cut> {
         [[0.065, 90.0, 0.1, 0.5], [0.325, 150.0, 0.2, 1.5]]
-            .map(|it| Cut { conditions: CutConditions::of(it), cutting_power_w: 1.0 })
+            .map(|it| Cut { conditions: CutConditions::from_vector(it), cutting_power_w: 1.0 })
             .to_vec()
     }
 
     #[test]
     fn the_published_coding_of_the_wear() {
-        let coding = Coding::of(&Range::of(&cuts()));
+        let coding = Coding::from_range(&Range::from_cuts(&cuts()));
         assert!((coding.centre[0] - 0.195).abs() < 1e-12 && (coding.half[0] - 0.13).abs() < 1e-12);
-        let coded = coding.code(&CutConditions::of([0.3, 120.0, 0.1, 1.5]));
+        let coded = coding.encode_conditions(&CutConditions::from_vector([0.3, 120.0, 0.1, 1.5]));
         assert!((coded[0] - 0.807_692).abs() < 1e-6 && coded[1].abs() < 1e-12);
-        assert!((coding.decode(coded).flank_wear_mm - 0.3).abs() < 1e-12);
+        assert!((coding.decode_conditions(coded).flank_wear_mm - 0.3).abs() < 1e-12);
     }
 
     #[test]
     fn what_lies_outside_is_named() {
-        let range = Range::of(&cuts());
-        let outside = range.outside(&CutConditions::of([0.3, 170.0, 0.15, 0.2]));
+        let range = Range::from_cuts(&cuts());
+        let outside = range.find_factors_outside(&CutConditions::from_vector([0.3, 170.0, 0.15, 0.2]));
         assert_eq!(outside.iter().map(|it| it.symbol).collect::<Vec<_>>(), ["vc", "ap"]);
-        assert!(range.outside(&CutConditions::of([0.33, 90.0, 0.1, 0.5])).is_empty(), "a margin of 5 %");
+        assert!(
+            range.find_factors_outside(&CutConditions::from_vector([0.33, 90.0, 0.1, 0.5])).is_empty(),
+            "a margin of 5 %"
+        );
     }
 
     #[test]
     fn a_held_factor_must_be_named() {
         let mut held = cuts();
         held[1].conditions.cutting_speed_m_min = 90.0;
-        let range = Range::of(&held);
+        let range = Range::from_cuts(&held);
         let refusal = check_varied(&range, &[]).expect_err("constant").to_string();
         assert!(refusal.contains("cutting_speed_m_min is the same") && refusal.contains("--held"), "{refusal}");
         assert_eq!(check_varied(&range, &["cutting_speed_m_min"]), Ok(()));

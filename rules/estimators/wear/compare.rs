@@ -40,10 +40,10 @@ type FitFunction<'a> = &'a dyn Fn(&[Cut]) -> Option<WearModel>;
 
 /// Compares the two forms by cross-validation.
 #[must_use]
-pub fn compare(cuts: &[Cut], options: &SurfaceOptions) -> FormComparison {
-    let surface = |cuts: &[Cut]| largest(cuts, options);
+pub fn compare_forms(cuts: &[Cut], options: &SurfaceOptions) -> FormComparison {
+    let surface = |cuts: &[Cut]| fit_largest_surface(cuts, options);
     let physical = |cuts: &[Cut]| fit_physical(cuts, &options.held).ok().map(|fit| WearModel::Physical(fit.physical));
-    let forms = [errors("surface", cuts, &surface), errors("physical", cuts, &physical)];
+    let forms = [evaluate_form("surface", cuts, &surface), evaluate_form("physical", cuts, &physical)];
     let recommended = match (forms[0].bic, forms[1].bic) {
         (Some(surface), Some(physical)) if surface < physical => "surface",
         (Some(_), None) => "surface",
@@ -53,20 +53,20 @@ pub fn compare(cuts: &[Cut], options: &SurfaceOptions) -> FormComparison {
 }
 
 /// The surface of the highest order that these cuts carry.
-fn largest(cuts: &[Cut], options: &SurfaceOptions) -> Option<WearModel> {
+fn fit_largest_surface(cuts: &[Cut], options: &SurfaceOptions) -> Option<WearModel> {
     let orders = [Order::Second, Order::Interactions, Order::Linear];
     let mut allowed = orders.into_iter().skip_while(|order| *order != options.order);
     let fitted = allowed.find_map(|order| fit_surface(cuts, &SurfaceOptions { order, ..options.clone() }).ok());
     fitted.map(|fit| WearModel::Surface(fit.surface))
 }
 
-fn errors(form: &'static str, cuts: &[Cut], fit: FitFunction<'_>) -> FormErrors {
+fn evaluate_form(form: &'static str, cuts: &[Cut], fit: FitFunction<'_>) -> FormErrors {
     let one_by_one: Vec<Vec<usize>> = (0..cuts.len()).map(|at| vec![at]).collect();
     FormErrors {
         form,
         bic: fit(cuts).map(|model| bic(&model, cuts)),
         inside_rms_w: left_out(cuts, &one_by_one, fit),
-        outside_rms_w: left_out(cuts, &edges(cuts), fit),
+        outside_rms_w: left_out(cuts, &group_edge_cuts(cuts), fit),
     }
 }
 
@@ -82,15 +82,15 @@ fn bic(model: &WearModel, cuts: &[Cut]) -> f64 {
 }
 
 /// The cuts at each end of each factor that has more than two values.
-fn edges(cuts: &[Cut]) -> Vec<Vec<usize>> {
-    let range = Range::of(cuts);
+fn group_edge_cuts(cuts: &[Cut]) -> Vec<Vec<usize>> {
+    let range = Range::from_cuts(cuts);
     let at_end = |factor: usize, end: f64| {
-        let near = |cut: &Cut| (cut.conditions.vector()[factor] - end).abs() <= 0.02 * range.width(factor);
+        let near = |cut: &Cut| (cut.conditions.to_vector()[factor] - end).abs() <= 0.02 * range.width(factor);
         (0..cuts.len()).filter(|at| near(&cuts[*at])).collect::<Vec<usize>>()
     };
     let between = |factor: &usize| {
         let ends = at_end(*factor, range.least[*factor]).len() + at_end(*factor, range.greatest[*factor]).len();
-        range.varies(*factor) && ends < cuts.len()
+        range.is_varied(*factor) && ends < cuts.len()
     };
     let varied = (0..FACTORS.len()).filter(between);
     varied.flat_map(|factor| [at_end(factor, range.least[factor]), at_end(factor, range.greatest[factor])]).collect()
@@ -106,7 +106,7 @@ fn left_out(cuts: &[Cut], groups: &[Vec<usize>], fit: FitFunction<'_>) -> Option
             failed += 1;
             continue;
         };
-        let error = |at: &usize| model.predict(&cuts[*at].conditions).power_w - cuts[*at].cutting_power_w;
+        let error = |at: &usize| model.predict_power(&cuts[*at].conditions).power_w - cuts[*at].cutting_power_w;
         squares += group.iter().map(|at| error(at).powi(2)).sum::<f64>();
         count += group.len();
     }
@@ -116,7 +116,7 @@ fn left_out(cuts: &[Cut], groups: &[Vec<usize>], fit: FitFunction<'_>) -> Option
 #[cfg(test)]
 mod tests {
     use super::super::conditions::CutConditions;
-    use super::super::design::{FactorLevels, plan};
+    use super::super::design::{FactorLevels, plan_experiment};
     use super::super::orthogonal_array::Array;
     use super::*;
 
@@ -125,13 +125,13 @@ mod tests {
         let levels = [vec![0.065, 0.195, 0.325], vec![90.0, 120.0, 150.0], vec![0.1, 0.15, 0.2], vec![0.75, 1.0, 1.25]];
         let factors: Vec<FactorLevels> =
             FACTORS.iter().zip(levels).map(|(factor, values)| FactorLevels { factor, values }).collect();
-        let design = plan(Array::L27, &factors, 1).expect("a design");
+        let design = plan_experiment(Array::L27, &factors, 1).expect("a design");
         let cut = |(index, values): (usize, &Vec<f64>)| {
             let [wear, speed, feed, depth] = [values[0], values[1], values[2], values[3]];
             let force_n = (1700.0 * feed.powf(0.74) * (speed / 150.0).powf(-0.08) + 22.0 + 300.0 * wear) * depth;
             let noise = [8.0, -11.0, 3.0, -5.0, 9.0, -4.0, 0.5][index % 7];
             Cut {
-                conditions: CutConditions::of([wear, speed, feed, depth]),
+                conditions: CutConditions::from_vector([wear, speed, feed, depth]),
                 cutting_power_w: force_n * speed / 60.0 + noise,
             }
         };
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn the_physical_form_extrapolates_better() {
-        let comparison = compare(&cuts(), &SurfaceOptions::default());
+        let comparison = compare_forms(&cuts(), &SurfaceOptions::default());
         let outside = comparison.forms.clone().map(|form| form.outside_rms_w.expect("fitted"));
         let inside = comparison.forms.clone().map(|form| form.inside_rms_w.expect("fitted"));
         assert!(outside[1] < 0.5 * outside[0], "{comparison:?}");

@@ -92,13 +92,13 @@ pub struct CutConditions {
 impl CutConditions {
     /// In the order of [`FACTORS`].
     #[must_use]
-    pub fn vector(&self) -> [f64; 4] {
+    pub fn to_vector(&self) -> [f64; 4] {
         [self.flank_wear_mm, self.cutting_speed_m_min, self.feed_per_rev_mm, self.depth_of_cut_mm]
     }
 
     /// From the order of [`FACTORS`].
     #[must_use]
-    pub fn of(vector: [f64; 4]) -> Self {
+    pub fn from_vector(vector: [f64; 4]) -> Self {
         let [flank_wear_mm, cutting_speed_m_min, feed_per_rev_mm, depth_of_cut_mm] = vector;
         Self { flank_wear_mm, cutting_speed_m_min, feed_per_rev_mm, depth_of_cut_mm }
     }
@@ -117,15 +117,15 @@ impl CutConditions {
 
     /// Everything that is wrong with the four values; empty when they can be computed with.
     #[must_use]
-    pub fn problems(&self) -> Vec<String> {
-        FACTORS.iter().zip(self.vector()).filter_map(|(factor, value)| factor.problem(value)).collect()
+    pub fn list_problems(&self) -> Vec<String> {
+        FACTORS.iter().zip(self.to_vector()).filter_map(|(factor, value)| factor.describe_problem(value)).collect()
     }
 }
 
 impl ConditionFactor {
     /// What is wrong with a value, and in which unit it probably is.
     #[must_use]
-    pub fn problem(&self, value: f64) -> Option<String> {
+    pub fn describe_problem(&self, value: f64) -> Option<String> {
         let (least, greatest) = self.range;
         if value.is_finite() && value >= least && value <= greatest {
             return None;
@@ -141,7 +141,7 @@ impl ConditionFactor {
 
     /// The factor of this column.
     #[must_use]
-    pub fn of(name: &str) -> Option<&'static Self> {
+    pub fn find_by_name(name: &str) -> Option<&'static Self> {
         FACTORS.iter().find(|factor| factor.name == name || factor.symbol == name)
     }
 }
@@ -222,8 +222,11 @@ mod tests {
 
     #[test]
     fn units_that_were_mistaken_are_named() {
-        let cut = |power, wear| Cut { conditions: CutConditions::of([wear, 200.0, 0.15, 1.0]), cutting_power_w: power };
-        assert!(cut(790.0, 195.0).conditions.problems()[0].contains("is it in um?"));
+        let cut = |power, wear| Cut {
+            conditions: CutConditions::from_vector([wear, 200.0, 0.15, 1.0]),
+            cutting_power_w: power,
+        };
+        assert!(cut(790.0, 195.0).conditions.list_problems()[0].contains("is it in um?"));
         assert!(unit_trouble(&[cut(0.79, 0.2)]).is_some_and(|text| text.contains("kW")));
         assert!(unit_trouble(&[cut(790_000.0, 0.2)]).is_some_and(|text| text.contains("mW")));
         assert_eq!(unit_trouble(&[cut(790.0, 0.2)]), None);

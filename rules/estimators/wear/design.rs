@@ -64,13 +64,13 @@ pub struct ExperimentDesign {
 ///
 /// # Errors
 /// Everything that is wrong with the factors, and what to give instead.
-pub fn plan(array: Array, factors: &[FactorLevels], seed: u64) -> Result<ExperimentDesign, Vec<String>> {
-    let problems = problems(array, factors);
+pub fn plan_experiment(array: Array, factors: &[FactorLevels], seed: u64) -> Result<ExperimentDesign, Vec<String>> {
+    let problems = list_problems(array, factors);
     if !problems.is_empty() {
         return Err(problems);
     }
-    let runs = array.runs();
-    let columns = choose(array, factors, &runs);
+    let runs = array.list_runs();
+    let columns = choose_columns(array, factors, &runs);
     let cut = |(row, run): (usize, &Vec<u8>)| {
         let levels: Vec<usize> = columns.iter().map(|column| usize::from(run[*column])).collect();
         let values = levels.iter().zip(factors).map(|(level, factor)| factor.values[*level]).collect();
@@ -78,8 +78,8 @@ pub fn plan(array: Array, factors: &[FactorLevels], seed: u64) -> Result<Experim
     };
     let mut cuts: Vec<PlannedCut> = runs.iter().enumerate().map(cut).collect();
     cuts.shuffle(&mut Pcg64Mcg::seed_from_u64(seed));
-    let aliases = aliases(factors, &columns, &runs);
-    let warnings = warnings(array, factors, &aliases);
+    let aliases = find_aliases(factors, &columns, &runs);
+    let warnings = list_warnings(array, factors, &aliases);
     Ok(ExperimentDesign {
         array,
         factors: factors.to_vec(),
@@ -90,15 +90,15 @@ pub fn plan(array: Array, factors: &[FactorLevels], seed: u64) -> Result<Experim
     })
 }
 
-fn problems(array: Array, factors: &[FactorLevels]) -> Vec<String> {
+fn list_problems(array: Array, factors: &[FactorLevels]) -> Vec<String> {
     let mut problems = Vec::new();
     if factors.len() < 2 {
         problems.push("a design needs at least two factors: give --levels NAME=LOW,MIDDLE,HIGH for each".to_owned());
     }
-    let mut free = array.levels();
+    let mut free = array.column_levels();
     for FactorLevels { factor, values } in factors {
         let name = factor.name;
-        problems.extend(values.iter().filter_map(|value| factor.problem(*value)));
+        problems.extend(values.iter().filter_map(|value| factor.describe_problem(*value)));
         if values.windows(2).any(|pair| pair[1] <= pair[0]) {
             problems.push(format!("{name}: give the levels in increasing order, each once"));
         }
@@ -117,15 +117,15 @@ fn problems(array: Array, factors: &[FactorLevels]) -> Vec<String> {
 }
 
 fn column_text(array: Array) -> String {
-    let levels = array.levels();
+    let levels = array.column_levels();
     let count = |wanted: u8| levels.iter().filter(|it| **it == wanted).count();
     let part = |wanted: u8| (count(wanted) > 0).then(|| format!("{} times {wanted} levels", count(wanted)));
     [part(2), part(3)].into_iter().flatten().collect::<Vec<_>>().join(" and ")
 }
 
 /// The columns with the least aliasing: first of the single factors with anything else, then of the rest.
-fn choose(array: Array, factors: &[FactorLevels], runs: &[Vec<u8>]) -> Vec<usize> {
-    let levels = array.levels();
+fn choose_columns(array: Array, factors: &[FactorLevels], runs: &[Vec<u8>]) -> Vec<usize> {
+    let levels = array.column_levels();
     let mut choices = vec![Vec::new()];
     for factor in factors {
         let fits = |column: &usize| usize::from(levels[*column]) == factor.values.len();
@@ -139,7 +139,7 @@ fn choose(array: Array, factors: &[FactorLevels], runs: &[Vec<u8>]) -> Vec<usize
             .collect();
     }
     let score = |columns: &Vec<usize>| {
-        let found = aliases(factors, columns, runs);
+        let found = find_aliases(factors, columns, runs);
         let square = |single: bool| {
             let counted = found.iter().filter(|it| (single_factor(&it.one) || single_factor(&it.other)) == single);
             counted.map(|it| it.correlation * it.correlation).sum::<f64>()
@@ -159,7 +159,7 @@ fn single_factor(name: &str) -> bool {
 }
 
 /// Correlated pairs of second-order terms, on levels coded from -1 to 1.
-fn aliases(factors: &[FactorLevels], columns: &[usize], runs: &[Vec<u8>]) -> Vec<Alias> {
+fn find_aliases(factors: &[FactorLevels], columns: &[usize], runs: &[Vec<u8>]) -> Vec<Alias> {
     let coded = |run: &Vec<u8>| -> Vec<f64> {
         columns
             .iter()
@@ -174,14 +174,18 @@ fn aliases(factors: &[FactorLevels], columns: &[usize], runs: &[Vec<u8>]) -> Vec
     };
     let terms: Vec<WearTerm> = second_order(factors.len()).into_iter().skip(1).filter(curved).collect();
     let centred: Vec<Vec<f64>> =
-        terms.iter().map(|term| centre(points.iter().map(|it| term.value(it)).collect())).collect();
+        terms.iter().map(|term| centre_values(points.iter().map(|it| term.evaluate_at(it)).collect())).collect();
     let symbols: Vec<&str> = factors.iter().map(|it| it.factor.symbol).collect();
     let mut found = Vec::new();
     for a in 0..terms.len() {
         for b in a + 1..terms.len() {
-            let correlation = correlation(&centred[a], &centred[b]);
+            let correlation = correlate_columns(&centred[a], &centred[b]);
             if correlation.abs() > ALIASED {
-                found.push(Alias { one: terms[a].name(&symbols), other: terms[b].name(&symbols), correlation });
+                found.push(Alias {
+                    one: terms[a].format_name(&symbols),
+                    other: terms[b].format_name(&symbols),
+                    correlation,
+                });
             }
         }
     }
@@ -189,25 +193,25 @@ fn aliases(factors: &[FactorLevels], columns: &[usize], runs: &[Vec<u8>]) -> Vec
     found
 }
 
-fn centre(mut values: Vec<f64>) -> Vec<f64> {
+fn centre_values(mut values: Vec<f64>) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     values.iter_mut().for_each(|value| *value -= mean);
     values
 }
 
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
+fn correlate_columns(a: &[f64], b: &[f64]) -> f64 {
     let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
     let size = (dot(a, a) * dot(b, b)).sqrt();
     if size > 0.0 { dot(a, b) / size } else { 0.0 }
 }
 
-fn warnings(array: Array, factors: &[FactorLevels], aliases: &[Alias]) -> Vec<String> {
+fn list_warnings(array: Array, factors: &[FactorLevels], aliases: &[Alias]) -> Vec<String> {
     let mut warnings = Vec::new();
     let flat: Vec<&str> = factors.iter().filter(|it| it.values.len() < 3).map(|it| it.factor.symbol).collect();
     if !flat.is_empty() {
         warnings.push(format!("two levels of {} show no curvature in it", flat.join(", ")));
     }
-    let (runs, terms) = (array.runs().len(), second_order(factors.len()).len() - flat.len());
+    let (runs, terms) = (array.list_runs().len(), second_order(factors.len()).len() - flat.len());
     if runs <= terms {
         warnings.push(format!(
             "{runs} cuts cannot carry the {terms} terms of a second-order surface; only the strongest can be estimated: \
@@ -239,7 +243,7 @@ mod tests {
 
     #[test]
     fn l27_keeps_single_factors_clear_of_everything() {
-        let design = plan(Array::L27, &four(), 1).expect("a design");
+        let design = plan_experiment(Array::L27, &four(), 1).expect("a design");
         assert_eq!((design.cuts.len(), design.columns.len()), (27, 4));
         assert_eq!(design.columns[..3], [1, 2, 5], "the basic columns");
         assert!([9, 10, 12, 13].contains(&design.columns[3]), "{:?}", design.columns);
@@ -254,8 +258,14 @@ mod tests {
 
     #[test]
     fn the_order_is_random_and_repeatable() {
-        let order =
-            |seed| plan(Array::L27, &four(), seed).expect("a design").cuts.iter().map(|it| it.row).collect::<Vec<_>>();
+        let order = |seed| {
+            plan_experiment(Array::L27, &four(), seed)
+                .expect("a design")
+                .cuts
+                .iter()
+                .map(|it| it.row)
+                .collect::<Vec<_>>()
+        };
         assert_eq!(order(1), order(1));
         assert_ne!(order(1), order(2));
         assert_ne!(order(1), (1..=27).collect::<Vec<_>>());
@@ -269,13 +279,13 @@ mod tests {
         let mut factors = four();
         factors[0].values = vec![65.0, 195.0, 325.0];
         factors[1].values = vec![90.0, 150.0];
-        let told = plan(Array::L9, &factors, 1).expect_err("refused").join("\n");
+        let told = plan_experiment(Array::L9, &factors, 1).expect_err("refused").join("\n");
         for part in ["is it in um?", "L9 has no free column of 2 levels; its columns have 4 times 3 levels"] {
             assert!(told.contains(part), "{part}: {told}");
         }
-        assert!(plan(Array::L9, &four(), 1).expect("a design").warnings[0].contains("15 terms"));
+        assert!(plan_experiment(Array::L9, &four(), 1).expect("a design").warnings[0].contains("15 terms"));
         factors[0].values = vec![0.1, 0.3];
         factors.truncate(2);
-        assert!(plan(Array::L4, &factors, 1).expect("a design").warnings[0].contains("no curvature"));
+        assert!(plan_experiment(Array::L4, &factors, 1).expect("a design").warnings[0].contains("no curvature"));
     }
 }

@@ -1,11 +1,11 @@
 //! Fitting a response surface: all terms, then backward elimination.
 
-use super::anova::{Anova, anova};
+use super::anova::{Anova, build_anova};
 use super::coding::{Coding, Range, check_varied};
 use super::conditions::{CUTTING_POWER, Cut, FACTORS, unit_trouble};
 use super::surface::Surface;
 use super::term::{WearTerm, second_order};
-use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, Regression, fit};
+use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, Regression, fit_unweighted};
 use serde::Serialize;
 
 /// Values of a factor that differ by less than this share of its range are one level.
@@ -72,21 +72,21 @@ pub struct SurfaceFit {
 /// which terms say the same.
 pub fn fit_surface(cuts: &[Cut], options: &SurfaceOptions) -> Result<SurfaceFit, Refusal> {
     check_cuts(cuts)?;
-    let range = Range::of(cuts);
+    let range = Range::from_cuts(cuts);
     let held: Vec<&str> = options.held.iter().map(String::as_str).collect();
     check_varied(&range, &held)?;
-    let coding = Coding::of(&range);
-    let mut terms = candidates(cuts, &range, options.order);
-    let mut regression = regress(cuts, &coding, &terms)?;
+    let coding = Coding::from_range(&range);
+    let mut terms = list_candidate_terms(cuts, &range, options.order);
+    let mut regression = regress_on_terms(cuts, &coding, &terms)?;
     let mut dropped = Vec::new();
-    while let Some(at) = weakest(&terms, &regression, options) {
+    while let Some(at) = find_weakest_term(&terms, &regression, options) {
         let coefficient = &regression.coefficients[at];
         dropped.push(Dropped { term: coefficient.name.clone(), f: f_of(&regression, at), p: coefficient.p });
         terms.remove(at);
-        regression = regress(cuts, &coding, &terms)?;
+        regression = regress_on_terms(cuts, &coding, &terms)?;
     }
-    let surface = surface(&terms, coding, range, &regression);
-    let anova = anova(cuts, &regression);
+    let surface = build_surface(&terms, coding, range, &regression);
+    let anova = build_anova(cuts, &regression);
     Ok(SurfaceFit { surface, regression, anova, dropped })
 }
 
@@ -98,26 +98,26 @@ fn f_of(regression: &Regression, at: usize) -> f64 {
 /// Values that cannot be, and units that were mistaken.
 pub(super) fn check_cuts(cuts: &[Cut]) -> Result<(), Refusal> {
     for (index, cut) in cuts.iter().enumerate() {
-        if let Some(problem) = cut.conditions.problems().into_iter().next() {
+        if let Some(problem) = cut.conditions.list_problems().into_iter().next() {
             let kind = if problem.contains("is it in") { RefusalKind::Unit } else { RefusalKind::OutOfRange };
-            return Err(Refusal::new(kind, problem, "correct the table").at(format!("row {}", index + 1)));
+            return Err(Refusal::new(kind, problem, "correct the table").with_place(format!("row {}", index + 1)));
         }
         if !(cut.cutting_power_w.is_finite() && cut.cutting_power_w > 0.0) {
             let what = format!("{CUTTING_POWER} = {} is no power that removes material", cut.cutting_power_w);
             let next = "leave cuts in air out, and separate the no-load power first (identify no-load)";
-            return Err(Refusal::new(RefusalKind::OutOfRange, what, next).at(format!("row {}", index + 1)));
+            return Err(Refusal::new(RefusalKind::OutOfRange, what, next).with_place(format!("row {}", index + 1)));
         }
     }
-    let trouble = |what| Err(Refusal::new(RefusalKind::Unit, what, "").at(CUTTING_POWER));
+    let trouble = |what| Err(Refusal::new(RefusalKind::Unit, what, "").with_place(CUTTING_POWER));
     unit_trouble(cuts).map_or(Ok(()), trouble)
 }
 
 /// The terms to begin with: those that the values of the factors can show.
-fn candidates(cuts: &[Cut], range: &Range, order: Order) -> Vec<WearTerm> {
-    let levels: Vec<usize> = (0..FACTORS.len()).map(|at| distinct(cuts, at)).collect();
+fn list_candidate_terms(cuts: &[Cut], range: &Range, order: Order) -> Vec<WearTerm> {
+    let levels: Vec<usize> = (0..FACTORS.len()).map(|at| count_distinct_levels(cuts, at)).collect();
     let shows = |term: &WearTerm| {
         let each = term.powers().iter().enumerate();
-        let varied = each.clone().all(|(at, power)| *power == 0 || range.varies(at));
+        let varied = each.clone().all(|(at, power)| *power == 0 || range.is_varied(at));
         let curved = each.clone().all(|(at, power)| *power < 2 || levels[at] >= 3);
         let wanted = match order {
             Order::Linear => term.order() <= 1,
@@ -129,8 +129,8 @@ fn candidates(cuts: &[Cut], range: &Range, order: Order) -> Vec<WearTerm> {
     second_order(FACTORS.len()).into_iter().filter(shows).collect()
 }
 
-fn distinct(cuts: &[Cut], factor: usize) -> usize {
-    let mut values: Vec<f64> = cuts.iter().map(|cut| cut.conditions.vector()[factor]).collect();
+fn count_distinct_levels(cuts: &[Cut], factor: usize) -> usize {
+    let mut values: Vec<f64> = cuts.iter().map(|cut| cut.conditions.to_vector()[factor]).collect();
     values.sort_by(f64::total_cmp);
     let width = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
     // Measured levels scatter; a square that only their scatter shows would be nonsense.
@@ -139,16 +139,18 @@ fn distinct(cuts: &[Cut], factor: usize) -> usize {
 }
 
 /// Names of the terms in the symbols of the factors.
-pub(super) fn name(term: &WearTerm) -> String {
-    term.name(&FACTORS.map(|factor| factor.symbol))
+pub(super) fn format_term_name(term: &WearTerm) -> String {
+    term.format_name(&FACTORS.map(|factor| factor.symbol))
 }
 
-fn regress(cuts: &[Cut], coding: &Coding, terms: &[WearTerm]) -> Result<Regression, Refusal> {
-    let points: Vec<[f64; 4]> = cuts.iter().map(|cut| coding.code(&cut.conditions)).collect();
-    let column = |term: &WearTerm| Column::new(name(term), points.iter().map(|point| term.value(point)).collect());
+fn regress_on_terms(cuts: &[Cut], coding: &Coding, terms: &[WearTerm]) -> Result<Regression, Refusal> {
+    let points: Vec<[f64; 4]> = cuts.iter().map(|cut| coding.encode_conditions(&cut.conditions)).collect();
+    let column = |term: &WearTerm| {
+        Column::new(format_term_name(term), points.iter().map(|point| term.evaluate_at(point)).collect())
+    };
     let columns: Vec<Column> = terms.iter().skip(1).map(column).collect();
     let y = Column::new(CUTTING_POWER, cuts.iter().map(|cut| cut.cutting_power_w).collect());
-    fit(&y, &columns, Intercept::Fitted).map_err(|refusal| match refusal.kind {
+    fit_unweighted(&y, &columns, Intercept::Fitted).map_err(|refusal| match refusal.kind {
         RefusalKind::TooFew => Refusal {
             next: format!(
                 "a surface of {} terms needs more cuts than that, and half as many again to be judged; take --order linear, \
@@ -166,7 +168,7 @@ fn regress(cuts: &[Cut], coding: &Coding, terms: &[WearTerm]) -> Result<Regressi
 }
 
 /// The term to drop next: the least significant one that may go.
-fn weakest(terms: &[WearTerm], regression: &Regression, options: &SurfaceOptions) -> Option<usize> {
+fn find_weakest_term(terms: &[WearTerm], regression: &Regression, options: &SurfaceOptions) -> Option<usize> {
     let free = |at: &usize| !options.hierarchical || !terms.iter().any(|other| other.contains(&terms[*at]));
     let p = |at: usize| regression.coefficients[at].p;
     // One term besides the constant always stays.
@@ -174,7 +176,7 @@ fn weakest(terms: &[WearTerm], regression: &Regression, options: &SurfaceOptions
     (p(at) > options.p_out && terms.len() > 2).then_some(at)
 }
 
-fn surface(terms: &[WearTerm], coding: Coding, range: Range, regression: &Regression) -> Surface {
+fn build_surface(terms: &[WearTerm], coding: Coding, range: Range, regression: &Regression) -> Surface {
     let count = terms.len();
     Surface {
         coding,

@@ -1,35 +1,35 @@
 //! Surfaces come back from their own values, and what cannot be fitted is refused.
 
 use super::super::conditions::CutConditions;
-use super::super::design::{FactorLevels, plan};
+use super::super::design::{FactorLevels, plan_experiment};
 use super::super::orthogonal_array::Array;
 use super::super::surface::published_over;
 use super::*;
 
 const NOISE: [f64; 9] = [21.0, -33.0, 12.0, 40.0, -27.0, -8.0, 15.0, -36.0, 16.0];
 
-fn coding() -> Coding {
+fn build_coding() -> Coding {
     Coding { centre: [0.195, 120.0, 0.15, 1.0], half: [0.13, 30.0, 0.05, 0.25] }
 }
 
 /// The published surface at the 27 points of the design, with noise of this size.
-pub(super) fn cuts(noise: f64) -> Vec<Cut> {
+pub(super) fn simulate_cuts(noise: f64) -> Vec<Cut> {
     let levels = [vec![0.065, 0.195, 0.325], vec![90.0, 120.0, 150.0], vec![0.1, 0.15, 0.2], vec![0.75, 1.0, 1.25]];
     let factors: Vec<FactorLevels> =
         FACTORS.iter().zip(levels).map(|(factor, values)| FactorLevels { factor, values }).collect();
-    let surface = published_over(coding());
+    let surface = published_over(build_coding());
     let cut = |(index, values): (usize, &Vec<f64>)| {
-        let conditions = CutConditions::of([values[0], values[1], values[2], values[3]]);
-        let cutting_power_w = surface.predict(&conditions).power_w + noise * NOISE[index % NOISE.len()];
+        let conditions = CutConditions::from_vector([values[0], values[1], values[2], values[3]]);
+        let cutting_power_w = surface.predict_power(&conditions).power_w + noise * NOISE[index % NOISE.len()];
         Cut { conditions, cutting_power_w }
     };
-    let design = plan(Array::L27, &factors, 1).expect("a design");
+    let design = plan_experiment(Array::L27, &factors, 1).expect("a design");
     design.cuts.iter().map(|it| &it.values).enumerate().map(cut).collect()
 }
 
 #[test]
 fn the_published_surface_comes_back_with_its_eight_terms() {
-    let found = fit_surface(&cuts(1e-6), &SurfaceOptions::default()).expect("a fit");
+    let found = fit_surface(&simulate_cuts(1e-6), &SurfaceOptions::default()).expect("a fit");
     let names: Vec<&str> = found.regression.coefficients.iter().skip(1).map(|it| it.name.as_str()).collect();
     assert_eq!(names, ["VB", "vc", "f", "ap", "VB*vc", "VB*f", "vc*ap", "f*ap"]);
     let values = [1035.63, 83.5, 235.03, 246.36, 262.54, 37.02, -34.87, 62.14, 47.28];
@@ -41,7 +41,7 @@ fn the_published_surface_comes_back_with_its_eight_terms() {
 
 #[test]
 fn the_table_adds_up() {
-    let found = fit_surface(&cuts(1.0), &SurfaceOptions::default()).expect("a fit");
+    let found = fit_surface(&simulate_cuts(1.0), &SurfaceOptions::default()).expect("a fit");
     let row = |name: &str| found.anova.sources.iter().find(|it| it.source == name).expect("a row");
     let (model, residual, total) = (row("model"), row("residual"), row("total"));
     assert!(
@@ -57,10 +57,10 @@ fn the_table_adds_up() {
 
 #[test]
 fn hierarchy_keeps_the_parents_of_a_product() {
-    let mut cuts = cuts(1.0);
+    let mut cuts = simulate_cuts(1.0);
     // Without the wear alone, only with it in products.
     for cut in &mut cuts {
-        let [a, ..] = coding().code(&cut.conditions);
+        let [a, ..] = build_coding().encode_conditions(&cut.conditions);
         cut.cutting_power_w -= 83.5 * a;
     }
     let keeps = |hierarchical| {
@@ -73,7 +73,7 @@ fn hierarchy_keeps_the_parents_of_a_product() {
 
 #[test]
 fn repeated_cuts_show_what_the_surface_misses() {
-    let mut cuts = cuts(0.3);
+    let mut cuts = simulate_cuts(0.3);
     let again: Vec<Cut> =
         cuts[..6].iter().map(|cut| Cut { cutting_power_w: cut.cutting_power_w + 4.0, ..*cut }).collect();
     cuts.extend(again);
@@ -86,7 +86,7 @@ fn repeated_cuts_show_what_the_surface_misses() {
 #[test]
 fn what_cannot_be_fitted_is_refused_with_what_is_needed() {
     let told = |cuts: &[Cut]| fit_surface(cuts, &SurfaceOptions::default()).expect_err("refused").to_string();
-    let all = cuts(1.0);
+    let all = simulate_cuts(1.0);
     let changed = |change: fn(&mut Cut)| {
         let mut cuts = all.clone();
         cuts.iter_mut().for_each(change);

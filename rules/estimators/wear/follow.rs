@@ -75,42 +75,45 @@ impl WearFollower {
     }
 
     /// Takes the work of one part, which ended at `end_s`.
-    pub fn part(&mut self, works: &[EdgeWork], end_s: f64) -> Vec<WearNews> {
+    pub fn record_part(&mut self, works: &[EdgeWork], end_s: f64) -> Vec<WearNews> {
         let works: Vec<&EdgeWork> =
-            works.iter().filter(|work| work.seconds >= LEAST_S && work.excess().is_some()).collect();
+            works.iter().filter(|work| work.seconds >= LEAST_S && work.log_energy_ratio().is_some()).collect();
         let Some(first) = works.first() else { return Vec::new() };
         self.parts += 1;
-        self.material(&first.key, end_s);
+        self.update_hardness(&first.key, end_s);
         let mut news = Vec::new();
-        let wearing = self.grow(&works);
-        let measured: Vec<EdgeMeasurement> =
-            works.iter().filter(|work| leads(work, &works)).filter_map(|work| self.measured(work)).collect();
-        self.between(&measured, &mut news);
+        let wearing = self.predict_wear(&works);
+        let measured: Vec<EdgeMeasurement> = works
+            .iter()
+            .filter(|work| is_leading_operation(work, &works))
+            .filter_map(|work| self.measure_edge(work))
+            .collect();
+        self.weigh_hypotheses(&measured, &mut news);
         for at in &wearing {
             self.hold_against_limit(*at, &works, &mut news);
         }
         for at in wearing {
-            self.tell(at, &mut news);
+            self.report_observability(at, &mut news);
         }
         news
     }
 
     /// Another program, other material or a long pause may bring another hardness.
-    fn material(&mut self, key: &WorkKey, end_s: f64) {
+    fn update_hardness(&mut self, key: &WorkKey, end_s: f64) {
         let other = self.program != key.program || self.work_material != key.work_material;
         if self.parts > 1 && (other || (end_s - self.last_s).abs() > OTHER_MATERIAL_S) {
-            self.joint.reset(self.hardness, 0.0, HARDNESS_SD.powi(2));
+            self.joint.reset_state(self.hardness, 0.0, HARDNESS_SD.powi(2));
         } else {
-            self.joint.spread(self.hardness, HARDNESS_STEP_SD.powi(2));
+            self.joint.add_variance(self.hardness, HARDNESS_STEP_SD.powi(2));
         }
         (self.program, self.work_material, self.last_s) = (key.program.clone(), key.work_material.clone(), end_s);
     }
 
     /// Lets the edges of this part wear by what has slid along them; which they are.
-    fn grow(&mut self, works: &[&EdgeWork]) -> Vec<usize> {
+    fn predict_wear(&mut self, works: &[&EdgeWork]) -> Vec<usize> {
         let mut wearing: Vec<(usize, f64)> = Vec::new();
         for work in works {
-            let Some(at) = self.edge(work) else { continue };
+            let Some(at) = self.find_or_renew_edge(work) else { continue };
             match wearing.iter_mut().find(|(edge, _)| *edge == at) {
                 Some((_, slide_m)) => *slide_m += work.slide_m,
                 None => wearing.push((at, work.slide_m)),
@@ -123,17 +126,17 @@ impl WearFollower {
             let weight = 1.0 / f64::from(edge.parts.min(5));
             edge.part_m = if edge.part_m > 0.0 { edge.part_m + weight * (slide_m - edge.part_m) } else { *slide_m };
             let rate = self.joint.mean(edge.rate);
-            self.joint.grow(edge.wear, edge.rate, *slide_m);
+            self.joint.add_scaled_state(edge.wear, edge.rate, *slide_m);
             let share = (self.joint.mean(edge.wear) / edge.criterion_mm).clamp(0.0, 1.5);
-            self.joint.scale(edge.rate, 1.0 + ACCELERATION * share * rate * slide_m / edge.criterion_mm);
-            self.joint.spread(edge.wear, (GROWTH_STEP * rate * slide_m).powi(2));
-            self.joint.spread(edge.rate, (RATE_STEP * rate).powi(2));
+            self.joint.scale_state(edge.rate, 1.0 + ACCELERATION * share * rate * slide_m / edge.criterion_mm);
+            self.joint.add_variance(edge.wear, (GROWTH_STEP * rate * slide_m).powi(2));
+            self.joint.add_variance(edge.rate, (RATE_STEP * rate).powi(2));
         }
         wearing.into_iter().map(|(at, _)| at).collect()
     }
 
     /// The edge of this work; a new one where it has another name than before.
-    fn edge(&mut self, work: &EdgeWork) -> Option<usize> {
+    fn find_or_renew_edge(&mut self, work: &EdgeWork) -> Option<usize> {
         self.edges_named |= edge_of(&work.edge).is_some();
         let found = self.edges.iter().position(|edge| edge.tool == work.key.tool);
         let at = match found {
@@ -142,7 +145,7 @@ impl WearFollower {
         };
         if self.edges[at].name != work.edge {
             self.edges[at].name.clone_from(&work.edge);
-            self.renew(at);
+            self.renew_edge(at);
         }
         (self.edges[at].criterion_mm, self.edges[at].reference) = (work.criterion_mm, work.key.reference);
         Some(at)
@@ -177,7 +180,7 @@ impl WearFollower {
     }
 
     /// The edge at this place is a new one; the rate of the one before counts for it.
-    pub(super) fn renew(&mut self, at: usize) {
+    pub(super) fn renew_edge(&mut self, at: usize) {
         let edge = &mut self.edges[at];
         let grown = self.joint.mean(edge.wear) - NEW_MM.0;
         if edge.parts >= PARTS_OF_A_LIFE && edge.slide_m > 0.0 && grown > 0.0 {
@@ -192,15 +195,15 @@ impl WearFollower {
         }
         (edge.number, edge.slide_m, edge.parts, edge.blind) = (edge.number + 1, 0.0, 0, false);
         (edge.limit_parts, edge.material_parts) = (None, 0);
-        let (mean, sd) = pooled(&edge.rates);
-        self.joint.reset(edge.wear, NEW_MM.0, NEW_MM.1.powi(2));
-        self.joint.reset(edge.rate, mean, sd * sd);
+        let (mean, sd) = pool_rates(&edge.rates);
+        self.joint.reset_state(edge.wear, NEW_MM.0, NEW_MM.1.powi(2));
+        self.joint.reset_state(edge.rate, mean, sd * sd);
     }
 
-    fn measured(&mut self, work: &EdgeWork) -> Option<EdgeMeasurement> {
+    fn measure_edge(&mut self, work: &EdgeWork) -> Option<EdgeMeasurement> {
         let edge = self.edges.iter().position(|edge| edge.tool == work.key.tool)?;
-        let excess = work.excess()?;
-        let (group, is_new) = self.group(work, excess);
+        let excess = work.log_energy_ratio()?;
+        let (group, is_new) = self.find_or_add_group(work, excess);
         let group_path = &mut self.groups[group].path_mm;
         if work.key.reference == WorkReference::Feed && (work.path_mm / *group_path - 1.0).abs() > SAME_PATH {
             // What is longer from now on is learned slowly, what was cut short is left out.
@@ -218,24 +221,24 @@ impl WearFollower {
             variance: REPEAT_SD.powi(2) + (CHANGING_SHARE * work.energy_doubt()).powi(2),
         };
         if is_new {
-            self.doubt(&one);
+            self.widen_operation_constant(&one);
         }
         Some(one)
     }
 
     /// Where the first cut of an operation shows far more or less than was believed, its constant is doubted: neither wear nor
     /// hardness knows of another tool path. The variance is the one that makes what was measured likeliest.
-    fn doubt(&mut self, first: &EdgeMeasurement) {
-        let (gradient, above) = self.expected(first);
+    fn widen_operation_constant(&mut self, first: &EdgeMeasurement) {
+        let (gradient, above) = self.compute_innovation(first);
         let believed = self.joint.variance_of(&gradient, first.variance);
         let ratio = above.powi(2) / believed.max(f64::MIN_POSITIVE);
         if ratio > 1.0 && 0.5 * (ratio - 1.0 - ratio.ln()) > OTHER_CONSTANT {
-            self.joint.spread(first.group, above.powi(2) - believed);
+            self.joint.add_variance(first.group, above.powi(2) - believed);
         }
     }
 
     /// The number of the operation of this work, and whether it is new.
-    fn group(&mut self, work: &EdgeWork, excess: f64) -> (usize, bool) {
+    fn find_or_add_group(&mut self, work: &EdgeWork, excess: f64) -> (usize, bool) {
         if let Some(at) = self.groups.iter().position(|group| group.key == work.key) {
             return (at, false);
         }
@@ -252,13 +255,13 @@ impl WearFollower {
         }
         let oldest = (0..self.groups.len()).min_by_key(|at| self.groups[*at].used).unwrap_or(0);
         let at = self.groups[oldest].at;
-        self.joint.reset(at, mean, sd * sd);
+        self.joint.reset_state(at, mean, sd * sd);
         self.groups[oldest] = OperationGroup { key, at, path_mm, used };
         (oldest, true)
     }
 
     /// The slope over the states, and how far the measurement lies above the estimate. The mean of a part is that of its middle.
-    pub(super) fn expected(&self, one: &EdgeMeasurement) -> (Vec<(usize, f64)>, f64) {
+    pub(super) fn compute_innovation(&self, one: &EdgeMeasurement) -> (Vec<(usize, f64)>, f64) {
         let edge = &self.edges[one.edge];
         let wear = (self.joint.mean(edge.wear) - one.half_m * self.joint.mean(edge.rate)).max(0.0);
         let slope = one.rise / (1.0 + one.rise * wear);
@@ -276,8 +279,8 @@ impl WearFollower {
         above.abs() > OUTLIER_SD * self.joint.variance_of(gradient, one.variance).sqrt()
     }
 
-    pub(super) fn take(&mut self, one: &EdgeMeasurement) {
-        let (gradient, above) = self.expected(one);
+    pub(super) fn update_with_measurement(&mut self, one: &EdgeMeasurement) {
+        let (gradient, above) = self.compute_innovation(one);
         let odd = self.is_odd(&gradient, above, one);
         let edge = &mut self.edges[one.edge];
         edge.odd = if odd { edge.odd + 1 } else { 0 };
@@ -286,17 +289,17 @@ impl WearFollower {
             // What stays is no error of measurement: the edge has chipped, or was exchanged.
             ODD_IN_A_ROW.. => {
                 edge.odd = 0;
-                self.joint.spread(edge.wear, edge.criterion_mm.powi(2));
+                self.joint.add_variance(edge.wear, edge.criterion_mm.powi(2));
             }
             _ => return,
         }
-        self.joint.observe(&gradient, above, one.variance);
+        self.joint.update_with_measurement(&gradient, above, one.variance);
         let edge = &self.edges[one.edge];
         self.joint.at_least(edge.wear, 0.0);
         self.joint.at_least(edge.rate, 0.02 * RATE.0);
     }
 
-    fn tell(&mut self, at: usize, news: &mut Vec<WearNews>) {
+    fn report_observability(&mut self, at: usize, news: &mut Vec<WearNews>) {
         let Some(outlook) = self.outlook_at(at) else { return };
         let edge = &mut self.edges[at];
         if edge.blind != outlook.observed {
@@ -324,12 +327,12 @@ impl WearFollower {
             part_m: edge.part_m,
             criterion_mm: edge.criterion_mm,
         };
-        Some(known.outlook())
+        Some(known.build_outlook())
     }
 
     /// How the edge of this name stands after its last part; `None` before the first one.
     #[must_use]
-    pub fn outlook(&self, edge: &str) -> Option<(WorkReference, Outlook)> {
+    pub fn find_outlook(&self, edge: &str) -> Option<(WorkReference, Outlook)> {
         let at = self.edges.iter().position(|known| known.name == edge)?;
         Some((self.edges[at].reference, self.outlook_at(at)?))
     }
@@ -337,7 +340,7 @@ impl WearFollower {
     /// What the other two witnesses say of the edge of this name: parts in a row above its limit, and the share of the life of the
     /// edges before it.
     #[must_use]
-    pub fn witnesses(&self, edge: &str) -> (Option<u32>, Option<f64>) {
+    pub fn read_witnesses(&self, edge: &str) -> (Option<u32>, Option<f64>) {
         let found = self.edges.iter().find(|known| known.name == edge);
         (found.and_then(|edge| edge.limit_parts), found.and_then(CuttingEdge::life_share))
     }
@@ -358,7 +361,7 @@ impl WearFollower {
 
 /// Is this what most of its operation is compared with? The rest of the operation are entries, exits and corners that the model does
 /// not cover; their mixture differs from part to part.
-pub(super) fn leads(work: &EdgeWork, works: &[&EdgeWork]) -> bool {
+pub(super) fn is_leading_operation(work: &EdgeWork, works: &[&EdgeWork]) -> bool {
     works
         .iter()
         .filter(|other| other.key.is_of_the_same_operation(&work.key))

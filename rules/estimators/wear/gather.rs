@@ -58,10 +58,14 @@ pub struct GatheredCuts {
 ///
 /// # Errors
 /// Which columns are missing and where they come from; no row with a value in all of them.
-pub fn gather(recording: &Recording, columns: &CutColumns) -> Result<GatheredCuts, Refusal> {
+pub fn gather_cuts(recording: &Recording, columns: &CutColumns) -> Result<GatheredCuts, Refusal> {
     let recording = with_derived(recording.clone());
-    let missing: Vec<String> =
-        columns.conditions.iter().filter(|name| recording.numbers(name).is_none()).map(|name| absent(name)).collect();
+    let missing: Vec<String> = columns
+        .conditions
+        .iter()
+        .filter(|name| recording.find_numbers(name).is_none())
+        .map(|name| describe_missing_column(name))
+        .collect();
     let power = cutting_power(&recording, columns);
     if let Some(what) =
         missing.into_iter().chain(power.as_ref().err().cloned()).reduce(|all, one| format!("{all}; {one}"))
@@ -70,13 +74,13 @@ pub fn gather(recording: &Recording, columns: &CutColumns) -> Result<GatheredCut
                     cutting_power_w, one row per cut";
         return Err(Refusal::new(RefusalKind::Missing, what, next));
     }
-    let factors: Vec<&Numbers> = columns.conditions.iter().filter_map(|name| recording.numbers(name)).collect();
+    let factors: Vec<&Numbers> = columns.conditions.iter().filter_map(|name| recording.find_numbers(name)).collect();
     let rows = RecordingRows { recording: &recording, factors, power: power.unwrap_or_default() };
-    rows.gather(columns.each_row)
+    rows.collect_cuts(columns.each_row)
 }
 
 /// Where a missing column comes from.
-fn absent(name: &str) -> String {
+fn describe_missing_column(name: &str) -> String {
     let source = match name {
         "flank_wear_mm" => "read under the microscope, entered with each cut",
         "cutting_speed_m_min" => "or spindle_speed_rpm and diameter_mm (--operations gives the diameter)",
@@ -88,17 +92,17 @@ fn absent(name: &str) -> String {
 }
 
 fn cutting_power(recording: &Recording, columns: &CutColumns) -> Result<Numbers, String> {
-    if let Some(power) = recording.numbers(&columns.power) {
+    if let Some(power) = recording.find_numbers(&columns.power) {
         return Ok(power.clone());
     }
     let kilowatts = columns.power.strip_suffix("_w").map(|stem| format!("{stem}_kw"));
-    if let Some(name) = kilowatts.filter(|name| recording.numbers(name).is_some()) {
+    if let Some(name) = kilowatts.filter(|name| recording.find_numbers(name).is_some()) {
         return Err(format!("{name} is in kW; the column must be {} in W", columns.power));
     }
-    let (total, idle) = (recording.numbers("spindle_power_w"), recording.numbers("no_load_power_w"));
+    let (total, idle) = (recording.find_numbers("spindle_power_w"), recording.find_numbers("no_load_power_w"));
     match (total, idle, columns.load_loss) {
         (Some(total), Some(idle), Some(load_loss)) => {
-            let speed = recording.numbers("spindle_speed_rpm");
+            let speed = recording.find_numbers("spindle_speed_rpm");
             if load_loss.speed_rpm.is_some() && speed.is_none() {
                 return Err("there is no column spindle_speed_rpm, with which the load loss goes".to_owned());
             }
@@ -106,8 +110,8 @@ fn cutting_power(recording: &Recording, columns: &CutColumns) -> Result<Numbers,
                 Some(_) => speed.and_then(|speed| speed.get(row)),
                 None => Some(0.0),
             };
-            let split = |row: usize| load_loss.split(total.get(row)? - idle.get(row)?, at(row)?);
-            Ok((0..recording.rows()).map(|row| split(row).map(|it| it.cutting_power_w)).collect())
+            let split = |row: usize| load_loss.split_excess_power(total.get(row)? - idle.get(row)?, at(row)?);
+            Ok((0..recording.count_rows()).map(|row| split(row).map(|it| it.cutting_power_w)).collect())
         }
         (Some(_), _, _) => Err(format!(
             "there is no column {}; spindle_power_w alone holds the no-load power: add no_load_power_w (an export of the \
@@ -125,8 +129,8 @@ struct RecordingRows<'a> {
 }
 
 impl RecordingRows<'_> {
-    fn cut(&self, row: usize) -> Option<Cut> {
-        let engaged = self.recording.numbers("engaged").and_then(|engaged| engaged.get(row));
+    fn read_cut(&self, row: usize) -> Option<Cut> {
+        let engaged = self.recording.find_numbers("engaged").and_then(|engaged| engaged.get(row));
         if engaged.is_some_and(|engaged| engaged < 0.5) {
             return None;
         }
@@ -136,22 +140,23 @@ impl RecordingRows<'_> {
         }
         // Without speed or feed nothing is removed, whatever the recording says of the engagement.
         let removes = values[1] > 0.0 && values[2] > 0.0;
-        removes.then_some(Cut { conditions: CutConditions::of(values), cutting_power_w: self.power.get(row)? })
+        removes.then_some(Cut { conditions: CutConditions::from_vector(values), cutting_power_w: self.power.get(row)? })
     }
 
     fn same_group(&self, a: usize, b: usize) -> bool {
-        let same = |name: &&str| self.recording.words(name).is_none_or(|words| words.code(a) == words.code(b));
+        let same =
+            |name: &&str| self.recording.find_words(name).is_none_or(|words| words.find_code(a) == words.find_code(b));
         GROUPS.iter().all(same)
     }
 
-    fn gather(&self, each_row: bool) -> Result<GatheredCuts, Refusal> {
-        let groups = settled(self.groups(each_row));
+    fn collect_cuts(&self, each_row: bool) -> Result<GatheredCuts, Refusal> {
+        let groups = drop_transitions(self.group_rows(each_row));
         let rows: usize = groups.iter().map(|group| group.members.len()).sum();
         if groups.is_empty() {
             return Err(self.no_row());
         }
-        let cuts = self.merged(groups, each_row).iter().map(|group| mean(&group.members)).collect();
-        Ok(GatheredCuts { cuts, rows, left_out: self.recording.rows() - rows })
+        let cuts = self.merge_neighbours(groups, each_row).iter().map(|group| average_cuts(&group.members)).collect();
+        Ok(GatheredCuts { cuts, rows, left_out: self.recording.count_rows() - rows })
     }
 
     /// Why there is no cut: how many rows have a value in each column, and which column is absent where the others are there.
@@ -160,7 +165,7 @@ impl RecordingRows<'_> {
         let names = FACTORS.iter().map(|factor| factor.name);
         let columns: Vec<(&Numbers, &str)> = self.factors.iter().copied().zip(names).chain([power]).collect();
         let has = |column: &Numbers, row: usize| column.get(row).is_some_and(|value| value.is_finite());
-        let rows = self.recording.rows();
+        let rows = self.recording.count_rows();
         let each = columns.iter().map(|(column, name)| {
             let present = (0..rows).filter(|row| has(column, *row)).count();
             format!("{name} in {present}")
@@ -183,12 +188,12 @@ impl RecordingRows<'_> {
     }
 
     /// Consecutive rows of the same conditions.
-    fn groups(&self, each_row: bool) -> Vec<CutRows> {
+    fn group_rows(&self, each_row: bool) -> Vec<CutRows> {
         let mut groups: Vec<CutRows> = Vec::new();
-        for row in 0..self.recording.rows() {
-            let Some(cut) = self.cut(row) else { continue };
+        for row in 0..self.recording.count_rows() {
+            let Some(cut) = self.read_cut(row) else { continue };
             match groups.last_mut() {
-                Some(group) if !each_row && self.same_group(group.last_row, row) && group.takes(&cut) => {
+                Some(group) if !each_row && self.same_group(group.last_row, row) && group.accepts_cut(&cut) => {
                     group.last_row = row;
                     group.members.push(cut);
                 }
@@ -199,14 +204,14 @@ impl RecordingRows<'_> {
     }
 
     /// Neighbours that only a transition stood between are one cut.
-    fn merged(&self, groups: Vec<CutRows>, each_row: bool) -> Vec<CutRows> {
+    fn merge_neighbours(&self, groups: Vec<CutRows>, each_row: bool) -> Vec<CutRows> {
         let mut merged: Vec<CutRows> = Vec::new();
         for group in groups {
             match merged.last_mut() {
                 Some(before)
                     if !each_row
                         && self.same_group(before.last_row, group.last_row)
-                        && before.takes(&mean(&group.members)) =>
+                        && before.accepts_cut(&average_cuts(&group.members)) =>
                 {
                     before.last_row = group.last_row;
                     before.members.extend(group.members);
@@ -225,13 +230,13 @@ struct CutRows {
 }
 
 impl CutRows {
-    fn takes(&self, cut: &Cut) -> bool {
-        self.members.first().is_some_and(|first| alike(&first.conditions, &cut.conditions))
+    fn accepts_cut(&self, cut: &Cut) -> bool {
+        self.members.first().is_some_and(|first| are_alike(&first.conditions, &cut.conditions))
     }
 }
 
 /// Without transitions: groups much shorter than is usual in this recording.
-fn settled(mut groups: Vec<CutRows>) -> Vec<CutRows> {
+fn drop_transitions(mut groups: Vec<CutRows>) -> Vec<CutRows> {
     let mut lengths: Vec<usize> = groups.iter().map(|group| group.members.len()).collect();
     lengths.sort_unstable();
     let usual = lengths.get(lengths.len() * 3 / 4).copied().unwrap_or(0);
@@ -239,7 +244,7 @@ fn settled(mut groups: Vec<CutRows>) -> Vec<CutRows> {
     groups
 }
 
-fn alike(a: &CutConditions, b: &CutConditions) -> bool {
+fn are_alike(a: &CutConditions, b: &CutConditions) -> bool {
     let close = |x: f64, y: f64| (x - y).abs() <= SAME_SHARE * x.abs();
     (a.flank_wear_mm - b.flank_wear_mm).abs() <= SAME_WEAR_MM
         && (a.depth_of_cut_mm - b.depth_of_cut_mm).abs() <= SAME_MM
@@ -247,11 +252,11 @@ fn alike(a: &CutConditions, b: &CutConditions) -> bool {
         && close(a.feed_per_rev_mm, b.feed_per_rev_mm)
 }
 
-fn mean(cuts: &[Cut]) -> Cut {
+fn average_cuts(cuts: &[Cut]) -> Cut {
     let count = cuts.len() as f64;
     let mean = |read: &dyn Fn(&Cut) -> f64| cuts.iter().map(read).sum::<f64>() / count;
-    let conditions = std::array::from_fn(|at| mean(&|cut: &Cut| cut.conditions.vector()[at]));
-    Cut { conditions: CutConditions::of(conditions), cutting_power_w: mean(&|cut| cut.cutting_power_w) }
+    let conditions = std::array::from_fn(|at| mean(&|cut: &Cut| cut.conditions.to_vector()[at]));
+    Cut { conditions: CutConditions::from_vector(conditions), cutting_power_w: mean(&|cut| cut.cutting_power_w) }
 }
 
 #[cfg(test)]
@@ -262,7 +267,7 @@ mod tests {
     fn recording(rows: usize, columns: &[(&str, f64)]) -> Recording {
         let mut recording = Recording::new("test", (0..rows).map(|row| row as f64).collect(), None);
         for (name, value) in columns {
-            recording.set_column(name, Cells::Numbers(Numbers::full(vec![*value; rows])));
+            recording.set_column(name, Cells::Numbers(Numbers::from_values(vec![*value; rows])));
         }
         recording
     }
@@ -278,26 +283,29 @@ mod tests {
     #[test]
     fn rows_of_one_cut_are_averaged_and_speed_and_feed_are_derived() {
         let mut recording = recording(6, &CONDITIONS);
-        let power = Numbers::full(vec![780.0, 790.0, 800.0, 900.0, 910.0, 0.0]);
+        let power = Numbers::from_values(vec![780.0, 790.0, 800.0, 900.0, 910.0, 0.0]);
         recording.set_column("cutting_power_w", Cells::Numbers(power));
         recording.set_column("run", Cells::Words(Words::from_iter(["1", "1", "1", "2", "2", "2"])));
-        recording.set_column("engaged", Cells::Numbers(Numbers::full(vec![1.0, 1.0, 1.0, 1.0, 1.0, 0.0])));
-        let gathered = gather(&recording, &CutColumns::default()).expect("cuts");
+        recording.set_column("engaged", Cells::Numbers(Numbers::from_values(vec![1.0, 1.0, 1.0, 1.0, 1.0, 0.0])));
+        let gathered = gather_cuts(&recording, &CutColumns::default()).expect("cuts");
         let powers: Vec<f64> = gathered.cuts.iter().map(|cut| cut.cutting_power_w).collect();
         assert_eq!((powers, gathered.rows, gathered.left_out), (vec![790.0, 905.0], 5, 1));
         assert!((gathered.cuts[0].conditions.cutting_speed_m_min - 198.5).abs() < 0.1);
         assert!((gathered.cuts[0].conditions.feed_per_rev_mm - 0.153).abs() < 1e-9);
-        let each = gather(&recording, &CutColumns { each_row: true, ..CutColumns::default() }).expect("cuts");
+        let each = gather_cuts(&recording, &CutColumns { each_row: true, ..CutColumns::default() }).expect("cuts");
         assert_eq!(each.cuts.len(), 5);
     }
 
     #[test]
     fn the_cutting_power_is_separated_where_it_has_no_column() {
         let columns = [&CONDITIONS[..], &[("spindle_power_w", 1460.0), ("no_load_power_w", 500.0)]].concat();
-        let known = CutColumns { load_loss: Some(LoadLossLaw::constant(0.1807, 4e-5)), ..CutColumns::default() };
-        let gathered = gather(&recording(3, &columns), &known).expect("a cut");
+        let known = CutColumns {
+            load_loss: Some(LoadLossLaw::with_constant_coefficients(0.1807, 4e-5)),
+            ..CutColumns::default()
+        };
+        let gathered = gather_cuts(&recording(3, &columns), &known).expect("a cut");
         assert!((gathered.cuts[0].cutting_power_w - 791.84).abs() < 0.01, "the published cut");
-        let told = gather(&recording(3, &columns), &CutColumns::default()).expect_err("refused").to_string();
+        let told = gather_cuts(&recording(3, &columns), &CutColumns::default()).expect_err("refused").to_string();
         assert!(told.contains("--load-loss"), "{told}");
     }
 
@@ -305,9 +313,9 @@ mod tests {
     fn wear_that_grows_within_a_cut_does_not_break_it() {
         let mut recording = recording(100, &CONDITIONS);
         let wear = |row: usize| 0.1 + if row < 50 { 0.0 } else { 0.1 } + 5e-5 * row as f64;
-        recording.set_column("flank_wear_mm", Cells::Numbers(Numbers::full((0..100).map(wear).collect())));
-        recording.set_column("cutting_power_w", Cells::Numbers(Numbers::full(vec![800.0; 100])));
-        let gathered = gather(&recording, &CutColumns::default()).expect("cuts");
+        recording.set_column("flank_wear_mm", Cells::Numbers(Numbers::from_values((0..100).map(wear).collect())));
+        recording.set_column("cutting_power_w", Cells::Numbers(Numbers::from_values(vec![800.0; 100])));
+        let gathered = gather_cuts(&recording, &CutColumns::default()).expect("cuts");
         assert_eq!(gathered.cuts.len(), 2, "another edge is another cut: {gathered:?}");
     }
 
@@ -318,7 +326,7 @@ mod tests {
         recording.set_column("cutting_power_w", Cells::Numbers(power));
         let wear = [None, Some(0.1), Some(0.1), Some(0.1)].into_iter().collect::<Numbers>();
         recording.set_column("flank_wear_mm", Cells::Numbers(wear));
-        let told = gather(&recording, &CutColumns::default()).expect_err("refused").to_string();
+        let told = gather_cuts(&recording, &CutColumns::default()).expect_err("refused").to_string();
         for part in ["of 4 rows", "flank_wear_mm in 3", "cutting power in 1", "3 rows lack cutting power alone"] {
             assert!(told.contains(part), "{part}: {told}");
         }
@@ -326,7 +334,7 @@ mod tests {
 
     #[test]
     fn missing_columns_are_told_at_once() {
-        let told = gather(&recording(3, &[("cutting_power_kw", 0.8)]), &CutColumns::default())
+        let told = gather_cuts(&recording(3, &[("cutting_power_kw", 0.8)]), &CutColumns::default())
             .expect_err("refused")
             .to_string();
         for part in ["flank_wear_mm (read under", "depth_of_cut_mm (no controller", "cutting_power_kw is in kW"] {

@@ -42,7 +42,7 @@ impl Gaussian {
     }
 
     /// The state becomes another one, of which only this is known. What was known of the others stays.
-    pub(super) fn reset(&mut self, at: usize, mean: f64, variance: f64) {
+    pub(super) fn reset_state(&mut self, at: usize, mean: f64, variance: f64) {
         if at >= self.mean.len() {
             return;
         }
@@ -53,14 +53,14 @@ impl Gaussian {
     }
 
     /// The state has moved by something of mean 0 and this variance.
-    pub(super) fn spread(&mut self, at: usize, variance: f64) {
+    pub(super) fn add_variance(&mut self, at: usize, variance: f64) {
         if let Some(own) = self.covariance.get_mut(at).and_then(|row| row.get_mut(at)) {
             *own += variance;
         }
     }
 
     /// `to` grows by `factor` times `from`.
-    pub(super) fn grow(&mut self, to: usize, from: usize, factor: f64) {
+    pub(super) fn add_scaled_state(&mut self, to: usize, from: usize, factor: f64) {
         if to.max(from) >= self.mean.len() {
             return;
         }
@@ -75,12 +75,12 @@ impl Gaussian {
     }
 
     /// The state becomes `factor` times what it was.
-    pub(super) fn scale(&mut self, at: usize, factor: f64) {
-        self.grow(at, at, factor - 1.0);
+    pub(super) fn scale_state(&mut self, at: usize, factor: f64) {
+        self.add_scaled_state(at, at, factor - 1.0);
     }
 
     /// Becomes the mixture of itself and another one of the same states, which has this weight: its mean and covariance.
-    pub(super) fn mix(&mut self, other: &Self, weight: f64) {
+    pub(super) fn mix_with(&mut self, other: &Self, weight: f64) {
         if other.mean.len() != self.mean.len() || !(0.0..=1.0).contains(&weight) {
             return;
         }
@@ -102,8 +102,8 @@ impl Gaussian {
     }
 
     /// Takes a measurement: its gradient over states, how far it lies above what was expected, its variance.
-    pub(super) fn observe(&mut self, gradient: &[(usize, f64)], above: f64, variance: f64) {
-        let along: Vec<f64> = (0..self.len()).map(|at| self.along(at, gradient)).collect();
+    pub(super) fn update_with_measurement(&mut self, gradient: &[(usize, f64)], above: f64, variance: f64) {
+        let along: Vec<f64> = (0..self.len()).map(|at| self.covariance_along(at, gradient)).collect();
         let total = self.variance_of(gradient, variance);
         if !(total > 0.0 && total.is_finite() && above.is_finite()) {
             return;
@@ -124,10 +124,10 @@ impl Gaussian {
 
     /// Variance of a measurement with this gradient.
     pub(super) fn variance_of(&self, gradient: &[(usize, f64)], variance: f64) -> f64 {
-        gradient.iter().map(|(at, slope)| slope * self.along(*at, gradient)).sum::<f64>() + variance
+        gradient.iter().map(|(at, slope)| slope * self.covariance_along(*at, gradient)).sum::<f64>() + variance
     }
 
-    fn along(&self, at: usize, gradient: &[(usize, f64)]) -> f64 {
+    fn covariance_along(&self, at: usize, gradient: &[(usize, f64)]) -> f64 {
         gradient.iter().map(|(other, slope)| self.covariance(at, *other) * slope).sum()
     }
 }
@@ -140,9 +140,9 @@ mod tests {
     fn a_measured_sum_ties_its_parts_together() {
         let mut joint = Gaussian::default();
         let (a, b) = (joint.add(0.0, 1.0), joint.add(0.0, 1.0));
-        joint.observe(&[(a, 1.0), (b, 1.0)], 2.0, 0.0);
+        joint.update_with_measurement(&[(a, 1.0), (b, 1.0)], 2.0, 0.0);
         assert!((joint.mean(a) - 1.0).abs() < 1e-12 && (joint.covariance(a, b) + 0.5).abs() < 1e-12, "{joint:?}");
-        joint.observe(&[(a, 1.0)], -1.0, 1e-9);
+        joint.update_with_measurement(&[(a, 1.0)], -1.0, 1e-9);
         assert!((joint.mean(b) - 2.0).abs() < 1e-6, "what one has less the other has more: {joint:?}");
     }
 
@@ -151,7 +151,7 @@ mod tests {
         let (mut one, mut other) = (Gaussian::default(), Gaussian::default());
         one.add(0.0, 1.0);
         other.add(4.0, 3.0);
-        one.mix(&other, 0.25);
+        one.mix_with(&other, 0.25);
         assert!((one.mean(0) - 1.0).abs() < 1e-12 && (one.covariance(0, 0) - (1.5 + 3.0)).abs() < 1e-12, "{one:?}");
     }
 
@@ -159,12 +159,12 @@ mod tests {
     fn growth_moves_mean_and_covariance_and_a_reset_forgets() {
         let mut joint = Gaussian::default();
         let (wear, rate) = (joint.add(0.1, 0.01), joint.add(0.02, 0.0001));
-        joint.grow(wear, rate, 10.0);
+        joint.add_scaled_state(wear, rate, 10.0);
         assert!((joint.mean(wear) - 0.3).abs() < 1e-12);
         assert!(
             (joint.covariance(wear, wear) - 0.02).abs() < 1e-12 && (joint.covariance(wear, rate) - 0.001).abs() < 1e-12
         );
-        joint.reset(wear, 0.0, 0.5);
+        joint.reset_state(wear, 0.0, 0.5);
         assert_eq!((joint.covariance(wear, rate), joint.covariance(wear, wear)), (0.0, 0.5));
         assert!(joint.is_sound());
     }

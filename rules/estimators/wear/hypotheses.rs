@@ -1,6 +1,6 @@
 //! What may have happened between two parts besides wear, and what the limit of the model says beside the filter.
 
-use super::follow::{WearFollower, leads};
+use super::follow::{WearFollower, is_leading_operation};
 use super::followed::{EdgeMeasurement, WearNews};
 use super::prior::*;
 use super::work::EdgeWork;
@@ -9,12 +9,12 @@ impl WearFollower {
     /// What happened between the parts: nothing, another hardness, or a new edge of one tool; then takes the measurements. Nothing and
     /// another hardness are mixed by what speaks for them: a fall of all powers may be softer material, or wear that was
     /// overestimated, and a part alone does not tell.
-    pub(super) fn between(&mut self, measured: &[EdgeMeasurement], news: &mut Vec<WearNews>) {
-        let nothing = self.likelihood(measured) + OTHER_HARDNESS;
+    pub(super) fn weigh_hypotheses(&mut self, measured: &[EdgeMeasurement], news: &mut Vec<WearNews>) {
+        let nothing = self.compute_log_likelihood(measured) + OTHER_HARDNESS;
         let mut harder = self.clone();
-        harder.joint.reset(harder.hardness, 0.0, HARDNESS_SD.powi(2));
-        let other = harder.likelihood(measured);
-        if let Some((renewed, tool)) = self.renewed(measured, nothing.max(other)) {
+        harder.joint.reset_state(harder.hardness, 0.0, HARDNESS_SD.powi(2));
+        let other = harder.compute_log_likelihood(measured);
+        if let Some((renewed, tool)) = self.find_renewed_edge(measured, nothing.max(other)) {
             *self = renewed;
             news.push(WearNews::NewEdge { tool });
             return self.take_all(measured);
@@ -24,7 +24,7 @@ impl WearFollower {
         self.take_all(measured);
         if weight > 0.0 {
             harder.take_all(measured);
-            self.joint.mix(&harder.joint, weight);
+            self.joint.mix_with(&harder.joint, weight);
             if weight > 0.5 {
                 self.edges = harder.edges;
             }
@@ -36,7 +36,7 @@ impl WearFollower {
 
     fn take_all(&mut self, measured: &[EdgeMeasurement]) {
         for one in measured {
-            self.take(one);
+            self.update_with_measurement(one);
         }
     }
 
@@ -53,7 +53,7 @@ impl WearFollower {
     }
 
     /// The likeliest new edge of a tool whose controller names none, where it is likelier than `least`.
-    fn renewed(&self, measured: &[EdgeMeasurement], least: f64) -> Option<(Self, String)> {
+    fn find_renewed_edge(&self, measured: &[EdgeMeasurement], least: f64) -> Option<(Self, String)> {
         let mut tools: Vec<usize> = measured.iter().map(|one| one.edge).collect();
         tools.dedup();
         let mut best: Option<(f64, Self, String)> = None;
@@ -64,9 +64,9 @@ impl WearFollower {
                 continue;
             }
             let mut renewed = self.clone();
-            renewed.renew(at);
+            renewed.renew_edge(at);
             renewed.edges[at].parts = 1;
-            let likely = renewed.likelihood(measured) - UNANNOUNCED_EDGE + OTHER_HARDNESS;
+            let likely = renewed.compute_log_likelihood(measured) - UNANNOUNCED_EDGE + OTHER_HARDNESS;
             if likely > best.as_ref().map_or(least, |best| best.0) {
                 best = Some((likely, renewed, edge.tool.clone()));
             }
@@ -75,16 +75,16 @@ impl WearFollower {
     }
 
     /// Logarithm of how likely the measurements are, one after the other; nothing that leaves one of them odd explains them.
-    fn likelihood(&self, measured: &[EdgeMeasurement]) -> f64 {
+    fn compute_log_likelihood(&self, measured: &[EdgeMeasurement]) -> f64 {
         let mut trial = self.clone();
         let mut sum = 0.0;
         for one in measured {
-            let (gradient, above) = trial.expected(one);
+            let (gradient, above) = trial.compute_innovation(one);
             if trial.is_odd(&gradient, above, one) {
                 return f64::NEG_INFINITY;
             }
             sum += trial.joint.log_likelihood(&gradient, above, one.variance);
-            trial.joint.observe(&gradient, above, one.variance);
+            trial.joint.update_with_measurement(&gradient, above, one.variance);
         }
         sum
     }
@@ -92,7 +92,7 @@ impl WearFollower {
     /// The rule of the source: the power has passed the limit. It counts where every operation that has one says so.
     pub(super) fn hold_against_limit(&mut self, at: usize, works: &[&EdgeWork], news: &mut Vec<WearNews>) {
         let edge = &self.edges[at];
-        let of_edge = works.iter().filter(|work| work.edge == edge.name && leads(work, works));
+        let of_edge = works.iter().filter(|work| work.edge == edge.name && is_leading_operation(work, works));
         let shares: Vec<f64> = of_edge.filter_map(|work| work.of_limit()).collect();
         let (limit_before, material_before) = (edge.limit_parts, edge.material_parts);
         let is_above = !shares.is_empty() && shares.iter().all(|share| *share > 1.0);

@@ -1,11 +1,11 @@
 //! Everything that is learned from a set of cuts: both forms, which one to take, and where the wear can be seen.
 
-use super::compare::{FormComparison, compare};
+use super::compare::{FormComparison, compare_forms};
 use super::conditions::{Cut, CutConditions, FACTORS};
 use super::fit_surface::{SurfaceFit, SurfaceOptions, fit_surface};
 use super::model::WearModel;
 use super::physical::{PhysicalFit, fit_physical};
-use super::threshold::{PowerLimit, threshold};
+use super::threshold::{PowerLimit, compute_power_limit};
 use crate::estimators::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -67,24 +67,26 @@ pub struct LearnedWear {
 /// # Errors
 /// The reason when neither form can be fitted, or not the one that was asked for.
 pub fn identify_tool_wear(cuts: Vec<Cut>, options: &WearOptions) -> Result<LearnedWear, Refusal> {
-    if let Some(problem) = FACTORS[0].problem(options.criterion_mm).or_else(|| zero(options.criterion_mm)) {
-        return Err(
-            Refusal::new(RefusalKind::Unit, problem, "give the criterion in mm, for example 0.3").at("criterion")
-        );
+    if let Some(problem) =
+        FACTORS[0].describe_problem(options.criterion_mm).or_else(|| describe_zero_criterion(options.criterion_mm))
+    {
+        return Err(Refusal::new(RefusalKind::Unit, problem, "give the criterion in mm, for example 0.3")
+            .with_place("criterion"));
     }
     let surface = fit_surface(&cuts, &options.surface);
     let physical = fit_physical(&cuts, &options.surface.held);
-    let comparison = compare(&cuts, &options.surface);
-    let (model, r2) = chosen(&surface, &physical, options.form.as_deref().unwrap_or(comparison.recommended), options)?;
-    let places = places(&model, options.criterion_mm);
+    let comparison = compare_forms(&cuts, &options.surface);
+    let (model, r2) =
+        choose_form(&surface, &physical, options.form.as_deref().unwrap_or(comparison.recommended), options)?;
+    let places = list_design_points(&model, options.criterion_mm);
     Ok(LearnedWear { cuts, surface, physical, comparison, model, r2, criterion_mm: options.criterion_mm, places })
 }
 
-fn zero(criterion_mm: f64) -> Option<String> {
+fn describe_zero_criterion(criterion_mm: f64) -> Option<String> {
     (criterion_mm <= 0.0).then(|| "a criterion of 0 is reached by a sharp edge".to_owned())
 }
 
-fn chosen(
+fn choose_form(
     surface: &Result<SurfaceFit, Refusal>,
     physical: &Result<PhysicalFit, Refusal>,
     form: &str,
@@ -98,7 +100,7 @@ fn chosen(
 }
 
 /// The middle, then every corner of the factors that were changed.
-fn places(model: &WearModel, criterion_mm: f64) -> Vec<DesignPoint> {
+fn list_design_points(model: &WearModel, criterion_mm: f64) -> Vec<DesignPoint> {
     let range = model.range();
     let side = |at: usize, high: bool| if high { range.greatest[at] } else { range.least[at] };
     let mut points = vec![[1, 2, 3].map(|at| 0.5 * (range.least[at] + range.greatest[at]))];
@@ -107,8 +109,8 @@ fn places(model: &WearModel, criterion_mm: f64) -> Vec<DesignPoint> {
     }
     points.dedup();
     let place = |[speed, feed, depth]: [f64; 3]| {
-        let cut = CutConditions::of([criterion_mm, speed, feed, depth]);
-        let threshold = threshold(model, &cut, criterion_mm).ok()?;
+        let cut = CutConditions::from_vector([criterion_mm, speed, feed, depth]);
+        let threshold = compute_power_limit(model, &cut, criterion_mm).ok()?;
         Some(DesignPoint { cutting_speed_m_min: speed, feed_per_rev_mm: feed, depth_of_cut_mm: depth, threshold })
     };
     points.into_iter().filter_map(place).collect()
@@ -117,10 +119,10 @@ fn places(model: &WearModel, criterion_mm: f64) -> Vec<DesignPoint> {
 impl LearnedWear {
     /// For programs.
     #[must_use]
-    pub fn json(&self) -> Value {
-        let surface = self.surface.as_ref().map_or_else(refused, |fit| {
+    pub fn to_json(&self) -> Value {
+        let surface = self.surface.as_ref().map_or_else(refusal_to_json, |fit| {
             json!({
-                "formula": fit.surface.formula(),
+                "formula": fit.surface.format_formula(),
                 "coding": fit.surface.coding,
                 "coefficients_w": fit.regression.coefficients,
                 "residual_sd_w": fit.regression.residual_sd,
@@ -130,7 +132,7 @@ impl LearnedWear {
                 "dropped": fit.dropped,
             })
         });
-        let physical = self.physical.as_ref().map_or_else(refused, |fit| {
+        let physical = self.physical.as_ref().map_or_else(refusal_to_json, |fit| {
             json!({
                 "formula": "P = P0 (vc/vc0)^x (f/f0)^y (ap/ap0)^z + W VB vc ap",
                 "reference": {
@@ -139,7 +141,7 @@ impl LearnedWear {
                     "depth_of_cut_mm": fit.physical.reference[2],
                 },
                 "coefficients": fit.coefficients,
-                "script_model": fit.physical.short(),
+                "script_model": fit.physical.to_short_form(),
                 "residual_sd_w": fit.physical.residual_sd_w,
                 "degrees_of_freedom": fit.physical.degrees_of_freedom,
                 "condition_number": fit.condition_number,
@@ -160,6 +162,6 @@ impl LearnedWear {
     }
 }
 
-fn refused(refusal: &Refusal) -> Value {
+fn refusal_to_json(refusal: &Refusal) -> Value {
     json!({ "refused": refusal })
 }

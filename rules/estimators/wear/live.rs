@@ -3,13 +3,13 @@
 //! It gathers the work of every edge until the part is finished, gives it to the filter, and holds what the filter says until the
 //! next part. Beside it stands the limit `[Pc]` of the cut of the moment, where a model was learned.
 
-use super::choose::choose;
+use super::choose::choose_model;
 use super::conditions::CutConditions;
 use super::follow::WearFollower;
 use super::followed::WearNews;
 use super::outlook::Outlook;
 use super::record::{WearKey, WearRecord};
-use super::threshold::{Observability, PowerLimit, threshold};
+use super::threshold::{Observability, PowerLimit, compute_power_limit};
 use super::tool_name::tool_of;
 use super::work::{CutMoment, EdgeWork, ExpectedPower, WorkKey, WorkReference};
 use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
@@ -45,7 +45,7 @@ struct WearChannels {
 
 impl WearChannels {
     fn new() -> Self {
-        let of = |name| ChannelId::of(name).expect("the name stands in the table, which a test checks");
+        let of = |name| ChannelId::from_name(name).expect("the name stands in the table, which a test checks");
         Self {
             texts: ["tool", "work_material", "operation", "program"].map(of),
             part_count: of("part_count"),
@@ -109,7 +109,7 @@ impl WearEstimator {
     pub fn set_models(&mut self, machine: &str, models: Vec<Arc<WearRecord>>) {
         machine.clone_into(&mut self.machine);
         self.models = models;
-        self.choose();
+        self.choose_model();
     }
 
     /// What was told since the last call.
@@ -131,18 +131,18 @@ impl WearEstimator {
 
     /// How the edge in use stands after its last part.
     #[must_use]
-    pub fn outlook(&self) -> Option<(WorkReference, Outlook)> {
-        self.memory.follower.outlook(&self.texts[0])
+    pub fn current_outlook(&self) -> Option<(WorkReference, Outlook)> {
+        self.memory.follower.find_outlook(&self.texts[0])
     }
 
-    /// Everything remembered, for [`WearEstimator::restore`].
+    /// Everything remembered, for [`WearEstimator::restore_snapshot`].
     #[must_use]
-    pub fn snapshot(&self) -> serde_json::Value {
+    pub fn take_snapshot(&self) -> serde_json::Value {
         serde_json::to_value(&self.memory).unwrap_or(serde_json::Value::Null)
     }
 
     /// Goes on where a snapshot was taken; false when it is none of this version.
-    pub fn restore(&mut self, snapshot: serde_json::Value) -> bool {
+    pub fn restore_snapshot(&mut self, snapshot: serde_json::Value) -> bool {
         let memory = serde_json::from_value(snapshot).ok().filter(|memory: &SavedWear| memory.follower.is_sound());
         let known = memory.is_some();
         self.memory = memory.unwrap_or_default();
@@ -150,7 +150,7 @@ impl WearEstimator {
     }
 
     /// Takes one tick and fills in what it knows of the wear.
-    pub fn step(&mut self, sample: &Sample, estimates: &mut Estimates) {
+    pub fn update_estimates(&mut self, sample: &Sample, estimates: &mut Estimates) {
         let step_ns = self.last_ns.map_or(0, |last_ns| sample.at_ns - last_ns);
         self.last_ns = Some(sample.at_ns);
         self.follow_texts(sample);
@@ -158,17 +158,17 @@ impl WearEstimator {
         let counted = count.is_some() && self.memory.part_count.is_some() && count != self.memory.part_count;
         self.memory.part_count = count.or(self.memory.part_count);
         if counted || !(0..=PAUSE_NS).contains(&step_ns) {
-            self.finish(sample.at_ns);
+            self.finish_part(sample.at_ns);
         }
-        let moment = self.cutting(sample, estimates);
+        let moment = self.read_cut_moment(sample, estimates);
         if let (Some(moment), 1..=STEP_MAX_NS) = (&moment, step_ns) {
-            self.gather(moment, sample, step_ns as f64 / SECOND_NS as f64);
+            self.gather_work(moment, sample, step_ns as f64 / SECOND_NS as f64);
         }
-        self.fill(moment.as_ref(), estimates);
+        self.fill_estimates(moment.as_ref(), estimates);
     }
 
     /// The cut of this moment, where its power is known.
-    fn cutting(&self, sample: &Sample, estimates: &Estimates) -> Option<CutMoment> {
+    fn read_cut_moment(&self, sample: &Sample, estimates: &Estimates) -> Option<CutMoment> {
         let power = estimates.cutting_power_w.ok().filter(|_| estimates.state == State::Cutting)?;
         if sample.at_ns - estimates.since_ns < SETTLE_NS {
             return None;
@@ -191,14 +191,14 @@ impl WearEstimator {
         let now = [tool, material, operation].map(|channel| sample.text(channel).unwrap_or_default());
         if self.texts.iter().zip(now).any(|(before, now)| before != now) {
             self.texts = now.map(str::to_owned);
-            self.choose();
+            self.choose_model();
         }
     }
 
-    fn choose(&mut self) {
+    fn choose_model(&mut self) {
         let [tool, work_material, operation] = self.texts.clone();
         let cut = WearKey { machine: self.machine.clone(), tool, work_material, operation };
-        let found = choose(&self.models, &cut, |model| model);
+        let found = choose_model(&self.models, &cut, |model| model);
         let model = found.map(|choice| ModelInUse { record: choice.record.clone(), by: choice.by });
         let same = self.model.as_ref().map(|it| &it.record) == model.as_ref().map(|it| &it.record);
         self.model = model;
@@ -207,21 +207,21 @@ impl WearEstimator {
         }
     }
 
-    fn gather(&mut self, moment: &CutMoment, sample: &Sample, step_s: f64) {
+    fn gather_work(&mut self, moment: &CutMoment, sample: &Sample, step_s: f64) {
         let program = sample.text(self.channels.texts[3]).unwrap_or_default();
         let seconds: f64 = self.memory.works.iter().map(|work| work.seconds).sum();
         if seconds > PIECE_S || self.memory.works.first().is_some_and(|work| work.key.program != program) {
-            self.finish(sample.at_ns);
+            self.finish_part(sample.at_ns);
         }
         let record = self.model.as_ref().map(|model| &*model.record);
-        let expected = moment.expected(record);
+        let expected = moment.estimate_expected_power(record);
         let criterion_mm = record.map_or(CRITERION_MM, |record| record.criterion_mm);
-        if let Some(work) = self.work(expected, program, criterion_mm) {
+        if let Some(work) = self.find_or_add_work(expected, program, criterion_mm) {
             work.add(moment, &expected, step_s);
         }
     }
 
-    fn work(&mut self, expected: ExpectedPower, program: &str, criterion_mm: f64) -> Option<&mut EdgeWork> {
+    fn find_or_add_work(&mut self, expected: ExpectedPower, program: &str, criterion_mm: f64) -> Option<&mut EdgeWork> {
         let [edge, material, operation] = &self.texts;
         let same = |work: &EdgeWork| {
             let key = &work.key;
@@ -249,16 +249,16 @@ impl WearEstimator {
     }
 
     /// The part is finished, or what can be judged of it.
-    fn finish(&mut self, at_ns: TimeNs) {
+    fn finish_part(&mut self, at_ns: TimeNs) {
         let works = std::mem::take(&mut self.memory.works);
-        let news = self.memory.follower.part(&works, at_ns as f64 / SECOND_NS as f64);
+        let news = self.memory.follower.record_part(&works, at_ns as f64 / SECOND_NS as f64);
         self.news.extend(news);
         self.news.truncate(NEWS_MAX);
     }
 
-    fn fill(&mut self, moment: Option<&CutMoment>, estimates: &mut Estimates) {
+    fn fill_estimates(&mut self, moment: Option<&CutMoment>, estimates: &mut Estimates) {
         estimates.wear_limit_w = self.limit_of(moment, estimates.at_ns);
-        let (wear, growth, probability, parts) = match self.outlook() {
+        let (wear, growth, probability, parts) = match self.current_outlook() {
             None => {
                 let none = || Err(NoEstimate::NoPartYet);
                 (none(), none(), none(), none())
@@ -267,11 +267,11 @@ impl WearEstimator {
                 let none = || Err(NoEstimate::NotObservable);
                 (none(), none(), none(), none())
             }
-            Some((reference, outlook)) => filled(reference, &outlook),
+            Some((reference, outlook)) => build_wear_estimates(reference, &outlook),
         };
         (estimates.tool_wear_mm, estimates.tool_growth_pct) = (wear, growth);
         (estimates.tool_worn_probability, estimates.tool_parts_left) = (probability, parts);
-        let (limit_parts, life_share) = self.memory.follower.witnesses(&self.texts[0]);
+        let (limit_parts, life_share) = self.memory.follower.read_witnesses(&self.texts[0]);
         estimates.tool_limit_parts = limit_parts.map(f64::from).ok_or(NoEstimate::NoModel);
         estimates.tool_life_share = life_share.ok_or(NoEstimate::NoPartYet);
         let material = self.memory.follower.material_level().ok_or(NoEstimate::NoPartYet);
@@ -284,9 +284,9 @@ impl WearEstimator {
         let soon = self.limit_ns.is_some_and(|then_ns| (0..LIMIT_EVERY_NS).contains(&(at_ns - then_ns)));
         if !soon || self.limit.is_none() {
             self.limit_ns = Some(at_ns);
-            let found = moment.conditions().ok_or_else(|| NoEstimate::CutUnknown.to_string());
+            let found = moment.to_conditions().ok_or_else(|| NoEstimate::CutUnknown.to_string());
             self.limit = Some(found.and_then(|cut: CutConditions| {
-                threshold(&record.model, &cut, record.criterion_mm).map_err(|refusal| refusal.to_string())
+                compute_power_limit(&record.model, &cut, record.criterion_mm).map_err(|refusal| refusal.to_string())
             }));
         }
         match &self.limit {
@@ -300,7 +300,7 @@ impl WearEstimator {
     }
 }
 
-fn filled(reference: WorkReference, outlook: &Outlook) -> (Estimated, Estimated, Estimated, Estimated) {
+fn build_wear_estimates(reference: WorkReference, outlook: &Outlook) -> (Estimated, Estimated, Estimated, Estimated) {
     let learned = reference == WorkReference::Model;
     let wear = Estimate { value: outlook.wear_mm, sd: outlook.wear_sd_mm };
     let growth = Estimate {

@@ -56,17 +56,17 @@ mod tool_name;
 mod work;
 
 pub use anova::{Anova, AnovaRow};
-pub use choose::{ChosenModel, choose};
+pub use choose::{ChosenModel, choose_model};
 pub use coding::{Coding, Range};
-pub use compare::{FormComparison, FormErrors, compare};
+pub use compare::{FormComparison, FormErrors, compare_forms};
 pub use conditions::{
     CUTTING_POWER, ConditionFactor, Cut, CutConditions, FACTORS, WEAR, cutting_speed_m_min, unit_trouble,
 };
-pub use design::{Alias, ExperimentDesign, FactorLevels, PlannedCut, plan};
+pub use design::{Alias, ExperimentDesign, FactorLevels, PlannedCut, plan_experiment};
 pub use fit_surface::{Dropped, Order, SurfaceFit, SurfaceOptions, fit_surface};
 pub use follow::WearFollower;
 pub use followed::WearNews;
-pub use gather::{CutColumns, GatheredCuts, gather};
+pub use gather::{CutColumns, GatheredCuts, gather_cuts};
 pub use identify::{DesignPoint, LearnedWear, WearOptions, identify_tool_wear};
 pub use live::{ModelInUse, WearEstimator};
 pub use model::WearModel;
@@ -76,10 +76,10 @@ pub use physical::{FittedNumber, PHYSICAL_NAMES, Physical, PhysicalFit, fit_phys
 pub use predicted::Predicted;
 pub use record::{WearKey, WearRecord};
 pub use short::{SHORT_FORM, SHORT_LENGTH};
-pub use surface::{Surface, published, published_over};
+pub use surface::{Surface, build_published_surface, published_over};
 pub use term::{WearTerm, second_order};
 pub use threshold::{
-    OBSERVABLE_SHARE, Observability, POOLED_PARTS_MAX, PowerLimit, WearEstimate, estimate_wear, threshold,
+    OBSERVABLE_SHARE, Observability, POOLED_PARTS_MAX, PowerLimit, WearEstimate, compute_power_limit, estimate_wear,
 };
 pub use tool_name::{edge_of, tool_of};
 pub use work::{CutMoment, EdgeWork, WorkKey, WorkReference};

@@ -29,10 +29,10 @@ impl WearModel {
 
     /// Power and its uncertainty.
     #[must_use]
-    pub fn predict(&self, conditions: &CutConditions) -> Predicted {
+    pub fn predict_power(&self, conditions: &CutConditions) -> Predicted {
         match self {
-            Self::Surface(surface) => surface.predict(conditions),
-            Self::Physical(physical) => physical.predict(conditions),
+            Self::Surface(surface) => surface.predict_power(conditions),
+            Self::Physical(physical) => physical.predict_power(conditions),
         }
     }
 
@@ -56,8 +56,8 @@ impl WearModel {
 
     /// The factors in which these conditions lie outside what the model was fitted on.
     #[must_use]
-    pub fn outside(&self, conditions: &CutConditions) -> Vec<&'static ConditionFactor> {
-        self.range().outside(conditions)
+    pub fn find_factors_outside(&self, conditions: &CutConditions) -> Vec<&'static ConditionFactor> {
+        self.range().find_factors_outside(conditions)
     }
 
     /// Are all numbers finite and as many as belong together? A file or a database may have been edited.

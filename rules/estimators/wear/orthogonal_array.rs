@@ -61,28 +61,28 @@ impl Array {
 
     /// The array of this name, also written as `l27` or `L27(3^13)`.
     #[must_use]
-    pub fn of(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         let name = name.split('(').next().unwrap_or(name).trim();
         Self::ALL.into_iter().find(|array| array.name().eq_ignore_ascii_case(name))
     }
 
     /// The levels, 0-based: one inner list per run, one entry per column.
     #[must_use]
-    pub fn runs(self) -> Vec<Vec<u8>> {
+    pub fn list_runs(self) -> Vec<Vec<u8>> {
         match self {
-            Self::L4 => linear(2, 2),
-            Self::L8 => linear(2, 3),
-            Self::L16 => linear(2, 4),
-            Self::L9 => linear(3, 2),
-            Self::L27 => linear(3, 3),
+            Self::L4 => build_linear_array(2, 2),
+            Self::L8 => build_linear_array(2, 3),
+            Self::L16 => build_linear_array(2, 4),
+            Self::L9 => build_linear_array(3, 2),
+            Self::L27 => build_linear_array(3, 3),
             Self::L12 => plackett_burman(),
-            Self::L18 => developed(),
+            Self::L18 => develop_differences(),
         }
     }
 
     /// How many levels each column has.
     #[must_use]
-    pub fn levels(self) -> Vec<u8> {
+    pub fn column_levels(self) -> Vec<u8> {
         match self {
             Self::L4 => vec![2; 3],
             Self::L8 => vec![2; 7],
@@ -103,14 +103,14 @@ impl fmt::Display for Array {
 
 /// The linear array over GF(`prime`) with `prime^digits` runs: a run is a point, a column a direction, an entry their
 /// scalar product.
-fn linear(prime: u8, digits: usize) -> Vec<Vec<u8>> {
-    let directions = directions(prime, digits);
+fn build_linear_array(prime: u8, digits: usize) -> Vec<Vec<u8>> {
+    let directions = list_directions(prime, digits);
     let entry = |point: &[u8], direction: &[u8]| point.iter().zip(direction).map(|(a, b)| a * b).sum::<u8>() % prime;
-    points(prime, digits).iter().map(|point| directions.iter().map(|it| entry(point, it)).collect()).collect()
+    list_points(prime, digits).iter().map(|point| directions.iter().map(|it| entry(point, it)).collect()).collect()
 }
 
 /// Every point, the first digit slowest.
-fn points(prime: u8, digits: usize) -> Vec<Vec<u8>> {
+fn list_points(prime: u8, digits: usize) -> Vec<Vec<u8>> {
     let mut points = vec![Vec::new()];
     for _ in 0..digits {
         points = points
@@ -140,7 +140,7 @@ const DIRECTIONS_27: [[u8; 3]; 13] = [
 
 /// One direction of each line through the origin, in the order of Taguchi's tables: a new basic column, then its sums
 /// with every column before it.
-fn directions(prime: u8, digits: usize) -> Vec<Vec<u8>> {
+fn list_directions(prime: u8, digits: usize) -> Vec<Vec<u8>> {
     if (prime, digits) == (3, 3) {
         return DIRECTIONS_27.map(|direction| direction.to_vec()).to_vec();
     }
@@ -164,7 +164,7 @@ fn plackett_burman() -> Vec<Vec<u8>> {
     (0..11).map(shifted).chain([vec![0; 11]]).collect()
 }
 
-fn developed() -> Vec<Vec<u8>> {
+fn develop_differences() -> Vec<Vec<u8>> {
     let run = |row: usize, shift: u8| {
         let two = u8::from(row >= 3);
         #[expect(clippy::cast_possible_truncation, reason = "a remainder of three")]
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn every_pair_of_columns_holds_every_pair_of_levels_equally_often() {
         for array in Array::ALL {
-            let (runs, levels) = (array.runs(), array.levels());
+            let (runs, levels) = (array.list_runs(), array.column_levels());
             assert!(runs.iter().all(|run| run.len() == levels.len()), "{array}");
             assert_eq!(format!("L{}", runs.len()), array.name());
             for a in 0..levels.len() {
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn no_run_is_there_twice() {
         for array in Array::ALL {
-            let mut runs = array.runs();
+            let mut runs = array.list_runs();
             let count = runs.len();
             runs.sort();
             runs.dedup();
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn the_basic_columns_of_l27_are_the_first_second_and_fifth() {
-        let runs = Array::L27.runs();
+        let runs = Array::L27.list_runs();
         for (index, run) in runs.iter().enumerate() {
             assert_eq!([run[0], run[1], run[4]].map(usize::from), [index / 9, index / 3 % 3, index % 3]);
         }
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn names_are_understood() {
-        assert_eq!(Array::of("l27(3^13)"), Some(Array::L27));
-        assert_eq!(Array::of("L10"), None);
+        assert_eq!(Array::from_name("l27(3^13)"), Some(Array::L27));
+        assert_eq!(Array::from_name("L10"), None);
     }
 }

@@ -45,7 +45,7 @@ pub struct Outlook {
 
 impl Known {
     /// Probability that the criterion is passed after so many further parts.
-    fn passed(&self, parts: f64) -> f64 {
+    fn passing_probability(&self, parts: f64) -> f64 {
         let metres = parts * self.part_m;
         let [wear, both, rate] = self.covariance;
         let variance = wear + 2.0 * metres * both + metres * metres * rate;
@@ -54,26 +54,26 @@ impl Known {
     }
 
     /// Parts after which the criterion is passed with this probability.
-    fn parts(&self, probability: f64) -> f64 {
+    fn find_parts_until(&self, probability: f64) -> f64 {
         let (mut least, mut greatest) = (0.0, PARTS_MAX);
-        if self.passed(greatest) < probability {
+        if self.passing_probability(greatest) < probability {
             return PARTS_MAX;
         }
         for _ in 0..HALVINGS {
             let middle = 0.5 * (least + greatest);
-            if self.passed(middle) < probability { least = middle } else { greatest = middle }
+            if self.passing_probability(middle) < probability { least = middle } else { greatest = middle }
         }
         greatest
     }
 
-    pub(super) fn outlook(&self) -> Outlook {
+    pub(super) fn build_outlook(&self) -> Outlook {
         let wear_sd_mm = self.covariance[0].max(0.0).sqrt();
         Outlook {
             wear_mm: self.wear,
             wear_sd_mm,
             criterion_mm: self.criterion_mm,
-            worn_probability: self.passed(1.0),
-            parts_left: [0.5, INTERVAL.0, INTERVAL.1].map(|share| self.parts(share)),
+            worn_probability: self.passing_probability(1.0),
+            parts_left: [0.5, INTERVAL.0, INTERVAL.1].map(|share| self.find_parts_until(share)),
             observed: wear_sd_mm <= OBSERVED_SHARE * self.criterion_mm,
         }
     }
@@ -86,12 +86,12 @@ mod tests {
     #[test]
     fn the_parts_left_are_those_of_a_straight_line_and_the_interval_holds_them() {
         let known = Known { wear: 0.2, rate: 1e-5, covariance: [1e-4, 0.0, 1e-12], part_m: 1000.0, criterion_mm: 0.3 };
-        let outlook = known.outlook();
+        let outlook = known.build_outlook();
         assert!((outlook.parts_left[0] - 10.0).abs() < 0.01, "{outlook:?}");
         assert!(outlook.parts_left[1] < 9.0 && outlook.parts_left[2] > 11.0 && outlook.observed, "{outlook:?}");
         assert!(outlook.worn_probability < 1e-6);
-        assert!(Known { wear: 0.295, ..known }.outlook().worn_probability > 0.5);
+        assert!(Known { wear: 0.295, ..known }.build_outlook().worn_probability > 0.5);
         let blind = Known { covariance: [0.01, 0.0, 1e-12], ..known };
-        assert!(!blind.outlook().observed);
+        assert!(!blind.build_outlook().observed);
     }
 }

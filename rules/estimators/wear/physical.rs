@@ -11,7 +11,9 @@ use super::coding::{Range, check_varied};
 use super::conditions::{CUTTING_POWER, Cut, CutConditions, FACTORS, WEAR};
 use super::fit_surface::check_cuts;
 use super::predicted::Predicted;
-use crate::estimators::regression::{CONFIDENCE, Column, Intercept, Refusal, RefusalKind, Regression, fit, t_quantile};
+use crate::estimators::regression::{
+    CONFIDENCE, Column, Intercept, Refusal, RefusalKind, Regression, fit_unweighted, t_quantile,
+};
 use serde::{Deserialize, Serialize};
 
 /// Steps of the iteration, at most.
@@ -46,19 +48,19 @@ pub struct Physical {
 }
 
 impl Physical {
-    fn ratios(&self, conditions: &CutConditions) -> [f64; 3] {
-        let values = conditions.vector();
+    fn compute_ratios(&self, conditions: &CutConditions) -> [f64; 3] {
+        let values = conditions.to_vector();
         std::array::from_fn(|at| values[at + 1] / self.reference[at])
     }
 
     fn sharp_w(&self, conditions: &CutConditions) -> f64 {
-        self.cutting_power_w * power_law(&self.ratios(conditions), &self.exponents)
+        self.cutting_power_w * power_law(&self.compute_ratios(conditions), &self.exponents)
     }
 
     /// Power at these conditions, W.
     #[must_use]
     pub fn power_w(&self, conditions: &CutConditions) -> f64 {
-        self.sharp_w(conditions) + self.wear_w_min_m_mm2 * friction(conditions)
+        self.sharp_w(conditions) + self.wear_w_min_m_mm2 * friction_term(conditions)
     }
 
     /// Change of power per millimetre of flank wear, W/mm.
@@ -68,16 +70,16 @@ impl Physical {
     }
 
     /// Derivatives with respect to P0, the exponents and W.
-    fn gradient(&self, conditions: &CutConditions) -> [f64; 5] {
-        let law = power_law(&self.ratios(conditions), &self.exponents);
-        let by = self.ratios(conditions).map(|ratio| self.cutting_power_w * law * ratio.ln());
-        [law, by[0], by[1], by[2], friction(conditions)]
+    fn compute_gradient(&self, conditions: &CutConditions) -> [f64; 5] {
+        let law = power_law(&self.compute_ratios(conditions), &self.exponents);
+        let by = self.compute_ratios(conditions).map(|ratio| self.cutting_power_w * law * ratio.ln());
+        [law, by[0], by[1], by[2], friction_term(conditions)]
     }
 
     /// Power and its uncertainty.
     #[must_use]
-    pub fn predict(&self, conditions: &CutConditions) -> Predicted {
-        let gradient = self.gradient(conditions);
+    pub fn predict_power(&self, conditions: &CutConditions) -> Predicted {
+        let gradient = self.compute_gradient(conditions);
         let row = |i: usize| self.covariance[i].iter().zip(&gradient).map(|(entry, x)| entry * x).sum::<f64>();
         let variance: f64 = (0..self.covariance.len()).map(|i| gradient[i] * row(i)).sum();
         Predicted {
@@ -94,7 +96,7 @@ fn power_law(ratios: &[f64; 3], exponents: &[f64; 3]) -> f64 {
 }
 
 /// VB vc ap.
-fn friction(conditions: &CutConditions) -> f64 {
+fn friction_term(conditions: &CutConditions) -> f64 {
     conditions.flank_wear_mm * conditions.cutting_speed_m_min * conditions.depth_of_cut_mm
 }
 
@@ -137,26 +139,25 @@ pub struct FittedNumber {
 /// that does not settle.
 pub fn fit_physical(cuts: &[Cut], held: &[String]) -> Result<PhysicalFit, Refusal> {
     check_cuts(cuts)?;
-    let range = Range::of(cuts);
+    let range = Range::from_cuts(cuts);
     let names: Vec<&str> = held.iter().map(String::as_str).collect();
     check_varied(&range, &names)?;
-    if !range.varies(WEAR) {
+    if !range.is_varied(WEAR) {
         let what = "the flank wear is the same in every cut";
-        return Err(
-            Refusal::new(RefusalKind::Constant, what, "cut with edges of different wear").at(FACTORS[WEAR].name)
-        );
+        return Err(Refusal::new(RefusalKind::Constant, what, "cut with edges of different wear")
+            .with_place(FACTORS[WEAR].name));
     }
-    let free: Vec<usize> = (0..5).filter(|at| !(1..=3).contains(at) || range.varies(*at)).collect();
-    let mut work = PhysicalRegression { cuts, free, physical: begin(cuts, range) };
+    let free: Vec<usize> = (0..5).filter(|at| !(1..=3).contains(at) || range.is_varied(*at)).collect();
+    let mut work = PhysicalRegression { cuts, free, physical: build_initial_guess(cuts, range) };
     work.solve_linear()?;
-    let (last, steps) = work.iterate()?;
-    Ok(work.finish(&last, steps))
+    let (last, steps) = work.iterate_gauss_newton()?;
+    Ok(work.build_fit(&last, steps))
 }
 
 /// Exponents of 1 about the geometric middle.
-fn begin(cuts: &[Cut], range: Range) -> Physical {
+fn build_initial_guess(cuts: &[Cut], range: Range) -> Physical {
     let count = cuts.len() as f64;
-    let middle = |at: usize| (cuts.iter().map(|cut| cut.conditions.vector()[at].ln()).sum::<f64>() / count).exp();
+    let middle = |at: usize| (cuts.iter().map(|cut| cut.conditions.to_vector()[at].ln()).sum::<f64>() / count).exp();
     Physical {
         reference: [middle(1), middle(2), middle(3)],
         cutting_power_w: 0.0,
@@ -177,62 +178,65 @@ struct PhysicalRegression<'a> {
 }
 
 impl PhysicalRegression<'_> {
-    fn residuals(&self, physical: &Physical) -> Vec<f64> {
+    fn compute_residuals(&self, physical: &Physical) -> Vec<f64> {
         self.cuts.iter().map(|cut| cut.cutting_power_w - physical.power_w(&cut.conditions)).collect()
     }
 
-    fn rss(&self, physical: &Physical) -> f64 {
-        self.residuals(physical).iter().map(|residual| residual * residual).sum()
+    fn residual_sum_of_squares(&self, physical: &Physical) -> f64 {
+        self.compute_residuals(physical).iter().map(|residual| residual * residual).sum()
     }
 
-    fn jacobian(&self, physical: &Physical) -> Vec<Column> {
-        let gradients: Vec<[f64; 5]> = self.cuts.iter().map(|cut| physical.gradient(&cut.conditions)).collect();
+    fn build_jacobian(&self, physical: &Physical) -> Vec<Column> {
+        let gradients: Vec<[f64; 5]> = self.cuts.iter().map(|cut| physical.compute_gradient(&cut.conditions)).collect();
         let column =
             |at: &usize| Column::new(PHYSICAL_NAMES[*at], gradients.iter().map(|gradient| gradient[*at]).collect());
         self.free.iter().map(column).collect()
     }
 
     /// P0 and W of these exponents.
-    fn linear(&self, exponents: [f64; 3]) -> Result<Physical, Refusal> {
+    fn fit_linear_part(&self, exponents: [f64; 3]) -> Result<Physical, Refusal> {
         let mut physical = Physical { exponents, cutting_power_w: 1.0, ..self.physical.clone() };
         let column = |name: &str, law: &dyn Fn(&CutConditions) -> f64| {
             Column::new(name, self.cuts.iter().map(|cut| law(&cut.conditions)).collect())
         };
         let sharp = column(PHYSICAL_NAMES[0], &|it| physical.sharp_w(it));
-        let worn = column(PHYSICAL_NAMES[4], &friction);
+        let worn = column(PHYSICAL_NAMES[4], &friction_term);
         let y = Column::new(CUTTING_POWER, self.cuts.iter().map(|cut| cut.cutting_power_w).collect());
-        let solved = fit(&y, &[sharp, worn], Intercept::None)?.values();
+        let solved = fit_unweighted(&y, &[sharp, worn], Intercept::None)?.values();
         (physical.cutting_power_w, physical.wear_w_min_m_mm2) = (solved[0], solved[1]);
         Ok(physical)
     }
 
     fn solve_linear(&mut self) -> Result<(), Refusal> {
-        self.physical = self.linear(self.physical.exponents)?;
+        self.physical = self.fit_linear_part(self.physical.exponents)?;
         Ok(())
     }
 
-    fn linearised(&self) -> Result<Regression, Refusal> {
-        let y = Column::new(CUTTING_POWER, self.residuals(&self.physical));
-        fit(&y, &self.jacobian(&self.physical), Intercept::None).map_err(|refusal| match refusal.kind {
-            RefusalKind::TooFew => Refusal {
-                next: "the physical form has five numbers: make at least eight cuts, better an L9 or L27".to_owned(),
-                ..refusal
-            },
-            _ => refusal,
+    fn fit_linearised(&self) -> Result<Regression, Refusal> {
+        let y = Column::new(CUTTING_POWER, self.compute_residuals(&self.physical));
+        fit_unweighted(&y, &self.build_jacobian(&self.physical), Intercept::None).map_err(|refusal| {
+            match refusal.kind {
+                RefusalKind::TooFew => Refusal {
+                    next: "the physical form has five numbers: make at least eight cuts, better an L9 or L27"
+                        .to_owned(),
+                    ..refusal
+                },
+                _ => refusal,
+            }
         })
     }
 
     /// Gauss-Newton until the sum of squares stands still; the last linearisation.
-    fn iterate(&mut self) -> Result<(Regression, usize), Refusal> {
+    fn iterate_gauss_newton(&mut self) -> Result<(Regression, usize), Refusal> {
         for step in 1..=STEPS_MAX {
-            let linearised = self.linearised()?;
-            let before = self.rss(&self.physical);
+            let linearised = self.fit_linearised()?;
+            let before = self.residual_sum_of_squares(&self.physical);
             let better = self.shorter_until_better(&linearised, before)?;
             let Some(better) = better else { return Ok((linearised, step)) };
-            let gained = before - self.rss(&better);
+            let gained = before - self.residual_sum_of_squares(&better);
             self.physical = better;
             if gained <= CONVERGED * before {
-                return Ok((self.linearised()?, step));
+                return Ok((self.fit_linearised()?, step));
             }
         }
         let next = "look for cuts with another power than the rest; the table may mix tools or materials";
@@ -250,8 +254,8 @@ impl PhysicalRegression<'_> {
                 }
             }
             let sane = exponents.iter().all(|exponent| exponent.abs() < 10.0);
-            let found = if sane { Some(self.linear(exponents)?) } else { None };
-            if let Some(found) = found.filter(|found| self.rss(found) < before) {
+            let found = if sane { Some(self.fit_linear_part(exponents)?) } else { None };
+            if let Some(found) = found.filter(|found| self.residual_sum_of_squares(found) < before) {
                 return Ok(Some(found));
             }
             length *= 0.5;
@@ -259,7 +263,7 @@ impl PhysicalRegression<'_> {
         Ok(None)
     }
 
-    fn finish(mut self, last: &Regression, steps: usize) -> PhysicalFit {
+    fn build_fit(mut self, last: &Regression, steps: usize) -> PhysicalFit {
         let mean = self.cuts.iter().map(|cut| cut.cutting_power_w).sum::<f64>() / self.cuts.len() as f64;
         let total: f64 = self.cuts.iter().map(|cut| (cut.cutting_power_w - mean).powi(2)).sum();
         let share = |lost: f64| if total > 0.0 { 1.0 - lost / total } else { 0.0 };
@@ -269,11 +273,11 @@ impl PhysicalRegression<'_> {
             .zip(&last.leverage)
             .map(|(residual, leverage)| (*leverage < 1.0 - 1e-9).then(|| (residual / (1.0 - leverage)).powi(2)))
             .sum();
-        self.physical.covariance = self.covariance(last);
+        self.physical.covariance = self.estimate_covariance(last);
         self.physical.residual_sd_w = last.residual_sd;
         self.physical.degrees_of_freedom = last.degrees_of_freedom;
         PhysicalFit {
-            coefficients: self.coefficients(last),
+            coefficients: self.build_coefficients(last),
             r2: share(last.rss),
             adjusted_r2: share(last.rss * (self.cuts.len() as f64 - 1.0) / last.degrees_of_freedom),
             predicted_r2: left_out.map(share),
@@ -286,8 +290,8 @@ impl PhysicalRegression<'_> {
     /// Covariance of the five numbers. Heavy cuts scatter more than light ones, so that the residuals are not all of one size:
     /// errors are the greater ones of the ordinary form and of the one that takes each residual as it is (HC3: MacKinnon,
     /// White 1985), correlations those of the latter.
-    fn covariance(&self, last: &Regression) -> Vec<Vec<f64>> {
-        let columns = self.jacobian(&self.physical);
+    fn estimate_covariance(&self, last: &Regression) -> Vec<Vec<f64>> {
+        let columns = self.build_jacobian(&self.physical);
         let count = columns.len();
         let spread: Vec<f64> =
             last.residuals.iter().zip(&last.leverage).map(|(it, leverage)| it / (1.0 - leverage).max(1e-6)).collect();
@@ -310,7 +314,7 @@ impl PhysicalRegression<'_> {
     }
 
     /// The numbers with their errors; the values of the last linearisation itself are 0 by then.
-    fn coefficients(&self, last: &Regression) -> Vec<FittedNumber> {
+    fn build_coefficients(&self, last: &Regression) -> Vec<FittedNumber> {
         let [x, y, z] = self.physical.exponents;
         let values = [self.physical.cutting_power_w, x, y, z, self.physical.wear_w_min_m_mm2];
         let t = t_quantile(0.5 + 0.5 * CONFIDENCE, last.degrees_of_freedom);

@@ -24,7 +24,7 @@ impl Predicted {
 
     /// Half width of a 95 % interval in standard deviations.
     #[must_use]
-    pub fn t(&self) -> f64 {
+    pub fn interval_factor(&self) -> f64 {
         t_quantile(0.5 + 0.5 * CONFIDENCE, self.degrees_of_freedom.max(1.0))
     }
 }

@@ -73,7 +73,7 @@ pub(super) const ODD_IN_A_ROW: u32 = 3;
 pub(super) const OTHER_MATERIAL_S: f64 = 3600.0;
 
 /// Mean and standard deviation of the rate of the next edge.
-pub(super) fn pooled(rates: &[f64]) -> (f64, f64) {
+pub(super) fn pool_rates(rates: &[f64]) -> (f64, f64) {
     if rates.is_empty() {
         return RATE;
     }

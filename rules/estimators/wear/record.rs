@@ -63,7 +63,7 @@ impl WearRecord {
         if record.schema != SCHEMA {
             return Err(format!("schema {:?} is not known; {SCHEMA} is", record.schema));
         }
-        if let Some(problem) = FACTORS[0].problem(record.criterion_mm) {
+        if let Some(problem) = FACTORS[0].describe_problem(record.criterion_mm) {
             return Err(format!("the criterion: {problem}"));
         }
         if record.model.is_sound() { Ok(record) } else { Err("its numbers do not belong together".to_owned()) }
@@ -72,7 +72,7 @@ impl WearRecord {
 
 #[cfg(test)]
 mod tests {
-    use super::super::surface::published;
+    use super::super::surface::build_published_surface;
     use super::*;
 
     fn key(texts: [&str; 4]) -> WearKey {
@@ -86,7 +86,7 @@ mod tests {
             key(["CHK460", "T01", "45# steel", "rough"]),
             0.3,
             ("patent".to_owned(), 27, 0.9929),
-            WearModel::Surface(published()),
+            WearModel::Surface(build_published_surface()),
         );
         let text = record.to_toml().expect("TOML");
         assert_eq!(WearRecord::parse(&text), Ok(record.clone()));

@@ -16,7 +16,7 @@ const MANY: f64 = 1e6;
 impl Physical {
     /// The sixteen numbers, see [`SHORT_FORM`].
     #[must_use]
-    pub fn short(&self) -> [f64; SHORT_LENGTH] {
+    pub fn to_short_form(&self) -> [f64; SHORT_LENGTH] {
         let ([x, y, z], [speed, feed, depth]) = (self.exponents, self.reference);
         let Range { least, greatest } = self.range;
         [

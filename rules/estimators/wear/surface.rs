@@ -29,14 +29,14 @@ impl Surface {
     /// Power at coded variables, W.
     #[must_use]
     pub fn power_at(&self, coded: &[f64; 4]) -> f64 {
-        self.terms.iter().zip(&self.coefficients_w).map(|(term, b)| b * term.value(coded)).sum()
+        self.terms.iter().zip(&self.coefficients_w).map(|(term, b)| b * term.evaluate_at(coded)).sum()
     }
 
     /// Power and its uncertainty.
     #[must_use]
-    pub fn predict(&self, conditions: &CutConditions) -> Predicted {
-        let coded = self.coding.code(conditions);
-        let values: Vec<f64> = self.terms.iter().map(|term| term.value(&coded)).collect();
+    pub fn predict_power(&self, conditions: &CutConditions) -> Predicted {
+        let coded = self.coding.encode_conditions(conditions);
+        let values: Vec<f64> = self.terms.iter().map(|term| term.evaluate_at(&coded)).collect();
         let row = |i: usize| self.covariance_w2[i].iter().zip(&values).map(|(entry, x)| entry * x).sum::<f64>();
         let variance: f64 = (0..self.covariance_w2.len()).map(|i| values[i] * row(i)).sum();
         Predicted {
@@ -50,7 +50,7 @@ impl Surface {
     /// Change of power per millimetre of flank wear, W/mm.
     #[must_use]
     pub fn wear_slope_w_per_mm(&self, conditions: &CutConditions) -> f64 {
-        let coded = self.coding.code(conditions);
+        let coded = self.coding.encode_conditions(conditions);
         let slope: f64 =
             self.terms.iter().zip(&self.coefficients_w).map(|(term, b)| b * term.slope(WEAR, &coded)).sum();
         if self.coding.half[WEAR] > 0.0 { slope / self.coding.half[WEAR] } else { 0.0 }
@@ -58,7 +58,7 @@ impl Surface {
 
     /// The formula over the coded variables a (VB), b (vc), c (f), d (ap).
     #[must_use]
-    pub fn formula(&self) -> String {
+    pub fn format_formula(&self) -> String {
         let letters: Vec<String> = FACTORS.iter().map(|factor| factor.letter.to_string()).collect();
         let symbols: Vec<&str> = letters.iter().map(String::as_str).collect();
         let part = |(index, (term, b)): (usize, (&WearTerm, &f64))| {
@@ -68,7 +68,7 @@ impl Surface {
                 (_, false) => " + ",
                 (_, true) => " - ",
             };
-            let name = if term.order() == 0 { String::new() } else { format!(" {}", term.name(&symbols)) };
+            let name = if term.order() == 0 { String::new() } else { format!(" {}", term.format_name(&symbols)) };
             format!("{sign}{:.2}{name}", b.abs())
         };
         let parts: String = self.terms.iter().zip(&self.coefficients_w).enumerate().map(part).collect();
@@ -80,7 +80,7 @@ impl Surface {
 /// ap are not in the text and are taken as they are. Residual standard deviation from the printed R2 = 99.29 % of 27 runs
 /// and the sum of squares of the design's columns 1, 2, 5 and 9 (37.6 W, computed); no covariance is printed.
 #[must_use]
-pub fn published() -> Surface {
+pub fn build_published_surface() -> Surface {
     published_over(Coding { centre: [0.195, 0.0, 0.0, 0.0], half: [0.13, 1.0, 1.0, 1.0] })
 }
 
@@ -99,7 +99,7 @@ pub fn published_over(coding: Coding) -> Surface {
         ([0, 1, 0, 1], 62.14),
         ([0, 0, 1, 1], 47.28),
     ];
-    let cube = |side: f64| coding.decode([side; 4]).vector();
+    let cube = |side: f64| coding.decode_conditions([side; 4]).to_vector();
     Surface {
         terms: printed.iter().map(|(powers, _)| term(*powers)).collect(),
         coefficients_w: printed.iter().map(|(_, b)| *b).collect(),
@@ -117,8 +117,8 @@ mod tests {
 
     #[test]
     fn the_published_sensitivities() {
-        let surface = published();
-        let slope = |b: f64, c: f64| surface.wear_slope_w_per_mm(&surface.coding.decode([0.0, b, c, 0.0]));
+        let surface = build_published_surface();
+        let slope = |b: f64, c: f64| surface.wear_slope_w_per_mm(&surface.coding.decode_conditions([0.0, b, c, 0.0]));
         for (b, c, expected) in
             [(0.0, 0.0, 642.0), (1.0, 1.0, 659.0), (1.0, 0.0, 927.0), (1.0, -1.0, 1195.0), (-1.0, 1.0, 89.0)]
         {
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn the_formula_reads_as_printed() {
         assert_eq!(
-            published().formula(),
+            build_published_surface().format_formula(),
             "P = 1035.63 + 83.50 a + 235.03 b + 246.36 c + 262.54 d + 37.02 a*b - 34.87 a*c + 62.14 b*d + 47.28 c*d"
         );
     }

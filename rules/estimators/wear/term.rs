@@ -25,7 +25,7 @@ impl WearTerm {
 
     /// Value at a point, one coordinate per variable.
     #[must_use]
-    pub fn value(&self, point: &[f64]) -> f64 {
+    pub fn evaluate_at(&self, point: &[f64]) -> f64 {
         self.0.iter().zip(point).map(|(power, x)| x.powi(i32::from(*power))).product()
     }
 
@@ -37,14 +37,14 @@ impl WearTerm {
             power => {
                 let mut lower = self.clone();
                 lower.0[variable] -= 1;
-                f64::from(power) * lower.value(point)
+                f64::from(power) * lower.evaluate_at(point)
             }
         }
     }
 
     /// The term in these symbols: `VB*vc`, `f^2`, `1`.
     #[must_use]
-    pub fn name(&self, symbols: &[&str]) -> String {
+    pub fn format_name(&self, symbols: &[&str]) -> String {
         let part = |(power, symbol): (&u8, &&str)| match power {
             0 => None,
             1 => Some((*symbol).to_owned()),
@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn four_variables_have_fifteen_terms() {
         let terms = second_order(4);
-        let names: Vec<String> = terms.iter().map(|term| term.name(&["a", "b", "c", "d"])).collect();
+        let names: Vec<String> = terms.iter().map(|term| term.format_name(&["a", "b", "c", "d"])).collect();
         assert_eq!(
             names,
             ["1", "a", "b", "c", "d", "a*b", "a*c", "a*d", "b*c", "b*d", "c*d", "a^2", "b^2", "c^2", "d^2"]
@@ -98,7 +98,7 @@ mod tests {
             for variable in 0..3 {
                 let mut moved = point;
                 moved[variable] += 1e-6;
-                let slope = (term.value(&moved) - term.value(&point)) / 1e-6;
+                let slope = (term.evaluate_at(&moved) - term.evaluate_at(&point)) / 1e-6;
                 assert!((slope - term.slope(variable, &point)).abs() < 1e-5);
             }
         }

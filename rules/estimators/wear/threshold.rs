@@ -28,7 +28,7 @@ pub enum Observability {
 impl Observability {
     /// The word in JSON, scripts and SQL.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Observable => "observable",
             Self::ObservableOverParts => "observable_over_parts",
@@ -75,12 +75,12 @@ pub struct WearEstimate {
     pub extrapolated: Vec<&'static str>,
 }
 
-fn names(outside: Vec<&'static ConditionFactor>) -> Vec<&'static str> {
+fn list_names(outside: Vec<&'static ConditionFactor>) -> Vec<&'static str> {
     outside.into_iter().map(|factor| factor.name).collect()
 }
 
-fn check(conditions: &CutConditions) -> Result<(), Refusal> {
-    match conditions.problems().into_iter().next() {
+fn check_conditions(conditions: &CutConditions) -> Result<(), Refusal> {
+    match conditions.list_problems().into_iter().next() {
         None => Ok(()),
         Some(problem) => Err(Refusal::new(RefusalKind::OutOfRange, problem, "look at the sources of this cut")),
     }
@@ -90,16 +90,16 @@ fn check(conditions: &CutConditions) -> Result<(), Refusal> {
 ///
 /// # Errors
 /// Conditions that cannot be, or a limit that is no positive finite power (far outside of what was fitted).
-pub fn threshold(model: &WearModel, cut: &CutConditions, criterion_mm: f64) -> Result<PowerLimit, Refusal> {
+pub fn compute_power_limit(model: &WearModel, cut: &CutConditions, criterion_mm: f64) -> Result<PowerLimit, Refusal> {
     let worn = cut.with_wear(criterion_mm);
-    check(&worn)?;
-    let predicted = model.predict(&worn);
+    check_conditions(&worn)?;
+    let predicted = model.predict_power(&worn);
     let (power_w, sd_w) = (predicted.power_w, predicted.observation_sd_w());
-    let outside = model.outside(&worn);
+    let outside = model.find_factors_outside(&worn);
     if !(power_w.is_finite() && power_w > 0.0 && sd_w.is_finite()) {
         return Err(not_a_power(power_w, &outside));
     }
-    let half = predicted.t() * sd_w;
+    let half = predicted.interval_factor() * sd_w;
     let slope_w_per_mm = model.wear_slope_w_per_mm(&worn);
     let wear_half_interval_mm = (slope_w_per_mm > 0.0).then(|| half / slope_w_per_mm).filter(|it| it.is_finite());
     let parts_to_observe = parts_to_observe(&predicted, slope_w_per_mm, criterion_mm);
@@ -116,19 +116,19 @@ pub fn threshold(model: &WearModel, cut: &CutConditions, criterion_mm: f64) -> R
             Some(_) => Observability::ObservableOverParts,
             None => Observability::NotObservableHere,
         },
-        extrapolated: names(outside),
+        extrapolated: list_names(outside),
     })
 }
 
 /// The least number of parts whose mean power tells the wear. The scatter of single cuts becomes less with their number, the error
 /// of the law does not.
 fn parts_to_observe(predicted: &Predicted, slope_w_per_mm: f64, criterion_mm: f64) -> Option<u32> {
-    let narrow_w = OBSERVABLE_SHARE * criterion_mm * slope_w_per_mm / predicted.t();
+    let narrow_w = OBSERVABLE_SHARE * criterion_mm * slope_w_per_mm / predicted.interval_factor();
     let scatter = |parts: u32| predicted.residual_sd_w / f64::from(parts).sqrt();
     (1..=POOLED_PARTS_MAX).find(|parts| predicted.law_sd_w.hypot(scatter(*parts)) <= narrow_w)
 }
 
-fn observability(half_mm: Option<f64>, criterion_mm: f64) -> Observability {
+fn judge_observability(half_mm: Option<f64>, criterion_mm: f64) -> Observability {
     match half_mm {
         Some(half_mm) if half_mm <= OBSERVABLE_SHARE * criterion_mm => Observability::Observable,
         _ => Observability::NotObservableHere,
@@ -154,35 +154,35 @@ pub fn estimate_wear(
     (power_w, power_sd_w): (f64, f64),
     criterion_mm: f64,
 ) -> Result<WearEstimate, Refusal> {
-    check(&cut.with_wear(criterion_mm))?;
+    check_conditions(&cut.with_wear(criterion_mm))?;
     if !(power_w.is_finite() && power_w > 0.0 && power_sd_w.is_finite() && power_sd_w >= 0.0) {
         let what = format!("{power_w} W with a standard deviation of {power_sd_w} W is no cutting power");
         return Err(Refusal::new(RefusalKind::OutOfRange, what, "ask only while the machine cuts"));
     }
-    let wear_mm = invert(model, cut, power_w)?;
+    let wear_mm = invert_for_wear(model, cut, power_w)?;
     let at = cut.with_wear(wear_mm.max(0.0));
-    let predicted = model.predict(&at);
+    let predicted = model.predict_power(&at);
     let slope = model.wear_slope_w_per_mm(&at);
     let sd_mm = predicted.observation_sd_w().hypot(power_sd_w) / slope;
-    let half_mm = predicted.t() * sd_mm;
+    let half_mm = predicted.interval_factor() * sd_mm;
     if wear_mm + half_mm < 0.0 {
         let what = format!("{power_w:.0} W is less than a sharp edge takes here, by {:.0} W", -wear_mm * slope);
         let next =
             "check depth, feed and speed of this cut (the recipe), or the load loss; the model may be of another tool";
         return Err(Refusal::new(RefusalKind::Contradiction, what, next));
     }
-    let outside = model.range().outside(&at);
+    let outside = model.range().find_factors_outside(&at);
     Ok(WearEstimate {
         flank_wear_mm: wear_mm.max(0.0),
         sd_mm,
         interval_mm: ((wear_mm - half_mm).max(0.0), wear_mm + half_mm),
-        observability: observability(Some(half_mm), criterion_mm),
-        extrapolated: names(outside),
+        observability: judge_observability(Some(half_mm), criterion_mm),
+        extrapolated: list_names(outside),
     })
 }
 
 /// Both forms are at most quadratic in the wear: Newton from the middle of the range, on the rising branch.
-fn invert(model: &WearModel, cut: &CutConditions, power_w: f64) -> Result<f64, Refusal> {
+fn invert_for_wear(model: &WearModel, cut: &CutConditions, power_w: f64) -> Result<f64, Refusal> {
     let range = model.range();
     let mut wear_mm = 0.5 * (range.least[WEAR] + range.greatest[WEAR]);
     for _ in 0..60 {
@@ -196,7 +196,7 @@ fn invert(model: &WearModel, cut: &CutConditions, power_w: f64) -> Result<f64, R
                 "observe the wear at another cut of the part",
             ));
         }
-        let step = (power_w - model.predict(&at).power_w) / slope;
+        let step = (power_w - model.predict_power(&at).power_w) / slope;
         wear_mm += step;
         if step.abs() < 1e-12 {
             break;
@@ -224,26 +224,29 @@ mod tests {
     }
 
     fn cut(coded: [f64; 3]) -> CutConditions {
-        CutConditions::of([0.0, 120.0 + 30.0 * coded[0], 0.15 + 0.05 * coded[1], 1.0 + 0.25 * coded[2]])
+        CutConditions::from_vector([0.0, 120.0 + 30.0 * coded[0], 0.15 + 0.05 * coded[1], 1.0 + 0.25 * coded[2]])
     }
 
     #[test]
     fn the_published_limit_is_found_and_what_lies_outside_the_cube_is_flagged() {
-        let found = threshold(&model(), &cut([1.0, 1.0, 1.0]), 0.3).expect("a limit");
+        let found = compute_power_limit(&model(), &cut([1.0, 1.0, 1.0]), 0.3).expect("a limit");
         assert!((found.power_w - 1958.16).abs() < 0.01 && found.extrapolated.is_empty(), "{found:?}");
-        let outside = threshold(&model(), &cut([1.0, 1.0, 1.4]), 0.3).expect("a limit");
+        let outside = compute_power_limit(&model(), &cut([1.0, 1.0, 1.4]), 0.3).expect("a limit");
         assert_eq!(outside.extrapolated, ["depth_of_cut_mm"]);
         assert!(
-            threshold(&model(), &cut([1.0, 1.0, 1.0]), 300.0).expect_err("um").to_string().contains("is it in um?")
+            compute_power_limit(&model(), &cut([1.0, 1.0, 1.0]), 300.0)
+                .expect_err("um")
+                .to_string()
+                .contains("is it in um?")
         );
     }
 
     #[test]
     fn where_the_published_surface_is_blind_it_says_so() {
-        let blind = threshold(&model(), &cut([-1.0, 1.0, 0.0]), 0.3).expect("a limit");
+        let blind = compute_power_limit(&model(), &cut([-1.0, 1.0, 0.0]), 0.3).expect("a limit");
         assert!((blind.slope_w_per_mm - 89.3).abs() < 0.1, "{blind:?}");
         assert_eq!(blind.observability, Observability::NotObservableHere);
-        let middle = threshold(&model(), &cut([0.0; 3]), 0.3).expect("a limit");
+        let middle = compute_power_limit(&model(), &cut([0.0; 3]), 0.3).expect("a limit");
         assert_eq!(middle.observability, Observability::Observable);
         assert!((middle.wear_half_interval_mm.expect("rises") - 0.123).abs() < 0.001, "{middle:?}");
     }
@@ -251,7 +254,7 @@ mod tests {
     #[test]
     fn the_wear_comes_back_with_an_interval() {
         let (model, cut) = (model(), cut([0.0; 3]));
-        let power_w = model.predict(&cut.with_wear(0.276)).power_w;
+        let power_w = model.predict_power(&cut.with_wear(0.276)).power_w;
         let found = estimate_wear(&model, &cut, (power_w, 10.0), 0.3).expect("a wear");
         assert!((found.flank_wear_mm - 0.276).abs() < 1e-9);
         assert!((found.sd_mm - 37.6_f64.hypot(10.0) / 642.3).abs() < 1e-3, "{found:?}");
@@ -273,8 +276,8 @@ mod tests {
 
     #[test]
     fn an_interval_as_wide_as_the_criterion_is_not_observable() {
-        assert_eq!(observability(Some(0.14), 0.3), Observability::Observable);
-        assert_eq!(observability(Some(0.16), 0.3), Observability::NotObservableHere);
-        assert_eq!(observability(None, 0.3), Observability::NotObservableHere);
+        assert_eq!(judge_observability(Some(0.14), 0.3), Observability::Observable);
+        assert_eq!(judge_observability(Some(0.16), 0.3), Observability::NotObservableHere);
+        assert_eq!(judge_observability(None, 0.3), Observability::NotObservableHere);
     }
 }

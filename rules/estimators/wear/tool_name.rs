@@ -7,16 +7,16 @@ const EDGE_DIGITS_MAX: usize = 4;
 /// The tool of a name: `T1` of `T1-2`, and the whole name where it ends in no edge.
 #[must_use]
 pub fn tool_of(name: &str) -> &str {
-    split(name).0
+    split_edge_number(name).0
 }
 
 /// The number of the edge in a name: 2 in `T1-2`; `None` where the name has none.
 #[must_use]
 pub fn edge_of(name: &str) -> Option<u32> {
-    split(name).1
+    split_edge_number(name).1
 }
 
-fn split(name: &str) -> (&str, Option<u32>) {
+fn split_edge_number(name: &str) -> (&str, Option<u32>) {
     let Some((tool, edge)) = name.rsplit_once('-') else { return (name, None) };
     let digits = !edge.is_empty() && edge.len() <= EDGE_DIGITS_MAX && edge.bytes().all(|byte| byte.is_ascii_digit());
     match edge.parse() {

@@ -68,25 +68,25 @@ impl CutMoment {
     }
 
     /// Speed, feed per revolution and depth, where all are known.
-    pub(super) fn conditions(&self) -> Option<CutConditions> {
+    pub(super) fn to_conditions(&self) -> Option<CutConditions> {
         let turns = self.speed_rpm?.abs();
         let speed = cutting_speed_m_min(self.diameter_mm?, turns).ok()?;
-        let cut = CutConditions::of([0.0, speed, self.feed_mm_min? / turns.max(1.0), self.depth_mm?]);
-        cut.problems().is_empty().then_some(cut)
+        let cut = CutConditions::from_vector([0.0, speed, self.feed_mm_min? / turns.max(1.0), self.depth_mm?]);
+        cut.list_problems().is_empty().then_some(cut)
     }
 
-    pub(super) fn expected(&self, model: Option<&WearRecord>) -> ExpectedPower {
+    pub(super) fn estimate_expected_power(&self, model: Option<&WearRecord>) -> ExpectedPower {
         let of_model = || self.of_model(model?);
-        of_model().or_else(|| self.typical()).unwrap_or_else(|| self.of_feed())
+        of_model().or_else(|| self.estimate_typical_power()).unwrap_or_else(|| self.of_feed())
     }
 
     fn of_model(&self, record: &WearRecord) -> Option<ExpectedPower> {
-        let sharp = self.conditions()?;
+        let sharp = self.to_conditions()?;
         let worn = sharp.with_wear(record.criterion_mm);
-        if !record.model.outside(&worn).is_empty() {
+        if !record.model.find_factors_outside(&worn).is_empty() {
             return None;
         }
-        let (at_none, at_worn) = (record.model.predict(&sharp), record.model.predict(&worn));
+        let (at_none, at_worn) = (record.model.predict_power(&sharp), record.model.predict_power(&worn));
         let wear_w_per_mm = (at_worn.power_w - at_none.power_w) / record.criterion_mm;
         // A model whose power does not rise with the wear here says nothing of it.
         let stands = at_none.power_w > 0.0 && wear_w_per_mm > 0.0;
@@ -100,8 +100,8 @@ impl CutMoment {
         })
     }
 
-    fn typical(&self) -> Option<ExpectedPower> {
-        let cut = self.conditions()?;
+    fn estimate_typical_power(&self) -> Option<ExpectedPower> {
+        let cut = self.to_conditions()?;
         let (depth, speed_m_s) = (cut.depth_of_cut_mm, cut.cutting_speed_m_min / 60.0);
         let (chip_mm, engaged) = match self.milling.filter(|(width, teeth)| *width > 0.0 && *teeth > 0.0) {
             None => (cut.feed_per_rev_mm, 1.0),
@@ -209,7 +209,7 @@ impl EdgeWork {
     }
 
     /// Logarithm of the energy over that of a sharp edge.
-    pub(super) fn excess(&self) -> Option<f64> {
+    pub(super) fn log_energy_ratio(&self) -> Option<f64> {
         let ratio = self.energy_j.0 / self.expected_j.0;
         (ratio > 0.0 && ratio.is_finite()).then(|| ratio.ln())
     }

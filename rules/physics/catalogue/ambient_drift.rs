@@ -2,7 +2,7 @@
 
 use adapters::channel::quantity::Quantity;
 use crate::physics::drive::is_displacement;
-use crate::physics::excitation::{lag_forms, spread};
+use crate::physics::excitation::{lag_forms, compute_spread};
 use crate::physics::state::first_order_behind;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::f64::consts::LN_2;
@@ -16,14 +16,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "thermal",
     law: "E = per_k * w; dw/dt = ((T - T0) - w) / tau, T0 at the start; without tau: w = T - T0; two_masses: the same once more behind w, with half the tau",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "per_k",
             "output/K",
             (-100.0, 100.0),
             "displacement per kelvin of the shop",
             "环境每变化1 K的位移",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "tau_s",
             "s",
             (60.0, 43200.0),
@@ -64,12 +64,12 @@ impl Effect for AmbientDrift {
         &["direct", "lag", TWO_MASSES]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let known = scene.role(Role::Ambient).is_some_and(|ambient| spread(ambient) > 0.2);
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let known = scene.role_values(Role::Ambient).is_some_and(|ambient| compute_spread(ambient) > 0.2);
         if !known || !is_displacement(scene) {
             return Vec::new();
         }
-        let direct = Form { name: "direct", ..Form::plain() };
+        let direct = Form { name: "direct", ..Form::without_shape() };
         let lags = |name| lag_forms(scene, name, &[1800.0, 3600.0, 7200.0]);
         let two_masses = lags(TWO_MASSES).into_iter().map(|form| Form { ln_choices: LN_2, ..form });
         [direct].into_iter().chain(lags("lag")).chain(two_masses).collect()
@@ -79,11 +79,11 @@ impl Effect for AmbientDrift {
         scene.role_name(Role::Ambient)
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let ambient = scene.role(Role::Ambient)?;
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let ambient = scene.role_values(Role::Ambient)?;
         let first = *ambient.first()?;
         let change: Vec<f64> = ambient.iter().map(|t| t - first).collect();
-        let followed = match form.value("tau_s") {
+        let followed = match form.shape_value("tau_s") {
             Some(tau_s) if form.name == TWO_MASSES => {
                 let skin = first_order_behind(scene, &change, SKIN_SHARE * tau_s);
                 first_order_behind(scene, &skin, tau_s)
@@ -95,7 +95,7 @@ impl Effect for AmbientDrift {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "lag", ..Form::of(&[("tau_s", 3600.0)]) }
+        Form { name: "lag", ..Form::from_shape(&[("tau_s", 3600.0)]) }
     }
 }
 
@@ -118,7 +118,7 @@ mod tests {
         set(&mut recording, "ambient_temperature_c", |row| if row < 10 { 20.0 } else { 14.0 });
         set(&mut recording, "thermal_error_um", |_| 1.0);
         let scene = scene(&recording, "thermal_error_um");
-        let lag = Form { name: "lag", ..Form::of(&[("tau_s", 3600.0)]) };
+        let lag = Form { name: "lag", ..Form::from_shape(&[("tau_s", 3600.0)]) };
         let column = column(&AmbientDrift, &scene, &lag);
         // It fell all night, so that the column is an hour behind: 0.6 K.
         assert!(column[9] == 0.0 && (column[10] + 5.4).abs() < 0.01, "{column:?}");
@@ -131,7 +131,7 @@ mod tests {
         set(&mut recording, "thermal_error_um", |_| 1.0);
         let scene = scene(&recording, "thermal_error_um");
         let after = |name, minutes: usize| {
-            let form = Form { name, ..Form::of(&[("tau_s", 3600.0)]) };
+            let form = Form { name, ..Form::from_shape(&[("tau_s", 3600.0)]) };
             column(&AmbientDrift, &scene, &form)[10 + minutes]
         };
         assert!(after("two_masses", 10) > 0.4 * after("lag", 10), "{}", after("two_masses", 10));

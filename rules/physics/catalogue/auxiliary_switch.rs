@@ -1,7 +1,7 @@
 //! A consumer goes on and off: coolant, hydraulics, chip conveyor, chiller.
 
 use crate::physics::drive::{is_axis_output, is_power};
-use crate::physics::excitation::{ln_count, varies};
+use crate::physics::excitation::{ln_count, has_variation};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// A consumer that goes on and off.
@@ -12,7 +12,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "auxiliary_switch",
     family: "auxiliary",
     law: "P = level while the consumer runs",
-    parameters: &[ParameterDoc::linear(
+    parameters: &[ParameterDoc::new_linear(
         "level",
         "output",
         (0.0, f64::INFINITY),
@@ -48,18 +48,18 @@ impl Effect for AuxiliarySwitch {
         &["flag", "latent"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         if !is_power(scene) || is_axis_output(scene) {
             return Vec::new();
         }
         let names = scene.column_names().filter(|name| name.ends_with("_on") && *name != "drive_on");
-        let flags: Vec<&str> = names.filter(|name| scene.column(name).is_some_and(varies)).collect();
+        let flags: Vec<&str> = names.filter(|name| scene.column(name).is_some_and(has_variation)).collect();
         let ln_choices = ln_count(flags.len());
         let place = |flag: &&str| Some(((*flag).to_owned(), "1".to_owned()));
         flags.iter().map(|flag| Form { name: "flag", place: place(flag), ln_choices, ..Form::default() }).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "latent" {
             return Some(vec![("level", scene.latent_or_zero(DOC.kind))]);
         }

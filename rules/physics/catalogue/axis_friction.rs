@@ -1,7 +1,7 @@
 //! Feed axes take power to move, and the meter sees it.
 
 use crate::physics::drive::{axis_velocities, is_axis_output, is_power};
-use crate::physics::excitation::varies;
+use crate::physics::excitation::has_variation;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts, unit_in};
 
 /// Power to move the feed axes.
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "P = force * sum |v|; viscous: P = per_speed * sum v^2; v in m/s",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "force",
             "output/(m/s)",
             (0.0, f64::INFINITY),
             "friction force of the axes; newtons when the output is in watts",
             "进给轴摩擦力；输出为W时单位为N",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "per_speed",
             "output/(m/s)2",
             (0.0, f64::INFINITY),
@@ -65,13 +65,13 @@ impl Effect for AxisFriction {
         &["coulomb", "viscous", "both"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let named = ["coulomb", "viscous"].map(|name| Form { name, ..Form::plain() });
-        let acts = |form: &Form| self.columns(scene, form).is_some_and(|columns| varies(&columns[0].1));
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let named = ["coulomb", "viscous"].map(|name| Form { name, ..Form::without_shape() });
+        let acts = |form: &Form| self.compute_columns(scene, form).is_some_and(|columns| has_variation(&columns[0].1));
         named.into_iter().filter(acts).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let velocities = axis_velocities(scene);
         if velocities.is_empty() || !is_power(scene) || is_axis_output(scene) {
             return None;

@@ -1,6 +1,6 @@
 //! Force and power that accelerate a feed axis.
 
-use crate::physics::drive::{axis_velocities, in_si, is_axis_output, is_displacement, is_power, rate};
+use crate::physics::drive::{axis_velocities, in_si, is_axis_output, is_displacement, is_power, compute_rate};
 use crate::physics::excitation::plain_where_it_varies;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "P = mass_kg * sum v a; of a single axis in a force or current: F = per_m_s2 * a; v in m/s, a in m/s2",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "mass_kg",
             "kg",
             (0.0, 1000000.0),
             "moved mass, with the inertia of motor and screw",
             "移动质量，包括电机和丝杠惯量",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "per_m_s2",
             "output/(m/s2)",
             (0.0, f64::INFINITY),
@@ -53,29 +53,29 @@ impl Effect for AxisInertia {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         plain_where_it_varies(self, scene)
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         if is_axis_output(scene) && !is_power(scene) {
-            return Some(vec![("per_m_s2", acceleration(scene)?)]);
+            return Some(vec![("per_m_s2", read_acceleration(scene)?)]);
         }
         let velocities = axis_velocities(scene);
         if velocities.is_empty() || !is_power(scene) {
             return None;
         }
-        let rates: Vec<Vec<f64>> = velocities.iter().map(|velocity| rate(scene, velocity)).collect();
+        let rates: Vec<Vec<f64>> = velocities.iter().map(|velocity| compute_rate(scene, velocity)).collect();
         let power = |row: usize| velocities.iter().zip(&rates).map(|(v, a)| v[row] * a[row]).sum();
         Some(vec![("mass_kg", (0..scene.rows()).map(power).collect())])
     }
 }
 
 /// Acceleration of the axis: recorded, or else the rate of its velocity.
-fn acceleration(scene: &Scene) -> Option<Vec<f64>> {
+fn read_acceleration(scene: &Scene) -> Option<Vec<f64>> {
     if is_displacement(scene) {
         return None;
     }
     let recorded = scene.role_name(Role::Acceleration).and_then(|name| in_si(scene, name));
-    recorded.or_else(|| Some(rate(scene, &in_si(scene, scene.role_name(Role::Velocity)?)?)))
+    recorded.or_else(|| Some(compute_rate(scene, &in_si(scene, scene.role_name(Role::Velocity)?)?)))
 }

@@ -1,9 +1,9 @@
 //! Grease and bearings get thinner and freer as they warm: no-load power falls.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{krpm, slide_to_the, sliding, speed_to_the};
-use crate::physics::excitation::{lag_forms, varies};
-use crate::physics::state::{decay, first_order};
+use crate::physics::drive::{read_speed_krpm, slide_to_the, read_slide_velocity, speed_to_the};
+use crate::physics::excitation::{lag_forms, has_variation};
+use crate::physics::state::{compute_decay, first_order};
 use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Friction that falls as the bearings warm.
@@ -15,28 +15,28 @@ static DOC: EffectDoc = EffectDoc {
     family: "spindle",
     law: "P = -drop * g * w + initial * g * exp(-t/tau); g = (n / 1000 rpm)^(5/3), of a feed drive (v / 1 m/s)^(5/3), dw/dt = (g - w) / tau; in a force g / v; measured: P = -drop_per_k * g * (T - T0)",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "drop",
             "output",
             (0.0, f64::INFINITY),
             "fall of power at 1000 rpm once warm from 1000 rpm; of a feed drive, of power or force at 1 m/s",
             "在1000 rpm下热透后功率的下降量；进给轴按1 m/s的功率或力",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "initial",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "what the warmth at the start of the recording changes at 1000 rpm or 1 m/s",
             "记录开始时的热状态在1000 rpm或1 m/s下的影响",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "drop_per_k",
             "output/K",
             (0.0, f64::INFINITY),
             "fall at 1000 rpm or 1 m/s per kelvin of the bearing",
             "轴承温度每升高1 K，1000 rpm或1 m/s下的下降量",
         ),
-        ParameterDoc::shape("tau_s", "s", (60.0, 14400.0), "time constant of warming", "升温时间常数"),
+        ParameterDoc::new_shape("tau_s", "s", (60.0, 14400.0), "time constant of warming", "升温时间常数"),
     ],
     needs: &["speed | velocity"],
     source: "Palmgren: friction moment grows with (viscosity * n)^(2/3), viscosity falls with temperature (Walther); idle power 10-40 % lower warm",
@@ -76,31 +76,31 @@ impl Effect for BearingWarmUp {
         &["lag", "measured"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let velocity = sliding(scene);
-        if friction(scene, velocity.as_deref()).is_none_or(|friction| friction.iter().all(|g| *g == 0.0)) {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let velocity = read_slide_velocity(scene);
+        if compute_friction(scene, velocity.as_deref()).is_none_or(|friction| friction.iter().all(|g| *g == 0.0)) {
             return Vec::new();
         }
         // A nut warms faster than a spindle.
         let fast: &[f64] = if velocity.is_some() { &[75.0, 150.0] } else { &[] };
         let mut forms = lag_forms(scene, "lag", &[fast, &[300.0, 600.0, 1200.0, 2400.0]].concat());
-        let measured = scene.role(Role::Temperature).filter(|temperature| varies(temperature));
-        forms.extend(measured.map(|_| Form { name: "measured", ..Form::plain() }));
+        let measured = scene.role_values(Role::Temperature).filter(|temperature| has_variation(temperature));
+        forms.extend(measured.map(|_| Form { name: "measured", ..Form::without_shape() }));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let velocity = sliding(scene);
-        let friction = friction(scene, velocity.as_deref())?;
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let velocity = read_slide_velocity(scene);
+        let friction = compute_friction(scene, velocity.as_deref())?;
         if form.name == "measured" {
-            let temperature = scene.role(Role::Temperature)?;
+            let temperature = scene.role_values(Role::Temperature)?;
             let first = *temperature.first()?;
             let law = |(g, t): (&f64, &f64)| -g * (t - first);
             return Some(vec![("drop_per_k", friction.iter().zip(temperature).map(law).collect())]);
         }
-        let tau_s = form.value("tau_s").unwrap_or(900.0);
-        let warmth = first_order(scene, &heat(scene, velocity.as_deref())?, tau_s);
-        let left = decay(scene, tau_s);
+        let tau_s = form.shape_value("tau_s").unwrap_or(900.0);
+        let warmth = first_order(scene, &compute_heat(scene, velocity.as_deref())?, tau_s);
+        let left = compute_decay(scene, tau_s);
         Some(vec![
             ("drop", friction.iter().zip(&warmth).map(|(g, w)| -g * w).collect()),
             ("initial", friction.iter().zip(&left).map(|(g, left)| g * left).collect()),
@@ -108,12 +108,12 @@ impl Effect for BearingWarmUp {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "lag", ..Form::of(&[("tau_s", 900.0)]) }
+        Form { name: "lag", ..Form::from_shape(&[("tau_s", 900.0)]) }
     }
 }
 
 /// Friction in the output: of a feed drive over its velocity in m/s, else of the spindle over thousands of rpm.
-fn friction(scene: &Scene, velocity: Option<&[f64]>) -> Option<Vec<f64>> {
+fn compute_friction(scene: &Scene, velocity: Option<&[f64]>) -> Option<Vec<f64>> {
     match velocity {
         Some(velocity) => Some(slide_to_the(scene, velocity, EXPONENT)),
         None => speed_to_the(scene, EXPONENT),
@@ -121,9 +121,9 @@ fn friction(scene: &Scene, velocity: Option<&[f64]>) -> Option<Vec<f64>> {
 }
 
 /// The heat that friction makes, whatever the output.
-fn heat(scene: &Scene, velocity: Option<&[f64]>) -> Option<Vec<f64>> {
+fn compute_heat(scene: &Scene, velocity: Option<&[f64]>) -> Option<Vec<f64>> {
     let heat = |speeds: &[f64]| speeds.iter().map(|speed| speed.abs().powf(EXPONENT)).collect();
-    velocity.map(heat).or_else(|| Some(heat(&krpm(scene)?)))
+    velocity.map(heat).or_else(|| Some(heat(&read_speed_krpm(scene)?)))
 }
 
 /// Power of friction over speed: torque with the power 2/3.

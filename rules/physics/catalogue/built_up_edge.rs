@@ -1,7 +1,7 @@
 //! At low cutting speed a built-up edge forms and changes the force.
 
-use crate::physics::cut::{cut, cut_times, cutting_rows};
-use crate::physics::excitation::visits;
+use crate::physics::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::physics::excitation::count_visits;
 use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Built-up edge at low cutting speed.
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = -drop * L * exp(-((vc - centre) / 15 m/min)^2)",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "drop",
             "1",
             (0.0, 0.5),
             "share by which the built-up edge lowers the force",
             "积屑瘤使切削力降低的比例",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "centre_m_min",
             "m/min",
             (15.0, 70.0),
@@ -58,27 +58,27 @@ impl Effect for BuiltUpEdge {
         Bound::Cut(0.7)
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(speed) = scene.column("cutting_speed_m_min").filter(|_| cut(scene).is_some()) else {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(speed) = scene.column("cutting_speed_m_min").filter(|_| estimate_cut_load(scene).is_some()) else {
             return Vec::new();
         };
         let cutting = cutting_rows(scene);
         let near = |centre: f64| move |row: usize| (speed[row] - centre).abs() < WIDTH_M_MIN;
-        let inside = |centre: f64| visits(scene, |row| cutting[row] && near(centre)(row));
-        let outside = |centre: f64| visits(scene, |row| cutting[row] && !near(centre)(row));
+        let inside = |centre: f64| count_visits(scene, |row| cutting[row] && near(centre)(row));
+        let outside = |centre: f64| count_visits(scene, |row| cutting[row] && !near(centre)(row));
         let centres = [40.0, 30.0, 50.0].into_iter().filter(|centre| inside(*centre) >= 3 && outside(*centre) >= 3);
-        centres.map(|centre| Form::of(&[("centre_m_min", centre)])).collect()
+        centres.map(|centre| Form::from_shape(&[("centre_m_min", centre)])).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let speed = scene.column("cutting_speed_m_min")?;
-        let centre = form.value("centre_m_min").unwrap_or(40.0);
+        let centre = form.shape_value("centre_m_min").unwrap_or(40.0);
         let window = |row: usize| -(-((speed[row] - centre) / WIDTH_M_MIN).powi(2)).exp();
         Some(vec![("drop", cut_times(scene, window)?)])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form::of(&[("centre_m_min", 40.0)])
+        Form::from_shape(&[("centre_m_min", 40.0)])
     }
 }
 

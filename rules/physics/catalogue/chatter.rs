@@ -1,6 +1,6 @@
 //! Self-excited vibration above a depth of cut: noise grows, the mean hardly.
 
-use crate::physics::cut::{cut, cut_times, cutting_rows};
+use crate::physics::cut::{estimate_cut_load, cut_times, cutting_rows};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = gain * L * (ap / limit - 1) where ap > limit; mostly the scatter grows, the mean by 0-10 %",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "gain",
             "1",
             (0.0, 1.0),
             "growth of the mean cut at twice the limit",
             "切深为极限两倍时平均切削量的增长",
         ),
-        ParameterDoc::shape("limit_mm", "mm", (0.05, 20.0), "depth of cut above which it chatters", "开始颤振的切深"),
+        ParameterDoc::new_shape("limit_mm", "mm", (0.05, 20.0), "depth of cut above which it chatters", "开始颤振的切深"),
     ],
     needs: &["load | engaged", "depth_of_cut_mm"],
     source: "stability lobes; above the limit the cutting force grows with the vibration",
@@ -47,23 +47,23 @@ impl Effect for Chatter {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| cut(scene).is_some()) else { return Vec::new() };
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| estimate_cut_load(scene).is_some()) else { return Vec::new() };
         let cutting = cutting_rows(scene);
         let depths = || depth.iter().zip(&cutting).filter(|(_, cutting)| **cutting).map(|(depth, _)| *depth);
         let limits = [0.4, 0.55, 0.7, 0.85].into_iter().filter_map(|share| quantile(depths(), share));
         let mut limits: Vec<f64> = limits.filter(|limit| depths().any(|depth| depth > *limit)).collect();
         limits.dedup();
-        limits.into_iter().map(|limit| Form::of(&[("limit_mm", limit)])).collect()
+        limits.into_iter().map(|limit| Form::from_shape(&[("limit_mm", limit)])).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let depth = scene.column("depth_of_cut_mm")?;
-        let limit_mm = form.value("limit_mm").unwrap_or(2.0);
+        let limit_mm = form.shape_value("limit_mm").unwrap_or(2.0);
         Some(vec![("gain", cut_times(scene, |row| (depth[row] / limit_mm - 1.0).max(0.0))?)])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form::of(&[("limit_mm", 2.0)])
+        Form::from_shape(&[("limit_mm", 2.0)])
     }
 }

@@ -1,7 +1,7 @@
 //! At depths below the nose radius the chip is thinner and the force per area higher.
 
-use crate::physics::cut::{cut, cut_times, cutting_rows};
-use crate::physics::excitation::{varies, visits};
+use crate::physics::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::physics::excitation::{has_variation, count_visits};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
@@ -15,22 +15,22 @@ static DOC: EffectDoc = EffectDoc {
     law: "y = gain * L * max(0, 1 - ap / r); of a mill, over the mean chip thickness: y = share * L * ((h / h0)^-mc - 1), \
           h = 2 fz (ae / D) / arccos(1 - 2 ae / D), h0 its median in the cut",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "gain",
             "1",
             (0.0, 1.5),
             "share by which the cut is heavier at vanishing depth",
             "切深趋近零时切削负载增加的比例",
         ),
-        ParameterDoc::shape("r_mm", "mm", (0.1, 3.0), "nose radius of the insert", "刀尖圆弧半径"),
-        ParameterDoc::linear(
+        ParameterDoc::new_shape("r_mm", "mm", (0.1, 3.0), "nose radius of the insert", "刀尖圆弧半径"),
+        ParameterDoc::new_linear(
             "share",
             "1",
             (0.0, 3.0),
             "1: the force per area rises with thin chips as its exponent says",
             "1：薄切屑的单位切削力按指数规律上升",
         ),
-        ParameterDoc::shape("mc", "1", (0.05, 0.6), "exponent of the chip thickness", "切屑厚度指数"),
+        ParameterDoc::new_shape("mc", "1", (0.05, 0.6), "exponent of the chip thickness", "切屑厚度指数"),
     ],
     needs: &["load | engaged", "depth_of_cut_mm"],
     source: "h = f sin(kappa), with kappa falling where ap is below the nose radius 0.4-1.2 mm; mean chip thickness of a \
@@ -58,15 +58,15 @@ impl Effect for ChipThinning {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let milled = EXPONENTS.map(|mc| Form { name: MILLED, ..Form::of(&[("mc", mc)]) });
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let milled = EXPONENTS.map(|mc| Form { name: MILLED, ..Form::from_shape(&[("mc", mc)]) });
         let mut forms: Vec<Form> = if thickness_varies(scene) { milled.into() } else { Vec::new() };
-        let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| cut(scene).is_some()) else { return forms };
+        let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| estimate_cut_load(scene).is_some()) else { return forms };
         let cutting = cutting_rows(scene);
         let depths: Vec<f64> = (0..scene.rows()).filter(|row| cutting[*row]).map(|row| depth[row]).collect();
-        let shallow = |r_mm: &f64| visits(scene, |row| cutting[row] && depth[row] < *r_mm) >= 3;
-        let radii = [0.8, 0.4, 1.2].into_iter().filter(|r_mm| varies(&depths) && shallow(r_mm));
-        forms.extend(radii.map(|r_mm| Form::of(&[("r_mm", r_mm)])));
+        let shallow = |r_mm: &f64| count_visits(scene, |row| cutting[row] && depth[row] < *r_mm) >= 3;
+        let radii = [0.8, 0.4, 1.2].into_iter().filter(|r_mm| has_variation(&depths) && shallow(r_mm));
+        forms.extend(radii.map(|r_mm| Form::from_shape(&[("r_mm", r_mm)])));
         forms
     }
 
@@ -74,20 +74,20 @@ impl Effect for ChipThinning {
         &[MILLED]
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == MILLED {
-            let mc = form.value("mc").unwrap_or(0.25);
+            let mc = form.shape_value("mc").unwrap_or(0.25);
             let thickness = relative_thickness(scene)?;
             let law = |row: usize| if thickness[row] > 0.0 { thickness[row].powf(-mc) - 1.0 } else { 0.0 };
             return Some(vec![("share", cut_times(scene, law)?)]);
         }
         let depth = scene.column("depth_of_cut_mm")?;
-        let r_mm = form.value("r_mm").unwrap_or(0.8).max(f64::MIN_POSITIVE);
+        let r_mm = form.shape_value("r_mm").unwrap_or(0.8).max(f64::MIN_POSITIVE);
         Some(vec![("gain", cut_times(scene, |row| (1.0 - depth[row] / r_mm).max(0.0))?)])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form::of(&[("r_mm", 0.8)])
+        Form::from_shape(&[("r_mm", 0.8)])
     }
 }
 
@@ -114,7 +114,7 @@ fn relative_thickness(scene: &Scene) -> Option<Vec<f64>> {
 }
 
 fn thickness_varies(scene: &Scene) -> bool {
-    let Some(thickness) = relative_thickness(scene).filter(|_| cut(scene).is_some()) else { return false };
+    let Some(thickness) = relative_thickness(scene).filter(|_| estimate_cut_load(scene).is_some()) else { return false };
     let ln: Vec<f64> = thickness.iter().filter(|h| **h > 0.0).map(|h| h.ln()).collect();
     let middle = crate::statistics::mean(&ln);
     crate::statistics::rms(&ln.iter().map(|x| x - middle).collect::<Vec<_>>()) > VARIES

@@ -1,8 +1,8 @@
 //! The meter's clock is late or early against the controller's.
 
-use crate::physics::drive::{is_displacement, rate};
-use crate::physics::excitation::{delays, varies};
-use crate::physics::state::delayed;
+use crate::physics::drive::{is_displacement, compute_rate};
+use crate::physics::excitation::{list_delays, has_variation};
+use crate::physics::state::delay_values;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Meter late or early against the controller.
@@ -14,15 +14,15 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = share * (S(t - delay) - S(t)), S the simulated output; small: y = -lag_s * dS/dt",
     parameters: &[
-        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the delay explains all", "为1时延时可完全解释"),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear("share", "1", (0.0, 1.5), "one, when the delay explains all", "为1时延时可完全解释"),
+        ParameterDoc::new_linear(
             "lag_s",
             "s",
             (-2.0, 5.0),
             "how late the recording is, where it is small against the ramps",
             "记录滞后的时间（相对斜坡较小时）",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "delay_s",
             "s",
             (-3.0, 10.0),
@@ -59,27 +59,27 @@ impl Effect for ClockLag {
         &["delay", "small"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         // What grows over minutes shows no fraction of a second.
-        if is_displacement(scene) || !scene.simulated().is_some_and(varies) {
+        if is_displacement(scene) || !scene.simulated_output().is_some_and(has_variation) {
             return Vec::new();
         }
-        let delays = delays(scene, &[0.25, 0.5, 1.0, 1.5, 2.0, 3.0]);
+        let delays = list_delays(scene, &[0.25, 0.5, 1.0, 1.5, 2.0, 3.0]);
         let both = delays.iter().flat_map(|delay| [*delay, -delay]);
-        let late = |delay| Form { name: "delay", ..Form::of(&[("delay_s", delay)]) }.whole();
+        let late = |delay| Form { name: "delay", ..Form::from_shape(&[("delay_s", delay)]) }.with_full_share();
         both.map(late).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let simulated = scene.simulated()?;
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let simulated = scene.simulated_output()?;
         if form.name == "small" {
-            return Some(vec![("lag_s", rate(scene, simulated).iter().map(|rate| -rate).collect())]);
+            return Some(vec![("lag_s", compute_rate(scene, simulated).iter().map(|rate| -rate).collect())]);
         }
-        let late = delayed(scene, simulated, form.value("delay_s").unwrap_or(0.0));
+        let late = delay_values(scene, simulated, form.shape_value("delay_s").unwrap_or(0.0));
         Some(vec![("share", late.iter().zip(simulated).map(|(late, now)| late - now).collect())])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "delay", ..Form::of(&[("delay_s", 0.0)]) }
+        Form { name: "delay", ..Form::from_shape(&[("delay_s", 0.0)]) }
     }
 }

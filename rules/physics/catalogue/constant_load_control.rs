@@ -1,10 +1,10 @@
 //! A controller holds the load by turning the feed: what the cut gains, the feed loses.
 
-use crate::physics::cut::{cutting_rows, engaged};
-use crate::physics::excitation::varies;
+use crate::physics::cut::{cutting_rows, read_engagement};
+use crate::physics::excitation::has_variation;
 use crate::physics::state::first_order_in_each_pass;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::{count, quantile};
+use crate::statistics::{count_to_f64, quantile};
 
 /// Feed that a load controller turns down.
 #[derive(Debug, Clone, Copy)]
@@ -15,22 +15,22 @@ static DOC: EffectDoc = EffectDoc {
     family: "control",
     law: "of a feed or its override: y = -response * ln(L / L0) * y0 in the cut; unseen, of a power: y = share * L * g, g = (L / L0)^-exponent - 1 in the cut behind a lag tau, zero when the cut begins; L0, y0 medians in the cut",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "response",
             "1",
             (0.0, 2.0),
             "relative fall of the feed per relative rise of the load",
             "负载相对上升时进给的相对下降",
         ),
-        ParameterDoc::linear("share", "1", (0.0, 2.0), "1: the controller acts as a whole", "1：控制器完全起作用"),
-        ParameterDoc::shape(
+        ParameterDoc::new_linear("share", "1", (0.0, 2.0), "1: the controller acts as a whole", "1：控制器完全起作用"),
+        ParameterDoc::new_shape(
             "exponent",
             "1",
             (0.01, 1.5),
             "relative fall of the load per relative rise of the load that the program asks for",
             "程序要求的负载相对上升时实际负载的相对下降",
         ),
-        ParameterDoc::shape("tau_s", "s", (0.2, 30.0), "time constant of the controller", "控制器时间常数"),
+        ParameterDoc::new_shape("tau_s", "s", (0.2, 30.0), "time constant of the controller", "控制器时间常数"),
     ],
     needs: &["load", "engaged"],
     source: "f = f0 (P0 / P)^(1 / (1 - mc)): adaptive feed control at constant power",
@@ -61,52 +61,52 @@ impl Effect for ConstantLoadControl {
         &["feed", "unseen"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let tried = if is_feed(scene) {
-            vec![Form { name: "feed", ..Form::plain() }]
+            vec![Form { name: "feed", ..Form::without_shape() }]
         } else if knows_the_program_only(scene) {
-            let unseen = |(exponent, tau_s)| unseen(exponent, tau_s).whole();
+            let unseen = |(exponent, tau_s)| build_unseen_form(exponent, tau_s).with_full_share();
             [(0.1, 1.0), (0.1, 3.0), (0.5, 1.0), (0.5, 3.0)].map(unseen).into()
         } else {
             Vec::new()
         };
-        let acts = |form: &Form| self.columns(scene, form).is_some_and(|columns| varies(&columns[0].1));
+        let acts = |form: &Form| self.compute_columns(scene, form).is_some_and(|columns| has_variation(&columns[0].1));
         tried.into_iter().filter(acts).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let load = scene.load()?;
-        let engaged = engaged(scene);
+        let engaged = read_engagement(scene);
         let cutting = |row: &usize| engaged[*row] > 0.5 && load[*row] > 0.0;
         let reference = quantile((0..scene.rows()).filter(cutting).map(|row| load[row]), 0.5)?;
         if form.name == "unseen" {
-            let exponent = form.value("exponent").unwrap_or(0.1);
+            let exponent = form.shape_value("exponent").unwrap_or(0.1);
             let wanted = |row: usize| if cutting(&row) { (load[row] / reference).powf(-exponent) - 1.0 } else { 0.0 };
             let wanted: Vec<f64> = (0..scene.rows()).map(wanted).collect();
-            let tau_s = form.value("tau_s").unwrap_or(1.0).max(f64::MIN_POSITIVE);
+            let tau_s = form.shape_value("tau_s").unwrap_or(1.0).max(f64::MIN_POSITIVE);
             let turned = first_order_in_each_pass(scene, &wanted, tau_s);
             return Some(vec![("share", load.iter().zip(&turned).map(|(load, turned)| load * turned).collect())]);
         }
         if !is_feed(scene) {
             return None;
         }
-        let level = quantile((0..scene.rows()).filter(cutting).map(|row| scene.recorded()[row]), 0.5)?;
+        let level = quantile((0..scene.rows()).filter(cutting).map(|row| scene.recorded_output()[row]), 0.5)?;
         let law = |row: usize| if cutting(&row) { -level * (load[row] / reference).ln() } else { 0.0 };
         Some(vec![("response", (0..scene.rows()).map(law).collect())])
     }
 
     fn default_form(&self, scene: &Scene) -> Form {
-        if is_feed(scene) { Form { name: "feed", ..Form::plain() } } else { unseen(0.1, 1.0) }
+        if is_feed(scene) { Form { name: "feed", ..Form::without_shape() } } else { build_unseen_form(0.1, 1.0) }
     }
 }
 
-fn unseen(exponent: f64, tau_s: f64) -> Form {
-    Form { name: "unseen", ..Form::of(&[("exponent", exponent), ("tau_s", tau_s)]) }
+fn build_unseen_form(exponent: f64, tau_s: f64) -> Form {
+    Form { name: "unseen", ..Form::from_shape(&[("exponent", exponent), ("tau_s", tau_s)]) }
 }
 
 /// Is the output what such a controller turns?
 fn is_feed(scene: &Scene) -> bool {
-    ["feed_override_pct", "feed_mm_min", "feed_per_rev_mm"].contains(&scene.output())
+    ["feed_override_pct", "feed_mm_min", "feed_per_rev_mm"].contains(&scene.output_name())
 }
 
 /// Share of the rows in the cut in which a feed may differ from the program's.
@@ -121,7 +121,7 @@ fn knows_the_program_only(scene: &Scene) -> bool {
     let rows: Vec<usize> = (0..scene.rows()).filter(|row| cutting[*row]).collect();
     let agrees = |asked: &dyn Fn(usize) -> f64| {
         let differs = |row: &&usize| (actual[**row] - asked(**row)).abs() > 0.01 * asked(**row).abs();
-        count(rows.iter().filter(differs).count()) <= DIFFERS * count(rows.len())
+        count_to_f64(rows.iter().filter(differs).count()) <= DIFFERS * count_to_f64(rows.len())
     };
     let with_dial = |dial: &[f64]| agrees(&|row| program[row] * dial[row] / 100.0);
     agrees(&|row| program[row]) || scene.column("feed_override_pct").is_some_and(with_dial)

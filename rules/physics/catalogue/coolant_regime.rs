@@ -1,7 +1,7 @@
 //! Cutting wet needs another force than cutting dry.
 
-use crate::physics::cut::{cut, cut_times, cutting_rows};
-use crate::physics::excitation::{varies, visits};
+use crate::physics::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::physics::excitation::{has_variation, count_visits};
 use crate::physics::state::first_order_behind;
 use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::median;
@@ -15,21 +15,21 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = change * L * w, w = coolant_on; arriving: dw/dt = (coolant_on - w) / tau; fading: w = coolant_on * (vm / vc)^fading, vm the median cutting speed of the wet cuts",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "change",
             "1",
             (-0.3, 0.3),
             "share by which the cut changes with coolant, where it fades at the usual cutting speed; negative is lighter",
             "有冷却液时切削变化的比例（作用随速度减弱时指常用切速下），负值为变轻",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "fading",
             "1",
             (0.0, 4.0),
             "exponent by which it does less at higher cutting speed",
             "切速升高时作用减弱的指数",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "tau_s",
             "s",
             (0.05, 8.0),
@@ -72,26 +72,26 @@ impl Effect for CoolantRegime {
         &[FADING, ARRIVING]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(coolant) = scene.column("coolant_on") else { return Vec::new() };
         let cutting = cutting_rows(scene);
-        let wet = visits(scene, |row| cutting[row] && coolant[row] > 0.5);
-        let dry = visits(scene, |row| cutting[row] && coolant[row] < 0.5);
-        if wet.min(dry) == 0 || cut(scene).is_none() {
+        let wet = count_visits(scene, |row| cutting[row] && coolant[row] > 0.5);
+        let dry = count_visits(scene, |row| cutting[row] && coolant[row] < 0.5);
+        if wet.min(dry) == 0 || estimate_cut_load(scene).is_none() {
             return Vec::new();
         }
-        let speeds = wet_speeds(scene, coolant).filter(|speeds| varies(speeds));
-        let fading = speeds.map(|_| Form { name: FADING, ..Form::of(&[("fading", 1.0)]) });
+        let speeds = wet_speeds(scene, coolant).filter(|speeds| has_variation(speeds));
+        let fading = speeds.map(|_| Form { name: FADING, ..Form::from_shape(&[("fading", 1.0)]) });
         let arriving = ARRIVING_S.into_iter().filter(|tau_s| *tau_s > ARRIVING_PERIODS * scene.period_s());
-        let arriving = arriving.map(|tau_s| Form { name: ARRIVING, ..Form::of(&[("tau_s", tau_s)]) });
-        [Form::plain()].into_iter().chain(fading).chain(arriving).collect()
+        let arriving = arriving.map(|tau_s| Form { name: ARRIVING, ..Form::from_shape(&[("tau_s", tau_s)]) });
+        [Form::without_shape()].into_iter().chain(fading).chain(arriving).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let coolant = scene.column("coolant_on")?;
         let wet = match form.name {
-            ARRIVING => first_order_behind(scene, coolant, form.value("tau_s").unwrap_or(1.0)),
-            FADING => fading(scene, coolant, form.value("fading").unwrap_or(1.0))?,
+            ARRIVING => first_order_behind(scene, coolant, form.shape_value("tau_s").unwrap_or(1.0)),
+            FADING => fade_coolant(scene, coolant, form.shape_value("fading").unwrap_or(1.0))?,
             _ => coolant.to_vec(),
         };
         Some(vec![("change", cut_times(scene, |row| wet[row])?)])
@@ -110,7 +110,7 @@ const ARRIVING_PERIODS: f64 = 0.4;
 const SLOW_SHARE: f64 = 0.1;
 
 /// Coolant by what it does at the speed of each row; `None` where that is not known.
-fn fading(scene: &Scene, coolant: &[f64], exponent: f64) -> Option<Vec<f64>> {
+fn fade_coolant(scene: &Scene, coolant: &[f64], exponent: f64) -> Option<Vec<f64>> {
     let usual = median(wet_speeds(scene, coolant)?)?;
     let speed = scene.column("cutting_speed_m_min")?;
     let share = |speed: &f64| (usual / speed.max(SLOW_SHARE * usual)).powf(exponent);
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn coolant_that_arrives_late_is_all_there_later() {
-        let form = Form { name: "arriving", ..Form::of(&[("tau_s", 0.5)]) };
+        let form = Form { name: "arriving", ..Form::from_shape(&[("tau_s", 0.5)]) };
         let scene = cut_for_four_seconds([100.0; 4], [0.0, 1.0, 1.0, 1.0]);
         let column = column(&CoolantRegime, &scene, &form);
         assert!(column[0] == 0.0 && column[1] < 500.0 && column[1] < column[2] && column[3] > 780.0, "{column:?}");
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn coolant_that_fades_does_half_at_twice_the_usual_speed() {
-        let form = Form { name: "fading", ..Form::of(&[("fading", 1.0)]) };
+        let form = Form { name: "fading", ..Form::from_shape(&[("fading", 1.0)]) };
         let scene = cut_for_four_seconds([100.0, 100.0, 200.0, 200.0], [1.0, 1.0, 1.0, 0.0]);
         assert_eq!(column(&CoolantRegime, &scene, &form), [800.0, 800.0, 400.0, 0.0]);
     }

@@ -2,7 +2,7 @@
 
 use adapters::channel::quantity::Quantity;
 use crate::physics::drive::is_displacement;
-use crate::physics::excitation::{lag_forms, spread, varies};
+use crate::physics::excitation::{lag_forms, compute_spread, has_variation};
 use crate::physics::state::first_order_behind;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -17,14 +17,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "thermal",
     law: "E = per_k * w; dw/dt = ((Tc - Tc0) - w) / tau, Tc0 at the start; without tau: w = Tc - Tc0; flowing: w = (Tc - Tc0) while the coolant is on",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "per_k",
             "output/K",
             (-100.0, 100.0),
             "displacement per kelvin of the coolant",
             "冷却液每变化1 K的位移",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "tau_s",
             "s",
             (30.0, 14400.0),
@@ -65,15 +65,15 @@ impl Effect for CoolantTemperature {
         &["direct", "flowing", "lag"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let known = scene.column(COOLANT).is_some_and(|coolant| spread(coolant) > 0.2);
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let known = scene.column(COOLANT).is_some_and(|coolant| compute_spread(coolant) > 0.2);
         if !known || !is_displacement(scene) {
             return Vec::new();
         }
-        let direct = Form { name: "direct", ..Form::plain() };
+        let direct = Form { name: "direct", ..Form::without_shape() };
         // Only coolant that flows carries its warmth anywhere.
         let flowing =
-            scene.column("coolant_on").filter(|on| varies(on)).map(|_| Form { name: "flowing", ..Form::plain() });
+            scene.column("coolant_on").filter(|on| has_variation(on)).map(|_| Form { name: "flowing", ..Form::without_shape() });
         [direct].into_iter().chain(flowing).chain(lag_forms(scene, "lag", &[600.0, 1800.0])).collect()
     }
 
@@ -81,11 +81,11 @@ impl Effect for CoolantTemperature {
         Some(COOLANT)
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let coolant = scene.column(COOLANT)?;
         let first = *coolant.first()?;
         let change: Vec<f64> = coolant.iter().map(|t| t - first).collect();
-        let followed = match (form.name, form.value("tau_s")) {
+        let followed = match (form.name, form.shape_value("tau_s")) {
             ("flowing", _) => change.iter().zip(scene.column("coolant_on")?).map(|(change, on)| change * on).collect(),
             (_, Some(tau_s)) => first_order_behind(scene, &change, tau_s),
             (_, None) => change,
@@ -94,6 +94,6 @@ impl Effect for CoolantTemperature {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "direct", ..Form::plain() }
+        Form { name: "direct", ..Form::without_shape() }
     }
 }

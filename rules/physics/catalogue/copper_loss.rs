@@ -1,8 +1,8 @@
 //! Heat in the windings: grows with the square of torque.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{is_power, krpm, torque_at_1000_rpm};
-use crate::physics::excitation::varies;
+use crate::physics::drive::{is_power, read_speed_krpm, torque_at_1000_rpm};
+use crate::physics::excitation::has_variation;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Heat in the motor windings.
@@ -14,14 +14,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = per_load2 * (L / (n / 1000 rpm))^2; L load, n at least 50 rpm; weakened: times (n / base_speed_rpm)^2 above that speed",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "per_load2",
             "1/output",
             (0.0, 1.0),
             "loss per squared load at 1000 rpm",
             "1000 rpm下单位负载平方的损耗",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "base_speed_rpm",
             "rpm",
             (10.0, 100_000.0),
@@ -62,21 +62,21 @@ impl Effect for CopperLoss {
         &[WEAKENED]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let turns = krpm(scene).filter(|krpm| varies(krpm));
-        let columns = turns.as_ref().and_then(|_| self.columns(scene, &Form::plain()));
-        let (Some(krpm), Some(_)) = (turns, columns.filter(|columns| varies(&columns[0].1))) else { return Vec::new() };
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let turns = read_speed_krpm(scene).filter(|krpm| has_variation(krpm));
+        let columns = turns.as_ref().and_then(|_| self.compute_columns(scene, &Form::without_shape()));
+        let (Some(krpm), Some(_)) = (turns, columns.filter(|columns| has_variation(&columns[0].1))) else { return Vec::new() };
         let top_rpm = 1000.0 * krpm.iter().copied().fold(0.0, f64::max);
         let weakened =
-            BASE_SHARES.map(|share| Form { name: WEAKENED, ..Form::of(&[("base_speed_rpm", share * top_rpm)]) });
-        std::iter::once(Form::plain()).chain(weakened).collect()
+            BASE_SHARES.map(|share| Form { name: WEAKENED, ..Form::from_shape(&[("base_speed_rpm", share * top_rpm)]) });
+        std::iter::once(Form::without_shape()).chain(weakened).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let torque = is_power(scene).then(|| torque_at_1000_rpm(scene))??;
-        let krpm = krpm(scene)?;
+        let krpm = read_speed_krpm(scene)?;
         let base_krpm = match form.name {
-            WEAKENED => form.value("base_speed_rpm").unwrap_or(1000.0).max(1.0) / 1000.0,
+            WEAKENED => form.shape_value("base_speed_rpm").unwrap_or(1000.0).max(1.0) / 1000.0,
             _ => f64::INFINITY,
         };
         let squared = |(torque, n): (&f64, &f64)| (torque * (n / base_krpm).max(1.0)).powi(2);

@@ -1,6 +1,6 @@
 //! Power of the cut after Kienzle: specific force times the section of the chip, falling with its thickness.
 
-use crate::physics::cut::{engaged, in_output};
+use crate::physics::cut::{read_engagement, in_output};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "model",
     law: "turning: P = kc11 ap f^(1-mc) vc / 60; milling and drilling: P = kc11 hm^(-mc) Q / 60; times engaged. A force output takes ap f^(1-mc), a torque output D / 2000 of it",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "kc11_n_per_mm2",
             "N/mm2",
             (0.0, 20000.0),
             "specific cutting force of a chip 1 mm thick and 1 mm wide",
             "单位切削力（切屑厚、宽各1 mm）",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "mc",
             "1",
             (0.0, 0.6),
@@ -57,18 +57,18 @@ impl Effect for CuttingPower {
         &["turning", "milling", "drilling"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let milled = scene.column("width_of_cut_mm").is_some();
         let names = if milled { ["milling", "turning", "drilling"] } else { ["turning", "milling", "drilling"] };
         let names = names.into_iter();
-        let known = names.filter(|name| section(scene, name, 0.23).is_some());
-        known.take(1).flat_map(|name| [0.23, 0.15, 0.3].map(|mc| Form { name, ..Form::of(&[("mc", mc)]) })).collect()
+        let known = names.filter(|name| compute_chip_section(scene, name, 0.23).is_some());
+        known.take(1).flat_map(|name| [0.23, 0.15, 0.3].map(|mc| Form { name, ..Form::from_shape(&[("mc", mc)]) })).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let process = if form.name.is_empty() { "turning" } else { form.name };
-        let section = section(scene, process, form.value("mc").unwrap_or(0.23))?;
-        let mut engaged = engaged(scene);
+        let section = compute_chip_section(scene, process, form.shape_value("mc").unwrap_or(0.23))?;
+        let mut engaged = read_engagement(scene);
         if process == "milling" && rate_is_of_the_moment(scene, &engaged) {
             engaged.iter_mut().for_each(|engaged| *engaged = f64::from(u8::from(*engaged > 0.0)));
         }
@@ -76,29 +76,29 @@ impl Effect for CuttingPower {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "turning", ..Form::of(&[("mc", 0.23)]) }
+        Form { name: "turning", ..Form::from_shape(&[("mc", 0.23)]) }
     }
 }
 
 /// Output per unit of `kc11`: section of the chip times what makes it a power, force or torque.
-fn section(scene: &Scene, process: &str, mc: f64) -> Option<Vec<f64>> {
+fn compute_chip_section(scene: &Scene, process: &str, mc: f64) -> Option<Vec<f64>> {
     match process {
-        "turning" => turning(scene, mc),
-        "milling" => milling(scene, mc),
-        "drilling" => drilling(scene, mc),
+        "turning" => compute_turning_section(scene, mc),
+        "milling" => compute_milling_section(scene, mc),
+        "drilling" => compute_drilling_section(scene, mc),
         _ => None,
     }
 }
 
-fn turning(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
+fn compute_turning_section(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
     let depth = scene.column("depth_of_cut_mm")?;
     let feed = scene.column("feed_per_rev_mm")?;
-    let mut thinned = held(|feed: f64| feed.max(0.0).powf(1.0 - mc));
+    let mut thinned = cache_last_value(|feed: f64| feed.max(0.0).powf(1.0 - mc));
     let area: Vec<f64> = depth.iter().zip(feed).map(|(depth, feed)| depth * thinned(*feed)).collect();
     in_output(scene, &area)
 }
 
-fn milling(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
+fn compute_milling_section(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
     let rate = scene.column("removal_rate_cm3_min")?;
     let tooth = scene.column("feed_per_tooth_mm").or_else(|| scene.column("feed_per_rev_mm"))?;
     let width = scene.column("width_of_cut_mm");
@@ -107,7 +107,7 @@ fn milling(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
         (Some(width), Some(diameter)) if diameter[row] > 0.0 => (width[row] / diameter[row]).clamp(0.0, 1.0).sqrt(),
         _ => 1.0,
     };
-    let mut thinned = held(|thickness_mm| thinned(thickness_mm, mc));
+    let mut thinned = cache_last_value(|thickness_mm| chip_thinning_factor(thickness_mm, mc));
     Some((0..scene.rows()).map(|row| thinned(tooth[row] * share(row)) * rate[row] / 60.0).collect())
 }
 
@@ -134,19 +134,19 @@ fn rate_is_of_the_moment(scene: &Scene, engaged: &[f64]) -> bool {
     telling >= TELLING_ROWS_MIN && 2 * of_the_moment > telling
 }
 
-fn drilling(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
+fn compute_drilling_section(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
     let diameter = scene.column("diameter_mm")?;
     let feed = scene.column("feed_mm_min")?;
     let per_rev = scene.column("feed_per_rev_mm")?;
     let tooth = scene.column("feed_per_tooth_mm");
     let thickness = |row: usize| tooth.map_or(per_rev[row] / 2.0, |tooth| tooth[row]);
     let rate = |row: usize| PI * diameter[row].powi(2) * feed[row] / 4000.0;
-    let mut thinned = held(|thickness_mm| thinned(thickness_mm, mc));
+    let mut thinned = cache_last_value(|thickness_mm| chip_thinning_factor(thickness_mm, mc));
     Some((0..scene.rows()).map(|row| thinned(thickness(row)) * rate(row) / 60.0).collect())
 }
 
 /// A law that is worked out anew only where its argument changes: feeds are held over many rows, and powers are dear.
-fn held(law: impl Fn(f64) -> f64) -> impl FnMut(f64) -> f64 {
+fn cache_last_value(law: impl Fn(f64) -> f64) -> impl FnMut(f64) -> f64 {
     let mut last: Option<(f64, f64)> = None;
     move |x| match last {
         Some((known, value)) if known == x => value,
@@ -159,6 +159,6 @@ fn held(law: impl Fn(f64) -> f64) -> impl FnMut(f64) -> f64 {
 }
 
 /// `h^(-mc)`; zero without a chip.
-fn thinned(thickness_mm: f64, mc: f64) -> f64 {
+fn chip_thinning_factor(thickness_mm: f64, mc: f64) -> f64 {
     if thickness_mm > 0.0 { thickness_mm.powf(-mc) } else { 0.0 }
 }

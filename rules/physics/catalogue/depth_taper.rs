@@ -1,7 +1,7 @@
 //! The depth of cut changes along the pass: a tapered blank, or tool and work that bend away.
 
-use crate::physics::cut::{cut, cut_times, way_mm};
-use crate::physics::excitation::varies;
+use crate::physics::cut::{estimate_cut_load, cut_times, way_mm};
+use crate::physics::excitation::has_variation;
 use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -15,14 +15,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = (slope * s + curve * (s^2 - 1/12)) * L; s from -1/2 to 1/2 along the pass, by axis position where it moves, else by feed or time; distance: y = (slope * d + curve * d^2) * L, d from the start of the pass in lengths of the longest one",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "slope",
             "1",
             (-0.5, 0.5),
             "change of the cut from one end of the pass to the other, as a share",
             "走刀两端之间切削量变化的比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "curve",
             "1",
             (-2.0, 2.0),
@@ -64,11 +64,11 @@ impl Effect for DepthTaper {
         &["linear", "quadratic", "distance", "distance_quadratic"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if cut(scene).is_none() || !scene.passes().iter().any(|pass| pass.len() >= 5) {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        if estimate_cut_load(scene).is_none() || !scene.passes().iter().any(|pass| pass.len() >= 5) {
             return Vec::new();
         }
-        let named = |name| Form { name, ..Form::plain() };
+        let named = |name| Form { name, ..Form::without_shape() };
         let mut forms = vec![named("linear"), named("quadratic")];
         // Where another drive settles in each pass, what fades by the time in the pass has been asked for by name.
         if lengths_differ(scene) && scene.feed_load_growth().is_none() {
@@ -77,7 +77,7 @@ impl Effect for DepthTaper {
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let by_distance = form.name.starts_with("distance");
         let (along, middle) = if by_distance { (from_start(scene), 0.0) } else { (along_pass(scene), 1.0 / 12.0) };
         let mut columns = vec![("slope", cut_times(scene, |row| along[row].unwrap_or(0.0))?)];
@@ -93,9 +93,9 @@ impl Effect for DepthTaper {
 fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
     let mut along = vec![None; scene.rows()];
     for pass in scene.passes() {
-        let places = places(scene, pass);
+        let places = read_places(scene, pass);
         let low = places.iter().copied().fold(f64::INFINITY, f64::min);
-        let length = length(&places).max(f64::MIN_POSITIVE);
+        let length = measure_length(&places).max(f64::MIN_POSITIVE);
         along[pass.clone()]
             .iter_mut()
             .zip(places.iter())
@@ -108,9 +108,9 @@ fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
 /// work piece that bends away does so by the place, not by the share of a pass.
 fn from_start(scene: &Scene) -> Vec<Option<f64>> {
     let mut along = vec![None; scene.rows()];
-    let longest = lengths(scene).into_iter().fold(0.0, f64::max);
+    let longest = measure_pass_lengths(scene).into_iter().fold(0.0, f64::max);
     for pass in scene.passes() {
-        let places = places(scene, pass);
+        let places = read_places(scene, pass);
         let start = places.first().copied().unwrap_or(0.0);
         let from = |at: &f64| Some((at - start).abs() / longest.max(f64::MIN_POSITIVE));
         along[pass.clone()].iter_mut().zip(places.iter()).for_each(|(along, at)| *along = from(at));
@@ -120,21 +120,21 @@ fn from_start(scene: &Scene) -> Vec<Option<f64>> {
 
 /// Is there a pass that is shorter by more than a tenth than the longest?
 fn lengths_differ(scene: &Scene) -> bool {
-    let lengths = lengths(scene);
+    let lengths = measure_pass_lengths(scene);
     let longest = lengths.iter().copied().fold(0.0, f64::max);
     lengths.iter().any(|length| *length < 0.9 * longest)
 }
 
 /// How long each pass is.
-fn lengths(scene: &Scene) -> Vec<f64> {
-    scene.passes().iter().map(|pass| length(&places(scene, pass))).collect()
+fn measure_pass_lengths(scene: &Scene) -> Vec<f64> {
+    scene.passes().iter().map(|pass| measure_length(&read_places(scene, pass))).collect()
 }
 
 /// Positions of a pass where the axis moves, else the way that the feed tells, else times.
-fn places<'s>(scene: &'s Scene, pass: &Range<usize>) -> Cow<'s, [f64]> {
-    let position = scene.role(Role::Position).map(|position| &position[pass.clone()]);
+fn read_places<'s>(scene: &'s Scene, pass: &Range<usize>) -> Cow<'s, [f64]> {
+    let position = scene.role_values(Role::Position).map(|position| &position[pass.clone()]);
     let time_s = &scene.time_s()[pass.clone()];
-    match (position.filter(|position| varies(position)), scene.column("feed_mm_min")) {
+    match (position.filter(|position| has_variation(position)), scene.column("feed_mm_min")) {
         (Some(position), _) => Cow::Borrowed(position),
         (None, Some(feed)) if feed[pass.clone()].iter().all(|feed| *feed > 0.0) => {
             Cow::Owned(way_mm(time_s, &feed[pass.clone()]))
@@ -143,7 +143,7 @@ fn places<'s>(scene: &'s Scene, pass: &Range<usize>) -> Cow<'s, [f64]> {
     }
 }
 
-fn length(places: &[f64]) -> f64 {
+fn measure_length(places: &[f64]) -> f64 {
     let low = places.iter().copied().fold(f64::INFINITY, f64::min);
     places.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
 }

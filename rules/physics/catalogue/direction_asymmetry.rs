@@ -1,8 +1,8 @@
 //! Friction differs between the two directions of motion.
 
-use crate::physics::drive::{directions, goes_both_ways, is_power, motion, rest_width};
+use crate::physics::drive::{compute_directions, goes_both_ways, is_power, read_motion, rest_width};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::{count, mean};
+use crate::statistics::{count_to_f64, mean};
 
 /// Friction that differs between directions.
 #[derive(Debug, Clone, Copy)]
@@ -13,21 +13,21 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "F = level * |sign(v)|; viscous: F = slope * (|v| - about); in a power: P = slope * v, step: P = level * sign(v); v in m/s, of a spindle in rad/s",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "level",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "half the difference between the directions",
             "两个方向之差的一半",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "slope",
             "output/velocity",
             (f64::NEG_INFINITY, f64::INFINITY),
             "half the difference per speed; of a spindle per rad/s",
             "单位速度下两方向之差的一半；主轴按rad/s",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "about",
             "velocity",
             (0.0, 3000.0),
@@ -64,33 +64,33 @@ impl Effect for DirectionAsymmetry {
         &["slope", "step", "level", "viscous"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(motion) = motion(scene).filter(|motion| goes_both_ways(motion)) else { return Vec::new() };
-        let named = |name| Form { name, ..Form::plain() };
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(motion) = read_motion(scene).filter(|motion| goes_both_ways(motion)) else { return Vec::new() };
+        let named = |name| Form { name, ..Form::without_shape() };
         if is_power(scene) {
             return ["slope", "step"].map(named).into();
         }
         // About which speed a slope is told is a choice.
         let about: Vec<_> = mean_of_restless(&motion).map(|about| ("about", about)).into_iter().collect();
-        vec![named("level"), Form { name: "viscous", shape: about.clone(), known: about, ..Form::plain() }]
+        vec![named("level"), Form { name: "viscous", shape: about.clone(), known: about, ..Form::without_shape() }]
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let velocity = motion(scene)?;
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let velocity = read_motion(scene)?;
         let (name, column) = match form.name {
-            "step" => ("level", directions(&velocity).collect()),
+            "step" => ("level", compute_directions(&velocity).collect()),
             "viscous" => {
-                let about = form.value("about").unwrap_or(0.0);
+                let about = form.shape_value("about").unwrap_or(0.0);
                 ("slope", velocity.iter().map(|v| v.abs() - about).collect())
             }
             _ if is_power(scene) => ("slope", velocity),
-            _ => ("level", directions(&velocity).map(f64::abs).collect()),
+            _ => ("level", compute_directions(&velocity).map(f64::abs).collect()),
         };
         Some(vec![(name, column)])
     }
 
     fn default_form(&self, scene: &Scene) -> Form {
-        Form { name: if is_power(scene) { "slope" } else { "level" }, ..Form::plain() }
+        Form { name: if is_power(scene) { "slope" } else { "level" }, ..Form::without_shape() }
     }
 }
 
@@ -101,6 +101,6 @@ const RESTS: f64 = 0.03;
 /// constant has a name of its own: the slope alone is told, about the middle of what was seen.
 fn mean_of_restless(motion: &[f64]) -> Option<f64> {
     let rest = rest_width(motion);
-    let resting = count(motion.iter().filter(|v| v.abs() < rest).count());
-    (resting < RESTS * count(motion.len())).then(|| mean(&motion.iter().map(|v| v.abs()).collect::<Vec<_>>()))
+    let resting = count_to_f64(motion.iter().filter(|v| v.abs() < rest).count());
+    (resting < RESTS * count_to_f64(motion.len())).then(|| mean(&motion.iter().map(|v| v.abs()).collect::<Vec<_>>()))
 }

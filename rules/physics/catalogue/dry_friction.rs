@@ -1,9 +1,9 @@
 //! Coulomb friction: a level with the sign of motion in a force, proportional to speed in a power.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{RAD_PER_S_OF_RPM, motion, soft_sign, turns};
-use crate::physics::excitation::greatest;
-use crate::physics::state::{bent_over_the_way, strokes};
+use crate::physics::drive::{RAD_PER_S_OF_RPM, read_motion, soft_sign, is_rotary_drive};
+use crate::physics::excitation::find_greatest_magnitude;
+use crate::physics::state::{bent_over_the_way, measure_strokes};
 use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Coulomb friction of a drive.
@@ -16,21 +16,21 @@ static DOC: EffectDoc = EffectDoc {
     law: "F = level * tanh(v / v0); presliding: F = level * z, dz = (sign(v) - z) |dx| / way, held at rest; \
           in a power: P = level * |v| / (1 m/s), of a spindle / (1000 rpm)",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "level",
             "output",
             (0.0, f64::INFINITY),
             "friction level; in a power its loss at 1 m/s or 1000 rpm",
             "摩擦力大小；功率输出时为1 m/s或1000 rpm下的损耗",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "reversal_share",
             "1",
             (1e-5, 0.2),
             "speed at which the level is reached, as a share of the greatest speed",
             "达到摩擦力的速度与最大速度之比",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "presliding_way",
             "m",
             (1e-7, 10.0),
@@ -72,29 +72,29 @@ impl Effect for DryFriction {
         &[PRESLIDING]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(velocity) = motion(scene) else { return Vec::new() };
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(velocity) = read_motion(scene) else { return Vec::new() };
         if velocity.iter().all(|v| *v == 0.0) {
             return Vec::new();
         }
         match scene.output_kind() {
-            OutputKind::Power => vec![Form::plain()],
+            OutputKind::Power => vec![Form::without_shape()],
             _ => {
-                let sudden = [1e-4, 0.002, 0.01, 0.04].map(|share| Form::of(&[("reversal_share", share)]));
-                sudden.into_iter().chain(presliding(scene, &velocity)).collect()
+                let sudden = [1e-4, 0.002, 0.01, 0.04].map(|share| Form::from_shape(&[("reversal_share", share)]));
+                sudden.into_iter().chain(build_presliding_forms(scene, &velocity)).collect()
             }
         }
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let velocity = motion(scene)?;
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let velocity = read_motion(scene)?;
         if form.name == PRESLIDING {
-            let way = form.value("presliding_way").unwrap_or(PRESLIDING_WAY_M);
+            let way = form.shape_value("presliding_way").unwrap_or(PRESLIDING_WAY_M);
             return Some(vec![("level", bent_over_the_way(scene, &velocity, way))]);
         }
-        let top = greatest(&velocity);
-        let reference = if turns(scene) { 1000.0 * RAD_PER_S_OF_RPM } else { 1.0 };
-        let share = form.value("reversal_share").unwrap_or(0.01);
+        let top = find_greatest_magnitude(&velocity);
+        let reference = if is_rotary_drive(scene) { 1000.0 * RAD_PER_S_OF_RPM } else { 1.0 };
+        let share = form.shape_value("reversal_share").unwrap_or(0.01);
         let law = |v: &f64| match scene.output_kind() {
             OutputKind::Power => v.abs() / reference,
             _ => soft_sign(*v, share * top),
@@ -113,13 +113,13 @@ const STROKE_SHARES: [f64; 3] = [3e-4, 3e-3, 0.02];
 const STROKES_MIN: usize = 4;
 
 /// Where the motion reverses, forms that build up over a share of the longest stroke.
-fn presliding(scene: &Scene, velocity: &[f64]) -> Vec<Form> {
-    let strokes = strokes(scene, velocity);
-    let longest = greatest(&strokes);
+fn build_presliding_forms(scene: &Scene, velocity: &[f64]) -> Vec<Form> {
+    let strokes = measure_strokes(scene, velocity);
+    let longest = find_greatest_magnitude(&strokes);
     if strokes.len() < STROKES_MIN || longest <= 0.0 {
         return Vec::new();
     }
-    let form = |share: &f64| Form { name: PRESLIDING, ..Form::of(&[("presliding_way", share * longest)]) };
+    let form = |share: &f64| Form { name: PRESLIDING, ..Form::from_shape(&[("presliding_way", share * longest)]) };
     STROKE_SHARES.iter().map(form).collect()
 }
 
@@ -136,7 +136,7 @@ mod tests {
         let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
         set(&mut recording, "velocity_m_s", velocity);
         set(&mut recording, "axis_force_n", |_| 1.0);
-        let form = Form { name: "presliding", ..Form::of(&[("presliding_way", 0.01)]) };
+        let form = Form { name: "presliding", ..Form::from_shape(&[("presliding_way", 0.01)]) };
         let friction = column(&DryFriction, &scene(&recording, "axis_force_n"), &form);
         assert!((friction[10] - (1.0 - (-1.0_f64).exp())).abs() < 1e-9, "one way forwards: {}", friction[10]);
         assert!(
@@ -155,7 +155,7 @@ mod tests {
             let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
             set(&mut recording, "velocity_m_s", |row| if (row / period).is_multiple_of(2) { 0.1 } else { -0.1 });
             set(&mut recording, "axis_force_n", |_| 1.0);
-            let forms = DryFriction.forms(&scene(&recording, "axis_force_n"));
+            let forms = DryFriction.propose_forms(&scene(&recording, "axis_force_n"));
             forms.iter().filter(|form| form.name == "presliding").count()
         };
         assert_eq!((forms(30), forms(200)), (3, 0));

@@ -1,6 +1,6 @@
 //! Ploughing of the cutting edge: a force along the edge that does not depend on feed.
 
-use crate::physics::cut::{engaged, in_output, teeth_in_cut};
+use crate::physics::cut::{read_engagement, in_output, teeth_in_cut};
 use crate::physics::drive::{is_axis_output, is_displacement};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -14,14 +14,14 @@ static DOC: EffectDoc = EffectDoc {
     law: "P = kte * (ap + nose) * vc / 60 * engaged; milled: times the teeth that are in the work at once, \
           z * arccos(1 - 2 ae / D) / (2 pi); a force output takes kte * (ap + nose), a torque output D / 2000 of it",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "kte_n_per_mm",
             "N/mm",
             (0.0, 500.0),
             "force per length of edge in the cut",
             "单位切削刃长度的力",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "nose_mm",
             "mm",
             (0.0, 3.0),
@@ -58,23 +58,23 @@ impl Effect for EdgeForce {
         &[MILLED]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let whole = [0.0, 0.8].map(|nose_mm| Form::of(&[("nose_mm", nose_mm)]));
-        let milled = Form { name: MILLED, ..Form::plain() };
-        whole.into_iter().chain([milled]).filter(|form| self.columns(scene, form).is_some()).collect()
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let whole = [0.0, 0.8].map(|nose_mm| Form::from_shape(&[("nose_mm", nose_mm)]));
+        let milled = Form { name: MILLED, ..Form::without_shape() };
+        whole.into_iter().chain([milled]).filter(|form| self.compute_columns(scene, form).is_some()).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if is_displacement(scene) || is_axis_output(scene) {
             return None;
         }
-        let nose_mm = form.value("nose_mm").unwrap_or(0.0);
+        let nose_mm = form.shape_value("nose_mm").unwrap_or(0.0);
         let mut length: Vec<f64> = scene.column("depth_of_cut_mm")?.iter().map(|depth| depth + nose_mm).collect();
         if form.name == MILLED {
             length.iter_mut().zip(teeth_in_cut(scene)?).for_each(|(length, teeth)| *length *= teeth);
         }
         let edge = in_output(scene, &length)?;
-        let engaged = engaged(scene);
+        let engaged = read_engagement(scene);
         Some(vec![("kte_n_per_mm", edge.iter().zip(&engaged).map(|(edge, engaged)| edge * engaged).collect())])
     }
 }
@@ -99,7 +99,7 @@ mod tests {
         // A slot, then a cut of half the diameter: of four teeth two and one are in the work.
         set(&mut recording, "width_of_cut_mm", |row| [20.0, 10.0][row]);
         set(&mut recording, "spindle_power_w", |_| 1.0);
-        let milled = Form { name: "milled", ..Form::plain() };
+        let milled = Form { name: "milled", ..Form::without_shape() };
         let power = column(&EdgeForce, &scene(&recording, "spindle_power_w"), &milled);
         assert!((power[0] - 4.0).abs() < 1e-9 && (power[1] - 2.0).abs() < 1e-9, "teeth * ap * vc / 60: {power:?}");
     }

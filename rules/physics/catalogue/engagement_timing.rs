@@ -1,8 +1,8 @@
 //! The flag that says the tool is in the work comes late or early.
 
-use crate::physics::cut::cut;
-use crate::physics::excitation::delays;
-use crate::physics::state::delayed;
+use crate::physics::cut::estimate_cut_load;
+use crate::physics::excitation::list_delays;
+use crate::physics::state::delay_values;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Engagement flag late or early.
@@ -14,8 +14,8 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = share * (engaged(t - delay) - engaged(t)) * L, L held from the nearest row in the cut, losses included",
     parameters: &[
-        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the timing explains all", "为1时时序可完全解释"),
-        ParameterDoc::shape(
+        ParameterDoc::new_linear("share", "1", (0.0, 1.5), "one, when the timing explains all", "为1时时序可完全解释"),
+        ParameterDoc::new_shape(
             "delay_s",
             "s",
             (-10.0, 10.0),
@@ -48,19 +48,19 @@ impl Effect for EngagementTiming {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if scene.load().is_none() || cut(scene).is_none() || scene.passes().len() < 3 {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        if scene.load().is_none() || estimate_cut_load(scene).is_none() || scene.passes().len() < 3 {
             return Vec::new();
         }
-        let delays = delays(scene, &[0.5, 1.0, 2.0, 3.0, 5.0]);
+        let delays = list_delays(scene, &[0.5, 1.0, 2.0, 3.0, 5.0]);
         let both = delays.iter().flat_map(|delay| [*delay, -delay]);
-        both.map(|delay| Form::of(&[("delay_s", delay)]).whole()).collect()
+        both.map(|delay| Form::from_shape(&[("delay_s", delay)]).with_full_share()).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let engaged = scene.role(Role::Engaged)?;
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let engaged = scene.role_values(Role::Engaged)?;
         let load = held_from_cut(scene, scene.load_at_output()?, engaged);
-        let shifted = delayed(scene, engaged, form.value("delay_s").unwrap_or(0.0));
+        let shifted = delay_values(scene, engaged, form.shape_value("delay_s").unwrap_or(0.0));
         let law = |row: usize| (shifted[row] - engaged[row]) * load[row];
         Some(vec![("share", (0..scene.rows()).map(law).collect())])
     }
@@ -70,7 +70,7 @@ impl Effect for EngagementTiming {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form::of(&[("delay_s", 0.0)])
+        Form::from_shape(&[("delay_s", 0.0)])
     }
 }
 

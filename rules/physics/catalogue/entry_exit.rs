@@ -1,8 +1,8 @@
 //! The cut builds up when the tool enters and fades when it leaves.
 
-use crate::physics::cut::{cut, cut_times, way_mm};
+use crate::physics::cut::{estimate_cut_load, cut_times, way_mm};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use std::ops::Range;
 
 /// Build-up and fading of the cut.
@@ -14,31 +14,31 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: y = settling * exp(-(t - t_entry) / T) * L; ramp: y = (entry * max(0, 1 - (t - t_entry) / T) + exit * max(0, 1 - (t_exit - t) / T_exit)) * L; travel: the same over the way s at the feed, from entry and to exit, in place of the time",
     parameters: &[
-        ParameterDoc::linear("entry", "1", (-1.0, 0.0), "share by which the cut differs on entry", "切入时的差异比例"),
-        ParameterDoc::linear("exit", "1", (-1.0, 0.0), "share by which it differs on exit", "切出时的差异比例"),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear("entry", "1", (-1.0, 0.0), "share by which the cut differs on entry", "切入时的差异比例"),
+        ParameterDoc::new_linear("exit", "1", (-1.0, 0.0), "share by which it differs on exit", "切出时的差异比例"),
+        ParameterDoc::new_linear(
             "settling",
             "1",
             (-1.0, 1.0),
             "share by which the cut differs at first and then settles",
             "走刀初期的差异比例，随后稳定",
         ),
-        ParameterDoc::shape("length_s", "s", (0.05, 120.0), "how long entry and exit last", "切入切出持续时间"),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape("length_s", "s", (0.05, 120.0), "how long entry and exit last", "切入切出持续时间"),
+        ParameterDoc::new_shape(
             "exit_length_s",
             "s",
             (0.05, 120.0),
             "how long the exit lasts where it differs from the entry",
             "切出持续时间（与切入不同时）",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "length_mm",
             "mm",
             (0.02, 200.0),
             "way at the feed over which the cut builds up",
             "切削建立所经进给行程",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "exit_length_mm",
             "mm",
             (0.02, 200.0),
@@ -75,28 +75,28 @@ impl Effect for EntryExit {
         &["ramp", TRAVEL, "settling"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if cut(scene).is_none() || scene.passes().len() < 3 {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        if estimate_cut_load(scene).is_none() || scene.passes().len() < 3 {
             return Vec::new();
         }
         let longest_s = scene.passes().iter().map(|pass| length_s(scene, pass)).fold(0.0, f64::max);
         let told = |length_s: &f64| (scene.period_s()..=longest_s / 3.0).contains(length_s);
         let lengths_s = || [1.0, 3.0, 10.0, 30.0].into_iter().filter(told);
-        let mut forms: Vec<Form> = lengths_s().map(|length_s| Form::of(&[("length_s", length_s)])).collect();
-        forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(|length_s| entries("ramp", TIMES, length_s)));
-        forms.extend(ways_mm(scene).into_iter().flat_map(|length_mm| entries(TRAVEL, WAYS, length_mm)));
+        let mut forms: Vec<Form> = lengths_s().map(|length_s| Form::from_shape(&[("length_s", length_s)])).collect();
+        forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(|length_s| build_entry_forms("ramp", TIMES, length_s)));
+        forms.extend(ways_mm(scene).into_iter().flat_map(|length_mm| build_entry_forms(TRAVEL, WAYS, length_mm)));
         // Over a good part of a pass nearly anything bends: only where another drive settles as well.
         let shown = scene.feed_load_growth().is_some();
         let long = lengths_s().filter(|_| shown).filter(|length_s| *length_s >= SETTLING_PERIODS * scene.period_s());
-        forms.extend(long.map(|length_s| Form { name: "settling", ..Form::of(&[("length_s", length_s)]) }));
+        forms.extend(long.map(|length_s| Form { name: "settling", ..Form::from_shape(&[("length_s", length_s)]) }));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let travels = form.name == TRAVEL;
         let [length, exit_length] = if travels { WAYS } else { TIMES };
-        let over = form.value(length).unwrap_or(1.0).max(f64::MIN_POSITIVE);
-        let exit_over = form.value(exit_length).unwrap_or(over).max(f64::MIN_POSITIVE);
+        let over = form.shape_value(length).unwrap_or(1.0).max(f64::MIN_POSITIVE);
+        let exit_over = form.shape_value(exit_length).unwrap_or(over).max(f64::MIN_POSITIVE);
         let ramps = travels || form.name == "ramp";
         let fades = |s: f64, over: f64| if ramps { (1.0 - s / over).max(0.0) } else { (-s / over).exp() };
         let (time_s, feed) = (scene.time_s(), scene.column("feed_mm_min"));
@@ -109,7 +109,7 @@ impl Effect for EntryExit {
             };
             let (first, last) = (along[0], along[along.len() - 1]);
             // Between what is entered and the first row lies half a row's way in the mean: a fast feed is through by then.
-            let half = if travels { 0.5 * (last - first) / count((along.len() - 1).max(1)) } else { 0.0 };
+            let half = if travels { 0.5 * (last - first) / count_to_f64((along.len() - 1).max(1)) } else { 0.0 };
             for (row, at) in pass.clone().zip(&along) {
                 entry[row] = fades(at - first + half, over);
                 exit[row] = fades(last - at + half, exit_over);
@@ -126,7 +126,7 @@ impl Effect for EntryExit {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form::of(&[("length_s", 1.0)])
+        Form::from_shape(&[("length_s", 1.0)])
     }
 }
 
@@ -139,8 +139,8 @@ const TIMES: [&str; 2] = ["length_s", "exit_length_s"];
 const WAYS: [&str; 2] = ["length_mm", "exit_length_mm"];
 
 /// Forms of this name with an entry of this length, and an exit half as long and as long.
-fn entries(name: &'static str, [entry, exit]: [&'static str; 2], length: f64) -> [Form; 2] {
-    [0.5, 1.0].map(|share| Form { name, ..Form::of(&[(entry, length), (exit, share * length)]) })
+fn build_entry_forms(name: &'static str, [entry, exit]: [&'static str; 2], length: f64) -> [Form; 2] {
+    [0.5, 1.0].map(|share| Form { name, ..Form::from_shape(&[(entry, length), (exit, share * length)]) })
 }
 
 /// The form over the way at the feed.

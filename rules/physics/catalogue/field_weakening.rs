@@ -13,21 +13,21 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = magnetising * (n - nb) / 1000 rpm + per_load2 * L^2 * 1 / nb^2, both for n > nb only; in excess of a copper loss that is known below nb: 1 / nb^2 - 1 / n^2; n, nb in 1000 rpm",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "magnetising",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "change of no-load power per 1000 rpm above base speed",
             "基速以上每1000 rpm空载功率的变化",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "per_load2",
             "1/output",
             (-1.0, 1.0),
             "loss per squared load above base speed",
             "基速以上单位负载平方的损耗",
         ),
-        ParameterDoc::shape("base_speed_rpm", "rpm", (200.0, 20000.0), "base speed of the motor", "电机基速"),
+        ParameterDoc::new_shape("base_speed_rpm", "rpm", (200.0, 20000.0), "base speed of the motor", "电机基速"),
     ],
     needs: &["speed"],
     source: "torque constant proportional to nb / n above base speed, so that copper loss grows from T^2 to T^2 (n / nb)^2; nb 750-3000 rpm",
@@ -63,20 +63,20 @@ impl Effect for FieldWeakening {
         &["whole", "excess"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none() {
             return Vec::new();
         }
         let speeds = between_speeds(scene, SPEEDS_APART, BENDS_TRIED);
         let names = if reads_load(scene) { self.form_names() } else { &["whole"] };
         let ln_choices = ln_count(speeds.len() * names.len());
-        let form = |name, speed: &f64| Form { name, ln_choices, ..Form::of(&[("base_speed_rpm", *speed)]) };
+        let form = |name, speed: &f64| Form { name, ln_choices, ..Form::from_shape(&[("base_speed_rpm", *speed)]) };
         names.iter().flat_map(|name| speeds.iter().map(move |speed| form(name, speed))).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let krpm = driven_krpm(scene)?;
-        let base = form.value("base_speed_rpm").unwrap_or(1500.0) / 1000.0;
+        let base = form.shape_value("base_speed_rpm").unwrap_or(1500.0) / 1000.0;
         let mut columns = vec![("magnetising", krpm.iter().map(|n| (n - base).max(0.0)).collect())];
         if let Some(load) = scene.load().filter(|_| reads_load(scene)) {
             let below = |n: f64| if form.name == "excess" { n.powi(-2) } else { 0.0 };
@@ -91,7 +91,7 @@ impl Effect for FieldWeakening {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "whole", ..Form::of(&[("base_speed_rpm", 1500.0)]) }
+        Form { name: "whole", ..Form::from_shape(&[("base_speed_rpm", 1500.0)]) }
     }
 }
 

@@ -1,10 +1,10 @@
 //! Friction on a worn flank: grows with the cutting time of the tool, starts again with a new edge.
 
 use crate::physics::drive::is_displacement;
-use crate::physics::excitation::greatest;
+use crate::physics::excitation::find_greatest_magnitude;
 use crate::physics::tool_load;
 use crate::physics::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use std::borrow::Cow;
 
 /// Friction between a worn flank and the work.
@@ -16,47 +16,47 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "P = k * ap * vc * W^p; W minutes in the cut since the edge was new; of a drill D / 2 in place of ap; without ap or D and vc: y = k * engaged * W^p; break_in: P = (k_break_in * (1 - exp(-W / W0)) + k * W) * ap * vc; edges: every edge its own k_i, another one their mean; followed: P = k_load * ap * vc * (0.15 W^(1/2) + g); g growth of the feed drive's load since the edge was new",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "k",
             "output/(mm m/min min^p)",
             (0.0, f64::INFINITY),
             "growth of power per depth, cutting speed and cutting time",
             "单位切深、切速、切削时间的功率增长",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "p",
             "1",
             (0.3, 4.0),
             "exponent of the cutting time: below 1 break-in, above 1 accelerating wear",
             "切削时间指数：小于1为初期磨损，大于1为加速磨损",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "k_break_in",
             "output/(mm m/min)",
             (0.0, f64::INFINITY),
             "power per depth and cutting speed of an edge that has broken in",
             "初期磨损结束后，单位切深、切速的功率增量",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "break_in_min",
             "min",
             (0.05, 60.0),
             "cutting time in which an edge breaks in",
             "初期磨损的切削时间常数",
         ),
-        rate(
+        define_wear_rate(
             "k_1",
             "growth of the first edge, per depth, cutting speed and cutting time",
             "第1个刀刃单位切深、切速、切削时间的功率增长",
         ),
-        rate("k_2", "the same of the second edge", "第2个刀刃的功率增长"),
-        rate("k_3", "the same of the third edge", "第3个刀刃的功率增长"),
-        rate("k_4", "the same of the fourth edge", "第4个刀刃的功率增长"),
-        rate("k_5", "the same of the fifth edge", "第5个刀刃的功率增长"),
-        rate("k_6", "the same of the sixth edge", "第6个刀刃的功率增长"),
-        rate("k_7", "the same of the seventh edge", "第7个刀刃的功率增长"),
-        rate("k_8", "the same of the eighth edge", "第8个刀刃的功率增长"),
-        ParameterDoc::linear(
+        define_wear_rate("k_2", "the same of the second edge", "第2个刀刃的功率增长"),
+        define_wear_rate("k_3", "the same of the third edge", "第3个刀刃的功率增长"),
+        define_wear_rate("k_4", "the same of the fourth edge", "第4个刀刃的功率增长"),
+        define_wear_rate("k_5", "the same of the fifth edge", "第5个刀刃的功率增长"),
+        define_wear_rate("k_6", "the same of the sixth edge", "第6个刀刃的功率增长"),
+        define_wear_rate("k_7", "the same of the seventh edge", "第7个刀刃的功率增长"),
+        define_wear_rate("k_8", "the same of the eighth edge", "第8个刀刃的功率增长"),
+        ParameterDoc::new_linear(
             "k_load",
             "output/(mm m/min)",
             (0.0, f64::INFINITY),
@@ -85,7 +85,7 @@ static DOC: EffectDoc = EffectDoc {
 };
 
 /// How fast one of several edges wears.
-const fn rate(name: &'static str, en: &'static str, zh: &'static str) -> ParameterDoc {
+const fn define_wear_rate(name: &'static str, en: &'static str, zh: &'static str) -> ParameterDoc {
     ParameterDoc { name, unit: "output/(mm m/min min^p)", entry: Entry::Linear, range: (0.0, f64::INFINITY), en, zh }
 }
 
@@ -105,27 +105,27 @@ impl Effect for FlankWear {
         &["break_in", "edges", "followed"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if is_displacement(scene) || scene.role(Role::Engaged).is_none() || scene.column("cutting_time_min").is_none() {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        if is_displacement(scene) || scene.role_values(Role::Engaged).is_none() || scene.column("cutting_time_min").is_none() {
             return Vec::new();
         }
         // The same curve for every tool is only a clock: where a drive tells how worn each is, that is what counts.
         if scene.feed_load_growth().is_some() {
-            return vec![Form { name: "followed", ..Form::plain() }];
+            return vec![Form { name: "followed", ..Form::without_shape() }];
         }
-        let longest_min = greatest(scene.column("cutting_time_min").unwrap_or_default());
-        let powers = [1.0, 0.5, 1.5, 2.5].map(|p| Form::of(&[("p", p)]));
+        let longest_min = find_greatest_magnitude(scene.column("cutting_time_min").unwrap_or_default());
+        let powers = [1.0, 0.5, 1.5, 2.5].map(|p| Form::from_shape(&[("p", p)]));
         let break_ins =
-            BREAK_INS.map(|share| Form { name: "break_in", ..Form::of(&[("break_in_min", share * longest_min)]) });
-        let edges = edges(scene).map(|edges| {
+            BREAK_INS.map(|share| Form { name: "break_in", ..Form::from_shape(&[("break_in_min", share * longest_min)]) });
+        let edges = list_edges(scene).map(|edges| {
             let place = Some(("tool".to_owned(), edges.join(EDGE_TO_EDGE)));
-            [1.0, 0.5].map(|p| Form { name: "edges", place: place.clone(), ..Form::of(&[("p", p)]) })
+            [1.0, 0.5].map(|p| Form { name: "edges", place: place.clone(), ..Form::from_shape(&[("p", p)]) })
         });
         powers.into_iter().chain(break_ins).chain(edges.into_iter().flatten()).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let engaged = scene.role(Role::Engaged)?;
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let engaged = scene.role_values(Role::Engaged)?;
         let minutes = scene.column("cutting_time_min")?;
         let depth = length_of_edge(scene);
         let speed = scene.column("cutting_speed_m_min");
@@ -137,22 +137,22 @@ impl Effect for FlankWear {
             |worn: &dyn Fn(usize) -> f64| (0..scene.rows()).map(|row| engaged[row] * width(row) * worn(row)).collect();
         if form.name == "followed" {
             let growth = scene.feed_load_growth()?;
-            return Some(vec![("k_load", times(&|row| tool_load::wear(minutes[row], growth[row])))]);
+            return Some(vec![("k_load", times(&|row| tool_load::estimate_wear(minutes[row], growth[row])))]);
         }
         if form.name == "break_in" {
-            let whole_min = form.value("break_in_min").unwrap_or(1.0).max(f64::MIN_POSITIVE);
+            let whole_min = form.shape_value("break_in_min").unwrap_or(1.0).max(f64::MIN_POSITIVE);
             let broken_in = times(&|row| 1.0 - (-minutes[row].max(0.0) / whole_min).exp());
             return Some(vec![("k_break_in", broken_in), ("k", times(&|row| minutes[row].max(0.0)))]);
         }
-        let p = form.value("p").unwrap_or(1.0);
+        let p = form.shape_value("p").unwrap_or(1.0);
         if form.name == "edges" {
             let named: Vec<&str> = form.place.as_ref()?.1.split(EDGE_TO_EDGE).collect();
-            let tools = scene.words("tool");
+            let tools = scene.text_column("tool");
             let own = |row: usize| tools.and_then(|tools| tools.get(row)).filter(|tool| named.contains(tool));
             // An edge that nobody has measured yet wears like the others in the mean.
             let share = |edge: &str, row: usize| match own(row) {
                 Some(tool) => f64::from(u8::from(tool == edge)),
-                None => 1.0 / count(named.len()),
+                None => 1.0 / count_to_f64(named.len()),
             };
             let worn = |edge: &str| times(&|row| share(edge, row) * minutes[row].max(0.0).powf(p));
             return Some(RATES.into_iter().zip(&named).map(|(rate, edge)| (rate, worn(edge))).collect());
@@ -166,8 +166,8 @@ impl Effect for FlankWear {
 }
 
 /// The edges, where there are several and no more than can have a rate of their own.
-fn edges(scene: &Scene) -> Option<Vec<&str>> {
-    let edges: Vec<&str> = scene.words("tool")?.words().iter().map(String::as_str).collect();
+fn list_edges(scene: &Scene) -> Option<Vec<&str>> {
+    let edges: Vec<&str> = scene.text_column("tool")?.words().iter().map(String::as_str).collect();
     let tellable = edges.iter().all(|edge| !edge.contains(EDGE_TO_EDGE));
     ((2..=RATES.len()).contains(&edges.len()) && tellable).then_some(edges)
 }

@@ -14,28 +14,28 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "y = step + share * L in one stage while it turns; without the channel gear_stage: below a switching speed; sloped: and slope * n / (1000 rpm)",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "step",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "change of no-load output in this stage",
             "该档空载输出的变化",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "share",
             "1",
             (-0.4, 0.4),
             "share of the load lost in this stage beyond the others",
             "该档相对其他档多损失的负载比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "slope",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "change of no-load output in this stage that grows with the speed, at 1000 rpm",
             "该档空载输出随转速增长的变化（1000 rpm下）",
         ),
-        ParameterDoc::shape("switch_rpm", "rpm", (20.0, 20000.0), "speed below which the stage is engaged", "换档转速"),
+        ParameterDoc::new_shape("switch_rpm", "rpm", (20.0, 20000.0), "speed below which the stage is engaged", "换档转速"),
     ],
     needs: &["speed | gear_stage"],
     source: "efficiency differs by 2-6 % between stages",
@@ -71,11 +71,11 @@ impl Effect for GearStage {
         &["stage", "speed", SLOPED]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none() {
             return Vec::new();
         }
-        let stages = stages(scene);
+        let stages = list_stages(scene);
         let ln_choices = ln_count(stages.len());
         if stages.len() > 1 {
             let place = |stage: &i64| Some(("gear_stage".to_owned(), stage.to_string()));
@@ -84,11 +84,11 @@ impl Effect for GearStage {
         }
         let speeds = between_speeds(scene, SPEEDS_APART, STAGES_TRIED);
         let ln_choices = ln_count(speeds.len());
-        let form = |name| move |speed: &f64| Form { name, ln_choices, ..Form::of(&[("switch_rpm", *speed)]) };
+        let form = |name| move |speed: &f64| Form { name, ln_choices, ..Form::from_shape(&[("switch_rpm", *speed)]) };
         speeds.iter().map(form("speed")).chain(speeds.iter().map(form(SLOPED))).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let krpm = driven_krpm(scene)?;
         let here: Vec<bool> = match &form.place {
             // Wheels that stand take nothing, whatever stage is engaged.
@@ -98,7 +98,7 @@ impl Effect for GearStage {
                 scene.column(column)?.iter().zip(&krpm).map(turning).collect()
             }
             None => {
-                let switch = form.value("switch_rpm").unwrap_or(1000.0) / 1000.0;
+                let switch = form.shape_value("switch_rpm").unwrap_or(1000.0) / 1000.0;
                 krpm.iter().map(|n| *n > 0.001 && *n < switch).collect()
             }
         };
@@ -119,8 +119,8 @@ impl Effect for GearStage {
     }
 
     fn default_form(&self, scene: &Scene) -> Form {
-        let speed = Form { name: "speed", ..Form::of(&[("switch_rpm", 1000.0)]) };
-        self.forms(scene).into_iter().next().unwrap_or(speed)
+        let speed = Form { name: "speed", ..Form::from_shape(&[("switch_rpm", 1000.0)]) };
+        self.propose_forms(scene).into_iter().next().unwrap_or(speed)
     }
 }
 
@@ -128,7 +128,7 @@ impl Effect for GearStage {
 const SLOPED: &str = "sloped";
 
 /// The stages in use, in rising order; at most eight.
-fn stages(scene: &Scene) -> Vec<i64> {
+fn list_stages(scene: &Scene) -> Vec<i64> {
     let stages = scene.column("gear_stage").unwrap_or_default().iter().map(|stage| stage.round() as i64);
     stages.collect::<BTreeSet<_>>().into_iter().take(8).collect()
 }

@@ -1,7 +1,7 @@
 //! A vertical axis carries weight: up costs power, down gives it back.
 
-use crate::physics::drive::{directions, in_si, is_displacement, is_power, motion, rate};
-use crate::physics::excitation::varies;
+use crate::physics::drive::{compute_directions, in_si, is_displacement, is_power, read_motion, compute_rate};
+use crate::physics::excitation::has_variation;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Weight on a vertical axis.
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "P = weight * v, v in m/s, positive up; in a force or current: F = level wherever the drive holds the axis; braked: F = level * |sign(v)|, where a brake holds it at rest",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "weight",
             "output/(m/s)",
             (f64::NEG_INFINITY, f64::INFINITY),
             "unbalanced weight; newtons when the output is in watts; negative when over-balanced",
             "未平衡的重量；输出为W时单位为N；过平衡时为负",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "level",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
@@ -57,21 +57,21 @@ impl Effect for GravityAxis {
         &["braked"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let braked = Form { name: "braked", ..Form::plain() };
-        let forms = if is_power(scene) { vec![Form::plain()] } else { vec![Form::plain(), braked] };
-        let acts = |columns: ParameterColumns| !is_power(scene) || varies(&columns[0].1);
-        forms.into_iter().filter(|form| self.columns(scene, form).is_some_and(acts)).collect()
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let braked = Form { name: "braked", ..Form::without_shape() };
+        let forms = if is_power(scene) { vec![Form::without_shape()] } else { vec![Form::without_shape(), braked] };
+        let acts = |columns: ParameterColumns| !is_power(scene) || has_variation(&columns[0].1);
+        forms.into_iter().filter(|form| self.compute_columns(scene, form).is_some_and(acts)).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let declared = scene.role_name(Role::Vertical)?;
         if is_displacement(scene) {
             return None;
         }
         if form.name == "braked" {
             // At rest the brake carries the weight.
-            return Some(vec![("level", directions(&motion(scene)?).map(f64::abs).collect())]);
+            return Some(vec![("level", compute_directions(&read_motion(scene)?).map(f64::abs).collect())]);
         }
         if !is_power(scene) {
             let held = scene.column("drive_on").map_or_else(|| vec![1.0; scene.rows()], <[f64]>::to_vec);
@@ -89,7 +89,7 @@ fn upward_m_s(scene: &Scene, declared: &str) -> Option<Vec<f64>> {
     let of_letter = in_si(scene, &format!("{declared}_axis_velocity_mm_min"));
     let position = scene.column(declared).or_else(|| scene.column(&format!("{declared}_axis_position_mm")));
     let metres = |position: &[f64]| position.iter().map(|mm| mm / 1000.0).collect::<Vec<_>>();
-    let of_position = || position.map(|position| rate(scene, &metres(position)));
+    let of_position = || position.map(|position| compute_rate(scene, &metres(position)));
     let only = || scene.role_name(Role::Velocity).and_then(|name| in_si(scene, name));
     of_letter.or_else(of_position).or_else(only)
 }

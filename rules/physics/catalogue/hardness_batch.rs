@@ -1,6 +1,6 @@
 //! A lot of material is harder or softer than the one before.
 
-use crate::physics::cut::{cut, cut_times};
+use crate::physics::cut::{estimate_cut_load, cut_times};
 use crate::physics::excitation::{
     ln_count, run_named, since_run, step_forms, stretch_of_runs, where_word, within_runs, word_forms,
 };
@@ -15,43 +15,43 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = gain * L in one lot, or from one run on, or in a stretch of runs; lots: y = gain_i * L in lot i against the first",
     parameters: &[
-        ParameterDoc::linear("gain", "1", (-0.4, 0.4), "share by which the cut is heavier", "切削负载增加的比例"),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear("gain", "1", (-0.4, 0.4), "share by which the cut is heavier", "切削负载增加的比例"),
+        ParameterDoc::new_linear(
             "gain_2",
             "1",
             (-0.4, 0.4),
             "the same for lot 2 against the first lot",
             "第2批相对第一批的比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "gain_3",
             "1",
             (-0.4, 0.4),
             "the same for lot 3 against the first lot",
             "第3批相对第一批的比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "gain_4",
             "1",
             (-0.4, 0.4),
             "the same for lot 4 against the first lot",
             "第4批相对第一批的比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "gain_5",
             "1",
             (-0.4, 0.4),
             "the same for lot 5 against the first lot",
             "第5批相对第一批的比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "gain_6",
             "1",
             (-0.4, 0.4),
             "the same for lot 6 against the first lot",
             "第6批相对第一批的比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "gain_7",
             "1",
             (-0.4, 0.4),
@@ -93,19 +93,19 @@ impl Effect for HardnessBatch {
         &["lot", "lots", "step", "stretch", "stretches"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if cut(scene).is_none() {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        if estimate_cut_load(scene).is_none() {
             return Vec::new();
         }
         let mut forms = word_forms(scene, "lot", "lot", GAINS.len() + 1);
         if forms.len() > 2 {
-            forms.push(Form { name: "lots", ..Form::plain() });
+            forms.push(Form { name: "lots", ..Form::without_shape() });
         }
         forms.extend(steps_between_lots(scene));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "lots" {
             return every_lot(scene);
         }
@@ -131,7 +131,7 @@ const GAINS: [&str; 6] = ["gain_2", "gain_3", "gain_4", "gain_5", "gain_6", "gai
 /// Steps at the start of a run; where the lots are recorded, only of a run that begins one.
 fn steps_between_lots(scene: &Scene) -> Vec<Form> {
     let mut steps = step_forms(scene, "step");
-    let Some(lots) = scene.words("lot").filter(|lots| lots.words().len() > 1) else { return steps };
+    let Some(lots) = scene.text_column("lot").filter(|lots| lots.words().len() > 1) else { return steps };
     let begins_a_lot = |form: &Form| {
         let run = form.place.as_ref().and_then(|(_, run)| run_named(scene, run));
         run.is_some_and(|run| lots.get(scene.runs()[run].start) != lots.get(scene.runs()[run - 1].start))
@@ -174,7 +174,7 @@ fn from_start_to_start(scene: &Scene, starts: &str) -> Option<ParameterColumns> 
 }
 
 fn every_lot(scene: &Scene) -> Option<ParameterColumns> {
-    let lots = scene.words("lot")?;
+    let lots = scene.text_column("lot")?;
     let column = |(gain, lot): (&&'static str, &String)| {
         let here = where_word(scene, "lot", lot)?;
         Some((*gain, cut_times(scene, |row| here[row])?))

@@ -1,7 +1,7 @@
 //! Losses in the inverter: grow with current.
 
-use crate::physics::drive::{is_power, krpm, torque_at_1000_rpm};
-use crate::physics::excitation::{greatest, varies};
+use crate::physics::drive::{is_power, read_speed_krpm, torque_at_1000_rpm};
+use crate::physics::excitation::{find_greatest_magnitude, has_variation};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::LN_2;
 
@@ -15,21 +15,21 @@ static DOC: EffectDoc = EffectDoc {
     law: "P = conduction * |i| + resistive * i^2; magnetised: P = conduction * (sqrt(i^2 + m^2) - m); i = L / (n / 1000 rpm) \
           stands for the current, L load, n at least 50 rpm, m = magnetising_share times the greatest i",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "conduction",
             "1",
             (0.0, 0.5),
             "loss per current, at 1000 rpm as a share of the load",
             "单位电流损耗，1000 rpm下相对负载的比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "resistive",
             "1/output",
             (0.0, 1.0),
             "loss per squared current, at 1000 rpm",
             "单位电流平方损耗，1000 rpm下",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "magnetising_share",
             "1",
             (0.0, 1.0),
@@ -67,23 +67,23 @@ impl Effect for InverterLoss {
         &["conduction", "both", MAGNETISED]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let turns = krpm(scene).is_some_and(|krpm| varies(&krpm));
-        let known = turns && is_power(scene) && scene.load().is_some_and(varies);
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let turns = read_speed_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
+        let known = turns && is_power(scene) && scene.load().is_some_and(has_variation);
         if !known {
             return Vec::new();
         }
         let magnetising = vec![("magnetising_share", MAGNETISING_SHARE)];
         // How much it is hides in the coefficient; left open it would bend into the copper loss.
         let (shape, known, ln_choices) = (magnetising.clone(), magnetising, LN_2);
-        let magnetised = Form { name: MAGNETISED, shape, known, ln_choices, ..Form::plain() };
-        vec![Form { name: "conduction", ..Form::plain() }, magnetised]
+        let magnetised = Form { name: MAGNETISED, shape, known, ln_choices, ..Form::without_shape() };
+        vec![Form { name: "conduction", ..Form::without_shape() }, magnetised]
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let current = is_power(scene).then(|| torque_at_1000_rpm(scene))??;
         if form.name == MAGNETISED {
-            let magnetising = form.value("magnetising_share").unwrap_or(MAGNETISING_SHARE) * greatest(&current);
+            let magnetising = form.shape_value("magnetising_share").unwrap_or(MAGNETISING_SHARE) * find_greatest_magnitude(&current);
             let beyond = |i: &f64| i.hypot(magnetising) - magnetising;
             return Some(vec![("conduction", current.iter().map(beyond).collect())]);
         }
@@ -95,7 +95,7 @@ impl Effect for InverterLoss {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "both", ..Form::plain() }
+        Form { name: "both", ..Form::without_shape() }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Losses in the motor's iron: grow a little faster than speed.
 
 use crate::physics::drive::{driven_krpm, speed_to_the};
-use crate::physics::excitation::varies;
+use crate::physics::excitation::has_variation;
 use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Losses in the iron of the motor.
@@ -13,8 +13,8 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = level * (n / 1000 rpm)^p; a torque or current output takes one exponent less",
     parameters: &[
-        ParameterDoc::linear("level", "output", (0.0, f64::INFINITY), "loss at 1000 rpm", "1000 rpm时的损耗"),
-        ParameterDoc::shape("p", "1", (1.0, 2.0), "exponent of speed", "转速指数"),
+        ParameterDoc::new_linear("level", "output", (0.0, f64::INFINITY), "loss at 1000 rpm", "1000 rpm时的损耗"),
+        ParameterDoc::new_shape("p", "1", (1.0, 2.0), "exponent of speed", "转速指数"),
     ],
     needs: &["speed"],
     source: "hysteresis with n^1 to n^1.3, eddy currents with n^2; 50-300 W at base speed",
@@ -41,19 +41,19 @@ impl Effect for IronLoss {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let turns = driven_krpm(scene).is_some_and(|krpm| varies(&krpm));
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let turns = driven_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
         // On a drive whose only motion is its own speed, a loss torque that hardly grows is a shape of its friction.
         let drive =
             scene.output_kind() == OutputKind::Force && scene.role_name(Role::Velocity) == scene.role_name(Role::Speed);
         (turns && !drive).then(|| self.default_form(scene)).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        Some(vec![("level", speed_to_the(scene, form.value("p").unwrap_or(1.3))?)])
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        Some(vec![("level", speed_to_the(scene, form.shape_value("p").unwrap_or(1.3))?)])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form::of(&[("p", 1.3)])
+        Form::from_shape(&[("p", 1.3)])
     }
 }

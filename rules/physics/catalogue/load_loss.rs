@@ -1,7 +1,7 @@
 //! Losses of motor and gear that grow with the load.
 
 use crate::physics::drive::is_displacement;
-use crate::physics::excitation::varies;
+use crate::physics::excitation::has_variation;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Losses that grow with the load.
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = linear * L + quadratic_per_w * L^2; L load of the cut",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "linear",
             "1",
             (-0.5, 1.0),
             "share of the load that is lost on the way",
             "负载中沿途损失的比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "quadratic_per_w",
             "1/output",
             (-0.01, 0.01),
@@ -57,19 +57,19 @@ impl Effect for LoadLoss {
         &["quadratic", "both"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let loaded = !is_displacement(scene) && scene.load().is_some_and(varies);
-        let named = |name| Form { name, ..Form::plain() };
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let loaded = !is_displacement(scene) && scene.load().is_some_and(has_variation);
+        let named = |name| Form { name, ..Form::without_shape() };
         if loaded { vec![named("quadratic"), named("both")] } else { Vec::new() }
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let load = scene.load()?;
         let quadratic = ("quadratic_per_w", load.iter().map(|load| load * load).collect());
         Some(if form.name == "quadratic" { vec![quadratic] } else { vec![("linear", load.to_vec()), quadratic] })
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "both", ..Form::plain() }
+        Form { name: "both", ..Form::without_shape() }
     }
 }

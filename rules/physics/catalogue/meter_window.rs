@@ -1,8 +1,8 @@
 //! The meter averages over a window: edges are smeared.
 
 use crate::physics::drive::is_displacement;
-use crate::physics::excitation::{delays, varies};
-use crate::physics::state::delayed;
+use crate::physics::excitation::{list_delays, has_variation};
+use crate::physics::state::delay_values;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Averaging in the meter.
@@ -14,15 +14,15 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = share * (A(S) - S), S the simulated output; lag: A first order with time constant window_s; mean: A mean over the last window_s; late: lag, delay_s later",
     parameters: &[
-        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the window explains all", "为1时平均窗口可完全解释"),
-        ParameterDoc::shape(
+        ParameterDoc::new_linear("share", "1", (0.0, 1.5), "one, when the window explains all", "为1时平均窗口可完全解释"),
+        ParameterDoc::new_shape(
             "window_s",
             "s",
             (0.01, 30.0),
             "time constant, or length of the window",
             "时间常数或窗口长度",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "delay_s",
             "s",
             (0.0, 30.0),
@@ -59,25 +59,25 @@ impl Effect for MeterWindow {
         &["lag", "mean", LATE]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         // What grows over minutes shows no fraction of a second.
-        if is_displacement(scene) || !scene.simulated().is_some_and(varies) {
+        if is_displacement(scene) || !scene.simulated_output().is_some_and(has_variation) {
             return Vec::new();
         }
-        let windows = delays(scene, &[0.5, 1.0, 2.0, 4.0]);
-        let form = |name| move |window_s: &f64| Form { name, ..Form::of(&[("window_s", *window_s)]) }.whole();
-        let late_windows = delays(scene, &LATE_WINDOWS_S);
+        let windows = list_delays(scene, &[0.5, 1.0, 2.0, 4.0]);
+        let form = |name| move |window_s: &f64| Form { name, ..Form::from_shape(&[("window_s", *window_s)]) }.with_full_share();
+        let late_windows = list_delays(scene, &LATE_WINDOWS_S);
         let late = late_windows.iter().flat_map(|window_s| LATE_SHARES.map(|share| (*window_s, share * window_s)));
         let late = late.map(|(window_s, delay_s)| {
             let shape = [("window_s", window_s), ("delay_s", delay_s)];
-            Form { name: LATE, ..Form::of(&shape) }.whole()
+            Form { name: LATE, ..Form::from_shape(&shape) }.with_full_share()
         });
         windows.iter().map(form("lag")).chain(windows.iter().map(form("mean"))).chain(late).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let simulated = scene.simulated()?;
-        let window_s = form.value("window_s").unwrap_or(1.0).max(1e-6);
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let simulated = scene.simulated_output()?;
+        let window_s = form.shape_value("window_s").unwrap_or(1.0).max(1e-6);
         let mut smeared = vec![0.0; scene.rows()];
         for run in scene.runs() {
             let inside = &simulated[run.clone()];
@@ -86,13 +86,13 @@ impl Effect for MeterWindow {
             smeared[run.clone()].copy_from_slice(&average(time_s, inside, window_s));
         }
         if form.name == LATE {
-            smeared = delayed(scene, &smeared, form.value("delay_s").unwrap_or(0.0));
+            smeared = delay_values(scene, &smeared, form.shape_value("delay_s").unwrap_or(0.0));
         }
         Some(vec![("share", smeared.iter().zip(simulated).map(|(smeared, now)| smeared - now).collect())])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "lag", ..Form::of(&[("window_s", 1.0)]) }
+        Form { name: "lag", ..Form::from_shape(&[("window_s", 1.0)]) }
     }
 }
 

@@ -63,7 +63,7 @@ catalogue! {
 
 /// The effect of this kind.
 #[must_use]
-pub fn effect(kind: &str) -> Option<&'static dyn Effect> {
+pub fn find_effect(kind: &str) -> Option<&'static dyn Effect> {
     CATALOGUE.iter().copied().find(|effect| effect.doc().kind == kind)
 }
 

@@ -1,7 +1,7 @@
 //! Power that the spindle takes when it turns and does not cut.
 
 use crate::physics::drive::driven_krpm;
-use crate::physics::excitation::varies;
+use crate::physics::excitation::has_variation;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// No-load power of the spindle.
@@ -13,21 +13,21 @@ static DOC: EffectDoc = EffectDoc {
     family: "model",
     law: "P = p0 + p1 n + p2 n^2",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "p0_w",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "power with the spindle at rest",
             "主轴静止时的功率",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "p1_w_per_rpm",
             "output/rpm",
             (f64::NEG_INFINITY, f64::INFINITY),
             "growth with speed (friction torque)",
             "随转速线性增长（摩擦转矩）",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "p2_w_per_rpm2",
             "output/rpm2",
             (f64::NEG_INFINITY, f64::INFINITY),
@@ -60,13 +60,13 @@ impl Effect for NoLoadPower {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let turns = driven_krpm(scene).is_some_and(|krpm| varies(&krpm));
-        turns.then(Form::plain).into_iter().collect()
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let turns = driven_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
+        turns.then(Form::without_shape).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
-        let rpm: Vec<f64> = scene.role(Role::Speed)?.iter().map(|rpm| rpm.abs()).collect();
+    fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
+        let rpm: Vec<f64> = scene.role_values(Role::Speed)?.iter().map(|rpm| rpm.abs()).collect();
         let square = rpm.iter().map(|rpm| rpm * rpm).collect();
         Some(vec![("p0_w", vec![1.0; rpm.len()]), ("p1_w_per_rpm", rpm), ("p2_w_per_rpm2", square)])
     }

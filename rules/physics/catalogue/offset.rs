@@ -10,7 +10,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "offset",
     family: "measurement",
     law: "y = level",
-    parameters: &[ParameterDoc::linear("level", "output", (f64::NEG_INFINITY, f64::INFINITY), "the constant", "常量")],
+    parameters: &[ParameterDoc::new_linear("level", "output", (f64::NEG_INFINITY, f64::INFINITY), "the constant", "常量")],
     needs: &[],
     source: "definition",
     experiment_minutes: 1.0,
@@ -36,11 +36,11 @@ impl Effect for Offset {
         &DOC
     }
 
-    fn forms(&self, _scene: &Scene) -> Vec<Form> {
-        vec![Form::plain()]
+    fn propose_forms(&self, _scene: &Scene) -> Vec<Form> {
+        vec![Form::without_shape()]
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         Some(vec![("level", vec![1.0; scene.rows()])])
     }
 }

@@ -1,8 +1,8 @@
 //! The real feed follows the reported one late.
 
-use crate::physics::cut::{cut, cutting_rows};
-use crate::physics::excitation::{delays, visits};
-use crate::physics::state::delayed;
+use crate::physics::cut::{estimate_cut_load, cutting_rows};
+use crate::physics::excitation::{list_delays, count_visits};
+use crate::physics::state::delay_values;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Feed that follows late.
@@ -14,8 +14,8 @@ static DOC: EffectDoc = EffectDoc {
     family: "control",
     law: "y = share * L * ((f(t - delay) / f(t))^0.75 - 1)",
     parameters: &[
-        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the delay explains all", "为1时延时可完全解释"),
-        ParameterDoc::shape("delay_s", "s", (0.0, 5.0), "how late the real feed follows", "实际进给的滞后时间"),
+        ParameterDoc::new_linear("share", "1", (0.0, 1.5), "one, when the delay explains all", "为1时延时可完全解释"),
+        ParameterDoc::new_shape("delay_s", "s", (0.0, 5.0), "how late the real feed follows", "实际进给的滞后时间"),
     ],
     needs: &["load", "feed_mm_min | feed_programmed_mm_min"],
     source: "f_actual(t) = f_commanded(t - d), 50-500 ms and a ramp",
@@ -42,22 +42,22 @@ impl Effect for OverrideDelay {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(feed) = feed(scene).filter(|_| scene.load().is_some() && cut(scene).is_some()) else {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(feed) = read_feed(scene).filter(|_| scene.load().is_some() && estimate_cut_load(scene).is_some()) else {
             return Vec::new();
         };
         let cutting = cutting_rows(scene);
         let changes =
             |row: usize| row > 0 && cutting[row] && cutting[row - 1] && (feed[row] / feed[row - 1] - 1.0).abs() > 0.02;
-        if visits(scene, changes) < 3 {
+        if count_visits(scene, changes) < 3 {
             return Vec::new();
         }
-        delays(scene, &[0.1, 0.25, 0.5, 1.0, 2.0]).iter().map(|delay| Form::of(&[("delay_s", *delay)])).collect()
+        list_delays(scene, &[0.1, 0.25, 0.5, 1.0, 2.0]).iter().map(|delay| Form::from_shape(&[("delay_s", *delay)])).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let feed = feed_in_the_cut(scene)?;
-        let before = delayed(scene, &feed, form.value("delay_s").unwrap_or(0.25));
+        let before = delay_values(scene, &feed, form.shape_value("delay_s").unwrap_or(0.25));
         let law = |((load, before), now): ((&f64, &f64), &f64)| {
             let ratio = if *now > 0.0 { (before / now).clamp(0.0, 4.0) } else { 1.0 };
             load * (ratio.powf(0.75) - 1.0)
@@ -70,16 +70,16 @@ impl Effect for OverrideDelay {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form::of(&[("delay_s", 0.25)])
+        Form::from_shape(&[("delay_s", 0.25)])
     }
 }
 
 /// The feed, before each pass that of its first row: the delay acts on changes while cutting, not on the approach.
 fn feed_in_the_cut(scene: &Scene) -> Option<Vec<f64>> {
-    let mut feed = feed(scene)?;
+    let mut feed = read_feed(scene)?;
     for pass in scene.passes() {
         let start = scene.runs().iter().find(|run| run.contains(&pass.start)).map_or(0, |run| run.start);
-        let engaged = scene.role(Role::Engaged)?;
+        let engaged = scene.role_values(Role::Engaged)?;
         // The way in and what lies before it, up to where the tool leaves the pass before.
         let mut idle = false;
         let is_before = |row: &usize| {
@@ -94,7 +94,7 @@ fn feed_in_the_cut(scene: &Scene) -> Option<Vec<f64>> {
 }
 
 /// The feed as reported, or else as commanded times its override.
-fn feed(scene: &Scene) -> Option<Vec<f64>> {
+fn read_feed(scene: &Scene) -> Option<Vec<f64>> {
     if let Some(feed) = scene.column("feed_mm_min") {
         return Some(feed.to_vec());
     }

@@ -1,7 +1,7 @@
 //! Inner rings warm before the housing: preload and friction rise, and fall again when the housing follows.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{driven_krpm, krpm, speed_to_the};
+use crate::physics::drive::{driven_krpm, read_speed_krpm, speed_to_the};
 use crate::physics::excitation::lag_forms;
 use crate::physics::state::first_order;
 use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
@@ -15,15 +15,15 @@ static DOC: EffectDoc = EffectDoc {
     family: "spindle",
     law: "P = growth * (n / 1000 rpm)^2 * w; dw/dt = ((n / 1000 rpm)^(5/3) - w) / tau; gradient: w is the difference between a quick and a slow state",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "growth",
             "output",
             (0.0, f64::INFINITY),
             "rise of power at 1000 rpm once warm from 1000 rpm",
             "在1000 rpm下热透后功率的上升量",
         ),
-        ParameterDoc::shape("tau_s", "s", (20.0, 3600.0), "time constant of the inner ring", "内圈时间常数"),
-        ParameterDoc::shape("slow_tau_s", "s", (120.0, 14400.0), "time constant of the housing", "轴承座时间常数"),
+        ParameterDoc::new_shape("tau_s", "s", (20.0, 3600.0), "time constant of the inner ring", "内圈时间常数"),
+        ParameterDoc::new_shape("slow_tau_s", "s", (120.0, 14400.0), "time constant of the housing", "轴承座时间常数"),
     ],
     needs: &["speed"],
     source: "angular-contact bearings: thermally induced preload, grows with speed squared and the temperature difference of the rings",
@@ -63,34 +63,34 @@ impl Effect for PreloadGrowth {
         &["lag", "gradient"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none_or(|krpm| krpm.iter().all(|n| *n == 0.0)) {
             return Vec::new();
         }
         let mut forms = lag_forms(scene, "lag", &[120.0, 300.0, 600.0]);
         let gradient = |form: &Form| {
-            let tau_s = form.value("tau_s").unwrap_or(TAU_S);
-            Form { name: "gradient", ..Form::of(&[("tau_s", tau_s), ("slow_tau_s", SLOWER * tau_s)]) }
+            let tau_s = form.shape_value("tau_s").unwrap_or(TAU_S);
+            Form { name: "gradient", ..Form::from_shape(&[("tau_s", tau_s), ("slow_tau_s", SLOWER * tau_s)]) }
         };
         let gradients: Vec<Form> = forms.iter().take(2).map(gradient).collect();
         forms.extend(gradients);
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let friction = speed_to_the(scene, 2.0)?;
-        let heat: Vec<f64> = krpm(scene)?.iter().map(|n| n.powf(5.0 / 3.0)).collect();
-        let tau_s = form.value("tau_s").unwrap_or(TAU_S);
+        let heat: Vec<f64> = read_speed_krpm(scene)?.iter().map(|n| n.powf(5.0 / 3.0)).collect();
+        let tau_s = form.shape_value("tau_s").unwrap_or(TAU_S);
         let mut warmth = first_order(scene, &heat, tau_s);
         if form.name == "gradient" {
-            let slow = first_order(scene, &heat, form.value("slow_tau_s").unwrap_or(SLOWER * tau_s));
+            let slow = first_order(scene, &heat, form.shape_value("slow_tau_s").unwrap_or(SLOWER * tau_s));
             warmth.iter_mut().zip(&slow).for_each(|(warmth, slow)| *warmth -= slow);
         }
         Some(vec![("growth", friction.iter().zip(&warmth).map(|(g, w)| g * w).collect())])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "lag", ..Form::of(&[("tau_s", TAU_S)]) }
+        Form { name: "lag", ..Form::from_shape(&[("tau_s", TAU_S)]) }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Depth or width of cut is mis-stated for one operation.
 
-use crate::physics::cut::{cut, cut_times};
+use crate::physics::cut::{estimate_cut_load, cut_times};
 use crate::physics::excitation::{where_word, word_forms};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -12,7 +12,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "recipe_error",
     family: "measurement",
     law: "y = gain * L in one operation",
-    parameters: &[ParameterDoc::linear(
+    parameters: &[ParameterDoc::new_linear(
         "gain",
         "1",
         (-0.8, 3.0),
@@ -48,15 +48,15 @@ impl Effect for RecipeError {
         &["word"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if cut(scene).is_none() {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        if estimate_cut_load(scene).is_none() {
             return Vec::new();
         }
         let forms = |column| word_forms(scene, "word", column, MOST_WORDS);
         ["operation", "pass", "program"].into_iter().map(forms).find(|forms| !forms.is_empty()).unwrap_or_default()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let (column, word) = form.place.as_ref()?;
         let here = where_word(scene, column, word)?;
         Some(vec![("gain", cut_times(scene, |row| here[row])?)])

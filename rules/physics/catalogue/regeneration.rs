@@ -1,7 +1,7 @@
 //! Braking power does not come back: it is burnt in a resistor, or the meter does not count it.
 
 use crate::physics::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
-use crate::physics::excitation::visits;
+use crate::physics::excitation::count_visits;
 use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Braking power that is not fed back.
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = braking_kg_m2 * |w dw/dt| while the spindle slows down; clipped: P = share * |S| where the simulated power S is negative",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "braking_kg_m2",
             "kg m2",
             (0.0, INERTIA_KG_M2_MAX),
             "inertia times the share of braking power that is lost",
             "惯量乘以损失的制动功率比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "share",
             "1",
             (0.0, 1.0),
@@ -57,28 +57,28 @@ impl Effect for Regeneration {
         &["braking", "clipped"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         ["braking", "clipped"]
             .into_iter()
-            .map(|name| Form { name, ..Form::plain() })
-            .filter(|form| acts(scene, form))
+            .map(|name| Form { name, ..Form::without_shape() })
+            .filter(|form| is_active(scene, form))
             .collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if scene.output_kind() != OutputKind::Power {
             return None;
         }
         if form.name == "clipped" {
-            return Some(vec![("share", scene.simulated()?.iter().map(|power| (-power).max(0.0)).collect())]);
+            return Some(vec![("share", scene.simulated_output()?.iter().map(|power| (-power).max(0.0)).collect())]);
         }
         driven_krpm(scene)?;
-        let speed = scene.role(Role::Speed)?;
+        let speed = scene.role_values(Role::Speed)?;
         let braking = |(rpm, rate): (&f64, f64)| (-rpm * rate * RAD_PER_S_OF_RPM.powi(2)).max(0.0);
         Some(vec![("braking_kg_m2", speed.iter().zip(spindle_rate_rpm_per_s(scene)?).map(braking).collect())])
     }
 }
 
-fn acts(scene: &Scene, form: &Form) -> bool {
-    Regeneration.columns(scene, form).is_some_and(|columns| visits(scene, |row| columns[0].1[row] > 0.0) >= 3)
+fn is_active(scene: &Scene, form: &Form) -> bool {
+    Regeneration.compute_columns(scene, form).is_some_and(|columns| count_visits(scene, |row| columns[0].1[row] > 0.0) >= 3)
 }

@@ -12,28 +12,28 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = cosine * cos(2 pi f t) + sine * sin(2 pi f t), f = |2 f_mains - k f_sampling|; as a candidate: scale * a wave near f whose phase wanders with the mains, followed row by row",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "scale",
             "1",
             (0.0, 3.0),
             "size over that of the wave as it is followed",
             "相对于跟踪所得波动的比例",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "cosine",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "part in step with the clock",
             "与时钟同相部分",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "sine",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "part a quarter period later",
             "滞后四分之一周期部分",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "frequency_hz",
             "Hz",
             (1e-05, 50.0),
@@ -70,21 +70,21 @@ impl Effect for RippleAlias {
         &["latent"]
     }
 
-    fn forms(&self, _scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, _scene: &Scene) -> Vec<Form> {
         Vec::new()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "latent" {
             return Some(vec![("scale", scene.latent_or_zero(DOC.kind))]);
         }
-        let turn = 2.0 * PI * form.value("frequency_hz")?;
+        let turn = 2.0 * PI * form.shape_value("frequency_hz")?;
         let wave = |law: fn(f64) -> f64| scene.time_s().iter().map(|t| law(turn * t)).collect();
         Some(vec![("cosine", wave(f64::cos)), ("sine", wave(f64::sin))])
     }
 
     fn default_form(&self, scene: &Scene) -> Form {
-        Form::of(&[("frequency_hz", 0.1 / scene.period_s())])
+        Form::from_shape(&[("frequency_hz", 0.1 / scene.period_s())])
     }
 
     fn has_hidden_state(&self) -> bool {

@@ -1,6 +1,6 @@
 //! Tool or work runs out of true: the cut swells and fades once per turn.
 
-use crate::physics::cut::{cut, cut_times};
+use crate::physics::cut::{estimate_cut_load, cut_times};
 use crate::physics::drive::RAD_PER_S_OF_RPM;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -13,15 +13,15 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = (cosine * cos(phi) + sine * sin(phi)) * L; dphi/dt = 2 pi n / 60, phi = 0 at the start of each run; as a candidate also: scale * a tone of each cut's own size and phase, followed row by row",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "scale",
             "1",
             (0.0, 3.0),
             "size over that of the tone as it is followed",
             "相对于跟踪所得单音的比例",
         ),
-        ParameterDoc::linear("cosine", "1", (-1.0, 1.0), "share of the cut in step with the turn", "与转角同相的比例"),
-        ParameterDoc::linear("sine", "1", (-1.0, 1.0), "share a quarter turn later", "滞后四分之一转的比例"),
+        ParameterDoc::new_linear("cosine", "1", (-1.0, 1.0), "share of the cut in step with the turn", "与转角同相的比例"),
+        ParameterDoc::new_linear("sine", "1", (-1.0, 1.0), "share a quarter turn later", "滞后四分之一转的比例"),
     ],
     needs: &["load | engaged", "speed"],
     source: "P (1 + e cos(w t + phi)), e 0.05-0.5; only where the sampling is faster than 2.2 samples per turn",
@@ -52,15 +52,15 @@ impl Effect for Runout {
         &["latent"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let (Some(speed), Some(cut)) = (scene.role(Role::Speed), cut(scene)) else { return Vec::new() };
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let (Some(speed), Some(cut)) = (scene.role_values(Role::Speed), estimate_cut_load(scene)) else { return Vec::new() };
         let in_cut = cut.iter().zip(speed).filter(|(cut, _)| **cut != 0.0).map(|(_, speed)| speed.abs());
         let fastest_rpm = in_cut.fold(0.0, f64::max);
         let told = fastest_rpm > 1.0 && fastest_rpm / 60.0 * scene.period_s() * 2.2 < 1.0;
-        told.then(Form::plain).into_iter().collect()
+        told.then(Form::without_shape).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "latent" {
             return Some(vec![("scale", scene.latent_or_zero(DOC.kind))]);
         }
@@ -73,7 +73,7 @@ impl Effect for Runout {
 
 /// Angle of the spindle since the start of the run.
 fn turn_rad(scene: &Scene) -> Option<Vec<f64>> {
-    let speed = scene.role(Role::Speed)?;
+    let speed = scene.role_values(Role::Speed)?;
     let mut turn = vec![0.0; scene.rows()];
     for run in scene.runs() {
         for row in run.start + 1..run.end {

@@ -12,8 +12,8 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = share * min(0, ceiling - S), S the simulated output",
     parameters: &[
-        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the ceiling explains all", "为1时上限可完全解释"),
-        ParameterDoc::shape(
+        ParameterDoc::new_linear("share", "1", (0.0, 1.5), "one, when the ceiling explains all", "为1时上限可完全解释"),
+        ParameterDoc::new_shape(
             "ceiling",
             "output",
             (-1000000000.0, 1000000000.0),
@@ -46,31 +46,31 @@ impl Effect for Saturation {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(simulated) = scene.simulated() else { return Vec::new() };
-        let form = |ceiling: f64| Form::of(&[("ceiling", ceiling)]);
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(simulated) = scene.simulated_output() else { return Vec::new() };
+        let form = |ceiling: f64| Form::from_shape(&[("ceiling", ceiling)]);
         if let Some(ceiling) = pile_up(scene) {
             return vec![form(ceiling)];
         }
         // Noise after the clipping smears the pile: then the ceiling lies a little below the greatest recorded values,
         // and a fair number of rows is simulated beyond it.
-        let usable = || (0..scene.rows()).filter(|row| scene.usable()[*row]);
+        let usable = || (0..scene.rows()).filter(|row| scene.usable_rows()[*row]);
         let levels = [0.995, 0.98, 0.95, 0.9]
             .into_iter()
-            .filter_map(|share| quantile(usable().map(|row| scene.recorded()[row]), share));
+            .filter_map(|share| quantile(usable().map(|row| scene.recorded_output()[row]), share));
         let beyond = |ceiling: f64| usable().filter(|row| simulated[*row] > ceiling).count() >= 8;
         levels.filter(|ceiling| beyond(*ceiling)).map(form).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let ceiling = form.value("ceiling")?;
-        Some(vec![("share", scene.simulated()?.iter().map(|value| (ceiling - value).min(0.0)).collect())])
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let ceiling = form.shape_value("ceiling")?;
+        Some(vec![("share", scene.simulated_output()?.iter().map(|value| (ceiling - value).min(0.0)).collect())])
     }
 }
 
 /// The greatest recorded value, where at least five rows share it and more do than share the value below it.
 fn pile_up(scene: &Scene) -> Option<f64> {
-    let usable = scene.recorded().iter().zip(scene.usable()).filter(|(_, usable)| **usable);
+    let usable = scene.recorded_output().iter().zip(scene.usable_rows()).filter(|(_, usable)| **usable);
     let values: Vec<f64> = usable.map(|(value, _)| *value).collect();
     let top = values.iter().copied().reduce(f64::max)?;
     let next = values.iter().copied().filter(|value| *value < top).reduce(f64::max)?;

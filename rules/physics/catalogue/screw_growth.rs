@@ -2,7 +2,7 @@
 
 use adapters::channel::quantity::Quantity;
 use crate::physics::drive::{axis_velocities, in_si, is_displacement};
-use crate::physics::excitation::{lag_forms, varies};
+use crate::physics::excitation::{lag_forms, has_variation};
 use crate::physics::state::first_order;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -15,14 +15,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "thermal",
     law: "E = growth * w * z; dw/dt = (|v| - w) / tau, v in m/min; z position in m, 1 where none is recorded",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "growth",
             "output/(m m/min)",
             (f64::NEG_INFINITY, f64::INFINITY),
             "displacement per metre of screw once warm from 1 m/min",
             "在1 m/min下热透后每米丝杠的位移",
         ),
-        ParameterDoc::shape("tau_s", "s", (300.0, 7200.0), "time constant of the screw", "丝杠时间常数"),
+        ParameterDoc::new_shape("tau_s", "s", (300.0, 7200.0), "time constant of the screw", "丝杠时间常数"),
     ],
     needs: &["feed_mm_min | axis velocities"],
     source: "alpha L = 11.5 um/(m K), 20-60 min, driven by the mean speed of the axis",
@@ -53,20 +53,20 @@ impl Effect for ScrewGrowth {
         true
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let moves = axis_velocities(scene).iter().any(|velocity| varies(velocity));
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let moves = axis_velocities(scene).iter().any(|velocity| has_variation(velocity));
         let grid: &[f64] = if moves && is_displacement(scene) { &[1200.0, 2400.0, 3600.0] } else { &[] };
         lag_forms(scene, "", grid)
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let velocities = axis_velocities(scene);
         if velocities.is_empty() {
             return None;
         }
         let m_min = |row: usize| velocities.iter().map(|v| 60.0 * v[row].abs()).sum();
         let rubbing: Vec<f64> = (0..scene.rows()).map(m_min).collect();
-        let mut growth = first_order(scene, &rubbing, form.value("tau_s").unwrap_or(2400.0));
+        let mut growth = first_order(scene, &rubbing, form.shape_value("tau_s").unwrap_or(2400.0));
         if let Some(position) = position_m(scene) {
             growth.iter_mut().zip(&position).for_each(|(growth, z)| *growth *= z);
         }
@@ -74,7 +74,7 @@ impl Effect for ScrewGrowth {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form::of(&[("tau_s", 2400.0)])
+        Form::from_shape(&[("tau_s", 2400.0)])
     }
 }
 

@@ -1,6 +1,6 @@
 //! The meter shows a fixed share too much or too little.
 
-use crate::physics::excitation::{recording_share, since_run, step_forms, varies};
+use crate::physics::excitation::{recording_share, since_run, step_forms, has_variation};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Gain of the meter.
@@ -11,7 +11,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "sensor_gain",
     family: "measurement",
     law: "y = gain * S, S the simulated output; from one run on, or growing as share of the recording - 1/2",
-    parameters: &[ParameterDoc::linear(
+    parameters: &[ParameterDoc::new_linear(
         "gain",
         "1",
         (-0.5, 0.5),
@@ -47,17 +47,17 @@ impl Effect for SensorGain {
         &["constant", "drift", "step"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if !scene.simulated().is_some_and(varies) {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        if !scene.simulated_output().is_some_and(has_variation) {
             return Vec::new();
         }
-        let mut forms = vec![Form { name: "constant", ..Form::plain() }, Form { name: "drift", ..Form::plain() }];
+        let mut forms = vec![Form { name: "constant", ..Form::without_shape() }, Form { name: "drift", ..Form::without_shape() }];
         forms.extend(step_forms(scene, "step"));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let simulated = scene.simulated()?;
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let simulated = scene.simulated_output()?;
         let factor = match (form.name, &form.place) {
             ("step", Some((_, run))) => since_run(scene, run)?,
             ("drift", _) => recording_share(scene).iter().map(|share| share - 0.5).collect(),

@@ -1,7 +1,7 @@
 //! Faster cutting heats the chip and softens it: the specific force falls.
 
 use crate::physics::cut::{cut_times, cutting_rows};
-use crate::physics::excitation::varies;
+use crate::physics::excitation::has_variation;
 use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
@@ -13,7 +13,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "speed_softening",
     family: "cutting",
     law: "y = -q * L * ln(vc / v0); v0 the nearest of ... 50, 100, 200, 400 ... m/min to the median of the cut",
-    parameters: &[ParameterDoc::linear("q", "1", (0.0, 0.5), "exponent of the cutting speed", "切削速度指数")],
+    parameters: &[ParameterDoc::new_linear("q", "1", (0.0, 0.5), "exponent of the cutting speed", "切削速度指数")],
     needs: &["load | engaged", "cutting_speed_m_min"],
     source: "kc proportional to (vc / v0)^(-q), q 0.05-0.2; thermal softening as in Johnson and Cook",
     experiment_minutes: 6.0,
@@ -44,16 +44,16 @@ impl Effect for SpeedSoftening {
         Bound::Cut(0.7)
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let columns = self.columns(scene, &Form::plain());
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let columns = self.compute_columns(scene, &Form::without_shape());
         let cutting = cutting_rows(scene);
         let speeds =
             |speed: &[f64]| speed.iter().zip(&cutting).filter(|(_, cutting)| **cutting).map(|(v, _)| *v).collect();
-        let differ = scene.column("cutting_speed_m_min").map(speeds).is_some_and(|speeds: Vec<f64>| varies(&speeds));
-        columns.filter(|_| differ).map(|_| Form::plain()).into_iter().collect()
+        let differ = scene.column("cutting_speed_m_min").map(speeds).is_some_and(|speeds: Vec<f64>| has_variation(&speeds));
+        columns.filter(|_| differ).map(|_| Form::without_shape()).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         let speed = scene.column("cutting_speed_m_min")?;
         let cutting = cutting_rows(scene);
         let middle =

@@ -1,9 +1,9 @@
 //! The spindle grows as it warms, quickly at the nose and slowly in the housing.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{is_displacement, krpm};
-use crate::physics::excitation::{lag_forms, time_constants, varies};
-use crate::physics::state::{decay, first_order};
+use crate::physics::drive::{is_displacement, read_speed_krpm};
+use crate::physics::excitation::{lag_forms, time_constants, has_variation};
+use crate::physics::state::{compute_decay, first_order};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Growth of the spindle with its own heat.
@@ -15,43 +15,43 @@ static DOC: EffectDoc = EffectDoc {
     family: "thermal",
     law: "E = growth * w + initial * exp(-t/tau); dw/dt = ((n / 1000 rpm)^1.5 - w) / tau; two: a second, slower state; measured: E = per_k * (T - T0)",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "growth",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "growth once warm from 1000 rpm",
             "在1000 rpm下热透后的伸长",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "initial",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "growth left over at the start of the recording",
             "记录开始时残留的伸长",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "slow_growth",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "the same for the slow state",
             "慢速状态的伸长",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "slow_initial",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "growth of the slow state left over at the start",
             "记录开始时慢速状态残留的伸长",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "per_k",
             "output/K",
             (f64::NEG_INFINITY, f64::INFINITY),
             "growth per kelvin of the bearing",
             "轴承每升高1 K的伸长",
         ),
-        ParameterDoc::shape("tau_s", "s", (60.0, 14400.0), "time constant of the nose", "主轴端时间常数"),
-        ParameterDoc::shape("slow_tau_s", "s", (600.0, 43200.0), "time constant of the housing", "主轴箱时间常数"),
+        ParameterDoc::new_shape("tau_s", "s", (60.0, 14400.0), "time constant of the nose", "主轴端时间常数"),
+        ParameterDoc::new_shape("slow_tau_s", "s", (600.0, 43200.0), "time constant of the housing", "主轴箱时间常数"),
     ],
     needs: &["speed | temperature"],
     source: "ISO 230-3 tests: two states, 3-10 min and 30-120 min, 10-80 um",
@@ -86,43 +86,43 @@ impl Effect for SpindleGrowth {
         &["one", "two", "measured"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         if !is_displacement(scene) {
             return Vec::new();
         }
-        let turns = krpm(scene).is_some_and(|krpm| krpm.iter().any(|n| *n > 0.0));
+        let turns = read_speed_krpm(scene).is_some_and(|krpm| krpm.iter().any(|n| *n > 0.0));
         let grid: &[f64] = if turns { &[180.0, 600.0, 1800.0, 3600.0, 7200.0] } else { &[] };
         let mut forms = lag_forms(scene, "one", grid);
         let taus = time_constants(scene, grid);
         for (quick, slow) in [(180.0, 1800.0), (600.0, 3600.0), (600.0, 7200.0)] {
             if taus.contains(&slow) {
-                forms.push(Form { name: "two", ..Form::of(&[("tau_s", quick), ("slow_tau_s", slow)]) });
+                forms.push(Form { name: "two", ..Form::from_shape(&[("tau_s", quick), ("slow_tau_s", slow)]) });
             }
         }
-        let measured = scene.role(Role::Temperature).filter(|temperature| varies(temperature));
-        forms.extend(measured.map(|_| Form { name: "measured", ..Form::plain() }));
+        let measured = scene.role_values(Role::Temperature).filter(|temperature| has_variation(temperature));
+        forms.extend(measured.map(|_| Form { name: "measured", ..Form::without_shape() }));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "measured" {
-            let temperature = scene.role(Role::Temperature)?;
+            let temperature = scene.role_values(Role::Temperature)?;
             let first = *temperature.first()?;
             return Some(vec![("per_k", temperature.iter().map(|t| t - first).collect())]);
         }
-        let heat: Vec<f64> = krpm(scene)?.iter().map(|n| n.powf(1.5)).collect();
-        let tau_s = form.value("tau_s").unwrap_or(TAU_S);
-        let mut columns = vec![("growth", first_order(scene, &heat, tau_s)), ("initial", decay(scene, tau_s))];
+        let heat: Vec<f64> = read_speed_krpm(scene)?.iter().map(|n| n.powf(1.5)).collect();
+        let tau_s = form.shape_value("tau_s").unwrap_or(TAU_S);
+        let mut columns = vec![("growth", first_order(scene, &heat, tau_s)), ("initial", compute_decay(scene, tau_s))];
         if form.name == "two" {
-            let slow_s = form.value("slow_tau_s").unwrap_or(6.0 * tau_s);
+            let slow_s = form.shape_value("slow_tau_s").unwrap_or(6.0 * tau_s);
             columns.push(("slow_growth", first_order(scene, &heat, slow_s)));
-            columns.push(("slow_initial", decay(scene, slow_s)));
+            columns.push(("slow_initial", compute_decay(scene, slow_s)));
         }
         Some(columns)
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form { name: "one", ..Form::of(&[("tau_s", TAU_S)]) }
+        Form { name: "one", ..Form::from_shape(&[("tau_s", TAU_S)]) }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Power and torque that accelerate spindle, chuck and work.
 
 use crate::physics::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
-use crate::physics::excitation::{greatest, visits};
+use crate::physics::excitation::{find_greatest_magnitude, count_visits};
 use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of what the spindle turns.
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "spindle",
     law: "P = inertia_kg_m2 * w * dw/dt, w = 2 pi n / 60; a torque, current or load output takes per_rad_s2 * dw/dt",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "inertia_kg_m2",
             "kg m2",
             (0.0, INERTIA_KG_M2_MAX),
             "moment of inertia of spindle, chuck and work that the simulation lacks",
             "仿真中缺少的主轴、卡盘和工件转动惯量",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "per_rad_s2",
             "output/(rad/s2)",
             (0.0, f64::INFINITY),
@@ -56,17 +56,17 @@ impl Effect for SpindleInertia {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(speed) = scene.role(Role::Speed).filter(|_| driven_krpm(scene).is_some()) else { return Vec::new() };
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(speed) = scene.role_values(Role::Speed).filter(|_| driven_krpm(scene).is_some()) else { return Vec::new() };
         let Some(rates) = spindle_rate_rpm_per_s(scene) else { return Vec::new() };
-        let least = RAMP_PER_S * greatest(speed);
-        let ramps = visits(scene, |row| rates[row].abs() > least);
-        if ramps >= 2 { vec![Form::plain()] } else { Vec::new() }
+        let least = RAMP_PER_S * find_greatest_magnitude(speed);
+        let ramps = count_visits(scene, |row| rates[row].abs() > least);
+        if ramps >= 2 { vec![Form::without_shape()] } else { Vec::new() }
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         driven_krpm(scene)?;
-        let speed = scene.role(Role::Speed)?;
+        let speed = scene.role_values(Role::Speed)?;
         let rates = spindle_rate_rpm_per_s(scene)?.into_iter().map(|rpm_per_s| rpm_per_s * RAD_PER_S_OF_RPM);
         if scene.output_kind() == OutputKind::Force {
             return Some(vec![("per_rad_s2", rates.collect())]);

@@ -1,7 +1,7 @@
 //! At creep the oil film breaks down: friction is higher than when moving.
 
-use crate::physics::drive::{is_power, motion, soft_sign, turns};
-use crate::physics::excitation::{greatest, varies, visits};
+use crate::physics::drive::{is_power, read_motion, soft_sign, is_rotary_drive};
+use crate::physics::excitation::{find_greatest_magnitude, has_variation, count_visits};
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Extra friction at creep speed.
@@ -13,14 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "F = level * sign(v) * s, s = exp(-(v / vs)^2), or exp(-|v| / vs) (exponential), or 1 / (1 + (v / vs)^2) (lorentzian), vs = stribeck_speed; in a power: P = level * |v| / vs * s; v in m/s, of a spindle in rad/s",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "level",
             "output",
             (0.0, f64::INFINITY),
             "extra friction near standstill",
             "接近静止时的附加摩擦",
         ),
-        ParameterDoc::shape(
+        ParameterDoc::new_shape(
             "stribeck_speed",
             "velocity",
             (1e-06, 1000.0),
@@ -57,31 +57,31 @@ impl Effect for Stribeck {
         &FALLS[1..]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(velocity) = motion(scene).filter(|velocity| varies(velocity)) else { return Vec::new() };
-        let top = greatest(&velocity);
-        let creeps = |speed: f64| visits(scene, |row| (0.02 * speed..speed).contains(&velocity[row].abs())) >= 3;
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(velocity) = read_motion(scene).filter(|velocity| has_variation(velocity)) else { return Vec::new() };
+        let top = find_greatest_magnitude(&velocity);
+        let creeps = |speed: f64| count_visits(scene, |row| (0.02 * speed..speed).contains(&velocity[row].abs())) >= 3;
         let speeds = [0.01, 0.03, 0.1, 0.2].into_iter().map(|share| share * top).filter(|speed| creeps(*speed));
         // How the film of a guide carries differs; of a spindle's bearings a long tail is but any bend over speed.
-        let falls = if turns(scene) { &FALLS[..1] } else { &FALLS };
-        let form = |name, speed| Form { name, ..Form::of(&[("stribeck_speed", speed)]) };
+        let falls = if is_rotary_drive(scene) { &FALLS[..1] } else { &FALLS };
+        let form = |name, speed| Form { name, ..Form::from_shape(&[("stribeck_speed", speed)]) };
         speeds.flat_map(|speed| falls.iter().map(move |name| form(*name, speed))).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let velocity = motion(scene)?;
-        let speed = form.value("stribeck_speed").unwrap_or(0.05 * greatest(&velocity)).max(f64::MIN_POSITIVE);
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        let velocity = read_motion(scene)?;
+        let speed = form.shape_value("stribeck_speed").unwrap_or(0.05 * find_greatest_magnitude(&velocity)).max(f64::MIN_POSITIVE);
         let law = |v: &f64| {
             let share = v / speed;
             let level = if is_power(scene) { share.abs() } else { soft_sign(share, 0.05) };
-            level * fall(form.name, share)
+            level * compute_falloff(form.name, share)
         };
         Some(vec![("level", velocity.iter().map(law).collect())])
     }
 
     fn default_form(&self, scene: &Scene) -> Form {
-        let top = motion(scene).map_or(1.0, |velocity| greatest(&velocity));
-        Form::of(&[("stribeck_speed", 0.05 * top)])
+        let top = read_motion(scene).map_or(1.0, |velocity| find_greatest_magnitude(&velocity));
+        Form::from_shape(&[("stribeck_speed", 0.05 * top)])
     }
 }
 
@@ -91,7 +91,7 @@ const LORENTZIAN: &str = "lorentzian";
 const FALLS: [&str; 3] = ["", EXPONENTIAL, LORENTZIAN];
 
 /// Share of the extra friction that is left at so many times the Stribeck speed.
-fn fall(form: &str, share: f64) -> f64 {
+fn compute_falloff(form: &str, share: f64) -> f64 {
     match form {
         EXPONENTIAL => (-share.abs()).exp(),
         LORENTZIAN => 1.0 / (1.0 + share * share),

@@ -1,6 +1,6 @@
 //! The mains go up and down, and some consumers with them.
 
-use crate::physics::excitation::varies;
+use crate::physics::excitation::has_variation;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Output that follows the supply voltage.
@@ -11,7 +11,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "supply_voltage",
     family: "measurement",
     law: "y = exponent * (U / U0 - 1) * S, S the simulated output, U0 the mean voltage",
-    parameters: &[ParameterDoc::linear(
+    parameters: &[ParameterDoc::new_linear(
         "exponent",
         "1",
         (-2.5, 2.5),
@@ -43,18 +43,18 @@ impl Effect for SupplyVoltage {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let swings = scene.role(Role::Voltage).is_some_and(varies);
-        if swings && scene.simulated().is_some() { vec![Form::plain()] } else { Vec::new() }
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let swings = scene.role_values(Role::Voltage).is_some_and(has_variation);
+        if swings && scene.simulated_output().is_some() { vec![Form::without_shape()] } else { Vec::new() }
     }
 
     fn own_column<'a>(&self, scene: &'a Scene) -> Option<&'a str> {
         scene.role_name(Role::Voltage)
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
-        let voltage = scene.role(Role::Voltage)?;
-        let simulated = scene.simulated()?;
+    fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
+        let voltage = scene.role_values(Role::Voltage)?;
+        let simulated = scene.simulated_output()?;
         let mean = voltage.iter().sum::<f64>() / voltage.len().max(1) as f64;
         if mean <= 0.0 {
             return None;

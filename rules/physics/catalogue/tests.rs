@@ -17,12 +17,12 @@ const PUBLIC: &str = "no_load_power cutting_power load_loss offset copper_loss i
 const WITHOUT_FORMS: [&str; 2] = ["ripple_alias", "runout"];
 
 pub(super) fn set(recording: &mut Recording, name: &str, law: impl Fn(usize) -> f64) {
-    let values = (0..recording.rows()).map(law).collect();
-    recording.set_column(name, Cells::Numbers(Numbers::full(values)));
+    let values = (0..recording.count_rows()).map(law).collect();
+    recording.set_column(name, Cells::Numbers(Numbers::from_values(values)));
 }
 
 pub(super) fn set_words(recording: &mut Recording, name: &str, law: impl Fn(usize) -> String) {
-    let words: Vec<String> = (0..recording.rows()).map(law).collect();
+    let words: Vec<String> = (0..recording.count_rows()).map(law).collect();
     recording.set_column(name, Cells::Words(words.iter().map(String::as_str).collect::<Words>()));
 }
 
@@ -65,7 +65,7 @@ fn rich(output: &str) -> Scene {
 
 /// The first column that an effect makes.
 pub(super) fn column(effect: &dyn Effect, scene: &Scene, form: &Form) -> Vec<f64> {
-    effect.columns(scene, form).expect("makes columns").swap_remove(0).1
+    effect.compute_columns(scene, form).expect("makes columns").swap_remove(0).1
 }
 
 /// A scene as a model would show it: with a load, a simulation and a vertical axis.
@@ -73,19 +73,19 @@ pub(super) fn scene(recording: &Recording, output: &str) -> Scene {
     let roles = BTreeMap::from([(Role::Vertical, "z".to_owned())]);
     let mut scene = Scene::new(recording, output, &roles).expect("the output is recorded");
     let depth = |row: usize| scene.column("depth_of_cut_mm").map_or(1.0, |depth| depth[row]);
-    let engaged = |row: usize| scene.role(Role::Engaged).map_or(0.0, |engaged| engaged[row]);
+    let engaged = |row: usize| scene.role_values(Role::Engaged).map_or(0.0, |engaged| engaged[row]);
     let cut = (0..scene.rows()).map(|row| 800.0 * engaged(row) * depth(row)).collect();
-    let simulated = scene.recorded().iter().map(|value| 1.1 * value - 50.0).collect();
+    let simulated = scene.recorded_output().iter().map(|value| 1.1 * value - 50.0).collect();
     scene.set_load(Some(cut));
     scene.set_simulated(Some(simulated));
     scene
 }
 
 fn columns_of(effect: &dyn Effect, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-    let columns = effect.columns(scene, form)?;
+    let columns = effect.compute_columns(scene, form)?;
     let kind = effect.doc().kind;
     for (name, column) in &columns {
-        let parameter = effect.doc().parameter(name);
+        let parameter = effect.doc().find_parameter(name);
         assert!(parameter.is_some_and(|parameter| parameter.entry == Entry::Linear), "{kind}.{name} is not declared");
         assert_eq!(column.len(), scene.rows(), "{kind}.{name}");
         assert!(column.iter().all(|value| value.is_finite()), "{kind}.{name} {form:?} is not finite");
@@ -95,11 +95,11 @@ fn columns_of(effect: &dyn Effect, scene: &Scene, form: &Form) -> Option<Paramet
 
 fn check_scene(scene: &Scene) {
     for effect in CATALOGUE {
-        for form in effect.forms(scene) {
+        for form in effect.propose_forms(scene) {
             let columns = columns_of(*effect, scene, &form);
             assert!(columns.is_some(), "{} offers {form:?} but cannot make it", effect.doc().kind);
         }
-        for form in [effect.default_form(scene), Form::plain()] {
+        for form in [effect.default_form(scene), Form::without_shape()] {
             columns_of(*effect, scene, &form);
         }
     }
@@ -135,7 +135,7 @@ fn every_effect_is_told_completely_in_both_languages() {
         assert!(doc.law.is_ascii() && !doc.law.is_empty() && !doc.source.is_empty(), "{}", doc.kind);
         assert!(doc.experiment_minutes > 0.0 && !doc.rivals.is_empty(), "{}", doc.kind);
         for rival in doc.rivals {
-            assert!(super::effect(rival).is_some() && *rival != doc.kind, "{} has no rival {rival}", doc.kind);
+            assert!(super::find_effect(rival).is_some() && *rival != doc.kind, "{} has no rival {rival}", doc.kind);
         }
     }
 }
@@ -161,9 +161,9 @@ fn shapes_of_forms_are_declared_and_in_range() {
     for output in ["spindle_power_w", "axis_current_a", "thermal_error_um"] {
         let scene = rich(output);
         for effect in CATALOGUE {
-            for form in effect.forms(&scene).iter().chain([&effect.default_form(&scene)]) {
+            for form in effect.propose_forms(&scene).iter().chain([&effect.default_form(&scene)]) {
                 for (name, value) in &form.shape {
-                    let parameter = effect.doc().parameter(name).expect("declared");
+                    let parameter = effect.doc().find_parameter(name).expect("declared");
                     assert_eq!(parameter.entry, Entry::Shape);
                     let (low, high) = parameter.range;
                     assert!((low..=high).contains(value), "{} {name} = {value}", effect.doc().kind);
@@ -181,12 +181,12 @@ fn whatever_changes_with_the_load_says_so() {
         let mut heavier = scene.clone();
         heavier.set_load(scene.load().map(|load| load.iter().map(|load| 1.3 * load + load.signum()).collect()));
         for effect in CATALOGUE {
-            for form in effect.forms(&scene).iter().chain([&effect.default_form(&scene)]) {
-                let changes = effect.columns(&scene, form) != effect.columns(&heavier, form);
+            for form in effect.propose_forms(&scene).iter().chain([&effect.default_form(&scene)]) {
+                let changes = effect.compute_columns(&scene, form) != effect.compute_columns(&heavier, form);
                 assert!(!changes || effect.reads_load(), "{} {form:?}", effect.doc().kind);
                 let mut lossy = scene.clone();
                 lossy.set_load_at_output(heavier.load().map(<[f64]>::to_vec));
-                let changes = effect.columns(&scene, form) != effect.columns(&lossy, form);
+                let changes = effect.compute_columns(&scene, form) != effect.compute_columns(&lossy, form);
                 assert!(!changes || effect.reads_load_at_output(), "{} {form:?}", effect.doc().kind);
             }
         }
@@ -198,7 +198,7 @@ fn a_rich_recording_offers_every_effect_somewhere() {
     let outputs = ["total_power_w", "axis_current_a", "thermal_error_um", "feed_override_pct", "cutting_force_n"];
     let scenes: Vec<Scene> = outputs.iter().map(|output| rich(output)).collect();
     scenes.iter().for_each(check_scene);
-    let offered = |effect: &&&dyn Effect| scenes.iter().any(|scene| !effect.forms(scene).is_empty());
+    let offered = |effect: &&&dyn Effect| scenes.iter().any(|scene| !effect.propose_forms(scene).is_empty());
     let silent: BTreeSet<&str> =
         CATALOGUE.iter().filter(|effect| !offered(effect)).map(|effect| effect.doc().kind).collect();
     assert_eq!(silent, BTreeSet::from(WITHOUT_FORMS));

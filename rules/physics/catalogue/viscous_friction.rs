@@ -1,7 +1,7 @@
 //! Friction that grows in proportion to speed.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{is_power, motion};
+use crate::physics::drive::{is_power, read_motion};
 use crate::physics::excitation::plain_where_it_varies;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -13,7 +13,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "viscous_friction",
     family: "axis",
     law: "F = coefficient * v; in a power: P = coefficient * v^2; v in m/s, of a spindle in rad/s",
-    parameters: &[ParameterDoc::linear(
+    parameters: &[ParameterDoc::new_linear(
         "coefficient",
         "friction/velocity",
         (0.0, f64::INFINITY),
@@ -49,12 +49,12 @@ impl Effect for ViscousFriction {
         true
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         plain_where_it_varies(self, scene)
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
-        let velocity = motion(scene)?;
+    fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
+        let velocity = read_motion(scene)?;
         let law = |v: &f64| if is_power(scene) { v * v } else { *v };
         Some(vec![("coefficient", velocity.iter().map(law).collect())])
     }

@@ -1,7 +1,7 @@
 //! Air drag on spindle, chuck and fan: grows with the cube of speed.
 
 use crate::physics::drive::{driven_krpm, speed_to_the};
-use crate::physics::excitation::varies;
+use crate::physics::excitation::has_variation;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Air drag of what turns.
@@ -13,8 +13,8 @@ static DOC: EffectDoc = EffectDoc {
     family: "spindle",
     law: "P = level * (n / 1000 rpm)^p; a torque or current output takes one exponent less",
     parameters: &[
-        ParameterDoc::linear("level", "output", (0.0, f64::INFINITY), "drag at 1000 rpm", "1000 rpm时的风阻"),
-        ParameterDoc::shape("p", "1", (2.5, 3.2), "exponent of speed", "转速指数"),
+        ParameterDoc::new_linear("level", "output", (0.0, f64::INFINITY), "drag at 1000 rpm", "1000 rpm时的风阻"),
+        ParameterDoc::new_shape("p", "1", (2.5, 3.2), "exponent of speed", "转速指数"),
     ],
     needs: &["speed"],
     source: "turbulent drag on a rotating body: exponent 2.6 (smooth) to 3 (chuck, fan)",
@@ -41,12 +41,12 @@ impl Effect for Windage {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let turns = driven_krpm(scene).is_some_and(|krpm| varies(&krpm));
-        if turns { vec![Form::of(&[("p", 3.0)]), Form::of(&[("p", 2.6)])] } else { Vec::new() }
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
+        let turns = driven_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
+        if turns { vec![Form::from_shape(&[("p", 3.0)]), Form::from_shape(&[("p", 2.6)])] } else { Vec::new() }
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        Some(vec![("level", speed_to_the(scene, form.value("p").unwrap_or(3.0))?)])
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+        Some(vec![("level", speed_to_the(scene, form.shape_value("p").unwrap_or(3.0))?)])
     }
 }

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 pub struct ZeroDrift;
 
 /// A coefficient of a wander or a bend.
-const fn wave(name: &'static str, en: &'static str, zh: &'static str) -> ParameterDoc {
+const fn define_wave_coefficient(name: &'static str, en: &'static str, zh: &'static str) -> ParameterDoc {
     let range = (f64::NEG_INFINITY, f64::INFINITY);
     ParameterDoc { name, unit: "output", entry: Entry::Linear, range, en, zh }
 }
@@ -26,40 +26,40 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "linear: y = drift * (share of the recording - 1/2); bent: the same with other paces from each quarter on; settling: y = settled * (1 - exp(-t/tau)); wander: y = sum of c_k cos(k pi share), k up to 4, restless: up to 8",
     parameters: &[
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "drift",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "change over the recording",
             "整个记录期间的变化量",
         ),
-        ParameterDoc::linear(
+        ParameterDoc::new_linear(
             "settled",
             "output",
             (f64::NEG_INFINITY, f64::INFINITY),
             "change once settled",
             "稳定后的变化量",
         ),
-        wave(
+        define_wave_coefficient(
             "bend_1",
             "change of pace at a quarter of the recording, over its whole length",
             "记录四分之一处速率的变化",
         ),
-        wave("bend_2", "change of pace at the middle of the recording, over its whole length", "记录中点处速率的变化"),
-        wave(
+        define_wave_coefficient("bend_2", "change of pace at the middle of the recording, over its whole length", "记录中点处速率的变化"),
+        define_wave_coefficient(
             "bend_3",
             "change of pace at three quarters of the recording, over its whole length",
             "记录四分之三处速率的变化",
         ),
-        wave("c1", "wander with 1 half waves over the recording", "整个记录内1个半波的缓变"),
-        wave("c2", "wander with 2 half waves over the recording", "整个记录内2个半波的缓变"),
-        wave("c3", "wander with 3 half waves over the recording", "整个记录内3个半波的缓变"),
-        wave("c4", "wander with 4 half waves over the recording", "整个记录内4个半波的缓变"),
-        wave("c5", "wander with 5 half waves over the recording", "整个记录内5个半波的缓变"),
-        wave("c6", "wander with 6 half waves over the recording", "整个记录内6个半波的缓变"),
-        wave("c7", "wander with 7 half waves over the recording", "整个记录内7个半波的缓变"),
-        wave("c8", "wander with 8 half waves over the recording", "整个记录内8个半波的缓变"),
-        ParameterDoc::shape("tau_s", "s", (60.0, 14400.0), "time constant of settling", "稳定时间常数"),
+        define_wave_coefficient("c1", "wander with 1 half waves over the recording", "整个记录内1个半波的缓变"),
+        define_wave_coefficient("c2", "wander with 2 half waves over the recording", "整个记录内2个半波的缓变"),
+        define_wave_coefficient("c3", "wander with 3 half waves over the recording", "整个记录内3个半波的缓变"),
+        define_wave_coefficient("c4", "wander with 4 half waves over the recording", "整个记录内4个半波的缓变"),
+        define_wave_coefficient("c5", "wander with 5 half waves over the recording", "整个记录内5个半波的缓变"),
+        define_wave_coefficient("c6", "wander with 6 half waves over the recording", "整个记录内6个半波的缓变"),
+        define_wave_coefficient("c7", "wander with 7 half waves over the recording", "整个记录内7个半波的缓变"),
+        define_wave_coefficient("c8", "wander with 8 half waves over the recording", "整个记录内8个半波的缓变"),
+        ParameterDoc::new_shape("tau_s", "s", (60.0, 14400.0), "time constant of settling", "稳定时间常数"),
     ],
     needs: &[],
     source: "meter electronics: 5-40 W over 10-60 min with cabinet temperature",
@@ -94,23 +94,23 @@ impl Effect for ZeroDrift {
         &["linear", "settling", "bent", "wander", "restless"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         if scene.rows() < 20 {
             return Vec::new();
         }
         let whole_s = recording_elapsed_s(scene).last().copied().unwrap_or(0.0);
-        let mut forms = vec![Form { name: "linear", ..Form::plain() }];
+        let mut forms = vec![Form { name: "linear", ..Form::without_shape() }];
         let grid = [600.0, 1200.0, 2400.0, 4800.0].into_iter().filter(|tau_s| *tau_s < 0.5 * whole_s);
-        forms.extend(grid.map(|tau_s| Form { name: "settling", ..Form::of(&[("tau_s", tau_s)]) }));
-        forms.extend(["bent", "wander", "restless"].map(|name| Form { name, ..Form::plain() }));
+        forms.extend(grid.map(|tau_s| Form { name: "settling", ..Form::from_shape(&[("tau_s", tau_s)]) }));
+        forms.extend(["bent", "wander", "restless"].map(|name| Form { name, ..Form::without_shape() }));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let share = recording_share(scene);
         match form.name {
             "settling" => {
-                let tau_s = form.value("tau_s").unwrap_or(1200.0);
+                let tau_s = form.shape_value("tau_s").unwrap_or(1200.0);
                 let elapsed_s = recording_elapsed_s(scene);
                 Some(vec![("settled", elapsed_s.iter().map(|t| 1.0 - (-t / tau_s).exp()).collect())])
             }

@@ -72,13 +72,13 @@ impl Role {
 
     /// The role of this name.
     #[must_use]
-    pub fn of(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|role| role.name() == name)
     }
 
     /// The channels that play the role by their meaning, best first.
     #[must_use]
-    pub fn defaults(self) -> &'static [&'static str] {
+    pub fn default_channels(self) -> &'static [&'static str] {
         match self {
             Self::Speed => &["spindle_speed_rpm", "motor_speed_rpm", "spindle_programmed_rpm"],
             Self::Acceleration => &["acceleration_m_s2", "axis_acceleration_mm_s2"],
@@ -110,8 +110,8 @@ pub enum OutputKind {
 impl OutputKind {
     /// From the quantity that the output's name tells.
     #[must_use]
-    pub fn of(output: &str) -> Self {
-        match Quantity::of(output) {
+    pub fn from_output_name(output: &str) -> Self {
+        match Quantity::from_column_name(output) {
             Quantity::Displacement => Self::Displacement,
             Quantity::Power => Self::Power,
             Quantity::Force | Quantity::Torque | Quantity::Current | Quantity::Load => Self::Force,
@@ -134,7 +134,7 @@ pub enum SceneError {
 }
 
 /// A recording seen by the effects. Gaps of an input are filled by holding the last value within the run (a run's
-/// head by the first value that comes); [`Scene::usable`] tells where an output value stands.
+/// head by the first value that comes); [`Scene::usable_rows`] tells where an output value stands.
 #[derive(Debug, Clone)]
 pub struct Scene {
     rows: usize,
@@ -171,15 +171,15 @@ impl Scene {
     /// [`SceneError::NoOutput`] when the output is not recorded.
     pub fn new(recording: &Recording, output: &str, roles: &BTreeMap<Role, String>) -> Result<Self, SceneError> {
         let recording = with_derived(recording.clone());
-        let measured = recording.numbers(output).ok_or_else(|| SceneError::NoOutput {
+        let measured = recording.find_numbers(output).ok_or_else(|| SceneError::NoOutput {
             output: output.to_owned(),
             hint: format!("Record the channel {output}, or name another output in the model."),
         })?;
-        let runs = recording.runs();
+        let runs = recording.list_runs();
         let run_names = runs.iter().map(|run| run.name.clone()).collect();
         let runs: Vec<Range<usize>> = runs.into_iter().map(|run| run.rows).collect();
         let mut scene = Self {
-            rows: recording.rows(),
+            rows: recording.count_rows(),
             time_s: recording.time_s.clone(),
             clock_s: running_clock_s(&recording, &runs),
             latent: BTreeMap::new(),
@@ -225,7 +225,7 @@ impl Scene {
 
     fn take_roles(&mut self, declared: &BTreeMap<Role, String>) {
         for role in Role::ALL {
-            let default = role.defaults().iter().find(|name| self.columns.contains_key(**name));
+            let default = role.default_channels().iter().find(|name| self.columns.contains_key(**name));
             let column = declared.get(&role).cloned().or_else(|| default.map(|name| (*name).to_owned()));
             if let Some(column) = column {
                 self.roles.insert(role, column);
@@ -237,9 +237,9 @@ impl Scene {
     /// engaged (surface speed held on another diameter) or of what holds an axis in its place (another diameter at the
     /// same speed) starts a new one.
     fn find_passes(&self) -> Vec<Range<usize>> {
-        let Some(engaged) = self.role(Role::Engaged) else { return Vec::new() };
-        let speed = self.role(Role::Speed);
-        let named = self.words("pass");
+        let Some(engaged) = self.role_values(Role::Engaged) else { return Vec::new() };
+        let speed = self.role_values(Role::Speed);
+        let named = self.text_column("pass");
         let moved = super::tool_load::moved_rows(self);
         let steps = |row: usize| {
             speed.is_some_and(|n| (n[row] - n[row - 1]).abs() > PASS_JUMP * n[row - 1].abs())
@@ -328,19 +328,19 @@ impl Scene {
 
     /// Where a quantity has no value of its own (the filled value is held).
     #[must_use]
-    pub fn absent(&self, name: &str) -> Option<&[bool]> {
+    pub fn absent_rows(&self, name: &str) -> Option<&[bool]> {
         self.absent.get(name).map(Vec::as_slice)
     }
 
     /// A text column by its name.
     #[must_use]
-    pub fn words(&self, name: &str) -> Option<&Words> {
+    pub fn text_column(&self, name: &str) -> Option<&Words> {
         self.words.get(name)
     }
 
     /// The quantity that plays this role.
     #[must_use]
-    pub fn role(&self, role: Role) -> Option<&[f64]> {
+    pub fn role_values(&self, role: Role) -> Option<&[f64]> {
         self.column(self.roles.get(&role)?)
     }
 
@@ -352,30 +352,30 @@ impl Scene {
 
     /// The simulated output's name.
     #[must_use]
-    pub fn output(&self) -> &str {
+    pub fn output_name(&self) -> &str {
         &self.output
     }
 
     /// What kind of quantity the output is.
     #[must_use]
     pub fn output_kind(&self) -> OutputKind {
-        OutputKind::of(&self.output)
+        OutputKind::from_output_name(&self.output)
     }
 
-    /// The recorded output; meaningful only where [`Scene::usable`].
+    /// The recorded output; meaningful only where [`Scene::usable_rows`].
     #[must_use]
-    pub fn recorded(&self) -> &[f64] {
+    pub fn recorded_output(&self) -> &[f64] {
         &self.recorded
     }
 
     /// Rows with a recorded output.
     #[must_use]
-    pub fn usable(&self) -> &[bool] {
+    pub fn usable_rows(&self) -> &[bool] {
         &self.usable
     }
 
     /// Takes rows out of the comparison (spikes, dropouts, absent inputs).
-    pub fn exclude(&mut self, rows: impl IntoIterator<Item = usize>) {
+    pub fn exclude_rows(&mut self, rows: impl IntoIterator<Item = usize>) {
         rows.into_iter().for_each(|row| self.usable[row] = false);
     }
 
@@ -389,7 +389,7 @@ impl Scene {
     /// `load`. `None` when nothing tells how hard the cut is.
     #[must_use]
     pub fn load(&self) -> Option<&[f64]> {
-        self.load.as_deref().or_else(|| self.role(Role::Load))
+        self.load.as_deref().or_else(|| self.role_values(Role::Load))
     }
 
     /// Sets what the model simulates as the cut.
@@ -412,14 +412,14 @@ impl Scene {
     /// The state that nobody records of an effect of this kind, per row, where a search has found one: how present a
     /// hidden switch is (0 to 1), the height of a wandering wave (unit of the output).
     #[must_use]
-    pub fn latent(&self, kind: &str) -> Option<&[f64]> {
+    pub fn latent_state(&self, kind: &str) -> Option<&[f64]> {
         self.latent.get(kind).map(Vec::as_slice)
     }
 
     /// The same, zero in every row where none has been found.
     #[must_use]
     pub fn latent_or_zero(&self, kind: &str) -> Vec<f64> {
-        self.latent(kind).map_or_else(|| vec![0.0; self.rows()], <[f64]>::to_vec)
+        self.latent_state(kind).map_or_else(|| vec![0.0; self.rows()], <[f64]>::to_vec)
     }
 
     /// Sets the hidden state of an effect.
@@ -442,7 +442,7 @@ impl Scene {
     #[must_use]
     pub fn usual_cut(&self) -> f64 {
         *self.usual_cut.get_or_init(|| {
-            let Some(engaged) = self.role(Role::Engaged) else { return 1.0 };
+            let Some(engaged) = self.role_values(Role::Engaged) else { return 1.0 };
             let middle = |cutting: bool| {
                 let rows = (0..self.rows).filter(|row| self.usable[*row] && (engaged[*row] > 0.5) == cutting);
                 crate::statistics::quantile(rows.map(|row| self.recorded[row].abs()), 0.5)
@@ -456,12 +456,12 @@ impl Scene {
     /// `None` when no feed drive tells.
     #[must_use]
     pub fn feed_load_growth(&self) -> Option<&[f64]> {
-        self.feed_load_growth.get_or_init(|| super::tool_load::growth(self)).as_deref()
+        self.feed_load_growth.get_or_init(|| super::tool_load::estimate_growth(self)).as_deref()
     }
 
     /// The output as the model simulates it, for effects of the measurement.
     #[must_use]
-    pub fn simulated(&self) -> Option<&[f64]> {
+    pub fn simulated_output(&self) -> Option<&[f64]> {
         self.simulated.as_deref()
     }
 

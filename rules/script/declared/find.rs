@@ -1,10 +1,10 @@
 //! The declarations of a text, and the text with values in their place.
 
-use super::scan::{calls, position};
+use super::scan::{find_calls, to_position};
 use super::{Declared, Per, SettingValue};
 use crate::script::compile::ScriptFile;
-use crate::script::problem::{self, ScriptProblem, spoken};
-use adapters::channel::nearest;
+use crate::script::problem::{self, ScriptProblem, describe_type};
+use adapters::channel::find_nearest_name;
 use rhai::{Array, Dynamic, Engine, Expr, ImmutableString, Map, Position, Stmt};
 use std::ops::Range;
 
@@ -29,10 +29,13 @@ pub(in crate::script) struct FoundDeclaration {
 ///
 /// # Errors
 /// Everything that is wrong with them.
-pub(in crate::script) fn find(file: &ScriptFile, engine: &Engine) -> Result<Vec<FoundDeclaration>, Vec<ScriptProblem>> {
+pub(in crate::script) fn find_declarations(
+    file: &ScriptFile,
+    engine: &Engine,
+) -> Result<Vec<FoundDeclaration>, Vec<ScriptProblem>> {
     let (mut found, mut problems): (Vec<FoundDeclaration>, Vec<ScriptProblem>) = (Vec::new(), Vec::new());
-    for call in calls(&file.text, "setting") {
-        let at = position(&file.text, call.span.start);
+    for call in find_calls(&file.text, "setting") {
+        let at = to_position(&file.text, call.span.start);
         let wrong = |what: String, next: String| ScriptProblem::new(&file.name, at, what, next);
         let read = read(&file.text[call.span.clone()], engine).and_then(|mut declared| {
             if found.iter().any(|known| known.declared.name == declared.name) {
@@ -44,7 +47,7 @@ pub(in crate::script) fn find(file: &ScriptFile, engine: &Engine) -> Result<Vec<
         });
         match read {
             Ok(declared) => {
-                let constant = constant(&file.text, &call.span);
+                let constant = find_constant(&file.text, &call.span);
                 found.push(FoundDeclaration { declared, span: call.span, constant });
             }
             Err((what, next)) => problems.push(wrong(what, next)),
@@ -69,7 +72,7 @@ pub(in crate::script) fn with_values(
     for (index, (it, value)) in found.iter().zip(values).enumerate() {
         filled.push_str(&text[from..it.span.start]);
         let value = match value {
-            Some(SettingValue::Number(number)) => super::literal(*number),
+            Some(SettingValue::Number(number)) => super::format_literal(*number),
             Some(SettingValue::Text(text)) => format!("{text:?}"),
             None => format!("setting_now({index})"),
         };
@@ -85,7 +88,7 @@ pub(in crate::script) fn with_values(
 }
 
 /// The constant before `= setting(...);`.
-fn constant(text: &str, span: &Range<usize>) -> Option<String> {
+fn find_constant(text: &str, span: &Range<usize>) -> Option<String> {
     let before = text[..span.start].trim_end().strip_suffix('=')?.trim_end();
     let name = before.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next()?;
     let word = before[..before.len() - name.len()].trim_end();
@@ -112,9 +115,9 @@ fn read(call: &str, engine: &Engine) -> Result<Declared, Wrong> {
         return Err((what.to_owned(), example()));
     };
     let Some(map) = map.read_lock::<Map>().map(|map| map.clone()) else {
-        return Err((format!("what is said of a setting is a map, not {}", spoken(&map)), example()));
+        return Err((format!("what is said of a setting is a map, not {}", describe_type(&map)), example()));
     };
-    declared(name_of(&name)?, &default, &map)
+    read_declared(name_of(&name)?, &default, &map)
 }
 
 fn name_of(name: &Dynamic) -> Result<String, Wrong> {
@@ -122,45 +125,49 @@ fn name_of(name: &Dynamic) -> Result<String, Wrong> {
     let fits = name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
         && name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.len() <= NAME_MAX
-        && !Per::ALL.iter().any(|per| per.word() == name);
+        && !Per::ALL.iter().any(|per| per.as_word() == name);
     let next =
         format!("use a to z, 0 to 9 and _, beginning with a letter, at most {NAME_MAX}, not `tool` or `operation`");
     if fits { Ok(name) } else { Err((format!("{name:?} cannot be the name of a setting"), next)) }
 }
 
-fn declared(name: String, default: &Dynamic, map: &Map) -> Result<Declared, Wrong> {
+fn read_declared(name: String, default: &Dynamic, map: &Map) -> Result<Declared, Wrong> {
     if let Some(key) = map.keys().find(|key| !KEYS.contains(&key.as_str())) {
-        let near = nearest(key, KEYS)
+        let near = find_nearest_name(key, KEYS)
             .map_or_else(|| format!("these are: {}", KEYS.join(", ")), |near| format!("did you mean {near}?"));
         return Err((format!("`{key}` says nothing of a setting"), near));
     }
     let missing = |key: &str| (format!("the setting {name} has no {key}"), EXAMPLE.to_owned());
-    let text = |key: &str| text(map.get(key)).filter(|text| !text.is_empty());
+    let text = |key: &str| read_text(map.get(key)).filter(|text| !text.is_empty());
     let (en, zh) = (text("en").ok_or_else(|| missing("en"))?, text("zh").ok_or_else(|| missing("zh"))?);
-    let number = number(default);
+    let number = read_number(default);
     let (default, unit, range) = match number {
         Some(number) => {
-            let limit =
-                |key: &str| map.get(key).and_then(self::number).filter(|it| it.is_finite()).ok_or_else(|| missing(key));
+            let limit = |key: &str| {
+                map.get(key).and_then(self::read_number).filter(|it| it.is_finite()).ok_or_else(|| missing(key))
+            };
             let range = (limit("min")?, limit("max")?);
             (SettingValue::Number(number), text("unit").ok_or_else(|| missing("unit"))?, Some(range))
         }
         None => {
-            let written = self::text(Some(default));
+            let written = self::read_text(Some(default));
             let kind = || {
-                (format!("the default of {name} is {}; it is a number or a text", spoken(default)), EXAMPLE.to_owned())
+                (
+                    format!("the default of {name} is {}; it is a number or a text", describe_type(default)),
+                    EXAMPLE.to_owned(),
+                )
             };
             (SettingValue::Text(written.ok_or_else(kind)?), String::new(), None)
         }
     };
     let whole = map.get("whole").is_some_and(|it| it.as_bool().unwrap_or(false));
-    let per = words(map.get("per")).iter().map(|word| per(&name, word)).collect::<Result<_, _>>()?;
-    let (script, one_of) = (String::new(), words(map.get("one_of")));
+    let per = read_words(map.get("per")).iter().map(|word| read_per(&name, word)).collect::<Result<_, _>>()?;
+    let (script, one_of) = (String::new(), read_words(map.get("one_of")));
     let declared = Declared { script, name, default, unit, range, whole, one_of, en, zh, per, line: 0 };
     if let Some((least, greatest)) = declared.range.filter(|(least, greatest)| least >= greatest) {
         return Err((format!("the range of {} is empty: {least} to {greatest}", declared.name), EXAMPLE.to_owned()));
     }
-    match declared.refuse(&declared.default) {
+    match declared.explain_refusal(&declared.default) {
         Some((what, _)) => {
             Err((format!("the default is not allowed: {}", what.trim_start_matches('.')), EXAMPLE.to_owned()))
         }
@@ -168,22 +175,22 @@ fn declared(name: String, default: &Dynamic, map: &Map) -> Result<Declared, Wron
     }
 }
 
-fn per(name: &str, word: &str) -> Result<Per, Wrong> {
-    let known = Per::ALL.into_iter().find(|per| per.word() == word);
+fn read_per(name: &str, word: &str) -> Result<Per, Wrong> {
+    let known = Per::ALL.into_iter().find(|per| per.as_word() == word);
     known.ok_or_else(|| {
         (format!("{name}: {word:?} has no settings of its own"), "write per: [\"tool\", \"operation\"]".to_owned())
     })
 }
 
-fn number(value: &Dynamic) -> Option<f64> {
+fn read_number(value: &Dynamic) -> Option<f64> {
     value.as_float().ok().or_else(|| value.as_int().ok().map(|whole| whole as f64))
 }
 
-fn text(value: Option<&Dynamic>) -> Option<String> {
+fn read_text(value: Option<&Dynamic>) -> Option<String> {
     value?.read_lock::<ImmutableString>().map(|text| text.to_string())
 }
 
-fn words(value: Option<&Dynamic>) -> Vec<String> {
+fn read_words(value: Option<&Dynamic>) -> Vec<String> {
     let list = value.and_then(|value| value.read_lock::<Array>());
-    list.map(|list| list.iter().filter_map(|word| text(Some(word))).collect()).unwrap_or_default()
+    list.map(|list| list.iter().filter_map(|word| read_text(Some(word))).collect()).unwrap_or_default()
 }

@@ -21,13 +21,13 @@ pub(in crate::script) struct Force {
 impl Force {
     /// The values of this file for these declarations. One that the declaration does not allow is left out: it is a problem of
     /// the file.
-    pub(in crate::script) fn of(found: &[FoundDeclaration], values: &SettingValues) -> Self {
+    pub(in crate::script) fn from_values(found: &[FoundDeclaration], values: &SettingValues) -> Self {
         let mut force = Self::default();
         for (index, it) in found.iter().enumerate() {
             let declared = &it.declared;
-            let allowed = |place: &DeclarationPlace| allowed(declared, values, place);
+            let allowed = |place: &DeclarationPlace| find_allowed(declared, values, place);
             let machine = allowed(&DeclarationPlace::Machine).unwrap_or_else(|| declared.default.clone());
-            let places = values.places(declared.section()).into_iter();
+            let places = values.list_places(declared.section()).into_iter();
             let special: Vec<(DeclarationPlace, SettingValue)> = places
                 .filter(|place| place.per().is_some_and(|per| declared.per.contains(&per)))
                 .filter_map(|place| Some((allowed(&place)?, place)))
@@ -41,15 +41,15 @@ impl Force {
     }
 
     /// The values of the machine, or of one place, all of them in the text.
-    pub(in crate::script) fn fixed(
+    pub(in crate::script) fn with_fixed_values(
         found: &[FoundDeclaration],
         values: &SettingValues,
         place: &DeclarationPlace,
     ) -> Self {
         let text = |it: &FoundDeclaration| {
             let declared = &it.declared;
-            let own =
-                allowed(declared, values, place).or_else(|| allowed(declared, values, &DeclarationPlace::Machine));
+            let own = find_allowed(declared, values, place)
+                .or_else(|| find_allowed(declared, values, &DeclarationPlace::Machine));
             own.unwrap_or_else(|| declared.default.clone())
         };
         let texts: Vec<Option<SettingValue>> = found.iter().map(|it| Some(text(it))).collect();
@@ -59,9 +59,9 @@ impl Force {
 }
 
 /// The value that the file has for this place, where the declaration allows it.
-fn allowed(declared: &Declared, values: &SettingValues, place: &DeclarationPlace) -> Option<SettingValue> {
-    let value = values.of(declared.section(), &declared.name, place)?;
-    declared.refuse(value).is_none().then(|| value.clone())
+fn find_allowed(declared: &Declared, values: &SettingValues, place: &DeclarationPlace) -> Option<SettingValue> {
+    let value = values.find_value(declared.section(), &declared.name, place)?;
+    declared.explain_refusal(value).is_none().then(|| value.clone())
 }
 
 /// Values that depend on the tool or the operation.
@@ -82,12 +82,12 @@ impl LiveValues {
         machine: &SettingValue,
         special: Vec<(DeclarationPlace, SettingValue)>,
     ) {
-        self.machine.push(if special.is_empty() { Dynamic::UNIT } else { dynamic(machine) });
+        self.machine.push(if special.is_empty() { Dynamic::UNIT } else { to_dynamic(machine) });
         if let Some(constant) = constant.filter(|_| !special.is_empty()) {
             self.constants.push((constant.to_owned(), index));
         }
         for (place, value) in special {
-            self.special.entry(place).or_default().push((index, dynamic(&value)));
+            self.special.entry(place).or_default().push((index, to_dynamic(&value)));
         }
     }
 
@@ -102,16 +102,16 @@ impl LiveValues {
     }
 
     /// The values for one place.
-    pub(in crate::script) fn of(&self, place: &DeclarationPlace) -> Arc<[Dynamic]> {
+    pub(in crate::script) fn values_for_place(&self, place: &DeclarationPlace) -> Arc<[Dynamic]> {
         match place {
-            DeclarationPlace::Machine => self.values(None, None),
-            DeclarationPlace::Tool(tool) => self.values(Some(tool), None),
-            DeclarationPlace::Operation(operation) => self.values(None, Some(operation)),
+            DeclarationPlace::Machine => self.compose_values(None, None),
+            DeclarationPlace::Tool(tool) => self.compose_values(Some(tool), None),
+            DeclarationPlace::Operation(operation) => self.compose_values(None, Some(operation)),
         }
     }
 
     /// The values for this tool, or the tool of this edge, and this operation; the operation goes before the tool.
-    fn values(&self, tool: Option<&str>, operation: Option<&str>) -> Arc<[Dynamic]> {
+    fn compose_values(&self, tool: Option<&str>, operation: Option<&str>) -> Arc<[Dynamic]> {
         let mut values = self.machine.clone();
         let places = [
             tool.map(|edge| DeclarationPlace::Tool(tool_of(edge).to_owned())),
@@ -125,7 +125,7 @@ impl LiveValues {
     }
 }
 
-fn dynamic(value: &SettingValue) -> Dynamic {
+fn to_dynamic(value: &SettingValue) -> Dynamic {
     match value {
         SettingValue::Number(number) => Dynamic::from_float(*number),
         SettingValue::Text(text) => text.as_str().into(),
@@ -142,13 +142,13 @@ pub(in crate::script) struct Now {
 
 impl Now {
     /// The values for this sample.
-    pub(in crate::script) fn step(&mut self, live: &LiveValues, sample: &Sample) -> Arc<[Dynamic]> {
-        let text = |name: &str| ChannelId::of(name).and_then(|id| sample.text(id));
+    pub(in crate::script) fn update_values(&mut self, live: &LiveValues, sample: &Sample) -> Arc<[Dynamic]> {
+        let text = |name: &str| ChannelId::from_name(name).and_then(|id| sample.text(id));
         let (tool, operation) = (text("tool"), text("operation"));
         match &self.values {
             Some(values) if self.tool.as_deref() == tool && self.operation.as_deref() == operation => values.clone(),
             _ => {
-                let values = live.values(tool, operation);
+                let values = live.compose_values(tool, operation);
                 (self.tool, self.operation) = (tool.map(str::to_owned), operation.map(str::to_owned));
                 self.values.insert(values).clone()
             }

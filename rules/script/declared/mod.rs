@@ -27,11 +27,11 @@ mod force;
 pub(super) mod scan;
 mod values;
 
-pub(super) use find::{FoundDeclaration, find, with_values};
+pub(super) use find::{FoundDeclaration, find_declarations, with_values};
 pub(super) use force::{Force, LiveValues, Now};
 pub use values::{DeclarationPlace, SETTINGS_TEXT_MAX, SettingValues};
 
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use std::fmt;
 
 /// Longest text that a setting takes, characters.
@@ -50,14 +50,14 @@ impl fmt::Display for SettingValue {
     /// As it is written in the file of values.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Number(number) => f.write_str(&literal(*number)),
+            Self::Number(number) => f.write_str(&format_literal(*number)),
             Self::Text(text) => write!(f, "{text:?}"),
         }
     }
 }
 
 /// A number as scripts and TOML read it: with a point, without an exponent, and the same number when it is read again.
-fn literal(number: f64) -> String {
+fn format_literal(number: f64) -> String {
     let text = format!("{number}");
     if text.contains('.') { text } else { text + ".0" }
 }
@@ -77,7 +77,7 @@ impl Per {
 
     /// The word in declarations and in the file of values; also the name of the channel.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Tool => "tool",
             Self::Operation => "operation",
@@ -127,7 +127,7 @@ impl Declared {
 
     /// The range in words: `0 to 50000 W`, `"x", "y", "z"`.
     #[must_use]
-    pub fn takes(&self) -> String {
+    pub fn describe_range(&self) -> String {
         let words = || self.one_of.iter().map(|word| format!("{word:?}")).collect::<Vec<_>>().join(", ");
         match self.range {
             Some((least, greatest)) => {
@@ -142,9 +142,9 @@ impl Declared {
 
     /// Why this value cannot be used, and what to do; `None` where it can.
     #[must_use]
-    pub fn refuse(&self, value: &SettingValue) -> Option<(String, String)> {
+    pub fn explain_refusal(&self, value: &SettingValue) -> Option<(String, String)> {
         let path = self.path();
-        let next = format!("{}; it takes {}, by default {}", self.en, self.takes(), self.default);
+        let next = format!("{}; it takes {}, by default {}", self.en, self.describe_range(), self.default);
         match (value, self.range) {
             (SettingValue::Number(number), Some((least, greatest))) => {
                 let unit = if self.unit == "1" { String::new() } else { format!(" {}", self.unit) };
@@ -166,8 +166,8 @@ impl Declared {
         if self.one_of.is_empty() || self.one_of.iter().any(|word| word == text) {
             return None;
         }
-        let near = nearest(text, self.one_of.iter().map(String::as_str));
+        let near = find_nearest_name(text, self.one_of.iter().map(String::as_str));
         let next = near.map_or(next, |near| format!("did you mean {near:?}?"));
-        Some((format!("{path} = {text:?} is none of {}", self.takes()), next))
+        Some((format!("{path} = {text:?} is none of {}", self.describe_range()), next))
     }
 }

@@ -13,20 +13,20 @@ pub(in crate::script) struct Call {
 }
 
 /// Every call of a function of this name. A call whose bracket is never closed is left to the compiler.
-pub(in crate::script) fn calls(text: &str, name: &str) -> Vec<Call> {
+pub(in crate::script) fn find_calls(text: &str, name: &str) -> Vec<Call> {
     let bytes = text.as_bytes();
     let mut found = Vec::new();
     let mut at = 0;
     while at < bytes.len() {
-        let after = skipped(text, at);
+        let after = skip_text_or_comment(text, at);
         if after > at {
             at = after;
             continue;
         }
         let begins = text[at..].starts_with(name) && !text[..at].ends_with(part_of_name);
-        let open = at + name.len() + text[at..].get(name.len()..).map_or(0, blank);
+        let open = at + name.len() + text[at..].get(name.len()..).map_or(0, count_blank_bytes);
         if begins && bytes.get(open) == Some(&b'(') {
-            if let Some(close) = closing(text, open) {
+            if let Some(close) = find_closing_bracket(text, open) {
                 found.push(Call { span: at..close + 1, inside: open + 1..close });
             }
             at = open;
@@ -41,15 +41,15 @@ fn part_of_name(c: char) -> bool {
 }
 
 /// Bytes of white space at the beginning.
-fn blank(text: &str) -> usize {
+fn count_blank_bytes(text: &str) -> usize {
     text.len() - text.trim_start().len()
 }
 
 /// The bracket that closes the one at `open`.
-fn closing(text: &str, open: usize) -> Option<usize> {
+fn find_closing_bracket(text: &str, open: usize) -> Option<usize> {
     let (mut depth, mut at) = (0_usize, open);
     while at < text.len() {
-        let after = skipped(text, at);
+        let after = skip_text_or_comment(text, at);
         if after > at {
             at = after;
             continue;
@@ -71,7 +71,7 @@ fn closing(text: &str, open: usize) -> Option<usize> {
 }
 
 /// The end of the text or comment that begins here; `at` itself where none does.
-pub(in crate::script) fn skipped(text: &str, at: usize) -> usize {
+pub(in crate::script) fn skip_text_or_comment(text: &str, at: usize) -> usize {
     let rest = &text[at..];
     let to = |found: Option<usize>, more: usize| found.map_or(text.len(), |found| at + found + more);
     if rest.starts_with("//") {
@@ -96,13 +96,13 @@ pub(in crate::script) fn skipped(text: &str, at: usize) -> usize {
 }
 
 /// The text at the beginning of this piece, where it is one: `"name"`.
-pub(in crate::script) fn quoted(text: &str) -> Option<&str> {
+pub(in crate::script) fn read_quoted(text: &str) -> Option<&str> {
     let text = text.trim_start().strip_prefix('"')?;
     text.split_once('"').map(|(inside, _)| inside)
 }
 
 /// Line and column of a byte of the text.
-pub(in crate::script) fn position(text: &str, at: usize) -> Position {
+pub(in crate::script) fn to_position(text: &str, at: usize) -> Position {
     let before = &text[..at];
     let line = before.matches('\n').count() + 1;
     let column = before[before.rfind('\n').map_or(0, |end| end + 1)..].chars().count() + 1;
@@ -118,19 +118,19 @@ mod tests {
     fn a_call_is_found_where_it_is_one() {
         let text =
             "// setting(1)\nlet a = setting(\"a) \", 1, #{ en: \"(\" }); // ok\nlet b = my_setting(2) + `setting(3)`;";
-        let found = calls(text, "setting");
+        let found = find_calls(text, "setting");
         assert_eq!(found.len(), 1);
         assert_eq!(&text[found[0].inside.clone()], "\"a) \", 1, #{ en: \"(\" }");
         assert!(text[found[0].span.clone()].ends_with(')'));
-        assert_eq!(position(text, found[0].span.start), Position::new(2, 9));
-        assert_eq!(quoted(&text[found[0].inside.clone()]), Some("a) "));
-        assert!(calls("setting(1", "setting").is_empty() && calls("setting", "setting").is_empty());
+        assert_eq!(to_position(text, found[0].span.start), Position::new(2, 9));
+        assert_eq!(read_quoted(&text[found[0].inside.clone()]), Some("a) "));
+        assert!(find_calls("setting(1", "setting").is_empty() && find_calls("setting", "setting").is_empty());
     }
 
     proptest::proptest! {
         #[test]
         fn no_text_makes_it_panic(text in "(setting|[(){}\\[\\]\"`/*\\\\]|\\PC|\n){0,40}") {
-            for call in calls(&text, "setting") {
+            for call in find_calls(&text, "setting") {
                 let _ = (&text[call.span], &text[call.inside]);
             }
         }

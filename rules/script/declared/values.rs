@@ -1,9 +1,9 @@
 //! The file with the values of settings, checked against what the scripts declare.
 
 use super::{Declared, Per, SettingValue};
+use crate::script::list_shipped_scripts;
 use crate::script::problem::ScriptProblem;
-use crate::script::shipped;
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use toml::de::{DeTable, DeValue};
@@ -94,30 +94,30 @@ impl SettingValues {
 
     /// The value of a setting in this place, where the file has one.
     #[must_use]
-    pub fn of(&self, section: &str, name: &str, place: &DeclarationPlace) -> Option<&SettingValue> {
+    pub fn find_value(&self, section: &str, name: &str, place: &DeclarationPlace) -> Option<&SettingValue> {
         self.chosen.get(&(section.to_owned(), name.to_owned(), place.clone())).map(|chosen| &chosen.value)
     }
 
     /// The line on which a value stands, from 1.
     #[must_use]
-    pub fn line(&self, section: &str, name: &str, place: &DeclarationPlace) -> Option<usize> {
+    pub fn find_line(&self, section: &str, name: &str, place: &DeclarationPlace) -> Option<usize> {
         self.chosen.get(&(section.to_owned(), name.to_owned(), place.clone())).map(|chosen| chosen.line)
     }
 
     /// Every value: section, name, place, value.
-    pub fn all(&self) -> impl Iterator<Item = (&str, &str, &DeclarationPlace, &SettingValue)> {
+    pub fn list_values(&self) -> impl Iterator<Item = (&str, &str, &DeclarationPlace, &SettingValue)> {
         self.chosen.iter().map(|((section, name, place), chosen)| (&**section, &**name, place, &chosen.value))
     }
 
     /// The places of one section that have values of their own, besides the machine.
     #[must_use]
-    pub fn places(&self, section: &str) -> Vec<DeclarationPlace> {
+    pub fn list_places(&self, section: &str) -> Vec<DeclarationPlace> {
         let of = |key: &&DeclarationKey| key.0 == section && key.2 != DeclarationPlace::Machine;
         self.chosen.keys().filter(of).map(|key| key.2.clone()).collect::<BTreeSet<_>>().into_iter().collect()
     }
 
     /// Puts a value into a place; `None` takes it out.
-    pub fn put(&mut self, section: &str, name: &str, place: &DeclarationPlace, value: Option<SettingValue>) {
+    pub fn set_value(&mut self, section: &str, name: &str, place: &DeclarationPlace, value: Option<SettingValue>) {
         let key = (section.to_owned(), name.to_owned(), place.clone());
         match value {
             Some(value) => drop(self.chosen.insert(key, DeclaredValue { value, line: 0, column: 0 })),
@@ -127,13 +127,13 @@ impl SettingValues {
 
     /// The file as the gateway writes it: sections and names in the order of the alphabet.
     #[must_use]
-    pub fn text(&self) -> String {
+    pub fn to_toml_text(&self) -> String {
         let mut text = String::new();
         let mut open = None;
-        for ((section, name, place), chosen) in &self.sorted() {
+        for ((section, name, place), chosen) in &self.sort_values() {
             let header = (section.clone(), place.clone());
             if open.as_ref() != Some(&header) {
-                let below = place.per().map_or(String::new(), |per| format!(".{}.{:?}", per.word(), place.name()));
+                let below = place.per().map_or(String::new(), |per| format!(".{}.{:?}", per.as_word(), place.name()));
                 text += &format!("{}[{section}{below}]\n", if open.is_some() { "\n" } else { "" });
                 open = Some(header);
             }
@@ -142,7 +142,7 @@ impl SettingValues {
         text
     }
 
-    fn sorted(&self) -> Vec<(DeclarationKey, DeclaredValue)> {
+    fn sort_values(&self) -> Vec<(DeclarationKey, DeclaredValue)> {
         let mut rows: Vec<(DeclarationKey, DeclaredValue)> =
             self.chosen.iter().map(|(key, it)| (key.clone(), it.clone())).collect();
         rows.sort_by(|(a, _), (b, _)| (&a.0, &a.2, &a.1).cmp(&(&b.0, &b.2, &b.1)));
@@ -151,10 +151,10 @@ impl SettingValues {
 
     /// Everything of the file that does not fit what is declared. `scripts` are all files, also those without settings.
     #[must_use]
-    pub fn check(&self, declared: &[&Declared], scripts: &[&str]) -> Vec<ScriptProblem> {
+    pub fn list_problems(&self, declared: &[&Declared], scripts: &[&str]) -> Vec<ScriptProblem> {
         let mut problems = Vec::new();
         for ((section, name, place), chosen) in &self.chosen {
-            if let Some((what, next)) = wrong((section, name, place), &chosen.value, declared, scripts) {
+            if let Some((what, next)) = describe_problem((section, name, place), &chosen.value, declared, scripts) {
                 let (line, column) = (Some(chosen.line), Some(chosen.column));
                 problems.push(ScriptProblem { file: self.file.clone(), line, column, what, next });
             }
@@ -164,7 +164,7 @@ impl SettingValues {
     }
 }
 
-fn wrong(
+fn describe_problem(
     (section, name, place): (&str, &str, &DeclarationPlace),
     value: &SettingValue,
     declared: &[&Declared],
@@ -173,27 +173,27 @@ fn wrong(
     let own: Vec<&&Declared> = declared.iter().filter(|it| it.section() == section).collect();
     let Some(found) = own.iter().find(|it| it.name == name) else {
         let file = format!("{section}.rhai");
-        if !scripts.contains(&&*file) && shipped().iter().any(|script| script.name == file) {
+        if !scripts.contains(&&*file) && list_shipped_scripts().iter().any(|script| script.name == file) {
             return None; // A shipped script that was taken out: its settings wait for it.
         }
         if own.is_empty() {
             let sections = declared.iter().map(|it| it.section());
-            let near = nearest(section, sections).map_or_else(
+            let near = find_nearest_name(section, sections).map_or_else(
                 || "`cnc-gateway check --keys` lists every setting of the scripts".to_owned(),
                 |near| format!("did you mean [{near}]?"),
             );
             return Some((format!("no script {file} declares settings"), near));
         }
-        let near = nearest(name, own.iter().map(|it| it.name.as_str()));
+        let near = find_nearest_name(name, own.iter().map(|it| it.name.as_str()));
         let all = || own.iter().map(|it| it.name.as_str()).collect::<Vec<_>>().join(", ");
         let next = near.map_or_else(|| format!("{file} has {}", all()), |near| format!("did you mean {near}?"));
         return Some((format!("{file} has no setting {name}"), next));
     };
     if let Some(per) = place.per().filter(|per| !found.per.contains(per)) {
-        let what = format!("{} has no values for a single {}", found.path(), per.word());
+        let what = format!("{} has no values for a single {}", found.path(), per.as_word());
         return Some((what, format!("write it in [{section}]")));
     }
-    found.refuse(value)
+    found.explain_refusal(value)
 }
 
 struct DeclarationReader<'t> {
@@ -204,13 +204,13 @@ struct DeclarationReader<'t> {
 }
 
 impl DeclarationReader<'_> {
-    fn wrong(&mut self, at: usize, what: impl Into<String>, next: &str) {
-        let (line, column) = self.place(at);
+    fn report_problem(&mut self, at: usize, what: impl Into<String>, next: &str) {
+        let (line, column) = self.locate_offset(at);
         let (file, what, next) = (self.file.to_owned(), what.into(), next.to_owned());
         self.problems.push(ScriptProblem { file, line: Some(line), column: Some(column), what, next });
     }
 
-    fn place(&self, at: usize) -> (usize, usize) {
+    fn locate_offset(&self, at: usize) -> (usize, usize) {
         let before = self.text.get(..at).unwrap_or(self.text);
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
         (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
@@ -218,7 +218,7 @@ impl DeclarationReader<'_> {
 
     fn read(&mut self) {
         if self.text.len() > SETTINGS_TEXT_MAX {
-            return self.wrong(
+            return self.report_problem(
                 0,
                 format!("the file is longer than {SETTINGS_TEXT_MAX} bytes"),
                 "drop tools that are gone",
@@ -227,17 +227,21 @@ impl DeclarationReader<'_> {
         let (table, errors) = DeTable::parse_recoverable(self.text);
         for error in &errors {
             let next = "write one `name = value` per line, below the section of its script: [constant_load]";
-            self.wrong(error.span().map_or(0, |span| span.start), format!("not TOML: {}", error.message()), next);
+            self.report_problem(
+                error.span().map_or(0, |span| span.start),
+                format!("not TOML: {}", error.message()),
+                next,
+            );
         }
         if !errors.is_empty() {
             return;
         }
         for (key, value) in table.get_ref().iter() {
             match value.get_ref().as_table() {
-                Some(section) => self.section(key.get_ref(), section),
+                Some(section) => self.read_section(key.get_ref(), section),
                 None => {
                     let what = format!("`{}` stands outside of every section", key.get_ref());
-                    self.wrong(
+                    self.report_problem(
                         key.span().start,
                         what,
                         "write it below the section of its script, such as [constant_load]",
@@ -246,7 +250,7 @@ impl DeclarationReader<'_> {
             }
         }
         if self.chosen.len() > VALUES_MAX {
-            self.wrong(
+            self.report_problem(
                 0,
                 format!("{} values; at most {VALUES_MAX} are read", self.chosen.len()),
                 "drop tools that are gone",
@@ -254,21 +258,26 @@ impl DeclarationReader<'_> {
         }
     }
 
-    fn section(&mut self, section: &str, table: &DeTable<'_>) {
+    fn read_section(&mut self, section: &str, table: &DeTable<'_>) {
         for (key, value) in table.iter() {
-            let per = Per::ALL.into_iter().find(|per| per.word() == key.get_ref().as_ref());
+            let per = Per::ALL.into_iter().find(|per| per.as_word() == key.get_ref().as_ref());
             match (per, value.get_ref().as_table()) {
-                (Some(per), Some(names)) => self.names(section, per, names),
-                _ => self.value(section, key.get_ref(), DeclarationPlace::Machine, (key.span().start, value.get_ref())),
+                (Some(per), Some(names)) => self.read_names(section, per, names),
+                _ => self.read_value(
+                    section,
+                    key.get_ref(),
+                    DeclarationPlace::Machine,
+                    (key.span().start, value.get_ref()),
+                ),
             }
         }
     }
 
-    fn names(&mut self, section: &str, per: Per, names: &DeTable<'_>) {
+    fn read_names(&mut self, section: &str, per: Per, names: &DeTable<'_>) {
         for (name, values) in names.iter() {
             let Some(values) = values.get_ref().as_table() else {
                 let what = format!("`{}` is no section", name.get_ref());
-                self.wrong(name.span().start, what, "write [constant_load.tool.T3] and the values below it");
+                self.report_problem(name.span().start, what, "write [constant_load.tool.T3] and the values below it");
                 continue;
             };
             let name = name.get_ref().to_string();
@@ -277,12 +286,12 @@ impl DeclarationReader<'_> {
                     Per::Tool => DeclarationPlace::Tool(name.clone()),
                     Per::Operation => DeclarationPlace::Operation(name.clone()),
                 };
-                self.value(section, key.get_ref(), place, (key.span().start, value.get_ref()));
+                self.read_value(section, key.get_ref(), place, (key.span().start, value.get_ref()));
             }
         }
     }
 
-    fn value(&mut self, section: &str, name: &str, place: DeclarationPlace, (at, value): (usize, &DeValue<'_>)) {
+    fn read_value(&mut self, section: &str, name: &str, place: DeclarationPlace, (at, value): (usize, &DeValue<'_>)) {
         let number = match value {
             DeValue::Float(number) => number.as_str().replace('_', "").parse::<f64>().ok(),
             DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix()).ok().map(|it| it as f64),
@@ -293,14 +302,14 @@ impl DeclarationReader<'_> {
             (Some(number), _) => SettingValue::Number(number),
             (None, Some(text)) => SettingValue::Text(text.to_owned()),
             (None, None) => {
-                return self.wrong(
+                return self.report_problem(
                     at,
                     format!("{section}.{name} is neither a number nor a text"),
                     "write a number, or a text in \"quotes\"",
                 );
             }
         };
-        let (line, column) = self.place(at);
+        let (line, column) = self.locate_offset(at);
         self.chosen.insert((section.to_owned(), name.to_owned(), place), DeclaredValue { value, line, column });
     }
 }

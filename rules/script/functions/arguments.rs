@@ -3,7 +3,7 @@
 use super::Method;
 use crate::estimators::regression::{Refusal, RefusalKind};
 use crate::script::collect::ScriptResult;
-use crate::script::problem::spoken;
+use crate::script::problem::describe_type;
 use rhai::{Array, Dynamic, Map};
 
 /// Entries of an array that are read; a script cannot make a longer one.
@@ -29,17 +29,18 @@ impl<'a> Arguments<'a> {
     /// mistake in the script.
     pub(super) fn read(method: &'a Method, values: &[&mut Dynamic]) -> ScriptResult<Self> {
         let read = values.iter().zip(method.parameters).map(|(value, parameter)| {
-            let said =
-                || format!("{}: {} needs {}, not {}", method.name, parameter.name, parameter.unit, spoken(value));
-            let argument = argument(value).ok_or_else(said)?;
-            if argument.suits(parameter.unit) { Ok(argument) } else { Err(said()) }
+            let said = || {
+                format!("{}: {} needs {}, not {}", method.name, parameter.name, parameter.unit, describe_type(value))
+            };
+            let argument = to_argument(value).ok_or_else(said)?;
+            if argument.matches_unit(parameter.unit) { Ok(argument) } else { Err(said()) }
         });
         let values = read.collect::<Result<Vec<Argument>, String>>()?;
         Ok(Self { method, values })
     }
 
     /// The first argument that has no value.
-    pub(super) fn missing(&self) -> Option<Refusal> {
+    pub(super) fn find_missing(&self) -> Option<Refusal> {
         let at = self.values.iter().position(|value| *value == Argument::Absent)?;
         let name = self.method.parameters[at].name;
         Some(Refusal::new(RefusalKind::Missing, format!("{name} has no value"), ""))
@@ -95,7 +96,7 @@ impl<'a> Arguments<'a> {
 }
 
 impl Argument {
-    fn suits(&self, unit: &str) -> bool {
+    fn matches_unit(&self, unit: &str) -> bool {
         match self {
             Self::Absent => true,
             Self::Number(_) => !unit.starts_with('[') && unit != "text",
@@ -106,11 +107,11 @@ impl Argument {
     }
 }
 
-fn argument(value: &Dynamic) -> Option<Argument> {
+fn to_argument(value: &Dynamic) -> Option<Argument> {
     if value.is_unit() {
         return Some(Argument::Absent);
     }
-    if let Some(number) = number(value) {
+    if let Some(number) = read_number(value) {
         return Some(Argument::Number(number));
     }
     if let Ok(text) = value.as_immutable_string_ref() {
@@ -121,17 +122,17 @@ fn argument(value: &Dynamic) -> Option<Argument> {
         return None;
     }
     match array.first() {
-        Some(first) if first.is_array() => array.iter().map(row).collect::<Option<_>>().map(Argument::Rows),
-        _ => array.iter().map(number).collect::<Option<_>>().map(Argument::Numbers),
+        Some(first) if first.is_array() => array.iter().map(read_row).collect::<Option<_>>().map(Argument::Rows),
+        _ => array.iter().map(read_number).collect::<Option<_>>().map(Argument::Numbers),
     }
 }
 
-fn number(value: &Dynamic) -> Option<f64> {
+fn read_number(value: &Dynamic) -> Option<f64> {
     value.as_float().ok().or_else(|| value.as_int().ok().map(|whole| whole as f64))
 }
 
-fn row(value: &Dynamic) -> Option<Vec<f64>> {
-    value.read_lock::<Array>()?.iter().map(number).collect()
+fn read_row(value: &Dynamic) -> Option<Vec<f64>> {
+    value.read_lock::<Array>()?.iter().map(read_number).collect()
 }
 
 /// What a method answers.
@@ -147,7 +148,7 @@ pub enum MethodResult {
 
 impl MethodResult {
     /// The answer, where every number in it is one.
-    pub(super) fn checked(self) -> Result<Self, Refusal> {
+    pub(super) fn check_finite(self) -> Result<Self, Refusal> {
         let finite = match &self {
             Self::Number(number) => number.is_finite(),
             Self::Flag(_) => true,

@@ -27,7 +27,7 @@ pub struct MethodParameter {
     pub unit: &'static str,
 }
 
-const fn takes(name: &'static str, unit: &'static str) -> MethodParameter {
+const fn define_parameter(name: &'static str, unit: &'static str) -> MethodParameter {
     MethodParameter { name, unit }
 }
 
@@ -70,29 +70,29 @@ pub static SUBJECTS: &[&Subject] =
     &[&power_separation::SUBJECT, &spindle_current::SUBJECT, &thermal::SUBJECT, &wear::SUBJECT];
 
 /// Every method of every subject.
-pub fn methods() -> impl Iterator<Item = &'static Method> {
+pub fn list_methods() -> impl Iterator<Item = &'static Method> {
     SUBJECTS.iter().flat_map(|subject| subject.methods)
 }
 
 /// Makes every method callable; what one refuses goes to `shared`.
-pub(super) fn register(engine: &mut Engine, shared: &Shared) {
-    for method in methods() {
+pub(super) fn register_methods(engine: &mut Engine, shared: &Shared) {
+    for method in list_methods() {
         let types = vec![TypeId::of::<Dynamic>(); method.parameters.len()];
         let to = shared.clone();
-        let run = move |_: NativeCallContext<'_>, values: &mut [&mut Dynamic]| call(method, values, &to);
+        let run = move |_: NativeCallContext<'_>, values: &mut [&mut Dynamic]| call_method(method, values, &to);
         engine.register_raw_fn(method.name, types, run);
     }
     let to = shared.clone();
-    engine.register_fn("why", move |name: ImmutableString| to.lock().why(&name));
+    engine.register_fn("why", move |name: ImmutableString| to.lock().explain_refusal(&name));
 }
 
-fn call(method: &Method, values: &mut [&mut Dynamic], to: &Shared) -> ScriptResult<Dynamic> {
+fn call_method(method: &Method, values: &mut [&mut Dynamic], to: &Shared) -> ScriptResult<Dynamic> {
     let arguments = Arguments::read(method, values)?;
-    let answer = arguments.missing().map_or_else(|| (method.run)(&arguments), Err);
-    match answer.and_then(MethodResult::checked) {
+    let answer = arguments.find_missing().map_or_else(|| (method.run)(&arguments), Err);
+    match answer.and_then(MethodResult::check_finite) {
         Ok(answer) => Ok(answer.into_dynamic()),
         Err(refusal) => {
-            to.lock().refused(method.name, &refusal.to_string());
+            to.lock().record_refusal(method.name, &refusal.to_string());
             Ok(Dynamic::UNIT)
         }
     }

@@ -1,16 +1,17 @@
 //! Constant load by the spindle current: curves of a feature over feed, by depth of cut.
 
-use super::{Arguments, Method, MethodParameter, MethodResult, Subject, takes};
+use super::{Arguments, Method, MethodParameter, MethodResult, Subject, define_parameter};
 use crate::estimators::regression::Refusal;
 use crate::estimators::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
 
 pub(super) static SUBJECT: Subject = Subject { en: "Constant load", zh: "恒负荷进给", methods: METHODS };
 
 /// `identify feed-curve --out` writes them.
-const CURVES: MethodParameter = takes("curves", "[[depth mm, least feed, greatest feed, c0, c1, c2, c3, sd]]");
-const FEED: MethodParameter = takes("feed", "that of the curves");
-const FEATURE: MethodParameter = takes("feature", "that of the curves");
-const DEPTH: MethodParameter = takes("depth_mm", "mm");
+const CURVES: MethodParameter =
+    define_parameter("curves", "[[depth mm, least feed, greatest feed, c0, c1, c2, c3, sd]]");
+const FEED: MethodParameter = define_parameter("feed", "that of the curves");
+const FEATURE: MethodParameter = define_parameter("feature", "that of the curves");
+const DEPTH: MethodParameter = define_parameter("depth_mm", "mm");
 
 static METHODS: &[Method] = &[
     Method {
@@ -19,16 +20,20 @@ static METHODS: &[Method] = &[
         returns: "mm",
         en: "Equivalent depth of cut at which this feed gives this feature; no value outside the curves, as in the air. Wear and hard material look like depth",
         zh: "由进给和特征值反求等效背吃刀量",
-        run: |given| Ok(MethodResult::Number(family(given)?.depth(given.number(1), given.number(2), 0.0)?.depth_mm)),
+        run: |given| {
+            Ok(MethodResult::Number(read_family(given)?.infer_depth(given.number(1), given.number(2), 0.0)?.depth_mm))
+        },
     },
     Method {
         name: "feed_curve_depth_sd_mm",
-        parameters: &[CURVES, FEED, FEATURE, takes("feature_sd", "that of the curves")],
+        parameters: &[CURVES, FEED, FEATURE, define_parameter("feature_sd", "that of the curves")],
         returns: "mm",
         en: "One standard deviation of that depth, from that of the feature and of the curves",
         zh: "等效背吃刀量的标准不确定度",
         run: |given| {
-            Ok(MethodResult::Number(family(given)?.depth(given.number(1), given.number(2), given.number(3))?.sd_mm))
+            Ok(MethodResult::Number(
+                read_family(given)?.infer_depth(given.number(1), given.number(2), given.number(3))?.sd_mm,
+            ))
         },
     },
     Method {
@@ -37,7 +42,7 @@ static METHODS: &[Method] = &[
         returns: "unit of feed of the curves",
         en: "Feed at which a cut of this depth gives the wanted feature; no value below what the spindle takes at the least feed, or beyond the curves",
         zh: "给定背吃刀量下达到目标特征值的进给",
-        run: |given| Ok(MethodResult::Number(family(given)?.feed(given.number(1), given.number(2))?.feed)),
+        run: |given| Ok(MethodResult::Number(read_family(given)?.find_feed(given.number(1), given.number(2))?.feed)),
     },
     Method {
         name: "feed_curve_feature",
@@ -46,13 +51,13 @@ static METHODS: &[Method] = &[
         en: "Feature that a cut of this depth gives at this feed; no value outside the curves",
         zh: "给定背吃刀量和进给下的特征值",
         run: |given| {
-            let curve = family(given)?.curve(given.number(1))?;
-            within(&curve, given.number(2)).map(|()| MethodResult::Number(curve.at(given.number(2))))
+            let curve = read_family(given)?.interpolate_curve(given.number(1))?;
+            check_feed(&curve, given.number(2)).map(|()| MethodResult::Number(curve.evaluate_at(given.number(2))))
         },
     },
 ];
 
-fn family(given: &Arguments<'_>) -> Result<CurveFamily, Refusal> {
+fn read_family(given: &Arguments<'_>) -> Result<CurveFamily, Refusal> {
     let at = |[depth_mm, feed_min, feed_max, c0, c1, c2, c3, sd]: [f64; 8]| CurveAtDepth {
         depth_mm,
         curve: Cubic { coefficients: [c0, c1, c2, c3], feed_min, feed_max },
@@ -61,7 +66,7 @@ fn family(given: &Arguments<'_>) -> Result<CurveFamily, Refusal> {
     CurveFamily::new(given.rows_of::<8>(0)?.into_iter().map(at).collect())
 }
 
-fn within(curve: &Cubic, feed: f64) -> Result<(), Refusal> {
+fn check_feed(curve: &Cubic, feed: f64) -> Result<(), Refusal> {
     use crate::estimators::regression::RefusalKind::OutOfRange;
     if (curve.feed_min..=curve.feed_max).contains(&feed) {
         return Ok(());

@@ -1,6 +1,6 @@
 //! Thermal error: prediction from temperatures, the lag of a structure, and increments of a compensation.
 
-use super::{Arguments, Method, MethodParameter, MethodResult, Subject, takes};
+use super::{Arguments, Method, MethodParameter, MethodResult, Subject, define_parameter};
 use crate::estimators::regression::{Refusal, RefusalKind};
 use crate::estimators::thermal::first_order;
 
@@ -9,30 +9,37 @@ pub(super) static SUBJECT: Subject = Subject { en: "Thermal error", zh: "热误�
 /// A temperature above this was meant in kelvin.
 const KELVIN_FROM_C: f64 = 200.0;
 
-const PREDICTION: &[MethodParameter] =
-    &[takes("temperatures_c", "[°C]"), takes("coefficients_um_per_k", "[um/K]"), takes("intercept_um", "um")];
+const PREDICTION: &[MethodParameter] = &[
+    define_parameter("temperatures_c", "[°C]"),
+    define_parameter("coefficients_um_per_k", "[um/K]"),
+    define_parameter("intercept_um", "um"),
+];
 
-const DEVIATION: &[MethodParameter] =
-    &[takes("temperatures_c", "[°C]"), takes("covariance_by_rows", "[um2]"), takes("residual_sd_um", "um")];
+const DEVIATION: &[MethodParameter] = &[
+    define_parameter("temperatures_c", "[°C]"),
+    define_parameter("covariance_by_rows", "[um2]"),
+    define_parameter("residual_sd_um", "um"),
+];
 
 const LAG: &[MethodParameter] = &[
-    takes("state_c", "°C"),
-    takes("temperature_before_c", "°C"),
-    takes("temperature_c", "°C"),
-    takes("dt_s", "s"),
-    takes("tau_s", "s"),
+    define_parameter("state_c", "°C"),
+    define_parameter("temperature_before_c", "°C"),
+    define_parameter("temperature_c", "°C"),
+    define_parameter("dt_s", "s"),
+    define_parameter("tau_s", "s"),
 ];
 
 const WANTED: &[MethodParameter] = &[
-    takes("value_um", "um"),
-    takes("error_um", "um"),
-    takes("limit_um", "um"),
-    takes("dead_band_um", "um"),
-    takes("slew_um_per_s", "um/s"),
-    takes("dt_s", "s"),
+    define_parameter("value_um", "um"),
+    define_parameter("error_um", "um"),
+    define_parameter("limit_um", "um"),
+    define_parameter("dead_band_um", "um"),
+    define_parameter("slew_um_per_s", "um/s"),
+    define_parameter("dt_s", "s"),
 ];
 
-const PULSES: &[MethodParameter] = &[takes("value_um", "um"), takes("sent_um", "um"), takes("pulse_um", "um")];
+const PULSES: &[MethodParameter] =
+    &[define_parameter("value_um", "um"), define_parameter("sent_um", "um"), define_parameter("pulse_um", "um")];
 
 static METHODS: &[Method] = &[
     Method {
@@ -41,7 +48,7 @@ static METHODS: &[Method] = &[
         returns: "um",
         en: "Thermal error E = intercept + sum of coefficient times temperature; a lagged sensor takes its state from first_order_c",
         zh: "由各测温点温度线性预测热误差",
-        run: |given| predicted(given).map(MethodResult::Number),
+        run: |given| predict_error(given).map(MethodResult::Number),
     },
     Method {
         name: "predicted_thermal_error_sd_um",
@@ -49,15 +56,19 @@ static METHODS: &[Method] = &[
         returns: "um",
         en: "Standard deviation of that prediction, from the covariance of intercept and coefficients, row by row, and the residual",
         zh: "热误差预测的标准不确定度",
-        run: |given| deviation(given).map(MethodResult::Number),
+        run: |given| compute_deviation(given).map(MethodResult::Number),
     },
     Method {
         name: "temperature_outside_k",
-        parameters: &[takes("temperatures_c", "[°C]"), takes("least_c", "[°C]"), takes("greatest_c", "[°C]")],
+        parameters: &[
+            define_parameter("temperatures_c", "[°C]"),
+            define_parameter("least_c", "[°C]"),
+            define_parameter("greatest_c", "[°C]"),
+        ],
         returns: "K",
         en: "By how much the worst temperature lies outside its range of identification; 0 inside",
         zh: "温度超出辨识范围的最大值",
-        run: |given| outside(given).map(MethodResult::Number),
+        run: |given| measure_excursion(given).map(MethodResult::Number),
     },
     Method {
         name: "first_order_c",
@@ -65,7 +76,7 @@ static METHODS: &[Method] = &[
         returns: "°C",
         en: "State of a structure that follows its temperature late, dw/dt = (T - w) / tau, dt_s later; keep it in memory",
         zh: "一阶滞后温度状态",
-        run: |given| late(given).map(MethodResult::Number),
+        run: |given| advance_lagged_state(given).map(MethodResult::Number),
     },
     Method {
         name: "thermal_compensation_um",
@@ -73,7 +84,7 @@ static METHODS: &[Method] = &[
         returns: "um",
         en: "Next compensation value: against the error, within the limit, followed outside the dead band, at most slew times dt",
         zh: "热误差补偿量（限幅、死区、限速）",
-        run: |given| compensation(given).map(MethodResult::Number),
+        run: |given| advance_compensation(given).map(MethodResult::Number),
     },
     Method {
         name: "thermal_compensation_pulses",
@@ -81,82 +92,86 @@ static METHODS: &[Method] = &[
         returns: "1",
         en: "Whole pulses that bring what was sent to the value; what is less than a pulse is carried",
         zh: "补偿脉冲增量（小数部分保留）",
-        run: |given| pulses(given).map(MethodResult::Number),
+        run: |given| count_pulses(given).map(MethodResult::Number),
     },
 ];
 
-fn refuse<T>(kind: RefusalKind, what: String, next: &str) -> Result<T, Refusal> {
+fn refuse_call<T>(kind: RefusalKind, what: String, next: &str) -> Result<T, Refusal> {
     Err(Refusal::new(kind, what, next))
 }
 
 /// The temperatures of a call, none of them in kelvin.
-fn temperatures<'a>(given: &'a Arguments<'_>) -> Result<&'a [f64], Refusal> {
+fn read_temperatures<'a>(given: &'a Arguments<'_>) -> Result<&'a [f64], Refusal> {
     let all = given.numbers(0);
     match all.iter().find(|temperature| **temperature > KELVIN_FROM_C) {
-        Some(hot) => refuse(RefusalKind::Unit, format!("{hot:.1} °C looks like K"), "subtract 273.15"),
+        Some(hot) => refuse_call(RefusalKind::Unit, format!("{hot:.1} °C looks like K"), "subtract 273.15"),
         None => Ok(all),
     }
 }
 
-fn predicted(given: &Arguments<'_>) -> Result<f64, Refusal> {
-    let (temperatures, coefficients) = (temperatures(given)?, given.numbers(1));
+fn predict_error(given: &Arguments<'_>) -> Result<f64, Refusal> {
+    let (temperatures, coefficients) = (read_temperatures(given)?, given.numbers(1));
     if temperatures.is_empty() || temperatures.len() != coefficients.len() {
         let what = format!("{} temperatures for {} coefficients", temperatures.len(), coefficients.len());
-        return refuse(RefusalKind::Mismatch, what, "give one coefficient for each temperature");
+        return refuse_call(RefusalKind::Mismatch, what, "give one coefficient for each temperature");
     }
     Ok(given.number(2) + temperatures.iter().zip(coefficients).map(|(t, b)| t * b).sum::<f64>())
 }
 
-fn deviation(given: &Arguments<'_>) -> Result<f64, Refusal> {
-    let point: Vec<f64> = std::iter::once(1.0).chain(temperatures(given)?.iter().copied()).collect();
+fn compute_deviation(given: &Arguments<'_>) -> Result<f64, Refusal> {
+    let point: Vec<f64> = std::iter::once(1.0).chain(read_temperatures(given)?.iter().copied()).collect();
     let covariance = given.numbers(1);
     if covariance.len() != point.len() * point.len() {
         let what = format!("{} entries for {} coefficients with intercept", covariance.len(), point.len());
-        return refuse(RefusalKind::Mismatch, what, "give the whole covariance, row by row");
+        return refuse_call(RefusalKind::Mismatch, what, "give the whole covariance, row by row");
     }
     let rows = covariance.chunks(point.len()).zip(&point);
     let variance: f64 = rows.map(|(row, x)| x * row.iter().zip(&point).map(|(c, y)| c * y).sum::<f64>()).sum();
     if variance < 0.0 {
-        return refuse(RefusalKind::Contradiction, "the covariance is none".to_owned(), "copy it whole");
+        return refuse_call(RefusalKind::Contradiction, "the covariance is none".to_owned(), "copy it whole");
     }
     Ok(variance.sqrt().hypot(given.number(2)))
 }
 
-fn outside(given: &Arguments<'_>) -> Result<f64, Refusal> {
-    let (temperatures, least, greatest) = (temperatures(given)?, given.numbers(1), given.numbers(2));
+fn measure_excursion(given: &Arguments<'_>) -> Result<f64, Refusal> {
+    let (temperatures, least, greatest) = (read_temperatures(given)?, given.numbers(1), given.numbers(2));
     let count = temperatures.len();
     if count == 0 || least.len() != count || greatest.len() != count {
         let what = format!("{count} temperatures for {} and {} limits", least.len(), greatest.len());
-        return refuse(RefusalKind::Mismatch, what, "give one range for each temperature");
+        return refuse_call(RefusalKind::Mismatch, what, "give one range for each temperature");
     }
     let beyond = |at: usize| (least[at] - temperatures[at]).max(temperatures[at] - greatest[at]);
     Ok((0..count).map(beyond).fold(0.0, f64::max))
 }
 
-fn late(given: &Arguments<'_>) -> Result<f64, Refusal> {
+fn advance_lagged_state(given: &Arguments<'_>) -> Result<f64, Refusal> {
     let (dt_s, tau_s) = (given.number(3), given.number(4));
     if tau_s <= 0.0 || dt_s < 0.0 {
         let what = format!("dt_s = {dt_s}, tau_s = {tau_s}");
-        return refuse(RefusalKind::OutOfRange, what, "time does not go back, and a time constant is positive");
+        return refuse_call(RefusalKind::OutOfRange, what, "time does not go back, and a time constant is positive");
     }
     Ok(first_order(given.number(0), given.number(1), given.number(2), dt_s, tau_s))
 }
 
-fn compensation(given: &Arguments<'_>) -> Result<f64, Refusal> {
+fn advance_compensation(given: &Arguments<'_>) -> Result<f64, Refusal> {
     let [value, error, limit, dead_band, slew, dt_s] = std::array::from_fn(|at| given.number(at));
     if limit <= 0.0 || dead_band < 0.0 || slew <= 0.0 || dt_s < 0.0 {
         let what = format!("limit {limit} um, dead band {dead_band} um, slew {slew} um/s, dt {dt_s} s");
-        return refuse(RefusalKind::OutOfRange, what, "limit and slew are positive, dead band and dt not negative");
+        return refuse_call(
+            RefusalKind::OutOfRange,
+            what,
+            "limit and slew are positive, dead band and dt not negative",
+        );
     }
     let wanted = (-error).clamp(-limit, limit);
     let step = if (wanted - value).abs() <= dead_band { 0.0 } else { wanted - value };
     Ok((value + step.clamp(-slew * dt_s, slew * dt_s)).clamp(-limit, limit))
 }
 
-fn pulses(given: &Arguments<'_>) -> Result<f64, Refusal> {
+fn count_pulses(given: &Arguments<'_>) -> Result<f64, Refusal> {
     let [value, sent, pulse] = std::array::from_fn(|at| given.number(at));
     if pulse <= 0.0 {
-        return refuse(RefusalKind::OutOfRange, format!("pulse_um = {pulse}"), "a pulse has a length");
+        return refuse_call(RefusalKind::OutOfRange, format!("pulse_um = {pulse}"), "a pulse has a length");
     }
     // A whole pulse is not missed by rounding of the division.
     Ok(((value - sent) / pulse * (1.0 + 1e-12)).trunc())

@@ -1,8 +1,8 @@
 //! Arguments of the functions of the host that are wrong whatever the machine does.
 
-use super::{ExpressionKind, KindMistake, LikeWords, UNITS_OFF, WordInUse, known, near_word};
+use super::{ExpressionKind, KindMistake, LikeWords, UNITS_OFF, WordInUse, infer_kind, near_word};
 use crate::script::decision::{AlarmLevel, Axis};
-use crate::script::vocabulary::{WordKind, find, words};
+use crate::script::vocabulary::{WordKind, find_word, list_words};
 use rhai::{Expr, FnCallExpr, ImmutableString, Position};
 
 /// What an argument has to be.
@@ -56,29 +56,33 @@ const SHARE_MAX: f64 = 2.0;
 const PERCENT_MAX: f64 = 254.0;
 
 /// What is wrong with the arguments of this call.
-pub(in crate::script) fn arguments(call: &FnCallExpr, like: LikeWords<'_>) -> Vec<KindMistake> {
+pub(in crate::script) fn find_call_mistakes(call: &FnCallExpr, like: LikeWords<'_>) -> Vec<KindMistake> {
     let name = call.name.as_str();
     if let ("given", [Expr::Map(entries, _)]) = (name, &call.args[..]) {
-        return entries.0.iter().filter_map(|(word, value)| given(&word.name, value)).collect();
+        return entries.0.iter().filter_map(|(word, value)| find_given_mistake(&word.name, value)).collect();
     }
     let Some((_, wanted)) = WANTED.iter().find(|(known, wants)| *known == name && wants.len() == call.args.len())
     else {
         return Vec::new();
     };
-    wanted.iter().zip(&call.args).filter_map(|(wants, given)| argument(name, *wants, given, like)).collect()
+    wanted
+        .iter()
+        .zip(&call.args)
+        .filter_map(|(wants, given)| find_argument_mistake(name, *wants, given, like))
+        .collect()
 }
 
 /// A text that a trial gives and that never comes from a machine.
-fn given(name: &str, value: &Expr) -> Option<KindMistake> {
-    let seen = WordInUse::of(name, find(name).filter(|word| word.kind == WordKind::Text)?);
+fn find_given_mistake(name: &str, value: &Expr) -> Option<KindMistake> {
+    let seen = WordInUse::from_word(name, find_word(name).filter(|word| word.kind == WordKind::Text)?);
     let Expr::StringConstant(text, at) = value else { return None };
     let known = seen.one_of.is_empty() || seen.one_of.contains(&text.as_str());
     (!known).then(|| (*at, format!("`{name}` is never \"{text}\""), seen.right_word(text)))
 }
 
-fn argument(function: &str, wants: Wants, given: &Expr, like: LikeWords<'_>) -> Option<KindMistake> {
+fn find_argument_mistake(function: &str, wants: Wants, given: &Expr, like: LikeWords<'_>) -> Option<KindMistake> {
     let at = given.position();
-    let value = known(given, like);
+    let value = infer_kind(given, like);
     let wrong = |what: String, next: &str| Some((at, what, next.to_owned()));
     match (wants, &value) {
         (Number | Percent, ExpressionKind::Text(text)) => {
@@ -91,25 +95,25 @@ fn argument(function: &str, wants: Wants, given: &Expr, like: LikeWords<'_>) -> 
         (Number | Percent, ExpressionKind::Flag) => {
             wrong(format!("`{function}` needs a number here, not true or false"), "write 1.0 or 0.0")
         }
-        (Percent, ExpressionKind::Number(pct)) => percent(function, *pct, at),
+        (Percent, ExpressionKind::Number(pct)) => find_percent_mistake(function, *pct, at),
         (Flag, ExpressionKind::Word(_) | ExpressionKind::Number(_) | ExpressionKind::SomeNumber) => {
-            super::compare::condition(given, like)
+            super::compare::find_condition_mistake(given, like)
         }
         (Flag, ExpressionKind::Text(text)) => wrong(
             format!("`{function}` needs a condition here, not the text \"{text}\""),
             "write a comparison: x > 5.0",
         ),
-        (Level, ExpressionKind::Text(text)) if AlarmLevel::of(text).is_none() => {
-            let words = AlarmLevel::ALL.map(AlarmLevel::word);
+        (Level, ExpressionKind::Text(text)) if AlarmLevel::from_word(text).is_none() => {
+            let words = AlarmLevel::ALL.map(AlarmLevel::as_word);
             Some((at, format!("\"{text}\" is no level of an alarm"), right_word(text, &words)))
         }
-        (Wants::Axis, ExpressionKind::Text(text)) if Axis::of(text).is_none() => {
-            let words = Axis::ALL.map(Axis::word);
+        (Wants::Axis, ExpressionKind::Text(text)) if Axis::from_word(text).is_none() => {
+            let words = Axis::ALL.map(Axis::as_word);
             // Of names of one letter every one is near to every other.
-            Some((at, format!("there is no axis \"{text}\""), listed(&words)))
+            Some((at, format!("there is no axis \"{text}\""), format_list(&words)))
         }
         (Wants::NumberWord, ExpressionKind::Text(text)) => {
-            let numbers = || words().iter().filter(|word| word.kind == WordKind::Number).map(|word| word.name);
+            let numbers = || list_words().iter().filter(|word| word.kind == WordKind::Number).map(|word| word.name);
             if numbers().any(|name| name == *text) {
                 return None;
             }
@@ -131,7 +135,7 @@ fn argument(function: &str, wants: Wants, given: &Expr, like: LikeWords<'_>) -> 
 }
 
 /// An override is written in percent of the programmed feed.
-fn percent(function: &str, pct: f64, at: Position) -> Option<KindMistake> {
+fn find_percent_mistake(function: &str, pct: f64, at: Position) -> Option<KindMistake> {
     if pct > 0.0 && pct < SHARE_MAX {
         let what = format!("`{function}` takes percent of the programmed feed, and {pct} is a share");
         return Some((at, what, format!("write {}", 100.0 * pct)));
@@ -144,11 +148,12 @@ fn percent(function: &str, pct: f64, at: Position) -> Option<KindMistake> {
 }
 
 fn right_word(text: &str, words: &[&str]) -> String {
-    near_word(text, words.iter().copied()).map_or_else(|| listed(words), |near| format!("did you mean \"{near}\"?"))
+    near_word(text, words.iter().copied())
+        .map_or_else(|| format_list(words), |near| format!("did you mean \"{near}\"?"))
 }
 
 /// A list that is short enough to be read, or where to find it.
-fn listed(words: &[&str]) -> String {
+fn format_list(words: &[&str]) -> String {
     if words.len() > 12 {
         return "`cnc-gateway check --vocabulary` lists them".to_owned();
     }
@@ -178,7 +183,7 @@ impl AlarmNames {
     }
 
     /// Names that nothing in this file raises.
-    pub(in crate::script) fn mistakes(&self) -> Vec<KindMistake> {
+    pub(in crate::script) fn list_mistakes(&self) -> Vec<KindMistake> {
         let unknown = |name: &ImmutableString| !self.built && !self.raised.contains(name);
         let told = |(name, at): &(ImmutableString, Position)| {
             let near = near_word(name, self.raised.iter().map(ImmutableString::as_str));

@@ -1,6 +1,6 @@
 //! Comparisons, lists and conditions that can never be true, or never be computed.
 
-use super::{ExpressionKind, KindMistake, LikeWords, UNITS_OFF, WordInUse, known};
+use super::{ExpressionKind, KindMistake, LikeWords, UNITS_OFF, WordInUse, infer_kind};
 use crate::script::vocabulary::WordKind;
 use rhai::{Expr, FnCallExpr, Position};
 
@@ -8,18 +8,25 @@ const EQUAL: [&str; 2] = ["==", "!="];
 const ORDER: [&str; 4] = ["<", "<=", ">", ">="];
 
 /// What is wrong with a comparison, `x in [...]`, or `!x`.
-pub(in crate::script) fn operator(call: &FnCallExpr, at: Position, like: LikeWords<'_>) -> Vec<KindMistake> {
+pub(in crate::script) fn find_operator_mistakes(
+    call: &FnCallExpr,
+    at: Position,
+    like: LikeWords<'_>,
+) -> Vec<KindMistake> {
     let name = call.name.as_str();
     match &call.args[..] {
         [left, right] if EQUAL.contains(&name) || ORDER.contains(&name) => {
             let equal = EQUAL.contains(&name);
-            pair(left, right, equal, like).or_else(|| pair(right, left, equal, like)).into_iter().collect()
+            find_pair_mistake(left, right, equal, like)
+                .or_else(|| find_pair_mistake(right, left, equal, like))
+                .into_iter()
+                .collect()
         }
         // `x in list` is compiled as contains(list, x).
         [Expr::Array(items, _), wanted] if name == "contains" => {
-            items.iter().filter_map(|item| pair(wanted, item, true, like)).collect()
+            items.iter().filter_map(|item| find_pair_mistake(wanted, item, true, like)).collect()
         }
-        [of] if name == "!" => condition(of, like).into_iter().collect(),
+        [of] if name == "!" => find_condition_mistake(of, like).into_iter().collect(),
         _ => Vec::new(),
     }
     .into_iter()
@@ -28,12 +35,12 @@ pub(in crate::script) fn operator(call: &FnCallExpr, at: Position, like: LikeWor
 }
 
 /// A word beside something that it is compared with.
-fn pair(word: &Expr, other: &Expr, equal: bool, like: LikeWords<'_>) -> Option<KindMistake> {
-    let ExpressionKind::Word(seen) = known(word, like) else { return None };
+fn find_pair_mistake(word: &Expr, other: &Expr, equal: bool, like: LikeWords<'_>) -> Option<KindMistake> {
+    let ExpressionKind::Word(seen) = infer_kind(word, like) else { return None };
     let at = other.position();
     let WordInUse { name, .. } = &seen;
     let wrong = |what: String, next: String| Some((at, what, next));
-    match (seen.kind, known(other, like)) {
+    match (seen.kind, infer_kind(other, like)) {
         (WordKind::Text, ExpressionKind::Text(text))
             if !seen.one_of.is_empty() && !seen.one_of.contains(&text) && equal =>
         {
@@ -62,7 +69,7 @@ fn pair(word: &Expr, other: &Expr, equal: bool, like: LikeWords<'_>) -> Option<K
             wrong(what, UNITS_OFF.to_owned())
         }
         (WordKind::Number, ExpressionKind::Flag) => {
-            wrong(format!("`{name}` is a number, not true or false"), seen.asked())
+            wrong(format!("`{name}` is a number, not true or false"), seen.suggest_comparison())
         }
         (WordKind::Number, ExpressionKind::Number(number)) => {
             let (least, greatest) = seen.range?;
@@ -75,11 +82,11 @@ fn pair(word: &Expr, other: &Expr, equal: bool, like: LikeWords<'_>) -> Option<K
 }
 
 /// A number or a text where true or false is needed: `if coolant_on { ... }`.
-pub(in crate::script) fn condition(expr: &Expr, like: LikeWords<'_>) -> Option<KindMistake> {
+pub(in crate::script) fn find_condition_mistake(expr: &Expr, like: LikeWords<'_>) -> Option<KindMistake> {
     let at = expr.position();
-    match known(expr, like) {
+    match infer_kind(expr, like) {
         ExpressionKind::Word(seen) if seen.kind == WordKind::Number => {
-            Some((at, format!("`{}` is a number and no condition", seen.name), seen.asked()))
+            Some((at, format!("`{}` is a number and no condition", seen.name), seen.suggest_comparison()))
         }
         ExpressionKind::Word(seen) => {
             let next = format!("compare it: `{0} == \"...\"`; whether it has a value is has({0})", seen.name);

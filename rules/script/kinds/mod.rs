@@ -14,9 +14,9 @@ pub(super) mod compare;
 pub(super) mod switch;
 
 use super::fields;
-use super::vocabulary::{Word, WordKind, find};
+use super::vocabulary::{Word, WordKind, find_word};
 use adapters::ChannelId;
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use rhai::{Expr, Position};
 
 /// What to do with a text in the place of a number.
@@ -39,21 +39,21 @@ pub(super) struct WordInUse {
 }
 
 impl WordInUse {
-    fn of(name: &str, word: &'static Word) -> Self {
-        let channel = ChannelId::of(word.name).map(ChannelId::channel);
+    fn from_word(name: &str, word: &'static Word) -> Self {
+        let channel = ChannelId::from_name(word.name).map(ChannelId::channel);
         let range = channel.filter(|_| word.kind == WordKind::Number).map(|channel| channel.range);
         Self { name: name.to_owned(), kind: word.kind, one_of: word.one_of.to_vec(), range, unit: word.unit }
     }
 
     /// A number that is 0 or 1.
-    fn switches(&self) -> bool {
+    fn is_switch(&self) -> bool {
         self.kind == WordKind::Number && self.unit == "1" && self.range == Some((0.0, 1.0))
     }
 
     /// How to ask for a number in place of true or false.
-    fn asked(&self) -> String {
+    fn suggest_comparison(&self) -> String {
         let Self { name, .. } = self;
-        if self.switches() {
+        if self.is_switch() {
             format!("write `{name} > 0` for on and `{name} == 0` for off")
         } else {
             format!("compare it: `{name} > 0`; whether it has a value is has({name})")
@@ -79,7 +79,7 @@ fn near_word<'w>(text: &str, words: impl Iterator<Item = &'w str> + Clone) -> Op
     let same = words.clone().find(|word| word.eq_ignore_ascii_case(text));
     same.or_else(|| {
         let small: Vec<(String, &str)> = words.map(|word| (word.to_lowercase(), word)).collect();
-        let near = nearest(&text.to_lowercase(), small.iter().map(|(word, _)| word.as_str()))?.to_owned();
+        let near = find_nearest_name(&text.to_lowercase(), small.iter().map(|(word, _)| word.as_str()))?.to_owned();
         small.into_iter().find(|(word, _)| *word == near).map(|(_, word)| word)
     })
 }
@@ -100,47 +100,47 @@ pub(super) enum ExpressionKind<'e> {
 pub(super) type LikeWords<'a> = &'a [(&'a str, &'static Word)];
 
 /// What is known of this expression.
-pub(super) fn known<'e>(expr: &'e Expr, like: LikeWords<'_>) -> ExpressionKind<'e> {
+pub(super) fn infer_kind<'e>(expr: &'e Expr, like: LikeWords<'_>) -> ExpressionKind<'e> {
     match expr {
         Expr::IntegerConstant(number, _) => ExpressionKind::Number(*number as f64),
         Expr::FloatConstant(number, _) => ExpressionKind::Number(**number),
         Expr::StringConstant(text, _) => ExpressionKind::Text(text),
         Expr::BoolConstant(..) | Expr::And(..) | Expr::Or(..) => ExpressionKind::Flag,
-        Expr::Variable(name, short, _) if name.0.is_none() && short.is_none() => word(&name.1, like),
-        Expr::Dot(pair, ..) => field(&pair.lhs, &pair.rhs),
-        Expr::Coalesce(options, _) => options.first().map_or(ExpressionKind::Unknown, |first| known(first, like)),
-        Expr::FnCall(call, _) if call.op_token.is_some() => operated(&call.name, &call.args, like),
+        Expr::Variable(name, short, _) if name.0.is_none() && short.is_none() => infer_word_kind(&name.1, like),
+        Expr::Dot(pair, ..) => infer_field_kind(&pair.lhs, &pair.rhs),
+        Expr::Coalesce(options, _) => options.first().map_or(ExpressionKind::Unknown, |first| infer_kind(first, like)),
+        Expr::FnCall(call, _) if call.op_token.is_some() => infer_operation_kind(&call.name, &call.args, like),
         _ => ExpressionKind::Unknown,
     }
 }
 
-fn word(name: &str, like: LikeWords<'_>) -> ExpressionKind<'static> {
+fn infer_word_kind(name: &str, like: LikeWords<'_>) -> ExpressionKind<'static> {
     let stands_for = like.iter().find(|(known, _)| *known == name).map(|(_, word)| *word);
-    match stands_for.or_else(|| find(name)).filter(|word| word.kind != WordKind::Map) {
-        Some(word) => ExpressionKind::Word(WordInUse::of(name, word)),
+    match stands_for.or_else(|| find_word(name)).filter(|word| word.kind != WordKind::Map) {
+        Some(word) => ExpressionKind::Word(WordInUse::from_word(name, word)),
         None => ExpressionKind::Unknown,
     }
 }
 
 /// `sample.x`, `age_s.x`, `missing.x`.
-fn field(left: &Expr, right: &Expr) -> ExpressionKind<'static> {
+fn infer_field_kind(left: &Expr, right: &Expr) -> ExpressionKind<'static> {
     let (Expr::Variable(record, ..), Expr::Property(property, _)) = (left, right) else {
         return ExpressionKind::Unknown;
     };
-    let Some(found) = fields::record(&record.1).and_then(|record| record.field(&property.2).ok()) else {
+    let Some(found) = fields::find_record(&record.1).and_then(|record| record.find_field(&property.2).ok()) else {
         return ExpressionKind::Unknown;
     };
     let name = format!("{}.{}", record.1, property.2);
-    match found.reasons() {
+    match found.list_reasons() {
         Some(one_of) => ExpressionKind::Word(WordInUse { name, kind: WordKind::Text, one_of, range: None, unit: "" }),
         None if found.is_age() => ExpressionKind::SomeNumber,
-        None => ExpressionKind::Word(WordInUse::of(&name, found.word)),
+        None => ExpressionKind::Word(WordInUse::from_word(&name, found.word)),
     }
 }
 
 /// Arithmetic gives a number where one side is one; a comparison is true or false.
-fn operated<'e>(operator: &str, operands: &'e [Expr], like: LikeWords<'_>) -> ExpressionKind<'e> {
-    let number = |expr: &Expr| match known(expr, like) {
+fn infer_operation_kind<'e>(operator: &str, operands: &'e [Expr], like: LikeWords<'_>) -> ExpressionKind<'e> {
+    let number = |expr: &Expr| match infer_kind(expr, like) {
         ExpressionKind::Number(_) | ExpressionKind::SomeNumber => true,
         ExpressionKind::Word(seen) => seen.kind == WordKind::Number,
         _ => false,

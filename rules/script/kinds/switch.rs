@@ -1,25 +1,26 @@
 //! The cases of a `switch` over a word of the vocabulary. The compiled form keeps only their hashes, so they are read from the text.
 
-use super::{ExpressionKind, KindMistake, LikeWords, known};
-use crate::script::declared::scan::{position, skipped};
+use super::{ExpressionKind, KindMistake, LikeWords, infer_kind};
+use crate::script::declared::scan::{skip_text_or_comment, to_position};
 use rhai::{Expr, Position};
 
 /// What is wrong with the cases of the `switch` that looks at this expression.
-pub(in crate::script) fn cases(text: &str, looked_at: &Expr, like: LikeWords<'_>) -> Vec<KindMistake> {
-    let ExpressionKind::Word(seen) = known(looked_at, like) else { return Vec::new() };
+pub(in crate::script) fn find_case_mistakes(text: &str, looked_at: &Expr, like: LikeWords<'_>) -> Vec<KindMistake> {
+    let ExpressionKind::Word(seen) = infer_kind(looked_at, like) else { return Vec::new() };
     if seen.one_of.is_empty() {
         return Vec::new();
     }
-    let Some(begin) = offset(text, looked_at.position()) else { return Vec::new() };
+    let Some(begin) = to_byte_offset(text, looked_at.position()) else { return Vec::new() };
     let wrong = |(at, case): &(usize, &str)| {
         let known = seen.one_of.contains(case);
-        (!known).then(|| (position(text, *at), format!("`{}` is never \"{case}\"", seen.name), seen.right_word(case)))
+        (!known)
+            .then(|| (to_position(text, *at), format!("`{}` is never \"{case}\"", seen.name), seen.right_word(case)))
     };
-    literals(text, begin).iter().filter_map(wrong).collect()
+    find_literals(text, begin).iter().filter_map(wrong).collect()
 }
 
 /// Byte of a line and column.
-fn offset(text: &str, at: Position) -> Option<usize> {
+fn to_byte_offset(text: &str, at: Position) -> Option<usize> {
     let (line, column) = (at.line()?, at.position()?);
     let before: usize = text.split_inclusive('\n').take(line - 1).map(str::len).sum();
     let rest = text.get(before..)?;
@@ -27,10 +28,10 @@ fn offset(text: &str, at: Position) -> Option<usize> {
 }
 
 /// The texts that stand as cases: directly inside the braces, before `=>`.
-fn literals(text: &str, begin: usize) -> Vec<(usize, &str)> {
+fn find_literals(text: &str, begin: usize) -> Vec<(usize, &str)> {
     let (mut found, mut open, mut depth, mut at) = (Vec::new(), Vec::new(), 0_usize, begin);
     while at < text.len() {
-        let after = skipped(text, at);
+        let after = skip_text_or_comment(text, at);
         if after > at {
             if depth == 1 && text[at..].starts_with('"') {
                 open.push((at, &text[at + 1..after - 1]));

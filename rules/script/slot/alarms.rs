@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 impl Slot {
     /// Begins and ends alarms: those that the body named and those that stand until they are cleared.
-    pub(super) fn alarms(&self, now_ns: TimeNs, outputs: &mut Outputs<'_>) {
-        for (name, text) in self.named.iter().map(|(name, text)| (name, text)).chain(self.timers.latched()) {
+    pub(super) fn update_alarms(&self, now_ns: TimeNs, outputs: &mut Outputs<'_>) {
+        for (name, text) in self.named.iter().map(|(name, text)| (name, text)).chain(self.timers.latched_alarms()) {
             let standing = |alarm: &Alarm| *alarm.script == *self.script.file && *alarm.name == **name;
             if !outputs.alarms.iter().any(standing) {
                 self.begin_alarm(name, text, now_ns, outputs);
@@ -18,10 +18,10 @@ impl Slot {
         let own = |alarm: &Alarm| *alarm.script == *self.script.file && *alarm.name != *SCRIPT_STOPPED;
         let asked = |alarm: &Alarm| {
             let named = self.named.iter().any(|(name, _)| **name == *alarm.name);
-            named || self.timers.latched().contains_key(&*alarm.name)
+            named || self.timers.latched_alarms().contains_key(&*alarm.name)
         };
         let over = |alarm: &Alarm| own(alarm) && !asked(alarm);
-        let ended = outputs.alarms.iter().filter(|alarm| over(alarm)).map(|alarm| alarm.change(false));
+        let ended = outputs.alarms.iter().filter(|alarm| over(alarm)).map(|alarm| alarm.to_change(false));
         outputs.decision.alarms.extend(ended);
         outputs.alarms.retain(|alarm| !over(alarm));
     }
@@ -30,7 +30,7 @@ impl Slot {
         let (en, zh) = (Arc::from(text.en.as_str()), Arc::from(text.zh.as_str()));
         let script = self.script.file.clone();
         let alarm = Alarm { name: Arc::from(name), script, level: text.level, en, zh, since_ns };
-        outputs.decision.alarms.push(alarm.change(true));
+        outputs.decision.alarms.push(alarm.to_change(true));
         outputs.alarms.push(alarm);
     }
 }

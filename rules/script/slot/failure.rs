@@ -1,28 +1,28 @@
 //! A run that failed or was stopped, and who is in charge then.
 
 use super::{Outputs, Previous, ScriptCondition, Slot};
-use crate::script::compile::{ScriptFile, compile};
+use crate::script::compile::{ScriptFile, compile_scripts};
 use crate::script::compiled::Script;
 use crate::script::decision::{AlarmLevel, SCRIPT_STOPPED};
 use crate::script::script_memory::ScriptMemory;
-use crate::script::shipped::shipped;
+use crate::script::shipped::list_shipped_scripts;
 use crate::script::timers::AlarmText;
 use rhai::EvalAltResult;
 
 impl Slot {
     /// The clock has stopped this run: it asks for nothing, and the next one begins anew.
     pub(super) fn leave_out(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) {
-        self.withdraw();
+        self.withdraw_requests();
         self.values.fill(None);
         self.late += 1;
-        outputs.decision.problems.push(self.told(error));
+        outputs.decision.problems.push(self.describe_error(error));
     }
 
     /// The script failed. True when an older version has come into charge.
-    pub(super) fn fail(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) -> bool {
-        self.withdraw();
+    pub(super) fn recover_from_failure(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) -> bool {
+        self.withdraw_requests();
         self.values.fill(None);
-        let problem = self.told(error);
+        let problem = self.describe_error(error);
         let at_ns = outputs.decision.at_ns;
         let previous = self.previous.take().or_else(|| self.as_delivered());
         let next = if previous.is_some() { "the version before it is in charge" } else { "it is suspended" };
@@ -32,7 +32,7 @@ impl Slot {
         if let Some(Previous { script, script_memory }) = previous {
             *self = Self {
                 condition: ScriptCondition::Reverted(problem.clone()),
-                ..Self::fresh(script, None, script_memory)
+                ..Self::with_fresh_state(script, None, script_memory)
             };
         } else {
             self.condition = ScriptCondition::Suspended(Some(problem.clone()));
@@ -47,8 +47,9 @@ impl Slot {
     /// The script of this name as it was delivered, where nothing else has ever been good. It goes on with empty memory: what an
     /// edited one has remembered may mean something else.
     fn as_delivered(&self) -> Option<Previous> {
-        let files: Vec<ScriptFile> = shipped().into_iter().filter(|file| *file.name == *self.script.file).collect();
-        let script = compile(&files).ok()?.scripts.first()?.clone();
+        let files: Vec<ScriptFile> =
+            list_shipped_scripts().into_iter().filter(|file| *file.name == *self.script.file).collect();
+        let script = compile_scripts(&files).ok()?.scripts.first()?.clone();
         let fits = |script: &Script| script.version != self.script.version && script.foreign.is_empty();
         fits(&script).then(|| Previous { script, script_memory: ScriptMemory::default() })
     }

@@ -15,7 +15,7 @@ pub(super) struct Follows {
 
 impl Follows {
     /// What the newest run of the script follows, and why.
-    pub(super) fn take(&mut self, wanted: Option<(&'static Word, ImmutableString)>) {
+    pub(super) fn set_followed_word(&mut self, wanted: Option<(&'static Word, ImmutableString)>) {
         match (&mut self.word, wanted) {
             (Some((word, reason)), Some((wanted, why))) if word.name == wanted.name && **reason == *why => {}
             (word, wanted) => {
@@ -26,14 +26,14 @@ impl Follows {
     }
 
     /// Nothing is followed any more.
-    pub(super) fn end(&mut self) {
+    pub(super) fn stop_following(&mut self) {
         (self.word, self.request) = (None, None);
     }
 
     /// What is asked for at this tick.
-    pub(super) fn look(&mut self, view: &View<'_>, script: &Script) {
+    pub(super) fn update_request(&mut self, view: &View<'_>, script: &Script) {
         let Some((word, reason)) = &self.word else { return };
-        match (word.see(view), &mut self.request) {
+        match (word.read_value(view), &mut self.request) {
             (WordValue::Number(pct), Some(request)) => request.pct = pct,
             (WordValue::Number(pct), request) => {
                 let (reason, file) = (reason.clone(), script.file.clone());

@@ -17,7 +17,7 @@ use super::running::RunningScript;
 use super::script_memory::ScriptMemory;
 use super::status::{ScriptCondition, ScriptStatus};
 use super::timers::{AlarmText, Timers};
-use super::variables::{fill, has_absent, scope_of, why_absent};
+use super::variables::{fill_scope, has_absent, scope_of, why_absent};
 use super::vocabulary::View;
 use crate::estimators::Estimates;
 use adapters::Sample;
@@ -82,22 +82,24 @@ pub(super) struct Slot {
 
 impl Slot {
     /// `before` is what stood under this file name until now, `remembered` what the file had in an earlier process.
-    pub(super) fn install(script: Arc<Script>, before: Option<Self>, remembered: Option<&Value>) -> Self {
+    pub(super) fn install_script(script: Arc<Script>, before: Option<Self>, remembered: Option<&Value>) -> Self {
         match before {
             Some(before) if before.script.version == script.version && before.condition.is_active() => before,
             Some(before) => {
                 let script_memory = before.script_memory();
-                let proven = before.good_since_ns.is_some() && !before.condition.suspended();
+                let proven = before.good_since_ns.is_some() && !before.condition.is_suspended();
                 let standing = Previous { script: before.script, script_memory: script_memory.clone() };
                 let previous = if proven { Some(standing) } else { before.previous };
                 let previous = previous.filter(|previous| previous.script.version != script.version);
-                Self::fresh(script, previous, script_memory)
+                Self::with_fresh_state(script, previous, script_memory)
             }
-            None => Self::fresh(script, None, remembered.map(ScriptMemory::restore).unwrap_or_default()),
+            None => {
+                Self::with_fresh_state(script, None, remembered.map(ScriptMemory::from_snapshot).unwrap_or_default())
+            }
         }
     }
 
-    fn fresh(script: Arc<Script>, previous: Option<Previous>, script_memory: ScriptMemory) -> Self {
+    fn with_fresh_state(script: Arc<Script>, previous: Option<Previous>, script_memory: ScriptMemory) -> Self {
         let scope = scope_of(&script, script_memory.memory);
         Self {
             base: scope.len(),
@@ -128,8 +130,8 @@ impl Slot {
     }
 
     /// What outlives the process.
-    pub(super) fn snapshot(&self) -> Value {
-        self.script_memory().snapshot()
+    pub(super) fn take_snapshot(&self) -> Value {
+        self.script_memory().take_snapshot()
     }
 
     pub(super) fn file(&self) -> &str {
@@ -153,7 +155,7 @@ impl Slot {
     }
 
     /// The channels of its own, each with its newest value.
-    pub(super) fn published(&self) -> impl Iterator<Item = Published<'_>> {
+    pub(super) fn published_channels(&self) -> impl Iterator<Item = Published<'_>> {
         let rows = self.script.channels.iter().zip(&self.values);
         rows.map(|((name, unit), value)| Published { name, unit, script: &self.script.file, value: *value })
     }
@@ -166,7 +168,7 @@ impl Slot {
         foreign: &mut Vec<Option<f64>>,
     ) {
         let value = |name: &ImmutableString| {
-            let published = before.iter().flat_map(Self::published).find(|it| *it.name == **name);
+            let published = before.iter().flat_map(Self::published_channels).find(|it| *it.name == **name);
             published.map_or_else(|| given.get(name.as_str()).copied().flatten(), |it| it.value)
         };
         foreign.clear();
@@ -174,21 +176,21 @@ impl Slot {
     }
 
     /// Nothing is asked for any more.
-    pub(super) fn withdraw(&mut self) {
+    pub(super) fn withdraw_requests(&mut self) {
         self.request = None;
-        self.follows.end();
+        self.follows.stop_following();
         self.stops.clear();
         self.offsets.clear();
     }
 
     /// May an alarm of this name stand on after a set was installed?
-    pub(super) fn keeps(&self, name: &str) -> bool {
+    pub(super) fn can_keep_alarm(&self, name: &str) -> bool {
         name != SCRIPT_STOPPED || !matches!(self.condition, ScriptCondition::Running | ScriptCondition::Waiting(_))
     }
 
     /// Runs the handlers of what has happened, and the script when it is due; asks for what it follows. True when an older version
     /// has come into charge.
-    pub(super) fn tick(
+    pub(super) fn run_tick(
         &mut self,
         engine: &Engine,
         shared: &Shared,
@@ -196,60 +198,61 @@ impl Slot {
         outputs: &mut Outputs<'_>,
     ) -> bool {
         let replaced = self.run_due(engine, shared, moment, outputs);
-        self.follows.look(&View { sample: moment.sample, estimates: moment.estimates, dt_s: 0.0 }, &self.script);
+        self.follows
+            .update_request(&View { sample: moment.sample, estimates: moment.estimates, dt_s: 0.0 }, &self.script);
         replaced
     }
 
     fn run_due(&mut self, engine: &Engine, shared: &Shared, moment: &Moment<'_>, outputs: &mut Outputs<'_>) -> bool {
         let at_ns = moment.sample.at_ns;
-        let due = !self.script.passive && self.due(at_ns);
-        let heard = moment.events.iter().any(|event| self.script.hears(event));
-        if self.condition.suspended() || !(due || heard) {
+        let due = !self.script.passive && self.is_due(at_ns);
+        let heard = moment.events.iter().any(|event| self.script.has_handler_for(event));
+        if self.condition.is_suspended() || !(due || heard) {
             return false;
         }
         let dt_s = if due { self.elapsed_s(at_ns) } else { 0.0 };
         let view = View { sample: moment.sample, estimates: moment.estimates, dt_s };
-        let live = (!self.script.live.is_empty()).then(|| self.now.step(&self.script.live, moment.sample));
-        fill(&mut self.scope, &self.script, &view, (moment.foreign, live.as_deref().unwrap_or_default()));
-        self.exchange(shared, at_ns);
+        let live = (!self.script.live.is_empty()).then(|| self.now.update_values(&self.script.live, moment.sample));
+        fill_scope(&mut self.scope, &self.script, &view, (moment.foreign, live.as_deref().unwrap_or_default()));
+        self.exchange_timers(shared, at_ns);
         shared.lock().live = live;
-        let outcome = self.run(engine, moment.events, due);
+        let outcome = self.run_script(engine, moment.events, due);
         self.scope.rewind(self.base);
         let mut collected = shared.lock();
         std::mem::swap(&mut collected.timers, &mut self.timers);
         match outcome {
-            Ok(()) => self.succeed(&mut collected, due, outputs),
+            Ok(()) => self.accept_outcome(&mut collected, due, outputs),
             Err(error) if problem::is_absence(&error) && self.any_absent(&collected) => {
-                self.wait(&error, &view, &collected, moment.foreign);
+                self.wait_for_value(&error, &view, &collected, moment.foreign);
             }
             Err(error) if is_late(&error) && self.late + 1 < LATE_MAX => self.leave_out(&error, outputs),
-            Err(error) => return self.fail(&error, outputs),
+            Err(error) => return self.recover_from_failure(&error, outputs),
         }
         false
     }
 
     /// All of it within the operations of one run.
-    fn run(&mut self, engine: &Engine, events: &[Event], due: bool) -> ScriptResult<()> {
+    fn run_script(&mut self, engine: &Engine, events: &[Event], due: bool) -> ScriptResult<()> {
         let script = Arc::clone(&self.script);
-        self.running.begin(engine, &script.ast);
+        self.running.begin_run(engine, &script.ast);
         for event in events {
             for handler in script.handlers.iter().filter(|handler| handler.kind == event.kind()) {
-                for (name, value) in handler.parameters.iter().zip(event.values()) {
+                for (name, value) in handler.parameters.iter().zip(event.to_parameter_values()) {
                     self.scope.push_dynamic(name.clone(), value);
                 }
-                self.running.run(engine, &mut self.scope, &script.ast, handler.body.statements())?;
+                self.running.run_statements(engine, &mut self.scope, &script.ast, handler.body.statements())?;
                 self.scope.rewind(self.base);
             }
         }
         if due {
             self.runs += 1;
-            self.running.run(engine, &mut self.scope, &script.ast, script.body.statements())?;
+            self.running.run_statements(engine, &mut self.scope, &script.ast, script.body.statements())?;
         }
         // `memory` lives on, so its size is checked after every run.
         self.scope.get("memory").map_or(Ok(()), |memory| engine.ensure_data_size_within_limits(memory))
     }
 
-    fn due(&self, at_ns: TimeNs) -> bool {
+    fn is_due(&self, at_ns: TimeNs) -> bool {
         // A tick may come a little early; a hundredth of the pace does not make a run wait for the next one.
         let every_ns = self.script.every_ns - self.script.every_ns / 100;
         self.ran_ns.is_none_or(|ran_ns| at_ns < ran_ns || at_ns - ran_ns >= every_ns)
@@ -259,47 +262,47 @@ impl Slot {
     fn elapsed_s(&mut self, at_ns: TimeNs) -> f64 {
         let elapsed_ns = self.ran_ns.replace(at_ns).map_or(0, |ran_ns| at_ns - ran_ns);
         if elapsed_ns < 0 || elapsed_ns > PAUSE_NS.max(3 * self.script.every_ns) {
-            self.timers.restart();
+            self.timers.restart_timing();
             return 0.0;
         }
         elapsed_ns as f64 / SECOND_NS as f64
     }
 
-    fn exchange(&mut self, shared: &Shared, at_ns: TimeNs) {
+    fn exchange_timers(&mut self, shared: &Shared, at_ns: TimeNs) {
         let mut collected = shared.lock();
-        collected.begin(at_ns);
+        collected.begin_run(at_ns);
         std::mem::swap(&mut collected.timers, &mut self.timers);
     }
 
     fn any_absent(&self, collected: &RunOutput) -> bool {
-        collected.refusals().next().is_some() || has_absent(&self.scope, &self.script)
+        collected.list_refusals().next().is_some() || has_absent(&self.scope, &self.script)
     }
 
-    fn succeed(&mut self, collected: &mut RunOutput, due: bool, outputs: &mut Outputs<'_>) {
+    fn accept_outcome(&mut self, collected: &mut RunOutput, due: bool, outputs: &mut Outputs<'_>) {
         self.late = 0;
         if matches!(self.condition, ScriptCondition::Waiting(_)) {
             self.condition = ScriptCondition::Running;
         }
         self.good_since_ns.get_or_insert(collected.now_ns);
         if due {
-            self.ask(collected);
+            self.request_override(collected);
             self.named.clear();
             self.named.append(&mut collected.alarms);
         }
         self.ask_to_stop(collected, due);
         outputs.decision.learn_anew.extend(collected.learn_anew.drain(..).map(|program| Arc::from(program.as_str())));
-        self.alarms(collected.now_ns, outputs);
-        self.publish(collected);
+        self.update_alarms(collected.now_ns, outputs);
+        self.publish_values(collected);
         for text in collected.notes.drain(..) {
-            if let Some(text) = self.notes.admit(&text, collected.now_ns) {
+            if let Some(text) = self.notes.admit_note(&text, collected.now_ns) {
                 outputs.decision.notes.push(Note { script: self.script.file.clone(), text });
             }
         }
     }
 
-    fn ask(&mut self, collected: &mut RunOutput) {
-        self.propose(collected);
-        self.follows.take(collected.follows.take());
+    fn request_override(&mut self, collected: &mut RunOutput) {
+        self.propose_offsets(collected);
+        self.follows.set_followed_word(collected.follows.take());
         let Some((pct, reason)) = collected.request.take() else {
             self.request = None;
             return;
@@ -311,7 +314,7 @@ impl Slot {
         self.request = Some(OverrideRequest { pct, reason, script, version: self.script.version });
     }
 
-    fn propose(&mut self, collected: &mut RunOutput) {
+    fn propose_offsets(&mut self, collected: &mut RunOutput) {
         let Script { file, version, .. } = &*self.script;
         self.offsets.clear();
         self.offsets.extend(collected.offsets.drain(..).map(|(axis, (offset_um, reason))| OffsetProposal {
@@ -336,7 +339,7 @@ impl Slot {
         }
     }
 
-    fn publish(&mut self, collected: &mut RunOutput) {
+    fn publish_values(&mut self, collected: &mut RunOutput) {
         for (name, value) in collected.published.drain(..) {
             if let Some(at) = self.script.channels.iter().position(|(known, _)| **known == *name) {
                 self.values[at] = value;
@@ -344,20 +347,26 @@ impl Slot {
         }
     }
 
-    fn told(&self, error: &EvalAltResult) -> ScriptProblem {
+    fn describe_error(&self, error: &EvalAltResult) -> ScriptProblem {
         problem::of_run_behind(&self.script.file, error, self.script.body.lines)
     }
 
     /// The script worked on a value that is not there: it asks for nothing, publishes nothing and tries again; alarms stay
     /// as they are.
-    fn wait(&mut self, error: &EvalAltResult, view: &View<'_>, collected: &RunOutput, foreign: &[Option<f64>]) {
-        self.withdraw();
+    fn wait_for_value(
+        &mut self,
+        error: &EvalAltResult,
+        view: &View<'_>,
+        collected: &RunOutput,
+        foreign: &[Option<f64>],
+    ) {
+        self.withdraw_requests();
         self.values.fill(None);
         if self.condition != ScriptCondition::Running {
             return;
         }
-        let mut problem = self.told(error);
-        let absent: Vec<String> = why_absent(&self.script, view, foreign).chain(collected.refusals()).collect();
+        let mut problem = self.describe_error(error);
+        let absent: Vec<String> = why_absent(&self.script, view, foreign).chain(collected.list_refusals()).collect();
         problem.what = absent.join(", ");
         self.condition = ScriptCondition::Waiting(problem);
     }

@@ -24,10 +24,10 @@ mod stage;
 
 pub use functions::TRIAL_FUNCTIONS;
 
-use super::compile::variant;
+use super::compile::compile_variant;
 use super::compiled::{Script, ScriptSet};
 use super::declared::{DeclarationPlace, SettingValues};
-use super::engine::{OPERATIONS_MAX, Shared, engine};
+use super::engine::{OPERATIONS_MAX, Shared, build_engine};
 use super::problem::{self, ScriptProblem};
 use super::running::RunningScript;
 use rhai::{AST, Engine, Position, Scope};
@@ -70,7 +70,7 @@ pub struct TrialResult {
 /// values were chosen also with the defaults and with the values of each tool and operation. A script without a trial is run for
 /// a few seconds with and without values: it must come to an end and not fail.
 #[must_use]
-pub fn trials(set: &ScriptSet) -> Vec<TrialResult> {
+pub fn run_trials(set: &ScriptSet) -> Vec<TrialResult> {
     set.scripts.iter().flat_map(|script| of_script(set, script)).collect()
 }
 
@@ -78,21 +78,21 @@ pub fn trials(set: &ScriptSet) -> Vec<TrialResult> {
 ///
 /// # Errors
 /// What the trials found.
-pub fn prove(set: ScriptSet) -> Result<ScriptSet, Vec<ScriptProblem>> {
-    let problems: Vec<ScriptProblem> = trials(&set).into_iter().filter_map(|result| result.problem).collect();
+pub fn prove_scripts(set: ScriptSet) -> Result<ScriptSet, Vec<ScriptProblem>> {
+    let problems: Vec<ScriptProblem> = run_trials(&set).into_iter().filter_map(|result| result.problem).collect();
     if problems.is_empty() { Ok(set) } else { Err(problems) }
 }
 
 /// A script with other values of its settings, and which they are.
 type ScriptVariant = (Option<String>, Arc<Script>);
 
-fn variants(set: &ScriptSet, script: &Arc<Script>) -> Vec<ScriptVariant> {
+fn build_variants(set: &ScriptSet, script: &Arc<Script>) -> Vec<ScriptVariant> {
     let section = script.file.strip_suffix(".rhai").unwrap_or(&script.file);
     let own = |place: &DeclarationPlace| {
-        let all = set.values.all().filter(|(its, _, at, _)| *its == section && *at == place);
+        let all = set.values.list_values().filter(|(its, _, at, _)| *its == section && *at == place);
         all.map(|(_, name, _, value)| format!("{name} = {value}")).collect::<Vec<_>>().join(", ")
     };
-    let places = set.values.places(section);
+    let places = set.values.list_places(section);
     if own(&DeclarationPlace::Machine).is_empty() && places.is_empty() {
         return vec![(None, script.clone())];
     }
@@ -106,25 +106,25 @@ fn variants(set: &ScriptSet, script: &Arc<Script>) -> Vec<ScriptVariant> {
     wanted.extend(places.iter().take(PLACES_MAX).map(special));
     let ready = |(told, values, place): &(String, SettingValues, DeclarationPlace)| {
         // It has compiled with these values already; a set without texts is tried as it is.
-        variant(set, script, values, place).ok().map(|script| (Some(told.clone()), script))
+        compile_variant(set, script, values, place).ok().map(|script| (Some(told.clone()), script))
     };
     let found: Vec<ScriptVariant> = wanted.iter().filter_map(ready).collect();
     if found.is_empty() { vec![(None, script.clone())] } else { found }
 }
 
 fn of_script(set: &ScriptSet, script: &Arc<Script>) -> Vec<TrialResult> {
-    variants(set, script).into_iter().flat_map(|(with, script)| of_variant(&script, with.as_deref())).collect()
+    build_variants(set, script).into_iter().flat_map(|(with, script)| of_variant(&script, with.as_deref())).collect()
 }
 
 fn of_variant(script: &Arc<Script>, with: Option<&str>) -> Vec<TrialResult> {
     if script.trials.is_empty() {
-        return smoke::run(script).into_iter().collect();
+        return smoke::run_smoke_trial(script).into_iter().collect();
     }
     let theatre = Theatre::default();
-    let mut engine = engine(&Shared::default(), false);
-    functions::register(&mut engine, &theatre);
+    let mut engine = build_engine(&Shared::default(), false);
+    functions::register_trial_functions(&mut engine, &theatre);
     let mut results: Vec<TrialResult> =
-        script.trials.iter().map(|trial| perform(&engine, &theatre, script, trial)).collect();
+        script.trials.iter().map(|trial| run_trial(&engine, &theatre, script, trial)).collect();
     for result in &mut results {
         if let (Some(with), Some(problem)) = (with, &mut result.problem) {
             problem.what = format!("{with}: {}", problem.what);
@@ -137,14 +137,14 @@ fn of_variant(script: &Arc<Script>, with: Option<&str>) -> Vec<TrialResult> {
     results
 }
 
-fn perform(engine: &Engine, theatre: &Theatre, script: &Arc<Script>, trial: &Trial) -> TrialResult {
-    theatre.open(TrialContext::new(script));
+fn run_trial(engine: &Engine, theatre: &Theatre, script: &Arc<Script>, trial: &Trial) -> TrialResult {
+    theatre.open_stage(TrialContext::new(script));
     let mut scope = Scope::new();
     for (name, value) in &script.constants {
         scope.push_constant_dynamic(name.clone(), value.clone());
     }
     let outcome = RunningScript::new().run_within(engine, &mut scope, &trial.ast, &script.ast);
-    let stage = theatre.close();
+    let stage = theatre.close_stage();
     let name = trial.name.trim_start_matches(PREFIX).replace('_', " ");
     let problem = match outcome {
         Err(error) => {
@@ -156,12 +156,12 @@ fn perform(engine: &Engine, theatre: &Theatre, script: &Arc<Script>, trial: &Tri
         }
         Ok(()) => None,
     };
-    let problem = problem.map(|problem| told(problem, &name));
+    let problem = problem.map(|problem| attribute_to_trial(problem, &name));
     let line = trial.at.line().unwrap_or_default();
     TrialResult { file: script.file.clone(), name, line, met: stage.met, passed_s: stage.passed_s(), problem }
 }
 
-fn told(mut problem: ScriptProblem, name: &str) -> ScriptProblem {
+fn attribute_to_trial(mut problem: ScriptProblem, name: &str) -> ScriptProblem {
     problem.what = format!("trial \"{name}\": {}", problem.what);
     if problem.next.is_empty() {
         "mend the script, or the trial where it asks for the wrong thing".clone_into(&mut problem.next);

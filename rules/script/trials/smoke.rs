@@ -12,29 +12,29 @@ use std::sync::Arc;
 const EACH_S: f64 = 2.0;
 
 /// The result, where the script runs at all and fails.
-pub(super) fn run(script: &Arc<Script>) -> Option<TrialResult> {
+pub(super) fn run_smoke_trial(script: &Arc<Script>) -> Option<TrialResult> {
     if script.passive && script.handlers.is_empty() {
         return None;
     }
     let mut stage = TrialContext::new(script);
-    let failed = through(&mut stage, script).is_err();
+    let failed = run_through_states(&mut stage, script).is_err();
     let problem = stage.failure.clone().filter(|_| failed)?;
     let (file, name) = (script.file.clone(), "it runs, although no trial is written".to_owned());
     Some(TrialResult { file, name, line: 1, met: 0, passed_s: stage.passed_s(), problem: Some(problem) })
 }
 
-fn through(stage: &mut TrialContext, script: &Script) -> Result<(), String> {
-    stage.pass(EACH_S)?;
+fn run_through_states(stage: &mut TrialContext, script: &Script) -> Result<(), String> {
+    stage.pass_time(EACH_S)?;
     stage.give_all(script);
     for (turn, state) in State::ALL.into_iter().enumerate() {
         let text = |text: String| Dynamic::from(ImmutableString::from(text));
-        stage.give("state", &text(state.word().to_owned()))?;
+        stage.give_value("state", &text(state.as_word().to_owned()))?;
         // Handlers run too: another tool and program, one more part, an alarm of the controller.
-        stage.give("tool", &text(format!("T{}", turn + 1)))?;
-        stage.give("program", &text(format!("O{}", turn + 1)))?;
-        stage.give("part_count", &Dynamic::from_float(turn as f64))?;
-        stage.give("alarm", &text(if turn % 2 == 0 { String::new() } else { "EX1000".to_owned() }))?;
-        stage.pass(EACH_S)?;
+        stage.give_value("tool", &text(format!("T{}", turn + 1)))?;
+        stage.give_value("program", &text(format!("O{}", turn + 1)))?;
+        stage.give_value("part_count", &Dynamic::from_float(turn as f64))?;
+        stage.give_value("alarm", &text(if turn % 2 == 0 { String::new() } else { "EX1000".to_owned() }))?;
+        stage.pass_time(EACH_S)?;
     }
     Ok(())
 }

@@ -6,11 +6,11 @@ use crate::script::compiled::{Script, ScriptSet};
 use crate::script::decision::{Alarm, Axis, Decision, Stop};
 use crate::script::problem::ScriptProblem;
 use crate::script::quantities::QUANTITIES;
-use crate::script::settings::merge;
+use crate::script::settings::merge_settings;
 use crate::script::status::ScriptCondition;
-use crate::script::vocabulary::{find, words};
+use crate::script::vocabulary::{find_word, list_words};
 use crate::script::{Host, WordKind};
-use adapters::channel::nearest;
+use adapters::channel::find_nearest_name;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
 use rhai::{Dynamic, ImmutableString};
@@ -34,11 +34,11 @@ impl Theatre {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn open(&self, stage: TrialContext) {
+    pub(super) fn open_stage(&self, stage: TrialContext) {
         *self.lock() = stage;
     }
 
-    pub(super) fn close(&self) -> TrialContext {
+    pub(super) fn close_stage(&self) -> TrialContext {
         std::mem::take(&mut *self.lock())
     }
 }
@@ -67,8 +67,8 @@ impl Default for TrialContext {
     fn default() -> Self {
         Self {
             host: Host::new(),
-            sample: Sample::empty(BEGIN_NS),
-            estimates: Estimates::none(BEGIN_NS),
+            sample: Sample::new_empty(BEGIN_NS),
+            estimates: Estimates::without_samples(BEGIN_NS),
             loads: LoadEstimator::default(),
             given: Vec::new(),
             now_ns: BEGIN_NS,
@@ -87,8 +87,8 @@ impl TrialContext {
     pub(super) fn new(script: &Arc<Script>) -> Self {
         let mut stage = Self::default();
         let scripts = vec![script.clone()];
-        let settings = merge(&scripts, &mut Vec::new());
-        stage.host.install(ScriptSet { scripts, settings, ..ScriptSet::default() });
+        let settings = merge_settings(&scripts, &mut Vec::new());
+        stage.host.install_set(ScriptSet { scripts, settings, ..ScriptSet::default() });
         stage
     }
 
@@ -98,31 +98,32 @@ impl TrialContext {
     }
 
     /// From now on the script sees this.
-    pub(super) fn give(&mut self, name: &str, value: &Dynamic) -> Result<(), String> {
+    pub(super) fn give_value(&mut self, name: &str, value: &Dynamic) -> Result<(), String> {
         if name == "state" {
             return self.give_state(value);
         }
-        if let Some(id) = ChannelId::of(name) {
+        if let Some(id) = ChannelId::from_name(name) {
             return self.give_channel(id, value);
         }
-        if let Some(word) = find(name).filter(|word| word.is_figure()) {
+        if let Some(word) = find_word(name).filter(|word| word.is_figure()) {
             return self.give_figure(word.name, value);
         }
         match QUANTITIES.iter().find(|row| row.1 == name).map(|row| row.0) {
             Some(quantity) => {
-                let sd =
-                    number(value).filter(|sd| *sd >= 0.0).ok_or_else(|| format!("{name} needs a number from 0 on"))?;
-                let place = quantity_of(&mut self.estimates, quantity).ok_or_else(|| unknown(name))?;
+                let sd = read_number(value)
+                    .filter(|sd| *sd >= 0.0)
+                    .ok_or_else(|| format!("{name} needs a number from 0 on"))?;
+                let place = quantity_of(&mut self.estimates, quantity).ok_or_else(|| describe_unknown(name))?;
                 if let Ok(estimate) = place {
                     estimate.sd = sd;
                 }
             }
             None => {
-                if self.host.give(name, number(value)) {
+                if self.host.set_channel_value(name, read_number(value)) {
                     return Ok(());
                 }
-                let place = quantity_of(&mut self.estimates, name).ok_or_else(|| unknown(name))?;
-                *place = match number(value) {
+                let place = quantity_of(&mut self.estimates, name).ok_or_else(|| describe_unknown(name))?;
+                *place = match read_number(value) {
                     Some(value) => Ok(Estimate { value, sd: SD_SHARE * value.abs() }),
                     None if value.is_unit() => Err(NoEstimate::NotSettled),
                     None => return Err(format!("{name} needs a number, or () for no value")),
@@ -133,7 +134,7 @@ impl TrialContext {
     }
 
     fn give_figure(&mut self, name: &'static str, value: &Dynamic) -> Result<(), String> {
-        let figure = match number(value) {
+        let figure = match read_number(value) {
             Some(number) => Ok(number),
             None if value.is_unit() => Err(NoEstimate::NotCutting),
             None => return Err(format!("{name} needs a number, or () for no value")),
@@ -145,9 +146,10 @@ impl TrialContext {
 
     fn give_state(&mut self, value: &Dynamic) -> Result<(), String> {
         let word = value.clone().into_immutable_string().unwrap_or_default();
-        let Some(state) = State::ALL.into_iter().find(|state| state.word() == word.as_str()) else {
-            let words = State::ALL.map(State::word);
-            let near = nearest(&word, words).map(|near| format!("; did you mean \"{near}\"?")).unwrap_or_default();
+        let Some(state) = State::ALL.into_iter().find(|state| state.as_word() == word.as_str()) else {
+            let words = State::ALL.map(State::as_word);
+            let near =
+                find_nearest_name(&word, words).map(|near| format!("; did you mean \"{near}\"?")).unwrap_or_default();
             return Err(format!("there is no state \"{word}\": it is one of {}{near}", words.join(", ")));
         };
         if state != self.estimates.state {
@@ -160,9 +162,9 @@ impl TrialContext {
     fn give_channel(&mut self, id: ChannelId, value: &Dynamic) -> Result<(), String> {
         let channel = id.channel();
         let text = value.read_lock::<ImmutableString>().map(|text| text.to_string());
-        let value = match (number(value), text, channel.kind == adapters::channel::Kind::Text) {
+        let value = match (read_number(value), text, channel.kind == adapters::channel::Kind::Text) {
             _ if value.is_unit() => Err(Absence::Timeout),
-            (Some(number), _, false) if channel.holds(number) => Ok(Value::Number(number)),
+            (Some(number), _, false) if channel.accepts_number(number) => Ok(Value::Number(number)),
             (Some(number), _, false) => {
                 let (least, greatest) = channel.range;
                 return Err(format!("{id} = {number} is outside {least} to {greatest} {}", channel.unit));
@@ -171,19 +173,20 @@ impl TrialContext {
             (_, _, true) => return Err(format!("{id} needs a text, or () for no value")),
             (_, _, false) => return Err(format!("{id} needs a number, or () for no value")),
         };
-        self.sample.set(id, Slot { value, age_ns: 0 });
+        self.sample.set_slot(id, Slot { value, age_ns: 0 });
         Ok(())
     }
 
     /// Ticks come this far apart from now on.
-    pub(super) fn pace(&mut self, seconds: f64) -> Result<(), String> {
-        self.step_ns = span(seconds).filter(|step_ns| *step_ns > 0).ok_or("pace_s needs seconds from 0.001 to 3600")?;
+    pub(super) fn set_pace(&mut self, seconds: f64) -> Result<(), String> {
+        self.step_ns =
+            to_span_ns(seconds).filter(|step_ns| *step_ns > 0).ok_or("pace_s needs seconds from 0.001 to 3600")?;
         Ok(())
     }
 
     /// Lets time pass, tick by tick.
-    pub(super) fn pass(&mut self, seconds: f64) -> Result<(), String> {
-        let span_ns = span(seconds).ok_or("after_s needs seconds, from 0.001 on")?;
+    pub(super) fn pass_time(&mut self, seconds: f64) -> Result<(), String> {
+        let span_ns = to_span_ns(seconds).ok_or("after_s needs seconds, from 0.001 on")?;
         let end_ns = self.now_ns.saturating_add(span_ns);
         self.stops.clear();
         while self.now_ns < end_ns {
@@ -191,19 +194,19 @@ impl TrialContext {
             if self.ticks > TICKS_MAX {
                 return Err(format!("more than {TICKS_MAX} ticks in one trial; pace_s(1.0) makes them longer"));
             }
-            self.tick()?;
+            self.run_tick()?;
             self.now_ns += self.step_ns;
         }
         Ok(())
     }
 
-    fn tick(&mut self) -> Result<(), String> {
+    fn run_tick(&mut self) -> Result<(), String> {
         (self.sample.at_ns, self.estimates.at_ns) = (self.now_ns, self.now_ns);
         self.loads.step(&self.sample, &mut self.estimates, self.host.settings());
         for (name, given) in &self.given {
             self.estimates.figure_mut(name).into_iter().for_each(|figure| *figure = *given);
         }
-        let decision = self.host.tick(&self.sample, &self.estimates);
+        let decision = self.host.run_due_scripts(&self.sample, &self.estimates);
         self.stops.extend(decision.stops.iter().map(|request| request.stop));
         self.notes.extend(decision.notes.iter().map(|note| note.text.clone()));
         self.failure = decision.problems.first().cloned();
@@ -221,7 +224,7 @@ impl TrialContext {
     }
 
     /// Was this asked for since time last began to pass?
-    pub(super) fn stopped(&self, stop: Stop) -> bool {
+    pub(super) fn is_stop_requested(&self, stop: Stop) -> bool {
         self.stops.contains(&stop)
     }
 
@@ -235,8 +238,8 @@ impl TrialContext {
     pub(super) fn give_all(&mut self, script: &Script) {
         let text = |name: &str| Dynamic::from(ImmutableString::from(if name == "program" { "O1" } else { "T1" }));
         let words = script.reads.iter().copied().chain(script.fields.iter().map(|field| field.word));
-        for word in words.filter(|word| !word.writable()) {
-            let value = match (ChannelId::of(word.name).map(ChannelId::channel), word.kind) {
+        for word in words.filter(|word| !word.is_writable()) {
+            let value = match (ChannelId::from_name(word.name).map(ChannelId::channel), word.kind) {
                 (Some(channel), WordKind::Number) => {
                     let (least, greatest) = channel.range;
                     Dynamic::from_float(100.0_f64.clamp(least, greatest))
@@ -245,22 +248,22 @@ impl TrialContext {
                 (None, _) => Dynamic::from_float(100.0),
             };
             // What cannot be given, such as the time, is there anyway.
-            let _given = self.give(word.name, &value);
+            let _given = self.give_value(word.name, &value);
         }
         for name in &script.foreign {
-            self.host.give(name, Some(100.0));
+            self.host.set_channel_value(name, Some(100.0));
         }
     }
 
     /// The newest value of a channel of the script's own; `Err` where it has none of this name.
-    pub(super) fn published(&self, name: &str) -> Result<Option<f64>, String> {
-        let found = self.host.published().find(|it| it.name == name).map(|it| it.value);
-        let names = || self.host.published().map(|it| it.name.to_owned()).collect::<Vec<_>>().join(", ");
+    pub(super) fn find_published(&self, name: &str) -> Result<Option<f64>, String> {
+        let found = self.host.published_channels().find(|it| it.name == name).map(|it| it.value);
+        let names = || self.host.published_channels().map(|it| it.name.to_owned()).collect::<Vec<_>>().join(", ");
         found.ok_or_else(|| format!("the script publishes no `{name}`; it publishes: {}", names()))
     }
 
     /// A setting of the estimators, as this script alone leaves it.
-    pub(super) fn setting(&self, name: &str) -> Option<f64> {
+    pub(super) fn find_setting(&self, name: &str) -> Option<f64> {
         self.host.settings().get(name)
     }
 
@@ -270,7 +273,7 @@ impl TrialContext {
     }
 
     /// Why the script asks for nothing, where it waits for a value.
-    pub(super) fn waiting(&self) -> String {
+    pub(super) fn explain_waiting(&self) -> String {
         let status = self.host.status();
         match status.scripts.first().map(|script| &script.condition) {
             Some(ScriptCondition::Waiting(problem)) => format!("; the script waits: {}", problem.what),
@@ -279,12 +282,12 @@ impl TrialContext {
     }
 }
 
-fn number(value: &Dynamic) -> Option<f64> {
+fn read_number(value: &Dynamic) -> Option<f64> {
     value.as_float().ok().or_else(|| value.as_int().ok().map(|whole| whole as f64))
 }
 
 /// At most 10 days at once.
-fn span(seconds: f64) -> Option<i64> {
+fn to_span_ns(seconds: f64) -> Option<i64> {
     (0.001..=864_000.0).contains(&seconds).then_some((seconds * SECOND_NS as f64).round() as i64)
 }
 
@@ -305,8 +308,8 @@ fn quantity_of<'a>(estimates: &'a mut Estimates, name: &str) -> Option<&'a mut E
     }
 }
 
-fn unknown(name: &str) -> String {
-    let given = words().iter().filter(|word| word.kind != WordKind::Map).map(|word| word.name);
-    let near = nearest(name, given).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+fn describe_unknown(name: &str) -> String {
+    let given = list_words().iter().filter(|word| word.kind != WordKind::Map).map(|word| word.name);
+    let near = find_nearest_name(name, given).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
     format!("`{name}` is nothing that a trial can give{near}")
 }

@@ -3,7 +3,7 @@
 use super::algebra::CholeskyFactor;
 use super::gram::Comparison;
 use super::marginal::{Ground, SIZES, ln_size_prior, ln_sum};
-use crate::statistics::{count, normal_share};
+use crate::statistics::{count_to_f64, normal_share};
 use ndarray::{Array1, Array2};
 
 /// A variant with what its evidence needs for any output.
@@ -52,7 +52,7 @@ impl Comparison<'_> {
         let of = &self.bank.variants[asked.variant];
         let own =
             Array1::from_iter(of.relative.iter().enumerate().map(|(k, relative)| along[asked.start + k] * relative));
-        let rows = self.tempering * count(self.rows.len());
+        let rows = self.tempering * count_to_f64(self.rows.len());
         let all = asked.sizes.iter().enumerate().map(|(index, size)| {
             let explained = size.lambda * size.factor.half(&own);
             let left = (square - explained).max(1e-6 * square);

@@ -10,7 +10,7 @@ use super::gram::Comparison;
 use super::marginal::{SIZES, ln_size_prior, ln_sum};
 use super::posterior::NoiseSetting;
 use super::search::Members;
-use crate::statistics::{count, normal_share};
+use crate::statistics::{count_to_f64, normal_share};
 use crate::twin::units::Random;
 use ndarray::{Array1, Array2, Axis, ShapeBuilder, s};
 use std::collections::BTreeMap;
@@ -39,16 +39,18 @@ pub(super) struct Candidate<'a> {
 
 /// Pieces of the fitted rows, as places among them, never across stretches of unbroken noise; short neighbours share one.
 pub(super) fn pieces(blocks: &[Range<usize>], rows: usize, memory: f64) -> Vec<Vec<usize>> {
-    let size = (count(rows) / PIECES).max(PIECE_ROWS).max(PIECE_MEMORIES * memory);
+    let size = (count_to_f64(rows) / PIECES).max(PIECE_ROWS).max(PIECE_MEMORIES * memory);
     let mut all: Vec<Vec<usize>> = Vec::new();
     for range in blocks {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of pieces")]
-        let number = (count(range.len()) / size).round().max(1.0) as usize;
+        let number = (count_to_f64(range.len()) / size).round().max(1.0) as usize;
         for piece in 0..number {
             let at = |piece: usize| range.start + range.len() * piece / number;
             let own = at(piece)..at(piece + 1);
             match all.last_mut() {
-                Some(last) if count(last.len()) < 0.5 * size && count(own.len()) < 0.5 * size => last.extend(own),
+                Some(last) if count_to_f64(last.len()) < 0.5 * size && count_to_f64(own.len()) < 0.5 * size => {
+                    last.extend(own)
+                }
                 _ => all.push(own.collect()),
             }
         }
@@ -65,7 +67,7 @@ pub(super) fn pieces(blocks: &[Range<usize>], rows: usize, memory: f64) -> Vec<V
 /// Dirichlet weights of this many pieces, of mean one.
 fn weights(pieces: usize, random: &mut Random) -> Vec<f64> {
     let drawn: Vec<f64> = (0..pieces).map(|_| -random.draw().ln()).collect();
-    let mean = drawn.iter().sum::<f64>() / count(pieces.max(1));
+    let mean = drawn.iter().sum::<f64>() / count_to_f64(pieces.max(1));
     drawn.iter().map(|x| x / mean).collect()
 }
 
@@ -127,7 +129,7 @@ impl<'a> Bag<'a> {
             sums.iter().map(|sum| (sum - whole).max(-700.0)).collect()
         };
         let each: Vec<Vec<f64>> = totals.iter().map(share).collect();
-        (0..sets).map(|set| ln_sum(each.iter().map(|draw| draw[set])) - count(DRAWS).ln()).collect()
+        (0..sets).map(|set| ln_sum(each.iter().map(|draw| draw[set])) - count_to_f64(DRAWS).ln()).collect()
     }
 
     /// Inner products of the columns in each piece.
@@ -158,14 +160,15 @@ impl<'a> Bag<'a> {
         let size = self.columns.len();
         let mut gram = Array2::zeros((size, size));
         weights.iter().zip(grams).for_each(|(weight, part)| gram.scaled_add(*weight, part));
-        let rows: f64 = weights.iter().zip(&self.pieces).map(|(weight, piece)| weight * count(piece.len())).sum();
+        let rows: f64 =
+            weights.iter().zip(&self.pieces).map(|(weight, piece)| weight * count_to_f64(piece.len())).sum();
         let variance = setting.saturated.variance;
         let ridge = comparison.fixed_ridge(&gram, variance);
         let fixed: Vec<usize> = (0..comparison.first()).collect();
         let (left, ln_determinant) = schur(&gram, &fixed, &ridge);
         let last = size - 1;
         let square = left[[last, last]].max(1e-12 * gram[[last, last]]);
-        let share = rows / count(comparison.rows.len());
+        let share = rows / count_to_f64(comparison.rows.len());
         let noise = share * setting.gram.noise.ln_determinant(comparison.rows.len(), comparison.blocks.len());
         let levels: f64 = ridge[comparison.tangents..].iter().map(|ridge| ridge.ln()).sum();
         let likelihood = -0.5 * comparison.tempering * (rows * (square / rows).ln() + noise);

@@ -251,7 +251,7 @@ impl VariantBank {
     /// How many variants the kind of each has.
     pub(super) fn shares(&self) -> Vec<f64> {
         let of_kind = |kind: &str| self.variants.iter().filter(|v| v.kind() == Some(kind)).count();
-        let share = |v: &Variant| v.kind().map_or(1.0, |kind| crate::statistics::count(of_kind(kind)));
+        let share = |v: &Variant| v.kind().map_or(1.0, |kind| crate::statistics::count_to_f64(of_kind(kind)));
         self.variants.iter().map(share).collect()
     }
 

@@ -9,7 +9,7 @@ use super::judge::Judge;
 use super::means::PosteriorMeans;
 use super::noise::NoiseModel;
 use super::posterior::Explanation;
-use crate::statistics::{count, rms};
+use crate::statistics::{count_to_f64, rms};
 use crate::twin::diagnosis::UNKNOWN;
 use ndarray::{Array1, Array2, ShapeBuilder, s};
 
@@ -72,7 +72,7 @@ impl Judge<'_> {
         add_gram(&mut gram, tall.view());
         mirror(&mut gram);
         let noise = self.settings[of.noise].gram.noise;
-        let rows = count(comparison.rows.len());
+        let rows = count_to_f64(comparison.rows.len());
         let last = columns.len() - 1;
         let mut variance = gram[[last, last]] / rows;
         let mut w = Array1::zeros(last);

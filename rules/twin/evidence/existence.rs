@@ -13,7 +13,7 @@ use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
 use super::marginal::{Ground, Saturated, ln_sum};
 use super::search::SetSearch;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use crate::twin::units::Random;
 use ndarray::{Array1, Array2, Axis, s};
 
@@ -91,7 +91,7 @@ pub(super) fn existence(
 
 /// The chance that so many of the draws stand for.
 fn chance_of(reaching: usize) -> f64 {
-    count(reaching + 1) / count(DRAWS + 1)
+    count_to_f64(reaching + 1) / count_to_f64(DRAWS + 1)
 }
 
 /// In how many of these recordings a search finds a set of so much evidence; it ends as soon as they are too many.
@@ -116,5 +116,5 @@ fn effective_rows(
 ) -> f64 {
     let sums: f64 = pieces.iter().map(|piece| piece.iter().map(|at| innovations[*at]).sum::<f64>().powi(2)).sum();
     let squares = innovations.dot(innovations).max(f64::MIN_POSITIVE);
-    count(comparison.rows.len()) / (inflation * (sums / squares).max(1.0))
+    count_to_f64(comparison.rows.len()) / (inflation * (sums / squares).max(1.0))
 }

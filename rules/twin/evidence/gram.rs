@@ -8,7 +8,7 @@ use super::algebra::{add_gram, mirror};
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
-use crate::statistics::{count, rms};
+use crate::statistics::{count_to_f64, rms};
 use ndarray::{Array2, ShapeBuilder};
 use std::ops::Range;
 
@@ -93,14 +93,18 @@ impl<'a> Comparison<'a> {
             output: of.recorded.iter().zip(&inputs.simulated).map(|(y, f)| y - f).collect(),
             deviation,
             size: rms(&recorded).min(3.0 * deviation),
-            tempering: (ROWS_OF_A_FORM / count(rows.len().max(1))).min(1.0),
+            tempering: (ROWS_OF_A_FORM / count_to_f64(rows.len().max(1))).min(1.0),
             rows,
         }
     }
 
     /// A noise of these rows as it is from one recorded row to the next.
     pub(super) fn row_by_row(&self, noise: NoiseModel) -> NoiseModel {
-        if self.group == 1 { noise } else { NoiseModel::of(noise.share, noise.phi.powf(1.0 / count(self.group))) }
+        if self.group == 1 {
+            noise
+        } else {
+            NoiseModel::of(noise.share, noise.phi.powf(1.0 / count_to_f64(self.group)))
+        }
     }
 
     /// How many columns stand before those of the bank.

@@ -5,7 +5,7 @@
 //! earlier rows only.
 
 use super::inputs::RecordingInputs;
-use crate::statistics::{count, median, robust_deviation};
+use crate::statistics::{count_to_f64, median, robust_deviation};
 
 /// Steps between the levels that are tried, in deviations of the residual.
 const STEPS: [f64; 3] = [1.2, 2.2, 3.5];
@@ -45,9 +45,9 @@ const AT_CHANGES: f64 = 0.6;
 /// its own knows nothing of either.
 pub(super) fn follows_inputs(inputs: &RecordingInputs<'_>, on: &[f64]) -> bool {
     let rows: Vec<usize> = inputs.taken(false).collect();
-    let all = count(rows.len().max(1));
+    let all = count_to_f64(rows.len().max(1));
     let high = rows.iter().filter(|row| on[**row] > 0.5).count();
-    let by_chance = count(high.min(rows.len() - high)) / all;
+    let by_chance = count_to_f64(high.min(rows.len() - high)) / all;
     let channels = [&inputs.speed, &inputs.depth, &inputs.feed, &inputs.width, &inputs.velocity, &inputs.position];
     let told = channels.into_iter().flatten().any(|channel| {
         let mut sorted = rows.clone();
@@ -60,7 +60,7 @@ pub(super) fn follows_inputs(inputs: &RecordingInputs<'_>, on: &[f64]) -> bool {
                 high.min(bin.len() - high)
             })
             .sum();
-        count(wrong) / all < TOLD * by_chance
+        count_to_f64(wrong) / all < TOLD * by_chance
     });
     told || at_changes(inputs, on)
 }
@@ -77,7 +77,7 @@ fn at_changes(inputs: &RecordingInputs<'_>, on: &[f64]) -> bool {
     let near = |row: usize| (row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(inputs.rows)).any(paced);
     let rows = || inputs.taken(false).filter(|row| *row > 0 && inputs.fitted[row - 1]);
     let changes: Vec<usize> = rows().filter(|row| (on[*row] - on[row - 1]).abs() > 0.5).collect();
-    let share = |near: usize, all: usize| count(near) / count(all.max(1));
+    let share = |near: usize, all: usize| count_to_f64(near) / count_to_f64(all.max(1));
     let usual = share(rows().filter(|row| near(*row)).count(), rows().count());
     share(changes.iter().filter(|row| near(**row)).count(), changes.len()) > AT_CHANGES.max(2.0 * usual)
 }
@@ -156,15 +156,17 @@ impl Chain<'_> {
             }
             levels = self.levels(&on, levels);
             changes = self.changes(&on);
-            levels.change = (count(changes + 1) / count(all)).clamp(CHANGE.0, CHANGE.1);
+            levels.change = (count_to_f64(changes + 1) / count_to_f64(all)).clamp(CHANGE.0, CHANGE.1);
         }
-        let rows = count(self.inputs.taken(false).count());
+        let rows = count_to_f64(self.inputs.taken(false).count());
         let loss = |row: usize| {
             let [off, _, _, _] = self.likelihoods_on(row, &on, levels);
             off
         };
         let fit: f64 = self.inputs.taken(false).map(loss).sum();
-        let told = fit - rows * levels.deviation.ln() - count(changes) * ((rows / count(changes.max(1))).ln() + 1.0);
+        let told = fit
+            - rows * levels.deviation.ln()
+            - count_to_f64(changes) * ((rows / count_to_f64(changes.max(1))).ln() + 1.0);
         Some((told, on, levels, changes))
     }
 

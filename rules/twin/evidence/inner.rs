@@ -9,7 +9,7 @@ use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::marginal::SIZES;
 use super::posterior::NoiseSetting;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use ndarray::{Array1, Array2, Axis, ShapeBuilder, s};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -130,7 +130,7 @@ pub(super) fn paired(period_s: f64, rows: impl IntoIterator<Item = (usize, f64)>
     let mut gained: BTreeMap<usize, f64> = BTreeMap::new();
     for (row, gain) in rows {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count of rows")]
-        let number = (count(row) / stretch) as usize;
+        let number = (count_to_f64(row) / stretch) as usize;
         *gained.entry(number).or_default() += gain;
     }
     let sum: f64 = gained.values().sum();

@@ -1,8 +1,8 @@
 //! What the families see: the inputs of a recording by the part they play, and which rows are fitted.
 
-use crate::physics::drive::{is_axis_output, rate};
+use crate::physics::drive::{compute_rate, is_axis_output};
 use crate::physics::{OutputKind, Role, Scene};
-use crate::statistics::{count, median};
+use crate::statistics::{count_to_f64, median};
 use crate::twin::units::Unit;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -78,7 +78,7 @@ impl<'a> RecordingInputs<'a> {
     /// The inputs of a scene whose load and simulated output are set.
     pub(super) fn new(scene: &'a Scene, units: &[Unit], held: &BTreeSet<usize>, comparable: Vec<bool>) -> Self {
         let rows = scene.rows();
-        let own = |role: Role| scene.role(role).map(<[f64]>::to_vec);
+        let own = |role: Role| scene.role_values(role).map(<[f64]>::to_vec);
         let column = |name: &str| scene.column(name).map(<[f64]>::to_vec);
         let mut unit = vec![0; rows];
         units.iter().enumerate().for_each(|(index, of)| unit[of.rows.clone()].fill(index));
@@ -95,7 +95,7 @@ impl<'a> RecordingInputs<'a> {
             block: blocks(&clock_s, scene.period_s(), &unit),
             run,
             unit,
-            simulated: scene.simulated().map_or_else(|| vec![0.0; rows], <[f64]>::to_vec),
+            simulated: scene.simulated_output().map_or_else(|| vec![0.0; rows], <[f64]>::to_vec),
             in_cut: engaged.as_ref().map_or_else(|| vec![true; rows], |e| e.iter().map(|e| *e > 0.5).collect()),
             speed: own(Role::Speed).map(|n| n.iter().map(|n| n.abs()).collect()),
             velocity: own(Role::Velocity).or_else(|| any_axis(scene, "_velocity_mm_min")),
@@ -141,9 +141,9 @@ impl<'a> RecordingInputs<'a> {
     }
 
     fn take_edges(&mut self) {
-        if let Some(tools) = self.scene.words("tool") {
+        if let Some(tools) = self.scene.text_column("tool") {
             self.edges = tools.words().len().max(1);
-            self.edge = (0..self.rows).map(|row| tools.code(row).map_or(0, |code| code as usize)).collect();
+            self.edge = (0..self.rows).map(|row| tools.find_code(row).map_or(0, |code| code as usize)).collect();
         }
         if let Some(minutes) = self.scene.column("cutting_time_min") {
             self.edge_age_min = minutes.to_vec();
@@ -244,7 +244,7 @@ impl<'a> RecordingInputs<'a> {
 
     /// Median number of fitted rows in a block that has any.
     pub(super) fn median_block(&self) -> f64 {
-        let rows = |block: &Range<usize>| count(block.clone().filter(|row| self.fitted[*row]).count());
+        let rows = |block: &Range<usize>| count_to_f64(block.clone().filter(|row| self.fitted[*row]).count());
         median(self.block_rows().iter().map(rows).filter(|rows| *rows > 0.0).collect()).unwrap_or(1.0)
     }
 
@@ -304,7 +304,7 @@ impl<'a> RecordingInputs<'a> {
 
     /// Rate of change per second.
     pub(super) fn rate(&self, values: &[f64]) -> Vec<f64> {
-        rate(self.scene, values)
+        compute_rate(self.scene, values)
     }
 
     fn column_in_order(&self, mut law: impl FnMut(usize, bool) -> f64) -> Vec<f64> {
@@ -326,7 +326,7 @@ fn clock_s(scene: &Scene) -> Vec<f64> {
     }
     // The scene's clock stands still across an unknown pause; a slow state cools in it.
     for (number, run) in scene.runs().iter().enumerate() {
-        clock_s[run.clone()].iter_mut().for_each(|clock| *clock += count(number) * UNKNOWN_PAUSE_S);
+        clock_s[run.clone()].iter_mut().for_each(|clock| *clock += count_to_f64(number) * UNKNOWN_PAUSE_S);
     }
     clock_s
 }

@@ -9,7 +9,7 @@ use super::inputs::RecordingInputs;
 use super::naming::Naming;
 use super::posterior::{Explanation, Group, NoiseSetting, grouped};
 use super::second::SecondStage;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use crate::twin::diagnosis::{Existence, UNKNOWN, Verdict};
 use std::collections::BTreeMap;
 
@@ -155,7 +155,7 @@ impl Judge<'_> {
             };
             let all = (0..size).filter(|_| size > 1).map(without);
             let Some(fewer) = all.min_by(|a, b| a.0.total_cmp(&b.0)) else {
-                let rows = count(self.inputs.left_out().count());
+                let rows = count_to_f64(self.inputs.left_out().count());
                 let errors = Some(((before / rows).sqrt(), (left / rows).sqrt()));
                 return Err(Withdrawn { found, among_fitted: false, errors });
             };
@@ -191,14 +191,14 @@ impl Judge<'_> {
     }
 
     fn held_out_square(&self, total: &[f64]) -> f64 {
-        let recorded = self.inputs.scene.recorded();
+        let recorded = self.inputs.scene.recorded_output();
         self.inputs.left_out().map(|row| (recorded[row] - total[row]).powi(2)).sum()
     }
 
     /// Errors in each unit that is held out, without an explanation and with it, for engineers.
     fn held_out_errors(&self, of: &Explanation) -> String {
         let after = self.contributions(of).0;
-        let recorded = self.inputs.scene.recorded();
+        let recorded = self.inputs.scene.recorded_output();
         let mut units: BTreeMap<usize, (f64, f64, f64)> = BTreeMap::new();
         for row in self.inputs.left_out() {
             let sums = units.entry(self.inputs.unit[row]).or_default();

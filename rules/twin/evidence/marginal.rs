@@ -9,7 +9,7 @@ use super::algebra::{CholeskyFactor, Resolved, Tridiagonal, block, schur};
 use super::bank::Variant;
 use super::gram::{Comparison, Gram};
 use super::noise::NoiseModel;
-use crate::statistics::{count, normal_share};
+use crate::statistics::{count_to_f64, normal_share};
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, Axis, s};
 
@@ -139,7 +139,7 @@ impl Comparison<'_> {
         let fixed: Vec<usize> = (0..self.tangents).collect();
         let all: Vec<usize> = fixed.iter().copied().chain(self.tangents..last).collect();
         let flat = self.flat(&gram.whole, 1e-10);
-        let rows = count(self.rows.len());
+        let rows = count_to_f64(self.rows.len());
         let (left, _) = schur(&gram.whole, &fixed, &vec![flat; fixed.len()]);
         let mut variance = left[[last, last]].max(f64::MIN_POSITIVE) / rows;
         let y = Array1::from_iter(all.iter().map(|index| gram.whole[[*index, last]]));
@@ -153,11 +153,11 @@ impl Comparison<'_> {
             let w = factor.solve(&y);
             let q = (gram.whole[[last, last]] - w.dot(&y)).max(1e-12 * gram.whole[[last, last]]);
             let kept: f64 = factor.inverse_diagonal().iter().zip(&all).map(|(x, index)| x * ridge(*index)).sum();
-            let freedom = count(all.len()) - kept;
+            let freedom = count_to_f64(all.len()) - kept;
             let bent: f64 = all.iter().zip(&w).map(|(index, w)| ridge(*index) * w * w).sum();
             variance = (q - bent).max(1e-9 * q) / (rows - freedom).max(0.3 * rows);
             let ln_determinant = gram.noise.ln_determinant(self.rows.len(), self.blocks.len());
-            let priors = factor.ln_determinant() - count(free + self.first() - self.tangents) * own.ln();
+            let priors = factor.ln_determinant() - count_to_f64(free + self.first() - self.tangents) * own.ln();
             ln_likelihood = -0.5 * self.tempering * (rows * (q / rows).ln() + ln_determinant) - 0.5 * priors;
         }
         Saturated { variance, ln_likelihood }
@@ -166,7 +166,7 @@ impl Comparison<'_> {
     /// Likelihood of a residual by itself in a noise.
     pub(super) fn likelihood_of(&self, residual: &[f64], noise: NoiseModel) -> f64 {
         let white = self.whitened(residual, noise);
-        let rows = count(white.len());
+        let rows = count_to_f64(white.len());
         let square: f64 = white.iter().map(|x| x * x).sum();
         let ln_determinant = noise.ln_determinant(self.rows.len(), self.blocks.len());
         -0.5 * self.tempering * (rows * (square.max(f64::MIN_POSITIVE) / rows).ln() + ln_determinant)
@@ -174,7 +174,7 @@ impl Comparison<'_> {
 
     fn flat(&self, gram: &Array2<f64>, share: f64) -> f64 {
         let trace: f64 = (0..self.tangents).map(|index| gram[[index, index]]).sum();
-        share * trace / count(self.tangents.max(1))
+        share * trace / count_to_f64(self.tangents.max(1))
     }
 
     /// Evidence of the baseline alone, every run with a random level.
@@ -205,7 +205,7 @@ impl Comparison<'_> {
     /// Evidence of a baseline that leaves this square; its tangents have no prior, so what they cost is the same for every
     /// hypothesis and left out.
     fn ln_of(&self, gram: &Gram, left: f64, ln_determinant: f64, ridge: &[f64]) -> f64 {
-        let rows = count(self.rows.len());
+        let rows = count_to_f64(self.rows.len());
         let noise = gram.noise.ln_determinant(self.rows.len(), self.blocks.len());
         let likelihood = -0.5 * self.tempering * (rows * (left / rows).ln() + noise);
         let levels: f64 = ridge[self.tangents..].iter().map(|ridge| ridge.ln()).sum();
@@ -269,7 +269,7 @@ impl Comparison<'_> {
     }
 
     fn ln_evidence(&self, state: &MarginalState<'_>, resolved: &Resolved) -> f64 {
-        let rows = self.tempering * count(self.rows.len());
+        let rows = self.tempering * count_to_f64(self.rows.len());
         let left = (state.left - resolved.square).max(1e-6 * state.left);
         -0.5 * rows * (left / state.left).ln() - 0.5 * resolved.ln_determinant
     }

@@ -82,7 +82,7 @@ pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagn
         return Ok(cannot_tell(&case, &needed));
     }
     let fitted = case.fitted();
-    let recorded = case.scene.recorded().to_vec();
+    let recorded = case.scene.recorded_output().to_vec();
     let weigh = |column: &[f64]| -> Vec<f64> { fitted.iter().map(|row| column[*row]).collect() };
     let parts = case.parts.clone();
     let mut scene = case.scene.clone();
@@ -142,7 +142,7 @@ fn cannot_tell(case: &Case<'_>, needed: &Bilingual) -> Diagnosis {
 fn comparable(scene: &crate::physics::Scene, baseline: &Fit) -> Vec<bool> {
     let finite =
         |row: usize| baseline.tangents.iter().all(|t| t[row].is_finite()) && baseline.simulated[row].is_finite();
-    (0..scene.rows()).map(|row| scene.usable()[row] && finite(row)).collect()
+    (0..scene.rows()).map(|row| scene.usable_rows()[row] && finite(row)).collect()
 }
 
 /// Both stages, the test, the names and the decision; and the likeliest noise.

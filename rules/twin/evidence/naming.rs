@@ -9,8 +9,8 @@ use super::algebra::{CholeskyFactor, block, schur};
 use super::bank::{Variant, VariantBank};
 use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
-use crate::physics::effect;
-use crate::statistics::count;
+use crate::physics::find_effect;
+use crate::statistics::count_to_f64;
 use adapters::channel::quantity::Quantity;
 use ndarray::{Array1, Array2};
 use std::ops::Range;
@@ -68,7 +68,7 @@ impl<'a> Naming<'a> {
         let fixed: Vec<usize> = (0..comparison.tangents).collect();
         let cleared = |gram: &&Gram| {
             let trace: f64 = fixed.iter().map(|index| gram.whole[[*index, *index]]).sum();
-            let flat = 1e-9 * trace / count(fixed.len().max(1));
+            let flat = 1e-9 * trace / count_to_f64(fixed.len().max(1));
             schur(&gram.whole, &fixed, &vec![flat; fixed.len()]).0
         };
         let may = |index: &usize| {
@@ -81,9 +81,9 @@ impl<'a> Naming<'a> {
 
     /// May a law be what these curves are: does it know their channels?
     fn may_be(&self, law: usize, parts: &[(usize, &[f64])]) -> bool {
-        let Some(effect) = self.bank.variants[law].kind().and_then(effect) else { return true };
+        let Some(effect) = self.bank.variants[law].kind().and_then(find_effect) else { return true };
         let quantities = parts.iter().filter_map(|(variant, _)| self.bank.variants[*variant].drawn());
-        quantities.map(|drawn| Quantity::of(&drawn.over)).all(|quantity| effect.follows(quantity))
+        quantities.map(|drawn| Quantity::from_column_name(&drawn.over)).all(|quantity| effect.follows(quantity))
     }
 
     /// The best claim on a curve, given as nameless variants with their coefficients.
@@ -91,7 +91,7 @@ impl<'a> Naming<'a> {
         let claims = self.metrics.iter().filter_map(|metric| self.claim_in(metric, parts));
         let accepted = |claim: &Claim| claim.share >= THRESHOLDS.name_share;
         let better = |a: &Claim, b: &Claim| {
-            let key = |c: &Claim| (accepted(c), -count(c.laws.len()), c.share);
+            let key = |c: &Claim| (accepted(c), -count_to_f64(c.laws.len()), c.share);
             key(b).partial_cmp(&key(a)).is_some_and(std::cmp::Ordering::is_gt)
         };
         claims.reduce(|best, next| if better(&best, &next) { next } else { best }).filter(accepted)
@@ -242,7 +242,7 @@ impl<'a> Naming<'a> {
             }
             at += self.law(*law).len();
         }
-        let share = right.dot(&w) / square - PRICE * count(all.len() - 1);
+        let share = right.dot(&w) / square - PRICE * count_to_f64(all.len() - 1);
         Some(CurveRegression { share, coefficients: w.to_vec() })
     }
 
@@ -253,7 +253,7 @@ impl<'a> Naming<'a> {
         for variant in &self.named {
             let of = &self.bank.variants[*variant];
             let Some(fit) = self.regress(&self.metrics[0], along, square, &[*variant]) else { continue };
-            let size = count(of.law_columns().len() - 1);
+            let size = count_to_f64(of.law_columns().len() - 1);
             let left = square * (1.0 - fit.share - PRICE * size).max(0.0);
             let nats = nats * left + 0.7 * size - of.ln_prior.min(0.0);
             let kind = of.kind().unwrap_or_default().to_owned();
@@ -283,7 +283,7 @@ impl<'a> Naming<'a> {
         let fixed: Vec<usize> = (0..comparison.tangents).collect();
         let mut inner = block(&gram.whole, &fixed, &fixed);
         let trace: f64 = inner.diag().sum();
-        fixed.iter().for_each(|index| inner[[*index, *index]] += 1e-9 * trace / count(fixed.len().max(1)));
+        fixed.iter().for_each(|index| inner[[*index, *index]] += 1e-9 * trace / count_to_f64(fixed.len().max(1)));
         let right = Array1::from_iter(fixed.iter().map(|index| along[*index]));
         let w = CholeskyFactor::of(&inner).solve(&right);
         let square = white.dot(&white) - right.dot(&w);

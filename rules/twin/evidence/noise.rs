@@ -3,7 +3,7 @@
 //! The memory is bounded by a quarter of the median block and by two minutes, so that no noise can stand for a level:
 //! levels belong to laws, or to the random level that every run may have (`gram.rs`).
 
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use std::ops::Range;
 
 /// Shares of the variance that have a memory.
@@ -91,7 +91,7 @@ impl NoiseModel {
 
     /// Logarithm of the determinant of the covariance over so many rows in so many blocks.
     pub(super) fn ln_determinant(&self, rows: usize, blocks: usize) -> f64 {
-        count(rows.saturating_sub(blocks)) * self.variance.ln()
+        count_to_f64(rows.saturating_sub(blocks)) * self.variance.ln()
     }
 }
 

@@ -5,7 +5,7 @@
 use super::algebra::{CholeskyFactor, add_gram, mirror};
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
-use crate::statistics::{count, median, quantile, rms, robust_deviation};
+use crate::statistics::{count_to_f64, median, quantile, rms, robust_deviation};
 use ndarray::{Array1, Array2, ShapeBuilder};
 
 /// Rows that the wide model is fitted to, at most.
@@ -34,7 +34,7 @@ pub(super) struct Outliers {
 
 /// Judges every row.
 pub(super) fn outliers(inputs: &RecordingInputs<'_>, bank: &VariantBank, tangents: &[Vec<f64>]) -> Outliers {
-    let recorded = inputs.scene.recorded();
+    let recorded = inputs.scene.recorded_output();
     let residual = inputs.column(|row| recorded[row] - inputs.simulated[row]);
     let (left, ordinary) = wide_residual(inputs, bank, tangents, &residual);
     let scale = scales(inputs, &left, ordinary);
@@ -72,8 +72,9 @@ fn wide_residual(
     add_gram(&mut gram, tall.view());
     mirror(&mut gram);
     let output: Vec<f64> = rows.iter().map(|row| residual[*row]).collect();
-    let middle = crate::statistics::mean(&rows.iter().map(|row| inputs.scene.recorded()[*row]).collect::<Vec<_>>());
-    let spread: Vec<f64> = rows.iter().map(|row| inputs.scene.recorded()[*row] - middle).collect();
+    let middle =
+        crate::statistics::mean(&rows.iter().map(|row| inputs.scene.recorded_output()[*row]).collect::<Vec<_>>());
+    let spread: Vec<f64> = rows.iter().map(|row| inputs.scene.recorded_output()[*row] - middle).collect();
     let spread = rms(&spread) + 1e-12;
     let mut ordinary = robust_deviation(output.iter().copied()).unwrap_or(0.0) + 1e-12;
     let mut wanted = Array1::from(output.clone());
@@ -82,7 +83,7 @@ fn wide_residual(
         let mut inner = gram.clone();
         for index in 0..columns.len() {
             let own = if index < tangents.len() { 1e-8 } else { 1.0 };
-            inner[[index, index]] += own * (ordinary / (0.1 * spread)).powi(2) + 1e-9 * count(rows.len());
+            inner[[index, index]] += own * (ordinary / (0.1 * spread)).powi(2) + 1e-9 * count_to_f64(rows.len());
         }
         w = CholeskyFactor::of(&inner).solve(&tall.t().dot(&wanted));
         let fitted = tall.dot(&w);

@@ -6,7 +6,7 @@
 use super::bank::{Family, Owner, Variant, VariantBank};
 use super::inputs::RecordingInputs;
 use super::search::{NAMED, NAMELESS, SetEvidence};
-use crate::statistics::{count, rms};
+use crate::statistics::{count_to_f64, rms};
 use std::collections::BTreeMap;
 
 /// Leading sets whose members go into the second stage, single variants besides, and variants of one owner.
@@ -41,7 +41,7 @@ impl SecondStage {
             second.bank.columns.extend_from_slice(&bank.columns[variant.columns.clone()]);
             if widens(variant) && !departures.is_empty() {
                 let law = &bank.columns[variant.columns.start];
-                let share = DEPARTURE / (count(departures.len()) / 3.0).sqrt();
+                let share = DEPARTURE / (count_to_f64(departures.len()) / 3.0).sqrt();
                 for departure in &departures {
                     let bent = inputs.column(|row| law[row] * departure[row]);
                     let size = rms(&inputs.taken(false).map(|row| bent[row]).collect::<Vec<_>>()) + 1e-30;

@@ -4,7 +4,7 @@ use super::gram::{Comparison, Gram};
 use super::inputs::RecordingInputs;
 use super::marginal::Saturated;
 use super::noise::NoiseModel;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 
 /// Nameless curves that stand for everything that may be there.
 const CURVES_MAX: usize = 16;
@@ -66,10 +66,10 @@ pub(super) fn settings(inputs: &RecordingInputs<'_>, comparison: &Comparison<'_>
 
 /// The settings that make one of two residuals likely: that of the baseline, and that of a wide smooth model.
 fn preselected(inputs: &RecordingInputs<'_>, comparison: &Comparison<'_>, wide: &[f64]) -> Vec<NoiseModel> {
-    let group = count(comparison.group);
+    let group = count_to_f64(comparison.group);
     let grid = NoiseModel::grid(inputs.median_block() / group, inputs.period_s * group);
     let mut chosen = vec![NoiseModel::WHITE];
-    let base = inputs.column(|row| inputs.scene.recorded()[row] - inputs.simulated[row]);
+    let base = inputs.column(|row| inputs.scene.recorded_output()[row] - inputs.simulated[row]);
     for residual in [base.as_slice(), wide] {
         let mut ranked: Vec<(f64, NoiseModel)> =
             grid.iter().map(|noise| (comparison.likelihood_of(residual, *noise), *noise)).collect();

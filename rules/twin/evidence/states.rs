@@ -13,7 +13,7 @@ use super::second::SecondStage;
 use super::step::{Step, step};
 use super::wave::{self, SpectralLine};
 use crate::physics::OutputKind;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 
 /// Shares of the memory of the noise with which hidden sequences are looked for: what switches poses as memory.
 const MEMORY_SHARES: [f64; 3] = [1.0, 0.7, 0.4];
@@ -109,7 +109,7 @@ impl Residuals<'_> {
     /// Is a sequence likelier than noise that may be as slow as it likes? What switches has edges, slow noise has none; the
     /// memory of the noise is bounded everywhere else, so that levels stay levels, and a wandering meter would pass for one.
     fn is_more_than_slow_noise(&self, left: &[f64], sequence: &Sequence) -> bool {
-        let grid = NoiseModel::grid(f64::INFINITY, self.inputs.period_s * count(self.comparison.group));
+        let grid = NoiseModel::grid(f64::INFINITY, self.inputs.period_s * count_to_f64(self.comparison.group));
         let (mut slow, mut switching) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         for noise in grid {
             slow = slow.max(self.comparison.likelihood_of(left, noise));
@@ -125,7 +125,7 @@ impl Residuals<'_> {
 
 /// Is the output what a meter in the supply shows? Consumers are nowhere else, and not in the current of a feed drive.
 fn shows_consumers(inputs: &RecordingInputs<'_>) -> bool {
-    !inputs.is_axis && (inputs.kind == OutputKind::Power || inputs.scene.output().ends_with("_a"))
+    !inputs.is_axis && (inputs.kind == OutputKind::Power || inputs.scene.output_name().ends_with("_a"))
 }
 
 /// A wave of one frequency: the ripple of the mains where the output is electric, and without a name where it is not.
@@ -135,7 +135,7 @@ fn add_wave(inputs: &RecordingInputs<'_>, line: SpectralLine, second: &mut Secon
     let all: Vec<&std::ops::Range<usize>> = spells.iter().collect();
     let columns = of_spells(inputs, &all, &angle, &vec![1.0; inputs.rows]);
     let label = format!("{:.4} turns per row", line.frequency);
-    let is_electric = inputs.kind == OutputKind::Power || inputs.scene.output().ends_with("_a");
+    let is_electric = inputs.kind == OutputKind::Power || inputs.scene.output_name().ends_with("_a");
     second.add(-line.ln_choices, |bank| {
         if is_electric {
             bank.of(Family::of("ripple_alias").wide(), label).columns(inputs, columns);
@@ -149,7 +149,7 @@ fn add_wave(inputs: &RecordingInputs<'_>, line: SpectralLine, second: &mut Secon
 fn is_same(inputs: &RecordingInputs<'_>, a: &[f64], b: &[f64]) -> bool {
     let rows: Vec<usize> = inputs.taken(false).collect();
     let equal = rows.iter().filter(|row| (a[**row] - b[**row]).abs() < 0.5).count();
-    let share = count(equal) / count(rows.len().max(1));
+    let share = count_to_f64(equal) / count_to_f64(rows.len().max(1));
     !(1.0 - SAME_SEQUENCE..=SAME_SEQUENCE).contains(&share)
 }
 
@@ -163,14 +163,14 @@ fn divergence(seen: f64, usual: f64) -> f64 {
 /// A sequence as a consumer, as an event in the cut, and as a regime of the coolant.
 fn add_sequence(inputs: &RecordingInputs<'_>, second: &mut SecondStage, sequence: Sequence, number: usize) {
     let label = format!("hidden, {} changes, {:.0} nats", sequence.changes, sequence.ln);
-    let all = count(inputs.taken(false).count().max(1));
+    let all = count_to_f64(inputs.taken(false).count().max(1));
     let over = |of: &dyn Fn(usize) -> f64| inputs.taken(false).map(of).sum::<f64>();
     let on = over(&|row| sequence.on[row]).max(1.0);
     let in_cut = over(&|row| inputs.cutting(row));
     let cuts = inputs.engaged.is_some() && in_cut > 0.0 && in_cut < all;
     let in_cut_only = cuts && over(&|row| sequence.on[row] * inputs.cutting(row)) > OF_THE_CUT * on;
-    let short = on < EVENT_ROWS * 0.5 * count(sequence.changes);
-    let by_chance = count(sequence.changes)
+    let short = on < EVENT_ROWS * 0.5 * count_to_f64(sequence.changes);
+    let by_chance = count_to_f64(sequence.changes)
         * 0.5
         * divergence(over(&|row| sequence.on[row] * inputs.cutting(row)) / on, in_cut / all);
     let consumer = sequence.ln - by_chance + if in_cut_only || short { EVENT_AS_CONSUMER } else { 0.0 };

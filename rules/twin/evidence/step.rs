@@ -2,7 +2,7 @@
 
 use super::gram::Comparison;
 use super::noise::NoiseModel;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 
 /// Share of the carrier's square on each side of the row.
 const SIDE: f64 = 0.04;
@@ -25,7 +25,7 @@ pub(super) fn step(comparison: &Comparison<'_>, left: &[f64], carrier: &[f64], n
     let (x, y) = (comparison.whitened(carrier, noise), comparison.whitened(left, noise));
     let total = |of: &dyn Fn(usize) -> f64| (0..x.len()).map(of).sum::<f64>();
     let (xx, xy) = (total(&|at| x[at] * x[at]), total(&|at| x[at] * y[at]));
-    let variance = total(&|at| y[at] * y[at]) / count(x.len().max(1));
+    let variance = total(&|at| y[at] * y[at]) / count_to_f64(x.len().max(1));
     let every = x.len().div_ceil(TRIED).max(1);
     let (mut before_xx, mut before_xy) = (0.0, 0.0);
     let mut best: Option<(f64, usize)> = None;
@@ -42,6 +42,6 @@ pub(super) fn step(comparison: &Comparison<'_>, left: &[f64], carrier: &[f64], n
         before_xx += x[at] * x[at];
         before_xy += x[at] * y[at];
     }
-    let ln_choices = count(x.len().min(TRIED)).ln();
+    let ln_choices = count_to_f64(x.len().min(TRIED)).ln();
     best.filter(|(nats, _)| *nats > ln_choices + NATS_MIN).map(|(_, row)| Step { row, ln_choices })
 }

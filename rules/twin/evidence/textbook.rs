@@ -3,7 +3,7 @@
 
 use super::decision::THRESHOLDS;
 use super::told::EvidenceReport;
-use crate::physics::{Bound, Effect, Entry, Form, Scene, effect};
+use crate::physics::{Bound, Effect, Entry, Form, Scene, find_effect};
 use crate::twin::fit::{Fit, Metric, fit};
 use crate::twin::linear::least_squares;
 use crate::twin::model::{Parameter, Part};
@@ -92,7 +92,7 @@ impl EvidenceReport<'_, '_> {
     fn is_too_large(&self, name: &str, contribution: &[f64]) -> bool {
         let cut = self.inputs.cut.as_deref().filter(|_| self.inputs.knows_cut);
         let load = |row: usize| cut.map_or(0.0, |cut| cut[row].abs());
-        let bound = effect(name).map_or(Bound::Any, Effect::bound);
+        let bound = find_effect(name).map_or(Bound::Any, Effect::bound);
         let (times, basis): (f64, &dyn Fn(usize) -> f64) = match (bound, cut) {
             (Bound::NoLoad(times), _) => (times, &|row| (self.answer.after[row] - load(row)).abs()),
             (Bound::Cut(times), Some(_)) => (times, &load),
@@ -110,7 +110,7 @@ impl EvidenceReport<'_, '_> {
         if let Some(part) = hypothesis {
             return Some((part.clone(), 1.0));
         }
-        let effect = effect(kind)?;
+        let effect = find_effect(kind)?;
         let scene = self.inputs.scene;
         let rows: Vec<usize> = self.inputs.taken(false).collect();
         let over = |column: &[f64]| rows.iter().map(|row| column[*row]).collect::<Vec<f64>>();
@@ -118,8 +118,8 @@ impl EvidenceReport<'_, '_> {
         let tangents: Vec<Vec<f64>> = self.baseline.tangents.iter().map(|tangent| over(tangent)).collect();
         let whole = least_squares(&tangents, &wanted).rss;
         let mut best: Option<(f64, Part)> = None;
-        for form in effect.forms(scene) {
-            let Some(laws) = effect.columns(scene, &form) else { continue };
+        for form in effect.propose_forms(scene) {
+            let Some(laws) = effect.compute_columns(scene, &form) else { continue };
             let mut columns: Vec<Vec<f64>> = laws.iter().map(|(_, law)| over(law)).collect();
             let own = columns.len();
             columns.extend_from_slice(&tangents);
@@ -166,7 +166,7 @@ fn with_values(
 ) -> Part {
     let mut part = Part::candidate(effect, form, names);
     for parameter in &mut part.parameters {
-        if let Some(doc) = effect.doc().parameter(&parameter.name) {
+        if let Some(doc) = effect.doc().find_parameter(&parameter.name) {
             parameter.range = effect.range(scene, doc);
         }
     }

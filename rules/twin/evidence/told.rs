@@ -9,8 +9,8 @@ use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
 use super::textbook::Textbook;
-use crate::physics::effect;
-use crate::statistics::{count, rms};
+use crate::physics::find_effect;
+use crate::statistics::{count_to_f64, rms};
 use crate::twin::case::Case;
 use crate::twin::diagnosis::{
     Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
@@ -101,7 +101,7 @@ impl EvidenceReport<'_, '_> {
     }
 
     fn error(&self, total: &[f64], rows: &[bool]) -> Option<f64> {
-        let recorded = self.inputs.scene.recorded();
+        let recorded = self.inputs.scene.recorded_output();
         let left: Vec<f64> = (0..rows.len()).filter(|row| rows[*row]).map(|row| recorded[row] - total[row]).collect();
         (!left.is_empty()).then(|| rms(&left))
     }
@@ -214,7 +214,7 @@ impl EvidenceReport<'_, '_> {
             all.push(Region {
                 effect: name.clone(),
                 share: over(&squares) / whole.max(f64::MIN_POSITIVE),
-                mean: over(own) / count(inside.max(1)),
+                mean: over(own) / count_to_f64(inside.max(1)),
                 conditions: places.conditions(&active),
                 spans: spans(self.inputs.scene, &active),
                 onset: None,
@@ -258,7 +258,7 @@ fn texts(name: &str, part: Option<&Part>) -> (String, String) {
     }
     let place = part.and_then(Part::effect_and_form).and_then(|(_, form)| form.place);
     let place = place.map(|(column, word)| format!(" ({column} {word})")).unwrap_or_default();
-    effect(name).map_or_else(
+    find_effect(name).map_or_else(
         || ("The user's hypothesis".to_owned(), name.to_owned()),
         |effect| (format!("{}{place}", effect.doc().en.statement), effect.doc().law.to_owned()),
     )

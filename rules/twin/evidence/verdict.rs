@@ -5,8 +5,8 @@ use super::decision::THRESHOLDS;
 use super::judge::Judge;
 use super::naming::StandIn;
 use super::posterior::{Explanation, Group};
-use crate::physics::effect;
-use crate::statistics::count;
+use crate::physics::find_effect;
+use crate::statistics::count_to_f64;
 use crate::twin::diagnosis::{UNKNOWN, Verdict};
 use std::collections::BTreeMap;
 
@@ -26,7 +26,7 @@ impl Judge<'_> {
         let sum = sum_of(&remaining, self.inputs.rows);
         let whole = energy(&sum).max(f64::MIN_POSITIVE);
         let share: BTreeMap<&str, f64> = remaining.iter().map(|(name, x)| (name.as_str(), energy(x) / whole)).collect();
-        let rows = count(self.comparison.rows.len());
+        let rows = count_to_f64(self.comparison.rows.len());
         let small = |x: &[f64]| {
             let size = (energy(x) / rows).sqrt();
             size < THRESHOLDS.size_noise * self.ordinary && size < THRESHOLDS.size_output * self.comparison.size
@@ -186,7 +186,7 @@ fn is_of_like_form(named: &StandIn, other: &StandIn) -> bool {
 
 /// Does the catalogue say of one of two laws that it is confused with the other?
 fn are_confused(a: &str, b: &str) -> bool {
-    let says = |a: &str, b: &str| effect(a).is_some_and(|effect| effect.doc().rivals.contains(&b));
+    let says = |a: &str, b: &str| find_effect(a).is_some_and(|effect| effect.doc().rivals.contains(&b));
     says(a, b) || says(b, a)
 }
 

@@ -4,7 +4,7 @@
 use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -39,7 +39,8 @@ pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel)
     }
     let power =
         |frequency: f64| segments.iter().map(|rows| power_at(&innovations[rows.clone()], frequency)).sum::<f64>();
-    let bins: Vec<f64> = (FIRST_BIN..SEGMENT_ROWS / 2).map(|bin| count(bin) / count(SEGMENT_ROWS)).collect();
+    let bins: Vec<f64> =
+        (FIRST_BIN..SEGMENT_ROWS / 2).map(|bin| count_to_f64(bin) / count_to_f64(SEGMENT_ROWS)).collect();
     let powers: Vec<f64> = bins.iter().map(|frequency| power(*frequency)).collect();
     let mean = crate::statistics::mean(&powers);
     let (at, most) = powers.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
@@ -47,10 +48,13 @@ pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel)
         return None;
     }
     let best = bins[at];
-    let width = 1.0 / count(SEGMENT_ROWS);
-    let near = (0..=REFINED).map(|k| best + width * (2.0 * count(k) / count(REFINED) - 1.0));
+    let width = 1.0 / count_to_f64(SEGMENT_ROWS);
+    let near = (0..=REFINED).map(|k| best + width * (2.0 * count_to_f64(k) / count_to_f64(REFINED) - 1.0));
     let refined = near.map(|frequency| (power(frequency), frequency)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(SpectralLine { frequency: refined.1 / count(comparison.group), ln_choices: count(bins.len()).ln() })
+    Some(SpectralLine {
+        frequency: refined.1 / count_to_f64(comparison.group),
+        ln_choices: count_to_f64(bins.len()).ln(),
+    })
 }
 
 /// Mean power of the bins beside one.
@@ -82,8 +86,8 @@ fn segments(blocks: &[Range<usize>]) -> Vec<Range<usize>> {
 fn power_at(segment: &[f64], frequency: f64) -> f64 {
     let (mut cosine, mut sine) = (0.0, 0.0);
     for (row, x) in segment.iter().enumerate() {
-        let taper = (0.5 * TAU * (count(row) + 0.5) / count(segment.len())).sin();
-        let (s, c) = (TAU * frequency * count(row)).sin_cos();
+        let taper = (0.5 * TAU * (count_to_f64(row) + 0.5) / count_to_f64(segment.len())).sin();
+        let (s, c) = (TAU * frequency * count_to_f64(row)).sin_cos();
         cosine += x * taper * c;
         sine += x * taper * s;
     }

@@ -2,7 +2,7 @@
 
 use super::learn::WorkBlock;
 use super::regime::Regime;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use std::collections::BTreeMap;
 
 /// Seconds in a block: the threshold of the chart is reckoned for blocks of half a minute.
@@ -46,8 +46,8 @@ impl Gathering {
         Some(WorkBlock {
             from_s: first.at_s,
             to_s: last.at_s,
-            residual: inner.iter().sum::<f64>() / count(inner.len()),
-            expected: seconds.iter().map(|second| second.expected).sum::<f64>() / count(seconds.len()),
+            residual: inner.iter().sum::<f64>() / count_to_f64(inner.len()),
+            expected: seconds.iter().map(|second| second.expected).sum::<f64>() / count_to_f64(seconds.len()),
             work,
         })
     }

@@ -126,7 +126,7 @@ impl Simulation {
 
     fn expected(&mut self) -> Option<f64> {
         let mut recording = self.window.recording();
-        if recording.numbers(&self.model.output).is_none() {
+        if recording.find_numbers(&self.model.output).is_none() {
             recording.set_column(&self.model.output, Cells::Numbers(Numbers::default()));
         }
         let mut scene = Scene::new(&recording, &self.model.output, &self.model.roles).ok()?;

@@ -5,7 +5,7 @@
 
 use super::chart::{Healthy, Point};
 use super::noise::{self, Arma, PHI_MAX};
-use crate::statistics::{count, robust_deviation};
+use crate::statistics::{count_to_f64, robust_deviation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -71,14 +71,14 @@ pub fn learn(blocks: &[WorkBlock]) -> Option<Learned> {
     if known.len() < 2 * BAND_BLOCKS {
         return None;
     }
-    let n = count(known.len());
+    let n = count_to_f64(known.len());
     let expected = known.iter().map(|block| block.expected).sum::<f64>() / n;
     let bias = known.iter().map(|block| block.residual).sum::<f64>() / n;
     let nothing = Healthy { phi: 0.0, theta: 0.0, sd: 0.0, mean_variance: 0.0, band: 0.0 };
     let mut learned = Learned { healthy: nothing, usual, shared, bias, expected, blocks: known.len() };
     let deviations: Vec<f64> =
         known.iter().filter_map(|block| learned.point(block)).map(|point| point.deviation).collect();
-    learned.healthy = healthy(&deviations, expected, count(learned.usual.len()));
+    learned.healthy = healthy(&deviations, expected, count_to_f64(learned.usual.len()));
     Some(learned)
 }
 
@@ -87,24 +87,24 @@ fn usual(blocks: &[WorkBlock]) -> (BTreeMap<usize, Usual>, f64) {
     let mut works: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     blocks.iter().for_each(|block| works.entry(block.work).or_default().push(block.residual));
     works.retain(|_, residuals| residuals.len() >= WORK_BLOCKS);
-    let mean = |residuals: &[f64]| residuals.iter().sum::<f64>() / count(residuals.len());
+    let mean = |residuals: &[f64]| residuals.iter().sum::<f64>() / count_to_f64(residuals.len());
     let squares = |residuals: &[f64]| {
         let mean = mean(residuals);
         residuals.iter().map(|residual| (residual - mean).powi(2)).sum::<f64>()
     };
     let all: usize = works.values().map(Vec::len).sum();
     let within: f64 = works.values().map(|residuals| squares(residuals)).sum();
-    let shared = within / count(all.saturating_sub(works.len()).max(1));
+    let shared = within / count_to_f64(all.saturating_sub(works.len()).max(1));
     // Few blocks say little of their spread: it is drawn towards what all work shares.
     let sd = |residuals: &[f64]| {
-        ((squares(residuals) + SHARED_BLOCKS * shared) / (count(residuals.len()) + SHARED_BLOCKS)).sqrt()
+        ((squares(residuals) + SHARED_BLOCKS * shared) / (count_to_f64(residuals.len()) + SHARED_BLOCKS)).sqrt()
     };
     let usual = works.iter().map(|(work, residuals)| (*work, Usual { mean: mean(residuals), sd: sd(residuals) }));
     (usual.collect(), shared.sqrt())
 }
 
 fn healthy(deviations: &[f64], expected: f64, works: f64) -> Healthy {
-    let n = count(deviations.len());
+    let n = count_to_f64(deviations.len());
     let all = std::iter::once(0..deviations.len()).collect::<Vec<_>>();
     let noise = cautious(noise::fit(deviations, &all), n);
     let innovations = noise::whiten(deviations, &all, noise);
@@ -134,7 +134,7 @@ fn cautious(noise: Arma, n: f64) -> Arma {
 }
 
 fn band(deviations: &[f64], expected: f64, independent: f64) -> f64 {
-    let mean = |part: &[f64]| part.iter().sum::<f64>() / count(part.len());
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / count_to_f64(part.len());
     let greatest = deviations.windows(BAND_BLOCKS).map(|part| mean(part).abs()).fold(0.0, f64::max);
     let factor = BAND_FACTOR * (1.0 + BAND_FEW / independent.max(BAND_FEW));
     (factor * greatest).max(BAND_SHARE * expected.abs())

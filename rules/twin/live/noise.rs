@@ -4,7 +4,7 @@
 //! row of a stretch is weighted by the stationary variance. Every hypothesis profiles its own `phi` and `theta`.
 
 use crate::linear::columns::dot;
-use crate::statistics::count;
+use crate::statistics::count_to_f64;
 use std::ops::Range;
 
 /// Parameters of the noise.
@@ -97,8 +97,8 @@ pub fn whiten(column: &[f64], stretches: &[Range<usize>], noise: Arma) -> Vec<f6
 /// Logarithm of the likelihood, up to a constant, of innovations with this sum of squares.
 #[must_use]
 pub fn log_likelihood(rss: f64, rows: usize, stretches: usize, noise: Arma) -> f64 {
-    let rows_f = count(rows);
-    -0.5 * rows_f * (rss / rows_f).max(f64::MIN_POSITIVE).ln() + count(stretches) * noise.first_weight().ln()
+    let rows_f = count_to_f64(rows);
+    -0.5 * rows_f * (rss / rows_f).max(f64::MIN_POSITIVE).ln() + count_to_f64(stretches) * noise.first_weight().ln()
 }
 
 /// The noise of residuals by maximum likelihood: best of the grid, then refined by a pattern search.

@@ -26,13 +26,13 @@ impl Row {
     /// The mean of a channel.
     #[must_use]
     pub fn number(&self, name: &str) -> Option<f64> {
-        self.numbers.get(ChannelId::of(name)?.index()).copied().flatten()
+        self.numbers.get(ChannelId::from_name(name)?.index()).copied().flatten()
     }
 
     /// The word of a channel.
     #[must_use]
     pub fn word(&self, name: &str) -> Option<&str> {
-        self.words.get(&ChannelId::of(name)?.index()).map(|word| &**word)
+        self.words.get(&ChannelId::from_name(name)?.index()).map(|word| &**word)
     }
 
     /// Tool in the work, 0 to 1: as the controller says it, or as the program does, where a depth is planned and the
@@ -62,10 +62,10 @@ impl Seconds {
     #[must_use]
     pub fn new(output: &str) -> Self {
         Self {
-            output: ChannelId::of(output),
+            output: ChannelId::from_name(output),
             second: None,
             ticks: 0,
-            sums: vec![(0.0, 0); ChannelId::count()],
+            sums: vec![(0.0, 0); ChannelId::count_channels()],
             row: Row::default(),
         }
     }
@@ -84,7 +84,7 @@ impl Seconds {
     fn gather(&mut self, sample: &Sample, state: State) {
         self.ticks += 1;
         self.row.off |= state == State::Off;
-        for (id, slot) in sample.provided() {
+        for (id, slot) in sample.provided_slots() {
             match &slot.value {
                 Ok(Value::Number(number)) => {
                     // A channel that was declared later is not gathered.

@@ -220,7 +220,8 @@ impl Watched {
             return None;
         }
         let differs = self.differing.filter(|mismatch| mismatch.onset.is_some()).map_or(0.0, |mismatch| mismatch.mean);
-        let mean = of_work().map(|block| block.residual).sum::<f64>() / crate::statistics::count(2 * WORK_BLOCKS);
+        let mean =
+            of_work().map(|block| block.residual).sum::<f64>() / crate::statistics::count_to_f64(2 * WORK_BLOCKS);
         self.blocks.retain(|block| block.work != work);
         if let Some(learned) = &mut self.learned {
             let sd = learned.shared;

@@ -128,7 +128,7 @@ impl Window {
         let time_s = rows.iter().map(|(row, _)| seconds(row.at_ns - start_ns)).collect();
         let mut recording = Recording::new("live", time_s, Some(start_ns));
         let number = |row: &Row, index: usize| row.numbers.get(index).copied().flatten();
-        for id in ChannelId::all() {
+        for id in ChannelId::list_all() {
             let index = id.index();
             if id.channel().kind == Kind::Text {
                 if rows.iter().any(|(row, _)| row.words.contains_key(&index)) {

@@ -31,7 +31,7 @@ pub(super) fn curves() -> FeedCurves {
 fn table(samples: &[Sample]) -> Recording {
     let time_s = (0..samples.len()).map(|row| row as f64 / 10.0).collect();
     let mut recording = Recording::new("sweeps", time_s, None);
-    for id in ChannelId::all() {
+    for id in ChannelId::list_all() {
         let values = || samples.iter().map(|sample| sample.slot(id).value.as_ref().ok());
         if values().flatten().next().is_none() {
             continue;
@@ -47,7 +47,7 @@ fn table(samples: &[Sample]) -> Recording {
 
 /// The curves as rows of a script.
 fn rows(learned: &FeedCurves) -> String {
-    let family = learned.family(SPEED_RPM).expect("curves that do not cross");
+    let family = learned.build_family(SPEED_RPM).expect("curves that do not cross");
     let mut rows = String::new();
     for it in family.curves() {
         let [c0, c1, c2, c3] = it.curve.coefficients;
@@ -81,7 +81,7 @@ pub(super) fn by_exponent(target_w: f64) -> ScriptFile {
 /// The shipped script by learned curves, aiming at this power of the whole spindle.
 pub(super) fn by_curves(learned: &FeedCurves, target_w: f64) -> ScriptFile {
     let [least, most] = [MIN_PCT, MAX_PCT].map(|pct| format!("{pct:.1}"));
-    let curves = learned.map(SPEED_RPM, &learned.family(SPEED_RPM).expect("curves that do not cross"));
+    let curves = learned.map(SPEED_RPM, &learned.build_family(SPEED_RPM).expect("curves that do not cross"));
     let constants = [("TARGET_W", format!("{target_w:.1}")), ("MIN_PCT", least), ("MAX_PCT", most), ("CURVES", curves)];
     shipped("constant_load.rhai", &constants)
 }

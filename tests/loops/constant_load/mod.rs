@@ -117,7 +117,7 @@ fn run(settings: SimulatedSettings, steps: &[ExperimentStep], scripts: &[ScriptF
     let mut outcome = Outcome { least_pct: 100, greatest_pct: 100, ..Outcome::default() };
     let (mut begun, mut engaged_s, mut over_s, mut silent_s) = (false, 0.0, 0.0, 0.0);
     let mut asked = None;
-    let power = ChannelId::of("spindle_power_w").expect("a channel");
+    let power = ChannelId::from_name("spindle_power_w").expect("a channel");
     while !over(&bench) {
         silent_s = if bench.tick().number(power).is_err() && bench.now_s() > 30.0 { silent_s + 0.1 } else { 0.0 };
         let asks = bench.pipeline.scripts().decision().request.as_ref().map(|request| request.pct.round());
@@ -161,8 +161,8 @@ fn percentile(sorted: &[f64], share: f64) -> f64 {
 fn a_part_with_varying_depth_takes_an_even_power_and_less_time() {
     let learned = curves();
     // The target: what the spindle takes in the deepest cut at the programmed feed, which the programmer has allowed.
-    let family = learned.family(SPEED_RPM).expect("curves that do not cross");
-    let target_w = family.curve(DEEPEST_MM).expect("between the curves").at(FEED_MM_MIN);
+    let family = learned.build_family(SPEED_RPM).expect("curves that do not cross");
+    let target_w = family.interpolate_curve(DEEPEST_MM).expect("between the curves").evaluate_at(FEED_MM_MIN);
     let law = [law(&learned, target_w)];
     println!("target: {target_w:.0} W of the whole spindle");
     let plain = run(settings(1), &part(), &law, false);
@@ -196,8 +196,8 @@ fn a_part_with_varying_depth_takes_an_even_power_and_less_time() {
 #[test]
 fn hard_spots_a_worn_edge_and_a_silent_meter_do_no_harm() {
     let learned = curves();
-    let family = learned.family(SPEED_RPM).expect("curves that do not cross");
-    let law = [law(&learned, family.curve(DEEPEST_MM).expect("between").at(FEED_MM_MIN))];
+    let family = learned.build_family(SPEED_RPM).expect("curves that do not cross");
+    let law = [law(&learned, family.interpolate_curve(DEEPEST_MM).expect("between").evaluate_at(FEED_MM_MIN))];
     let usual = settings(2);
     let hard = SimulatedSettings { change: LaterChange { after_s: 120.0, cut: 1.35, ..usual.change }, ..usual };
     let worn = SimulatedSettings { wear_mm: 0.28, ..usual };

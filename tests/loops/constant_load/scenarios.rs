@@ -61,8 +61,8 @@ fn row(scenario: &str, law: &str, outcome: &Outcome) -> String {
 #[test]
 fn every_situation_in_which_a_constant_load_is_known_to_fail() {
     let learned = curves();
-    let family = learned.family(SPEED_RPM).expect("curves that do not cross");
-    let target_w = family.curve(DEEPEST_MM).expect("between").at(FEED_MM_MIN);
+    let family = learned.build_family(SPEED_RPM).expect("curves that do not cross");
+    let target_w = family.interpolate_curve(DEEPEST_MM).expect("between").evaluate_at(FEED_MM_MIN);
     let laws = [
         ("plain feed", law(&learned, target_w), false),
         ("shipped, exponent", by_exponent(ALLOWED_W), true),

@@ -66,7 +66,7 @@ impl Device {
     ) -> Self {
         let mut dice = Pcg64Mcg::seed_from_u64(seed);
         let silent = if dropouts { silences(course.length_s(), &mut dice) } else { Vec::new() };
-        let channels = channels.iter().map(|name| ChannelId::of(name).expect("in the table")).collect();
+        let channels = channels.iter().map(|name| ChannelId::from_name(name).expect("in the table")).collect();
         let next_s = dice.random_range(0.0..0.1);
         Self { name, channels, course: course.clone(), disturbance, dice, silent, next_s }
     }
@@ -127,7 +127,7 @@ impl Pull for Device {
         (self.next_s < self.course.length_s()).then(|| nanoseconds(self.next_s))
     }
 
-    fn pull(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+    fn pull_readings(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let arrives_s = self.next_s;
         let half_trip_s = self.dice.random_range(0.005..0.025);
         let mid_s = arrives_s - half_trip_s;
@@ -139,7 +139,7 @@ impl Pull for Device {
         }
         let stamp = Stamp { mid_ns: nanoseconds(mid_s), half_width_ns: nanoseconds(half_trip_s) };
         for channel in self.channels.clone() {
-            out.push(Reading::number(channel, stamp, self.value(channel.name(), mid_s)));
+            out.push(Reading::from_number(channel, stamp, self.value(channel.name(), mid_s)));
         }
         Ok(())
     }

@@ -10,7 +10,7 @@ pub(super) struct ByteReader<'a> {
 macro_rules! number {
     ($name:ident, $kind:ty) => {
         pub(super) fn $name(&mut self) -> Option<$kind> {
-            let bytes = self.take(size_of::<$kind>())?.try_into().ok()?;
+            let bytes = self.take_bytes(size_of::<$kind>())?.try_into().ok()?;
             Some(if self.is_big { <$kind>::from_be_bytes(bytes) } else { <$kind>::from_le_bytes(bytes) })
         }
     };
@@ -22,7 +22,7 @@ impl<'a> ByteReader<'a> {
     }
 
     /// The next bytes; `None` where there are fewer.
-    pub(super) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+    pub(super) fn take_bytes(&mut self, count: usize) -> Option<&'a [u8]> {
         let (taken, left) = self.left.split_at_checked(count)?;
         self.left = left;
         Some(taken)
@@ -33,9 +33,9 @@ impl<'a> ByteReader<'a> {
     number!(i64, i64);
 
     /// A text after its length.
-    pub(super) fn text(&mut self) -> Option<String> {
+    pub(super) fn read_text(&mut self) -> Option<String> {
         let length = usize::try_from(self.u32()?).ok()?;
-        Some(String::from_utf8_lossy(self.take(length)?).into_owned())
+        Some(String::from_utf8_lossy(self.take_bytes(length)?).into_owned())
     }
 }
 
@@ -55,7 +55,7 @@ pub(super) enum NumberKind {
 }
 
 impl NumberKind {
-    pub(super) fn size(self) -> usize {
+    pub(super) fn byte_size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -66,7 +66,7 @@ impl NumberKind {
 
     /// Every number of these bytes.
     #[expect(clippy::cast_precision_loss, reason = "counts of a recording are far below 2^53")]
-    pub(super) fn all(self, bytes: &[u8], is_big: bool) -> Vec<f64> {
+    pub(super) fn decode_numbers(self, bytes: &[u8], is_big: bool) -> Vec<f64> {
         macro_rules! of {
             ($kind:ty, $convert:expr) => {
                 bytes

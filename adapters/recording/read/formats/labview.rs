@@ -30,7 +30,7 @@ struct LvmHead {
 }
 
 pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
-    let separator = if input.head(400)?.windows(9).any(|part| part == b"Separator") && has_comma_key(&input)? {
+    let separator = if input.read_head(400)?.windows(9).any(|part| part == b"Separator") && has_comma_key(&input)? {
         b','
     } else {
         b'\t'
@@ -44,7 +44,7 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
     let mut named = false;
     let mut row_number = 0_u32;
     let mut of_time: Vec<usize> = Vec::new();
-    text.visit(&mut |row| {
+    text.visit_rows(&mut |row| {
         let words: Vec<&str> =
             row.cells.iter().map(|cell| if let Cell::Text(text) = cell { *text } else { "" }).collect();
         let first = words.first().copied().unwrap_or("");
@@ -55,7 +55,7 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
         let is_key = row.cells.len() > 1 && !first.is_empty() && first.chars().all(|c| c.is_alphanumeric() || c == '_');
         if !named && first != "X_Value" {
             if is_key {
-                head.take(first, &words[1..]);
+                head.accept_key(first, &words[1..]);
             }
             return Ok(VisitStep::Next);
         }
@@ -68,7 +68,7 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
             table.rows.extend(head.header_rows(row.line, &words));
             return Ok(VisitStep::Next);
         }
-        let mut owned: Vec<OwnedCell> = words.iter().map(|word| OwnedCell::text(word)).collect();
+        let mut owned: Vec<OwnedCell> = words.iter().map(|word| OwnedCell::from_text(word)).collect();
         if head.no_x {
             owned[0] = head
                 .delta_s
@@ -77,13 +77,13 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
         row_number += 1;
         for place in &of_time {
             if let Some(cell) = owned.get_mut(*place) {
-                *cell = head.moment(std::mem::replace(cell, OwnedCell::Empty));
+                *cell = head.convert_time_cell(std::mem::replace(cell, OwnedCell::Empty));
             }
         }
         cells += owned.len();
         table.rows.push((row.line, owned));
         if cells > CELLS_IN_MEMORY_MAX {
-            return Err(RecordingError::format(
+            return Err(RecordingError::with_format_reason(
                 &file,
                 "more values than are read at once: export it in parts",
                 "数据过多：请分成几个文件导出",
@@ -94,13 +94,13 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
     if !named {
         return Err(no_names(&file));
     }
-    table.form = text.form().into_iter().filter(|form| form.en != "tab").collect();
+    table.form = text.describe_form().into_iter().filter(|form| form.en != "tab").collect();
     table.form.insert(0, Bilingual::new("LabVIEW measurement file", "LabVIEW测量文件"));
     Ok(table)
 }
 
 fn no_names(file: &str) -> RecordingError {
-    RecordingError::format(
+    RecordingError::with_format_reason(
         file,
         "a LabVIEW measurement file without a line X_Value: export it with a header (one, or one per packet)",
         "LabVIEW测量文件缺少X_Value行：请带表头导出",
@@ -108,12 +108,12 @@ fn no_names(file: &str) -> RecordingError {
 }
 
 fn has_comma_key(input: &Input) -> Result<bool, RecordingError> {
-    let head = String::from_utf8_lossy(&input.head(400)?).into_owned();
+    let head = String::from_utf8_lossy(&input.read_head(400)?).into_owned();
     Ok(head.lines().any(|line| line.starts_with("Separator") && line.to_lowercase().contains("comma")))
 }
 
 impl LvmHead {
-    fn take(&mut self, key: &str, values: &[&str]) {
+    fn accept_key(&mut self, key: &str, values: &[&str]) {
         let number = |text: &&str| text.replace(',', ".").parse::<f64>().ok();
         match key {
             "X_Columns" => self.no_x = values.first().is_some_and(|value| value.eq_ignore_ascii_case("no")),
@@ -136,7 +136,7 @@ impl LvmHead {
     }
 
     /// A cell of time as a moment, where the beginning is known.
-    fn moment(&self, cell: OwnedCell) -> OwnedCell {
+    fn convert_time_cell(&self, cell: OwnedCell) -> OwnedCell {
         let Some(start_ns) = self.start_ns() else { return cell };
         let seconds = match &cell {
             OwnedCell::Number(seconds) => Some(*seconds),
@@ -163,7 +163,7 @@ impl LvmHead {
                     unit.map_or_else(|| name.to_owned(), |unit| format!("{name} [{unit}]"))
                 }
             };
-            OwnedCell::text(&text)
+            OwnedCell::from_text(&text)
         };
         vec![(line, names.iter().map(cell).collect())]
     }

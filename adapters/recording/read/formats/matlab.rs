@@ -28,9 +28,9 @@ pub(super) fn is_mat(head: &[u8]) -> bool {
 }
 
 pub(super) fn open(input: &Input, wanted: Option<&str>) -> Result<ColumnTable, RecordingError> {
-    let bytes = super::whole(input)?;
+    let bytes = super::read_whole(input)?;
     if bytes.starts_with(b"MATLAB 7.3") {
-        return Err(RecordingError::format(
+        return Err(RecordingError::with_format_reason(
             &input.file,
             "a MAT file of version 7.3, which is HDF5 and is not read: save it with save(..., '-v7'), or write CSV with writetable",
             "MAT文件版本7.3（HDF5），无法读取：请用save(..., '-v7')保存，或用writetable导出CSV",
@@ -38,7 +38,11 @@ pub(super) fn open(input: &Input, wanted: Option<&str>) -> Result<ColumnTable, R
     }
     let variables = if bytes.starts_with(b"MATLAB 5.0") { version_5(&bytes) } else { version_4(&bytes) };
     let mut variables = variables.ok_or_else(|| {
-        RecordingError::format(&input.file, "the MAT file is damaged: save it again", "MAT文件已损坏：请重新保存")
+        RecordingError::with_format_reason(
+            &input.file,
+            "the MAT file is damaged: save it again",
+            "MAT文件已损坏：请重新保存",
+        )
     })?;
     if let Some(wanted) = wanted {
         variables.retain(|variable| variable.name == wanted || variable.name.starts_with(&format!("{wanted}.")));
@@ -50,18 +54,18 @@ pub(super) fn open(input: &Input, wanted: Option<&str>) -> Result<ColumnTable, R
     {
         variables.iter_mut().for_each(|variable| variable.name = variable.name[prefix.len() + 1..].to_owned());
     }
-    table(variables, input)
+    build_table(variables, input)
 }
 
 /// Variables of the commonest length become columns; a matrix becomes several.
-fn table(variables: Vec<Variable>, input: &Input) -> Result<ColumnTable, RecordingError> {
+fn build_table(variables: Vec<Variable>, input: &Input) -> Result<ColumnTable, RecordingError> {
     let length = |variable: &Variable| if variable.rows > 1 { variable.rows } else { variable.values.len() };
     let mut lengths: Vec<usize> = variables.iter().map(length).filter(|length| *length > 1).collect();
     lengths.sort_unstable();
     let usual =
         lengths.iter().copied().max_by_key(|length| (lengths.iter().filter(|other| *other == length).count(), *length));
     let Some(usual) = usual else {
-        return Err(RecordingError::format(
+        return Err(RecordingError::with_format_reason(
             &input.file,
             "the MAT file has no array of numbers",
             "MAT文件中没有数值数组",
@@ -93,19 +97,19 @@ fn version_5(bytes: &[u8]) -> Option<Vec<Variable>> {
     let mut found = Vec::new();
     let mut budget = UNPACKED_BYTES_MAX;
     while !left.left.is_empty() {
-        let Some((kind, data)) = element(&mut left) else { break };
+        let Some((kind, data)) = read_element(&mut left) else { break };
         match kind {
             15 => {
                 let mut plain = Vec::new();
                 flate2::read::ZlibDecoder::new(data).take(budget + 1).read_to_end(&mut plain).ok()?;
                 budget = budget.checked_sub(plain.len() as u64)?;
-                let (kind, data) = element(&mut ByteReader::new(&plain, is_big))?;
+                let (kind, data) = read_element(&mut ByteReader::new(&plain, is_big))?;
                 if kind == 14 {
-                    matrix(data, is_big, "", DEPTH_MAX, &mut found);
+                    read_matrix(data, is_big, "", DEPTH_MAX, &mut found);
                 }
             }
             14 => {
-                matrix(data, is_big, "", DEPTH_MAX, &mut found);
+                read_matrix(data, is_big, "", DEPTH_MAX, &mut found);
             }
             _ => {}
         }
@@ -114,16 +118,16 @@ fn version_5(bytes: &[u8]) -> Option<Vec<Variable>> {
 }
 
 /// Type and bytes of the next element; what follows begins at a multiple of eight, except after a compressed one.
-fn element<'a>(bytes: &mut ByteReader<'a>) -> Option<(u32, &'a [u8])> {
+fn read_element<'a>(bytes: &mut ByteReader<'a>) -> Option<(u32, &'a [u8])> {
     let tag = bytes.u32()?;
     if tag >> 16 != 0 {
-        let data = bytes.take(4)?;
+        let data = bytes.take_bytes(4)?;
         return Some((tag & 0xffff, data.get(..usize::try_from(tag >> 16).ok()?)?));
     }
     let length = usize::try_from(bytes.u32()?).ok()?;
-    let data = bytes.take(length)?;
+    let data = bytes.take_bytes(length)?;
     if tag != 15 {
-        let _padding = bytes.take(length.next_multiple_of(8) - length);
+        let _padding = bytes.take_bytes(length.next_multiple_of(8) - length);
     }
     Some((tag, data))
 }
@@ -146,34 +150,34 @@ fn number_kind(code: u32) -> Option<NumberKind> {
 }
 
 /// Adds the numbers of an array, or of the fields of a structure. `None` where it is damaged.
-fn matrix(data: &[u8], is_big: bool, parent: &str, depth: usize, found: &mut Vec<Variable>) -> Option<()> {
+fn read_matrix(data: &[u8], is_big: bool, parent: &str, depth: usize, found: &mut Vec<Variable>) -> Option<()> {
     let mut bytes = ByteReader::new(data, is_big);
-    let (_, flags) = element(&mut bytes)?;
+    let (_, flags) = read_element(&mut bytes)?;
     let class = ByteReader::new(flags, is_big).u32()? & 0xff;
-    let (_, dimensions) = element(&mut bytes)?;
-    let dimensions: Vec<f64> = NumberKind::I32.all(dimensions, is_big);
-    let (_, own) = element(&mut bytes)?;
+    let (_, dimensions) = read_element(&mut bytes)?;
+    let dimensions: Vec<f64> = NumberKind::I32.decode_numbers(dimensions, is_big);
+    let (_, own) = read_element(&mut bytes)?;
     let own = String::from_utf8_lossy(own).trim_end_matches('\0').to_owned();
     let name = if parent.is_empty() { own } else { parent.to_owned() };
     match class {
         2 if depth > 0 => {
-            let (_, length) = element(&mut bytes)?;
+            let (_, length) = read_element(&mut bytes)?;
             let length = usize::try_from(ByteReader::new(length, is_big).u32()?).ok().filter(|length| *length > 0)?;
-            let (_, names) = element(&mut bytes)?;
+            let (_, names) = read_element(&mut bytes)?;
             let fields: Vec<String> = names
                 .chunks(length)
                 .map(|field| String::from_utf8_lossy(field).split('\0').next().unwrap_or("").to_owned())
                 .collect();
             for field in fields {
-                let (kind, data) = element(&mut bytes)?;
+                let (kind, data) = read_element(&mut bytes)?;
                 if kind == 14 {
-                    matrix(data, is_big, &format!("{name}.{field}"), depth - 1, found);
+                    read_matrix(data, is_big, &format!("{name}.{field}"), depth - 1, found);
                 }
             }
         }
         6..=15 => {
-            let (kind, data) = element(&mut bytes)?;
-            let values = number_kind(kind)?.all(data, is_big);
+            let (kind, data) = read_element(&mut bytes)?;
+            let values = number_kind(kind)?.decode_numbers(data, is_big);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a dimension, as stored")]
             let rows = dimensions.first().map_or(1, |rows| rows.max(0.0) as usize);
             found.push(Variable { name, rows, values });
@@ -213,7 +217,7 @@ fn header_4(bytes: &mut ByteReader<'_>) -> Option<Header4> {
     if !plausible {
         return None;
     }
-    let name = read.take(usize::try_from(length).ok()?)?;
+    let name = read.take_bytes(usize::try_from(length).ok()?)?;
     let name = name.strip_suffix(b"\0")?;
     let is_name = name.first().is_some_and(u8::is_ascii_alphabetic)
         && name.iter().all(|byte| byte.is_ascii_alphanumeric() || *byte == b'_');
@@ -239,22 +243,22 @@ fn version_4(bytes: &[u8]) -> Option<Vec<Variable>> {
     while !left.left.is_empty() {
         let header = header_4(&mut left)?;
         let kind = header.kind?;
-        let size = header.rows.checked_mul(header.columns)?.checked_mul(kind.size())?;
-        let values = kind.all(left.take(size)?, header.is_big);
+        let size = header.rows.checked_mul(header.columns)?.checked_mul(kind.byte_size())?;
+        let values = kind.decode_numbers(left.take_bytes(size)?, header.is_big);
         if header.is_complex {
-            left.take(size)?;
+            left.take_bytes(size)?;
         }
         let variable = Variable { name: header.name, rows: header.rows, values };
         if header.is_text || variable.name == "Aclass" { texts.push(variable) } else { found.push(variable) }
     }
     match texts.iter().find(|text| text.name == "name").filter(|_| texts.iter().any(|text| text.name == "Aclass")) {
-        Some(names) => modelica(names, &found),
+        Some(names) => expand_modelica(names, &found),
         None => Some(found),
     }
 }
 
 /// A result of a Modelica tool: names as columns of letters, `dataInfo` says in which matrix and row each variable stands.
-fn modelica(names: &Variable, found: &[Variable]) -> Option<Vec<Variable>> {
+fn expand_modelica(names: &Variable, found: &[Variable]) -> Option<Vec<Variable>> {
     let of = |name: &str| found.iter().find(|variable| variable.name == name);
     let (info, data) = (of("dataInfo")?, of("data_2")?);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "letters and places, as stored")]

@@ -46,9 +46,9 @@ const REFUSED: &[RefusedFormat] = &[
 
 /// Reads by a library of others. A damaged file may break off inside it, which is an answer about the file and not the end of
 /// this program (calamine 0.38 indexes into what an xls file says of itself).
-fn hold<T>(input: &Input, read: impl FnOnce() -> Result<T, RecordingError>) -> Result<T, RecordingError> {
+fn catch_damage<T>(input: &Input, read: impl FnOnce() -> Result<T, RecordingError>) -> Result<T, RecordingError> {
     let damaged = |_| {
-        Err(RecordingError::format(
+        Err(RecordingError::with_format_reason(
             &input.file,
             "the file is damaged: its parts do not fit together; save it anew, or as CSV",
             "文件已损坏：内部结构不一致；请重新保存，或另存为CSV",
@@ -58,20 +58,20 @@ fn hold<T>(input: &Input, read: impl FnOnce() -> Result<T, RecordingError>) -> R
 }
 
 /// Opens a file as a table.
-pub(super) fn open(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, RecordingError> {
-    let head = input.head(1024)?;
+pub(super) fn open_table(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, RecordingError> {
+    let head = input.read_head(1024)?;
     if let Some((_, name, en, zh)) = REFUSED.iter().find(|(start, ..)| head.starts_with(start)) {
-        return Err(RecordingError::format(
+        return Err(RecordingError::with_format_reason(
             &input.file,
             format!("this is {name}, which is not read: {en}"),
             format!("该文件是{name}，无法读取：{zh}"),
         ));
     }
     if head.starts_with(b"PAR1") {
-        return Ok(Box::new(hold(&input, || parquet::open(&input))?));
+        return Ok(Box::new(catch_damage(&input, || parquet::open(&input))?));
     }
     if head.starts_with(b"PK\x03\x04") || head.starts_with(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1") {
-        let table = hold(&input, || workbook::open(&input, mapping.sheet.as_deref()))?;
+        let table = catch_damage(&input, || workbook::open(&input, mapping.sheet.as_deref()))?;
         return Ok(Box::new(table));
     }
     if head.starts_with(b"TDSm") {
@@ -81,15 +81,15 @@ pub(super) fn open(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, Re
         return Ok(Box::new(matlab::open(&input, mapping.sheet.as_deref())?));
     }
     let encoding = mapping.encoding.as_deref().and_then(|name| encoding_rs::Encoding::for_label(name.as_bytes()));
-    let separator = mapping.separator.as_deref().and_then(Separator::named);
+    let separator = mapping.separator.as_deref().and_then(Separator::from_text);
     let text = TextTable::new(input, encoding, separator)?;
-    let start = text.head()?;
+    let start = text.read_head()?;
     let start = start.trim_start();
     if start.starts_with('<') {
         return Ok(Box::new(mtconnect::open(&text.input)?));
     }
     if start.starts_with('{') || start.starts_with('[') {
-        return Err(RecordingError::format(
+        return Err(RecordingError::with_format_reason(
             &text.input.file,
             "this is JSON, which is not read: write CSV or Parquet (pandas: to_csv, to_parquet)",
             "该文件是JSON，无法读取：请导出为CSV或Parquet（pandas：to_csv、to_parquet）",
@@ -99,7 +99,7 @@ pub(super) fn open(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, Re
         return Ok(Box::new(labview::open(text.input)?));
     }
     if head.iter().take(512).filter(|byte| **byte == 0).count() > 8 && text.encoding.encoding == encoding_rs::UTF_8 {
-        return Err(RecordingError::format(
+        return Err(RecordingError::with_format_reason(
             &text.input.file,
             "this is no text and no format that is known (CSV, Excel, OpenDocument, LabVIEW lvm and tdms, MATLAB up to version 7, Parquet, MTConnect)",
             "该文件不是文本，也不是已知格式（CSV、Excel、OpenDocument、LabVIEW lvm与tdms、MATLAB 7及以下、Parquet、MTConnect）",
@@ -109,14 +109,14 @@ pub(super) fn open(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, Re
 }
 
 /// Everything of a file, for formats that jump about in it.
-fn whole(input: &Input) -> Result<Vec<u8>, RecordingError> {
+fn read_whole(input: &Input) -> Result<Vec<u8>, RecordingError> {
     let too_big = || {
         let mb = UNPACKED_BYTES_MAX >> 20;
-        RecordingError::format(
+        RecordingError::with_format_reason(
             &input.file,
             format!("larger than {mb} MB: export it as CSV, or in parts"),
             format!("超过{mb} MB：请导出为CSV，或分成几个文件"),
         )
     };
-    input.whole(UNPACKED_BYTES_MAX)?.ok_or_else(too_big)
+    input.read_whole(UNPACKED_BYTES_MAX)?.ok_or_else(too_big)
 }

@@ -67,21 +67,21 @@ pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
     let mut buffer = Vec::new();
     loop {
         let event = reader.read_event_into(&mut buffer).map_err(|error| {
-            RecordingError::format(
+            RecordingError::with_format_reason(
                 &input.file,
                 format!("the XML is broken at byte {}: {error}", reader.error_position()),
                 format!("XML在第{}字节处损坏：{error}", reader.error_position()),
             )
         })?;
         match event {
-            Event::Start(element) => stream.begin(&element),
-            Event::Text(text) => stream.value(&text),
+            Event::Start(element) => stream.begin_element(&element),
+            Event::Text(text) => stream.record_value(&text),
             Event::End(_) => stream.open = None,
             Event::Eof => break,
             _ => {}
         }
         if stream.cells > CELLS_IN_MEMORY_MAX || stream.items.len() > COLUMNS_MAX {
-            return Err(RecordingError::format(
+            return Err(RecordingError::with_format_reason(
                 &input.file,
                 "more observations than are read at once: ask the agent for less",
                 "观测值过多：请减少一次请求的数量",
@@ -90,7 +90,7 @@ pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
         buffer.clear();
     }
     if !stream.is_streams {
-        return Err(RecordingError::format(
+        return Err(RecordingError::with_format_reason(
             &input.file,
             "this is XML, but no answer of an MTConnect agent (MTConnectStreams): export the data as CSV",
             "该文件是XML，但不是MTConnect应答（MTConnectStreams）：请导出为CSV",
@@ -98,7 +98,7 @@ pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
     }
     let has_value = |item: &Item| item.values.iter().any(|value| *value != OwnedCell::Empty);
     if !stream.items.iter().any(has_value) {
-        return Err(RecordingError::format(
+        return Err(RecordingError::with_format_reason(
             &input.file,
             "an MTConnect document in which every observation is UNAVAILABLE: the machine or its adapter was off",
             "MTConnect文档中所有观测值均为UNAVAILABLE：机床或适配器未连接",
@@ -111,7 +111,7 @@ pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
 }
 
 impl Stream {
-    fn begin(&mut self, element: &BytesStart<'_>) {
+    fn begin_element(&mut self, element: &BytesStart<'_>) {
         self.open = None;
         let tag = element.local_name().as_ref().to_owned();
         let attribute = |name: &str| {
@@ -125,7 +125,7 @@ impl Stream {
             }
             _ => {
                 let (Some(item), Some(time)) = (attribute("dataItemId"), attribute("timestamp")) else { return };
-                let name = self.name(&tag, &item, attribute("subType").as_deref());
+                let name = self.choose_name(&tag, &item, attribute("subType").as_deref());
                 let index = *self.known.entry(item).or_insert_with(|| {
                     self.items.push(Item { name, times: Vec::new(), values: Vec::new() });
                     self.items.len() - 1
@@ -135,16 +135,16 @@ impl Stream {
         }
     }
 
-    fn value(&mut self, text: &str) {
+    fn record_value(&mut self, text: &str) {
         let Some((index, time)) = self.open.take() else { return };
         let item = &mut self.items[index];
-        item.times.push(OwnedCell::text(&time));
-        item.values.push(if text == "UNAVAILABLE" { OwnedCell::Empty } else { OwnedCell::text(text) });
+        item.times.push(OwnedCell::from_text(&time));
+        item.values.push(if text == "UNAVAILABLE" { OwnedCell::Empty } else { OwnedCell::from_text(text) });
         self.cells += 2;
     }
 
     /// A name of our dictionary where type and component tell the column, else the item's own.
-    fn name(&self, tag: &str, item: &str, sub_type: Option<&str>) -> String {
+    fn choose_name(&self, tag: &str, item: &str, sub_type: Option<&str>) -> String {
         let is_actual = sub_type.is_none_or(|sub_type| sub_type.eq_ignore_ascii_case("ACTUAL"));
         let is_spindle = SPINDLES.contains(&self.component.0.as_str());
         let taken = |name: &String| self.items.iter().any(|known| known.name == *name);

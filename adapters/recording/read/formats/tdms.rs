@@ -6,7 +6,7 @@ use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::table::{ColumnCells, ColumnTable};
 use super::bytes::ByteReader;
-use super::tdms_channel::{RawIndex, TdmsChannel, TdmsValues, ValueKind, WaveformClock, moment, parts};
+use super::tdms_channel::{RawIndex, TdmsChannel, TdmsValues, ValueKind, WaveformClock, read_moment, split_path};
 use crate::bilingual::Bilingual;
 use std::collections::HashMap;
 
@@ -27,27 +27,27 @@ struct TdmsFile {
 }
 
 pub(super) fn open(input: &Input, group: Option<&str>) -> Result<ColumnTable, RecordingError> {
-    let bytes = super::whole(input)?;
+    let bytes = super::read_whole(input)?;
     let mut file = TdmsFile::default();
     let mut at = 0;
     while at + LEAD_IN <= bytes.len() {
         let damaged = || {
-            RecordingError::format(
+            RecordingError::with_format_reason(
                 &input.file,
                 format!("the TDMS file is damaged in the segment at byte {at}: copy it again"),
                 format!("TDMS文件在第{at}字节的段损坏：请重新复制"),
             )
         };
-        at = file.segment(&bytes, at).map_err(|problem| match problem {
+        at = file.read_segment(&bytes, at).map_err(|problem| match problem {
             Problem::Damaged => damaged(),
-            Problem::Daqmx => RecordingError::format(
+            Problem::Daqmx => RecordingError::with_format_reason(
                 &input.file,
                 "raw data of DAQmx, which is not read: save it as waveforms, or convert it in LabVIEW",
                 "DAQmx原始数据，无法读取：请在LabVIEW中另存为波形",
             ),
         })?;
     }
-    file.table(input, group)
+    file.into_table(input, group)
 }
 
 enum Problem {
@@ -57,9 +57,9 @@ enum Problem {
 
 impl TdmsFile {
     /// Reads the segment here; where the next one begins.
-    fn segment(&mut self, bytes: &[u8], at: usize) -> Result<usize, Problem> {
+    fn read_segment(&mut self, bytes: &[u8], at: usize) -> Result<usize, Problem> {
         let mut lead = ByteReader::new(&bytes[at..], false);
-        if lead.take(4) != Some(b"TDSm") {
+        if lead.take_bytes(4) != Some(b"TDSm") {
             return Err(Problem::Damaged);
         }
         let mask = lead.u32().ok_or(Problem::Damaged)?;
@@ -78,33 +78,33 @@ impl TdmsFile {
                 self.active.clear();
             }
             let metadata = bytes.get(start..raw_at.min(end)).ok_or(Problem::Damaged)?;
-            self.metadata(ByteReader::new(metadata, lead.is_big))?;
+            self.read_metadata(ByteReader::new(metadata, lead.is_big))?;
         }
         if mask & HAS_RAW_DATA != 0 {
             if mask & IS_DAQMX != 0 {
                 return Err(Problem::Daqmx);
             }
             let data = bytes.get(raw_at..end).ok_or(Problem::Damaged)?;
-            self.raw(ByteReader::new(data, lead.is_big), mask & IS_INTERLEAVED != 0);
+            self.read_raw(ByteReader::new(data, lead.is_big), mask & IS_INTERLEAVED != 0);
         }
         Ok(end)
     }
 
-    fn metadata(&mut self, mut bytes: ByteReader<'_>) -> Result<(), Problem> {
+    fn read_metadata(&mut self, mut bytes: ByteReader<'_>) -> Result<(), Problem> {
         let count = bytes.u32().ok_or(Problem::Damaged)?;
         for _ in 0..count {
-            let path = bytes.text().ok_or(Problem::Damaged)?;
+            let path = bytes.read_text().ok_or(Problem::Damaged)?;
             let index = *self.known.entry(path.clone()).or_insert_with(|| {
-                self.channels.push(TdmsChannel { path: parts(&path), ..TdmsChannel::default() });
+                self.channels.push(TdmsChannel { path: split_path(&path), ..TdmsChannel::default() });
                 self.channels.len() - 1
             });
             let length = bytes.u32().ok_or(Problem::Damaged)?;
             match length {
                 u32::MAX => {}
-                0 => self.activate(index),
+                0 => self.activate_channel(index),
                 0x1269 | 0x1369 => return Err(Problem::Daqmx),
                 _ => {
-                    let kind = bytes.u32().and_then(ValueKind::of).ok_or(Problem::Damaged)?;
+                    let kind = bytes.u32().and_then(ValueKind::from_code).ok_or(Problem::Damaged)?;
                     let _dimension = bytes.u32();
                     let count = bytes.u64().and_then(|count| usize::try_from(count).ok()).ok_or(Problem::Damaged)?;
                     let size = if kind == ValueKind::Text {
@@ -113,40 +113,41 @@ impl TdmsFile {
                         Some(0)
                     };
                     self.channels[index].index = Some(RawIndex { kind, count, bytes: size.ok_or(Problem::Damaged)? });
-                    self.activate(index);
+                    self.activate_channel(index);
                 }
             }
-            self.properties(&mut bytes, index).ok_or(Problem::Damaged)?;
+            self.read_properties(&mut bytes, index).ok_or(Problem::Damaged)?;
         }
         Ok(())
     }
 
-    fn activate(&mut self, index: usize) {
+    fn activate_channel(&mut self, index: usize) {
         if !self.active.contains(&index) {
             self.active.push(index);
         }
     }
 
-    fn properties(&mut self, bytes: &mut ByteReader<'_>, index: usize) -> Option<()> {
+    fn read_properties(&mut self, bytes: &mut ByteReader<'_>, index: usize) -> Option<()> {
         for _ in 0..bytes.u32()? {
-            let name = bytes.text()?;
-            let kind = ValueKind::of(bytes.u32()?)?;
+            let name = bytes.read_text()?;
+            let kind = ValueKind::from_code(bytes.u32()?)?;
             let channel = &mut self.channels[index];
             match kind {
                 ValueKind::Text => {
-                    let text = bytes.text()?;
+                    let text = bytes.read_text()?;
                     if name == "unit_string" {
                         channel.unit = Some(text).filter(|unit| !unit.is_empty());
                     }
                 }
                 ValueKind::Moment => {
-                    let at_ns = moment(bytes)?;
+                    let at_ns = read_moment(bytes)?;
                     if name == "wf_start_time" {
                         channel.start_ns = Some(at_ns);
                     }
                 }
                 ValueKind::Number(kind) => {
-                    let value = kind.all(bytes.take(kind.size())?, bytes.is_big).first().copied()?;
+                    let value =
+                        kind.decode_numbers(bytes.take_bytes(kind.byte_size())?, bytes.is_big).first().copied()?;
                     match name.as_str() {
                         "wf_increment" => channel.increment_s = Some(value).filter(|step_s| *step_s > 0.0),
                         "wf_start_offset" => channel.offset_s = value,
@@ -154,7 +155,7 @@ impl TdmsFile {
                     }
                 }
                 ValueKind::Flag => {
-                    bytes.take(1)?;
+                    bytes.take_bytes(1)?;
                 }
                 ValueKind::Nothing => {}
             }
@@ -163,7 +164,7 @@ impl TdmsFile {
     }
 
     /// Chunks of equal layout follow one another; a last one that is not whole is left out.
-    fn raw(&mut self, mut bytes: ByteReader<'_>, is_interleaved: bool) {
+    fn read_raw(&mut self, mut bytes: ByteReader<'_>, is_interleaved: bool) {
         let layout: Vec<(usize, RawIndex)> = self
             .active
             .iter()
@@ -171,7 +172,7 @@ impl TdmsFile {
             .filter(|(_, index)| index.count > 0)
             .collect();
         let size = |index: &RawIndex| {
-            if index.kind == ValueKind::Text { index.bytes } else { index.kind.size().saturating_mul(index.count) }
+            if index.kind == ValueKind::Text { index.bytes } else { index.kind.byte_size().saturating_mul(index.count) }
         };
         let chunk: usize = layout.iter().map(|(_, index)| size(index)).fold(0, usize::saturating_add);
         if chunk == 0 {
@@ -179,29 +180,29 @@ impl TdmsFile {
         }
         while bytes.left.len() >= chunk {
             if is_interleaved {
-                let Some(block) = bytes.take(chunk) else { return };
+                let Some(block) = bytes.take_bytes(chunk) else { return };
                 self.read_interleaved(block, &layout, bytes.is_big);
                 continue;
             }
             for (channel, index) in &layout {
-                let Some(part) = bytes.take(size(index)) else { return };
+                let Some(part) = bytes.take_bytes(size(index)) else { return };
                 self.channels[*channel].push(part, *index, bytes.is_big);
             }
         }
     }
 
     fn read_interleaved(&mut self, block: &[u8], layout: &[(usize, RawIndex)], is_big: bool) {
-        let width: usize = layout.iter().map(|(_, index)| index.kind.size()).sum();
+        let width: usize = layout.iter().map(|(_, index)| index.kind.byte_size()).sum();
         for row in block.chunks_exact(width.max(1)) {
             let mut bytes = ByteReader::new(row, is_big);
             for (channel, index) in layout {
-                let Some(part) = bytes.take(index.kind.size()) else { return };
+                let Some(part) = bytes.take_bytes(index.kind.byte_size()) else { return };
                 self.channels[*channel].push(part, RawIndex { count: 1, ..*index }, is_big);
             }
         }
     }
 
-    fn table(self, input: &Input, group: Option<&str>) -> Result<ColumnTable, RecordingError> {
+    fn into_table(self, input: &Input, group: Option<&str>) -> Result<ColumnTable, RecordingError> {
         let groups: Vec<String> = {
             let mut all: Vec<String> = Vec::new();
             for channel in self.channels.iter().filter(|channel| channel.values.len() > 0 && channel.path.len() == 2) {
@@ -212,7 +213,7 @@ impl TdmsFile {
             all
         };
         let Some(first) = groups.first() else {
-            return Err(RecordingError::format(
+            return Err(RecordingError::with_format_reason(
                 &input.file,
                 "the TDMS file has no channel with values",
                 "TDMS文件没有带数值的通道",
@@ -223,7 +224,7 @@ impl TdmsFile {
             |asked| {
                 groups.iter().find(|name| *name == asked).cloned().ok_or_else(|| {
                     let list = groups.join(", ");
-                    RecordingError::format(
+                    RecordingError::with_format_reason(
                         &input.file,
                         format!("there is no group {asked}; there are {list}"),
                         format!("没有组{asked}；现有：{list}"),
@@ -245,9 +246,9 @@ impl TdmsFile {
             .into_iter()
             .filter(|channel| channel.path.first() == Some(&chosen) && channel.values.len() > 0)
         {
-            let own = channel.clock();
+            let own = channel.build_clock();
             if let Some(own) = own.filter(|own| Some(*own) != clock) {
-                columns.push(own.column());
+                columns.push(own.into_column());
                 clock = Some(own);
             }
             let name = channel.path.last().cloned().unwrap_or_default();

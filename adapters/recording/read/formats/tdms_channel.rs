@@ -17,7 +17,7 @@ pub(super) enum ValueKind {
 }
 
 impl ValueKind {
-    pub(super) fn of(code: u32) -> Option<Self> {
+    pub(super) fn from_code(code: u32) -> Option<Self> {
         use NumberKind::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
         Some(match code {
             0 => Self::Nothing,
@@ -38,9 +38,9 @@ impl ValueKind {
         })
     }
 
-    pub(super) fn size(self) -> usize {
+    pub(super) fn byte_size(self) -> usize {
         match self {
-            Self::Number(kind) => kind.size(),
+            Self::Number(kind) => kind.byte_size(),
             Self::Flag => 1,
             Self::Moment => 16,
             Self::Text | Self::Nothing => 0,
@@ -103,7 +103,7 @@ impl WaveformClock {
         clippy::cast_possible_truncation,
         reason = "numbers of rows are far below 2^53; saturates"
     )]
-    pub(super) fn column(self) -> (String, ColumnCells) {
+    pub(super) fn into_column(self) -> (String, ColumnCells) {
         let at_s = |row: usize| self.offset_s + row as f64 * self.step_s;
         match self.start_ns {
             Some(start_ns) => {
@@ -116,7 +116,7 @@ impl WaveformClock {
 }
 
 impl TdmsChannel {
-    pub(super) fn clock(&self) -> Option<WaveformClock> {
+    pub(super) fn build_clock(&self) -> Option<WaveformClock> {
         // A waveform that was never started has the beginning of 1904.
         let start_ns = self.start_ns.filter(|at_ns| *at_ns > 0);
         Some(WaveformClock { start_ns, offset_s: self.offset_s, step_s: self.increment_s?, rows: self.values.len() })
@@ -124,18 +124,18 @@ impl TdmsChannel {
 
     pub(super) fn push(&mut self, part: &[u8], index: RawIndex, is_big: bool) {
         match index.kind {
-            ValueKind::Number(kind) => self.numbers(kind.all(part, is_big)),
-            ValueKind::Flag => self.numbers(part.iter().map(|flag| f64::from(u8::from(*flag != 0))).collect()),
+            ValueKind::Number(kind) => self.append_numbers(kind.decode_numbers(part, is_big)),
+            ValueKind::Flag => self.append_numbers(part.iter().map(|flag| f64::from(u8::from(*flag != 0))).collect()),
             ValueKind::Moment => {
                 let mut bytes = ByteReader::new(part, is_big);
-                let read: Vec<TimeNs> = std::iter::from_fn(|| moment(&mut bytes)).collect();
+                let read: Vec<TimeNs> = std::iter::from_fn(|| read_moment(&mut bytes)).collect();
                 match &mut self.values {
                     TdmsValues::Moments(values) => values.extend(read),
                     values => *values = TdmsValues::Moments(read),
                 }
             }
             ValueKind::Text => {
-                let read = texts(part, index.count, is_big);
+                let read = read_texts(part, index.count, is_big);
                 match &mut self.values {
                     TdmsValues::Texts(values) => values.extend(read),
                     values => *values = TdmsValues::Texts(read),
@@ -145,7 +145,7 @@ impl TdmsChannel {
         }
     }
 
-    fn numbers(&mut self, read: Vec<f64>) {
+    fn append_numbers(&mut self, read: Vec<f64>) {
         match &mut self.values {
             TdmsValues::Numbers(values) => values.extend(read),
             values => *values = TdmsValues::Numbers(read),
@@ -154,7 +154,7 @@ impl TdmsChannel {
 }
 
 /// `/'group'/'channel'`; a quote within a name is doubled.
-pub(super) fn parts(path: &str) -> Vec<String> {
+pub(super) fn split_path(path: &str) -> Vec<String> {
     let inner = path.trim_start_matches('/');
     if inner.is_empty() {
         return Vec::new();
@@ -163,7 +163,7 @@ pub(super) fn parts(path: &str) -> Vec<String> {
 }
 
 /// Sixteen bytes: fractions of 2^-64 s, then seconds since 1904; in the other order where the bytes are big endian.
-pub(super) fn moment(bytes: &mut ByteReader<'_>) -> Option<TimeNs> {
+pub(super) fn read_moment(bytes: &mut ByteReader<'_>) -> Option<TimeNs> {
     let (fraction, seconds) = if bytes.is_big {
         let seconds = bytes.i64()?;
         (bytes.u64()?, seconds)
@@ -174,7 +174,7 @@ pub(super) fn moment(bytes: &mut ByteReader<'_>) -> Option<TimeNs> {
     seconds.checked_sub(EPOCH_1904_S)?.checked_mul(SECOND_NS)?.checked_add(ns)
 }
 
-pub(super) fn texts(part: &[u8], count: usize, is_big: bool) -> Vec<OwnedCell> {
+pub(super) fn read_texts(part: &[u8], count: usize, is_big: bool) -> Vec<OwnedCell> {
     let mut bytes = ByteReader::new(part, is_big);
     let ends: Vec<usize> = (0..count).map_while(|_| usize::try_from(bytes.u32()?).ok()).collect();
     let mut start = 0;
@@ -182,7 +182,7 @@ pub(super) fn texts(part: &[u8], count: usize, is_big: bool) -> Vec<OwnedCell> {
         let text =
             bytes.left.get(start..end).map_or_else(String::new, |text| String::from_utf8_lossy(text).into_owned());
         start = end;
-        OwnedCell::text(&text)
+        OwnedCell::from_text(&text)
     };
     ends.into_iter().map(text).collect()
 }

@@ -13,19 +13,20 @@ use std::io::{Cursor, Read};
 const EPOCH_DAYS: f64 = 25_569.0;
 
 pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, RecordingError> {
-    let bytes = super::whole(input)?;
+    let bytes = super::read_whole(input)?;
     if bytes.starts_with(b"PK") {
         unpacks_within_limit(&bytes, input)?;
     } else if has_encrypted_package(&bytes) {
-        return Err(password(input));
+        return Err(build_password_error(input));
     }
-    let mut book = calamine::open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(|error| broken(input, &error))?;
+    let mut book =
+        calamine::open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(|error| build_broken_error(input, &error))?;
     let names = book.sheet_names();
-    let chosen = choose(&mut book, &names, sheet, input)?;
-    let range = book.worksheet_range(&chosen).map_err(|error| broken(input, &error))?;
+    let chosen = choose_sheet(&mut book, &names, sheet, input)?;
+    let range = book.worksheet_range(&chosen).map_err(|error| build_broken_error(input, &error))?;
     let (rows, columns) = range.get_size();
     if columns > COLUMNS_MAX || rows.saturating_mul(columns) > CELLS_IN_MEMORY_MAX {
-        return Err(RecordingError::format(
+        return Err(RecordingError::with_format_reason(
             &input.file,
             format!(
                 "sheet {chosen} has {rows} rows of {columns} columns, more than are read: save it as CSV, or in parts"
@@ -36,7 +37,7 @@ pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, Re
     let first = range.start().map_or(0, |(row, _)| u64::from(row));
     let mut table = MemoryTable::default();
     for (index, cells) in range.rows().enumerate() {
-        table.rows.push((first + index as u64 + 1, cells.iter().map(cell).collect()));
+        table.rows.push((first + index as u64 + 1, cells.iter().map(convert_cell).collect()));
     }
     if names.len() > 1 {
         table.form.push(Bilingual::new(
@@ -50,11 +51,16 @@ pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, Re
 type Book = Sheets<Cursor<Vec<u8>>>;
 
 /// The sheet that is asked for; else the one with the most cells.
-fn choose(book: &mut Book, names: &[String], asked: Option<&str>, input: &Input) -> Result<String, RecordingError> {
+fn choose_sheet(
+    book: &mut Book,
+    names: &[String],
+    asked: Option<&str>,
+    input: &Input,
+) -> Result<String, RecordingError> {
     if let Some(asked) = asked {
         let known = || names.join(", ");
         return names.iter().find(|name| *name == asked).cloned().ok_or_else(|| {
-            RecordingError::format(
+            RecordingError::with_format_reason(
                 &input.file,
                 format!("there is no sheet {asked}; there are {}", known()),
                 format!("没有工作表{asked}；现有：{}", known()),
@@ -72,20 +78,20 @@ fn choose(book: &mut Book, names: &[String], asked: Option<&str>, input: &Input)
     }
     best.filter(|(cells, _)| *cells > 0)
         .map(|(_, name)| name)
-        .ok_or_else(|| RecordingError::format(&input.file, "the workbook is empty", "工作簿为空"))
+        .ok_or_else(|| RecordingError::with_format_reason(&input.file, "the workbook is empty", "工作簿为空"))
 }
 
-fn cell(data: &Data) -> OwnedCell {
+fn convert_cell(data: &Data) -> OwnedCell {
     match data {
         Data::Empty | Data::Error(_) => OwnedCell::Empty,
         #[expect(clippy::cast_precision_loss, reason = "a cell of a workbook holds 15 digits")]
         Data::Int(number) => OwnedCell::Number(*number as f64),
         Data::Float(number) => OwnedCell::Number(*number),
-        Data::String(text) | Data::DurationIso(text) => OwnedCell::text(text.trim()),
+        Data::String(text) | Data::DurationIso(text) => OwnedCell::from_text(text.trim()),
         Data::Bool(flag) => OwnedCell::Flag(*flag),
-        Data::DateTime(at) => moment(*at),
+        Data::DateTime(at) => convert_moment(*at),
         Data::DateTimeIso(text) => text.parse::<jiff::civil::DateTime>().map_or_else(
-            |_| OwnedCell::text(text),
+            |_| OwnedCell::from_text(text),
             |at| {
                 at.to_zoned(jiff::tz::TimeZone::UTC)
                     .ok()
@@ -97,7 +103,7 @@ fn cell(data: &Data) -> OwnedCell {
 }
 
 /// A day with a time is a moment on the wall, a time alone a time of day, and a duration a number of seconds.
-fn moment(at: ExcelDateTime) -> OwnedCell {
+fn convert_moment(at: ExcelDateTime) -> OwnedCell {
     let days = at.as_f64();
     if at.is_duration() {
         return OwnedCell::Number(days * 86_400.0);
@@ -108,23 +114,23 @@ fn moment(at: ExcelDateTime) -> OwnedCell {
     if (0.0..1.0).contains(&days) {
         let ms = milliseconds(days).min(86_400_000 - 1);
         let (s, m, h) = (ms / 1000, ms / 60_000, ms / 3_600_000);
-        return OwnedCell::text(&format!("{h:02}:{:02}:{:02}.{:03}", m % 60, s % 60, ms % 1000));
+        return OwnedCell::from_text(&format!("{h:02}:{:02}:{:02}.{:03}", m % 60, s % 60, ms % 1000));
     }
     OwnedCell::Local(milliseconds(days - EPOCH_DAYS).saturating_mul(SECOND_NS / 1000))
 }
 
 /// Counts what the parts of the archive really come to: what they claim may be a lie.
 fn unpacks_within_limit(bytes: &[u8], input: &Input) -> Result<(), RecordingError> {
-    let wrong = |error: zip::result::ZipError| broken(input, &error);
+    let wrong = |error: zip::result::ZipError| build_broken_error(input, &error);
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(wrong)?;
     let mut left = UNPACKED_BYTES_MAX;
     for index in 0..archive.len() {
         let part = archive.by_index(index).map_err(wrong)?;
-        let taken =
-            std::io::copy(&mut part.take(left + 1), &mut std::io::sink()).map_err(|error| input.broken(error))?;
+        let taken = std::io::copy(&mut part.take(left + 1), &mut std::io::sink())
+            .map_err(|error| input.build_io_error(error))?;
         if taken > left {
             let mb = UNPACKED_BYTES_MAX >> 20;
-            return Err(RecordingError::format(
+            return Err(RecordingError::with_format_reason(
                 &input.file,
                 format!("unpacked it is larger than {mb} MB: save it as CSV, or in parts"),
                 format!("解压后超过{mb} MB：请另存为CSV，或分成几个文件"),
@@ -141,20 +147,20 @@ fn has_encrypted_package(bytes: &[u8]) -> bool {
     bytes.windows(name.len()).any(|part| part == name)
 }
 
-fn password(input: &Input) -> RecordingError {
-    RecordingError::format(
+fn build_password_error(input: &Input) -> RecordingError {
+    RecordingError::with_format_reason(
         &input.file,
         "the workbook is protected by a password: open it, save it without one, and try again",
         "工作簿有密码保护：请打开后去掉密码另存，再试",
     )
 }
 
-fn broken(input: &Input, error: &dyn std::fmt::Display) -> RecordingError {
+fn build_broken_error(input: &Input, error: &dyn std::fmt::Display) -> RecordingError {
     let text = error.to_string();
     if text.to_lowercase().contains("password") {
-        return password(input);
+        return build_password_error(input);
     }
-    RecordingError::format(
+    RecordingError::with_format_reason(
         &input.file,
         format!("not a readable workbook: {text}; save it again, or as CSV"),
         format!("无法读取的工作簿：{text}；请重新保存或另存为CSV"),

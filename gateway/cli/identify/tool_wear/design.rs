@@ -1,10 +1,10 @@
 //! The cuts to make: a design of experiments as a work list.
 
 use super::ToolWearArguments;
-use crate::cli::{CannotRun, CommandOutcome, CommandResult, print, print_json};
-use crate::diagnosis::put;
+use crate::cli::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
+use crate::diagnosis::write_output;
 use clap::Args;
-use rules::estimators::wear::{Array, ConditionFactor, ExperimentDesign, FACTORS, FactorLevels, plan};
+use rules::estimators::wear::{Array, ConditionFactor, ExperimentDesign, FACTORS, FactorLevels, plan_experiment};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -13,10 +13,10 @@ use std::fmt::Write as _;
 #[derive(Debug, Args)]
 pub(super) struct DesignArguments {
     /// Print the cuts to make instead: L4, L8, L9, L12, L16, L18 or L27.
-    #[arg(long, value_name = "ARRAY", value_parser = array, conflicts_with = "recording")]
+    #[arg(long, value_name = "ARRAY", value_parser = parse_array, conflicts_with = "recording")]
     design: Option<Array>,
     /// Levels of one factor, as in --levels VB=0.065,0.195,0.325 --levels vc=90,120,150 --levels f=0.1,0.15,0.2.
-    #[arg(long, value_name = "FACTOR=A,B,C", value_parser = levels, requires = "design")]
+    #[arg(long, value_name = "FACTOR=A,B,C", value_parser = parse_levels, requires = "design")]
     levels: Vec<FactorLevels>,
     /// Diameter of the work: adds the spindle speed of each cut.
     #[arg(long, value_name = "MM", requires = "design")]
@@ -26,14 +26,14 @@ pub(super) struct DesignArguments {
     seed: u64,
 }
 
-fn array(text: &str) -> Result<Array, String> {
+fn parse_array(text: &str) -> Result<Array, String> {
     let names = || Array::ALL.map(Array::name).join(", ");
-    Array::of(text).ok_or_else(|| format!("the arrays are {}", names()))
+    Array::from_name(text).ok_or_else(|| format!("the arrays are {}", names()))
 }
 
-fn levels(text: &str) -> Result<FactorLevels, String> {
+fn parse_levels(text: &str) -> Result<FactorLevels, String> {
     let (name, values) = text.split_once('=').ok_or("write FACTOR=A,B,C, for example vc=90,120,150")?;
-    let factor = ConditionFactor::of(name.trim()).ok_or_else(|| {
+    let factor = ConditionFactor::find_by_name(name.trim()).ok_or_else(|| {
         let known = FACTORS.map(|factor| format!("{} ({}, {})", factor.symbol, factor.name, factor.en));
         format!("the factors are {}", known.join(", "))
     })?;
@@ -44,7 +44,7 @@ fn levels(text: &str) -> Result<FactorLevels, String> {
 
 impl DesignArguments {
     /// Is a list of cuts wanted?
-    pub(super) fn wanted(&self) -> bool {
+    pub(super) fn is_wanted(&self) -> bool {
         self.design.is_some()
     }
 
@@ -59,21 +59,21 @@ impl DesignArguments {
 pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
     let own = &arguments.design;
     let Some(array) = own.design else { return Ok(CommandOutcome::Fine) };
-    let design = plan(array, &own.levels, own.seed)
+    let design = plan_experiment(array, &own.levels, own.seed)
         .map_err(|problems| CannotRun::new(format!("this design cannot be made:\n  {}", problems.join("\n  ")), ""))?;
     if let Some(path) = &arguments.out {
-        put(path, &csv(own, &design)).map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(path, &format_csv(own, &design)).map_err(|problem| CannotRun::new(problem, ""))?;
     }
     if arguments.json {
-        print_json(&document(own, &design));
+        print_json(&design_to_json(own, &design));
     } else {
-        print(&text(own, &design));
+        print_text(&format_design(own, &design));
     }
     Ok(CommandOutcome::Fine)
 }
 
 /// A table that comes back filled in: the columns that `identify tool-wear` reads, with the power still empty.
-fn csv(own: &DesignArguments, design: &ExperimentDesign) -> String {
+fn format_csv(own: &DesignArguments, design: &ExperimentDesign) -> String {
     let names: Vec<&str> = design.factors.iter().map(|it| it.factor.name).collect();
     let rpm = if own.diameter_mm.is_some() { ",spindle_programmed_rpm" } else { "" };
     let mut csv = format!("time_s,run,{}{rpm},cutting_power_w\n", names.join(","));
@@ -85,7 +85,7 @@ fn csv(own: &DesignArguments, design: &ExperimentDesign) -> String {
     csv
 }
 
-fn document(own: &DesignArguments, design: &ExperimentDesign) -> Value {
+fn design_to_json(own: &DesignArguments, design: &ExperimentDesign) -> Value {
     let cuts: Vec<Value> = design
         .cuts
         .iter()
@@ -110,7 +110,7 @@ fn document(own: &DesignArguments, design: &ExperimentDesign) -> Value {
             "cuts": cuts, "aliases": aliases, "warnings": design.warnings })
 }
 
-fn text(own: &DesignArguments, design: &ExperimentDesign) -> String {
+fn format_design(own: &DesignArguments, design: &ExperimentDesign) -> String {
     let columns: Vec<String> = design.columns.iter().map(ToString::to_string).collect();
     let mut text = format!("{}: {} cuts, columns {}\n\n", design.array, design.cuts.len(), columns.join(", "));
     let heads: Vec<String> =

@@ -1,6 +1,6 @@
 //! The library: models stored in a history by machine, tool, work material and operation.
 
-use crate::cli::{CannotRun, CommandOutcome, CommandResult, print, print_json};
+use crate::cli::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::clock;
 use crate::history::{HistoryError, Reader, StoredWearModel, store_wear_model};
 use clap::Args;
@@ -34,13 +34,13 @@ pub(super) struct LibraryArguments {
     operation: String,
 }
 
-fn cannot(error: &HistoryError) -> CannotRun {
+fn to_cannot_run(error: &HistoryError) -> CannotRun {
     CannotRun::new(error.to_string(), "")
 }
 
 impl LibraryArguments {
     /// What the model is for.
-    pub(super) fn key(&self) -> WearKey {
+    pub(super) fn wear_key(&self) -> WearKey {
         let Self { machine, tool, work_material, operation, .. } = self;
         WearKey {
             machine: machine.clone(),
@@ -52,9 +52,9 @@ impl LibraryArguments {
 }
 
 /// Stores the model where that was asked for; a line that says so.
-pub(super) fn store(arguments: &LibraryArguments, record: &WearRecord) -> Result<Option<String>, CannotRun> {
+pub(super) fn store_model(arguments: &LibraryArguments, record: &WearRecord) -> Result<Option<String>, CannotRun> {
     let Some(path) = &arguments.store else { return Ok(None) };
-    let id = store_wear_model(path, clock::now_ns(), record).map_err(|error| cannot(&error))?;
+    let id = store_wear_model(path, clock::now_ns(), record).map_err(|error| to_cannot_run(&error))?;
     Ok(Some(format!("\nstored as model {id} in {}: {}\n", path.display(), format_key(&record.key))))
 }
 
@@ -69,25 +69,28 @@ fn format_key(key: &WearKey) -> String {
 }
 
 /// Prints every model of the library.
-pub(super) fn list(arguments: &LibraryArguments, as_json: bool) -> CommandResult {
-    let reader = Reader::open(&arguments.history).map_err(|error| cannot(&error))?;
-    let models = reader.wear_models().map_err(|error| cannot(&error))?;
+pub(super) fn list_models(arguments: &LibraryArguments, as_json: bool) -> CommandResult {
+    let reader = Reader::open(&arguments.history).map_err(|error| to_cannot_run(&error))?;
+    let models = reader.wear_models().map_err(|error| to_cannot_run(&error))?;
     if as_json {
-        let each: Vec<_> = models.iter().map(document).collect();
+        let each: Vec<_> = models.iter().map(model_to_json).collect();
         print_json(&json!({ "schema": "wear-models/1", "models": each }));
     } else if models.is_empty() {
-        print(&format!("{}: no wear model yet; identify tool-wear --store writes one\n", arguments.history.display()));
+        print_text(&format!(
+            "{}: no wear model yet; identify tool-wear --store writes one\n",
+            arguments.history.display()
+        ));
     } else {
-        models.iter().for_each(|model| print(&line(model)));
+        models.iter().for_each(|model| print_text(&format_model(model)));
     }
     Ok(CommandOutcome::Fine)
 }
 
-fn document(model: &StoredWearModel) -> serde_json::Value {
+fn model_to_json(model: &StoredWearModel) -> serde_json::Value {
     json!({ "id": model.id, "at_ns": model.at_ns, "in_force": model.in_force, "record": model.record })
 }
 
-fn line(model: &StoredWearModel) -> String {
+fn format_model(model: &StoredWearModel) -> String {
     let record = &model.record;
     let force = if model.in_force { "in force" } else { "replaced" };
     format!(

@@ -12,7 +12,8 @@ use clap::{Args, ValueEnum};
 use rules::estimators::LoadLossLaw;
 use rules::estimators::regression::{Refusal, RefusalKind};
 use rules::estimators::wear::{
-    ConditionFactor, CutColumns, FACTORS, Order, SurfaceOptions, WearOptions, WearRecord, gather, identify_tool_wear,
+    ConditionFactor, CutColumns, FACTORS, Order, SurfaceOptions, WearOptions, WearRecord, gather_cuts,
+    identify_tool_wear,
 };
 use rules::operations::complete_recording;
 use serde_json::json;
@@ -45,7 +46,7 @@ pub(super) struct ToolWearArguments {
 #[derive(Debug, Args)]
 struct TableArguments {
     /// Column of a quantity under another name: VB, vc, f, ap or power, as in --column power=pc_w.
-    #[arg(long, value_name = "WHAT=COLUMN", value_parser = pair)]
+    #[arg(long, value_name = "WHAT=COLUMN", value_parser = parse_column_pair)]
     column: Vec<(String, String)>,
     /// Coefficients a0 and a1 (1/W) of the load loss, to separate the cutting power from spindle_power_w and no_load_power_w; with the
     /// spindle speed of a1 where it goes with 1/n^2, as identify load-loss says.
@@ -89,9 +90,9 @@ enum OrderWord {
     Second,
 }
 
-fn pair(text: &str) -> Result<(String, String), String> {
+fn parse_column_pair(text: &str) -> Result<(String, String), String> {
     let (what, column) = text.split_once('=').ok_or("write WHAT=COLUMN, for example power=pc_w")?;
-    let known = what == "power" || ConditionFactor::of(what).is_some();
+    let known = what == "power" || ConditionFactor::find_by_name(what).is_some();
     if known {
         Ok((what.to_owned(), column.to_owned()))
     } else {
@@ -100,66 +101,67 @@ fn pair(text: &str) -> Result<(String, String), String> {
 }
 
 pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
-    if arguments.design.wanted() {
+    if arguments.design.is_wanted() {
         return design::run(arguments);
     }
     if arguments.model_library.list {
-        return library::list(&arguments.model_library, arguments.json);
+        return library::list_models(&arguments.model_library, arguments.json);
     }
-    let recording = arguments.reading().read()?;
+    let recording = arguments.to_identify_files().read()?;
     let recording = match &arguments.table.operations {
         Some(path) => complete_recording(recording, &recipe_from(path)?).0,
         None => recording,
     };
-    let learned = match learn(arguments, &recording) {
+    let learned = match learn_model(arguments, &recording) {
         Ok((mut learned, record)) => {
-            learned.text += &library::store(&arguments.model_library, &record)?.unwrap_or_default();
-            arguments.shown_by.keep(TOOL_WEAR, &mut learned, arguments.model_library.store.as_deref())?;
+            learned.text += &library::store_model(&arguments.model_library, &record)?.unwrap_or_default();
+            arguments.shown_by.store_answer(TOOL_WEAR, &mut learned, arguments.model_library.store.as_deref())?;
             Ok(learned)
         }
         Err(refusal) => Err(refusal),
     };
-    arguments.reading().finish(TOOL_WEAR, learned)
+    arguments.to_identify_files().report_result(TOOL_WEAR, learned)
 }
 
-fn learn(arguments: &ToolWearArguments, recording: &Recording) -> Result<(IdentifyOutput, WearRecord), Refusal> {
-    let gathered = gather(recording, &arguments.table.columns())?;
-    let learned = identify_tool_wear(gathered.cuts, &arguments.fit.options())?;
+fn learn_model(arguments: &ToolWearArguments, recording: &Recording) -> Result<(IdentifyOutput, WearRecord), Refusal> {
+    let gathered = gather_cuts(recording, &arguments.table.cut_columns())?;
+    let learned = identify_tool_wear(gathered.cuts, &arguments.fit.wear_options())?;
     let origin = (arguments.recording.join(", "), learned.cuts.len(), learned.r2);
-    let record = WearRecord::new(arguments.model_library.key(), learned.criterion_mm, origin, learned.model.clone());
+    let record =
+        WearRecord::new(arguments.model_library.wear_key(), learned.criterion_mm, origin, learned.model.clone());
     let file = record.to_toml().map_err(|what| Refusal::new(RefusalKind::NotFinite, what, ""))?;
     let text = format!("{} rows used, {} left out; {learned}", gathered.rows, gathered.left_out);
-    let mut json = learned.json();
+    let mut json = learned.to_json();
     json["rows_used"] = json!(gathered.rows);
     json["rows_left_out"] = json!(gathered.left_out);
     Ok((IdentifyOutput { text, json, file: Some(file) }, record))
 }
 
 impl ToolWearArguments {
-    fn reading(&self) -> IdentifyFiles {
+    fn to_identify_files(&self) -> IdentifyFiles {
         IdentifyFiles { recording: self.recording.clone(), json: self.json, out: self.out.clone() }
     }
 }
 
 impl TableArguments {
-    fn columns(&self) -> CutColumns {
+    fn cut_columns(&self) -> CutColumns {
         let mut columns = CutColumns { each_row: self.each_row, ..CutColumns::default() };
         for (what, column) in &self.column {
-            match FACTORS.iter().position(|factor| Some(factor) == ConditionFactor::of(what)) {
+            match FACTORS.iter().position(|factor| Some(factor) == ConditionFactor::find_by_name(what)) {
                 Some(at) => columns.conditions[at].clone_from(column),
                 None => columns.power.clone_from(column),
             }
         }
         if let [linear, quadratic_per_w, ref speed @ ..] = self.load_loss[..] {
             let speed_rpm = speed.first().copied().unwrap_or(0.0);
-            columns.load_loss = Some(LoadLossLaw::stated(linear, quadratic_per_w, speed_rpm));
+            columns.load_loss = Some(LoadLossLaw::from_stated_speed(linear, quadratic_per_w, speed_rpm));
         }
         columns
     }
 }
 
 impl FitArguments {
-    fn options(&self) -> WearOptions {
+    fn wear_options(&self) -> WearOptions {
         let order = match self.order {
             OrderWord::Linear => Order::Linear,
             OrderWord::Interactions => Order::Interactions,
@@ -168,7 +170,7 @@ impl FitArguments {
         let held = self
             .held
             .iter()
-            .map(|name| ConditionFactor::of(name).map_or(name.as_str(), |it| it.name).to_owned())
+            .map(|name| ConditionFactor::find_by_name(name).map_or(name.as_str(), |it| it.name).to_owned())
             .collect();
         let surface = SurfaceOptions { order, p_out: self.p_out, hierarchical: !self.no_hierarchy, held };
         WearOptions { surface, criterion_mm: self.criterion_mm, form: self.form.clone() }

@@ -7,8 +7,10 @@
 use super::CONFIDENCE;
 use super::distributions::{t_quantile, t_two_sided};
 use super::refusal::{Refusal, RefusalKind};
-use crate::linear::orthogonal::{Factored, back_substitute, factor, inverse, product, singular_values};
-use crate::statistics::count;
+use crate::linear::orthogonal::{
+    Factored, back_substitute, dot_product, factor_columns, invert_upper_triangle, singular_values,
+};
+use crate::statistics::count_to_f64;
 use serde::Serialize;
 
 /// Least to greatest singular value of the scaled columns below which they count as dependent.
@@ -102,13 +104,13 @@ pub struct Regression {
 impl Regression {
     /// Value of the coefficient of this name.
     #[must_use]
-    pub fn value(&self, name: &str) -> Option<f64> {
-        self.coefficient(name).map(|coefficient| coefficient.value)
+    pub fn find_value(&self, name: &str) -> Option<f64> {
+        self.find_coefficient(name).map(|coefficient| coefficient.value)
     }
 
     /// The coefficient of this name.
     #[must_use]
-    pub fn coefficient(&self, name: &str) -> Option<&Coefficient> {
+    pub fn find_coefficient(&self, name: &str) -> Option<&Coefficient> {
         self.coefficients.iter().find(|coefficient| coefficient.name == name)
     }
 
@@ -130,14 +132,14 @@ impl Regression {
 /// # Errors
 /// A [`Refusal`] that names the column and what is needed: a number that is none, heights that differ, no more rows than
 /// coefficients, a constant column, columns that depend on each other.
-pub fn fit(y: &Column, columns: &[Column], intercept: Intercept) -> Result<Regression, Refusal> {
+pub fn fit_unweighted(y: &Column, columns: &[Column], intercept: Intercept) -> Result<Regression, Refusal> {
     fit_weighted(y, columns, intercept, &vec![1.0; y.values.len()])
 }
 
-/// As [`fit`], each row with a weight: the inverse of its relative variance, positive.
+/// As [`fit_unweighted`], each row with a weight: the inverse of its relative variance, positive.
 ///
 /// # Errors
-/// As [`fit`], and a weight that is not positive and finite.
+/// As [`fit_unweighted`], and a weight that is not positive and finite.
 pub fn fit_weighted(
     y: &Column,
     columns: &[Column],
@@ -145,8 +147,8 @@ pub fn fit_weighted(
     weights: &[f64],
 ) -> Result<Regression, Refusal> {
     let count = columns.len() + usize::from(intercept == Intercept::Fitted);
-    check(y, columns, intercept, count)?;
-    let roots = roots(weights, y.values.len())?;
+    check_columns(y, columns, intercept, count)?;
+    let roots = compute_weight_roots(weights, y.values.len())?;
     let weigh = |values: &[f64]| values.iter().zip(&roots).map(|(value, root)| value * root).collect::<Vec<f64>>();
     let ones = (intercept == Intercept::Fitted).then(|| roots.clone());
     let design: Vec<Vec<f64>> = ones.into_iter().chain(columns.iter().map(|column| weigh(&column.values))).collect();
@@ -155,35 +157,36 @@ pub fn fit_weighted(
         .into_iter()
         .chain(columns.iter().map(|column| column.name.as_str()))
         .collect();
-    let factored = factor(&design);
-    let condition_number = condition(&factored, &names)?;
+    let factored = factor_columns(&design);
+    let condition_number = compute_condition_number(&factored, &names)?;
     let work = LeastSquaresWork { y: weigh(&y.values), design, names, factored, condition_number, intercept, roots };
-    Ok(work.regression())
+    Ok(work.solve_regression())
 }
 
-fn check(y: &Column, columns: &[Column], intercept: Intercept, count: usize) -> Result<(), Refusal> {
+fn check_columns(y: &Column, columns: &[Column], intercept: Intercept, count: usize) -> Result<(), Refusal> {
     let rows = y.values.len();
     for column in std::iter::once(y).chain(columns) {
         if column.values.len() != rows {
             let what = format!("{} rows where {} has {rows}", column.values.len(), y.name);
-            return Err(
-                Refusal::new(RefusalKind::Mismatch, what, "give every column a number in every row").at(&column.name)
-            );
+            return Err(Refusal::new(RefusalKind::Mismatch, what, "give every column a number in every row")
+                .with_place(&column.name));
         }
         if let Some(row) = column.values.iter().position(|value| !value.is_finite()) {
             let what = format!("no number in row {}", row + 1);
-            return Err(Refusal::new(RefusalKind::NotFinite, what, "leave rows without a value out").at(&column.name));
+            return Err(
+                Refusal::new(RefusalKind::NotFinite, what, "leave rows without a value out").with_place(&column.name)
+            );
         }
     }
     if count == 0 || rows <= count {
         let what = format!("{rows} rows for {count} coefficients");
         let next = format!("record at least {} rows; twice as many make an interval of use", count + 1);
-        return Err(Refusal::new(RefusalKind::TooFew, what, next).at(&y.name));
+        return Err(Refusal::new(RefusalKind::TooFew, what, next).with_place(&y.name));
     }
-    columns.iter().try_for_each(|column| varies(column, intercept))
+    columns.iter().try_for_each(|column| check_variation(column, intercept))
 }
 
-fn varies(column: &Column, intercept: Intercept) -> Result<(), Refusal> {
+fn check_variation(column: &Column, intercept: Intercept) -> Result<(), Refusal> {
     let (least, greatest) = column
         .values
         .iter()
@@ -193,23 +196,22 @@ fn varies(column: &Column, intercept: Intercept) -> Result<(), Refusal> {
     if constant || size == 0.0 {
         let what = format!("is {least} in every row");
         return Err(Refusal::new(RefusalKind::Constant, what, "record with other values of it, or leave it out")
-            .at(&column.name));
+            .with_place(&column.name));
     }
     Ok(())
 }
 
-fn roots(weights: &[f64], rows: usize) -> Result<Vec<f64>, Refusal> {
+fn compute_weight_roots(weights: &[f64], rows: usize) -> Result<Vec<f64>, Refusal> {
     let fine = weights.len() == rows && weights.iter().all(|weight| weight.is_finite() && *weight > 0.0);
     if !fine {
-        return Err(
-            Refusal::new(RefusalKind::NotFinite, "a weight is not positive", "leave such rows out").at("weights")
-        );
+        return Err(Refusal::new(RefusalKind::NotFinite, "a weight is not positive", "leave such rows out")
+            .with_place("weights"));
     }
     Ok(weights.iter().map(|weight| weight.sqrt()).collect())
 }
 
 /// Condition number, or which columns depend on each other.
-fn condition(factored: &Factored, names: &[&str]) -> Result<f64, Refusal> {
+fn compute_condition_number(factored: &Factored, names: &[&str]) -> Result<f64, Refusal> {
     let (values, direction) = singular_values(&factored.r);
     let greatest = values.iter().fold(0.0_f64, |greatest, value| greatest.max(*value));
     let least = values.iter().fold(f64::INFINITY, |least, value| least.min(*value));
@@ -234,25 +236,25 @@ struct LeastSquaresWork<'a> {
 }
 
 impl LeastSquaresWork<'_> {
-    fn regression(self) -> Regression {
+    fn solve_regression(self) -> Regression {
         let rows = self.y.len();
         let columns = self.design.len();
-        let along: Vec<f64> = self.factored.q.iter().map(|q| product(q, &self.y)).collect();
+        let along: Vec<f64> = self.factored.q.iter().map(|q| dot_product(q, &self.y)).collect();
         let scaled = back_substitute(&self.factored.r, &along);
         let values: Vec<f64> = scaled.iter().zip(&self.factored.lengths).map(|(x, length)| x / length).collect();
         let fitted: Vec<f64> =
             (0..rows).map(|row| self.factored.q.iter().zip(&along).map(|(q, along)| q[row] * along).sum()).collect();
         let residuals: Vec<f64> = self.y.iter().zip(&fitted).map(|(y, fitted)| y - fitted).collect();
         let leverage: Vec<f64> = (0..rows).map(|row| self.factored.q.iter().map(|q| q[row] * q[row]).sum()).collect();
-        let inverse = self.inverse();
-        let rss = product(&residuals, &residuals);
-        let total = self.total();
-        let degrees_of_freedom = count(rows - columns);
+        let inverse = self.invert_normal_matrix();
+        let rss = dot_product(&residuals, &residuals);
+        let total = self.total_sum_of_squares();
+        let degrees_of_freedom = count_to_f64(rows - columns);
         let residual_sd = (rss / degrees_of_freedom).sqrt();
-        let spare = count(rows - usize::from(self.intercept == Intercept::Fitted));
+        let spare = count_to_f64(rows - usize::from(self.intercept == Intercept::Fitted));
         let share = |lost: f64| if total > 0.0 { 1.0 - lost / total } else { 0.0 };
         Regression {
-            coefficients: self.coefficients(&values, &inverse, residual_sd, degrees_of_freedom),
+            coefficients: self.build_coefficients(&values, &inverse, residual_sd, degrees_of_freedom),
             rows,
             degrees_of_freedom,
             residual_sd,
@@ -260,41 +262,41 @@ impl LeastSquaresWork<'_> {
             explained: (total - rss).max(0.0),
             r2: share(rss),
             adjusted_r2: share(rss * spare / degrees_of_freedom),
-            predicted_r2: press(&residuals, &leverage).map(share),
+            predicted_r2: compute_press_statistic(&residuals, &leverage).map(share),
             condition_number: self.condition_number,
-            fitted: self.plain(&fitted),
-            residuals: self.plain(&residuals),
+            fitted: self.remove_weights(&fitted),
+            residuals: self.remove_weights(&residuals),
             leverage,
             inverse,
             intercept: self.intercept,
         }
     }
 
-    fn plain(&self, weighed: &[f64]) -> Vec<f64> {
+    fn remove_weights(&self, weighed: &[f64]) -> Vec<f64> {
         weighed.iter().zip(&self.roots).map(|(value, root)| value / root).collect()
     }
 
     /// Sum of squares of y, about its weighted mean where a constant is fitted.
-    fn total(&self) -> f64 {
+    fn total_sum_of_squares(&self) -> f64 {
         if self.intercept == Intercept::None {
-            return product(&self.y, &self.y);
+            return dot_product(&self.y, &self.y);
         }
         self.about_mean(&self.y)
     }
 
     fn about_mean(&self, weighed: &[f64]) -> f64 {
-        let mean = product(weighed, &self.roots) / product(&self.roots, &self.roots);
+        let mean = dot_product(weighed, &self.roots) / dot_product(&self.roots, &self.roots);
         weighed.iter().zip(&self.roots).map(|(value, root)| (value - mean * root).powi(2)).sum()
     }
 
-    fn inverse(&self) -> Vec<Vec<f64>> {
-        let (r, lengths) = (inverse(&self.factored.r), &self.factored.lengths);
+    fn invert_normal_matrix(&self) -> Vec<Vec<f64>> {
+        let (r, lengths) = (invert_upper_triangle(&self.factored.r), &self.factored.lengths);
         let count = lengths.len();
         let entry = |i: usize, j: usize| (0..count).map(|k| r[k][i] * r[k][j]).sum::<f64>() / (lengths[i] * lengths[j]);
         (0..count).map(|i| (0..count).map(|j| entry(i, j)).collect()).collect()
     }
 
-    fn coefficients(&self, values: &[f64], inverse: &[Vec<f64>], sd: f64, df: f64) -> Vec<Coefficient> {
+    fn build_coefficients(&self, values: &[f64], inverse: &[Vec<f64>], sd: f64, df: f64) -> Vec<Coefficient> {
         let t = t_quantile(0.5 + 0.5 * CONFIDENCE, df);
         let coefficient = |at: usize| {
             let standard_error = sd * inverse[at][at].sqrt();
@@ -306,13 +308,13 @@ impl LeastSquaresWork<'_> {
                 standard_error,
                 interval: (value - t * standard_error, value + t * standard_error),
                 p,
-                variance_inflation: self.inflation(at, inverse),
+                variance_inflation: self.compute_variance_inflation(at, inverse),
             }
         };
         (0..values.len()).map(coefficient).collect()
     }
 
-    fn inflation(&self, at: usize, inverse: &[Vec<f64>]) -> Option<f64> {
+    fn compute_variance_inflation(&self, at: usize, inverse: &[Vec<f64>]) -> Option<f64> {
         match (self.intercept, at) {
             (Intercept::Fitted, 0) => None,
             (Intercept::Fitted, _) => Some(inverse[at][at] * self.about_mean(&self.design[at])),
@@ -322,7 +324,7 @@ impl LeastSquaresWork<'_> {
 }
 
 /// Sum of squared residuals of rows left out one at a time.
-fn press(residuals: &[f64], leverage: &[f64]) -> Option<f64> {
+fn compute_press_statistic(residuals: &[f64], leverage: &[f64]) -> Option<f64> {
     let left_out = residuals.iter().zip(leverage).map(|(residual, leverage)| {
         let rest = 1.0 - leverage;
         (rest > 1e-9).then(|| (residual / rest).powi(2))

@@ -61,7 +61,7 @@ pub struct CompensationSettingError {
 impl CompensationSettings {
     /// # Errors
     /// The first setting that cannot work, millimetres given for micrometres among them.
-    pub fn check(&self) -> Result<(), CompensationSettingError> {
+    pub fn check_values(&self) -> Result<(), CompensationSettingError> {
         let positive = |value: f64| value.is_finite() && value > 0.0;
         let wrong = |name, value, need| Err(CompensationSettingError { name, value, need });
         if !positive(self.pulse_um) || self.pulse_um > 100.0 {
@@ -109,7 +109,7 @@ pub enum Standing {
 impl Standing {
     /// The word used in JSON and SQL.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Follows => "follows",
             Self::DeadBand => "dead_band",
@@ -170,31 +170,36 @@ impl Compensator {
     /// # Errors
     /// A setting that cannot work.
     pub fn new(settings: CompensationSettings) -> Result<Self, CompensationSettingError> {
-        settings.check()?;
+        settings.check_values()?;
         Ok(Self { settings, target_um: 0.0, value_um: 0.0, sent_pulses: 0, without_s: 0.0, clamped: false })
     }
 
     /// One step, `dt_s` after the one before.
-    pub fn step(&mut self, dt_s: f64, prediction: Option<&ThermalPrediction>, axis: AxisSituation) -> CompensationStep {
+    pub fn advance_compensation(
+        &mut self,
+        dt_s: f64,
+        prediction: Option<&ThermalPrediction>,
+        axis: AxisSituation,
+    ) -> CompensationStep {
         let dt_s = if dt_s.is_finite() { dt_s.max(0.0) } else { 0.0 };
         if axis.reference_return {
             // The controller takes the reference as it is: what was inserted before is gone.
             self.sent_pulses = 0;
             self.value_um = 0.0;
-            return self.tell(0, Standing::ReferenceReturn);
+            return self.report_step(0, Standing::ReferenceReturn);
         }
-        let standing = self.aim(dt_s, prediction, axis.bypass);
+        let standing = self.update_target(dt_s, prediction, axis.bypass);
         let most_um = self.settings.slew_um_per_s * dt_s.min(STEP_S_MAX);
         self.value_um += (self.target_um - self.value_um).clamp(-most_um, most_um);
         let missing = self.value_um / self.settings.pulse_um - self.sent_pulses as f64;
         #[expect(clippy::cast_possible_truncation, reason = "at most limit / pulse, which the settings bound")]
         let increment = missing.trunc() as i64;
         self.sent_pulses += increment;
-        self.tell(increment, standing)
+        self.report_step(increment, standing)
     }
 
     /// Sets the target and tells whether the prediction is followed.
-    fn aim(&mut self, dt_s: f64, prediction: Option<&ThermalPrediction>, bypass: bool) -> Standing {
+    fn update_target(&mut self, dt_s: f64, prediction: Option<&ThermalPrediction>, bypass: bool) -> Standing {
         if bypass {
             return self.go_home(Standing::Bypass);
         }
@@ -213,7 +218,7 @@ impl Compensator {
             self.target_um = self.value_um;
             return Standing::Doubted;
         }
-        let followed = self.follow(prediction.safe_um);
+        let followed = self.follow_error(prediction.safe_um);
         match prediction.outside {
             Some(_) if prediction.is_at_the_edge() => Standing::AtTheEdge,
             Some(_) => Standing::Extrapolated,
@@ -221,7 +226,7 @@ impl Compensator {
         }
     }
 
-    fn follow(&mut self, error_um: f64) -> Standing {
+    fn follow_error(&mut self, error_um: f64) -> Standing {
         let against = if self.settings.positive_moves_along_error { -error_um } else { error_um };
         let wanted = against.clamp(-self.settings.limit_um, self.settings.limit_um);
         self.clamped = wanted != against;
@@ -238,7 +243,7 @@ impl Compensator {
         why
     }
 
-    fn tell(&self, increment_pulses: i64, standing: Standing) -> CompensationStep {
+    fn report_step(&self, increment_pulses: i64, standing: Standing) -> CompensationStep {
         let sent_um = self.sent_pulses as f64 * self.settings.pulse_um;
         let remainder_um = self.value_um - sent_um;
         let (value_um, clamped) = (self.value_um, self.clamped);

@@ -23,10 +23,10 @@ const RUNNING: AxisSituation = AxisSituation { bypass: false, reference_return: 
 /// Steps of a tenth of a second until the value stands.
 fn settle(compensator: &mut Compensator, error_um: f64) -> (i64, CompensationStep) {
     let mut sum = 0;
-    let mut last = compensator.step(0.1, Some(&predicted(error_um)), RUNNING);
+    let mut last = compensator.advance_compensation(0.1, Some(&predicted(error_um)), RUNNING);
     sum += last.increment_pulses;
     for _ in 0..2000 {
-        last = compensator.step(0.1, Some(&predicted(error_um)), RUNNING);
+        last = compensator.advance_compensation(0.1, Some(&predicted(error_um)), RUNNING);
         sum += last.increment_pulses;
     }
     (sum, last)
@@ -46,9 +46,9 @@ fn the_increments_add_up_to_the_value_and_the_fraction_is_carried() {
 #[test]
 fn limits_hold_and_are_said() {
     let mut compensator = Compensator::new(settings()).expect("settings");
-    let step = compensator.step(0.5, Some(&predicted(-400.0)), RUNNING);
+    let step = compensator.advance_compensation(0.5, Some(&predicted(-400.0)), RUNNING);
     assert!(step.clamped && (step.value_um - 1.0).abs() < 1e-12, "2 um/s for half a second: {step:?}");
-    let pause = compensator.step(3600.0, Some(&predicted(-400.0)), RUNNING);
+    let pause = compensator.advance_compensation(3600.0, Some(&predicted(-400.0)), RUNNING);
     assert!((pause.value_um - 3.0).abs() < 1e-12, "a pause is no licence to jump");
     let (_, last) = settle(&mut compensator, -400.0);
     assert_eq!(last.value_um, 50.0);
@@ -60,12 +60,12 @@ fn limits_hold_and_are_said() {
 fn without_a_prediction_the_value_stands_then_goes_home() {
     let mut compensator = Compensator::new(settings()).expect("settings");
     settle(&mut compensator, 20.0);
-    let step = compensator.step(0.1, None, RUNNING);
+    let step = compensator.advance_compensation(0.1, None, RUNNING);
     assert_eq!((step.increment_pulses, step.value_um, step.standing), (0, -20.0, Standing::NoPrediction));
-    assert_eq!(compensator.step(0.1, Some(&predicted(f64::NAN)), RUNNING).value_um, -20.0);
-    let gone = compensator.step(700.0, None, RUNNING);
+    assert_eq!(compensator.advance_compensation(0.1, Some(&predicted(f64::NAN)), RUNNING).value_um, -20.0);
+    let gone = compensator.advance_compensation(700.0, None, RUNNING);
     assert_eq!(gone.standing, Standing::HeldTooLong);
-    let home = (0..200).map(|_| compensator.step(0.1, None, RUNNING)).last().expect("steps");
+    let home = (0..200).map(|_| compensator.advance_compensation(0.1, None, RUNNING)).last().expect("steps");
     assert_eq!((home.value_um, home.sent_um), (0.0, 0.0));
 }
 
@@ -73,7 +73,7 @@ fn without_a_prediction_the_value_stands_then_goes_home() {
 fn outside_the_range_it_follows_and_far_outside_it_holds_the_edge() {
     let mut compensator = Compensator::new(settings()).expect("settings");
     let settle = |compensator: &mut Compensator, prediction: ThermalPrediction| {
-        (0..400).map(|_| compensator.step(0.1, Some(&prediction), RUNNING)).last().expect("steps")
+        (0..400).map(|_| compensator.advance_compensation(0.1, Some(&prediction), RUNNING)).last().expect("steps")
     };
     let beyond = ThermalPrediction { outside: Some(Outside::Combination), ..predicted(30.0) };
     let step = settle(&mut compensator, beyond);
@@ -91,7 +91,8 @@ fn bypass_takes_everything_back() {
     let mut compensator = Compensator::new(settings()).expect("settings");
     let (sent, _) = settle(&mut compensator, 20.0);
     let bypass = AxisSituation { bypass: true, ..RUNNING };
-    let back: i64 = (0..200).map(|_| compensator.step(0.1, Some(&predicted(20.0)), bypass).increment_pulses).sum();
+    let back: i64 =
+        (0..200).map(|_| compensator.advance_compensation(0.1, Some(&predicted(20.0)), bypass).increment_pulses).sum();
     assert_eq!(sent + back, 0);
 }
 
@@ -100,7 +101,7 @@ fn after_a_reference_return_the_value_is_sent_anew() {
     let mut compensator = Compensator::new(settings()).expect("settings");
     let (sent, _) = settle(&mut compensator, 20.0);
     let returning = AxisSituation { reference_return: true, ..RUNNING };
-    let step = compensator.step(0.1, Some(&predicted(20.0)), returning);
+    let step = compensator.advance_compensation(0.1, Some(&predicted(20.0)), returning);
     assert_eq!((step.increment_pulses, step.sent_um, step.standing), (0, 0.0, Standing::ReferenceReturn));
     let (again, last) = settle(&mut compensator, 20.0);
     assert_eq!((again, last.value_um), (sent, -20.0));
@@ -118,7 +119,7 @@ fn settings_that_cannot_work_are_refused() {
     assert_eq!(refused(&|it| it.slew_um_per_s = -1.0), "slew_um_per_s");
     assert_eq!(refused(&|it| it.dead_band_um = f64::NAN), "dead_band_um");
     assert_eq!(refused(&|it| it.hold_s = f64::INFINITY), "hold_s");
-    let wrong = CompensationSettings { limit_um: 0.05, ..settings() }.check().expect_err("millimetres");
+    let wrong = CompensationSettings { limit_um: 0.05, ..settings() }.check_values().expect_err("millimetres");
     assert!(wrong.to_string().contains("is it in mm?"), "{wrong}");
 }
 
@@ -134,7 +135,7 @@ proptest! {
         for (dt_s, error_um, what) in course {
             let axis = AxisSituation { bypass: what == 0, reference_return: what == 1 };
             let prediction = error_um.map(predicted);
-            let step = compensator.step(dt_s, prediction.as_ref(), axis);
+            let step = compensator.advance_compensation(dt_s, prediction.as_ref(), axis);
             if axis.reference_return {
                 (sum, before) = (0, 0.0);
             }

@@ -59,14 +59,14 @@ const SAME: f64 = 1e-12;
 impl Grades {
     /// Do the grades tell the sensors apart at all?
     #[must_use]
-    pub fn discriminate(&self) -> bool {
+    pub fn can_discriminate(&self) -> bool {
         let all = self.grades.iter().map(|grade| grade.grade);
         all.clone().fold(f64::MIN, f64::max) - all.fold(f64::MAX, f64::min) >= DISCRIMINATION_MIN
     }
 
     /// Names of the sensors, best first.
     #[must_use]
-    pub fn order(&self) -> Vec<&str> {
+    pub fn order_sensors(&self) -> Vec<&str> {
         let mut sorted: Vec<&Grade> = self.grades.iter().collect();
         sorted.sort_by(|a, b| b.grade.total_cmp(&a.grade));
         sorted.into_iter().map(|grade| grade.sensor.as_str()).collect()
@@ -78,7 +78,7 @@ impl Grades {
 /// # Errors
 /// A [`Refusal`] that says what is wrong with which series: too short, not finite, constant, in kelvin or millimetres, of
 /// another length, or, for the initial image, a first value by which nothing can be divided.
-pub fn grades(
+pub fn compute_grades(
     error_um: &[f64],
     sensors: &[Series<'_>],
     normalisation: Normalisation,
@@ -88,19 +88,20 @@ pub fn grades(
         let next = "give a resolution coefficient above 0 and at most 1; 0.5 is usual";
         return Err(Refusal::new(RefusalKind::OutOfRange, format!("rho = {rho}"), next));
     }
-    quantities::check(error_um, sensors)?;
-    let error = normalised(quantities::THERMAL_ERROR, error_um, normalisation)?;
+    quantities::check_series(error_um, sensors)?;
+    let error = normalise_values(quantities::THERMAL_ERROR, error_um, normalisation)?;
     let curves: Vec<Vec<f64>> = sensors
         .iter()
         .map(|sensor| {
-            normalised(sensor.name, sensor.values, normalisation).map(|curve| along(curve, &error, normalisation))
+            normalise_values(sensor.name, sensor.values, normalisation)
+                .map(|curve| orient_curve(curve, &error, normalisation))
         })
         .collect::<Result<_, _>>()?;
-    Ok(Grades { normalisation, rho, grades: ranked(sensors, &relational(&error, &curves, rho)) })
+    Ok(Grades { normalisation, rho, grades: rank_grades(sensors, &compute_relational_grades(&error, &curves, rho)) })
 }
 
-fn normalised(name: &str, values: &[f64], normalisation: Normalisation) -> Result<Vec<f64>, Refusal> {
-    let (least, greatest) = quantities::extremes(values);
+fn normalise_values(name: &str, values: &[f64], normalisation: Normalisation) -> Result<Vec<f64>, Refusal> {
+    let (least, greatest) = quantities::find_extremes(values);
     let span = greatest - least;
     if normalisation == Normalisation::Range {
         return Ok(values.iter().map(|value| (value - least) / span).collect());
@@ -109,28 +110,28 @@ fn normalised(name: &str, values: &[f64], normalisation: Normalisation) -> Resul
     if least < 0.0 && greatest > 0.0 {
         let what =
             format!("runs from {least:.3} to {greatest:.3}: beyond zero a multiple of the first value is no rise");
-        return Err(Refusal::new(RefusalKind::OutOfRange, what, "use the range normalisation").at(name));
+        return Err(Refusal::new(RefusalKind::OutOfRange, what, "use the range normalisation").with_place(name));
     }
     if first.abs() < FIRST_SHARE_MIN * span {
         let what = format!("begins at {first:.3} and spans {span:.3}: divided by its first value it means nothing");
         let next = "use the range normalisation, or do not set the error to zero at the start";
-        return Err(Refusal::new(RefusalKind::OutOfRange, what, next).at(name));
+        return Err(Refusal::new(RefusalKind::OutOfRange, what, next).with_place(name));
     }
     Ok(values.iter().map(|value| value / first).collect())
 }
 
 /// A curve that runs against the error is turned over; only the range allows it.
-fn along(curve: Vec<f64>, error: &[f64], normalisation: Normalisation) -> Vec<f64> {
-    if normalisation == Normalisation::InitialImage || quantities::correlation(&curve, error) >= 0.0 {
+fn orient_curve(curve: Vec<f64>, error: &[f64], normalisation: Normalisation) -> Vec<f64> {
+    if normalisation == Normalisation::InitialImage || quantities::correlate_series(&curve, error) >= 0.0 {
         return curve;
     }
     curve.into_iter().map(|value| 1.0 - value).collect()
 }
 
-fn relational(error: &[f64], curves: &[Vec<f64>], rho: f64) -> Vec<f64> {
+fn compute_relational_grades(error: &[f64], curves: &[Vec<f64>], rho: f64) -> Vec<f64> {
     let differences = |curve: &Vec<f64>| error.iter().zip(curve).map(|(y, x)| (y - x).abs()).collect::<Vec<f64>>();
     let all: Vec<Vec<f64>> = curves.iter().map(differences).collect();
-    let (least, greatest) = quantities::extremes(&all.concat());
+    let (least, greatest) = quantities::find_extremes(&all.concat());
     let resolution = rho * greatest;
     let grade = |delta: &Vec<f64>| {
         let xi = delta.iter().map(|delta| (least + resolution) / (delta + resolution));
@@ -140,7 +141,7 @@ fn relational(error: &[f64], curves: &[Vec<f64>], rho: f64) -> Vec<f64> {
     if greatest < SAME { vec![1.0; all.len()] } else { all.iter().map(grade).collect() }
 }
 
-fn ranked(sensors: &[Series<'_>], values: &[f64]) -> Vec<Grade> {
+fn rank_grades(sensors: &[Series<'_>], values: &[f64]) -> Vec<Grade> {
     let rank = |value: f64| 1 + values.iter().filter(|other| **other > value).count();
     let grade = |(sensor, value): (&Series<'_>, &f64)| Grade {
         sensor: sensor.name.to_owned(),

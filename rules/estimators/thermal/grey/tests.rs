@@ -13,7 +13,7 @@ fn warm_up(start: f64, rise: f64, tau_min: f64) -> Vec<f64> {
 
 fn graded(error: &[f64], columns: &[Vec<f64>], normalisation: Normalisation) -> Grades {
     let names: Vec<String> = (1..=columns.len()).map(|at| format!("temperature_{at}_c")).collect();
-    grades(error, &series(&names, columns), normalisation, RHO_USUAL).expect("gradable")
+    compute_grades(error, &series(&names, columns), normalisation, RHO_USUAL).expect("gradable")
 }
 
 #[test]
@@ -26,7 +26,7 @@ fn the_arithmetic_is_that_of_the_formula() {
     let first = (xi(0.0) + xi(0.1) + xi(0.2) + xi(0.1)) / 4.0;
     let second = (xi(0.0) + xi(0.2) + xi(0.35) + xi(0.5)) / 4.0;
     assert!((got.grades[0].grade - first).abs() < 1e-12 && (got.grades[1].grade - second).abs() < 1e-12);
-    assert_eq!(got.order(), ["temperature_1_c", "temperature_2_c"]);
+    assert_eq!(got.order_sensors(), ["temperature_1_c", "temperature_2_c"]);
     let same = graded(&error, &[error.iter().map(|e| 15.0 + e).collect()], Normalisation::Range);
     assert_eq!(same.grades[0].grade, 1.0, "the same curve");
 }
@@ -39,8 +39,8 @@ fn the_initial_image_prefers_the_greatest_rise_and_the_range_the_right_dynamics(
     let columns = [motor, box_, bed];
     let image = graded(&error, &columns, Normalisation::InitialImage);
     let range = graded(&error, &columns, Normalisation::Range);
-    assert_eq!(image.order()[0], "temperature_1_c", "the weakness: {image:?}");
-    assert_eq!(range.order()[0], "temperature_2_c", "{range:?}");
+    assert_eq!(image.order_sensors()[0], "temperature_1_c", "the weakness: {image:?}");
+    assert_eq!(range.order_sensors()[0], "temperature_2_c", "{range:?}");
     assert!(range.grades[1].grade > 0.97);
 }
 
@@ -48,18 +48,20 @@ fn the_initial_image_prefers_the_greatest_rise_and_the_range_the_right_dynamics(
 fn grades_hang_on_the_first_value_of_the_error_and_that_is_said() {
     let columns = [warm_up(20.0, 16.0, 25.0), warm_up(20.0, 9.0, 70.0)];
     let from_20 = graded(&warm_up(20.0, 60.0, 70.0), &columns, Normalisation::InitialImage);
-    assert!(from_20.discriminate());
+    assert!(from_20.can_discriminate());
     let names = ["temperature_1_c".to_owned(), "temperature_2_c".to_owned()];
     let sensors = series(&names, &columns);
     for start in [0.0, 1.0] {
-        let refused = grades(&warm_up(start, 60.0, 70.0), &sensors, Normalisation::InitialImage, RHO_USUAL);
+        let refused = compute_grades(&warm_up(start, 60.0, 70.0), &sensors, Normalisation::InitialImage, RHO_USUAL);
         let refused = refused.expect_err("nothing can be divided by that").to_string();
         assert!(refused.starts_with("thermal_error_um: begins at"), "{refused}");
-        assert!(grades(&warm_up(start, 60.0, 70.0), &sensors, Normalisation::Range, RHO_USUAL).is_ok());
+        assert!(compute_grades(&warm_up(start, 60.0, 70.0), &sensors, Normalisation::Range, RHO_USUAL).is_ok());
     }
     for rho in [0.0, -1.0, 1.1, f64::NAN] {
         assert_eq!(
-            grades(&warm_up(20.0, 60.0, 70.0), &sensors, Normalisation::Range, rho).expect_err("no such rho").kind,
+            compute_grades(&warm_up(20.0, 60.0, 70.0), &sensors, Normalisation::Range, rho)
+                .expect_err("no such rho")
+                .kind,
             RefusalKind::OutOfRange
         );
     }
@@ -69,7 +71,8 @@ fn grades_hang_on_the_first_value_of_the_error_and_that_is_said() {
 fn kelvin_would_level_the_grades_and_is_refused() {
     let kelvin = [warm_up(293.15, 16.0, 25.0)];
     let names = ["temperature_1_c".to_owned()];
-    let refused = grades(&warm_up(20.0, 60.0, 70.0), &series(&names, &kelvin), Normalisation::InitialImage, RHO_USUAL);
+    let refused =
+        compute_grades(&warm_up(20.0, 60.0, 70.0), &series(&names, &kelvin), Normalisation::InitialImage, RHO_USUAL);
     assert!(refused.expect_err("kelvin").to_string().contains("looks like K"));
 }
 

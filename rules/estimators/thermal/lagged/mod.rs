@@ -9,11 +9,11 @@
 //! 94 %: 10.1177/0954405414556499.
 
 use super::course::Course;
-use super::cross_validation::{HeldOut, outside, squares, trained};
+use super::cross_validation::{HeldOut, compute_squared_errors, exclude_block, train_outside_block};
 use super::law::{Path, first_order};
 use super::quantities::THERMAL_ERROR;
-use super::regression::{ROWS_MAX, RegressionDesign, Tau, ThermalFit, column, finish};
-use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit};
+use super::regression::{ROWS_MAX, RegressionDesign, Tau, ThermalFit, fit_design, to_column};
+use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit_unweighted};
 use crate::statistics::rms;
 use std::ops::Range;
 
@@ -40,16 +40,16 @@ const ROUNDS: usize = 4;
 /// # Errors
 /// A [`Refusal`]: pauses that are not known, runs too short for any time constant, and all that stops a regression.
 pub(super) fn fit_lagged(course: &Course, sensors: &[usize], form: LagForm) -> Result<ThermalFit, Refusal> {
-    course.check(sensors)?;
+    course.check_sensors(sensors)?;
     known_pauses(course)?;
     let law = LaggedCourse { course, sensors, form };
-    let mut tau_s = law.search()?;
-    let mut fit = law.fit(tau_s)?;
+    let mut tau_s = law.search_tau()?;
+    let mut fit = law.fit_at_tau(tau_s)?;
     for _ in 0..ROUNDS {
         let Some(better_s) = fit.law.tau_s else { break };
         let moved = (better_s / tau_s).ln();
-        tau_s = better_s.clamp(law.bounds().0, law.bounds().1);
-        fit = law.fit(tau_s)?;
+        tau_s = better_s.clamp(law.tau_bounds_s().0, law.tau_bounds_s().1);
+        fit = law.fit_at_tau(tau_s)?;
         if moved.abs() < 1e-3 {
             break;
         }
@@ -63,11 +63,11 @@ fn known_pauses(course: &Course) -> Result<(), Refusal> {
     }
     let what = "the pauses between runs are not known, so how far the structure cooled meanwhile is not either";
     let next = "record with time_utc, or with a time_s that goes on from run to run";
-    Err(Refusal::new(RefusalKind::Missing, what, next).at("time_s"))
+    Err(Refusal::new(RefusalKind::Missing, what, next).with_place("time_s"))
 }
 
 /// The first-order state of a temperature along the clock of the course; it begins at the first temperature.
-pub(super) fn late(course: &Course, values: &[f64], tau_s: f64) -> Vec<f64> {
+pub(super) fn compute_lagged_states(course: &Course, values: &[f64], tau_s: f64) -> Vec<f64> {
     let mut states = Vec::with_capacity(values.len());
     let mut state = values.first().copied().unwrap_or(0.0);
     for (row, value) in values.iter().enumerate() {
@@ -83,7 +83,7 @@ pub(super) fn late(course: &Course, values: &[f64], tau_s: f64) -> Vec<f64> {
 /// A few time constants over the range that is tried.
 pub(super) fn some_taus(course: &Course) -> Result<Vec<f64>, Refusal> {
     known_pauses(course)?;
-    let all = LaggedCourse { course, sensors: &[], form: LagForm::All }.taus()?;
+    let all = LaggedCourse { course, sensors: &[], form: LagForm::All }.list_taus()?;
     Ok(all.into_iter().skip(1).step_by(2).collect())
 }
 
@@ -94,28 +94,28 @@ struct LaggedCourse<'a> {
 }
 
 impl LaggedCourse<'_> {
-    fn bounds(&self) -> (f64, f64) {
+    fn tau_bounds_s(&self) -> (f64, f64) {
         (2.0 * self.course.period_s(), 0.5 * self.course.longest_s())
     }
 
-    fn taus(&self) -> Result<Vec<f64>, Refusal> {
-        let (least, greatest) = self.bounds();
+    fn list_taus(&self) -> Result<Vec<f64>, Refusal> {
+        let (least, greatest) = self.tau_bounds_s();
         if greatest <= 4.0 * least {
             let what = format!("the longest run lasts {:.0} s at one row in {:.0} s", 2.0 * greatest, 0.5 * least);
             let next = "record runs of an hour or more, at least one row a minute";
-            return Err(Refusal::new(RefusalKind::TooFew, what, next).at("time_s"));
+            return Err(Refusal::new(RefusalKind::TooFew, what, next).with_place("time_s"));
         }
         let ratio = (greatest / least).powf(1.0 / (TAUS - 1) as f64);
         Ok((0..TAUS).map(|step| least * ratio.powi(i32::try_from(step).unwrap_or(0))).collect())
     }
 
-    /// Columns of the terms, in the order of [`LaggedCourse::terms`].
-    fn columns(&self, tau_s: f64) -> Vec<Column> {
+    /// Columns of the terms, in the order of [`LaggedCourse::list_terms`].
+    fn build_columns(&self, tau_s: f64) -> Vec<Column> {
         let sensor = |at: &usize| &self.course.sensors()[*at];
-        let direct = |at: &usize| column(sensor(at));
+        let direct = |at: &usize| to_column(sensor(at));
         let state = |at: &usize| {
             let name = format!("late({})", sensor(at).name);
-            Column::new(name, late(self.course, &sensor(at).values, tau_s))
+            Column::new(name, compute_lagged_states(self.course, &sensor(at).values, tau_s))
         };
         match self.form {
             LagForm::All => self.sensors.iter().map(state).collect(),
@@ -124,7 +124,7 @@ impl LaggedCourse<'_> {
     }
 
     /// Sensor and path of every term.
-    fn terms(&self) -> (Vec<usize>, Vec<Path>) {
+    fn list_terms(&self) -> (Vec<usize>, Vec<Path>) {
         let mut sensors = self.sensors.to_vec();
         let path = if self.form == LagForm::All { Path::Lagged } else { Path::Direct };
         let mut paths = vec![path; sensors.len()];
@@ -136,48 +136,48 @@ impl LaggedCourse<'_> {
     }
 
     /// What is left of a state that did not begin at the first temperature.
-    fn beginning(&self, tau_s: f64) -> Column {
+    fn build_beginning_column(&self, tau_s: f64) -> Column {
         let clock_s = self.course.clock_s();
         let left = |at: &f64| (-(at - clock_s[0]) / tau_s).exp();
         Column::new("beginning", clock_s.iter().map(left).collect())
     }
 
     /// The time constant with the least sum of squares.
-    fn search(&self) -> Result<f64, Refusal> {
-        let taus = self.taus()?;
+    fn search_tau(&self) -> Result<f64, Refusal> {
+        let taus = self.list_taus()?;
         let squares = |tau_s: f64| {
-            let (short, columns) = self.course.condensed(&self.whole(tau_s), ROWS_MAX / 3);
+            let (short, columns) = self.course.condense_rows(&self.build_all_columns(tau_s), ROWS_MAX / 3);
             let target = Column::new(THERMAL_ERROR, short.error_um().to_vec());
-            Ok(fit(&target, &columns, Intercept::None)?.rss)
+            Ok(fit_unweighted(&target, &columns, Intercept::None)?.rss)
         };
         let tried = taus.iter().map(|tau_s| Ok((*tau_s, squares(*tau_s)?))).collect::<Result<Vec<_>, Refusal>>()?;
         let least = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(taus[0], |(tau_s, _)| *tau_s);
         let ratio = taus[1] / taus[0];
-        narrow(least / ratio, least * ratio, squares)
+        minimise_by_golden_section(least / ratio, least * ratio, squares)
     }
 
     /// Constant, terms and beginning.
-    fn whole(&self, tau_s: f64) -> Vec<Column> {
+    fn build_all_columns(&self, tau_s: f64) -> Vec<Column> {
         let ones = Column::new("intercept", vec![1.0; self.course.rows()]);
-        std::iter::once(ones).chain(self.columns(tau_s)).chain([self.beginning(tau_s)]).collect()
+        std::iter::once(ones).chain(self.build_columns(tau_s)).chain([self.build_beginning_column(tau_s)]).collect()
     }
 
     /// The fit linearised at `tau_s`; the law in it has the tau that this suggests.
-    fn fit(&self, tau_s: f64) -> Result<ThermalFit, Refusal> {
-        let columns = self.columns(tau_s);
-        let (short, whole) = self.course.condensed(&self.whole(tau_s), ROWS_MAX / 3);
+    fn fit_at_tau(&self, tau_s: f64) -> Result<ThermalFit, Refusal> {
+        let columns = self.build_columns(tau_s);
+        let (short, whole) = self.course.condense_rows(&self.build_all_columns(tau_s), ROWS_MAX / 3);
         let target = Column::new(THERMAL_ERROR, short.error_um().to_vec());
-        let white = fit(&target, &whole, Intercept::None)?.values();
-        let (more, less) = (self.columns(tau_s * STEP.exp()), self.columns(tau_s * (-STEP).exp()));
+        let white = fit_unweighted(&target, &whole, Intercept::None)?.values();
+        let (more, less) = (self.build_columns(tau_s * STEP.exp()), self.build_columns(tau_s * (-STEP).exp()));
         let slope = |row: usize| {
             let terms = white[1..].iter().zip(more.iter().zip(&less));
             terms.map(|(b, (more, less))| b * (more.values[row] - less.values[row]) / (2.0 * STEP)).sum::<f64>()
         };
         let by_log_tau = Column::new("tau_s", (0..self.course.rows()).map(slope).collect());
-        let (sensors, paths) = self.terms();
+        let (sensors, paths) = self.list_terms();
         let tau = Tau { tau_s, spread_k: self.spread_k(tau_s), by_log_tau };
-        let nuisance = vec![self.beginning(tau_s)];
-        finish(&RegressionDesign {
+        let nuisance = vec![self.build_beginning_column(tau_s)];
+        fit_design(&RegressionDesign {
             course: self.course,
             sensors: &sensors,
             paths: &paths,
@@ -191,7 +191,7 @@ impl LaggedCourse<'_> {
     fn spread_k(&self, tau_s: f64) -> f64 {
         let differences = self.sensors.iter().flat_map(|at| {
             let values = &self.course.sensors()[*at].values;
-            let states = late(self.course, values, tau_s);
+            let states = compute_lagged_states(self.course, values, tau_s);
             values.iter().zip(states).map(|(value, state)| value - state).collect::<Vec<f64>>()
         });
         rms(&differences.collect::<Vec<f64>>())
@@ -199,7 +199,11 @@ impl LaggedCourse<'_> {
 }
 
 /// Where a function of a positive number is least, by golden section over its logarithm.
-fn narrow(least: f64, greatest: f64, of: impl Fn(f64) -> Result<f64, Refusal>) -> Result<f64, Refusal> {
+fn minimise_by_golden_section(
+    least: f64,
+    greatest: f64,
+    of: impl Fn(f64) -> Result<f64, Refusal>,
+) -> Result<f64, Refusal> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let (mut low, mut high) = (least.ln(), greatest.ln());
     for _ in 0..NARROW {
@@ -220,19 +224,20 @@ pub(super) fn held_out_lagged(
     rows_max: usize,
 ) -> Result<HeldOut, Refusal> {
     let law = LaggedCourse { course, sensors, form };
-    let taus = law.taus()?;
+    let taus = law.list_taus()?;
     let mut error_um = Vec::new();
     let mut blocks = Vec::new();
     let mut designs = Vec::new();
     for tau_s in taus {
-        let columns: Vec<Column> = law.columns(tau_s).into_iter().chain([law.beginning(tau_s)]).collect();
-        let (short, columns) = course.condensed(&columns, rows_max);
-        (error_um, blocks) = (short.error_um().to_vec(), short.blocks());
+        let columns: Vec<Column> =
+            law.build_columns(tau_s).into_iter().chain([law.build_beginning_column(tau_s)]).collect();
+        let (short, columns) = course.condense_rows(&columns, rows_max);
+        (error_um, blocks) = (short.error_um().to_vec(), short.split_into_blocks());
         designs.push(columns);
     }
     let squares =
         blocks.iter().map(|block| one_block(&designs, &error_um, block)).collect::<Result<Vec<_>, Refusal>>()?;
-    Ok(HeldOut::of(&squares))
+    Ok(HeldOut::from_squares(&squares))
 }
 
 /// Squared errors of one block with the time constant that suits the other rows best.
@@ -242,16 +247,16 @@ fn one_block(designs: &[Vec<Column>], error_um: &[f64], block: &Range<usize>) ->
     for columns in designs {
         // The beginning of the states is forgotten in most blocks, and then cannot be fitted.
         let terms = columns.len() - 1;
-        let left = outside(&columns[terms].values, block).iter().fold(0.0_f64, |most, x| most.max(*x));
+        let left = exclude_block(&columns[terms].values, block).iter().fold(0.0_f64, |most, x| most.max(*x));
         let count = if left > 0.05 { terms + 1 } else { terms };
-        match trained(&columns[..count], error_um, block) {
+        match train_outside_block(&columns[..count], error_um, block) {
             Ok(coefficients) => {
                 let rest: f64 = [0..block.start, block.end..error_um.len()]
                     .iter()
-                    .flat_map(|rows| squares(&coefficients, columns, error_um, rows))
+                    .flat_map(|rows| compute_squared_errors(&coefficients, columns, error_um, rows))
                     .sum();
                 if best.as_ref().is_none_or(|(least, _)| rest < *least) {
-                    best = Some((rest, squares(&coefficients, columns, error_um, block)));
+                    best = Some((rest, compute_squared_errors(&coefficients, columns, error_um, block)));
                 }
             }
             Err(refusal) => refused = Some(refusal),

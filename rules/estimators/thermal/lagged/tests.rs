@@ -3,13 +3,13 @@
 use super::*;
 use crate::estimators::thermal::bed::{self, ROUGH};
 use crate::estimators::thermal::regression::tests::nine_tenths;
-use crate::estimators::thermal::{SelectionSettings, learn};
+use crate::estimators::thermal::{SelectionSettings, learn_law};
 
 const TAU_S: f64 = 1500.0;
 const LAW: (f64, &[(&str, f64)]) = (-50.0, &[("bearing_temperature_c", 3.0), ("ambient_temperature_c", 1.5)]);
 
 fn course(seed: u64, tau_s: f64) -> Course {
-    let mut random = bed::random(seed);
+    let mut random = bed::create_random(seed);
     let course = bed::warm_ups(&mut random, 4, 180);
     bed::with_error(&mut random, &course, LAW, tau_s, ROUGH)
 }
@@ -51,7 +51,7 @@ fn intervals_cover_in_two_hundred_repetitions() {
 fn a_lag_is_chosen_where_there_is_one_and_removes_the_loop() {
     let (mut wide, mut narrow) = (0.0, 0.0);
     for seed in 0..6 {
-        let learned = learn(&course(seed, TAU_S), SelectionSettings::default(), Some(&sensors())).expect("a law");
+        let learned = learn_law(&course(seed, TAU_S), SelectionSettings::default(), Some(&sensors())).expect("a law");
         assert!(learned.lag_chosen, "seed {seed}: {}", learned.reason);
         let late = learned.with_lag.as_ref().expect("a late law");
         let (before, after) = (learned.without_lag.held_out.rms_um, late.held_out.rms_um);
@@ -71,7 +71,8 @@ fn a_lag_is_chosen_where_there_is_one_and_removes_the_loop() {
 #[test]
 fn no_lag_is_chosen_where_there_is_none() {
     let chosen = (0..12).filter(|seed| {
-        let learned = learn(&course(200 + seed, 0.0), SelectionSettings::default(), Some(&sensors())).expect("a law");
+        let learned =
+            learn_law(&course(200 + seed, 0.0), SelectionSettings::default(), Some(&sensors())).expect("a law");
         println!("seed {seed}: {}", learned.reason);
         learned.lag_chosen
     });
@@ -82,13 +83,13 @@ fn no_lag_is_chosen_where_there_is_none() {
 fn a_late_law_may_have_sensors_of_its_own() {
     let (mut chosen, mut before, mut after) = (0, 0.0, 0.0);
     for seed in 40..44 {
-        let mut random = bed::random(seed);
+        let mut random = bed::create_random(seed);
         let course = bed::warm_ups(&mut random, 7, 180);
         let course = bed::with_error(&mut random, &course, LAW, TAU_S, ROUGH);
-        let learned = learn(&course, SelectionSettings::default(), None).expect("a law");
-        let names: Vec<&str> = learned.best().fit.law.terms.iter().map(|term| term.sensor.as_str()).collect();
+        let learned = learn_law(&course, SelectionSettings::default(), None).expect("a law");
+        let names: Vec<&str> = learned.best_candidate().fit.law.terms.iter().map(|term| term.sensor.as_str()).collect();
         println!("seed {seed}: {names:?}, {}", learned.reason);
-        let best = learned.best().held_out.rms_um;
+        let best = learned.best_candidate().held_out.rms_um;
         (chosen, before, after) =
             (chosen + usize::from(learned.lag_chosen), before + learned.without_lag.held_out.rms_um, after + best);
         let in_use = learned.selection.sensors.iter().filter(|it| it.chosen).count();
@@ -104,7 +105,7 @@ fn unknown_pauses_are_a_reason_and_the_static_law_remains() {
     let known = course(1, TAU_S);
     let (runs, error) = (known.runs().to_vec(), known.error_um().to_vec());
     let unknown = Course::new(known.clock_s().to_vec(), runs, false, error, known.sensors().to_vec());
-    let learned = learn(&unknown, SelectionSettings::default(), Some(&sensors())).expect("a static law");
+    let learned = learn_law(&unknown, SelectionSettings::default(), Some(&sensors())).expect("a static law");
     let refusal = learned.with_lag.as_ref().expect_err("pauses are not known");
     assert!(refusal.to_string().contains("record with time_utc"), "{refusal}");
     assert!(!learned.lag_chosen && learned.reason.contains("pauses"));

@@ -2,9 +2,9 @@
 
 use super::course::Course;
 use super::cross_validation::{HeldOut, held_out};
-use super::lagged::{LagForm, fit_lagged, held_out_lagged, late, some_taus};
-use super::regression::{ThermalFit, column, fit_static};
-use super::selection::{Selection, SelectionSettings, select, select_late};
+use super::lagged::{LagForm, compute_lagged_states, fit_lagged, held_out_lagged, some_taus};
+use super::regression::{ThermalFit, fit_static, to_column};
+use super::selection::{Selection, SelectionSettings, select_late, select_sensors};
 use crate::estimators::regression::{Column, Refusal, RefusalKind};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -66,7 +66,7 @@ fn or_refused<S: Serializer>(late: &Result<CandidateLaw, Refusal>, to: S) -> Res
 impl ThermalLearned {
     /// The law to use.
     #[must_use]
-    pub fn best(&self) -> &CandidateLaw {
+    pub fn best_candidate(&self) -> &CandidateLaw {
         match &self.with_lag {
             Ok(late) if self.lag_chosen => late,
             _ => &self.without_lag,
@@ -78,31 +78,31 @@ impl ThermalLearned {
 ///
 /// # Errors
 /// A [`Refusal`] that says what cannot be learned, where, and what to record instead.
-pub fn learn(
+pub fn learn_law(
     course: &Course,
     settings: SelectionSettings,
     sensors: Option<&[String]>,
 ) -> Result<ThermalLearned, Refusal> {
-    course.usable()?;
-    let chosen = sensors.map(|names| positions(course, names)).transpose()?;
+    course.find_usable_sensors()?;
+    let chosen = sensors.map(|names| find_positions(course, names)).transpose()?;
     let mut selection = match &chosen {
-        Some(chosen) => given(course, settings, chosen)?,
-        None => select(course, settings)?,
+        Some(chosen) => describe_given_sensors(course, settings, chosen)?,
+        None => select_sensors(course, settings)?,
     };
-    let without_lag = candidate(course, &selection.chosen, fit_static(course, &selection.chosen)?)?;
+    let without_lag = build_candidate(course, &selection.chosen, fit_static(course, &selection.chosen)?)?;
     says_something(&without_lag)?;
     let mut with_lag = best_late(course, &selection.chosen);
-    let (mut lag_chosen, mut reason) = decide(&without_lag, &with_lag);
+    let (mut lag_chosen, mut reason) = decide_on_lag(&without_lag, &with_lag);
     // A late law may want other sensors than those that imitate a lag best.
     let other = if sensors.is_none() { late_with_own_sensors(course, settings, &with_lag) } else { None };
     if let Some((own, candidate)) = other {
         let late = Ok(candidate);
-        let (chosen, why) = decide(&without_lag, &late);
+        let (chosen, why) = decide_on_lag(&without_lag, &late);
         if chosen {
             (selection, with_lag, lag_chosen, reason) = (own, late, chosen, why);
         }
     }
-    let (blocks_are_runs, blocks) = (course.blocks_are_runs(), course.blocks().len());
+    let (blocks_are_runs, blocks) = (course.blocks_are_runs(), course.split_into_blocks().len());
     let rows_averaged = course.rows().div_ceil(ROWS_MAX);
     Ok(ThermalLearned { selection, without_lag, with_lag, lag_chosen, reason, blocks_are_runs, blocks, rows_averaged })
 }
@@ -115,35 +115,40 @@ fn late_with_own_sensors(
 ) -> Option<(Selection, CandidateLaw)> {
     let selection = select_late(course, settings, &some_taus(course).ok()?).ok()?;
     let candidate = late_candidate(course, &selection.chosen, LagForm::All).ok()?;
-    let better = other.as_ref().map_or(true, |other| candidate.held_out.beats(&other.held_out, GAIN_MIN));
+    let better = other.as_ref().map_or(true, |other| candidate.held_out.is_better_than(&other.held_out, GAIN_MIN));
     better.then_some((selection, candidate))
 }
 
-fn positions(course: &Course, names: &[String]) -> Result<Vec<usize>, Refusal> {
+fn find_positions(course: &Course, names: &[String]) -> Result<Vec<usize>, Refusal> {
     let position = |name: &String| {
         let known: Vec<&str> = course.sensors().iter().map(|sensor| sensor.name.as_str()).collect();
         let next = format!("choose among {}", known.join(", "));
-        let missing = || Refusal::new(RefusalKind::Missing, "is not among the usable temperatures", next).at(name);
+        let missing =
+            || Refusal::new(RefusalKind::Missing, "is not among the usable temperatures", next).with_place(name);
         known.iter().position(|sensor| sensor == name).ok_or_else(missing)
     };
     names.iter().map(position).collect()
 }
 
-fn given(course: &Course, settings: SelectionSettings, chosen: &[usize]) -> Result<Selection, Refusal> {
+fn describe_given_sensors(
+    course: &Course,
+    settings: SelectionSettings,
+    chosen: &[usize],
+) -> Result<Selection, Refusal> {
     let everything = SelectionSettings { inflation_max: f64::INFINITY, ..settings };
-    super::selection::describe(course, everything, chosen.to_vec())
+    super::selection::describe_chosen(course, everything, chosen.to_vec())
 }
 
-fn candidate(course: &Course, sensors: &[usize], fit: ThermalFit) -> Result<CandidateLaw, Refusal> {
-    let columns: Vec<Column> = sensors.iter().map(|at| column(&course.sensors()[*at])).collect();
-    let (short, columns) = course.condensed(&columns, ROWS_MAX);
-    let held_out = held_out(&columns, short.error_um(), &short.blocks())?;
+fn build_candidate(course: &Course, sensors: &[usize], fit: ThermalFit) -> Result<CandidateLaw, Refusal> {
+    let columns: Vec<Column> = sensors.iter().map(|at| to_column(&course.sensors()[*at])).collect();
+    let (short, columns) = course.condense_rows(&columns, ROWS_MAX);
+    let held_out = held_out(&columns, short.error_um(), &short.split_into_blocks())?;
     let hysteresis_um = hysteresis_um(course, sensors, &fit.residuals_um);
-    Ok(CandidateLaw { fit: expecting(fit, &held_out), held_out, hysteresis_um })
+    Ok(CandidateLaw { fit: widen_residual_sd(fit, &held_out), held_out, hysteresis_um })
 }
 
 /// What a law leaves of rows that it was not fitted to is what is to be expected of it later.
-fn expecting(mut fit: ThermalFit, held_out: &HeldOut) -> ThermalFit {
+fn widen_residual_sd(mut fit: ThermalFit, held_out: &HeldOut) -> ThermalFit {
     fit.law.residual_sd_um = fit.law.residual_sd_um.max(held_out.rms_um);
     fit
 }
@@ -157,7 +162,7 @@ fn says_something(candidate: &CandidateLaw) -> Result<(), Refusal> {
     let rows = candidate.fit.memory.effective_rows;
     let what = format!("no coefficient differs from zero: the rows tell as much as {rows:.1} independent ones");
     let next = "record several warm-ups and cool-downs at different speeds, each longer than an hour";
-    Err(Refusal::new(RefusalKind::NotIdentifiable, what, next).at(super::quantities::THERMAL_ERROR))
+    Err(Refusal::new(RefusalKind::NotIdentifiable, what, next).with_place(super::quantities::THERMAL_ERROR))
 }
 
 /// The late law that predicts best. The second form is not the first with a term more, and must be clearly better both in
@@ -166,17 +171,17 @@ fn best_late(course: &Course, sensors: &[usize]) -> Result<CandidateLaw, Refusal
     let all = late_candidate(course, sensors, LagForm::All)?;
     let Ok(twice) = late_candidate(course, sensors, LagForm::FirstTwice) else { return Ok(all) };
     let likelier = twice.fit.likelihood > all.fit.likelihood + LIKELIHOOD_MIN;
-    Ok(if likelier && twice.held_out.beats(&all.held_out, GAIN_MIN) { twice } else { all })
+    Ok(if likelier && twice.held_out.is_better_than(&all.held_out, GAIN_MIN) { twice } else { all })
 }
 
 fn late_candidate(course: &Course, sensors: &[usize], form: LagForm) -> Result<CandidateLaw, Refusal> {
     let held_out = held_out_lagged(course, sensors, form, ROWS_MAX)?;
     let fit = fit_lagged(course, sensors, form)?;
     let hysteresis_um = hysteresis_um(course, sensors, &fit.residuals_um);
-    Ok(CandidateLaw { fit: expecting(fit, &held_out), held_out, hysteresis_um })
+    Ok(CandidateLaw { fit: widen_residual_sd(fit, &held_out), held_out, hysteresis_um })
 }
 
-fn decide(plain: &CandidateLaw, late: &Result<CandidateLaw, Refusal>) -> (bool, String) {
+fn decide_on_lag(plain: &CandidateLaw, late: &Result<CandidateLaw, Refusal>) -> (bool, String) {
     let late = match late {
         Ok(late) => late,
         Err(refusal) => return (false, format!("without lag, because a lag cannot be learned: {refusal}")),
@@ -185,7 +190,7 @@ fn decide(plain: &CandidateLaw, late: &Result<CandidateLaw, Refusal>) -> (bool, 
     let gained = late.fit.likelihood - plain.fit.likelihood;
     let numbers =
         format!("blocks left out {before:.2} um without, {after:.2} um with lag; log likelihood {gained:+.1}");
-    if !late.held_out.beats(&plain.held_out, GAIN_MIN) {
+    if !late.held_out.is_better_than(&plain.held_out, GAIN_MIN) {
         return (false, format!("without lag: a lag does not predict better ({numbers})"));
     }
     if gained < LIKELIHOOD_MIN {
@@ -197,7 +202,7 @@ fn decide(plain: &CandidateLaw, late: &Result<CandidateLaw, Refusal>) -> (bool, 
 /// Mean residual while the first sensor warms less that while it cools.
 fn hysteresis_um(course: &Course, sensors: &[usize], residuals_um: &[f64]) -> Option<f64> {
     let values = &course.sensors()[*sensors.first()?].values;
-    let behind = late(course, values, (20.0 * course.period_s()).min(0.1 * course.longest_s()));
+    let behind = compute_lagged_states(course, values, (20.0 * course.period_s()).min(0.1 * course.longest_s()));
     let ahead: Vec<f64> = values.iter().zip(&behind).map(|(value, state)| value - state).collect();
     let threshold = 0.3 * crate::statistics::rms(&ahead);
     let mean = |sign: f64| {

@@ -43,7 +43,7 @@ pub enum NoPrediction {
 impl NoPrediction {
     /// The word used in JSON and SQL.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Missing { .. } => "input_missing",
             Self::Kelvin { .. } => "kelvin",
@@ -108,7 +108,7 @@ impl ThermalPrediction {
 
     /// Measured and residual beside this prediction.
     #[must_use]
-    pub fn beside(&self, measured_um: Result<f64, Absence>) -> PredictedAndMeasured {
+    pub fn compare_with_measured(&self, measured_um: Result<f64, Absence>) -> PredictedAndMeasured {
         let measured_um =
             measured_um.and_then(|value| if value.is_finite() { Ok(value) } else { Err(Absence::OutOfRange) });
         let residual_um =
@@ -153,10 +153,10 @@ impl Predictor {
     /// # Errors
     /// A law that cannot be used, or a sensor of it that is not among `sensors`.
     pub fn new(law: ThermalLaw, sensors: &[&str]) -> Result<Self, Refusal> {
-        law.check()?;
+        law.check_consistency()?;
         let position = |name: &str| {
             let next = "connect the sensor, or identify the law again without it";
-            let missing = || Refusal::new(RefusalKind::Missing, "no source delivers it", next).at(name);
+            let missing = || Refusal::new(RefusalKind::Missing, "no source delivers it", next).with_place(name);
             sensors.iter().position(|sensor| *sensor == name).ok_or_else(missing)
         };
         let sensor_of = law.terms.iter().map(|term| position(&term.sensor)).collect::<Result<Vec<usize>, _>>()?;
@@ -179,7 +179,7 @@ impl Predictor {
 
     /// Standard deviation of a beginning of the lagged states that was guessed, as a share of what it was; 0 once forgotten.
     #[must_use]
-    pub fn unsettled(&self) -> f64 {
+    pub fn unsettled_share(&self) -> f64 {
         if self.law.tau_s.is_some() { self.unsettled } else { 0.0 }
     }
 
@@ -194,7 +194,7 @@ impl Predictor {
     ///
     /// # Errors
     /// [`NoPrediction`] where a sensor of the law gives no value; sensors that the law does not use may be missing.
-    pub fn predict(
+    pub fn predict_error(
         &mut self,
         at_ns: i64,
         temperatures_c: &[Result<f64, Absence>],
@@ -204,18 +204,18 @@ impl Predictor {
         }
         let mut point = [1.0; TERMS_MAX + 1];
         for (slot, sensor) in point.iter_mut().skip(1).zip(&self.sensor_of) {
-            *slot = usable(*sensor, temperatures_c[*sensor])?;
+            *slot = check_temperature(*sensor, temperatures_c[*sensor])?;
         }
         let point = &mut point[..=self.law.terms.len()];
-        let outside = self.outside(&point[1..]);
-        self.follow(at_ns, &mut point[1..]);
+        let outside = self.find_outside_range(&point[1..]);
+        self.advance_lagged_states(at_ns, &mut point[1..]);
         self.point.clear();
         self.point.extend_from_slice(point);
-        Ok(self.at(point, outside))
+        Ok(self.evaluate_at(point, outside))
     }
 
     /// Replaces the temperatures of lagged terms by their states.
-    fn follow(&mut self, at_ns: i64, values: &mut [f64]) {
+    fn advance_lagged_states(&mut self, at_ns: i64, values: &mut [f64]) {
         let dt_s = self.last_ns.map(|last_ns| at_ns.saturating_sub(last_ns) as f64 * 1e-9);
         let tau_s = self.law.tau_s.unwrap_or(0.0);
         for ((value, last), term) in values.iter_mut().zip(&mut self.last).zip(&self.law.terms) {
@@ -231,7 +231,7 @@ impl Predictor {
         self.last_ns = Some(self.last_ns.map_or(at_ns, |last_ns| last_ns.max(at_ns)));
     }
 
-    fn at(&self, point: &[f64], outside: Option<Outside>) -> ThermalPrediction {
+    fn evaluate_at(&self, point: &[f64], outside: Option<Outside>) -> ThermalPrediction {
         let law_sd_um = self.law.law_sd_um(point);
         let lagged = self.law.terms.iter().filter(|term| term.path == Path::Lagged);
         let slope: f64 = lagged.map(|term| term.um_per_k.abs()).sum();
@@ -263,7 +263,7 @@ impl Predictor {
         (safe, variance.sqrt())
     }
 
-    fn outside(&self, temperatures_c: &[f64]) -> Option<Outside> {
+    fn find_outside_range(&self, temperatures_c: &[f64]) -> Option<Outside> {
         let terms = self.law.terms.iter().zip(temperatures_c).zip(&self.sensor_of);
         terms.into_iter().find_map(|((term, temperature_c), sensor)| {
             let (least, greatest) = term.range_c;
@@ -280,7 +280,7 @@ pub(super) fn margin_k(least_c: f64, greatest_c: f64) -> f64 {
     (MARGIN_SHARE * (greatest_c - least_c)).max(MARGIN_K)
 }
 
-fn usable(sensor: usize, temperature_c: Result<f64, Absence>) -> Result<f64, NoPrediction> {
+fn check_temperature(sensor: usize, temperature_c: Result<f64, Absence>) -> Result<f64, NoPrediction> {
     let value = temperature_c.map_err(|absence| NoPrediction::Missing { sensor, absence })?;
     if !value.is_finite() {
         return Err(NoPrediction::Missing { sensor, absence: Absence::OutOfRange });

@@ -38,14 +38,14 @@ fn predictor(law: ThermalLaw) -> Predictor {
 fn thirteen_points_give_an_error_with_its_deviation() {
     let mut predictor = predictor(law(13, Path::Direct));
     let temperatures: Vec<Result<f64, Absence>> = (0..13).map(|at| Ok(25.0 + f64::from(at))).collect();
-    let got = predictor.predict(0, &temperatures).expect("every sensor answers");
+    let got = predictor.predict_error(0, &temperatures).expect("every sensor answers");
     let expected = -100.0 + (0..13).map(|at| (1.0 + f64::from(at)) * (25.0 + f64::from(at))).sum::<f64>();
     assert!((got.error_um.value - expected).abs() < 1e-9);
     assert!(got.error_um.sd >= 1.0 && got.law_sd_um > 0.0 && got.is_inside_range());
-    let beside = got.beside(Ok(expected + 1.0));
+    let beside = got.compare_with_measured(Ok(expected + 1.0));
     assert!(beside.residual_um.is_ok_and(|it| (it.value - 1.0).abs() < 1e-9) && !beside.contradicts);
-    assert!(got.beside(Ok(expected + 50.0)).contradicts);
-    assert_eq!(got.beside(Err(Absence::Stale)).residual_um, Err(Absence::Stale));
+    assert!(got.compare_with_measured(Ok(expected + 50.0)).contradicts);
+    assert_eq!(got.compare_with_measured(Err(Absence::Stale)).residual_um, Err(Absence::Stale));
 }
 
 #[test]
@@ -53,32 +53,32 @@ fn a_missing_sensor_is_a_reason_and_an_unused_one_is_none() {
     let mut predictor = predictor(law(4, Path::Direct));
     let mut temperatures = vec![Ok(25.0); 13];
     temperatures[9] = Err(Absence::Timeout);
-    assert!(predictor.predict(0, &temperatures).is_ok(), "the tenth sensor is not in the law");
+    assert!(predictor.predict_error(0, &temperatures).is_ok(), "the tenth sensor is not in the law");
     temperatures[2] = Err(Absence::Stale);
-    let missing = predictor.predict(0, &temperatures);
+    let missing = predictor.predict_error(0, &temperatures);
     assert_eq!(missing, Err(NoPrediction::Missing { sensor: 2, absence: Absence::Stale }));
     temperatures[2] = Ok(f64::NAN);
-    assert_eq!(predictor.predict(0, &temperatures).map_err(NoPrediction::word), Err("input_missing"));
+    assert_eq!(predictor.predict_error(0, &temperatures).map_err(NoPrediction::as_word), Err("input_missing"));
     temperatures[2] = Ok(298.15);
-    assert_eq!(predictor.predict(0, &temperatures), Err(NoPrediction::Kelvin { sensor: 2 }));
-    assert_eq!(predictor.predict(0, &temperatures[..5]), Err(NoPrediction::TooFew));
+    assert_eq!(predictor.predict_error(0, &temperatures), Err(NoPrediction::Kelvin { sensor: 2 }));
+    assert_eq!(predictor.predict_error(0, &temperatures[..5]), Err(NoPrediction::TooFew));
 }
 
 #[test]
 fn temperatures_outside_the_range_are_flagged_alone_and_together() {
     let mut far = predictor(law(4, Path::Direct));
     let mut temperatures = vec![Ok(30.0); 13];
-    assert!(far.predict(0, &temperatures).expect("a number").is_inside_range());
+    assert!(far.predict_error(0, &temperatures).expect("a number").is_inside_range());
     temperatures[1] = Ok(45.0);
-    let outside = far.predict(0, &temperatures).expect("a number, flagged").outside;
+    let outside = far.predict_error(0, &temperatures).expect("a number, flagged").outside;
     assert_eq!(outside, Some(Outside::Sensor { sensor: 1, temperature_c: 45.0, range_c: (20.0, 40.0) }));
-    let near = far.predict(0, &temperatures).expect("a number");
+    let near = far.predict_error(0, &temperatures).expect("a number");
     assert!(
         !near.is_at_the_edge() && near.error_um.sd > 2.5,
         "five kelvin at 2 um/K, a quarter of that in doubt: {near:?}"
     );
     temperatures[1] = Ok(70.0);
-    let edge = far.predict(0, &temperatures).expect("a number");
+    let edge = far.predict_error(0, &temperatures).expect("a number");
     let at_edge_um = near.error_um.value + 2.0 * (50.0 - 45.0);
     assert!(edge.is_at_the_edge() && (edge.safe_um - at_edge_um).abs() < 1e-9 && edge.error_um.sd > 10.0, "{edge:?}");
     // Two sensors that always rose together, one hot and one cold: each inside, together never seen.
@@ -86,9 +86,9 @@ fn temperatures_outside_the_range_are_flagged_alone_and_together() {
     pair.covariance = vec![vec![0.1, 0.0, 0.0], vec![0.0, 1.0, -0.999], vec![0.0, -0.999, 1.0]];
     let mut pair = predictor(pair);
     let mut temperatures = vec![Ok(30.0); 13];
-    assert!(pair.predict(0, &temperatures).expect("a number").is_inside_range());
+    assert!(pair.predict_error(0, &temperatures).expect("a number").is_inside_range());
     temperatures[1] = Ok(22.0);
-    assert_eq!(pair.predict(0, &temperatures).expect("a number").outside, Some(Outside::Combination));
+    assert_eq!(pair.predict_error(0, &temperatures).expect("a number").outside, Some(Outside::Combination));
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn a_lagged_law_follows_late_and_is_unsure_of_its_beginning() {
     let at = |predictor: &mut Predictor, t_s: i64, c: f64| {
         let mut temperatures = [Err(Absence::NotProvided); 13];
         temperatures[0] = Ok(c);
-        predictor.predict(t_s * SECOND_NS, &temperatures).expect("the sensor answers")
+        predictor.predict_error(t_s * SECOND_NS, &temperatures).expect("the sensor answers")
     };
     let first = at(&mut late, 0, 20.0);
     assert!((first.error_um.value + 80.0).abs() < 1e-9 && first.error_um.sd > 2.0);

@@ -67,7 +67,7 @@ impl PulseInserter {
     /// A device at rest whose encoder shows `lines` at `at_ns`; edges leave at least `spacing_ns` apart.
     #[must_use]
     pub fn new(lines: Lines, at_ns: u64, spacing_ns: u64) -> Self {
-        let position = (0..EDGES_PER_PULSE).find(|position| Lines::at(*position) == lines).unwrap_or(0);
+        let position = (0..EDGES_PER_PULSE).find(|position| Lines::from_position(*position) == lines).unwrap_or(0);
         Self {
             spacing_ns,
             encoder: Decoder::new(lines, position),
@@ -81,7 +81,7 @@ impl PulseInserter {
     }
 
     /// Asks for more pulses, positive up. They are inserted one by one whenever both lines are low.
-    pub fn request(&mut self, pulses: i64) {
+    pub fn request_pulses(&mut self, pulses: i64) {
         self.requested_pulses = self.requested_pulses.saturating_add(pulses);
     }
 
@@ -94,7 +94,7 @@ impl PulseInserter {
     ///
     /// # Errors
     /// [`InsertionFault`]; nothing more leaves after one until a new device takes its place.
-    pub fn advance(
+    pub fn advance_to(
         &mut self,
         at_ns: u64,
         lines: Lines,
@@ -106,7 +106,7 @@ impl PulseInserter {
         // Before `at_ns` with the old levels, at `at_ns` with the new ones.
         self.emit_before(at_ns, &mut emit);
         self.now_ns = at_ns;
-        self.encoder.see(lines, at_ns)?;
+        self.encoder.decode_lines(lines, at_ns)?;
         let waiting = (self.wanted_edges() - self.out_edges).abs();
         if waiting > WAITING_MAX {
             return Err(InsertionFault::TooFast { at_ns, waiting, spacing_ns: self.spacing_ns });
@@ -130,7 +130,7 @@ impl PulseInserter {
             self.out_edges += step;
             self.now_ns = at_ns;
             self.last_edge_ns = Some(at_ns);
-            emit(SignalEdge { at_ns, lines: Lines::at(self.out_edges) });
+            emit(SignalEdge { at_ns, lines: Lines::from_position(self.out_edges) });
         }
     }
 
@@ -170,7 +170,7 @@ impl PulseInserter {
     /// The levels that the controller sees now.
     #[must_use]
     pub fn lines(&self) -> Lines {
-        Lines::at(self.out_edges)
+        Lines::from_position(self.out_edges)
     }
 }
 

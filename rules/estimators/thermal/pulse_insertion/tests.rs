@@ -20,7 +20,7 @@ struct Controller {
 
 impl Controller {
     fn see(&mut self, edge: SignalEdge) {
-        match self.decoder.see(edge.lines, edge.at_ns) {
+        match self.decoder.decode_lines(edge.lines, edge.at_ns) {
             Ok(0) => self.still += 1,
             Ok(_) => {}
             Err(_) => self.illegal += 1,
@@ -51,9 +51,9 @@ impl Bed {
     fn after(&mut self, pause_ns: u64, step: i64) {
         self.at_ns += pause_ns;
         self.position += step;
-        let lines = Lines::at(self.position);
+        let lines = Lines::from_position(self.position);
         let before = (self.device.encoder.lines(), self.device.inserted_pulses());
-        self.device.advance(self.at_ns, lines, |edge| self.controller.see(edge)).expect("slow enough");
+        self.device.advance_to(self.at_ns, lines, |edge| self.controller.see(edge)).expect("slow enough");
         if !before.0.is_low() && !lines.is_low() {
             assert_eq!(before.1, self.device.inserted_pulses(), "a pulse was begun while a line was high");
         }
@@ -61,7 +61,7 @@ impl Bed {
 
     fn request(&mut self, pulses: i64) {
         self.asked += pulses;
-        self.device.request(pulses);
+        self.device.request_pulses(pulses);
     }
 
     fn settle(&mut self) {
@@ -163,11 +163,11 @@ fn nothing_is_inserted_while_a_line_is_high_or_in_bypass() {
 #[test]
 fn faults_are_said_not_counted_on() {
     let mut bed = Bed::new();
-    let fault = bed.device.advance(10, Lines::at(2), |_| {});
+    let fault = bed.device.advance_to(10, Lines::from_position(2), |_| {});
     assert!(matches!(fault, Err(InsertionFault::Encoder(_))), "{fault:?}");
-    assert!(matches!(bed.device.advance(5, Lines::LOW, |_| {}), Err(InsertionFault::TimeWentBack { .. })));
+    assert!(matches!(bed.device.advance_to(5, Lines::LOW, |_| {}), Err(InsertionFault::TimeWentBack { .. })));
     let mut fast = PulseInserter::new(Lines::LOW, 0, SPACING_NS);
-    let fault = (1..1000).find_map(|step| fast.advance(step * 10, Lines::at(step as i64), |_| {}).err());
+    let fault = (1..1000).find_map(|step| fast.advance_to(step * 10, Lines::from_position(step as i64), |_| {}).err());
     let Some(fault @ InsertionFault::TooFast { .. }) = fault else { panic!("{fault:?}") };
     assert!(fault.to_string().contains("too fast for edges 250 ns apart"), "{fault}");
 }

@@ -8,7 +8,7 @@ use super::law::{Path, ThermalLaw, ThermalTerm};
 use super::noise::{self, Averaged};
 use super::quantities::{self, THERMAL_ERROR};
 use crate::estimators::regression::{
-    Coefficient, Column, Intercept, Refusal, Regression, fit, t_quantile, t_two_sided,
+    Coefficient, Column, Intercept, Refusal, Regression, fit_unweighted, t_quantile, t_two_sided,
 };
 use crate::statistics::rms;
 use serde::Serialize;
@@ -73,14 +73,14 @@ pub struct ThermalFit {
 /// # Errors
 /// A [`Refusal`]: what is wrong with the rows, sensors that say the same, too few rows that are independent.
 pub fn fit_static(course: &Course, sensors: &[usize]) -> Result<ThermalFit, Refusal> {
-    course.check(sensors)?;
-    let columns: Vec<Column> = sensors.iter().map(|at| column(&course.sensors()[*at])).collect();
+    course.check_sensors(sensors)?;
+    let columns: Vec<Column> = sensors.iter().map(|at| to_column(&course.sensors()[*at])).collect();
     let paths = vec![Path::Direct; sensors.len()];
-    finish(&RegressionDesign { course, sensors, paths: &paths, columns, nuisance: Vec::new(), tau: None })
+    fit_design(&RegressionDesign { course, sensors, paths: &paths, columns, nuisance: Vec::new(), tau: None })
 }
 
 /// A temperature as a column.
-pub(super) fn column(sensor: &Sensor) -> Column {
+pub(super) fn to_column(sensor: &Sensor) -> Column {
     Column::new(sensor.name.as_str(), sensor.values.clone())
 }
 
@@ -110,14 +110,14 @@ impl Tau {
 
 impl RegressionDesign<'_> {
     /// The constant, the terms, then what is not kept.
-    fn all(&self) -> Vec<Column> {
+    fn build_all_columns(&self) -> Vec<Column> {
         let ones = Column::new("intercept", vec![1.0; self.course.rows()]);
         let tau = self.tau.iter().map(|tau| tau.by_log_tau.clone());
         let kept = std::iter::once(ones).chain(self.columns.iter().cloned());
         kept.chain(tau).chain(self.nuisance.iter().cloned()).collect()
     }
 
-    fn terms(&self) -> usize {
+    fn count_terms(&self) -> usize {
         self.columns.len()
     }
 }
@@ -126,13 +126,13 @@ impl RegressionDesign<'_> {
 ///
 /// # Errors
 /// As the regression.
-pub(super) fn finish(design: &RegressionDesign<'_>) -> Result<ThermalFit, Refusal> {
+pub(super) fn fit_design(design: &RegressionDesign<'_>) -> Result<ThermalFit, Refusal> {
     let target = Column::new(THERMAL_ERROR, design.course.error_um().to_vec());
     let others: Vec<Column> = design.columns.iter().chain(&design.nuisance).cloned().collect();
-    let plain = fit(&target, &others, Intercept::Fitted)?;
-    let (short, columns) = design.course.condensed(&design.all(), ROWS_MAX);
-    let averaged = noise::average(&short, &columns, short.error_um())?;
-    let coefficients = coefficients(design, &plain, &averaged);
+    let plain = fit_unweighted(&target, &others, Intercept::Fitted)?;
+    let (short, columns) = design.course.condense_rows(&design.build_all_columns(), ROWS_MAX);
+    let averaged = noise::average_over_noises(&short, &columns, short.error_um())?;
+    let coefficients = build_coefficients(design, &plain, &averaged);
     let fitted = |row: usize| {
         let terms = design.columns.iter().zip(&averaged.values[1..]).map(|(c, b)| b * c.values[row]).sum::<f64>();
         let rest = averaged.values.len() - design.nuisance.len();
@@ -141,7 +141,7 @@ pub(super) fn finish(design: &RegressionDesign<'_>) -> Result<ThermalFit, Refusa
     };
     let error = design.course.error_um().iter().enumerate();
     let residuals_um: Vec<f64> = error.map(|(row, error)| error - fitted(row)).collect();
-    let law = law(design, &averaged, &coefficients, &residuals_um);
+    let law = build_law(design, &averaged, &coefficients, &residuals_um);
     Ok(ThermalFit {
         law,
         coefficients,
@@ -160,25 +160,29 @@ pub(super) fn finish(design: &RegressionDesign<'_>) -> Result<ThermalFit, Refusa
     })
 }
 
-fn coefficients(design: &RegressionDesign<'_>, plain: &Regression, averaged: &Averaged) -> Vec<ThermalCoefficient> {
+fn build_coefficients(
+    design: &RegressionDesign<'_>,
+    plain: &Regression,
+    averaged: &Averaged,
+) -> Vec<ThermalCoefficient> {
     let df = averaged.degrees_of_freedom;
-    let count = 1 + design.terms() + usize::from(design.tau.is_some());
+    let count = 1 + design.count_terms() + usize::from(design.tau.is_some());
     let own = t_quantile(0.5 + 0.5 * CONFIDENCE, df);
     let joint = t_quantile(1.0 - 0.5 * (1.0 - CONFIDENCE) / count as f64, df);
     let around = |value: f64, half: f64| (value - half, value + half);
-    let mut all: Vec<ThermalCoefficient> = (0..=design.terms())
+    let mut all: Vec<ThermalCoefficient> = (0..=design.count_terms())
         .map(|at| {
             let (value, sd) = (averaged.values[at], averaged.covariance[at][at].max(0.0).sqrt());
             let p = if sd > 0.0 { t_two_sided(value / sd, df) } else { 0.0 };
             let variance_inflation = plain.coefficients[at].variance_inflation;
-            let name = if at == 0 { "intercept".to_owned() } else { name(design, at - 1) };
+            let name = if at == 0 { "intercept".to_owned() } else { format_term_name(design, at - 1) };
             let interval = around(value, own * sd);
             let own = Coefficient { name, value, standard_error: sd, interval, p, variance_inflation };
             ThermalCoefficient { own, joint_interval: around(value, joint * sd) }
         })
         .collect();
     if let Some(tau) = &design.tau {
-        let at = 1 + design.terms();
+        let at = 1 + design.count_terms();
         let sd = averaged.covariance[at][at].max(0.0).sqrt();
         let tau_s = tau.better_s(averaged, at);
         let times = |factor: f64| (tau_s * (-factor * sd).exp(), tau_s * (factor * sd).exp());
@@ -197,25 +201,25 @@ fn coefficients(design: &RegressionDesign<'_>, plain: &Regression, averaged: &Av
     all
 }
 
-fn name(design: &RegressionDesign<'_>, term: usize) -> String {
+fn format_term_name(design: &RegressionDesign<'_>, term: usize) -> String {
     let sensor = &design.course.sensors()[design.sensors[term]].name;
     if design.paths[term] == Path::Lagged { format!("late({sensor})") } else { sensor.clone() }
 }
 
-fn law(
+fn build_law(
     design: &RegressionDesign<'_>,
     averaged: &Averaged,
     all: &[ThermalCoefficient],
     residuals: &[f64],
 ) -> ThermalLaw {
-    let size = 1 + design.terms();
+    let size = 1 + design.count_terms();
     let covariance: Vec<Vec<f64>> = averaged.covariance[..size].iter().map(|row| row[..size].to_vec()).collect();
     let term = |at: usize| ThermalTerm {
         sensor: design.course.sensors()[design.sensors[at]].name.clone(),
         path: design.paths[at],
         um_per_k: averaged.values[at + 1],
         interval: all[at + 1].own.interval,
-        range_c: quantities::extremes(&design.course.sensors()[design.sensors[at]].values),
+        range_c: quantities::find_extremes(&design.course.sensors()[design.sensors[at]].values),
     };
     let tau = design.tau.as_ref();
     let mut law = ThermalLaw {
@@ -226,7 +230,7 @@ fn law(
         residual_sd_um: rms(residuals),
         law_sd_max_um: 0.0,
         lag_spread_k: tau.map_or(0.0, |tau| tau.spread_k),
-        terms: (0..design.terms()).map(term).collect(),
+        terms: (0..design.count_terms()).map(term).collect(),
         covariance,
     };
     let point =

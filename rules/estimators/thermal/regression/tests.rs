@@ -7,7 +7,7 @@ const LAW: (f64, &[(&str, f64)]) = (-60.0, &[("bearing_temperature_c", 1.6), ("t
 const SENSORS: [usize; 2] = [1, 4];
 
 fn course(seed: u64) -> Course {
-    let mut random = bed::random(seed);
+    let mut random = bed::create_random(seed);
     let course = bed::warm_ups(&mut random, 4, 180);
     bed::with_error(&mut random, &course, LAW, 0.0, ROUGH)
 }
@@ -23,9 +23,9 @@ fn coverage(seeds: u64) -> ([usize; 3], usize, [usize; 3]) {
         let holds = |(least, greatest): (f64, f64), truth: f64| least <= truth && truth <= greatest;
         let joint = fitted.coefficients.iter().zip(truth).all(|(c, truth)| holds(c.joint_interval, truth));
         together += usize::from(joint);
-        let columns: Vec<Column> = SENSORS.iter().map(|at| column(&course.sensors()[*at])).collect();
+        let columns: Vec<Column> = SENSORS.iter().map(|at| to_column(&course.sensors()[*at])).collect();
         let target = Column::new(THERMAL_ERROR, course.error_um().to_vec());
-        let plain = fit(&target, &columns, Intercept::Fitted).expect("a law");
+        let plain = fit_unweighted(&target, &columns, Intercept::Fitted).expect("a law");
         for (at, truth) in truth.iter().enumerate() {
             each[at] += usize::from(holds(fitted.coefficients[at].own.interval, *truth));
             ordinary[at] += usize::from(holds(plain.coefficients[at].interval, *truth));
@@ -66,7 +66,7 @@ fn the_law_predicts_with_its_deviation() {
     let fitted = fit_static(&course, &SENSORS).expect("a law");
     assert!((1.0..3.0).contains(&fitted.residual_rms_um) && fitted.r2 > 0.9, "{fitted:?}");
     assert!(fitted.memory.effective_rows < 0.3 * course.rows() as f64, "{:?}", fitted.memory);
-    assert_eq!(fitted.law.check(), Ok(()));
+    assert_eq!(fitted.law.check_consistency(), Ok(()));
 }
 
 #[test]

@@ -9,11 +9,11 @@
 
 use super::course::{Course, Sensor};
 use super::cross_validation::{HeldOut, held_out};
-use super::grey::{Grades, Normalisation, grades};
-use super::lagged::late;
+use super::grey::{Grades, Normalisation, compute_grades};
+use super::lagged::compute_lagged_states;
 use super::quantities::{self, Series};
-use super::regression::column;
-use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit};
+use super::regression::to_column;
+use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit_unweighted};
 use serde::Serialize;
 use std::ops::Range;
 
@@ -82,32 +82,32 @@ const BEAM: usize = 8;
 /// Chooses sensors.
 ///
 /// # Errors
-/// A [`Refusal`]: unusable rows (see [`Course::usable`]), or no sensor predicts the error better than its mean.
-pub fn select(course: &Course, settings: SelectionSettings) -> Result<Selection, Refusal> {
-    let candidates = course.usable()?;
+/// A [`Refusal`]: unusable rows (see [`Course::find_usable_sensors`]), or no sensor predicts the error better than its mean.
+pub fn select_sensors(course: &Course, settings: SelectionSettings) -> Result<Selection, Refusal> {
+    let candidates = course.find_usable_sensors()?;
     let search = SensorSelection::new(course, settings, candidates);
-    let chosen = search.choose()?;
-    search.selection(course, chosen)
+    let chosen = search.choose_sensors()?;
+    search.build_selection(course, chosen)
 }
 
 /// Chooses up to two sensors for a law in which every sensor is late, over several time constants.
 ///
 /// # Errors
-/// As [`select`].
+/// As [`select_sensors`].
 pub(super) fn select_late(course: &Course, settings: SelectionSettings, taus_s: &[f64]) -> Result<Selection, Refusal> {
-    let candidates = course.usable()?;
+    let candidates = course.find_usable_sensors()?;
     let settings = SelectionSettings { sensors_max: settings.sensors_max.min(LATE_MAX), ..settings };
     let mut best: Option<(f64, SensorSelection, Vec<usize>)> = None;
     for tau_s in taus_s {
-        let search = SensorSelection::late(course, settings, candidates.clone(), *tau_s);
-        let Ok(chosen) = search.choose() else { continue };
-        let error = search.score(&chosen).map_or(f64::MAX, |it| it.rms_um);
+        let search = SensorSelection::with_lagged_states(course, settings, candidates.clone(), *tau_s);
+        let Ok(chosen) = search.choose_sensors() else { continue };
+        let error = search.score_sensors(&chosen).map_or(f64::MAX, |it| it.rms_um);
         if best.as_ref().is_none_or(|(least, ..)| error < *least) {
             best = Some((error, search, chosen));
         }
     }
     match best {
-        Some((_, search, chosen)) => search.selection(course, chosen),
+        Some((_, search, chosen)) => search.build_selection(course, chosen),
         None => Err(nothing_found()),
     }
 }
@@ -116,9 +116,13 @@ pub(super) fn select_late(course: &Course, settings: SelectionSettings, taus_s: 
 ///
 /// # Errors
 /// As the regression of blocks left out.
-pub(super) fn describe(course: &Course, settings: SelectionSettings, chosen: Vec<usize>) -> Result<Selection, Refusal> {
+pub(super) fn describe_chosen(
+    course: &Course,
+    settings: SelectionSettings,
+    chosen: Vec<usize>,
+) -> Result<Selection, Refusal> {
     let candidates = (0..course.sensors().len()).collect();
-    SensorSelection::new(course, settings, candidates).selection(course, chosen)
+    SensorSelection::new(course, settings, candidates).build_selection(course, chosen)
 }
 
 /// A selection in progress; columns of all sensors, condensed.
@@ -132,49 +136,50 @@ pub(super) struct SensorSelection {
 
 impl SensorSelection {
     fn new(course: &Course, settings: SelectionSettings, candidates: Vec<usize>) -> Self {
-        let (short, _) = course.condensed(&[], ROWS_MAX);
-        let columns = short.sensors().iter().map(column).collect();
-        let (error_um, blocks) = (short.error_um().to_vec(), short.blocks());
+        let (short, _) = course.condense_rows(&[], ROWS_MAX);
+        let columns = short.sensors().iter().map(to_column).collect();
+        let (error_um, blocks) = (short.error_um().to_vec(), short.split_into_blocks());
         Self { settings, candidates, columns, error_um, blocks }
     }
 
     /// The same with the state of every sensor in its place.
-    fn late(course: &Course, settings: SelectionSettings, candidates: Vec<usize>, tau_s: f64) -> Self {
-        let state = |sensor: &Sensor| Column::new(sensor.name.as_str(), late(course, &sensor.values, tau_s));
+    fn with_lagged_states(course: &Course, settings: SelectionSettings, candidates: Vec<usize>, tau_s: f64) -> Self {
+        let state =
+            |sensor: &Sensor| Column::new(sensor.name.as_str(), compute_lagged_states(course, &sensor.values, tau_s));
         let states: Vec<Column> = course.sensors().iter().map(state).collect();
-        let (short, columns) = course.condensed(&states, ROWS_MAX);
-        let (error_um, blocks) = (short.error_um().to_vec(), short.blocks());
+        let (short, columns) = course.condense_rows(&states, ROWS_MAX);
+        let (error_um, blocks) = (short.error_um().to_vec(), short.split_into_blocks());
         Self { settings, candidates, columns, error_um, blocks }
     }
 
-    fn of(&self, sensors: &[usize]) -> Vec<Column> {
+    fn select_columns(&self, sensors: &[usize]) -> Vec<Column> {
         sensors.iter().map(|at| self.columns[*at].clone()).collect()
     }
 
     /// Error in blocks left out; none where the remaining rows do not identify the coefficients.
-    pub(super) fn score(&self, sensors: &[usize]) -> Option<HeldOut> {
-        held_out(&self.of(sensors), &self.error_um, &self.blocks).ok()
+    pub(super) fn score_sensors(&self, sensors: &[usize]) -> Option<HeldOut> {
+        held_out(&self.select_columns(sensors), &self.error_um, &self.blocks).ok()
     }
 
     /// Greatest variance inflation, and condition number; none where the sensors are linearly dependent.
-    pub(super) fn inflation(&self, sensors: &[usize]) -> Option<(f64, f64)> {
+    pub(super) fn compute_inflation(&self, sensors: &[usize]) -> Option<(f64, f64)> {
         let target = Column::new(quantities::THERMAL_ERROR, self.error_um.clone());
-        let fitted = fit(&target, &self.of(sensors), Intercept::Fitted).ok()?;
+        let fitted = fit_unweighted(&target, &self.select_columns(sensors), Intercept::Fitted).ok()?;
         let factors = fitted.coefficients.iter().filter_map(|coefficient| coefficient.variance_inflation);
         Some((factors.fold(1.0, f64::max), fitted.condition_number))
     }
 
-    fn lawful(&self, sensors: &[usize]) -> bool {
-        self.inflation(sensors).is_some_and(|(inflation, _)| inflation <= self.settings.inflation_max)
+    fn is_inflation_allowed(&self, sensors: &[usize]) -> bool {
+        self.compute_inflation(sensors).is_some_and(|(inflation, _)| inflation <= self.settings.inflation_max)
     }
 
-    fn choose(&self) -> Result<Vec<usize>, Refusal> {
+    fn choose_sensors(&self) -> Result<Vec<usize>, Refusal> {
         let mut chosen: Vec<usize> = Vec::new();
         let mut beam: Vec<Vec<usize>> = vec![Vec::new()];
         for size in 1..=self.settings.sensors_max {
-            let longer = self.extended(&beam);
+            let longer = self.extend_lists(&beam);
             let Some(best) = longer.first() else { break };
-            if self.better(best, &chosen) {
+            if self.is_better(best, &chosen) {
                 chosen.clone_from(best);
             }
             // Every sensor alone goes on: two that are useless alone may be right together.
@@ -187,7 +192,7 @@ impl SensorSelection {
     }
 
     /// Every list with one more sensor that is not collinear, best first by the error of blocks left out.
-    fn extended(&self, lists: &[Vec<usize>]) -> Vec<Vec<usize>> {
+    fn extend_lists(&self, lists: &[Vec<usize>]) -> Vec<Vec<usize>> {
         let mut longer: Vec<Vec<usize>> = Vec::new();
         for list in lists {
             let new = self.candidates.iter().filter(|at| !list.contains(at)).map(|at| with(list, *at));
@@ -197,24 +202,24 @@ impl SensorSelection {
                 }
             }
         }
-        let scored = longer.into_iter().filter(|list| self.lawful(list));
-        let mut scored: Vec<_> = scored.filter_map(|list| Some((self.score(&list)?.rms_um, list))).collect();
+        let scored = longer.into_iter().filter(|list| self.is_inflation_allowed(list));
+        let mut scored: Vec<_> = scored.filter_map(|list| Some((self.score_sensors(&list)?.rms_um, list))).collect();
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
         scored.into_iter().map(|(_, list)| list).collect()
     }
 
-    fn better(&self, list: &[usize], other: &[usize]) -> bool {
-        let (Some(ours), Some(theirs)) = (self.score(list), self.score(other)) else { return false };
-        ours.beats(&theirs, self.settings.gain_min)
+    fn is_better(&self, list: &[usize], other: &[usize]) -> bool {
+        let (Some(ours), Some(theirs)) = (self.score_sensors(list), self.score_sensors(other)) else { return false };
+        ours.is_better_than(&theirs, self.settings.gain_min)
     }
 
-    fn selection(&self, course: &Course, chosen: Vec<usize>) -> Result<Selection, Refusal> {
-        let held_out = held_out(&self.of(&chosen), &self.error_um, &self.blocks)?;
-        let graded = Graded::of(course, &self.candidates, self.settings.rho);
+    fn build_selection(&self, course: &Course, chosen: Vec<usize>) -> Result<Selection, Refusal> {
+        let held_out = held_out(&self.select_columns(&chosen), &self.error_um, &self.blocks)?;
+        let graded = Graded::from_course(course, &self.candidates, self.settings.rho);
         Ok(Selection {
-            sensors: verdict::verdicts(self, course, &chosen, &graded),
+            sensors: verdict::judge_sensors(self, course, &chosen, &graded),
             held_out_mean: cross_mean(&self.error_um, &self.blocks)?,
-            condition_number: self.inflation(&chosen).map_or(f64::MAX, |(_, condition)| condition),
+            condition_number: self.compute_inflation(&chosen).map_or(f64::MAX, |(_, condition)| condition),
             by_grades: graded
                 .image
                 .as_ref()
@@ -226,14 +231,14 @@ impl SensorSelection {
     }
 
     fn by_grades(&self, course: &Course, grades: &Grades, count: usize) -> GradeChoice {
-        let names: Vec<String> = grades.order().into_iter().take(count.max(2)).map(str::to_owned).collect();
+        let names: Vec<String> = grades.order_sensors().into_iter().take(count.max(2)).map(str::to_owned).collect();
         let position = |name: &String| course.sensors().iter().position(|sensor| sensor.name == *name);
         let list: Vec<usize> = names.iter().filter_map(position).collect();
-        let inflation = self.inflation(&list);
+        let inflation = self.compute_inflation(&list);
         GradeChoice {
             variance_inflation: inflation.map(|it| it.0),
             condition_number: inflation.map(|it| it.1),
-            held_out_rms_um: self.score(&list).map(|it| it.rms_um),
+            held_out_rms_um: self.score_sensors(&list).map(|it| it.rms_um),
             sensors: names,
         }
     }
@@ -242,7 +247,7 @@ impl SensorSelection {
 fn nothing_found() -> Refusal {
     let what = "no temperature predicts blocks that were left out better than the mean of the others does";
     let next = "record several warm-ups and cool-downs, with sensors near the spindle, the motor and the column";
-    Refusal::new(RefusalKind::NotIdentifiable, what, next).at(quantities::THERMAL_ERROR)
+    Refusal::new(RefusalKind::NotIdentifiable, what, next).with_place(quantities::THERMAL_ERROR)
 }
 
 fn cross_mean(error_um: &[f64], blocks: &[Range<usize>]) -> Result<HeldOut, Refusal> {
@@ -260,9 +265,9 @@ pub(super) struct Graded {
 }
 
 impl Graded {
-    fn of(course: &Course, candidates: &[usize], rho: f64) -> Self {
-        let series: Vec<Series<'_>> = candidates.iter().map(|at| course.sensors()[*at].series()).collect();
-        let of = |normalisation| grades(course.error_um(), &series, normalisation, rho).ok();
+    fn from_course(course: &Course, candidates: &[usize], rho: f64) -> Self {
+        let series: Vec<Series<'_>> = candidates.iter().map(|at| course.sensors()[*at].as_series()).collect();
+        let of = |normalisation| compute_grades(course.error_um(), &series, normalisation, rho).ok();
         Self { image: of(Normalisation::InitialImage), range: of(Normalisation::Range) }
     }
 }

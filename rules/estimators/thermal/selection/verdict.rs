@@ -28,36 +28,42 @@ pub struct SensorVerdict {
     pub held_out_rms_um: Option<f64>,
 }
 
-pub(super) fn verdicts(
+pub(super) fn judge_sensors(
     search: &SensorSelection,
     course: &Course,
     chosen: &[usize],
     graded: &Graded,
 ) -> Vec<SensorVerdict> {
-    (0..course.sensors().len()).map(|at| verdict(search, course, chosen, graded, at)).collect()
+    (0..course.sensors().len()).map(|at| judge_sensor(search, course, chosen, graded, at)).collect()
 }
 
-fn verdict(search: &SensorSelection, course: &Course, chosen: &[usize], graded: &Graded, at: usize) -> SensorVerdict {
+fn judge_sensor(
+    search: &SensorSelection,
+    course: &Course,
+    chosen: &[usize],
+    graded: &Graded,
+    at: usize,
+) -> SensorVerdict {
     let sensor = &course.sensors()[at];
     let is_chosen = chosen.contains(&at);
     let list = if is_chosen { chosen.to_vec() } else { with(chosen, at) };
-    let unusable = quantities::temperature_is_usable(sensor.series(), course.rows()).err();
+    let unusable = quantities::temperature_is_usable(sensor.as_series(), course.rows()).err();
     let usable = unusable.is_none();
     let grade = |grades: &Option<Grades>| {
         grades.as_ref()?.grades.iter().find(|grade| grade.sensor == sensor.name).map(|grade| grade.grade)
     };
-    let inflation = if usable { search.inflation(&list).map(|it| it.0) } else { None };
-    let error = if usable { search.score(&list).map(|it| it.rms_um) } else { None };
+    let inflation = if usable { search.compute_inflation(&list).map(|it| it.0) } else { None };
+    let error = if usable { search.score_sensors(&list).map(|it| it.rms_um) } else { None };
     let reason = match (unusable, is_chosen) {
         (Some(refusal), _) => without_place(refusal),
-        (None, true) => inside(search, chosen, at),
-        (None, false) => outside(search, course, chosen, at, inflation, error),
+        (None, true) => explain_inclusion(search, chosen, at),
+        (None, false) => explain_exclusion(search, course, chosen, at, inflation, error),
     };
     SensorVerdict {
         sensor: sensor.name.clone(),
         chosen: is_chosen,
         reason,
-        correlation: usable.then(|| quantities::correlation(&sensor.values, course.error_um())),
+        correlation: usable.then(|| quantities::correlate_series(&sensor.values, course.error_um())),
         grade_initial_image: grade(&graded.image),
         grade_range: grade(&graded.range),
         variance_inflation: inflation,
@@ -69,15 +75,15 @@ fn without_place(refusal: Refusal) -> String {
     Refusal { place: String::new(), ..refusal }.to_string()
 }
 
-fn inside(search: &SensorSelection, chosen: &[usize], at: usize) -> String {
+fn explain_inclusion(search: &SensorSelection, chosen: &[usize], at: usize) -> String {
     let others: Vec<usize> = chosen.iter().copied().filter(|other| *other != at).collect();
-    let error = |list: &[usize]| search.score(list).map_or(f64::NAN, |it| it.rms_um);
+    let error = |list: &[usize]| search.score_sensors(list).map_or(f64::NAN, |it| it.rms_um);
     let without = error(&others);
     let what = if others.is_empty() { "the mean alone" } else { "the others alone" };
     format!("lowers the error of blocks left out to {:.2} um; {what} leave {without:.2} um", error(chosen))
 }
 
-fn outside(
+fn explain_exclusion(
     search: &SensorSelection,
     course: &Course,
     chosen: &[usize],
@@ -87,10 +93,10 @@ fn outside(
 ) -> String {
     let limit = search.settings.inflation_max;
     let twin = || {
-        let like = |other: &&usize| correlation(course, at, **other).abs();
+        let like = |other: &&usize| correlate_sensors(course, at, **other).abs();
         let nearest = chosen.iter().max_by(|a, b| like(a).total_cmp(&like(b)));
         nearest.map_or_else(String::new, |other| {
-            let (name, r) = (&course.sensors()[*other].name, correlation(course, at, *other));
+            let (name, r) = (&course.sensors()[*other].name, correlate_sensors(course, at, *other));
             format!(", nearest {name} (correlation {r:.3})")
         })
     };
@@ -104,12 +110,12 @@ fn outside(
             format!("{} sensors are enough as asked, and these predict better", chosen.len())
         }
         (_, Some(error)) => {
-            let before = search.score(chosen).map_or(f64::NAN, |it| it.rms_um);
+            let before = search.score_sensors(chosen).map_or(f64::NAN, |it| it.rms_um);
             format!("adds too little: the error of blocks left out would go from {before:.2} to {error:.2} um")
         }
     }
 }
 
-fn correlation(course: &Course, a: usize, b: usize) -> f64 {
-    quantities::correlation(&course.sensors()[a].values, &course.sensors()[b].values)
+fn correlate_sensors(course: &Course, a: usize, b: usize) -> f64 {
+    quantities::correlate_series(&course.sensors()[a].values, &course.sensors()[b].values)
 }

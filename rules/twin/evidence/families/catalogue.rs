@@ -20,10 +20,10 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
             Some(family) => (family.clone(), FORMS_BESIDE),
             None => (Family { sign: sign(*effect), ..Family::of(effect.doc().kind).rare(-1.0) }, FORMS_MAX),
         };
-        let forms = effect.forms(inputs.scene);
+        let forms = effect.propose_forms(inputs.scene);
         let step = forms.len().div_ceil(most).max(1);
         for form in forms.iter().step_by(step) {
-            let Some(columns) = effect.columns(inputs.scene, form) else { continue };
+            let Some(columns) = effect.compute_columns(inputs.scene, form) else { continue };
             let columns = columns.into_iter().map(|(_, column)| (column, 1.0));
             bank.of(family.clone(), format!("{form:?}")).columns(inputs, columns);
         }

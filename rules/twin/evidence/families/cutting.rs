@@ -83,11 +83,11 @@ fn over_speed(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank)
 
 /// Levels of the cut, or of the whole output, that begin with a run or within a long one.
 fn steps(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
-    if let Some(lots) = inputs.scene.words("lot")
+    if let Some(lots) = inputs.scene.text_column("lot")
         && (2..=12).contains(&lots.words().len())
     {
         let codes: Vec<usize> =
-            (0..inputs.rows).map(|row| lots.code(row).map_or(usize::MAX, |code| code as usize)).collect();
+            (0..inputs.rows).map(|row| lots.find_code(row).map_or(usize::MAX, |code| code as usize)).collect();
         let (_, columns) = inputs.of_members(&codes, cut);
         bank.of(BATCH, "lot").columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
     }
@@ -216,11 +216,12 @@ fn last_in_cut(inputs: &RecordingInputs<'_>, cut: &[f64], behind: bool) -> Vec<f
 /// Whatever is told by a word of the recording: an operation whose recipe is wrong, or that runs a consumer.
 fn recipes(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     for column in ["operation", "program"] {
-        let Some(words) = inputs.scene.words(column).filter(|words| (3..=25).contains(&words.words().len())) else {
+        let Some(words) = inputs.scene.text_column(column).filter(|words| (3..=25).contains(&words.words().len()))
+        else {
             continue;
         };
         for (code, word) in words.words().iter().enumerate() {
-            let here = |row: usize| f64::from(u8::from(words.code(row).is_some_and(|at| at as usize == code)));
+            let here = |row: usize| f64::from(u8::from(words.find_code(row).is_some_and(|at| at as usize == code)));
             let law = inputs.column(|row| cut[row] * inputs.cutting(row) * here(row));
             bank.of(RECIPE, format!("{column} {word}")).up_to(0.5).column(inputs, law);
         }

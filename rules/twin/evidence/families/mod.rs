@@ -16,7 +16,7 @@ mod wear;
 
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
-use crate::physics::effect;
+use crate::physics::find_effect;
 use crate::twin::candidates::{shifts_time_in_vain, wanted};
 use crate::twin::model::Model;
 
@@ -36,7 +36,7 @@ pub(super) fn bank(inputs: &RecordingInputs<'_>, model: &Model) -> VariantBank {
     bank.variants.retain(|variant| {
         let Some(kind) = variant.kind() else { return true };
         let vain = in_vain && ["clock_lag", "meter_window"].contains(&kind);
-        !vain && effect(kind).is_none_or(|effect| wanted(effect, model))
+        !vain && find_effect(kind).is_none_or(|effect| wanted(effect, model))
     });
     catalogue::hypotheses(inputs, model, &mut bank);
     nameless::add(inputs, model, &mut bank);

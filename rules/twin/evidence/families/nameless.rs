@@ -68,7 +68,7 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, model: &Model, bank: &mut Varian
             {
                 add_curve(inputs, bank, drawn("fine bumps"), &fine, carrier);
             }
-            let slow = channel.name == "time" || Quantity::of(&channel.name) == Quantity::Temperature;
+            let slow = channel.name == "time" || Quantity::from_column_name(&channel.name) == Quantity::Temperature;
             let skipped = carrier.name == "1" && alone
                 || carrier.name == "speed" && !slow
                 || carrier.name == "engaged" && inputs.knows_cut && !tells_in_cut(&channel.name);
@@ -130,7 +130,7 @@ fn channels(inputs: &RecordingInputs<'_>, model: &Model) -> Vec<Channel> {
     let is_input = |name: &str| {
         let any = |words: &[&str]| words.iter().any(|word| name.contains(word));
         let declared = crate::physics::Role::ALL.iter().any(|role| scene.role_name(*role) == Some(name));
-        name != scene.output() && !any(&ELECTRIC) && (!any(&MEASURED) || declared || read.contains(&name))
+        name != scene.output_name() && !any(&ELECTRIC) && (!any(&MEASURED) || declared || read.contains(&name))
     };
     let mut all: Vec<Channel> = Vec::new();
     let mut add = |name: &str, values: Vec<f64>, fine: bool| {
@@ -171,7 +171,7 @@ fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usi
     }
     let last = sorted.len() - 1;
     let at = |share: f64| {
-        let place = share * crate::statistics::count(last);
+        let place = share * crate::statistics::count_to_f64(last);
         let low = place.floor();
         #[expect(
             clippy::cast_possible_truncation,
@@ -181,7 +181,7 @@ fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usi
         let index = low as usize;
         sorted[index] + (place - low) * (sorted[(index + 1).min(last)] - sorted[index])
     };
-    let step = |k: usize| crate::statistics::count(k) / crate::statistics::count(wanted - 1);
+    let step = |k: usize| crate::statistics::count_to_f64(k) / crate::statistics::count_to_f64(wanted - 1);
     let mut quantiles: Vec<f64> = (0..wanted).map(|k| at(0.02 + 0.96 * step(k))).collect();
     let spread = quantiles[wanted - 1] - quantiles[0];
     quantiles.dedup_by(|b, a| *b - *a <= 1e-12 * spread.max(1e-9));
@@ -190,12 +190,12 @@ fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usi
     }
     let (size, low) = (quantiles.len(), quantiles[0]);
     let range = quantiles[size - 1] - low;
-    let even = |k: usize| low + range * crate::statistics::count(k) / crate::statistics::count(size - 1);
+    let even = |k: usize| low + range * crate::statistics::count_to_f64(k) / crate::statistics::count_to_f64(size - 1);
     let knots: Vec<f64> = (0..size).map(|k| f64::midpoint(quantiles[k], even(k))).collect();
-    let least = range / crate::statistics::count(2 * wanted);
+    let least = range / crate::statistics::count_to_f64(2 * wanted);
     let width = |k: usize| {
         let (before, after) = (k.saturating_sub(1), (k + 1).min(size - 1));
-        ((knots[after] - knots[before]) / crate::statistics::count(after - before)).max(least)
+        ((knots[after] - knots[before]) / crate::statistics::count_to_f64(after - before)).max(least)
     };
     (0..size)
         .map(|k| {
@@ -224,8 +224,8 @@ fn codes(inputs: &RecordingInputs<'_>, group: &str) -> Option<Vec<usize>> {
     if group == "run" {
         return Some(inputs.run.clone());
     }
-    let words = inputs.scene.words(group)?;
-    Some((0..inputs.rows).map(|row| words.code(row).map_or(usize::MAX, |code| code as usize)).collect())
+    let words = inputs.scene.text_column(group)?;
+    Some((0..inputs.rows).map(|row| words.find_code(row).map_or(usize::MAX, |code| code as usize)).collect())
 }
 
 fn waves(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {

@@ -30,7 +30,7 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     bank.of(RUNOUT, "each spell").columns(inputs, of_spells(inputs, &told, &turn, cut));
     // Noise that grows with the cut swells at every frequency: what is no tone of the spindle does so at these as well.
     for off in [0.05, -0.05] {
-        let other = inputs.column(|row| turn[row] + std::f64::consts::TAU * off * crate::statistics::count(row));
+        let other = inputs.column(|row| turn[row] + std::f64::consts::TAU * off * crate::statistics::count_to_f64(row));
         let drawn = Drawn { over: "time".to_owned(), times: "cut", shape: "wave" };
         bank.nameless(drawn).columns(inputs, of_spells(inputs, &told, &other, cut));
     }
@@ -50,9 +50,9 @@ fn angle(inputs: &RecordingInputs<'_>, speed: &[f64]) -> Vec<f64> {
 
 /// Turns of a spell as the sampling shows them: folded to half a turn per row at most.
 fn shown_turns(turn: &[f64], spell: &Range<usize>) -> f64 {
-    let per_row = (turn[spell.end - 1] - turn[spell.start]) / crate::statistics::count(spell.len().max(2) - 1);
+    let per_row = (turn[spell.end - 1] - turn[spell.start]) / crate::statistics::count_to_f64(spell.len().max(2) - 1);
     let folded = per_row / std::f64::consts::TAU;
-    (folded - folded.round()).abs() * crate::statistics::count(spell.len())
+    (folded - folded.round()).abs() * crate::statistics::count_to_f64(spell.len())
 }
 
 /// Stretches of a block (in the cut), none longer than a spell.
