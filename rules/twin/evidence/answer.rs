@@ -77,7 +77,10 @@ impl EvidenceAnswer {
         for name in refused {
             let may_stand = |rival: &&Rival| rival.instead_of == *name && rival.name != UNKNOWN;
             let nearest = self.rivals.iter().filter(may_stand).min_by(|a, b| a.nats.total_cmp(&b.nats));
-            let Some(next) = nearest.map(|rival| rival.name.clone()).filter(|next| !self.names.contains(next)) else {
+            // One law alone would stand there unrivalled, though it was not the best.
+            let several = self.rivals.iter().filter(may_stand).count() > 1;
+            let next = nearest.map(|rival| rival.name.clone()).filter(|next| several && !self.names.contains(next));
+            let Some(next) = next else {
                 unnamed.push(name.clone());
                 continue;
             };
@@ -87,9 +90,6 @@ impl EvidenceAnswer {
             }
             self.names.iter_mut().filter(|known| *known == name).for_each(|known| next.clone_into(known));
             self.rivals.iter_mut().filter(|r| r.instead_of == *name).for_each(|r| next.clone_into(&mut r.instead_of));
-            if !self.rivals.iter().any(|rival| rival.instead_of == next) {
-                self.rivals.push(Rival { name: UNKNOWN.to_owned(), instead_of: next, nats: 0.0 });
-            }
             self.verdict = Verdict::Ambiguous;
         }
         unnamed
