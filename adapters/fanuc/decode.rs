@@ -4,6 +4,7 @@
 use super::answer::{Alarm, FocasAnswer, SpeedUnit, Status, System};
 use super::item::{FocasItem, PmcWidth, PositionFrame, Spindle};
 use super::opening::Generation;
+use super::records;
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, Number, WireError};
 use crate::text::TextEncoding;
@@ -31,98 +32,80 @@ impl From<Generation> for Dialect {
 ///
 /// # Errors
 /// The length does not fit the item.
+#[expect(clippy::too_many_lines, reason = "one arm for each item that a control knows")]
 pub fn read_answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) -> Result<FocasAnswer, WireError> {
     let Dialect { generation, encoding } = dialect.into();
     let text = |bytes: &[u8]| encoding.decode_trimmed(bytes);
-    let mut cursor = Cursor::new("data of an answer", data);
+    let mut whole = Cursor::new("data of an answer", data);
+    let at = &mut whole;
     let answer = match item {
-        FocasItem::System => FocasAnswer::System(read_system(&mut cursor)?),
-        FocasItem::Status => FocasAnswer::Status(read_status(&mut cursor)?),
+        FocasItem::System => FocasAnswer::System(read_system(at)?),
+        FocasItem::Status => FocasAnswer::Status(read_status(at)?),
         FocasItem::StatusLong => {
-            let status = read_status(&mut cursor)?;
-            cursor.read_bytes(8)?;
+            let status = read_status(at)?;
+            at.read_bytes(8)?;
             FocasAnswer::Status(status)
         }
         FocasItem::Feed | FocasItem::SpindleSpeed | FocasItem::Position(_, 1..) => {
-            FocasAnswer::Number(read_number(&mut cursor)?.measured_value())
+            FocasAnswer::Number(read_number(at)?.measured_value())
         }
-        FocasItem::Macro(_) => FocasAnswer::Number(read_number(&mut cursor)?.value()),
-        FocasItem::ToolOffset(..) | FocasItem::WorkOffset(..) => {
-            FocasAnswer::Number(read_number(&mut cursor)?.measured_value())
-        }
+        FocasItem::Macro(_) => FocasAnswer::Number(read_number(at)?.value()),
+        FocasItem::ToolOffset(..) | FocasItem::WorkOffset(..) => FocasAnswer::Number(read_number(at)?.measured_value()),
         FocasItem::Spindles(Spindle::PlainLoad | Spindle::MaxSpeed | Spindle::Gear) => {
-            FocasAnswer::Numbers(read_records(&mut cursor, Number::LEN, |c| {
-                Ok(Some(f64::from(low_half(read_number(c)?))))
-            })?)
+            FocasAnswer::Numbers(read_records(at, Number::LEN, |c| Ok(Some(f64::from(low_half(read_number(c)?)))))?)
         }
         FocasItem::Spindles(_) | FocasItem::Servos(_) | FocasItem::Position(..) => {
-            FocasAnswer::Numbers(read_records(&mut cursor, Number::LEN, |cursor| {
-                Ok(read_number(cursor)?.measured_value())
-            })?)
+            FocasAnswer::Numbers(read_records(at, Number::LEN, |c| Ok(read_number(c)?.measured_value()))?)
         }
-        FocasItem::FeedUnit => FocasAnswer::Unit(decode_speed_unit(generation, cursor.read_i16()?)),
-        FocasItem::PositionUnit(frame) => {
-            FocasAnswer::Units(read_records(&mut cursor, 4, |c| position_unit(c, frame))?)
-        }
+        FocasItem::FeedUnit => FocasAnswer::Unit(decode_speed_unit(generation, at.read_i16()?)),
+        FocasItem::PositionUnit(frame) => FocasAnswer::Units(read_records(at, 4, |c| position_unit(c, frame))?),
         FocasItem::SpindleUnit => {
             // The library says rpm whatever the number is.
-            cursor.read_i16()?;
+            at.read_i16()?;
             FocasAnswer::Unit(SpeedUnit::Rpm)
         }
         FocasItem::HandleRetrace | FocasItem::ToolMode | FocasItem::Count(_) | FocasItem::TuningMode => {
-            FocasAnswer::Whole(i32::from(cursor.read_i16()?))
+            FocasAnswer::Whole(i32::from(at.read_i16()?))
         }
-        FocasItem::Sequence | FocasItem::BlockCount | FocasItem::AlarmBits => FocasAnswer::Whole(cursor.read_i32()?),
-        FocasItem::AxisNames | FocasItem::SpindleNames(_) => {
-            FocasAnswer::Names(read_records(&mut cursor, 4, read_name)?)
-        }
-        FocasItem::Program => FocasAnswer::Program { running: cursor.read_i32()?, main: cursor.read_i32()? },
-        FocasItem::ProgramName => {
-            FocasAnswer::Named { number: cursor.read_i32()?, name: text(read_rest(&mut cursor)?) }
-        }
-        FocasItem::ProgramPath | FocasItem::MainProgram => FocasAnswer::Text(text(read_rest(&mut cursor)?)),
+        FocasItem::Sequence | FocasItem::BlockCount | FocasItem::AlarmBits => FocasAnswer::Whole(at.read_i32()?),
+        FocasItem::AxisNames | FocasItem::SpindleNames(_) => FocasAnswer::Names(read_records(at, 4, read_name)?),
+        FocasItem::Program => FocasAnswer::Program { running: at.read_i32()?, main: at.read_i32()? },
+        FocasItem::ProgramName => FocasAnswer::Named { number: at.read_i32()?, name: text(read_rest(at)?) },
+        FocasItem::ProgramPath | FocasItem::MainProgram => FocasAnswer::Text(text(read_rest(at)?)),
         FocasItem::Alarms(_) => {
             let length = 16 + super::request::ALARM_TEXT_LEN;
-            FocasAnswer::Alarms(read_records(&mut cursor, length, |cursor| read_alarm(cursor, encoding))?)
+            FocasAnswer::Alarms(read_records(at, length, |c| read_alarm(c, encoding))?)
         }
-        FocasItem::ModalGroup(_) => {
-            FocasAnswer::Groups(read_records(&mut cursor, 2, |cursor| Ok(cursor.read_bytes(2)?[0]))?)
-        }
-        FocasItem::ModalWord(_) => modal_word(&mut cursor)?,
-        FocasItem::Parameter(wanted, axis) => read_parameter(&mut cursor, generation, wanted, axis, REAL)?,
-        FocasItem::Diagnosis(wanted, axis) => read_parameter(&mut cursor, generation, wanted, axis, DIAGNOSIS_REAL)?,
+        FocasItem::ModalGroup(_) => FocasAnswer::Groups(read_records(at, 2, |c| Ok(c.read_bytes(2)?[0]))?),
+        FocasItem::ModalWord(_) => modal_word(at)?,
+        FocasItem::Parameter(wanted, axis) => read_parameter(at, generation, wanted, axis, REAL)?,
+        FocasItem::Diagnosis(wanted, axis) => read_parameter(at, generation, wanted, axis, DIAGNOSIS_REAL)?,
         FocasItem::Pmc(stretch) => {
             if data.len() != stretch.len() {
                 return Err(build_mismatch("bytes of PMC memory", stretch.len(), data.len()));
             }
-            FocasAnswer::Memory(read_records(&mut cursor, usize::from(stretch.width.byte_count()), |c| {
+            FocasAnswer::Memory(read_records(at, usize::from(stretch.width.byte_count()), |c| {
                 read_element(c, stretch.width)
             })?)
         }
-        FocasItem::ExecutedText(_) => {
-            FocasAnswer::Named { number: cursor.read_i32()?, name: text(read_rest(&mut cursor)?) }
-        }
-        FocasItem::Timer(_) => FocasAnswer::Time { minutes: cursor.read_i32()?, milliseconds: cursor.read_i32()? },
-        FocasItem::PanelSignals(_) => FocasAnswer::Signals(read_records(&mut cursor, 2, |cursor| cursor.read_i16())?),
-        FocasItem::CncId => FocasAnswer::Text(super::records::cnc_id(&mut cursor)?),
+        FocasItem::ExecutedText(_) => FocasAnswer::Named { number: at.read_i32()?, name: text(read_rest(at)?) },
+        FocasItem::Timer(_) => FocasAnswer::Time { minutes: at.read_i32()?, milliseconds: at.read_i32()? },
+        FocasItem::PanelSignals(_) => FocasAnswer::Signals(read_records(at, 2, |c| c.read_i16())?),
+        FocasItem::CncId => FocasAnswer::Text(records::cnc_id(at)?),
         FocasItem::Messages(_) => {
             let length = 12 + MESSAGE_TEXT_LEN;
-            FocasAnswer::Messages(read_records(&mut cursor, length, |cursor| {
-                super::records::read_message(cursor, encoding)
-            })?)
+            FocasAnswer::Messages(read_records(at, length, |c| records::read_message(c, encoding))?)
         }
-        FocasItem::HistoryCount => FocasAnswer::Whole(cursor.read_i32()?),
+        FocasItem::HistoryCount => FocasAnswer::Whole(at.read_i32()?),
         FocasItem::AlarmHistory(..) => {
             let length = 28 + HISTORY_TEXT_LEN;
-            FocasAnswer::History(read_records(&mut cursor, length, |cursor| {
-                super::records::past_alarm(cursor, encoding)
-            })?)
+            FocasAnswer::History(read_records(at, length, |c| records::past_alarm(c, encoding))?)
         }
-        FocasItem::GCodes => FocasAnswer::Names(read_records(&mut cursor, 12, super::records::g_code)?),
-        FocasItem::ToolGroup => tool_group(&mut cursor)?,
-        FocasItem::ToolLife(group) => super::records::read_tool_life(&mut cursor, group)?,
+        FocasItem::GCodes => FocasAnswer::Names(read_records(at, 12, records::g_code)?),
+        FocasItem::ToolGroup => tool_group(at)?,
+        FocasItem::ToolLife(group) => records::read_tool_life(at, group)?,
     };
-    cursor.check_end()?;
+    whole.check_end()?;
     Ok(answer)
 }
 

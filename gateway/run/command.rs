@@ -97,12 +97,12 @@ impl Commands {
     }
 
     /// Before the tick is decided: what persons at the box have ordered meanwhile.
-    pub fn carry_out_orders(&mut self, gate: &mut Gate, sample: &Sample, health: &mut Health) {
+    pub fn run_orders(&mut self, gate: &mut Gate, sample: &Sample, health: &mut Health) {
         if !std::mem::replace(&mut self.begun, true) {
             self.record_audit(trail::audit_start(gate.limits(), sample.at_ns), gate, health);
         }
         while let Ok(QueuedOrder { order, reply }) = self.inbox.orders.try_recv() {
-            let answer = self.carry_out_order(&order, gate, sample, health);
+            let answer = self.run_order(&order, gate, sample, health);
             // Whoever has gone meanwhile finds it in the audit.
             let _gone = reply.send(answer);
         }
@@ -148,16 +148,10 @@ impl Commands {
         self.network.find_least_override(at_ns)
     }
 
-    fn carry_out_order(
-        &mut self,
-        order: &control::Order,
-        gate: &mut Gate,
-        sample: &Sample,
-        health: &mut Health,
-    ) -> Reply {
+    fn run_order(&mut self, order: &control::Order, gate: &mut Gate, sample: &Sample, health: &mut Health) -> Reply {
         let at_ns = sample.at_ns;
         match order {
-            control::Order::Arm { by, for_s } => self.arm_gate(by, *for_s, gate, sample, health),
+            control::Order::Arm { by, for_s } => self.arm(by, *for_s, gate, sample, health),
             control::Order::Disarm { by } => {
                 let was = gate.current_arming().is_ok();
                 gate.disarm(Disarmed::Person);
@@ -165,11 +159,8 @@ impl Commands {
                 if !was {
                     self.record_audit(trail::audit_order("disarmed", "was_not_armed", "", by, at_ns), gate, health);
                 }
-                Reply::from_success(if was {
-                    "disarmed; the machine is given back to its dial"
-                } else {
-                    "it was not armed"
-                })
+                let text = if was { "disarmed; the machine is given back to its dial" } else { "it was not armed" };
+                Reply::from_success(text)
             }
             control::Order::Acknowledge { by } => {
                 gate.acknowledge_requests();
@@ -183,24 +174,14 @@ impl Commands {
             control::Order::AcknowledgeAlarm { by, code } => {
                 let reply = self.acknowledge_alarm(code, by, at_ns);
                 let outcome = if reply.done { "done" } else { "refused" };
-                self.record_audit(
-                    trail::audit_order("acknowledged", outcome, &format!("alarm {code}"), by, at_ns),
-                    gate,
-                    health,
-                );
+                let row = trail::audit_order("acknowledged", outcome, &format!("alarm {code}"), by, at_ns);
+                self.record_audit(row, gate, health);
                 reply
             }
         }
     }
 
-    fn arm_gate(
-        &mut self,
-        by: &str,
-        for_s: Option<f64>,
-        gate: &mut Gate,
-        sample: &Sample,
-        health: &mut Health,
-    ) -> Reply {
+    fn arm(&mut self, by: &str, for_s: Option<f64>, gate: &mut Gate, sample: &Sample, health: &mut Health) -> Reply {
         let at_ns = sample.at_ns;
         let lasts = for_s.map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::ZERO));
         let armed = match health.is_storing() {
@@ -214,11 +195,8 @@ impl Commands {
                 self.was_armed = true;
                 self.record_audit(trail::audit_arming(&armed), gate, health);
                 self.clear_alarm(at_ns, health);
-                let text = format!(
-                    "{}; {}",
-                    describe_arming(&armed, &self.target, gate.limits()),
-                    StateBasis::from_sample(sample)
-                );
+                let arming = describe_arming(&armed, &self.target, gate.limits());
+                let text = format!("{arming}; {}", StateBasis::from_sample(sample));
                 health.record_event(at_ns, SOURCE, &Notice::new(Severity::Warning, "gate_armed", text.clone()));
                 Reply::from_success(text)
             }
@@ -303,10 +281,8 @@ impl Commands {
                 let asks = matches!(written.occasion, Occasion::Change | Occasion::SignOfLife);
                 self.written = asks.then(|| f64::from(written.asked.percent()));
                 self.trail.write(&written).into_iter().for_each(|row| self.record_audit(row, gate, health));
-                self.trail
-                    .command_from_write(&written, &self.target)
-                    .into_iter()
-                    .for_each(|row| health.keep_record(row.into()));
+                let command = self.trail.command_from_write(&written, &self.target);
+                command.into_iter().for_each(|row| health.keep_record(row.into()));
                 written.fault.into_iter().for_each(|fault| self.raise_fault(&fault, sample.at_ns, gate, health));
             }
             ActuatorReport::Seen(reaction) => {
@@ -319,11 +295,8 @@ impl Commands {
             ActuatorReport::Moved(moved) => self.record_offset_result(&moved, sample, gate, health),
             ActuatorReport::Withdrawn(order) => gate.offsets_mut().withdraw_order(order),
             ActuatorReport::Asked(ask, failed) => {
-                self.record_audit(
-                    trail::audit_ladder_request(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns),
-                    gate,
-                    health,
-                );
+                let row = trail::audit_ladder_request(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns);
+                self.record_audit(row, gate, health);
                 if let Some(failed) = failed {
                     health.record_event(sample.at_ns, SOURCE, &Notice::new(Severity::Error, "ask_failed", failed));
                 }
@@ -372,8 +345,8 @@ impl Commands {
     /// Gives the machine back and ends.
     pub fn close(&mut self, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         let mut said = Vec::new();
-        self.actuator_worker
-            .order_shifts(&gate.offsets().list_restore_orders(), false, sample.at_ns, |it| said.push(it));
+        let orders = gate.offsets().list_restore_orders();
+        self.actuator_worker.order_shifts(&orders, false, sample.at_ns, |it| said.push(it));
         self.actuator_worker.close(|it| said.push(it));
         self.accept_reports(said, sample, gate, health);
         // What the page has asked to be noted just before the end is noted too.

@@ -124,7 +124,7 @@ impl Ticker {
             let alive = self.feed.sample_into(&mut sample, now_ns);
             self.fill_from_recipe(&mut sample, now_ns);
             self.scripts.apply_changes(&mut self.pipeline, &mut self.health, &self.run_flags, (now_ns, sample.at_ns));
-            self.commands.carry_out_orders(self.pipeline.gate_mut(), &sample, &mut self.health);
+            self.commands.run_orders(self.pipeline.gate_mut(), &sample, &mut self.health);
             self.wear.supply_models(&mut self.pipeline, sample.at_ns, &mut self.health);
             let inferred = *self.pipeline.infer_estimates(&sample);
             self.feed.alignment_mut().record_state(sample.at_ns, inferred.state);
@@ -177,7 +177,7 @@ impl Ticker {
             // Before the first tick there is nothing to order about.
             let Some(last_ns) = last_ns.filter(|_| left > 0) else { return };
             left -= 1;
-            commands.carry_out_orders(pipeline.gate_mut(), sample, health);
+            commands.run_orders(pipeline.gate_mut(), sample, health);
             commands.let_go(pipeline, sample, last_ns, health);
         })
     }

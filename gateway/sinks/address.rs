@@ -144,9 +144,9 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String
 /// Which build has it. The keys are right there, and are not told as unknown here.
 #[cfg(not(feature = "opcua"))]
 fn without_opcua(keys: &mut Keys) -> String {
-    let _login = adapters::address::Login::of(keys);
+    let _login = adapters::address::Login::from_keys(keys);
     for key in ["anonymous", "certificates", "manufacturer", "model", "serial_number"] {
-        let _known_elsewhere = keys.text(key);
+        let _known_elsewhere = keys.take_text(key);
     }
     "this program was built without OPC UA; `cargo build --release --features opcua` makes one that has it".to_owned()
 }

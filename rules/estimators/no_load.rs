@@ -58,7 +58,7 @@ pub struct NoLoad {
 }
 
 impl NoLoad {
-    /// Not just the rough idea of [`NoLoadTable::estimate_rough_power`].
+    /// Not just the rough idea of [`NoLoadTable::rough_power`].
     #[must_use]
     pub fn is_estimate(&self) -> bool {
         self.origin != NoLoadOrigin::None
@@ -207,7 +207,7 @@ impl StagePowers {
     }
 
     /// The power law alone, and its uncertainty; `None` too far from any known speed.
-    fn estimate_by_power_law(&self, n: f64, now_ns: TimeNs, settings: &Settings) -> Option<(f64, f64, f64)> {
+    fn by_power_law(&self, n: f64, now_ns: TimeNs, settings: &Settings) -> Option<(f64, f64, f64)> {
         let (_, distance) = self.find_nearest_speed(n).filter(|(_, distance)| *distance <= ROUGH_SPAN)?;
         let weights = self.by_law(n);
         let power_w = weights.weigh_powers(&self.powers_w);
@@ -285,13 +285,7 @@ impl NoLoadTable {
     ///
     /// # Errors
     /// [`NoEstimate::NotLearned`] or [`NoEstimate::Extrapolated`].
-    pub fn estimate_power(
-        &self,
-        stage: usize,
-        speed_rpm: f64,
-        now_ns: TimeNs,
-        settings: &Settings,
-    ) -> Result<NoLoad, NoEstimate> {
+    pub fn get(&self, stage: usize, speed_rpm: f64, now_ns: TimeNs, settings: &Settings) -> Result<NoLoad, NoEstimate> {
         let n = speed_rpm.abs();
         let stage = self.stages.get(stage).ok_or(NoEstimate::NotLearned)?;
         if let Some(at) = stage.find_speed_near(n, settings.speed_tolerance) {
@@ -319,18 +313,11 @@ impl NoLoadTable {
         Ok(NoLoad { power_w, sd_w, noise_gain, origin, supply_log: stage.supply_log(&weights) })
     }
 
-    /// A rough idea of no-load power where [`NoLoadTable::estimate_power`] refuses: good enough to tell a heavy cut from none, not to
+    /// A rough idea of no-load power where [`NoLoadTable::get`] refuses: good enough to tell a heavy cut from none, not to
     /// be called an estimate. `None` where the gear stage has no known power within a factor of two of the speed.
     #[must_use]
-    pub fn estimate_rough_power(
-        &self,
-        stage: usize,
-        speed_rpm: f64,
-        now_ns: TimeNs,
-        settings: &Settings,
-    ) -> Option<NoLoad> {
-        let (power_w, sd_w, supply_log) =
-            self.stages.get(stage)?.estimate_by_power_law(speed_rpm.abs(), now_ns, settings)?;
+    pub fn rough_power(&self, stage: usize, speed_rpm: f64, now_ns: TimeNs, settings: &Settings) -> Option<NoLoad> {
+        let (power_w, sd_w, supply_log) = self.stages.get(stage)?.by_power_law(speed_rpm.abs(), now_ns, settings)?;
         Some(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::None, supply_log })
     }
 }
@@ -356,7 +343,7 @@ mod tests {
         let mut table = learned(&[(600.0, 400.0), (1200.0, 800.0)], &settings);
         let later = 600 * SECOND_NS;
         table.learn_power(point(600.0, 380.0), 2.0, 0.0, later, &settings);
-        let other = table.estimate_power(0, 1200.0, later, &settings).expect("known");
+        let other = table.get(0, 1200.0, later, &settings).expect("known");
         assert!(other.power_w < 780.0 && other.power_w > 760.0, "{other:?}");
         assert!(other.sd_w > 10.0, "less sure than a measurement: {other:?}");
     }
@@ -365,7 +352,7 @@ mod tests {
     fn what_is_known_grows_old_but_not_without_bound() {
         let settings = Settings::default();
         let table = learned(&[(600.0, 400.0)], &settings);
-        let sd = |after_s: i64| table.estimate_power(0, 600.0, after_s * SECOND_NS, &settings).expect("known").sd_w;
+        let sd = |after_s: i64| table.get(0, 600.0, after_s * SECOND_NS, &settings).expect("known").sd_w;
         assert!(sd(0) < 2.1 && sd(60) > 4.0 && sd(3600) > 15.0);
         assert!(sd(1_000_000) < 1.01 * 400.0 * settings.no_load_drift.hypot(2.0 / 400.0));
     }
@@ -375,7 +362,7 @@ mod tests {
         let settings = Settings::default();
         let mut table = learned(&[(600.0, 400.0), (600.0, 401.0), (600.0, 399.0)], &settings);
         table.learn_power(point(600.0, 520.0), 2.0, 0.0, SECOND_NS, &settings);
-        assert!((table.estimate_power(0, 600.0, SECOND_NS, &settings).expect("known").power_w - 520.0).abs() < 6.0);
+        assert!((table.get(0, 600.0, SECOND_NS, &settings).expect("known").power_w - 520.0).abs() < 6.0);
     }
 
     #[test]
@@ -400,11 +387,11 @@ mod tests {
             table.learn_power(point(speed, power), 1.0, 0.0, 0, &settings);
         }
         assert_eq!(table.points().count(), 1);
-        let rough = table.estimate_rough_power(0, 900.0, 0, &settings).expect("within a factor of two");
+        let rough = table.rough_power(0, 900.0, 0, &settings).expect("within a factor of two");
         assert!((rough.power_w - 400.0 * 1.5_f64.powf(1.3)).abs() < 1e-9 && rough.sd_w > 0.1 * rough.power_w);
         assert!(!rough.is_estimate());
-        assert_eq!(table.estimate_power(0, 900.0, 0, &settings), Err(NoEstimate::NotLearned));
-        assert_eq!(table.estimate_rough_power(0, 1300.0, 0, &settings), None);
-        assert_eq!(table.estimate_rough_power(1, 600.0, 0, &settings), None);
+        assert_eq!(table.get(0, 900.0, 0, &settings), Err(NoEstimate::NotLearned));
+        assert_eq!(table.rough_power(0, 1300.0, 0, &settings), None);
+        assert_eq!(table.rough_power(1, 600.0, 0, &settings), None);
     }
 }

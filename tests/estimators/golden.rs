@@ -38,23 +38,23 @@ fn machine() -> (NoLoadTable, Settings) {
 #[test]
 fn no_load_power_between_the_known_speeds_is_the_published_one() {
     let (table, settings) = machine();
-    let known = table.estimate_power(0, 800.0, 0, &settings).expect("known");
+    let known = table.get(0, 800.0, 0, &settings).expect("known");
     assert!((known.power_w - 500.0).abs() < 1e-9, "{known:?}");
     assert!((known.noise_gain - 1.106).abs() < 1e-3);
     assert_eq!(known.origin, NoLoadOrigin::Interpolated);
     assert!((known.power_w / 505.0 - 1.0).abs() < 0.01, "measured: 505 W");
-    assert_eq!(table.estimate_power(0, -800.0, 0, &settings), Ok(known), "either direction");
-    assert_eq!(table.estimate_power(1, 800.0, 0, &settings), Err(NoEstimate::NotLearned), "never across a gear stage");
+    assert_eq!(table.get(0, -800.0, 0, &settings), Ok(known), "either direction");
+    assert_eq!(table.get(1, 800.0, 0, &settings), Err(NoEstimate::NotLearned), "never across a gear stage");
 }
 
 #[test]
 fn extrapolation_is_flagged_up_to_a_noise_gain_of_three_and_refused_beyond() {
     let (table, settings) = machine();
-    let known = table.estimate_power(0, 1000.0, 0, &settings).expect("flagged");
+    let known = table.get(0, 1000.0, 0, &settings).expect("flagged");
     assert_eq!(known.origin, NoLoadOrigin::Extrapolated);
     assert!((known.noise_gain - 3.0).abs() < 1e-9 && known.sd_w > 3.0 * 0.03 * 300.0);
     for (speed, gain) in [(1200.0, 11.4455), (1500.0, 33.6006)] {
-        match table.estimate_power(0, speed, 0, &settings) {
+        match table.get(0, speed, 0, &settings) {
             Err(NoEstimate::Extrapolated { noise_gain }) => assert!((noise_gain - gain).abs() < 1e-3),
             other => panic!("{other:?}"),
         }
@@ -67,7 +67,7 @@ fn a_slope_break_errs_by_three_percent_and_says_so() {
     // Slope 0.5 W/rpm up to 700 rpm, 0.1 W/rpm beyond: the truth at 800 rpm is 420 W.
     let table = [(500.0, 310.0), (600.0, 360.0), (700.0, 410.0), (900.0, 430.0)];
     settings.set_no_load_table(0, &table).expect("a table");
-    let known = NoLoadTable::new(&settings).estimate_power(0, 800.0, 0, &settings).expect("known");
+    let known = NoLoadTable::new(&settings).get(0, 800.0, 0, &settings).expect("known");
     assert!((known.power_w - 433.3).abs() < 0.1, "{known:?}");
     assert!((known.power_w - 420.0).abs() < 2.0 * known.sd_w);
 }

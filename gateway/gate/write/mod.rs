@@ -177,9 +177,7 @@ impl<A: Actuator> OverrideWriter<A> {
         match (begins, self.find_interruption(at_ns, clock)) {
             (Ok(false), _) => None,
             (Err(fault), _) | (Ok(true), Some(fault)) => self.track_failure(|_| Some(failed(fault))),
-            (Ok(true), None) => {
-                self.track_failure(|writer| writer.write(occasion, verdict.permitted, verdict.at_ns, clock))
-            }
+            (Ok(true), None) => self.track_failure(|it| it.write(occasion, verdict.permitted, verdict.at_ns, clock)),
         }
     }
 
@@ -385,10 +383,8 @@ impl<A: Actuator> OverrideWriter<A> {
     fn find_mismatch(&mut self, asked: OverridePct, found: OverridePct, now_ns: TimeNs) -> Option<Fault> {
         self.remove_settled(now_ns);
         let rule = self.pace.rule;
-        let known = self
-            .recent
-            .iter()
-            .any(|(_, pct)| self.dials.iter().any(|(_, dial)| rule.combine_overrides(*dial, *pct) == found));
+        let makes = |pct: OverridePct| self.dials.iter().any(|(_, dial)| rule.combine_overrides(*dial, pct) == found);
+        let known = self.recent.iter().any(|(_, pct)| makes(*pct));
         (!known).then(|| self.read_back(asked, found))
     }
 

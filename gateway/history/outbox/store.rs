@@ -49,7 +49,7 @@ pub(super) struct OutboxContents {
 }
 
 impl OutboxContents {
-    pub(super) fn to_figures(&self, lost: u64) -> OutboxFigures {
+    pub(super) fn to_figures(self, lost: u64) -> OutboxFigures {
         let seconds =
             self.newest_ns.zip(self.first_ns).map(|(newest, first)| (newest - first) as f64 / SECOND_NS as f64);
         let rate = seconds.filter(|seconds| *seconds >= 60.0).map(|seconds| self.added_bytes as f64 / seconds);

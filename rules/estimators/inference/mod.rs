@@ -126,8 +126,8 @@ impl Inference {
         }
         let (memory, settings) = (&self.memory, &self.settings);
         let stage = memory.signals.stage();
-        let learned = memory.no_load.estimate_power(stage, speed_rpm, inputs.at_ns, settings);
-        let rough = || memory.no_load.estimate_rough_power(stage, speed_rpm, inputs.at_ns, settings);
+        let learned = memory.no_load.get(stage, speed_rpm, inputs.at_ns, settings);
+        let rough = || memory.no_load.rough_power(stage, speed_rpm, inputs.at_ns, settings);
         let known = learned.or_else(|reason| self.find_upper_bound(stage, speed_rpm).or_else(rough).ok_or(reason));
         known.map(|known| memory.supply.add_exponent_doubt(known, inputs.supply_log))
     }
@@ -292,7 +292,7 @@ impl Inference {
     fn explain_refusal(&self, inputs: &TickInputs) -> NoEstimate {
         let speed_rpm = inputs.speed.unwrap_or(0.0);
         let table = &self.memory.no_load;
-        let refused = table.estimate_power(self.memory.signals.stage(), speed_rpm, inputs.at_ns, &self.settings);
+        let refused = table.get(self.memory.signals.stage(), speed_rpm, inputs.at_ns, &self.settings);
         refused.err().unwrap_or(NoEstimate::NotLearned)
     }
 

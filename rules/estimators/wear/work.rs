@@ -68,7 +68,7 @@ impl CutMoment {
     }
 
     /// Speed, feed per revolution and depth, where all are known.
-    pub(super) fn to_conditions(&self) -> Option<CutConditions> {
+    pub(super) fn to_conditions(self) -> Option<CutConditions> {
         let turns = self.speed_rpm?.abs();
         let speed = cutting_speed_m_min(self.diameter_mm?, turns).ok()?;
         let cut = CutConditions::from_vector([0.0, speed, self.feed_mm_min? / turns.max(1.0), self.depth_mm?]);
