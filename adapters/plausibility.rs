@@ -1,8 +1,8 @@
 //! What is not believed, counted and told: the step between a driver and the merge.
 //!
-//! The limits stand in the table of channels and nowhere else; [`Reading::from_number`](crate::Reading::number) holds every number
+//! The limits stand in the table of channels and nowhere else; [`Reading::from_number`](crate::Reading::from_number) holds every number
 //! against them, so that no driver can go around it. A driver that knows more (a meter without any supply voltage, phases that do
-//! not make the sum) gives [`Reading::from_implausible`](crate::Reading::implausible). Either way the channel has no value, and what the device
+//! not make the sum) gives [`Reading::from_implausible`](crate::Reading::from_implausible). Either way the channel has no value, and what the device
 //! said is counted here and told while it lasts. Nothing is ever cut off to fit.
 
 use crate::channel::ChannelId;

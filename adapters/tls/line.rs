@@ -26,7 +26,7 @@ impl TcpConnection {
     /// connection.
     ///
     /// # Errors
-    /// What the system or TLS says; [`TlsError::from_io_error`](super::TlsError::within) puts the latter into words.
+    /// What the system or TLS says; [`TlsError::from_io_error`](super::TlsError::from_io_error) puts the latter into words.
     pub fn from_tcp(mut tcp: TcpStream, host: &str, lines: &Lines) -> io::Result<Self> {
         let Some(config) = lines else { return Ok(Self { tcp, host: host.to_owned(), tls: None }) };
         let name = ServerName::try_from(host.to_owned()).map_err(io::Error::other)?;

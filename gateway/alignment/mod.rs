@@ -121,7 +121,7 @@ impl Alignment {
         self.pairs.iter().map(Pair::build_status).collect()
     }
 
-    /// The newest values of [`series`].
+    /// The newest values of [`list_series`].
     #[must_use]
     pub fn current_values(&self) -> [ExtraValue<'static>; SERIES] {
         shown::collect_values(POWERS.map(|name| self.pairs.iter().find(|pair| pair.power_name() == name)))

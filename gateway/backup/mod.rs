@@ -5,7 +5,7 @@
 //! annotations and what was identified; and the configuration, to be read. [`list`] names every file of the data directory, with
 //! the reason where it is not in an archive. The history is copied beside it ([`copy_history`]).
 //!
-//! A restore ([`restore()`]) checks everything first, then changes everything, and what it replaces is kept as an archive. The
+//! A restore ([`restore_backup`]) checks everything first, then changes everything, and what it replaces is kept as an archive. The
 //! configuration is not put back: it says which machine is polled, and a restart with the wrong one would poll another.
 
 pub mod list;

@@ -21,7 +21,7 @@ pub enum WhenFull {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fidelity {
     /// A decimal of at most 9 significant digits and 9 places comes back bit for bit; any other number is rounded to
-    /// the series' resolution. See [`rounded`](super::rounded).
+    /// the series' resolution. See [`round_to_decimals`](super::round_to_decimals).
     Resolution,
     /// Every number comes back bit for bit. Interpolated values then need about 7 bytes each instead of 1 to 2.
     Exact,

@@ -3,7 +3,7 @@
 //! # How a sink is written
 //! A receiver is one type that implements [`Sink`]: connect, send some items, look after an idle connection. Everything
 //! else is common: [`drive`] reads the outbox, keeps the position, tries again with growing pauses, sends live data before
-//! what an outage left behind, and tells how it goes. An address names the receiver ([`SinkAddress`]); [`open()`] makes
+//! what an outage left behind, and tells how it goes. An address names the receiver ([`SinkAddress`]); [`open_sink`] makes
 //! the sink of an address.
 //!
 //! # What is promised

@@ -5,7 +5,7 @@
 //!
 //! - A script is a text that runs from top to bottom at every tick, or every `const EVERY_S = 1.0;` seconds. Functions with
 //!   the names of [`HANDLERS`] run before it when a state, part, program, tool or alarm of the controller has changed.
-//! - It sees the words of [`words`] as variables: channels, estimates, `state`, `now_s`, `dt_s`, and `memory`, which is
+//! - It sees the words of [`list_words`] as variables: channels, estimates, `state`, `now_s`, `dt_s`, and `memory`, which is
 //!   its own; the same as fields of [`RECORDS`], with age and reason of absence. A word without a value is `()`: `has(x)`
 //!   asks, `x ?? 0.0` replaces, a comparison is false. A script that computes with a value that is not there waits: it asks
 //!   for nothing and runs again when it is due.

@@ -17,7 +17,7 @@
 //! | `steady` | stamps of the controller put on the beat of its polling, where that is the steadier clock |
 //! | `fit` | the power model at one lag and window, and its residual |
 //! | `profile` | the residual over lag and window, its minimum and its rivals |
-//! | `estimate` | [`align`]: lag, width, drift and window over all transients, or why they cannot be known |
+//! | `estimate` | [`estimate_lag`]: lag, width, drift and window over all transients, or why they cannot be known |
 //! | `courses` | a file on a clock that nobody set, laid beside the history by its cuts |
 //! | `collect` | transients out of a running machine, without what was measured while it cut |
 //! | `follow` | the lag in force: follows the estimates slowly, stands still while the machine cuts |

@@ -1,7 +1,7 @@
 //! Power separation: what a recording tells about a machine's no-load power and load loss.
 //!
 //! Law: `Pi = Pu(n) + (1 + a0) Pc + a1(n) Pc^2` per gear stage; the split of one sample is [`super::LoadLossLaw`], no-load power
-//! between known speeds is [`super::lagrange`]. Here the numbers of that law are found in recordings.
+//! between known speeds is [`super::lagrange_weights`]. Here the numbers of that law are found in recordings.
 //!
 //! | file | what |
 //! |---|---|

@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `least_squares` | [`fit`]: coefficients with intervals, and how good the fit is |
+//! | `least_squares` | [`fit_unweighted`]: coefficients with intervals, and how good the fit is |
 //! | `prediction` | what a fit says at a new point, and tests between fits |
 //! | `distributions` | Student's t and Fisher's F |
 //! | `series` | level and trend of noise that remembers |

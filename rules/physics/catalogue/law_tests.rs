@@ -5,7 +5,7 @@ use super::tests::{self, scene, set, set_words};
 use crate::physics::{Form, Scene};
 use adapters::recording::Recording;
 
-fn compute_column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
+fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
     tests::column(find_effect(kind).expect("known"), scene, form)
 }
 
@@ -16,8 +16,7 @@ fn the_published_cutting_power() {
         set(&mut recording, name, |_| value);
     }
     set(&mut recording, "spindle_power_w", |_| 1.0);
-    let power =
-        compute_column("cutting_power", &scene(&recording, "spindle_power_w"), &Form::from_shape(&[("mc", 0.0)]));
+    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &Form::from_shape(&[("mc", 0.0)]));
     assert!((2000.0 * power[0] - 2000.0 * 2.0 * 0.25 * 120.0 / 60.0).abs() < 1e-9, "kc ap f vc / 60 W");
 }
 
@@ -29,7 +28,7 @@ fn drilling_is_milling_with_the_whole_diameter() {
     }
     set(&mut recording, "spindle_power_w", |_| 1.0);
     let form = Form { name: "drilling", ..Form::from_shape(&[("mc", 0.25)]) };
-    let power = compute_column("cutting_power", &scene(&recording, "spindle_power_w"), &form);
+    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &form);
     let rate_cm3_min = std::f64::consts::PI * 100.0 / 4.0 * 200.0 / 1000.0;
     assert!((power[0] - 0.1_f64.powf(-0.25) * rate_cm3_min / 60.0).abs() < 1e-9);
 }
@@ -42,7 +41,7 @@ fn a_running_mean_and_a_lag_settle_to_the_input() {
     scene.set_simulated(Some(scene.recorded_output().to_vec()));
     for name in ["mean", "lag"] {
         let form = Form { name, ..Form::from_shape(&[("window_s", 1.0)]) };
-        let smear = compute_column("meter_window", &scene, &form);
+        let smear = column("meter_window", &scene, &form);
         assert!(smear[..49].iter().all(|value| value.abs() < 1e-9), "{name}: nothing before the edge");
         assert!(smear[50..58].iter().all(|value| *value < -10.0), "{name}: behind after the edge");
         assert!(smear[199].abs() < 1e-3, "{name}: settled");
@@ -54,7 +53,7 @@ fn inertia_is_the_rate_of_kinetic_energy() {
     let mut recording = Recording::new("ramp", (0..100).map(|row| 0.1 * f64::from(row)).collect(), None);
     set(&mut recording, "spindle_speed_rpm", |row| 20.0 * row as f64);
     set(&mut recording, "spindle_power_w", |_| 0.0);
-    let power = compute_column("spindle_inertia", &scene(&recording, "spindle_power_w"), &Form::without_shape());
+    let power = column("spindle_inertia", &scene(&recording, "spindle_power_w"), &Form::without_shape());
     let energy_j: f64 = power[1..99].iter().map(|power| 0.1 * power).sum();
     let top = 1970.0 * std::f64::consts::PI / 30.0;
     assert!((energy_j / (0.5 * top * top) - 1.0).abs() < 0.01, "{energy_j}");
@@ -73,7 +72,7 @@ fn run_out_needs_more_than_two_samples_per_turn() {
     let runout = find_effect("runout").expect("known");
     assert!(runout.propose_forms(&turning(0.06)).is_empty());
     let fast = turning(0.01);
-    let cosine = compute_column("runout", &fast, &runout.propose_forms(&fast)[0]);
+    let cosine = column("runout", &fast, &runout.propose_forms(&fast)[0]);
     assert!((cosine[0] - cosine[10]).abs() < 1e-6, "ten turns a second, a hundred samples");
 }
 
@@ -85,7 +84,7 @@ fn with_inputs(rows: u32, period_s: f64, output: &str, inputs: &[(&str, &dyn Fn(
     scene(&recording, output)
 }
 
-fn propose_forms(kind: &str, scene: &Scene) -> Vec<Form> {
+fn forms(kind: &str, scene: &Scene) -> Vec<Form> {
     find_effect(kind).expect("known").propose_forms(scene)
 }
 
@@ -109,12 +108,11 @@ fn in_excess_of_a_known_copper_loss_a_weak_field_begins_at_base_speed() {
 #[test]
 fn warm_up_lowers_and_preload_raises_idle_power() {
     let idle = with_inputs(3600, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &|_| 2000.0)]);
-    let warm_up =
-        compute_column("bearing_warm_up", &idle, &Form { name: "lag", ..Form::from_shape(&[("tau_s", 600.0)]) });
+    let warm_up = column("bearing_warm_up", &idle, &Form { name: "lag", ..Form::from_shape(&[("tau_s", 600.0)]) });
     let warm = 2.0_f64.powf(10.0 / 3.0);
     assert!(warm_up[0] == 0.0 && (warm_up[3599] / -warm - 1.0).abs() < 0.01, "{}", warm_up[3599]);
     let gradient = Form { name: "gradient", ..Form::from_shape(&[("tau_s", 120.0), ("slow_tau_s", 720.0)]) };
-    let preload = compute_column("preload_growth", &idle, &gradient);
+    let preload = column("preload_growth", &idle, &gradient);
     let peak = preload.iter().copied().fold(0.0, f64::max);
     assert!(peak > 5.0 * preload[3599] && preload[3599] > 0.0, "rises, then falls as the housing follows");
 }
@@ -122,25 +120,24 @@ fn warm_up_lowers_and_preload_raises_idle_power() {
 #[test]
 fn a_state_needs_a_recording_that_can_tell_it() {
     let short = with_inputs(60, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &|_| 2000.0)]);
-    assert!(propose_forms("bearing_warm_up", &short).is_empty());
-    assert!(propose_forms("preload_growth", &short).is_empty());
+    assert!(forms("bearing_warm_up", &short).is_empty());
+    assert!(forms("preload_growth", &short).is_empty());
 }
 
 #[test]
 fn stribeck_needs_visits_at_creep() {
     let fast = |row: usize| if row % 20 < 10 { 0.5 } else { -0.5 };
-    assert!(propose_forms("stribeck", &with_inputs(400, 0.1, "force_n", &[("velocity_m_s", &fast)])).is_empty());
+    assert!(forms("stribeck", &with_inputs(400, 0.1, "force_n", &[("velocity_m_s", &fast)])).is_empty());
     let creeping = |row: usize| 0.5 * (row as f64 / 30.0).sin();
     let creep = with_inputs(400, 0.1, "force_n", &[("velocity_m_s", &creeping)]);
-    let tried = propose_forms("stribeck", &creep);
+    let tried = forms("stribeck", &creep);
     assert!(tried.iter().any(|form| form.name == "lorentzian"), "{tried:?}");
-    let level =
-        |name| compute_column("stribeck", &creep, &Form { name, ..Form::from_shape(&[("stribeck_speed", 0.1)]) })[45];
+    let level = |name| column("stribeck", &creep, &Form { name, ..Form::from_shape(&[("stribeck_speed", 0.1)]) })[45];
     // At nearly five times the Stribeck speed.
     assert!(level("") < 1e-9 && level("exponential") < 0.02 && (0.03..0.06).contains(&level("lorentzian")));
     let turning = |row: usize| 3000.0 * (row as f64 / 300.0).sin().abs();
     let spindle = with_inputs(4000, 0.1, "spindle_power_w", &[("spindle_speed_rpm", &turning)]);
-    let tried = propose_forms("stribeck", &spindle);
+    let tried = forms("stribeck", &spindle);
     assert!(!tried.is_empty() && tried.iter().all(|form| form.name.is_empty()), "{tried:?}");
 }
 
@@ -152,13 +149,13 @@ fn an_entry_over_a_way_lasts_longer_at_a_slow_feed() {
     let inputs: [(&str, &dyn Fn(usize) -> f64); 2] = [("engaged", &engaged), ("feed_mm_min", &feed)];
     let mut scene = with_inputs(400, 1.0, "spindle_power_w", &inputs);
     scene.set_load(Some((0..400).map(|row| 500.0 * engaged(row)).collect()));
-    assert!(propose_forms("entry_exit", &scene).iter().any(|form| form.name == "travel"));
+    assert!(forms("entry_exit", &scene).iter().any(|form| form.name == "travel"));
     let form = Form { name: "travel", ..Form::from_shape(&[("length_mm", 4.0), ("exit_length_mm", 4.0)]) };
-    let entry = compute_column("entry_exit", &scene, &form);
+    let entry = column("entry_exit", &scene, &form);
     let rows = |pass: usize| (40 * pass..40 * pass + 40).filter(|row| entry[*row] > 0.0).count();
     assert_eq!((rows(0), rows(1)), (4, 1), "a millimetre per row, and four");
     let even = with_inputs(400, 1.0, "spindle_power_w", &[("engaged", &engaged), ("feed_mm_min", &|_| 60.0)]);
-    assert!(propose_forms("entry_exit", &even).iter().all(|form| form.name != "travel"), "at one feed a way is a time");
+    assert!(forms("entry_exit", &even).iter().all(|form| form.name != "travel"), "at one feed a way is a time");
 }
 
 #[test]
@@ -171,9 +168,9 @@ fn every_edge_wears_at_a_rate_of_its_own_and_breaks_in() {
     set(&mut recording, "spindle_power_w", |_| 1.0);
     set_words(&mut recording, "tool", |row| if row < 120 { "T1-a" } else { "T1-b" }.to_owned());
     let scene = scene(&recording, "spindle_power_w");
-    let names: Vec<&str> = propose_forms("flank_wear", &scene).iter().map(|form| form.name).collect();
+    let names: Vec<&str> = forms("flank_wear", &scene).iter().map(|form| form.name).collect();
     assert_eq!(names, ["", "", "", "", "break_in", "break_in", "edges", "edges"]);
-    let edges = propose_forms("flank_wear", &scene).swap_remove(6);
+    let edges = forms("flank_wear", &scene).swap_remove(6);
     let columns = find_effect("flank_wear").expect("known").compute_columns(&scene, &edges).expect("columns");
     assert_eq!(columns.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["k_1", "k_2"]);
     // Half the diameter of the drill cuts.
@@ -186,16 +183,16 @@ fn every_edge_wears_at_a_rate_of_its_own_and_breaks_in() {
     let columns = columns.expect("columns");
     assert!((columns[0].1[60] - 2000.0).abs() < 1e-9 && (columns[1].1[180] - 2000.0).abs() < 1e-9, "half each");
     let broken_in =
-        compute_column("flank_wear", &scene, &Form { name: "break_in", ..Form::from_shape(&[("break_in_min", 1.0)]) });
+        column("flank_wear", &scene, &Form { name: "break_in", ..Form::from_shape(&[("break_in_min", 1.0)]) });
     assert!(broken_in[119] / broken_in[30] < 1.01 && broken_in[30] / broken_in[3] > 2.0);
 }
 
 #[test]
 fn directions_differ_only_where_both_are_visited() {
     let one_way = with_inputs(100, 0.1, "force_n", &[("velocity_m_s", &|row| 0.1 + row as f64 / 100.0)]);
-    assert!(propose_forms("direction_asymmetry", &one_way).is_empty());
+    assert!(forms("direction_asymmetry", &one_way).is_empty());
     let both = with_inputs(100, 0.1, "force_n", &[("velocity_m_s", &|row| (row as f64 / 5.0).sin())]);
-    let level = compute_column("direction_asymmetry", &both, &Form::without_shape());
+    let level = column("direction_asymmetry", &both, &Form::without_shape());
     assert!(level.iter().all(|level| (0.0..=1.0).contains(level)));
 }
 
@@ -205,11 +202,8 @@ fn weight_needs_an_axis_declared_vertical() {
     set(&mut recording, "z_axis_velocity_mm_min", |row| 6000.0 * row as f64);
     set(&mut recording, "total_power_w", |_| 1.0);
     let undeclared = Scene::new(&recording, "total_power_w", &std::collections::BTreeMap::new()).expect("recorded");
-    assert!(propose_forms("gravity_axis", &undeclared).is_empty());
-    assert_eq!(
-        compute_column("gravity_axis", &scene(&recording, "total_power_w"), &Form::without_shape()),
-        vec![0.0, 0.1]
-    );
+    assert!(forms("gravity_axis", &undeclared).is_empty());
+    assert_eq!(column("gravity_axis", &scene(&recording, "total_power_w"), &Form::without_shape()), vec![0.0, 0.1]);
 }
 
 #[test]
@@ -217,7 +211,7 @@ fn a_late_meter_lies_below_a_rising_edge() {
     let mut late = with_inputs(20, 1.0, "spindle_power_w", &[]);
     late.set_simulated(Some((0..20).map(|row| if row < 10 { 100.0 } else { 500.0 }).collect()));
     let delay = |delay_s| Form { name: "delay", ..Form::from_shape(&[("delay_s", delay_s)]) };
-    let column_of = |delay_s| compute_column("clock_lag", &late, &delay(delay_s));
+    let column_of = |delay_s| column("clock_lag", &late, &delay(delay_s));
     assert_eq!(column_of(2.0)[10..13], [-400.0, -400.0, 0.0]);
     assert_eq!(column_of(-1.0)[9..11], [400.0, 0.0]);
     assert_eq!(column_of(0.5)[10], -200.0, "half-way between two rows");
@@ -227,7 +221,7 @@ fn a_late_meter_lies_below_a_rising_edge() {
 fn a_late_flag_moves_the_whole_step_of_the_cut() {
     let engaged = |row: usize| f64::from(u8::from((5..10).contains(&(row % 20))));
     let flagged = with_inputs(40, 1.0, "spindle_power_w", &[("engaged", &engaged)]);
-    let column = compute_column("engagement_timing", &flagged, &Form::from_shape(&[("delay_s", 1.0)]));
+    let column = column("engagement_timing", &flagged, &Form::from_shape(&[("delay_s", 1.0)]));
     assert_eq!((column[5], column[10]), (-800.0, 800.0));
     assert!(column.iter().enumerate().all(|(row, value)| *value == 0.0 || row % 20 == 5 || row % 20 == 10));
 }
@@ -237,7 +231,7 @@ fn taper_starts_again_in_every_pass_and_turns_with_the_direction() {
     let engaged = |row: usize| f64::from(u8::from(row % 20 < 11));
     let place = |row: usize| if row < 20 { (row % 20) as f64 } else { -((row % 20) as f64) };
     let passes = with_inputs(40, 1.0, "spindle_power_w", &[("engaged", &engaged), ("axis_position_mm", &place)]);
-    let slope = compute_column("depth_taper", &passes, &Form::without_shape());
+    let slope = column("depth_taper", &passes, &Form::without_shape());
     assert_eq!((slope[0], slope[10]), (-400.0, 400.0));
     assert_eq!((slope[20], slope[30], slope[15]), (400.0, -400.0, 0.0));
 }
@@ -249,11 +243,11 @@ fn a_batch_steps_at_a_run_with_two_runs_on_either_side() {
     set(&mut recording, "spindle_power_w", |_| 1.0);
     set_words(&mut recording, "run", |row| (row / 10).to_string());
     let runs = scene(&recording, "spindle_power_w");
-    let steps = propose_forms("hardness_batch", &runs);
+    let steps = forms("hardness_batch", &runs);
     let starts: Vec<&str> = steps.iter().filter_map(|form| Some(form.place.as_ref()?.1.as_str())).collect();
     assert_eq!(starts, ["2", "3", "4"]);
     assert!((steps[0].ln_choices - 3.0_f64.ln()).abs() < 1e-12);
-    let step = compute_column("hardness_batch", &runs, &steps[1]);
+    let step = column("hardness_batch", &runs, &steps[1]);
     assert_eq!((step[29], step[30]), (0.0, 800.0));
 }
 
@@ -263,10 +257,10 @@ fn gear_stages_are_taken_from_their_channel() {
     let speed = |row: usize| if row % 10 < 3 { 0.0 } else { 500.0 };
     let inputs: [(&str, &dyn Fn(usize) -> f64); 2] = [("gear_stage", &stage), ("spindle_speed_rpm", &speed)];
     let geared = with_inputs(100, 1.0, "spindle_power_w", &inputs);
-    let forms = propose_forms("gear_stage", &geared);
+    let forms = forms("gear_stage", &geared);
     assert_eq!(forms.len(), 4, "either may be the lossy one, with a slope or without");
     assert_eq!(forms[1].place, Some(("gear_stage".to_owned(), "2".to_owned())));
-    let step = compute_column("gear_stage", &geared, &forms[1]);
+    let step = column("gear_stage", &geared, &forms[1]);
     assert_eq!((step[5], step[99], step[90]), (0.0, 1.0, 0.0), "wheels that stand take nothing");
 }
 
@@ -274,7 +268,7 @@ fn gear_stages_are_taken_from_their_channel() {
 fn a_ceiling_is_where_the_recording_piles_up() {
     let mut recording = Recording::new("ceiling", (0..100).map(f64::from).collect(), None);
     set(&mut recording, "spindle_power_w", |row| (10.0 * row as f64).min(800.0));
-    let forms = propose_forms("saturation", &scene(&recording, "spindle_power_w"));
+    let forms = forms("saturation", &scene(&recording, "spindle_power_w"));
     assert_eq!(forms.iter().filter_map(|form| form.shape_value("ceiling")).collect::<Vec<_>>(), [800.0]);
     // Without a pile only a simulation that goes well beyond the recording suggests a ceiling.
     set(&mut recording, "spindle_power_w", |row| 10.0 * row as f64);
@@ -288,9 +282,7 @@ fn thermal_effects_speak_of_displacements_only() {
     let speed: (&str, &dyn Fn(usize) -> f64) = ("spindle_speed_rpm", &|row| 1000.0 + row as f64);
     let displaced = with_inputs(3600, 1.0, "thermal_error_um", &[speed, ("engaged", &|_| 1.0)]);
     let powered = with_inputs(3600, 1.0, "spindle_power_w", &[speed]);
-    assert!(
-        !propose_forms("spindle_growth", &displaced).is_empty() && propose_forms("spindle_growth", &powered).is_empty()
-    );
+    assert!(!forms("spindle_growth", &displaced).is_empty() && forms("spindle_growth", &powered).is_empty());
     for kind in ["windage", "load_loss", "hardness_batch", "bearing_warm_up", "dry_friction", "flank_wear"] {
         assert!(propose_forms(kind, &displaced).is_empty(), "{kind}");
     }
@@ -309,9 +301,9 @@ fn a_taper_by_distance_is_the_same_at_the_same_place_of_every_pass() {
     let names: Vec<&str> =
         find_effect("depth_taper").expect("known").propose_forms(&scene).iter().map(|form| form.name).collect();
     assert_eq!(names, ["linear", "quadratic", "distance", "distance_quadratic"]);
-    let taper = compute_column("depth_taper", &scene, &Form { name: "distance", ..Form::without_shape() });
+    let taper = column("depth_taper", &scene, &Form { name: "distance", ..Form::without_shape() });
     assert!(taper[20] > 0.0 && (taper[20] - taper[100]).abs() < 1e-9, "{} {}", taper[20], taper[100]);
-    let share = compute_column("depth_taper", &scene, &Form { name: "linear", ..Form::without_shape() });
+    let share = column("depth_taper", &scene, &Form { name: "linear", ..Form::without_shape() });
     assert!((share[59] - share[109]).abs() < 1e-9, "by share the ends of both passes are alike");
 }
 
@@ -320,7 +312,7 @@ fn a_flag_that_is_late_within_a_row_moves_the_whole_cut() {
     // A row in which the tool was in the work for three quarters shows three quarters of the load.
     let share = |row: usize| if row == 10 { 0.75 } else { f64::from(u8::from(row > 10)) };
     let scene = with_inputs(40, 1.0, "spindle_power_w", &[("engaged", &share), ("depth_of_cut_mm", &|_| 1.0)]);
-    let moved = compute_column("engagement_timing", &scene, &Form::from_shape(&[("delay_s", -0.5)]));
+    let moved = column("engagement_timing", &scene, &Form::from_shape(&[("delay_s", -0.5)]));
     let whole = 800.0;
     assert!((moved[9] - 0.375 * whole).abs() < 1e-9, "{}", moved[9]);
     assert!((moved[10] - 0.125 * whole).abs() < 1e-9, "{}", moved[10]);
@@ -331,11 +323,7 @@ fn delays_of_part_of_a_row_are_tried_where_rows_are_fast() {
     let delays_at = |period_s: f64| -> Vec<f64> {
         let mut scene = with_inputs(40, period_s, "axis_force_n", &[]);
         scene.set_simulated(Some((0..40).map(|row| f64::from(row % 7)).collect()));
-        propose_forms("clock_lag", &scene)
-            .iter()
-            .filter_map(|form| form.shape_value("delay_s"))
-            .filter(|s| *s > 0.0)
-            .collect()
+        forms("clock_lag", &scene).iter().filter_map(|form| form.shape_value("delay_s")).filter(|s| *s > 0.0).collect()
     };
     assert_eq!(delays_at(1.0), [0.25, 0.5, 1.0, 1.5, 2.0, 3.0]);
     let fast = delays_at(0.02);
@@ -351,16 +339,16 @@ fn a_controller_unseen_takes_from_heavy_cuts_after_a_while() {
     let inputs: [(&str, &dyn Fn(usize) -> f64); 3] =
         [("engaged", &engaged), ("depth_of_cut_mm", &depth), ("feed_programmed_mm_min", &program)];
     let scene = with_inputs(120, 1.0, "spindle_power_w", &inputs);
-    let tried = propose_forms("constant_load_control", &scene);
+    let tried = forms("constant_load_control", &scene);
     assert!(!tried.is_empty() && tried.iter().all(|form| form.name == "unseen"), "{tried:?}");
     let form = Form { name: "unseen", ..Form::from_shape(&[("exponent", 0.5), ("tau_s", 2.0)]) };
-    let taken = compute_column("constant_load_control", &scene, &form);
+    let taken = column("constant_load_control", &scene, &form);
     // Three times the depth is heavy, one is light, two is the median.
     assert!(taken[45].abs() < 1e-9 && taken[59] < -100.0 && taken[50] > taken[59], "{:?}", &taken[40..60]);
     assert!(taken[19] > 100.0 && taken[39].abs() < 1e-9, "{} {}", taken[19], taken[39]);
     let with_dial_and_actual = |dial: &dyn Fn(usize) -> f64, actual: &dyn Fn(usize) -> f64| {
         let inputs = [inputs[0], inputs[1], inputs[2], ("feed_override_pct", dial), ("feed_mm_min", actual)];
-        propose_forms("constant_load_control", &with_inputs(120, 1.0, "spindle_power_w", &inputs)).len()
+        forms("constant_load_control", &with_inputs(120, 1.0, "spindle_power_w", &inputs)).len()
     };
     let turned = |row: usize| if row.is_multiple_of(2) { 200.0 } else { 150.0 };
     assert_eq!(with_dial_and_actual(&|_| 100.0, &turned), 0, "what the feed became is known");
@@ -372,10 +360,9 @@ fn a_controller_unseen_takes_from_heavy_cuts_after_a_while() {
 fn the_friction_of_a_feed_drive_falls_as_it_warms() {
     let velocity = |row: usize| 6000.0 * (row as f64 / 9.0).sin();
     let scene = with_inputs(1200, 1.0, "axis_force_n", &[("axis_velocity_mm_min", &velocity)]);
-    let tried = propose_forms("bearing_warm_up", &scene);
+    let tried = forms("bearing_warm_up", &scene);
     assert!(tried.iter().any(|form| form.shape_value("tau_s") == Some(150.0)), "{tried:?}");
-    let fall =
-        compute_column("bearing_warm_up", &scene, &Form { name: "lag", ..Form::from_shape(&[("tau_s", 150.0)]) });
+    let fall = column("bearing_warm_up", &scene, &Form { name: "lag", ..Form::from_shape(&[("tau_s", 150.0)]) });
     assert!((0..1200).all(|row| fall[row] * velocity(row) <= 0.0), "against the friction, whatever the direction");
     let size = |rows: std::ops::Range<usize>| fall[rows].iter().map(|x| x.abs()).fold(0.0, f64::max);
     assert!(size(1000..1200) > 5.0 * size(0..20));
@@ -399,7 +386,7 @@ fn a_removal_rate_of_the_moment_has_the_engagement_in_it_already() {
         ];
         let scene = with_inputs(80, 1.0, "spindle_power_w", &inputs);
         let form = Form { name: "milling", ..Form::from_shape(&[("mc", 0.25)]) };
-        compute_column("cutting_power", &scene, &form)
+        column("cutting_power", &scene, &form)
     };
     let (moment, nominal) = (section(&|row| full * engaged(row)), section(&|_| full));
     assert!(moment.iter().zip(&nominal).all(|(a, b)| (a - b).abs() < 1e-9), "{:?} {:?}", &moment[..4], &nominal[..4]);
