@@ -284,7 +284,7 @@ fn thermal_effects_speak_of_displacements_only() {
     let powered = with_inputs(3600, 1.0, "spindle_power_w", &[speed]);
     assert!(!forms("spindle_growth", &displaced).is_empty() && forms("spindle_growth", &powered).is_empty());
     for kind in ["windage", "load_loss", "hardness_batch", "bearing_warm_up", "dry_friction", "flank_wear"] {
-        assert!(propose_forms(kind, &displaced).is_empty(), "{kind}");
+        assert!(forms(kind, &displaced).is_empty(), "{kind}");
     }
 }
 
