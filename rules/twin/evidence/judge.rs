@@ -136,7 +136,7 @@ impl Judge<'_> {
         (kept, gain)
     }
 
-    /// Rows that took no part only withdraw: as long as their error does not fall, the member goes whose absence leaves the
+    /// Rows that took no part only withdraw: as long as their error does not fall noticeably, the member goes whose absence leaves the
     /// least. An error where nothing is left.
     fn not_withdrawn(&self, mut best: Explanation) -> Result<Explanation, Withdrawn> {
         let before = self.held_out_square(&self.inputs.simulated);
@@ -146,7 +146,8 @@ impl Judge<'_> {
         }
         let found = names_of(&best);
         let mut left = after(&best);
-        while left >= before || self.predicts(&best).together < THRESHOLDS.predicted {
+        let enough = (1.0 - THRESHOLDS.held_out_square) * before;
+        while left >= enough || self.predicts(&best).together < THRESHOLDS.predicted {
             let size = best.members.len();
             let without = |gone: usize| {
                 let kept: Vec<usize> = (0..size).filter(|member| *member != gone).collect();
