@@ -157,12 +157,6 @@ fn runs_of(scene: &Scene, stretch: &str) -> Option<(usize, usize)> {
     (first <= last).then_some((first, last))
 }
 
-/// A stretch of runs as a word.
-pub(crate) fn stretch_of_runs(scene: &Scene, first: usize, last: usize) -> String {
-    let names = scene.run_names();
-    format!("{}{RUN_TO_RUN}{}", names[first], names[last])
-}
-
 /// Between the first and the last run of a stretch.
 const RUN_TO_RUN: &str = " to ";
 

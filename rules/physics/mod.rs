@@ -224,12 +224,6 @@ pub trait Effect: Sync + Send {
         false
     }
 
-    /// The column of this recording that nothing else in the catalogue follows: whatever bends over it is this effect, if
-    /// with another law.
-    fn own_column<'a>(&self, _scene: &'a Scene) -> Option<&'a str> {
-        None
-    }
-
     /// Does a hidden state (how worn this tool is, a pump on or off, which lot) belong to a tool, lot or stretch, so
     /// that it must be followed through a held-out run?
     fn has_hidden_state(&self) -> bool {

@@ -41,12 +41,6 @@ impl Verdict {
             Self::CannotTell => "cannot_tell",
         }
     }
-
-    /// Does it report nothing?
-    #[must_use]
-    pub fn is_silent(self) -> bool {
-        matches!(self, Self::NoMismatch | Self::CannotTell)
-    }
 }
 
 /// A fitted number with its 95 % interval.

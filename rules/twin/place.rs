@@ -1,8 +1,10 @@
-//! Where an effect acts, in the fewest words that cover it: conditions on what a person can set or see (a speed, a tool, the age of an edge, the time on
-//! the clock), found by what they cover of the rows in which it acts, less the share of the rows that they take in, less a price for each condition and each
-//! word of a list. So a threshold is told in place of a list of runs.
+//! Where an effect acts, in the fewest words that cover it: conditions on what a person can set or see (a speed, a tool, the
+//! age of an edge, the time on the clock), found by what they cover of the rows in which it acts, less the share of the rows
+//! that they take in, less a price for each condition and each word of a list. So a threshold is told in place of a list of
+//! runs.
 
 use super::locate::Condition;
+use crate::statistics::count_to_f64;
 use adapters::Recording;
 use adapters::channel::quantity::Quantity;
 use adapters::recording::{Words, derive_quantity};
@@ -15,20 +17,11 @@ const WORD_PRICE: f64 = 0.02;
 /// Conditions that hold together, at most: more are not kept in mind.
 const CONDITIONS_MAX: usize = 3;
 /// Thresholds that are tried for each column before the best is moved: the cost of a search grows with their square.
-const THRESHOLDS: usize = 24;
+const THRESHOLDS_TRIED: usize = 24;
 /// Words of a list, at most: a longer one is a condition on something else.
 const WORDS_MAX: usize = 4;
 /// Rows that are looked at; a long recording is thinned: a place is known to less than a thousandth of it.
 const ROWS_MAX: usize = 6000;
-
-/// How well a description covers an effect.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Coverage {
-    /// Share of the affected rows within.
-    affected: f64,
-    /// Share of all rows within.
-    rows: f64,
-}
 
 /// A column as the search sees it.
 enum PlaceColumn<'a> {
@@ -81,22 +74,16 @@ impl<'a> PlaceSearch<'a> {
 
     /// Conditions that together describe the affected rows; none where nothing describes them.
     pub(super) fn conditions(&self, active: &[bool]) -> Vec<Condition> {
-        let at = |row: &usize| f64::from(u8::from(active.get(*row).copied().unwrap_or(false)));
-        self.best(&self.rows.iter().map(at).collect::<Vec<f64>>()).0
+        let at = |row: &usize| active.get(*row).copied().unwrap_or(false);
+        self.best(&self.rows.iter().map(at).collect::<Vec<bool>>())
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "some thousand rows")]
-    fn coverage(&self, inside: &[bool], affected: &[f64]) -> Coverage {
-        let all: f64 = affected.iter().sum();
-        let within: f64 =
-            affected.iter().zip(inside).filter(|(_, inside)| **inside).map(|(affected, _)| affected).sum();
+    /// Share of the affected rows within, less the share of all rows within.
+    fn gain(&self, inside: &[bool], affected: &[bool]) -> f64 {
+        let all = affected.iter().filter(|affected| **affected).count();
+        let within = affected.iter().zip(inside).filter(|(affected, inside)| **affected && **inside).count();
         let rows = inside.iter().filter(|inside| **inside).count();
-        Coverage { affected: within / all.max(f64::MIN_POSITIVE), rows: rows as f64 / self.rows.len().max(1) as f64 }
-    }
-
-    fn gain(&self, inside: &[bool], affected: &[f64]) -> f64 {
-        let found = self.coverage(inside, affected);
-        found.affected - found.rows
+        share(within, all) - share(rows, self.rows.len())
     }
 
     fn narrow(&self, inside: &mut [bool], condition: &Condition) {
@@ -119,11 +106,11 @@ impl<'a> PlaceSearch<'a> {
     }
 
     /// One condition after the other, each the one that gains most.
-    fn best(&self, affected: &[f64]) -> (Vec<Condition>, f64) {
+    fn best(&self, affected: &[bool]) -> Vec<Condition> {
         let (mut chosen, mut value): (Vec<Condition>, f64) = (Vec::new(), 0.0);
         let mut inside = vec![true; self.rows.len()];
         while chosen.len() < CONDITIONS_MAX {
-            let mut best: Option<(f64, Condition, Vec<bool>)> = None;
+            let mut best: Option<(f64, Condition)> = None;
             for candidate in self.columns.iter().flat_map(|column| self.candidates(column, &inside, affected)) {
                 if chosen.iter().any(|known| known.column() == candidate.column()) {
                     continue;
@@ -133,16 +120,16 @@ impl<'a> PlaceSearch<'a> {
                 let mut all = chosen.clone();
                 all.push(candidate.clone());
                 let worth = self.gain(&narrowed, affected) - price(&all);
-                if best.as_ref().is_none_or(|(most, ..)| worth > *most) {
-                    best = Some((worth, candidate, narrowed));
+                if best.as_ref().is_none_or(|(most, _)| worth > *most) {
+                    best = Some((worth, candidate));
                 }
             }
-            let Some((_, condition, _)) = best.filter(|(worth, ..)| *worth > value + 1e-9) else { break };
+            let Some((_, condition)) = best.filter(|(worth, _)| *worth > value + 1e-9) else { break };
             let (worth, condition, narrowed) = self.sharpen(condition, &chosen, &inside, affected);
             (value, inside) = (worth, narrowed);
             chosen.push(condition);
         }
-        (chosen, value)
+        chosen
     }
 
     /// Moves the bounds of a range to the value where it gains most: the thresholds that are tried first stand far apart.
@@ -151,7 +138,7 @@ impl<'a> PlaceSearch<'a> {
         condition: Condition,
         chosen: &[Condition],
         inside: &[bool],
-        affected: &[f64],
+        affected: &[bool],
     ) -> (f64, Condition, Vec<bool>) {
         let worth = |candidate: Condition| {
             let mut narrowed = inside.to_vec();
@@ -161,7 +148,7 @@ impl<'a> PlaceSearch<'a> {
         };
         let sorted = self.sorted_values(condition.column(), inside);
         let mut best = worth(condition);
-        let mut step = sorted.len().div_ceil(2 * THRESHOLDS);
+        let mut step = sorted.len().div_ceil(2 * THRESHOLDS_TRIED);
         while step > 0 && !sorted.is_empty() {
             for candidate in moved_bounds(&best.1, &sorted, step) {
                 let other = worth(candidate);
@@ -181,7 +168,7 @@ impl<'a> PlaceSearch<'a> {
         sort_values(values, inside)
     }
 
-    fn candidates(&self, column: &PlaceColumn<'_>, inside: &[bool], affected: &[f64]) -> Vec<Condition> {
+    fn candidates(&self, column: &PlaceColumn<'_>, inside: &[bool], affected: &[bool]) -> Vec<Condition> {
         match column {
             PlaceColumn::Numbers(name, values) => {
                 thresholds(values, inside).into_iter().flat_map(|(low, high)| ranges(name, low, high)).collect()
@@ -191,16 +178,17 @@ impl<'a> PlaceSearch<'a> {
     }
 
     /// The words that hold most of the affected for their rows: the first one, the first two, and so on.
-    fn lists(&self, name: &str, words: &Words, inside: &[bool], affected: &[f64]) -> Vec<Condition> {
-        let mut sums = vec![(0.0, 0.0); words.words().len()];
+    fn lists(&self, name: &str, words: &Words, inside: &[bool], affected: &[bool]) -> Vec<Condition> {
+        let mut counts = vec![(0_usize, 0_usize); words.words().len()];
         for ((row, inside), affected) in self.rows.iter().zip(inside).zip(affected) {
             if let Some(code) = words.find_code(*row).filter(|_| *inside) {
-                sums[code as usize].0 += affected;
-                sums[code as usize].1 += 1.0;
+                counts[code as usize].0 += usize::from(*affected);
+                counts[code as usize].1 += 1;
             }
         }
-        let mut order: Vec<usize> = (0..sums.len()).filter(|code| sums[*code].1 > 0.0).collect();
-        order.sort_by(|a, b| (sums[*b].0 / sums[*b].1).total_cmp(&(sums[*a].0 / sums[*a].1)));
+        let affected_share = |code: &usize| share(counts[*code].0, counts[*code].1);
+        let mut order: Vec<usize> = (0..counts.len()).filter(|code| counts[*code].1 > 0).collect();
+        order.sort_by(|a, b| affected_share(b).total_cmp(&affected_share(a)));
         (1..=WORDS_MAX.min(order.len().saturating_sub(1)))
             .map(|count| {
                 let mut list: Vec<usize> = order[..count].to_vec();
@@ -214,10 +202,14 @@ impl<'a> PlaceSearch<'a> {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a few conditions")]
+/// So many of so many.
+fn share(part: usize, whole: usize) -> f64 {
+    count_to_f64(part) / count_to_f64(whole.max(1))
+}
+
 fn price(conditions: &[Condition]) -> f64 {
     let words = |condition: &Condition| match condition {
-        Condition::Equals { words, .. } => words.len().saturating_sub(1) as f64,
+        Condition::Equals { words, .. } => count_to_f64(words.len().saturating_sub(1)),
         Condition::Range { min: Some(_), max: Some(_), .. } => 0.5,
         Condition::Range { .. } => 0.0,
     };
@@ -268,7 +260,7 @@ fn thresholds(values: &[Option<f64>], inside: &[bool]) -> Vec<(f64, f64)> {
     if sorted.len() < 2 {
         return Vec::new();
     }
-    let count = THRESHOLDS.min(sorted.len() - 1);
+    let count = THRESHOLDS_TRIED.min(sorted.len() - 1);
     let mut places: Vec<usize> = (0..count).map(|k| (2 * k + 1) * (sorted.len() - 1) / (2 * count)).collect();
     places.dedup();
     let bounds: Vec<f64> = places.into_iter().map(|place| f64::midpoint(sorted[place], sorted[place + 1])).collect();

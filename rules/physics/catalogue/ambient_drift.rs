@@ -75,10 +75,6 @@ impl Effect for AmbientDrift {
         [direct].into_iter().chain(lags("lag")).chain(two_masses).collect()
     }
 
-    fn own_column<'a>(&self, scene: &'a Scene) -> Option<&'a str> {
-        scene.role_name(Role::Ambient)
-    }
-
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let ambient = scene.role_values(Role::Ambient)?;
         let first = *ambient.first()?;

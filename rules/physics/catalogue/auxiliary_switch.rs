@@ -61,7 +61,7 @@ impl Effect for AuxiliarySwitch {
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "latent" {
-            return Some(vec![("level", scene.latent_or_zero(DOC.kind))]);
+            return Some(vec![("level", scene.unrecorded_state())]);
         }
         let (flag, _) = form.place.as_ref()?;
         Some(vec![("level", scene.column(flag)?.to_vec())])

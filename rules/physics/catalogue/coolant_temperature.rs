@@ -77,10 +77,6 @@ impl Effect for CoolantTemperature {
         [direct].into_iter().chain(flowing).chain(lag_forms(scene, "lag", &[600.0, 1800.0])).collect()
     }
 
-    fn own_column<'a>(&self, _scene: &'a Scene) -> Option<&'a str> {
-        Some(COOLANT)
-    }
-
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let coolant = scene.column(COOLANT)?;
         let first = *coolant.first()?;

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{estimate_cut_load, cut_times};
 use crate::physics::excitation::{
-    ln_count, run_named, since_run, step_forms, stretch_of_runs, where_word, within_runs, word_forms,
+    ln_count, run_named, since_run, step_forms, where_word, within_runs, word_forms,
 };
 use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -141,23 +141,6 @@ fn steps_between_lots(scene: &Scene) -> Vec<Form> {
     steps.iter_mut().for_each(|form| form.ln_choices = ln_choices);
     steps
 }
-
-/// The form for an odd lot nobody wrote down: the runs from `first` to `last`, one of `e^ln_choices` stretches.
-#[must_use]
-pub fn odd_lot(scene: &Scene, first: usize, last: usize, ln_choices: f64) -> Form {
-    let place = Some(("run".to_owned(), stretch_of_runs(scene, first, last)));
-    Form { name: "stretch", place, ln_choices, ..Form::default() }
-}
-
-/// The form for lots nobody wrote down: these runs begin the second and the further ones.
-#[must_use]
-pub fn unwritten_lots(scene: &Scene, starts: &[usize], ln_choices: f64) -> Form {
-    let names: Vec<&str> = starts.iter().map(|run| scene.run_names()[*run].as_str()).collect();
-    Form { name: "stretches", place: Some(("run".to_owned(), names.join(LOT_TO_LOT))), ln_choices, ..Form::default() }
-}
-
-/// Lots beyond which no gains of their own are fitted.
-pub const LOTS_MAX: usize = GAINS.len() + 1;
 
 /// Between the runs that begin a lot.
 const LOT_TO_LOT: &str = ", ";

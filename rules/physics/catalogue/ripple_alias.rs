@@ -76,7 +76,7 @@ impl Effect for RippleAlias {
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "latent" {
-            return Some(vec![("scale", scene.latent_or_zero(DOC.kind))]);
+            return Some(vec![("scale", scene.unrecorded_state())]);
         }
         let turn = 2.0 * PI * form.shape_value("frequency_hz")?;
         let wave = |law: fn(f64) -> f64| scene.time_s().iter().map(|t| law(turn * t)).collect();

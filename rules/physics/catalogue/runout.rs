@@ -62,7 +62,7 @@ impl Effect for Runout {
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "latent" {
-            return Some(vec![("scale", scene.latent_or_zero(DOC.kind))]);
+            return Some(vec![("scale", scene.unrecorded_state())]);
         }
         let turn = turn_rad(scene)?;
         let cosine = cut_times(scene, |row| turn[row].cos())?;

@@ -48,10 +48,6 @@ impl Effect for SupplyVoltage {
         if swings && scene.simulated_output().is_some() { vec![Form::without_shape()] } else { Vec::new() }
     }
 
-    fn own_column<'a>(&self, scene: &'a Scene) -> Option<&'a str> {
-        scene.role_name(Role::Voltage)
-    }
-
     fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         let voltage = scene.role_values(Role::Voltage)?;
         let simulated = scene.simulated_output()?;

@@ -142,7 +142,6 @@ pub struct Scene {
     runs: Vec<Range<usize>>,
     run_names: Vec<String>,
     clock_s: Vec<f64>,
-    latent: BTreeMap<&'static str, Vec<f64>>,
     period_s: f64,
     columns: BTreeMap<String, Vec<f64>>,
     absent: BTreeMap<String, Vec<bool>>,
@@ -182,7 +181,6 @@ impl Scene {
             rows: recording.count_rows(),
             time_s: recording.time_s.clone(),
             clock_s: running_clock_s(&recording, &runs),
-            latent: BTreeMap::new(),
             period_s: median_period_s(&recording.time_s, &runs),
             recorded: measured.iter().map(|value| value.unwrap_or(0.0)).collect(),
             usable: measured.iter().map(|value| value.is_some()).collect(),
@@ -409,22 +407,10 @@ impl Scene {
         self.load_at_output = load;
     }
 
-    /// The state that nobody records of an effect of this kind, per row, where a search has found one: how present a
-    /// hidden switch is (0 to 1), the height of a wandering wave (unit of the output).
+    /// A state that nobody records, in a model file: a recording does not hold it, so it is zero in every row.
     #[must_use]
-    pub fn latent_state(&self, kind: &str) -> Option<&[f64]> {
-        self.latent.get(kind).map(Vec::as_slice)
-    }
-
-    /// The same, zero in every row where none has been found.
-    #[must_use]
-    pub fn latent_or_zero(&self, kind: &str) -> Vec<f64> {
-        self.latent_state(kind).map_or_else(|| vec![0.0; self.rows()], <[f64]>::to_vec)
-    }
-
-    /// Sets the hidden state of an effect.
-    pub fn set_latent(&mut self, kind: &'static str, state: Vec<f64>) {
-        self.latent.insert(kind, state);
+    pub fn unrecorded_state(&self) -> Vec<f64> {
+        vec![0.0; self.rows()]
     }
 
     /// The columns of a formula over this recording, found by `find` once and kept: columns never change.

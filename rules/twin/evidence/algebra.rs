@@ -12,8 +12,16 @@ const PANEL: usize = 96;
 /// Share of the diagonal that is added where a matrix is not quite positive definite, at first.
 const JITTER: f64 = 1e-12;
 
-/// `gram += tall' tall`, the upper triangle by panels and the lower one as its mirror.
-pub(super) fn add_gram(gram: &mut Array2<f64>, tall: ArrayView2<'_, f64>) {
+/// Inner products of the columns of a tall matrix.
+pub(super) fn gram(tall: ArrayView2<'_, f64>) -> Array2<f64> {
+    let mut gram = Array2::zeros((tall.ncols(), tall.ncols()));
+    fill_upper_triangle(&mut gram, tall);
+    mirror(&mut gram);
+    gram
+}
+
+/// The upper triangle of `tall' tall`, by panels.
+fn fill_upper_triangle(gram: &mut Array2<f64>, tall: ArrayView2<'_, f64>) {
     let size = tall.ncols();
     let mut start = 0;
     while start < size {
@@ -26,7 +34,7 @@ pub(super) fn add_gram(gram: &mut Array2<f64>, tall: ArrayView2<'_, f64>) {
 }
 
 /// Copies the upper triangle into the lower one.
-pub(super) fn mirror(gram: &mut Array2<f64>) {
+fn mirror(gram: &mut Array2<f64>) {
     for row in 1..gram.nrows() {
         for column in 0..row {
             gram[[row, column]] = gram[[column, row]];
@@ -243,10 +251,7 @@ mod tests {
     }
 
     fn gram() -> Array2<f64> {
-        let mut gram = Array2::zeros((5, 5));
-        add_gram(&mut gram, tall().view());
-        mirror(&mut gram);
-        gram
+        super::gram(tall().view())
     }
 
     #[test]

@@ -13,6 +13,13 @@ pub(super) struct Rival {
     pub(super) nats: f64,
 }
 
+impl Rival {
+    /// Something without a name that may stand where a name is told.
+    pub(super) fn unknown(instead_of: &str, nats: f64) -> Self {
+        Self { name: UNKNOWN.to_owned(), instead_of: instead_of.to_owned(), nats }
+    }
+}
+
 /// Why something that is there is not told.
 #[derive(Debug, Clone)]
 pub(super) struct Withdrawn {
@@ -131,8 +138,7 @@ impl EvidenceAnswer {
             return;
         }
         self.verdict = Verdict::Ambiguous;
-        let beside = |name: &String| Rival { name: UNKNOWN.to_owned(), instead_of: name.clone(), nats: 0.0 };
-        self.rivals.extend(doubted.iter().map(beside));
+        self.rivals.extend(doubted.iter().map(|name| Rival::unknown(name, 0.0)));
     }
 
     /// Takes the names back: they and these others stand beside something without a name.

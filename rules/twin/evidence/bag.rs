@@ -5,14 +5,14 @@
 //! Miller, Bayesian Analysis 18, 2023). Two explanations that no law separates share their probability, however many rows
 //! there are; a posterior of all rows as they are gives it to one of them.
 
-use super::algebra::{CholeskyFactor, add_gram, block, mirror, schur};
+use super::algebra::{CholeskyFactor, block, gram, schur};
 use super::gram::Comparison;
 use super::marginal::{SIZES, ln_size_prior, ln_sum};
 use super::posterior::NoiseSetting;
 use super::search::Members;
 use crate::statistics::{count_to_f64, normal_share};
 use crate::twin::units::Random;
-use ndarray::{Array1, Array2, Axis, ShapeBuilder, s};
+use ndarray::{Array1, Array2, Axis, s};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -134,22 +134,10 @@ impl<'a> Bag<'a> {
 
     /// Inner products of the columns in each piece.
     fn grams(&self, setting: &NoiseSetting) -> Vec<Array2<f64>> {
-        let size = self.columns.len();
-        let mut tall = Array2::zeros((self.comparison.rows.len(), size).f());
-        for (index, column) in self.columns.iter().enumerate() {
-            let white = self.comparison.whitened(column, setting.gram.noise);
-            tall.column_mut(index).iter_mut().zip(white).for_each(|(cell, x)| *cell = x);
-        }
-        let of = |piece: &Vec<usize>| {
-            let mut gram = Array2::zeros((size, size));
-            match (piece.first(), piece.last()) {
-                (Some(first), Some(last)) if last + 1 - first == piece.len() => {
-                    add_gram(&mut gram, tall.slice(s![*first..=*last, ..]));
-                }
-                _ => add_gram(&mut gram, tall.select(Axis(0), piece).view()),
-            }
-            mirror(&mut gram);
-            gram
+        let tall = self.comparison.whiten_columns(&self.columns, setting.gram.noise);
+        let of = |piece: &Vec<usize>| match (piece.first(), piece.last()) {
+            (Some(first), Some(last)) if last + 1 - first == piece.len() => gram(tall.slice(s![*first..=*last, ..])),
+            _ => gram(tall.select(Axis(0), piece).view()),
         };
         self.pieces.iter().map(of).collect()
     }

@@ -1,17 +1,16 @@
 //! What an explanation contributes: the output with it, and every name's share of it row by row.
 
-use super::algebra::{CholeskyFactor, add_gram, mirror};
+use super::algebra::{CholeskyFactor, gram};
 use super::answer::Named;
 use super::bank::Since;
 use super::follow::Follower;
-use super::inner::unbroken;
 use super::judge::Judge;
 use super::means::PosteriorMeans;
 use super::noise::NoiseModel;
 use super::posterior::Explanation;
 use crate::statistics::{count_to_f64, rms};
 use crate::twin::diagnosis::UNKNOWN;
-use ndarray::{Array1, Array2, ShapeBuilder, s};
+use ndarray::{Array1, s};
 
 /// Squared deviations gained from which a step is taken to have begun in a held-out run.
 const BEGUN: f64 = 12.0;
@@ -63,14 +62,8 @@ impl Judge<'_> {
         let bank = &comparison.bank;
         let members = of.members.iter().flat_map(|(variant, _)| &bank.columns[bank.variants[*variant].columns.clone()]);
         let columns: Vec<&[f64]> = fixed.iter().chain(members).map(Vec::as_slice).chain([output]).collect();
-        let mut tall = Array2::zeros((comparison.rows.len(), columns.len()).f());
-        for (index, column) in columns.iter().enumerate() {
-            let plain = comparison.whitened(column, NoiseModel::WHITE);
-            tall.column_mut(index).iter_mut().zip(plain).for_each(|(cell, x)| *cell = x);
-        }
-        let mut gram = Array2::zeros((columns.len(), columns.len()));
-        add_gram(&mut gram, tall.view());
-        mirror(&mut gram);
+        let tall = comparison.whiten_columns(&columns, NoiseModel::WHITE);
+        let gram = gram(tall.view());
         let noise = self.settings[of.noise].gram.noise;
         let rows = count_to_f64(comparison.rows.len());
         let last = columns.len() - 1;
@@ -119,7 +112,7 @@ impl Judge<'_> {
         after: &mut [f64],
         all: &mut [Named],
     ) {
-        let blocks = unbroken(self.inputs, rows);
+        let blocks = self.inputs.unbroken_stretches(rows);
         let white = |value: &dyn Fn(usize) -> f64| {
             let mut white: Vec<f64> = rows.iter().map(|row| value(*row)).collect();
             noise.whiten(&mut white, &blocks);

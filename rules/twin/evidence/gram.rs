@@ -4,7 +4,7 @@
 //! Every hypothesis is a Schur complement of it. For the inner test the columns of one hypothesis alone are whitened and
 //! summed unit by unit (`inner.rs`): leaving a unit out is a difference.
 
-use super::algebra::{add_gram, mirror};
+use super::algebra::gram;
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
@@ -67,14 +67,6 @@ impl<'a> Comparison<'a> {
         rows_max: usize,
     ) -> Self {
         let (group, rows) = groups(inputs, rows_max);
-        let mut blocks: Vec<Range<usize>> = Vec::new();
-        for at in 0..rows.len() {
-            let goes_on = at > 0 && inputs.block[rows[at]] == inputs.block[rows[at - 1]];
-            match blocks.last_mut() {
-                Some(last) if goes_on => last.end = at + 1,
-                _ => blocks.push(at..at + 1),
-            }
-        }
         let recorded: Vec<f64> = rows.iter().map(|row| of.recorded[*row]).collect();
         let middle = crate::statistics::mean(&recorded);
         let around: Vec<f64> = recorded.iter().map(|y| y - middle).collect();
@@ -84,7 +76,7 @@ impl<'a> Comparison<'a> {
         fixed.extend(run_levels(inputs));
         Self {
             bank,
-            blocks,
+            blocks: inputs.unbroken_stretches(&rows),
             scale: rows.iter().map(|row| of.scale[*row]).collect(),
             group,
             ends: ends(&rows, inputs),
@@ -143,9 +135,14 @@ impl<'a> Comparison<'a> {
     /// Every column whitened, one after the other: those before the bank, these of the bank, the output.
     pub(super) fn whole(&self, noise: NoiseModel, takes: impl Fn(usize) -> bool) -> Array2<f64> {
         let of_bank = self.bank.columns.iter().enumerate().filter(|(index, _)| takes(*index)).map(|(_, c)| c);
-        let columns: Vec<&Vec<f64>> = self.fixed.iter().chain(of_bank).chain([&self.output]).collect();
+        let columns: Vec<&[f64]> = self.fixed.iter().chain(of_bank).chain([&self.output]).map(Vec::as_slice).collect();
+        self.whiten_columns(&columns, noise)
+    }
+
+    /// These full-length columns whitened over the fitted rows.
+    pub(super) fn whiten_columns(&self, columns: &[&[f64]], noise: NoiseModel) -> Array2<f64> {
         let mut tall = Array2::zeros((self.rows.len(), columns.len()).f());
-        for (index, column) in columns.into_iter().enumerate() {
+        for (index, column) in columns.iter().enumerate() {
             let white = self.whitened(column, noise);
             tall.column_mut(index).iter_mut().zip(white).for_each(|(cell, x)| *cell = x);
         }
@@ -159,12 +156,7 @@ impl<'a> Comparison<'a> {
 
     /// The same of some columns of the bank only.
     pub(super) fn gram_of(&self, noise: NoiseModel, takes: impl Fn(usize) -> bool) -> Gram {
-        let tall = self.whole(noise, takes);
-        let size = tall.ncols();
-        let mut whole = Array2::zeros((size, size));
-        add_gram(&mut whole, tall.view());
-        mirror(&mut whole);
-        Gram { noise, whole }
+        Gram { noise, whole: gram(self.whole(noise, takes).view()) }
     }
 }
 

@@ -3,14 +3,14 @@
 //! It is asked in the metric of the noise and paired over stretches, so that slow noise, which nothing predicts, does not
 //! drown what is there. Only fitted units are asked; those that are held out stay out of it.
 
-use super::algebra::{CholeskyFactor, add_gram, mirror};
+use super::algebra::{CholeskyFactor, gram};
 use super::follow::Follower;
 use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::marginal::SIZES;
 use super::posterior::NoiseSetting;
 use crate::statistics::count_to_f64;
-use ndarray::{Array1, Array2, Axis, ShapeBuilder, s};
+use ndarray::{Array1, Array2, Axis, s};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -57,20 +57,10 @@ impl<'a> Inner<'a> {
             ridge.extend(of.relative.iter().map(|d| setting.saturated.variance / (deviation * d).powi(2)));
         }
         columns.push(output);
-        let mut tall = Array2::zeros((comparison.rows.len(), columns.len()).f());
-        for (index, column) in columns.into_iter().enumerate() {
-            let white = comparison.whitened(column, setting.gram.noise);
-            tall.column_mut(index).iter_mut().zip(white).for_each(|(cell, x)| *cell = x);
-        }
+        let tall = comparison.whiten_columns(&columns, setting.gram.noise);
         let parts = parts(inputs, comparison);
         let deviation = setting.saturated.variance.sqrt();
-        let of_part = |part: &Vec<usize>| {
-            let mut gram = Array2::zeros((tall.ncols(), tall.ncols()));
-            add_gram(&mut gram, tall.select(Axis(0), part).view());
-            mirror(&mut gram);
-            gram
-        };
-        let grams = parts.iter().map(of_part).collect();
+        let grams = parts.iter().map(|part| gram(tall.select(Axis(0), part).view())).collect();
         Self { comparison, inputs, tall, parts, grams, ridge, deviation, members: places, fixed: fixed.len() }
     }
 
@@ -136,19 +126,6 @@ pub(super) fn paired(period_s: f64, rows: impl IntoIterator<Item = (usize, f64)>
     let sum: f64 = gained.values().sum();
     let squares: f64 = gained.values().map(|x| x * x).sum();
     (sum / (squares.sqrt() + 1e-30), sum)
-}
-
-/// Stretches of unbroken noise among some rows, as places among them.
-pub(super) fn unbroken(inputs: &RecordingInputs<'_>, rows: &[usize]) -> Vec<Range<usize>> {
-    let mut blocks: Vec<Range<usize>> = Vec::new();
-    for at in 0..rows.len() {
-        let goes_on = at > 0 && inputs.block[rows[at]] == inputs.block[rows[at - 1]];
-        match blocks.last_mut() {
-            Some(last) if goes_on => last.end = at + 1,
-            _ => blocks.push(at..at + 1),
-        }
-    }
-    blocks
 }
 
 /// Places of the rows of each part: the fitted units in turn.

@@ -307,6 +307,19 @@ impl<'a> RecordingInputs<'a> {
         compute_rate(self.scene, values)
     }
 
+    /// Stretches of unbroken noise among some rows, as places among them.
+    pub(super) fn unbroken_stretches(&self, rows: &[usize]) -> Vec<Range<usize>> {
+        let mut stretches: Vec<Range<usize>> = Vec::new();
+        for at in 0..rows.len() {
+            let goes_on = at > 0 && self.block[rows[at]] == self.block[rows[at - 1]];
+            match stretches.last_mut() {
+                Some(last) if goes_on => last.end = at + 1,
+                _ => stretches.push(at..at + 1),
+            }
+        }
+        stretches
+    }
+
     fn column_in_order(&self, mut law: impl FnMut(usize, bool) -> f64) -> Vec<f64> {
         (0..self.rows).map(|row| law(row, row == 0 || self.block[row - 1] != self.block[row])).collect()
     }

@@ -4,7 +4,7 @@ use super::answer::{EvidenceAnswer, Withdrawn, sum_of};
 use super::decision::THRESHOLDS;
 use super::existence::ExistenceTest;
 use super::gram::{Comparison, Gram};
-use super::inner::{Inner, paired, unbroken};
+use super::inner::{Inner, paired};
 use super::inputs::RecordingInputs;
 use super::naming::Naming;
 use super::posterior::{Explanation, Group, NoiseSetting, grouped};
@@ -68,20 +68,21 @@ impl Judge<'_> {
             if kept.is_empty() || gain <= THRESHOLDS.inner_gain {
                 continue;
             }
-            let own = self.own_share(&self.less(of, &kept));
+            let held = self.less(of, &kept);
+            let own = self.own_share(&held);
             if own < THRESHOLDS.own_share {
                 answer.debug.push_str(&format!("\nthe baseline leaves {own:.5}"));
                 continue;
             }
-            match self.not_withdrawn(self.less(of, &kept)) {
+            match self.not_withdrawn(held.clone()) {
                 Ok(best) => {
                     let lost = best.members.len() < kept.len();
                     return self.told(answer, &best, &groups, lost);
                 }
                 Err(withdrawn) => {
-                    let told = self.predicts(&self.less(of, &kept));
+                    let told = self.predicts(&held);
                     answer.debug.push_str(&format!("\npredicts {:.2} held out {:.2}", told.together, told.held_out));
-                    answer.debug.push_str(&self.held_out_errors(&self.less(of, &kept)));
+                    answer.debug.push_str(&self.held_out_errors(&held));
                     answer.withdrawn = Some(withdrawn);
                 }
             }
@@ -178,7 +179,7 @@ impl Judge<'_> {
     /// Paired deviation of what an explanation gains in rows that are held out, in the metric of the noise.
     fn held_out_gain(&self, of: &Explanation) -> f64 {
         let rows: Vec<usize> = self.inputs.left_out().collect();
-        let blocks = unbroken(self.inputs, &rows);
+        let blocks = self.inputs.unbroken_stretches(&rows);
         let noise = self.comparison.row_by_row(self.settings[of.noise].gram.noise);
         let white = |total: &[f64]| {
             let mut left: Vec<f64> =

@@ -2,7 +2,7 @@
 //!
 //! Only isolated outliers are cut: plain cutting by size would delete real effects at edges and in short events.
 
-use super::algebra::{CholeskyFactor, add_gram, mirror};
+use super::algebra::{CholeskyFactor, gram};
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
 use crate::statistics::{count_to_f64, median, quantile, rms, robust_deviation};
@@ -68,9 +68,7 @@ fn wide_residual(
         let size = if index < tangents.len() { rms(column) + 1e-30 } else { 1.0 };
         tall.column_mut(index).iter_mut().zip(&rows).for_each(|(cell, row)| *cell = column[*row] / size);
     }
-    let mut gram = Array2::zeros((columns.len(), columns.len()));
-    add_gram(&mut gram, tall.view());
-    mirror(&mut gram);
+    let gram = gram(tall.view());
     let output: Vec<f64> = rows.iter().map(|row| residual[*row]).collect();
     let middle =
         crate::statistics::mean(&rows.iter().map(|row| inputs.scene.recorded_output()[*row]).collect::<Vec<_>>());

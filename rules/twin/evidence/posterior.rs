@@ -15,6 +15,7 @@ const OFFERED: usize = 25;
 const NOISES: usize = 2;
 
 /// A set of variants with its posterior probability.
+#[derive(Clone)]
 pub(super) struct Explanation {
     /// Its members with the sizes they have in the likeliest noise.
     pub(super) members: Members,

@@ -102,12 +102,8 @@ impl Judge<'_> {
             let unsure = || answer.names.iter().filter(|name| !kept.contains(name));
             let likely = unsure().all(|name| mass(name) > 0.5);
             if likely && more >= 1.0 - THRESHOLDS.nothing_max {
-                let beside = |name: &String| Rival {
-                    name: UNKNOWN.to_owned(),
-                    instead_of: name.clone(),
-                    nats: (mass(name) / (1.0 - mass(name)).max(1e-12)).ln(),
-                };
-                unnamed = unsure().map(beside).collect();
+                let odds = |name: &str| mass(name) / (1.0 - mass(name)).max(1e-12);
+                unnamed = unsure().map(|name| Rival::unknown(name, odds(name).ln())).collect();
             } else if kept.is_empty() {
                 answer.leave_unnamed(groups, ln);
                 return;
