@@ -8,7 +8,7 @@
 //! The level itself is not the quantity: under a light cut it lies above no-load power by the cut, and a cut that is
 //! learned as no-load power is never seen again.
 
-use crate::statistics::erfc;
+use numerics::statistics::erfc;
 
 /// Mean and standard deviation of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,7 @@
 //! One pulse in the window is removed exactly, two leak. The sums are formed anew every time: a running sum would drift.
 //! Values that are missing must not be pushed; the delay is that of a plain mean, (N - 1)/2 samples.
 
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use serde::{Deserialize, Serialize};
 
 /// The last N values and their anti-pulse mean.

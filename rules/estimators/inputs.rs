@@ -99,7 +99,7 @@ fn to_gear_stage(number: Input) -> Result<usize, Absence> {
         Err(Absence::NotProvided) => Ok(0),
         Err(absence) => Err(absence),
         Ok(number) => (0..STAGES)
-            .find(|stage| (number - crate::statistics::count_to_f64(*stage)).abs() < 0.5)
+            .find(|stage| (number - numerics::statistics::count_to_f64(*stage)).abs() < 0.5)
             .ok_or(Absence::OutOfRange),
     }
 }

@@ -14,7 +14,7 @@ use super::no_load::{NoLoad, NoLoadPoint};
 use super::noise::RelativeVariances;
 use super::settings::Settings;
 use super::signals::{seconds_between, to_window_length};
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use adapters::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;

@@ -5,7 +5,7 @@ use super::inputs::TickInputs;
 use super::noise::RelativeVariances;
 use super::settings::Settings;
 use super::window::{Means, PowerWindow};
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use adapters::clock::{SECOND_NS, TimeNs};
 use serde::{Deserialize, Serialize};
 

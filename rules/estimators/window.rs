@@ -5,7 +5,7 @@
 //! start-up still decays (bias up to 83 % at tau = 2 s), hence the second one and the slope between them.
 
 use super::settings::Settings;
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

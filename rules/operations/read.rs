@@ -2,7 +2,7 @@
 
 use super::quantity::{QUANTITIES, suggest_key};
 use super::recipe::{Operation, Recipe};
-use crate::script::ScriptProblem;
+use script::ScriptProblem;
 use adapters::channel::find_nearest_name;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;

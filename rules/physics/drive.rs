@@ -8,13 +8,13 @@ use std::f64::consts::PI;
 /// Greatest moment of inertia of a spindle with its work: a blank of 20 t and 2 m on a vertical lathe has 10,000 kg m2.
 pub(crate) const INERTIA_KG_M2_MAX: f64 = 20_000.0;
 /// Radians per second of one revolution per minute.
-pub(crate) const RAD_PER_S_OF_RPM: f64 = PI / 30.0;
+pub const RAD_PER_S_OF_RPM: f64 = PI / 30.0;
 
 /// Slowest speed, in thousands of rpm, at which a load still counts as a torque.
 const CREEP_KRPM: f64 = 0.05;
 
 /// Does the output belong to a feed axis rather than to the spindle or the whole machine?
-pub(crate) fn is_axis_output(scene: &Scene) -> bool {
+pub fn is_axis_output(scene: &Scene) -> bool {
     let name = scene.output_name();
     let lettered = ["x_", "y_", "z_"].iter().any(|letter| name.starts_with(letter));
     name.contains("axis")
@@ -66,7 +66,7 @@ fn pace_to_the(scene: &Scene, pace: &[f64], sides: impl Iterator<Item = f64>, ex
 }
 
 /// The velocity of the slide in m/s where the output is that of its feed drive.
-pub(crate) fn read_slide_velocity(scene: &Scene) -> Option<Vec<f64>> {
+pub fn read_slide_velocity(scene: &Scene) -> Option<Vec<f64>> {
     if is_rotary_drive(scene) { None } else { read_motion(scene) }
 }
 
@@ -144,7 +144,7 @@ pub(crate) fn axis_velocities(scene: &Scene) -> Vec<Vec<f64>> {
 }
 
 /// Rate of change per second: central difference within a run, one-sided at its ends.
-pub(crate) fn compute_rate(scene: &Scene, values: &[f64]) -> Vec<f64> {
+pub fn compute_rate(scene: &Scene, values: &[f64]) -> Vec<f64> {
     let mut rates = vec![0.0; values.len()];
     for run in scene.runs() {
         for row in run.clone() {
@@ -166,7 +166,7 @@ pub(crate) fn spindle_rate_rpm_per_s(scene: &Scene) -> Option<Vec<f64>> {
 }
 
 /// Both directions are visited, each in at least a fiftieth of the rows.
-pub(crate) fn goes_both_ways(motion: &[f64]) -> bool {
+pub fn goes_both_ways(motion: &[f64]) -> bool {
     let least = motion.len().div_ceil(50);
     let forward = motion.iter().filter(|v| **v > 0.0).count();
     let backward = motion.iter().filter(|v| **v < 0.0).count();
@@ -174,7 +174,7 @@ pub(crate) fn goes_both_ways(motion: &[f64]) -> bool {
 }
 
 /// The direction of a motion, -1 to 1: a reversal passes through zero within a hundredth of the greatest velocity.
-pub(crate) fn compute_directions(motion: &[f64]) -> impl Iterator<Item = f64> {
+pub fn compute_directions(motion: &[f64]) -> impl Iterator<Item = f64> {
     let width = rest_width(motion);
     motion.iter().map(move |v| soft_sign(*v, width))
 }

@@ -7,7 +7,7 @@
 //! the start of every pass, `growth` starts at zero with a new edge and has a rate that wanders.
 
 use super::Scene;
-use crate::statistics::quantile;
+use numerics::statistics::quantile;
 use std::collections::BTreeMap;
 use std::ops::Range;
 

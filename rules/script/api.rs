@@ -3,7 +3,7 @@
 use super::functions::{Method, SUBJECTS, Subject};
 use super::vocabulary::format_vocabulary;
 use super::{FUNCTIONS, HANDLERS, RECORDS, list_words};
-use crate::estimators::SETTINGS;
+use estimators::SETTINGS;
 use serde_json::{Value, json};
 
 /// The methods by subject, then variables, functions and settings, as Markdown.
@@ -76,7 +76,7 @@ fn subject_json(subject: &Subject) -> Vec<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::script::functions::list_methods;
+    use crate::functions::list_methods;
     use std::collections::BTreeSet;
 
     #[test]
@@ -87,7 +87,7 @@ mod tests {
             assert!(!method.en.is_empty() && !method.zh.is_empty() && !method.returns.is_empty());
             assert!(method.parameters.iter().all(|parameter| !parameter.unit.is_empty()));
         }
-        let host = FUNCTIONS.iter().filter_map(crate::script::Function::name);
+        let host = FUNCTIONS.iter().filter_map(crate::Function::name);
         let taken: BTreeSet<&str> = list_words().iter().map(|it| it.name).chain(host).collect();
         let names: BTreeSet<&str> = list_methods().map(|it| it.name).collect();
         assert!(names.is_disjoint(&taken) && names.len() == list_methods().count());

@@ -9,7 +9,7 @@ use super::settings::ChosenSetting;
 use super::trials::Trial;
 use super::variables::ScriptBody;
 use super::vocabulary::Word;
-use crate::estimators::Settings;
+use estimators::Settings;
 use rhai::{AST, Dynamic, ImmutableString};
 use std::sync::Arc;
 

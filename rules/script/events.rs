@@ -4,7 +4,7 @@
 //! has not been changed.
 
 use super::problem::ScriptProblem;
-use crate::estimators::{Estimates, State};
+use estimators::{Estimates, State};
 use adapters::channel::find_nearest_name;
 use adapters::{ChannelId, Sample};
 use rhai::{Dynamic, Position};

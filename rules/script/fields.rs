@@ -5,7 +5,7 @@
 //! the file is loaded, and one that nobody reads costs nothing.
 
 use super::vocabulary::{View, Word, WordSource, WordValue, find_word, list_words};
-use crate::estimators::NoEstimate;
+use estimators::NoEstimate;
 use adapters::Absence;
 use adapters::channel::find_nearest_name;
 use adapters::clock::SECOND_NS;
@@ -154,7 +154,7 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::Estimates;
+    use estimators::Estimates;
     use adapters::{ChannelId, Sample, Slot, Value};
 
     fn field(record_name: &str, name: &str) -> Result<Field, String> {

@@ -11,7 +11,7 @@ use super::problem::ScriptProblem;
 use super::settings::merge_settings;
 use super::slot::{Moment, Outputs, Slot};
 use super::status::{ScriptStatus, Status};
-use crate::estimators::{Estimates, Settings};
+use estimators::{Estimates, Settings};
 use adapters::Sample;
 use adapters::clock::TimeNs;
 use rhai::Engine;

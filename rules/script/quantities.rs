@@ -1,7 +1,7 @@
 //! The estimated quantities and figures that a script sees: name, unit, texts, value.
 
-use crate::estimators::loads::Figure;
-use crate::estimators::{Estimated, Estimates};
+use estimators::loads::Figure;
+use estimators::{Estimated, Estimates};
 
 /// Name, name of the standard deviation, unit, texts, value.
 pub(super) type QuantityRow =

@@ -4,8 +4,8 @@ use super::compile::{ScriptFile, position_of};
 use super::compiled::Script;
 use super::declared::DeclarationPlace;
 use super::problem::{ScriptProblem, describe_type};
-use crate::estimators::loads::LoadCurves;
-use crate::estimators::{SettingError, Settings};
+use estimators::loads::LoadCurves;
+use estimators::{SettingError, Settings};
 use rhai::{Array, Dynamic, Map, Position};
 use std::sync::Arc;
 

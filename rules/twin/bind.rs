@@ -1,7 +1,7 @@
 //! Binding a model to a recording: forms and missing parameters are completed, missing inputs are named.
 
 use super::model::{Model, Parameter, Part, PartFunction};
-use crate::physics::{Entry, Role, Scene};
+use physics::{Entry, Role, Scene};
 
 /// Completes every part for this scene.
 ///
@@ -44,7 +44,7 @@ fn complete(part: &Part, scene: &Scene) -> Part {
             part.parameters.push(added(name, *value, Entry::Shape, doc.map(|doc| (doc.range, doc.unit))));
         }
     }
-    let shaped = crate::physics::Form { shape: default.shape.clone(), ..form.clone() };
+    let shaped = physics::Form { shape: default.shape.clone(), ..form.clone() };
     for (name, _) in effect.compute_columns(&stand_in, &shaped).unwrap_or_default() {
         if !known(&part.parameters, name) {
             let doc = effect.doc().find_parameter(name);

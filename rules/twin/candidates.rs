@@ -2,8 +2,8 @@
 
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::term::Term;
-use crate::physics::{Effect, Role, Scene};
-use crate::statistics::count_to_f64;
+use physics::{Effect, Role, Scene};
+use numerics::statistics::count_to_f64;
 
 /// What a machine takes without a cut builds a model and is never a finding by itself.
 const BUILDING: &str = "no_load_power";
@@ -122,7 +122,7 @@ fn derivative(part: &Part, index: usize, scene: &Scene) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::parse_model;
+    use crate::parse_model;
     use adapters::recording::read_csv;
     use std::collections::BTreeMap;
     use std::fmt::Write;

@@ -4,7 +4,7 @@ use super::bind::bind;
 use super::model::{Model, Part, simulate};
 use super::quality::{Fault, clean};
 use super::units::{Unit, held_out, units};
-use crate::physics::Scene;
+use physics::Scene;
 use adapters::Recording;
 use adapters::bilingual::Bilingual;
 use std::collections::BTreeSet;

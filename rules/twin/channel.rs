@@ -1,8 +1,8 @@
 //! Channels by name: those of the recording, and those that nobody records but that formulas may be drawn over - the time in the run and in the cut, the direction of a slide, and what the model itself simulates.
 
-use crate::physics::drive::{compute_directions, goes_both_ways, read_slide_velocity};
-use crate::physics::state::{first_order, first_order_behind};
-use crate::physics::{Role, Scene};
+use physics::drive::{compute_directions, goes_both_ways, read_slide_velocity};
+use physics::state::{first_order, first_order_behind};
+use physics::{Role, Scene};
 use adapters::channel::quantity::Quantity;
 use std::borrow::Cow;
 
@@ -131,8 +131,8 @@ fn cut_per_krpm(scene: &Scene) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::model::simulate;
-    use crate::twin::parse_model;
+    use crate::model::simulate;
+    use crate::parse_model;
     use adapters::recording::read_csv;
     use std::collections::BTreeMap;
     use std::fmt::Write;

@@ -5,8 +5,8 @@ use super::bind::bind;
 use super::diagnosis::unit_of;
 use super::inputs::columns;
 use super::model::{Model, Part, simulate};
-use crate::physics::Scene;
-use crate::statistics::{count_to_f64, median};
+use physics::Scene;
+use numerics::statistics::{count_to_f64, median};
 use adapters::Recording;
 use adapters::channel::{ChannelId, Kind};
 use adapters::recording::Numbers;
@@ -180,7 +180,7 @@ fn extremes(values: &[f64]) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::parse_model;
+    use crate::parse_model;
     use adapters::recording::read_csv;
 
     const MODEL: &str = "schema = \"model/1\"\noutput = \"spindle_power_w\"\n[[effect]]\nkind = \"no_load_power\"\n\

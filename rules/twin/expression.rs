@@ -2,7 +2,7 @@
 
 use super::channel::{SIMULATED_OUTPUT, channel_values, is_simulated};
 use super::model::Parameter;
-use crate::physics::{LinearLaw, Scene};
+use physics::{LinearLaw, Scene};
 use rhai::{AST, Engine, EvalAltResult, Scope};
 use std::borrow::Cow;
 use std::fmt;
@@ -88,7 +88,7 @@ impl Expression {
             columns.push(unit.iter().zip(&zero).map(|(unit, zero)| unit - zero).collect());
         }
         let mixtures: [&dyn Fn(usize) -> f64; 2] =
-            [&|index| 0.7 + 0.6 * crate::statistics::count_to_f64(index), &|index| parameters[index].value * -1.3];
+            [&|index| 0.7 + 0.6 * numerics::statistics::count_to_f64(index), &|index| parameters[index].value * -1.3];
         let linear = mixtures.iter().all(|values| {
             at(values).is_some_and(|got| {
                 got.iter().enumerate().all(|(row, got)| {

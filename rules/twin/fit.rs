@@ -5,8 +5,8 @@
 
 use super::linear::{dot, least_squares};
 use super::model::{Part, Simulated, simulate, simulate_changed};
-use crate::physics::{Entry, Scene};
-use crate::statistics::rms;
+use physics::{Entry, Scene};
+use numerics::statistics::rms;
 
 /// Gauss-Newton steps at most.
 const STEPS_MAX: usize = 12;
@@ -215,7 +215,7 @@ fn difference(scene: &mut Scene, parts: &[Part], free: Free, base: &Simulated) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::parse_model;
+    use crate::parse_model;
     use adapters::recording::read_csv;
     use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! Inputs of a model in a recording: which columns its parts read, and in which rows they have a value.
 
 use super::model::{Part, PartFunction};
-use crate::physics::{Role, Scene};
+use physics::{Role, Scene};
 
 /// Longest stretch, in rows, over which a held input still counts as known.
 const HELD_ROWS_MAX: usize = 3;

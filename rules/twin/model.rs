@@ -3,7 +3,7 @@
 use super::channel::{SIMULATED_OUTPUT, is_simulated};
 use super::expression::Expression;
 use super::term::Term;
-use crate::physics::{Effect, Entry, Form, ParameterDoc, Role, Scene};
+use physics::{Effect, Entry, Form, ParameterDoc, Role, Scene};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -348,7 +348,7 @@ fn run_stage<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::parse_model;
+    use crate::parse_model;
     use adapters::recording::read_csv;
     use std::fmt::Write;
 

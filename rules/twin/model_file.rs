@@ -4,7 +4,7 @@ use super::expression::Expression;
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::table::SpeedTable;
 use super::term::Term;
-use crate::physics::{CATALOGUE, Effect, Entry, Form, Role, find_effect};
+use physics::{CATALOGUE, Effect, Entry, Form, Role, find_effect};
 use adapters::channel::find_nearest_name;
 use std::collections::BTreeMap;
 use std::fmt;

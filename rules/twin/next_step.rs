@@ -2,7 +2,7 @@
 //! what has no name is asked for by the channel that its curve was found over.
 
 use super::diagnosis::{Alternative, Experiment};
-use crate::physics::find_effect;
+use physics::find_effect;
 
 /// Minutes of an experiment over one channel: four levels of it, up and down, twice, half a minute each, and the way there.
 const CHANNEL_MINUTES: f64 = 10.0;

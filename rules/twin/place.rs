@@ -4,7 +4,7 @@
 //! runs.
 
 use super::locate::Condition;
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use adapters::Recording;
 use adapters::channel::quantity::Quantity;
 use adapters::recording::{Words, derive_quantity};

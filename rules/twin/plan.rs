@@ -5,9 +5,9 @@
 
 use super::diagnosis::Diagnosis;
 use super::experiments::moves;
-use crate::physics::explain::Language;
-use crate::physics::{Role, Scene, find_effect};
-use crate::statistics::median;
+use physics::explain::Language;
+use physics::{Role, Scene, find_effect};
+use numerics::statistics::median;
 use adapters::Recording;
 use adapters::channel::quantity::is_of_spindle;
 use std::collections::BTreeMap;
@@ -119,7 +119,7 @@ fn kinds(diagnosis: &Diagnosis) -> Vec<&str> {
 fn chosen<'a>(wanted: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut kinds: Vec<&str> = Vec::new();
     let mut minutes = 0.0;
-    for doc in wanted.filter_map(|kind| find_effect(kind).map(crate::physics::Effect::doc)) {
+    for doc in wanted.filter_map(|kind| find_effect(kind).map(physics::Effect::doc)) {
         let fits = kinds.is_empty() || minutes + doc.experiment_minutes <= TOGETHER_MINUTES_MAX;
         if fits && !kinds.iter().any(|kind| moves::same(kind, doc.kind)) {
             kinds.push(doc.kind);
@@ -224,7 +224,7 @@ impl Move {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::CATALOGUE;
+    use physics::CATALOGUE;
     use adapters::recording::read_csv;
 
     fn envelope() -> Envelope {

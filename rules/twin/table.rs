@@ -1,6 +1,6 @@
 //! No-load power as a table over speed, interpolated quadratically between neighbouring speeds (seed 000, eq. 4).
 
-use crate::physics::{Role, Scene};
+use physics::{Role, Scene};
 
 /// Speeds of a no-load table; the powers are the part's parameters `power_w[0]`, `power_w[1]`, ...
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Terms of a `linear` part: a column, `one`, a power, a sign, an absolute value or a delay of a column.
 
-use crate::physics::Scene;
-use crate::physics::state::delay_values;
+use physics::Scene;
+use physics::state::delay_values;
 
 /// One term.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,8 +3,8 @@
 use super::diagnosis::{Alternative, Diagnosis, Fits, Missing, ParameterEstimate, Shift, Verdict};
 use super::locate::{Condition, Region};
 use super::words;
-use crate::physics::explain::Language;
-use crate::physics::find_effect;
+use physics::explain::Language;
+use physics::find_effect;
 use std::fmt::Write as _;
 
 /// Spans that are listed; the JSON holds all of them.

@@ -4,8 +4,8 @@
 //! operating points are most like those of the whole recording. So no tool, no operation and no place of a program that
 //! repeats is held out as a whole where another choice exists.
 
-use crate::physics::Scene;
-use crate::statistics::{count_to_f64, quantile};
+use physics::Scene;
+use numerics::statistics::{count_to_f64, quantile};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -127,7 +127,7 @@ impl Features {
         let end = |values: &[f64], share: f64| quantile(values.iter().copied(), share).unwrap_or(0.0);
         let names = scene.column_names().filter(|name| *name != scene.output_name());
         for values in names.filter_map(|name| scene.column(name)).chain(scene.simulated_output()) {
-            columns.push(over_units(&crate::statistics::mean, values));
+            columns.push(over_units(&numerics::statistics::mean, values));
             // What is held out should lie within what is fitted.
             columns.push(over_units(&|values| end(values, ENDS), values));
             columns.push(over_units(&|values| end(values, 1.0 - ENDS), values));
@@ -176,8 +176,8 @@ impl Features {
 
 /// A column of mean zero and deviation one; nothing where it does not change.
 fn standardised(column: Vec<f64>) -> Option<Vec<f64>> {
-    let middle = crate::statistics::mean(&column);
-    let spread = crate::statistics::rms(&column.iter().map(|x| x - middle).collect::<Vec<_>>());
+    let middle = numerics::statistics::mean(&column);
+    let spread = numerics::statistics::rms(&column.iter().map(|x| x - middle).collect::<Vec<_>>());
     (spread > 1e-9 * middle.abs().max(1e-12)).then(|| column.iter().map(|x| (x - middle) / spread).collect())
 }
 

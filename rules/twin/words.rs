@@ -3,7 +3,7 @@
 use super::diagnosis::{Diagnosis, Existence, UNKNOWN, Verdict};
 use super::locate::Condition;
 use super::text::short;
-use crate::physics::find_effect;
+use physics::find_effect;
 use adapters::bilingual::Bilingual;
 
 /// One or two sentences for the machinist.

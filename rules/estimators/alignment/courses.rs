@@ -7,8 +7,8 @@
 //! Not identifiable where the best correlation is poor, or another lag is as good: cuts that repeat like the teeth of a comb
 //! fit in many places. Cuts of different length and power, or an idle stretch of its own length, tell them apart.
 
-use crate::estimators::regression::{Refusal, RefusalKind};
-use crate::statistics::correlate_pairs;
+use crate::regression::{Refusal, RefusalKind};
+use numerics::statistics::correlate_pairs;
 
 /// Step of the coarse grid, s.
 const COARSE_S: f64 = 1.0;

@@ -2,7 +2,7 @@
 
 use super::speed::{PREDICTORS, RunningIntegrals, Transient};
 use super::steady::regularize_stamps;
-use crate::linear::cholesky::{LinearSolution, NormalEquations};
+use numerics::linear::cholesky::{LinearSolution, NormalEquations};
 
 /// Constant, and every predictor.
 const COLUMNS: usize = PREDICTORS + 1;

@@ -1,10 +1,10 @@
 //! Settings that change while the estimators run.
 
 use super::Inference;
-use crate::estimators::learning::Learner;
-use crate::estimators::no_load::NoLoadTable;
-use crate::estimators::settings::Settings;
-use crate::estimators::signals::Signals;
+use crate::learning::Learner;
+use crate::no_load::NoLoadTable;
+use crate::settings::Settings;
+use crate::signals::Signals;
 
 impl Inference {
     /// Takes new settings and keeps what was learned; the recent past begins anew where a length changed. No-load

@@ -1,10 +1,10 @@
 //! What is different where something else stands for spindle power; see [`StateBasis`].
 
 use super::Inference;
-use crate::estimators::basis::StateBasis;
-use crate::estimators::estimate::Estimates;
-use crate::estimators::no_load::NoLoadTable;
-use crate::estimators::settings::Settings;
+use crate::basis::StateBasis;
+use crate::estimate::Estimates;
+use crate::no_load::NoLoadTable;
+use crate::settings::Settings;
 use adapters::Absence;
 
 impl Inference {

@@ -1,7 +1,7 @@
 //! What the estimators remember, to be stored and taken up again.
 
 use super::{Inference, InferenceState, RestoreError};
-use crate::estimators::settings::Settings;
+use crate::settings::Settings;
 
 impl Inference {
     /// Everything remembered, to be stored and given to [`Inference::from_snapshot`] after a restart.

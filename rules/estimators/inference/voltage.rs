@@ -1,11 +1,11 @@
 //! Power as it would be at the reference of the supply voltage.
 
 use super::{Inference, InferenceState};
-use crate::estimators::inputs::TickInputs;
-use crate::estimators::learning::Observation;
-use crate::estimators::no_load::{NoLoad, NoLoadPoint};
-use crate::estimators::settings::Settings;
-use crate::estimators::supply::MeasuredIdlePower;
+use crate::inputs::TickInputs;
+use crate::learning::Observation;
+use crate::no_load::{NoLoad, NoLoadPoint};
+use crate::settings::Settings;
+use crate::supply::MeasuredIdlePower;
 
 impl Inference {
     /// Takes off the power what the supply voltage does to no-load power, so that all that follows compares like with like; no

@@ -8,7 +8,7 @@ use super::curves::{LoadCurves, LoadQuantity, Told};
 use super::follower::{FedShare, OverrideFollower};
 use super::in_force::LoadMoment;
 use super::limits::ConstantLimits;
-use crate::estimators::NoEstimate;
+use crate::NoEstimate;
 
 /// A touch below this share of the least load that counts as a cut ends a rise; so a load at the border does not chatter.
 const AIR_BACK: f64 = 0.7;

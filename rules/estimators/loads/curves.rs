@@ -4,8 +4,8 @@
 //! the feed at which it meets the wanted load.
 
 use super::in_force::LoadMoment;
-use crate::estimators::regression::Refusal;
-use crate::estimators::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
+use crate::regression::Refusal;
+use crate::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
 use adapters::channel::find_nearest_name;
 
 /// Curves hold at speeds this near to their own, as a share.
@@ -108,7 +108,7 @@ impl LoadCurves {
         if (speed_rpm / self.speed_rpm - 1.0).abs() > SPEED_SHARE {
             return Some("the curves are of another spindle speed");
         }
-        if !self.tool.is_empty() && crate::estimators::wear::tool_of(now.tool) != self.tool && now.tool != self.tool {
+        if !self.tool.is_empty() && crate::wear::tool_of(now.tool) != self.tool && now.tool != self.tool {
             return Some("the curves are of another tool");
         }
         let other = !self.material.is_empty() && !now.material.is_empty() && now.material != self.material;

@@ -1,7 +1,7 @@
 //! What is needed of a sample: the loads, the feed and the feed override in force.
 
-use crate::estimators::signals::seconds_between;
-use crate::estimators::{Estimates, State};
+use crate::signals::seconds_between;
+use crate::{Estimates, State};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
 

@@ -5,7 +5,7 @@ use super::follower::{FedShare, OverrideFollower};
 use super::in_force::{LoadChannels, LoadMoment};
 use super::limits::LearnedLimits;
 use super::place::Place;
-use crate::estimators::NoEstimate;
+use crate::NoEstimate;
 use adapters::Sample;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -154,7 +154,7 @@ impl LearnedLoad {
             let block: String = block.as_deref().unwrap_or_default().chars().take(BLOCK_MAX).collect();
             format!(
                 "{program}/{}/{}/{block}",
-                crate::estimators::wear::tool_of(tool),
+                crate::wear::tool_of(tool),
                 operation.as_deref().unwrap_or_default()
             )
         });

@@ -3,7 +3,7 @@
 use super::curves::LoadCurves;
 use super::follower::OverrideRange;
 use super::in_force::LoadChannels;
-use crate::estimators::settings::Settings;
+use crate::settings::Settings;
 use adapters::Sample;
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! The laws in a closed loop with a cut that answers: ramps of entry and exit, light cuts, hard spots, steps of depth.
 
 use super::LoadEstimator;
-use crate::estimators::{Estimate, Estimates, Settings, State};
+use crate::{Estimate, Estimates, Settings, State};
 use adapters::clock::SECOND_NS;
 use adapters::{ChannelId, Sample, Slot, Value};
 use rand::{Rng, SeedableRng};

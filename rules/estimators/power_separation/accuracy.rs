@@ -7,8 +7,8 @@
 use super::cuts::SteadyPoint;
 use super::forms::fit_best_form;
 use super::load_loss::is_same_speed;
-use crate::estimators::LoadLossLaw;
-use crate::statistics::count_to_f64;
+use crate::LoadLossLaw;
+use numerics::statistics::count_to_f64;
 use serde::Serialize;
 
 /// Fixed load losses that were usual before: shares of the cutting power.

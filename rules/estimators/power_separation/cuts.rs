@@ -3,9 +3,9 @@
 use super::reference::Referenced;
 use super::rows::MachineRow;
 use super::stretches::{SAME_SPEED, Stretch, settled_from};
-use crate::estimators::State;
-use crate::estimators::regression::{SteadyLevel, estimate_level, without_pulses};
-use crate::statistics::count_to_f64;
+use crate::State;
+use crate::regression::{SteadyLevel, estimate_level, without_pulses};
+use numerics::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 

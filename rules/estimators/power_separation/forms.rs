@@ -12,9 +12,9 @@
 
 use super::cuts::SteadyPoint;
 use super::load_loss::is_same_speed;
-use crate::estimators::LoadLossLaw;
-use crate::estimators::regression::{Column, FTest, Intercept, Refusal, Regression, UnequalScatter, fit_unweighted};
-use crate::statistics::count_to_f64;
+use crate::LoadLossLaw;
+use crate::regression::{Column, FTest, Intercept, Refusal, Regression, UnequalScatter, fit_unweighted};
+use numerics::statistics::count_to_f64;
 use serde::Serialize;
 
 /// What each form leaves, residual standard deviation, W.

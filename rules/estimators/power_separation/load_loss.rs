@@ -9,9 +9,9 @@ use super::forms::{FittedLoss, FormResiduals, by_speed, fit_best_form};
 use super::reference::{PowerReference, ReferenceChoice, select_reference};
 use super::rows::classify_rows;
 use super::stretches::{SAME_SPEED, find_stretches};
-use crate::estimators::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, UnequalScatter, t_quantile};
-use crate::estimators::{LoadLossLaw, STAGES};
-use crate::statistics::count_to_f64;
+use crate::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, UnequalScatter, t_quantile};
+use crate::{LoadLossLaw, STAGES};
+use numerics::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 

@@ -2,11 +2,11 @@
 
 use super::rows::classify_rows;
 use super::stretches::{SAME_SPEED, Stretch, find_stretches};
-use crate::estimators::regression::{
+use crate::regression::{
     CONFIDENCE, Coefficient, Column, Intercept, Refusal, RefusalKind, fit_unweighted, t_quantile,
 };
-use crate::estimators::{SPEEDS_PER_STAGE, STAGES};
-use crate::statistics::count_to_f64;
+use crate::{SPEEDS_PER_STAGE, STAGES};
+use numerics::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 

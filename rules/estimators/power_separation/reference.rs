@@ -4,8 +4,8 @@
 //! all cuts less that of idling. Never row by row: the magnitude of noise about zero has a mean of its own.
 
 use super::rows::MachineRow;
-use crate::estimators::State;
-use crate::estimators::regression::{Plausible, Refusal, RefusalKind};
+use crate::State;
+use crate::regression::{Plausible, Refusal, RefusalKind};
 use adapters::Recording;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};

@@ -1,7 +1,7 @@
 //! A recording through the estimators, row by row.
 
-use crate::estimators::regression::{Plausible, Refusal, RefusalKind};
-use crate::estimators::{Inference, Settings, State};
+use crate::regression::{Plausible, Refusal, RefusalKind};
+use crate::{Inference, Settings, State};
 use adapters::clock::SECOND_NS;
 use adapters::{Absence, ChannelId, Recording, Sample, Slot, Value};
 

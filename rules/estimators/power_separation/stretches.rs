@@ -1,9 +1,9 @@
 //! Idle stretches of one speed, their settled part, and its level.
 
 use super::rows::MachineRow;
-use crate::estimators::State;
-use crate::estimators::regression::{SteadyLevel, estimate_level, without_pulses};
-use crate::statistics::{count_to_f64, mean};
+use crate::State;
+use crate::regression::{SteadyLevel, estimate_level, without_pulses};
+use numerics::statistics::{count_to_f64, mean};
 use serde::Serialize;
 
 /// Speeds closer than this share are one speed.
@@ -105,7 +105,7 @@ fn close_stretch(open: &[(f64, f64, f64)], stage: usize) -> Option<Stretch> {
 }
 
 /// Where the level is settled: leading twelfths are left out while they lie apart from what follows, at most half of all.
-pub(in crate::estimators) fn settled_from(time_s: &[f64], power_w: &[f64]) -> usize {
+pub(crate) fn settled_from(time_s: &[f64], power_w: &[f64]) -> usize {
     let block = time_s.len() / 12;
     let mut from = 0;
     while block >= 2 && from + block <= time_s.len() / 2 {

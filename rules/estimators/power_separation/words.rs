@@ -3,7 +3,7 @@
 use super::accuracy::{Accuracy, FIXED_LOSSES};
 use super::load_loss::{LoadLossLearned, StageLearned};
 use super::no_load::{NoLoadLearned, SpeedLearned};
-use crate::estimators::{SPEEDS_PER_STAGE, STAGES};
+use crate::{SPEEDS_PER_STAGE, STAGES};
 use std::fmt::{self, Write as _};
 
 impl NoLoadLearned {

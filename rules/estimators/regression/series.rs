@@ -3,8 +3,8 @@
 //! The number of independent samples follows from the integrated autocorrelation time, summed while the sums of pairs are
 //! positive and falling. Source: Geyer, Practical Markov Chain Monte Carlo, Statistical Science 7 (1992) 473, section 3.3.
 
-use crate::linear::orthogonal::dot_product;
-use crate::statistics::{count_to_f64, median, robust_deviation};
+use numerics::linear::orthogonal::dot_product;
+use numerics::statistics::{count_to_f64, median, robust_deviation};
 use serde::Serialize;
 
 /// What a trend leaves of slow noise is corrected by no more than the inverse of this.

@@ -68,7 +68,7 @@ impl UnequalScatter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::regression::{Intercept, fit_unweighted};
+    use crate::regression::{Intercept, fit_unweighted};
 
     #[test]
     fn of_a_mean_it_is_the_usual_variance_with_the_usual_degrees_of_freedom() {

@@ -8,7 +8,7 @@
 //! A filter behind the sampling removes nothing that has already folded down: at 350 Hz of 1 kHz, which is 0.7 of the
 //! Nyquist frequency, an analogue filter must stand in front against the carrier of the inverter.
 
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 use std::f64::consts::{PI, TAU};
 
 const SECTIONS: usize = 2;

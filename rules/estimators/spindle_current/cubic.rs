@@ -1,6 +1,6 @@
 //! A cubic of the feature over feed, on the range of feeds it was found in.
 
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 
 /// `I(f) = c0 + c1 f + c2 f^2 + c3 f^3` for feeds from `feed_min` to `feed_max`, in one unit of feed throughout.

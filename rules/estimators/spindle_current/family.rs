@@ -6,7 +6,7 @@
 //! so the depth inferred is an equivalent one, deeper than the true one: the feed errs to the safe side.
 
 use super::cubic::{Cubic, Inversion};
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 
 /// At most so many depths.

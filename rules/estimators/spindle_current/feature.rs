@@ -7,7 +7,7 @@
 
 use super::butterworth::{LowPass, LowPassDesign};
 use super::half_periods::{CurrentSums, Splitter};
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 
 /// At most this many half periods make a window.
 const HALVES_MAX: usize = 64;
@@ -149,7 +149,7 @@ impl PhaseFeature {
     /// Rectangles of one sample each; the last one is split between this window and the next.
     fn push_by_frequency(&mut self, sample_a: f64, hz: f64) -> Option<Feature> {
         let one = CurrentSums { samples: 1.0, absolute: sample_a.abs(), square: sample_a * sample_a };
-        let length = crate::statistics::count_to_f64(self.halves) * 0.5 * self.rate_hz / hz;
+        let length = numerics::statistics::count_to_f64(self.halves) * 0.5 * self.rate_hz / hz;
         let rest = length - self.window.samples;
         if rest > 1.0 {
             self.window.add(one);
@@ -172,7 +172,7 @@ impl PhaseFeature {
             FeatureKind::Rms => (square / samples).sqrt(),
             FeatureKind::AbsoluteIntegral => absolute / self.rate_hz,
         };
-        Feature { value, window_s, frequency_hz: crate::statistics::count_to_f64(self.halves) / (2.0 * window_s) }
+        Feature { value, window_s, frequency_hz: numerics::statistics::count_to_f64(self.halves) / (2.0 * window_s) }
     }
 }
 

@@ -6,10 +6,10 @@
 use super::cubic::Cubic;
 use super::family::{CurveAtDepth, CurveFamily};
 use super::plateaus::{Plateau, SAME, find_plateaus};
-use crate::estimators::regression::{
+use crate::regression::{
     Coefficient, Column, FTest, Intercept, Refusal, RefusalKind, Regression, f_upper_tail, fit_weighted,
 };
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 

@@ -1,8 +1,8 @@
 //! Stretches of constant speed, depth and feed in a recording, and the level of the feature in each.
 
-use crate::estimators::power_separation::settled_from;
-use crate::estimators::regression::{Plausible, Refusal, RefusalKind, SteadyLevel, estimate_level, without_pulses};
-use crate::statistics::count_to_f64;
+use crate::power_separation::settled_from;
+use crate::regression::{Plausible, Refusal, RefusalKind, SteadyLevel, estimate_level, without_pulses};
+use numerics::statistics::count_to_f64;
 use adapters::Recording;
 use serde::Serialize;
 

@@ -55,7 +55,7 @@ impl FeedCurves {
     #[must_use]
     pub fn mean_level(&self) -> f64 {
         let levels = self.plateaus.iter().map(|plateau| plateau.level.mean);
-        levels.clone().sum::<f64>() / crate::statistics::count_to_f64(levels.count().max(1))
+        levels.clone().sum::<f64>() / numerics::statistics::count_to_f64(levels.count().max(1))
     }
 
     /// What the script holds, and who chose it.

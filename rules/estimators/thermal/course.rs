@@ -1,8 +1,8 @@
 //! Rows of warm-ups and cool-downs: times, error and temperatures, run by run.
 
 use super::quantities::{self, Series};
-use crate::estimators::regression::{Column, Refusal, RefusalKind};
-use crate::statistics::mean;
+use crate::regression::{Column, Refusal, RefusalKind};
+use numerics::statistics::mean;
 use std::ops::Range;
 
 /// A named temperature, one value per row, °C.

@@ -4,7 +4,7 @@
 //! 40:913 (blocked cross-validation for data with structure).
 
 use super::quantities::THERMAL_ERROR;
-use crate::estimators::regression::{Column, Intercept, Refusal, fit_unweighted};
+use crate::regression::{Column, Intercept, Refusal, fit_unweighted};
 use serde::Serialize;
 use std::ops::Range;
 

@@ -95,7 +95,7 @@ impl ThermalFollower {
         corrected: Corrected,
         sensors: &[&str],
         settings: FollowSettings,
-    ) -> Result<Self, crate::estimators::regression::Refusal> {
+    ) -> Result<Self, crate::regression::Refusal> {
         corrected.identified.check_consistency()?;
         let predictor = Predictor::new(corrected.law, sensors)?;
         Ok(Self { predictor, identified: corrected.identified, readings: corrected.readings, settings })

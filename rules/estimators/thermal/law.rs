@@ -1,6 +1,6 @@
 //! The law of a thermal error: which temperatures, with what weight, late by how much, and how well all that is known.
 
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 use serde::{Deserialize, Serialize};
 
 /// Temperature points that a law may use.

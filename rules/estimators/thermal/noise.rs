@@ -13,7 +13,7 @@
 //! under V: Greene, Econometric Analysis, 9.2.
 
 use super::course::Course;
-use crate::estimators::regression::{Column, Intercept, Refusal, Regression, fit_unweighted};
+use crate::regression::{Column, Intercept, Refusal, Regression, fit_unweighted};
 
 /// Memory and share of white noise.
 #[derive(Debug, Clone, Copy, PartialEq)]

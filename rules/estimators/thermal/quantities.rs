@@ -1,6 +1,6 @@
 //! What is asked of temperatures and thermal errors before anything is inferred from them.
 
-use crate::estimators::regression::{Mistake, Plausible, Refusal, RefusalKind};
+use crate::regression::{Mistake, Plausible, Refusal, RefusalKind};
 
 /// A named series, one value per row; the name ends in the unit.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::course::{Course, Sensor};
 use super::quantities::THERMAL_ERROR;
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 use adapters::Recording;
 use adapters::channel::quantity::{has_word, unit_of};
 use adapters::recording::{Cells, Numbers};

@@ -3,8 +3,8 @@
 //! Source: Montgomery, Design and Analysis of Experiments, 8th edition, 10.4 (significance) and 11.2.1 (lack of fit).
 
 use super::conditions::Cut;
-use crate::estimators::regression::{Regression, f_upper_tail};
-use crate::statistics::count_to_f64;
+use crate::regression::{Regression, f_upper_tail};
+use numerics::statistics::count_to_f64;
 use serde::Serialize;
 
 /// One row of the table.

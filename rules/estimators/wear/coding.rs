@@ -2,7 +2,7 @@
 //! nearly orthogonal. The patent codes `a = (VB - 0.195) / 0.13` in the same way.
 
 use super::conditions::{ConditionFactor, Cut, CutConditions, FACTORS};
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 use serde::{Deserialize, Serialize};
 
 /// Share of the recorded range by which a condition may lie outside before it counts as extrapolated.

@@ -5,7 +5,7 @@ use super::coding::{Coding, Range, check_varied};
 use super::conditions::{CUTTING_POWER, Cut, FACTORS, unit_trouble};
 use super::surface::Surface;
 use super::term::{WearTerm, second_order};
-use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, Regression, fit_unweighted};
+use crate::regression::{Column, Intercept, Refusal, RefusalKind, Regression, fit_unweighted};
 use serde::Serialize;
 
 /// Values of a factor that differ by less than this share of its range are one level.

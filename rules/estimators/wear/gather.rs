@@ -1,8 +1,8 @@
 //! From a recording or a table to cuts: one row per cut, its conditions and its mean cutting power.
 
 use super::conditions::{CUTTING_POWER, Cut, CutConditions, FACTORS};
-use crate::estimators::LoadLossLaw;
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::LoadLossLaw;
+use crate::regression::{Refusal, RefusalKind};
 use adapters::Recording;
 use adapters::recording::{Numbers, with_derived};
 

@@ -6,7 +6,7 @@ use super::fit_surface::{SurfaceFit, SurfaceOptions, fit_surface};
 use super::model::WearModel;
 use super::physical::{PhysicalFit, fit_physical};
 use super::threshold::{PowerLimit, compute_power_limit};
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 use serde_json::{Value, json};
 

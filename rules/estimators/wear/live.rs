@@ -12,7 +12,7 @@ use super::record::{WearKey, WearRecord};
 use super::threshold::{Observability, PowerLimit, compute_power_limit};
 use super::tool_name::tool_of;
 use super::work::{CutMoment, EdgeWork, ExpectedPower, WorkKey, WorkReference};
-use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
+use crate::{Estimate, Estimated, Estimates, NoEstimate, State};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! From what is known of wear and rate: the probability that the criterion is passed, and the parts that remain.
 
-use crate::statistics::normal_share;
+use numerics::statistics::normal_share;
 use serde::Serialize;
 
 /// Share of the criterion that one standard deviation of the wear may have for an edge to count as observed. With a wider one an

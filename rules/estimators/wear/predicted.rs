@@ -1,6 +1,6 @@
 //! What a model of the cutting power says of a cut.
 
-use crate::estimators::regression::{CONFIDENCE, t_quantile};
+use crate::regression::{CONFIDENCE, t_quantile};
 
 /// A power with what is known of its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]

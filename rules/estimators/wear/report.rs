@@ -4,7 +4,7 @@ use super::anova::{Anova, AnovaRow};
 use super::fit_surface::SurfaceFit;
 use super::identify::{DesignPoint, LearnedWear};
 use super::physical::PhysicalFit;
-use crate::estimators::regression::Refusal;
+use crate::regression::Refusal;
 use std::fmt::{self, Write as _};
 
 impl fmt::Display for LearnedWear {

@@ -2,7 +2,7 @@
 
 use super::coding::Range;
 use super::physical::Physical;
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 
 /// How many numbers there are.
 pub const SHORT_LENGTH: usize = 16;

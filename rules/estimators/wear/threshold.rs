@@ -3,7 +3,7 @@
 use super::conditions::{ConditionFactor, CutConditions, WEAR};
 use super::model::WearModel;
 use super::predicted::Predicted;
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 
 /// Share of the criterion that half the 95 % interval of a single wear estimate may have for the wear to count as

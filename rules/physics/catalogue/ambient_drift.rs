@@ -1,10 +1,10 @@
 //! The machine follows the temperature of the shop, late.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::is_displacement;
-use crate::physics::excitation::{lag_forms, compute_spread};
-use crate::physics::state::first_order_behind;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::is_displacement;
+use crate::excitation::{lag_forms, compute_spread};
+use crate::state::first_order_behind;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::f64::consts::LN_2;
 
 /// Displacement that follows the shop.
@@ -103,7 +103,7 @@ const SKIN_SHARE: f64 = 0.5;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::catalogue::tests::{column, scene, set};
+    use crate::catalogue::tests::{column, scene, set};
     use adapters::Recording;
 
     #[test]

@@ -1,8 +1,8 @@
 //! A consumer goes on and off: coolant, hydraulics, chip conveyor, chiller.
 
-use crate::physics::drive::{is_axis_output, is_power};
-use crate::physics::excitation::{ln_count, has_variation};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{is_axis_output, is_power};
+use crate::excitation::{ln_count, has_variation};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// A consumer that goes on and off.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 //! Feed axes take power to move, and the meter sees it.
 
-use crate::physics::drive::{axis_velocities, is_axis_output, is_power};
-use crate::physics::excitation::has_variation;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts, unit_in};
+use crate::drive::{axis_velocities, is_axis_output, is_power};
+use crate::excitation::has_variation;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts, unit_in};
 
 /// Power to move the feed axes.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 //! Force and power that accelerate a feed axis.
 
-use crate::physics::drive::{axis_velocities, in_si, is_axis_output, is_displacement, is_power, compute_rate};
-use crate::physics::excitation::plain_where_it_varies;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::{axis_velocities, in_si, is_axis_output, is_displacement, is_power, compute_rate};
+use crate::excitation::plain_where_it_varies;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of the feed axes.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,10 @@
 //! Grease and bearings get thinner and freer as they warm: no-load power falls.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{read_speed_krpm, slide_to_the, read_slide_velocity, speed_to_the};
-use crate::physics::excitation::{lag_forms, has_variation};
-use crate::physics::state::{compute_decay, first_order};
-use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::{read_speed_krpm, slide_to_the, read_slide_velocity, speed_to_the};
+use crate::excitation::{lag_forms, has_variation};
+use crate::state::{compute_decay, first_order};
+use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Friction that falls as the bearings warm.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 //! At low cutting speed a built-up edge forms and changes the force.
 
-use crate::physics::cut::{estimate_cut_load, cut_times, cutting_rows};
-use crate::physics::excitation::count_visits;
-use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::excitation::count_visits;
+use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Built-up edge at low cutting speed.
 #[derive(Debug, Clone, Copy)]

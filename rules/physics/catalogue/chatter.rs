@@ -1,8 +1,8 @@
 //! Self-excited vibration above a depth of cut: noise grows, the mean hardly.
 
-use crate::physics::cut::{estimate_cut_load, cut_times, cutting_rows};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::quantile;
+use crate::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use numerics::statistics::quantile;
 
 /// Self-excited vibration in the cut.
 #[derive(Debug, Clone, Copy)]

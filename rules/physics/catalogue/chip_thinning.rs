@@ -1,9 +1,9 @@
 //! At depths below the nose radius the chip is thinner and the force per area higher.
 
-use crate::physics::cut::{estimate_cut_load, cut_times, cutting_rows};
-use crate::physics::excitation::{has_variation, count_visits};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::quantile;
+use crate::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::excitation::{has_variation, count_visits};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use numerics::statistics::quantile;
 
 /// Thinner chips at small depth.
 #[derive(Debug, Clone, Copy)]
@@ -116,6 +116,6 @@ fn relative_thickness(scene: &Scene) -> Option<Vec<f64>> {
 fn thickness_varies(scene: &Scene) -> bool {
     let Some(thickness) = relative_thickness(scene).filter(|_| estimate_cut_load(scene).is_some()) else { return false };
     let ln: Vec<f64> = thickness.iter().filter(|h| **h > 0.0).map(|h| h.ln()).collect();
-    let middle = crate::statistics::mean(&ln);
-    crate::statistics::rms(&ln.iter().map(|x| x - middle).collect::<Vec<_>>()) > VARIES
+    let middle = numerics::statistics::mean(&ln);
+    numerics::statistics::rms(&ln.iter().map(|x| x - middle).collect::<Vec<_>>()) > VARIES
 }

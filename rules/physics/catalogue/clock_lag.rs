@@ -1,9 +1,9 @@
 //! The meter's clock is late or early against the controller's.
 
-use crate::physics::drive::{is_displacement, compute_rate};
-use crate::physics::excitation::{list_delays, has_variation};
-use crate::physics::state::delay_values;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{is_displacement, compute_rate};
+use crate::excitation::{list_delays, has_variation};
+use crate::state::delay_values;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Meter late or early against the controller.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,10 @@
 //! A controller holds the load by turning the feed: what the cut gains, the feed loses.
 
-use crate::physics::cut::{cutting_rows, read_engagement};
-use crate::physics::excitation::has_variation;
-use crate::physics::state::first_order_in_each_pass;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::{count_to_f64, quantile};
+use crate::cut::{cutting_rows, read_engagement};
+use crate::excitation::has_variation;
+use crate::state::first_order_in_each_pass;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use numerics::statistics::{count_to_f64, quantile};
 
 /// Feed that a load controller turns down.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,10 @@
 //! Cutting wet needs another force than cutting dry.
 
-use crate::physics::cut::{estimate_cut_load, cut_times, cutting_rows};
-use crate::physics::excitation::{has_variation, count_visits};
-use crate::physics::state::first_order_behind;
-use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::median;
+use crate::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::excitation::{has_variation, count_visits};
+use crate::state::first_order_behind;
+use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use numerics::statistics::median;
 
 /// Cut that differs wet and dry.
 #[derive(Debug, Clone, Copy)]
@@ -129,7 +129,7 @@ fn wet_speeds(scene: &Scene, coolant: &[f64]) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::catalogue::tests::{column, scene, set};
+    use crate::catalogue::tests::{column, scene, set};
     use adapters::Recording;
 
     /// Four seconds in a cut of 800 W, at these speeds in m/min and with the coolant on where it is one.

@@ -1,10 +1,10 @@
 //! Coolant warms bed, work and fixture.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::is_displacement;
-use crate::physics::excitation::{lag_forms, compute_spread, has_variation};
-use crate::physics::state::first_order_behind;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::is_displacement;
+use crate::excitation::{lag_forms, compute_spread, has_variation};
+use crate::state::first_order_behind;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Displacement that follows the coolant.
 #[derive(Debug, Clone, Copy)]

@@ -1,9 +1,9 @@
 //! Heat in the windings: grows with the square of torque.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{is_power, read_speed_krpm, torque_at_1000_rpm};
-use crate::physics::excitation::has_variation;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{is_power, read_speed_krpm, torque_at_1000_rpm};
+use crate::excitation::has_variation;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Heat in the motor windings.
 #[derive(Debug, Clone, Copy)]

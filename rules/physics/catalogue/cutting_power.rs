@@ -1,7 +1,7 @@
 //! Power of the cut after Kienzle: specific force times the section of the chip, falling with its thickness.
 
-use crate::physics::cut::{read_engagement, in_output};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::cut::{read_engagement, in_output};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
 /// Cutting power after Kienzle.

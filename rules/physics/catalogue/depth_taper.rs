@@ -1,8 +1,8 @@
 //! The depth of cut changes along the pass: a tapered blank, or tool and work that bend away.
 
-use crate::physics::cut::{estimate_cut_load, cut_times, way_mm};
-use crate::physics::excitation::has_variation;
-use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::cut::{estimate_cut_load, cut_times, way_mm};
+use crate::excitation::has_variation;
+use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::borrow::Cow;
 use std::ops::Range;
 

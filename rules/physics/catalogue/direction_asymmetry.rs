@@ -1,8 +1,8 @@
 //! Friction differs between the two directions of motion.
 
-use crate::physics::drive::{compute_directions, goes_both_ways, is_power, read_motion, rest_width};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::{count_to_f64, mean};
+use crate::drive::{compute_directions, goes_both_ways, is_power, read_motion, rest_width};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use numerics::statistics::{count_to_f64, mean};
 
 /// Friction that differs between directions.
 #[derive(Debug, Clone, Copy)]

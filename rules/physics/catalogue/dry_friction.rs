@@ -1,10 +1,10 @@
 //! Coulomb friction: a level with the sign of motion in a force, proportional to speed in a power.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{RAD_PER_S_OF_RPM, read_motion, soft_sign, is_rotary_drive};
-use crate::physics::excitation::find_greatest_magnitude;
-use crate::physics::state::{bent_over_the_way, measure_strokes};
-use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{RAD_PER_S_OF_RPM, read_motion, soft_sign, is_rotary_drive};
+use crate::excitation::find_greatest_magnitude;
+use crate::state::{bent_over_the_way, measure_strokes};
+use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Coulomb friction of a drive.
 #[derive(Debug, Clone, Copy)]
@@ -126,7 +126,7 @@ fn build_presliding_forms(scene: &Scene, velocity: &[f64]) -> Vec<Form> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::catalogue::tests::{column, scene, set};
+    use crate::catalogue::tests::{column, scene, set};
     use adapters::Recording;
 
     #[test]

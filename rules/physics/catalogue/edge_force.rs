@@ -1,8 +1,8 @@
 //! Ploughing of the cutting edge: a force along the edge that does not depend on feed.
 
-use crate::physics::cut::{read_engagement, in_output, teeth_in_cut};
-use crate::physics::drive::{is_axis_output, is_displacement};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::cut::{read_engagement, in_output, teeth_in_cut};
+use crate::drive::{is_axis_output, is_displacement};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Force along the cutting edge.
 #[derive(Debug, Clone, Copy)]
@@ -85,7 +85,7 @@ const MILLED: &str = "milled";
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::catalogue::tests::{column, scene, set};
+    use crate::catalogue::tests::{column, scene, set};
     use adapters::Recording;
 
     #[test]

@@ -1,9 +1,9 @@
 //! The flag that says the tool is in the work comes late or early.
 
-use crate::physics::cut::estimate_cut_load;
-use crate::physics::excitation::list_delays;
-use crate::physics::state::delay_values;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::cut::estimate_cut_load;
+use crate::excitation::list_delays;
+use crate::state::delay_values;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Engagement flag late or early.
 #[derive(Debug, Clone, Copy)]

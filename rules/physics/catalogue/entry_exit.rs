@@ -1,8 +1,8 @@
 //! The cut builds up when the tool enters and fades when it leaves.
 
-use crate::physics::cut::{estimate_cut_load, cut_times, way_mm};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::count_to_f64;
+use crate::cut::{estimate_cut_load, cut_times, way_mm};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use numerics::statistics::count_to_f64;
 use std::ops::Range;
 
 /// Build-up and fading of the cut.

@@ -1,8 +1,8 @@
 //! Above its base speed the motor is run with a weakened field: currents and losses change there.
 
-use crate::physics::drive::{driven_krpm, is_power};
-use crate::physics::excitation::{between_speeds, ln_count};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{driven_krpm, is_power};
+use crate::excitation::{between_speeds, ln_count};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Change of losses above base speed.
 #[derive(Debug, Clone, Copy)]

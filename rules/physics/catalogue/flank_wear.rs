@@ -1,10 +1,10 @@
 //! Friction on a worn flank: grows with the cutting time of the tool, starts again with a new edge.
 
-use crate::physics::drive::is_displacement;
-use crate::physics::excitation::find_greatest_magnitude;
-use crate::physics::tool_load;
-use crate::physics::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
-use crate::statistics::count_to_f64;
+use crate::drive::is_displacement;
+use crate::excitation::find_greatest_magnitude;
+use crate::tool_load;
+use crate::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use numerics::statistics::count_to_f64;
 use std::borrow::Cow;
 
 /// Friction between a worn flank and the work.

@@ -1,8 +1,8 @@
 //! Each gear or belt stage has its own drag and efficiency.
 
-use crate::physics::drive::driven_krpm;
-use crate::physics::excitation::{between_speeds, ln_count};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::driven_krpm;
+use crate::excitation::{between_speeds, ln_count};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::collections::BTreeSet;
 
 /// Drag and efficiency of a gear stage.

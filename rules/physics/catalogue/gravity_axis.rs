@@ -1,8 +1,8 @@
 //! A vertical axis carries weight: up costs power, down gives it back.
 
-use crate::physics::drive::{compute_directions, in_si, is_displacement, is_power, read_motion, compute_rate};
-use crate::physics::excitation::has_variation;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::{compute_directions, in_si, is_displacement, is_power, read_motion, compute_rate};
+use crate::excitation::has_variation;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Weight on a vertical axis.
 #[derive(Debug, Clone, Copy)]

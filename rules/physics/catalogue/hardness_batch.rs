@@ -1,10 +1,10 @@
 //! A lot of material is harder or softer than the one before.
 
-use crate::physics::cut::{estimate_cut_load, cut_times};
-use crate::physics::excitation::{
+use crate::cut::{estimate_cut_load, cut_times};
+use crate::excitation::{
     ln_count, run_named, since_run, step_forms, where_word, within_runs, word_forms,
 };
-use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Hardness that differs between lots.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 //! Losses in the inverter: grow with current.
 
-use crate::physics::drive::{is_power, read_speed_krpm, torque_at_1000_rpm};
-use crate::physics::excitation::{find_greatest_magnitude, has_variation};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{is_power, read_speed_krpm, torque_at_1000_rpm};
+use crate::excitation::{find_greatest_magnitude, has_variation};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::LN_2;
 
 /// Losses in the inverter.

@@ -1,8 +1,8 @@
 //! Losses in the motor's iron: grow a little faster than speed.
 
-use crate::physics::drive::{driven_krpm, speed_to_the};
-use crate::physics::excitation::has_variation;
-use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::{driven_krpm, speed_to_the};
+use crate::excitation::has_variation;
+use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Losses in the iron of the motor.
 #[derive(Debug, Clone, Copy)]

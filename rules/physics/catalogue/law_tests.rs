@@ -2,7 +2,7 @@
 
 use super::find_effect;
 use super::tests::{self, scene, set, set_words};
-use crate::physics::{Form, Scene};
+use crate::{Form, Scene};
 use adapters::recording::Recording;
 
 fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {

@@ -1,8 +1,8 @@
 //! Losses of motor and gear that grow with the load.
 
-use crate::physics::drive::is_displacement;
-use crate::physics::excitation::has_variation;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::is_displacement;
+use crate::excitation::has_variation;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Losses that grow with the load.
 #[derive(Debug, Clone, Copy)]

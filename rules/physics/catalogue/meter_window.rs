@@ -1,9 +1,9 @@
 //! The meter averages over a window: edges are smeared.
 
-use crate::physics::drive::is_displacement;
-use crate::physics::excitation::{list_delays, has_variation};
-use crate::physics::state::delay_values;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::is_displacement;
+use crate::excitation::{list_delays, has_variation};
+use crate::state::delay_values;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Averaging in the meter.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 //! Power that the spindle takes when it turns and does not cut.
 
-use crate::physics::drive::driven_krpm;
-use crate::physics::excitation::has_variation;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::driven_krpm;
+use crate::excitation::has_variation;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// No-load power of the spindle.
 #[derive(Debug, Clone, Copy)]

@@ -1,6 +1,6 @@
 //! A constant that the simulation lacks.
 
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// A constant in the output.
 #[derive(Debug, Clone, Copy)]

@@ -1,9 +1,9 @@
 //! The real feed follows the reported one late.
 
-use crate::physics::cut::{estimate_cut_load, cutting_rows};
-use crate::physics::excitation::{list_delays, count_visits};
-use crate::physics::state::delay_values;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::cut::{estimate_cut_load, cutting_rows};
+use crate::excitation::{list_delays, count_visits};
+use crate::state::delay_values;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Feed that follows late.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,10 @@
 //! Inner rings warm before the housing: preload and friction rise, and fall again when the housing follows.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{driven_krpm, read_speed_krpm, speed_to_the};
-use crate::physics::excitation::lag_forms;
-use crate::physics::state::first_order;
-use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{driven_krpm, read_speed_krpm, speed_to_the};
+use crate::excitation::lag_forms;
+use crate::state::first_order;
+use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Friction that rises with bearing preload.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 //! Depth or width of cut is mis-stated for one operation.
 
-use crate::physics::cut::{estimate_cut_load, cut_times};
-use crate::physics::excitation::{where_word, word_forms};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::cut::{estimate_cut_load, cut_times};
+use crate::excitation::{where_word, word_forms};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Depth or width mis-stated for an operation.
 #[derive(Debug, Clone, Copy)]

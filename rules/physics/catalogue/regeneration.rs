@@ -1,8 +1,8 @@
 //! Braking power does not come back: it is burnt in a resistor, or the meter does not count it.
 
-use crate::physics::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
-use crate::physics::excitation::count_visits;
-use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
+use crate::excitation::count_visits;
+use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Braking power that is not fed back.
 #[derive(Debug, Clone, Copy)]

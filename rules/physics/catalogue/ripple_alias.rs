@@ -1,6 +1,6 @@
 //! The ripple of the mains, sampled too slowly, looks like a slow wave.
 
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
 /// Mains ripple folded by slow sampling.

@@ -1,8 +1,8 @@
 //! Tool or work runs out of true: the cut swells and fades once per turn.
 
-use crate::physics::cut::{estimate_cut_load, cut_times};
-use crate::physics::drive::RAD_PER_S_OF_RPM;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::cut::{estimate_cut_load, cut_times};
+use crate::drive::RAD_PER_S_OF_RPM;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Cut that swells once per turn.
 #[derive(Debug, Clone, Copy)]

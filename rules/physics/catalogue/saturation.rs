@@ -1,7 +1,7 @@
 //! The meter or drive shows no more than its ceiling.
 
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::quantile;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use numerics::statistics::quantile;
 
 /// Ceiling of the meter.
 #[derive(Debug, Clone, Copy)]

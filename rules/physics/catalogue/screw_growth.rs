@@ -1,10 +1,10 @@
 //! The ball screw grows as its nut rubs: the error grows with the distance from the fixed bearing.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{axis_velocities, in_si, is_displacement};
-use crate::physics::excitation::{lag_forms, has_variation};
-use crate::physics::state::first_order;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::{axis_velocities, in_si, is_displacement};
+use crate::excitation::{lag_forms, has_variation};
+use crate::state::first_order;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Growth of the ball screw.
 #[derive(Debug, Clone, Copy)]

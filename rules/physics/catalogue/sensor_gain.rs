@@ -1,7 +1,7 @@
 //! The meter shows a fixed share too much or too little.
 
-use crate::physics::excitation::{recording_share, since_run, step_forms, has_variation};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::excitation::{recording_share, since_run, step_forms, has_variation};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Gain of the meter.
 #[derive(Debug, Clone, Copy)]

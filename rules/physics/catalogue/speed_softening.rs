@@ -1,9 +1,9 @@
 //! Faster cutting heats the chip and softens it: the specific force falls.
 
-use crate::physics::cut::{cut_times, cutting_rows};
-use crate::physics::excitation::has_variation;
-use crate::physics::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use crate::statistics::quantile;
+use crate::cut::{cut_times, cutting_rows};
+use crate::excitation::has_variation;
+use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use numerics::statistics::quantile;
 
 /// Specific force that falls with cutting speed.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,10 @@
 //! The spindle grows as it warms, quickly at the nose and slowly in the housing.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{is_displacement, read_speed_krpm};
-use crate::physics::excitation::{lag_forms, time_constants, has_variation};
-use crate::physics::state::{compute_decay, first_order};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::{is_displacement, read_speed_krpm};
+use crate::excitation::{lag_forms, time_constants, has_variation};
+use crate::state::{compute_decay, first_order};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Growth of the spindle with its own heat.
 #[derive(Debug, Clone, Copy)]

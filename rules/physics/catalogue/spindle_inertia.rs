@@ -1,8 +1,8 @@
 //! Power and torque that accelerate spindle, chuck and work.
 
-use crate::physics::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
-use crate::physics::excitation::{find_greatest_magnitude, count_visits};
-use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
+use crate::excitation::{find_greatest_magnitude, count_visits};
+use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of what the spindle turns.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 //! At creep the oil film breaks down: friction is higher than when moving.
 
-use crate::physics::drive::{is_power, read_motion, soft_sign, is_rotary_drive};
-use crate::physics::excitation::{find_greatest_magnitude, has_variation, count_visits};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{is_power, read_motion, soft_sign, is_rotary_drive};
+use crate::excitation::{find_greatest_magnitude, has_variation, count_visits};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Extra friction at creep speed.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! The mains go up and down, and some consumers with them.
 
-use crate::physics::excitation::has_variation;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use crate::excitation::has_variation;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Output that follows the supply voltage.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! Every effect of the catalogue: told completely, finite on a rich recording, silent on a poor one.
 
 use super::CATALOGUE;
-use crate::physics::{Effect, Entry, Form, ParameterColumns, Role, Scene, Texts};
+use crate::{Effect, Entry, Form, ParameterColumns, Role, Scene, Texts};
 use adapters::recording::{Cells, Numbers, Recording, Words};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,9 +1,9 @@
 //! Friction that grows in proportion to speed.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::drive::{is_power, read_motion};
-use crate::physics::excitation::plain_where_it_varies;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{is_power, read_motion};
+use crate::excitation::plain_where_it_varies;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Friction in proportion to speed.
 #[derive(Debug, Clone, Copy)]

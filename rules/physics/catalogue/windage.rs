@@ -1,8 +1,8 @@
 //! Air drag on spindle, chuck and fan: grows with the cube of speed.
 
-use crate::physics::drive::{driven_krpm, speed_to_the};
-use crate::physics::excitation::has_variation;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::drive::{driven_krpm, speed_to_the};
+use crate::excitation::has_variation;
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Air drag of what turns.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 //! The zero of the meter creeps, with cabinet temperature or age.
 
 use adapters::channel::quantity::Quantity;
-use crate::physics::excitation::{recording_elapsed_s, recording_share};
-use crate::physics::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use crate::excitation::{recording_elapsed_s, recording_share};
+use crate::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
 /// Zero of the meter that creeps.

@@ -431,7 +431,7 @@ impl Scene {
             let Some(engaged) = self.role_values(Role::Engaged) else { return 1.0 };
             let middle = |cutting: bool| {
                 let rows = (0..self.rows).filter(|row| self.usable[*row] && (engaged[*row] > 0.5) == cutting);
-                crate::statistics::quantile(rows.map(|row| self.recorded[row].abs()), 0.5)
+                numerics::statistics::quantile(rows.map(|row| self.recorded[row].abs()), 0.5)
             };
             let usual = middle(true).unwrap_or(1.0) - middle(false).unwrap_or(0.0);
             if usual > 0.0 { usual } else { 1.0 }
@@ -473,7 +473,7 @@ fn running_clock_s(recording: &Recording, runs: &[Range<usize>]) -> Vec<f64> {
 
 fn median_period_s(time_s: &[f64], runs: &[Range<usize>]) -> f64 {
     let steps = runs.iter().flat_map(|run| time_s[run.clone()].windows(2).map(|pair| pair[1] - pair[0]));
-    crate::statistics::median(steps.filter(|step| *step > 0.0).collect()).unwrap_or(1.0)
+    numerics::statistics::median(steps.filter(|step| *step > 0.0).collect()).unwrap_or(1.0)
 }
 
 fn hold_fill(values: &[Option<f64>], runs: &[Range<usize>]) -> Vec<f64> {

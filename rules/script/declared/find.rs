@@ -2,8 +2,8 @@
 
 use super::scan::{find_calls, to_position};
 use super::{Declared, Per, SettingValue};
-use crate::script::compile::ScriptFile;
-use crate::script::problem::{self, ScriptProblem, describe_type};
+use crate::compile::ScriptFile;
+use crate::problem::{self, ScriptProblem, describe_type};
 use adapters::channel::find_nearest_name;
 use rhai::{Array, Dynamic, Engine, Expr, ImmutableString, Map, Position, Stmt};
 use std::ops::Range;
@@ -18,18 +18,18 @@ const EXAMPLE: &str =
 
 /// A declaration and where it stands.
 #[derive(Debug, Clone)]
-pub(in crate::script) struct FoundDeclaration {
-    pub(in crate::script) declared: Declared,
+pub(crate) struct FoundDeclaration {
+    pub(crate) declared: Declared,
     span: Range<usize>,
     /// The constant that it alone is the value of.
-    pub(in crate::script) constant: Option<String>,
+    pub(crate) constant: Option<String>,
 }
 
 /// Every declaration of a file, in the order of the text.
 ///
 /// # Errors
 /// Everything that is wrong with them.
-pub(in crate::script) fn find_declarations(
+pub(crate) fn find_declarations(
     file: &ScriptFile,
     engine: &Engine,
 ) -> Result<Vec<FoundDeclaration>, Vec<ScriptProblem>> {
@@ -62,7 +62,7 @@ pub(in crate::script) fn find_declarations(
 
 /// The text with these values, each in the place of its declaration. Lines and columns of everything else stay; `None` stands
 /// for a value that is looked up when the script runs.
-pub(in crate::script) fn with_values(
+pub(crate) fn with_values(
     text: &str,
     found: &[FoundDeclaration],
     values: &[Option<SettingValue>],

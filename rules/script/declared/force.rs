@@ -1,7 +1,7 @@
 //! The values in force for one script: which stand in its text, and which are looked up by tool and operation.
 
 use super::{DeclarationPlace, Declared, FoundDeclaration, SettingValue, SettingValues};
-use crate::estimators::wear::tool_of;
+use estimators::wear::tool_of;
 use adapters::{ChannelId, Sample};
 use rhai::Dynamic;
 use std::collections::BTreeMap;
@@ -9,19 +9,19 @@ use std::sync::Arc;
 
 /// See the [module](self).
 #[derive(Debug, Clone, Default)]
-pub(in crate::script) struct Force {
+pub(crate) struct Force {
     /// The value of each declaration as it stands in the text; `None` where it is looked up.
-    pub(in crate::script) texts: Vec<Option<SettingValue>>,
+    pub(crate) texts: Vec<Option<SettingValue>>,
     /// What is looked up.
-    pub(in crate::script) live: LiveValues,
+    pub(crate) live: LiveValues,
     /// Is anything else than the default in force?
-    pub(in crate::script) chosen: bool,
+    pub(crate) chosen: bool,
 }
 
 impl Force {
     /// The values of this file for these declarations. One that the declaration does not allow is left out: it is a problem of
     /// the file.
-    pub(in crate::script) fn from_values(found: &[FoundDeclaration], values: &SettingValues) -> Self {
+    pub(crate) fn from_values(found: &[FoundDeclaration], values: &SettingValues) -> Self {
         let mut force = Self::default();
         for (index, it) in found.iter().enumerate() {
             let declared = &it.declared;
@@ -41,7 +41,7 @@ impl Force {
     }
 
     /// The values of the machine, or of one place, all of them in the text.
-    pub(in crate::script) fn with_fixed_values(
+    pub(crate) fn with_fixed_values(
         found: &[FoundDeclaration],
         values: &SettingValues,
         place: &DeclarationPlace,
@@ -66,12 +66,12 @@ fn find_allowed(declared: &Declared, values: &SettingValues, place: &Declaration
 
 /// Values that depend on the tool or the operation.
 #[derive(Debug, Clone, Default)]
-pub(in crate::script) struct LiveValues {
+pub(crate) struct LiveValues {
     /// Value of the machine for every declaration; unit where it stands in the text.
     machine: Vec<Dynamic>,
     special: BTreeMap<DeclarationPlace, Vec<(usize, Dynamic)>>,
     /// Constants whose value is looked up, with the number of their declaration.
-    pub(in crate::script) constants: Vec<(String, usize)>,
+    pub(crate) constants: Vec<(String, usize)>,
 }
 
 impl LiveValues {
@@ -92,17 +92,17 @@ impl LiveValues {
     }
 
     /// Is nothing looked up?
-    pub(in crate::script) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.special.is_empty()
     }
 
     /// Every tool and operation with values of its own.
-    pub(in crate::script) fn places(&self) -> impl Iterator<Item = &DeclarationPlace> {
+    pub(crate) fn places(&self) -> impl Iterator<Item = &DeclarationPlace> {
         self.special.keys()
     }
 
     /// The values for one place.
-    pub(in crate::script) fn values_for_place(&self, place: &DeclarationPlace) -> Arc<[Dynamic]> {
+    pub(crate) fn values_for_place(&self, place: &DeclarationPlace) -> Arc<[Dynamic]> {
         match place {
             DeclarationPlace::Machine => self.compose_values(None, None),
             DeclarationPlace::Tool(tool) => self.compose_values(Some(tool), None),
@@ -134,7 +134,7 @@ fn to_dynamic(value: &SettingValue) -> Dynamic {
 
 /// The values that hold now, looked up anew when the tool or the operation has changed.
 #[derive(Debug, Default)]
-pub(in crate::script) struct Now {
+pub(crate) struct Now {
     tool: Option<String>,
     operation: Option<String>,
     values: Option<Arc<[Dynamic]>>,
@@ -142,7 +142,7 @@ pub(in crate::script) struct Now {
 
 impl Now {
     /// The values for this sample.
-    pub(in crate::script) fn update_values(&mut self, live: &LiveValues, sample: &Sample) -> Arc<[Dynamic]> {
+    pub(crate) fn update_values(&mut self, live: &LiveValues, sample: &Sample) -> Arc<[Dynamic]> {
         let text = |name: &str| ChannelId::from_name(name).and_then(|id| sample.text(id));
         let (tool, operation) = (text("tool"), text("operation"));
         match &self.values {

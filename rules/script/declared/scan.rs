@@ -5,15 +5,15 @@ use std::ops::Range;
 
 /// A call that was found.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::script) struct Call {
+pub(crate) struct Call {
     /// The whole of it, from the name to the closing bracket, in bytes.
-    pub(in crate::script) span: Range<usize>,
+    pub(crate) span: Range<usize>,
     /// What stands between the brackets, in bytes.
-    pub(in crate::script) inside: Range<usize>,
+    pub(crate) inside: Range<usize>,
 }
 
 /// Every call of a function of this name. A call whose bracket is never closed is left to the compiler.
-pub(in crate::script) fn find_calls(text: &str, name: &str) -> Vec<Call> {
+pub(crate) fn find_calls(text: &str, name: &str) -> Vec<Call> {
     let bytes = text.as_bytes();
     let mut found = Vec::new();
     let mut at = 0;
@@ -71,7 +71,7 @@ fn find_closing_bracket(text: &str, open: usize) -> Option<usize> {
 }
 
 /// The end of the text or comment that begins here; `at` itself where none does.
-pub(in crate::script) fn skip_text_or_comment(text: &str, at: usize) -> usize {
+pub(crate) fn skip_text_or_comment(text: &str, at: usize) -> usize {
     let rest = &text[at..];
     let to = |found: Option<usize>, more: usize| found.map_or(text.len(), |found| at + found + more);
     if rest.starts_with("//") {
@@ -96,13 +96,13 @@ pub(in crate::script) fn skip_text_or_comment(text: &str, at: usize) -> usize {
 }
 
 /// The text at the beginning of this piece, where it is one: `"name"`.
-pub(in crate::script) fn read_quoted(text: &str) -> Option<&str> {
+pub(crate) fn read_quoted(text: &str) -> Option<&str> {
     let text = text.trim_start().strip_prefix('"')?;
     text.split_once('"').map(|(inside, _)| inside)
 }
 
 /// Line and column of a byte of the text.
-pub(in crate::script) fn to_position(text: &str, at: usize) -> Position {
+pub(crate) fn to_position(text: &str, at: usize) -> Position {
     let before = &text[..at];
     let line = before.matches('\n').count() + 1;
     let column = before[before.rfind('\n').map_or(0, |end| end + 1)..].chars().count() + 1;

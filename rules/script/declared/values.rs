@@ -1,8 +1,8 @@
 //! The file with the values of settings, checked against what the scripts declare.
 
 use super::{Declared, Per, SettingValue};
-use crate::script::list_shipped_scripts;
-use crate::script::problem::ScriptProblem;
+use crate::list_shipped_scripts;
+use crate::problem::ScriptProblem;
 use adapters::channel::find_nearest_name;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

@@ -14,7 +14,7 @@ pub use arguments::{Arguments, MethodResult};
 
 use super::collect::ScriptResult;
 use super::engine::Shared;
-use crate::estimators::regression::Refusal;
+use estimators::regression::Refusal;
 use rhai::{Dynamic, Engine, ImmutableString, NativeCallContext};
 use std::any::TypeId;
 

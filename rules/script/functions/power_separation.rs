@@ -1,8 +1,8 @@
 //! Power separation: no-load power at a speed, cutting power and load loss.
 
 use super::{Arguments, Method, MethodParameter, MethodResult, Subject, define_parameter};
-use crate::estimators::regression::{Refusal, RefusalKind};
-use crate::estimators::{LoadLossLaw, lagrange_weights, noise_gain, select_adjacent_speeds, solve_power_balance};
+use estimators::regression::{Refusal, RefusalKind};
+use estimators::{LoadLossLaw, lagrange_weights, noise_gain, select_adjacent_speeds, solve_power_balance};
 
 /// Extrapolation that amplifies noise more than this is refused, as the estimators do.
 const GAIN_MAX: f64 = 3.0 + 1e-9;
@@ -94,7 +94,7 @@ fn read_interpolation(given: &Arguments<'_>) -> Result<([f64; 3], [f64; 3]), Ref
     Ok(([table[first][1], table[first + 1][1], table[first + 2][1]], weights))
 }
 
-fn split_excess_power(given: &Arguments<'_>) -> Result<crate::estimators::Balance, Refusal> {
+fn split_excess_power(given: &Arguments<'_>) -> Result<estimators::Balance, Refusal> {
     let excess_w = given.number(0) - given.number(1);
     solve_power_balance(excess_w, given.number(2), given.number(3)).ok_or_else(|| {
         let what = format!("no cutting power gives {excess_w:.1} W above no-load power with these coefficients");

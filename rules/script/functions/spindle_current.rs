@@ -1,8 +1,8 @@
 //! Constant load by the spindle current: curves of a feature over feed, by depth of cut.
 
 use super::{Arguments, Method, MethodParameter, MethodResult, Subject, define_parameter};
-use crate::estimators::regression::Refusal;
-use crate::estimators::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
+use estimators::regression::Refusal;
+use estimators::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
 
 pub(super) static SUBJECT: Subject = Subject { en: "Constant load", zh: "恒负荷进给", methods: METHODS };
 
@@ -67,7 +67,7 @@ fn read_family(given: &Arguments<'_>) -> Result<CurveFamily, Refusal> {
 }
 
 fn check_feed(curve: &Cubic, feed: f64) -> Result<(), Refusal> {
-    use crate::estimators::regression::RefusalKind::OutOfRange;
+    use estimators::regression::RefusalKind::OutOfRange;
     if (curve.feed_min..=curve.feed_max).contains(&feed) {
         return Ok(());
     }

@@ -1,8 +1,8 @@
 //! Thermal error: prediction from temperatures, the lag of a structure, and increments of a compensation.
 
 use super::{Arguments, Method, MethodParameter, MethodResult, Subject, define_parameter};
-use crate::estimators::regression::{Refusal, RefusalKind};
-use crate::estimators::thermal::first_order;
+use estimators::regression::{Refusal, RefusalKind};
+use estimators::thermal::first_order;
 
 pub(super) static SUBJECT: Subject = Subject { en: "Thermal error", zh: "热误差", methods: METHODS };
 

@@ -1,8 +1,8 @@
 //! Tool wear: the limit of the cutting power, the wear that a power means, the cutting speed.
 
 use super::{Arguments, Method, MethodParameter, MethodResult, Subject, define_parameter};
-use crate::estimators::regression::{Refusal, RefusalKind};
-use crate::estimators::wear::{
+use estimators::regression::{Refusal, RefusalKind};
+use estimators::wear::{
     CutConditions, Observability, Physical, WearEstimate, WearModel, compute_power_limit, cutting_speed_m_min,
     estimate_wear,
 };
@@ -124,8 +124,8 @@ fn check_observability(extrapolated: &[&str], observability: Observability) -> R
 
 #[cfg(test)]
 mod tests {
-    use crate::estimators::regression::RefusalKind;
-    use crate::estimators::wear::Physical;
+    use estimators::regression::RefusalKind;
+    use estimators::wear::Physical;
 
     #[test]
     fn sixteen_numbers_are_a_model_and_come_back() {

@@ -1,8 +1,8 @@
 //! Arguments of the functions of the host that are wrong whatever the machine does.
 
 use super::{ExpressionKind, KindMistake, LikeWords, UNITS_OFF, WordInUse, infer_kind, near_word};
-use crate::script::decision::{AlarmLevel, Axis};
-use crate::script::vocabulary::{WordKind, find_word, list_words};
+use crate::decision::{AlarmLevel, Axis};
+use crate::vocabulary::{WordKind, find_word, list_words};
 use rhai::{Expr, FnCallExpr, ImmutableString, Position};
 
 /// What an argument has to be.
@@ -56,7 +56,7 @@ const SHARE_MAX: f64 = 2.0;
 const PERCENT_MAX: f64 = 254.0;
 
 /// What is wrong with the arguments of this call.
-pub(in crate::script) fn find_call_mistakes(call: &FnCallExpr, like: LikeWords<'_>) -> Vec<KindMistake> {
+pub(crate) fn find_call_mistakes(call: &FnCallExpr, like: LikeWords<'_>) -> Vec<KindMistake> {
     let name = call.name.as_str();
     if let ("given", [Expr::Map(entries, _)]) = (name, &call.args[..]) {
         return entries.0.iter().filter_map(|(word, value)| find_given_mistake(&word.name, value)).collect();
@@ -162,7 +162,7 @@ fn format_list(words: &[&str]) -> String {
 
 /// The names of alarms in one file: those that are raised, and those that are cleared or expected.
 #[derive(Debug, Default)]
-pub(in crate::script) struct AlarmNames {
+pub(crate) struct AlarmNames {
     raised: Vec<ImmutableString>,
     used: Vec<(ImmutableString, Position)>,
     /// A name is put together while the script runs: then nothing is known.
@@ -171,7 +171,7 @@ pub(in crate::script) struct AlarmNames {
 
 impl AlarmNames {
     /// Takes a call.
-    pub(in crate::script) fn add(&mut self, call: &FnCallExpr) {
+    pub(crate) fn add(&mut self, call: &FnCallExpr) {
         let raises = ["alarm", "raise_alarm", "alarm_when", "alarm_above", "alarm_below"].contains(&call.name.as_str());
         let uses = ["clear_alarm", "expect_alarm", "expect_no_alarm"].contains(&call.name.as_str());
         match call.args.first() {
@@ -183,7 +183,7 @@ impl AlarmNames {
     }
 
     /// Names that nothing in this file raises.
-    pub(in crate::script) fn list_mistakes(&self) -> Vec<KindMistake> {
+    pub(crate) fn list_mistakes(&self) -> Vec<KindMistake> {
         let unknown = |name: &ImmutableString| !self.built && !self.raised.contains(name);
         let told = |(name, at): &(ImmutableString, Position)| {
             let near = near_word(name, self.raised.iter().map(ImmutableString::as_str));

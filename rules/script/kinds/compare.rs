@@ -1,14 +1,14 @@
 //! Comparisons, lists and conditions that can never be true, or never be computed.
 
 use super::{ExpressionKind, KindMistake, LikeWords, UNITS_OFF, WordInUse, infer_kind};
-use crate::script::vocabulary::WordKind;
+use crate::vocabulary::WordKind;
 use rhai::{Expr, FnCallExpr, Position};
 
 const EQUAL: [&str; 2] = ["==", "!="];
 const ORDER: [&str; 4] = ["<", "<=", ">", ">="];
 
 /// What is wrong with a comparison, `x in [...]`, or `!x`.
-pub(in crate::script) fn find_operator_mistakes(
+pub(crate) fn find_operator_mistakes(
     call: &FnCallExpr,
     at: Position,
     like: LikeWords<'_>,
@@ -82,7 +82,7 @@ fn find_pair_mistake(word: &Expr, other: &Expr, equal: bool, like: LikeWords<'_>
 }
 
 /// A number or a text where true or false is needed: `if coolant_on { ... }`.
-pub(in crate::script) fn find_condition_mistake(expr: &Expr, like: LikeWords<'_>) -> Option<KindMistake> {
+pub(crate) fn find_condition_mistake(expr: &Expr, like: LikeWords<'_>) -> Option<KindMistake> {
     let at = expr.position();
     match infer_kind(expr, like) {
         ExpressionKind::Word(seen) if seen.kind == WordKind::Number => {

@@ -1,11 +1,11 @@
 //! The cases of a `switch` over a word of the vocabulary. The compiled form keeps only their hashes, so they are read from the text.
 
 use super::{ExpressionKind, KindMistake, LikeWords, infer_kind};
-use crate::script::declared::scan::{skip_text_or_comment, to_position};
+use crate::declared::scan::{skip_text_or_comment, to_position};
 use rhai::{Expr, Position};
 
 /// What is wrong with the cases of the `switch` that looks at this expression.
-pub(in crate::script) fn find_case_mistakes(text: &str, looked_at: &Expr, like: LikeWords<'_>) -> Vec<KindMistake> {
+pub(crate) fn find_case_mistakes(text: &str, looked_at: &Expr, like: LikeWords<'_>) -> Vec<KindMistake> {
     let ExpressionKind::Word(seen) = infer_kind(looked_at, like) else { return Vec::new() };
     if seen.one_of.is_empty() {
         return Vec::new();

@@ -1,8 +1,8 @@
 //! The alarms of one script: which begin and which end after a run.
 
 use super::{Outputs, Slot};
-use crate::script::decision::{Alarm, SCRIPT_STOPPED};
-use crate::script::timers::AlarmText;
+use crate::decision::{Alarm, SCRIPT_STOPPED};
+use crate::timers::AlarmText;
 use adapters::clock::TimeNs;
 use std::sync::Arc;
 

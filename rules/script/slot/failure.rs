@@ -1,12 +1,12 @@
 //! A run that failed or was stopped, and who is in charge then.
 
 use super::{Outputs, Previous, ScriptCondition, Slot};
-use crate::script::compile::{ScriptFile, compile_scripts};
-use crate::script::compiled::Script;
-use crate::script::decision::{AlarmLevel, SCRIPT_STOPPED};
-use crate::script::script_memory::ScriptMemory;
-use crate::script::shipped::list_shipped_scripts;
-use crate::script::timers::AlarmText;
+use crate::compile::{ScriptFile, compile_scripts};
+use crate::compiled::Script;
+use crate::decision::{AlarmLevel, SCRIPT_STOPPED};
+use crate::script_memory::ScriptMemory;
+use crate::shipped::list_shipped_scripts;
+use crate::timers::AlarmText;
 use rhai::EvalAltResult;
 
 impl Slot {

@@ -1,8 +1,8 @@
 //! A feed override that a script follows: an estimate whose value is asked for at every tick, also between two runs of the script.
 
-use crate::script::compiled::Script;
-use crate::script::decision::OverrideRequest;
-use crate::script::vocabulary::{View, Word, WordValue};
+use crate::compiled::Script;
+use crate::decision::OverrideRequest;
+use crate::vocabulary::{View, Word, WordValue};
 use rhai::ImmutableString;
 use std::sync::Arc;
 

@@ -19,7 +19,7 @@ use super::status::{ScriptCondition, ScriptStatus};
 use super::timers::{AlarmText, Timers};
 use super::variables::{fill_scope, has_absent, scope_of, why_absent};
 use super::vocabulary::View;
-use crate::estimators::Estimates;
+use estimators::Estimates;
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use follows::Follows;

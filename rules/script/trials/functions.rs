@@ -1,9 +1,9 @@
 //! What a trial can call.
 
 use super::stage::{Theatre, TrialContext};
-use crate::script::callable::{Function, define_function};
-use crate::script::collect::ScriptResult;
-use crate::script::decision::{Axis, Stop};
+use crate::callable::{Function, define_function};
+use crate::collect::ScriptResult;
+use crate::decision::{Axis, Stop};
 use rhai::{Dynamic, Engine, ImmutableString, Map};
 
 /// Every function of trials.

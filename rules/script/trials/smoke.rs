@@ -3,8 +3,8 @@
 
 use super::TrialResult;
 use super::stage::TrialContext;
-use crate::estimators::State;
-use crate::script::compiled::Script;
+use estimators::State;
+use crate::compiled::Script;
 use rhai::{Dynamic, ImmutableString};
 use std::sync::Arc;
 

@@ -1,15 +1,15 @@
 //! What a trial is played on: one script, what it sees, and a clock of its own.
 
-use crate::estimators::loads::{Figure, LoadEstimator};
-use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
-use crate::script::compiled::{Script, ScriptSet};
-use crate::script::decision::{Alarm, Axis, Decision, Stop};
-use crate::script::problem::ScriptProblem;
-use crate::script::quantities::QUANTITIES;
-use crate::script::settings::merge_settings;
-use crate::script::status::ScriptCondition;
-use crate::script::vocabulary::{find_word, list_words};
-use crate::script::{Host, WordKind};
+use estimators::loads::{Figure, LoadEstimator};
+use estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
+use crate::compiled::{Script, ScriptSet};
+use crate::decision::{Alarm, Axis, Decision, Stop};
+use crate::problem::ScriptProblem;
+use crate::quantities::QUANTITIES;
+use crate::settings::merge_settings;
+use crate::status::ScriptCondition;
+use crate::vocabulary::{find_word, list_words};
+use crate::{Host, WordKind};
 use adapters::channel::find_nearest_name;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, ChannelId, Sample, Slot, Value};

@@ -2,7 +2,7 @@
 
 use super::decision::THRESHOLDS;
 use super::posterior::Group;
-use crate::twin::diagnosis::{Existence, UNKNOWN, Verdict};
+use crate::diagnosis::{Existence, UNKNOWN, Verdict};
 
 /// Another name, and what it would replace.
 #[derive(Debug, Clone, PartialEq)]

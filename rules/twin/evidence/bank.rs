@@ -251,7 +251,7 @@ impl VariantBank {
     /// How many variants the kind of each has.
     pub(super) fn shares(&self) -> Vec<f64> {
         let of_kind = |kind: &str| self.variants.iter().filter(|v| v.kind() == Some(kind)).count();
-        let share = |v: &Variant| v.kind().map_or(1.0, |kind| crate::statistics::count_to_f64(of_kind(kind)));
+        let share = |v: &Variant| v.kind().map_or(1.0, |kind| numerics::statistics::count_to_f64(of_kind(kind)));
         self.variants.iter().map(share).collect()
     }
 
@@ -348,5 +348,5 @@ fn largest_of(column: &[f64], rows: impl Iterator<Item = usize>) -> Option<f64> 
 fn acting_size<R: Iterator<Item = usize>>(column: &[f64], rows: impl Fn() -> R) -> Option<f64> {
     let largest = largest_of(column, rows())?;
     let acting: Vec<f64> = rows().map(|row| column[row]).filter(|x| x.abs() > ACTING * largest).collect();
-    Some(crate::statistics::rms(&acting).max(f64::MIN_POSITIVE))
+    Some(numerics::statistics::rms(&acting).max(f64::MIN_POSITIVE))
 }

@@ -8,8 +8,8 @@ use super::judge::Judge;
 use super::means::PosteriorMeans;
 use super::noise::NoiseModel;
 use super::posterior::Explanation;
-use crate::statistics::{count_to_f64, rms};
-use crate::twin::diagnosis::UNKNOWN;
+use numerics::statistics::{count_to_f64, rms};
+use crate::diagnosis::UNKNOWN;
 use ndarray::{Array1, s};
 
 /// Squared deviations gained from which a step is taken to have begun in a held-out run.
@@ -202,7 +202,7 @@ impl Judge<'_> {
         let scaled = self.tangents.iter().zip(&sizes);
         let columns: Vec<Vec<f64>> = scaled.map(|(t, size)| rows.iter().map(|row| t[*row] / size).collect()).collect();
         let wanted: Vec<f64> = rows.iter().map(|row| x[*row]).collect();
-        let w = crate::twin::linear::least_squares(&columns, &wanted).coefficients;
+        let w = numerics::linear::columns::least_squares(&columns, &wanted).coefficients;
         let mut left = x.to_vec();
         for ((tangent, size), w) in self.tangents.iter().zip(&sizes).zip(&w) {
             left.iter_mut().zip(tangent).for_each(|(left, t)| *left -= w * t / size);

@@ -13,8 +13,8 @@ use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
 use super::marginal::{Ground, Saturated, ln_sum};
 use super::search::SetSearch;
-use crate::statistics::count_to_f64;
-use crate::twin::units::Random;
+use numerics::statistics::count_to_f64;
+use crate::units::Random;
 use ndarray::{Array1, Array2, Axis, s};
 
 /// Recordings without anything missing that are made. The chance is known to one over their number.

@@ -8,7 +8,7 @@ use super::algebra::gram;
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
-use crate::statistics::{count_to_f64, rms};
+use numerics::statistics::{count_to_f64, rms};
 use ndarray::{Array2, ShapeBuilder};
 use std::ops::Range;
 
@@ -68,7 +68,7 @@ impl<'a> Comparison<'a> {
     ) -> Self {
         let (group, rows) = groups(inputs, rows_max);
         let recorded: Vec<f64> = rows.iter().map(|row| of.recorded[*row]).collect();
-        let middle = crate::statistics::mean(&recorded);
+        let middle = numerics::statistics::mean(&recorded);
         let around: Vec<f64> = recorded.iter().map(|y| y - middle).collect();
         let deviation = rms(&around) + 1e-12;
         let mut fixed: Vec<Vec<f64>> = of.tangents.iter().map(|tangent| unit(tangent, &rows)).collect();
@@ -126,7 +126,7 @@ impl<'a> Comparison<'a> {
             self.rows.iter().zip(&self.scale).map(|(row, scale)| column[*row] / scale).collect()
         } else {
             let groups = self.rows.iter().zip(&self.ends).zip(&self.scale);
-            groups.map(|((row, end), scale)| crate::statistics::mean(&column[*row..*end]) / scale).collect()
+            groups.map(|((row, end), scale)| numerics::statistics::mean(&column[*row..*end]) / scale).collect()
         };
         noise.whiten(&mut white, &self.blocks);
         white

@@ -5,7 +5,7 @@
 //! earlier rows only.
 
 use super::inputs::RecordingInputs;
-use crate::statistics::{count_to_f64, median, robust_deviation};
+use numerics::statistics::{count_to_f64, median, robust_deviation};
 
 /// Steps between the levels that are tried, in deviations of the residual.
 const STEPS: [f64; 3] = [1.2, 2.2, 3.5];
@@ -259,7 +259,7 @@ impl Chain<'_> {
     /// Held-out rows follow the state from earlier rows only.
     fn follow(&self, on: &mut [f64], levels: TwoLevels) {
         let fitted: Vec<f64> = self.inputs.taken(false).map(|row| on[row]).collect();
-        let usual = crate::statistics::mean(&fitted);
+        let usual = numerics::statistics::mean(&fitted);
         let (stay, turn) = (1.0 - levels.change, levels.change);
         let mut share = usual;
         for (row, on) in on.iter_mut().enumerate() {

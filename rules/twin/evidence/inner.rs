@@ -9,7 +9,7 @@ use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::marginal::SIZES;
 use super::posterior::NoiseSetting;
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use ndarray::{Array1, Array2, Axis, s};
 use std::collections::BTreeMap;
 use std::ops::Range;

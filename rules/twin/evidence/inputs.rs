@@ -1,9 +1,9 @@
 //! What the families see: the inputs of a recording by the part they play, and which rows are fitted.
 
-use crate::physics::drive::{compute_rate, is_axis_output};
-use crate::physics::{OutputKind, Role, Scene};
-use crate::statistics::{count_to_f64, median};
-use crate::twin::units::Unit;
+use physics::drive::{compute_rate, is_axis_output};
+use physics::{OutputKind, Role, Scene};
+use numerics::statistics::{count_to_f64, median};
+use crate::units::Unit;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -190,14 +190,14 @@ impl<'a> RecordingInputs<'a> {
     /// Mean over rows that are fitted (and in the cut).
     pub(super) fn mean_of(&self, values: &[f64], in_cut: bool) -> f64 {
         let rows: Vec<f64> = self.taken(in_cut).map(|row| values[row]).collect();
-        crate::statistics::mean(&rows)
+        numerics::statistics::mean(&rows)
     }
 
     /// Standard deviation over rows that are fitted (and in the cut).
     pub(super) fn deviation_of(&self, values: &[f64], in_cut: bool) -> f64 {
         let middle = self.mean_of(values, in_cut);
         let squares: Vec<f64> = self.taken(in_cut).map(|row| (values[row] - middle).powi(2)).collect();
-        crate::statistics::mean(&squares).sqrt()
+        numerics::statistics::mean(&squares).sqrt()
     }
 
     /// Values at rows that are fitted (and in the cut), sorted.
@@ -282,7 +282,7 @@ impl<'a> RecordingInputs<'a> {
         for block in self.block_rows() {
             for row in block.clone() {
                 let from = (row + 1).saturating_sub(window).max(block.start);
-                out[row] = crate::statistics::mean(&values[from..=row]);
+                out[row] = numerics::statistics::mean(&values[from..=row]);
             }
         }
         out

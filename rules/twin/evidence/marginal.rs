@@ -9,7 +9,7 @@ use super::algebra::{CholeskyFactor, Resolved, Tridiagonal, block, schur};
 use super::bank::Variant;
 use super::gram::{Comparison, Gram};
 use super::noise::NoiseModel;
-use crate::statistics::{count_to_f64, normal_share};
+use numerics::statistics::{count_to_f64, normal_share};
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, Axis, s};
 

@@ -139,7 +139,7 @@ fn cannot_tell(case: &Case<'_>, needed: &Bilingual) -> Diagnosis {
 }
 
 /// Rows with a recorded output, every input of the model and finite tangents.
-fn comparable(scene: &crate::physics::Scene, baseline: &Fit) -> Vec<bool> {
+fn comparable(scene: &physics::Scene, baseline: &Fit) -> Vec<bool> {
     let finite =
         |row: usize| baseline.tangents.iter().all(|t| t[row].is_finite()) && baseline.simulated[row].is_finite();
     (0..scene.rows()).map(|row| scene.usable_rows()[row] && finite(row)).collect()

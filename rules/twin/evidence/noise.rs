@@ -3,7 +3,7 @@
 //! The memory is bounded by a quarter of the median block and by two minutes, so that no noise can stand for a level:
 //! levels belong to laws, or to the random level that every run may have (`gram.rs`).
 
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use std::ops::Range;
 
 /// Shares of the variance that have a memory.

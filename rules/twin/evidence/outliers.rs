@@ -5,7 +5,7 @@
 use super::algebra::{CholeskyFactor, gram};
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
-use crate::statistics::{count_to_f64, median, quantile, rms, robust_deviation};
+use numerics::statistics::{count_to_f64, median, quantile, rms, robust_deviation};
 use ndarray::{Array1, Array2, ShapeBuilder};
 
 /// Rows that the wide model is fitted to, at most.
@@ -71,7 +71,7 @@ fn wide_residual(
     let gram = gram(tall.view());
     let output: Vec<f64> = rows.iter().map(|row| residual[*row]).collect();
     let middle =
-        crate::statistics::mean(&rows.iter().map(|row| inputs.scene.recorded_output()[*row]).collect::<Vec<_>>());
+        numerics::statistics::mean(&rows.iter().map(|row| inputs.scene.recorded_output()[*row]).collect::<Vec<_>>());
     let spread: Vec<f64> = rows.iter().map(|row| inputs.scene.recorded_output()[*row] - middle).collect();
     let spread = rms(&spread) + 1e-12;
     let mut ordinary = robust_deviation(output.iter().copied()).unwrap_or(0.0) + 1e-12;

@@ -6,7 +6,7 @@
 use super::bank::{Family, Owner, Variant, VariantBank};
 use super::inputs::RecordingInputs;
 use super::search::{NAMED, NAMELESS, SetEvidence};
-use crate::statistics::{count_to_f64, rms};
+use numerics::statistics::{count_to_f64, rms};
 use std::collections::BTreeMap;
 
 /// Leading sets whose members go into the second stage, single variants besides, and variants of one owner.

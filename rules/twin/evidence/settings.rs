@@ -4,7 +4,7 @@ use super::gram::{Comparison, Gram};
 use super::inputs::RecordingInputs;
 use super::marginal::Saturated;
 use super::noise::NoiseModel;
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 
 /// Nameless curves that stand for everything that may be there.
 const CURVES_MAX: usize = 16;

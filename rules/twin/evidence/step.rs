@@ -2,7 +2,7 @@
 
 use super::gram::Comparison;
 use super::noise::NoiseModel;
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 
 /// Share of the carrier's square on each side of the row.
 const SIDE: f64 = 0.04;

@@ -1,8 +1,8 @@
 //! The engine from end to end, on a slide whose simulation knows mass and viscous friction only.
 
 use super::diagnose;
-use crate::twin::diagnosis::Verdict;
-use crate::twin::{Diagnosis, parse_model};
+use crate::diagnosis::Verdict;
+use crate::{Diagnosis, parse_model};
 use adapters::recording::read_csv;
 use std::fmt::Write;
 

@@ -9,21 +9,21 @@ use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
 use super::textbook::Textbook;
-use crate::physics::find_effect;
-use crate::statistics::{count_to_f64, rms};
-use crate::twin::case::Case;
-use crate::twin::diagnosis::{
+use physics::find_effect;
+use numerics::statistics::{count_to_f64, rms};
+use crate::case::Case;
+use crate::diagnosis::{
     Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
     unit_of,
 };
-use crate::twin::fit::Fit;
-use crate::twin::inputs::rows_with_inputs;
-use crate::twin::intervals::FittedRows;
-use crate::twin::locate::{Region, active_rows, spans, usual_size};
-use crate::twin::model::{Model, Parameter, Part};
-use crate::twin::next_step::{alternative, of_effects, over_channel};
-use crate::twin::place::PlaceSearch;
-use crate::twin::words;
+use crate::fit::Fit;
+use crate::inputs::rows_with_inputs;
+use crate::intervals::FittedRows;
+use crate::locate::{Region, active_rows, spans, usual_size};
+use crate::model::{Model, Parameter, Part};
+use crate::next_step::{alternative, of_effects, over_channel};
+use crate::place::PlaceSearch;
+use crate::words;
 use adapters::Recording;
 use adapters::bilingual::Bilingual;
 

@@ -4,7 +4,7 @@
 use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -42,7 +42,7 @@ pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel)
     let bins: Vec<f64> =
         (FIRST_BIN..SEGMENT_ROWS / 2).map(|bin| count_to_f64(bin) / count_to_f64(SEGMENT_ROWS)).collect();
     let powers: Vec<f64> = bins.iter().map(|frequency| power(*frequency)).collect();
-    let mean = crate::statistics::mean(&powers);
+    let mean = numerics::statistics::mean(&powers);
     let (at, most) = powers.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     if *most < PEAK_MIN * mean.max(neighbourhood(&powers, at)) {
         return None;
@@ -60,7 +60,7 @@ pub(super) fn line(comparison: &Comparison<'_>, left: &[f64], noise: NoiseModel)
 /// Mean power of the bins beside one.
 fn neighbourhood(powers: &[f64], at: usize) -> f64 {
     let beside = (0..powers.len()).filter(|bin| BESIDE.contains(&bin.abs_diff(at))).map(|bin| powers[bin]);
-    crate::statistics::mean(&beside.collect::<Vec<_>>())
+    numerics::statistics::mean(&beside.collect::<Vec<_>>())
 }
 
 /// Angle of a line in every row, rad: by the clock, so that gaps do not shift it.

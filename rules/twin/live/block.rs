@@ -2,7 +2,7 @@
 
 use super::learn::WorkBlock;
 use super::regime::Regime;
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use std::collections::BTreeMap;
 
 /// Seconds in a block: the threshold of the chart is reckoned for blocks of half a minute.

@@ -227,7 +227,7 @@ impl Chart {
             return None;
         }
         let sum: f64 = self.recent.iter().rev().take(blocks).sum();
-        Some(sum / crate::statistics::count_to_f64(blocks))
+        Some(sum / numerics::statistics::count_to_f64(blocks))
     }
 
     /// After a change: is the level back where it was, for twenty blocks?

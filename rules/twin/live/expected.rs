@@ -2,9 +2,9 @@
 
 use super::second::Row;
 use super::window::{CuttingTimes, LookBack, Window};
-use crate::physics::Scene;
-use crate::twin::model::{Model, Part, simulate};
-use crate::twin::{bind::bind, inputs::rows_with_inputs};
+use physics::Scene;
+use crate::model::{Model, Part, simulate};
+use crate::{bind::bind, inputs::rows_with_inputs};
 use adapters::Absence;
 use adapters::recording::{Cells, Numbers};
 use serde::{Deserialize, Serialize};

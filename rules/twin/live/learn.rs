@@ -5,7 +5,7 @@
 
 use super::chart::{Healthy, Point};
 use super::noise::{self, Arma, PHI_MAX};
-use crate::statistics::{count_to_f64, robust_deviation};
+use numerics::statistics::{count_to_f64, robust_deviation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

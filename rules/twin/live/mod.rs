@@ -22,7 +22,7 @@ pub use regime::Regime;
 pub use watch::{Mismatch, Notice, RegimeStage};
 
 use super::model::Model;
-use crate::estimators::State;
+use estimators::State;
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use block::SettledSecond;

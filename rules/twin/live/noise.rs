@@ -3,8 +3,8 @@
 //! `x_t = phi x_{t-1} + e_t + theta e_{t-1}`; the innovations `e` are white when `phi` and `theta` are right. The first
 //! row of a stretch is weighted by the stationary variance. Every hypothesis profiles its own `phi` and `theta`.
 
-use crate::linear::columns::dot;
-use crate::statistics::count_to_f64;
+use numerics::linear::columns::dot;
+use numerics::statistics::count_to_f64;
 use std::ops::Range;
 
 /// Parameters of the noise.

@@ -1,6 +1,6 @@
 //! Ticks gathered into seconds: the mean of every number, the last of every word, and how many ticks had one.
 
-use crate::estimators::State;
+use estimators::State;
 use adapters::channel::{ChannelId, Kind};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, Sample, Value};

@@ -221,7 +221,7 @@ impl Watched {
         }
         let differs = self.differing.filter(|mismatch| mismatch.onset.is_some()).map_or(0.0, |mismatch| mismatch.mean);
         let mean =
-            of_work().map(|block| block.residual).sum::<f64>() / crate::statistics::count_to_f64(2 * WORK_BLOCKS);
+            of_work().map(|block| block.residual).sum::<f64>() / numerics::statistics::count_to_f64(2 * WORK_BLOCKS);
         self.blocks.retain(|block| block.work != work);
         if let Some(learned) = &mut self.learned {
             let sd = learned.shared;

@@ -7,10 +7,10 @@
 use super::CONFIDENCE;
 use super::distributions::{t_quantile, t_two_sided};
 use super::refusal::{Refusal, RefusalKind};
-use crate::linear::orthogonal::{
+use numerics::linear::orthogonal::{
     Factored, back_substitute, dot_product, factor_columns, invert_upper_triangle, singular_values,
 };
-use crate::statistics::count_to_f64;
+use numerics::statistics::count_to_f64;
 use serde::Serialize;
 
 /// Least to greatest singular value of the scaled columns below which they count as dependent.

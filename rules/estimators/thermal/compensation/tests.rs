@@ -1,8 +1,8 @@
 //! Increments that add up, limits that hold, and what happens without a prediction.
 
 use super::*;
-use crate::estimators::estimate::Estimate;
-use crate::estimators::thermal::predictor::Outside;
+use crate::estimate::Estimate;
+use crate::thermal::predictor::Outside;
 use proptest::prelude::*;
 
 fn predicted(error_um: f64) -> ThermalPrediction {

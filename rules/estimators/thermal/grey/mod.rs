@@ -9,7 +9,7 @@
 //! A grade is therefore shown, and never decides alone: see `selection`.
 
 use super::quantities::{self, Series};
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::regression::{Refusal, RefusalKind};
 use serde::{Deserialize, Serialize};
 
 /// How a curve is made dimensionless.

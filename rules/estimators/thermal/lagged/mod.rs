@@ -13,8 +13,8 @@ use super::cross_validation::{HeldOut, compute_squared_errors, exclude_block, tr
 use super::law::{Path, first_order};
 use super::quantities::THERMAL_ERROR;
 use super::regression::{ROWS_MAX, RegressionDesign, Tau, ThermalFit, fit_design, to_column};
-use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit_unweighted};
-use crate::statistics::rms;
+use crate::regression::{Column, Intercept, Refusal, RefusalKind, fit_unweighted};
+use numerics::statistics::rms;
 use std::ops::Range;
 
 /// Which terms are late.

@@ -1,9 +1,9 @@
 //! A lag is found with its interval, removes the loop, and is not chosen where there is none.
 
 use super::*;
-use crate::estimators::thermal::bed::{self, ROUGH};
-use crate::estimators::thermal::regression::tests::nine_tenths;
-use crate::estimators::thermal::{SelectionSettings, learn_law};
+use crate::thermal::bed::{self, ROUGH};
+use crate::thermal::regression::tests::nine_tenths;
+use crate::thermal::{SelectionSettings, learn_law};
 
 const TAU_S: f64 = 1500.0;
 const LAW: (f64, &[(&str, f64)]) = (-50.0, &[("bearing_temperature_c", 3.0), ("ambient_temperature_c", 1.5)]);

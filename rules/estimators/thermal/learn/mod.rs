@@ -5,7 +5,7 @@ use super::cross_validation::{HeldOut, held_out};
 use super::lagged::{LagForm, compute_lagged_states, fit_lagged, held_out_lagged, some_taus};
 use super::regression::{ThermalFit, fit_static, to_column};
 use super::selection::{Selection, SelectionSettings, select_late, select_sensors};
-use crate::estimators::regression::{Column, Refusal, RefusalKind};
+use crate::regression::{Column, Refusal, RefusalKind};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
@@ -204,7 +204,7 @@ fn hysteresis_um(course: &Course, sensors: &[usize], residuals_um: &[f64]) -> Op
     let values = &course.sensors()[*sensors.first()?].values;
     let behind = compute_lagged_states(course, values, (20.0 * course.period_s()).min(0.1 * course.longest_s()));
     let ahead: Vec<f64> = values.iter().zip(&behind).map(|(value, state)| value - state).collect();
-    let threshold = 0.3 * crate::statistics::rms(&ahead);
+    let threshold = 0.3 * numerics::statistics::rms(&ahead);
     let mean = |sign: f64| {
         let rows = residuals_um.iter().zip(&ahead).filter(|(_, ahead)| sign * **ahead > threshold);
         let chosen: Vec<f64> = rows.map(|(residual, _)| *residual).collect();

@@ -1,8 +1,8 @@
 //! What cannot be learned is refused with words.
 
 use super::*;
-use crate::estimators::thermal::bed::{self, ROUGH};
-use crate::estimators::thermal::course::Sensor;
+use crate::thermal::bed::{self, ROUGH};
+use crate::thermal::course::Sensor;
 
 fn course() -> Course {
     let mut random = bed::create_random(5);

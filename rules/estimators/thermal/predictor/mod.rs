@@ -1,8 +1,8 @@
 //! The law at work: every tick an error with its uncertainty, measured beside predicted, without allocating.
 
 use super::law::{Path, TERMS_MAX, ThermalLaw, first_order};
-use crate::estimators::estimate::Estimate;
-use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::estimate::Estimate;
+use crate::regression::{Refusal, RefusalKind};
 use adapters::Absence;
 use std::fmt;
 

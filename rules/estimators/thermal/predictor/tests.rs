@@ -1,7 +1,7 @@
 //! The law at work on thirteen points.
 
 use super::*;
-use crate::estimators::thermal::law::ThermalTerm;
+use crate::thermal::law::ThermalTerm;
 
 const SECOND_NS: i64 = 1_000_000_000;
 

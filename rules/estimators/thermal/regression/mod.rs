@@ -7,10 +7,10 @@ use super::course::{Course, Sensor};
 use super::law::{Path, ThermalLaw, ThermalTerm};
 use super::noise::{self, Averaged};
 use super::quantities::{self, THERMAL_ERROR};
-use crate::estimators::regression::{
+use crate::regression::{
     Coefficient, Column, Intercept, Refusal, Regression, fit_unweighted, t_quantile, t_two_sided,
 };
-use crate::statistics::rms;
+use numerics::statistics::rms;
 use serde::Serialize;
 
 /// Rows that a regression under memory works on; more are averaged first.

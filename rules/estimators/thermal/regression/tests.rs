@@ -1,7 +1,7 @@
 //! Intervals cover although errors remember; ordinary ones would not.
 
 use super::*;
-use crate::estimators::thermal::bed::{self, ROUGH};
+use crate::thermal::bed::{self, ROUGH};
 
 const LAW: (f64, &[(&str, f64)]) = (-60.0, &[("bearing_temperature_c", 1.6), ("temperature_3_c", 2.5)]);
 const SENSORS: [usize; 2] = [1, 4];
@@ -44,7 +44,7 @@ fn check(seeds: u64) {
 }
 
 /// The least count that does not contradict a coverage of 90 %: with few repetitions chance takes its share.
-pub(in crate::estimators::thermal) fn nine_tenths(seeds: u64) -> usize {
+pub(in crate::thermal) fn nine_tenths(seeds: u64) -> usize {
     let expected = 0.9 * seeds as f64;
     if seeds >= 200 { expected.ceil() as usize } else { (expected - 1.64 * (0.1 * expected).sqrt()).floor() as usize }
 }

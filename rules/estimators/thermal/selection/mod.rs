@@ -13,7 +13,7 @@ use super::grey::{Grades, Normalisation, compute_grades};
 use super::lagged::compute_lagged_states;
 use super::quantities::{self, Series};
 use super::regression::to_column;
-use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit_unweighted};
+use crate::regression::{Column, Intercept, Refusal, RefusalKind, fit_unweighted};
 use serde::Serialize;
 use std::ops::Range;
 

@@ -1,8 +1,8 @@
 //! The right sensors, twins left out with the reason, and grades that would have chosen badly.
 
 use super::*;
-use crate::estimators::thermal::bed::{self, ROUGH};
-use crate::estimators::thermal::course::Sensor;
+use crate::thermal::bed::{self, ROUGH};
+use crate::thermal::course::Sensor;
 
 fn course(seed: u64) -> Course {
     let mut random = bed::create_random(seed);

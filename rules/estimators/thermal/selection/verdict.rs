@@ -1,10 +1,10 @@
 //! Why a sensor is in or out, in words.
 
 use super::{Graded, SensorSelection, with};
-use crate::estimators::regression::Refusal;
-use crate::estimators::thermal::course::Course;
-use crate::estimators::thermal::grey::Grades;
-use crate::estimators::thermal::quantities;
+use crate::regression::Refusal;
+use crate::thermal::course::Course;
+use crate::thermal::grey::Grades;
+use crate::thermal::quantities;
 use serde::Serialize;
 
 /// One sensor and why it is in or out.

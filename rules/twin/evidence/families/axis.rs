@@ -1,9 +1,9 @@
 //! Feed axes as consumers of a power or current that another drive dominates.
 
 use super::drive::{is_drive, pace};
-use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Family, VariantBank};
-use crate::twin::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
+use crate::evidence::bank::{Family, VariantBank};
+use crate::evidence::inputs::RecordingInputs;
 
 const VELOCITY: &[&str] = &["axis_velocity_mm_min", "z_axis_velocity_mm_min", "velocity_m_s", "velocity"];
 
@@ -22,7 +22,7 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let size = inputs.column(|row| pace[row].abs());
     let square = inputs.column(|row| pace[row].powi(2));
     let moving = inputs.column(|row| f64::from(u8::from(pace[row].abs() > 0.01)));
-    let vertical = inputs.scene.role_name(crate::physics::Role::Vertical).is_some();
+    let vertical = inputs.scene.role_name(physics::Role::Vertical).is_some();
     // Where an axis moves against gravity, the difference of directions is its weight.
     let uneven = (!vertical).then(|| (pace.clone(), 0.3));
     let columns = [(size.clone(), 1.0), (square, 0.3), (moving.clone(), 0.3)].into_iter().chain(uneven.clone());
@@ -42,7 +42,7 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
 
 /// Velocity of the axis that moves against gravity, where it has a column of its own.
 fn vertical_pace(inputs: &RecordingInputs<'_>) -> Option<Vec<f64>> {
-    let name = inputs.scene.role_name(crate::physics::Role::Vertical)?;
+    let name = inputs.scene.role_name(physics::Role::Vertical)?;
     let letter = name.chars().next().filter(|_| name.len() == 1);
     let own = letter.map(|letter| format!("{letter}_axis_velocity_mm_min"));
     let column =

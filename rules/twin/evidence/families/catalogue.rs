@@ -1,10 +1,10 @@
 //! Kinds without a family of their own: the laws of the catalogue as they are; and what users have written.
 
-use crate::physics::{CATALOGUE, Effect};
-use crate::twin::candidates::law_columns;
-use crate::twin::evidence::bank::{Family, VariantBank};
-use crate::twin::evidence::inputs::RecordingInputs;
-use crate::twin::model::Model;
+use physics::{CATALOGUE, Effect};
+use crate::candidates::law_columns;
+use crate::evidence::bank::{Family, VariantBank};
+use crate::evidence::inputs::RecordingInputs;
+use crate::model::Model;
 use std::borrow::Cow;
 
 /// Forms of one kind that are tried at most: of a kind without a family, and of one with its own.
@@ -32,7 +32,7 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
 
 /// The sign that the range of its first parameter leaves a law.
 fn sign(effect: &dyn Effect) -> f64 {
-    let linear = effect.doc().parameters.iter().find(|parameter| parameter.entry == crate::physics::Entry::Linear);
+    let linear = effect.doc().parameters.iter().find(|parameter| parameter.entry == physics::Entry::Linear);
     match linear.map(|parameter| parameter.range) {
         Some((low, _)) if low >= 0.0 => 1.0,
         Some((_, high)) if high <= 0.0 => -1.0,

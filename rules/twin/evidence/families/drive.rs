@@ -1,8 +1,8 @@
 //! A drive on its own: friction of a slide or of a shaft whose velocity is recorded.
 
-use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Family, VariantBank};
-use crate::twin::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
+use crate::evidence::bank::{Family, VariantBank};
+use crate::evidence::inputs::RecordingInputs;
 
 const VELOCITY: &[&str] = &["velocity_m_s", "axis_velocity_mm_min", "velocity"];
 
@@ -49,13 +49,13 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     bank.of(INERTIA, "a").column(inputs, acceleration);
     bank.of(OFFSET, "level").column(inputs, vec![1.0; inputs.rows]);
     bank.of(WINDAGE, "v3").column(inputs, inputs.column(|row| pace[row].powi(3)));
-    if inputs.scene.role_name(crate::physics::Role::Vertical).is_some() {
+    if inputs.scene.role_name(physics::Role::Vertical).is_some() {
         bank.of(GRAVITY, "level").column(inputs, vec![1.0; inputs.rows]);
     }
 }
 
 /// Velocity as a share of what it exceeds in a hundredth of the rows only; `None` at rest.
 pub(super) fn pace(inputs: &RecordingInputs<'_>, velocity: &[f64]) -> Option<Vec<f64>> {
-    let top = crate::statistics::quantile(inputs.taken(false).map(|row| velocity[row].abs()), 0.99)?;
+    let top = numerics::statistics::quantile(inputs.taken(false).map(|row| velocity[row].abs()), 0.99)?;
     (top > 0.0).then(|| velocity.iter().map(|v| v / top).collect())
 }

@@ -1,9 +1,9 @@
 //! The measurement: a zero that drifts, a gain that follows the supply, a clock that is late, a meter that averages or
 //! clips.
 
-use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Family, VariantBank};
-use crate::twin::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
+use crate::evidence::bank::{Family, VariantBank};
+use crate::evidence::inputs::RecordingInputs;
 
 const DRIFT: Family = Family::of("zero_drift").through(&["time"]).wide();
 const VOLTAGE: Family = Family::of("supply_voltage").through(&["supply_voltage_v"]);
@@ -32,7 +32,7 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
         delays(inputs, bank);
     }
     for share in [0.8, 0.9, 0.95] {
-        let Some(limit) = crate::statistics::quantile(inputs.taken(false).map(|row| inputs.simulated[row]), share)
+        let Some(limit) = numerics::statistics::quantile(inputs.taken(false).map(|row| inputs.simulated[row]), share)
         else {
             continue;
         };

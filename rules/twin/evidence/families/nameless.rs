@@ -4,10 +4,10 @@
 //! a named family (`naming.rs`).
 
 use super::drive::is_drive;
-use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Drawn, VariantBank};
-use crate::twin::evidence::inputs::RecordingInputs;
-use crate::twin::model::Model;
+use physics::OutputKind;
+use crate::evidence::bank::{Drawn, VariantBank};
+use crate::evidence::inputs::RecordingInputs;
+use crate::model::Model;
 use adapters::channel::quantity::Quantity;
 
 /// Bumps over a channel, and over one that a machine may resonate or jam along.
@@ -118,7 +118,7 @@ fn carriers(inputs: &RecordingInputs<'_>) -> Vec<Carrier> {
     }
     for carrier in &mut all {
         let acting: Vec<f64> = inputs.taken(false).map(|row| carrier.values[row]).filter(|x| x.abs() > 1e-9).collect();
-        let size = crate::statistics::rms(&acting).max(f64::MIN_POSITIVE);
+        let size = numerics::statistics::rms(&acting).max(f64::MIN_POSITIVE);
         carrier.values.iter_mut().for_each(|x| *x /= size);
     }
     all
@@ -129,7 +129,7 @@ fn channels(inputs: &RecordingInputs<'_>, model: &Model) -> Vec<Channel> {
     let read: Vec<&str> = model.parts.iter().flat_map(|part| part.inputs()).collect();
     let is_input = |name: &str| {
         let any = |words: &[&str]| words.iter().any(|word| name.contains(word));
-        let declared = crate::physics::Role::ALL.iter().any(|role| scene.role_name(*role) == Some(name));
+        let declared = physics::Role::ALL.iter().any(|role| scene.role_name(*role) == Some(name));
         name != scene.output_name() && !any(&ELECTRIC) && (!any(&MEASURED) || declared || read.contains(&name))
     };
     let mut all: Vec<Channel> = Vec::new();
@@ -171,7 +171,7 @@ fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usi
     }
     let last = sorted.len() - 1;
     let at = |share: f64| {
-        let place = share * crate::statistics::count_to_f64(last);
+        let place = share * numerics::statistics::count_to_f64(last);
         let low = place.floor();
         #[expect(
             clippy::cast_possible_truncation,
@@ -181,7 +181,7 @@ fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usi
         let index = low as usize;
         sorted[index] + (place - low) * (sorted[(index + 1).min(last)] - sorted[index])
     };
-    let step = |k: usize| crate::statistics::count_to_f64(k) / crate::statistics::count_to_f64(wanted - 1);
+    let step = |k: usize| numerics::statistics::count_to_f64(k) / numerics::statistics::count_to_f64(wanted - 1);
     let mut quantiles: Vec<f64> = (0..wanted).map(|k| at(0.02 + 0.96 * step(k))).collect();
     let spread = quantiles[wanted - 1] - quantiles[0];
     quantiles.dedup_by(|b, a| *b - *a <= 1e-12 * spread.max(1e-9));
@@ -190,12 +190,12 @@ fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usi
     }
     let (size, low) = (quantiles.len(), quantiles[0]);
     let range = quantiles[size - 1] - low;
-    let even = |k: usize| low + range * crate::statistics::count_to_f64(k) / crate::statistics::count_to_f64(size - 1);
+    let even = |k: usize| low + range * numerics::statistics::count_to_f64(k) / numerics::statistics::count_to_f64(size - 1);
     let knots: Vec<f64> = (0..size).map(|k| f64::midpoint(quantiles[k], even(k))).collect();
-    let least = range / crate::statistics::count_to_f64(2 * wanted);
+    let least = range / numerics::statistics::count_to_f64(2 * wanted);
     let width = |k: usize| {
         let (before, after) = (k.saturating_sub(1), (k + 1).min(size - 1));
-        ((knots[after] - knots[before]) / crate::statistics::count_to_f64(after - before)).max(least)
+        ((knots[after] - knots[before]) / numerics::statistics::count_to_f64(after - before)).max(least)
     };
     (0..size)
         .map(|k| {

@@ -1,8 +1,8 @@
 //! The spindle and its motor: friction, windage, inertia, warm-up, stages and losses.
 
-use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Family, VariantBank};
-use crate::twin::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
+use crate::evidence::bank::{Family, VariantBank};
+use crate::evidence::inputs::RecordingInputs;
 
 const SPEED: &[&str] = &["spindle_speed_rpm"];
 const SPEED_AND_TORQUE: &[&str] = &["spindle_speed_rpm", "torque"];
@@ -162,7 +162,7 @@ impl Spindle<'_> {
             let mut all: Vec<f64> = self.inputs.taken(false).map(|row| self.rpm[row]).collect();
             all.retain(|n| *n > 0.02 * self.top_rpm);
             (0..12)
-                .filter_map(|k| crate::statistics::quantile(all.iter().copied(), 0.12 + 0.069 * f64::from(k)))
+                .filter_map(|k| numerics::statistics::quantile(all.iter().copied(), 0.12 + 0.069 * f64::from(k)))
                 .collect()
         };
         between.dedup_by(|b, a| *b - *a < least);
@@ -184,7 +184,7 @@ impl Spindle<'_> {
                         || self.inputs.block[row] != self.inputs.block[row - 1]);
             if breaks {
                 let rows = stretch.len();
-                kept.extend(crate::statistics::median(std::mem::take(&mut stretch)).filter(|_| rows >= 5));
+                kept.extend(numerics::statistics::median(std::mem::take(&mut stretch)).filter(|_| rows >= 5));
             }
             if row < self.inputs.rows && self.inputs.fitted[row] {
                 stretch.push(self.rpm[row]);

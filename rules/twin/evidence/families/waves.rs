@@ -2,9 +2,9 @@
 //! speed miscounts the turns. So each spell of some rows has a size and a phase of its own, two numbers that all spells draw
 //! from one bell (random effects: Laird and Ware, Biometrics 38, 1982).
 
-use crate::physics::drive::RAD_PER_S_OF_RPM;
-use crate::twin::evidence::bank::{Drawn, Family, VariantBank};
-use crate::twin::evidence::inputs::RecordingInputs;
+use physics::drive::RAD_PER_S_OF_RPM;
+use crate::evidence::bank::{Drawn, Family, VariantBank};
+use crate::evidence::inputs::RecordingInputs;
 use std::ops::Range;
 
 const RUNOUT: Family = Family::of("runout").wide();
@@ -30,7 +30,7 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     bank.of(RUNOUT, "each spell").columns(inputs, of_spells(inputs, &told, &turn, cut));
     // Noise that grows with the cut swells at every frequency: what is no tone of the spindle does so at these as well.
     for off in [0.05, -0.05] {
-        let other = inputs.column(|row| turn[row] + std::f64::consts::TAU * off * crate::statistics::count_to_f64(row));
+        let other = inputs.column(|row| turn[row] + std::f64::consts::TAU * off * numerics::statistics::count_to_f64(row));
         let drawn = Drawn { over: "time".to_owned(), times: "cut", shape: "wave" };
         bank.nameless(drawn).columns(inputs, of_spells(inputs, &told, &other, cut));
     }
@@ -50,13 +50,13 @@ fn angle(inputs: &RecordingInputs<'_>, speed: &[f64]) -> Vec<f64> {
 
 /// Turns of a spell as the sampling shows them: folded to half a turn per row at most.
 fn shown_turns(turn: &[f64], spell: &Range<usize>) -> f64 {
-    let per_row = (turn[spell.end - 1] - turn[spell.start]) / crate::statistics::count_to_f64(spell.len().max(2) - 1);
+    let per_row = (turn[spell.end - 1] - turn[spell.start]) / numerics::statistics::count_to_f64(spell.len().max(2) - 1);
     let folded = per_row / std::f64::consts::TAU;
-    (folded - folded.round()).abs() * crate::statistics::count_to_f64(spell.len())
+    (folded - folded.round()).abs() * numerics::statistics::count_to_f64(spell.len())
 }
 
 /// Stretches of a block (in the cut), none longer than a spell.
-pub(in crate::twin::evidence) fn spells(inputs: &RecordingInputs<'_>, in_cut: bool) -> Vec<Range<usize>> {
+pub(in crate::evidence) fn spells(inputs: &RecordingInputs<'_>, in_cut: bool) -> Vec<Range<usize>> {
     let longest = SPELL_ROWS.max(inputs.rows.div_ceil(SPELLS_MAX));
     let mut all: Vec<Range<usize>> = Vec::new();
     for row in 0..inputs.rows {
@@ -75,7 +75,7 @@ pub(in crate::twin::evidence) fn spells(inputs: &RecordingInputs<'_>, in_cut: bo
 }
 
 /// Cosine and sine of an angle times a carrier in each spell, those with fitted rows first.
-pub(in crate::twin::evidence) fn of_spells(
+pub(in crate::evidence) fn of_spells(
     inputs: &RecordingInputs<'_>,
     spells: &[&Range<usize>],
     angle: &[f64],

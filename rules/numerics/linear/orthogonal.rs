@@ -4,24 +4,26 @@
 //! Jacobi).
 
 /// Rows down, columns across: `columns[j][i]`.
-pub(crate) type MatrixColumns = Vec<Vec<f64>>;
+pub type MatrixColumns = Vec<Vec<f64>>;
 
 /// `X D^-1 = Q R` with `D` the lengths of the columns.
 #[derive(Debug, Clone)]
-pub(crate) struct Factored {
+pub struct Factored {
     /// Orthonormal columns, as many as X has.
-    pub(crate) q: MatrixColumns,
+    pub q: MatrixColumns,
     /// Upper triangle, column by column, full height.
-    pub(crate) r: MatrixColumns,
+    pub r: MatrixColumns,
     /// Length of each column of X.
-    pub(crate) lengths: Vec<f64>,
+    pub lengths: Vec<f64>,
 }
 
-pub(crate) fn dot_product(a: &[f64], b: &[f64]) -> f64 {
+/// Sum of the products of both columns.
+pub fn dot_product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-pub(crate) fn euclidean_norm(a: &[f64]) -> f64 {
+/// Square root of the sum of squares.
+pub fn euclidean_norm(a: &[f64]) -> f64 {
     let greatest = a.iter().fold(0.0_f64, |greatest, x| greatest.max(x.abs()));
     if greatest == 0.0 { 0.0 } else { greatest * a.iter().map(|x| (x / greatest).powi(2)).sum::<f64>().sqrt() }
 }
@@ -32,7 +34,7 @@ fn reflect_vector(v: &[f64], x: &mut [f64]) {
 }
 
 /// Factors columns of equal height, at least as high as there are columns, none of length zero.
-pub(crate) fn factor_columns(columns: &[Vec<f64>]) -> Factored {
+pub fn factor_columns(columns: &[Vec<f64>]) -> Factored {
     let lengths: Vec<f64> = columns.iter().map(|column| euclidean_norm(column)).collect();
     let mut a: MatrixColumns =
         columns.iter().zip(&lengths).map(|(column, length)| column.iter().map(|x| x / length).collect()).collect();
@@ -72,7 +74,7 @@ fn extract_upper_part(column: &[f64], k: usize, size: usize) -> Vec<f64> {
 }
 
 /// Solves `R x = b` for an upper triangle without zeros on the diagonal.
-pub(crate) fn back_substitute(r: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
+pub fn back_substitute(r: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
     let mut x = b.to_vec();
     for i in (0..x.len()).rev() {
         let sum: f64 = (i + 1..x.len()).map(|j| r[j][i] * x[j]).sum();
@@ -82,13 +84,13 @@ pub(crate) fn back_substitute(r: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
 }
 
 /// Inverse of an upper triangle, column by column.
-pub(crate) fn invert_upper_triangle(r: &[Vec<f64>]) -> MatrixColumns {
+pub fn invert_upper_triangle(r: &[Vec<f64>]) -> MatrixColumns {
     let unit = |k| (0..r.len()).map(|i| if i == k { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
     (0..r.len()).map(|k| back_substitute(r, &unit(k))).collect()
 }
 
 /// Singular values of a small square matrix and the right singular vector of the least, by one-sided Jacobi.
-pub(crate) fn singular_values(matrix: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
+pub fn singular_values(matrix: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let size = matrix.len();
     let mut a: MatrixColumns = matrix.to_vec();
     let mut v: MatrixColumns = (0..size).map(|k| (0..size).map(|i| if i == k { 1.0 } else { 0.0 }).collect()).collect();

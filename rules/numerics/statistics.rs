@@ -2,7 +2,7 @@
 
 /// A count as a number.
 #[must_use]
-pub(crate) fn count_to_f64(n: usize) -> f64 {
+pub fn count_to_f64(n: usize) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "counts of rows stay far below 2^52")]
     let n = n as f64;
     n
@@ -10,13 +10,13 @@ pub(crate) fn count_to_f64(n: usize) -> f64 {
 
 /// The mean; zero for no values.
 #[must_use]
-pub(crate) fn mean(values: &[f64]) -> f64 {
+pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / count_to_f64(values.len().max(1))
 }
 
 /// The median of finite values, the upper of two; `None` for none.
 #[must_use]
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
     if values.is_empty() {
         return None;
     }
@@ -26,7 +26,7 @@ pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
 
 /// The value below which this share of the values lies; `None` for none.
 #[must_use]
-pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
+pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     let last = values.len().checked_sub(1)?;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count lies within it")]
@@ -37,19 +37,19 @@ pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Opt
 /// The standard deviation of normal noise about zero, told by the middle of its sizes: whatever the few greatest are.
 /// `None` for no values.
 #[must_use]
-pub(crate) fn robust_deviation(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+pub fn robust_deviation(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     median(values.into_iter().map(f64::abs).collect()).map(|middle| 1.4826 * middle)
 }
 
 /// The root of the mean square; zero for no values.
 #[must_use]
-pub(crate) fn rms(values: &[f64]) -> f64 {
+pub fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / count_to_f64(values.len().max(1))).sqrt()
 }
 
 /// Correlation of pairs in one pass, and how many there were; 0 where one side is constant.
 #[must_use]
-pub(crate) fn correlate_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+pub fn correlate_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     let (mut n, mut sx, mut sy, mut sxx, mut syy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (x, y) in pairs {
         (n, sx, sy) = (n + 1.0, sx + x, sy + y);
@@ -62,7 +62,7 @@ pub(crate) fn correlate_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, 
 /// The complementary error function, relative error below 1.2e-7.
 /// Source: Press et al., Numerical Recipes, section 6.2 (Chebyshev fit).
 #[must_use]
-pub(crate) fn erfc(x: f64) -> f64 {
+pub fn erfc(x: f64) -> f64 {
     const TERMS: [f64; 10] = [
         -1.265_512_23,
         1.000_023_68,
@@ -83,7 +83,7 @@ pub(crate) fn erfc(x: f64) -> f64 {
 
 /// Share of the standard normal distribution below `x`.
 #[must_use]
-pub(crate) fn normal_share(x: f64) -> f64 {
+pub fn normal_share(x: f64) -> f64 {
     0.5 * erfc(-x / std::f64::consts::SQRT_2)
 }
 

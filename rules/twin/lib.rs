@@ -40,7 +40,7 @@ pub mod text;
 pub mod units;
 pub mod words;
 
-use crate::linear::columns as linear;
+use numerics::linear::columns as linear;
 pub use diagnosis::Diagnosis;
 pub use evidence::diagnose;
 pub use examine::{Examination, examine};

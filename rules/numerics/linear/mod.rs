@@ -6,6 +6,6 @@
 //! | `columns` | modified Gram-Schmidt on long columns, least squares that drop collinear ones | many candidate columns, each thousands of rows long |
 //! | `cholesky` | normal equations summed row by row | a fit that is repeated for hundreds of lags over the same rows, where the columns are never held |
 
-pub(crate) mod cholesky;
+pub mod cholesky;
 pub mod columns;
-pub(crate) mod orthogonal;
+pub mod orthogonal;

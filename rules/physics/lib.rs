@@ -6,7 +6,7 @@
 
 pub mod catalogue;
 mod cut;
-pub(crate) mod drive;
+pub mod drive;
 mod excitation;
 pub mod explain;
 mod scene;

@@ -10,7 +10,7 @@ const NEW_MIN: f64 = 1e-9;
 
 /// Sums over the rows of a fit of `N` columns.
 #[derive(Debug, Clone)]
-pub(crate) struct NormalEquations<const N: usize> {
+pub struct NormalEquations<const N: usize> {
     xx: [[f64; N]; N],
     xy: [f64; N],
     yy: f64,
@@ -20,25 +20,25 @@ pub(crate) struct NormalEquations<const N: usize> {
 
 /// What the sums say.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct LinearSolution<const N: usize> {
+pub struct LinearSolution<const N: usize> {
     /// One coefficient per column; zero for one that was left out.
-    pub(crate) coefficients: [f64; N],
+    pub coefficients: [f64; N],
     /// Sum of the squared residuals.
-    pub(crate) rss: f64,
+    pub rss: f64,
     /// Sum of the squares of `y` about its mean.
-    pub(crate) total: f64,
+    pub total: f64,
     /// Rows that were added.
-    pub(crate) rows: usize,
+    pub rows: usize,
 }
 
 impl<const N: usize> NormalEquations<N> {
     /// No rows yet.
-    pub(crate) fn new() -> Self {
+    pub fn new() -> Self {
         Self { xx: [[0.0; N]; N], xy: [0.0; N], yy: 0.0, y: 0.0, rows: 0 }
     }
 
     /// Adds a row.
-    pub(crate) fn add(&mut self, row: &[f64; N], y: f64) {
+    pub fn add(&mut self, row: &[f64; N], y: f64) {
         for (i, a) in row.iter().enumerate() {
             self.xy[i] += a * y;
             row.iter().enumerate().for_each(|(j, b)| self.xx[i][j] += a * b);
@@ -49,7 +49,7 @@ impl<const N: usize> NormalEquations<N> {
     }
 
     /// The least squares solution.
-    pub(crate) fn solve(&self) -> LinearSolution<N> {
+    pub fn solve(&self) -> LinearSolution<N> {
         let length: Vec<f64> = (0..N).map(|i| self.xx[i][i].sqrt()).collect();
         let (lower, used, half) = self.factor_normal_matrix(&length);
         let mut coefficients = [0.0; N];
