@@ -13,7 +13,7 @@ use crate::channel::ChannelId;
 use crate::clock::Clock;
 use crate::driver::{Fact, Source, SourceError, SourceProblem};
 use crate::electric::{Doubts, SupplyCheck, SupplyValues};
-use crate::modbus::line::{ModbusError, serial_fault, serial_silence};
+pub use crate::modbus::line::{ModbusError, serial_fault, serial_silence};
 use crate::reading::{Reading, Stamp};
 use crate::serial::{Bus, SharedBus, wire_time};
 use std::sync::PoisonError;

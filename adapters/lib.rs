@@ -4,6 +4,19 @@
 //! absence. Readings of all sources are merged onto the gateway's tick as a [`Sample`], and samples over time are a
 //! [`Recording`].
 //!
+//! | crate | what | uses |
+//! |---|---|---|
+//! | [`adapter_core`] | channels, readings, merging, what every driver needs | |
+//! | [`recording`](mod@recording) | recordings in every format that is read | `adapter_core` |
+//! | [`simulated`] | the built-in machine | `adapter_core` |
+//! | [`mqtt`] | a client of MQTT | `adapter_core` |
+//! | [`modbus`] | meters by Modbus | `adapter_core`, `simulated` |
+//! | [`fanuc`] | FANUC controllers, natively and through the vendor's library | `adapter_core`, `simulated` |
+//! | [`nclink`] | Huazhong controllers by NC-Link | `adapter_core`, `mqtt`, `simulated` |
+//! | [`hnc`] | Huazhong controllers through the vendor's library | `adapter_core`, `nclink` |
+//!
+//! This crate reads addresses, opens what they name and runs the threads that poll it.
+//!
 //! What is deliberately absent here:
 //! - no estimation: an adapter reports, it never infers;
 //! - no tokio: a driver is synchronous and lives on its own thread;
@@ -11,46 +24,28 @@
 //! - no `unsafe` outside files named `ffi.rs`.
 
 pub mod address;
-pub mod bilingual;
-pub mod channel;
-pub mod child;
-pub mod clock;
-pub mod conversion;
-pub mod driver;
 pub mod eda9033a;
-pub mod electric;
-pub mod fanuc;
-pub mod histogram;
-pub mod hnc;
-pub mod merge;
-pub mod modbus;
-pub mod mqtt;
-pub mod nclink;
-pub mod offset;
 pub mod open;
-pub mod own;
-pub mod plausibility;
-pub mod reading;
-pub mod recording;
 pub mod replay;
-pub mod sample;
-pub mod serial;
-pub mod simulated;
-pub(crate) mod stream;
 pub mod temperature;
-pub mod text;
-pub mod tls;
-pub mod units;
 pub mod waveform;
-pub mod words;
 pub mod worker;
 
-pub use address::Address;
-pub use channel::{Channel, ChannelId};
-pub use driver::{
-    Actuator, Fact, FactValue, LadderRequest, LadderRule, Offer, Pull, Source, SourceError, SourceProblem,
+pub use adapter_core::{
+    bilingual, channel, child, clock, conversion, driver, electric, histogram, merge, offset, own, plausibility,
+    reading, sample, serial, text, tls, units, words,
 };
-pub use offset::{Axis, OffsetSink};
-pub use reading::{Absence, Reading, Stamp, Value};
+pub use fanuc;
+pub use hnc;
+pub use modbus;
+pub use mqtt;
+pub use nclink;
+pub use recording;
+pub use simulated;
+
+pub use adapter_core::{
+    Absence, Actuator, Axis, Channel, ChannelId, Fact, FactValue, LadderRequest, LadderRule, Offer, OffsetSink, Pull,
+    Reading, Sample, Slot, Source, SourceError, SourceProblem, Stamp, Value,
+};
+pub use address::Address;
 pub use recording::Recording;
-pub use sample::{Sample, Slot};

@@ -10,6 +10,7 @@ use crate::recording::{RecordingError, RowProblem, read_path};
 use crate::replay::{LiveReplay, Replay};
 use crate::simulated::{Simulated, SimulatedSettings};
 use crate::temperature::Temperatures;
+use adapter_core::{OpenedDevice, UnreadableSecret};
 use thiserror::Error;
 
 /// Why an address could not be opened.
@@ -19,13 +20,8 @@ pub enum OpenError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// A file with a password cannot be read.
-    #[error("{file}: the password cannot be read: {what}")]
-    Secret {
-        /// The file named in the address.
-        file: String,
-        /// What the system said.
-        what: String,
-    },
+    #[error(transparent)]
+    Secret(#[from] UnreadableSecret),
     /// What the address says does not go together, or names something that is not there.
     #[error("{address}: {what}")]
     Refused {
@@ -56,6 +52,13 @@ pub struct Opened {
     pub simulated: Option<Simulated>,
     /// Refused rows of a recording.
     pub refused: Refused,
+}
+
+impl From<OpenedDevice> for Opened {
+    fn from(device: OpenedDevice) -> Self {
+        let OpenedDevice { sources, actuator, offsets } = device;
+        Self { sources, actuator, offsets, simulated: None, refused: Refused::default() }
+    }
 }
 
 /// What an address opens for a run as fast as possible.
@@ -107,10 +110,12 @@ pub fn open_address(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenErr
             let (sources, actuator, offsets) = (opened.sources, opened.actuator, opened.offsets);
             Ok(Opened { sources, actuator, offsets, simulated: None, refused: Refused::default() })
         }
-        Target::NcLink(target) => crate::nclink::open_address(address, target),
-        Target::HncNet(target) => Ok(crate::hnc::open_address(address, target)),
-        Target::ModbusTcp { at, meter } => read_only(address, ModbusMeter::with_tcp_line(address, at, meter)),
-        Target::ModbusRtu { line, meter } => read_only(address, ModbusMeter::with_rtu_line(address, line, meter)),
+        Target::NcLink(target) => Ok(crate::nclink::open_address(address.text(), target)?.into()),
+        Target::HncNet(target) => Ok(crate::hnc::open_address(address.text(), target).into()),
+        Target::ModbusTcp { at, meter } => read_only(address, ModbusMeter::with_tcp_line(address.text(), at, meter)),
+        Target::ModbusRtu { line, meter } => {
+            read_only(address, ModbusMeter::with_rtu_line(address.text(), line, meter))
+        }
         Target::Eda9033a { line, meter } => read_only(address, Eda9033a::new(address.text(), line, meter)),
         Target::Temperature { file, sys } => read_only(address, Temperatures::open(address.text(), file, sys)),
         other => Err(not_built(address, other)),

@@ -1,28 +1,20 @@
 //! Sources and sinks as addresses: the same notation in the configuration, on the command line and in messages.
 
-mod fanuc;
-mod huazhong;
-mod keys;
-mod masked;
-mod meter;
-mod secured;
+mod eda9033a;
 mod target;
 
-pub use fanuc::{FanucOptions, WriteMethod};
-pub use huazhong::{HncNetTarget, HncOffset, NcLinkTarget};
-pub use keys::Keys;
-pub use masked::{NO_SECRETS, mask_secrets};
-pub use meter::{Circuit, EdaTarget, MeterTarget, WaveformKeep};
-pub use secured::{Login, tls_files};
-pub use target::{
-    Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDay, SimulatedDevice, SimulatedMachine,
-    SimulatedTarget, Speed, Target, parse_endpoint,
-};
+pub use adapter_core::address::*;
+pub use eda9033a::EdaTarget;
+pub use fanuc::address::{FanucBackend, FanucOptions, WriteMethod};
+pub use hnc::address::{HncNetTarget, HncOffset};
+pub use modbus::address::MeterTarget;
+pub use nclink::address::NcLinkTarget;
+pub use simulated::address::{SimulatedDay, SimulatedDevice, SimulatedMachine, SimulatedTarget};
+pub use target::{ReplayTarget, Target};
 
-use crate::own::{Own, OwnChannel, OwnChannelError};
+use adapter_core::own::{Own, OwnChannel, OwnChannelError};
 use std::fmt;
 use std::str::FromStr;
-use thiserror::Error;
 
 /// The schemes of the notation, for "did you mean" and for help texts.
 pub const SCHEMES: [&str; 11] = [
@@ -38,16 +30,6 @@ pub const SCHEMES: [&str; 11] = [
     "temperature",
     "waveform",
 ];
-
-/// A text that is no usable address, with everything that is wrong with it.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{address}: {}", .problems.join("; "))]
-pub struct AddressError {
-    /// The text as given, without what could be a secret.
-    pub address: String,
-    /// Each problem, with what to do about it.
-    pub problems: Vec<String>,
-}
 
 /// Where a source or sink is, and how to talk to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,32 +99,6 @@ impl FromStr for Address {
         let text = text.trim();
         let target = parse(text, no_scheme, target::parse)?;
         Ok(Self { text: text.to_owned(), target })
-    }
-}
-
-/// What a text `SCHEME:BODY?KEYS` means. `no_scheme` says what is missing in a text without a scheme; `target` is given
-/// scheme, body and keys, and takes the keys that it knows.
-///
-/// # Errors
-/// Everything that is wrong: what `target` says comes first, then keys that are unknown, doubled or out of range.
-pub fn parse<T>(
-    text: &str,
-    no_scheme: impl Fn(&str) -> String,
-    target: impl Fn(&str, &str, &mut Keys) -> Result<T, String>,
-) -> Result<T, AddressError> {
-    let fail = |problems| AddressError { address: mask_secrets(text), problems };
-    let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme(text)]))?;
-    let (body, query) = rest.rsplit_once('?').unwrap_or((rest, ""));
-    if masked::names_somebody(body) {
-        return Err(fail(vec![NO_SECRETS.to_owned()]));
-    }
-    let mut keys = Keys::from_query(query);
-    let target = target(scheme, body, &mut keys);
-    let problems = keys.into_problems();
-    match target {
-        Ok(target) if problems.is_empty() => Ok(target),
-        Ok(_) => Err(fail(problems)),
-        Err(problem) => Err(fail(std::iter::once(problem).chain(problems).collect())),
     }
 }
 

@@ -23,9 +23,9 @@ use super::line::{Asked, FanucLine};
 use super::poll::find_signal_address;
 use super::server::ladder::ENABLED;
 use crate::address::{FanucOptions, WriteMethod};
-use crate::clock::{Clock, TimeNs};
-use crate::driver::{Actuator, LadderRequest, LadderRule, SourceError};
-use crate::units::OverridePct;
+use adapter_core::clock::{Clock, TimeNs};
+use adapter_core::driver::{Actuator, LadderRequest, LadderRule, SourceError};
+use adapter_core::units::OverridePct;
 use std::time::Duration;
 
 /// States of a mailbox, as the ladder's byte +4 tells them.

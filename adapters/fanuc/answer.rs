@@ -1,8 +1,8 @@
 //! What a controller answers, typed. Numbers are in the unit that the question implies.
 
 use super::code::{Consequence, FocasReturnCode};
-use crate::driver::SEE_DOCTOR;
-use crate::reading::Absence;
+use adapter_core::driver::SEE_DOCTOR;
+use adapter_core::reading::Absence;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -8,8 +8,8 @@ use super::answer::FocasAnswer;
 use super::item::{Area, FocasItem, Stretch, Write};
 use super::line::FanucLine;
 use super::server::ladder::request_bit;
-use crate::clock::Clock;
-use crate::driver::{LadderRequest, SEE_DOCTOR, SourceError};
+use adapter_core::clock::Clock;
+use adapter_core::driver::{LadderRequest, SEE_DOCTOR, SourceError};
 
 /// The ladder is looked at this often before it counts as silent.
 const LOOKS: u8 = 3;

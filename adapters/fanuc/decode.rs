@@ -7,7 +7,7 @@ use super::opening::Generation;
 use super::records;
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, Number, WireError};
-use crate::text::TextEncoding;
+use adapter_core::text::TextEncoding;
 
 /// Types of parameters and diagnosis numbers whose values are reals.
 const REAL: i16 = 4;

@@ -11,8 +11,8 @@ use super::line::Asked;
 use super::readings::build_reading;
 use super::states::OrAbsence;
 use super::view::{View, to_number_value, to_text_value};
-use crate::channel::ChannelId;
-use crate::reading::{Absence, Reading, Stamp, Value};
+use adapter_core::channel::ChannelId;
+use adapter_core::reading::{Absence, Reading, Stamp, Value};
 
 /// Parameters of the parts made, made in all, and required.
 const PARTS: FocasItem = FocasItem::Parameter(6711, 0);
@@ -171,7 +171,7 @@ fn main_program(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
         _ => return Err(Absence::OutOfRange),
     }
     match further.and_then(|further| further.find_item_result(FocasItem::MainProgram)) {
-        Some(Ok(FocasAnswer::Text(path))) => Ok(crate::nclink::last_part(path).to_owned()),
+        Some(Ok(FocasAnswer::Text(path))) => Ok(adapter_core::text::last_part(path).to_owned()),
         Some(Err(error)) => Err(error.to_absence()),
         _ => Err(Absence::NotSupported),
     }

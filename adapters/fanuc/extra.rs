@@ -9,10 +9,10 @@ use super::readings::build_reading;
 use super::states::OrAbsence;
 use super::view::{View, to_number_value};
 use crate::address::FanucOptions;
-use crate::channel::{ChannelId, DeclareError, Kind, NewChannel, declare_channel};
-use crate::own::{Own, ReadWith};
-use crate::reading::{Absence, Reading, Stamp, Value};
-use crate::text::TextEncoding;
+use adapter_core::channel::{ChannelId, DeclareError, Kind, NewChannel, declare_channel};
+use adapter_core::own::{Own, ReadWith};
+use adapter_core::reading::{Absence, Reading, Stamp, Value};
+use adapter_core::text::TextEncoding;
 
 /// An axis that has channels of its own.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -135,7 +135,7 @@ pub fn declare_channels(options: &FanucOptions, path: u8) -> Result<Vec<(ReadWit
         for of in list_quantities(options) {
             let (ending, unit, range, en, zh) = of.describe_channel(axis.rotary);
             let name = format!("{}_axis_{ending}", axis.name.to_lowercase());
-            if crate::channel::CHANNELS.iter().any(|known| known.name == name) {
+            if adapter_core::channel::CHANNELS.iter().any(|known| known.name == name) {
                 // X, Y and Z have it already.
                 continue;
             }
@@ -193,7 +193,9 @@ impl Extra {
     pub(super) fn to_reading(&self, asked: &Asked, stamp: Stamp, encoding: TextEncoding) -> Reading {
         let view = View { asked, path: self.path };
         if let From::Own(own) = &self.from {
-            let found = view.find_answer(own.item.item).and_then(|answer| own.extract_value(answer, encoding));
+            let found = view
+                .find_answer(own.item.item)
+                .and_then(|answer| own.item.extract_value(&own.channel, answer, encoding));
             return own.to_reading(stamp, found);
         }
         build_reading(self.channel, stamp, self.read(&view))

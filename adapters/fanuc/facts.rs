@@ -9,7 +9,7 @@ use super::answer::{FocasAnswer, FocasItemError, FocasItemResult, System};
 use super::code::{Consequence, FocasReturnCode};
 use super::item::{FocasItem, Question};
 use super::opening::{Generation, Opening};
-use crate::reading::Absence;
+use adapter_core::reading::Absence;
 
 /// Parameter 1001, bit 0 (INM): the machine measures in inches.
 pub const INCH_MACHINE: FocasItem = FocasItem::Parameter(1001, 0);
@@ -200,7 +200,7 @@ fn is_final(error: &FocasItemError) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fanuc::answer::Refusal;
+    use crate::answer::Refusal;
 
     fn facts(version: u16) -> Facts {
         let generation = Generation::from_version(version);

@@ -10,8 +10,8 @@ use super::facts::Facts;
 use super::focas::{Focas, FocasError};
 use super::item::{FocasItem, Question, Write};
 use super::opening::Opening;
-use crate::clock::{Clock, TimeNs};
-use crate::driver::SourceError;
+use adapter_core::clock::{Clock, TimeNs};
+use adapter_core::driver::SourceError;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -20,12 +20,12 @@ pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Focas>, FocasError> + Send>
 
 /// A controller that refuses connections this long after it was lost is starting or off; afterwards something is wrong
 /// with it.
-const STARTING_NS: i64 = 180 * crate::clock::SECOND_NS;
+const STARTING_NS: i64 = 180 * adapter_core::clock::SECOND_NS;
 
 /// The control may be owed this much rest before anybody waits: what one answer that takes long costs is paid by the pauses
 /// after it, and does not delay the next poll by as much again. As much as one answer costs that comes just within a usual deadline, 3 s
 /// at a duty of 50 %: with less, a single long answer made two polls late, which looks like a control that has become slow.
-const OWED_NS: i64 = 3 * crate::clock::SECOND_NS;
+const OWED_NS: i64 = 3 * adapter_core::clock::SECOND_NS;
 
 /// Next step where something listens and has never opened a session: perhaps it is no controller.
 const NEVER_OPENED: &str = "Something listens there and opens no session: is it the FOCAS2 port (8193 unless changed), and \
@@ -252,7 +252,7 @@ impl FanucConnection {
     fn record_busy_time(&mut self, began_ns: TimeNs, ended_ns: TimeNs) {
         let (took_ns, duty) = ((ended_ns - began_ns).max(0), i64::from(self.duty_pct));
         let owed_ns = (self.rested_ns.saturating_sub(began_ns)).clamp(0, OWED_NS);
-        self.rested_ns = ended_ns + owed_ns + took_ns.min(60 * crate::clock::SECOND_NS) * (100 - duty) / duty;
+        self.rested_ns = ended_ns + owed_ns + took_ns.min(60 * adapter_core::clock::SECOND_NS) * (100 - duty) / duty;
     }
 
     fn update_support(&mut self, questions: &[Question], results: &[FocasItemResult]) {

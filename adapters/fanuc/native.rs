@@ -17,9 +17,9 @@ use super::wire::{
     FocasFrame, FocasHeader, FrameKind, HEADER_LEN, Reply, Request, WireError, encode_frame, parse_replies,
     request_body,
 };
-use crate::address::Endpoint;
-use crate::stream::{self, Short};
-use crate::text::TextEncoding;
+use adapter_core::address::Endpoint;
+use adapter_core::stream::{self, Short};
+use adapter_core::text::TextEncoding;
 use std::io::{ErrorKind, Write as _};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};

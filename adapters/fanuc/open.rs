@@ -13,10 +13,11 @@ use super::readings::Manner;
 use super::source::FanucSource;
 use super::vendor::{Vendor, VendorSettings};
 use super::work_offset::ExternalOffsets;
-use crate::address::{Endpoint, FanucOptions, WriteMethod};
-use crate::driver::{Actuator, Source};
-use crate::offset::OffsetSink;
-use crate::own::ReadWith;
+use crate::address::{FanucOptions, WriteMethod};
+use adapter_core::address::Endpoint;
+use adapter_core::driver::{Actuator, Source};
+use adapter_core::offset::OffsetSink;
+use adapter_core::own::ReadWith;
 use std::path::Path;
 
 /// What an address opens.

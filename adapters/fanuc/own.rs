@@ -12,9 +12,9 @@
 use super::answer::FocasAnswer;
 use super::item::{Area, FocasItem, PmcWidth, Stretch};
 use super::states::OrAbsence;
-use crate::own::{Own, OwnRead};
-use crate::reading::{Absence, Value};
-use crate::text::TextEncoding;
+use adapter_core::own::{OwnChannel, OwnRead};
+use adapter_core::reading::{Absence, Value};
+use adapter_core::text::TextEncoding;
 use std::sync::Arc;
 
 /// What is read.
@@ -119,16 +119,21 @@ fn parse_pmc(place: &str, width: PmcWidth) -> Option<OwnItem> {
     })
 }
 
-impl Own<OwnItem> {
-    /// What was answered, before the scale. `encoding` is the character set of the source.
+impl OwnItem {
+    /// What was answered for this channel, before the scale. `encoding` is the character set of the source.
     ///
     /// # Errors
     /// The answer holds no value: a vacant variable, or another kind of answer.
-    pub fn extract_value(&self, answer: &FocasAnswer, encoding: TextEncoding) -> OrAbsence<Value> {
-        let number = match (answer, self.item.bit) {
-            (FocasAnswer::Memory(elements), _) if self.item.text => {
+    pub fn extract_value(
+        &self,
+        channel: &OwnChannel,
+        answer: &FocasAnswer,
+        encoding: TextEncoding,
+    ) -> OrAbsence<Value> {
+        let number = match (answer, self.bit) {
+            (FocasAnswer::Memory(elements), _) if self.text => {
                 let bytes: Vec<u8> = elements.iter().filter_map(|byte| u8::try_from(*byte).ok()).collect();
-                let text = self.channel.encoding.unwrap_or(encoding).decode_trimmed(&bytes);
+                let text = channel.encoding.unwrap_or(encoding).decode_trimmed(&bytes);
                 return Ok(Value::Text(Arc::from(text)));
             }
             (FocasAnswer::Memory(elements), Some(bit)) => {

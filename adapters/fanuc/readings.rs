@@ -9,9 +9,9 @@ use super::line::Asked;
 use super::poll;
 use super::states::{self, OrAbsence};
 use super::view::{View, to_flag_value, to_number_value, to_text_value, to_word_value};
-use crate::channel::{ChannelId, on_path};
-use crate::reading::{Absence, Reading, Stamp, Value};
-use crate::text::TextEncoding;
+use adapter_core::channel::{ChannelId, on_path};
+use adapter_core::reading::{Absence, Reading, Stamp, Value};
+use adapter_core::text::TextEncoding;
 use std::sync::Arc;
 
 /// Channels of the quick group, in the order of [`append_fast_readings`]. A further path has those of them that the table of channels

@@ -4,7 +4,7 @@
 use super::answer::{Alarm, FocasAnswer, OperatorMessage, PastAlarm};
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, WireError};
-use crate::text::TextEncoding;
+use adapter_core::text::TextEncoding;
 
 type Read<T> = Result<T, WireError>;
 

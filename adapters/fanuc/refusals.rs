@@ -6,7 +6,7 @@ use super::item::{FocasItem, Question};
 use super::opening::Generation;
 use super::request;
 use super::table::TABLE;
-use crate::driver::SourceProblem;
+use adapter_core::driver::SourceProblem;
 use std::collections::BTreeMap;
 
 /// At most so many items are named in a sentence.
@@ -66,8 +66,8 @@ fn name_item(item: FocasItem) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fanuc::item::{BlockWord, Stretch};
-    use crate::fanuc::pmc::Area;
+    use crate::item::{BlockWord, Stretch};
+    use crate::pmc::Area;
 
     fn refused(items: &[FocasItem], code: i16) -> Vec<(Question, Refusal)> {
         items.iter().map(|item| (item.to_question(1), Refusal { code: FocasReturnCode(code), detail: 0 })).collect()

@@ -9,11 +9,11 @@ use super::pace::{GroupPace, SharedPace};
 use super::poll;
 use super::readings::{self, Manner};
 use crate::address::FanucOptions;
-use crate::channel::{ChannelId, on_path};
-use crate::clock::Clock;
-use crate::driver::{Fact, Source, SourceError, SourceProblem};
-use crate::reading::{Absence, Reading};
-use crate::text::TextEncoding;
+use adapter_core::channel::{ChannelId, on_path};
+use adapter_core::clock::Clock;
+use adapter_core::driver::{Fact, Source, SourceError, SourceProblem};
+use adapter_core::reading::{Absence, Reading};
+use adapter_core::text::TextEncoding;
 use std::sync::Arc;
 use std::time::Duration;
 

@@ -4,9 +4,9 @@
 
 use super::answer::Status;
 use super::feed_override;
-use crate::reading::Absence;
-use crate::units::OverridePct;
-use crate::words::{execution, mode, operation};
+use adapter_core::reading::Absence;
+use adapter_core::units::OverridePct;
+use adapter_core::words::{execution, mode, operation};
 
 /// A signal, or why it is not known.
 pub type OrAbsence<T> = Result<T, Absence>;

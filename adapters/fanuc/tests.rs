@@ -5,12 +5,12 @@ use super::line::FanucLine;
 use super::open::{OpenedFanuc, open_native};
 use super::server::{Controller, ServedControl, Server, ServerSettings, SimulatedControl};
 use super::work_offset::ExternalOffsets;
-use crate::address::{Address, Target};
-use crate::clock::{Clock, ScaledClock, SystemClock};
-use crate::driver::{Actuator, LadderRequest, SourceError};
-use crate::offset::{Axis, OffsetSink};
-use crate::simulated::{Simulated, SimulatedSettings};
-use crate::units::OverridePct;
+use crate::address::parse_fanuc;
+use adapter_core::clock::{Clock, ScaledClock, SystemClock};
+use adapter_core::driver::{Actuator, LadderRequest, SourceError};
+use adapter_core::offset::{Axis, OffsetSink};
+use adapter_core::units::OverridePct;
+use simulated::{Simulated, SimulatedSettings};
 use std::net::TcpListener;
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ fn lathe() -> Server {
 
 fn lathe_with(times: f64, with: impl FnOnce(SimulatedControl) -> SimulatedControl) -> (Server, Simulated) {
     let clock = Arc::new(ScaledClock::new(times));
-    let origin_ns = clock.now_ns() - 1800 * crate::clock::SECOND_NS;
+    let origin_ns = clock.now_ns() - 1800 * adapter_core::clock::SECOND_NS;
     let machine = Simulated::new("simulated://lathe", SimulatedSettings::default(), origin_ns);
     let server = serve(Box::new(with(SimulatedControl::new(machine.clone(), clock, 4))));
     // The morning is simulated at the first look, which a client must not wait for.
@@ -43,11 +43,10 @@ fn dial_at(percent: u8) -> impl FnOnce(SimulatedControl) -> SimulatedControl {
 }
 
 fn opened(server: &Server, keys: &str) -> OpenedFanuc {
-    let address: Address = format!("fanuc://{}?{keys}", server.address()).parse().expect("usable");
-    match address.target() {
-        Target::Fanuc { at, path, options, .. } => open_native(address.text(), at, *path, options),
-        other => panic!("{other:?}"),
-    }
+    let text = format!("fanuc://{}?{keys}", server.address());
+    let target = adapter_core::address::parse(&text, |_| String::new(), |_, body, keys| parse_fanuc(body, keys));
+    let target = target.expect("usable");
+    open_native(&text, &target.at, target.path, &target.options)
 }
 
 fn actuator(server: &Server, keys: &str) -> Box<dyn Actuator> {
@@ -104,7 +103,7 @@ fn a_known_dial_is_told_apart_from_what_is_in_force() {
 
 #[test]
 fn a_product_goes_above_the_dial_where_the_maker_lets_it() {
-    let (server, _) = lathe_with(4.0, |control| dial_at(80)(control.with_rule(crate::LadderRule::Product)));
+    let (server, _) = lathe_with(4.0, |control| dial_at(80)(control.with_rule(adapter_core::LadderRule::Product)));
     let mut mailbox = actuator(&server, "write=mailbox&dial=R907");
     assert_eq!(write(mailbox.as_mut(), 120), Ok(pct(96)));
     mailbox.release_override(&SystemClock::new()).expect("given back");

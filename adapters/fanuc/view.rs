@@ -6,7 +6,7 @@ use super::item::{FocasItem, Position, Servo, Stretch};
 use super::line::Asked;
 use super::poll;
 use super::states::{OrAbsence, Signals};
-use crate::reading::{Absence, Value};
+use adapter_core::reading::{Absence, Value};
 use std::sync::Arc;
 
 const MM_PER_INCH: f64 = 25.4;

@@ -3,15 +3,15 @@
 //!
 //! The offset is in the coordinate of every work offset G54 to G59 and takes effect for blocks that are not yet
 //! buffered; hence only while no program runs. The operator may use the external offset too; whose is which part of it is
-//! the gate's account ([`crate::offset::OffsetShares`]). Increment system IS-B in millimetres only, where an increment is a
+//! the gate's account ([`adapter_core::offset::OffsetShares`]). Increment system IS-B in millimetres only, where an increment is a
 //! micrometre.
 
 use super::answer::{FocasAnswer, Status};
 use super::item::{FocasItem, Write};
 use super::line::{Asked, FanucLine};
-use crate::clock::Clock;
-use crate::driver::{SEE_DOCTOR, SourceError};
-use crate::offset::{Axis, OffsetSink};
+use adapter_core::clock::Clock;
+use adapter_core::driver::{SEE_DOCTOR, SourceError};
+use adapter_core::offset::{Axis, OffsetSink};
 
 /// The external offsets of the axes that the control names with the letters X, Y and Z.
 pub struct ExternalOffsets {

@@ -3,12 +3,12 @@
 use super::decode::extract_number;
 use super::item::{channel, define_whole_item};
 use super::line::HncLine;
-use crate::clock::Clock;
-use crate::driver::{Actuator, LadderRequest, SourceError};
-use crate::nclink::mailbox::{ControllerRegister, Mailbox, MailboxRequest};
-use crate::units::OverridePct;
+use adapter_core::clock::Clock;
+use adapter_core::driver::{Actuator, LadderRequest, SourceError};
+use adapter_core::units::OverridePct;
+use nclink::mailbox::{ControllerRegister, Mailbox, MailboxRequest};
 
-/// Posts letters for the ladder; see [`mailbox`](crate::nclink::mailbox).
+/// Posts letters for the ladder; see [`mailbox`](nclink::mailbox).
 pub struct HncActuator {
     line: HncLine,
     mailbox: Mailbox,
@@ -44,6 +44,6 @@ impl Actuator for HncActuator {
 
     fn read_feed_override(&mut self, _: &dyn Clock) -> Result<OverridePct, SourceError> {
         let found = extract_number(&self.line.read(define_whole_item(channel::FEED_OVERRIDE))?);
-        crate::nclink::mailbox::in_force(self.line.name(), found)
+        nclink::mailbox::in_force(self.line.name(), found)
     }
 }

@@ -1,6 +1,6 @@
 //! What the library answers, and why there is no value.
 
-use crate::reading::Absence;
+use adapter_core::reading::Absence;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -7,7 +7,7 @@ use super::item::{EXTERNAL_ZERO, HncItem, HncWidth};
 use super::line::DEAD_LINK;
 use super::message::{HncReply, HncRequest};
 use super::sampling::{Columns, POINTS_MAX, SAMPLED_MAX, SampledItem};
-use crate::child::{Guarded, Missing, serve_words};
+use adapter_core::child::{Guarded, Missing, serve_words};
 use std::ffi::CString;
 use std::path::Path;
 use std::time::Instant;

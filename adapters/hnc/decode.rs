@@ -2,9 +2,9 @@
 
 use super::answer::{HncAnswer, HncItemError, HncItemResult};
 use super::item::{HncItem, channel, define_whole_item};
-use crate::reading::Absence;
-use crate::text::TextEncoding;
-use crate::words::{execution, mode, operation};
+use adapter_core::reading::Absence;
+use adapter_core::text::TextEncoding;
+use adapter_core::words::{execution, mode, operation};
 
 /// Text up to the first zero, out of GBK; bytes that are none stay as marks.
 pub(super) fn text_of(bytes: &[u8]) -> String {

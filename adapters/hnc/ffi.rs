@@ -3,7 +3,7 @@
 
 #![allow(unsafe_code, reason = "calls into a foreign library")]
 
-use crate::child::{Guarded, functions};
+use adapter_core::child::{Guarded, functions};
 use std::ffi::{CStr, c_char, c_long, c_void};
 
 functions! {

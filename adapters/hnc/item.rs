@@ -1,6 +1,6 @@
 //! What can be asked of the library: the numbers of the vendor's headers, each with the width of its value.
 
-use crate::nclink::mailbox::ControllerRegister;
+use nclink::mailbox::ControllerRegister;
 use serde::{Deserialize, Serialize};
 
 /// How a value lies in the buffer.

@@ -10,11 +10,11 @@ use super::answer::{HncAnswer, HncItemError, HncItemResult};
 use super::decode::{extract_text, extract_whole};
 use super::item::{self, HncItem, HncWidth, axis, channel, define_whole_item, register_type};
 use super::line::HncLine;
-use crate::clock::Clock;
-use crate::driver::{SEE_DOCTOR, SourceError};
-use crate::nclink::mailbox::ControllerRegister;
-use crate::nclink::offset_mailbox::RegisterAccess;
-use crate::offset::{Axis, OffsetSink};
+use adapter_core::clock::Clock;
+use adapter_core::driver::{SEE_DOCTOR, SourceError};
+use adapter_core::offset::{Axis, OffsetSink};
+use nclink::mailbox::ControllerRegister;
+use nclink::offset_mailbox::RegisterAccess;
 
 /// Axes whose names are asked for.
 const AXES: i32 = 3;

@@ -4,28 +4,28 @@ use super::actuator::HncActuator;
 use super::line::{HncLine, HncSettings};
 use super::offsets::{HncRegisters, ZeroOffsets};
 use super::source::HncSource;
-use crate::address::{Address, HncNetTarget, HncOffset};
-use crate::driver::Actuator;
-use crate::nclink::BlockSink;
-use crate::nclink::offset_mailbox::LadderOffsets;
-use crate::offset::OffsetSink;
-use crate::open::{Opened, Refused};
+use crate::address::{HncNetTarget, HncOffset};
+use adapter_core::OpenedDevice;
+use adapter_core::driver::Actuator;
+use adapter_core::offset::OffsetSink;
+use nclink::BlockSink;
+use nclink::offset_mailbox::LadderOffsets;
 use std::time::Duration;
 
 /// A call on a dead link takes the library 3 s.
 const DEADLINE: Duration = Duration::from_millis(4500);
 
-/// Opens an address; the child is started with the first poll.
+/// Opens the controller under this name; the child is started with the first poll.
 #[must_use]
-pub fn open_address(address: &Address, target: &HncNetTarget) -> Opened {
-    open_sampled(address, target, None)
+pub fn open_address(name: &str, target: &HncNetTarget) -> OpenedDevice {
+    open_sampled(name, target, None)
 }
 
 /// The same; whole blocks of the controller's sampling go to `sink`.
 #[must_use]
-pub fn open_sampled(address: &Address, target: &HncNetTarget, sink: Option<BlockSink>) -> Opened {
+pub fn open_sampled(name: &str, target: &HncNetTarget, sink: Option<BlockSink>) -> OpenedDevice {
     let line = HncLine::new(HncSettings {
-        name: address.text().to_owned(),
+        name: name.to_owned(),
         vendor_library: target.vendor_library.clone(),
         at: target.at.clone(),
         local_host: target.local_host.clone(),
@@ -42,7 +42,7 @@ pub fn open_sampled(address: &Address, target: &HncNetTarget, sink: Option<Block
     }
     let offsets = target.offset.map(|how| build_offset_sink(&line, how));
     let actuator = target.mailbox.map(|first| Box::new(HncActuator::new(line, first)) as Box<dyn Actuator>);
-    Opened { sources: vec![Box::new(source)], actuator, offsets, simulated: None, refused: Refused::default() }
+    OpenedDevice { sources: vec![Box::new(source)], actuator, offsets }
 }
 
 /// The way to the offsets that the address names.

@@ -8,9 +8,9 @@
 
 use super::answer::{HncAnswer, HncItemResult};
 use super::item::{HncItem, HncWidth, register_type};
-use crate::nclink::mailbox::ControllerRegister;
-use crate::own::{Own, OwnRead};
-use crate::reading::{Absence, Value};
+use adapter_core::own::OwnRead;
+use adapter_core::reading::{Absence, Value};
+use nclink::mailbox::ControllerRegister;
 use std::sync::Arc;
 
 /// A value of the library.
@@ -81,13 +81,13 @@ fn parse_register(place: &str) -> Option<OwnValue> {
     Some(OwnValue { item: HncItem::Register(register_type(at)?, index), bit })
 }
 
-impl Own<OwnValue> {
+impl OwnValue {
     /// What was answered, before the scale.
     ///
     /// # Errors
     /// There is no value of the kind that the channel has.
     pub(super) fn extract_value(&self, result: &HncItemResult) -> Result<Value, Absence> {
-        match (result, self.item.bit) {
+        match (result, self.bit) {
             (Ok(HncAnswer::Whole(whole)), Some(bit)) => Value::from_number(f64::from(whole >> bit & 1)),
             (Ok(HncAnswer::Whole(whole)), None) => Value::from_number(f64::from(*whole)),
             (Ok(HncAnswer::Real(real)), _) => Value::from_number(*real),

@@ -3,7 +3,7 @@
 //! The first channel always is the system's counter of milliseconds (F register of the system, word 149). By it a missing
 //! millisecond is counted, and a library that gives the same values twice is seen through.
 
-use crate::nclink::sample::{ItemColumn, SampleBlock};
+use nclink::sample::{ItemColumn, SampleBlock};
 use serde::{Deserialize, Serialize};
 
 /// Sampling channels of V1.

@@ -6,13 +6,14 @@ use super::item::{self, HncItem, HncWidth, axis, channel, define_real_item, defi
 use super::line::{Alive, HncLine};
 use super::own::OwnValue;
 use super::sampling::{Sampled, Sampling};
-use crate::channel::ChannelId;
-use crate::clock::Clock;
-use crate::driver::{Fact, Source, SourceError};
-use crate::nclink::sample::SampleBlock;
-use crate::nclink::{BlockSink, last_part};
-use crate::own::Own;
-use crate::reading::{Absence, Reading, Stamp};
+use adapter_core::channel::ChannelId;
+use adapter_core::clock::Clock;
+use adapter_core::driver::{Fact, Source, SourceError};
+use adapter_core::own::Own;
+use adapter_core::reading::{Absence, Reading, Stamp};
+use adapter_core::text::last_part;
+use nclink::BlockSink;
+use nclink::sample::SampleBlock;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -180,7 +181,7 @@ impl HncSource {
 
     fn append_readings(&self, poll: &HncPoll, stamp: Stamp, out: &mut Vec<Reading>) {
         for own in &self.own {
-            out.push(own.to_reading(stamp, own.extract_value(&poll.find_answer(own.item.item))));
+            out.push(own.to_reading(stamp, own.item.extract_value(&poll.find_answer(own.item.item))));
         }
         let of_table = self.channels.len() - self.own.len();
         for channel in &self.channels[..of_table] {

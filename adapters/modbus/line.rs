@@ -1,10 +1,10 @@
 //! One request and its answer over either carrier, and every way in which that fails.
 
-use crate::address::{Parity, SerialTarget};
-use crate::clock::Clock;
-use crate::driver::SourceError;
-use crate::modbus::pdu;
-use crate::reading::Stamp;
+use crate::pdu;
+use adapter_core::address::{Parity, SerialTarget};
+use adapter_core::clock::Clock;
+use adapter_core::driver::SourceError;
+use adapter_core::reading::Stamp;
 use std::io::{self, ErrorKind};
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ pub(crate) struct ModbusResponse {
 
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum ModbusError {
+pub enum ModbusError {
     /// The line itself.
     Line {
         /// What happened.
@@ -40,7 +40,7 @@ pub(crate) enum ModbusError {
 
 impl ModbusError {
     /// The same as the error of a source.
-    pub(crate) fn of_source(self, source_name: &str, request: String, deadline: Duration) -> SourceError {
+    pub fn of_source(self, source_name: &str, request: String, deadline: Duration) -> SourceError {
         let source_name = source_name.to_owned();
         match self {
             Self::Line { what, next } => SourceError::Line { source_name, what, next },
@@ -80,7 +80,7 @@ pub(crate) trait ModbusLine: Send {
 const NO_TERMINAL: i32 = 25;
 
 /// What a failed serial line means, and what to do.
-pub(crate) fn serial_fault(error: &io::Error, target: &SerialTarget) -> ModbusError {
+pub fn serial_fault(error: &io::Error, target: &SerialTarget) -> ModbusError {
     let port = target.port.display();
     let next = match error.kind() {
         ErrorKind::NotFound => "Plug the adapter in and look with: ls /dev/serial/by-id".to_owned(),
@@ -95,7 +95,7 @@ pub(crate) fn serial_fault(error: &io::Error, target: &SerialTarget) -> ModbusEr
 }
 
 /// What silence on a serial line means, and what to do.
-pub(crate) fn serial_silence(target: &SerialTarget) -> ModbusError {
+pub fn serial_silence(target: &SerialTarget) -> ModbusError {
     let parity = match target.parity {
         Parity::None => "no",
         Parity::Even => "even",

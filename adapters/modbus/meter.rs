@@ -10,14 +10,15 @@ use super::refresh::Refresh;
 use super::register::{MeterRegister, RegisterMeaning};
 use super::rtu::RtuLine;
 use super::tcp::TcpLine;
-use crate::address::{Address, Endpoint, MeterTarget, SerialTarget};
-use crate::channel::ChannelId;
-use crate::clock::Clock;
-use crate::driver::{Fact, Offer, Source, SourceError, SourceProblem};
-use crate::electric::{Doubts, SupplyCheck};
-use crate::own::Own;
-use crate::reading::{Absence, Reading};
-use crate::serial::Bus;
+use crate::address::MeterTarget;
+use adapter_core::address::{Endpoint, SerialTarget};
+use adapter_core::channel::ChannelId;
+use adapter_core::clock::Clock;
+use adapter_core::driver::{Fact, Offer, Source, SourceError, SourceProblem};
+use adapter_core::electric::{Doubts, SupplyCheck};
+use adapter_core::own::Own;
+use adapter_core::reading::{Absence, Reading};
+use adapter_core::serial::Bus;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -46,22 +47,22 @@ impl ModbusMeter {
     ///
     /// # Errors
     /// In words: an unusable profile; another address that uses the same host and port with other frames.
-    pub fn with_tcp_line(address: &Address, at: &Endpoint, meter: &MeterTarget) -> Result<Self, String> {
+    pub fn with_tcp_line(name: &str, at: &Endpoint, meter: &MeterTarget) -> Result<Self, String> {
         let line = TcpLine::new(at, meter.framing, meter.timeout)?;
-        Self::new(address, Box::new(line), meter, None)
+        Self::new(name, Box::new(line), meter, None)
     }
 
     /// A meter on a serial line.
     ///
     /// # Errors
     /// In words: an unusable profile; a line that another address uses at another speed.
-    pub fn with_rtu_line(address: &Address, target: &SerialTarget, meter: &MeterTarget) -> Result<Self, String> {
+    pub fn with_rtu_line(name: &str, target: &SerialTarget, meter: &MeterTarget) -> Result<Self, String> {
         let line = RtuLine::new(Bus::from_target(target)?, meter.timeout);
-        Self::new(address, Box::new(line), meter, Some(target.clone()))
+        Self::new(name, Box::new(line), meter, Some(target.clone()))
     }
 
     fn new(
-        address: &Address,
+        name: &str,
         line: Box<dyn ModbusLine>,
         meter: &MeterTarget,
         serial: Option<SerialTarget>,
@@ -80,7 +81,7 @@ impl ModbusMeter {
         let busy = serial.as_ref().map(|line| blocks.wire_time(line) * 5 / 4).unwrap_or_default();
         let channels = outputs.iter().map(|output| output.channel).chain(own.iter().map(|(own, _)| own.id));
         Ok(Self {
-            name: address.text().to_owned(),
+            name: name.to_owned(),
             line,
             target: meter.clone(),
             period: profile.period.max(busy),
@@ -116,7 +117,7 @@ impl ModbusMeter {
             stamp = found.as_ref().map_or_else(|(_, at)| *at, |(_, at)| *at);
             parts.push((register, found.map(|(found, _)| found).map_err(|(why, _)| why)));
         }
-        own.to_reading(stamp, own.extract_value(&parts))
+        own.to_reading(stamp, own.item.extract_value(&own.channel, &parts))
     }
 
     /// Tries a profile on this meter: what it would give, or why it does not fit.

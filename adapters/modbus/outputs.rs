@@ -3,10 +3,11 @@
 use super::poll::RegisterPoll;
 use super::profile::Profile;
 use super::register::{MeterRegister, RegisterMeaning};
-use crate::address::{Circuit, MeterTarget};
-use crate::channel::ChannelId;
-use crate::electric::{Doubts, SupplyValues};
-use crate::reading::Reading;
+use crate::address::MeterTarget;
+use adapter_core::address::Circuit;
+use adapter_core::channel::ChannelId;
+use adapter_core::electric::{Doubts, SupplyValues};
+use adapter_core::reading::Reading;
 
 /// How the registers of an output are put together.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,10 +11,10 @@
 use super::number::{Format, WordOrder};
 use super::pdu::RegisterTable;
 use super::register::{MeterRegister, RegisterMeaning};
-use crate::channel::ChannelId;
-use crate::conversion::Conversion;
-use crate::own::{Own, OwnRead};
-use crate::reading::{Absence, Value};
+use adapter_core::channel::ChannelId;
+use adapter_core::conversion::Conversion;
+use adapter_core::own::{OwnChannel, OwnRead};
+use adapter_core::reading::{Absence, Value};
 use std::sync::Arc;
 
 /// Longest text, registers.
@@ -111,14 +111,18 @@ impl OwnRegister {
     }
 }
 
-impl Own<OwnRegister> {
+impl OwnRegister {
     /// What stands in the registers, before the scale. `parts` are those of [`OwnRegister::list_registers`], each with what it
     /// holds.
     ///
     /// # Errors
     /// The device does not have them, or says that there is no value.
-    pub(super) fn extract_value(&self, parts: &[(&MeterRegister, Result<&[u16], Absence>)]) -> Result<Value, Absence> {
-        match self.item.holds {
+    pub(super) fn extract_value(
+        &self,
+        channel: &OwnChannel,
+        parts: &[(&MeterRegister, Result<&[u16], Absence>)],
+    ) -> Result<Value, Absence> {
+        match self.holds {
             InRegisters::Number(..) => {
                 let (register, found) = parts.first().ok_or(Absence::NotSupported)?;
                 Value::from_number(register.decode_number((*found)?).ok_or(Absence::NotSupported)?)
@@ -129,7 +133,7 @@ impl Own<OwnRegister> {
                     .map(|(_, found)| found.and_then(|word| word.first().copied().ok_or(Absence::NotSupported)));
                 let bytes: Vec<u8> =
                     words.collect::<Result<Vec<u16>, _>>()?.into_iter().flat_map(u16::to_be_bytes).collect();
-                let encoding = self.channel.encoding.unwrap_or_default();
+                let encoding = channel.encoding.unwrap_or_default();
                 Ok(Value::Text(Arc::from(encoding.decode_trimmed(&bytes))))
             }
         }

@@ -6,8 +6,8 @@
 
 use super::pdu::{RegisterBlock, RegisterTable};
 use super::register::MeterRegister;
-use crate::address::SerialTarget;
-use crate::serial;
+use adapter_core::address::SerialTarget;
+use adapter_core::serial;
 use std::time::Duration;
 
 /// More requests than this in one poll are a sign of a profile that should be two.
@@ -128,7 +128,7 @@ pub fn wire_time(line: &SerialTarget, registers: u16) -> Duration {
 mod tests {
     use super::super::profile::{Profile, SHIPPED, find_profile};
     use super::*;
-    use crate::address::Parity;
+    use adapter_core::address::Parity;
     use std::path::PathBuf;
 
     fn plan(profile: &Profile) -> PollBlocks {

@@ -4,9 +4,9 @@ use super::line::{ModbusError, ModbusLine};
 use super::pdu::{NoRegisters, RegisterBlock};
 use super::plan::PollBlocks;
 use super::register::MeterRegister;
-use crate::address::SerialTarget;
-use crate::clock::Clock;
-use crate::reading::{Absence, Stamp};
+use adapter_core::address::SerialTarget;
+use adapter_core::clock::Clock;
+use adapter_core::reading::{Absence, Stamp};
 use std::time::Duration;
 
 /// What a block gave, and when.

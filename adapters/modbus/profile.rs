@@ -33,7 +33,7 @@
 use super::number::WordOrder;
 use super::pdu::{REGISTERS_MAX, RegisterTable};
 use super::register::{self, MeterRegister, RawAddresses, RawTable, RawValue, Whole};
-use crate::channel;
+use adapter_core::channel;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

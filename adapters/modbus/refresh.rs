@@ -5,7 +5,7 @@
 //! digit over two renewals, so a change of any register is a renewal and no change is none. The mean time between changes
 //! is the refresh; at every poll something new means that the meter is at least as fast as the polling.
 
-use crate::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use std::collections::VecDeque;
 
 /// The last so many renewals count.

@@ -2,8 +2,8 @@
 
 use super::number::{Format, WordOrder};
 use super::pdu::RegisterTable;
-use crate::channel::{self, CHANNELS, ChannelId};
-use crate::conversion::{self, Conversion};
+use adapter_core::channel::{self, CHANNELS, ChannelId};
+use adapter_core::conversion::{self, Conversion};
 use serde::Deserialize;
 
 /// What a register means.

@@ -6,9 +6,9 @@
 
 use super::crc::{compute_crc, is_whole};
 use super::line::{ModbusError, ModbusLine, ModbusResponse, serial_fault, serial_silence};
-use crate::clock::Clock;
-use crate::reading::Stamp;
-use crate::serial::{Bus, SharedBus, wire_time};
+use adapter_core::clock::Clock;
+use adapter_core::reading::Stamp;
+use adapter_core::serial::{Bus, SharedBus, wire_time};
 use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 

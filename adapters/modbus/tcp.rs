@@ -6,10 +6,10 @@
 
 use super::line::{ModbusError, ModbusLine, ModbusResponse};
 use super::rtu;
-use crate::address::Endpoint;
-use crate::clock::Clock;
-use crate::reading::Stamp;
-use crate::stream::{self, Short};
+use adapter_core::address::Endpoint;
+use adapter_core::clock::Clock;
+use adapter_core::reading::Stamp;
+use adapter_core::stream::{self, Short};
 use std::collections::HashMap;
 use std::io::{self, ErrorKind, Write};
 use std::net::TcpStream;
@@ -348,7 +348,7 @@ mod tests {
         });
         let at = Endpoint { host: "127.0.0.1".to_owned(), port };
         let mut line = TcpLine::new(&at, TcpFraming::Rtu, Duration::from_millis(150)).expect("a line");
-        let clock = crate::clock::SystemClock::new();
+        let clock = adapter_core::clock::SystemClock::new();
         let mut ask = || line.exchange_pdu(&clock, 1, &[3, 0, 0, 0, 1], 4).map(|response| response.pdu);
         assert!(matches!(ask(), Err(ModbusError::Timeout { .. })));
         assert_eq!(ask().expect("an answer"), [3, 2, 0, 2]);

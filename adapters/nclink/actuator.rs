@@ -4,10 +4,10 @@ use super::connection::Link;
 use super::mailbox::{ControllerRegister, Mailbox, MailboxRequest, in_force};
 use super::message::{RequestedItem, first_number};
 use super::registers::RegisterLine;
-use crate::clock::Clock;
-use crate::driver::{Actuator, LadderRequest, SourceError};
-use crate::reading::Absence;
-use crate::units::OverridePct;
+use adapter_core::clock::Clock;
+use adapter_core::driver::{Actuator, LadderRequest, SourceError};
+use adapter_core::reading::Absence;
+use adapter_core::units::OverridePct;
 
 /// The override in force.
 const OVERRIDE: &str = "FEED_OVERRIDE";

@@ -1,7 +1,8 @@
 //! State words, alarms and names out of what an HNC-8 says.
 
 use super::liberal::{find_field, find_text, parse_number};
-use crate::words::{execution, mode, operation};
+use adapter_core::text::last_part;
+use adapter_core::words::{execution, mode, operation};
 use serde_json::Value;
 
 /// The channel's first F word (HNC-8 register map, configuration HNC-30: F2560; HNC-80: F6400).
@@ -94,11 +95,6 @@ fn one_alarm(alarm: &Value) -> String {
         Some(list) if words.is_empty() => self::format_alarms(list),
         _ => words.join(" "),
     }
-}
-
-/// What stands behind the last `/` or `\\` of a path.
-pub(crate) fn last_part(path: &str) -> &str {
-    path.trim().rsplit(['/', '\\']).next().unwrap_or_default()
 }
 
 /// The name of a program without its directory: `../prog/O1234` is `O1234`.

@@ -13,9 +13,9 @@
 //!
 //! The heartbeat is written last, in the same request: a letter counts when it moves.
 
-use crate::driver::{LadderRequest, SourceError};
-use crate::reading::Absence;
-use crate::units::OverridePct;
+use adapter_core::driver::{LadderRequest, SourceError};
+use adapter_core::reading::Absence;
+use adapter_core::units::OverridePct;
 use std::fmt;
 use std::str::FromStr;
 

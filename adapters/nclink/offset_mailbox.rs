@@ -18,9 +18,9 @@
 //! second is withdrawn (+3 gets the number in +7), so that it is not taken at some later time.
 
 use super::mailbox::ControllerRegister;
-use crate::clock::Clock;
-use crate::driver::SourceError;
-use crate::offset::{Axis, OffsetSink};
+use adapter_core::clock::Clock;
+use adapter_core::driver::SourceError;
+use adapter_core::offset::{Axis, OffsetSink};
 
 /// Between two looks whether the letter was taken, ns.
 const SETTLE_NS: i64 = 100_000_000;
@@ -28,7 +28,7 @@ const SETTLE_NS: i64 = 100_000_000;
 const LOOKS: u32 = 10;
 
 /// Registers of a controller, however they are reached.
-pub(crate) trait RegisterAccess: Send {
+pub trait RegisterAccess: Send {
     /// The address.
     fn name(&self) -> &str;
 
@@ -139,14 +139,14 @@ impl OffsetMailbox {
 
 /// The shifts of X, Y and Z behind such a mailbox. Nobody but the gateway writes them: what the operator has set is
 /// elsewhere, and here it is 0.
-pub(crate) struct LadderOffsets<R> {
+pub struct LadderOffsets<R> {
     registers: R,
     mailbox: OffsetMailbox,
 }
 
 impl<R: RegisterAccess> LadderOffsets<R> {
     /// A mailbox that begins at this register.
-    pub(crate) fn new(registers: R, first: ControllerRegister) -> Self {
+    pub fn new(registers: R, first: ControllerRegister) -> Self {
         Self { registers, mailbox: OffsetMailbox::new(first) }
     }
 
@@ -224,7 +224,7 @@ fn to_micrometres(count: i64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clock::ScaledClock;
+    use adapter_core::clock::ScaledClock;
     use std::sync::{Arc, Mutex};
 
     const FIRST: ControllerRegister = ControllerRegister { kind: 'D', index: 110 };

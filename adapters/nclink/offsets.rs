@@ -7,8 +7,8 @@ use super::mailbox::ControllerRegister;
 use super::message::{NcLinkAnswer, RequestedItem};
 use super::offset_mailbox::RegisterAccess;
 use super::registers::{RegisterLine, build_register_path};
-use crate::driver::SourceError;
-use crate::words::execution;
+use adapter_core::driver::SourceError;
+use adapter_core::words::execution;
 
 /// Where it is said whether a program runs.
 const CHANNEL_WORDS: &str = "CONTROLLER/VARIABLE@REG_F";

@@ -8,9 +8,9 @@
 
 use super::liberal::{parse_integer, parse_number};
 use super::message::NcLinkAnswer;
-use crate::channel::Kind;
-use crate::own::{Own, OwnRead};
-use crate::reading::{Absence, Value};
+use adapter_core::channel::Kind;
+use adapter_core::own::{OwnChannel, OwnRead};
+use adapter_core::reading::{Absence, Value};
 use std::sync::Arc;
 
 /// An item of a model.
@@ -58,22 +58,22 @@ fn parse_element(place: &str) -> Option<(u32, Option<u8>)> {
     Some((index.parse().ok()?, bit))
 }
 
-impl Own<OwnPath> {
-    /// What was answered, before the scale.
+impl OwnPath {
+    /// What was answered for this channel, before the scale.
     ///
     /// # Errors
     /// There is no value of the kind that the channel has.
-    pub(super) fn extract_value(&self, answer: Option<&NcLinkAnswer>) -> Result<Value, Absence> {
+    pub(super) fn extract_value(&self, channel: &OwnChannel, answer: Option<&NcLinkAnswer>) -> Result<Value, Absence> {
         let value = match answer {
             Some(Ok(values)) => values.first().filter(|value| !value.is_null()).ok_or(Absence::NotYetRead)?,
             Some(Err(_)) => return Err(Absence::Refused),
             None => return Err(Absence::NotSupported),
         };
-        if self.channel.new.kind == Kind::Text {
+        if channel.new.kind == Kind::Text {
             let text = value.as_str().map_or_else(|| value.to_string(), |text| text.trim().to_owned());
             return Ok(Value::Text(Arc::from(text)));
         }
-        let found = match self.item.bit {
+        let found = match self.bit {
             Some(bit) => parse_integer(value).map(|whole| f64::from(u8::from(whole >> bit & 1 == 1))),
             None => parse_number(value),
         };

@@ -5,7 +5,7 @@ use super::connection::{Connection, Link};
 use super::mailbox::ControllerRegister;
 use super::message::{NcLinkAnswer, RequestedItem};
 use super::model::Model;
-use crate::driver::SourceError;
+use adapter_core::driver::SourceError;
 
 /// Items of a device by their paths, written and read.
 pub(super) struct RegisterLine {

@@ -9,11 +9,11 @@ use super::sample::SampleBlock;
 use super::topic::Subject;
 use super::track::SampleTracks;
 use crate::address::NcLinkTarget;
-use crate::channel::ChannelId;
-use crate::clock::Clock;
-use crate::driver::{Fact, Offer, Source, SourceError, SourceProblem};
-use crate::own::Own;
-use crate::reading::{Reading, Stamp};
+use adapter_core::channel::ChannelId;
+use adapter_core::clock::Clock;
+use adapter_core::driver::{Fact, Offer, Source, SourceError, SourceProblem};
+use adapter_core::own::Own;
+use adapter_core::reading::{Reading, Stamp};
 use std::time::{Duration, Instant};
 
 /// Takes whole blocks of a sample channel, with the moment of their arrival.

@@ -2,7 +2,7 @@
 
 use super::decode;
 use super::sample::SampleBlock;
-use crate::driver::Fact;
+use adapter_core::driver::Fact;
 use serde_json::Value;
 use std::collections::BTreeMap;
 

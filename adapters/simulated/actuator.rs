@@ -2,9 +2,9 @@
 
 use super::Simulated;
 use super::ladder::LadderInput;
-use crate::clock::Clock;
-use crate::driver::{Actuator, LadderRequest, SourceError};
-use crate::units::OverridePct;
+use adapter_core::clock::Clock;
+use adapter_core::driver::{Actuator, LadderRequest, SourceError};
+use adapter_core::units::OverridePct;
 
 /// Posts overrides and requests to the ladder of the simulated machine, and reads back what is in force.
 pub struct SimulatedOverride {

@@ -5,10 +5,10 @@ use super::device::{PolledDevice, to_nanoseconds};
 use super::moment::{Moment, Panel};
 use super::noise::{Purpose, sample_normal};
 use crate::address::SimulatedMachine;
-use crate::channel::ChannelId;
-use crate::clock::{Clock, TimeNs};
-use crate::driver::{Pull, Source, SourceError};
-use crate::reading::{Reading, Stamp};
+use adapter_core::channel::ChannelId;
+use adapter_core::clock::{Clock, TimeNs};
+use adapter_core::driver::{Pull, Source, SourceError};
+use adapter_core::reading::{Reading, Stamp};
 use std::sync::Arc;
 use std::time::Duration;
 

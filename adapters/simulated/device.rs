@@ -2,8 +2,8 @@
 
 use super::noise::{Purpose, sample_uniform};
 use super::settings::DeviceSettings;
-use crate::clock::{SECOND_NS, TimeNs};
-use crate::driver::SourceError;
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::driver::SourceError;
 use std::time::Duration;
 
 /// A request is given up after this time.

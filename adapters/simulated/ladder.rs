@@ -11,9 +11,9 @@
 //!
 //! The dial is the operator's; nothing that is posted turns it.
 
-use crate::clock::TimeNs;
-use crate::driver::{LadderRequest, LadderRule};
-use crate::units::OverridePct;
+use adapter_core::clock::TimeNs;
+use adapter_core::driver::{LadderRequest, LadderRule};
+use adapter_core::units::OverridePct;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -209,7 +209,7 @@ fn to_nanoseconds(duration: Duration) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clock::SECOND_NS;
+    use adapter_core::clock::SECOND_NS;
 
     fn pct(percent: u8) -> OverridePct {
         OverridePct::new(percent).expect("not 255")

@@ -5,10 +5,10 @@ use super::Simulated;
 use super::device::{DEADLINE, PolledDevice, build_timeout_error, to_nanoseconds};
 use super::noise::{Purpose, sample_normal, sample_uniform};
 use super::settings::MeterSettings;
-use crate::channel::ChannelId;
-use crate::clock::{Clock, TimeNs};
-use crate::driver::{Pull, Source, SourceError};
-use crate::reading::{Reading, Stamp};
+use adapter_core::channel::ChannelId;
+use adapter_core::clock::{Clock, TimeNs};
+use adapter_core::driver::{Pull, Source, SourceError};
+use adapter_core::reading::{Reading, Stamp};
 use std::f64::consts::TAU;
 use std::time::Duration;
 

@@ -1,6 +1,6 @@
 //! The machine at one instant: what its control shows, what is electrically true, and what only a scorer may know.
 
-use crate::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 
 /// What the machine truly does. Compare an estimate with it; never feed it to one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -48,9 +48,9 @@ pub struct Panel {
     pub booted: bool,
     /// Drives ready.
     pub drives_on: bool,
-    /// One of [`words::mode`](crate::words::mode).
+    /// One of [`words::mode`](adapter_core::words::mode).
     pub mode: &'static str,
-    /// One of [`words::execution`](crate::words::execution).
+    /// One of [`words::execution`](adapter_core::words::execution).
     pub execution: &'static str,
     /// Number after the O.
     pub program: u16,

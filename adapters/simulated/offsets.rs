@@ -1,10 +1,10 @@
 //! The external work offsets of the simulated control: what a thermal compensation shifts between two programs.
 
 use super::Simulated;
-use crate::clock::Clock;
-use crate::driver::SourceError;
-use crate::offset::{Axis, OffsetSink};
-use crate::words::execution;
+use adapter_core::clock::Clock;
+use adapter_core::driver::SourceError;
+use adapter_core::offset::{Axis, OffsetSink};
+use adapter_core::words::execution;
 
 /// Shifts the offsets of the simulated machine, in whole micrometres, while no program runs.
 pub struct SimulatedOffsets {

@@ -2,13 +2,13 @@
 
 use super::*;
 use crate::address::SimulatedMachine;
-use crate::channel::ChannelId;
-use crate::clock::{ManualClock, SECOND_NS};
-use crate::driver::{Actuator, LadderRequest, Pull, SourceError};
-use crate::merge::{Delay, Lockstep};
-use crate::reading::{Absence, Reading};
-use crate::sample::Sample;
-use crate::units::OverridePct;
+use adapter_core::channel::ChannelId;
+use adapter_core::clock::{ManualClock, SECOND_NS};
+use adapter_core::driver::{Actuator, LadderRequest, Pull, SourceError};
+use adapter_core::merge::{Delay, Lockstep};
+use adapter_core::reading::{Absence, Reading};
+use adapter_core::sample::Sample;
+use adapter_core::units::OverridePct;
 use std::collections::BTreeMap;
 
 fn machine(settings: SimulatedSettings) -> Simulated {
@@ -345,14 +345,15 @@ fn a_feed_hold_stops_the_axes_and_a_stop_the_program_until_the_operator_comes() 
     let clock = ManualClock::with_time((cut_s + 1) * SECOND_NS);
     ladder.ask_ladder(&clock, LadderRequest::FeedHold).expect("the control is on");
     let held = machine.moment((cut_s + 2) * SECOND_NS).panel;
-    assert_eq!((held.execution, held.feed_mm_min), (crate::words::execution::FEED_HOLD, 0.0));
+    assert_eq!((held.execution, held.feed_mm_min), (adapter_core::words::execution::FEED_HOLD, 0.0));
     let on_s = first_s(&machine, cut_s + 2, |moment| moment.panel.feed_mm_min > 0.0);
     assert!((44..=47).contains(&(on_s - cut_s)), "{on_s} {cut_s}");
     clock.set_time((on_s + 1) * SECOND_NS);
     ladder.ask_ladder(&clock, LadderRequest::Stop).expect("the control is on");
-    let stood_s = first_s(&machine, on_s + 1, |moment| moment.panel.execution == crate::words::execution::STOPPED);
+    let stood_s =
+        first_s(&machine, on_s + 1, |moment| moment.panel.execution == adapter_core::words::execution::STOPPED);
     let before = machine.moment((stood_s - 1) * SECOND_NS).panel;
-    let after_s = first_s(&machine, stood_s, |moment| moment.panel.execution == crate::words::execution::ACTIVE);
+    let after_s = first_s(&machine, stood_s, |moment| moment.panel.execution == adapter_core::words::execution::ACTIVE);
     let after = machine.moment(after_s * SECOND_NS).panel;
     assert!(after_s - stood_s >= 45 && after.part_count == 1, "{after:?}");
     assert!(before.part_count <= 1 && machine.written().count_writes() == 2);

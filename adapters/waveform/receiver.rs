@@ -5,7 +5,7 @@ use super::intake::{Block, Intake, count_missing, end_ns};
 use crate::address::Endpoint;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::SourceError;
-use crate::stream::{self, Short};
+use adapter_core::stream::{self, Short};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 

@@ -40,16 +40,16 @@ pub(super) fn open_sampled_source(address: &Address) -> Option<Result<Opened, Op
 fn open_nclink(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenError> {
     let (waiting, sink) = create_queue();
     let current = SampledCurrent::new(Some(target.spindle_axis.unwrap_or(SPINDLE_AXIS)), 1.0);
-    let opened = adapters::nclink::open_sampled(address, target, Some(sink))?;
-    Ok(join_sources(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened))
+    let opened = adapters::nclink::open_sampled(address.text(), target, Some(sink))?;
+    Ok(join_sources(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened.into()))
 }
 
 fn open_hnc(address: &Address, target: &HncNetTarget, scale_a: f64) -> Opened {
     let (waiting, sink) = create_queue();
     // The driver lets the spindle be the first of the load currents.
     let current = SampledCurrent::new(None, scale_a);
-    let opened = adapters::hnc::open_sampled(address, target, Some(sink));
-    join_sources(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened)
+    let opened = adapters::hnc::open_sampled(address.text(), target, Some(sink));
+    join_sources(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened.into())
 }
 
 /// What is sampled goes before what is polled.

@@ -14,8 +14,8 @@ use super::no_load::{NoLoad, NoLoadPoint};
 use super::noise::RelativeVariances;
 use super::settings::Settings;
 use super::signals::{seconds_between, to_window_length};
-use numerics::statistics::count_to_f64;
 use adapters::clock::TimeNs;
+use numerics::statistics::count_to_f64;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

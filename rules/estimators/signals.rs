@@ -5,8 +5,8 @@ use super::inputs::TickInputs;
 use super::noise::RelativeVariances;
 use super::settings::Settings;
 use super::window::{Means, PowerWindow};
-use numerics::statistics::count_to_f64;
 use adapters::clock::{SECOND_NS, TimeNs};
+use numerics::statistics::count_to_f64;
 use serde::{Deserialize, Serialize};
 
 /// Speeds remembered to judge whether a change of speed is over: 0.5 s at 10 Hz.

@@ -2,8 +2,8 @@
 
 use super::quantity::{QUANTITIES, suggest_key};
 use super::recipe::{Operation, Recipe};
-use script::ScriptProblem;
 use adapters::channel::find_nearest_name;
+use script::ScriptProblem;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::sync::Arc;

@@ -4,9 +4,9 @@
 //! has not been changed.
 
 use super::problem::ScriptProblem;
-use estimators::{Estimates, State};
 use adapters::channel::find_nearest_name;
 use adapters::{ChannelId, Sample};
+use estimators::{Estimates, State};
 use rhai::{Dynamic, Position};
 use std::sync::Arc;
 

@@ -5,10 +5,10 @@
 //! the file is loaded, and one that nobody reads costs nothing.
 
 use super::vocabulary::{View, Word, WordSource, WordValue, find_word, list_words};
-use estimators::NoEstimate;
 use adapters::Absence;
 use adapters::channel::find_nearest_name;
 use adapters::clock::SECOND_NS;
+use estimators::NoEstimate;
 
 /// What a record tells of its fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,8 +154,8 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use estimators::Estimates;
     use adapters::{ChannelId, Sample, Slot, Value};
+    use estimators::Estimates;
 
     fn field(record_name: &str, name: &str) -> Result<Field, String> {
         find_record(record_name).expect("a record").find_field(name)

@@ -5,12 +5,12 @@ use super::events::HANDLERS;
 use super::fields::RECORDS;
 use super::quantities::{FIGURES, QUANTITIES};
 use super::trials::TRIAL_FUNCTIONS;
-use estimators::loads::Figure;
-use estimators::wear::tool_of;
-use estimators::{Estimated, Estimates, NoLoadOrigin, SETTINGS, State, Visibility};
 use adapters::clock::SECOND_NS;
 use adapters::words::of_channel;
 use adapters::{ChannelId, Sample};
+use estimators::loads::Figure;
+use estimators::wear::tool_of;
+use estimators::{Estimated, Estimates, NoLoadOrigin, SETTINGS, State, Visibility};
 use std::collections::HashMap;
 use std::sync::LazyLock;
 

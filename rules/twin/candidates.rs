@@ -2,8 +2,8 @@
 
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::term::Term;
-use physics::{Effect, Role, Scene};
 use numerics::statistics::count_to_f64;
+use physics::{Effect, Role, Scene};
 
 /// What a machine takes without a cut builds a model and is never a finding by itself.
 const BUILDING: &str = "no_load_power";

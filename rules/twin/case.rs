@@ -4,9 +4,9 @@ use super::bind::bind;
 use super::model::{Model, Part, simulate};
 use super::quality::{Fault, clean};
 use super::units::{Unit, held_out, units};
-use physics::Scene;
 use adapters::Recording;
 use adapters::bilingual::Bilingual;
+use physics::Scene;
 use std::collections::BTreeSet;
 
 /// A recording prepared for comparison with a model.

@@ -1,9 +1,9 @@
 //! Channels by name: those of the recording, and those that nobody records but that formulas may be drawn over - the time in the run and in the cut, the direction of a slide, and what the model itself simulates.
 
+use adapters::channel::quantity::Quantity;
 use physics::drive::{compute_directions, goes_both_ways, read_slide_velocity};
 use physics::state::{first_order, first_order_behind};
 use physics::{Role, Scene};
-use adapters::channel::quantity::Quantity;
 use std::borrow::Cow;
 
 /// Seconds of the recording's clock.

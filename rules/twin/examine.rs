@@ -5,11 +5,11 @@ use super::bind::bind;
 use super::diagnosis::unit_of;
 use super::inputs::columns;
 use super::model::{Model, Part, simulate};
-use physics::Scene;
-use numerics::statistics::{count_to_f64, median};
 use adapters::Recording;
 use adapters::channel::{ChannelId, Kind};
 use adapters::recording::Numbers;
+use numerics::statistics::{count_to_f64, median};
+use physics::Scene;
 
 /// Share of values outside the physical range beyond which the unit must be wrong.
 const OUTSIDE_SHARE_MAX: f64 = 0.01;

@@ -5,8 +5,8 @@
 
 use super::linear::{dot, least_squares};
 use super::model::{Part, Simulated, simulate, simulate_changed};
-use physics::{Entry, Scene};
 use numerics::statistics::rms;
+use physics::{Entry, Scene};
 
 /// Gauss-Newton steps at most.
 const STEPS_MAX: usize = 12;

@@ -17,8 +17,8 @@ use super::diagnosis::ParameterEstimate;
 use super::fit::Fit;
 use super::linear::{dot, extend_basis, least_squares, project_out};
 use super::model::{Part, PartFunction};
-use physics::{Entry, Scene, unit_in};
 use numerics::statistics::count_to_f64;
+use physics::{Entry, Scene, unit_in};
 
 /// By how much of its value a parameter may be off because no machine follows a law to the letter, with a certainty of
 /// 95 %: a share that no amount of rows makes smaller (GUM, type B).

@@ -40,9 +40,9 @@ pub mod text;
 pub mod units;
 pub mod words;
 
-use numerics::linear::columns as linear;
 pub use diagnosis::Diagnosis;
 pub use evidence::diagnose;
 pub use examine::{Examination, examine};
 pub use model::{Model, Parameter, Part, PartFunction, Simulated, simulate};
 pub use model_file::{Problem, parse_hypotheses, parse_model, toml_text, write_model};
+use numerics::linear::columns as linear;

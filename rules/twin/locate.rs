@@ -1,7 +1,7 @@
 //! Where: the region of time and of operating space in which a missing effect acts.
 
-use physics::Scene;
 use numerics::statistics::quantile;
+use physics::Scene;
 
 /// Share of the usual greatest size above which a row counts as affected: a fifth is a change that is seen beside it. Lower: noise
 /// of the estimate and the tails of a curve are called affected; higher: only the peak is.

@@ -4,10 +4,10 @@
 //! runs.
 
 use super::locate::Condition;
-use numerics::statistics::count_to_f64;
 use adapters::Recording;
 use adapters::channel::quantity::Quantity;
 use adapters::recording::{Words, derive_quantity};
+use numerics::statistics::count_to_f64;
 
 /// Price of one condition, in shares of what is covered: a reader takes it in for a thirtieth. Lower: words that cover noise;
 /// higher: one condition where two are needed.

@@ -1,7 +1,7 @@
 //! Faults of a recording that do not bias the comparison: they are noted, and their rows are left out.
 
-use physics::Scene;
 use numerics::statistics::{median, robust_deviation};
+use physics::Scene;
 
 /// One kind of fault found in one column.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,8 +4,8 @@
 //! operating points are most like those of the whole recording. So no tool, no operation and no place of a program that
 //! repeats is held out as a whole where another choice exists.
 
-use physics::Scene;
 use numerics::statistics::{count_to_f64, quantile};
+use physics::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 

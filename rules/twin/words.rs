@@ -3,8 +3,8 @@
 use super::diagnosis::{Diagnosis, Existence, UNKNOWN, Verdict};
 use super::locate::Condition;
 use super::text::short;
-use physics::find_effect;
 use adapters::bilingual::Bilingual;
+use physics::find_effect;
 
 /// One or two sentences for the machinist.
 #[must_use]

@@ -145,7 +145,7 @@ fn without_offset_in_the_address_there_is_no_way_to_shift_anything() {
     }
     let address: Address = "hncnet://192.0.2.1?library=x.so&offset=D110".parse().expect("usable");
     let Target::HncNet(target) = address.target() else { panic!("hncnet") };
-    assert!(adapters::hnc::open_address(&address, target).offsets.is_some());
+    assert!(adapters::hnc::open_address(address.text(), target).offsets.is_some());
 }
 
 const SCRIPT: &str = "propose_offset_um(\"z\", 7.3, \"thermal error\");";

@@ -136,6 +136,6 @@ pub(crate) fn address(port: u16, keys: &str) -> Address {
 pub(crate) fn source(port: u16, keys: &str) -> NcLinkSource {
     let address = address(port, keys);
     let adapters::address::Target::NcLink(target) = address.target() else { panic!("nclink") };
-    open_address(&address, target).expect("opens");
+    open_address(address.text(), target).expect("opens");
     NcLinkSource::new(address.text(), target, None)
 }

@@ -135,5 +135,5 @@ fn one_line_has_one_speed() {
     let error = adapters::open::open_address(&fast, 0).err().expect("another speed").to_string();
     assert!(error.contains("baud"), "{error}");
     drop(first);
-    let _meter: fn(&adapters::Address, _, _) -> Result<ModbusMeter, String> = ModbusMeter::with_tcp_line;
+    let _meter: fn(&str, _, _) -> Result<ModbusMeter, String> = ModbusMeter::with_tcp_line;
 }

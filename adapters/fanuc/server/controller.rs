@@ -1,11 +1,11 @@
 //! What a control holds, as plain values.
 
 use super::Memory;
-use crate::fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit, Status, System};
-use crate::fanuc::item::BlockWord;
-use crate::fanuc::opening::{Generation, Opening};
-use crate::fanuc::poll;
-use crate::fanuc::wire::Number;
+use crate::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit, Status, System};
+use crate::item::BlockWord;
+use crate::opening::{Generation, Opening};
+use crate::poll;
+use crate::wire::Number;
 use std::collections::BTreeMap;
 
 /// The modal group of feed per minute and per revolution, and the parameter that shows the feed per revolution.

@@ -31,12 +31,12 @@
 //! The gateway can neither end what it has asked for nor ask for the same a second time before it was acknowledged.
 
 use super::Memory;
-use crate::clock::TimeNs;
-use crate::driver::{LadderRequest, LadderRule};
-use crate::fanuc::feed_override;
-use crate::fanuc::item::Area;
-use crate::fanuc::poll::find_signal_address;
-use crate::units::OverridePct;
+use crate::feed_override;
+use crate::item::Area;
+use crate::poll::find_signal_address;
+use adapter_core::clock::TimeNs;
+use adapter_core::driver::{LadderRequest, LadderRule};
+use adapter_core::units::OverridePct;
 
 /// Value of the first byte while an override is asked for.
 pub const ENABLED: u8 = 0xA5;

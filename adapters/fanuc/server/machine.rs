@@ -4,15 +4,15 @@ use super::controller::{Controller, Data};
 use super::ladder::{PmcLadder, SCAN_NS};
 use super::listen::ServedControl;
 use super::{screen, second_path};
-use crate::address::SimulatedMachine;
-use crate::clock::{Clock, TimeNs};
-use crate::driver::{Actuator, LadderRequest, LadderRule};
-use crate::fanuc::answer::{Alarm, Status};
-use crate::fanuc::item::{Area, BlockWord};
-use crate::fanuc::wire::Number;
-use crate::simulated::{Moment, Panel, Simulated};
-use crate::units::OverridePct;
-use crate::words::{execution, mode, operation};
+use crate::answer::{Alarm, Status};
+use crate::item::{Area, BlockWord};
+use crate::wire::Number;
+use adapter_core::clock::{Clock, TimeNs};
+use adapter_core::driver::{Actuator, LadderRequest, LadderRule};
+use adapter_core::units::OverridePct;
+use adapter_core::words::{execution, mode, operation};
+use simulated::address::SimulatedMachine;
+use simulated::{Moment, Panel, Simulated};
 use std::sync::Arc;
 
 /// After a pause without questions the ladder makes up for at most so many scans.

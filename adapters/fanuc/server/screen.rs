@@ -3,14 +3,14 @@
 
 use super::controller::{Controller, Data, ProgramFile, ToolGroup};
 use super::machine::round_to_number;
-use crate::clock::TimeNs;
-use crate::fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit};
-use crate::fanuc::item::BlockWord;
-use crate::fanuc::wire::Number;
-use crate::simulated::{Moment, Panel};
-use crate::words::execution;
+use crate::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit};
+use crate::item::BlockWord;
+use crate::wire::Number;
+use adapter_core::clock::TimeNs;
+use adapter_core::words::execution;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
+use simulated::{Moment, Panel};
 
 /// Kinds of parameters on the wire: byte, two words, real.
 const BYTE: i16 = 1;

@@ -6,11 +6,11 @@ use super::controller::Controller;
 use super::ladder::PmcLadder;
 use super::machine::{build_status, round_to_number};
 use super::memory::Memory;
-use crate::driver::LadderRequest;
-use crate::fanuc::item::{Area, BlockWord};
-use crate::fanuc::poll::find_signal_address;
-use crate::fanuc::wire::Number;
-use crate::simulated::Moment;
+use crate::item::{Area, BlockWord};
+use crate::poll::find_signal_address;
+use crate::wire::Number;
+use adapter_core::driver::LadderRequest;
+use simulated::Moment;
 
 /// Its programs have numbers this much higher.
 const PROGRAM_STEP: i32 = 1000;

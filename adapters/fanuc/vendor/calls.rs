@@ -6,10 +6,10 @@ use super::layout::{
     OdbSpLoad, OdbSpn, OdbSt, OdbSys, PMC_HEAD_LEN, POSITIONS_LEN, PosElm, SpeedElm, ZOFS_LEN,
 };
 use super::structure::{Bytes, POSITION_PLACES, check_code, fill_structure, scale_decimal};
-use crate::child::Guarded;
-use crate::fanuc::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, Refusal, SpeedUnit, Status, System};
-use crate::fanuc::code::FocasReturnCode;
-use crate::fanuc::item::{BlockWord, FocasItem, PmcWidth, PositionFrame, Servo, Spindle, Stretch};
+use crate::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, Refusal, SpeedUnit, Status, System};
+use crate::code::FocasReturnCode;
+use crate::item::{BlockWord, FocasItem, PmcWidth, PositionFrame, Servo, Spindle, Stretch};
+use adapter_core::child::Guarded;
 use std::mem::{offset_of, size_of};
 
 /// Most alarms, spindles and PMC bytes that are asked for at a time.

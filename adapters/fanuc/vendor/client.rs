@@ -2,15 +2,15 @@
 
 use super::KIND;
 use super::message::{FocasReply, FocasRequest};
-use crate::address::Endpoint;
-use crate::child::{ChildClient, ChildCounts, ChildError, ChildSettings, Taken};
-use crate::fanuc::answer::{FocasItemError, FocasItemResult, Refusal};
-use crate::fanuc::code::{Consequence, FocasReturnCode};
-use crate::fanuc::focas::{Focas, FocasError};
-use crate::fanuc::item::{Question, Write};
-use crate::fanuc::opening::Opening;
-use crate::stream;
-use crate::text::TextEncoding;
+use crate::answer::{FocasItemError, FocasItemResult, Refusal};
+use crate::code::{Consequence, FocasReturnCode};
+use crate::focas::{Focas, FocasError};
+use crate::item::{Question, Write};
+use crate::opening::Opening;
+use adapter_core::address::Endpoint;
+use adapter_core::child::{ChildClient, ChildCounts, ChildError, ChildSettings, Taken};
+use adapter_core::stream;
+use adapter_core::text::TextEncoding;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};

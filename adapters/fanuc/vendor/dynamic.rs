@@ -2,8 +2,8 @@
 
 use super::layout::OdbDy2;
 use super::structure::{Bytes, scale_decimal};
-use crate::fanuc::answer::FocasAnswer;
-use crate::fanuc::item::{FocasItem, Position};
+use crate::answer::FocasAnswer;
+use crate::item::{FocasItem, Position};
 use std::mem::{offset_of, size_of};
 
 /// What the call for the positions of every axis says besides: it asks for all of this in one frame. `places` are the places

@@ -1,10 +1,10 @@
 //! What parent and child say, as JSON: small, and legible in a debugger.
 
-use crate::fanuc::answer::FocasItemResult;
-use crate::fanuc::code::FocasReturnCode;
-use crate::fanuc::item::{Question, Write};
-use crate::fanuc::opening::Opening;
-use crate::text::TextEncoding;
+use crate::answer::FocasItemResult;
+use crate::code::FocasReturnCode;
+use crate::item::{Question, Write};
+use crate::opening::Opening;
+use adapter_core::text::TextEncoding;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

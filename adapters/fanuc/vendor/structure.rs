@@ -1,10 +1,10 @@
 //! A structure that the library filled in, read field by field.
 
 use super::layout::LoadElm;
-use crate::child::{Guarded, Missing};
-use crate::fanuc::answer::{FocasItemError, Refusal};
-use crate::fanuc::code::FocasReturnCode;
-use crate::text::TextEncoding;
+use crate::answer::{FocasItemError, Refusal};
+use crate::code::FocasReturnCode;
+use adapter_core::child::{Guarded, Missing};
+use adapter_core::text::TextEncoding;
 use std::mem::offset_of;
 
 /// Decimals of offsets that the library gives without them (increment system IS-B, millimetres).

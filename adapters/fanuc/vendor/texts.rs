@@ -3,9 +3,9 @@
 
 use super::child::FocasSession;
 use super::structure::{Bytes, check_code, fill_structure};
-use crate::fanuc::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, OperatorMessage, PastAlarm};
-use crate::fanuc::item::FocasItem;
-use crate::text::TextEncoding;
+use crate::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, OperatorMessage, PastAlarm};
+use crate::item::FocasItem;
+use adapter_core::text::TextEncoding;
 
 /// `ODBGCD`: group, flag, text of eight bytes.
 const G_CODE_LEN: usize = 12;

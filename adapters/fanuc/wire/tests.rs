@@ -1,9 +1,9 @@
 //! Bytes that come from anywhere.
 
 use super::*;
-use crate::fanuc::decode;
-use crate::fanuc::item::{FocasItem, Position};
-use crate::fanuc::opening::Generation;
+use crate::decode;
+use crate::item::{FocasItem, Position};
+use crate::opening::Generation;
 use proptest::prelude::*;
 
 fn anything(bytes: &[u8]) {

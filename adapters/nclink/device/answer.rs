@@ -1,10 +1,10 @@
 //! One request in, one answer out.
 
 use super::{NcLinkDevice, to_milliseconds, values};
-use crate::nclink::liberal::{find_list, find_text, parse_integer};
-use crate::nclink::mailbox::ControllerRegister;
-use crate::nclink::message::find_identifier;
-use crate::nclink::topic::Subject;
+use crate::liberal::{find_list, find_text, parse_integer};
+use crate::mailbox::ControllerRegister;
+use crate::message::find_identifier;
+use crate::topic::Subject;
 use serde_json::{Value, json};
 
 /// At most so many elements of a list are answered.
@@ -53,7 +53,7 @@ impl NcLinkDevice {
         let indexes = parse_indexes(params)?;
         if known.path == "CONTROLLER/VARIABLE@CHAN_0" {
             // Of the channel's list only the flag of rigid tapping is served.
-            let flag = i64::from(moment.panel.operation == crate::words::operation::TAPPING);
+            let flag = i64::from(moment.panel.operation == adapter_core::words::operation::TAPPING);
             return Ok(indexes.iter().map(|index| json!(if *index == 23 { flag } else { 0 })).collect());
         }
         let kind = register_kind(&known.path).ok_or("NOT_SUPPORTED")?;

@@ -21,12 +21,12 @@ mod values;
 
 use super::model::Model;
 use super::topic::Subject;
-use crate::clock::Clock;
-use crate::mqtt::{MqttClient, MqttError, MqttMessage, Options, Qos, generate_unique_id};
-use crate::simulated::Simulated;
+use adapter_core::clock::Clock;
+use mqtt::{MqttClient, MqttError, MqttMessage, Options, Qos, generate_unique_id};
 use registers::SimulatedRegisters;
 use sampling::ChannelSampler;
 use serde_json::{Value, json};
+use simulated::Simulated;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

@@ -2,12 +2,12 @@
 //! the mailboxes from which the ladder takes the gateway's override and its shifts.
 
 use super::values::channel_word;
-use crate::clock::Clock;
-use crate::driver::Actuator;
-use crate::nclink::mailbox::{ControllerRegister, Mailbox, MailboxRequest, request_of};
-use crate::nclink::offset_mailbox::OffsetMailbox;
-use crate::offset::{Axis, OffsetSink};
-use crate::simulated::{Moment, Simulated, SimulatedOffsets, SimulatedOverride};
+use crate::mailbox::{ControllerRegister, Mailbox, MailboxRequest, request_of};
+use crate::offset_mailbox::OffsetMailbox;
+use adapter_core::clock::Clock;
+use adapter_core::driver::Actuator;
+use adapter_core::offset::{Axis, OffsetSink};
+use simulated::{Moment, Simulated, SimulatedOffsets, SimulatedOverride};
 use std::collections::BTreeMap;
 
 /// First F and G word of channel 0, configuration HNC-30.

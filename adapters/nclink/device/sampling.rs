@@ -1,9 +1,9 @@
 //! Messages of a sample channel: a column per item, one value per interval.
 
 use super::{to_milliseconds, values};
-use crate::nclink::model::{Model, SampleChannel};
-use crate::simulated::Simulated;
+use crate::model::{Model, SampleChannel};
 use serde_json::{Value, json};
+use simulated::Simulated;
 
 /// A device that is further behind than this goes on from now.
 const BEHIND_NS: i64 = 2_000_000_000;
@@ -22,7 +22,7 @@ pub(super) struct ChannelSampler {
 impl ChannelSampler {
     /// `None` for a channel whose times are not whole milliseconds or whose upload holds no value.
     pub(super) fn new(channel: &SampleChannel, model: &Model) -> Option<Self> {
-        let whole = |ms: f64| crate::nclink::liberal::parse_integer(&json!(ms)).filter(|ms| *ms > 0);
+        let whole = |ms: f64| crate::liberal::parse_integer(&json!(ms)).filter(|ms| *ms > 0);
         let (interval_ms, upload_ms) = (whole(channel.interval_ms)?, whole(channel.upload_ms)?);
         let path = |name: &String| model.find_item(name).map(|item| item.path.clone());
         let paths: Vec<String> = channel.items.iter().filter_map(path).collect();
@@ -71,7 +71,7 @@ impl ChannelSampler {
         }
         let data: Vec<Value> = columns.into_iter().map(|column| json!({"data": column})).collect();
         Some(json!({
-            "@id": crate::mqtt::generate_unique_id(), "paths": self.names, "id": self.name, "beginTime": begin_ms.to_string(),
+            "@id": mqtt::generate_unique_id(), "paths": self.names, "id": self.name, "beginTime": begin_ms.to_string(),
             "data": data, "interval": self.interval_ms, "uploadInterval": self.upload_ms,
         }))
     }

@@ -1,7 +1,7 @@
 //! The model of the simulated machine, laid out and numbered like Huazhong's default model.
 
-use crate::address::SimulatedMachine;
 use serde_json::{Value, json};
+use simulated::address::SimulatedMachine;
 
 /// Number of the spindle's axis.
 const SPINDLE: u32 = 5;

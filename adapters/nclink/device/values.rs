@@ -1,8 +1,8 @@
 //! What a data item of the simulated machine is worth at a moment.
 
-use crate::simulated::{Moment, Panel};
-use crate::words::{execution, mode};
+use adapter_core::words::{execution, mode};
 use serde_json::{Value, json};
+use simulated::{Moment, Panel};
 
 /// The value of the item with this path; `None` when it is no single value of this machine.
 pub(super) fn find_value(path: &str, moment: &Moment) -> Option<Value> {

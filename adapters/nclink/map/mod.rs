@@ -5,11 +5,11 @@ use super::liberal::parse_integer;
 use super::message::{NcLinkAnswer, RequestedItem, first_number};
 use super::model::{Model, ModelItem};
 use super::own::OwnPath;
-use crate::channel::ChannelId;
-use crate::conversion::{self, Conversion};
-use crate::driver::SourceProblem;
-use crate::own::Own;
-use crate::reading::{Absence, Reading, Stamp, Value as Held};
+use adapter_core::channel::ChannelId;
+use adapter_core::conversion::{self, Conversion};
+use adapter_core::driver::SourceProblem;
+use adapter_core::own::Own;
+use adapter_core::reading::{Absence, Reading, Stamp, Value as Held};
 use serde_json::Value;
 use std::sync::Arc;
 
@@ -296,8 +296,10 @@ impl PolledItem {
             return Reading::from_absence(self.channel, stamp, Absence::UnknownUnit);
         };
         if let Some(own) = &self.own {
-            return own
-                .to_reading(stamp, own.extract_value(answer.as_ref()).map(|value| convert_value(value, conversion)));
+            return own.to_reading(
+                stamp,
+                own.item.extract_value(&own.channel, answer.as_ref()).map(|value| convert_value(value, conversion)),
+            );
         }
         let found = self.find_value(answer).and_then(|value| {
             if value.is_null() {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::reading::Value as Held;
+use adapter_core::reading::Value as Held;
 use serde_json::json;
 
 const LAYOUT: NcLinkLayout = NcLinkLayout { f_channel: 2560, spindle_axis: None };

@@ -13,7 +13,7 @@ use super::plan::{BlockPlan, Note, NoteKind, PlannedColumn, PlannedKind, ReadPla
 use super::survey::{fit_row, is_comment, repeats_header};
 use super::table::{Table, VisitStep};
 use super::time::{RawTime, resolve_times};
-use crate::recording::{Cells, Numbers, Recording, Words};
+use crate::{Cells, Numbers, Recording, Words};
 
 /// Lines after the data that are taken for sums and remarks; more of them are refused rows.
 const FOOTER_MAX: usize = 12;

@@ -1,6 +1,6 @@
 //! One cell of a foreign table, and how a number may be written in it.
 
-use crate::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 
 /// A cell as the file holds it. Text is not judged yet.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,8 +8,8 @@ use super::moment::DateOrder;
 use super::names::ForeignName;
 use super::plan::{Note, NoteKind, TimeKind, TimePlan};
 use super::survey::ColumnSurvey;
-use crate::bilingual::Bilingual;
-use crate::channel::unit::{Dimension, Unit};
+use adapter_core::bilingual::Bilingual;
+use adapter_core::channel::unit::{Dimension, Unit};
 
 /// A step so long, s, in whole numbers and without a unit, may as well be milliseconds.
 const LONG_STEP: f64 = 10.0;

@@ -3,7 +3,7 @@
 use super::cell::{Cell, is_absent_number};
 use super::moment::{WrittenMoment, written_moment};
 use super::time::RawTime;
-use crate::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 
 pub(super) fn is_nothing(cell: Cell<'_>) -> bool {
     match cell {

@@ -1,6 +1,6 @@
 //! Why a recording cannot be read, and what was refused of one that can.
 
-use crate::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use std::fmt;
 use thiserror::Error;
 

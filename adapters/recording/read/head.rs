@@ -5,8 +5,8 @@ use super::error::RecordingError;
 use super::limits::HEAD_ROWS;
 use super::moment::written_moment;
 use super::table::{OwnedCell, Table, VisitStep};
-use crate::bilingual::Bilingual;
-use crate::channel::unit::Unit;
+use adapter_core::bilingual::Bilingual;
+use adapter_core::channel::unit::Unit;
 
 /// Share of the filled cells of a row that must be of the kind of their columns, for a row of data.
 const AGREEMENT: f64 = 0.7;

@@ -7,7 +7,7 @@ use super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX};
 use super::names::squeeze_name;
 use super::survey::{Survey, fit_row};
 use super::table::{ColumnCells, ColumnTable, OwnedCell, Table, VisitStep};
-use crate::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use std::collections::HashMap;
 
 const NAME: &[&str] = &[

@@ -2,7 +2,7 @@
 //! taken at its times: interpolated between neighbours, flags and words held. Nothing is averaged: a mean over a step would look like a slow meter.
 
 use super::plan::{Note, NoteKind};
-use crate::recording::{Cells, Numbers, Recording, Words};
+use crate::{Cells, Numbers, Recording, Words};
 
 /// A series with less than this share of the samples of the longest one does not give the clock.
 const SLOW_SHARE: usize = 10;

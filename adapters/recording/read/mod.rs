@@ -45,7 +45,7 @@ pub use preview::{ColumnPreview, Preview, preview_recording, preview_rows};
 
 use super::Recording;
 
-use crate::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use input::Input;
 use mapping::Mapping;
 use plan::{Note, NoteKind, ReadPlan};

@@ -1,7 +1,7 @@
 //! Moments as people write them: `2026-11-26T14:03:01.25+01:00`, `26.11.2026 14:03:01,250`, `11/26/2026 2:03 PM`,
 //! `2026年11月26日 14时03分01秒`, `14:03:01`.
 
-use crate::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 
 /// Which number of a date is the day where the year stands last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! What a foreign name means: a dictionary of the field's words in English, German and Chinese, and the unit that stands in the name.
 
-use crate::channel::unit::Unit;
-use crate::channel::{ChannelId, Kind, quantity};
+use adapter_core::channel::unit::Unit;
+use adapter_core::channel::{ChannelId, Kind, quantity};
 
 /// WordRow for a column, written as [`squeeze_name`] gives them.
 type WordRow = (&'static str, &'static [&'static str]);
@@ -270,7 +270,7 @@ impl ForeignName {
 /// What turns a number of this unit into one of the column's: factor and offset. A column without a unit (a flag, a text) needs none.
 #[must_use]
 pub fn find_unit_conversion(unit: Option<&str>, column: &str) -> Option<(f64, f64)> {
-    let is_text = crate::recording::TEXT_COLUMNS.contains(&column)
+    let is_text = crate::TEXT_COLUMNS.contains(&column)
         || ChannelId::from_name(column).is_some_and(|id| id.channel().kind == Kind::Text);
     if is_text {
         return Some((1.0, 0.0));
@@ -389,7 +389,7 @@ mod tests {
     #[test]
     fn every_column_of_the_dictionary_exists() {
         for (column, words) in DICTIONARY.iter().chain(UNSURE) {
-            let known = crate::recording::TEXT_COLUMNS.contains(column) || quantity::unit_of(column).is_some();
+            let known = crate::TEXT_COLUMNS.contains(column) || quantity::unit_of(column).is_some();
             assert!(known, "{column}");
             for word in *words {
                 assert_eq!(squeeze_name(word), *word);

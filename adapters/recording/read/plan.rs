@@ -2,7 +2,7 @@
 
 use super::cell::Decimal;
 use super::moment::DateOrder;
-use crate::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 
 /// What a sentence about the reading is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use super::input::Input;
 use super::mapping::Mapping;
 use super::names::ForeignName;
 use super::{ReadRecording, read_input};
-use crate::recording::{Cells, Recording};
+use crate::{Cells, Recording};
 use std::path::Path;
 
 /// One column of the file.

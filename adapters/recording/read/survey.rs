@@ -5,7 +5,7 @@ use super::error::RecordingError;
 use super::head::Head;
 use super::moment::{OrderEvidence, written_moment};
 use super::table::{Row, Table, VisitStep};
-use crate::clock::SECOND_NS;
+use adapter_core::clock::SECOND_NS;
 
 /// Examples kept of each strange kind.
 const EXAMPLES: usize = 5;

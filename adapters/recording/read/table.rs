@@ -2,8 +2,8 @@
 
 use super::cell::Cell;
 use super::error::RecordingError;
-use crate::bilingual::Bilingual;
-use crate::clock::TimeNs;
+use adapter_core::bilingual::Bilingual;
+use adapter_core::clock::TimeNs;
 
 /// One row on its way past.
 #[derive(Debug, Clone, Copy)]

@@ -6,9 +6,9 @@ use super::mapping::ColumnMapping;
 use super::names::{ForeignName, find_unit_conversion};
 use super::plan::{Note, NoteKind, TimePlan};
 use super::survey::ColumnSurvey;
-use crate::channel::unit::Unit;
-use crate::channel::{ChannelId, quantity};
-use crate::recording::TEXT_COLUMNS;
+use crate::TEXT_COLUMNS;
+use adapter_core::channel::unit::Unit;
+use adapter_core::channel::{ChannelId, quantity};
 use std::collections::BTreeMap;
 
 /// Which column of the table becomes which of ours, in the order of the table.
@@ -54,7 +54,7 @@ fn unknown_mappings(columns: &ForeignColumns<'_>) -> Result<(), RecordingError> 
     };
     let Some(lost) = columns.mapping.column.iter().find(|mapped| !has(mapped)) else { return Ok(()) };
     let known: Vec<&str> = columns.names.iter().map(|name| name.text.as_str()).collect();
-    let near = crate::channel::find_nearest_name(&lost.from, known);
+    let near = adapter_core::channel::find_nearest_name(&lost.from, known);
     let hint = near.map_or_else(String::new, |near| format!("; did you mean {near}?"));
     Err(columns.build_header_error(
         format!("the map names a column {:?}, which the file does not have{hint}", lost.from),

@@ -1,7 +1,7 @@
 //! The contract as it always was, and files of strangers.
 
 use super::*;
-use crate::recording::Recording;
+use crate::Recording;
 
 fn read(text: &str) -> Result<ReadRecording, RecordingError> {
     read_csv(text.as_bytes(), "t.csv")

@@ -8,7 +8,7 @@ use super::limits::{COLUMNS_MAX, HEAD_BYTES, ROW_BYTES_MAX};
 use super::moment::written_moment;
 use super::splitter::{SplitError, Splitter};
 use super::table::{Row, Table, Visit, VisitStep};
-use crate::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use std::io::Read;
 
 /// What stands between two cells.

@@ -2,8 +2,8 @@
 
 use super::mapping::TimeMapping;
 use super::plan::{Note, NoteKind};
-use crate::clock::{SECOND_NS, TimeNs};
-use crate::recording::Words;
+use crate::Words;
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use jiff::tz::{AmbiguousOffset, TimeZone};
 use std::collections::HashMap;
 

@@ -10,9 +10,9 @@ use super::names::ForeignName;
 use super::plan::{BlockPlan, Note, NoteKind, PlannedColumn, PlannedKind, ReadPlan};
 use super::survey::{ColumnSurvey, Survey};
 use super::targets::{ColumnTarget, find_targets};
-use crate::bilingual::Bilingual;
-use crate::channel::{ChannelId, Kind};
-use crate::recording::TEXT_COLUMNS;
+use crate::TEXT_COLUMNS;
+use adapter_core::bilingual::Bilingual;
+use adapter_core::channel::{ChannelId, Kind};
 
 /// Makes the plan.
 pub(super) fn build_plan(

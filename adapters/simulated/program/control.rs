@@ -4,7 +4,7 @@ use super::super::frame::MachineSnapshot;
 use super::super::plant::{Demand, Plant};
 use super::super::settings::FRESH_EDGE_MM;
 use super::{Action, Cut, NcBlock, Planner, Rate};
-use crate::words::{execution, mode};
+use adapter_core::words::{execution, mode};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use std::collections::VecDeque;

@@ -1,7 +1,7 @@
 //! Experiments: stretches of commanded speed, feed and auxiliaries, run once.
 
 use super::{Action, Cut, ProgramWriter, Rate};
-use crate::words::{execution, mode};
+use adapter_core::words::{execution, mode};
 
 /// Number of the program that an experiment runs under.
 pub const EXPERIMENT_PROGRAM: u16 = 9100;

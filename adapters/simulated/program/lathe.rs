@@ -1,7 +1,7 @@
 //! Turned parts: facing, roughing and finishing of two diameters, and a thread on some.
 
 use super::{Action, Cut, ProgramWriter, Rate};
-use crate::words::operation;
+use adapter_core::words::operation;
 
 /// A turned part. Diameters and lengths in mm, speeds in rpm.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! Milled parts: face milling, roughing and finishing of a pocket, drilled and tapped holes.
 
 use super::{Action, Cut, ProgramWriter, Rate};
-use crate::words::operation;
+use adapter_core::words::operation;
 
 /// A milling tool and its data.
 #[derive(Debug, Clone, Copy)]

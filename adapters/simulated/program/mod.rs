@@ -11,7 +11,7 @@ pub(super) use control::{Control, Motion};
 pub use experiment::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};
 pub(super) use planner::Planner;
 
-use crate::words::{execution, mode};
+use adapter_core::words::{execution, mode};
 
 /// Feed of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]

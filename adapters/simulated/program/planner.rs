@@ -5,7 +5,7 @@ use super::experiment::{self, ExperimentStep};
 use super::short_day;
 use super::{Action, NcBlock, ProgramWriter, lathe, mill};
 use crate::address::SimulatedMachine;
-use crate::words::{execution, mode};
+use adapter_core::words::{execution, mode};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use std::collections::VecDeque;

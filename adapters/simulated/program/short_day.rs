@@ -1,7 +1,7 @@
 //! A whole day in five minutes, again and again: for a demonstration, in which nobody wants to wait for an evening.
 
 use super::{Action, ProgramWriter, lathe};
-use crate::words::{execution, mode};
+use adapter_core::words::{execution, mode};
 
 /// Parts of one day.
 pub(super) const PARTS: u32 = 4;

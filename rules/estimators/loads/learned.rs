@@ -152,11 +152,7 @@ impl LearnedLoad {
         }
         self.key = program.as_ref().zip(tool.as_ref()).map(|(program, tool)| {
             let block: String = block.as_deref().unwrap_or_default().chars().take(BLOCK_MAX).collect();
-            format!(
-                "{program}/{}/{}/{block}",
-                crate::wear::tool_of(tool),
-                operation.as_deref().unwrap_or_default()
-            )
+            format!("{program}/{}/{}/{block}", crate::wear::tool_of(tool), operation.as_deref().unwrap_or_default())
         });
         self.changes += 1;
         if let Some(place) = self.key.as_ref().and_then(|key| self.places.get_mut(key)) {

@@ -11,9 +11,7 @@ use super::coding::{Range, check_varied};
 use super::conditions::{CUTTING_POWER, Cut, CutConditions, FACTORS, WEAR};
 use super::fit_surface::check_cuts;
 use super::predicted::Predicted;
-use crate::regression::{
-    CONFIDENCE, Column, Intercept, Refusal, RefusalKind, Regression, fit_unweighted, t_quantile,
-};
+use crate::regression::{CONFIDENCE, Column, Intercept, Refusal, RefusalKind, Regression, fit_unweighted, t_quantile};
 use serde::{Deserialize, Serialize};
 
 /// Steps of the iteration, at most.

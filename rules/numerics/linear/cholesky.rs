@@ -31,6 +31,12 @@ pub struct LinearSolution<const N: usize> {
     pub rows: usize,
 }
 
+impl<const N: usize> Default for NormalEquations<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<const N: usize> NormalEquations<N> {
     /// No rows yet.
     pub fn new() -> Self {

@@ -62,11 +62,7 @@ pub(crate) fn find_declarations(
 
 /// The text with these values, each in the place of its declaration. Lines and columns of everything else stay; `None` stands
 /// for a value that is looked up when the script runs.
-pub(crate) fn with_values(
-    text: &str,
-    found: &[FoundDeclaration],
-    values: &[Option<SettingValue>],
-) -> String {
+pub(crate) fn with_values(text: &str, found: &[FoundDeclaration], values: &[Option<SettingValue>]) -> String {
     let mut filled = String::with_capacity(text.len());
     let mut from = 0;
     for (index, (it, value)) in found.iter().zip(values).enumerate() {

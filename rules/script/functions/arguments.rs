@@ -1,9 +1,9 @@
 //! What a method is called with, and what it answers.
 
 use super::Method;
-use estimators::regression::{Refusal, RefusalKind};
 use crate::collect::ScriptResult;
 use crate::problem::describe_type;
+use estimators::regression::{Refusal, RefusalKind};
 use rhai::{Array, Dynamic, Map};
 
 /// Entries of an array that are read; a script cannot make a longer one.

@@ -8,11 +8,7 @@ const EQUAL: [&str; 2] = ["==", "!="];
 const ORDER: [&str; 4] = ["<", "<=", ">", ">="];
 
 /// What is wrong with a comparison, `x in [...]`, or `!x`.
-pub(crate) fn find_operator_mistakes(
-    call: &FnCallExpr,
-    at: Position,
-    like: LikeWords<'_>,
-) -> Vec<KindMistake> {
+pub(crate) fn find_operator_mistakes(call: &FnCallExpr, at: Position, like: LikeWords<'_>) -> Vec<KindMistake> {
     let name = call.name.as_str();
     match &call.args[..] {
         [left, right] if EQUAL.contains(&name) || ORDER.contains(&name) => {

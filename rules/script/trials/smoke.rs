@@ -3,8 +3,8 @@
 
 use super::TrialResult;
 use super::stage::TrialContext;
-use estimators::State;
 use crate::compiled::Script;
+use estimators::State;
 use rhai::{Dynamic, ImmutableString};
 use std::sync::Arc;
 

@@ -1,7 +1,5 @@
 //! What a trial is played on: one script, what it sees, and a clock of its own.
 
-use estimators::loads::{Figure, LoadEstimator};
-use estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use crate::compiled::{Script, ScriptSet};
 use crate::decision::{Alarm, Axis, Decision, Stop};
 use crate::problem::ScriptProblem;
@@ -13,6 +11,8 @@ use crate::{Host, WordKind};
 use adapters::channel::find_nearest_name;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
+use estimators::loads::{Figure, LoadEstimator};
+use estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use rhai::{Dynamic, ImmutableString};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

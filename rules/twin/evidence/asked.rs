@@ -3,8 +3,8 @@
 use super::algebra::CholeskyFactor;
 use super::gram::Comparison;
 use super::marginal::{Ground, SIZES, ln_size_prior, ln_sum};
-use numerics::statistics::{count_to_f64, normal_share};
 use ndarray::{Array1, Array2};
+use numerics::statistics::{count_to_f64, normal_share};
 
 /// A variant with what its evidence needs for any output.
 pub(super) struct AskedVariant {

@@ -10,9 +10,9 @@ use super::gram::Comparison;
 use super::marginal::{SIZES, ln_size_prior, ln_sum};
 use super::posterior::NoiseSetting;
 use super::search::Members;
-use numerics::statistics::{count_to_f64, normal_share};
 use crate::units::Random;
 use ndarray::{Array1, Array2, Axis, s};
+use numerics::statistics::{count_to_f64, normal_share};
 use std::collections::BTreeMap;
 use std::ops::Range;
 

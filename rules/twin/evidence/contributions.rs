@@ -8,9 +8,9 @@ use super::judge::Judge;
 use super::means::PosteriorMeans;
 use super::noise::NoiseModel;
 use super::posterior::Explanation;
-use numerics::statistics::{count_to_f64, rms};
 use crate::diagnosis::UNKNOWN;
 use ndarray::{Array1, s};
+use numerics::statistics::{count_to_f64, rms};
 
 /// Squared deviations gained from which a step is taken to have begun in a held-out run.
 const BEGUN: f64 = 12.0;

@@ -13,9 +13,9 @@ use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
 use super::marginal::{Ground, Saturated, ln_sum};
 use super::search::SetSearch;
-use numerics::statistics::count_to_f64;
 use crate::units::Random;
 use ndarray::{Array1, Array2, Axis, s};
+use numerics::statistics::count_to_f64;
 
 /// Recordings without anything missing that are made. The chance is known to one over their number.
 const DRAWS: usize = 199;

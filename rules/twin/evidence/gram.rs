@@ -8,8 +8,8 @@ use super::algebra::gram;
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
-use numerics::statistics::{count_to_f64, rms};
 use ndarray::{Array2, ShapeBuilder};
+use numerics::statistics::{count_to_f64, rms};
 use std::ops::Range;
 
 /// Independent rows beyond which more rows do not make a form of a law truer: evidence is tempered there.

@@ -9,8 +9,8 @@ use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::marginal::SIZES;
 use super::posterior::NoiseSetting;
-use numerics::statistics::count_to_f64;
 use ndarray::{Array1, Array2, Axis, s};
+use numerics::statistics::count_to_f64;
 use std::collections::BTreeMap;
 use std::ops::Range;
 

@@ -1,9 +1,9 @@
 //! What the families see: the inputs of a recording by the part they play, and which rows are fitted.
 
+use crate::units::Unit;
+use numerics::statistics::{count_to_f64, median};
 use physics::drive::{compute_rate, is_axis_output};
 use physics::{OutputKind, Role, Scene};
-use numerics::statistics::{count_to_f64, median};
-use crate::units::Unit;
 use std::collections::BTreeSet;
 use std::ops::Range;
 

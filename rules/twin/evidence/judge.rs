@@ -9,8 +9,8 @@ use super::inputs::RecordingInputs;
 use super::naming::Naming;
 use super::posterior::{Explanation, Group, NoiseSetting, grouped};
 use super::second::SecondStage;
-use numerics::statistics::count_to_f64;
 use crate::diagnosis::{Existence, UNKNOWN, Verdict};
+use numerics::statistics::count_to_f64;
 use std::collections::BTreeMap;
 
 /// Groups that are looked at.

@@ -9,9 +9,9 @@ use super::algebra::{CholeskyFactor, Resolved, Tridiagonal, block, schur};
 use super::bank::Variant;
 use super::gram::{Comparison, Gram};
 use super::noise::NoiseModel;
-use numerics::statistics::{count_to_f64, normal_share};
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, Axis, s};
+use numerics::statistics::{count_to_f64, normal_share};
 
 /// Sizes of a contribution, in deviations of the output, and their prior probabilities.
 pub(super) const SIZES: [f64; 7] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0];

@@ -9,10 +9,10 @@ use super::algebra::{CholeskyFactor, block, schur};
 use super::bank::{Variant, VariantBank};
 use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
-use physics::find_effect;
-use numerics::statistics::count_to_f64;
 use adapters::channel::quantity::Quantity;
 use ndarray::{Array1, Array2};
+use numerics::statistics::count_to_f64;
+use physics::find_effect;
 use std::ops::Range;
 
 /// Columns of a law that may claim a curve: wider ones could claim any.

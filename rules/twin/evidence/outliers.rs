@@ -5,8 +5,8 @@
 use super::algebra::{CholeskyFactor, gram};
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
-use numerics::statistics::{count_to_f64, median, quantile, rms, robust_deviation};
 use ndarray::{Array1, Array2, ShapeBuilder};
+use numerics::statistics::{count_to_f64, median, quantile, rms, robust_deviation};
 
 /// Rows that the wide model is fitted to, at most.
 const ROWS_MAX: usize = 6000;

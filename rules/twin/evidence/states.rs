@@ -12,8 +12,8 @@ use super::search::SetEvidence;
 use super::second::SecondStage;
 use super::step::{Step, step};
 use super::wave::{self, SpectralLine};
-use physics::OutputKind;
 use numerics::statistics::count_to_f64;
+use physics::OutputKind;
 
 /// Shares of the memory of the noise with which hidden sequences are looked for: what switches poses as memory.
 const MEMORY_SHARES: [f64; 3] = [1.0, 0.7, 0.4];

@@ -3,10 +3,10 @@
 
 use super::decision::THRESHOLDS;
 use super::told::EvidenceReport;
-use physics::{Bound, Effect, Entry, Form, Scene, find_effect};
 use crate::fit::{Fit, Metric, fit};
-use numerics::linear::columns::least_squares;
 use crate::model::{Parameter, Part};
+use numerics::linear::columns::least_squares;
+use physics::{Bound, Effect, Entry, Form, Scene, find_effect};
 
 /// Share of the end of a range within which a value stands at it.
 const AT_END: f64 = 1e-6;

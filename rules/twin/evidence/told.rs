@@ -9,8 +9,6 @@ use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
 use super::textbook::Textbook;
-use physics::find_effect;
-use numerics::statistics::{count_to_f64, rms};
 use crate::case::Case;
 use crate::diagnosis::{
     Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
@@ -26,6 +24,8 @@ use crate::place::PlaceSearch;
 use crate::words;
 use adapters::Recording;
 use adapters::bilingual::Bilingual;
+use numerics::statistics::{count_to_f64, rms};
+use physics::find_effect;
 
 /// Times that a name of impossible size is replaced by the nearest law beside it.
 const REPLACED_MAX: usize = 3;

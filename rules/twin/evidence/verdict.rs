@@ -5,9 +5,9 @@ use super::decision::THRESHOLDS;
 use super::judge::Judge;
 use super::naming::StandIn;
 use super::posterior::{Explanation, Group};
-use physics::find_effect;
-use numerics::statistics::count_to_f64;
 use crate::diagnosis::{UNKNOWN, Verdict};
+use numerics::statistics::count_to_f64;
+use physics::find_effect;
 use std::collections::BTreeMap;
 
 impl Judge<'_> {

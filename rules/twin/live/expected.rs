@@ -2,11 +2,11 @@
 
 use super::second::Row;
 use super::window::{CuttingTimes, LookBack, Window};
-use physics::Scene;
 use crate::model::{Model, Part, simulate};
 use crate::{bind::bind, inputs::rows_with_inputs};
 use adapters::Absence;
 use adapters::recording::{Cells, Numbers};
+use physics::Scene;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -22,10 +22,10 @@ pub use regime::Regime;
 pub use watch::{Mismatch, Notice, RegimeStage};
 
 use super::model::Model;
-use estimators::State;
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use block::SettledSecond;
+use estimators::State;
 use expected::Simulation;
 use second::{Row, Seconds};
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,9 @@
 //! Ticks gathered into seconds: the mean of every number, the last of every word, and how many ticks had one.
 
-use estimators::State;
 use adapters::channel::{ChannelId, Kind};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, Sample, Value};
+use estimators::State;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

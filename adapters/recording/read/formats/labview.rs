@@ -10,8 +10,8 @@ use super::super::limits::CELLS_IN_MEMORY_MAX;
 use super::super::moment::{DateOrder, written_moment};
 use super::super::table::{MemoryTable, OwnedCell, Table, VisitStep};
 use super::super::text::{Separator, TextTable};
-use crate::bilingual::Bilingual;
-use crate::clock::{SECOND_NS, TimeNs};
+use adapter_core::bilingual::Bilingual;
+use adapter_core::clock::{SECOND_NS, TimeNs};
 
 const END: &str = "***End_of_Header***";
 

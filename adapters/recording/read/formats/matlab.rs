@@ -6,7 +6,7 @@ use super::super::input::Input;
 use super::super::limits::UNPACKED_BYTES_MAX;
 use super::super::table::{ColumnCells, ColumnTable};
 use super::bytes::{ByteReader, NumberKind};
-use crate::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use std::io::Read;
 
 const HEADER: usize = 128;

@@ -6,7 +6,7 @@ use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX};
 use super::super::table::{ColumnCells, ColumnTable, OwnedCell};
-use crate::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::collections::HashMap;

@@ -7,7 +7,7 @@ use super::super::input::Input;
 use super::super::table::{ColumnCells, ColumnTable};
 use super::bytes::ByteReader;
 use super::tdms_channel::{RawIndex, TdmsChannel, TdmsValues, ValueKind, WaveformClock, read_moment, split_path};
-use crate::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use std::collections::HashMap;
 
 const HAS_METADATA: u32 = 1 << 1;

@@ -2,7 +2,7 @@
 
 use super::super::table::{ColumnCells, OwnedCell};
 use super::bytes::{ByteReader, NumberKind};
-use crate::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 
 /// Seconds from 1904-01-01 to 1970-01-01.
 const EPOCH_1904_S: i64 = 2_082_844_800;

@@ -4,8 +4,8 @@ use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX, UNPACKED_BYTES_MAX};
 use super::super::table::{MemoryTable, OwnedCell};
-use crate::bilingual::Bilingual;
-use crate::clock::{SECOND_NS, TimeNs};
+use adapter_core::bilingual::Bilingual;
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use calamine::{Data, ExcelDateTime, Reader, Sheets};
 use std::io::{Cursor, Read};
 

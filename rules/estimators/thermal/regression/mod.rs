@@ -7,9 +7,7 @@ use super::course::{Course, Sensor};
 use super::law::{Path, ThermalLaw, ThermalTerm};
 use super::noise::{self, Averaged};
 use super::quantities::{self, THERMAL_ERROR};
-use crate::regression::{
-    Coefficient, Column, Intercept, Refusal, Regression, fit_unweighted, t_quantile, t_two_sided,
-};
+use crate::regression::{Coefficient, Column, Intercept, Refusal, Regression, fit_unweighted, t_quantile, t_two_sided};
 use numerics::statistics::rms;
 use serde::Serialize;
 

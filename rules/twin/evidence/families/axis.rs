@@ -1,9 +1,9 @@
 //! Feed axes as consumers of a power or current that another drive dominates.
 
 use super::drive::{is_drive, pace};
-use physics::OutputKind;
 use crate::evidence::bank::{Family, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
 
 const VELOCITY: &[&str] = &["axis_velocity_mm_min", "z_axis_velocity_mm_min", "velocity_m_s", "velocity"];
 

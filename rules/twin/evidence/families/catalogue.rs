@@ -1,10 +1,10 @@
 //! Kinds without a family of their own: the laws of the catalogue as they are; and what users have written.
 
-use physics::{CATALOGUE, Effect};
 use crate::candidates::law_columns;
 use crate::evidence::bank::{Family, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
 use crate::model::Model;
+use physics::{CATALOGUE, Effect};
 use std::borrow::Cow;
 
 /// Forms of one kind that are tried at most: of a kind without a family, and of one with its own.

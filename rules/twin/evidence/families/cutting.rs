@@ -1,9 +1,9 @@
 //! The cut: what scales with it, changes through a pass, from lot to lot, with speed or with chip thickness.
 
 use super::wear::edge_load;
-use physics::OutputKind;
 use crate::evidence::bank::{Family, Since, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
 
 const CUT: Family = Family::of("cutting_power").beside_catalogue().signed(1.0).through(&["engaged"]);
 const LOAD_LOSS: Family = Family::of("load_loss").through(&["load"]);

@@ -1,8 +1,8 @@
 //! A drive on its own: friction of a slide or of a shaft whose velocity is recorded.
 
-use physics::OutputKind;
 use crate::evidence::bank::{Family, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
 
 const VELOCITY: &[&str] = &["velocity_m_s", "axis_velocity_mm_min", "velocity"];
 

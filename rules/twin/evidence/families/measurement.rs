@@ -1,9 +1,9 @@
 //! The measurement: a zero that drifts, a gain that follows the supply, a clock that is late, a meter that averages or
 //! clips.
 
-use physics::OutputKind;
 use crate::evidence::bank::{Family, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
 
 const DRIFT: Family = Family::of("zero_drift").through(&["time"]).wide();
 const VOLTAGE: Family = Family::of("supply_voltage").through(&["supply_voltage_v"]);

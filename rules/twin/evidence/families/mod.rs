@@ -16,9 +16,9 @@ mod wear;
 
 use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
-use physics::find_effect;
 use crate::candidates::{shifts_time_in_vain, wanted};
 use crate::model::Model;
+use physics::find_effect;
 
 /// Every variant that this recording can tell anything about.
 pub(super) fn bank(inputs: &RecordingInputs<'_>, model: &Model) -> VariantBank {

@@ -4,11 +4,11 @@
 //! a named family (`naming.rs`).
 
 use super::drive::is_drive;
-use physics::OutputKind;
 use crate::evidence::bank::{Drawn, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
 use crate::model::Model;
 use adapters::channel::quantity::Quantity;
+use physics::OutputKind;
 
 /// Bumps over a channel, and over one that a machine may resonate or jam along.
 const BUMPS: usize = 7;
@@ -190,7 +190,8 @@ fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usi
     }
     let (size, low) = (quantiles.len(), quantiles[0]);
     let range = quantiles[size - 1] - low;
-    let even = |k: usize| low + range * numerics::statistics::count_to_f64(k) / numerics::statistics::count_to_f64(size - 1);
+    let even =
+        |k: usize| low + range * numerics::statistics::count_to_f64(k) / numerics::statistics::count_to_f64(size - 1);
     let knots: Vec<f64> = (0..size).map(|k| f64::midpoint(quantiles[k], even(k))).collect();
     let least = range / numerics::statistics::count_to_f64(2 * wanted);
     let width = |k: usize| {

@@ -1,8 +1,8 @@
 //! The spindle and its motor: friction, windage, inertia, warm-up, stages and losses.
 
-use physics::OutputKind;
 use crate::evidence::bank::{Family, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
 
 const SPEED: &[&str] = &["spindle_speed_rpm"];
 const SPEED_AND_TORQUE: &[&str] = &["spindle_speed_rpm", "torque"];

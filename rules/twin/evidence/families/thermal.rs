@@ -1,10 +1,10 @@
 //! Thermal error: growth of spindle, screw and frame behind what heats them.
 
 use super::drive::pace;
-use physics::OutputKind;
-use physics::state::first_order_behind;
 use crate::evidence::bank::{Family, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
+use physics::state::first_order_behind;
 
 const SPINDLE: Family = Family::of("spindle_growth");
 const AMBIENT: Family = Family::of("ambient_drift").through(&["ambient_temperature_c"]);

@@ -2,9 +2,9 @@
 //! speed miscounts the turns. So each spell of some rows has a size and a phase of its own, two numbers that all spells draw
 //! from one bell (random effects: Laird and Ware, Biometrics 38, 1982).
 
-use physics::drive::RAD_PER_S_OF_RPM;
 use crate::evidence::bank::{Drawn, Family, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use physics::drive::RAD_PER_S_OF_RPM;
 use std::ops::Range;
 
 const RUNOUT: Family = Family::of("runout").wide();
@@ -30,7 +30,8 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     bank.of(RUNOUT, "each spell").columns(inputs, of_spells(inputs, &told, &turn, cut));
     // Noise that grows with the cut swells at every frequency: what is no tone of the spindle does so at these as well.
     for off in [0.05, -0.05] {
-        let other = inputs.column(|row| turn[row] + std::f64::consts::TAU * off * numerics::statistics::count_to_f64(row));
+        let other =
+            inputs.column(|row| turn[row] + std::f64::consts::TAU * off * numerics::statistics::count_to_f64(row));
         let drawn = Drawn { over: "time".to_owned(), times: "cut", shape: "wave" };
         bank.nameless(drawn).columns(inputs, of_spells(inputs, &told, &other, cut));
     }
@@ -50,7 +51,8 @@ fn angle(inputs: &RecordingInputs<'_>, speed: &[f64]) -> Vec<f64> {
 
 /// Turns of a spell as the sampling shows them: folded to half a turn per row at most.
 fn shown_turns(turn: &[f64], spell: &Range<usize>) -> f64 {
-    let per_row = (turn[spell.end - 1] - turn[spell.start]) / numerics::statistics::count_to_f64(spell.len().max(2) - 1);
+    let per_row =
+        (turn[spell.end - 1] - turn[spell.start]) / numerics::statistics::count_to_f64(spell.len().max(2) - 1);
     let folded = per_row / std::f64::consts::TAU;
     (folded - folded.round()).abs() * numerics::statistics::count_to_f64(spell.len())
 }

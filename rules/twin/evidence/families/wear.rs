@@ -1,8 +1,8 @@
 //! Flank wear: growth with the time of an edge in the cut, with a rate and a state of its own for every edge.
 
-use physics::OutputKind;
 use crate::evidence::bank::{Family, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use physics::OutputKind;
 
 const WEAR: Family = Family::of("flank_wear").signed(1.0).through(&["tool_age"]);
 

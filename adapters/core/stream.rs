@@ -14,7 +14,7 @@ const LEAST: Duration = Duration::from_millis(1);
 ///
 /// # Errors
 /// The name is not known.
-pub(crate) fn resolve_addresses(at: &Endpoint) -> io::Result<Vec<SocketAddr>> {
+pub fn resolve_addresses(at: &Endpoint) -> io::Result<Vec<SocketAddr>> {
     let found: Vec<SocketAddr> = (at.host.as_str(), at.port).to_socket_addrs()?.take(ADDRESSES_MAX).collect();
     match found.is_empty() {
         true => Err(io::Error::new(ErrorKind::NotFound, "the name has no address")),
@@ -26,7 +26,7 @@ pub(crate) fn resolve_addresses(at: &Endpoint) -> io::Result<Vec<SocketAddr>> {
 ///
 /// # Errors
 /// As there, or the name is not known.
-pub(crate) fn connect_host(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
+pub fn connect_host(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
     connect_any(&resolve_addresses(at)?, until)
 }
 
@@ -35,7 +35,7 @@ pub(crate) fn connect_host(at: &Endpoint, until: Instant) -> io::Result<TcpStrea
 ///
 /// # Errors
 /// What the system says of the last address.
-pub(crate) fn connect_any(addresses: &[SocketAddr], until: Instant) -> io::Result<TcpStream> {
+pub fn connect_any(addresses: &[SocketAddr], until: Instant) -> io::Result<TcpStream> {
     let mut last = io::Error::new(ErrorKind::NotFound, "the name has no address");
     for address in addresses {
         let left = until.saturating_duration_since(Instant::now()).max(LEAST);
@@ -49,7 +49,7 @@ pub(crate) fn connect_any(addresses: &[SocketAddr], until: Instant) -> io::Resul
 
 /// Why a stream gave less than was asked for.
 #[derive(Debug)]
-pub(crate) enum Short {
+pub enum Short {
     /// Nothing more came in time.
     Silent,
     /// The other side closed it.
@@ -62,7 +62,7 @@ pub(crate) enum Short {
 ///
 /// # Errors
 /// Why it could not.
-pub(crate) fn fill_buffer(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), Short> {
+pub fn fill_buffer(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), Short> {
     fill_counting(stream, into, until).map_err(|(_, short)| short)
 }
 
@@ -70,7 +70,7 @@ pub(crate) fn fill_buffer(stream: &mut TcpStream, into: &mut [u8], until: Instan
 ///
 /// # Errors
 /// How many bytes had come, and why no more did.
-pub(crate) fn fill_counting(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), (usize, Short)> {
+pub fn fill_counting(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), (usize, Short)> {
     let mut got = 0;
     while got < into.len() {
         let left = until.saturating_duration_since(Instant::now());
@@ -93,7 +93,7 @@ pub(crate) fn fill_counting(stream: &mut TcpStream, into: &mut [u8], until: Inst
 ///
 /// # Errors
 /// Why nothing came.
-pub(crate) fn append_available(stream: &mut TcpStream, into: &mut Vec<u8>, until: Instant) -> Result<(), Short> {
+pub fn append_available(stream: &mut TcpStream, into: &mut Vec<u8>, until: Instant) -> Result<(), Short> {
     let mut buffer = [0_u8; 512];
     loop {
         let left = until.saturating_duration_since(Instant::now());
@@ -115,6 +115,6 @@ pub(crate) fn append_available(stream: &mut TcpStream, into: &mut Vec<u8>, until
 }
 
 /// Did a read end because its time was over?
-pub(crate) fn is_silence(error: &io::Error) -> bool {
+pub fn is_silence(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
 }

@@ -90,7 +90,7 @@ macro_rules! vendor_functions {
         #[allow(non_snake_case, reason = "the vendor's names")]
         pub(super) struct Functions {
             $($name: Option<unsafe extern "C" fn($($raw),*) -> $result>,)*
-            _library: libloading::Library,
+            _library: $crate::child::Library,
         }
 
         #[allow(non_snake_case, clippy::too_many_arguments, reason = "as the vendor made them")]
@@ -102,7 +102,7 @@ macro_rules! vendor_functions {
             pub(super) fn load(path: &std::path::Path) -> Result<Self, String> {
                 // SAFETY: loading runs the library's initialisers. This happens only in a child process that holds
                 // nothing but its line to the parent, and the user named the file.
-                let library = unsafe { libloading::Library::new(path) };
+                let library = unsafe { $crate::child::Library::new(path) };
                 let library = library.map_err(|error| $crate::child::describe_load_error(&error, path))?;
                 $(
                     // SAFETY: the signature is that of the vendor's header, as the one who listed it says; the pointer

@@ -1,14 +1,15 @@
 //! What follows the question mark of a `fanuc://` address.
 
-use super::keys::Keys;
-use crate::channel::PATHS;
-use crate::fanuc::dial::Dial;
-use crate::fanuc::extra::AxisName;
-use crate::fanuc::feed_override;
-use crate::fanuc::item::{Area, Position};
-use crate::fanuc::own::OwnItem;
-use crate::own::Own;
-use crate::text::TextEncoding;
+use crate::dial::Dial;
+use crate::extra::AxisName;
+use crate::feed_override;
+use crate::item::{Area, Position};
+use crate::own::OwnItem;
+use adapter_core::address::{Endpoint, Keys, parse_encoding, parse_endpoint, parse_library};
+use adapter_core::channel::PATHS;
+use adapter_core::own::Own;
+use adapter_core::text::TextEncoding;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Most axes that have channels of their own names.
@@ -40,6 +41,28 @@ pub enum WriteMethod {
     },
     /// Straight into G012. The ladder usually writes it in every scan and takes it back.
     Direct,
+}
+
+/// How FOCAS2 is spoken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FanucBackend {
+    /// By ourselves.
+    Native,
+    /// Through this vendor library, in a child process.
+    Vendor(PathBuf),
+}
+
+/// A controller that an address names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FanucTarget {
+    /// Where.
+    pub at: Endpoint,
+    /// Path (channel) of the controller, from 1.
+    pub path: u8,
+    /// How.
+    pub backend: FanucBackend,
+    /// Pace, limits and the way of writing.
+    pub options: FanucOptions,
 }
 
 /// Keys of a `fanuc://` address besides path and backend.
@@ -89,13 +112,14 @@ impl Default for FanucOptions {
 }
 
 impl FanucOptions {
-    pub(super) fn read(keys: &mut Keys) -> Self {
+    /// What the keys of an address say.
+    pub fn read(keys: &mut Keys) -> Self {
         let ms = |keys: &mut Keys, key, default, least, greatest| {
             Duration::from_millis(keys.take_number(key, default, least, greatest))
         };
         let allow = keys.take_text("allow").map(|text| text.split(',').map(|one| one.trim().to_owned()).collect());
         let allow: Vec<String> = allow.unwrap_or_default();
-        for text in allow.iter().filter(|text| crate::fanuc::allow::Allowed::read(text).is_none()) {
+        for text in allow.iter().filter(|text| crate::allow::Allowed::read(text).is_none()) {
             keys.add_problem(format!("allow={text}: write addresses like R900-R904, #500-#509 or EXT"));
         }
         let write = write(keys);
@@ -106,7 +130,7 @@ impl FanucOptions {
             spindles: keys.take_number("spindles", 1, 1, 8),
             details: keys.take_choice("details", &[("yes", true), ("no", false)]),
             own: Vec::new(),
-            encoding: super::keys::parse_encoding(keys),
+            encoding: parse_encoding(keys),
             further: Vec::new(),
             period: ms(keys, "period_ms", 100, 20, 60_000),
             slow: ms(keys, "slow_ms", 1000, 100, 600_000),
@@ -120,6 +144,28 @@ impl FanucOptions {
             allow,
         }
     }
+}
+
+/// The controller that the address names.
+///
+/// # Errors
+/// No host is named, or no library where one is needed.
+pub fn parse_fanuc(body: &str, keys: &mut Keys) -> Result<FanucTarget, String> {
+    let named = keys.take_optional_number("path", 1, 10);
+    let vendor = keys.take_choice("backend", &[("native", false), ("vendor", true)]);
+    let backend = if vendor { parse_library(keys).map(FanucBackend::Vendor) } else { Ok(FanucBackend::Native) };
+    let mut options = FanucOptions::read(keys);
+    let path = match parse_paths(keys) {
+        Some((own, further)) => {
+            if named.is_some() {
+                keys.add_problem("give either path=, for one path under the plain channel names, or paths=".to_owned());
+            }
+            options.further = further;
+            own
+        }
+        None => named.unwrap_or(1),
+    };
+    Ok(FanucTarget { at: parse_endpoint(body, Some(8193))?, path, backend: backend?, options })
 }
 
 /// `axes=X1,C1,B` and `positions=absolute,relative,to_go`.
@@ -149,7 +195,7 @@ fn parse_axes(keys: &mut Keys) -> (Vec<AxisName>, Vec<Position>) {
 }
 
 /// `paths=2,1`: the first has the plain channel names and is the one that is written to, the others have a prefix.
-pub(super) fn parse_paths(keys: &mut Keys) -> Option<(u8, Vec<u8>)> {
+fn parse_paths(keys: &mut Keys) -> Option<(u8, Vec<u8>)> {
     let text = keys.take_text("paths")?;
     let paths: Option<Vec<u8>> = text.split(',').map(|path| path.trim().parse().ok()).collect();
     let once = |paths: &[u8]| paths.iter().enumerate().all(|(at, path)| !paths[..at].contains(path));

@@ -103,6 +103,12 @@ fn mark_bytes(bytes: &[u8]) -> String {
     text
 }
 
+/// What stands behind the last `/` or `\\` of a path.
+#[must_use]
+pub fn last_part(path: &str) -> &str {
+    path.trim().rsplit(['/', '\\']).next().unwrap_or_default()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

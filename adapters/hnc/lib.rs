@@ -15,7 +15,7 @@
 //! | `ffi` | loading, symbols and calls: the only `unsafe` |
 //! | `line` | the parent's side: the child, its deaths, the state of the connection |
 //! | `source` | the [`Source`](crate::Source) |
-//! | `actuator` | the [`Actuator`](crate::Actuator): the register mailbox of [`nclink::mailbox`](crate::nclink::mailbox) |
+//! | `actuator` | the [`Actuator`](crate::Actuator): the register mailbox of [`nclink::mailbox`](nclink::mailbox) |
 //! | `offsets` | shifts of axes: registers of the ladder, or the external zero offset |
 //! | `sampling` | the 1 ms sampling channels: which, and whether a millisecond is missing; blocks go to whoever asked for them |
 //!
@@ -38,6 +38,7 @@
 //! whether reading samples takes them away (the controller's own counter of milliseconds shows it either way).
 
 mod actuator;
+pub mod address;
 pub mod answer;
 mod child;
 mod decode;

@@ -11,7 +11,7 @@ pub use read::mapping::{ColumnMapping, Mapping, MappingError, TimeMapping};
 pub use read::plan::{Note, NoteKind};
 pub use read::{ReadRecording, RecordingError, RowProblem, read_csv, read_path, read_path_as};
 
-use crate::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use std::collections::HashMap;
 
 /// Columns that hold text even when their cells look like numbers.

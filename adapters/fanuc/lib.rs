@@ -52,6 +52,7 @@
 //! connection, no thread, no write outside the allowed addresses.
 
 pub mod actuator;
+pub mod address;
 pub mod alarms;
 pub mod allow;
 pub mod answer;

@@ -47,6 +47,7 @@
 //! offsets of configurations other than HNC-30 (key `f_channel`).
 
 mod actuator;
+pub mod address;
 pub mod connection;
 mod decode;
 pub mod device;
@@ -66,7 +67,6 @@ pub mod topic;
 mod track;
 
 pub use actuator::NcLinkActuator;
-pub(crate) use decode::last_part;
 pub use message::{NcLinkAnswer, Params, RequestedItem};
 pub use open::{open_address, open_sampled};
 pub use own::OwnPath;

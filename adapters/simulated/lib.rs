@@ -12,6 +12,7 @@
 //! [`Simulated::truth`] is for scoring an estimate, never for making one.
 
 mod actuator;
+pub mod address;
 mod controller;
 mod cutting;
 mod device;
@@ -38,9 +39,9 @@ pub use offsets::SimulatedOffsets;
 pub use program::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};
 pub use settings::{CutLevel, DaySettings, DeviceSettings, LaterChange, MeterSettings, SimulatedSettings};
 
-use crate::clock::TimeNs;
-use crate::offset::Axis;
-use crate::units::OverridePct;
+use adapter_core::clock::TimeNs;
+use adapter_core::offset::Axis;
+use adapter_core::units::OverridePct;
 use ladder::LadderInput;
 use machine::Machine;
 use moment::Integrals;

@@ -14,7 +14,7 @@
 //! | `own` | what the user can have read besides |
 //! | `plan` | the fewest blocks that hold all registers of a profile, and what they take on the wire |
 //! | `poll` | one poll, in parts where the meter does not give a block as a whole |
-//! | `outputs` | from registers to channels, and to what [`electric`](crate::electric) judges |
+//! | `outputs` | from registers to channels, and to what [`electric`](adapter_core::electric) judges |
 //! | `refresh` | how often the meter really has something new |
 //! | `meter` | the source |
 //! | `server` | the other side: the simulated machine as a meter |
@@ -30,8 +30,9 @@
 //!
 //! What a meter says is kept as it is, with its sign: a spindle that brakes feeds power back, and that is negative.
 
+pub mod address;
 mod crc;
-pub(crate) mod line;
+pub mod line;
 mod meter;
 mod number;
 mod outputs;

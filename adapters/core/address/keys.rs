@@ -98,7 +98,7 @@ impl Keys {
 }
 
 /// `encoding=gbk`: the character set of a device's texts.
-pub(super) fn parse_encoding(keys: &mut Keys) -> TextEncoding {
+pub fn parse_encoding(keys: &mut Keys) -> TextEncoding {
     let Some(label) = keys.take_text("encoding") else { return TextEncoding::default() };
     TextEncoding::of_label(&label).unwrap_or_else(|| {
         let near = find_nearest_name(

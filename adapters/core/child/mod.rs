@@ -41,6 +41,8 @@ pub use crate::vendor_functions as functions;
 pub use client::{ChildClient, Taken};
 pub use ffi::{Argument, Missing, Returned, describe_load_error};
 pub use guard::{Guarded, MARGIN_LEN, Overrun};
+#[doc(hidden)]
+pub use libloading::Library;
 pub use message::MESSAGE_MAX;
 pub use serve::{SUBCOMMAND, serve_requests, serve_words};
 pub use supervise::{ChildCounts, ChildError, ChildSettings, Supervised};

@@ -1,0 +1,40 @@
+//! A serial line as an address says it.
+
+use super::keys::Keys;
+use std::path::PathBuf;
+
+/// Parity of a serial line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parity {
+    /// No parity bit.
+    None,
+    /// Even parity.
+    Even,
+    /// Odd parity.
+    Odd,
+}
+
+/// A serial line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SerialTarget {
+    /// The device file.
+    pub port: PathBuf,
+    /// Bits per second.
+    pub baud: u32,
+    /// Parity bit.
+    pub parity: Parity,
+}
+
+/// The device file of `//DEVICE`, with the keys `baud` and `parity`.
+///
+/// # Errors
+/// No device file is named.
+pub fn parse_serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
+    let baud = keys.take_number("baud", 9600, 300, 4_000_000);
+    let parity = keys.take_choice("parity", &[("none", Parity::None), ("even", Parity::Even), ("odd", Parity::Odd)]);
+    let port = body.strip_prefix("//").unwrap_or(body);
+    if port.is_empty() {
+        return Err("no serial port; write it like :///dev/ttyUSB0".to_owned());
+    }
+    Ok(SerialTarget { port: PathBuf::from(port), baud, parity })
+}

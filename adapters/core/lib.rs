@@ -1,0 +1,36 @@
+//! The vocabulary of all devices: channels, readings with a time and a typed absence, and what every driver needs.
+//!
+//! A driver is a [`Source`]: it delivers [`Reading`]s. [`merge`] puts the readings of all sources onto the gateway's tick as
+//! a [`Sample`]. What one kind of device needs stands in its own crate; nothing here knows of any.
+
+pub mod address;
+pub mod bilingual;
+pub mod channel;
+pub mod child;
+pub mod clock;
+pub mod conversion;
+pub mod driver;
+pub mod electric;
+pub mod histogram;
+pub mod merge;
+pub mod offset;
+pub mod opened;
+pub mod own;
+pub mod plausibility;
+pub mod reading;
+pub mod sample;
+pub mod serial;
+pub mod stream;
+pub mod text;
+pub mod tls;
+pub mod units;
+pub mod words;
+
+pub use channel::{Channel, ChannelId};
+pub use driver::{
+    Actuator, Fact, FactValue, LadderRequest, LadderRule, Offer, Pull, Source, SourceError, SourceProblem,
+};
+pub use offset::{Axis, OffsetSink};
+pub use opened::{OpenedDevice, UnreadableSecret};
+pub use reading::{Absence, Reading, Stamp, Value};
+pub use sample::{Sample, Slot};
