@@ -4,6 +4,7 @@
 use crate::files::{Lookout, Mark, Rest, advise_on_read_error, read_mark, read_text, replace_file};
 use crate::settings;
 use adapters::channel::find_nearest_name;
+pub use gateway_base::files::compute_digest;
 use rules::script::{
     Host, ScriptFile, ScriptProblem, ScriptSet, SettingValues, TEXT_MAX, list_shipped_scripts, prepare_scripts,
     prepare_with,
@@ -66,12 +67,6 @@ fn read_list(path: &Path) -> BTreeMap<String, u64> {
         Some((name.to_owned(), u64::from_str_radix(digest, 16).ok()?))
     };
     text.lines().filter_map(line).collect()
-}
-
-/// FNV-1a: tells one text from another, keeps no secret.
-#[must_use]
-pub fn compute_digest(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
 }
 
 /// Every script of the directory, in the order of the names.

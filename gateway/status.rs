@@ -4,6 +4,8 @@
 //! tick for a reader. Every number carries its unit in its name or beside it; a missing one carries its reason.
 
 use adapters::histogram::Histogram;
+pub use gateway_base::clock::ClockStatus;
+pub use gateway_base::problem::StatusProblem;
 use serde::Serialize;
 
 /// A number or a word.
@@ -301,16 +303,6 @@ pub struct HistoryStatus {
     pub set_aside: Vec<String>,
 }
 
-/// The clock of the box.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ClockStatus {
-    /// What is thought of the wall clock: `unset`, `plausible`, `confirmed` or `leapt`. In all but the last two times may
-    /// be corrected later.
-    pub trust: crate::clock::Trust,
-    /// Wall clock minus the time of the box, s; 0 while they agree.
-    pub wall_ahead_s: f64,
-}
-
 /// The tick.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TickStatus {
@@ -327,15 +319,6 @@ pub struct TickStatus {
     pub late: Histogram,
     /// Ticks left out because the box was too late for them.
     pub skipped: u64,
-}
-
-/// Something that does not work while the box goes on.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct StatusProblem {
-    /// What and where.
-    pub what: String,
-    /// What to do next.
-    pub next: String,
 }
 
 /// The whole document.

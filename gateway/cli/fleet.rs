@@ -5,7 +5,7 @@ use crate::fleet::ingest::{self, Done, IngestSettings};
 use crate::fleet::questions::{QUESTIONS, of_name};
 use crate::fleet::retention::{self, Going, KEEPING};
 use crate::fleet::{DatabaseSettings, TABLES, VIEWS, parse_cluster};
-use crate::nats::{Connection, NatsError, NatsTarget, StreamSettings};
+use crate::nats::{Connection, NatsTarget, StreamSettings};
 use crate::signals::{SignalRequest, Signals};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -108,12 +108,6 @@ pub(super) struct IngestArguments {
     /// End when nothing is left to do, instead of waiting for more.
     #[arg(long)]
     once: bool,
-}
-
-impl From<NatsError> for CannotRun {
-    fn from(error: NatsError) -> Self {
-        Self::new(error.what, error.next)
-    }
 }
 
 /// A second copy of a message within this time is not stored a second time; PostgreSQL recognises later ones.

@@ -25,8 +25,9 @@ pub use problem::Problem;
 
 use crate::history::OutboxSettings;
 use crate::log::LogFormat;
-use crate::sinks::SinkAddress;
 use adapters::{Address, Axis};
+pub use gateway_gate::limits::{GateConfig, GateMode, OffsetConfig};
+pub use gateway_sinks::configured::SinkConfig;
 use rules::estimators::thermal::CompensationSettings;
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
@@ -154,87 +155,6 @@ pub struct OperationsConfig {
     pub path: Option<PathBuf>,
 }
 
-/// How far the gate goes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GateMode {
-    /// Nothing is decided.
-    Off,
-    /// Decided and recorded, never written.
-    Shadow,
-    /// May be armed on the box; until then as in shadow.
-    Armed,
-}
-
-impl GateMode {
-    /// The word in the configuration, in the history and on the page.
-    #[must_use]
-    pub fn as_word(self) -> &'static str {
-        match self {
-            Self::Off => "off",
-            Self::Shadow => "shadow",
-            Self::Armed => "armed",
-        }
-    }
-}
-
-/// `[gate]`: the limits that no script can widen.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GateConfig {
-    /// How far it goes.
-    pub mode: GateMode,
-    /// Name of the source that is written to.
-    pub source: Option<String>,
-    /// Least override, whole percent, 10 to 100.
-    pub min_pct: f64,
-    /// Greatest override, whole percent, 100 to 200.
-    pub max_pct: f64,
-    /// Greatest rise, percent per second.
-    pub slew_up_pct_per_s: f64,
-    /// Greatest fall, percent per second.
-    pub slew_down_pct_per_s: f64,
-    /// May the override exceed the operator's dial? Then the ladder multiplies the two.
-    pub above_dial: bool,
-    /// A request within this of the one in force changes nothing, percent.
-    pub dead_band_pct: f64,
-    /// Least time between two changes.
-    pub min_interval: Duration,
-    /// Time between two signs of life.
-    pub heartbeat: Duration,
-    /// Data older than this holds 100 %.
-    pub stale: Duration,
-    /// Arming ends by itself after this.
-    pub armed_for: Duration,
-    /// Thermal offsets.
-    pub offset: OffsetConfig,
-}
-
-impl GateConfig {
-    /// The furthest that overrides or offsets may go: what arming needs.
-    #[must_use]
-    pub fn greatest_mode(&self) -> GateMode {
-        if self.offset.mode == GateMode::Armed { GateMode::Armed } else { self.mode }
-    }
-}
-
-/// `[gate.offset]`: the limits of thermal offsets.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OffsetConfig {
-    /// How far it goes.
-    pub mode: GateMode,
-    /// Name of the source that is written to.
-    pub source: Option<String>,
-    /// Axes that may be shifted.
-    pub axes: Vec<Axis>,
-    /// Greatest change at a time, um.
-    pub step_um: f64,
-    /// Greatest shift from what the operator has set, um.
-    pub total_um: f64,
-    /// Least time between two writes.
-    pub min_interval: Duration,
-    /// Give back what the operator had set when nobody writes any more.
-    pub restore: bool,
-}
-
 /// `[history]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HistoryConfig {
@@ -246,17 +166,6 @@ pub struct HistoryConfig {
     pub max_gb: f64,
     /// Time between two commits.
     pub commit: Duration,
-}
-
-/// One `[[sink]]`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SinkConfig {
-    /// Where it is and how to talk to it.
-    pub address: SinkAddress,
-    /// Short name; the text of the address when none was given.
-    pub name: String,
-    /// May computers on its network ask the gate for something?
-    pub allow_requests: bool,
 }
 
 /// `[http]`.

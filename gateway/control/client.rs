@@ -1,7 +1,7 @@
 //! Orders from the command line of the same box.
 
 use super::{ANSWER_WITHIN, LINE_MAX, Order, Reply, socket_path};
-use crate::cannot_run::CannotRun;
+use gateway_base::cannot_run::CannotRun;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;

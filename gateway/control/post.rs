@@ -4,7 +4,7 @@
 //! order to disarm finds its place. Neither waits for the next tick: the tick's thread is woken while it waits for that.
 
 use super::{ANSWER_WITHIN, NetworkRequest, Order, QueuedOrder, Reply, WAITING_MAX};
-use crate::history::Audit;
+use gateway_history::Audit;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, OnceLock};

@@ -1,7 +1,7 @@
 //! Listens for orders and hands each to the tick, on a thread of its own: however busy the page is, an order is heard.
 
 use super::{LINE_MAX, Order, OrderSender, Reply, socket_path};
-use crate::log::{Notice, Severity};
+use gateway_base::log::{Notice, Severity};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
 //! A range of a history as a recording: `history:DB?from=..&to=..`.
 
-use crate::history::{Query, Reader};
-use crate::moment;
 use adapters::Recording;
+use gateway_base::moment;
+use gateway_history::{Query, Reader};
 use std::path::Path;
 
 /// How the address is written, for messages.

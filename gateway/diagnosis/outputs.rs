@@ -129,5 +129,5 @@ pub fn write_output(path: &Path, text: &str) -> Result<(), String> {
         // A pipe or a device is written into, never replaced.
         return std::fs::write(path, text).map_err(say);
     }
-    crate::files::replace_file(path, text).map_err(say)
+    gateway_base::files::replace_file(path, text).map_err(say)
 }

@@ -5,11 +5,11 @@
 use super::beside::{BesideModel, compose_headline};
 use super::context::DiagnosisContext;
 use super::steps::{DiagnosisStep, group_steps};
-use crate::files::{read_text, replace_file};
-use crate::history;
-use crate::reload::compute_digest;
 use crate::report::{PageInput, page};
 use adapters::Recording;
+use gateway_base::files::compute_digest;
+use gateway_base::files::{read_text, replace_file};
+use gateway_history as history;
 use rules::physics::explain::Language;
 use rules::twin::{self, diagnosis::Verdict, plan};
 use serde::{Deserialize, Serialize};

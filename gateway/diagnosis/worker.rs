@@ -6,9 +6,9 @@ use super::child::{self, ChildMessage, DiagnosisJob, JobInput, Stage};
 use super::handle::DiagnosisHandle;
 use super::outputs;
 use super::store::{self, DiagnosisFile, DiagnosisStore};
-use crate::files::{LOOK_EVERY, Mark, Rest, read_mark};
-use crate::history::{self, Reader};
 use adapters::clock::TimeNs;
+use gateway_base::files::{LOOK_EVERY, Mark, Rest, read_mark};
+use gateway_history::Reader;
 use rules::twin::{self, Model, parse_model};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -63,7 +63,7 @@ pub struct Finished {
     /// The person who had asked for it; `None`: the box itself.
     pub by: Option<String>,
     /// As stored; `at_ns` is for the tick to fill in.
-    pub record: history::Diagnosis,
+    pub record: gateway_history::Diagnosis,
     /// What is missing.
     pub missing: Vec<String>,
     /// Where the improved model was written, if there is one.
@@ -188,7 +188,7 @@ fn diagnose_stretch(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: 
 }
 
 /// Row of the history and what is missing.
-pub(super) type FoundDiagnosis = (history::Diagnosis, Vec<String>);
+pub(super) type FoundDiagnosis = (gateway_history::Diagnosis, Vec<String>);
 
 pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, String> {
     let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled_by().map(|by| format!("{by} has ended it"));
@@ -216,7 +216,7 @@ pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Resul
 fn finish_diagnosis(
     by: Option<String>,
     places: &WorkerPaths,
-    record: history::Diagnosis,
+    record: gateway_history::Diagnosis,
     missing: Vec<String>,
 ) -> Finished {
     let model = places.kept.read_file(&store::diagnosis_key(&record), DiagnosisFile::Model);

@@ -1,6 +1,6 @@
 //! Who let the gate write, and until when. Off after every start.
 
-use crate::config::GateMode;
+use crate::limits::GateMode;
 use adapters::clock::{SECOND_NS, TimeNs};
 use std::fmt;
 use std::time::Duration;

@@ -6,16 +6,14 @@ use super::arming::{Armed, Disarmed};
 use super::ask::{AskOutcome, ScriptRequest};
 use super::verdict::{GateOutcome, Verdict};
 use super::write::{Occasion, Reaction, WriteRecord};
-use crate::config;
-use crate::history::{Audit, Command, ReactionTime};
+use crate::limits::{GateConfig, GateMode, OffsetConfig};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
+pub use gateway_base::row_rate::RowRate;
+use gateway_history::{Audit, Command, ReactionTime};
 use rules::script::OverrideRequest;
 use std::collections::VecDeque;
 
-/// Rows of requests per second on average; twenty times as many may come at once.
-const ROWS_PER_S: f64 = 10.0;
-const ROWS_AT_ONCE: f64 = 200.0;
 /// A script's words in the audit are cut at so many characters.
 const WORDS_MAX: usize = 200;
 /// What went wrong begins with the address of the source, and ends with what to do.
@@ -54,48 +52,6 @@ pub struct Trail {
     /// Who has asked since when, the newest at the end.
     authors: VecDeque<(TimeNs, Author)>,
     pace: RowRate,
-}
-
-/// How many rows of requests there may be.
-#[derive(Debug)]
-pub(crate) struct RowRate {
-    per_s: f64,
-    at_once: f64,
-    tokens: f64,
-    at_ns: TimeNs,
-    left_out: u64,
-}
-
-impl Default for RowRate {
-    fn default() -> Self {
-        Self::new(ROWS_PER_S, ROWS_AT_ONCE)
-    }
-}
-
-impl RowRate {
-    /// So many per second on average, and at most so many at once.
-    pub(crate) fn new(per_s: f64, at_once: f64) -> Self {
-        Self { per_s, at_once, tokens: at_once, at_ns: 0, left_out: 0 }
-    }
-
-    /// May there be one now? Then how many before it were left out.
-    pub(crate) fn may_pass(&mut self, at_ns: TimeNs) -> Option<u64> {
-        let elapsed_s = at_ns.saturating_sub(self.at_ns).max(0) as f64 / SECOND_NS as f64;
-        self.at_ns = at_ns;
-        self.tokens = (self.tokens + elapsed_s * self.per_s).min(self.at_once);
-        if self.tokens < 1.0 {
-            self.left_out += 1;
-            return None;
-        }
-        self.tokens -= 1.0;
-        Some(std::mem::take(&mut self.left_out))
-    }
-
-    /// The same; the text says how many before it were left out.
-    pub(super) fn may_tell(&mut self, at_ns: TimeNs) -> Option<String> {
-        let left_out = self.may_pass(at_ns)?;
-        Some(if left_out > 0 { format!("; {left_out} requests before it were left out") } else { String::new() })
-    }
 }
 
 impl Trail {
@@ -207,9 +163,8 @@ fn to_percent(pct: OverridePct) -> f64 {
 
 /// The box has started with these limits.
 #[must_use]
-pub fn audit_start(limits: &config::GateConfig, at_ns: TimeNs) -> Audit {
-    let config::GateConfig { min_pct, max_pct, slew_up_pct_per_s: up, slew_down_pct_per_s: down, above_dial, .. } =
-        limits;
+pub fn audit_start(limits: &GateConfig, at_ns: TimeNs) -> Audit {
+    let GateConfig { min_pct, max_pct, slew_up_pct_per_s: up, slew_down_pct_per_s: down, above_dial, .. } = limits;
     let target = limits.source.as_deref().unwrap_or("no source");
     let dial = if *above_dial { ", may exceed the dial" } else { "" };
     let offsets = describe_offsets(&limits.offset);
@@ -218,12 +173,12 @@ pub fn audit_start(limits: &config::GateConfig, at_ns: TimeNs) -> Audit {
 }
 
 /// What may be shifted, if anything.
-fn describe_offsets(limits: &config::OffsetConfig) -> String {
-    if limits.mode == config::GateMode::Off {
+fn describe_offsets(limits: &OffsetConfig) -> String {
+    if limits.mode == GateMode::Off {
         return String::new();
     }
     let axes: Vec<&str> = limits.axes.iter().map(|axis| axis.as_word()).collect();
-    let config::OffsetConfig { step_um, total_um, .. } = limits;
+    let OffsetConfig { step_um, total_um, .. } = limits;
     format!("; offsets of {} {}, by {step_um} um up to {total_um} um", axes.join(" "), limits.mode.as_word())
 }
 

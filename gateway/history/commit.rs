@@ -6,7 +6,7 @@ use super::minute_buffer::MinuteBuffer;
 use super::outbox::Gatherer;
 use super::record_sql;
 use super::{pyramid, segments, tail};
-use crate::clock::ClockMark;
+use gateway_base::clock::ClockMark;
 use rusqlite::{Connection, params};
 use std::collections::VecDeque;
 use std::ops::Range;

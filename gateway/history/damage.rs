@@ -3,8 +3,8 @@
 use super::error::{HistoryError, add_path};
 use super::info::format_utc;
 use super::lock::append_suffix;
-use crate::{clock, moment};
 use adapters::clock::TimeNs;
+use gateway_base::{clock, moment};
 use rusqlite::{Connection, ErrorCode, ffi};
 use serde::Serialize;
 use std::fmt;

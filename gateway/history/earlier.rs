@@ -1,6 +1,6 @@
 //! A copy of the history as it was before a newer version of the program changed its tables, and the way back to it.
 //!
-//! An older program cannot read newer tables. So a version that goes back after an update (`crate::update`) would have no
+//! An older program cannot read newer tables. So a version that goes back after an update (the command `update`) would have no
 //! history. It finds the copy of its own kind beside the file, `history.db.schema-N`, gives the newer file another name, and
 //! goes on with the copy. What was stored in between stays in the newer file, which the newer program reads.
 
@@ -11,8 +11,8 @@ use super::outbox::skip_numbers;
 use super::record::Event;
 use super::schema::{SCHEMA, copy_whole};
 use super::space::disk_room;
-use crate::{clock, files};
 use adapters::clock::TimeNs;
+use gateway_base::{clock, files};
 use rusqlite::Connection;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
 //! How a history is kept: durability, limits, and the estimates that are stored beside the channels.
 
 use super::outbox::Outbox;
-use crate::clock::ClockMark;
 use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_base::clock::ClockMark;
 use std::time::Duration;
 
 /// One day in nanoseconds.

@@ -198,7 +198,7 @@ impl Audit {
     }
 
     /// As it comes back from the file: numbers that are none become absent, and -0 becomes 0.
-    pub(crate) fn to_storable(&self) -> Self {
+    pub fn to_storable(&self) -> Self {
         let number = |value: Option<f64>| value.filter(|value| value.is_finite()).map(|value| value + 0.0);
         Self { before: number(self.before), asked: number(self.asked), after: number(self.after), ..self.clone() }
     }

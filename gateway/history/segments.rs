@@ -7,8 +7,8 @@
 use super::error::{Doing, HistoryError};
 use super::minute_buffer::Segment;
 use super::{outbox, schema};
-use crate::clock::ClockMark;
 use adapters::clock::TimeNs;
+use gateway_base::clock::ClockMark;
 use rusqlite::{Connection, OptionalExtension, params};
 use serde::{Deserialize, Serialize};
 

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 /// A statement of the program's own has ended long before this.
-pub(crate) const SQL_WITHIN: Duration = Duration::from_secs(600);
+pub const SQL_WITHIN: Duration = Duration::from_secs(600);
 /// A statement is looked at every so many steps of `SQLite`'s machine: some tenths of a millisecond.
 const STEPS: i32 = 10_000;
 

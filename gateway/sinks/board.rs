@@ -2,10 +2,10 @@
 
 use super::SinkError;
 use super::status::SinkStatus;
-use crate::history::Outbox;
-use crate::status::StatusProblem;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::histogram::Histogram;
+use gateway_base::problem::StatusProblem;
+use gateway_history::Outbox;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What one task tells of itself.

@@ -1,7 +1,7 @@
 //! `doctor` for a sink: connects as the box would, and says what is wrong. Sends nothing.
 
 use super::{Requests, SinkAddress, SinkError, open_sink};
-use crate::history::{Outbox, OutboxSettings};
+use gateway_history::{Outbox, OutboxSettings};
 use serde_json::json;
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -3,11 +3,11 @@
 use super::board::{Board, to_seconds};
 use super::isolation::{Isolation, Turn};
 use super::{Batch, Requests, Sink, SinkError, open_sink};
-use crate::clock;
-use crate::config;
-use crate::control::OrderSender;
-use crate::history::{Item, Outbox, OutboxHead, OutboxReader, OutboxStretch};
-use crate::log::{Notice, Severity};
+use crate::configured::SinkConfig;
+use gateway_base::clock;
+use gateway_base::log::{Notice, Severity};
+use gateway_control::OrderSender;
+use gateway_history::{Item, Outbox, OutboxHead, OutboxReader, OutboxStretch};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::sync::watch;
@@ -36,13 +36,8 @@ pub struct Sinks {
 /// Starts a task for each of these sinks, which must be known to outbox and board in this order. The history at `path` may be
 /// opened later. What the network asks for goes by `post`. Call it within a runtime.
 #[must_use]
-pub fn start_sinks(
-    sinks: &[config::SinkConfig],
-    post: &OrderSender,
-    (outbox, board): (&Outbox, &Board),
-    path: &Path,
-) -> Sinks {
-    let opened = sinks.iter().map(|config::SinkConfig { name, address, allow_requests }| {
+pub fn start_sinks(sinks: &[SinkConfig], post: &OrderSender, (outbox, board): (&Outbox, &Board), path: &Path) -> Sinks {
+    let opened = sinks.iter().map(|SinkConfig { name, address, allow_requests }| {
         let requests = Requests::new(name, *allow_requests, Some(post.clone()));
         (name.clone(), open_sink(address, (name, requests), outbox, path))
     });

@@ -6,9 +6,9 @@
 
 use super::mqtt::build_document;
 use super::{Batch, Pending, Sink, SinkError};
-use crate::history::{Item, Outbox};
-use crate::nats::{Connection, JetStreamFailure, NatsError, NatsTarget, Outgoing};
 use adapters::address::Keys;
+use gateway_history::{Item, Outbox};
+use gateway_nats::{Connection, JetStreamFailure, NatsError, NatsTarget, Outgoing};
 
 /// Where to, and under which subjects.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,7 +8,7 @@ use super::parquet::ParquetSink;
 use super::shdr::ShdrSink;
 use super::sparkplug::SparkplugSink;
 use super::{Requests, Sink, SinkAddress, SinkTarget};
-use crate::history::Outbox;
+use gateway_history::Outbox;
 use std::path::Path;
 
 /// The sink of an address. `name` is its name in the configuration, `requests` the way of its network to the gate, `outbox`

@@ -5,9 +5,9 @@
 //! away, is made up for as long as the history holds the days.
 
 use super::{Batch, Pending, Sink, SinkError};
-use crate::history::{DAY_NS, HistoryError, Outbox, Reader, day_of};
 use adapters::address::Keys;
 use adapters::clock::TimeNs;
+use gateway_history::{DAY_NS, HistoryError, Outbox, Reader, day_of};
 use std::path::{Path, PathBuf};
 
 /// Where to.

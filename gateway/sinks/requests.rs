@@ -3,9 +3,9 @@
 //! A sink hands every message that looks like a request to [`Requests::submit_change`], whether it is allowed or not: the tick writes
 //! all of them into the audit, carries out what is allowed, and says what became of it.
 
-use crate::clock;
-use crate::control::{NetworkRequest, OrderSender, Reply, RequestedChange};
-use crate::gate::trail::RowRate;
+use gateway_base::clock;
+use gateway_base::row_rate::RowRate;
+use gateway_control::{NetworkRequest, OrderSender, Reply, RequestedChange};
 
 /// Requests per second on average, and at once. A plant's system asks a few times an hour and repeats once in half a minute;
 /// whoever sends more fills the audit and holds up data: each waits for the tick, at most a tenth of a second. What is beyond is

@@ -2,7 +2,7 @@
 //! half of it, and one unit makes it fit, that unit is asked for.
 
 use super::{UnitDoubt, list_possible_units};
-use crate::diagnosis::simulation;
+use crate::simulation;
 use adapters::Recording;
 use adapters::channel::quantity::unit_of;
 use adapters::recording::{Cells, Numbers};

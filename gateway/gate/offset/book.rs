@@ -6,8 +6,8 @@
 //!
 //! A control that the configuration no longer names keeps its entry: what is shifted there a person has to see to.
 
-use crate::files::replace_durably;
 use adapters::offset::{Axis, Left};
+use gateway_base::files::replace_durably;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io;

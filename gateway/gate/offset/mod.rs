@@ -29,7 +29,7 @@ pub use order::{Moved, OffsetOrder, Shifted};
 pub use trail::OffsetTrail;
 
 use super::hold::Hold;
-use crate::config::{self, GateMode};
+use crate::limits::{GateMode, OffsetConfig};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::offset::Axis;
 use rules::script::OffsetProposal;
@@ -112,14 +112,14 @@ pub(super) struct Circumstances {
 /// Decides about offsets. One per machine.
 #[derive(Debug)]
 pub struct Offsets {
-    limits: config::OffsetConfig,
+    limits: OffsetConfig,
     slides: Vec<Slide>,
     ordered_ns: Option<TimeNs>,
 }
 
 impl Offsets {
     /// Nothing is shifted, as far as is known.
-    pub(super) fn new(limits: config::OffsetConfig) -> Self {
+    pub(super) fn new(limits: OffsetConfig) -> Self {
         let slides = limits.axes.iter().map(|axis| Slide::new(*axis)).collect();
         Self { limits, slides, ordered_ns: None }
     }
@@ -270,7 +270,7 @@ impl Slide {
         self.shift_um == 0.0 || (0..MISSING_NS).contains(&since_ns)
     }
 
-    fn judge_shift(&self, wanted_um: Option<f64>, limits: &config::OffsetConfig, now: Circumstances) -> OffsetVerdict {
+    fn judge_shift(&self, wanted_um: Option<f64>, limits: &OffsetConfig, now: Circumstances) -> OffsetVerdict {
         let finite = wanted_um.is_none_or(f64::is_finite);
         // Controls count in whole micrometres.
         let target_um =
@@ -290,7 +290,7 @@ impl Slide {
     }
 
     /// What is to be written: a step while armed; afterwards everything back, where that is configured.
-    fn plan_order(&self, verdict: &OffsetVerdict, limits: &config::OffsetConfig) -> Option<OffsetOrder> {
+    fn plan_order(&self, verdict: &OffsetVerdict, limits: &OffsetConfig) -> Option<OffsetOrder> {
         if verdict.armed && !self.retired {
             let (axis, from_um, wanted_um) = (self.axis, self.shift_um, verdict.permitted_um);
             let step = OffsetOrder::Shift { axis, from_um, wanted_um };

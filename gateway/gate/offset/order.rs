@@ -1,6 +1,6 @@
 //! What is ordered about an offset, and what came of it.
 
-use crate::gate::Fault;
+use crate::Fault;
 use adapters::SourceError;
 use adapters::clock::TimeNs;
 use adapters::offset::{Axis, LastWrite, Left, is_same_offset};

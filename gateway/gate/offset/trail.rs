@@ -2,10 +2,11 @@
 
 use super::order::{Moved, OffsetOrder, Shifted};
 use super::{OffsetBound, OffsetOutcome, OffsetVerdict};
-use crate::config;
-use crate::gate::trail::{Author, RowRate, truncate_text};
-use crate::history::Audit;
+use crate::limits::OffsetConfig;
+use crate::trail::{Author, truncate_text};
 use adapters::offset::{Axis, LastWrite};
+use gateway_base::row_rate::RowRate;
+use gateway_history::Audit;
 use rules::script::OffsetProposal;
 
 /// What was last recorded of the proposals for an axis.
@@ -32,7 +33,7 @@ impl OffsetTrail {
         &mut self,
         proposal: Option<&OffsetProposal>,
         verdict: &OffsetVerdict,
-        limits: &config::OffsetConfig,
+        limits: &OffsetConfig,
     ) -> Option<Audit> {
         if verdict.order.is_some() {
             self.authors[verdict.axis.index()] =
@@ -153,7 +154,7 @@ fn outcome_word(verdict: &OffsetVerdict) -> &'static str {
 }
 
 /// Why, for the operator.
-fn describe_reason(verdict: &OffsetVerdict, limits: &config::OffsetConfig) -> String {
+fn describe_reason(verdict: &OffsetVerdict, limits: &OffsetConfig) -> String {
     match verdict.outcome {
         OffsetOutcome::Permitted if verdict.armed => "as proposed".to_owned(),
         OffsetOutcome::Permitted => "the gate is not armed for offsets: recorded, not written".to_owned(),

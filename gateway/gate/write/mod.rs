@@ -14,7 +14,7 @@ mod withdraw;
 
 use super::fault::{Fault, UnexpectedReading};
 use super::verdict::{GateOutcome, Verdict};
-use crate::config;
+use crate::limits::GateConfig;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use adapters::{Actuator, LadderRequest, LadderRule, SourceError};
@@ -124,7 +124,7 @@ pub struct OverrideWriter<A> {
 
 impl<A: Actuator> OverrideWriter<A> {
     /// Nothing is written until a verdict says so, but what an earlier run has left enabled is withdrawn.
-    pub fn new(actuator: A, limits: &config::GateConfig) -> Self {
+    pub fn new(actuator: A, limits: &GateConfig) -> Self {
         let ns = |duration: std::time::Duration| i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX);
         let rule = if limits.above_dial { LadderRule::Product } else { LadderRule::Least };
         let settle_ns = ns(actuator.settles_within()).max(SECOND_NS / 100);

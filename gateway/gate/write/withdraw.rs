@@ -2,7 +2,7 @@
 //! could not. A withdrawal that the machine refuses is repeated until it is taken.
 
 use super::{Occasion, OverrideWriter, PendingWrite, WriteRecord};
-use crate::gate::fault::Fault;
+use crate::fault::Fault;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use adapters::{Actuator, LadderRule, SourceError};

@@ -41,7 +41,7 @@ fn escape_name(name: &str) -> String {
 
 /// The file of a machine, box and day for one kind of rows.
 fn day_file(root: &Path, kind: &str, (machine, box_id): (&str, &str), day_ns: TimeNs) -> PathBuf {
-    let date: String = crate::moment::format_utc(day_ns).chars().take(10).collect();
+    let date: String = gateway_base::moment::format_utc(day_ns).chars().take(10).collect();
     root.join(kind)
         .join(format!("machine={}", escape_name(machine)))
         .join(format!("date={date}"))

@@ -1,12 +1,12 @@
 //! One thing that leaves the box.
 
-use crate::history::pyramid::LEVELS;
-use crate::history::record::Record;
-use crate::history::{Series, SeriesKind};
-use crate::moment;
+use crate::pyramid::LEVELS;
+use crate::record::Record;
+use crate::{Series, SeriesKind};
 use adapters::ChannelId;
 use adapters::channel::{Channel, Form};
 use adapters::clock::TimeNs;
+use gateway_base::moment;
 use serde_json::{Value as Json, json};
 use std::sync::Arc;
 
@@ -226,7 +226,7 @@ fn record_json(record: &Record) -> Json {
 }
 
 /// The fields of a record with what is JSON in a text as JSON. A detail that is plain words stays a text.
-pub(crate) fn parse_nested_json(mut fields: Json) -> Json {
+pub fn parse_nested_json(mut fields: Json) -> Json {
     for name in NESTED {
         let Some(Json::String(text)) = fields.get(name) else { continue };
         let nested = if text.is_empty() { Some(Json::Null) } else { serde_json::from_str(text).ok() };

@@ -5,8 +5,8 @@
 //! or day. A cell is a number, a text, or `{"m":"reason"}`.
 
 use super::item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
-use crate::history::record::Record;
-use crate::history::tail::{append_comma, put_number};
+use crate::record::Record;
+use crate::tail::{append_comma, put_number};
 use adapters::clock::TimeNs;
 use serde::Deserialize;
 use serde_json::{Map, Value as Json, json};

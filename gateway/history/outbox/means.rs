@@ -5,9 +5,9 @@
 //! so a later one of the same bucket replaces it.
 
 use super::line;
-use crate::history::HistoryError;
-use crate::history::error::Doing;
-use crate::history::pyramid::{LEVELS, Level};
+use crate::HistoryError;
+use crate::error::Doing;
+use crate::pyramid::{LEVELS, Level};
 use adapters::clock::{SECOND_NS, TimeNs};
 use rusqlite::Connection;
 use std::collections::BTreeSet;

@@ -34,7 +34,7 @@ mod shared;
 mod store;
 
 pub(crate) use gather::Gatherer;
-pub(crate) use item::parse_nested_json;
+pub use item::parse_nested_json;
 pub use item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 pub use position::Position;
 pub use reader::{OutboxReader, OutboxStretch};

@@ -2,9 +2,9 @@
 
 use super::item::{Item, SeriesInfo};
 use super::line::{self, SeriesByNumber};
-use crate::history::HistoryError;
-use crate::history::error::Doing;
-use crate::history::schema::{known_series, open_for_reading};
+use crate::HistoryError;
+use crate::error::Doing;
+use crate::schema::{known_series, open_for_reading};
 use rusqlite::Connection;
 use std::path::Path;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ impl OutboxReader {
     /// Opens the history at `path`, which the gateway must have opened for writing before.
     ///
     /// # Errors
-    /// As [`Reader::open`](crate::history::Reader::open).
+    /// As [`Reader::open`](crate::Reader::open).
     pub fn open(path: &Path) -> Result<Self, HistoryError> {
         let mut feed = Self { db: open_for_reading(path)?, known: SeriesByNumber::new() };
         feed.load_series()?;

@@ -4,8 +4,8 @@ use super::line;
 use super::position::Position;
 use super::reader::unpack_lines;
 use super::store::{LEVEL, has_tables};
-use crate::history::HistoryError;
-use crate::history::error::Doing;
+use crate::HistoryError;
+use crate::error::Doing;
 use rusqlite::{Connection, params};
 use std::ops::Range;
 

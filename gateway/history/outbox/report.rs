@@ -2,11 +2,11 @@
 //! and all of them once in a while, so that a receiver that came late knows everything soon.
 
 use super::item::{Cell, Reading, SeriesInfo};
-use crate::history::reason::{NOT_PROVIDED, PRESENT, Reasons};
-use crate::history::rounding::round_to_decimals;
-use crate::history::rows::{Column, SeriesRows, Word};
-use crate::history::series::Series;
-use crate::history::tail::{append_comma, put_missing, put_number};
+use crate::reason::{NOT_PROVIDED, PRESENT, Reasons};
+use crate::rounding::round_to_decimals;
+use crate::rows::{Column, SeriesRows, Word};
+use crate::series::Series;
+use crate::tail::{append_comma, put_missing, put_number};
 use adapters::clock::TimeNs;
 use serde_json::Value as Json;
 use std::fmt::Write;
@@ -204,8 +204,8 @@ fn put_cell(out: &mut String, cell: &Last, reasons: &Reasons) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::series::stored_series;
-    use crate::history::{ExtraSeries, ExtraValue, Options};
+    use crate::series::stored_series;
+    use crate::{ExtraSeries, ExtraValue, Options};
     use adapters::{Absence, ChannelId, Sample, Slot, Value};
 
     fn series() -> Vec<Series> {

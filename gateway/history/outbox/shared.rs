@@ -3,7 +3,7 @@
 use super::item::Reading;
 use super::position::Position;
 use super::report::OutboxSettings;
-use crate::history::HistoryError;
+use crate::HistoryError;
 use adapters::clock::TimeNs;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -104,7 +104,7 @@ fn lock_mutex<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Outbox {
-    /// The outbox of a machine for these sinks. Hand it to [`Options::outbox`](crate::history::Options::outbox).
+    /// The outbox of a machine for these sinks. Hand it to [`Options::outbox`](crate::Options::outbox).
     #[must_use]
     pub fn new(machine: &str, settings: OutboxSettings, sinks: impl IntoIterator<Item = String>) -> Self {
         let standing = || DeliveryState::from_next(1);

@@ -2,9 +2,9 @@
 
 use super::position::Position;
 use super::shared::{DeliveryState, Outbox, OutboxFigures};
-use crate::history::HistoryError;
-use crate::history::error::Doing;
-use crate::history::schema::{open_for_reading, open_for_writing};
+use crate::HistoryError;
+use crate::error::Doing;
+use crate::schema::{open_for_reading, open_for_writing};
 use adapters::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use std::borrow::Cow;

@@ -3,7 +3,7 @@
 #![allow(unsafe_code, reason = "SQLite calls these functions through C and hands over plain memory")]
 
 use super::sum::{self, FileHeader, HEADER, ROOM};
-use crate::history::schema::SEALED_APPLICATION;
+use crate::schema::SEALED_APPLICATION;
 use rusqlite::{Connection, ffi};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::null_mut;
@@ -11,13 +11,13 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Name of the layer.
-pub(in crate::history) const VFS: &CStr = c"cnc-gateway";
+pub(crate) const VFS: &CStr = c"cnc-gateway";
 
 /// The page that was last found damaged; 0: none.
 static DAMAGED: AtomicU32 = AtomicU32::new(0);
 
 /// The page that was last found damaged in this process.
-pub(in crate::history) fn damaged_page() -> Option<u32> {
+pub(crate) fn damaged_page() -> Option<u32> {
     Some(DAMAGED.load(Ordering::Relaxed)).filter(|page| *page > 0)
 }
 
@@ -38,7 +38,7 @@ const OWN: usize = size_of::<SealedFile>().next_multiple_of(16);
 ///
 /// # Errors
 /// The code of `SQLite`: there is no layer of the system to lie over.
-pub(in crate::history) fn register_layer() -> Result<(), c_int> {
+pub(crate) fn register_layer() -> Result<(), c_int> {
     static DONE: OnceLock<c_int> = OnceLock::new();
     // SAFETY: the layer of the system lives as long as the process. Ours is a copy of it that is leaked, so it does too; the
     // functions that are taken over look at no field of it but the longest name of a path, which the copy has.
@@ -62,7 +62,7 @@ pub(in crate::history) fn register_layer() -> Result<(), c_int> {
 ///
 /// # Errors
 /// The code of `SQLite`.
-pub(in crate::history) fn reserve_room(db: &Connection) -> Result<(), c_int> {
+pub(crate) fn reserve_room(db: &Connection) -> Result<(), c_int> {
     let mut bytes = ROOM as c_int;
     // SAFETY: the handle lives as long as the connection, and the argument is the one integer that this request reads and writes.
     let code = unsafe {

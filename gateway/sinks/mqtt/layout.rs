@@ -9,10 +9,10 @@
 //! What a subscriber that comes late must know is retained: the newest state, part and diagnosis, with `topics` the newest value of
 //! each channel, and in every layout `PREFIX/latest` ([`build_latest_message`]).
 
-use crate::history::{Cell, Content, Gap, Item, Outbox, Reading, SeriesMean};
-use crate::moment;
 use adapters::clock::TimeNs;
 use adapters::mqtt::Outgoing;
+use gateway_base::moment;
+use gateway_history::{Cell, Content, Gap, Item, Outbox, Reading, SeriesMean};
 use serde_json::{Map, Value as Json, json};
 
 /// How items look on their topics.
@@ -30,7 +30,7 @@ pub enum Layout {
 const RETAINED: [&str; 3] = ["state", "part", "diagnosis"];
 
 /// The document of an item, with who made it and whether it comes late.
-pub(in crate::sinks) fn build_document(outbox: &Outbox, item: &Item, historical: bool) -> Json {
+pub(crate) fn build_document(outbox: &Outbox, item: &Item, historical: bool) -> Json {
     let mut document = item.to_json();
     document["machine"] = Json::from(outbox.machine());
     document["box"] = Json::from(outbox.box_id());

@@ -17,11 +17,11 @@ pub(super) use layout::build_document;
 
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
-use crate::control::Reply;
-use crate::history::{Content, Item, Outbox, Record};
-use crate::log::{Notice, Severity};
 use adapters::address::Keys;
 use adapters::mqtt::{MqttMessage, Outgoing, Qos, Will};
+use gateway_base::log::{Notice, Severity};
+use gateway_control::Reply;
+use gateway_history::{Content, Item, Outbox, Record};
 use request::RequestDocument;
 use serde_json::{Value as Json, json};
 use std::collections::BTreeSet;

@@ -1,6 +1,6 @@
 //! A request of the network as a JSON document. Pure.
 
-use crate::control::RequestedChange;
+use gateway_control::RequestedChange;
 use serde::Deserialize;
 
 /// What the broker has kept would come again at every connection, long after whoever asked has gone.

@@ -3,8 +3,8 @@
 use super::layout;
 use super::space::Numbers;
 use super::values::to_opcua_time;
-use crate::history::Alarm;
 use adapters::clock::TimeNs;
+use gateway_history::Alarm;
 use opcua::nodes::{BaseEventType, Event, EventField};
 use opcua::types::{AttributeId, ByteString, DateTime, LocalizedText, NodeId, NumericRange, QualifiedName, Variant};
 

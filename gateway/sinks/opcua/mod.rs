@@ -23,8 +23,8 @@ mod values;
 
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
-use crate::history::{Content, Item, Outbox, Record};
 use adapters::address::{Endpoint, Keys, Login, parse_endpoint};
+use gateway_history::{Content, Item, Outbox, Record};
 use server::Running;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -228,7 +228,7 @@ impl Sink for OpcuaSink {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::OutboxSettings;
+    use gateway_history::OutboxSettings;
 
     /// A server on a free port, for everybody.
     fn anonymous(directory: &Path) -> OpcuaSink {

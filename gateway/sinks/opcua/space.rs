@@ -3,7 +3,7 @@
 use super::layout::{self, Form, StatePart};
 use super::values::{Shown, set_missing};
 use super::{MachineIdentity, units};
-use crate::history::{Reading, SeriesInfo, SeriesKind};
+use gateway_history::{Reading, SeriesInfo, SeriesKind};
 use opcua::nodes::{
     DataTypeBuilder, EventNotifier, NodeSetImport, NodeSetNamespaceMapper, ObjectBuilder, ObjectTypeBuilder,
     VariableBuilder,

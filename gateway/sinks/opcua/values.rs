@@ -2,8 +2,8 @@
 
 use super::layout::{self, Form, ProgramState, StatePart};
 use super::space::Numbers;
-use crate::history::{Cell, Reading};
 use adapters::clock::TimeNs;
+use gateway_history::{Cell, Reading};
 use opcua::server::address_space::AddressSpace;
 use opcua::types::{DataValue, DateTime, LocalizedText, NodeId, StatusCode, Variant};
 use std::collections::HashMap;

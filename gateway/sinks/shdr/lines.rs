@@ -4,9 +4,9 @@
 
 use super::conditions::{self, AlarmKind, OWN};
 use super::model::{AVAILABILITY, UNAVAILABLE, of_channel};
-use crate::history::{Alarm, Cell, Content, Item, Reading, Record};
-use crate::moment;
 use adapters::clock::TimeNs;
+use gateway_base::moment;
+use gateway_history::{Alarm, Cell, Content, Item, Reading, Record};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A line without its time.
@@ -180,7 +180,7 @@ fn escape_attribute(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::{AlarmClear, Gap};
+    use gateway_history::{AlarmClear, Gap};
 
     #[test]
     fn times_never_go_back() {

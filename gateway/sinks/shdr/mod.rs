@@ -17,10 +17,10 @@ pub use devices::{Described, devices_xml, is_prefix, prefix_of};
 
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
-use crate::clock;
-use crate::history::Outbox;
 use adapters::address::{Endpoint, Keys, parse_endpoint};
 use adapters::clock::TimeNs;
+use gateway_base::clock;
+use gateway_history::Outbox;
 use lines::{Line, Machine, format_lines};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;

@@ -6,7 +6,7 @@
 //! Source: MTConnect Standard 1.4, Part 2 (devices), tables of data items and units. Newer agents read it as well.
 
 use super::lines::replace_separators;
-use crate::history::Cell;
+use gateway_history::Cell;
 
 /// A data item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

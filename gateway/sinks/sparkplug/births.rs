@@ -6,9 +6,9 @@
 //! `Quality` (0 bad, 500 stale) and the reason as one word in `missing`. Records are metrics of type String that hold JSON.
 
 use super::payload::{Metric, MetricValue, Payload, Property, PropertySet, datatype};
-use crate::history::{Cell, Content, Item, Reading, SeriesInfo, SeriesKind};
 use adapters::channel::Form;
 use adapters::clock::TimeNs;
+use gateway_history::{Cell, Content, Item, Reading, SeriesInfo, SeriesKind};
 use std::collections::BTreeSet;
 
 /// Where metrics of the protocol itself stand (specification, 6.4.8).

@@ -9,7 +9,7 @@
 //! A host may name a metric by its alias alone, as the birth gave it.
 
 use super::payload::{Metric, MetricValue, Payload, datatype};
-use crate::control::RequestedChange;
+use gateway_control::RequestedChange;
 use serde_json::json;
 
 const FEED_OVERRIDE: (&str, u64) = ("request/feed_override_pct", 9);

@@ -27,11 +27,11 @@ mod payload;
 
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
-use crate::clock;
-use crate::control::{Reply, RequestedChange};
-use crate::history::{Cell, Outbox};
 use adapters::address::Keys;
 use adapters::mqtt::{Outgoing, Qos, Will};
+use gateway_base::clock;
+use gateway_control::{Reply, RequestedChange};
+use gateway_history::{Cell, Outbox};
 use host::PrimaryHost;
 use payload::Payload;
 use prost::Message;
@@ -297,9 +297,9 @@ impl SparkplugSink {
     }
 }
 
-fn series_of(item: &crate::history::Item) -> Vec<i64> {
+fn series_of(item: &gateway_history::Item) -> Vec<i64> {
     match &item.content {
-        crate::history::Content::Sample(readings) => readings.iter().map(|reading| reading.series.id).collect(),
+        gateway_history::Content::Sample(readings) => readings.iter().map(|reading| reading.series.id).collect(),
         _ => Vec::new(),
     }
 }

@@ -14,6 +14,7 @@ pub mod model_new;
 mod models;
 mod outputs;
 mod recordings;
+pub mod report;
 pub mod series;
 mod series_alignment;
 pub mod simulation;

@@ -1,7 +1,7 @@
 //! The page of real diagnoses of small synthetic recordings: complete, self-contained, escaped, bounded, repeatable.
 
 use super::{PageInput, page};
-use crate::diagnosis::context::DiagnosisContext;
+use crate::context::DiagnosisContext;
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers, Words};
 use rand::{Rng, SeedableRng};

@@ -27,6 +27,7 @@ mod ask;
 mod fault;
 mod hold;
 mod limit;
+pub mod limits;
 pub mod offset;
 mod thread_cycle;
 pub mod trail;
@@ -42,7 +43,7 @@ pub use offset::{OffsetVerdict, Offsets};
 pub use verdict::{GateOutcome, Verdict};
 pub use write::{Occasion, OverrideWriter, Reaction, WriteRecord};
 
-use crate::config::{self, GateMode};
+use crate::limits::{GateConfig, GateMode};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use adapters::{ChannelId, Sample};
@@ -58,7 +59,7 @@ use std::time::Duration;
 /// Decides about feed overrides. One per machine; remembers the last decision, for the slew limit, and the arming.
 #[derive(Debug)]
 pub struct Gate {
-    limits: config::GateConfig,
+    limits: GateConfig,
     interlocks: Interlocks,
     dial: Option<ChannelId>,
     aim: Aim,
@@ -75,7 +76,7 @@ pub struct Gate {
 impl Gate {
     /// A gate with these limits. It is disarmed, whatever the configuration says.
     #[must_use]
-    pub fn new(limits: config::GateConfig) -> Self {
+    pub fn new(limits: GateConfig) -> Self {
         let stale_ns = i64::try_from(limits.stale.as_nanos()).unwrap_or(i64::MAX);
         Self {
             interlocks: Interlocks::new(stale_ns),
@@ -93,7 +94,7 @@ impl Gate {
 
     /// The limits in force.
     #[must_use]
-    pub fn limits(&self) -> &config::GateConfig {
+    pub fn limits(&self) -> &GateConfig {
         &self.limits
     }
 

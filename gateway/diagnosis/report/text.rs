@@ -9,7 +9,7 @@ use rules::twin::locate::Condition;
 const WORDS_MAX: usize = 8;
 
 /// Text that came from data, safe between tags and in attributes.
-pub(crate) fn escape_html(text: &str) -> String {
+pub fn escape_html(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -23,13 +23,13 @@ mod tests;
 mod text;
 mod verdict;
 
-use crate::diagnosis::context::DiagnosisContext;
+use crate::context::DiagnosisContext;
 use adapters::Recording;
 use data::Data;
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::Diagnosis;
 use std::fmt::Write as _;
-pub(crate) use text::escape_html;
+pub use text::escape_html;
 
 /// Styles of the page.
 const STYLE: &str = include_str!("style.css");

@@ -24,6 +24,8 @@
 //! | `judge` | the rules above, pure: readings in, news out |
 //! | `box_clock` | the time of the box for everybody in the process |
 
+mod status;
+pub use status::ClockStatus;
 mod box_clock;
 mod judge;
 

@@ -1,4 +1,4 @@
-//! What leaves the box: one task per `[[sink]]`, each with its own position in the [outbox](crate::history::Outbox).
+//! What leaves the box: one task per `[[sink]]`, each with its own position in the [outbox](gateway_history::Outbox).
 //!
 //! # How a sink is written
 //! A receiver is one type that implements [`Sink`]: connect, send some items, look after an idle connection. Everything
@@ -17,6 +17,7 @@
 pub mod address;
 mod board;
 pub mod broker;
+pub mod configured;
 pub mod doctor;
 pub mod drive;
 mod isolation;
@@ -39,7 +40,7 @@ pub use open::open_sink;
 pub use requests::Requests;
 pub use status::SinkStatus;
 
-use crate::history::Item;
+use gateway_history::Item;
 use std::fmt;
 use std::pin::Pin;
 

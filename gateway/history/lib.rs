@@ -99,7 +99,7 @@ pub use future::FutureRows;
 pub use info::{Dropped, Info, TableRows};
 pub use list::{AlarmEntry, RecordSpan, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
-pub(crate) use outbox::parse_nested_json;
+pub use outbox::parse_nested_json;
 pub use outbox::{
     Cell, Content, DeliveryState, Gap, Item, Outbox, OutboxFigures, OutboxHead, OutboxReader, OutboxSettings,
     OutboxStretch, Position, Reading, SeriesInfo, SeriesMean, box_id,
@@ -119,7 +119,7 @@ pub use schema::page_layer;
 pub use series::{Series, as_stored, decimals_of_unit};
 pub use set_apart::{SetApart, set_apart};
 pub use space::{DiskRoom, disk_room};
-pub(crate) use sql::SQL_WITHIN;
+pub use sql::SQL_WITHIN;
 pub use status::HistoryFigures;
 pub use wear_models::{StoredWearModel, store_wear_model};
 pub use writer::Writer;

@@ -1,7 +1,7 @@
 //! The time of the box: the wall clock of one moment, carried on by the processor.
 
+use super::ClockStatus;
 use super::judge::{Certain, ClockNews, ClockRules, Judge, Trust};
-use crate::status::ClockStatus;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use rustix::time::{ClockId, clock_gettime};
 use std::sync::atomic::{AtomicI64, Ordering};

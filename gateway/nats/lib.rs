@@ -25,6 +25,7 @@ pub use connection::{Connection, Message};
 pub use jetstream::{Backlog, FetchLimits, JetStreamFailure, Outgoing, StreamSettings};
 pub use target::NatsTarget;
 
+use gateway_base::cannot_run::CannotRun;
 use std::fmt;
 
 /// What went wrong with a server, and what to do next.
@@ -34,6 +35,12 @@ pub struct NatsError {
     pub what: String,
     /// What to do next.
     pub next: String,
+}
+
+impl From<NatsError> for CannotRun {
+    fn from(error: NatsError) -> Self {
+        Self::new(error.what, error.next)
+    }
 }
 
 impl NatsError {

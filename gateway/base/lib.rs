@@ -1,0 +1,9 @@
+//! What every part of the box needs: its clock, its messages, its files.
+
+pub mod cannot_run;
+pub mod clock;
+pub mod files;
+pub mod log;
+pub mod moment;
+pub mod problem;
+pub mod row_rate;
