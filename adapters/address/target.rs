@@ -86,7 +86,7 @@ pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target,
         "simulated" => Ok(Target::Simulated(parse_simulated(body, keys)?)),
         "replay" => parse_replay(body, keys),
         "fanuc" => {
-            let FanucTarget { at, path, backend, options } = parse_fanuc(body, keys)?;
+            let FanucTarget { endpoint: at, path, backend, options } = parse_fanuc(body, keys)?;
             Ok(Target::Fanuc { at, path, backend, options: Box::new(options) })
         }
         "nclink" => Ok(Target::NcLink(parse_nclink(body, keys, false)?)),

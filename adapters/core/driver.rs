@@ -227,13 +227,13 @@ pub enum LadderRule {
 impl LadderRule {
     /// What is in force with this dial and this override in the mailbox.
     #[must_use]
-    pub fn combine_overrides(self, dial: OverridePct, mail: OverridePct) -> OverridePct {
+    pub fn combine_overrides(self, dial: OverridePct, mailbox: OverridePct) -> OverridePct {
         match self {
-            Self::Least => dial.min(mail),
-            Self::Replace => mail,
+            Self::Least => dial.min(mailbox),
+            Self::Replace => mailbox,
             Self::Product => {
-                let product = u32::from(dial.percent()) * u32::from(mail.percent()) / 100;
-                u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(dial.min(mail))
+                let product = u32::from(dial.percent()) * u32::from(mailbox.percent()) / 100;
+                u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(dial.min(mailbox))
             }
         }
     }

@@ -15,10 +15,10 @@
 //! that the ladder left it there.
 
 use super::answer::{FocasAnswer, FocasItemResult};
-use super::asking::Asking;
 use super::dial::Dial;
 use super::feed_override;
 use super::item::{Area, FocasItem, Stretch, Write};
+use super::ladder_request::Asking;
 use super::line::{Asked, FanucLine};
 use super::poll::find_signal_address;
 use super::server::ladder::ENABLED;

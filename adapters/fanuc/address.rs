@@ -4,7 +4,7 @@ use crate::dial::Dial;
 use crate::extra::AxisName;
 use crate::feed_override;
 use crate::item::{Area, Position};
-use crate::own::OwnItem;
+use crate::own_item::OwnItem;
 use adapter_core::address::{Endpoint, Keys, parse_encoding, parse_endpoint, parse_library};
 use adapter_core::channel::PATHS;
 use adapter_core::own::Own;
@@ -56,7 +56,7 @@ pub enum FanucBackend {
 #[derive(Debug, Clone, PartialEq)]
 pub struct FanucTarget {
     /// Where.
-    pub at: Endpoint,
+    pub endpoint: Endpoint,
     /// Path (channel) of the controller, from 1.
     pub path: u8,
     /// How.
@@ -119,7 +119,7 @@ impl FanucOptions {
         };
         let allow = keys.take_text("allow").map(|text| text.split(',').map(|one| one.trim().to_owned()).collect());
         let allow: Vec<String> = allow.unwrap_or_default();
-        for text in allow.iter().filter(|text| crate::allow::Allowed::read(text).is_none()) {
+        for text in allow.iter().filter(|text| crate::allow_list::Allowed::read(text).is_none()) {
             keys.add_problem(format!("allow={text}: write addresses like R900-R904, #500-#509 or EXT"));
         }
         let write = write(keys);
@@ -165,7 +165,7 @@ pub fn parse_fanuc(body: &str, keys: &mut Keys) -> Result<FanucTarget, String> {
         }
         None => named.unwrap_or(1),
     };
-    Ok(FanucTarget { at: parse_endpoint(body, Some(8193))?, path, backend: backend?, options })
+    Ok(FanucTarget { endpoint: parse_endpoint(body, Some(8193))?, path, backend: backend?, options })
 }
 
 /// `axes=X1,C1,B` and `positions=absolute,relative,to_go`.

@@ -2,8 +2,8 @@
 //! value.
 
 use super::answer::{Alarm, FocasAnswer, SpeedUnit, Status, System};
+use super::generation::Generation;
 use super::item::{FocasItem, PmcWidth, PositionFrame, Spindle};
-use super::opening::Generation;
 use super::records;
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, Number, WireError};

@@ -4,7 +4,7 @@
 use super::answer::FocasAnswer;
 use super::item::{FocasItem, Position, Question, Servo, Spindle};
 use super::line::Asked;
-use super::own::OwnItem;
+use super::own_item::OwnItem;
 use super::readings::build_reading;
 use super::states::OrAbsence;
 use super::view::{View, to_number_value};

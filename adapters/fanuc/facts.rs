@@ -7,8 +7,8 @@
 use super::alarms::AlarmTable;
 use super::answer::{FocasAnswer, FocasItemError, FocasItemResult, System};
 use super::code::{Consequence, FocasReturnCode};
+use super::generation::{Generation, Opening};
 use super::item::{FocasItem, Question};
-use super::opening::{Generation, Opening};
 use adapter_core::reading::Absence;
 
 /// Parameter 1001, bit 0 (INM): the machine measures in inches.

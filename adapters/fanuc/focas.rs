@@ -1,8 +1,8 @@
 //! What the adapter needs of a controller, however it is talked to.
 
 use super::answer::{FocasItemResult, Refusal};
+use super::generation::Opening;
 use super::item::{Question, Write};
-use super::opening::Opening;
 use std::time::Duration;
 use thiserror::Error;
 

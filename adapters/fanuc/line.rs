@@ -3,13 +3,13 @@
 //! refuses connections, is switched off, which is a state and not a fault. One that accepts and is silent, or closes what it
 //! has accepted, is none of that: it gives no answer.
 
-use super::allow::AllowList;
+use super::allow_list::AllowList;
 use super::answer::{FocasItemError, FocasItemResult, Refusal};
 use super::code::Consequence;
 use super::facts::Facts;
 use super::focas::{Focas, FocasError};
+use super::generation::Opening;
 use super::item::{FocasItem, Question, Write};
-use super::opening::Opening;
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::SourceError;
 use std::collections::{HashMap, HashSet};
@@ -65,7 +65,7 @@ struct FanucConnection {
 /// A handle on the connection; clones are handles on the same one.
 #[derive(Clone)]
 pub struct FanucLine {
-    inner: Arc<Mutex<FanucConnection>>,
+    connection: Arc<Mutex<FanucConnection>>,
 }
 
 /// What one round of questions gave.
@@ -120,11 +120,11 @@ impl FanucLine {
             known: false,
             counts: LineCounts::default(),
         };
-        Self { inner: Arc::new(Mutex::new(inner)) }
+        Self { connection: Arc::new(Mutex::new(inner)) }
     }
 
     fn with_connection<T>(&self, act: impl FnOnce(&mut FanucConnection) -> T) -> T {
-        act(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
+        act(&mut self.connection.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Asks for all items of the line's own path; see [`FanucLine::ask_on`].
@@ -308,7 +308,7 @@ impl FanucConnection {
     }
 
     fn write(&mut self, clock: &dyn Clock, write: &Write) -> Result<(), SourceError> {
-        let what = super::allow::format_address(write);
+        let what = super::allow_list::format_address(write);
         if let Err(error) = self.allow.check_write(write) {
             return Err(self.build_error(&error, &what));
         }

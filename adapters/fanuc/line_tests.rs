@@ -1,13 +1,13 @@
 //! The line with a controller that is a list of answers, on a clock that stands still.
 
-use super::allow::AllowList;
+use super::allow_list::AllowList;
 use super::answer::{FocasAnswer, FocasItemError, FocasItemResult, Refusal, System};
 use super::code::FocasReturnCode;
 use super::facts::INCH_MACHINE;
 use super::focas::{Focas, FocasError};
+use super::generation::{Generation, Opening};
 use super::item::{FocasItem, Question, Stretch, Write};
 use super::line::{Connect, FanucLine};
-use super::opening::{Generation, Opening};
 use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 use adapter_core::driver::SourceError;
 use adapter_core::reading::Absence;

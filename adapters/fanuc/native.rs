@@ -9,8 +9,8 @@ use super::answer::{FocasItemError, FocasItemResult, Refusal};
 use super::code::FocasReturnCode;
 use super::decode::{self, Dialect};
 use super::focas::{Focas, FocasError};
+use super::generation::{Generation, Opening};
 use super::item::{FocasItem, Question, Write};
-use super::opening::{Generation, Opening};
 use super::request;
 use super::statistics::Statistics;
 use super::wire::{
@@ -37,7 +37,7 @@ const FOR_QUESTIONS: [u8; 2] = [0, 2];
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NativeSettings {
     /// Where the controller is.
-    pub at: Endpoint,
+    pub endpoint: Endpoint,
     /// Path from 1 that is written to; every path can be asked.
     pub path: u8,
     /// Longest time for connecting, and for one exchange.
@@ -62,7 +62,7 @@ impl Native {
     /// See [`FocasError`].
     pub fn connect(settings: NativeSettings) -> Result<Self, FocasError> {
         let deadline = Instant::now() + settings.timeout;
-        let mut stream = connect_tcp(&settings.at, deadline)?;
+        let mut stream = connect_tcp(&settings.endpoint, deadline)?;
         send_bytes(&mut stream, &encode_frame(CLIENT, FrameKind::Open, &FOR_QUESTIONS), settings.timeout)?;
         let answer = receive_frame(&mut stream, deadline, settings.timeout)?;
         let opening = match answer.kind {

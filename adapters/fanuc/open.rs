@@ -1,14 +1,14 @@
 //! From an address to sources and the way to the feed override.
 
 use super::actuator::FanucActuator;
-use super::allow::{AllowList, Allowed};
+use super::allow_list::{AllowList, Allowed};
 use super::extra;
 use super::feed_override;
 use super::item::Area;
 use super::line::{Connect, FanucLine};
 use super::native::{Native, NativeSettings};
-use super::pace::SharedPace;
 use super::poll;
+use super::poll_period::SharedPace;
 use super::readings::Manner;
 use super::source::FanucSource;
 use super::vendor::{Vendor, VendorSettings};
@@ -37,7 +37,7 @@ pub struct OpenedFanuc {
 /// Opens a controller that we talk to ourselves. Nothing is sent before the first poll.
 #[must_use]
 pub fn open_native(name: &str, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
-    let settings = NativeSettings { at: at.clone(), path, timeout: options.timeout, encoding: options.encoding };
+    let settings = NativeSettings { endpoint: at.clone(), path, timeout: options.timeout, encoding: options.encoding };
     let connect: Connect = Box::new(move || Ok(Box::new(Native::connect(settings.clone())?)));
     open_controller(name, connect, path, options)
 }
@@ -47,7 +47,7 @@ pub fn open_native(name: &str, at: &Endpoint, path: u8, options: &FanucOptions) 
 pub fn open_vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
     let settings = VendorSettings {
         vendor_library: library.to_owned(),
-        at: at.clone(),
+        endpoint: at.clone(),
         path,
         timeout: options.timeout,
         encoding: options.encoding,

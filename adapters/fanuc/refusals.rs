@@ -2,8 +2,8 @@
 
 use super::answer::Refusal;
 use super::code::{Consequence, FocasReturnCode};
+use super::generation::Generation;
 use super::item::{FocasItem, Question};
-use super::opening::Generation;
 use super::request;
 use super::table::TABLE;
 use adapter_core::driver::SourceProblem;

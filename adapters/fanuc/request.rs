@@ -1,7 +1,7 @@
 //! Items and writes as blocks on the wire, in the encoding of the controller's generation.
 
+use super::generation::{Generation, Opening};
 use super::item::{FocasItem, PositionFrame, Write};
-use super::opening::{Generation, Opening};
 use super::wire::{Number, Request};
 
 pub use super::table::function;

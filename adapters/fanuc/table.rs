@@ -67,7 +67,7 @@ pub struct TableRow {
     /// Calls of the vendor's library that send it.
     pub calls: &'static str,
     /// Who asks with it.
-    pub known: RowOrigin,
+    pub origin: RowOrigin,
 }
 
 macro_rules! table {
@@ -89,7 +89,7 @@ macro_rules! table {
             arguments: $arguments,
             answer: $answer,
             calls: $library,
-            known: RowOrigin::$known,
+            origin: RowOrigin::$known,
         },)*];
     };
 }
@@ -173,7 +173,7 @@ pub fn format_markdown() -> String {
             row.arguments,
             row.answer,
             row.calls,
-            row.known.as_word()
+            row.origin.as_word()
         )
     };
     head.to_owned() + &TABLE.iter().map(row).collect::<String>()

@@ -46,7 +46,7 @@ fn opened(server: &Server, keys: &str) -> OpenedFanuc {
     let text = format!("fanuc://{}?{keys}", server.address());
     let target = adapter_core::address::parse(&text, |_| String::new(), |_, body, keys| parse_fanuc(body, keys));
     let target = target.expect("usable");
-    open_native(&text, &target.at, target.path, &target.options)
+    open_native(&text, &target.endpoint, target.path, &target.options)
 }
 
 fn actuator(server: &Server, keys: &str) -> Box<dyn Actuator> {

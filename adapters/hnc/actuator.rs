@@ -12,14 +12,14 @@ use nclink::mailbox::{ControllerRegister, Mailbox, MailboxRequest};
 pub struct HncActuator {
     line: HncLine,
     mailbox: Mailbox,
-    last: MailboxRequest,
+    last_request: MailboxRequest,
 }
 
 impl HncActuator {
     /// A mailbox that begins at this register.
     #[must_use]
     pub fn new(line: HncLine, first: ControllerRegister) -> Self {
-        Self { line, mailbox: Mailbox::new(first), last: MailboxRequest::Release }
+        Self { line, mailbox: Mailbox::new(first), last_request: MailboxRequest::Release }
     }
 }
 
@@ -29,17 +29,17 @@ impl Actuator for HncActuator {
     }
 
     fn write_feed_override(&mut self, _: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
-        self.last = MailboxRequest::Override(wanted);
-        self.line.write(&self.mailbox.build_letter(self.last, None))
+        self.last_request = MailboxRequest::Override(wanted);
+        self.line.write(&self.mailbox.build_letter(self.last_request, None))
     }
 
     fn release_override(&mut self, _: &dyn Clock) -> Result<(), SourceError> {
-        self.last = MailboxRequest::Release;
-        self.line.write(&self.mailbox.build_letter(self.last, None))
+        self.last_request = MailboxRequest::Release;
+        self.line.write(&self.mailbox.build_letter(self.last_request, None))
     }
 
     fn ask_ladder(&mut self, _: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
-        self.line.write(&self.mailbox.build_letter(self.last, Some(request)))
+        self.line.write(&self.mailbox.build_letter(self.last_request, Some(request)))
     }
 
     fn read_feed_override(&mut self, _: &dyn Clock) -> Result<OverridePct, SourceError> {

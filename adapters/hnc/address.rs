@@ -11,7 +11,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, PartialEq)]
 pub struct HncNetTarget {
     /// Where.
-    pub at: Endpoint,
+    pub endpoint: Endpoint,
     /// The vendor's library.
     pub vendor_library: PathBuf,
     /// Number of this computer in the controller's network; found out when not given.
@@ -76,7 +76,7 @@ pub fn parse_hncnet(body: &str, keys: &mut Keys) -> Result<HncNetTarget, String>
     let offset = hnc_offset(keys, mailbox);
     let (at, vendor_library) = (parse_endpoint(body, Some(10001))?, vendor_library?);
     Ok(HncNetTarget {
-        at,
+        endpoint: at,
         vendor_library,
         local_host,
         local_port,

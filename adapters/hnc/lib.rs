@@ -48,14 +48,14 @@ pub mod line;
 mod message;
 mod offsets;
 mod open;
-mod own;
+mod own_value;
 pub mod sampling;
 mod source;
 
 pub use actuator::HncActuator;
 pub use child::serve_parent;
 pub use open::{build_offset_sink, open_address, open_sampled};
-pub use own::OwnValue;
+pub use own_value::OwnValue;
 pub use source::{HncSource, list_channels as delivered};
 
 /// What the hidden subcommand calls this child.

@@ -25,7 +25,7 @@ pub struct HncSettings {
     /// The library's file.
     pub vendor_library: PathBuf,
     /// Where the controller is.
-    pub at: Endpoint,
+    pub endpoint: Endpoint,
     /// Number of this computer in the controller's network; `None` is found out.
     pub local_host: Option<String>,
     /// Port of the library's own listener.
@@ -59,7 +59,7 @@ struct HncConnection {
 /// A handle on the child; clones are handles on the same one.
 #[derive(Clone)]
 pub struct HncLine {
-    inner: Arc<Mutex<HncConnection>>,
+    connection: Arc<Mutex<HncConnection>>,
     name: String,
 }
 
@@ -72,7 +72,7 @@ impl HncLine {
         child.environment.clone_from(&settings.environment);
         let name = settings.name.clone();
         let inner = HncConnection { child: ChildClient::new(child), settings };
-        Self { inner: Arc::new(Mutex::new(inner)), name }
+        Self { connection: Arc::new(Mutex::new(inner)), name }
     }
 
     /// The address.
@@ -188,7 +188,7 @@ impl HncLine {
     }
 
     fn lock_connection(&self) -> MutexGuard<'_, HncConnection> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+        self.connection.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -248,10 +248,10 @@ impl HncConnection {
         let settings = &self.settings;
         let ask = HncRequest::Open {
             vendor_library: settings.vendor_library.clone(),
-            local_host: settings.local_host.clone().unwrap_or_else(|| local_host(&settings.at)),
+            local_host: settings.local_host.clone().unwrap_or_else(|| local_host(&settings.endpoint)),
             local_port: settings.local_port,
-            host: settings.at.host.clone(),
-            port: settings.at.port,
+            host: settings.endpoint.host.clone(),
+            port: settings.endpoint.port,
             long_bytes: settings.long_bytes,
         };
         let told = self.child.request_answer(&ask).map_err(|error| self.child_failed(&error, "opening"));

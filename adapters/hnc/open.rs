@@ -27,7 +27,7 @@ pub fn open_sampled(name: &str, target: &HncNetTarget, sink: Option<BlockSink>) 
     let line = HncLine::new(HncSettings {
         name: name.to_owned(),
         vendor_library: target.vendor_library.clone(),
-        at: target.at.clone(),
+        endpoint: target.endpoint.clone(),
         local_host: target.local_host.clone(),
         local_port: target.local_port,
         long_bytes: target.long_bytes,

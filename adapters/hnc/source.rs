@@ -4,7 +4,7 @@ use super::answer::{HncItemError, HncItemResult};
 use super::decode::{Answers, extract_number, extract_text, extract_whole, format_alarms};
 use super::item::{self, HncItem, HncWidth, axis, channel, define_real_item, define_whole_item};
 use super::line::{Alive, HncLine};
-use super::own::OwnValue;
+use super::own_value::OwnValue;
 use super::sampling::{Sampled, Sampling};
 use adapter_core::channel::ChannelId;
 use adapter_core::clock::Clock;

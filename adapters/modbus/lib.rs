@@ -36,7 +36,7 @@ pub mod line;
 mod meter;
 mod number;
 mod outputs;
-mod own;
+mod own_register;
 pub mod pdu;
 mod plan;
 mod poll;
@@ -49,7 +49,7 @@ mod tcp;
 
 pub use meter::ModbusMeter;
 pub use number::{Format, WordOrder};
-pub use own::{InRegisters, OwnRegister};
+pub use own_register::{InRegisters, OwnRegister};
 pub use plan::{PollBlocks, wire_time};
 pub use refresh::Refresh;
 pub use tcp::TcpFraming;

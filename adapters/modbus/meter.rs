@@ -2,7 +2,7 @@
 
 use super::line::{ModbusError, ModbusLine};
 use super::outputs::{self, MeterChannel};
-use super::own::OwnRegister;
+use super::own_register::OwnRegister;
 use super::plan::PollBlocks;
 use super::poll::RegisterPoll;
 use super::profile::{self, Profile};
@@ -168,7 +168,7 @@ impl ModbusMeter {
 
 /// What a point is called on this machine, as a fact.
 fn point_name(register: &MeterRegister) -> Option<Fact> {
-    let RegisterMeaning::Channel(channel) = register.quantity else { return None };
+    let RegisterMeaning::Channel(channel) = register.meaning else { return None };
     let name = register.name.as_ref()?;
     Some(Fact::from_text(channel.name(), name.clone()))
 }

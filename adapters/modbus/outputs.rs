@@ -110,7 +110,7 @@ pub(super) fn list_registers(profile: &Profile, meter: &MeterTarget) -> Result<V
     };
     let scaled = |register: &MeterRegister| {
         let mut register = register.clone();
-        register.conversion.scale *= ratio(register.quantity);
+        register.conversion.scale *= ratio(register.meaning);
         register
     };
     Ok(profile.registers.iter().map(scaled).collect())
@@ -123,7 +123,7 @@ pub(super) fn list_registers(profile: &Profile, meter: &MeterTarget) -> Result<V
 pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel>, String> {
     let all = |wanted: &dyn Fn(RegisterMeaning) -> bool| -> Vec<usize> {
         let each = profile.registers.iter().enumerate();
-        each.filter(|(_, register)| wanted(register.quantity)).map(|(at, _)| at).collect()
+        each.filter(|(_, register)| wanted(register.meaning)).map(|(at, _)| at).collect()
     };
     let one = |wanted: RegisterMeaning| all(&|quantity| quantity == wanted);
     let (total, line) = (one(RegisterMeaning::Power), one(RegisterMeaning::LineVoltage));
@@ -153,7 +153,7 @@ pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<M
         add(&name, Law::Mean, believed, one(meaning));
     }
     for (at, register) in profile.registers.iter().enumerate() {
-        if let RegisterMeaning::Channel(channel) = register.quantity {
+        if let RegisterMeaning::Channel(channel) = register.meaning {
             let believed = if channel.channel().is_electric() { Believed::WithAll } else { Believed::Always };
             outputs.push(MeterChannel { channel, law: Law::Sum, believed, parts: vec![at] });
         }
@@ -178,7 +178,7 @@ pub(super) fn collect_supply_values(registers: &[MeterRegister], poll: &Register
                 *place = number;
             }
         };
-        match register.quantity {
+        match register.meaning {
             RegisterMeaning::Power => values.power = number,
             RegisterMeaning::PhasePower(at) => phase(&mut values.phase_power, at),
             RegisterMeaning::Current(at) => phase(&mut values.current, at),

@@ -16,7 +16,7 @@ type BlockAnswer = (Result<Vec<u16>, u8>, Stamp);
 #[derive(Debug, Clone)]
 pub(super) struct RegisterPoll {
     /// As the profile has it.
-    whole: PollBlocks,
+    initial_blocks: PollBlocks,
     /// As the meter gives it.
     blocks: PollBlocks,
     answers: Vec<BlockAnswer>,
@@ -26,7 +26,7 @@ pub(super) struct RegisterPoll {
 
 impl RegisterPoll {
     pub(super) fn new(blocks: PollBlocks) -> Self {
-        Self { whole: blocks.clone(), blocks, answers: Vec::new(), stamp: Stamp::from_exact_time(0) }
+        Self { initial_blocks: blocks.clone(), blocks, answers: Vec::new(), stamp: Stamp::from_exact_time(0) }
     }
 
     /// Asks for everything once. A block that is refused is kept as refused while another one is answered.
@@ -56,7 +56,7 @@ impl RegisterPoll {
             return Ok(());
         }
         // Perhaps it is another meter now: the next poll begins with whole blocks again.
-        self.blocks = self.whole.clone();
+        self.blocks = self.initial_blocks.clone();
         let (code, told) = refused.unwrap_or((2, "any register".to_owned()));
         Err((ModbusError::Refused(code), told))
     }
@@ -106,7 +106,7 @@ impl RegisterPoll {
 
     /// Did the meter refuse a block of the profile?
     pub(super) fn is_split(&self) -> bool {
-        self.blocks != self.whole
+        self.blocks != self.initial_blocks
     }
 
     /// What a poll takes on a serial line.

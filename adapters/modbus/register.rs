@@ -35,7 +35,7 @@ pub enum RegisterMeaning {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeterRegister {
     /// What it means.
-    pub quantity: RegisterMeaning,
+    pub meaning: RegisterMeaning,
     /// In which table.
     pub table: RegisterTable,
     /// Protocol address of its first register.
@@ -165,7 +165,7 @@ pub(super) fn read(raw: &RawValue, whole: Whole) -> Result<MeterRegister, String
     }
     let given = raw.no_value.as_ref().map(|bits| bits.iter().map(|bits| bits.cast_unsigned()).collect());
     Ok(MeterRegister {
-        quantity,
+        meaning: quantity,
         table,
         address,
         format: raw.r#type,

@@ -170,7 +170,7 @@ impl ServedMeter {
         }
         let mut image = vec![0_u16; to - from];
         for register in registers {
-            let number = find_number(register.quantity, values, spindle).unwrap_or(f64::NAN);
+            let number = find_number(register.meaning, values, spindle).unwrap_or(f64::NAN);
             let number = (number - register.conversion.offset) / register.conversion.scale;
             let words = register.format.encode(number, register.order);
             for (offset, word) in words.into_iter().enumerate() {

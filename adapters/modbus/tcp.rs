@@ -40,7 +40,7 @@ pub enum TcpFraming {
 /// One connection to a host and port, with every unit that is asked over it: a converter to a serial line serves one client as a
 /// rule, and one request at a time in any case.
 struct TcpPort {
-    at: Endpoint,
+    endpoint: Endpoint,
     framing: TcpFraming,
     stream: Option<TcpStream>,
     transaction: u16,
@@ -64,7 +64,7 @@ fn open_shared_port(at: &Endpoint, framing: TcpFraming) -> Result<SharedPort, St
     ports.retain(|_, port| port.strong_count() > 0);
     let key = (at.host.clone(), at.port);
     let Some(port) = ports.get(&key).and_then(Weak::upgrade) else {
-        let new = TcpPort { at: at.clone(), framing, stream: None, transaction: 0, stray: 0, quiet_until: None };
+        let new = TcpPort { endpoint: at.clone(), framing, stream: None, transaction: 0, stray: 0, quiet_until: None };
         let port = Arc::new(Mutex::new(new));
         ports.insert(key, Arc::downgrade(&port));
         return Ok(port);
@@ -110,7 +110,7 @@ impl TcpPort {
     /// for and thrown away.
     fn discard_late_answer(&mut self, deadline: Duration) {
         let Some(quiet_until) = self.quiet_until.take().filter(|until| *until > Instant::now()) else { return };
-        let Ok(mut stream) = connect_device(&self.at, Instant::now() + deadline) else { return };
+        let Ok(mut stream) = connect_device(&self.endpoint, Instant::now() + deadline) else { return };
         let (mut late, mut until) = (Vec::new(), quiet_until);
         while late.len() < rtu::BYTES_MAX && stream::append_available(&mut stream, &mut late, until).is_ok() {
             until = Instant::now() + SILENCE;
@@ -122,8 +122,8 @@ impl TcpPort {
     fn attempt_exchange(&mut self, clock: &dyn Clock, asked: TcpRequest<'_>) -> Result<ModbusResponse, Attempt> {
         self.transaction = self.transaction.wrapping_add(1);
         let open = self.stream.take();
-        let connected = open.map_or_else(|| connect_device(&self.at, asked.until), Ok);
-        let mut stream = connected.map_err(|error| Attempt::Failed(build_unreachable_error(&self.at, &error)))?;
+        let connected = open.map_or_else(|| connect_device(&self.endpoint, asked.until), Ok);
+        let mut stream = connected.map_err(|error| Attempt::Failed(build_unreachable_error(&self.endpoint, &error)))?;
         let began_ns = clock.now_ns();
         let bytes = match self.framing {
             TcpFraming::Tcp => encode_frame(self.transaction, asked.unit, asked.request),

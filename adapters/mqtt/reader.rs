@@ -16,7 +16,7 @@ pub(super) const READ_PAUSE: Duration = Duration::from_millis(200);
 /// The writing half of the connection; one packet at a time.
 #[derive(Debug)]
 pub(super) struct PacketWriter {
-    line: Arc<TcpConnection>,
+    connection: Arc<TcpConnection>,
     /// When something was sent last. Held while it is sent: one packet at a time.
     sent: Mutex<Sent>,
 }
@@ -30,25 +30,25 @@ struct Sent {
 
 impl PacketWriter {
     pub(super) fn new(line: Arc<TcpConnection>) -> Self {
-        Self { line, sent: Mutex::new(Sent { at: Instant::now(), pings: 0 }) }
+        Self { connection: line, sent: Mutex::new(Sent { at: Instant::now(), pings: 0 }) }
     }
 
     pub(super) fn write(&self, packet: &[u8]) -> std::io::Result<()> {
         let mut sent = self.sent.lock().unwrap_or_else(PoisonError::into_inner);
         sent.at = Instant::now();
-        self.line.write_all(packet)
+        self.connection.write_all(packet)
     }
 
     /// Asks for a sign of life; how many have been asked for with this one.
     pub(super) fn send_ping(&self) -> std::io::Result<u64> {
         let mut sent = self.sent.lock().unwrap_or_else(PoisonError::into_inner);
         (sent.at, sent.pings) = (Instant::now(), sent.pings + 1);
-        self.line.write_all(&PING).map(|()| sent.pings)
+        self.connection.write_all(&PING).map(|()| sent.pings)
     }
 
     /// Ends the connection in both directions; the reading thread ends by it.
     pub(super) fn shut_connection(&self) {
-        self.line.shut_connection();
+        self.connection.shut_connection();
     }
 
     fn idle_time(&self, now: Instant) -> Duration {
@@ -76,7 +76,7 @@ impl Reader {
         let mut heard = Instant::now();
         self.dispatch_packets()?;
         loop {
-            match self.writer.line.read(&mut buffer) {
+            match self.writer.connection.read(&mut buffer) {
                 Ok(0) => return Ok(()),
                 Ok(count) => {
                     heard = Instant::now();

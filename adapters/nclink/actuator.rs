@@ -16,20 +16,20 @@ const OVERRIDE: &str = "FEED_OVERRIDE";
 pub struct NcLinkActuator {
     line: RegisterLine,
     mailbox: Mailbox,
-    last: MailboxRequest,
+    last_request: MailboxRequest,
 }
 
 impl NcLinkActuator {
     /// A mailbox that begins at this register.
     #[must_use]
     pub fn new(link: Link, first: ControllerRegister) -> Self {
-        Self { line: RegisterLine::new(link), mailbox: Mailbox::new(first), last: MailboxRequest::Release }
+        Self { line: RegisterLine::new(link), mailbox: Mailbox::new(first), last_request: MailboxRequest::Release }
     }
 
     /// The last letter once more, with or without a request. What could not be read back is not written.
     fn write_letter(&mut self, request: Option<LadderRequest>) -> Result<(), SourceError> {
         self.line.check_item(OVERRIDE)?;
-        let words = self.mailbox.build_letter(self.last, request);
+        let words = self.mailbox.build_letter(self.last_request, request);
         self.line.write(&words)
     }
 }
@@ -40,12 +40,12 @@ impl Actuator for NcLinkActuator {
     }
 
     fn write_feed_override(&mut self, _: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
-        self.last = MailboxRequest::Override(wanted);
+        self.last_request = MailboxRequest::Override(wanted);
         self.write_letter(None)
     }
 
     fn release_override(&mut self, _: &dyn Clock) -> Result<(), SourceError> {
-        self.last = MailboxRequest::Release;
+        self.last_request = MailboxRequest::Release;
         self.write_letter(None)
     }
 

@@ -14,7 +14,7 @@ use adapter_core::tls::TlsFiles;
 #[derive(Debug, Clone, PartialEq)]
 pub struct NcLinkTarget {
     /// The broker.
-    pub at: Endpoint,
+    pub endpoint: Endpoint,
     /// Serial number of the device.
     pub serial: String,
     /// The files of TLS, where the line is secured.
@@ -63,7 +63,7 @@ pub fn parse_nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<NcLinkTarg
     let at = parse_endpoint(broker, Some(if tls { 8883 } else { 1883 }))?;
     let serial = serial.to_owned();
     Ok(NcLinkTarget {
-        at,
+        endpoint: at,
         serial,
         tls: files,
         login,

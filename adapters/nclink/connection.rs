@@ -44,8 +44,8 @@ impl Link {
     pub fn from_target(name: &str, target: &NcLinkTarget, login: Option<(String, String)>) -> Self {
         Self {
             name: name.to_owned(),
-            host: target.at.host.clone(),
-            port: target.at.port,
+            host: target.endpoint.host.clone(),
+            port: target.endpoint.port,
             serial: target.serial.clone(),
             login,
             tls: target.tls.clone(),

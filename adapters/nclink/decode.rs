@@ -1,6 +1,6 @@
 //! State words, alarms and names out of what an HNC-8 says.
 
-use super::liberal::{find_field, find_text, parse_number};
+use super::lenient_json::{find_field, find_text, parse_number};
 use adapter_core::text::last_part;
 use adapter_core::words::{execution, mode, operation};
 use serde_json::Value;

@@ -1,7 +1,7 @@
 //! Query and set: requests as JSON, answers as values or reasons. Wire forms: T/CMTBA 1008.5 and the recorded messages of
 //! open implementations.
 
-use super::liberal::{find_field, find_list, find_text, parse_number};
+use super::lenient_json::{find_field, find_list, find_text, parse_number};
 use serde_json::{Value, json};
 
 /// What is asked of one data item.

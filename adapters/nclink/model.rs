@@ -3,7 +3,7 @@
 //! A path is the types of the components above an item, each with `@` and its number where it has one:
 //! `AXIS@5/MOTOR/CURRENT`, `CONTROLLER/VARIABLE@REG_G`. The device itself is not part of it.
 
-use super::liberal::{find_flag, find_list, find_text, parse_number};
+use super::lenient_json::{find_flag, find_list, find_text, parse_number};
 use serde_json::Value;
 use std::collections::HashMap;
 

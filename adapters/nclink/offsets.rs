@@ -2,7 +2,7 @@
 
 use super::connection::Link;
 use super::decode::{ChannelWord, status_word};
-use super::liberal::parse_integer;
+use super::lenient_json::parse_integer;
 use super::mailbox::ControllerRegister;
 use super::message::{NcLinkAnswer, RequestedItem};
 use super::offset_mailbox::RegisterAccess;

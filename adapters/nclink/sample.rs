@@ -1,6 +1,6 @@
 //! One message of a sample channel: a column of values per item, and when they were true on the device's clock.
 
-use super::liberal::{find_field, find_list, find_text, parse_integer, parse_number};
+use super::lenient_json::{find_field, find_list, find_text, parse_integer, parse_number};
 use super::model::Model;
 use serde_json::Value;
 

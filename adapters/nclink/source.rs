@@ -4,10 +4,10 @@ use super::connection::{Connection, Link, Unasked};
 use super::map::{self, NcLinkLayout, NcLinkPoll};
 use super::message::{NcLinkAnswer, RequestedItem};
 use super::model::{Model, ModelItem};
-use super::own::OwnPath;
+use super::own_path::OwnPath;
 use super::sample::SampleBlock;
+use super::sample_tracks::SampleTracks;
 use super::topic::Subject;
-use super::track::SampleTracks;
 use crate::address::NcLinkTarget;
 use adapter_core::channel::ChannelId;
 use adapter_core::clock::Clock;
@@ -35,7 +35,7 @@ pub struct NcLinkSource {
 struct NcLinkSession {
     connection: Connection,
     model: Model,
-    plan: NcLinkPoll,
+    poll: NcLinkPoll,
     by_path: bool,
     /// Has any answer been of use? Until then the other way of naming is tried once.
     understood: bool,
@@ -92,7 +92,7 @@ impl NcLinkSource {
         for message in &unasked {
             self.record_message(message, &session.model);
         }
-        let outcome = answers.map(|(answers, stamp)| session.plan.append_readings(&answers, stamp, out));
+        let outcome = answers.map(|(answers, stamp)| session.poll.append_readings(&answers, stamp, out));
         session.doubtful = matches!(outcome, Err(SourceError::Timeout { .. }));
         // Only a broken line needs another connection.
         self.session = (!matches!(outcome, Err(SourceError::Line { .. }))).then_some(session);
@@ -128,13 +128,13 @@ impl NcLinkSession {
                 what: format!("none of its {} data items is one that the gateway knows", model.items.len()),
             });
         }
-        Ok(Self { connection, model, plan, by_path, understood: false, turned: false, doubtful: false })
+        Ok(Self { connection, model, poll: plan, by_path, understood: false, turned: false, doubtful: false })
     }
 
     /// Asks a device that was silent for its model again.
     fn renew_model(&mut self, layout: NcLinkLayout, own: &[Own<OwnPath>]) -> Result<(), SourceError> {
         self.model = self.connection.probe_model()?;
-        self.plan = NcLinkPoll::from_model(&self.model, layout, own, self.by_path);
+        self.poll = NcLinkPoll::from_model(&self.model, layout, own, self.by_path);
         self.doubtful = false;
         Ok(())
     }
@@ -151,7 +151,7 @@ impl NcLinkSession {
         }
         loop {
             let began_ns = clock.now_ns();
-            let answers = self.connection.query_values(self.plan.requested_items())?;
+            let answers = self.connection.query_values(self.poll.requested_items())?;
             let stamp = Stamp::of_request(began_ns, clock.now_ns());
             self.understood |= answers.iter().any(|answer| matches!(answer, Some(Ok(_))));
             if self.understood || self.turned {
@@ -159,7 +159,7 @@ impl NcLinkSession {
             }
             self.turned = true;
             self.by_path = !self.by_path;
-            self.plan = NcLinkPoll::from_model(&self.model, layout, own, self.by_path);
+            self.poll = NcLinkPoll::from_model(&self.model, layout, own, self.by_path);
         }
     }
 }
@@ -200,7 +200,7 @@ impl Source for NcLinkSource {
     }
 
     fn list_problems(&self) -> Vec<SourceProblem> {
-        self.session.as_ref().map_or_else(Vec::new, |session| session.plan.problems().to_vec())
+        self.session.as_ref().map_or_else(Vec::new, |session| session.poll.problems().to_vec())
     }
 
     fn list_offers(&mut self, _: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
@@ -232,7 +232,7 @@ impl NcLinkSession {
                 offers.push(Offer {
                     name: item.path.clone(),
                     says: describe_answer(item, answer),
-                    channel: self.plan.find_channel(name),
+                    channel: self.poll.find_channel(name),
                 });
             }
         }

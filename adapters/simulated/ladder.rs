@@ -99,7 +99,7 @@ pub(super) struct Ladder {
     settings: LadderSettings,
     dial: OverridePct,
     mail: Option<Mail>,
-    letters: VecDeque<(TimeNs, LadderInput)>,
+    inputs: VecDeque<(TimeNs, LadderInput)>,
     feed_hold: Option<Latch>,
     stop: Option<Latch>,
     counts: LadderCounts,
@@ -111,7 +111,7 @@ impl Ladder {
             settings,
             dial: OverridePct::FULL,
             mail: None,
-            letters: VecDeque::new(),
+            inputs: VecDeque::new(),
             feed_hold: None,
             stop: None,
             counts: LadderCounts::default(),
@@ -127,17 +127,17 @@ impl Ladder {
             LadderInput::Ask(LadderRequest::Stop) => self.counts.stops += 1,
             LadderInput::Dial(_) => {}
         }
-        if self.letters.len() >= LETTERS_MAX {
-            self.letters.pop_back();
+        if self.inputs.len() >= LETTERS_MAX {
+            self.inputs.pop_back();
         }
         let due_ns = at_ns.saturating_add(to_nanoseconds(self.settings.scan));
-        let earliest_ns = self.letters.back().map_or(due_ns, |(due_ns, _)| *due_ns);
-        self.letters.push_back((due_ns.max(earliest_ns), letter));
+        let earliest_ns = self.inputs.back().map_or(due_ns, |(due_ns, _)| *due_ns);
+        self.inputs.push_back((due_ns.max(earliest_ns), letter));
     }
 
     /// One scan.
     pub(super) fn run_scan(&mut self, at_ns: TimeNs) {
-        while let Some((due_ns, letter)) = self.letters.pop_front_if(|(due_ns, _)| *due_ns <= at_ns) {
+        while let Some((due_ns, letter)) = self.inputs.pop_front_if(|(due_ns, _)| *due_ns <= at_ns) {
             self.apply_letter(due_ns, letter);
         }
         let heartbeat_ns = to_nanoseconds(self.settings.heartbeat);

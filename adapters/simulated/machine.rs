@@ -29,11 +29,11 @@ const REMEMBERED: usize = 800;
 
 pub(super) struct Machine {
     settings: SimulatedSettings,
-    frame: &'static MachineSnapshot,
+    snapshot: &'static MachineSnapshot,
     origin_ns: TimeNs,
     /// Steps made so far; the newest moment is that of step `steps - 1`.
     steps: i64,
-    remembered: VecDeque<Moment>,
+    moments: VecDeque<Moment>,
     plant: Plant,
     control: Control,
     ladder: Ladder,
@@ -62,10 +62,10 @@ impl Machine {
         };
         let mut machine = Self {
             settings,
-            frame,
+            snapshot: frame,
             origin_ns,
             steps: 0,
-            remembered: VecDeque::with_capacity(REMEMBERED),
+            moments: VecDeque::with_capacity(REMEMBERED),
             plant: Plant::new(frame, settings.tau_s, settings.start_peak_w, rng(2)),
             control: Control::new(planner, rng(3), frame, settings.wear_mm),
             ladder: Ladder::new(settings.ladder),
@@ -134,9 +134,9 @@ impl Machine {
     }
 
     fn remembered_step(&self, step: i64) -> Moment {
-        let first = self.steps - i64::try_from(self.remembered.len()).unwrap_or(0);
-        let index = usize::try_from(step - first).unwrap_or(0).min(self.remembered.len() - 1);
-        self.remembered[index]
+        let first = self.steps - i64::try_from(self.moments.len()).unwrap_or(0);
+        let index = usize::try_from(step - first).unwrap_or(0).min(self.moments.len() - 1);
+        self.moments[index]
     }
 
     /// The running integrals at exactly `at_ns`.
@@ -196,8 +196,8 @@ impl Machine {
             self.engaged = 0.0;
         }
         let now = self.collect_circumstances();
-        let stage = self.frame.stage(self.control.demand.gear_stage);
-        self.load = cutting::compute_load(self.frame, stage, &self.cut, &now, self.cut_level(since_s));
+        let stage = self.snapshot.stage(self.control.demand.gear_stage);
+        self.load = cutting::compute_load(self.snapshot, stage, &self.cut, &now, self.cut_level(since_s));
         let lathe = self.settings.machine == SimulatedMachine::Lathe;
         let tool = self.control.tool_index();
         self.control.wear_mm[tool] += STEP_S * self.settings.day.wear_factor * cutting::wear_rate_mm_s(lathe, &now);
@@ -242,8 +242,8 @@ impl Machine {
     }
 
     fn record_moment(&mut self, at_ns: TimeNs) {
-        if self.remembered.len() >= REMEMBERED {
-            self.remembered.pop_front();
+        if self.moments.len() >= REMEMBERED {
+            self.moments.pop_front();
         }
         let moment = Moment {
             panel: self.build_panel(),
@@ -251,7 +251,7 @@ impl Machine {
             truth: self.build_truth(at_ns),
             integrals: self.integrals,
         };
-        self.remembered.push_back(moment);
+        self.moments.push_back(moment);
     }
 
     fn classify_state(&self) -> TrueState {

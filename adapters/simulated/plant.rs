@@ -32,7 +32,7 @@ pub(super) enum Spin {
 /// State of the physics.
 #[derive(Debug, Clone)]
 pub(super) struct Plant {
-    frame: &'static MachineSnapshot,
+    snapshot: &'static MachineSnapshot,
     tau_s: f64,
     start_peak_w: f64,
     rng: Pcg64Mcg,
@@ -61,7 +61,7 @@ pub(super) struct Plant {
 impl Plant {
     pub(super) fn new(frame: &'static MachineSnapshot, tau_s: f64, start_peak_w: f64, rng: Pcg64Mcg) -> Self {
         Self {
-            frame,
+            snapshot: frame,
             tau_s,
             start_peak_w,
             rng,
@@ -115,14 +115,14 @@ impl Plant {
     fn speed_step(&self, dt_s: f64) -> f64 {
         let free = (self.target_rpm - self.speed_rpm) * (1.0 - (-dt_s / (0.6 * self.tau_s)).exp());
         let rad_s = (self.speed_rpm.abs() * TAU / 60.0).max(10.0);
-        let limit = self.frame.acceleration_limit_w / (self.frame.inertia_kg_m2 * rad_s) * dt_s * 60.0 / TAU;
+        let limit = self.snapshot.acceleration_limit_w / (self.snapshot.inertia_kg_m2 * rad_s) * dt_s * 60.0 / TAU;
         free.clamp(-limit, limit)
     }
 
     /// `J w dw/dt`; braking returns seven tenths to the supply.
     fn acceleration_power(&self, before_rpm: f64, dt_s: f64) -> f64 {
         let (w0, w1) = (before_rpm * TAU / 60.0, self.speed_rpm * TAU / 60.0);
-        let power = self.frame.inertia_kg_m2 * (w1 * w1 - w0 * w0) / (2.0 * dt_s);
+        let power = self.snapshot.inertia_kg_m2 * (w1 * w1 - w0 * w0) / (2.0 * dt_s);
         if power < 0.0 { 0.7 * power } else { power }
     }
 
@@ -148,7 +148,7 @@ impl Plant {
         if w < 0.2 {
             return 0.0;
         }
-        let stage = self.frame.stage(gear_stage);
+        let stage = self.snapshot.stage(gear_stage);
         let viscosity = (-0.012 * (self.bearing_c - 40.0)).exp();
         let field_w = stage.field_w * (self.supply_v / 400.0).powi(2);
         let friction_w = stage.dry_nm * w + stage.viscous * w.powf(1.6) * viscosity;
@@ -169,10 +169,10 @@ impl Plant {
         // The accumulator of the hydraulics is charged for 6 s in every 41 s.
         let charging = if since_s % 41.0 < 6.0 { 1.9 } else { 1.0 };
         let axes_w = on(demand.drives_on, 0.055 * demand.axis_mm_min);
-        self.frame.control_w
-            + on(demand.drives_on, self.frame.drives_w)
-            + on(demand.hydraulics_on, self.frame.hydraulics_w * charging)
-            + on(demand.coolant_on, self.frame.coolant_w)
+        self.snapshot.control_w
+            + on(demand.drives_on, self.snapshot.drives_w)
+            + on(demand.hydraulics_on, self.snapshot.hydraulics_w * charging)
+            + on(demand.coolant_on, self.snapshot.coolant_w)
             + axes_w
     }
 
@@ -204,7 +204,7 @@ impl Plant {
 
     /// Load display of the drive in percent of its rated power; like a real one it stops at a full scale.
     pub(super) fn load_display_pct(&self) -> f64 {
-        (100.0 * self.load_display_w / self.frame.rated_w).clamp(-LOAD_DISPLAY_MAX_PCT, LOAD_DISPLAY_MAX_PCT)
+        (100.0 * self.load_display_w / self.snapshot.rated_w).clamp(-LOAD_DISPLAY_MAX_PCT, LOAD_DISPLAY_MAX_PCT)
     }
 
     /// Magnetising current and the current that makes torque, at right angles.
@@ -213,7 +213,7 @@ impl Plant {
             return 0.0;
         }
         let active_a = spindle_w / (3_f64.sqrt() * self.supply_v * 0.92);
-        self.frame.magnetising_a.hypot(active_a)
+        self.snapshot.magnetising_a.hypot(active_a)
     }
 
     /// Growth of the spindle nose towards the work, and bending of the bed.

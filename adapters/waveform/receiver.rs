@@ -21,7 +21,7 @@ struct OpenStream {
 /// Reads a stream and keeps it open.
 pub struct Receiver {
     name: String,
-    at: Endpoint,
+    endpoint: Endpoint,
     open: Option<OpenStream>,
     intake: Intake,
 }
@@ -30,7 +30,7 @@ impl Receiver {
     /// A receiver that connects at the first read. `name` is the address.
     #[must_use]
     pub fn new(name: &str, at: &Endpoint) -> Self {
-        Self { name: name.to_owned(), at: at.clone(), open: None, intake: Intake::default() }
+        Self { name: name.to_owned(), endpoint: at.clone(), open: None, intake: Intake::default() }
     }
 
     /// What has come so far.
@@ -55,7 +55,7 @@ impl Receiver {
     }
 
     fn connect_sampler(&mut self, until: Instant) -> Result<OpenStream, SourceError> {
-        let connected = stream::connect_host(&self.at, until);
+        let connected = stream::connect_host(&self.endpoint, until);
         let mut stream = connected.map_err(|error| self.build_line_error(&format!("cannot connect: {error}")))?;
         let header = self.header_line(&mut stream, until)?;
         self.intake.record_connection(header.clone());

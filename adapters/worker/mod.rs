@@ -77,7 +77,7 @@ struct Shared {
     /// Polls and short waits that are over: it grows unless the thread hangs.
     steps: AtomicU64,
     queue: Mutex<Queue>,
-    ledger: Mutex<WorkerCounters>,
+    counters: Mutex<WorkerCounters>,
 }
 
 /// A source on its own thread.
@@ -104,7 +104,7 @@ impl Worker {
             stop: AtomicBool::new(false),
             steps: AtomicU64::new(0),
             queue: Mutex::new(Queue::new(settings.queue_polls)),
-            ledger: Mutex::new(ledger),
+            counters: Mutex::new(ledger),
         });
         let asked_ns = TimeNs::MIN;
         let mut poller = Poller {
@@ -142,7 +142,7 @@ impl Worker {
                 merge.record_failure(source, poll.ended_ns, error);
             }
         });
-        if let Some(period) = locked(&self.shared.ledger).take_new_pace() {
+        if let Some(period) = locked(&self.shared.counters).take_new_pace() {
             merge.set_period(source, period);
         }
         polls
@@ -161,7 +161,7 @@ impl Worker {
     #[must_use]
     pub fn stats(&self, now_ns: TimeNs) -> WorkerStats {
         let dropped = locked(&self.shared.queue).count_dropped();
-        locked(&self.shared.ledger).build_stats(now_ns, dropped)
+        locked(&self.shared.counters).build_stats(now_ns, dropped)
     }
 
     /// Polls and short waits between them that are over. Whoever looks twice sees whether the thread moves.
@@ -227,7 +227,7 @@ impl Poller {
             self.plausibility.record_readings(&poll.readings);
             locked(&self.shared.queue).push_poll(poll);
             self.follow_pace();
-            locked(&self.shared.ledger).poll_over(due_ns, began_ns, ended_ns, error.as_ref());
+            locked(&self.shared.counters).poll_over(due_ns, began_ns, ended_ns, error.as_ref());
             self.take_facts(ended_ns);
             self.take_problems(error.is_none());
             if matches!(error, Some(SourceError::End { .. })) {
@@ -236,14 +236,14 @@ impl Poller {
             due_ns = self.next_due(due_ns, ended_ns, error.as_ref());
             self.sleep_until(due_ns);
         }
-        locked(&self.shared.ledger).record_stop(self.clock.now_ns());
+        locked(&self.shared.counters).record_stop(self.clock.now_ns());
     }
 
     /// The device may keep a slower pace than was wanted.
     fn follow_pace(&mut self) {
         let wanted = self.settings.period.unwrap_or_else(|| self.source.period());
         self.period = wanted.max(self.source.achievable_period());
-        locked(&self.shared.ledger).set_beat(self.period);
+        locked(&self.shared.counters).set_beat(self.period);
     }
 
     fn take_facts(&mut self, now_ns: TimeNs) {
@@ -252,7 +252,7 @@ impl Poller {
         }
         self.asked_ns = now_ns;
         let facts = self.source.collect_facts().into_iter().chain(self.plausibility.build_fact()).collect();
-        locked(&self.shared.ledger).set_facts(facts);
+        locked(&self.shared.counters).set_facts(facts);
     }
 
     /// A source that does not answer has an error instead.
@@ -262,7 +262,7 @@ impl Poller {
         } else {
             Vec::new()
         };
-        locked(&self.shared.ledger).set_problems(problems);
+        locked(&self.shared.counters).set_problems(problems);
     }
 
     fn stopping(&self) -> bool {
@@ -271,7 +271,7 @@ impl Poller {
 
     fn poll(&mut self, mut readings: Vec<Reading>) -> (TimeNs, Poll) {
         let began_ns = self.clock.now_ns();
-        locked(&self.shared.ledger).poll_began(began_ns);
+        locked(&self.shared.counters).poll_began(began_ns);
         let read = AssertUnwindSafe(|| self.source.read(self.clock.as_ref(), &mut readings));
         let result = catch_unwind(read).unwrap_or_else(|_| Err(panicked(self.source.name())));
         (began_ns, Poll { ended_ns: self.clock.now_ns(), readings, error: result.err() })
@@ -291,7 +291,7 @@ impl Poller {
         }
         let beats = (ended_ns - due_ns).max(0) / period_ns;
         if beats > 0 {
-            locked(&self.shared.ledger).count_missed(beats.unsigned_abs());
+            locked(&self.shared.counters).count_missed(beats.unsigned_abs());
         }
         due_ns + (beats + 1) * period_ns
     }

@@ -59,7 +59,7 @@ pub(super) struct DiagnoseArguments {
 pub(super) fn diagnose_recordings(arguments: DiagnoseArguments) -> CommandResult {
     let (model, given) = read_inputs(&arguments)?;
     given.warnings.iter().for_each(|warning| eprintln!("{}", localize_text(warning)));
-    let examination = twin::examine(&given.recording, &model);
+    let examination = twin::examine_recording(&given.recording, &model);
     let mut unusable = examination.unusable;
     unusable.extend(collect_outputs(&arguments).find_unwritable_files());
     let context = DiagnosisContext::from_recording(&given.recording, &model, given.warnings.clone());
@@ -69,7 +69,7 @@ pub(super) fn diagnose_recordings(arguments: DiagnoseArguments) -> CommandResult
         return Err(cannot_use(&unusable));
     }
     examination.notes.iter().for_each(|note| eprintln!("{}{note}", pick_text("note: ", "提示：")));
-    let found = twin::diagnose(&given.recording, &model, arguments.seed);
+    let found = twin::diagnose_recording(&given.recording, &model, arguments.seed);
     let mut diagnosis = found.map_err(|all| cannot_use(&all))?;
     note_refusals(&mut diagnosis, &given);
     let context = context.with_diagnosis(&model, &diagnosis);

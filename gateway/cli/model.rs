@@ -8,8 +8,8 @@ use crate::diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
 use crate::diagnosis::{read_model, read_recordings_as, simulation, unit_check, write_output};
 use clap::{Args, Subcommand};
 use rules::physics::explain::Language;
-use rules::twin::diagnosis::unit_of;
-use rules::twin::text::short;
+use rules::twin::diagnosis::find_output_unit;
+use rules::twin::text_report::format_short_number;
 use rules::twin::{self};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -125,13 +125,13 @@ fn check_model(path: &Path, recordings: &[String], map: Option<&PathBuf>) -> Com
     let model = read_model(path).map_err(|wrong| super::diagnose::cannot_use(&wrong))?;
     let given = read_recordings_as(recordings, map).map_err(|all| cannot_use_as(&all))?;
     given.warnings.iter().for_each(|warning| print_text(&format!("{}\n", localize_text(warning))));
-    let examination = twin::examine(&given.recording, &model);
+    let examination = twin::examine_recording(&given.recording, &model);
     let (rows, runs) = (given.recording.count_rows(), given.recording.list_runs().len());
     print_text(pick_text(&format!("{rows} rows in {runs} runs\n"), &format!("{rows}行，{runs}个批次\n")));
     if let Ok(simulation) = simulation::run(&given.recording, &model)
         && let Some((rmse, rows)) = simulation.rmse()
     {
-        let (error, unit) = (short(rmse), unit_of(&model.output));
+        let (error, unit) = (format_short_number(rmse), find_output_unit(&model.output));
         print_text(pick_text(
             &format!("the model as given misses {} by {error} {unit} over {rows} rows\n", model.output),
             &format!("按给定模型，{}的误差为{error} {unit}（{rows}行）\n", model.output),

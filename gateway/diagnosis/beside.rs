@@ -8,8 +8,8 @@
 use super::simulation;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Recording};
-use rules::twin::live::{Regime, regime, second::Row};
-use rules::twin::text::short;
+use rules::twin::live::{Regime, regime, second_row::Row};
+use rules::twin::text_report::format_short_number;
 use rules::twin::{Diagnosis, Model};
 use serde::{Deserialize, Serialize};
 
@@ -116,7 +116,7 @@ fn compare_rows(recording: &Recording, output: &str, expected: &[Option<f64>], f
     let Some(recorded) = recording.find_numbers(output) else { return Vec::new() };
     let start_ns = recording.start_ns.unwrap_or(0);
     let one = |row: usize| {
-        let (regime, _) = regime::of(&second_of(recording, row))?;
+        let (regime, _) = regime::classify_row(&second_of(recording, row))?;
         #[expect(clippy::cast_possible_truncation, reason = "seconds of a stretch of some hours")]
         let at_ns = start_ns + (recording.time_s[row] * SECOND_NS as f64) as i64;
         Some(ComparedRow {
@@ -185,11 +185,11 @@ impl BesideModel {
 
     /// How far the machine is from the model in charge, English and Chinese.
     fn difference_words(&self, unit: &str) -> (String, String) {
-        let (en_where, zh_where) = self.regime.words();
-        let amount = format!("{} {unit}", short(self.difference.abs()));
+        let (en_where, zh_where) = self.regime.as_phrases();
+        let amount = format!("{} {unit}", format_short_number(self.difference.abs()));
         // A share of nothing is no figure.
         let share = (self.expected.abs() > self.negligible_difference())
-            .then(|| short(100.0 * self.difference.abs() / self.expected.abs()));
+            .then(|| format_short_number(100.0 * self.difference.abs() / self.expected.abs()));
         let en_share = share.as_ref().map_or(String::new(), |share| format!(" ({share} %)"));
         let zh_share = share.map_or(String::new(), |share| format!("（{share} %）"));
         let (en_way, zh_way) = if self.difference > 0.0 { ("more", "高") } else { ("less", "低") };
@@ -223,7 +223,7 @@ pub fn compose_headline(beside: &[BesideModel], unit: &str, (en, zh): (&str, &st
 }
 
 fn describe_model(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (String, String) {
-    let (en_where, zh_where) = one.regime.words();
+    let (en_where, zh_where) = one.regime.as_phrases();
     if !one.has_difference() {
         return (
             format!(
@@ -237,7 +237,9 @@ fn describe_model(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (S
     let mut zh: Vec<String> = Vec::new();
     let told = |value: f64| value.abs() > 0.05 * one.difference.abs();
     if told(one.by_parameters) {
-        let of = |it: &MovedParameter| format!("{} {} → {} {}", it.name, short(it.before), short(it.after), it.unit);
+        let of = |it: &MovedParameter| {
+            format!("{} {} → {} {}", it.name, format_short_number(it.before), format_short_number(it.after), it.unit)
+        };
         let names: Vec<String> = moved.iter().take(NAMED_MAX).map(of).collect();
         let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
         en.push(format!(

@@ -203,13 +203,13 @@ fn run_job(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Stri
     tell(Stage::Reading, 0)?;
     let Compared { model, recording, reading, from_ns, to_ns } = read_input(job)?;
     tell(Stage::Comparing, recording.count_rows())?;
-    let examination = twin::examine(&recording, &model);
+    let examination = twin::examine_recording(&recording, &model);
     let context = DiagnosisContext::from_recording(&recording, &model, reading);
     if !examination.unusable.is_empty() {
         let doubts = context.doubts.iter().map(|doubt| doubt.text.en.clone());
         return Err(examination.unusable.into_iter().chain(doubts).collect::<Vec<_>>().join("; "));
     }
-    let found = twin::diagnose(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
+    let found = twin::diagnose_recording(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
     let context = context.with_diagnosis(&model, &found);
     tell(Stage::Writing, recording.count_rows())?;
     let beside = match &job.input {
@@ -220,7 +220,7 @@ fn run_job(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Stri
         at_ns: to_ns,
         from_ns,
         to_ns,
-        verdict: found.verdict.word().to_owned(),
+        verdict: found.verdict.as_word().to_owned(),
         summary: describe_finding(&found, &beside),
         json: outputs::diagnosis_to_json(&found, &context).to_string(),
     };

@@ -6,7 +6,7 @@ use super::unit_check::{self, UnitDoubt};
 use adapters::Recording;
 use adapters::bilingual::Bilingual;
 use rules::physics::explain::Language;
-use rules::twin::text::short;
+use rules::twin::text_report::format_short_number;
 use rules::twin::{Diagnosis, Model};
 use serde_json::{Value, json};
 
@@ -95,7 +95,8 @@ impl SeriesErrors {
     /// One sentence.
     #[must_use]
     pub fn describe_errors(&self, unit: &str) -> Bilingual {
-        let [given, fitted, gain, offset] = [self.as_given, self.refitted, self.gain, self.offset].map(short);
+        let [given, fitted, gain, offset] =
+            [self.as_given, self.refitted, self.gain, self.offset].map(format_short_number);
         Bilingual::new(
             format!(
                 "your simulation as given misses the recording by {given} {unit}; times {gain} plus {offset} {unit} it misses by {fitted} {unit}"

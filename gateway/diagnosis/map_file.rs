@@ -4,7 +4,7 @@ use adapters::bilingual::Bilingual;
 use adapters::channel::quantity::unit_of;
 use adapters::recording::Recording;
 use adapters::recording::read::{ColumnPreview, Preview, preview_rows};
-use rules::twin::toml_text;
+use rules::twin::format_toml_text;
 use std::fmt::Write as _;
 
 /// One column of a proposal.
@@ -81,7 +81,7 @@ impl MapProposal {
             .as_deref()
             .or_else(|| self.columns.iter().find(|column| column.is_time).map(|column| column.from.as_str()));
         if let Some(time) = time {
-            let _ = writeln!(text, "column = {}", toml_text(time));
+            let _ = writeln!(text, "column = {}", format_toml_text(time));
         }
         for column in self.columns.iter().filter(|column| !column.is_time && Some(column.from.as_str()) != time) {
             text.push_str(&column_toml(column));
@@ -92,9 +92,9 @@ impl MapProposal {
 
 fn column_toml(column: &ProposedColumn) -> String {
     let to = column.to.as_deref().unwrap_or(&column.from);
-    let mut text = format!("\n[[column]]\nfrom = {}\nto = {}\n", toml_text(&column.from), toml_text(to));
+    let mut text = format!("\n[[column]]\nfrom = {}\nto = {}\n", format_toml_text(&column.from), format_toml_text(to));
     if let Some(unit) = &column.unit {
-        let _ = writeln!(text, "unit = {}", toml_text(unit));
+        let _ = writeln!(text, "unit = {}", format_toml_text(unit));
     }
     let others: Vec<&str> = column.candidates.iter().copied().filter(|candidate| *candidate != to).collect();
     if !others.is_empty() {

@@ -1,7 +1,7 @@
 //! A first model of a machine, with a word about every line: what `model new` writes and the page offers.
 
 use super::series::series_model_text;
-use rules::twin::toml_text;
+use rules::twin::format_toml_text;
 use std::fmt::Write as _;
 
 /// What is modelled.
@@ -95,9 +95,9 @@ impl NewModel {
             "What the simulation believes (model/1). Numbers are first guesses: diagnose refits all but those in `fixed`.",
             "仿真模型（model/1）。数值只是初值：除fixed外，诊断时都会重新拟合。",
         );
-        let _ = write!(text, "schema = \"model/1\"\nname = {}\n", toml_text(&self.name));
+        let _ = write!(text, "schema = \"model/1\"\nname = {}\n", format_toml_text(&self.name));
         write_comment(&mut text, "the recorded quantity that is simulated", "被仿真的实测量");
-        let _ = write!(text, "output = {}\n\n", toml_text(&self.output_name()));
+        let _ = write!(text, "output = {}\n\n", format_toml_text(&self.output_name()));
         match self.kind {
             ModelKind::Lathe | ModelKind::Mill | ModelKind::Drill => {
                 no_load(&mut text);

@@ -4,8 +4,8 @@ use super::context::DiagnosisContext;
 use crate::report::{PageInput, page};
 use adapters::Recording;
 use rules::physics::explain::Language;
-use rules::twin::plan::plan;
-use rules::twin::{Diagnosis, diagnosis::Verdict, report, text, write_model};
+use rules::twin::plan::plan_experiments;
+use rules::twin::{Diagnosis, diagnosis::Verdict, json_report, text_report, write_model};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -56,8 +56,8 @@ impl DiagnosisOutputs {
             write_output(path, &format_rows(diagnosis, recording))?;
         }
         if let Some(path) = &self.experiment {
-            match plan(diagnosis, recording) {
-                Ok(plan) => write_output(path, &plan.csv(self.language))?,
+            match plan_experiments(diagnosis, recording) {
+                Ok(plan) => write_output(path, &plan.to_csv(self.language))?,
                 Err(reason) => eprintln!("note: {reason}"),
             }
         }
@@ -74,13 +74,13 @@ impl DiagnosisOutputs {
 
 /// The report in words, with what is doubtful before it.
 fn describe_diagnosis(diagnosis: &Diagnosis, context: &DiagnosisContext, language: Language) -> String {
-    context.to_words(language, &diagnosis.unit) + text::report(diagnosis, language).as_str()
+    context.to_words(language, &diagnosis.unit) + text_report::format_report(diagnosis, language).as_str()
 }
 
 /// The document (`diagnosis/1`), with the report in words in both languages.
 #[must_use]
 pub(super) fn diagnosis_to_json(diagnosis: &Diagnosis, context: &DiagnosisContext) -> serde_json::Value {
-    let mut document = report::to_json(diagnosis);
+    let mut document = json_report::to_json(diagnosis);
     context.add_to(&mut document);
     document["words"] = serde_json::json!({
         "en": describe_diagnosis(diagnosis, context, Language::En),
@@ -99,7 +99,7 @@ fn format_rows(diagnosis: &Diagnosis, recording: &Recording) -> String {
         Some(numbers) => numbers.iter().collect(),
         None => vec![None; recording.count_rows()],
     };
-    report::rows_csv(&recording.time_s, &names, &recorded, &diagnosis.rows)
+    json_report::format_rows_csv(&recording.time_s, &names, &recorded, &diagnosis.rows)
 }
 
 fn is_stdout(path: &Path) -> bool {

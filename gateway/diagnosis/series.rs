@@ -9,8 +9,8 @@ use adapters::bilingual::Bilingual;
 use adapters::channel::quantity::{Quantity, unit_of};
 use adapters::channel::unit::Unit;
 use adapters::recording::{Cells, Mapping, Numbers, read_path, read_path_as};
-use rules::twin::text::short;
-use rules::twin::{Model, parse_model, toml_text};
+use rules::twin::text_report::format_short_number;
+use rules::twin::{Model, format_toml_text, parse_model};
 use std::path::Path;
 
 /// How a series is laid beside a recording.
@@ -116,8 +116,8 @@ pub fn attach_series(
     let cells: Numbers = cells.iter().map(|value| value.map(|value| value * factor)).collect();
     if (factor - 1.0).abs() > 1e-12 {
         told.push(Bilingual::new(
-            format!("  {name}: times {} for the unit of {output}", short(factor)),
-            format!("  {name}：乘以{}换算为{output}的单位", short(factor)),
+            format!("  {name}: times {} for the unit of {output}", format_short_number(factor)),
+            format!("  {name}：乘以{}换算为{output}的单位", format_short_number(factor)),
         ));
     }
     told.push(Bilingual::new(
@@ -153,7 +153,7 @@ pub fn series_model_text(output: &str) -> String {
     format!(
         "schema = \"model/1\"\nname = \"the simulated series\"\noutput = {}\n\n# gain and offset of the series; 1 and 0: as it was given\n\
          [[effect]]\nkind = \"linear\"\ncolumns = {{ {column} = 1.0, one = 0.0 }}\n",
-        toml_text(output)
+        format_toml_text(output)
     )
 }
 
@@ -212,7 +212,7 @@ fn check_match(recorded: &Numbers, simulated: &Numbers, name: &str) -> Result<Ve
     let pairs: Vec<(f64, f64)> = recorded.iter().zip(simulated.iter()).filter_map(|(a, b)| Some((a?, b?))).collect();
     let share = pairs.len() as f64 / recorded.count_present().max(1) as f64;
     if share < COVERED_MIN {
-        let percent = short(100.0 * share);
+        let percent = format_short_number(100.0 * share);
         return Err(vec![Bilingual::new(
             format!(
                 "{name} covers {percent} % of the recorded rows only: is it of the same run? --align course looks for where it fits"
@@ -228,7 +228,7 @@ fn check_match(recorded: &Numbers, simulated: &Numbers, name: &str) -> Result<Ve
     });
     let correlation = moments.2 / (moments.0 * moments.1).sqrt().max(f64::MIN_POSITIVE);
     if correlation < ALIKE_MIN {
-        let text = short(correlation);
+        let text = format_short_number(correlation);
         return Ok(vec![Bilingual::new(
             format!(
                 "unsure: {name} and the recording hardly go together (correlation {text}): is it of the same program, tool and output?"

@@ -6,7 +6,7 @@ use adapters::bilingual::Bilingual;
 use adapters::channel::quantity::{Quantity, without_unit};
 use adapters::recording::Numbers;
 use rules::estimators::alignment::match_courses;
-use rules::twin::text::short;
+use rules::twin::text_report::format_short_number;
 
 pub(super) type Aligned = (Vec<Option<f64>>, Bilingual);
 
@@ -61,7 +61,8 @@ fn by_course(
                 |time_s: f64| (time_s - matched.lag_s + matched.drift * matched.middle_s) / (1.0 + matched.drift);
             let cells =
                 recording.time_s.iter().map(|time_s| interpolate_at(&series.time_s, numbers, back(*time_s))).collect();
-            let (lag, correlation) = (short(matched.lag_s.abs()), short(matched.correlation));
+            let (lag, correlation) =
+                (format_short_number(matched.lag_s.abs()), format_short_number(matched.correlation));
             let (way, way_zh) = if matched.lag_s < 0.0 { ("earlier", "提前") } else { ("later", "滞后") };
             Ok((
                 cells,

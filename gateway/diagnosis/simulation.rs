@@ -3,9 +3,9 @@
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
 use rules::physics::Scene;
-use rules::twin::diagnosis::unit_of;
-use rules::twin::text::short;
-use rules::twin::{Model, bind::bind, inputs::rows_with_inputs, simulate};
+use rules::twin::diagnosis::find_output_unit;
+use rules::twin::text_report::format_short_number;
+use rules::twin::{Model, bind::bind_model, inputs::mark_rows_with_inputs, simulate_parts};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -33,9 +33,9 @@ pub fn run(recording: &Recording, model: &Model) -> Result<Simulation, Vec<Strin
         complete.set_column(&model.output, Cells::Numbers(Numbers::default()));
     }
     let mut scene = Scene::new(&complete, &model.output, &model.roles).map_err(|error| vec![error.to_string()])?;
-    let parts = bind(model, &scene)?;
-    let known = rows_with_inputs(&scene, &parts);
-    let Some(simulated) = simulate(&parts, &mut scene) else {
+    let parts = bind_model(model, &scene)?;
+    let known = mark_rows_with_inputs(&scene, &parts);
+    let Some(simulated) = simulate_parts(&parts, &mut scene) else {
         return Err(vec!["the model cannot be simulated over this recording".to_owned()]);
     };
     let total = simulated.total.into_iter().zip(&known).map(|(x, known)| known.then_some(x)).collect();
@@ -78,15 +78,22 @@ impl Simulation {
     /// For the reader.
     #[must_use]
     pub fn format_text(&self) -> String {
-        let unit = unit_of(&self.output);
+        let unit = find_output_unit(&self.output);
         let rows = self.total.iter().flatten().count();
         let mut text = format!("{}: {} simulated in {rows} of {} rows\n", self.name, self.output, self.total.len());
         for (label, mean, low, high) in self.part_summaries() {
-            let _ = writeln!(text, "  {label}: mean {}, {} to {} {unit}", short(mean), short(low), short(high));
+            let _ = writeln!(
+                text,
+                "  {label}: mean {}, {} to {} {unit}",
+                format_short_number(mean),
+                format_short_number(low),
+                format_short_number(high)
+            );
         }
         match self.rmse() {
             Some((rmse, rows)) => {
-                let _ = writeln!(text, "rmse against the recording: {} {unit} over {rows} rows", short(rmse));
+                let _ =
+                    writeln!(text, "rmse against the recording: {} {unit} over {rows} rows", format_short_number(rmse));
             }
             None => text.push_str("the output is not recorded, so there is nothing to compare it with\n"),
         }
@@ -101,7 +108,7 @@ impl Simulation {
             "schema": "simulation/1",
             "model": self.name,
             "output": self.output,
-            "unit": unit_of(&self.output),
+            "unit": find_output_unit(&self.output),
             "rows": self.total.len(),
             "simulated_rows": self.total.iter().flatten().count(),
             "parts": self.part_summaries().map(part).collect::<Vec<_>>(),

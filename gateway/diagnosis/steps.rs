@@ -96,7 +96,7 @@ fn format_levels(group: &[&Move], name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rules::twin::plan::{Envelope, of_kinds};
+    use rules::twin::plan::{Envelope, build_plan};
 
     #[test]
     fn a_ladder_of_speeds_is_one_step_and_a_repetition_says_so() {
@@ -110,7 +110,7 @@ mod tests {
             axis_column: "z_axis_velocity_mm_min".to_owned(),
             spindle: true,
         };
-        let steps = group_steps(&of_kinds(&["no_load_power"], &envelope));
+        let steps = group_steps(&build_plan(&["no_load_power"], &envelope));
         assert_eq!(steps.len(), 4, "{steps:#?}");
         assert_eq!(steps[0].en, "Run 1: drives on, nothing moves, 20 s");
         assert!(steps[1].en.starts_with("Run 1: turn without a cut; ") && steps[1].en.contains("1500"), "{steps:#?}");

@@ -165,10 +165,10 @@ impl DiagnosisStore {
         let summary_zh = summary_zh(found, &beside);
         let mut words =
             DiagnosisTexts { summary_zh, beside, effects: effect_texts(found), ..DiagnosisTexts::default() };
-        if let Ok(plan) = plan::plan(found, recording) {
-            (words.steps, words.minutes) = (group_steps(&plan), Some(plan.minutes()));
+        if let Ok(plan) = plan::plan_experiments(found, recording) {
+            (words.steps, words.minutes) = (group_steps(&plan), Some(plan.duration_min()));
             for language in [Language::En, Language::Zh] {
-                put(DiagnosisFile::Plan(language), &plan.csv(language))?;
+                put(DiagnosisFile::Plan(language), &plan.to_csv(language))?;
             }
         }
         if found.verdict != Verdict::CannotTell && !found.missing.is_empty() {

@@ -2,7 +2,7 @@
 
 use adapters::clock::{SECOND_NS, TimeNs};
 use rules::twin::live::{LevelChange, Mismatch, Regime};
-use rules::twin::text::short;
+use rules::twin::text_report::format_short_number;
 
 /// A time in seconds since 1970 as nanoseconds.
 #[must_use]
@@ -37,9 +37,11 @@ pub fn mismatch_since(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (
 /// A difference for the operator, English and Chinese, without a time: who shows it has the clock of the reader.
 #[must_use]
 pub fn describe_mismatch(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String, String) {
-    let size = format!("{} {unit}", short(found.mean.abs()));
-    let percent = found.percent().map_or(String::new(), |percent| format!(" ({} %)", short(percent.abs())));
-    let (en_where, zh_where) = found.regime.words();
+    let size = format!("{} {unit}", format_short_number(found.mean.abs()));
+    let percent = found
+        .difference_percent()
+        .map_or(String::new(), |percent| format!(" ({} %)", format_short_number(percent.abs())));
+    let (en_where, zh_where) = found.regime.as_phrases();
     let (en_way, zh_way) = if found.mean > 0.0 { ("more", "高") } else { ("less", "低") };
     let (en, zh) = quantity;
     (
@@ -61,7 +63,7 @@ fn describe_onset(onset: Option<&LevelChange>) -> (String, String) {
 /// The end of a difference, English and Chinese.
 #[must_use]
 pub fn describe_agreement(regime: Regime, quantity: (&str, &str)) -> (String, String) {
-    let (en_where, zh_where) = regime.words();
+    let (en_where, zh_where) = regime.as_phrases();
     let (en, zh) = quantity;
     (format!("{} {en_where} agrees with the simulation again", short_name(en)), format!("{zh_where}{zh}与仿真重新一致"))
 }

@@ -23,7 +23,7 @@ use axum::body::Bytes;
 use axum::extract::{Path, Query as Pairs, State};
 use axum::response::Response;
 use axum::routing::{delete, get, post, put};
-use rules::twin::toml_text;
+use rules::twin::format_toml_text;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -219,14 +219,14 @@ impl ClickedMap {
         let mut said = String::new();
         for (key, value) in [("zone", &self.zone), ("unit", &self.time_unit), ("order", &self.order)] {
             if !value.is_empty() {
-                said.push_str(&format!("{key} = {}\n", toml_text(value)));
+                said.push_str(&format!("{key} = {}\n", format_toml_text(value)));
             }
         }
         let text = text.replacen("[time]\n", &format!("[time]\n{said}"), 1);
         if self.decimal.is_empty() {
             text
         } else {
-            text.replacen("schema = ", &format!("decimal = {}\nschema = ", toml_text(&self.decimal)), 1)
+            text.replacen("schema = ", &format!("decimal = {}\nschema = ", format_toml_text(&self.decimal)), 1)
         }
     }
 }

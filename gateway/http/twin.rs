@@ -59,7 +59,7 @@ fn diagnosis_to_json(found: &Diagnosis, kept: Option<&DiagnosisStore>) -> Value 
 /// The diagnosis beside the watch: figures in the unit of the output that add up to the difference.
 fn model_to_json(one: &BesideModel) -> Value {
     json!({
-        "regime": one.regime.word(),
+        "regime": one.regime.as_word(),
         "from_ms": one.from_ns.div_euclid(1_000_000),
         "seconds": one.seconds,
         "expected": one.expected,

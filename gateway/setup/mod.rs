@@ -6,7 +6,7 @@ mod scan;
 pub use scan::{AddressRange, FoundControl, RangeError, scan_for_controls};
 
 use rules::physics::explain::Language;
-use rules::twin::toml_text;
+use rules::twin::format_toml_text;
 
 /// What the box has to know to begin.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,9 +30,9 @@ impl SetupAnswers {
         let mut text = String::from(
             "# Written by `cnc-gateway setup`. `cnc-gateway check --keys` explains every key; what is not written has its default.\n\n[gateway]\n",
         );
-        text += &format!("name = {}\n", toml_text(&self.machine));
+        text += &format!("name = {}\n", format_toml_text(&self.machine));
         if let Some(language) = self.language {
-            text += &format!("language = {}\n", toml_text(language_word(language)));
+            text += &format!("language = {}\n", format_toml_text(language_word(language)));
         }
         if let Some(control) = &self.control {
             text += &render_source(control, "control");
@@ -51,7 +51,7 @@ impl SetupAnswers {
 }
 
 fn render_source(address: &str, name: &str) -> String {
-    format!("\n[[source]]\naddress = {}\nname = {}\n", toml_text(address), toml_text(name))
+    format!("\n[[source]]\naddress = {}\nname = {}\n", format_toml_text(address), format_toml_text(name))
 }
 
 fn language_word(language: Language) -> &'static str {

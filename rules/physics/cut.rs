@@ -22,7 +22,7 @@ pub(crate) fn estimate_cut_load(scene: &Scene) -> Option<Cow<'_, [f64]>> {
 }
 
 /// Rows in which the tool cuts.
-pub(crate) fn cutting_rows(scene: &Scene) -> Vec<bool> {
+pub(crate) fn mark_cutting_rows(scene: &Scene) -> Vec<bool> {
     match scene.role_values(Role::Engaged) {
         Some(engaged) => engaged.iter().map(|engaged| *engaged > 0.5).collect(),
         None => estimate_cut_load(scene)
@@ -31,13 +31,13 @@ pub(crate) fn cutting_rows(scene: &Scene) -> Vec<bool> {
 }
 
 /// Cut times a factor of the row.
-pub(crate) fn cut_times(scene: &Scene, factor: impl Fn(usize) -> f64) -> Option<Vec<f64>> {
+pub(crate) fn multiply_cut(scene: &Scene, factor: impl Fn(usize) -> f64) -> Option<Vec<f64>> {
     Some(estimate_cut_load(scene)?.iter().enumerate().map(|(row, cut)| cut * factor(row)).collect())
 }
 
 /// What a force in the cut means in the output: `area` is in mm2, or mm for a force along an edge.
 /// A power takes `area * vc / 60`, a torque `area * D / 2000`, a force `area` itself.
-pub(crate) fn in_output(scene: &Scene, area: &[f64]) -> Option<Vec<f64>> {
+pub(crate) fn convert_to_output(scene: &Scene, area: &[f64]) -> Option<Vec<f64>> {
     let lever: Vec<f64> = match Quantity::from_column_name(scene.output_name()) {
         Quantity::Force => return Some(area.to_vec()),
         Quantity::Torque => scene.column("diameter_mm")?.iter().map(|diameter| diameter / 2000.0).collect(),
@@ -49,7 +49,7 @@ pub(crate) fn in_output(scene: &Scene, area: &[f64]) -> Option<Vec<f64>> {
 /// How many teeth of a milling cutter are in the work at once, in the mean of a turn: `z arccos(1 - 2 ae / D) / (2 pi)`, of a
 /// cut from the side (Altintas, Manufacturing Automation, 2nd ed., chapter 2). `None` where teeth, width and diameter
 /// are not known; zero in rows in which one of them is none.
-pub(crate) fn teeth_in_cut(scene: &Scene) -> Option<Vec<f64>> {
+pub(crate) fn count_teeth_in_cut(scene: &Scene) -> Option<Vec<f64>> {
     let [teeth, width, diameter] = ["teeth", "width_of_cut_mm", "diameter_mm"].map(|name| scene.column(name));
     let (teeth, width, diameter) = (teeth?, width?, diameter?);
     let of = |row: usize| match diameter[row] {
@@ -60,7 +60,7 @@ pub(crate) fn teeth_in_cut(scene: &Scene) -> Option<Vec<f64>> {
 }
 
 /// Way since the first of some rows at these feeds, mm.
-pub(crate) fn way_mm(time_s: &[f64], feed_mm_min: &[f64]) -> Vec<f64> {
+pub(crate) fn integrate_way_mm(time_s: &[f64], feed_mm_min: &[f64]) -> Vec<f64> {
     let mut way_mm = vec![0.0; time_s.len()];
     for row in 1..time_s.len() {
         let mean_mm_min = 0.5 * (feed_mm_min[row] + feed_mm_min[row - 1]);

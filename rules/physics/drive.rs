@@ -38,26 +38,26 @@ pub(crate) fn read_speed_krpm(scene: &Scene) -> Option<Vec<f64>> {
 }
 
 /// The same, where the output is a power or torque of the spindle or of the whole machine.
-pub(crate) fn driven_krpm(scene: &Scene) -> Option<Vec<f64>> {
+pub(crate) fn read_driven_speed_krpm(scene: &Scene) -> Option<Vec<f64>> {
     (!is_displacement(scene) && !is_axis_output(scene)).then(|| read_speed_krpm(scene))?
 }
 
 /// `(n / 1000 rpm)^exponent` in a power; one exponent less, with the sign of rotation, in a torque, current or load.
-pub(crate) fn speed_to_the(scene: &Scene, exponent: f64) -> Option<Vec<f64>> {
-    let krpm = driven_krpm(scene)?;
+pub(crate) fn raise_speed_to_exponent(scene: &Scene, exponent: f64) -> Option<Vec<f64>> {
+    let krpm = read_driven_speed_krpm(scene)?;
     let signed = is_signed(scene);
-    let sides = scene.role_values(Role::Speed)?.iter().map(|rpm| sign_of_motion(*rpm, signed));
-    Some(pace_to_the(scene, &krpm, sides, exponent))
+    let sides = scene.role_values(Role::Speed)?.iter().map(|rpm| find_motion_sign(*rpm, signed));
+    Some(raise_to_exponent(scene, &krpm, sides, exponent))
 }
 
 /// The same law of a feed drive over its velocity in m/s: in a power, or with the direction in a force.
-pub(crate) fn slide_to_the(scene: &Scene, velocity: &[f64], exponent: f64) -> Vec<f64> {
+pub(crate) fn raise_velocity_to_exponent(scene: &Scene, velocity: &[f64], exponent: f64) -> Vec<f64> {
     let pace: Vec<f64> = velocity.iter().map(|v| v.abs()).collect();
-    pace_to_the(scene, &pace, compute_directions(velocity), exponent)
+    raise_to_exponent(scene, &pace, compute_directions(velocity), exponent)
 }
 
 /// `pace^exponent` in a power; one exponent less, with the side of the motion, in a torque, force, current or load.
-fn pace_to_the(scene: &Scene, pace: &[f64], sides: impl Iterator<Item = f64>, exponent: f64) -> Vec<f64> {
+fn raise_to_exponent(scene: &Scene, pace: &[f64], sides: impl Iterator<Item = f64>, exponent: f64) -> Vec<f64> {
     if scene.output_kind() != OutputKind::Force {
         return pace.iter().map(|n| n.powf(exponent)).collect();
     }
@@ -76,13 +76,13 @@ pub(crate) fn is_signed(scene: &Scene) -> bool {
         || scene.recorded_output().iter().zip(scene.usable_rows()).any(|(value, usable)| *usable && *value < 0.0)
 }
 
-fn sign_of_motion(motion: f64, signed: bool) -> f64 {
+fn find_motion_sign(motion: f64, signed: bool) -> f64 {
     if signed && motion < 0.0 { -1.0 } else { 1.0 }
 }
 
 /// The load over the speed in thousands of rpm: the torque of the cut, in the output's unit at 1000 rpm.
-pub(crate) fn torque_at_1000_rpm(scene: &Scene) -> Option<Vec<f64>> {
-    let krpm = driven_krpm(scene)?;
+pub(crate) fn compute_torque_at_1000_rpm(scene: &Scene) -> Option<Vec<f64>> {
+    let krpm = read_driven_speed_krpm(scene)?;
     Some(scene.load()?.iter().zip(&krpm).map(|(load, n)| load / n.max(CREEP_KRPM)).collect())
 }
 
@@ -107,7 +107,7 @@ pub(crate) fn read_motion(scene: &Scene) -> Option<Vec<f64>> {
         return None;
     }
     let role = if is_rotary_drive(scene) { Role::Speed } else { Role::Velocity };
-    let motion = in_si(scene, scene.role_name(role)?)?;
+    let motion = convert_to_si(scene, scene.role_name(role)?)?;
     let unsigned = scene.output_kind() == OutputKind::Force && !is_signed(scene);
     if unsigned {
         return Some(motion.iter().map(|v| v.abs()).collect());
@@ -122,7 +122,7 @@ pub(crate) fn is_rotary_drive(scene: &Scene) -> bool {
 }
 
 /// A quantity in m, m/s, m/s2 or rad/s, by the unit at the end of its name.
-pub(crate) fn in_si(scene: &Scene, column: &str) -> Option<Vec<f64>> {
+pub(crate) fn convert_to_si(scene: &Scene, column: &str) -> Option<Vec<f64>> {
     let scale = match unit_of(column) {
         Some("mm/min") => 1.0 / 60_000.0,
         Some("mm" | "mm/s" | "mm/s2") => 1e-3,
@@ -133,14 +133,14 @@ pub(crate) fn in_si(scene: &Scene, column: &str) -> Option<Vec<f64>> {
 }
 
 /// Velocities of the feed axes in m/s: of every axis, else of the one axis, else the feed along the path.
-pub(crate) fn axis_velocities(scene: &Scene) -> Vec<Vec<f64>> {
+pub(crate) fn read_axis_velocities(scene: &Scene) -> Vec<Vec<f64>> {
     let named = ["x_axis_velocity_mm_min", "y_axis_velocity_mm_min", "z_axis_velocity_mm_min"];
-    let axes: Vec<_> = named.iter().filter_map(|name| in_si(scene, name)).collect();
+    let axes: Vec<_> = named.iter().filter_map(|name| convert_to_si(scene, name)).collect();
     if !axes.is_empty() {
         return axes;
     }
-    let one = scene.role_name(Role::Velocity).and_then(|name| in_si(scene, name));
-    one.or_else(|| in_si(scene, "feed_mm_min")).into_iter().collect()
+    let one = scene.role_name(Role::Velocity).and_then(|name| convert_to_si(scene, name));
+    one.or_else(|| convert_to_si(scene, "feed_mm_min")).into_iter().collect()
 }
 
 /// Rate of change per second: central difference within a run, one-sided at its ends.
@@ -158,7 +158,7 @@ pub fn compute_rate(scene: &Scene, values: &[f64]) -> Vec<f64> {
 }
 
 /// Change of the spindle speed in rpm per second: as recorded, or from the speed where it is not.
-pub(crate) fn spindle_rate_rpm_per_s(scene: &Scene) -> Option<Vec<f64>> {
+pub(crate) fn read_spindle_rate_rpm_per_s(scene: &Scene) -> Option<Vec<f64>> {
     if let Some(recorded) = scene.column("spindle_acceleration_rpm_per_s") {
         return Some(recorded.to_vec());
     }
@@ -166,7 +166,7 @@ pub(crate) fn spindle_rate_rpm_per_s(scene: &Scene) -> Option<Vec<f64>> {
 }
 
 /// Both directions are visited, each in at least a fiftieth of the rows.
-pub fn goes_both_ways(motion: &[f64]) -> bool {
+pub fn has_both_directions(motion: &[f64]) -> bool {
     let least = motion.len().div_ceil(50);
     let forward = motion.iter().filter(|v| **v > 0.0).count();
     let backward = motion.iter().filter(|v| **v < 0.0).count();
@@ -175,16 +175,16 @@ pub fn goes_both_ways(motion: &[f64]) -> bool {
 
 /// The direction of a motion, -1 to 1: a reversal passes through zero within a hundredth of the greatest velocity.
 pub fn compute_directions(motion: &[f64]) -> impl Iterator<Item = f64> {
-    let width = rest_width(motion);
-    motion.iter().map(move |v| soft_sign(*v, width))
+    let width = compute_rest_width(motion);
+    motion.iter().map(move |v| compute_soft_sign(*v, width))
 }
 
 /// Speed below which a motion counts as resting, in its own unit: a hundredth of the greatest.
-pub(crate) fn rest_width(motion: &[f64]) -> f64 {
+pub(crate) fn compute_rest_width(motion: &[f64]) -> f64 {
     0.01 * find_greatest_magnitude(motion)
 }
 
 /// A sign that passes smoothly through zero within `width`.
-pub(crate) fn soft_sign(value: f64, width: f64) -> f64 {
+pub(crate) fn compute_soft_sign(value: f64, width: f64) -> f64 {
     (value / width.max(f64::MIN_POSITIVE)).tanh()
 }

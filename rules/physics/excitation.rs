@@ -14,7 +14,7 @@ pub(crate) fn has_variation(values: &[f64]) -> bool {
 }
 
 /// The plain form of an effect where its first column varies in the recording; no form where nothing could tell it.
-pub(crate) fn plain_where_it_varies(effect: &dyn Effect, scene: &Scene) -> Vec<Form> {
+pub(crate) fn propose_plain_form(effect: &dyn Effect, scene: &Scene) -> Vec<Form> {
     let columns = effect.compute_columns(scene, &Form::without_shape());
     columns.filter(|columns| has_variation(&columns[0].1)).map(|_| Form::without_shape()).into_iter().collect()
 }
@@ -33,11 +33,11 @@ const BAND_GAPS: f64 = 4.0;
 
 /// Speeds in rpm half-way between the levels at which the spindle stays, which are apart by more than `gap_share` of the
 /// greatest, and at every such gap within a band that it passes through; at most `most` of them, as many rows between each.
-pub(crate) fn between_speeds(scene: &Scene, gap_share: f64, most: usize) -> Vec<f64> {
-    let Some(speeds) = steady_speeds_rpm(scene) else { return Vec::new() };
+pub(crate) fn list_speeds_between_levels(scene: &Scene, gap_share: f64, most: usize) -> Vec<f64> {
+    let Some(speeds) = list_steady_speeds_rpm(scene) else { return Vec::new() };
     let gap = gap_share * find_greatest_magnitude(&speeds);
     let bands = speeds.chunk_by(|slower, faster| faster - slower <= gap);
-    let levels: Vec<&[f64]> = bands.flat_map(|band| levels_of(band, gap)).collect();
+    let levels: Vec<&[f64]> = bands.flat_map(|band| split_speed_band(band, gap)).collect();
     let mut rows = 0;
     let between = levels.windows(2).map(|pair| {
         rows += pair[0].len();
@@ -48,7 +48,7 @@ pub(crate) fn between_speeds(scene: &Scene, gap_share: f64, most: usize) -> Vec<
 }
 
 /// A band of speeds in rising order: one level, or one for every gap that it is wide.
-fn levels_of(mut band: &[f64], gap: f64) -> Vec<&[f64]> {
+fn split_speed_band(mut band: &[f64], gap: f64) -> Vec<&[f64]> {
     let mut levels = Vec::new();
     if band[band.len() - 1] - band[0] > BAND_GAPS * gap {
         while let Some(first) = band.first() {
@@ -77,7 +77,7 @@ fn thin_places(places: &[(usize, f64)], rows: usize, most: usize) -> Vec<f64> {
 }
 
 /// Speeds of the rows in which the spindle turns and hardly accelerates, in rising order.
-fn steady_speeds_rpm(scene: &Scene) -> Option<Vec<f64>> {
+fn list_steady_speeds_rpm(scene: &Scene) -> Option<Vec<f64>> {
     let speed = scene.role_values(super::Role::Speed)?;
     let rates = super::drive::compute_rate(scene, speed);
     let slow = 0.02 * find_greatest_magnitude(speed);
@@ -88,15 +88,15 @@ fn steady_speeds_rpm(scene: &Scene) -> Option<Vec<f64>> {
 }
 
 /// The time constants of the grid that this recording can tell: two periods to half of its longest stretch.
-pub(crate) fn time_constants(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
-    let longest_s = super::state::elapsed_s(scene).into_iter().fold(0.0, f64::max);
+pub(crate) fn list_time_constants(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
+    let longest_s = super::state::compute_elapsed_s(scene).into_iter().fold(0.0, f64::max);
     grid_s.iter().copied().filter(|tau_s| (2.0 * scene.period_s()..=0.5 * longest_s).contains(tau_s)).collect()
 }
 
 /// One form per time constant that this recording can tell.
-pub(crate) fn lag_forms(scene: &Scene, name: &'static str, grid_s: &[f64]) -> Vec<Form> {
+pub(crate) fn build_lag_forms(scene: &Scene, name: &'static str, grid_s: &[f64]) -> Vec<Form> {
     let form = |tau_s| Form { name, ..Form::from_shape(&[("tau_s", tau_s)]) };
-    time_constants(scene, grid_s).into_iter().map(form).collect()
+    list_time_constants(scene, grid_s).into_iter().map(form).collect()
 }
 
 /// Shortest delay, in sampling periods, that is worth trying where rows are recorded faster than the grid is fine.
@@ -120,40 +120,40 @@ pub(crate) fn list_delays(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
 const STEPS_MAX: usize = 96;
 
 /// Forms that step at the start of a run and stay, with at least two runs on either side.
-pub(crate) fn step_forms(scene: &Scene, name: &'static str) -> Vec<Form> {
+pub(crate) fn build_step_forms(scene: &Scene, name: &'static str) -> Vec<Form> {
     let mut seen = BTreeSet::new();
     let first_of_name: Vec<bool> = scene.run_names().iter().map(|run| seen.insert(run.clone())).collect();
     let last = scene.runs().len().saturating_sub(2);
     let starts: Vec<&String> =
         (2..=last).filter(|run| first_of_name[*run]).map(|run| &scene.run_names()[run]).collect();
-    let ln_choices = ln_count(starts.len());
+    let ln_choices = compute_ln_count(starts.len());
     let form =
         |run: &&String| Form { name, place: Some(("run".to_owned(), (*run).clone())), ln_choices, ..Form::default() };
     starts.iter().step_by(starts.len().div_ceil(STEPS_MAX).max(1)).map(form).collect()
 }
 
 /// The position among the scene's runs of the first run of this name.
-pub(crate) fn run_named(scene: &Scene, name: &str) -> Option<usize> {
+pub(crate) fn find_run(scene: &Scene, name: &str) -> Option<usize> {
     scene.run_names().iter().position(|known| known == name)
 }
 
 /// One from the first row of the run on, zero before; `None` when there is no such run.
-pub(crate) fn since_run(scene: &Scene, run: &str) -> Option<Vec<f64>> {
-    let start = scene.runs()[run_named(scene, run)?].start;
+pub(crate) fn mark_rows_since_run(scene: &Scene, run: &str) -> Option<Vec<f64>> {
+    let start = scene.runs()[find_run(scene, run)?].start;
     Some((0..scene.rows()).map(|row| if row >= start { 1.0 } else { 0.0 }).collect())
 }
 
 /// One in the rows of a stretch of runs, `first to last`, zero elsewhere; `None` when there are no such runs.
-pub(crate) fn within_runs(scene: &Scene, stretch: &str) -> Option<Vec<f64>> {
-    let (first, last) = runs_of(scene, stretch)?;
+pub(crate) fn mark_rows_within_runs(scene: &Scene, stretch: &str) -> Option<Vec<f64>> {
+    let (first, last) = parse_run_stretch(scene, stretch)?;
     let rows = scene.runs()[first].start..scene.runs()[last].end;
     Some((0..scene.rows()).map(|row| if rows.contains(&row) { 1.0 } else { 0.0 }).collect())
 }
 
 /// The first and the last run of a stretch that is written `first to last`.
-fn runs_of(scene: &Scene, stretch: &str) -> Option<(usize, usize)> {
+fn parse_run_stretch(scene: &Scene, stretch: &str) -> Option<(usize, usize)> {
     let (first, last) = stretch.split_once(RUN_TO_RUN)?;
-    let (first, last) = (run_named(scene, first)?, run_named(scene, last)?);
+    let (first, last) = (find_run(scene, first)?, find_run(scene, last)?);
     (first <= last).then_some((first, last))
 }
 
@@ -161,38 +161,38 @@ fn runs_of(scene: &Scene, stretch: &str) -> Option<(usize, usize)> {
 const RUN_TO_RUN: &str = " to ";
 
 /// One form per word of a text column, where it has `2..=most` words.
-pub(crate) fn word_forms(scene: &Scene, name: &'static str, column: &str, most: usize) -> Vec<Form> {
+pub(crate) fn build_word_forms(scene: &Scene, name: &'static str, column: &str, most: usize) -> Vec<Form> {
     let Some(words) = scene.text_column(column) else { return Vec::new() };
     let words = words.words();
     if !(2..=most).contains(&words.len()) {
         return Vec::new();
     }
-    let ln_choices = ln_count(words.len());
+    let ln_choices = compute_ln_count(words.len());
     let form =
         |word: &String| Form { name, place: Some((column.to_owned(), word.clone())), ln_choices, ..Form::default() };
     words.iter().map(form).collect()
 }
 
 /// One in the rows where the text column holds the word.
-pub(crate) fn where_word(scene: &Scene, column: &str, word: &str) -> Option<Vec<f64>> {
+pub(crate) fn mark_word_rows(scene: &Scene, column: &str, word: &str) -> Option<Vec<f64>> {
     let words = scene.text_column(column)?;
     Some((0..scene.rows()).map(|row| if words.get(row) == Some(word) { 1.0 } else { 0.0 }).collect())
 }
 
 /// Natural logarithm of a number of alternatives; zero for none or one.
-pub(crate) fn ln_count(count: usize) -> f64 {
+pub(crate) fn compute_ln_count(count: usize) -> f64 {
     (count.max(1) as f64).ln()
 }
 
 /// Share of the recording that is over, 0 to 1; a pause of unknown length counts as one period.
-pub(crate) fn recording_share(scene: &Scene) -> Vec<f64> {
-    let elapsed_s = recording_elapsed_s(scene);
+pub(crate) fn compute_recording_share(scene: &Scene) -> Vec<f64> {
+    let elapsed_s = compute_clock_elapsed_s(scene);
     let whole_s = elapsed_s.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
     elapsed_s.iter().map(|elapsed_s| elapsed_s / whole_s).collect()
 }
 
 /// Seconds since the first row on the clock that never restarts.
-pub(crate) fn recording_elapsed_s(scene: &Scene) -> Vec<f64> {
+pub(crate) fn compute_clock_elapsed_s(scene: &Scene) -> Vec<f64> {
     scene.clock_s().to_vec()
 }
 
@@ -205,14 +205,14 @@ pub(crate) fn compute_spread(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{levels_of, thin_places};
+    use super::{split_speed_band, thin_places};
 
     #[test]
     fn speeds_that_are_held_are_levels_and_a_band_that_is_passed_through_is_cut() {
         let held = [995.0, 1000.0, 1004.0, 1012.0];
-        assert_eq!(levels_of(&held, 9.0), [&held], "jitter");
+        assert_eq!(split_speed_band(&held, 9.0), [&held], "jitter");
         let passed: Vec<f64> = (0..100).map(|row| 500.0 + 10.0 * f64::from(row)).collect();
-        let levels = levels_of(&passed, 90.0);
+        let levels = split_speed_band(&passed, 90.0);
         assert!(levels.len() == 10 && levels.iter().all(|level| level.len() == 10), "{levels:?}");
     }
 

@@ -59,7 +59,7 @@ pub fn format_effect_list(language: Language) -> String {
     for doc in CATALOGUE.iter().map(|effect| effect.doc()) {
         if family != doc.family {
             family = doc.family;
-            let _ = writeln!(lines, "{}", family_name(family, language));
+            let _ = writeln!(lines, "{}", translate_family(family, language));
         }
         let texts = doc.texts(language);
         let _ = writeln!(lines, "  {:widest$}  {}", doc.kind, texts.statement);
@@ -67,7 +67,7 @@ pub fn format_effect_list(language: Language) -> String {
     lines
 }
 
-fn family_name(family: &'static str, language: Language) -> &'static str {
+fn translate_family(family: &'static str, language: Language) -> &'static str {
     if language == Language::En {
         return family;
     }
@@ -97,7 +97,7 @@ pub fn explain_effect(kind: &str, language: Language) -> Result<String, UnknownE
     let _ = writeln!(text, "{}\n  {}", words.law, doc.law);
     if !doc.parameters.is_empty() {
         let _ = writeln!(text, "{}", words.parameters);
-        doc.parameters.iter().for_each(|parameter| text.push_str(&parameter_line(parameter, language)));
+        doc.parameters.iter().for_each(|parameter| text.push_str(&format_parameter_line(parameter, language)));
         list_placeholder_notes(doc, language).for_each(|note| text.push_str(&format!("  {note}\n")));
     }
     let minutes = format!("{} ({} min)", texts.experiment, doc.experiment_minutes);
@@ -170,7 +170,7 @@ fn list_placeholder_notes(doc: &EffectDoc, language: Language) -> impl Iterator<
     notes.into_iter().filter(move |(word, _, _)| used(word)).map(note)
 }
 
-fn parameter_line(parameter: &ParameterDoc, language: Language) -> String {
+fn format_parameter_line(parameter: &ParameterDoc, language: Language) -> String {
     let shape = match parameter.entry {
         Entry::Linear => String::new(),
         Entry::Shape => format!(" ({})", select_labels(language).shape),
@@ -193,31 +193,31 @@ fn format_range((low, high): (f64, f64)) -> String {
 /// # Errors
 /// [`UnknownEffect`] with the nearest name.
 pub fn explain_json(kind: &str) -> Result<Value, UnknownEffect> {
-    find_effect_doc(kind).map(doc_json)
+    find_effect_doc(kind).map(encode_doc)
 }
 
 /// The whole catalogue as JSON.
 #[must_use]
 pub fn list_json() -> Value {
-    Value::Array(CATALOGUE.iter().map(|effect| doc_json(effect.doc())).collect())
+    Value::Array(CATALOGUE.iter().map(|effect| encode_doc(effect.doc())).collect())
 }
 
-fn doc_json(doc: &EffectDoc) -> Value {
+fn encode_doc(doc: &EffectDoc) -> Value {
     json!({
         "kind": doc.kind,
         "family": doc.family,
         "law": doc.law,
-        "parameters": doc.parameters.iter().map(parameter_json).collect::<Vec<_>>(),
+        "parameters": doc.parameters.iter().map(encode_parameter).collect::<Vec<_>>(),
         "needs": doc.needs,
         "rivals": doc.rivals,
         "experiment_minutes": doc.experiment_minutes,
         "source": doc.source,
-        "en": texts_json(&doc.en),
-        "zh": texts_json(&doc.zh),
+        "en": encode_texts(&doc.en),
+        "zh": encode_texts(&doc.zh),
     })
 }
 
-fn parameter_json(parameter: &ParameterDoc) -> Value {
+fn encode_parameter(parameter: &ParameterDoc) -> Value {
     let end = |value: f64| value.is_finite().then_some(value);
     json!({
         "name": parameter.name,
@@ -230,7 +230,7 @@ fn parameter_json(parameter: &ParameterDoc) -> Value {
     })
 }
 
-fn texts_json(texts: &Texts) -> Value {
+fn encode_texts(texts: &Texts) -> Value {
     json!({
         "name": texts.name,
         "statement": texts.statement,

@@ -17,7 +17,7 @@ mod unit;
 use adapters::channel::quantity::Quantity;
 pub use catalogue::{CATALOGUE, find_effect};
 pub use scene::{LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError};
-pub use unit::{unit_in, unit_of_quantity};
+pub use unit::{find_quantity_unit, resolve_unit};
 
 /// How a parameter enters the law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -187,7 +187,7 @@ pub trait Effect: Sync + Send {
     fn propose_forms(&self, scene: &Scene) -> Vec<Form>;
 
     /// Least and greatest value of a parameter that is physically possible for this output.
-    fn range(&self, _scene: &Scene, parameter: &ParameterDoc) -> (f64, f64) {
+    fn parameter_range(&self, _scene: &Scene, parameter: &ParameterDoc) -> (f64, f64) {
         parameter.range
     }
 
@@ -197,7 +197,7 @@ pub trait Effect: Sync + Send {
     }
 
     /// Can it be what a curve over a channel of this quantity is? Few laws know a temperature or a voltage.
-    fn follows(&self, quantity: Quantity) -> bool {
+    fn follows_quantity(&self, quantity: Quantity) -> bool {
         quantity != Quantity::Temperature
     }
 

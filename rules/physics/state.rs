@@ -5,7 +5,7 @@ use super::Scene;
 /// A first-order state `dx/dt = (u - x) / tau_s`, exact for an input held between rows, starting from zero. Across a
 /// known pause the input is held for ten periods, then it is zero; across an unknown pause the state stands still.
 #[must_use]
-pub fn first_order(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
+pub fn apply_first_order_lag(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
     let mut state = vec![0.0; input.len()];
     for row in 1..input.len() {
         state[row] = advance_state(scene, state[row - 1], input[row - 1], row, tau_s);
@@ -16,7 +16,7 @@ pub fn first_order(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
 /// A first-order lag behind something that is there whether the machine runs or not, such as the air of a hall: linear
 /// between rows, also across known pauses; from rest at the first value.
 #[must_use]
-pub fn first_order_behind(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
+pub fn apply_continuous_lag(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
     let mut state = input.to_vec();
     for row in 1..input.len() {
         let dt_s = (scene.clock_s()[row] - scene.clock_s()[row - 1]).max(0.0);
@@ -41,7 +41,7 @@ fn relax_state(x: f64, input: f64, dt_s: f64, tau_s: f64) -> f64 {
 /// A first-order lag that starts from zero with every pass and follows the input of the row it stands at: what acts on the
 /// cut lets go where nothing is cut.
 #[must_use]
-pub fn first_order_in_each_pass(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
+pub fn apply_lag_in_each_pass(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
     let mut state = vec![0.0; input.len()];
     for pass in scene.passes() {
         for row in pass.clone().skip(1) {
@@ -55,7 +55,7 @@ pub fn first_order_in_each_pass(scene: &Scene, input: &[f64], tau_s: f64) -> Vec
 /// A state that follows the direction of motion over the way, `dz = (sign(dx) - z) |dx| / way`, from zero at the first row:
 /// what is bent stays bent at rest and across pauses. Velocity in m/s or rad/s, linear between rows; way in m or rad.
 #[must_use]
-pub fn bent_over_the_way(scene: &Scene, velocity: &[f64], way: f64) -> Vec<f64> {
+pub fn compute_presliding_state(scene: &Scene, velocity: &[f64], way: f64) -> Vec<f64> {
     let mut state = vec![0.0; velocity.len()];
     for row in 1..velocity.len() {
         let bent = |z: f64, dx: f64| relax_state(z, dx.signum(), dx.abs(), way);
@@ -94,7 +94,7 @@ pub fn compute_decay(scene: &Scene, tau_s: f64) -> Vec<f64> {
 
 /// Seconds since the first row.
 #[must_use]
-pub fn elapsed_s(scene: &Scene) -> Vec<f64> {
+pub fn compute_elapsed_s(scene: &Scene) -> Vec<f64> {
     scene.clock_s().to_vec()
 }
 

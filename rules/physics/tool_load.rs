@@ -56,7 +56,7 @@ pub(crate) fn estimate_growth(scene: &Scene) -> Option<Vec<f64>> {
     }
     let names: Vec<&str> =
         scene.column_names().filter(|name| is_feed_drive(name) && *name != scene.output_name()).collect();
-    let grown = names.into_iter().filter_map(|name| of_channel(scene, scene.column(name)?));
+    let grown = names.into_iter().filter_map(|name| estimate_channel_growth(scene, scene.column(name)?));
     let best = grown.fold(None, |best: Option<(f64, Vec<f64>)>, next| match best {
         Some(best) if best.0 >= next.0 => Some(best),
         _ => Some(next),
@@ -65,13 +65,13 @@ pub(crate) fn estimate_growth(scene: &Scene) -> Option<Vec<f64>> {
 }
 
 /// The growth that one channel tells, after its mean over the tools.
-fn of_channel(scene: &Scene, load: &[f64]) -> Option<(f64, Vec<f64>)> {
+fn estimate_channel_growth(scene: &Scene, load: &[f64]) -> Option<(f64, Vec<f64>)> {
     let unit = quantile(scene.passes().iter().flat_map(|pass| load[pass.clone()].iter().map(|x| x.abs())), 0.5)?;
     if unit <= 0.0 {
         return None;
     }
     let relative: Vec<f64> = load.iter().map(|x| x.abs() / unit).collect();
-    let scatter = pass_scatter(scene, &relative)?;
+    let scatter = estimate_pass_scatter(scene, &relative)?;
     let steps = scene.passes().iter().flat_map(|pass| relative[pass.clone()].windows(2).map(|p| (p[1] - p[0]).abs()));
     let deviation = quantile(steps, 0.5)? / (0.6745 * std::f64::consts::SQRT_2);
     if scatter > SCATTER_MAX || deviation <= 0.0 {
@@ -85,12 +85,12 @@ fn of_channel(scene: &Scene, load: &[f64]) -> Option<(f64, Vec<f64>)> {
     let still = filter.filter_scene(scene, &relative);
     let moving = WANDER.map(|wander| Filter { wander, ..filter }.filter_scene(scene, &relative));
     let best = moving.into_iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
-    let mean = mean_end(scene, &best.growth);
+    let mean = compute_mean_end_growth(scene, &best.growth);
     (best.log_likelihood - still.log_likelihood >= GAIN_MIN && mean >= GROWTH_MIN).then_some((mean, best.growth))
 }
 
 /// Robust standard deviation of a pass's level, from neighbours of the same tool.
-fn pass_scatter(scene: &Scene, relative: &[f64]) -> Option<f64> {
+fn estimate_pass_scatter(scene: &Scene, relative: &[f64]) -> Option<f64> {
     let level = |pass: &Range<usize>| quantile(relative[pass.clone()].iter().copied(), 0.5);
     let same = |a: &Range<usize>, b: &Range<usize>| find_tool(scene, a.start) == find_tool(scene, b.start);
     let neighbours = scene.passes().windows(2).filter(|pair| same(&pair[0], &pair[1]));
@@ -105,7 +105,7 @@ fn find_tool(scene: &Scene, row: usize) -> Option<&str> {
 }
 
 /// Mean over the tools of the growth at their last row.
-fn mean_end(scene: &Scene, growth: &[f64]) -> f64 {
+fn compute_mean_end_growth(scene: &Scene, growth: &[f64]) -> f64 {
     let ends: BTreeMap<_, _> =
         scene.passes().iter().map(|pass| (find_tool(scene, pass.start), growth[pass.end - 1])).collect();
     ends.values().sum::<f64>() / (ends.len().max(1) as f64)
@@ -146,7 +146,7 @@ impl Filter {
         for pass in scene.passes() {
             let name = find_tool(scene, pass.start);
             let known = tools.entry(name).or_insert_with(|| self.build_fresh_tool());
-            known.new_pass(self.pass_variance);
+            known.begin_pass(self.pass_variance);
             // Out of the cut a tool is as worn as when it left it.
             (done..pass.start).for_each(|row| {
                 followed.growth[row] = last.get(&find_tool(scene, row)).copied().unwrap_or(0.0);
@@ -195,7 +195,7 @@ impl Filter {
 }
 
 impl Tool {
-    fn new_pass(&mut self, variance: f64) {
+    fn begin_pass(&mut self, variance: f64) {
         self.mean[PASS] = 0.0;
         for i in 0..STATES {
             self.covariance[PASS][i] = 0.0;
@@ -238,7 +238,7 @@ const MOVED_DEVIATIONS: f64 = 20.0;
 const MOVED_SHARE: f64 = 0.1;
 
 /// Rows in which the load of an axis steps: it has been moved since the row before.
-pub(crate) fn moved_rows(scene: &Scene) -> Vec<bool> {
+pub(crate) fn mark_moved_rows(scene: &Scene) -> Vec<bool> {
     let mut moved = Vec::new();
     let drives = scene.column_names().filter(|name| is_feed_drive(name) && *name != scene.output_name());
     for load in drives.filter_map(|name| scene.column(name)) {

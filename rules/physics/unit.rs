@@ -5,7 +5,7 @@ use adapters::channel::quantity;
 
 /// The unit of a quantity by its name, else the name's own last word.
 #[must_use]
-pub fn unit_of_quantity(name: &str) -> &str {
+pub fn find_quantity_unit(name: &str) -> &str {
     quantity::unit_of(name).unwrap_or_else(|| name.rsplit('_').next().unwrap_or(name))
 }
 
@@ -13,17 +13,17 @@ pub fn unit_of_quantity(name: &str) -> &str {
 /// `velocity` for m/s or, of a spindle, rad/s, and `friction` for the output itself, or the output over a velocity
 /// where the output is a power.
 #[must_use]
-pub fn unit_in(unit: &str, scene: &Scene) -> String {
+pub fn resolve_unit(unit: &str, scene: &Scene) -> String {
     let power = scene.output_kind() != OutputKind::Force;
     let velocity = if drive::is_rotary_drive(scene) { "rad/s" } else { "m/s" };
     let unit = unit.replace("friction/velocity", if power { "output/velocity2" } else { "output/velocity" });
     let unit =
         if unit == "velocity" { velocity.to_owned() } else { unit.replace("velocity", &format!("({velocity})")) };
-    in_newtons(&unit.replace("output", unit_of_quantity(scene.output_name())))
+    convert_to_newtons(&unit.replace("output", find_quantity_unit(scene.output_name())))
 }
 
 /// Watts over a velocity are newtons, over an angular velocity newton metres.
-fn in_newtons(unit: &str) -> String {
+fn convert_to_newtons(unit: &str) -> String {
     let known = [
         ("W/(m/s)2", "N/(m/s)"),
         ("W/(m/s)", "N"),
@@ -61,16 +61,16 @@ mod tests {
             ("1/output", "1/W", "1/N", "1/A"),
             ("N/mm2", "N/mm2", "N/mm2", "N/mm2"),
         ] {
-            assert_eq!(unit_in(unit, &spindle), in_spindle);
-            assert_eq!(unit_in(unit, &axis), in_axis);
-            assert_eq!(unit_in(unit, &current), in_current);
+            assert_eq!(resolve_unit(unit, &spindle), in_spindle);
+            assert_eq!(resolve_unit(unit, &axis), in_axis);
+            assert_eq!(resolve_unit(unit, &current), in_current);
         }
     }
 
     #[test]
     fn an_unknown_quantity_ends_in_its_unit() {
-        assert_eq!(unit_of_quantity("thermal_error_um"), "um");
-        assert_eq!(unit_of_quantity("x_force_n"), "N");
-        assert_eq!(unit_of_quantity("table_force_counts"), "counts");
+        assert_eq!(find_quantity_unit("thermal_error_um"), "um");
+        assert_eq!(find_quantity_unit("x_force_n"), "N");
+        assert_eq!(find_quantity_unit("table_force_counts"), "counts");
     }
 }

@@ -131,8 +131,8 @@ pub fn prepare_with(files: &[ScriptFile], values: &SettingValues) -> Result<Scri
 
 struct Compiler {
     shared: Shared,
-    checking: Engine,
-    running: Engine,
+    checking_engine: Engine,
+    running_engine: Engine,
     callable: Vec<(String, usize)>,
     /// The channels that any of the files publishes.
     channels: PublishedChannels,
@@ -144,7 +144,13 @@ impl Compiler {
         let checking = engine::build_engine(&shared, false);
         let callable = engine::list_callables(&checking);
         let running = engine::build_engine(&shared, true);
-        Self { shared, running, checking, callable, channels: PublishedChannels::from_files(files) }
+        Self {
+            shared,
+            running_engine: running,
+            checking_engine: checking,
+            callable,
+            channels: PublishedChannels::from_files(files),
+        }
     }
 
     fn compile_script(
@@ -160,17 +166,17 @@ impl Compiler {
         let parse =
             |engine: &Engine, text: &str| engine.compile(text).map_err(|error| vec![problem::of_parse(name, &error)]);
         // As written first: an error is told before any value stands in the text.
-        parse(&self.checking, &file.text)?;
-        let declarations = declared::find_declarations(file, &self.checking)?;
+        parse(&self.checking_engine, &file.text)?;
+        let declarations = declared::find_declarations(file, &self.checking_engine)?;
         let force = force(&declarations);
         let filled = ScriptFile {
             name: file.name.clone(),
             text: declared::with_values(&file.text, &declarations, &force.texts),
         };
-        let plain = parse(&self.checking, &filled.text)?;
+        let plain = parse(&self.checking_engine, &filled.text)?;
         let constants = list_constants(&plain);
         let mut problems = Vec::new();
-        let called = find_called_functions(&filled, &plain, &self.checking, &mut problems);
+        let called = find_called_functions(&filled, &plain, &self.checking_engine, &mut problems);
         let live: Vec<&str> = force.live.constants.iter().map(|(name, _)| name.as_str()).collect();
         let mut found = self.examine_script(
             (name, &filled.text),
@@ -186,16 +192,17 @@ impl Compiler {
         if !found.problems.is_empty() {
             return Err(found.problems);
         }
-        let ast = parse(&self.running, &filled.text)?;
+        let ast = parse(&self.running_engine, &filled.text)?;
         let choices = match &called.settings {
             Some(settings) => self.evaluate_settings(&filled, (settings, &ast), &constants, &force.live)?,
             None => Vec::new(),
         };
         let names = variables::list_variables(&found, &constants, &force.live);
-        let body = ScriptBody::compile_behind_names(&self.running, &filled.text, &names)
+        let body = ScriptBody::compile_behind_names(&self.running_engine, &filled.text, &names)
             .map_err(|error| vec![problem::of_parse(name, &error)])?;
-        let handlers =
-            called.compile_handlers(&self.running, &names).map_err(|error| vec![problem::of_parse(name, &error)])?;
+        let handlers = called
+            .compile_handlers(&self.running_engine, &names)
+            .map_err(|error| vec![problem::of_parse(name, &error)])?;
         Ok(Script {
             file: file.name.as_str().into(),
             version: if force.chosen {
@@ -271,7 +278,7 @@ impl Compiler {
                 scope.push_constant_dynamic(name.clone(), values.get(*index).cloned().unwrap_or_default());
             }
             self.shared.lock().live = Some(values);
-            let result = self.running.eval_ast_with_scope::<Map>(&mut scope, &ast);
+            let result = self.running_engine.eval_ast_with_scope::<Map>(&mut scope, &ast);
             let map = result.map_err(|error| vec![problem::of_run(&file.name, &error, OPERATIONS_MAX)])?;
             read_choices(file, &map, place)
         };

@@ -64,7 +64,7 @@ pub(super) struct Walk<'a> {
     callable: &'a [(String, usize)],
     own: Vec<(String, usize)>,
     channels: &'a PublishedChannels,
-    pub(super) found: Findings,
+    pub(super) findings: Findings,
 }
 
 impl<'a> Walk<'a> {
@@ -76,7 +76,7 @@ impl<'a> Walk<'a> {
         channels: &'a PublishedChannels,
     ) -> Self {
         let own = whole.iter_functions().map(|it| (it.name.to_owned(), it.params.len())).collect();
-        Self { file, text, alarms: AlarmNames::default(), callable, own, channels, found: Findings::default() }
+        Self { file, text, alarms: AlarmNames::default(), callable, own, channels, findings: Findings::default() }
     }
 
     /// Looks through everything that stands in this place.
@@ -88,9 +88,9 @@ impl<'a> Walk<'a> {
     pub(super) fn into_findings(mut self) -> Findings {
         let mistakes = self.alarms.list_mistakes();
         self.report_mistakes(mistakes);
-        self.found.problems.sort_by_key(|problem| (problem.line, problem.column));
-        self.found.problems.dedup();
-        self.found
+        self.findings.problems.sort_by_key(|problem| (problem.line, problem.column));
+        self.findings.problems.dedup();
+        self.findings
     }
 
     fn examine_node(&mut self, path: &[ASTNode<'_>], place: ScriptPlace<'_>) -> bool {
@@ -146,7 +146,7 @@ impl<'a> Walk<'a> {
     }
 
     fn report_problem(&mut self, at: Position, what: String, next: impl Into<String>) {
-        self.found.problems.push(ScriptProblem::new(self.file, at, what, next));
+        self.findings.problems.push(ScriptProblem::new(self.file, at, what, next));
     }
 
     fn examine_call(&mut self, call: &FnCallExpr, arguments: usize, at: Position, place: ScriptPlace<'_>) {
@@ -253,8 +253,8 @@ impl<'a> Walk<'a> {
     }
 
     fn reads_of_others(&mut self, name: &str) {
-        if !self.found.foreign.iter().any(|known| *known == *name) {
-            self.found.foreign.push(name.into());
+        if !self.findings.foreign.iter().any(|known| *known == *name) {
+            self.findings.foreign.push(name.into());
         }
     }
 
@@ -277,8 +277,8 @@ impl<'a> Walk<'a> {
         match record.find_field(field) {
             Ok(found) => {
                 let same = |it: &Field| it.record.name == name && it.word.name == found.word.name;
-                if !self.found.fields.iter().any(same) {
-                    self.found.fields.push(found);
+                if !self.findings.fields.iter().any(same) {
+                    self.findings.fields.push(found);
                 }
             }
             Err(next) => self.report_problem(at_field, format!("there is no `{name}.{field}`"), next),
@@ -302,8 +302,8 @@ impl<'a> Walk<'a> {
             let next = format!("choose another name, such as my_{name}");
             return self.report_problem(*at_name, format!("`{name}` is a channel or an estimate already"), next);
         }
-        match self.found.channels.iter().find(|(known, _)| known == name) {
-            None => self.found.channels.push((name.clone(), unit.clone())),
+        match self.findings.channels.iter().find(|(known, _)| known == name) {
+            None => self.findings.channels.push((name.clone(), unit.clone())),
             Some((_, other)) if other != unit => {
                 let what = format!("`{name}` is published in {other} and in {unit}");
                 self.report_problem(*at_name, what, "a channel has one unit");
@@ -313,8 +313,8 @@ impl<'a> Walk<'a> {
     }
 
     fn record_read(&mut self, word: &'static Word) {
-        if !self.found.reads.iter().any(|known| known.name == word.name) {
-            self.found.reads.push(word);
+        if !self.findings.reads.iter().any(|known| known.name == word.name) {
+            self.findings.reads.push(word);
         }
     }
 

@@ -6,12 +6,12 @@ use rhai::{AST, Caches, Engine, GlobalRuntimeState, Scope, Stmt};
 /// What the interpreter keeps for one script: its functions, and which function each call means. Looking every call up
 /// anew costs more than half of a run.
 pub(super) struct RunningScript {
-    kept: Option<(GlobalRuntimeState, Caches)>,
+    cache: Option<(GlobalRuntimeState, Caches)>,
 }
 
 impl RunningScript {
     pub(super) fn new() -> Self {
-        Self { kept: None }
+        Self { cache: None }
     }
 
     /// Runs statements with the functions of another AST.
@@ -28,7 +28,7 @@ impl RunningScript {
 
     /// Operations are counted from here on. `ast` holds the functions of the script.
     pub(super) fn begin_run(&mut self, engine: &Engine, ast: &AST) {
-        let (global, _) = self.kept.get_or_insert_with(|| create_runtime(engine, ast));
+        let (global, _) = self.cache.get_or_insert_with(|| create_runtime(engine, ast));
         global.num_operations = 0;
     }
 
@@ -40,13 +40,13 @@ impl RunningScript {
         functions: &AST,
         statements: &[Stmt],
     ) -> ScriptResult<()> {
-        let (mut global, mut caches) = self.kept.take().unwrap_or_else(|| create_runtime(engine, functions));
+        let (mut global, mut caches) = self.cache.take().unwrap_or_else(|| create_runtime(engine, functions));
         #[expect(
             deprecated,
             reason = "the only call that takes caches; rhai offers no other before its next major version"
         )]
         let _value = engine.eval_statements_raw(&mut global, &mut caches, scope, statements)?;
-        self.kept = Some((global, caches));
+        self.cache = Some((global, caches));
         Ok(())
     }
 }

@@ -7,16 +7,16 @@ use physics::{Entry, Role, Scene};
 ///
 /// # Errors
 /// Every part that cannot be simulated over this recording, and what to record.
-pub fn bind(model: &Model, scene: &Scene) -> Result<Vec<Part>, Vec<String>> {
+pub fn bind_model(model: &Model, scene: &Scene) -> Result<Vec<Part>, Vec<String>> {
     let mut problems = Vec::new();
-    let parts = model.parts.iter().map(|part| complete(part, scene)).collect::<Vec<_>>();
+    let parts = model.parts.iter().map(|part| complete_part(part, scene)).collect::<Vec<_>>();
     // Some laws need the load or the output that other parts simulate; a stand-in tells inputs from those.
     let mut stand_in = scene.clone();
     stand_in.set_load(Some(vec![1.0; scene.rows()]));
     stand_in.set_simulated(Some(vec![1.0; scene.rows()]));
     for part in &parts {
-        if part.contribution(&stand_in).is_none() {
-            problems.push(missing_input(part, scene));
+        if part.compute_contribution(&stand_in).is_none() {
+            problems.push(describe_missing_input(part, scene));
         }
     }
     let load_known = scene.load().is_some() || parts.iter().any(Part::is_cut);
@@ -26,7 +26,7 @@ pub fn bind(model: &Model, scene: &Scene) -> Result<Vec<Part>, Vec<String>> {
     if problems.is_empty() { Ok(parts) } else { Err(problems) }
 }
 
-fn complete(part: &Part, scene: &Scene) -> Part {
+fn complete_part(part: &Part, scene: &Scene) -> Part {
     let mut part = part.clone();
     let PartFunction::Effect(effect, form) = &mut part.body else { return part };
     let effect = *effect;
@@ -41,39 +41,39 @@ fn complete(part: &Part, scene: &Scene) -> Part {
     for (name, value) in &default.shape {
         if !known(&part.parameters, name) {
             let doc = effect.doc().find_parameter(name);
-            part.parameters.push(added(name, *value, Entry::Shape, doc.map(|doc| (doc.range, doc.unit))));
+            part.parameters.push(build_parameter(name, *value, Entry::Shape, doc.map(|doc| (doc.range, doc.unit))));
         }
     }
     let shaped = physics::Form { shape: default.shape.clone(), ..form.clone() };
     for (name, _) in effect.compute_columns(&stand_in, &shaped).unwrap_or_default() {
         if !known(&part.parameters, name) {
             let doc = effect.doc().find_parameter(name);
-            part.parameters.push(added(name, 0.0, Entry::Linear, doc.map(|doc| (doc.range, doc.unit))));
+            part.parameters.push(build_parameter(name, 0.0, Entry::Linear, doc.map(|doc| (doc.range, doc.unit))));
         }
     }
     part
 }
 
-fn added(name: &str, value: f64, entry: Entry, doc: Option<((f64, f64), &str)>) -> Parameter {
+fn build_parameter(name: &str, value: f64, entry: Entry, doc: Option<((f64, f64), &str)>) -> Parameter {
     let (range, unit) = doc.unwrap_or(((f64::NEG_INFINITY, f64::INFINITY), "output"));
     Parameter { name: name.to_owned(), value, fixed: false, entry, range, unit: unit.to_owned() }
 }
 
 /// Which of an effect's needs the recording does not meet, each with the channels that would.
-fn lacking(needs: &[&str], scene: &Scene) -> String {
+fn describe_unmet_needs(needs: &[&str], scene: &Scene) -> String {
     let met = |name: &str| {
         scene.column(name).is_some() || Role::from_name(name).is_some_and(|role| scene.role_values(role).is_some())
     };
     let lacking: Vec<String> = needs
         .iter()
         .filter(|need| !need.split('|').any(|name| met(name.trim())))
-        .map(|need| need.split('|').map(|name| channels(name.trim())).collect::<Vec<_>>().join(" or "))
+        .map(|need| need.split('|').map(|name| describe_channels(name.trim())).collect::<Vec<_>>().join(" or "))
         .collect();
     if lacking.is_empty() { needs.join(", ") } else { lacking.join(" and ") }
 }
 
 /// The channels that provide what an effect calls by its role, or that it is computed from.
-fn channels(need: &str) -> String {
+fn describe_channels(need: &str) -> String {
     match (Role::from_name(need).and_then(|role| role.default_channels().first()), need) {
         (Some(channel), _) => format!("{need} ({channel})"),
         (None, "cutting_speed_m_min") => format!("{need} (or diameter_mm and spindle_speed_rpm)"),
@@ -83,9 +83,9 @@ fn channels(need: &str) -> String {
     }
 }
 
-fn missing_input(part: &Part, scene: &Scene) -> String {
+fn describe_missing_input(part: &Part, scene: &Scene) -> String {
     let place = format!("{} (line {})", part.label(), part.line);
-    let unknown = |name: &&str| super::channel::channel_values(scene, name).is_none();
+    let unknown = |name: &&str| super::channel::read_channel_values(scene, name).is_none();
     let absent = part.inputs().into_iter().filter(unknown).collect::<Vec<_>>().join(", ");
     match &part.body {
         PartFunction::Linear(_) => format!("{place} needs the columns {absent}: record them"),
@@ -99,7 +99,7 @@ fn missing_input(part: &Part, scene: &Scene) -> String {
             format!("{place} needs the spindle speed: record spindle_speed_rpm or declare the role speed")
         }
         PartFunction::Effect(effect, _) => {
-            format!("{place} needs {}: record it, or declare a role", lacking(effect.doc().needs, scene))
+            format!("{place} needs {}: record it, or declare a role", describe_unmet_needs(effect.doc().needs, scene))
         }
     }
 }

@@ -19,7 +19,7 @@ const REPEATED_SHARE: f64 = 0.98;
 const RATE_SHARE: f64 = 1e-3;
 
 /// Would a shift in time explain anything of this model and mean nothing?
-pub(super) fn shifts_time_in_vain(model: &Model, scene: &Scene) -> bool {
+pub(super) fn is_time_shift_trivial(model: &Model, scene: &Scene) -> bool {
     reads_output(model) || repeats_output(model, scene)
 }
 
@@ -33,51 +33,51 @@ fn reads_output(model: &Model) -> bool {
 fn repeats_output(model: &Model, scene: &Scene) -> bool {
     let of = |name: &str| {
         let Some(column) = scene.column(name) else { return false };
-        (1..=REPEATED_ROWS).any(|by| repeats(scene, column, by)) || is_rate_of(scene, column)
+        (1..=REPEATED_ROWS).any(|by| is_lagged_output(scene, column, by)) || is_output_rate_of(scene, column)
     };
     model.parts.iter().flat_map(Part::inputs).any(of)
 }
 
 /// Rows of which the row so many before, in the same run, is known too.
-fn known_after(scene: &Scene, by: usize) -> Vec<usize> {
+fn list_lagged_rows(scene: &Scene, by: usize) -> Vec<usize> {
     let rows = scene.runs().iter().flat_map(|run| run.start + by..run.end.max(run.start + by));
     rows.filter(|row| scene.usable_rows()[row - by] && scene.usable_rows()[*row]).collect()
 }
 
 /// Does it hold for nearly all of these rows, of which there are some?
-fn holds_in_most(rows: &[usize], holds: impl Fn(usize) -> bool) -> bool {
+fn holds_in_most_rows(rows: &[usize], holds: impl Fn(usize) -> bool) -> bool {
     let held = count_to_f64(rows.iter().filter(|row| holds(**row)).count());
     !rows.is_empty() && held >= REPEATED_SHARE * count_to_f64(rows.len())
 }
 
 /// Is a column the output of so many rows before?
-fn repeats(scene: &Scene, column: &[f64], by: usize) -> bool {
-    let known = known_after(scene, by);
+fn is_lagged_output(scene: &Scene, column: &[f64], by: usize) -> bool {
+    let known = list_lagged_rows(scene, by);
     let equal = |row: usize| (column[row] - scene.recorded_output()[row - by]).abs() <= 1e-6 * column[row].abs();
     let changes = known.iter().any(|row| column[*row] != scene.recorded_output()[*row]);
-    holds_in_most(&known, equal) && changes
+    holds_in_most_rows(&known, equal) && changes
 }
 
 /// Is the output the difference quotient of a column, over the row before or the row after?
-fn is_rate_of(scene: &Scene, column: &[f64]) -> bool {
+fn is_output_rate_of(scene: &Scene, column: &[f64]) -> bool {
     let (time_s, output) = (scene.time_s(), scene.recorded_output());
-    let known = known_after(scene, 1);
+    let known = list_lagged_rows(scene, 1);
     let rate = |row: usize| (column[row] - column[row - 1]) / (time_s[row] - time_s[row - 1]);
     let size = known.iter().map(|row| rate(*row)).fold(0.0_f64, |most, rate| most.max(rate.abs()));
-    let is_of = |at: usize| holds_in_most(&known, |row| (output[row - at] - rate(row)).abs() <= RATE_SHARE * size);
+    let is_of = |at: usize| holds_in_most_rows(&known, |row| (output[row - at] - rate(row)).abs() <= RATE_SHARE * size);
     size > 0.0 && size.is_finite() && (is_of(0) || is_of(1))
 }
 
 /// May the search propose this effect beside this model?
 #[must_use]
-pub(super) fn wanted(effect: &dyn Effect, model: &Model) -> bool {
+pub(super) fn is_candidate_effect(effect: &dyn Effect, model: &Model) -> bool {
     let kind = effect.doc().kind;
     let listed = model.only.is_empty() || model.only.iter().any(|only| only == kind);
     let excluded =
         model.exclude.iter().any(|excluded| excluded == kind) || kind == BUILDING || kind == CUT && may_hold_cut(model);
     // A part whose every number is fixed may itself be wrong, so its kind stays a candidate.
     let modelled = model.parts.iter().any(|part| part.kind == kind && !part.parameters.iter().all(|p| p.fixed));
-    let weighed = INERTIA.contains(&kind) && weighs_acceleration(model);
+    let weighed = INERTIA.contains(&kind) && has_free_inertia_term(model);
     listed && !(excluded || modelled || weighed)
 }
 
@@ -88,7 +88,7 @@ fn may_hold_cut(model: &Model) -> bool {
 }
 
 /// Has the model a free coefficient of the acceleration it declares? Another inertia would only mend that column.
-fn weighs_acceleration(model: &Model) -> bool {
+fn has_free_inertia_term(model: &Model) -> bool {
     let Some(acceleration) = model.roles.get(&Role::Acceleration) else { return false };
     let weighs = |part: &Part| match &part.body {
         PartFunction::Linear(terms) => {
@@ -103,19 +103,21 @@ fn weighs_acceleration(model: &Model) -> bool {
 }
 
 /// The columns of a part, or of an expression its derivatives by the parameters.
-pub(super) fn law_columns(part: &Part, scene: &Scene) -> Option<Vec<Vec<f64>>> {
+pub(super) fn compute_law_columns(part: &Part, scene: &Scene) -> Option<Vec<Vec<f64>>> {
     match &part.body {
-        PartFunction::Expression(_) => (0..part.parameters.len()).map(|index| derivative(part, index, scene)).collect(),
-        _ => Some(part.columns(scene)?.into_iter().map(|(_, column)| column).collect()),
+        PartFunction::Expression(_) => {
+            (0..part.parameters.len()).map(|index| differentiate_part(part, index, scene)).collect()
+        }
+        _ => Some(part.compute_columns(scene)?.into_iter().map(|(_, column)| column).collect()),
     }
 }
 
-fn derivative(part: &Part, index: usize, scene: &Scene) -> Option<Vec<f64>> {
-    let base = part.contribution(scene)?;
+fn differentiate_part(part: &Part, index: usize, scene: &Scene) -> Option<Vec<f64>> {
+    let base = part.compute_contribution(scene)?;
     let mut moved = part.clone();
     let step = 1e-4 * moved.parameters[index].value.abs().max(1e-3);
     moved.parameters[index].value += step;
-    let ahead = moved.contribution(scene)?;
+    let ahead = moved.compute_contribution(scene)?;
     Some(ahead.iter().zip(&base).map(|(ahead, base)| (ahead - base) / step).collect())
 }
 

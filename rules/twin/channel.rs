@@ -1,8 +1,8 @@
 //! Channels by name: those of the recording, and those that nobody records but that formulas may be drawn over - the time in the run and in the cut, the direction of a slide, and what the model itself simulates.
 
 use adapters::channel::quantity::Quantity;
-use physics::drive::{compute_directions, goes_both_ways, read_slide_velocity};
-use physics::state::{first_order, first_order_behind};
+use physics::drive::{compute_directions, has_both_directions, read_slide_velocity};
+use physics::state::{apply_continuous_lag, apply_first_order_lag};
 use physics::{Role, Scene};
 use std::borrow::Cow;
 
@@ -33,30 +33,34 @@ pub(super) const ACCELERATION: &str = "acceleration_of_motion";
 pub(super) const DIRECTION: &str = "direction_of_motion";
 
 /// The values of a channel, one per row; `None` where this scene has no such channel.
-pub(super) fn channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
+pub(super) fn read_channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
     match name {
         TIME => Some(Cow::Borrowed(scene.clock_s())),
-        TIME_IN_RUN => Some(Cow::Owned(time_in_run_s(scene))),
-        TIME_IN_CUT => time_in_cut_s(scene).map(Cow::Owned),
-        DIRECTION => direction(scene).map(Cow::Owned),
+        TIME_IN_RUN => Some(Cow::Owned(compute_time_in_run_s(scene))),
+        TIME_IN_CUT => compute_time_in_cut_s(scene).map(Cow::Owned),
+        DIRECTION => read_motion_direction(scene).map(Cow::Owned),
         ACCELERATION => scene.role_values(Role::Acceleration).map(Cow::Borrowed),
         SIMULATED_CUT => scene.load().map(Cow::Borrowed),
-        SIMULATED_CUT_PER_KRPM => cut_per_krpm(scene).map(Cow::Owned),
+        SIMULATED_CUT_PER_KRPM => compute_cut_per_krpm(scene).map(Cow::Owned),
         SIMULATED_OUTPUT => scene.simulated_output().map(Cow::Borrowed),
-        _ => scene.column(name).or_else(|| by_role(scene, name)).map(Cow::Borrowed).or_else(|| derived(scene, name)),
+        _ => scene
+            .column(name)
+            .or_else(|| read_role_channel(scene, name))
+            .map(Cow::Borrowed)
+            .or_else(|| derive_channel(scene, name)),
     }
 }
 
 /// A channel that is made of a column named in its own name.
-fn derived<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
+fn derive_channel<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
     if let Some(column) = name.strip_prefix(TIME_SINCE_CHANGE_OF) {
-        return time_since_change_s(scene, column).map(Cow::Owned);
+        return compute_time_since_change_s(scene, column).map(Cow::Owned);
     }
     let (tau_s, column) = name.strip_prefix(LAG_OF)?.split_once(LAG_OF_WHAT)?;
     let tau_s = tau_s.parse().ok().filter(|tau_s: &f64| *tau_s > 0.0)?;
     let input = scene.column(column)?;
     let is_there_always = Quantity::from_column_name(column) == Quantity::Temperature;
-    let lag = if is_there_always { first_order_behind } else { first_order };
+    let lag = if is_there_always { apply_continuous_lag } else { apply_first_order_lag };
     Some(Cow::Owned(lag(scene, input, tau_s)))
 }
 
@@ -66,7 +70,7 @@ pub(super) fn is_simulated(name: &str) -> bool {
 }
 
 /// The rows at which a column, of words or of numbers, has another value than in the row before; `None` without it.
-pub(super) fn changes_of(scene: &Scene, column: &str) -> Option<Vec<usize>> {
+pub(super) fn find_change_rows(scene: &Scene, column: &str) -> Option<Vec<usize>> {
     let rows = 1..scene.rows();
     if let Some(words) = scene.text_column(column) {
         return Some(rows.filter(|row| words.get(*row) != words.get(row - 1)).collect());
@@ -76,7 +80,7 @@ pub(super) fn changes_of(scene: &Scene, column: &str) -> Option<Vec<usize>> {
 }
 
 /// What a recording may call otherwise.
-fn by_role<'s>(scene: &'s Scene, name: &str) -> Option<&'s [f64]> {
+fn read_role_channel<'s>(scene: &'s Scene, name: &str) -> Option<&'s [f64]> {
     match name {
         "engaged" => scene.role_values(Role::Engaged),
         "spindle_speed_rpm" => scene.role_values(Role::Speed),
@@ -84,7 +88,7 @@ fn by_role<'s>(scene: &'s Scene, name: &str) -> Option<&'s [f64]> {
     }
 }
 
-fn time_in_run_s(scene: &Scene) -> Vec<f64> {
+fn compute_time_in_run_s(scene: &Scene) -> Vec<f64> {
     let mut values = scene.time_s().to_vec();
     for run in scene.runs() {
         let start = scene.time_s()[run.start];
@@ -93,7 +97,7 @@ fn time_in_run_s(scene: &Scene) -> Vec<f64> {
     values
 }
 
-fn time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
+fn compute_time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
     let engaged = scene.role_values(Role::Engaged)?;
     let mut values = vec![0.0; scene.rows()];
     for run in scene.runs() {
@@ -106,9 +110,9 @@ fn time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
     Some(values)
 }
 
-fn time_since_change_s(scene: &Scene, column: &str) -> Option<Vec<f64>> {
+fn compute_time_since_change_s(scene: &Scene, column: &str) -> Option<Vec<f64>> {
     let clock_s = scene.clock_s();
-    let mut changes = changes_of(scene, column)?.into_iter().peekable();
+    let mut changes = find_change_rows(scene, column)?.into_iter().peekable();
     let mut since = 0;
     let at = |row: usize| {
         since = changes.next_if_eq(&row).unwrap_or(since);
@@ -117,12 +121,12 @@ fn time_since_change_s(scene: &Scene, column: &str) -> Option<Vec<f64>> {
     Some((0..scene.rows()).map(at).collect())
 }
 
-fn direction(scene: &Scene) -> Option<Vec<f64>> {
-    let velocity = read_slide_velocity(scene).filter(|velocity| goes_both_ways(velocity))?;
+fn read_motion_direction(scene: &Scene) -> Option<Vec<f64>> {
+    let velocity = read_slide_velocity(scene).filter(|velocity| has_both_directions(velocity))?;
     Some(compute_directions(&velocity).collect())
 }
 
-fn cut_per_krpm(scene: &Scene) -> Option<Vec<f64>> {
+fn compute_cut_per_krpm(scene: &Scene) -> Option<Vec<f64>> {
     let (load, speed) = (scene.load()?, scene.role_values(Role::Speed)?);
     let per_krpm = |(load, rpm): (&f64, &f64)| if rpm.abs() > 1.0 { 1000.0 * load / rpm.abs() } else { 0.0 };
     Some(load.iter().zip(speed).map(per_krpm).collect())
@@ -131,7 +135,7 @@ fn cut_per_krpm(scene: &Scene) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::simulate;
+    use crate::model::simulate_parts;
     use crate::parse_model;
     use adapters::recording::read_csv;
     use std::collections::BTreeMap;
@@ -151,7 +155,7 @@ mod tests {
         }
         let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
         let mut scene = Scene::new(&recording, "spindle_power_w", &BTreeMap::new()).expect("recorded");
-        simulate(&parse_model(MODEL).expect("fine").parts, &mut scene).expect("simulated");
+        simulate_parts(&parse_model(MODEL).expect("fine").parts, &mut scene).expect("simulated");
         scene
     }
 
@@ -160,7 +164,7 @@ mod tests {
         let text = "time_s,run,spindle_power_w,tool,depth_of_cut_mm\n0,a,1,T1,1\n2,a,1,T1,2\n4,a,1,T2,2\n7,a,1,T2,2\n";
         let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
         let scene = Scene::new(&recording, "spindle_power_w", &BTreeMap::new()).expect("recorded");
-        let since = |column: &str| channel_values(&scene, &format!("{TIME_SINCE_CHANGE_OF}{column}"));
+        let since = |column: &str| read_channel_values(&scene, &format!("{TIME_SINCE_CHANGE_OF}{column}"));
         assert_eq!(since("tool").as_deref(), Some(&[0.0, 2.0, 0.0, 3.0][..]));
         assert_eq!(since("depth_of_cut_mm").as_deref(), Some(&[0.0, 0.0, 2.0, 5.0][..]));
         assert_eq!(since("coolant"), None, "what is not recorded");
@@ -171,9 +175,9 @@ mod tests {
         let scene = cut();
         for name in ["lag_of_0_s_behind_engaged", "lag_of_x_s_behind_engaged", "lag_of_5_s_behind_nothing", "lag_of_5"]
         {
-            assert_eq!(channel_values(&scene, name), None, "{name}");
+            assert_eq!(read_channel_values(&scene, name), None, "{name}");
         }
-        let lag = channel_values(&scene, "lag_of_5_s_behind_spindle_speed_rpm").expect("there");
+        let lag = read_channel_values(&scene, "lag_of_5_s_behind_spindle_speed_rpm").expect("there");
         assert!(lag.windows(2).all(|pair| pair[0] <= pair[1] && pair[1] < 900.0 + 1e-6), "from zero to the speed");
     }
 }

@@ -1,13 +1,13 @@
 //! What a diagnosis says (`diagnosis/1`), before it is written as JSON, words or a page.
 
-use super::locate::Region;
 use super::model::Model;
 use super::quality::Fault;
+use super::region::Region;
 use adapters::bilingual::Bilingual;
 
 /// The unit of an output, from its name.
 #[must_use]
-pub fn unit_of(output: &str) -> &'static str {
+pub fn find_output_unit(output: &str) -> &'static str {
     adapters::channel::quantity::unit_of(output).unwrap_or("1")
 }
 
@@ -32,7 +32,7 @@ pub enum Verdict {
 impl Verdict {
     /// The word in the contract.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Explained => "explained",
             Self::Ambiguous => "ambiguous",

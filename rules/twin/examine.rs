@@ -1,10 +1,10 @@
 //! Is this recording fit to be compared with this model? Everything that is wrong, at once, each with what to record
 //! instead.
 
-use super::bind::bind;
-use super::diagnosis::unit_of;
-use super::inputs::columns;
-use super::model::{Model, Part, simulate};
+use super::bind::bind_model;
+use super::diagnosis::find_output_unit;
+use super::inputs::list_input_columns;
+use super::model::{Model, Part, simulate_parts};
 use adapters::Recording;
 use adapters::channel::{ChannelId, Kind};
 use adapters::recording::Numbers;
@@ -34,21 +34,21 @@ pub struct Examination {
 
 /// Examines a recording for a model.
 #[must_use]
-pub fn examine(recording: &Recording, model: &Model) -> Examination {
+pub fn examine_recording(recording: &Recording, model: &Model) -> Examination {
     let mut found = Examination::default();
     for column in recording.columns() {
         if let Some(numbers) = recording.find_numbers(&column.name) {
-            range(&column.name, numbers, &mut found);
-            kelvin(&column.name, numbers, &mut found);
+            check_value_range(&column.name, numbers, &mut found);
+            check_temperature_unit(&column.name, numbers, &mut found);
         }
     }
-    time(recording, &mut found);
-    consistent(recording, &mut found);
+    check_time_stamps(recording, &mut found);
+    check_derived_quantities(recording, &mut found);
     match Scene::new(recording, &model.output, &model.roles) {
         Err(error) => found.unusable.push(error.to_string()),
-        Ok(mut scene) => match bind(model, &scene) {
+        Ok(mut scene) => match bind_model(model, &scene) {
             Err(problems) => found.unusable.extend(problems),
-            Ok(parts) => comparable(&parts, &mut scene, &mut found),
+            Ok(parts) => check_nominal_model(&parts, &mut scene, &mut found),
         },
     }
     found
@@ -58,7 +58,7 @@ pub fn examine(recording: &Recording, model: &Model) -> Examination {
 ///
 /// Of a measured quantity only the size tells the unit: a current is recorded below zero where its meter has noise at rest or gives
 /// the direction, and its unit is right all the same.
-fn range(name: &str, numbers: &Numbers, found: &mut Examination) {
+fn check_value_range(name: &str, numbers: &Numbers, found: &mut Examination) {
     let Some(channel) = ChannelId::from_name(name).map(ChannelId::channel) else { return };
     let outside = |x: &f64| !channel.accepts_number(*x);
     let outsiders = numbers.present_values().filter(outside).count();
@@ -81,7 +81,7 @@ fn range(name: &str, numbers: &Numbers, found: &mut Examination) {
     }
 }
 
-fn kelvin(name: &str, numbers: &Numbers, found: &mut Examination) {
+fn check_temperature_unit(name: &str, numbers: &Numbers, found: &mut Examination) {
     if !name.ends_with("temperature_c") {
         return;
     }
@@ -91,7 +91,7 @@ fn kelvin(name: &str, numbers: &Numbers, found: &mut Examination) {
     }
 }
 
-fn time(recording: &Recording, found: &mut Examination) {
+fn check_time_stamps(recording: &Recording, found: &mut Examination) {
     let steps = |rows: std::ops::Range<usize>| -> usize {
         recording.time_s[rows].windows(2).filter(|pair| pair[1] <= pair[0]).count()
     };
@@ -114,7 +114,7 @@ fn time(recording: &Recording, found: &mut Examination) {
 }
 
 /// Quantities that must agree because one follows from others: a constant factor between them is a unit.
-fn consistent(recording: &Recording, found: &mut Examination) {
+fn check_derived_quantities(recording: &Recording, found: &mut Examination) {
     for (name, factors) in [
         ("feed_per_rev_mm", &[(60.0, "mm/s in feed_mm_min, or rev/s in spindle_speed_rpm")][..]),
         ("cutting_speed_m_min", &[(60.0, "m/s"), (1000.0, "mm/min")][..]),
@@ -138,10 +138,10 @@ fn consistent(recording: &Recording, found: &mut Examination) {
 }
 
 /// The nominal model over the recording: does its output have the size of the recorded one, and do its inputs change?
-fn comparable(parts: &[Part], scene: &mut Scene, found: &mut Examination) {
-    let inputs = columns(scene, parts);
+fn check_nominal_model(parts: &[Part], scene: &mut Scene, found: &mut Examination) {
+    let inputs = list_input_columns(scene, parts);
     for name in &inputs {
-        if let Some((low, high)) = scene.column(name).and_then(extremes)
+        if let Some((low, high)) = scene.column(name).and_then(find_extremes)
             && low == high
         {
             found.notes.push(format!(
@@ -149,20 +149,20 @@ fn comparable(parts: &[Part], scene: &mut Scene, found: &mut Examination) {
             ));
         }
     }
-    let Some(simulated) = simulate(parts, scene) else {
+    let Some(simulated) = simulate_parts(parts, scene) else {
         found.unusable.push("the model cannot be simulated over this recording".to_owned());
         return;
     };
     if parts.iter().any(|part| matches!(part.kind.as_str(), "no_load_power" | "cutting_power")) {
-        prefix(scene, &simulated.total, found);
+        check_unit_prefix(scene, &simulated.total, found);
     }
 }
 
-fn prefix(scene: &Scene, simulated: &[f64], found: &mut Examination) {
+fn check_unit_prefix(scene: &Scene, simulated: &[f64], found: &mut Examination) {
     let usable = |row: &usize| scene.usable_rows()[*row];
     let typical = |values: &[f64]| median((0..values.len()).filter(usable).map(|row| values[row].abs()).collect());
     let (Some(recorded), Some(simulated)) = (typical(scene.recorded_output()), typical(simulated)) else { return };
-    let (output, unit) = (scene.output_name(), unit_of(scene.output_name()));
+    let (output, unit) = (scene.output_name(), find_output_unit(scene.output_name()));
     let inside = |ratio: f64| ratio > PREFIX.0 && ratio < PREFIX.1;
     if recorded > 0.0 && simulated > 0.0 && (inside(recorded / simulated) || inside(simulated / recorded)) {
         found.unusable.push(format!(
@@ -172,7 +172,7 @@ fn prefix(scene: &Scene, simulated: &[f64], found: &mut Examination) {
     }
 }
 
-fn extremes(values: &[f64]) -> Option<(f64, f64)> {
+fn find_extremes(values: &[f64]) -> Option<(f64, f64)> {
     let first = *values.first()?;
     Some(values.iter().fold((first, first), |(low, high), x| (low.min(*x), high.max(*x))))
 }
@@ -188,7 +188,7 @@ mod tests {
 
     fn examined(csv: &str) -> Examination {
         let recording = read_csv(csv.as_bytes(), "t.csv").expect("readable").recording;
-        examine(&recording, &parse_model(MODEL).expect("fine"))
+        examine_recording(&recording, &parse_model(MODEL).expect("fine"))
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! A user's hypothesis as a rhai expression over columns and its own parameters.
 
-use super::channel::{SIMULATED_OUTPUT, channel_values, is_simulated};
+use super::channel::{SIMULATED_OUTPUT, is_simulated, read_channel_values};
 use super::model::Parameter;
 use physics::{LinearLaw, Scene};
 use rhai::{AST, Engine, EvalAltResult, Scope};
@@ -31,15 +31,15 @@ impl Expression {
     ///
     /// # Errors
     /// What the compiler says, with the column of the text.
-    pub fn compile(text: &str, parameters: &[String]) -> Result<Self, String> {
+    pub fn compile_text(text: &str, parameters: &[String]) -> Result<Self, String> {
         let mut engine = Engine::new();
         engine.set_max_operations(OPERATIONS_PER_ROW_MAX);
         engine.set_max_expr_depths(64, 64);
         engine.set_max_string_size(1024);
         engine.set_max_array_size(64);
         engine.set_max_map_size(64);
-        let ast = engine.compile_expression(without_ternaries(text)).map_err(|error| error.to_string())?;
-        let inputs = identifiers(text).into_iter().filter(|name| !parameters.contains(name)).collect();
+        let ast = engine.compile_expression(replace_ternaries(text)).map_err(|error| error.to_string())?;
+        let inputs = list_identifiers(text).into_iter().filter(|name| !parameters.contains(name)).collect();
         Ok(Self { text: text.to_owned(), engine: Arc::new(engine), ast: Arc::new(ast), inputs })
     }
 
@@ -58,9 +58,10 @@ impl Expression {
     /// Its value in every row; `None` when a column is missing or a row fails. A formula that is linear in its
     /// parameters is run through the script engine once only.
     #[must_use]
-    pub fn evaluate(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    pub fn evaluate_rows(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
         let kept = !self.inputs.iter().any(|input| is_simulated(input) || input == SIMULATED_OUTPUT);
-        let law = kept.then(|| scene.linear_law(&self.text, || self.linear_law(scene, parameters))).flatten();
+        let law =
+            kept.then(|| scene.cache_linear_law(&self.text, || self.find_linear_law(scene, parameters))).flatten();
         match law {
             Some(law) => {
                 let mut sum = law.first()?.clone();
@@ -69,17 +70,17 @@ impl Expression {
                 }
                 Some(sum)
             }
-            None => self.run(scene, parameters),
+            None => self.run_script(scene, parameters),
         }
     }
 
     /// The formula as columns, if it is linear in its parameters: told by its values at zero, at each unit, and at two
     /// mixtures of them.
-    fn linear_law(&self, scene: &Scene, parameters: &[Parameter]) -> LinearLaw {
+    fn find_linear_law(&self, scene: &Scene, parameters: &[Parameter]) -> LinearLaw {
         let at = |values: &dyn Fn(usize) -> f64| {
             let mut moved = parameters.to_vec();
             moved.iter_mut().enumerate().for_each(|(index, parameter)| parameter.value = values(index));
-            self.run(scene, &moved)
+            self.run_script(scene, &moved)
         };
         let zero = at(&|_| 0.0)?;
         let mut columns = vec![zero.clone()];
@@ -103,8 +104,8 @@ impl Expression {
     }
 
     /// Runs the script engine over every row.
-    fn run(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
-        let known = |name: &String| channel_values(scene, name);
+    fn run_script(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        let known = |name: &String| read_channel_values(scene, name);
         let values = self.inputs.iter().map(known).collect::<Option<Vec<_>>>()?;
         let inputs: Vec<(&str, Cow<'_, [f64]>)> = self.inputs.iter().map(String::as_str).zip(values).collect();
         let mut scope = Scope::new();
@@ -118,13 +119,13 @@ impl Expression {
                 for (name, values) in &inputs {
                     scope.push((*name).to_owned(), values[row]);
                 }
-                number(self.engine.eval_ast_with_scope(&mut scope, &self.ast))
+                to_finite_number(self.engine.eval_ast_with_scope(&mut scope, &self.ast))
             })
             .collect()
     }
 }
 
-fn number(value: Result<rhai::Dynamic, Box<EvalAltResult>>) -> Option<f64> {
+fn to_finite_number(value: Result<rhai::Dynamic, Box<EvalAltResult>>) -> Option<f64> {
     let value = value.ok()?;
     #[expect(clippy::cast_precision_loss, reason = "an integer result of a formula is small")]
     let number = value.as_float().ok().or_else(|| value.as_int().ok().map(|int| int as f64))?;
@@ -132,34 +133,38 @@ fn number(value: Result<rhai::Dynamic, Box<EvalAltResult>>) -> Option<f64> {
 }
 
 /// The expression with every `condition ? a : b` written as rhai's `if condition { a } else { b }`.
-fn without_ternaries(text: &str) -> String {
+fn replace_ternaries(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;
     // Inside out: every bracketed group is translated by itself, what remains has no brackets that matter.
     while let Some(open) = rest.find(['(', '[']) {
-        let Some(close) = closing(rest, open) else { break };
+        let Some(close) = find_closing_bracket(rest, open) else { break };
         out.push_str(&rest[..=open]);
-        let inside: Vec<String> = split_top(&rest[open + 1..close], ',').into_iter().map(without_ternaries).collect();
+        let inside: Vec<String> =
+            split_top_level(&rest[open + 1..close], ',').into_iter().map(replace_ternaries).collect();
         out.push_str(&inside.join(","));
         out.push_str(&rest[close..=close]);
         rest = &rest[close + 1..];
     }
     out.push_str(rest);
-    choice(&out)
+    translate_ternary(&out)
 }
 
 /// Translates the choice at the top level, if there is one.
-fn choice(text: &str) -> String {
-    let Some(question) = top(text).find(|(at, c)| *c == '?' && is_choice(text, *at)).map(|(at, _)| at) else {
+fn translate_ternary(text: &str) -> String {
+    let Some(question) =
+        iterate_top_level(text).find(|(at, c)| *c == '?' && is_ternary_mark(text, *at)).map(|(at, _)| at)
+    else {
         return text.to_owned();
     };
     let after = &text[question + 1..];
     let mut open = 0;
-    for (at, c) in top(after) {
+    for (at, c) in iterate_top_level(after) {
         match c {
-            '?' if is_choice(after, at) => open += 1,
+            '?' if is_ternary_mark(after, at) => open += 1,
             ':' if open == 0 => {
-                let (condition, yes, no) = (&text[..question], choice(&after[..at]), choice(&after[at + 1..]));
+                let (condition, yes, no) =
+                    (&text[..question], translate_ternary(&after[..at]), translate_ternary(&after[at + 1..]));
                 return format!("if {condition} {{ {yes} }} else {{ {no} }}");
             }
             ':' => open -= 1,
@@ -170,14 +175,14 @@ fn choice(text: &str) -> String {
 }
 
 /// `??`, `?.` and `?[` are other operators.
-fn is_choice(text: &str, at: usize) -> bool {
+fn is_ternary_mark(text: &str, at: usize) -> bool {
     let next = text[at + 1..].chars().next();
     let before = text[..at].chars().next_back();
     !matches!(next, Some('?' | '.' | '[')) && before != Some('?')
 }
 
 /// Characters outside every bracket.
-fn top(text: &str) -> impl Iterator<Item = (usize, char)> + '_ {
+fn iterate_top_level(text: &str) -> impl Iterator<Item = (usize, char)> + '_ {
     let mut depth = 0_i32;
     text.char_indices().filter(move |(_, c)| {
         match c {
@@ -189,14 +194,16 @@ fn top(text: &str) -> impl Iterator<Item = (usize, char)> + '_ {
     })
 }
 
-fn closing(text: &str, open: usize) -> Option<usize> {
-    top(&text[open..]).map(|(at, _)| open + at).find(|at| *at >= open && text[*at..].starts_with([')', ']']))
+fn find_closing_bracket(text: &str, open: usize) -> Option<usize> {
+    iterate_top_level(&text[open..])
+        .map(|(at, _)| open + at)
+        .find(|at| *at >= open && text[*at..].starts_with([')', ']']))
 }
 
-fn split_top(text: &str, separator: char) -> Vec<&str> {
+fn split_top_level(text: &str, separator: char) -> Vec<&str> {
     let mut parts = Vec::new();
     let mut start = 0;
-    let cuts: Vec<usize> = top(text).filter(|(_, c)| *c == separator).map(|(at, _)| at).collect();
+    let cuts: Vec<usize> = iterate_top_level(text).filter(|(_, c)| *c == separator).map(|(at, _)| at).collect();
     for cut in cuts {
         parts.push(&text[start..cut]);
         start = cut + separator.len_utf8();
@@ -206,7 +213,7 @@ fn split_top(text: &str, separator: char) -> Vec<&str> {
 }
 
 /// Names in the text that are not called as functions and are not literals.
-fn identifiers(text: &str) -> Vec<String> {
+fn list_identifiers(text: &str) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     let bytes = text.as_bytes();
     let mut at = 0;
@@ -237,23 +244,23 @@ mod tests {
     #[test]
     fn columns_are_told_from_parameters_functions_and_numbers() {
         let text = "k * abs(axis_velocity_mm_min) * (ambient_temperature_c < 15.0 ? 1.0 : 0.0)";
-        let got = Expression::compile(text, &["k".to_owned()]).expect("compiles");
+        let got = Expression::compile_text(text, &["k".to_owned()]).expect("compiles");
         assert_eq!(got.inputs(), ["axis_velocity_mm_min", "ambient_temperature_c"]);
     }
 
     #[test]
     fn choices_are_written_as_rhai_writes_them() {
-        let got = without_ternaries("k * (a < 1.0 ? 1.0 : b > 2.0 ? max(a, b ? c : d) : 0.0)");
+        let got = replace_ternaries("k * (a < 1.0 ? 1.0 : b > 2.0 ? max(a, b ? c : d) : 0.0)");
         assert_eq!(
             got,
             "k * (if a < 1.0  {  1.0  } else { if  b > 2.0  {  max(a,if  b  {  c  } else {  d })  } else {  0.0 } })"
         );
-        assert_eq!(without_ternaries("a ?? b"), "a ?? b");
+        assert_eq!(replace_ternaries("a ?? b"), "a ?? b");
     }
 
     #[test]
     fn a_broken_expression_says_where() {
-        let error = Expression::compile("k * (", &["k".to_owned()]).expect_err("broken");
+        let error = Expression::compile_text("k * (", &["k".to_owned()]).expect_err("broken");
         assert!(error.contains("position"), "{error}");
     }
 }

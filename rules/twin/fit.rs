@@ -4,7 +4,7 @@
 //! the metric of the likeliest noise. Every number is computed over all rows; only those that the metric takes are fitted.
 
 use super::linear::{dot, least_squares};
-use super::model::{Part, Simulated, simulate, simulate_changed};
+use super::model::{Part, Simulated, simulate_changed_part, simulate_parts};
 use numerics::statistics::rms;
 use physics::{Entry, Scene};
 
@@ -53,31 +53,31 @@ pub(super) struct Fit {
 
 /// Fits everything in `parts` that is not fixed, from its present values; the scene keeps load and simulated output of the
 /// fitted parts. `None` when a part lacks an input.
-pub(super) fn fit(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) -> Option<Fit> {
-    let free = free_parameters(parts);
+pub(super) fn fit_parts(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) -> Option<Fit> {
+    let free = list_free_parameters(parts);
     let mut parts = parts.to_vec();
     if metric.bounded {
-        parts.iter_mut().for_each(hold_in_range);
+        parts.iter_mut().for_each(clamp_to_range);
     }
-    let mut simulated = simulate(&parts, scene)?;
-    let mut error = square(metric, &simulated.total);
+    let mut simulated = simulate_parts(&parts, scene)?;
+    let mut error = sum_residual_squares(metric, &simulated.total);
     for _ in 0..STEPS_MAX {
-        let tangents = tangents(scene, &parts, &free, &simulated)?;
-        let step = step(&parts, &free, metric, &simulated.total, &tangents);
-        let Some((moved, total, less)) = advance(scene, &parts, &free, &step, metric, error)? else { break };
+        let tangents = compute_tangents(scene, &parts, &free, &simulated)?;
+        let step = solve_gauss_newton_step(&parts, &free, metric, &simulated.total, &tangents);
+        let Some((moved, total, less)) = search_step_length(scene, &parts, &free, &step, metric, error)? else { break };
         let gained = error - less;
         (parts, simulated, error) = (moved, total, less);
         if gained <= AT_REST * error {
             break;
         }
     }
-    let tangents = tangents(scene, &parts, &free, &simulated)?;
-    let simulated = simulate(&parts, scene)?.total;
+    let tangents = compute_tangents(scene, &parts, &free, &simulated)?;
+    let simulated = simulate_parts(&parts, scene)?.total;
     Some(Fit { parts, free, simulated, tangents })
 }
 
 /// A fit without bounds may have left a parameter outside of its range; from there no step would lead back.
-fn hold_in_range(part: &mut Part) {
+fn clamp_to_range(part: &mut Part) {
     for parameter in part.parameters.iter_mut().filter(|parameter| !parameter.fixed) {
         let (low, high) = parameter.range;
         parameter.value = parameter.value.clamp(low, high);
@@ -85,7 +85,7 @@ fn hold_in_range(part: &mut Part) {
 }
 
 /// Everything that is not fixed.
-fn free_parameters(parts: &[Part]) -> Vec<Free> {
+fn list_free_parameters(parts: &[Part]) -> Vec<Free> {
     let of = |(part, p): (usize, &Part)| {
         let free = (0..p.parameters.len()).filter(|index| !p.parameters[*index].fixed);
         free.map(|parameter| Free { part, parameter }).collect::<Vec<_>>()
@@ -94,20 +94,26 @@ fn free_parameters(parts: &[Part]) -> Vec<Free> {
 }
 
 /// What is left, as it counts.
-fn left(metric: &Metric<'_>, total: &[f64]) -> Vec<f64> {
+fn compute_weighted_residual(metric: &Metric<'_>, total: &[f64]) -> Vec<f64> {
     let left: Vec<f64> = metric.recorded.iter().zip(total).map(|(recorded, total)| recorded - total).collect();
     (metric.weigh)(&left)
 }
 
-fn square(metric: &Metric<'_>, total: &[f64]) -> f64 {
-    let left = left(metric, total);
+fn sum_residual_squares(metric: &Metric<'_>, total: &[f64]) -> f64 {
+    let left = compute_weighted_residual(metric, total);
     dot(&left, &left)
 }
 
 /// The step to the least error if everything were proportional; parameters that stand at the end of their range and would
 /// leave it rest.
-fn step(parts: &[Part], free: &[Free], metric: &Metric<'_>, total: &[f64], tangents: &[Vec<f64>]) -> Vec<f64> {
-    let left = left(metric, total);
+fn solve_gauss_newton_step(
+    parts: &[Part],
+    free: &[Free],
+    metric: &Metric<'_>,
+    total: &[f64],
+    tangents: &[Vec<f64>],
+) -> Vec<f64> {
+    let left = compute_weighted_residual(metric, total);
     let mut columns: Vec<Vec<f64>> = tangents.iter().map(|tangent| (metric.weigh)(tangent)).collect();
     let sizes: Vec<f64> = columns.iter().map(|column| rms(column).max(f64::MIN_POSITIVE)).collect();
     columns.iter_mut().zip(&sizes).for_each(|(column, size)| column.iter_mut().for_each(|x| *x /= size));
@@ -133,7 +139,7 @@ fn step(parts: &[Part], free: &[Free], metric: &Metric<'_>, total: &[f64], tange
 type Moved = (Vec<Part>, Simulated, f64);
 
 /// Goes the step, or as much of it as makes the error smaller; nothing where no share of it does.
-fn advance(
+fn search_step_length(
     scene: &mut Scene,
     parts: &[Part],
     free: &[Free],
@@ -157,8 +163,8 @@ fn advance(
                 parameter.value = parameter.value.clamp(low, high);
             }
         }
-        let simulated = simulate(&moved, scene)?;
-        let less = square(metric, &simulated.total);
+        let simulated = simulate_parts(&moved, scene)?;
+        let less = sum_residual_squares(metric, &simulated.total);
         if less < error {
             return Some(Some((moved, simulated, less)));
         }
@@ -168,15 +174,15 @@ fn advance(
 
 /// Change of the output with each free parameter: its own column where nothing else reads what it does, a difference
 /// quotient (exact where it is proportional) elsewhere.
-fn tangents(scene: &mut Scene, parts: &[Part], free: &[Free], base: &Simulated) -> Option<Vec<Vec<f64>>> {
-    simulate(parts, scene)?;
+fn compute_tangents(scene: &mut Scene, parts: &[Part], free: &[Free], base: &Simulated) -> Option<Vec<Vec<f64>>> {
+    simulate_parts(parts, scene)?;
     let mut columns: Vec<Option<Vec<f64>>> = vec![None; free.len()];
     for (index, part) in parts.iter().enumerate() {
-        let direct = |free: &Free| free.part == index && is_direct(parts, *free);
+        let direct = |free: &Free| free.part == index && has_column_derivative(parts, *free);
         if !free.iter().any(direct) {
             continue;
         }
-        let known = part.columns(scene)?;
+        let known = part.compute_columns(scene)?;
         for (position, free) in free.iter().enumerate().filter(|(_, free)| direct(free)) {
             let name = &part.parameters[free.parameter].name;
             let own = known.iter().find(|(known, _)| known == name).map(|(_, column)| column.clone());
@@ -185,21 +191,21 @@ fn tangents(scene: &mut Scene, parts: &[Part], free: &[Free], base: &Simulated) 
     }
     for (position, free) in free.iter().enumerate() {
         if columns[position].is_none() {
-            columns[position] = Some(difference(scene, parts, *free, base)?);
+            columns[position] = Some(compute_difference_quotient(scene, parts, *free, base)?);
         }
     }
     columns.into_iter().collect()
 }
 
 /// Is the derivative simply the part's own column? Not where other parts read what this one simulates.
-fn is_direct(parts: &[Part], free: Free) -> bool {
+fn has_column_derivative(parts: &[Part], free: Free) -> bool {
     let part = &parts[free.part];
     let linear = part.parameters[free.parameter].entry == Entry::Linear;
     let coupled = parts.iter().any(Part::acts_on_output) && !part.acts_on_output();
     linear && !coupled && !parts.iter().any(|other| part.is_read_by(other))
 }
 
-fn difference(scene: &mut Scene, parts: &[Part], free: Free, base: &Simulated) -> Option<Vec<f64>> {
+fn compute_difference_quotient(scene: &mut Scene, parts: &[Part], free: Free, base: &Simulated) -> Option<Vec<f64>> {
     let mut moved = parts.to_vec();
     let parameter = &mut moved[free.part].parameters[free.parameter];
     let mut step = DIFFERENCE * parameter.value.abs().max(if parameter.entry == Entry::Shape { 1e-2 } else { 1e-6 });
@@ -207,8 +213,8 @@ fn difference(scene: &mut Scene, parts: &[Part], free: Free, base: &Simulated) -
         step = -step;
     }
     parameter.value += step;
-    let ahead = simulate_changed(&moved, scene, base, free.part)?;
-    simulate(parts, scene)?;
+    let ahead = simulate_changed_part(&moved, scene, base, free.part)?;
+    simulate_parts(parts, scene)?;
     Some(ahead.iter().zip(&base.total).map(|(ahead, base)| (ahead - base) / step).collect())
 }
 
@@ -240,20 +246,20 @@ mod tests {
         let recorded = scene.recorded_output().to_vec();
         let parts = parse_model(MODEL).expect("fine").parts;
         let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), bounded };
-        fit(&mut scene, &parts, &metric).expect("every input is recorded")
+        fit_parts(&mut scene, &parts, &metric).expect("every input is recorded")
     }
 
     #[test]
     fn sizes_and_shapes_are_those_of_the_recording() {
         let fit = fitted(20.0, true);
-        let value = |part: usize, name: &str| fit.parts[part].parameter(name).expect("a parameter").value;
+        let value = |part: usize, name: &str| fit.parts[part].find_parameter(name).expect("a parameter").value;
         assert!((value(0, "acceleration_m_s2") - 90.0).abs() < 0.5, "{:?}", fit.parts);
         assert!((value(1, "level") - 20.0).abs() < 0.2, "{:?}", fit.parts);
     }
 
     #[test]
     fn what_must_stay_possible_rests_at_its_bound() {
-        let level = |bounded: bool| fitted(-20.0, bounded).parts[1].parameter("level").expect("a level").value;
+        let level = |bounded: bool| fitted(-20.0, bounded).parts[1].find_parameter("level").expect("a level").value;
         assert_eq!(level(true), 0.0);
         assert!(level(false) < -15.0, "{}", level(false));
     }
@@ -264,7 +270,7 @@ mod tests {
         let recorded = scene.recorded_output().to_vec();
         let outside = fitted(-20.0, false).parts;
         let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), bounded: true };
-        let held = fit(&mut scene, &outside, &metric).expect("every input is recorded");
-        assert_eq!(held.parts[1].parameter("level").expect("a level").value, 0.0);
+        let held = fit_parts(&mut scene, &outside, &metric).expect("every input is recorded");
+        assert_eq!(held.parts[1].find_parameter("level").expect("a level").value, 0.0);
     }
 }

@@ -8,15 +8,15 @@ const HELD_ROWS_MAX: usize = 3;
 
 /// The columns that the parts read directly.
 #[must_use]
-pub fn columns(scene: &Scene, parts: &[Part]) -> Vec<String> {
-    let mut names: Vec<String> = parts.iter().flat_map(|part| columns_of(scene, part)).collect();
+pub fn list_input_columns(scene: &Scene, parts: &[Part]) -> Vec<String> {
+    let mut names: Vec<String> = parts.iter().flat_map(|part| list_part_columns(scene, part)).collect();
     names.sort();
     names.dedup();
     names.retain(|name| scene.column(name).is_some());
     names
 }
 
-fn columns_of(scene: &Scene, part: &Part) -> Vec<String> {
+fn list_part_columns(scene: &Scene, part: &Part) -> Vec<String> {
     let role = |role: Role| scene.role_name(role).map(str::to_owned);
     match &part.body {
         PartFunction::Table(_) => role(Role::Speed).into_iter().collect(),
@@ -33,11 +33,11 @@ fn columns_of(scene: &Scene, part: &Part) -> Vec<String> {
 /// Rows in which every input of the parts has a value of its own, or held for at most three rows. Inputs of the cut
 /// matter only in the cut.
 #[must_use]
-pub fn rows_with_inputs(scene: &Scene, parts: &[Part]) -> Vec<bool> {
+pub fn mark_rows_with_inputs(scene: &Scene, parts: &[Part]) -> Vec<bool> {
     let mut known = vec![true; scene.rows()];
     let engaged = scene.role_values(Role::Engaged);
     for part in parts {
-        for name in columns(scene, std::slice::from_ref(part)) {
+        for name in list_input_columns(scene, std::slice::from_ref(part)) {
             let Some(absent) = scene.absent_rows(&name) else { continue };
             let mut since = 0;
             for row in 0..scene.rows() {
@@ -54,6 +54,6 @@ pub fn rows_with_inputs(scene: &Scene, parts: &[Part]) -> Vec<bool> {
 
 /// Takes rows whose inputs are absent out of the comparison.
 pub fn exclude_rows_without_inputs(scene: &mut Scene, parts: &[Part]) {
-    let known = rows_with_inputs(scene, parts);
+    let known = mark_rows_with_inputs(scene, parts);
     scene.exclude_rows((0..known.len()).filter(|row| !known[*row]));
 }

@@ -18,7 +18,7 @@ use super::fit::Fit;
 use super::linear::{dot, extend_basis, least_squares, project_out};
 use super::model::{Part, PartFunction};
 use numerics::statistics::count_to_f64;
-use physics::{Entry, Scene, unit_in};
+use physics::{Entry, Scene, resolve_unit};
 
 /// By how much of its value a parameter may be off because no machine follows a law to the letter, with a certainty of
 /// 95 %: a share that no amount of rows makes smaller (GUM, type B).
@@ -56,7 +56,7 @@ pub(super) struct FittedRows<'a> {
 
 impl FittedRows<'_> {
     /// The parameters of part number `part`, with intervals in their own units.
-    pub(super) fn estimates(&self, part: usize) -> Vec<ParameterEstimate> {
+    pub(super) fn estimate_parameters(&self, part: usize) -> Vec<ParameterEstimate> {
         let fit = self.fit;
         let left: Vec<f64> = self.recorded.iter().zip(&fit.simulated).map(|(y, f)| y - f).collect();
         let innovations = (self.whiten)(&left);
@@ -64,8 +64,8 @@ impl FittedRows<'_> {
         let freedom = innovations.len().saturating_sub(fit.free.len()).max(1);
         let variance = dot(&innovations, &innovations) / count_to_f64(freedom);
         let inverse = least_squares(&white, &innovations).inverse;
-        let among_units = disagreement(&white, &innovations, &inverse, &self.unit);
-        let passed_on = self.passed_on(part);
+        let among_units = compute_sandwich_variances(&white, &innovations, &inverse, &self.unit);
+        let passed_on = self.compute_load_loss_factor(part);
         let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
         of_part
             .map(|(index, free)| {
@@ -73,7 +73,12 @@ impl FittedRows<'_> {
                 let between = match parameter.entry {
                     Entry::Linear => {
                         let own: Vec<f64> = self.rows.iter().map(|row| fit.tangents[index][*row]).collect();
-                        between_levels(&cleared(&white, index), &innovations, &levels(&own), variance)
+                        estimate_level_variance(
+                            &project_out_others(&white, index),
+                            &innovations,
+                            &assign_levels(&own),
+                            variance,
+                        )
                     }
                     Entry::Shape => 0.0,
                 };
@@ -89,7 +94,7 @@ impl FittedRows<'_> {
                     value: parameter.value,
                     low: low.max(parameter.range.0),
                     high: high.min(parameter.range.1),
-                    unit: unit_in(&parameter.unit, self.scene),
+                    unit: resolve_unit(&parameter.unit, self.scene),
                 }
             })
             .collect()
@@ -97,7 +102,7 @@ impl FittedRows<'_> {
 
     /// What one unit more in the cut comes to at the output if the load loss that the model has acts on this part too; one
     /// for a part that does not change the cut.
-    fn passed_on(&self, part: usize) -> f64 {
+    fn compute_load_loss_factor(&self, part: usize) -> f64 {
         let in_the_cut = |part: &Part| match &part.body {
             PartFunction::Effect(effect, _) => {
                 effect.doc().family == "cutting" || OF_THE_CUT.contains(&part.kind.as_str())
@@ -112,14 +117,19 @@ impl FittedRows<'_> {
         let Some(load) = self.scene.load() else { return 1.0 };
         let size: f64 = load.iter().map(|load| load.abs()).sum();
         let typical = if size > 0.0 { dot(load, load) / size } else { 0.0 };
-        let value = |part: &Part, name: &str| part.parameter(name).map_or(0.0, |parameter| parameter.value);
+        let value = |part: &Part, name: &str| part.find_parameter(name).map_or(0.0, |parameter| parameter.value);
         let slope = |part: &&Part| value(part, "linear") + 2.0 * value(part, "quadratic_per_w") * typical;
         (1.0 + losses.iter().map(slope).sum::<f64>()).max(0.5)
     }
 }
 
 /// Variances of the parameters from the sums of each unit; zero for too few units.
-fn disagreement(columns: &[Vec<f64>], innovations: &[f64], inverse: &[Vec<f64>], unit: &[usize]) -> Vec<f64> {
+fn compute_sandwich_variances(
+    columns: &[Vec<f64>],
+    innovations: &[f64],
+    inverse: &[Vec<f64>],
+    unit: &[usize],
+) -> Vec<f64> {
     let units = unit.iter().max().map_or(0, |last| last + 1);
     let mut scores = vec![vec![0.0; columns.len()]; units];
     for (row, unit) in unit.iter().enumerate() {
@@ -136,7 +146,7 @@ fn disagreement(columns: &[Vec<f64>], innovations: &[f64], inverse: &[Vec<f64>],
 
 /// The level of each row by the value of a column, from the lowest to the highest; none where the column is next to
 /// nothing. Equal values share a level, so a column of one value has one.
-fn levels(column: &[f64]) -> Vec<Option<usize>> {
+fn assign_levels(column: &[f64]) -> Vec<Option<usize>> {
     let top = column.iter().fold(0.0_f64, |top, x| top.max(x.abs()));
     let mut rows: Vec<usize> = (0..column.len()).filter(|row| column[*row].abs() > NOTICED * top).collect();
     rows.sort_by(|a, b| column[*a].total_cmp(&column[*b]));
@@ -158,7 +168,7 @@ fn levels(column: &[f64]) -> Vec<Option<usize>> {
 
 /// Variance of a coefficient between levels beyond what the noise makes of it; zero for fewer than two levels. `own` is
 /// its whitened tangent clear of all others, `variance` that of one innovation.
-fn between_levels(own: &[f64], innovations: &[f64], levels: &[Option<usize>], variance: f64) -> f64 {
+fn estimate_level_variance(own: &[f64], innovations: &[f64], levels: &[Option<usize>], variance: f64) -> f64 {
     let mut told = [(0.0, 0.0); LEVELS];
     for (row, level) in levels.iter().enumerate() {
         if let Some(level) = level {
@@ -174,19 +184,19 @@ fn between_levels(own: &[f64], innovations: &[f64], levels: &[Option<usize>], va
     }
     let mean = told.iter().map(|(_, score)| score).sum::<f64>() / sum;
     let q = told.iter().map(|(weight, score)| weight * (score / weight - mean).powi(2)).sum::<f64>() / variance;
-    between(&told, q, variance)
+    estimate_between_variance(&told, q, variance)
 }
 
 /// Variance of a coefficient between groups beyond what the noise makes of it: DerSimonian and Laird, Controlled Clinical
 /// Trials 7 (1986) 177. `told` holds what each group knows of it (weight, score), `variance` is that of one innovation.
-fn between(told: &[(f64, f64)], q: f64, variance: f64) -> f64 {
+fn estimate_between_variance(told: &[(f64, f64)], q: f64, variance: f64) -> f64 {
     let sum: f64 = told.iter().map(|(weight, _)| weight).sum();
     let squares: f64 = told.iter().map(|(weight, _)| weight * weight).sum();
     ((q - count_to_f64(told.len().saturating_sub(1))) * variance / (sum - squares / sum)).max(0.0)
 }
 
 /// A parameter's whitened tangent with those of all others taken out.
-fn cleared(white: &[Vec<f64>], index: usize) -> Vec<f64> {
+fn project_out_others(white: &[Vec<f64>], index: usize) -> Vec<f64> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for (_, column) in white.iter().enumerate().filter(|(other, _)| *other != index) {
         let _ = extend_basis(&mut basis, column.clone(), 1e-8);
@@ -217,7 +227,7 @@ mod tests {
     }
 
     fn difference(column: &[f64], y: &[f64]) -> f64 {
-        between_levels(column, &left(column, y), &levels(column), 1.0).sqrt()
+        estimate_level_variance(column, &left(column, y), &assign_levels(column), 1.0).sqrt()
     }
 
     #[test]
@@ -242,9 +252,9 @@ mod tests {
     #[test]
     fn a_switch_has_one_level_and_a_ramp_has_all() {
         let switch: Vec<f64> = (0..ROWS).map(|row| f64::from(u8::from(row % 3 == 0))).collect();
-        assert!(levels(&switch).iter().flatten().all(|level| *level == 0));
+        assert!(assign_levels(&switch).iter().flatten().all(|level| *level == 0));
         let ramp: Vec<f64> = (0..ROWS).map(count_to_f64).collect();
-        let found = levels(&ramp);
+        let found = assign_levels(&ramp);
         assert_eq!((found[0], found[ROWS - 1]), (None, Some(LEVELS - 1)));
         let squares = |wanted: usize| -> f64 {
             ramp.iter().zip(&found).filter(|(_, level)| **level == Some(wanted)).map(|(x, _)| x * x).sum()

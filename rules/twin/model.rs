@@ -33,7 +33,7 @@ pub enum PartFunction {
     /// A sum of coefficient times term; one parameter per term.
     Linear(Vec<Term>),
     /// No-load power as a table over speed; one parameter per speed, interpolated quadratically.
-    Table(super::table::SpeedTable),
+    Table(super::speed_table::SpeedTable),
     /// A user's expression over columns and its parameters.
     Expression(Expression),
 }
@@ -67,9 +67,9 @@ pub struct Part {
 impl Part {
     /// A candidate as a part, its linear parameters at zero where they are not known.
     #[must_use]
-    pub fn candidate(effect: &'static dyn Effect, form: &Form, linear: &[&'static str]) -> Self {
-        let shape = form.shape.iter().map(|(name, value)| parameter(effect, name, *value, Entry::Shape));
-        let linear = linear.iter().map(|name| parameter(effect, name, 0.0, Entry::Linear));
+    pub fn from_effect(effect: &'static dyn Effect, form: &Form, linear: &[&'static str]) -> Self {
+        let shape = form.shape.iter().map(|(name, value)| build_parameter(effect, name, *value, Entry::Shape));
+        let linear = linear.iter().map(|name| build_parameter(effect, name, 0.0, Entry::Linear));
         let mut parameters: Vec<Parameter> = linear.chain(shape).collect();
         for parameter in &mut parameters {
             if let Some((_, value)) = form.known.iter().find(|(name, _)| *name == parameter.name) {
@@ -100,13 +100,13 @@ impl Part {
     #[must_use]
     pub(super) fn effect_and_form(&self) -> Option<(&'static dyn Effect, Form)> {
         match &self.body {
-            PartFunction::Effect(effect, form) => Some((*effect, self.form(form))),
+            PartFunction::Effect(effect, form) => Some((*effect, self.build_current_form(form))),
             _ => None,
         }
     }
 
     /// The form with the present shape values.
-    fn form(&self, form: &Form) -> Form {
+    fn build_current_form(&self, form: &Form) -> Form {
         let mut form = form.clone();
         for parameter in self.parameters.iter().filter(|parameter| parameter.entry == Entry::Shape) {
             match form.shape.iter_mut().find(|(name, _)| *name == parameter.name) {
@@ -131,28 +131,28 @@ impl Part {
 
     /// One column per linear parameter, by name; `None` when an input is missing. An expression has none.
     #[must_use]
-    pub fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
+    pub fn compute_columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
         match &self.body {
             PartFunction::Effect(effect, form) => {
-                let columns = effect.compute_columns(scene, &self.form(form))?;
+                let columns = effect.compute_columns(scene, &self.build_current_form(form))?;
                 Some(columns.into_iter().map(|(name, column)| (name.to_owned(), column)).collect())
             }
             PartFunction::Linear(terms) => {
-                terms.iter().map(|term| Some((term.text().to_owned(), term.column(scene)?))).collect()
+                terms.iter().map(|term| Some((term.text().to_owned(), term.compute_column(scene)?))).collect()
             }
-            PartFunction::Table(table) => table.columns(scene),
+            PartFunction::Table(table) => table.compute_columns(scene),
             PartFunction::Expression(_) => Some(Vec::new()),
         }
     }
 
     /// What the part adds to the output, in the output's unit.
     #[must_use]
-    pub fn contribution(&self, scene: &Scene) -> Option<Vec<f64>> {
+    pub fn compute_contribution(&self, scene: &Scene) -> Option<Vec<f64>> {
         if let PartFunction::Expression(expression) = &self.body {
-            return expression.evaluate(scene, &self.parameters);
+            return expression.evaluate_rows(scene, &self.parameters);
         }
         let mut sum = vec![0.0; scene.rows()];
-        for (name, column) in self.columns(scene)? {
+        for (name, column) in self.compute_columns(scene)? {
             if let Some(parameter) = self.parameters.iter().find(|parameter| parameter.name == name) {
                 let factor = parameter.value;
                 sum.iter_mut().zip(&column).for_each(|(sum, x)| *sum += factor * x);
@@ -165,12 +165,12 @@ impl Part {
     #[must_use]
     pub fn acts_on_output(&self) -> bool {
         let acting = ["sensor_gain", "supply_voltage", "clock_lag", "meter_window", "saturation"];
-        let over_output = self.is_drawn_over(|channel| channel == SIMULATED_OUTPUT);
+        let over_output = self.reads_channel(|channel| channel == SIMULATED_OUTPUT);
         over_output || self.has_form("clipped") || acting.contains(&self.kind.as_str())
     }
 
     /// Is it a formula over such a channel?
-    fn is_drawn_over(&self, such: impl Fn(&str) -> bool) -> bool {
+    fn reads_channel(&self, such: impl Fn(&str) -> bool) -> bool {
         matches!(&self.body, PartFunction::Expression(_)) && self.inputs().into_iter().any(such)
     }
 
@@ -179,7 +179,7 @@ impl Part {
     pub fn reads_load(&self) -> bool {
         match &self.body {
             PartFunction::Effect(effect, _) => effect.reads_load(),
-            _ => self.is_drawn_over(is_simulated),
+            _ => self.reads_channel(is_simulated),
         }
     }
 
@@ -190,7 +190,7 @@ impl Part {
     }
 
     /// Does this part have to be simulated again after that one of the same model has changed?
-    fn follows(&self, changed: &Self) -> bool {
+    fn depends_on_part(&self, changed: &Self) -> bool {
         self.acts_on_output() && !changed.acts_on_output() || changed.is_read_by(self)
     }
 
@@ -213,12 +213,12 @@ impl Part {
 
     /// The parameter of this name.
     #[must_use]
-    pub fn parameter(&self, name: &str) -> Option<&Parameter> {
+    pub fn find_parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 }
 
-fn parameter(effect: &'static dyn Effect, name: &str, value: f64, entry: Entry) -> Parameter {
+fn build_parameter(effect: &'static dyn Effect, name: &str, value: f64, entry: Entry) -> Parameter {
     let doc: Option<&ParameterDoc> = effect.doc().find_parameter(name);
     Parameter {
         name: name.to_owned(),
@@ -261,25 +261,25 @@ pub struct Simulated {
 /// Runs parts over a scene: the cut first, whose contribution becomes the load; its losses; the other physical parts; last
 /// those that act on the output as a whole. The scene keeps load and simulated output for candidates. `None` when a
 /// part lacks an input.
-pub fn simulate(parts: &[Part], scene: &mut Scene) -> Option<Simulated> {
-    let (total, contributions) = simulate_again(parts, scene, None)?;
+pub fn simulate_parts(parts: &[Part], scene: &mut Scene) -> Option<Simulated> {
+    let (total, contributions) = simulate_stages(parts, scene, None)?;
     Some(Simulated { total, contributions: contributions.into_iter().map(Cow::into_owned).collect() })
 }
 
 /// The total where one part has changed since all were simulated: what does not follow from it is taken from there.
-pub(super) fn simulate_changed(
+pub(super) fn simulate_changed_part(
     parts: &[Part],
     scene: &mut Scene,
     before: &Simulated,
     changed: usize,
 ) -> Option<Vec<f64>> {
-    simulate_again(parts, scene, Some((before, changed))).map(|(total, _)| total)
+    simulate_stages(parts, scene, Some((before, changed))).map(|(total, _)| total)
 }
 
 /// The total and what each part adds to it.
 type PartSums<'a> = (Vec<f64>, Vec<Cow<'a, [f64]>>);
 
-fn simulate_again<'a>(
+fn simulate_stages<'a>(
     parts: &[Part],
     scene: &mut Scene,
     before: Option<(&'a Simulated, usize)>,
@@ -291,7 +291,7 @@ fn simulate_again<'a>(
     scene.set_simulated(None);
     let cut = parts.iter().any(Part::is_cut);
     if !cut {
-        scene.set_load(linear_load(parts, scene));
+        scene.set_load(compute_linear_load(parts, scene));
     }
     let losses = cut && parts.iter().any(Part::is_load_loss);
     if cut {
@@ -313,7 +313,7 @@ fn simulate_again<'a>(
 }
 
 /// The load in the unit of the output, where the cut is a linear term of the column that plays its part.
-fn linear_load(parts: &[Part], scene: &Scene) -> Option<Vec<f64>> {
+fn compute_linear_load(parts: &[Part], scene: &Scene) -> Option<Vec<f64>> {
     let name = scene.role_name(Role::Load)?;
     let factor = parts.iter().find_map(|part| match &part.body {
         PartFunction::Linear(terms) => {
@@ -334,11 +334,11 @@ fn run_stage<'a>(
     belongs: impl Fn(&Part) -> bool,
 ) -> Option<()> {
     for (index, part) in parts.iter().enumerate().filter(|(_, part)| belongs(part)) {
-        let known = before.filter(|(_, changed)| index != *changed && !part.follows(&parts[*changed]));
+        let known = before.filter(|(_, changed)| index != *changed && !part.depends_on_part(&parts[*changed]));
         let slot = &mut contributions[index];
         *slot = match known {
             Some((before, _)) => Cow::Borrowed(&before.contributions[index]),
-            None => Cow::Owned(part.contribution(scene)?),
+            None => Cow::Owned(part.compute_contribution(scene)?),
         };
         total.iter_mut().zip(slot.iter()).for_each(|(total, x)| *total += x);
     }
@@ -376,13 +376,17 @@ mod tests {
     fn what_follows_from_a_change_is_simulated_again() {
         let mut scene = scene();
         let parts = parse_model(MODEL).expect("fine").parts;
-        let before = simulate(&parts, &mut scene).expect("simulated");
+        let before = simulate_parts(&parts, &mut scene).expect("simulated");
         for changed in 0..parts.len() {
             for parameter in 0..parts[changed].parameters.len() {
                 let mut moved = parts.clone();
                 moved[changed].parameters[parameter].value *= 1.1;
-                let again = simulate_changed(&moved, &mut scene, &before, changed).expect("simulated");
-                assert_eq!(again, simulate(&moved, &mut scene).expect("simulated").total, "{changed} {parameter}");
+                let again = simulate_changed_part(&moved, &mut scene, &before, changed).expect("simulated");
+                assert_eq!(
+                    again,
+                    simulate_parts(&moved, &mut scene).expect("simulated").total,
+                    "{changed} {parameter}"
+                );
             }
         }
     }

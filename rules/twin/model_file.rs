@@ -2,7 +2,7 @@
 
 use super::expression::Expression;
 use super::model::{Model, Parameter, Part, PartFunction};
-use super::table::SpeedTable;
+use super::speed_table::SpeedTable;
 use super::term::Term;
 use adapters::channel::find_nearest_name;
 use physics::{CATALOGUE, Effect, Entry, Form, Role, find_effect};
@@ -35,7 +35,7 @@ type Entry1<'a> = (&'a Spanned<std::borrow::Cow<'a, str>>, &'a Spanned<DeValue<'
 /// Every problem of the file.
 pub fn parse_model(text: &str) -> Result<Model, Vec<Problem>> {
     let mut reader = Reader { text, problems: Vec::new() };
-    let model = reader.model();
+    let model = reader.read_model();
     match model {
         Some(model) if reader.problems.is_empty() => Ok(model),
         _ => Err(reader.problems),
@@ -48,7 +48,10 @@ pub fn parse_model(text: &str) -> Result<Model, Vec<Problem>> {
 /// Every problem of the file.
 pub fn parse_hypotheses(text: &str) -> Result<Vec<Part>, Vec<Problem>> {
     let mut reader = Reader { text, problems: Vec::new() };
-    let parts = reader.root().map(|table| reader.parts(table.get_ref(), &["schema", "effect"])).unwrap_or_default();
+    let parts = reader
+        .parse_root_table()
+        .map(|table| reader.read_parts(table.get_ref(), &["schema", "effect"]))
+        .unwrap_or_default();
     if reader.problems.is_empty() { Ok(parts) } else { Err(reader.problems) }
 }
 
@@ -58,115 +61,122 @@ struct Reader<'t> {
 }
 
 impl<'t> Reader<'t> {
-    fn line(&self, offset: usize) -> usize {
+    fn find_line_number(&self, offset: usize) -> usize {
         self.text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
     }
 
-    fn wrong(&mut self, offset: usize, text: String) {
-        let line = self.line(offset);
+    fn report_problem(&mut self, offset: usize, text: String) {
+        let line = self.find_line_number(offset);
         self.problems.push(Problem { line, text });
     }
 
-    fn root(&mut self) -> Option<Spanned<Table<'t>>> {
+    fn parse_root_table(&mut self) -> Option<Spanned<Table<'t>>> {
         match DeTable::parse(self.text) {
             Ok(table) => Some(table),
             Err(error) => {
                 let offset = error.span().map_or(0, |span| span.start);
-                self.wrong(offset, format!("not valid TOML: {}", error.message()));
+                self.report_problem(offset, format!("not valid TOML: {}", error.message()));
                 None
             }
         }
     }
 
-    fn model(&mut self) -> Option<Model> {
-        let root = self.root()?;
+    fn read_model(&mut self) -> Option<Model> {
+        let root = self.parse_root_table()?;
         let table = root.get_ref();
         let known = ["schema", "name", "output", "effect", "roles", "candidates"];
-        let parts = self.parts(table, &known);
+        let parts = self.read_parts(table, &known);
         match table.get("schema").map(|schema| (schema.get_ref().as_str(), schema.span().start)) {
             Some((Some("model/1"), _)) => {}
-            Some((_, offset)) => self.wrong(offset, "schema must be \"model/1\"".to_owned()),
-            None => self.wrong(0, "schema = \"model/1\" is missing".to_owned()),
+            Some((_, offset)) => self.report_problem(offset, "schema must be \"model/1\"".to_owned()),
+            None => self.report_problem(0, "schema = \"model/1\" is missing".to_owned()),
         }
         let output = table.get("output").and_then(|output| output.get_ref().as_str());
         if output.is_none() {
-            self.wrong(0, "output = \"<channel>\" is missing: which quantity does the model simulate?".to_owned());
+            self.report_problem(
+                0,
+                "output = \"<channel>\" is missing: which quantity does the model simulate?".to_owned(),
+            );
         }
         if parts.is_empty() && self.problems.is_empty() {
-            self.wrong(0, "the model has no [[effect]]".to_owned());
+            self.report_problem(0, "the model has no [[effect]]".to_owned());
         }
         let name = table.get("name").and_then(|name| name.get_ref().as_str()).unwrap_or("model").to_owned();
-        let roles = self.roles(table);
-        let (exclude, only) = self.candidates(table);
+        let roles = self.read_roles(table);
+        let (exclude, only) = self.read_candidates(table);
         Some(Model { name, output: output?.to_owned(), parts, roles, exclude, only, hypotheses: Vec::new() })
     }
 
-    fn unknown_keys(&mut self, table: &Table<'_>, known: &[&str], what: &str) {
+    fn report_unknown_keys(&mut self, table: &Table<'_>, known: &[&str], what: &str) {
         for (key, _) in table {
             let name = key.get_ref().as_ref();
             if !known.contains(&name) {
-                let hint = suggestion(name, known.iter().copied());
-                self.wrong(key.span().start, format!("unknown key {name} in {what}{hint}"));
+                let hint = format_suggestion(name, known.iter().copied());
+                self.report_problem(key.span().start, format!("unknown key {name} in {what}{hint}"));
             }
         }
     }
 
-    fn parts(&mut self, table: &Table<'_>, known: &[&str]) -> Vec<Part> {
-        self.unknown_keys(table, known, "the model");
+    fn read_parts(&mut self, table: &Table<'_>, known: &[&str]) -> Vec<Part> {
+        self.report_unknown_keys(table, known, "the model");
         let Some(effects) = table.get("effect") else { return Vec::new() };
         let Some(entries) = effects.get_ref().as_array() else {
-            self.wrong(effects.span().start, "write effects as [[effect]]".to_owned());
+            self.report_problem(effects.span().start, "write effects as [[effect]]".to_owned());
             return Vec::new();
         };
         let entries: Vec<_> =
             entries.iter().filter_map(|entry| Some((entry.span().start, entry.get_ref().as_table()?))).collect();
-        entries.into_iter().filter_map(|(offset, entry)| self.part(entry, offset)).collect()
+        entries.into_iter().filter_map(|(offset, entry)| self.read_part(entry, offset)).collect()
     }
 
-    fn part(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
+    fn read_part(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
         let known =
             ["kind", "name", "parameters", "fixed", "columns", "expression", "process", "form", "place", "gear_stage"];
-        self.unknown_keys(table, &known, "an [[effect]]");
+        self.report_unknown_keys(table, &known, "an [[effect]]");
         let Some(kind) = table.get("kind").and_then(|kind| kind.get_ref().as_str()) else {
-            self.wrong(offset, "an [[effect]] needs a kind".to_owned());
+            self.report_problem(offset, "an [[effect]] needs a kind".to_owned());
             return None;
         };
         let kind_offset = table.get("kind").map_or(offset, |kind| kind.span().start);
         let name = table.get("name").and_then(|name| name.get_ref().as_str()).map(str::to_owned);
         let mut part = match kind {
-            "linear" => self.linear(table, offset)?,
-            "expression" => self.expression(table, offset)?,
-            "no_load_power" if has_table(table) => self.speed_table(table, offset)?,
-            _ => self.catalogue(kind, table, kind_offset)?,
+            "linear" => self.read_linear_part(table, offset)?,
+            "expression" => self.read_expression_part(table, offset)?,
+            "no_load_power" if has_speed_table(table) => self.read_speed_table(table, offset)?,
+            _ => self.read_catalogue_part(kind, table, kind_offset)?,
         };
         part.name = name;
-        part.line = self.line(kind_offset);
-        self.fix(&mut part, table);
+        part.line = self.find_line_number(kind_offset);
+        self.fix_parameters(&mut part, table);
         Some(part)
     }
 
-    fn numbers(&mut self, table: &Table<'_>, key: &str) -> Vec<(String, f64, usize)> {
+    fn read_numbers(&mut self, table: &Table<'_>, key: &str) -> Vec<(String, f64, usize)> {
         let Some(value) = table.get(key) else { return Vec::new() };
         let Some(entries) = value.get_ref().as_table() else {
-            self.wrong(value.span().start, format!("{key} must be a table of numbers, {key} = {{ name = 1.0 }}"));
+            self.report_problem(
+                value.span().start,
+                format!("{key} must be a table of numbers, {key} = {{ name = 1.0 }}"),
+            );
             return Vec::new();
         };
-        let read = |(key, value): Entry1<'_>| (key.get_ref().to_string(), number(value.get_ref()), value.span().start);
+        let read =
+            |(key, value): Entry1<'_>| (key.get_ref().to_string(), parse_number(value.get_ref()), value.span().start);
         let entries: Vec<_> = entries.iter().map(read).collect();
         let mut numbers = Vec::new();
         for (name, value, offset) in entries {
             match value {
                 Some(value) => numbers.push((name, value, offset)),
-                None => self.wrong(offset, format!("{name} must be a finite number")),
+                None => self.report_problem(offset, format!("{name} must be a finite number")),
             }
         }
         numbers
     }
 
-    fn linear(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
-        let coefficients = self.numbers(table, "columns");
+    fn read_linear_part(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
+        let coefficients = self.read_numbers(table, "columns");
         if coefficients.is_empty() {
-            self.wrong(offset, "a linear effect needs columns = { column = coefficient }".to_owned());
+            self.report_problem(offset, "a linear effect needs columns = { column = coefficient }".to_owned());
             return None;
         }
         let mut terms = Vec::new();
@@ -174,90 +184,97 @@ impl<'t> Reader<'t> {
         for (name, value, offset) in coefficients {
             match Term::parse(&name) {
                 Ok(term) => {
-                    parameters.push(free(term.text(), value, Entry::Linear));
+                    parameters.push(build_free_parameter(term.text(), value, Entry::Linear));
                     terms.push(term);
                 }
-                Err(reason) => self.wrong(offset, reason),
+                Err(reason) => self.report_problem(offset, reason),
             }
         }
-        Some(part("linear", PartFunction::Linear(terms), parameters))
+        Some(build_part("linear", PartFunction::Linear(terms), parameters))
     }
 
-    fn expression(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
+    fn read_expression_part(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
         let parameters: Vec<Parameter> = self
-            .numbers(table, "parameters")
+            .read_numbers(table, "parameters")
             .into_iter()
-            .map(|(name, value, _)| free(&name, value, Entry::Shape))
+            .map(|(name, value, _)| build_free_parameter(&name, value, Entry::Shape))
             .collect();
         let Some(text) = table.get("expression").and_then(|text| text.get_ref().as_str()) else {
-            self.wrong(offset, "an expression effect needs expression = \"...\"".to_owned());
+            self.report_problem(offset, "an expression effect needs expression = \"...\"".to_owned());
             return None;
         };
         let names: Vec<String> = parameters.iter().map(|parameter| parameter.name.clone()).collect();
-        match Expression::compile(text, &names) {
-            Ok(expression) => Some(part("expression", PartFunction::Expression(expression), parameters)),
+        match Expression::compile_text(text, &names) {
+            Ok(expression) => Some(build_part("expression", PartFunction::Expression(expression), parameters)),
             Err(reason) => {
                 let offset = table.get("expression").map_or(offset, |text| text.span().start);
-                self.wrong(offset, format!("the expression does not compile: {reason}"));
+                self.report_problem(offset, format!("the expression does not compile: {reason}"));
                 None
             }
         }
     }
 
-    fn speed_table(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
+    fn read_speed_table(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
         let inside = table.get("parameters")?.get_ref().as_table()?;
-        self.unknown_keys(inside, &["speeds_rpm", "power_w"], "the no-load table");
+        self.report_unknown_keys(inside, &["speeds_rpm", "power_w"], "the no-load table");
         let list = |key: &str| -> Option<Vec<f64>> {
-            inside.get(key)?.get_ref().as_array()?.iter().map(|value| number(value.get_ref())).collect()
+            inside.get(key)?.get_ref().as_array()?.iter().map(|value| parse_number(value.get_ref())).collect()
         };
         let (speeds, powers) = (list("speeds_rpm").unwrap_or_default(), list("power_w").unwrap_or_default());
         if speeds.is_empty() || speeds.len() != powers.len() || speeds.windows(2).any(|pair| pair[1] <= pair[0]) {
             let text = "a no-load table needs increasing speeds_rpm and as many power_w".to_owned();
-            self.wrong(offset, text);
+            self.report_problem(offset, text);
             return None;
         }
         let parameters = powers
             .iter()
             .enumerate()
-            .map(|(index, power)| free(&format!("power_w[{index}]"), *power, Entry::Linear))
+            .map(|(index, power)| build_free_parameter(&format!("power_w[{index}]"), *power, Entry::Linear))
             .collect();
-        let gear_stage = table.get("gear_stage").and_then(|stage| number(stage.get_ref()));
-        Some(part("no_load_power", PartFunction::Table(SpeedTable { speeds_rpm: speeds, gear_stage }), parameters))
+        let gear_stage = table.get("gear_stage").and_then(|stage| parse_number(stage.get_ref()));
+        Some(build_part(
+            "no_load_power",
+            PartFunction::Table(SpeedTable { speeds_rpm: speeds, gear_stage }),
+            parameters,
+        ))
     }
 
-    fn catalogue(&mut self, kind: &str, table: &Table<'_>, offset: usize) -> Option<Part> {
+    fn read_catalogue_part(&mut self, kind: &str, table: &Table<'_>, offset: usize) -> Option<Part> {
         let Some(effect) = find_effect(kind) else {
             let kinds = CATALOGUE.iter().map(|effect| effect.doc().kind).chain(["linear", "expression"]);
-            let hint = suggestion(kind, kinds);
-            self.wrong(offset, format!("unknown kind {kind}{hint}; `cnc-gateway effects list` shows every kind"));
+            let hint = format_suggestion(kind, kinds);
+            self.report_problem(
+                offset,
+                format!("unknown kind {kind}{hint}; `cnc-gateway effects list` shows every kind"),
+            );
             return None;
         };
         let doc = effect.doc();
         let mut parameters = Vec::new();
-        for (name, value, offset) in self.numbers(table, "parameters") {
+        for (name, value, offset) in self.read_numbers(table, "parameters") {
             let Some(known) = doc.find_parameter(&name) else {
-                let hint = suggestion(&name, doc.parameters.iter().map(|parameter| parameter.name));
-                self.wrong(offset, format!("{kind} has no parameter {name}{hint}"));
+                let hint = format_suggestion(&name, doc.parameters.iter().map(|parameter| parameter.name));
+                self.report_problem(offset, format!("{kind} has no parameter {name}{hint}"));
                 continue;
             };
             if value < known.range.0 || value > known.range.1 {
                 let (low, high) = known.range;
                 let unit = known.unit;
-                self.wrong(
+                self.report_problem(
                     offset,
                     format!("{kind}.{name} = {value} is outside its physical range {low} to {high} {unit}"),
                 );
             }
-            let mut parameter = free(&name, value, known.entry);
+            let mut parameter = build_free_parameter(&name, value, known.entry);
             parameter.range = known.range;
             known.unit.clone_into(&mut parameter.unit);
             parameters.push(parameter);
         }
-        let form = self.form(effect, table);
-        Some(part(kind, PartFunction::Effect(effect, form), parameters))
+        let form = self.read_form(effect, table);
+        Some(build_part(kind, PartFunction::Effect(effect, form), parameters))
     }
 
-    fn form(&mut self, effect: &'static dyn Effect, table: &Table<'_>) -> Form {
+    fn read_form(&mut self, effect: &'static dyn Effect, table: &Table<'_>) -> Form {
         let mut form = Form::without_shape();
         let chosen = table.get("form").or_else(|| table.get("process"));
         if let Some(name) = chosen.and_then(|name| name.get_ref().as_str()) {
@@ -267,7 +284,10 @@ impl<'t> Reader<'t> {
                     let offset = chosen.map_or(0, |name| name.span().start);
                     let known = effect.form_names();
                     let forms = if known.is_empty() { "only one".to_owned() } else { known.join(", ") };
-                    self.wrong(offset, format!("{} has no form {name}; its forms: {forms}", effect.doc().kind));
+                    self.report_problem(
+                        offset,
+                        format!("{} has no form {name}; its forms: {forms}", effect.doc().kind),
+                    );
                 }
             }
         }
@@ -278,10 +298,10 @@ impl<'t> Reader<'t> {
         form
     }
 
-    fn fix(&mut self, part: &mut Part, table: &Table<'_>) {
+    fn fix_parameters(&mut self, part: &mut Part, table: &Table<'_>) {
         let Some(fixed) = table.get("fixed") else { return };
         let Some(names) = fixed.get_ref().as_array() else {
-            self.wrong(fixed.span().start, "fixed must be a list of parameter names".to_owned());
+            self.report_problem(fixed.span().start, "fixed must be a list of parameter names".to_owned());
             return;
         };
         for name in names.iter() {
@@ -289,8 +309,8 @@ impl<'t> Reader<'t> {
             match part.parameters.iter_mut().find(|parameter| parameter.name == text) {
                 Some(parameter) => parameter.fixed = true,
                 None => {
-                    let hint = suggestion(text, part.parameters.iter().map(|parameter| parameter.name.as_str()));
-                    self.wrong(
+                    let hint = format_suggestion(text, part.parameters.iter().map(|parameter| parameter.name.as_str()));
+                    self.report_problem(
                         name.span().start,
                         format!("fixed names {text:?}, which is no parameter of this effect{hint}"),
                     );
@@ -299,7 +319,7 @@ impl<'t> Reader<'t> {
         }
     }
 
-    fn roles(&mut self, table: &Table<'_>) -> BTreeMap<Role, String> {
+    fn read_roles(&mut self, table: &Table<'_>) -> BTreeMap<Role, String> {
         let mut roles = BTreeMap::new();
         let Some(entries) = table.get("roles").and_then(|roles| roles.get_ref().as_table()) else { return roles };
         let read = |(key, value): Entry1<'_>| {
@@ -312,20 +332,20 @@ impl<'t> Reader<'t> {
                     roles.insert(role, column);
                 }
                 (None, _) => {
-                    let hint = suggestion(&name, Role::ALL.iter().map(|role| role.name()));
-                    self.wrong(offset, format!("unknown role {name}{hint}"));
+                    let hint = format_suggestion(&name, Role::ALL.iter().map(|role| role.name()));
+                    self.report_problem(offset, format!("unknown role {name}{hint}"));
                 }
-                (_, None) => self.wrong(offset, format!("role {name} must name a column")),
+                (_, None) => self.report_problem(offset, format!("role {name} must name a column")),
             }
         }
         roles
     }
 
-    fn candidates(&mut self, table: &Table<'_>) -> (Vec<String>, Vec<String>) {
+    fn read_candidates(&mut self, table: &Table<'_>) -> (Vec<String>, Vec<String>) {
         let Some(candidates) = table.get("candidates").and_then(|entry| entry.get_ref().as_table()) else {
             return (Vec::new(), Vec::new());
         };
-        self.unknown_keys(candidates, &["exclude", "only"], "[candidates]");
+        self.report_unknown_keys(candidates, &["exclude", "only"], "[candidates]");
         let mut list = |key: &str| -> Vec<String> {
             let Some(entries) = candidates.get(key).and_then(|entry| entry.get_ref().as_array()) else {
                 return Vec::new();
@@ -336,8 +356,8 @@ impl<'t> Reader<'t> {
                 .collect();
             for (kind, offset) in &kinds {
                 if find_effect(kind).is_none() {
-                    let hint = suggestion(kind, CATALOGUE.iter().map(|effect| effect.doc().kind));
-                    self.wrong(*offset, format!("unknown kind {kind}{hint}"));
+                    let hint = format_suggestion(kind, CATALOGUE.iter().map(|effect| effect.doc().kind));
+                    self.report_problem(*offset, format!("unknown kind {kind}{hint}"));
                 }
             }
             kinds.into_iter().map(|(kind, _)| kind).collect()
@@ -346,21 +366,21 @@ impl<'t> Reader<'t> {
     }
 }
 
-fn has_table(table: &Table<'_>) -> bool {
+fn has_speed_table(table: &Table<'_>) -> bool {
     let inside = table.get("parameters").and_then(|parameters| parameters.get_ref().as_table());
     inside.is_some_and(|inside| inside.contains_key("speeds_rpm") || inside.contains_key("power_w"))
 }
 
-fn part(kind: &str, body: PartFunction, parameters: Vec<Parameter>) -> Part {
+fn build_part(kind: &str, body: PartFunction, parameters: Vec<Parameter>) -> Part {
     Part { kind: kind.to_owned(), name: None, body, parameters, line: 0 }
 }
 
-fn free(name: &str, value: f64, entry: Entry) -> Parameter {
+fn build_free_parameter(name: &str, value: f64, entry: Entry) -> Parameter {
     let range = (f64::NEG_INFINITY, f64::INFINITY);
     Parameter { name: name.to_owned(), value, fixed: false, entry, range, unit: "output".to_owned() }
 }
 
-fn number(value: &DeValue<'_>) -> Option<f64> {
+fn parse_number(value: &DeValue<'_>) -> Option<f64> {
     let text = match value {
         DeValue::Integer(integer) => integer.as_str().to_owned(),
         DeValue::Float(float) => float.as_str().to_owned(),
@@ -369,56 +389,66 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
     text.replace('_', "").parse().ok().filter(|number: &f64| number.is_finite())
 }
 
-fn suggestion<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
+fn format_suggestion<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
     find_nearest_name(name, known).map(|known| format!("; did you mean {known}?")).unwrap_or_default()
 }
 
 /// Writes a model in the form in which it is read.
 #[must_use]
 pub fn write_model(model: &Model) -> String {
-    let mut text =
-        format!("schema = \"model/1\"\nname   = {}\noutput = {}\n", toml_text(&model.name), toml_text(&model.output));
+    let mut text = format!(
+        "schema = \"model/1\"\nname   = {}\noutput = {}\n",
+        format_toml_text(&model.name),
+        format_toml_text(&model.output)
+    );
     for part in &model.parts {
         text.push_str(&write_part(part));
     }
     if !model.roles.is_empty() {
         text.push_str("\n[roles]\n");
         for (role, column) in &model.roles {
-            text.push_str(&format!("{} = {}\n", role.name(), toml_text(column)));
+            text.push_str(&format!("{} = {}\n", role.name(), format_toml_text(column)));
         }
     }
     if !model.exclude.is_empty() {
-        let kinds: Vec<String> = model.exclude.iter().map(|kind| toml_text(kind)).collect();
+        let kinds: Vec<String> = model.exclude.iter().map(|kind| format_toml_text(kind)).collect();
         text.push_str(&format!("\n[candidates]\nexclude = [{}]\n", kinds.join(", ")));
     }
     text
 }
 
 fn write_part(part: &Part) -> String {
-    let mut text = format!("\n[[effect]]\nkind = {}\n", toml_text(&part.kind));
+    let mut text = format!("\n[[effect]]\nkind = {}\n", format_toml_text(&part.kind));
     if let Some(name) = &part.name {
-        text.push_str(&format!("name = {}\n", toml_text(name)));
+        text.push_str(&format!("name = {}\n", format_toml_text(name)));
     }
     let numbers: Vec<String> = part
         .parameters
         .iter()
-        .map(|parameter| format!("{} = {}", key(&parameter.name), float(parameter.value)))
+        .map(|parameter| format!("{} = {}", format_key(&parameter.name), format_float(parameter.value)))
         .collect();
     let numbers = numbers.join(", ");
     match &part.body {
         PartFunction::Linear(_) => text.push_str(&format!("columns = {{ {numbers} }}\n")),
         PartFunction::Table(table) => text.push_str(&write_table(part, table)),
         PartFunction::Expression(expression) => {
-            text.push_str(&format!("expression = {}\nparameters = {{ {numbers} }}\n", toml_text(expression.text())));
+            text.push_str(&format!(
+                "expression = {}\nparameters = {{ {numbers} }}\n",
+                format_toml_text(expression.text())
+            ));
         }
         PartFunction::Effect(_, form) => {
             text.push_str(&format!("parameters = {{ {numbers} }}\n"));
             if !form.name.is_empty() {
                 let key = if part.kind == "cutting_power" { "process" } else { "form" };
-                text.push_str(&format!("{key} = {}\n", toml_text(form.name)));
+                text.push_str(&format!("{key} = {}\n", format_toml_text(form.name)));
             }
             if let Some((column, word)) = &form.place {
-                text.push_str(&format!("place = {{ column = {}, equals = {} }}\n", toml_text(column), toml_text(word)));
+                text.push_str(&format!(
+                    "place = {{ column = {}, equals = {} }}\n",
+                    format_toml_text(column),
+                    format_toml_text(word)
+                ));
             }
         }
     }
@@ -426,7 +456,7 @@ fn write_part(part: &Part) -> String {
         .parameters
         .iter()
         .filter(|parameter| parameter.fixed)
-        .map(|parameter| toml_text(&parameter.name))
+        .map(|parameter| format_toml_text(&parameter.name))
         .collect();
     if !fixed.is_empty() {
         text.push_str(&format!("fixed = [{}]\n", fixed.join(", ")));
@@ -435,25 +465,25 @@ fn write_part(part: &Part) -> String {
 }
 
 fn write_table(part: &Part, table: &SpeedTable) -> String {
-    let list = |values: Vec<f64>| values.into_iter().map(float).collect::<Vec<_>>().join(", ");
+    let list = |values: Vec<f64>| values.into_iter().map(format_float).collect::<Vec<_>>().join(", ");
     let powers = list(part.parameters.iter().map(|parameter| parameter.value).collect());
     let speeds = list(table.speeds_rpm.clone());
-    let stage = table.gear_stage.map(|stage| format!("gear_stage = {}\n", float(stage))).unwrap_or_default();
+    let stage = table.gear_stage.map(|stage| format!("gear_stage = {}\n", format_float(stage))).unwrap_or_default();
     format!("parameters = {{ speeds_rpm = [{speeds}], power_w = [{powers}] }}\n{stage}")
 }
 
-fn float(value: f64) -> String {
+fn format_float(value: f64) -> String {
     format!("{value:?}")
 }
 
-fn key(name: &str) -> String {
+fn format_key(name: &str) -> String {
     let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
-    if bare { name.to_owned() } else { toml_text(name) }
+    if bare { name.to_owned() } else { format_toml_text(name) }
 }
 
 /// A text as TOML writes it, with quotation marks. What Rust prints for debugging has escapes that TOML does not know.
 #[must_use]
-pub fn toml_text(text: &str) -> String {
+pub fn format_toml_text(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
@@ -494,7 +524,7 @@ mod tests {
             for name in effect.form_names() {
                 let offset = "schema = \"model/1\"\noutput = \"y_w\"\n[[effect]]\nkind = \"offset\"\n";
                 let mut model = parse_model(offset).expect("reads");
-                model.parts = vec![Part::candidate(*effect, &Form { name, ..Form::without_shape() }, &linear)];
+                model.parts = vec![Part::from_effect(*effect, &Form { name, ..Form::without_shape() }, &linear)];
                 let read = parse_model(&write_model(&model));
                 let read = read.unwrap_or_else(|problems| panic!("{}: {problems:?}", effect.doc().kind));
                 assert_eq!(read.parts[0].parameters.len(), linear.len());

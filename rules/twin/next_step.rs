@@ -11,14 +11,14 @@ const CHANNEL_MINUTES: f64 = 10.0;
 const GAIN_BOUNDS: (f64, f64) = (10.0, 100.0);
 
 /// The experiment of the first of these kinds that the catalogue holds.
-pub(super) fn of_effects<'a>(mut kinds: impl Iterator<Item = &'a str>, gain: f64) -> Option<Experiment> {
+pub(super) fn find_effect_experiment<'a>(mut kinds: impl Iterator<Item = &'a str>, gain: f64) -> Option<Experiment> {
     let doc = kinds.find_map(find_effect)?.doc();
-    Some(experiment(doc.en.experiment.to_owned(), doc.experiment_minutes, gain, doc.kind))
+    Some(build_experiment(doc.en.experiment.to_owned(), doc.experiment_minutes, gain, doc.kind))
 }
 
 /// Another kind that this data cannot rule out, `delta_ic` units of information behind the one it would replace, with the
 /// experiment that separates them.
-pub(super) fn alternative(kind: &str, instead_of: &str, delta_ic: f64) -> Alternative {
+pub(super) fn build_alternative(kind: &str, instead_of: &str, delta_ic: f64) -> Alternative {
     let experiment = find_effect(kind).or_else(|| find_effect(instead_of)).map(|effect| effect.doc().en.experiment);
     Alternative {
         effect: kind.to_owned(),
@@ -29,22 +29,22 @@ pub(super) fn alternative(kind: &str, instead_of: &str, delta_ic: f64) -> Altern
 }
 
 /// An experiment, its gain in information within the bounds in which it is told.
-pub(super) fn experiment(statement: String, minutes: f64, gain: f64, effect: &str) -> Experiment {
+pub(super) fn build_experiment(statement: String, minutes: f64, gain: f64, effect: &str) -> Experiment {
     let expected_delta_ic = gain.clamp(GAIN_BOUNDS.0, GAIN_BOUNDS.1);
     Experiment { statement, minutes, expected_delta_ic, effect: effect.to_owned() }
 }
 
 /// To learn what depends on this channel; on nothing that is known where there is none.
-pub(super) fn over_channel(channel: Option<&str>, gain: f64) -> Experiment {
-    experiment(channel.map_or_else(repeat, over), CHANNEL_MINUTES, gain, "")
+pub(super) fn build_channel_experiment(channel: Option<&str>, gain: f64) -> Experiment {
+    build_experiment(channel.map_or_else(describe_repetition, describe_channel_sweep), CHANNEL_MINUTES, gain, "")
 }
 
-fn repeat() -> String {
+fn describe_repetition() -> String {
     "Record the same programs again, at least four runs, and vary speed, feed and load on their own in each".to_owned()
 }
 
 /// What to record to learn what depends on a channel.
-fn over(channel: &str) -> String {
+fn describe_channel_sweep(channel: &str) -> String {
     let stepped = |what: &str| {
         format!(
             "Step {what} alone over its whole range, up and down, twice, with everything else constant: what repeats with it depends on it"
@@ -67,11 +67,11 @@ fn over(channel: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::over;
+    use super::describe_channel_sweep;
 
     #[test]
     fn a_channel_is_stepped_and_time_is_waited_for() {
-        assert!(over("feed_mm_min").starts_with("Step feed_mm_min alone"));
-        assert!(over("time").starts_with("Record one run twice as long"));
+        assert!(describe_channel_sweep("feed_mm_min").starts_with("Step feed_mm_min alone"));
+        assert!(describe_channel_sweep("time").starts_with("Record one run twice as long"));
     }
 }

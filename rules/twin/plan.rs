@@ -72,37 +72,37 @@ pub struct Plan {
 ///
 /// # Errors
 /// Why no experiment is needed, or none is known.
-pub fn plan(diagnosis: &Diagnosis, recording: &Recording) -> Result<Plan, String> {
-    let kinds = kinds(diagnosis);
+pub fn plan_experiments(diagnosis: &Diagnosis, recording: &Recording) -> Result<Plan, String> {
+    let kinds = list_experiment_kinds(diagnosis);
     if kinds.is_empty() {
         return Err(format!(
             "the verdict is {}: there is nothing left to tell apart, so no plan was written",
-            diagnosis.verdict.word()
+            diagnosis.verdict.as_word()
         ));
     }
-    Ok(of_kinds(&kinds, &Envelope::of(recording, diagnosis)))
+    Ok(build_plan(&kinds, &Envelope::from_recording(recording, diagnosis)))
 }
 
 /// The plan of these kinds, one experiment after the other.
 #[must_use]
-pub fn of_kinds(kinds: &[&str], envelope: &Envelope) -> Plan {
-    let mut all = vec![moves::standstill(20.0)];
+pub fn build_plan(kinds: &[&str], envelope: &Envelope) -> Plan {
+    let mut all = vec![moves::build_standstill(20.0)];
     let mut run = 1;
     for kind in kinds {
-        let one = moves::of_kind(kind, envelope);
+        let one = moves::list_moves(kind, envelope);
         let last = one.iter().map(|a| a.run).max().unwrap_or(1);
         all.extend(one.into_iter().map(|a| Move { run: a.run + run - 1, ..a }));
         run += last;
     }
     let last = all.last().map_or(1, |a| a.run);
-    all.push(Move { run: last, ..moves::standstill(20.0) });
+    all.push(Move { run: last, ..moves::build_standstill(20.0) });
     Plan { kinds: kinds.iter().map(|kind| (*kind).to_owned()).collect(), moves: all }
 }
 
 /// The kinds whose experiments separate what is left: that of the next experiment first, then those of every explanation
 /// that is still open, then those that the best explanation is usually confused with: a recording in which little was
 /// varied cannot even tell that they compete.
-fn kinds(diagnosis: &Diagnosis) -> Vec<&str> {
+fn list_experiment_kinds(diagnosis: &Diagnosis) -> Vec<&str> {
     let asked = diagnosis.next_experiment.iter().map(|experiment| experiment.effect.as_str());
     if diagnosis.alternatives.is_empty() && diagnosis.missing.is_empty() && diagnosis.next_experiment.is_none() {
         return Vec::new();
@@ -112,16 +112,16 @@ fn kinds(diagnosis: &Diagnosis) -> Vec<&str> {
     let first = diagnosis.alternatives.first().map(|other| other.instead_of.as_str());
     let rivals = first.and_then(find_effect).map_or(&[][..], |effect| effect.doc().rivals);
     let usual = if diagnosis.alternatives.is_empty() { found.take(1).collect() } else { rivals.to_vec() };
-    chosen(asked.chain(open).chain(usual))
+    select_kinds(asked.chain(open).chain(usual))
 }
 
 /// As many as can be carried out in the time, each experiment once.
-fn chosen<'a>(wanted: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+fn select_kinds<'a>(wanted: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut kinds: Vec<&str> = Vec::new();
     let mut minutes = 0.0;
     for doc in wanted.filter_map(|kind| find_effect(kind).map(physics::Effect::doc)) {
         let fits = kinds.is_empty() || minutes + doc.experiment_minutes <= TOGETHER_MINUTES_MAX;
-        if fits && !kinds.iter().any(|kind| moves::same(kind, doc.kind)) {
+        if fits && !kinds.iter().any(|kind| moves::has_same_experiment(kind, doc.kind)) {
             kinds.push(doc.kind);
             minutes += doc.experiment_minutes;
         }
@@ -132,7 +132,7 @@ fn chosen<'a>(wanted: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 impl Envelope {
     /// The range of a recording; usual values of a small lathe stand in for what it does not hold.
     #[must_use]
-    pub fn of(recording: &Recording, diagnosis: &Diagnosis) -> Self {
+    pub fn from_recording(recording: &Recording, diagnosis: &Diagnosis) -> Self {
         let scene = Scene::new(recording, &diagnosis.output, &diagnosis.model.roles).ok();
         let column = |name: &str| scene.as_ref().and_then(|scene| scene.column(name)).map(<[f64]>::to_vec);
         let role = |role: Role| scene.as_ref().and_then(|scene| scene.role_values(role)).map(<[f64]>::to_vec);
@@ -147,11 +147,11 @@ impl Envelope {
         let axis_column = scene.as_ref().and_then(|scene| scene.role_name(Role::Velocity)).map(str::to_owned);
         let axis_speed = role(Role::Velocity).map_or(0.0, |v| v.iter().fold(0.0_f64, |top, x| top.max(x.abs())));
         Self {
-            speed_rpm: range(speed.clone(), (300.0, 1500.0)),
-            cutting_speed_rpm: middle(in_cut(speed), 800.0),
-            feed_mm: range(in_cut(column("feed_per_rev_mm")), (0.05, 0.2)),
-            depth_mm: range(in_cut(column("depth_of_cut_mm")), (0.5, 1.5)),
-            diameter_mm: middle(in_cut(column("diameter_mm")), 60.0),
+            speed_rpm: compute_quantile_range(speed.clone(), (300.0, 1500.0)),
+            cutting_speed_rpm: compute_median_size(in_cut(speed), 800.0),
+            feed_mm: compute_quantile_range(in_cut(column("feed_per_rev_mm")), (0.05, 0.2)),
+            depth_mm: compute_quantile_range(in_cut(column("depth_of_cut_mm")), (0.5, 1.5)),
+            diameter_mm: compute_median_size(in_cut(column("diameter_mm")), 60.0),
             axis_speed: if axis_speed > 0.0 { axis_speed } else { 3000.0 },
             axis_column: axis_column.unwrap_or_else(|| "axis_velocity_mm_min".to_owned()),
             spindle: is_of_spindle(&diagnosis.output),
@@ -160,7 +160,7 @@ impl Envelope {
 }
 
 /// 2 % and 98 % points of the sizes above a hundredth of the greatest.
-fn range(values: Option<Vec<f64>>, usual: (f64, f64)) -> (f64, f64) {
+fn compute_quantile_range(values: Option<Vec<f64>>, usual: (f64, f64)) -> (f64, f64) {
     let mut sizes: Vec<f64> = values.unwrap_or_default().into_iter().map(f64::abs).collect();
     let top = sizes.iter().copied().fold(0.0, f64::max);
     sizes.retain(|x| *x > 0.01 * top);
@@ -172,7 +172,7 @@ fn range(values: Option<Vec<f64>>, usual: (f64, f64)) -> (f64, f64) {
     }
 }
 
-fn middle(values: Option<Vec<f64>>, usual: f64) -> f64 {
+fn compute_median_size(values: Option<Vec<f64>>, usual: f64) -> f64 {
     let sizes: Vec<f64> = values.unwrap_or_default().into_iter().map(f64::abs).filter(|x| *x > 0.0).collect();
     median(sizes).unwrap_or(usual)
 }
@@ -180,13 +180,13 @@ fn middle(values: Option<Vec<f64>>, usual: f64) -> f64 {
 impl Plan {
     /// How long it takes, minutes.
     #[must_use]
-    pub fn minutes(&self) -> f64 {
+    pub fn duration_min(&self) -> f64 {
         self.moves.iter().map(|a| a.seconds).sum::<f64>() / 60.0
     }
 
     /// As `recording/1`: one row per second (of long plans fewer), an empty cell where nothing is commanded.
     #[must_use]
-    pub fn csv(&self, language: Language) -> String {
+    pub fn to_csv(&self, language: Language) -> String {
         let mut numbers: Vec<&str> = self.moves.iter().flat_map(|a| a.commands.keys()).map(String::as_str).collect();
         let mut words: Vec<&str> = self.moves.iter().flat_map(|a| a.words.keys()).copied().collect();
         for names in [&mut numbers, &mut words] {
@@ -195,11 +195,11 @@ impl Plan {
         }
         let columns = [&["time_s", "run", "operation"][..], &words, &numbers, &["instruction"]].concat();
         let mut text = format!("{}\n", columns.join(","));
-        let step_s = (self.minutes() * 60.0 / ROWS_MAX).ceil().max(1.0);
+        let step_s = (self.duration_min() * 60.0 / ROWS_MAX).ceil().max(1.0);
         let mut time_s = 0.0;
         for a in &self.moves {
             let end_s = time_s + a.seconds;
-            let cells = a.cells(&words, &numbers, language);
+            let cells = a.format_cells(&words, &numbers, language);
             let mut at_s = time_s;
             while at_s < end_s - 1e-9 {
                 let _ = writeln!(text, "{at_s},{},{},{cells}", a.run, a.operation);
@@ -212,7 +212,7 @@ impl Plan {
 }
 
 impl Move {
-    fn cells(&self, words: &[&str], numbers: &[&str], language: Language) -> String {
+    fn format_cells(&self, words: &[&str], numbers: &[&str], language: Language) -> String {
         let words = words.iter().map(|name| self.words.get(name).copied().unwrap_or("").to_owned());
         let numbers = numbers.iter().map(|name| self.commands.get(*name).map(f64::to_string).unwrap_or_default());
         let (en, zh) = self.instruction;
@@ -243,21 +243,26 @@ mod tests {
     #[test]
     fn every_effect_has_a_plan_that_reads_as_a_recording_and_stays_in_range() {
         for doc in CATALOGUE.iter().map(|effect| effect.doc()) {
-            let plan = of_kinds(&[doc.kind], &envelope());
-            let csv = plan.csv(Language::En);
+            let plan = build_plan(&[doc.kind], &envelope());
+            let csv = plan.to_csv(Language::En);
             let read = read_csv(csv.as_bytes(), doc.kind).unwrap_or_else(|error| panic!("{}: {error}", doc.kind));
             assert_eq!(read.refused, 0, "{}: {:?}", doc.kind, read.problems.first());
             if let Some(speed) = read.recording.find_numbers("spindle_programmed_rpm") {
                 assert!(speed.present_values().all(|n| (0.0..=1500.0).contains(&n)), "{}", doc.kind);
             }
             let asked = doc.experiment_minutes;
-            assert!(plan.minutes() > 0.5 && plan.minutes() < 2.0 * asked + 6.0, "{}: {}", doc.kind, plan.minutes());
+            assert!(
+                plan.duration_min() > 0.5 && plan.duration_min() < 2.0 * asked + 6.0,
+                "{}: {}",
+                doc.kind,
+                plan.duration_min()
+            );
         }
     }
 
     #[test]
     fn two_experiments_are_runs_of_their_own() {
-        let plan = of_kinds(&["edge_force", "no_load_power"], &envelope());
+        let plan = build_plan(&["edge_force", "no_load_power"], &envelope());
         let runs: Vec<u32> = plan.moves.iter().map(|a| a.run).collect();
         assert!(runs.is_sorted() && runs.last() >= Some(&4), "{runs:?}");
     }

@@ -22,7 +22,7 @@ const SPIKE_DEVIATIONS: f64 = 8.0;
 const HELD_ROWS: usize = 4;
 
 /// Notes faults and takes their rows out of the scene. `simulated` is the baseline's output.
-pub fn clean(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
+pub fn exclude_faulty_rows(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
     let mut faults = Vec::new();
     let output = scene.output_name().to_owned();
     let mut note = |fault: &'static str, column: &str, rows: usize| {
@@ -30,36 +30,36 @@ pub fn clean(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
             faults.push(Fault { fault, column: column.to_owned(), rows });
         }
     };
-    note("duplicate_time", "time_s", duplicates(scene));
-    note("quantisation", &output, quantised(scene));
-    let mut dropped = absent(scene);
-    let held = held(scene, &at_stop(scene));
-    let zeros = zeros(scene, simulated);
+    note("duplicate_time", "time_s", count_duplicate_times(scene));
+    note("quantisation", &output, count_quantised_rows(scene));
+    let mut dropped = find_absent_rows(scene);
+    let held = find_held_rows(scene, &mark_rows_at_limit(scene));
+    let zeros = find_zero_rows(scene, simulated);
     dropped.extend(held.iter().chain(&zeros));
     dropped.sort_unstable();
     dropped.dedup();
     scene.exclude_rows(dropped.iter().copied());
     note("dropouts", &output, dropped.len());
-    let spikes = spikes(scene, simulated);
+    let spikes = find_spike_rows(scene, simulated);
     scene.exclude_rows(spikes.iter().copied());
     note("spikes", &output, spikes.len());
     faults
 }
 
-fn duplicates(scene: &Scene) -> usize {
+fn count_duplicate_times(scene: &Scene) -> usize {
     let time_s = scene.time_s();
     let same =
         |rows: &std::ops::Range<usize>| time_s[rows.clone()].windows(2).filter(|pair| pair[0] >= pair[1]).count();
     scene.runs().iter().map(same).sum()
 }
 
-fn absent(scene: &Scene) -> Vec<usize> {
+fn find_absent_rows(scene: &Scene) -> Vec<usize> {
     (0..scene.rows()).filter(|row| !scene.usable_rows()[*row]).collect()
 }
 
 /// Rows in which the output stands at the end of its range again and again: for several rows at a time, more than once,
 /// and in few rows of all. Zero is what a meter reads that gives nothing.
-fn at_stop(scene: &Scene) -> Vec<bool> {
+fn mark_rows_at_limit(scene: &Scene) -> Vec<bool> {
     let mut stands = vec![false; scene.rows()];
     let recorded = scene.recorded_output();
     let known = || (0..scene.rows()).filter(|row| scene.usable_rows()[*row]);
@@ -83,7 +83,7 @@ fn at_stop(scene: &Scene) -> Vec<bool> {
 
 /// Rows in which the output repeats exactly, where that is unusual and nothing stands at a stop: what a full tank, a
 /// limit or a meter at its end holds is no dropout.
-fn held(scene: &Scene, at_stop: &[bool]) -> Vec<usize> {
+fn find_held_rows(scene: &Scene, at_stop: &[bool]) -> Vec<usize> {
     let recorded = scene.recorded_output();
     let equal = (1..scene.rows()).filter(|row| recorded[*row] == recorded[row - 1]).count();
     let mut rows = Vec::new();
@@ -104,7 +104,7 @@ fn held(scene: &Scene, at_stop: &[bool]) -> Vec<usize> {
 }
 
 /// Rows that read exactly zero although the simulation says otherwise and few rows do.
-fn zeros(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
+fn find_zero_rows(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
     let recorded = scene.recorded_output();
     let sizes: Vec<f64> = recorded.iter().map(|x| x.abs()).collect();
     let typical = median(sizes).unwrap_or(0.0);
@@ -115,11 +115,11 @@ fn zeros(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
 }
 
 /// Isolated rows far from their neighbours while the simulation is steady.
-fn spikes(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
+fn find_spike_rows(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
     let residual: Vec<f64> =
         scene.recorded_output().iter().zip(simulated).map(|(recorded, simulated)| recorded - simulated).collect();
     let jumps: Vec<(usize, f64, f64)> =
-        scene.runs().iter().flat_map(|run| jumps_of(scene, &residual, simulated, run)).collect();
+        scene.runs().iter().flat_map(|run| measure_jumps(scene, &residual, simulated, run)).collect();
     let Some(spread) = robust_deviation(jumps.iter().map(|(_, jump, _)| *jump)) else {
         return Vec::new();
     };
@@ -129,7 +129,7 @@ fn spikes(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
 }
 
 /// Per row: distance of its residual from the median of its neighbours, and how much the simulation moves around it.
-fn jumps_of(
+fn measure_jumps(
     scene: &Scene,
     residual: &[f64],
     simulated: &[f64],
@@ -149,7 +149,7 @@ fn jumps_of(
 }
 
 /// Rows on a coarse comb: the step between distinct values is a noticeable part of the spread between neighbours.
-fn quantised(scene: &Scene) -> usize {
+fn count_quantised_rows(scene: &Scene) -> usize {
     let mut values: Vec<f64> = scene
         .recorded_output()
         .iter()
@@ -185,7 +185,11 @@ mod tests {
     fn dropped(brim: f64, asleep: std::ops::Range<u32>) -> usize {
         let mut scene = scene(brim, asleep);
         let simulated = vec![1.0; scene.rows()];
-        clean(&mut scene, &simulated).iter().filter(|fault| fault.fault == "dropouts").map(|fault| fault.rows).sum()
+        exclude_faulty_rows(&mut scene, &simulated)
+            .iter()
+            .filter(|fault| fault.fault == "dropouts")
+            .map(|fault| fault.rows)
+            .sum()
     }
 
     #[test]

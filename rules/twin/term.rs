@@ -31,21 +31,24 @@ impl Term {
             TermKind::One
         } else if let Some((column, power)) = trimmed.split_once('^') {
             let power = power.trim().parse().ok().filter(|power| [2, 3].contains(power));
-            TermKind::Power(name(column)?, power.ok_or_else(|| format!("{text}: the power must be 2 or 3"))?)
-        } else if let Some(inside) = call(trimmed, "sign") {
-            TermKind::Sign(name(inside)?)
-        } else if let Some(inside) = call(trimmed, "abs") {
-            TermKind::Abs(name(inside)?)
-        } else if let Some(inside) = call(trimmed, "delay") {
+            TermKind::Power(
+                parse_column_name(column)?,
+                power.ok_or_else(|| format!("{text}: the power must be 2 or 3"))?,
+            )
+        } else if let Some(inside) = parse_call_argument(trimmed, "sign") {
+            TermKind::Sign(parse_column_name(inside)?)
+        } else if let Some(inside) = parse_call_argument(trimmed, "abs") {
+            TermKind::Abs(parse_column_name(inside)?)
+        } else if let Some(inside) = parse_call_argument(trimmed, "delay") {
             let (column, delay) =
                 inside.split_once(',').ok_or_else(|| format!("{text}: write delay(column, seconds)"))?;
             let delay = delay.trim().parse().ok().filter(|delay: &f64| delay.is_finite());
             TermKind::Delay(
-                name(column)?,
+                parse_column_name(column)?,
                 delay.ok_or_else(|| format!("{text}: the delay must be a number of seconds"))?,
             )
         } else {
-            TermKind::Column(name(trimmed)?)
+            TermKind::Column(parse_column_name(trimmed)?)
         };
         Ok(Self { text: trimmed.to_owned(), law })
     }
@@ -71,7 +74,7 @@ impl Term {
 
     /// Its values, `None` when the column is missing.
     #[must_use]
-    pub fn column(&self, scene: &Scene) -> Option<Vec<f64>> {
+    pub fn compute_column(&self, scene: &Scene) -> Option<Vec<f64>> {
         let Some(input) = self.input() else { return Some(vec![1.0; scene.rows()]) };
         let values = scene.column(input)?;
         Some(match &self.law {
@@ -84,11 +87,11 @@ impl Term {
     }
 }
 
-fn call<'a>(text: &'a str, function: &str) -> Option<&'a str> {
+fn parse_call_argument<'a>(text: &'a str, function: &str) -> Option<&'a str> {
     text.strip_prefix(function)?.trim_start().strip_prefix('(')?.strip_suffix(')')
 }
 
-fn name(text: &str) -> Result<String, String> {
+fn parse_column_name(text: &str) -> Result<String, String> {
     let text = text.trim();
     let fine = !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || c == '_');
     if fine { Ok(text.to_owned()) } else { Err(format!("{text:?} is not the name of a column")) }

@@ -354,7 +354,7 @@ pub(crate) fn real(library: &Path, server: &Server) -> VendorSettings {
 pub(crate) fn real_at(library: &Path, address: SocketAddr) -> VendorSettings {
     VendorSettings {
         vendor_library: library.to_owned(),
-        at: Endpoint { host: address.ip().to_string(), port: address.port() },
+        endpoint: Endpoint { host: address.ip().to_string(), port: address.port() },
         path: 1,
         timeout: Duration::from_secs(2),
         encoding: adapters::text::TextEncoding::default(),

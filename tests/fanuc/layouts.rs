@@ -196,7 +196,8 @@ fn layouts_of_marked_answers_are_read_as_the_library_reads_them() {
         let at = Endpoint { host: control.address.ip().to_string(), port: control.address.port() };
         let encoding = adapters::text::TextEncoding::default();
         let mut native =
-            Native::connect(NativeSettings { at, path: 1, timeout: Duration::from_secs(5), encoding }).expect("opens");
+            Native::connect(NativeSettings { endpoint: at, path: 1, timeout: Duration::from_secs(5), encoding })
+                .expect("opens");
         let mut out = Vec::new();
         native.ask_questions(&[item.to_question(1)], &mut out).expect("answers");
         assert_eq!(out, [Ok(expected)], "{key} of generation {version}");

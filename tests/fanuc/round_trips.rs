@@ -33,7 +33,7 @@ fn the_whole_poll_set_is_one_round_trip() {
         let address: Address = serving.address.parse().expect("usable");
         let Target::Fanuc { at, .. } = address.target() else { panic!("{address}") };
         let encoding = adapters::text::TextEncoding::default();
-        let settings = NativeSettings { at: at.clone(), path: 1, timeout: Duration::from_secs(2), encoding };
+        let settings = NativeSettings { endpoint: at.clone(), path: 1, timeout: Duration::from_secs(2), encoding };
         let mut native = Native::connect(settings).expect("on");
         let (half, most) = median(polls(&mut native, 300));
         let seen = native.statistics();

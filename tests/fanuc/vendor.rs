@@ -21,7 +21,7 @@ pub(crate) fn library(flags: &[&str]) -> Library {
 pub(crate) fn settings(library: &Library) -> VendorSettings {
     VendorSettings {
         vendor_library: library.file.clone(),
-        at: Endpoint { host: "192.0.2.1".to_owned(), port: 8193 },
+        endpoint: Endpoint { host: "192.0.2.1".to_owned(), port: 8193 },
         path: 1,
         timeout: Duration::from_secs(1),
         encoding: adapters::text::TextEncoding::default(),
@@ -175,7 +175,7 @@ fn what_cannot_be_loaded_or_connected_says_so() {
     library.fault("code cnc_allclibhndl3 -16");
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let port = listener.local_addr().expect("bound").port();
-    let local = || VendorSettings { at: Endpoint { host: "127.0.0.1".to_owned(), port }, ..settings(&library) };
+    let local = || VendorSettings { endpoint: Endpoint { host: "127.0.0.1".to_owned(), port }, ..settings(&library) };
     let text = refused(local());
     assert!(text.contains("no answer"), "it accepts and is silent: {text}");
     drop(listener);

@@ -2,8 +2,8 @@
 
 use adapters::address::Address;
 use adapters::fanuc::decode;
+use adapters::fanuc::generation::{Generation, Opening};
 use adapters::fanuc::item::FocasItem;
-use adapters::fanuc::opening::{Generation, Opening};
 use adapters::fanuc::request;
 use adapters::fanuc::server::{Controller, answer_body};
 use adapters::fanuc::wire::{FocasFrame, FrameKind, encode_frame, parse_replies, parse_requests, request_body};

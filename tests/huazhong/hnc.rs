@@ -24,7 +24,7 @@ fn settings(library: &Library) -> HncSettings {
     HncSettings {
         name: "hncnet://fake".to_owned(),
         vendor_library: library.file.clone(),
-        at: Endpoint { host: "192.0.2.1".to_owned(), port: 10001 },
+        endpoint: Endpoint { host: "192.0.2.1".to_owned(), port: 10001 },
         local_host: Some("127.0.0.1".to_owned()),
         local_port: free_port(),
         long_bytes: size_of::<std::ffi::c_long>(),

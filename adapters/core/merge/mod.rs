@@ -82,7 +82,7 @@ pub const LAG_MAX: Duration = Duration::from_secs(2);
 pub const GAP_PERIODS: i64 = 2;
 
 struct SourceState {
-    pace: PeriodLimits,
+    period_limits: PeriodLimits,
     /// Its readings were true so much before their stamps.
     lag_ns: i64,
     newest_ns: TimeNs,
@@ -140,7 +140,7 @@ impl Merge {
             sources: plans
                 .iter()
                 .map(|plan| SourceState {
-                    pace: pace(plan),
+                    period_limits: pace(plan),
                     lag_ns: 0,
                     newest_ns: TimeNs::MIN,
                     failure: None,
@@ -164,7 +164,7 @@ impl Merge {
         for (source, _) in plans.iter().enumerate().filter(|(_, plan)| plan.channels.contains(&channel)) {
             let track = self.tracks.len();
             self.lookup[source * self.channels + channel.index()] = u16::try_from(track).unwrap_or(NO_TRACK);
-            self.tracks.push(ReadingTrack::new(channel, source, self.sources[source].pace));
+            self.tracks.push(ReadingTrack::new(channel, source, self.sources[source].period_limits));
         }
         if self.tracks.len() > first {
             self.lanes.push(Lane { channel, tracks: first..self.tracks.len() });
@@ -195,7 +195,7 @@ impl Merge {
     /// A source turned out to be slower (or faster) than it promised: gaps are measured with this period from now on.
     pub fn set_period(&mut self, source: SourceId, period: Duration) {
         let Some(state) = self.sources.get_mut(source.0) else { return };
-        state.pace = PeriodLimits::new(to_nanoseconds(period), self.delay_ns);
+        state.period_limits = PeriodLimits::new(to_nanoseconds(period), self.delay_ns);
     }
 
     /// Takes a reading. One of a channel that the source did not announce is counted and dropped.
@@ -215,7 +215,7 @@ impl Merge {
         }
         state.newest_ns = state.newest_ns.max(mid_ns);
         let late = mid_ns <= self.last_tick_ns;
-        let put = track.insert_reading(mid_ns, reading.value, self.last_tick_ns, &state.pace);
+        let put = track.insert_reading(mid_ns, reading.value, self.last_tick_ns, &state.period_limits);
         state.counts.count_reading(put, late);
     }
 
@@ -251,7 +251,7 @@ impl Merge {
     fn step_back(&mut self, at_ns: TimeNs) {
         self.tick_steps += 1;
         for track in &mut self.tracks {
-            track.drop_after(at_ns + self.sources[track.source].pace.horizon_ns);
+            track.drop_after(at_ns + self.sources[track.source].period_limits.horizon_ns);
         }
     }
 
@@ -273,7 +273,7 @@ fn choose_slot(tracks: &mut [ReadingTrack], sources: &mut [SourceState], at_ns: 
     let mut reason: Option<Slot> = None;
     for track in tracks {
         let state = &mut sources[track.source];
-        let slot = explain_absence(track.evaluate_at(at_ns, state.pace.gap_ns), state.failure, at_ns);
+        let slot = explain_absence(track.evaluate_at(at_ns, state.period_limits.gap_ns), state.failure, at_ns);
         if slot.value.is_ok() {
             state.counts.stepped_in += u64::from(reason.is_some());
             return slot;

@@ -15,8 +15,8 @@ mod values;
 
 use super::answer::FocasItemResult;
 use super::decode;
+use super::generation::Generation;
 use super::item::{FocasItem, Write};
-use super::opening::Generation;
 use super::request;
 use super::server::{Controller, answer_body};
 use super::wire::{FocasFrame, FrameKind, Request, encode_frame, parse_replies, parse_requests, request_body};

@@ -5,8 +5,8 @@ use super::controller::{Controller, Data};
 use super::encode::{clamp_to_i32, encode_longs, encode_shorts, encode_text};
 use super::{message, program, tool, write};
 use crate::answer::System;
+use crate::generation::Generation;
 use crate::item::{Area, PmcWidth, Spindle, Stretch};
-use crate::opening::Generation;
 use crate::request::function as f;
 use crate::wire::{CncOrPmc, Number, ReplyBlock, Request, reply_body};
 

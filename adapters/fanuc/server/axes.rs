@@ -4,8 +4,8 @@ use super::answer::{ATTRIB, Data8};
 use super::controller::{Controller, ControllerAxis};
 use super::encode::{encode_longs, encode_shorts};
 use crate::answer::SpeedUnit;
+use crate::generation::Generation;
 use crate::item::{Position, Servo, Spindle};
-use crate::opening::Generation;
 use crate::request::UNIT_OF_FEED;
 use crate::wire::Number;
 

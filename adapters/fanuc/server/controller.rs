@@ -2,8 +2,8 @@
 
 use super::Memory;
 use crate::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit, Status, System};
+use crate::generation::{Generation, Opening};
 use crate::item::BlockWord;
-use crate::opening::{Generation, Opening};
 use crate::poll;
 use crate::wire::Number;
 use std::collections::BTreeMap;

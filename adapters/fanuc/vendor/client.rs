@@ -5,8 +5,8 @@ use super::message::{FocasReply, FocasRequest};
 use crate::answer::{FocasItemError, FocasItemResult, Refusal};
 use crate::code::{Consequence, FocasReturnCode};
 use crate::focas::{Focas, FocasError};
+use crate::generation::Opening;
 use crate::item::{Question, Write};
-use crate::opening::Opening;
 use adapter_core::address::Endpoint;
 use adapter_core::child::{ChildClient, ChildCounts, ChildError, ChildSettings, Taken};
 use adapter_core::stream;
@@ -24,7 +24,7 @@ pub struct VendorSettings {
     /// The library's file.
     pub vendor_library: PathBuf,
     /// Where the controller is.
-    pub at: Endpoint,
+    pub endpoint: Endpoint,
     /// Path from 1.
     pub path: u8,
     /// The library's patience with the controller; whole seconds, at least one.
@@ -110,8 +110,8 @@ fn round_up_seconds(timeout: Duration) -> i32 {
 fn open_connection(child: &mut ChildClient<Question>, settings: &VendorSettings) -> Result<Opening, FocasError> {
     let ask = FocasRequest::Open {
         vendor_library: settings.vendor_library.clone(),
-        host: settings.at.host.clone(),
-        port: settings.at.port,
+        host: settings.endpoint.host.clone(),
+        port: settings.endpoint.port,
         path: settings.path,
         timeout_s: round_up_seconds(settings.timeout),
         encoding: settings.encoding,
@@ -130,7 +130,7 @@ fn open_connection(child: &mut ChildClient<Question>, settings: &VendorSettings)
 
 /// What the library's one code for every failed connection means: a connection of our own tells.
 fn no_socket(settings: &VendorSettings, code: FocasReturnCode) -> FocasError {
-    match stream::connect_host(&settings.at, Instant::now() + settings.timeout) {
+    match stream::connect_host(&settings.endpoint, Instant::now() + settings.timeout) {
         Ok(_) => FocasError::Timeout(settings.timeout),
         Err(error) if error.kind() == ErrorKind::ConnectionRefused => FocasError::NobodyThere(code.to_string()),
         Err(_) => FocasError::Unreachable(code.to_string()),

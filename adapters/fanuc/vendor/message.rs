@@ -2,8 +2,8 @@
 
 use crate::answer::FocasItemResult;
 use crate::code::FocasReturnCode;
+use crate::generation::Opening;
 use crate::item::{Question, Write};
-use crate::opening::Opening;
 use adapter_core::text::TextEncoding;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::decode;
+use crate::generation::Generation;
 use crate::item::{FocasItem, Position};
-use crate::opening::Generation;
 use proptest::prelude::*;
 
 fn anything(bytes: &[u8]) {

@@ -1,7 +1,7 @@
 //! One request in, one answer out.
 
 use super::{NcLinkDevice, to_milliseconds, values};
-use crate::liberal::{find_list, find_text, parse_integer};
+use crate::lenient_json::{find_list, find_text, parse_integer};
 use crate::mailbox::ControllerRegister;
 use crate::message::find_identifier;
 use crate::topic::Subject;

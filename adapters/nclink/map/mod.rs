@@ -1,10 +1,10 @@
 //! Which data item feeds which channel. The paths are those of Huazhong's default model.
 
 use super::decode::{self, ChannelWord};
-use super::liberal::parse_integer;
+use super::lenient_json::parse_integer;
 use super::message::{NcLinkAnswer, RequestedItem, first_number};
 use super::model::{Model, ModelItem};
-use super::own::OwnPath;
+use super::own_path::OwnPath;
 use adapter_core::channel::ChannelId;
 use adapter_core::conversion::{self, Conversion};
 use adapter_core::driver::SourceProblem;
@@ -107,8 +107,8 @@ struct PolledItem {
 /// What is asked of this device, and what becomes of its answers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct NcLinkPoll {
-    asks: Vec<RequestedItem>,
-    entries: Vec<PolledItem>,
+    requested_items: Vec<RequestedItem>,
+    items: Vec<PolledItem>,
     operation: Option<ChannelId>,
     execution: Option<ChannelId>,
     /// Channels that this device does not have.
@@ -143,7 +143,7 @@ impl NcLinkPoll {
             }
         }
         own.iter().for_each(|own| plan.add_own(model, own, by_path));
-        let fed: Vec<ChannelId> = plan.entries.iter().map(|entry| entry.channel).collect();
+        let fed: Vec<ChannelId> = plan.items.iter().map(|entry| entry.channel).collect();
         plan.absent = list_channels(own).into_iter().filter(|channel| !fed.contains(channel)).collect();
         plan
     }
@@ -157,8 +157,8 @@ impl NcLinkPoll {
         let Some(item) = model.find_item(path).or_else(|| self.find_elsewhere(model, path, channel)) else { return };
         let conversion =
             if matches!(how, How::Number) { self.find_conversion(item, channel) } else { Some(Conversion::NONE) };
-        self.asks.push(RequestedItem::with_elements(name_item(item, by_path).as_str(), indexes));
-        self.entries.push(PolledItem { channel, how, conversion, own: None });
+        self.requested_items.push(RequestedItem::with_elements(name_item(item, by_path).as_str(), indexes));
+        self.items.push(PolledItem { channel, how, conversion, own: None });
     }
 
     fn add_own(&mut self, model: &Model, own: &Own<OwnPath>, by_path: bool) {
@@ -171,8 +171,8 @@ impl NcLinkPoll {
         let is_text = own.channel.new.unit.is_empty();
         let conversion = if is_text { Some(Conversion::NONE) } else { self.find_conversion(item, own.id) };
         let indexes: Vec<u32> = own.item.index.into_iter().collect();
-        self.asks.push(RequestedItem::with_elements(name_item(item, by_path).as_str(), &indexes));
-        self.entries.push(PolledItem { channel: own.id, how: How::Number, conversion, own: Some(own.clone()) });
+        self.requested_items.push(RequestedItem::with_elements(name_item(item, by_path).as_str(), &indexes));
+        self.items.push(PolledItem { channel: own.id, how: How::Number, conversion, own: Some(own.clone()) });
     }
 
     /// The only item that ends in the same word, wherever it stands; with several, nobody knows which is meant.
@@ -227,27 +227,27 @@ impl NcLinkPoll {
 
     /// The channel that takes the item of this name and, of a list, any of its elements.
     pub(super) fn find_channel(&self, id: &str) -> Option<ChannelId> {
-        let at = self.asks.iter().position(|ask| ask.id == id)?;
-        self.entries.get(at).map(|entry| entry.channel)
+        let at = self.requested_items.iter().position(|ask| ask.id == id)?;
+        self.items.get(at).map(|entry| entry.channel)
     }
 
     /// One request for everything.
     pub(super) fn requested_items(&self) -> &[RequestedItem] {
-        &self.asks
+        &self.requested_items
     }
 
     /// The readings of one answer, with a reason for every channel that has none.
     pub(super) fn append_readings(&self, answers: &[Option<NcLinkAnswer>], stamp: Stamp, out: &mut Vec<Reading>) {
         let mut tapping = None;
         let mut word = None;
-        for (entry, answer) in self.entries.iter().zip(answers) {
+        for (entry, answer) in self.items.iter().zip(answers) {
             match entry.how {
                 How::Tapping => tapping = entry.find_value(answer).ok().and_then(parse_integer),
                 How::ChannelWord => word = entry.find_value(answer).ok().and_then(parse_integer).map(ChannelWord),
                 _ => {}
             }
         }
-        for (entry, answer) in self.entries.iter().zip(answers) {
+        for (entry, answer) in self.items.iter().zip(answers) {
             let reading = match entry.how {
                 How::Tapping => continue,
                 How::ChannelWord => entry.build_text_reading(answer, stamp, |value| {

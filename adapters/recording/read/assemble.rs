@@ -115,7 +115,7 @@ struct BlockBuilder<'p> {
     times: Vec<RawTime>,
     columns: Vec<ColumnBuilder<'p>>,
     /// Rows without a time since the last one that had one: the end of the file says whether they are a footer.
-    waiting: Vec<RowProblem>,
+    problems: Vec<RowProblem>,
 }
 
 impl<'p> BlockBuilder<'p> {
@@ -132,7 +132,7 @@ impl<'p> BlockBuilder<'p> {
             lines: Vec::new(),
             times: Vec::new(),
             columns: plan.columns.iter().map(column).collect(),
-            waiting: Vec::new(),
+            problems: Vec::new(),
         }
     }
 
@@ -147,9 +147,9 @@ impl<'p> BlockBuilder<'p> {
         let column = Some(self.plan.time.source.clone());
         let time = match self.parse_time(cells) {
             Ok(time) => time,
-            Err(reason) => return self.waiting.push(RowProblem { line, column, reason }),
+            Err(reason) => return self.problems.push(RowProblem { line, column, reason }),
         };
-        std::mem::take(&mut self.waiting).into_iter().for_each(|problem| done.record_refusal(problem));
+        std::mem::take(&mut self.problems).into_iter().for_each(|problem| done.record_refusal(problem));
         for builder in self.columns.iter().filter(|builder| builder.plan.strict) {
             if let Err(reason) = builder.check_cell(at(builder.plan.index)) {
                 return done.record_refusal(RowProblem { line, column: Some(builder.plan.source.clone()), reason });
@@ -236,15 +236,15 @@ impl<'p> BlockBuilder<'p> {
     }
 
     fn finish_recording(self, file: &str, mapping: &Mapping, done: &mut Assembled) -> Recording {
-        if self.waiting.len() <= FOOTER_MAX && !self.waiting.is_empty() && !self.times.is_empty() {
-            let (lines, first) = (self.waiting.len(), self.waiting[0].line);
+        if self.problems.len() <= FOOTER_MAX && !self.problems.is_empty() && !self.times.is_empty() {
+            let (lines, first) = (self.problems.len(), self.problems[0].line);
             done.notes.push(Note::new(
                 NoteKind::Loss,
                 format!("{lines} lines after the data left out (from line {first})"),
                 format!("数据之后的{lines}行未读取（自第{first}行起）"),
             ));
         } else {
-            self.waiting.into_iter().for_each(|problem| done.record_refusal(problem));
+            self.problems.into_iter().for_each(|problem| done.record_refusal(problem));
         }
         let runs = self.columns.iter().find(|column| column.plan.name == "run").map(|column| &column.words);
         let timed = resolve_times(&self.times, runs, &mapping.time, &mut done.notes);

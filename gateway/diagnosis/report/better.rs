@@ -6,7 +6,7 @@ use super::plot::{Curve, Plot, thin_curve};
 use super::text::{format_number, with_unit};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::Fits;
-use rules::twin::units::Unit;
+use rules::twin::hold_out::Unit;
 use std::fmt::Write as _;
 use std::ops::Range;
 

@@ -3,7 +3,7 @@
 use super::data::Data;
 use super::text::{escape_html, format_number};
 use adapters::recording::{Cells, Numbers, Words, derive_quantity};
-use rules::twin::locate::Condition;
+use rules::twin::region::Condition;
 use std::borrow::Cow;
 
 /// Rows looked at to choose columns and bins.

@@ -4,7 +4,7 @@ use super::PageInput;
 use super::text::{Tongue, escape_html};
 use adapters::recording::{Numbers, Run};
 use rules::twin::diagnosis::Diagnosis;
-use rules::twin::units::{Unit, units_of};
+use rules::twin::hold_out::{Unit, split_into_units};
 use std::ops::Range;
 
 /// Which simulation.
@@ -36,7 +36,7 @@ impl<'a> Data<'a> {
         let rows: Vec<Range<usize>> = runs.iter().map(|run| run.rows.clone()).collect();
         let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
         let held = diagnosis.fit.as_ref().map_or(&[][..], |fit| &fit.held_out_runs);
-        let held = units_of(&rows, &names).into_iter().filter(|unit| held.contains(&unit.name)).collect();
+        let held = split_into_units(&rows, &names).into_iter().filter(|unit| held.contains(&unit.name)).collect();
         let starts_s = compute_run_starts(&input.recording.time_s, &rows);
         let recorded = input.recording.find_numbers(&diagnosis.output);
         Self { input, diagnosis, tongue: Tongue(input.language), runs, held, starts_s, recorded }

@@ -4,7 +4,7 @@ use super::data::Data;
 use super::strip::{REGIONS_MAX, render_strip};
 use super::text::{format_fixed, format_number, format_signed, with_unit};
 use rules::physics::explain::Language;
-use rules::twin::locate::{OnsetInterval, Region, active_rows, usual_size};
+use rules::twin::region::{OnsetInterval, Region, compute_usual_size, mark_active_rows};
 
 /// Mean, as a share of the typical size, below which an effect counts as one of both signs.
 const MEAN_TELLS: f64 = 0.3;
@@ -101,7 +101,7 @@ fn describe_onset(data: &Data<'_>, onset: &OnsetInterval) -> String {
 /// Root mean square of an effect over the rows where it acts: an effect of both signs has a mean that tells little.
 fn compute_effect_rms(data: &Data<'_>, effect: &str) -> Option<f64> {
     let (_, values) = data.diagnosis.rows.effects.iter().find(|(name, _)| name == effect)?;
-    let active = active_rows(values, usual_size(values));
+    let active = mark_active_rows(values, compute_usual_size(values));
     let inside = values.iter().zip(active).filter(|(_, active)| *active);
     let (sum, count) = inside.fold((0.0, 0_u32), |(sum, count), (x, _)| (sum + x * x, count.saturating_add(1)));
     (count > 0).then(|| (sum / f64::from(count)).sqrt())

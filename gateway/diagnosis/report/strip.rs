@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::text::{escape_html, format_fixed};
-use rules::twin::locate::{OnsetInterval, Region, Span};
+use rules::twin::region::{OnsetInterval, Region, Span};
 use std::fmt::Write as _;
 
 /// Runs above which every run becomes one tile.

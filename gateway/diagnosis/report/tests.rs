@@ -8,8 +8,8 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::{Diagnosis, Verdict};
-use rules::twin::locate::{OnsetInterval, Span};
-use rules::twin::{diagnose, parse_model};
+use rules::twin::region::{OnsetInterval, Span};
+use rules::twin::{diagnose_recording, parse_model};
 
 const MODEL: &str = r#"
 schema = "model/1"
@@ -51,7 +51,7 @@ fn recording(runs: usize, rows_per_run: usize, friction_n: f64) -> Recording {
 
 fn diagnosed(recording: &Recording) -> Diagnosis {
     let model = parse_model(MODEL).expect("a model");
-    diagnose(recording, &model, 1).expect("a diagnosis")
+    diagnose_recording(recording, &model, 1).expect("a diagnosis")
 }
 
 fn in_language(diagnosis: &Diagnosis, recording: &Recording, language: Language) -> String {

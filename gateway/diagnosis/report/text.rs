@@ -3,7 +3,7 @@
 use adapters::channel::{ChannelId, quantity};
 use rules::physics::explain::Language;
 use rules::physics::{CATALOGUE, EffectDoc, find_effect};
-use rules::twin::locate::Condition;
+use rules::twin::region::Condition;
 
 /// Words of a condition that are listed.
 const WORDS_MAX: usize = 8;

@@ -6,7 +6,7 @@ use crate::simulation;
 use adapters::Recording;
 use adapters::channel::quantity::unit_of;
 use adapters::recording::{Cells, Numbers};
-use rules::twin::text::short;
+use rules::twin::text_report::format_short_number;
 use rules::twin::{Model, PartFunction};
 
 /// Error over the size of the output from which a model is asked whether a unit is wrong,
@@ -78,13 +78,14 @@ struct UnitHypothesis {
 fn describe_doubt(output: &str, given: f64, found: &[UnitHypothesis]) -> UnitDoubt {
     let (mut en, mut zh, mut ask_en, mut ask_zh) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for UnitHypothesis { error, column, unit, factor } in found {
-        let (after, factor, own) = (short(100.0 * error), short(*factor), unit_of(column).unwrap_or(""));
+        let (after, factor, own) =
+            (format_short_number(100.0 * error), format_short_number(*factor), unit_of(column).unwrap_or(""));
         en.push(format!("with {column} taken as {unit} ({factor} times as many {own}) it misses by {after} %"));
         zh.push(format!("若{column}以{unit}为单位（换算为{own}乘以{factor}），误差为{after} %"));
         ask_en.push(format!("{column} in {unit}"));
         ask_zh.push(format!("{column}以{unit}为单位"));
     }
-    let before = short(100.0 * given);
+    let before = format_short_number(100.0 * given);
     UnitDoubt::new(
         &found[0].column,
         format!("the model as given misses {output} by {before} %; {}: is {}?", en.join(", "), ask_en.join(", or ")),

@@ -2,7 +2,7 @@
 
 use super::{UnitDoubt, list_possible_units};
 use rules::physics::Entry;
-use rules::twin::text::short;
+use rules::twin::text_report::format_short_number;
 use rules::twin::{Model, Parameter, Part, PartFunction};
 
 /// Times its nominal value from which a parameter is asked for. Two machines of a kind differ by less than three.
@@ -31,7 +31,7 @@ pub fn find_parameter_doubts(nominal: &Model, refitted: &Model) -> Vec<UnitDoubt
             .iter()
             .filter(|parameter| parameter.entry == Entry::Linear && !parameter.fixed && parameter.value != 0.0)
         {
-            found.extend(other.parameter(&parameter.name).and_then(|now| compare_parameter(part, parameter, now)));
+            found.extend(other.find_parameter(&parameter.name).and_then(|now| compare_parameter(part, parameter, now)));
         }
     }
     found
@@ -56,7 +56,8 @@ fn compare_parameter(part: &Part, nominal: &Parameter, now: &Parameter) -> Optio
     let asked = unit
         .or_else(|| column.map(|column| format!("{column} in another unit")))
         .unwrap_or_else(|| "one of its columns in another unit".to_owned());
-    let (times, value, was) = (short(ratio), short(now.value), short(nominal.value));
+    let (times, value, was) =
+        (format_short_number(ratio), format_short_number(now.value), format_short_number(nominal.value));
     let unit = &nominal.unit;
     Some(UnitDoubt::new(
         &name,

@@ -3,7 +3,7 @@
 use super::{UnitDoubt, find_nearest_unit, median};
 use adapters::Recording;
 use adapters::recording::derive_quantity;
-use rules::twin::text::short;
+use rules::twin::text_report::format_short_number;
 
 /// Two courses that belong together keep their ratio within this share of it in half of the rows.
 const STEADY: f64 = 0.1;
@@ -61,7 +61,7 @@ fn find_relation_doubt(name: &str, others: &[&str], pairs: Vec<(f64, f64)>) -> O
     } else {
         (format!(": is {}?", list.join(", or ")), format!("：是否{}？", list_zh.join("，或")))
     };
-    let (ratio, others_list) = (short(middle), others.join(", "));
+    let (ratio, others_list) = (format_short_number(middle), others.join(", "));
     Some(UnitDoubt::new(
         name,
         format!("{name} is {ratio} times what follows from {others_list}{end}"),
@@ -97,7 +97,7 @@ fn find_position_doubt(recording: &Recording, prefix: &str) -> Option<UnitDoubt>
     if ratios.len() < ROWS_MIN || 2 * steady < ratios.len() {
         return None;
     }
-    let ratio = short(middle);
+    let ratio = format_short_number(middle);
     let mut guesses: Vec<(String, String)> = Vec::new();
     let mut add =
         |column: &str, unit: &str| guesses.push((format!("{column} in {unit}"), format!("{column}以{unit}为单位")));
@@ -144,7 +144,7 @@ fn find_power_doubts(recording: &Recording) -> Vec<UnitDoubt> {
         (ratios.len() >= ROWS_MIN).then(|| median(ratios)).flatten()
     };
     if let Some(ratio) = typical("spindle_power_w", "total_power_w") {
-        let text = short(ratio);
+        let text = format_short_number(ratio);
         if ratio > 5.0 {
             found.push(UnitDoubt::new(
                 "total_power_w",
@@ -174,7 +174,7 @@ fn find_power_doubts(recording: &Recording) -> Vec<UnitDoubt> {
         if let Some(ratio) =
             median(ratios.clone()).filter(|ratio| ratios.len() >= ROWS_MIN && !(0.03..30.0).contains(ratio))
         {
-            let text = short(ratio);
+            let text = format_short_number(ratio);
             found.push(UnitDoubt::new(
                 "torque_nm",
                 format!("spindle_power_w is {text} times torque times speed: is one of the three in another unit (kW, N cm, 1/s)?"),

@@ -3,7 +3,7 @@
 use super::{UnitDoubt, median};
 use adapters::Recording;
 use adapters::recording::Numbers;
-use rules::twin::text::short;
+use rules::twin::text_report::format_short_number;
 
 /// Column, what its greatest values lie between, and the unit that smaller and greater ones look like.
 type Size = (&'static str, (f64, f64), &'static str, &'static str);
@@ -71,7 +71,7 @@ fn find_size_doubt(recording: &Recording, (name, (low, high), smaller, greater):
     } else {
         return None;
     };
-    let text = short(great);
+    let text = format_short_number(great);
     Some(UnitDoubt::new(
         name,
         format!("{name}: its great values are about {text}, which no machine tool has: is it in {unit}?"),
@@ -87,7 +87,7 @@ fn find_temperature_doubts(recording: &Recording) -> Vec<UnitDoubt> {
     let is_air =
         middle("ambient_temperature_c").is_some_and(|middle| middle > FAHRENHEIT_AIR.0 && middle < FAHRENHEIT_AIR.1);
     let say = |name: &str, middle: f64, unit: &str| {
-        let text = short(middle);
+        let text = format_short_number(middle);
         UnitDoubt::new(
             name,
             format!("{name} is {text} in the middle: is it in {unit}?"),
@@ -114,7 +114,7 @@ fn find_time_doubt(recording: &Recording) -> Option<UnitDoubt> {
         recording.time_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
     let step = *steps.get(steps.len() / 2)?;
-    let text = short(step);
+    let text = format_short_number(step);
     if step >= LONG_ROW_S && changes_often(recording) {
         let unit = if step >= 5e5 { "us" } else { "ms" };
         return Some(UnitDoubt::new(

@@ -15,7 +15,7 @@ use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
-use rules::twin::diagnosis::unit_of;
+use rules::twin::diagnosis::find_output_unit;
 use rules::twin::live::{self, ComparedSecond, Live, Mismatch, Regime, RegimeStage};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -146,7 +146,7 @@ impl Twin {
 
     fn put_in_charge(&mut self, loaded: LoadedModel, before: Remembered) {
         let same = before.toml == loaded.toml;
-        let memory = if same { before.memory } else { before.memory.of_the_machine() };
+        let memory = if same { before.memory } else { before.memory.retain_cutting_times() };
         self.due = before.due.filter(|_| same);
         if self.suffix.is_empty() {
             self.suffix = loaded.model.output.rsplit('_').next().unwrap_or("").to_owned();
@@ -175,7 +175,7 @@ impl Twin {
     #[must_use]
     pub fn extra_series(&self) -> Vec<ExtraSeries> {
         let Some(ActiveModel { loaded, .. }) = &self.active else { return Vec::new() };
-        let unit = unit_of(&loaded.model.output);
+        let unit = find_output_unit(&loaded.model.output);
         let series = |name: &str, en, zh| ExtraSeries::new_number(&format!("{name}_{}", self.suffix), unit, en, zh);
         vec![
             series("twin_expected", "Expected by the simulation", "仿真值"),
@@ -189,11 +189,11 @@ impl Twin {
     pub fn extra_values(&self) -> [ExtraValue<'static>; 2] {
         let same_unit = |loaded: &LoadedModel| loaded.model.output.ends_with(&self.suffix);
         let compared = match &self.active {
-            Some(ActiveModel { live, loaded }) if same_unit(loaded) => live.compared(),
-            _ => ComparedSecond::none(live::NoTwin::NotYet),
+            Some(ActiveModel { live, loaded }) if same_unit(loaded) => live.compared_second(),
+            _ => ComparedSecond::from_reason(live::NoTwin::NotYet),
         };
         let expected = compared.residual.and(compared.expected);
-        [expected, compared.residual].map(|value| value.map_err(live::NoTwin::word).into())
+        [expected, compared.residual].map(|value| value.map_err(live::NoTwin::as_word).into())
     }
 
     /// Takes one tick, after the pipeline has.
@@ -211,11 +211,12 @@ impl Twin {
             self.tell_onsets();
         }
         let Some(ActiveModel { live, .. }) = &mut self.active else { return };
-        let noticed = live.step(sample, pipeline.estimates().state);
+        let noticed = live.update_with_sample(sample, pipeline.estimates().state);
         match noticed {
             None => {}
             Some(live::Notice::Learned(regime)) => {
-                let text = format!("what is usual {} has been learned; it is watched from now on", regime.words().0);
+                let text =
+                    format!("what is usual {} has been learned; it is watched from now on", regime.as_phrases().0);
                 health.record_event(now_ns, SOURCE, &Notice::new(Severity::Info, "twin_learned", text));
                 self.save_learned(health);
             }
@@ -238,7 +239,7 @@ impl Twin {
     }
 
     fn output_unit(&self) -> &'static str {
-        self.active.as_ref().map_or("", |active| unit_of(&active.loaded.model.output))
+        self.active.as_ref().map_or("", |active| find_output_unit(&active.loaded.model.output))
     }
 
     fn report_mismatch(&mut self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
@@ -279,7 +280,7 @@ impl Twin {
     }
 
     fn list_mismatches(&self) -> Vec<Mismatch> {
-        let stages = self.active.iter().flat_map(|active| active.live.stages());
+        let stages = self.active.iter().flat_map(|active| active.live.list_stages());
         let differing = |(_, stage)| if let RegimeStage::Differing(mismatch) = stage { Some(mismatch) } else { None };
         stages.filter_map(differing).collect()
     }
@@ -330,7 +331,7 @@ impl Twin {
             let code = alarm_code(mismatch.regime);
             health.keep_record(AlarmClear { at_ns: now_ns, code, source: SOURCE.to_owned() }.into());
         }
-        let memory = self.active.take().map(|before| before.live.memory()).unwrap_or_default();
+        let memory = self.active.take().map(|before| before.live.to_state()).unwrap_or_default();
         self.put_in_charge(loaded, Remembered { toml: String::new(), memory, due: None });
         self.save_learned(health);
     }
@@ -339,7 +340,7 @@ impl Twin {
     pub fn save_learned(&mut self, health: &Health) {
         self.saved = Instant::now();
         let Some(ActiveModel { live, loaded }) = &self.active else { return };
-        let remembered = Remembered { toml: loaded.toml.clone(), memory: live.memory(), due: self.due };
+        let remembered = Remembered { toml: loaded.toml.clone(), memory: live.to_state(), due: self.due };
         match serde_json::to_string(&remembered) {
             Ok(text) => health.put_learned(&self.memory, text),
             Err(error) => tracing::warn!("what the twin has learned could not be saved: {error}"),

@@ -29,7 +29,7 @@ impl Twin {
         RegimeStatus {
             stage: "differing",
             difference: Some(mismatch.mean),
-            difference_pct: mismatch.percent(),
+            difference_pct: mismatch.difference_percent(),
             since_ms: mismatch.onset.map(|onset| [onset.at_s, onset.low_s, onset.high_s].map(to_milliseconds)),
             text: Some(text),
             zh: Some(zh),
@@ -41,8 +41,9 @@ impl Twin {
     #[must_use]
     pub fn build_status(&self) -> TwinStatus {
         let active = self.active.as_ref();
-        let compared = active.map_or(ComparedSecond::none(live::NoTwin::NotYet), |active| active.live.compared());
-        let why = active.and_then(|active| active.live.why().map(str::to_owned));
+        let compared =
+            active.map_or(ComparedSecond::from_reason(live::NoTwin::NotYet), |active| active.live.compared_second());
+        let why = active.and_then(|active| active.live.failure_reason().map(str::to_owned));
         let reason = compared.residual.err();
         TwinStatus {
             model: active.map(|active| active.loaded.model.name.clone()).unwrap_or_default(),
@@ -54,7 +55,7 @@ impl Twin {
             twin_recorded: compared.expected.ok().zip(compared.residual.ok()).map(|(expected, rest)| expected + rest),
             twin_expected: compared.expected.ok(),
             twin_residual: compared.residual.ok(),
-            missing: reason.map(live::NoTwin::word),
+            missing: reason.map(live::NoTwin::as_word),
             why: reason.map(|reason| why.unwrap_or_else(|| reason.to_string())),
             regimes: active.map_or_else(Vec::new, |active| self.list_regimes(&active.live)),
             diagnosing_since_ms: self.begun_ns.filter(|_| self.diagnosing).map(|ns| ns.div_euclid(1_000_000)),
@@ -66,7 +67,7 @@ impl Twin {
     fn list_regimes(&self, live: &Live) -> Vec<RegimeStatus> {
         let status = |(regime, stage): (Regime, RegimeStage)| {
             let none = RegimeStatus {
-                regime: regime.word(),
+                regime: regime.as_word(),
                 stage: "learning",
                 learned: None,
                 usual: None,
@@ -82,7 +83,7 @@ impl Twin {
                 RegimeStage::Differing(mismatch) => self.build_mismatch_status(&mismatch, none),
             }
         };
-        live.stages().map(status).collect()
+        live.list_stages().map(status).collect()
     }
 
     fn build_diagnosis_status(&self, finished: &Finished) -> DiagnosisStatus {

@@ -45,8 +45,8 @@ pub struct Collector {
     changed_s: Option<(f64, f64)>,
     /// From and to, the oldest first.
     cuts: VecDeque<(f64, f64)>,
-    kept: VecDeque<Transient>,
-    gathered: AlignmentData,
+    transients: VecDeque<Transient>,
+    data: AlignmentData,
 }
 
 impl Collector {
@@ -120,15 +120,15 @@ impl Collector {
             |points: usize, point: &PowerPoint| points + usize::from((from_s..=to_s).contains(&point.time_s));
         let (all, left) = (self.power.iter().fold(0, of_change), free.iter().fold(0, of_change));
         if count_to_f64(left) < LEFT_SHARE * count_to_f64(all) {
-            self.gathered.while_cutting += 1;
+            self.data.while_cutting += 1;
             return;
         }
         let speed = self.speed.iter().filter(|point| point.time_s >= from_s - BEFORE_S).copied().collect();
-        if self.kept.len() >= TRANSIENTS_MAX {
-            self.kept.pop_front();
+        if self.transients.len() >= TRANSIENTS_MAX {
+            self.transients.pop_front();
         }
-        self.kept.push_back(Transient { speed, power: free });
-        self.gathered.new = true;
+        self.transients.push_back(Transient { speed, power: free });
+        self.data.new = true;
     }
 
     fn is_cut(&self, time_s: f64) -> bool {
@@ -137,14 +137,14 @@ impl Collector {
 
     /// What there is; `new` is then false until the next transient.
     pub fn take_gathered_data(&mut self) -> AlignmentData {
-        let gathered = AlignmentData { transients: self.kept.len(), ..self.gathered };
-        self.gathered.new = false;
+        let gathered = AlignmentData { transients: self.transients.len(), ..self.data };
+        self.data.new = false;
         gathered
     }
 
     /// The transients, the oldest first.
     pub fn transients(&mut self) -> &[Transient] {
-        self.kept.make_contiguous()
+        self.transients.make_contiguous()
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod reconfigure;
 mod stand_in;
-mod stored;
+mod stored_state;
 mod voltage;
 
 use super::detector::{Detected, Detector};
@@ -36,7 +36,7 @@ pub struct RestoreError(#[from] serde_json::Error);
 pub struct Inference {
     settings: Settings,
     channels: InputChannels,
-    memory: InferenceState,
+    state: InferenceState,
     estimates: Estimates,
 }
 
@@ -83,37 +83,37 @@ impl Inference {
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let memory = InferenceState::new(&settings);
-        Self { settings, channels: InputChannels::new(), memory, estimates: Estimates::without_samples(0) }
+        Self { settings, channels: InputChannels::new(), state: memory, estimates: Estimates::without_samples(0) }
     }
 
     /// Takes one sample; samples come in the order of time.
     pub fn update_with_sample(&mut self, sample: &Sample) -> &Estimates {
-        let mut inputs = self.channels.read(sample, self.memory.standby_w, &self.settings);
+        let mut inputs = self.channels.read(sample, self.state.standby_w, &self.settings);
         self.follow_basis(inputs.basis);
-        let broken = self.memory.signals.push(&inputs, &self.settings);
+        let broken = self.state.signals.push(&inputs, &self.settings);
         if broken.gap {
-            self.memory.detector.forget_past();
+            self.state.detector.forget_past();
         }
         if broken.stage {
-            self.memory.detector.mark_speed_change(inputs.at_ns);
+            self.state.detector.mark_speed_change(inputs.at_ns);
         }
         if broken.gap || broken.stage {
-            self.memory.learner.discard_collected();
+            self.state.learner.discard_collected();
         }
         self.take_to_reference_voltage(&mut inputs);
-        let filtered_w = inputs.power.ok().and_then(|power| self.memory.signals.push_power(power, &self.settings));
+        let filtered_w = inputs.power.ok().and_then(|power| self.state.signals.push_power(power, &self.settings));
         let mut no_load = self.select_no_load_reference(&inputs);
         let tick =
-            Tick { inputs: &inputs, signals: &self.memory.signals, settings: &self.settings, filtered_w, no_load };
-        let feed = self.memory.signals.classify_feed(&inputs, &self.settings);
-        let verdict = self.memory.detector.update_state(&tick);
+            Tick { inputs: &inputs, signals: &self.state.signals, settings: &self.settings, filtered_w, no_load };
+        let feed = self.state.signals.classify_feed(&inputs, &self.settings);
+        let verdict = self.state.detector.update_state(&tick);
         if let Some(power_w) = verdict.settled_at_w {
             self.settled_at(power_w, feed, &inputs);
             no_load = self.select_no_load_reference(&inputs);
         }
         self.update_memory(&inputs, filtered_w, no_load, &verdict);
         self.estimates = self.build_estimates(&inputs, filtered_w, no_load, &verdict);
-        self.memory.loads.step(sample, &mut self.estimates, &self.settings);
+        self.state.loads.step(sample, &mut self.estimates, &self.settings);
         &self.estimates
     }
 
@@ -124,7 +124,7 @@ impl Inference {
         if speed_rpm < self.settings.spindle_min_rpm {
             return Err(NoEstimate::SpindleStopped);
         }
-        let (memory, settings) = (&self.memory, &self.settings);
+        let (memory, settings) = (&self.state, &self.settings);
         let stage = memory.signals.stage();
         let learned = memory.no_load.get(stage, speed_rpm, inputs.at_ns, settings);
         let rough = || memory.no_load.rough_power(stage, speed_rpm, inputs.at_ns, settings);
@@ -133,7 +133,7 @@ impl Inference {
     }
 
     fn find_upper_bound(&self, stage: usize, speed_rpm: f64) -> Option<NoLoad> {
-        let bound = self.memory.upper_bound.filter(|bound| {
+        let bound = self.state.upper_bound.filter(|bound| {
             let near = (bound.speed_rpm - speed_rpm).abs() <= self.settings.speed_tolerance * speed_rpm;
             near && bound.stage == stage
         })?;
@@ -154,12 +154,12 @@ impl Inference {
     /// The power has settled at a speed without a known no-load power.
     fn settled_at(&mut self, power_w: f64, feed: Feed, inputs: &TickInputs) {
         let Ok(speed) = inputs.speed else { return };
-        let point = NoLoadPoint { stage: self.memory.signals.stage(), speed_rpm: speed.abs(), power_w };
+        let point = NoLoadPoint { stage: self.state.signals.stage(), speed_rpm: speed.abs(), power_w };
         if feed == Feed::Off {
-            let sd_w = power_w * self.settings.c2_on.hypot(self.memory.signals.noise.sd()) / 2.0;
-            self.memory.no_load.learn_power(point, sd_w, inputs.supply_log, inputs.at_ns, &self.settings);
+            let sd_w = power_w * self.settings.c2_on.hypot(self.state.signals.noise.sd()) / 2.0;
+            self.state.no_load.learn_power(point, sd_w, inputs.supply_log, inputs.at_ns, &self.settings);
         } else if power_w > 0.0 {
-            self.memory.upper_bound = Some(point);
+            self.state.upper_bound = Some(point);
         }
     }
 
@@ -171,7 +171,7 @@ impl Inference {
         no_load: Result<NoLoad, NoEstimate>,
         verdict: &Detected,
     ) {
-        let memory = &mut self.memory;
+        let memory = &mut self.state;
         if let (State::Standby, Ok(total)) = (verdict.state, inputs.total) {
             let standby = memory.standby_w.get_or_insert(total);
             *standby += STANDBY_WEIGHT * (total - *standby);
@@ -197,8 +197,8 @@ impl Inference {
 
     /// A stationary level visibly below the upper bound is a better one.
     fn lower_bound(&mut self, filtered_w: Option<f64>) {
-        let (signals, settings) = (&self.memory.signals, &self.settings);
-        let (Some(bound), Some(level_w)) = (&mut self.memory.upper_bound, filtered_w) else { return };
+        let (signals, settings) = (&self.state.signals, &self.settings);
+        let (Some(bound), Some(level_w)) = (&mut self.state.upper_bound, filtered_w) else { return };
         let agreement_w = signals.agreement_w(level_w, settings);
         if let Some(means) = signals.window.find_stationary_means(agreement_w, settings) {
             let level_w = means.older_w.max(means.newer_w);
@@ -209,7 +209,7 @@ impl Inference {
     }
 
     fn learn_idle_power(&mut self, inputs: &TickInputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) {
-        let memory = &mut self.memory;
+        let memory = &mut self.state;
         let rested = memory.signals.worked_ago_s(inputs.at_ns) >= self.settings.learn_guard_s && inputs.feed.is_ok();
         let running = matches!(verdict.state, State::Idle | State::Rapid | State::Cutting);
         let (Ok(power_w), Ok(speed_rpm), true) = (inputs.power, inputs.speed, running) else {
@@ -251,12 +251,12 @@ impl Inference {
         no_load: Result<NoLoad, NoEstimate>,
         verdict: &Detected,
     ) -> Estimates {
-        let detector = &self.memory.detector;
+        let detector = &self.state.detector;
         let steady = self.check_steadiness(inputs, verdict);
         let power = inputs.power.map_err(|absence| self.explain_missing_input(self.channels.power, absence));
         let filtered = power.and(filtered_w.ok_or(NoEstimate::NotSettled)).map(|value| Estimate {
             value: value + inputs.by_voltage_w,
-            sd: self.memory.signals.filter.noise_gain() * self.memory.signals.noise.sd() * value.abs(),
+            sd: self.state.signals.filter.noise_gain() * self.state.signals.noise.sd() * value.abs(),
         });
         let reference = match (steady, no_load) {
             (Err(NoEstimate::MachineOff), _) => Err(NoEstimate::MachineOff),
@@ -282,7 +282,7 @@ impl Inference {
             no_load_origin: reference.map_or(NoLoadOrigin::None, |known| known.origin),
             noise_gain: reference.map_or(0.0, |known| known.noise_gain),
             visibility: self.classify_visibility(inputs, no_load, verdict),
-            gear_stage: u8::try_from(self.memory.signals.stage()).unwrap_or(0),
+            gear_stage: u8::try_from(self.state.signals.stage()).unwrap_or(0),
             ..Estimates::without_samples(inputs.at_ns)
         };
         if inputs.basis.in_watts() { estimates } else { self.without_watts(estimates) }
@@ -291,8 +291,8 @@ impl Inference {
     /// Why the table gives no estimate at this speed.
     fn explain_refusal(&self, inputs: &TickInputs) -> NoEstimate {
         let speed_rpm = inputs.speed.unwrap_or(0.0);
-        let table = &self.memory.no_load;
-        let refused = table.get(self.memory.signals.stage(), speed_rpm, inputs.at_ns, &self.settings);
+        let table = &self.state.no_load;
+        let refused = table.get(self.state.signals.stage(), speed_rpm, inputs.at_ns, &self.settings);
         refused.err().unwrap_or(NoEstimate::NotLearned)
     }
 
@@ -322,7 +322,7 @@ impl Inference {
     }
 
     fn split_known(&self, filtered: Estimate, known: NoLoad, speed_rpm: f64) -> (Estimated, Estimated) {
-        let load_loss = self.settings.load_loss(self.memory.signals.stage());
+        let load_loss = self.settings.load_loss(self.state.signals.stage());
         let excess_w = filtered.value - known.power_w;
         let excess_sd_w = filtered.sd.hypot(known.sd_w);
         if excess_w < -BELOW_NO_LOAD_SD * excess_sd_w {
@@ -344,7 +344,7 @@ impl Inference {
     /// Cutting power that would be noticed within one window.
     fn least_visible(&self, no_load: Result<NoLoad, NoEstimate>, speed_rpm: f64) -> Estimated {
         let known = no_load?;
-        let signals = &self.memory.signals;
+        let signals = &self.state.signals;
         let noise_w = signals.noise.sd() * known.power_w;
         let excess_w = visible_excess_w(known, signals, &self.settings)
             + self.settings.cutting_evidence * noise_w / self.settings.window_samples;
@@ -359,7 +359,7 @@ impl Inference {
         no_load: Result<NoLoad, NoEstimate>,
         verdict: &Detected,
     ) -> Visibility {
-        let fed = self.memory.signals.classify_feed(inputs, &self.settings) == Feed::On;
+        let fed = self.state.signals.classify_feed(inputs, &self.settings) == Feed::On;
         match verdict.state {
             State::Cutting => Visibility::Visible,
             State::Idle if fed && no_load.is_ok() => Visibility::BelowVisibility,
@@ -381,7 +381,7 @@ impl Inference {
     /// No-load powers known by now.
     #[must_use]
     pub fn no_load(&self) -> &NoLoadTable {
-        &self.memory.no_load
+        &self.state.no_load
     }
 
     /// The settings in force.

@@ -12,27 +12,27 @@ impl Inference {
     pub fn apply_settings(&mut self, settings: Settings) {
         let lengths = |settings: &Settings| (settings.filter_samples, settings.window_samples);
         if lengths(&settings) != lengths(&self.settings) {
-            let noise = self.memory.signals.noise;
-            self.memory.signals = Signals::new(&settings);
-            self.memory.signals.noise = noise;
-            self.memory.learner = Learner::new(&settings);
-            self.memory.detector.forget_past();
+            let noise = self.state.signals.noise;
+            self.state.signals = Signals::new(&settings);
+            self.state.signals.noise = noise;
+            self.state.learner = Learner::new(&settings);
+            self.state.detector.forget_past();
         }
         if settings.no_load_table != self.settings.no_load_table && self.estimates.basis.in_watts() {
-            self.memory.no_load = NoLoadTable::new(&settings);
+            self.state.no_load = NoLoadTable::new(&settings);
         }
         self.settings = settings;
-        self.memory.loads.reconfigure();
+        self.state.loads.reconfigure();
     }
 
     /// Everything that was learned of the load of this program is learned anew.
     pub fn learn_load_anew(&mut self, program: &str) {
-        self.memory.loads.learn_anew(program);
+        self.state.loads.learn_anew(program);
     }
 
     /// Forgets the learned no-load powers, as after work on the spindle; those of the settings stay.
     pub fn forget_no_load(&mut self) {
-        self.memory.no_load = NoLoadTable::new(&self.settings);
-        self.memory.upper_bound = None;
+        self.state.no_load = NoLoadTable::new(&self.settings);
+        self.state.upper_bound = None;
     }
 }

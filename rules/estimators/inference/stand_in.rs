@@ -12,21 +12,21 @@ impl Inference {
     /// were several: spindle power.
     pub(super) fn follow_basis(&mut self, basis: StateBasis) {
         // Nothing is learned from motion alone.
-        if self.memory.basis == basis.as_word() || basis == StateBasis::Motion {
+        if self.state.basis == basis.as_word() || basis == StateBasis::Motion {
             return;
         }
-        let before = std::mem::replace(&mut self.memory.basis, basis.as_word().to_owned());
+        let before = std::mem::replace(&mut self.state.basis, basis.as_word().to_owned());
         let was_in_watts =
             StateBasis::ALL.into_iter().find(|known| known.as_word() == before).is_none_or(StateBasis::in_watts);
         if was_in_watts && basis.in_watts() {
             return;
         }
         let no_load_table = if basis.in_watts() { self.settings.no_load_table.clone() } else { Vec::new() };
-        self.memory.no_load = NoLoadTable::new(&Settings { no_load_table, ..self.settings.clone() });
-        self.memory.upper_bound = None;
-        self.memory.signals.forget_history();
-        self.memory.learner.discard_collected();
-        self.memory.detector.forget_past();
+        self.state.no_load = NoLoadTable::new(&Settings { no_load_table, ..self.settings.clone() });
+        self.state.upper_bound = None;
+        self.state.signals.forget_history();
+        self.state.learner.discard_collected();
+        self.state.detector.forget_past();
     }
 
     /// What stands for power tells the state, and nothing in watts.

@@ -14,9 +14,9 @@ impl Inference {
         if !inputs.basis.in_watts() {
             return;
         }
-        inputs.supply_log = self.memory.supply.observe_voltage(inputs.voltage);
+        inputs.supply_log = self.state.supply.observe_voltage(inputs.voltage);
         let Ok(power_w) = inputs.power else { return };
-        let ratio = self.memory.supply.power_ratio(inputs.supply_log);
+        let ratio = self.state.supply.power_ratio(inputs.supply_log);
         let known = self.select_no_load_reference(inputs).ok().filter(NoLoad::is_estimate);
         inputs.by_voltage_w = known.map_or(power_w * (1.0 - 1.0 / ratio), |known| known.power_w * (ratio - 1.0));
         inputs.power = Ok(power_w - inputs.by_voltage_w);
@@ -24,7 +24,7 @@ impl Inference {
 
     /// The same no-load power at the voltage of this tick.
     pub(super) fn at_voltage(&self, known: NoLoad, inputs: &TickInputs) -> NoLoad {
-        let ratio = self.memory.supply.power_ratio(inputs.supply_log);
+        let ratio = self.state.supply.power_ratio(inputs.supply_log);
         NoLoad { power_w: ratio * known.power_w, sd_w: ratio * known.sd_w, ..known }
     }
 }

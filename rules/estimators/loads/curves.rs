@@ -3,7 +3,7 @@
 //! Source: constant-load feed control (DM4600): infer the depth from the present feed and load, choose the curve of that depth, take
 //! the feed at which it meets the wanted load.
 
-use super::in_force::LoadMoment;
+use super::load_inputs::LoadMoment;
 use crate::regression::Refusal;
 use crate::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
 use adapters::channel::find_nearest_name;

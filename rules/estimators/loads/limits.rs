@@ -2,7 +2,7 @@
 
 use super::curves::LoadCurves;
 use super::follower::OverrideRange;
-use super::in_force::LoadChannels;
+use super::load_inputs::LoadChannels;
 use crate::settings::Settings;
 use adapters::Sample;
 use std::sync::Arc;

@@ -13,28 +13,28 @@
 //! | `constant` | constant load |
 //! | `place`, `learned` | the load of each place of a program, learned from the first parts |
 
-mod constant;
+mod constant_load;
 mod curves;
 mod follower;
-mod in_force;
-mod learned;
+mod learned_load;
 mod limits;
+mod load_inputs;
 mod place;
 
 #[cfg(test)]
 mod tests;
 
 pub use curves::LoadCurves;
-pub use learned::PLACES_MAX;
+pub use learned_load::PLACES_MAX;
 
 use super::estimate::{Estimates, NoEstimate};
 use super::settings::Settings;
 use adapters::Sample;
 use adapters::clock::TimeNs;
-use constant::ConstantLoad;
-use in_force::LoadChannels;
-use learned::LearnedLoad;
+use constant_load::ConstantLoad;
+use learned_load::LearnedLoad;
 use limits::LoadSettings;
+use load_inputs::LoadChannels;
 use serde::{Deserialize, Serialize};
 
 /// A number, or why there is none.

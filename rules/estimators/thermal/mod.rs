@@ -42,9 +42,9 @@ mod quadrature;
 mod quantities;
 mod recording;
 mod regression;
+mod report;
+mod script_text;
 mod selection;
-mod told;
-mod written;
 
 pub use compensation::{
     AxisSituation, CompensationSettingError, CompensationSettings, CompensationStep, Compensator, Standing,

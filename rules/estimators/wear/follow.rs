@@ -18,7 +18,7 @@
 //! Source: R. E. Kalman 1960, extended to the logarithm by its slope at the estimate. What happened between two parts is chosen
 //! among a few possibilities by likelihood: nothing, another hardness, a new edge that nobody announced.
 
-use super::followed::{CuttingEdge, EdgeMeasurement, OperationGroup, WearNews};
+use super::edge_state::{CuttingEdge, EdgeMeasurement, OperationGroup, WearNews};
 use super::gaussian::Gaussian;
 use super::outlook::{Known, Outlook};
 use super::prior::*;

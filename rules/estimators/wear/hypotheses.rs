@@ -1,7 +1,7 @@
 //! What may have happened between two parts besides wear, and what the limit of the model says beside the filter.
 
+use super::edge_state::{EdgeMeasurement, WearNews};
 use super::follow::{WearFollower, is_leading_operation};
-use super::followed::{EdgeMeasurement, WearNews};
 use super::prior::*;
 use super::work::EdgeWork;
 

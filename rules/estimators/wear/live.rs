@@ -3,10 +3,10 @@
 //! It gathers the work of every edge until the part is finished, gives it to the filter, and holds what the filter says until the
 //! next part. Beside it stands the limit `[Pc]` of the cut of the moment, where a model was learned.
 
-use super::choose::choose_model;
 use super::conditions::CutConditions;
+use super::edge_state::WearNews;
 use super::follow::WearFollower;
-use super::followed::WearNews;
+use super::model_selection::choose_model;
 use super::outlook::Outlook;
 use super::record::{WearKey, WearRecord};
 use super::threshold::{Observability, PowerLimit, compute_power_limit};

@@ -27,28 +27,28 @@
 //! | `live` | all of it beside the running machine |
 
 mod anova;
-mod choose;
 mod coding;
 mod compare;
 mod conditions;
 mod design;
+mod edge_state;
 mod fit_surface;
 mod follow;
-mod followed;
 mod gather;
 mod gaussian;
 mod hypotheses;
 mod identify;
 mod live;
 mod model;
+mod model_selection;
 mod orthogonal_array;
 mod outlook;
 mod physical;
-mod predicted;
+mod power_prediction;
 mod prior;
 mod record;
 mod report;
-mod short;
+mod script_numbers;
 mod surface;
 mod term;
 mod threshold;
@@ -56,26 +56,26 @@ mod tool_name;
 mod work;
 
 pub use anova::{Anova, AnovaRow};
-pub use choose::{ChosenModel, choose_model};
 pub use coding::{Coding, Range};
 pub use compare::{FormComparison, FormErrors, compare_forms};
 pub use conditions::{
     CUTTING_POWER, ConditionFactor, Cut, CutConditions, FACTORS, WEAR, cutting_speed_m_min, unit_trouble,
 };
 pub use design::{Alias, ExperimentDesign, FactorLevels, PlannedCut, plan_experiment};
+pub use edge_state::WearNews;
 pub use fit_surface::{Dropped, Order, SurfaceFit, SurfaceOptions, fit_surface};
 pub use follow::WearFollower;
-pub use followed::WearNews;
 pub use gather::{CutColumns, GatheredCuts, gather_cuts};
 pub use identify::{DesignPoint, LearnedWear, WearOptions, identify_tool_wear};
 pub use live::{ModelInUse, WearEstimator};
 pub use model::WearModel;
+pub use model_selection::{ChosenModel, choose_model};
 pub use orthogonal_array::Array;
 pub use outlook::{OBSERVED_SHARE, Outlook};
 pub use physical::{FittedNumber, PHYSICAL_NAMES, Physical, PhysicalFit, fit_physical};
-pub use predicted::Predicted;
+pub use power_prediction::Predicted;
 pub use record::{WearKey, WearRecord};
-pub use short::{SHORT_FORM, SHORT_LENGTH};
+pub use script_numbers::{SHORT_FORM, SHORT_LENGTH};
 pub use surface::{Surface, build_published_surface, published_over};
 pub use term::{WearTerm, second_order};
 pub use threshold::{

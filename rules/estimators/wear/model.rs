@@ -3,7 +3,7 @@
 use super::coding::Range;
 use super::conditions::{ConditionFactor, CutConditions};
 use super::physical::Physical;
-use super::predicted::Predicted;
+use super::power_prediction::Predicted;
 use super::surface::Surface;
 use serde::{Deserialize, Serialize};
 

@@ -10,7 +10,7 @@
 use super::coding::{Range, check_varied};
 use super::conditions::{CUTTING_POWER, Cut, CutConditions, FACTORS, WEAR};
 use super::fit_surface::check_cuts;
-use super::predicted::Predicted;
+use super::power_prediction::Predicted;
 use crate::regression::{CONFIDENCE, Column, Intercept, Refusal, RefusalKind, Regression, fit_unweighted, t_quantile};
 use serde::{Deserialize, Serialize};
 

@@ -2,7 +2,7 @@
 
 use super::coding::{Coding, Range};
 use super::conditions::{CutConditions, FACTORS, WEAR};
-use super::predicted::Predicted;
+use super::power_prediction::Predicted;
 use super::term::WearTerm;
 use serde::{Deserialize, Serialize};
 

@@ -2,7 +2,7 @@
 
 use super::conditions::{ConditionFactor, CutConditions, WEAR};
 use super::model::WearModel;
-use super::predicted::Predicted;
+use super::power_prediction::Predicted;
 use crate::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 

@@ -2,8 +2,8 @@
 
 use adapters::channel::quantity::Quantity;
 use crate::drive::is_displacement;
-use crate::excitation::{lag_forms, compute_spread};
-use crate::state::first_order_behind;
+use crate::excitation::{build_lag_forms, compute_spread};
+use crate::state::apply_continuous_lag;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::f64::consts::LN_2;
 
@@ -56,7 +56,7 @@ impl Effect for AmbientDrift {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
@@ -70,7 +70,7 @@ impl Effect for AmbientDrift {
             return Vec::new();
         }
         let direct = Form { name: "direct", ..Form::without_shape() };
-        let lags = |name| lag_forms(scene, name, &[1800.0, 3600.0, 7200.0]);
+        let lags = |name| build_lag_forms(scene, name, &[1800.0, 3600.0, 7200.0]);
         let two_masses = lags(TWO_MASSES).into_iter().map(|form| Form { ln_choices: LN_2, ..form });
         [direct].into_iter().chain(lags("lag")).chain(two_masses).collect()
     }
@@ -81,10 +81,10 @@ impl Effect for AmbientDrift {
         let change: Vec<f64> = ambient.iter().map(|t| t - first).collect();
         let followed = match form.shape_value("tau_s") {
             Some(tau_s) if form.name == TWO_MASSES => {
-                let skin = first_order_behind(scene, &change, SKIN_SHARE * tau_s);
-                first_order_behind(scene, &skin, tau_s)
+                let skin = apply_continuous_lag(scene, &change, SKIN_SHARE * tau_s);
+                apply_continuous_lag(scene, &skin, tau_s)
             }
-            Some(tau_s) => first_order_behind(scene, &change, tau_s),
+            Some(tau_s) => apply_continuous_lag(scene, &change, tau_s),
             None => change,
         };
         Some(vec![("per_k", followed)])

@@ -1,7 +1,7 @@
 //! A consumer goes on and off: coolant, hydraulics, chip conveyor, chiller.
 
 use crate::drive::{is_axis_output, is_power};
-use crate::excitation::{ln_count, has_variation};
+use crate::excitation::{compute_ln_count, has_variation};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// A consumer that goes on and off.
@@ -54,7 +54,7 @@ impl Effect for AuxiliarySwitch {
         }
         let names = scene.column_names().filter(|name| name.ends_with("_on") && *name != "drive_on");
         let flags: Vec<&str> = names.filter(|name| scene.column(name).is_some_and(has_variation)).collect();
-        let ln_choices = ln_count(flags.len());
+        let ln_choices = compute_ln_count(flags.len());
         let place = |flag: &&str| Some(((*flag).to_owned(), "1".to_owned()));
         flags.iter().map(|flag| Form { name: "flag", place: place(flag), ln_choices, ..Form::default() }).collect()
     }

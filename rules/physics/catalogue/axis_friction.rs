@@ -1,8 +1,8 @@
 //! Feed axes take power to move, and the meter sees it.
 
-use crate::drive::{axis_velocities, is_axis_output, is_power};
+use crate::drive::{read_axis_velocities, is_axis_output, is_power};
 use crate::excitation::has_variation;
-use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts, unit_in};
+use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts, resolve_unit};
 
 /// Power to move the feed axes.
 #[derive(Debug, Clone, Copy)]
@@ -56,8 +56,8 @@ impl Effect for AxisFriction {
         &DOC
     }
 
-    fn range(&self, scene: &Scene, parameter: &ParameterDoc) -> (f64, f64) {
-        let in_watts = unit_in("output", scene) == "W" && parameter.name == "force";
+    fn parameter_range(&self, scene: &Scene, parameter: &ParameterDoc) -> (f64, f64) {
+        let in_watts = resolve_unit("output", scene) == "W" && parameter.name == "force";
         (parameter.range.0, if in_watts { THRUST_MAX_N } else { parameter.range.1 })
     }
 
@@ -72,7 +72,7 @@ impl Effect for AxisFriction {
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let velocities = axis_velocities(scene);
+        let velocities = read_axis_velocities(scene);
         if velocities.is_empty() || !is_power(scene) || is_axis_output(scene) {
             return None;
         }

@@ -1,7 +1,7 @@
 //! Force and power that accelerate a feed axis.
 
-use crate::drive::{axis_velocities, in_si, is_axis_output, is_displacement, is_power, compute_rate};
-use crate::excitation::plain_where_it_varies;
+use crate::drive::{read_axis_velocities, convert_to_si, is_axis_output, is_displacement, is_power, compute_rate};
+use crate::excitation::propose_plain_form;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of the feed axes.
@@ -54,14 +54,14 @@ impl Effect for AxisInertia {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        plain_where_it_varies(self, scene)
+        propose_plain_form(self, scene)
     }
 
     fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         if is_axis_output(scene) && !is_power(scene) {
             return Some(vec![("per_m_s2", read_acceleration(scene)?)]);
         }
-        let velocities = axis_velocities(scene);
+        let velocities = read_axis_velocities(scene);
         if velocities.is_empty() || !is_power(scene) {
             return None;
         }
@@ -76,6 +76,6 @@ fn read_acceleration(scene: &Scene) -> Option<Vec<f64>> {
     if is_displacement(scene) {
         return None;
     }
-    let recorded = scene.role_name(Role::Acceleration).and_then(|name| in_si(scene, name));
-    recorded.or_else(|| Some(compute_rate(scene, &in_si(scene, scene.role_name(Role::Velocity)?)?)))
+    let recorded = scene.role_name(Role::Acceleration).and_then(|name| convert_to_si(scene, name));
+    recorded.or_else(|| Some(compute_rate(scene, &convert_to_si(scene, scene.role_name(Role::Velocity)?)?)))
 }

@@ -1,9 +1,9 @@
 //! Grease and bearings get thinner and freer as they warm: no-load power falls.
 
 use adapters::channel::quantity::Quantity;
-use crate::drive::{read_speed_krpm, slide_to_the, read_slide_velocity, speed_to_the};
-use crate::excitation::{lag_forms, has_variation};
-use crate::state::{compute_decay, first_order};
+use crate::drive::{read_speed_krpm, raise_velocity_to_exponent, read_slide_velocity, raise_speed_to_exponent};
+use crate::excitation::{build_lag_forms, has_variation};
+use crate::state::{compute_decay, apply_first_order_lag};
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Friction that falls as the bearings warm.
@@ -63,7 +63,7 @@ impl Effect for BearingWarmUp {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
@@ -83,7 +83,7 @@ impl Effect for BearingWarmUp {
         }
         // A nut warms faster than a spindle.
         let fast: &[f64] = if velocity.is_some() { &[75.0, 150.0] } else { &[] };
-        let mut forms = lag_forms(scene, "lag", &[fast, &[300.0, 600.0, 1200.0, 2400.0]].concat());
+        let mut forms = build_lag_forms(scene, "lag", &[fast, &[300.0, 600.0, 1200.0, 2400.0]].concat());
         let measured = scene.role_values(Role::Temperature).filter(|temperature| has_variation(temperature));
         forms.extend(measured.map(|_| Form { name: "measured", ..Form::without_shape() }));
         forms
@@ -99,7 +99,7 @@ impl Effect for BearingWarmUp {
             return Some(vec![("drop_per_k", friction.iter().zip(temperature).map(law).collect())]);
         }
         let tau_s = form.shape_value("tau_s").unwrap_or(900.0);
-        let warmth = first_order(scene, &compute_heat(scene, velocity.as_deref())?, tau_s);
+        let warmth = apply_first_order_lag(scene, &compute_heat(scene, velocity.as_deref())?, tau_s);
         let left = compute_decay(scene, tau_s);
         Some(vec![
             ("drop", friction.iter().zip(&warmth).map(|(g, w)| -g * w).collect()),
@@ -115,8 +115,8 @@ impl Effect for BearingWarmUp {
 /// Friction in the output: of a feed drive over its velocity in m/s, else of the spindle over thousands of rpm.
 fn compute_friction(scene: &Scene, velocity: Option<&[f64]>) -> Option<Vec<f64>> {
     match velocity {
-        Some(velocity) => Some(slide_to_the(scene, velocity, EXPONENT)),
-        None => speed_to_the(scene, EXPONENT),
+        Some(velocity) => Some(raise_velocity_to_exponent(scene, velocity, EXPONENT)),
+        None => raise_speed_to_exponent(scene, EXPONENT),
     }
 }
 

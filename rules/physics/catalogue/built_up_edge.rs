@@ -1,6 +1,6 @@
 //! At low cutting speed a built-up edge forms and changes the force.
 
-use crate::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::cut::{estimate_cut_load, multiply_cut, mark_cutting_rows};
 use crate::excitation::count_visits;
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -62,7 +62,7 @@ impl Effect for BuiltUpEdge {
         let Some(speed) = scene.column("cutting_speed_m_min").filter(|_| estimate_cut_load(scene).is_some()) else {
             return Vec::new();
         };
-        let cutting = cutting_rows(scene);
+        let cutting = mark_cutting_rows(scene);
         let near = |centre: f64| move |row: usize| (speed[row] - centre).abs() < WIDTH_M_MIN;
         let inside = |centre: f64| count_visits(scene, |row| cutting[row] && near(centre)(row));
         let outside = |centre: f64| count_visits(scene, |row| cutting[row] && !near(centre)(row));
@@ -74,7 +74,7 @@ impl Effect for BuiltUpEdge {
         let speed = scene.column("cutting_speed_m_min")?;
         let centre = form.shape_value("centre_m_min").unwrap_or(40.0);
         let window = |row: usize| -(-((speed[row] - centre) / WIDTH_M_MIN).powi(2)).exp();
-        Some(vec![("drop", cut_times(scene, window)?)])
+        Some(vec![("drop", multiply_cut(scene, window)?)])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {

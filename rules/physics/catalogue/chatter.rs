@@ -1,6 +1,6 @@
 //! Self-excited vibration above a depth of cut: noise grows, the mean hardly.
 
-use crate::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::cut::{estimate_cut_load, multiply_cut, mark_cutting_rows};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use numerics::statistics::quantile;
 
@@ -49,7 +49,7 @@ impl Effect for Chatter {
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| estimate_cut_load(scene).is_some()) else { return Vec::new() };
-        let cutting = cutting_rows(scene);
+        let cutting = mark_cutting_rows(scene);
         let depths = || depth.iter().zip(&cutting).filter(|(_, cutting)| **cutting).map(|(depth, _)| *depth);
         let limits = [0.4, 0.55, 0.7, 0.85].into_iter().filter_map(|share| quantile(depths(), share));
         let mut limits: Vec<f64> = limits.filter(|limit| depths().any(|depth| depth > *limit)).collect();
@@ -60,7 +60,7 @@ impl Effect for Chatter {
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let depth = scene.column("depth_of_cut_mm")?;
         let limit_mm = form.shape_value("limit_mm").unwrap_or(2.0);
-        Some(vec![("gain", cut_times(scene, |row| (depth[row] / limit_mm - 1.0).max(0.0))?)])
+        Some(vec![("gain", multiply_cut(scene, |row| (depth[row] / limit_mm - 1.0).max(0.0))?)])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {

@@ -1,6 +1,6 @@
 //! At depths below the nose radius the chip is thinner and the force per area higher.
 
-use crate::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::cut::{estimate_cut_load, multiply_cut, mark_cutting_rows};
 use crate::excitation::{has_variation, count_visits};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use numerics::statistics::quantile;
@@ -62,7 +62,7 @@ impl Effect for ChipThinning {
         let milled = EXPONENTS.map(|mc| Form { name: MILLED, ..Form::from_shape(&[("mc", mc)]) });
         let mut forms: Vec<Form> = if thickness_varies(scene) { milled.into() } else { Vec::new() };
         let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| estimate_cut_load(scene).is_some()) else { return forms };
-        let cutting = cutting_rows(scene);
+        let cutting = mark_cutting_rows(scene);
         let depths: Vec<f64> = (0..scene.rows()).filter(|row| cutting[*row]).map(|row| depth[row]).collect();
         let shallow = |r_mm: &f64| count_visits(scene, |row| cutting[row] && depth[row] < *r_mm) >= 3;
         let radii = [0.8, 0.4, 1.2].into_iter().filter(|r_mm| has_variation(&depths) && shallow(r_mm));
@@ -77,13 +77,13 @@ impl Effect for ChipThinning {
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == MILLED {
             let mc = form.shape_value("mc").unwrap_or(0.25);
-            let thickness = relative_thickness(scene)?;
+            let thickness = compute_relative_thickness(scene)?;
             let law = |row: usize| if thickness[row] > 0.0 { thickness[row].powf(-mc) - 1.0 } else { 0.0 };
-            return Some(vec![("share", cut_times(scene, law)?)]);
+            return Some(vec![("share", multiply_cut(scene, law)?)]);
         }
         let depth = scene.column("depth_of_cut_mm")?;
         let r_mm = form.shape_value("r_mm").unwrap_or(0.8).max(f64::MIN_POSITIVE);
-        Some(vec![("gain", cut_times(scene, |row| (1.0 - depth[row] / r_mm).max(0.0))?)])
+        Some(vec![("gain", multiply_cut(scene, |row| (1.0 - depth[row] / r_mm).max(0.0))?)])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
@@ -99,11 +99,11 @@ const EXPONENTS: [f64; 2] = [0.2, 0.35];
 const VARIES: f64 = 0.05;
 
 /// Mean thickness of the chips of a mill over its median in the cut; zero where there is no chip.
-fn relative_thickness(scene: &Scene) -> Option<Vec<f64>> {
+fn compute_relative_thickness(scene: &Scene) -> Option<Vec<f64>> {
     let [feed, width, diameter] =
         ["feed_per_tooth_mm", "width_of_cut_mm", "diameter_mm"].map(|name| scene.column(name));
     let (feed, width, diameter) = (feed?, width?, diameter?);
-    let cutting = cutting_rows(scene);
+    let cutting = mark_cutting_rows(scene);
     let of = |row: usize| {
         let share = if diameter[row] > 0.0 { (width[row] / diameter[row]).clamp(0.0, 1.0) } else { 0.0 };
         if !cutting[row] || share <= 0.0 { 0.0 } else { 2.0 * feed[row] * share / (1.0 - 2.0 * share).acos() }
@@ -114,7 +114,7 @@ fn relative_thickness(scene: &Scene) -> Option<Vec<f64>> {
 }
 
 fn thickness_varies(scene: &Scene) -> bool {
-    let Some(thickness) = relative_thickness(scene).filter(|_| estimate_cut_load(scene).is_some()) else { return false };
+    let Some(thickness) = compute_relative_thickness(scene).filter(|_| estimate_cut_load(scene).is_some()) else { return false };
     let ln: Vec<f64> = thickness.iter().filter(|h| **h > 0.0).map(|h| h.ln()).collect();
     let middle = numerics::statistics::mean(&ln);
     numerics::statistics::rms(&ln.iter().map(|x| x - middle).collect::<Vec<_>>()) > VARIES

@@ -1,8 +1,8 @@
 //! A controller holds the load by turning the feed: what the cut gains, the feed loses.
 
-use crate::cut::{cutting_rows, read_engagement};
+use crate::cut::{mark_cutting_rows, read_engagement};
 use crate::excitation::has_variation;
-use crate::state::first_order_in_each_pass;
+use crate::state::apply_lag_in_each_pass;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use numerics::statistics::{count_to_f64, quantile};
 
@@ -64,7 +64,7 @@ impl Effect for ConstantLoadControl {
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let tried = if is_feed(scene) {
             vec![Form { name: "feed", ..Form::without_shape() }]
-        } else if knows_the_program_only(scene) {
+        } else if has_programmed_feed_only(scene) {
             let unseen = |(exponent, tau_s)| build_unseen_form(exponent, tau_s).with_full_share();
             [(0.1, 1.0), (0.1, 3.0), (0.5, 1.0), (0.5, 3.0)].map(unseen).into()
         } else {
@@ -84,7 +84,7 @@ impl Effect for ConstantLoadControl {
             let wanted = |row: usize| if cutting(&row) { (load[row] / reference).powf(-exponent) - 1.0 } else { 0.0 };
             let wanted: Vec<f64> = (0..scene.rows()).map(wanted).collect();
             let tau_s = form.shape_value("tau_s").unwrap_or(1.0).max(f64::MIN_POSITIVE);
-            let turned = first_order_in_each_pass(scene, &wanted, tau_s);
+            let turned = apply_lag_in_each_pass(scene, &wanted, tau_s);
             return Some(vec![("share", load.iter().zip(&turned).map(|(load, turned)| load * turned).collect())]);
         }
         if !is_feed(scene) {
@@ -114,10 +114,10 @@ const DIFFERS: f64 = 0.02;
 
 /// Is the feed that the program asks for recorded, and of what became of it no more than the dial's override? Then a
 /// controller acts unseen.
-fn knows_the_program_only(scene: &Scene) -> bool {
+fn has_programmed_feed_only(scene: &Scene) -> bool {
     let Some(program) = scene.column("feed_programmed_mm_min") else { return false };
     let Some(actual) = scene.column("feed_mm_min") else { return true };
-    let cutting = cutting_rows(scene);
+    let cutting = mark_cutting_rows(scene);
     let rows: Vec<usize> = (0..scene.rows()).filter(|row| cutting[*row]).collect();
     let agrees = |asked: &dyn Fn(usize) -> f64| {
         let differs = |row: &&usize| (actual[**row] - asked(**row)).abs() > 0.01 * asked(**row).abs();

@@ -1,8 +1,8 @@
 //! Cutting wet needs another force than cutting dry.
 
-use crate::cut::{estimate_cut_load, cut_times, cutting_rows};
+use crate::cut::{estimate_cut_load, multiply_cut, mark_cutting_rows};
 use crate::excitation::{has_variation, count_visits};
-use crate::state::first_order_behind;
+use crate::state::apply_continuous_lag;
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use numerics::statistics::median;
 
@@ -74,13 +74,13 @@ impl Effect for CoolantRegime {
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(coolant) = scene.column("coolant_on") else { return Vec::new() };
-        let cutting = cutting_rows(scene);
+        let cutting = mark_cutting_rows(scene);
         let wet = count_visits(scene, |row| cutting[row] && coolant[row] > 0.5);
         let dry = count_visits(scene, |row| cutting[row] && coolant[row] < 0.5);
         if wet.min(dry) == 0 || estimate_cut_load(scene).is_none() {
             return Vec::new();
         }
-        let speeds = wet_speeds(scene, coolant).filter(|speeds| has_variation(speeds));
+        let speeds = list_wet_speeds(scene, coolant).filter(|speeds| has_variation(speeds));
         let fading = speeds.map(|_| Form { name: FADING, ..Form::from_shape(&[("fading", 1.0)]) });
         let arriving = ARRIVING_S.into_iter().filter(|tau_s| *tau_s > ARRIVING_PERIODS * scene.period_s());
         let arriving = arriving.map(|tau_s| Form { name: ARRIVING, ..Form::from_shape(&[("tau_s", tau_s)]) });
@@ -90,11 +90,11 @@ impl Effect for CoolantRegime {
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let coolant = scene.column("coolant_on")?;
         let wet = match form.name {
-            ARRIVING => first_order_behind(scene, coolant, form.shape_value("tau_s").unwrap_or(1.0)),
+            ARRIVING => apply_continuous_lag(scene, coolant, form.shape_value("tau_s").unwrap_or(1.0)),
             FADING => fade_coolant(scene, coolant, form.shape_value("fading").unwrap_or(1.0))?,
             _ => coolant.to_vec(),
         };
-        Some(vec![("change", cut_times(scene, |row| wet[row])?)])
+        Some(vec![("change", multiply_cut(scene, |row| wet[row])?)])
     }
 }
 
@@ -111,16 +111,16 @@ const SLOW_SHARE: f64 = 0.1;
 
 /// Coolant by what it does at the speed of each row; `None` where that is not known.
 fn fade_coolant(scene: &Scene, coolant: &[f64], exponent: f64) -> Option<Vec<f64>> {
-    let usual = median(wet_speeds(scene, coolant)?)?;
+    let usual = median(list_wet_speeds(scene, coolant)?)?;
     let speed = scene.column("cutting_speed_m_min")?;
     let share = |speed: &f64| (usual / speed.max(SLOW_SHARE * usual)).powf(exponent);
     Some(coolant.iter().zip(speed).map(|(on, speed)| on * share(speed)).collect())
 }
 
 /// Cutting speeds of the rows that cut wet, m/min; `None` where they are not known.
-fn wet_speeds(scene: &Scene, coolant: &[f64]) -> Option<Vec<f64>> {
+fn list_wet_speeds(scene: &Scene, coolant: &[f64]) -> Option<Vec<f64>> {
     let speed = scene.column("cutting_speed_m_min")?;
-    let cutting = cutting_rows(scene);
+    let cutting = mark_cutting_rows(scene);
     let wet = |row: &usize| cutting[*row] && coolant[*row] > 0.5 && speed[*row] > 0.0;
     let speeds: Vec<f64> = (0..scene.rows()).filter(wet).map(|row| speed[row]).collect();
     (!speeds.is_empty()).then_some(speeds)

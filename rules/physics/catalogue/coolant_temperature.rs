@@ -2,8 +2,8 @@
 
 use adapters::channel::quantity::Quantity;
 use crate::drive::is_displacement;
-use crate::excitation::{lag_forms, compute_spread, has_variation};
-use crate::state::first_order_behind;
+use crate::excitation::{build_lag_forms, compute_spread, has_variation};
+use crate::state::apply_continuous_lag;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Displacement that follows the coolant.
@@ -57,7 +57,7 @@ impl Effect for CoolantTemperature {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
@@ -74,7 +74,7 @@ impl Effect for CoolantTemperature {
         // Only coolant that flows carries its warmth anywhere.
         let flowing =
             scene.column("coolant_on").filter(|on| has_variation(on)).map(|_| Form { name: "flowing", ..Form::without_shape() });
-        [direct].into_iter().chain(flowing).chain(lag_forms(scene, "lag", &[600.0, 1800.0])).collect()
+        [direct].into_iter().chain(flowing).chain(build_lag_forms(scene, "lag", &[600.0, 1800.0])).collect()
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
@@ -83,7 +83,7 @@ impl Effect for CoolantTemperature {
         let change: Vec<f64> = coolant.iter().map(|t| t - first).collect();
         let followed = match (form.name, form.shape_value("tau_s")) {
             ("flowing", _) => change.iter().zip(scene.column("coolant_on")?).map(|(change, on)| change * on).collect(),
-            (_, Some(tau_s)) => first_order_behind(scene, &change, tau_s),
+            (_, Some(tau_s)) => apply_continuous_lag(scene, &change, tau_s),
             (_, None) => change,
         };
         Some(vec![("per_k", followed)])

@@ -1,7 +1,7 @@
 //! Heat in the windings: grows with the square of torque.
 
 use adapters::channel::quantity::Quantity;
-use crate::drive::{is_power, read_speed_krpm, torque_at_1000_rpm};
+use crate::drive::{is_power, read_speed_krpm, compute_torque_at_1000_rpm};
 use crate::excitation::has_variation;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -54,7 +54,7 @@ impl Effect for CopperLoss {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
@@ -73,7 +73,7 @@ impl Effect for CopperLoss {
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let torque = is_power(scene).then(|| torque_at_1000_rpm(scene))??;
+        let torque = is_power(scene).then(|| compute_torque_at_1000_rpm(scene))??;
         let krpm = read_speed_krpm(scene)?;
         let base_krpm = match form.name {
             WEAKENED => form.shape_value("base_speed_rpm").unwrap_or(1000.0).max(1.0) / 1000.0,

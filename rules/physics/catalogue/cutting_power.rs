@@ -1,6 +1,6 @@
 //! Power of the cut after Kienzle: specific force times the section of the chip, falling with its thickness.
 
-use crate::cut::{read_engagement, in_output};
+use crate::cut::{read_engagement, convert_to_output};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
@@ -69,7 +69,7 @@ impl Effect for CuttingPower {
         let process = if form.name.is_empty() { "turning" } else { form.name };
         let section = compute_chip_section(scene, process, form.shape_value("mc").unwrap_or(0.23))?;
         let mut engaged = read_engagement(scene);
-        if process == "milling" && rate_is_of_the_moment(scene, &engaged) {
+        if process == "milling" && is_instantaneous_rate(scene, &engaged) {
             engaged.iter_mut().for_each(|engaged| *engaged = f64::from(u8::from(*engaged > 0.0)));
         }
         Some(vec![("kc11_n_per_mm2", section.iter().zip(&engaged).map(|(power, engaged)| power * engaged).collect())])
@@ -95,7 +95,7 @@ fn compute_turning_section(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
     let feed = scene.column("feed_per_rev_mm")?;
     let mut thinned = cache_last_value(|feed: f64| feed.max(0.0).powf(1.0 - mc));
     let area: Vec<f64> = depth.iter().zip(feed).map(|(depth, feed)| depth * thinned(*feed)).collect();
-    in_output(scene, &area)
+    convert_to_output(scene, &area)
 }
 
 fn compute_milling_section(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
@@ -107,7 +107,7 @@ fn compute_milling_section(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
         (Some(width), Some(diameter)) if diameter[row] > 0.0 => (width[row] / diameter[row]).clamp(0.0, 1.0).sqrt(),
         _ => 1.0,
     };
-    let mut thinned = cache_last_value(|thickness_mm| chip_thinning_factor(thickness_mm, mc));
+    let mut thinned = cache_last_value(|thickness_mm| compute_thinning_factor(thickness_mm, mc));
     Some((0..scene.rows()).map(|row| thinned(tooth[row] * share(row)) * rate[row] / 60.0).collect())
 }
 
@@ -118,7 +118,7 @@ const TELLING_ROWS_MIN: usize = 5;
 
 /// Is the recorded removal rate that of the moment, as a CAM system works it out, which is less while the tool enters? Then
 /// the engagement is in it already. Told by the rows in which the tool is partly in the work.
-fn rate_is_of_the_moment(scene: &Scene, engaged: &[f64]) -> bool {
+fn is_instantaneous_rate(scene: &Scene, engaged: &[f64]) -> bool {
     let columns = ["removal_rate_cm3_min", "depth_of_cut_mm", "width_of_cut_mm", "feed_mm_min"];
     let [Some(rate), Some(depth), Some(width), Some(feed)] = columns.map(|name| scene.column(name)) else {
         return false;
@@ -141,7 +141,7 @@ fn compute_drilling_section(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
     let tooth = scene.column("feed_per_tooth_mm");
     let thickness = |row: usize| tooth.map_or(per_rev[row] / 2.0, |tooth| tooth[row]);
     let rate = |row: usize| PI * diameter[row].powi(2) * feed[row] / 4000.0;
-    let mut thinned = cache_last_value(|thickness_mm| chip_thinning_factor(thickness_mm, mc));
+    let mut thinned = cache_last_value(|thickness_mm| compute_thinning_factor(thickness_mm, mc));
     Some((0..scene.rows()).map(|row| thinned(thickness(row)) * rate(row) / 60.0).collect())
 }
 
@@ -159,6 +159,6 @@ fn cache_last_value(law: impl Fn(f64) -> f64) -> impl FnMut(f64) -> f64 {
 }
 
 /// `h^(-mc)`; zero without a chip.
-fn chip_thinning_factor(thickness_mm: f64, mc: f64) -> f64 {
+fn compute_thinning_factor(thickness_mm: f64, mc: f64) -> f64 {
     if thickness_mm > 0.0 { thickness_mm.powf(-mc) } else { 0.0 }
 }

@@ -1,6 +1,6 @@
 //! The depth of cut changes along the pass: a tapered blank, or tool and work that bend away.
 
-use crate::cut::{estimate_cut_load, cut_times, way_mm};
+use crate::cut::{estimate_cut_load, multiply_cut, integrate_way_mm};
 use crate::excitation::has_variation;
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::borrow::Cow;
@@ -79,18 +79,18 @@ impl Effect for DepthTaper {
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let by_distance = form.name.starts_with("distance");
-        let (along, middle) = if by_distance { (from_start(scene), 0.0) } else { (along_pass(scene), 1.0 / 12.0) };
-        let mut columns = vec![("slope", cut_times(scene, |row| along[row].unwrap_or(0.0))?)];
+        let (along, middle) = if by_distance { (compute_start_distance(scene), 0.0) } else { (compute_pass_position(scene), 1.0 / 12.0) };
+        let mut columns = vec![("slope", multiply_cut(scene, |row| along[row].unwrap_or(0.0))?)];
         if form.name.ends_with("quadratic") {
             let curve = |row: usize| along[row].map_or(0.0, |s| s * s - middle);
-            columns.push(("curve", cut_times(scene, curve)?));
+            columns.push(("curve", multiply_cut(scene, curve)?));
         }
         Some(columns)
     }
 }
 
 /// Where each row stands along its pass, -1/2 to 1/2; `None` out of the cut.
-fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
+fn compute_pass_position(scene: &Scene) -> Vec<Option<f64>> {
     let mut along = vec![None; scene.rows()];
     for pass in scene.passes() {
         let places = read_places(scene, pass);
@@ -106,7 +106,7 @@ fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
 
 /// How far each row stands from the start of its pass, in lengths of the longest one; `None` out of the cut. A tool or a
 /// work piece that bends away does so by the place, not by the share of a pass.
-fn from_start(scene: &Scene) -> Vec<Option<f64>> {
+fn compute_start_distance(scene: &Scene) -> Vec<Option<f64>> {
     let mut along = vec![None; scene.rows()];
     let longest = measure_pass_lengths(scene).into_iter().fold(0.0, f64::max);
     for pass in scene.passes() {
@@ -137,7 +137,7 @@ fn read_places<'s>(scene: &'s Scene, pass: &Range<usize>) -> Cow<'s, [f64]> {
     match (position.filter(|position| has_variation(position)), scene.column("feed_mm_min")) {
         (Some(position), _) => Cow::Borrowed(position),
         (None, Some(feed)) if feed[pass.clone()].iter().all(|feed| *feed > 0.0) => {
-            Cow::Owned(way_mm(time_s, &feed[pass.clone()]))
+            Cow::Owned(integrate_way_mm(time_s, &feed[pass.clone()]))
         }
         _ => Cow::Borrowed(time_s),
     }

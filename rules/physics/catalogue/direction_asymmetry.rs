@@ -1,6 +1,6 @@
 //! Friction differs between the two directions of motion.
 
-use crate::drive::{compute_directions, goes_both_ways, is_power, read_motion, rest_width};
+use crate::drive::{compute_directions, has_both_directions, is_power, read_motion, compute_rest_width};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use numerics::statistics::{count_to_f64, mean};
 
@@ -65,13 +65,13 @@ impl Effect for DirectionAsymmetry {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(motion) = read_motion(scene).filter(|motion| goes_both_ways(motion)) else { return Vec::new() };
+        let Some(motion) = read_motion(scene).filter(|motion| has_both_directions(motion)) else { return Vec::new() };
         let named = |name| Form { name, ..Form::without_shape() };
         if is_power(scene) {
             return ["slope", "step"].map(named).into();
         }
         // About which speed a slope is told is a choice.
-        let about: Vec<_> = mean_of_restless(&motion).map(|about| ("about", about)).into_iter().collect();
+        let about: Vec<_> = find_restless_speed(&motion).map(|about| ("about", about)).into_iter().collect();
         vec![named("level"), Form { name: "viscous", shape: about.clone(), known: about, ..Form::without_shape() }]
     }
 
@@ -99,8 +99,8 @@ const RESTS: f64 = 0.03;
 
 /// The mean speed of an axis that never rests. Another level in each direction is then the same as a constant, and a
 /// constant has a name of its own: the slope alone is told, about the middle of what was seen.
-fn mean_of_restless(motion: &[f64]) -> Option<f64> {
-    let rest = rest_width(motion);
+fn find_restless_speed(motion: &[f64]) -> Option<f64> {
+    let rest = compute_rest_width(motion);
     let resting = count_to_f64(motion.iter().filter(|v| v.abs() < rest).count());
     (resting < RESTS * count_to_f64(motion.len())).then(|| mean(&motion.iter().map(|v| v.abs()).collect::<Vec<_>>()))
 }

@@ -1,9 +1,9 @@
 //! Coulomb friction: a level with the sign of motion in a force, proportional to speed in a power.
 
 use adapters::channel::quantity::Quantity;
-use crate::drive::{RAD_PER_S_OF_RPM, read_motion, soft_sign, is_rotary_drive};
+use crate::drive::{RAD_PER_S_OF_RPM, read_motion, compute_soft_sign, is_rotary_drive};
 use crate::excitation::find_greatest_magnitude;
-use crate::state::{bent_over_the_way, measure_strokes};
+use crate::state::{compute_presliding_state, measure_strokes};
 use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Coulomb friction of a drive.
@@ -64,7 +64,7 @@ impl Effect for DryFriction {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
@@ -90,14 +90,14 @@ impl Effect for DryFriction {
         let velocity = read_motion(scene)?;
         if form.name == PRESLIDING {
             let way = form.shape_value("presliding_way").unwrap_or(PRESLIDING_WAY_M);
-            return Some(vec![("level", bent_over_the_way(scene, &velocity, way))]);
+            return Some(vec![("level", compute_presliding_state(scene, &velocity, way))]);
         }
         let top = find_greatest_magnitude(&velocity);
         let reference = if is_rotary_drive(scene) { 1000.0 * RAD_PER_S_OF_RPM } else { 1.0 };
         let share = form.shape_value("reversal_share").unwrap_or(0.01);
         let law = |v: &f64| match scene.output_kind() {
             OutputKind::Power => v.abs() / reference,
-            _ => soft_sign(*v, share * top),
+            _ => compute_soft_sign(*v, share * top),
         };
         Some(vec![("level", velocity.iter().map(law).collect())])
     }

@@ -1,6 +1,6 @@
 //! Ploughing of the cutting edge: a force along the edge that does not depend on feed.
 
-use crate::cut::{read_engagement, in_output, teeth_in_cut};
+use crate::cut::{read_engagement, convert_to_output, count_teeth_in_cut};
 use crate::drive::{is_axis_output, is_displacement};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -71,9 +71,9 @@ impl Effect for EdgeForce {
         let nose_mm = form.shape_value("nose_mm").unwrap_or(0.0);
         let mut length: Vec<f64> = scene.column("depth_of_cut_mm")?.iter().map(|depth| depth + nose_mm).collect();
         if form.name == MILLED {
-            length.iter_mut().zip(teeth_in_cut(scene)?).for_each(|(length, teeth)| *length *= teeth);
+            length.iter_mut().zip(count_teeth_in_cut(scene)?).for_each(|(length, teeth)| *length *= teeth);
         }
-        let edge = in_output(scene, &length)?;
+        let edge = convert_to_output(scene, &length)?;
         let engaged = read_engagement(scene);
         Some(vec![("kte_n_per_mm", edge.iter().zip(&engaged).map(|(edge, engaged)| edge * engaged).collect())])
     }

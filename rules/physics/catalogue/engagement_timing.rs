@@ -59,7 +59,7 @@ impl Effect for EngagementTiming {
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let engaged = scene.role_values(Role::Engaged)?;
-        let load = held_from_cut(scene, scene.load_at_output()?, engaged);
+        let load = hold_cut_load(scene, scene.load_at_output()?, engaged);
         let shifted = delay_values(scene, engaged, form.shape_value("delay_s").unwrap_or(0.0));
         let law = |row: usize| (shifted[row] - engaged[row]) * load[row];
         Some(vec![("share", (0..scene.rows()).map(law).collect())])
@@ -75,7 +75,7 @@ impl Effect for EngagementTiming {
 }
 
 /// The load of a tool fully in the work; where it is not, that of the nearest row of the run in which it nearly is.
-fn held_from_cut(scene: &Scene, load: &[f64], engaged: &[f64]) -> Vec<f64> {
+fn hold_cut_load(scene: &Scene, load: &[f64], engaged: &[f64]) -> Vec<f64> {
     let time_s = scene.time_s();
     let mut held = load.to_vec();
     for run in scene.runs() {

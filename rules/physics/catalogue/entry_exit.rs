@@ -1,6 +1,6 @@
 //! The cut builds up when the tool enters and fades when it leaves.
 
-use crate::cut::{estimate_cut_load, cut_times, way_mm};
+use crate::cut::{estimate_cut_load, multiply_cut, integrate_way_mm};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use numerics::statistics::count_to_f64;
 use std::ops::Range;
@@ -79,12 +79,12 @@ impl Effect for EntryExit {
         if estimate_cut_load(scene).is_none() || scene.passes().len() < 3 {
             return Vec::new();
         }
-        let longest_s = scene.passes().iter().map(|pass| length_s(scene, pass)).fold(0.0, f64::max);
+        let longest_s = scene.passes().iter().map(|pass| compute_length_s(scene, pass)).fold(0.0, f64::max);
         let told = |length_s: &f64| (scene.period_s()..=longest_s / 3.0).contains(length_s);
         let lengths_s = || [1.0, 3.0, 10.0, 30.0].into_iter().filter(told);
         let mut forms: Vec<Form> = lengths_s().map(|length_s| Form::from_shape(&[("length_s", length_s)])).collect();
         forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(|length_s| build_entry_forms("ramp", TIMES, length_s)));
-        forms.extend(ways_mm(scene).into_iter().flat_map(|length_mm| build_entry_forms(TRAVEL, WAYS, length_mm)));
+        forms.extend(list_entry_ways_mm(scene).into_iter().flat_map(|length_mm| build_entry_forms(TRAVEL, WAYS, length_mm)));
         // Over a good part of a pass nearly anything bends: only where another drive settles as well.
         let shown = scene.feed_load_growth().is_some();
         let long = lengths_s().filter(|_| shown).filter(|length_s| *length_s >= SETTLING_PERIODS * scene.period_s());
@@ -103,7 +103,7 @@ impl Effect for EntryExit {
         let (mut entry, mut exit) = (vec![0.0; scene.rows()], vec![0.0; scene.rows()]);
         for pass in scene.passes() {
             let along = if travels {
-                way_mm(&time_s[pass.clone()], &feed?[pass.clone()])
+                integrate_way_mm(&time_s[pass.clone()], &feed?[pass.clone()])
             } else {
                 time_s[pass.clone()].to_vec()
             };
@@ -116,9 +116,9 @@ impl Effect for EntryExit {
             }
         }
         if form.name == "settling" {
-            return Some(vec![("settling", cut_times(scene, |row| entry[row])?)]);
+            return Some(vec![("settling", multiply_cut(scene, |row| entry[row])?)]);
         }
-        Some(vec![("entry", cut_times(scene, |row| entry[row])?), ("exit", cut_times(scene, |row| exit[row])?)])
+        Some(vec![("entry", multiply_cut(scene, |row| entry[row])?), ("exit", multiply_cut(scene, |row| exit[row])?)])
     }
 
     fn reads_load(&self) -> bool {
@@ -153,7 +153,7 @@ const TOLD_IN: usize = 3;
 const FEEDS_APART: f64 = 1.3;
 
 /// The ways that this recording can tell: they last for a row or more, and for no more than a third of the pass.
-fn ways_mm(scene: &Scene) -> Vec<f64> {
+fn list_entry_ways_mm(scene: &Scene) -> Vec<f64> {
     let Some(feed) = scene.column("feed_mm_min") else { return Vec::new() };
     let mm_s = |pass: &Range<usize>| feed[pass.start + pass.len() / 2] / 60.0;
     let passes = || scene.passes().iter().filter(|pass| feed[(*pass).clone()].iter().all(|feed| *feed > 0.0));
@@ -163,12 +163,12 @@ fn ways_mm(scene: &Scene) -> Vec<f64> {
     }
     let tells = |way_mm: &f64| {
         let lasts =
-            |pass: &&Range<usize>| (scene.period_s()..=length_s(scene, pass) / 3.0).contains(&(way_mm / mm_s(pass)));
+            |pass: &&Range<usize>| (scene.period_s()..=compute_length_s(scene, pass) / 3.0).contains(&(way_mm / mm_s(pass)));
         passes().filter(lasts).count() >= TOLD_IN
     };
     WAYS_MM.into_iter().filter(tells).collect()
 }
 
-fn length_s(scene: &Scene, pass: &Range<usize>) -> f64 {
+fn compute_length_s(scene: &Scene, pass: &Range<usize>) -> f64 {
     scene.time_s()[pass.end - 1] - scene.time_s()[pass.start]
 }

@@ -1,7 +1,7 @@
 //! Above its base speed the motor is run with a weakened field: currents and losses change there.
 
-use crate::drive::{driven_krpm, is_power};
-use crate::excitation::{between_speeds, ln_count};
+use crate::drive::{read_driven_speed_krpm, is_power};
+use crate::excitation::{list_speeds_between_levels, compute_ln_count};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Change of losses above base speed.
@@ -64,21 +64,21 @@ impl Effect for FieldWeakening {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        if driven_krpm(scene).is_none() {
+        if read_driven_speed_krpm(scene).is_none() {
             return Vec::new();
         }
-        let speeds = between_speeds(scene, SPEEDS_APART, BENDS_TRIED);
-        let names = if reads_load(scene) { self.form_names() } else { &["whole"] };
-        let ln_choices = ln_count(speeds.len() * names.len());
+        let speeds = list_speeds_between_levels(scene, SPEEDS_APART, BENDS_TRIED);
+        let names = if has_output_load(scene) { self.form_names() } else { &["whole"] };
+        let ln_choices = compute_ln_count(speeds.len() * names.len());
         let form = |name, speed: &f64| Form { name, ln_choices, ..Form::from_shape(&[("base_speed_rpm", *speed)]) };
         names.iter().flat_map(|name| speeds.iter().map(move |speed| form(name, speed))).collect()
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let krpm = driven_krpm(scene)?;
+        let krpm = read_driven_speed_krpm(scene)?;
         let base = form.shape_value("base_speed_rpm").unwrap_or(1500.0) / 1000.0;
         let mut columns = vec![("magnetising", krpm.iter().map(|n| (n - base).max(0.0)).collect())];
-        if let Some(load) = scene.load().filter(|_| reads_load(scene)) {
+        if let Some(load) = scene.load().filter(|_| has_output_load(scene)) {
             let below = |n: f64| if form.name == "excess" { n.powi(-2) } else { 0.0 };
             let law = |(n, load): (&f64, &f64)| if *n > base { load * load * (base.powi(-2) - below(*n)) } else { 0.0 };
             columns.push(("per_load2", krpm.iter().zip(load).map(law).collect()));
@@ -96,6 +96,6 @@ impl Effect for FieldWeakening {
 }
 
 /// Is there a load whose losses are of this output?
-fn reads_load(scene: &Scene) -> bool {
+fn has_output_load(scene: &Scene) -> bool {
     is_power(scene) && scene.load().is_some()
 }

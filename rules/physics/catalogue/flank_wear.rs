@@ -127,7 +127,7 @@ impl Effect for FlankWear {
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let engaged = scene.role_values(Role::Engaged)?;
         let minutes = scene.column("cutting_time_min")?;
-        let depth = length_of_edge(scene);
+        let depth = read_edge_length(scene);
         let speed = scene.column("cutting_speed_m_min");
         let width = |row: usize| match (&depth, speed) {
             (Some(depth), Some(speed)) => depth[row] * speed[row],
@@ -173,7 +173,7 @@ fn list_edges(scene: &Scene) -> Option<Vec<&str>> {
 }
 
 /// How much of an edge cuts, mm: the depth of cut, of a drill its radius.
-fn length_of_edge(scene: &Scene) -> Option<Cow<'_, [f64]>> {
+fn read_edge_length(scene: &Scene) -> Option<Cow<'_, [f64]>> {
     let radius = || scene.column("diameter_mm").map(|diameter| diameter.iter().map(|d| 0.5 * d).collect());
     scene.column("depth_of_cut_mm").map(Cow::Borrowed).or_else(radius)
 }

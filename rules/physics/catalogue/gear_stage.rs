@@ -1,7 +1,7 @@
 //! Each gear or belt stage has its own drag and efficiency.
 
-use crate::drive::driven_krpm;
-use crate::excitation::{between_speeds, ln_count};
+use crate::drive::read_driven_speed_krpm;
+use crate::excitation::{list_speeds_between_levels, compute_ln_count};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::collections::BTreeSet;
 
@@ -72,24 +72,24 @@ impl Effect for GearStage {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        if driven_krpm(scene).is_none() {
+        if read_driven_speed_krpm(scene).is_none() {
             return Vec::new();
         }
         let stages = list_stages(scene);
-        let ln_choices = ln_count(stages.len());
+        let ln_choices = compute_ln_count(stages.len());
         if stages.len() > 1 {
             let place = |stage: &i64| Some(("gear_stage".to_owned(), stage.to_string()));
             let form = |name| move |stage: &i64| Form { name, place: place(stage), ln_choices, ..Form::default() };
             return stages.iter().map(form("stage")).chain(stages.iter().map(form(SLOPED))).collect();
         }
-        let speeds = between_speeds(scene, SPEEDS_APART, STAGES_TRIED);
-        let ln_choices = ln_count(speeds.len());
+        let speeds = list_speeds_between_levels(scene, SPEEDS_APART, STAGES_TRIED);
+        let ln_choices = compute_ln_count(speeds.len());
         let form = |name| move |speed: &f64| Form { name, ln_choices, ..Form::from_shape(&[("switch_rpm", *speed)]) };
         speeds.iter().map(form("speed")).chain(speeds.iter().map(form(SLOPED))).collect()
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let krpm = driven_krpm(scene)?;
+        let krpm = read_driven_speed_krpm(scene)?;
         let here: Vec<bool> = match &form.place {
             // Wheels that stand take nothing, whatever stage is engaged.
             Some((column, stage)) => {

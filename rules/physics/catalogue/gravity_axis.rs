@@ -1,6 +1,6 @@
 //! A vertical axis carries weight: up costs power, down gives it back.
 
-use crate::drive::{compute_directions, in_si, is_displacement, is_power, read_motion, compute_rate};
+use crate::drive::{compute_directions, convert_to_si, is_displacement, is_power, read_motion, compute_rate};
 use crate::excitation::has_variation;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -77,19 +77,19 @@ impl Effect for GravityAxis {
             let held = scene.column("drive_on").map_or_else(|| vec![1.0; scene.rows()], <[f64]>::to_vec);
             return Some(vec![("level", held)]);
         }
-        Some(vec![("weight", upward_m_s(scene, declared)?)])
+        Some(vec![("weight", read_upward_velocity_m_s(scene, declared)?)])
     }
 }
 
 /// Velocity of the vertical axis: declared by its letter, by its position, or the only axis there is.
-fn upward_m_s(scene: &Scene, declared: &str) -> Option<Vec<f64>> {
+fn read_upward_velocity_m_s(scene: &Scene, declared: &str) -> Option<Vec<f64>> {
     if declared.contains("velocity") {
-        return in_si(scene, declared);
+        return convert_to_si(scene, declared);
     }
-    let of_letter = in_si(scene, &format!("{declared}_axis_velocity_mm_min"));
+    let of_letter = convert_to_si(scene, &format!("{declared}_axis_velocity_mm_min"));
     let position = scene.column(declared).or_else(|| scene.column(&format!("{declared}_axis_position_mm")));
     let metres = |position: &[f64]| position.iter().map(|mm| mm / 1000.0).collect::<Vec<_>>();
     let of_position = || position.map(|position| compute_rate(scene, &metres(position)));
-    let only = || scene.role_name(Role::Velocity).and_then(|name| in_si(scene, name));
+    let only = || scene.role_name(Role::Velocity).and_then(|name| convert_to_si(scene, name));
     of_letter.or_else(of_position).or_else(only)
 }

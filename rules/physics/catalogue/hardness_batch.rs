@@ -1,8 +1,8 @@
 //! A lot of material is harder or softer than the one before.
 
-use crate::cut::{estimate_cut_load, cut_times};
+use crate::cut::{estimate_cut_load, multiply_cut};
 use crate::excitation::{
-    ln_count, run_named, since_run, step_forms, where_word, within_runs, word_forms,
+    compute_ln_count, find_run, mark_rows_since_run, build_step_forms, mark_word_rows, mark_rows_within_runs, build_word_forms,
 };
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -97,27 +97,27 @@ impl Effect for HardnessBatch {
         if estimate_cut_load(scene).is_none() {
             return Vec::new();
         }
-        let mut forms = word_forms(scene, "lot", "lot", GAINS.len() + 1);
+        let mut forms = build_word_forms(scene, "lot", "lot", GAINS.len() + 1);
         if forms.len() > 2 {
             forms.push(Form { name: "lots", ..Form::without_shape() });
         }
-        forms.extend(steps_between_lots(scene));
+        forms.extend(build_lot_step_forms(scene));
         forms
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "lots" {
-            return every_lot(scene);
+            return compute_recorded_lots(scene);
         }
         let (column, word) = form.place.as_ref()?;
         if form.name == "stretches" {
-            return from_start_to_start(scene, word);
+            return compute_inferred_lots(scene, word);
         }
         let here = match column.as_str() {
-            "run" => since_run(scene, word).or_else(|| within_runs(scene, word)),
-            _ => where_word(scene, column, word),
+            "run" => mark_rows_since_run(scene, word).or_else(|| mark_rows_within_runs(scene, word)),
+            _ => mark_word_rows(scene, column, word),
         }?;
-        Some(vec![("gain", cut_times(scene, |row| here[row])?)])
+        Some(vec![("gain", multiply_cut(scene, |row| here[row])?)])
     }
 
     fn has_hidden_state(&self) -> bool {
@@ -129,15 +129,15 @@ impl Effect for HardnessBatch {
 const GAINS: [&str; 6] = ["gain_2", "gain_3", "gain_4", "gain_5", "gain_6", "gain_7"];
 
 /// Steps at the start of a run; where the lots are recorded, only of a run that begins one.
-fn steps_between_lots(scene: &Scene) -> Vec<Form> {
-    let mut steps = step_forms(scene, "step");
+fn build_lot_step_forms(scene: &Scene) -> Vec<Form> {
+    let mut steps = build_step_forms(scene, "step");
     let Some(lots) = scene.text_column("lot").filter(|lots| lots.words().len() > 1) else { return steps };
     let begins_a_lot = |form: &Form| {
-        let run = form.place.as_ref().and_then(|(_, run)| run_named(scene, run));
+        let run = form.place.as_ref().and_then(|(_, run)| find_run(scene, run));
         run.is_some_and(|run| lots.get(scene.runs()[run].start) != lots.get(scene.runs()[run - 1].start))
     };
     steps.retain(begins_a_lot);
-    let ln_choices = ln_count(steps.len());
+    let ln_choices = compute_ln_count(steps.len());
     steps.iter_mut().for_each(|form| form.ln_choices = ln_choices);
     steps
 }
@@ -145,22 +145,22 @@ fn steps_between_lots(scene: &Scene) -> Vec<Form> {
 /// Between the runs that begin a lot.
 const LOT_TO_LOT: &str = ", ";
 
-fn from_start_to_start(scene: &Scene, starts: &str) -> Option<ParameterColumns> {
-    let row = |name: &str| Some(scene.runs()[run_named(scene, name)?].start);
+fn compute_inferred_lots(scene: &Scene, starts: &str) -> Option<ParameterColumns> {
+    let row = |name: &str| Some(scene.runs()[find_run(scene, name)?].start);
     let mut rows: Vec<usize> = starts.split(LOT_TO_LOT).map(row).collect::<Option<_>>()?;
     rows.push(scene.rows());
     let gain = |(gain, lot): (&&'static str, &[usize])| {
         let here = |row: usize| f64::from(u8::from((lot[0]..lot[1]).contains(&row)));
-        Some((*gain, cut_times(scene, here)?))
+        Some((*gain, multiply_cut(scene, here)?))
     };
     GAINS.iter().zip(rows.windows(2)).map(gain).collect()
 }
 
-fn every_lot(scene: &Scene) -> Option<ParameterColumns> {
+fn compute_recorded_lots(scene: &Scene) -> Option<ParameterColumns> {
     let lots = scene.text_column("lot")?;
     let column = |(gain, lot): (&&'static str, &String)| {
-        let here = where_word(scene, "lot", lot)?;
-        Some((*gain, cut_times(scene, |row| here[row])?))
+        let here = mark_word_rows(scene, "lot", lot)?;
+        Some((*gain, multiply_cut(scene, |row| here[row])?))
     };
     GAINS.iter().zip(lots.words().iter().skip(1)).map(column).collect()
 }

@@ -1,6 +1,6 @@
 //! Losses in the inverter: grow with current.
 
-use crate::drive::{is_power, read_speed_krpm, torque_at_1000_rpm};
+use crate::drive::{is_power, read_speed_krpm, compute_torque_at_1000_rpm};
 use crate::excitation::{find_greatest_magnitude, has_variation};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::LN_2;
@@ -81,7 +81,7 @@ impl Effect for InverterLoss {
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let current = is_power(scene).then(|| torque_at_1000_rpm(scene))??;
+        let current = is_power(scene).then(|| compute_torque_at_1000_rpm(scene))??;
         if form.name == MAGNETISED {
             let magnetising = form.shape_value("magnetising_share").unwrap_or(MAGNETISING_SHARE) * find_greatest_magnitude(&current);
             let beyond = |i: &f64| i.hypot(magnetising) - magnetising;

@@ -1,6 +1,6 @@
 //! Losses in the motor's iron: grow a little faster than speed.
 
-use crate::drive::{driven_krpm, speed_to_the};
+use crate::drive::{read_driven_speed_krpm, raise_speed_to_exponent};
 use crate::excitation::has_variation;
 use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -42,7 +42,7 @@ impl Effect for IronLoss {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        let turns = driven_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
+        let turns = read_driven_speed_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
         // On a drive whose only motion is its own speed, a loss torque that hardly grows is a shape of its friction.
         let drive =
             scene.output_kind() == OutputKind::Force && scene.role_name(Role::Velocity) == scene.role_name(Role::Speed);
@@ -50,7 +50,7 @@ impl Effect for IronLoss {
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        Some(vec![("level", speed_to_the(scene, form.shape_value("p").unwrap_or(1.3))?)])
+        Some(vec![("level", raise_speed_to_exponent(scene, form.shape_value("p").unwrap_or(1.3))?)])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {

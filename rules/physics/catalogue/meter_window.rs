@@ -82,7 +82,7 @@ impl Effect for MeterWindow {
         for run in scene.runs() {
             let inside = &simulated[run.clone()];
             let time_s = &scene.time_s()[run.clone()];
-            let average = if form.name == "mean" { running_mean } else { first_order_lag };
+            let average = if form.name == "mean" { compute_running_mean } else { apply_linear_lag };
             smeared[run.clone()].copy_from_slice(&average(time_s, inside, window_s));
         }
         if form.name == LATE {
@@ -103,7 +103,7 @@ const LATE_WINDOWS_S: [f64; 3] = [0.5, 1.5, 4.0];
 const LATE_SHARES: [f64; 2] = [0.5, 1.5];
 
 /// First-order lag, settled at the start, exact for an input that is linear between rows.
-fn first_order_lag(time_s: &[f64], input: &[f64], tau_s: f64) -> Vec<f64> {
+fn apply_linear_lag(time_s: &[f64], input: &[f64], tau_s: f64) -> Vec<f64> {
     let mut state = input.to_vec();
     for row in 1..input.len() {
         let dt_s = time_s[row] - time_s[row - 1];
@@ -117,7 +117,7 @@ fn first_order_lag(time_s: &[f64], input: &[f64], tau_s: f64) -> Vec<f64> {
 }
 
 /// Mean over the last `window_s` of an input that is linear between rows, constant before the first.
-fn running_mean(time_s: &[f64], input: &[f64], window_s: f64) -> Vec<f64> {
+fn compute_running_mean(time_s: &[f64], input: &[f64], window_s: f64) -> Vec<f64> {
     let mut area = vec![0.0; input.len()];
     for row in 1..input.len() {
         let dt_s = (time_s[row] - time_s[row - 1]).max(0.0);
@@ -129,12 +129,12 @@ fn running_mean(time_s: &[f64], input: &[f64], window_s: f64) -> Vec<f64> {
         while at + 1 < row && time_s[at + 1] <= from_s {
             at += 1;
         }
-        (area[row] - area_until(time_s, input, &area, at, from_s)) / window_s
+        (area[row] - integrate_until(time_s, input, &area, at, from_s)) / window_s
     };
     (0..input.len()).map(mean).collect()
 }
 
-fn area_until(time_s: &[f64], input: &[f64], area: &[f64], at: usize, until_s: f64) -> f64 {
+fn integrate_until(time_s: &[f64], input: &[f64], area: &[f64], at: usize, until_s: f64) -> f64 {
     let into_s = until_s - time_s[at];
     let Some(next) = time_s.get(at + 1) else { return area[at] + input[at] * into_s };
     let dt_s = next - time_s[at];

@@ -1,6 +1,6 @@
 //! Power that the spindle takes when it turns and does not cut.
 
-use crate::drive::driven_krpm;
+use crate::drive::read_driven_speed_krpm;
 use crate::excitation::has_variation;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -61,7 +61,7 @@ impl Effect for NoLoadPower {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        let turns = driven_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
+        let turns = read_driven_speed_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
         turns.then(Form::without_shape).into_iter().collect()
     }
 

@@ -1,6 +1,6 @@
 //! The real feed follows the reported one late.
 
-use crate::cut::{estimate_cut_load, cutting_rows};
+use crate::cut::{estimate_cut_load, mark_cutting_rows};
 use crate::excitation::{list_delays, count_visits};
 use crate::state::delay_values;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
@@ -46,7 +46,7 @@ impl Effect for OverrideDelay {
         let Some(feed) = read_feed(scene).filter(|_| scene.load().is_some() && estimate_cut_load(scene).is_some()) else {
             return Vec::new();
         };
-        let cutting = cutting_rows(scene);
+        let cutting = mark_cutting_rows(scene);
         let changes =
             |row: usize| row > 0 && cutting[row] && cutting[row - 1] && (feed[row] / feed[row - 1] - 1.0).abs() > 0.02;
         if count_visits(scene, changes) < 3 {
@@ -56,7 +56,7 @@ impl Effect for OverrideDelay {
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let feed = feed_in_the_cut(scene)?;
+        let feed = hold_feed_before_cut(scene)?;
         let before = delay_values(scene, &feed, form.shape_value("delay_s").unwrap_or(0.25));
         let law = |((load, before), now): ((&f64, &f64), &f64)| {
             let ratio = if *now > 0.0 { (before / now).clamp(0.0, 4.0) } else { 1.0 };
@@ -75,7 +75,7 @@ impl Effect for OverrideDelay {
 }
 
 /// The feed, before each pass that of its first row: the delay acts on changes while cutting, not on the approach.
-fn feed_in_the_cut(scene: &Scene) -> Option<Vec<f64>> {
+fn hold_feed_before_cut(scene: &Scene) -> Option<Vec<f64>> {
     let mut feed = read_feed(scene)?;
     for pass in scene.passes() {
         let start = scene.runs().iter().find(|run| run.contains(&pass.start)).map_or(0, |run| run.start);

@@ -1,9 +1,9 @@
 //! Inner rings warm before the housing: preload and friction rise, and fall again when the housing follows.
 
 use adapters::channel::quantity::Quantity;
-use crate::drive::{driven_krpm, read_speed_krpm, speed_to_the};
-use crate::excitation::lag_forms;
-use crate::state::first_order;
+use crate::drive::{read_driven_speed_krpm, read_speed_krpm, raise_speed_to_exponent};
+use crate::excitation::build_lag_forms;
+use crate::state::apply_first_order_lag;
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Friction that rises with bearing preload.
@@ -50,7 +50,7 @@ impl Effect for PreloadGrowth {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
@@ -64,10 +64,10 @@ impl Effect for PreloadGrowth {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        if driven_krpm(scene).is_none_or(|krpm| krpm.iter().all(|n| *n == 0.0)) {
+        if read_driven_speed_krpm(scene).is_none_or(|krpm| krpm.iter().all(|n| *n == 0.0)) {
             return Vec::new();
         }
-        let mut forms = lag_forms(scene, "lag", &[120.0, 300.0, 600.0]);
+        let mut forms = build_lag_forms(scene, "lag", &[120.0, 300.0, 600.0]);
         let gradient = |form: &Form| {
             let tau_s = form.shape_value("tau_s").unwrap_or(TAU_S);
             Form { name: "gradient", ..Form::from_shape(&[("tau_s", tau_s), ("slow_tau_s", SLOWER * tau_s)]) }
@@ -78,12 +78,12 @@ impl Effect for PreloadGrowth {
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let friction = speed_to_the(scene, 2.0)?;
+        let friction = raise_speed_to_exponent(scene, 2.0)?;
         let heat: Vec<f64> = read_speed_krpm(scene)?.iter().map(|n| n.powf(5.0 / 3.0)).collect();
         let tau_s = form.shape_value("tau_s").unwrap_or(TAU_S);
-        let mut warmth = first_order(scene, &heat, tau_s);
+        let mut warmth = apply_first_order_lag(scene, &heat, tau_s);
         if form.name == "gradient" {
-            let slow = first_order(scene, &heat, form.shape_value("slow_tau_s").unwrap_or(SLOWER * tau_s));
+            let slow = apply_first_order_lag(scene, &heat, form.shape_value("slow_tau_s").unwrap_or(SLOWER * tau_s));
             warmth.iter_mut().zip(&slow).for_each(|(warmth, slow)| *warmth -= slow);
         }
         Some(vec![("growth", friction.iter().zip(&warmth).map(|(g, w)| g * w).collect())])

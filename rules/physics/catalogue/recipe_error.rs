@@ -1,7 +1,7 @@
 //! Depth or width of cut is mis-stated for one operation.
 
-use crate::cut::{estimate_cut_load, cut_times};
-use crate::excitation::{where_word, word_forms};
+use crate::cut::{estimate_cut_load, multiply_cut};
+use crate::excitation::{mark_word_rows, build_word_forms};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Depth or width mis-stated for an operation.
@@ -52,14 +52,14 @@ impl Effect for RecipeError {
         if estimate_cut_load(scene).is_none() {
             return Vec::new();
         }
-        let forms = |column| word_forms(scene, "word", column, MOST_WORDS);
+        let forms = |column| build_word_forms(scene, "word", column, MOST_WORDS);
         ["operation", "pass", "program"].into_iter().map(forms).find(|forms| !forms.is_empty()).unwrap_or_default()
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let (column, word) = form.place.as_ref()?;
-        let here = where_word(scene, column, word)?;
-        Some(vec![("gain", cut_times(scene, |row| here[row])?)])
+        let here = mark_word_rows(scene, column, word)?;
+        Some(vec![("gain", multiply_cut(scene, |row| here[row])?)])
     }
 }
 

@@ -1,6 +1,6 @@
 //! Braking power does not come back: it is burnt in a resistor, or the meter does not count it.
 
-use crate::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
+use crate::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, read_driven_speed_krpm, read_spindle_rate_rpm_per_s};
 use crate::excitation::count_visits;
 use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -72,10 +72,10 @@ impl Effect for Regeneration {
         if form.name == "clipped" {
             return Some(vec![("share", scene.simulated_output()?.iter().map(|power| (-power).max(0.0)).collect())]);
         }
-        driven_krpm(scene)?;
+        read_driven_speed_krpm(scene)?;
         let speed = scene.role_values(Role::Speed)?;
         let braking = |(rpm, rate): (&f64, f64)| (-rpm * rate * RAD_PER_S_OF_RPM.powi(2)).max(0.0);
-        Some(vec![("braking_kg_m2", speed.iter().zip(spindle_rate_rpm_per_s(scene)?).map(braking).collect())])
+        Some(vec![("braking_kg_m2", speed.iter().zip(read_spindle_rate_rpm_per_s(scene)?).map(braking).collect())])
     }
 }
 

@@ -1,6 +1,6 @@
 //! Tool or work runs out of true: the cut swells and fades once per turn.
 
-use crate::cut::{estimate_cut_load, cut_times};
+use crate::cut::{estimate_cut_load, multiply_cut};
 use crate::drive::RAD_PER_S_OF_RPM;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -64,15 +64,15 @@ impl Effect for Runout {
         if form.name == "latent" {
             return Some(vec![("scale", scene.unrecorded_state())]);
         }
-        let turn = turn_rad(scene)?;
-        let cosine = cut_times(scene, |row| turn[row].cos())?;
-        let sine = cut_times(scene, |row| turn[row].sin())?;
+        let turn = compute_turn_rad(scene)?;
+        let cosine = multiply_cut(scene, |row| turn[row].cos())?;
+        let sine = multiply_cut(scene, |row| turn[row].sin())?;
         Some(vec![("cosine", cosine), ("sine", sine)])
     }
 }
 
 /// Angle of the spindle since the start of the run.
-fn turn_rad(scene: &Scene) -> Option<Vec<f64>> {
+fn compute_turn_rad(scene: &Scene) -> Option<Vec<f64>> {
     let speed = scene.role_values(Role::Speed)?;
     let mut turn = vec![0.0; scene.rows()];
     for run in scene.runs() {

@@ -49,7 +49,7 @@ impl Effect for Saturation {
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(simulated) = scene.simulated_output() else { return Vec::new() };
         let form = |ceiling: f64| Form::from_shape(&[("ceiling", ceiling)]);
-        if let Some(ceiling) = pile_up(scene) {
+        if let Some(ceiling) = find_saturation_limit(scene) {
             return vec![form(ceiling)];
         }
         // Noise after the clipping smears the pile: then the ceiling lies a little below the greatest recorded values,
@@ -69,7 +69,7 @@ impl Effect for Saturation {
 }
 
 /// The greatest recorded value, where at least five rows share it and more do than share the value below it.
-fn pile_up(scene: &Scene) -> Option<f64> {
+fn find_saturation_limit(scene: &Scene) -> Option<f64> {
     let usable = scene.recorded_output().iter().zip(scene.usable_rows()).filter(|(_, usable)| **usable);
     let values: Vec<f64> = usable.map(|(value, _)| *value).collect();
     let top = values.iter().copied().reduce(f64::max)?;

@@ -1,9 +1,9 @@
 //! The ball screw grows as its nut rubs: the error grows with the distance from the fixed bearing.
 
 use adapters::channel::quantity::Quantity;
-use crate::drive::{axis_velocities, in_si, is_displacement};
-use crate::excitation::{lag_forms, has_variation};
-use crate::state::first_order;
+use crate::drive::{read_axis_velocities, convert_to_si, is_displacement};
+use crate::excitation::{build_lag_forms, has_variation};
+use crate::state::apply_first_order_lag;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Growth of the ball screw.
@@ -49,25 +49,25 @@ impl Effect for ScrewGrowth {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        let moves = axis_velocities(scene).iter().any(|velocity| has_variation(velocity));
+        let moves = read_axis_velocities(scene).iter().any(|velocity| has_variation(velocity));
         let grid: &[f64] = if moves && is_displacement(scene) { &[1200.0, 2400.0, 3600.0] } else { &[] };
-        lag_forms(scene, "", grid)
+        build_lag_forms(scene, "", grid)
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let velocities = axis_velocities(scene);
+        let velocities = read_axis_velocities(scene);
         if velocities.is_empty() {
             return None;
         }
         let m_min = |row: usize| velocities.iter().map(|v| 60.0 * v[row].abs()).sum();
         let rubbing: Vec<f64> = (0..scene.rows()).map(m_min).collect();
-        let mut growth = first_order(scene, &rubbing, form.shape_value("tau_s").unwrap_or(2400.0));
-        if let Some(position) = position_m(scene) {
+        let mut growth = apply_first_order_lag(scene, &rubbing, form.shape_value("tau_s").unwrap_or(2400.0));
+        if let Some(position) = read_position_m(scene) {
             growth.iter_mut().zip(&position).for_each(|(growth, z)| *growth *= z);
         }
         Some(vec![("growth", growth)])
@@ -78,6 +78,6 @@ impl Effect for ScrewGrowth {
     }
 }
 
-fn position_m(scene: &Scene) -> Option<Vec<f64>> {
-    in_si(scene, scene.role_name(Role::Position)?)
+fn read_position_m(scene: &Scene) -> Option<Vec<f64>> {
+    convert_to_si(scene, scene.role_name(Role::Position)?)
 }

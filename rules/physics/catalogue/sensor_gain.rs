@@ -1,6 +1,6 @@
 //! The meter shows a fixed share too much or too little.
 
-use crate::excitation::{recording_share, since_run, step_forms, has_variation};
+use crate::excitation::{compute_recording_share, mark_rows_since_run, build_step_forms, has_variation};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Gain of the meter.
@@ -52,15 +52,15 @@ impl Effect for SensorGain {
             return Vec::new();
         }
         let mut forms = vec![Form { name: "constant", ..Form::without_shape() }, Form { name: "drift", ..Form::without_shape() }];
-        forms.extend(step_forms(scene, "step"));
+        forms.extend(build_step_forms(scene, "step"));
         forms
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let simulated = scene.simulated_output()?;
         let factor = match (form.name, &form.place) {
-            ("step", Some((_, run))) => since_run(scene, run)?,
-            ("drift", _) => recording_share(scene).iter().map(|share| share - 0.5).collect(),
+            ("step", Some((_, run))) => mark_rows_since_run(scene, run)?,
+            ("drift", _) => compute_recording_share(scene).iter().map(|share| share - 0.5).collect(),
             _ => vec![1.0; scene.rows()],
         };
         Some(vec![("gain", simulated.iter().zip(&factor).map(|(value, factor)| value * factor).collect())])

@@ -1,6 +1,6 @@
 //! Faster cutting heats the chip and softens it: the specific force falls.
 
-use crate::cut::{cut_times, cutting_rows};
+use crate::cut::{multiply_cut, mark_cutting_rows};
 use crate::excitation::has_variation;
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use numerics::statistics::quantile;
@@ -46,7 +46,7 @@ impl Effect for SpeedSoftening {
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let columns = self.compute_columns(scene, &Form::without_shape());
-        let cutting = cutting_rows(scene);
+        let cutting = mark_cutting_rows(scene);
         let speeds =
             |speed: &[f64]| speed.iter().zip(&cutting).filter(|(_, cutting)| **cutting).map(|(v, _)| *v).collect();
         let differ = scene.column("cutting_speed_m_min").map(speeds).is_some_and(|speeds: Vec<f64>| has_variation(&speeds));
@@ -55,10 +55,10 @@ impl Effect for SpeedSoftening {
 
     fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         let speed = scene.column("cutting_speed_m_min")?;
-        let cutting = cutting_rows(scene);
+        let cutting = mark_cutting_rows(scene);
         let middle =
             quantile(speed.iter().zip(&cutting).filter(|(_, cutting)| **cutting).map(|(v, _)| v.max(1.0)), 0.5);
         let reference = 100.0 * (middle.unwrap_or(100.0) / 100.0).log2().round().exp2();
-        Some(vec![("q", cut_times(scene, |row| -(speed[row].max(1.0) / reference).ln())?)])
+        Some(vec![("q", multiply_cut(scene, |row| -(speed[row].max(1.0) / reference).ln())?)])
     }
 }

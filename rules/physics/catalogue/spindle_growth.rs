@@ -2,8 +2,8 @@
 
 use adapters::channel::quantity::Quantity;
 use crate::drive::{is_displacement, read_speed_krpm};
-use crate::excitation::{lag_forms, time_constants, has_variation};
-use crate::state::{compute_decay, first_order};
+use crate::excitation::{build_lag_forms, list_time_constants, has_variation};
+use crate::state::{compute_decay, apply_first_order_lag};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Growth of the spindle with its own heat.
@@ -78,7 +78,7 @@ impl Effect for SpindleGrowth {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
@@ -92,8 +92,8 @@ impl Effect for SpindleGrowth {
         }
         let turns = read_speed_krpm(scene).is_some_and(|krpm| krpm.iter().any(|n| *n > 0.0));
         let grid: &[f64] = if turns { &[180.0, 600.0, 1800.0, 3600.0, 7200.0] } else { &[] };
-        let mut forms = lag_forms(scene, "one", grid);
-        let taus = time_constants(scene, grid);
+        let mut forms = build_lag_forms(scene, "one", grid);
+        let taus = list_time_constants(scene, grid);
         for (quick, slow) in [(180.0, 1800.0), (600.0, 3600.0), (600.0, 7200.0)] {
             if taus.contains(&slow) {
                 forms.push(Form { name: "two", ..Form::from_shape(&[("tau_s", quick), ("slow_tau_s", slow)]) });
@@ -112,10 +112,10 @@ impl Effect for SpindleGrowth {
         }
         let heat: Vec<f64> = read_speed_krpm(scene)?.iter().map(|n| n.powf(1.5)).collect();
         let tau_s = form.shape_value("tau_s").unwrap_or(TAU_S);
-        let mut columns = vec![("growth", first_order(scene, &heat, tau_s)), ("initial", compute_decay(scene, tau_s))];
+        let mut columns = vec![("growth", apply_first_order_lag(scene, &heat, tau_s)), ("initial", compute_decay(scene, tau_s))];
         if form.name == "two" {
             let slow_s = form.shape_value("slow_tau_s").unwrap_or(6.0 * tau_s);
-            columns.push(("slow_growth", first_order(scene, &heat, slow_s)));
+            columns.push(("slow_growth", apply_first_order_lag(scene, &heat, slow_s)));
             columns.push(("slow_initial", compute_decay(scene, slow_s)));
         }
         Some(columns)

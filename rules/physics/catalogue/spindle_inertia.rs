@@ -1,6 +1,6 @@
 //! Power and torque that accelerate spindle, chuck and work.
 
-use crate::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
+use crate::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, read_driven_speed_krpm, read_spindle_rate_rpm_per_s};
 use crate::excitation::{find_greatest_magnitude, count_visits};
 use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
@@ -57,17 +57,17 @@ impl Effect for SpindleInertia {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(speed) = scene.role_values(Role::Speed).filter(|_| driven_krpm(scene).is_some()) else { return Vec::new() };
-        let Some(rates) = spindle_rate_rpm_per_s(scene) else { return Vec::new() };
+        let Some(speed) = scene.role_values(Role::Speed).filter(|_| read_driven_speed_krpm(scene).is_some()) else { return Vec::new() };
+        let Some(rates) = read_spindle_rate_rpm_per_s(scene) else { return Vec::new() };
         let least = RAMP_PER_S * find_greatest_magnitude(speed);
         let ramps = count_visits(scene, |row| rates[row].abs() > least);
         if ramps >= 2 { vec![Form::without_shape()] } else { Vec::new() }
     }
 
     fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
-        driven_krpm(scene)?;
+        read_driven_speed_krpm(scene)?;
         let speed = scene.role_values(Role::Speed)?;
-        let rates = spindle_rate_rpm_per_s(scene)?.into_iter().map(|rpm_per_s| rpm_per_s * RAD_PER_S_OF_RPM);
+        let rates = read_spindle_rate_rpm_per_s(scene)?.into_iter().map(|rpm_per_s| rpm_per_s * RAD_PER_S_OF_RPM);
         if scene.output_kind() == OutputKind::Force {
             return Some(vec![("per_rad_s2", rates.collect())]);
         }

@@ -1,6 +1,6 @@
 //! At creep the oil film breaks down: friction is higher than when moving.
 
-use crate::drive::{is_power, read_motion, soft_sign, is_rotary_drive};
+use crate::drive::{is_power, read_motion, compute_soft_sign, is_rotary_drive};
 use crate::excitation::{find_greatest_magnitude, has_variation, count_visits};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -73,7 +73,7 @@ impl Effect for Stribeck {
         let speed = form.shape_value("stribeck_speed").unwrap_or(0.05 * find_greatest_magnitude(&velocity)).max(f64::MIN_POSITIVE);
         let law = |v: &f64| {
             let share = v / speed;
-            let level = if is_power(scene) { share.abs() } else { soft_sign(share, 0.05) };
+            let level = if is_power(scene) { share.abs() } else { compute_soft_sign(share, 0.05) };
             level * compute_falloff(form.name, share)
         };
         Some(vec![("level", velocity.iter().map(law).collect())])

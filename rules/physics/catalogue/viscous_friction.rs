@@ -2,7 +2,7 @@
 
 use adapters::channel::quantity::Quantity;
 use crate::drive::{is_power, read_motion};
-use crate::excitation::plain_where_it_varies;
+use crate::excitation::propose_plain_form;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Friction in proportion to speed.
@@ -45,12 +45,12 @@ impl Effect for ViscousFriction {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        plain_where_it_varies(self, scene)
+        propose_plain_form(self, scene)
     }
 
     fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {

@@ -1,6 +1,6 @@
 //! Air drag on spindle, chuck and fan: grows with the cube of speed.
 
-use crate::drive::{driven_krpm, speed_to_the};
+use crate::drive::{read_driven_speed_krpm, raise_speed_to_exponent};
 use crate::excitation::has_variation;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -42,11 +42,11 @@ impl Effect for Windage {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        let turns = driven_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
+        let turns = read_driven_speed_krpm(scene).is_some_and(|krpm| has_variation(&krpm));
         if turns { vec![Form::from_shape(&[("p", 3.0)]), Form::from_shape(&[("p", 2.6)])] } else { Vec::new() }
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        Some(vec![("level", speed_to_the(scene, form.shape_value("p").unwrap_or(3.0))?)])
+        Some(vec![("level", raise_speed_to_exponent(scene, form.shape_value("p").unwrap_or(3.0))?)])
     }
 }

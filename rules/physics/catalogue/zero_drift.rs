@@ -1,7 +1,7 @@
 //! The zero of the meter creeps, with cabinet temperature or age.
 
 use adapters::channel::quantity::Quantity;
-use crate::excitation::{recording_elapsed_s, recording_share};
+use crate::excitation::{compute_clock_elapsed_s, compute_recording_share};
 use crate::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
@@ -86,7 +86,7 @@ impl Effect for ZeroDrift {
         &DOC
     }
 
-    fn follows(&self, _quantity: Quantity) -> bool {
+    fn follows_quantity(&self, _quantity: Quantity) -> bool {
         true
     }
 
@@ -98,7 +98,7 @@ impl Effect for ZeroDrift {
         if scene.rows() < 20 {
             return Vec::new();
         }
-        let whole_s = recording_elapsed_s(scene).last().copied().unwrap_or(0.0);
+        let whole_s = compute_clock_elapsed_s(scene).last().copied().unwrap_or(0.0);
         let mut forms = vec![Form { name: "linear", ..Form::without_shape() }];
         let grid = [600.0, 1200.0, 2400.0, 4800.0].into_iter().filter(|tau_s| *tau_s < 0.5 * whole_s);
         forms.extend(grid.map(|tau_s| Form { name: "settling", ..Form::from_shape(&[("tau_s", tau_s)]) }));
@@ -107,11 +107,11 @@ impl Effect for ZeroDrift {
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        let share = recording_share(scene);
+        let share = compute_recording_share(scene);
         match form.name {
             "settling" => {
                 let tau_s = form.shape_value("tau_s").unwrap_or(1200.0);
-                let elapsed_s = recording_elapsed_s(scene);
+                let elapsed_s = compute_clock_elapsed_s(scene);
                 Some(vec![("settled", elapsed_s.iter().map(|t| 1.0 - (-t / tau_s).exp()).collect())])
             }
             "wander" | "restless" => {

@@ -180,8 +180,8 @@ impl Scene {
         let mut scene = Self {
             rows: recording.count_rows(),
             time_s: recording.time_s.clone(),
-            clock_s: running_clock_s(&recording, &runs),
-            period_s: median_period_s(&recording.time_s, &runs),
+            clock_s: compute_clock_s(&recording, &runs),
+            period_s: compute_median_period_s(&recording.time_s, &runs),
             recorded: measured.iter().map(|value| value.unwrap_or(0.0)).collect(),
             usable: measured.iter().map(|value| value.is_some()).collect(),
             run_names,
@@ -199,19 +199,19 @@ impl Scene {
             usual_cut: OnceLock::new(),
             runs,
         };
-        scene.take_columns(&recording);
-        scene.take_roles(roles);
+        scene.read_columns(&recording);
+        scene.assign_roles(roles);
         scene.passes = scene.find_passes();
         Ok(scene)
     }
 
-    fn take_columns(&mut self, recording: &Recording) {
+    fn read_columns(&mut self, recording: &Recording) {
         for column in recording.columns() {
             match &column.cells {
                 adapters::recording::Cells::Numbers(numbers) if numbers.count_present() > 0 => {
                     let values: Vec<Option<f64>> = numbers.iter().collect();
                     self.absent.insert(column.name.clone(), values.iter().map(Option::is_none).collect());
-                    self.columns.insert(column.name.clone(), hold_fill(&values, &self.runs));
+                    self.columns.insert(column.name.clone(), fill_by_holding(&values, &self.runs));
                 }
                 adapters::recording::Cells::Words(words) if !words.words().is_empty() => {
                     self.words.insert(column.name.clone(), words.clone());
@@ -221,7 +221,7 @@ impl Scene {
         }
     }
 
-    fn take_roles(&mut self, declared: &BTreeMap<Role, String>) {
+    fn assign_roles(&mut self, declared: &BTreeMap<Role, String>) {
         for role in Role::ALL {
             let default = role.default_channels().iter().find(|name| self.columns.contains_key(**name));
             let column = declared.get(&role).cloned().or_else(|| default.map(|name| (*name).to_owned()));
@@ -238,7 +238,7 @@ impl Scene {
         let Some(engaged) = self.role_values(Role::Engaged) else { return Vec::new() };
         let speed = self.role_values(Role::Speed);
         let named = self.text_column("pass");
-        let moved = super::tool_load::moved_rows(self);
+        let moved = super::tool_load::mark_moved_rows(self);
         let steps = |row: usize| {
             speed.is_some_and(|n| (n[row] - n[row - 1]).abs() > PASS_JUMP * n[row - 1].abs())
                 || named.is_some_and(|pass| pass.get(row) != pass.get(row - 1))
@@ -414,7 +414,7 @@ impl Scene {
     }
 
     /// The columns of a formula over this recording, found by `find` once and kept: columns never change.
-    pub fn linear_law(&self, formula: &str, find: impl FnOnce() -> LinearLaw) -> LinearLaw {
+    pub fn cache_linear_law(&self, formula: &str, find: impl FnOnce() -> LinearLaw) -> LinearLaw {
         if let Some(known) = self.laws.borrow().get(formula) {
             return known.clone();
         }
@@ -457,12 +457,12 @@ impl Scene {
     }
 }
 
-fn running_clock_s(recording: &Recording, runs: &[Range<usize>]) -> Vec<f64> {
+fn compute_clock_s(recording: &Recording, runs: &[Range<usize>]) -> Vec<f64> {
     let time_s = &recording.time_s;
     if recording.pauses_known() {
         return time_s.iter().map(|time| time - time_s[0]).collect();
     }
-    let period_s = median_period_s(time_s, runs);
+    let period_s = compute_median_period_s(time_s, runs);
     let mut clock_s = vec![0.0; time_s.len()];
     for (index, run) in runs.iter().enumerate() {
         let start_s = if index == 0 { 0.0 } else { clock_s[run.start - 1] + period_s };
@@ -471,12 +471,12 @@ fn running_clock_s(recording: &Recording, runs: &[Range<usize>]) -> Vec<f64> {
     clock_s
 }
 
-fn median_period_s(time_s: &[f64], runs: &[Range<usize>]) -> f64 {
+fn compute_median_period_s(time_s: &[f64], runs: &[Range<usize>]) -> f64 {
     let steps = runs.iter().flat_map(|run| time_s[run.clone()].windows(2).map(|pair| pair[1] - pair[0]));
     numerics::statistics::median(steps.filter(|step| *step > 0.0).collect()).unwrap_or(1.0)
 }
 
-fn hold_fill(values: &[Option<f64>], runs: &[Range<usize>]) -> Vec<f64> {
+fn fill_by_holding(values: &[Option<f64>], runs: &[Range<usize>]) -> Vec<f64> {
     let mut filled = vec![0.0; values.len()];
     for run in runs {
         let head = values[run.clone()].iter().flatten().next().copied().unwrap_or(0.0);

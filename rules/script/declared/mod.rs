@@ -23,13 +23,13 @@
 //! | `force` | the values in force for one script |
 
 mod find;
-mod force;
 pub(super) mod scan;
 mod values;
+mod values_in_force;
 
 pub(super) use find::{FoundDeclaration, find_declarations, with_values};
-pub(super) use force::{Force, LiveValues, Now};
 pub use values::{DeclarationPlace, SETTINGS_TEXT_MAX, SettingValues};
+pub(super) use values_in_force::{Force, LiveValues, Now};
 
 use adapters::channel::find_nearest_name;
 use std::fmt;

@@ -1,6 +1,6 @@
 //! What a trial can call.
 
-use super::stage::{Theatre, TrialContext};
+use super::trial_context::{Theatre, TrialContext};
 use crate::callable::{Function, define_function};
 use crate::collect::ScriptResult;
 use crate::decision::{Axis, Stop};

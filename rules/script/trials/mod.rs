@@ -20,7 +20,7 @@
 
 mod functions;
 mod smoke;
-mod stage;
+mod trial_context;
 
 pub use functions::TRIAL_FUNCTIONS;
 
@@ -31,8 +31,8 @@ use super::engine::{OPERATIONS_MAX, Shared, build_engine};
 use super::problem::{self, ScriptProblem};
 use super::running::RunningScript;
 use rhai::{AST, Engine, Position, Scope};
-use stage::{Theatre, TrialContext};
 use std::sync::Arc;
+use trial_context::{Theatre, TrialContext};
 
 /// Tools and operations with values of their own whose trials are run; more of them take the same path through the script.
 const PLACES_MAX: usize = 16;

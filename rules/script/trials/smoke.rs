@@ -2,7 +2,7 @@
 //! decides does not matter; it must come to an end and must not fail.
 
 use super::TrialResult;
-use super::stage::TrialContext;
+use super::trial_context::TrialContext;
 use crate::compiled::Script;
 use estimators::State;
 use rhai::{Dynamic, ImmutableString};

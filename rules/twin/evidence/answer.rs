@@ -1,7 +1,7 @@
 //! The answer: verdict, names, what stands beside them, and what each contributes.
 
-use super::decision::THRESHOLDS;
 use super::posterior::Group;
+use super::thresholds::THRESHOLDS;
 use crate::diagnosis::{Existence, UNKNOWN, Verdict};
 
 /// Another name, and what it would replace.
@@ -15,7 +15,7 @@ pub(super) struct Rival {
 
 impl Rival {
     /// Something without a name that may stand where a name is told.
-    pub(super) fn unknown(instead_of: &str, nats: f64) -> Self {
+    pub(super) fn new_unknown(instead_of: &str, nats: f64) -> Self {
         Self { name: UNKNOWN.to_owned(), instead_of: instead_of.to_owned(), nats }
     }
 }
@@ -64,7 +64,7 @@ pub(super) type Named = (String, Vec<f64>);
 
 impl EvidenceAnswer {
     /// Something real that no name explains; names that come near stand beside it.
-    pub(super) fn leave_unnamed(&mut self, groups: &[Group<'_>], ln: f64) {
+    pub(super) fn mark_unexplained(&mut self, groups: &[Group<'_>], ln: f64) {
         let mut near: Vec<(String, f64)> = self.names.iter().map(|name| (name.clone(), 0.0)).collect();
         for other in groups.iter().filter(|other| other.ln > ln - THRESHOLDS.beside) {
             for name in other.names.iter().flatten() {
@@ -75,11 +75,11 @@ impl EvidenceAnswer {
         }
         self.rivals = Vec::new();
         self.names = Vec::new();
-        self.unname(near);
+        self.withdraw_names(near);
     }
 
     /// Takes some names back: what they contribute goes to the nearest law beside each.
-    pub(super) fn replace(&mut self, refused: &[String]) -> Vec<String> {
+    pub(super) fn replace_names(&mut self, refused: &[String]) -> Vec<String> {
         let mut unnamed = Vec::new();
         for name in refused {
             let may_stand = |rival: &&Rival| rival.instead_of == *name && rival.name != UNKNOWN;
@@ -103,16 +103,16 @@ impl EvidenceAnswer {
     }
 
     /// Takes some names back: what they contribute has no name. Where little is left under names, or none, all are taken back.
-    pub(super) fn refuse(&mut self, refused: &[String], energy: impl Fn(&[f64]) -> f64) {
+    pub(super) fn reject_names(&mut self, refused: &[String], energy: impl Fn(&[f64]) -> f64) {
         for all in [&mut self.contributions, &mut self.remaining] {
             let (gone, mut kept): (Vec<Named>, Vec<Named>) =
                 std::mem::take(all).into_iter().partition(|(name, _)| refused.contains(name) || name == UNKNOWN);
             let rows = gone.first().map_or(0, |(_, x)| x.len());
-            kept.push((UNKNOWN.to_owned(), sum_of(&gone, rows)));
+            kept.push((UNKNOWN.to_owned(), sum_contributions(&gone, rows)));
             *all = kept;
         }
         let rows = self.remaining.first().map_or(0, |(_, x)| x.len());
-        let whole = energy(&sum_of(&self.remaining, rows)).max(f64::MIN_POSITIVE);
+        let whole = energy(&sum_contributions(&self.remaining, rows)).max(f64::MIN_POSITIVE);
         let unknown = self.remaining.iter().find(|(name, _)| name == UNKNOWN).map_or(0.0, |(_, x)| energy(x));
         self.names.retain(|name| !refused.contains(name));
         if let Some(first) = self.names.first() {
@@ -122,7 +122,7 @@ impl EvidenceAnswer {
             }
         }
         if self.names.is_empty() || unknown > THRESHOLDS.unknown_share * whole {
-            self.unname(refused.iter().map(|name| (name.clone(), 0.0)).collect());
+            self.withdraw_names(refused.iter().map(|name| (name.clone(), 0.0)).collect());
         } else if let Some(first) = self.names.first() {
             // A part that has lost its name keeps the whole from being sure.
             self.verdict = Verdict::Ambiguous;
@@ -133,16 +133,16 @@ impl EvidenceAnswer {
     }
 
     /// Sets something without a name beside some names: their curves are theirs, their textbook laws are not.
-    pub(super) fn doubt(&mut self, doubted: &[String]) {
+    pub(super) fn add_unknown_rivals(&mut self, doubted: &[String]) {
         if self.verdict == Verdict::Unexplained {
             return;
         }
         self.verdict = Verdict::Ambiguous;
-        self.rivals.extend(doubted.iter().map(|name| Rival::unknown(name, 0.0)));
+        self.rivals.extend(doubted.iter().map(|name| Rival::new_unknown(name, 0.0)));
     }
 
     /// Takes the names back: they and these others stand beside something without a name.
-    pub(super) fn unname(&mut self, others: Vec<(String, f64)>) {
+    pub(super) fn withdraw_names(&mut self, others: Vec<(String, f64)>) {
         let names = std::mem::take(&mut self.names).into_iter().map(|name| (name, 0.0));
         let rivals = std::mem::take(&mut self.rivals).into_iter().map(|rival| (rival.name, rival.nats));
         let mut near: Vec<(String, f64)> = Vec::new();
@@ -157,13 +157,13 @@ impl EvidenceAnswer {
         self.verdict = Verdict::Unexplained;
         for all in [&mut self.contributions, &mut self.remaining] {
             let rows = all.first().map_or(0, |(_, x)| x.len());
-            *all = vec![(UNKNOWN.to_owned(), sum_of(all, rows))];
+            *all = vec![(UNKNOWN.to_owned(), sum_contributions(all, rows))];
         }
     }
 }
 
 /// The sum of all contributions.
-pub(super) fn sum_of(all: &[Named], rows: usize) -> Vec<f64> {
+pub(super) fn sum_contributions(all: &[Named], rows: usize) -> Vec<f64> {
     let mut sum = vec![0.0; rows];
     for (_, x) in all {
         sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);

@@ -1,13 +1,13 @@
 //! What an explanation contributes: the output with it, and every name's share of it row by row.
 
-use super::algebra::{CholeskyFactor, gram};
 use super::answer::Named;
-use super::bank::Since;
-use super::follow::Follower;
-use super::judge::Judge;
-use super::means::PosteriorMeans;
+use super::linear_algebra::{CholeskyFactor, compute_gram_matrix};
 use super::noise::NoiseModel;
 use super::posterior::Explanation;
+use super::posterior_means::PosteriorMeans;
+use super::recursive_least_squares::Follower;
+use super::validation::Judge;
+use super::variant_bank::Since;
 use crate::diagnosis::UNKNOWN;
 use ndarray::{Array1, s};
 use numerics::statistics::{count_to_f64, rms};
@@ -17,8 +17,8 @@ const BEGUN: f64 = 12.0;
 
 impl Judge<'_> {
     /// The output with what an explanation adds, and each name's contribution.
-    pub(super) fn contributions(&self, of: &Explanation) -> (Vec<f64>, Vec<Named>) {
-        let solved = self.solved_by_levels(of);
+    pub(super) fn compute_contributions(&self, of: &Explanation) -> (Vec<f64>, Vec<Named>) {
+        let solved = self.solve_plain_means(of);
         let mut after = self.inputs.simulated.clone();
         for (index, w) in solved.tangents.iter().enumerate() {
             let tangent = self.comparison.tangent(index);
@@ -33,7 +33,7 @@ impl Judge<'_> {
         let mut shared: Vec<(usize, Vec<f64>)> = Vec::new();
         for (at, (variant, _)) in of.members.iter().enumerate() {
             let variant = &self.second.bank.variants[*variant];
-            let x = self.second.bank.contribution(variant, &solved.members[at]);
+            let x = self.second.bank.compute_contribution(variant, &solved.members[at]);
             match (variant.kind(), &of.claims[at]) {
                 (Some(kind), _) => {
                     if let Some(Since::Run(run)) = variant.since {
@@ -45,43 +45,43 @@ impl Judge<'_> {
                 (None, Some(_)) => shared.push((at, x)),
             }
         }
-        self.put_claimed(of, shared, &mut put);
-        after = self.sum_with(after, &all);
+        self.distribute_claimed_curves(of, shared, &mut put);
+        after = self.add_contributions(after, &all);
         for (kind, run) in steps {
-            self.begin_earlier(&kind, run, &mut after, &mut all);
+            self.backdate_run_step(&kind, run, &mut after, &mut all);
         }
-        self.follow(of, &mut after, &mut all);
+        self.track_hidden_states(of, &mut after, &mut all);
         (after, all)
     }
 
     /// Posterior means by plain least squares, as the baseline is fitted: in the metric of slow noise edges would decide
     /// about levels. What the noise remembers makes each row worth less.
-    fn solved_by_levels(&self, of: &Explanation) -> PosteriorMeans {
+    fn solve_plain_means(&self, of: &Explanation) -> PosteriorMeans {
         let comparison = self.comparison;
         let (fixed, output) = comparison.fixed_and_output();
         let bank = &comparison.bank;
         let members = of.members.iter().flat_map(|(variant, _)| &bank.columns[bank.variants[*variant].columns.clone()]);
         let columns: Vec<&[f64]> = fixed.iter().chain(members).map(Vec::as_slice).chain([output]).collect();
         let tall = comparison.whiten_columns(&columns, NoiseModel::WHITE);
-        let gram = gram(tall.view());
+        let gram = compute_gram_matrix(tall.view());
         let noise = self.settings[of.noise].gram.noise;
         let rows = count_to_f64(comparison.rows.len());
         let last = columns.len() - 1;
         let mut variance = gram[[last, last]] / rows;
         let mut w = Array1::zeros(last);
         for _ in 0..2 {
-            let ridge = comparison.ridges(&gram, variance, &of.members);
+            let ridge = comparison.build_ridges(&gram, variance, &of.members);
             let mut inner = gram.slice(s![..last, ..last]).to_owned();
             ridge.iter().enumerate().for_each(|(at, ridge)| inner[[at, at]] += ridge);
-            w = CholeskyFactor::of(&inner).solve(&gram.slice(s![..last, last]).to_owned());
+            w = CholeskyFactor::from_matrix(&inner).solve_system(&gram.slice(s![..last, last]).to_owned());
             let left = &tall.column(last) - &tall.slice(s![.., ..last]).dot(&w);
-            variance = left.dot(&left) / rows * noise.inflation();
+            variance = left.dot(&left) / rows * noise.variance_inflation();
         }
-        comparison.split(&w, &of.members)
+        comparison.split_coefficients(&w, &of.members)
     }
 
     /// States that act in rows held out only, followed through each unit from its own earlier rows.
-    fn follow(&self, of: &Explanation, after: &mut [f64], all: &mut [Named]) {
+    fn track_hidden_states(&self, of: &Explanation, after: &mut [f64], all: &mut [Named]) {
         let setting = &self.settings[of.noise];
         let variance = setting.saturated.variance;
         let mut states: Vec<(String, &[f64], f64)> = Vec::new();
@@ -94,17 +94,17 @@ impl Judge<'_> {
             states.extend(variant.followed.iter().map(|(column, d)| (name.clone(), column.as_slice(), known(*d))));
         }
         let units: std::collections::BTreeSet<usize> =
-            self.inputs.left_out().map(|row| self.inputs.unit[row]).collect();
+            self.inputs.held_out_rows().map(|row| self.inputs.unit[row]).collect();
         for unit in units.into_iter().filter(|_| !states.is_empty()) {
-            let rows: Vec<usize> = self.inputs.left_out().filter(|row| self.inputs.unit[*row] == unit).collect();
+            let rows: Vec<usize> = self.inputs.held_out_rows().filter(|row| self.inputs.unit[*row] == unit).collect();
             let acts = |(_, column, _): &&(String, &[f64], f64)| rows.iter().any(|row| column[*row] != 0.0);
             let here: Vec<&(String, &[f64], f64)> = states.iter().filter(acts).collect();
-            let noise = self.comparison.row_by_row(setting.gram.noise);
-            self.follow_unit(&rows, &here, (noise, variance.sqrt()), after, all);
+            let noise = self.comparison.convert_noise_to_rows(setting.gram.noise);
+            self.track_unit_states(&rows, &here, (noise, variance.sqrt()), after, all);
         }
     }
 
-    fn follow_unit(
+    fn track_unit_states(
         &self,
         rows: &[usize],
         states: &[&(String, &[f64], f64)],
@@ -112,10 +112,10 @@ impl Judge<'_> {
         after: &mut [f64],
         all: &mut [Named],
     ) {
-        let blocks = self.inputs.unbroken_stretches(rows);
+        let blocks = self.inputs.list_unbroken_stretches(rows);
         let white = |value: &dyn Fn(usize) -> f64| {
             let mut white: Vec<f64> = rows.iter().map(|row| value(*row)).collect();
-            noise.whiten(&mut white, &blocks);
+            noise.whiten_column(&mut white, &blocks);
             white
         };
         let left = white(&|row| self.recorded[row] - after[row]);
@@ -129,11 +129,11 @@ impl Judge<'_> {
                     own[*row] += step;
                 }
             }
-            follower.learn(&columns.iter().map(|column| column[at]).collect(), left[at] / deviation);
+            follower.update_with_row(&columns.iter().map(|column| column[at]).collect(), left[at] / deviation);
         }
     }
 
-    fn sum_with(&self, mut after: Vec<f64>, all: &[Named]) -> Vec<f64> {
+    fn add_contributions(&self, mut after: Vec<f64>, all: &[Named]) -> Vec<f64> {
         for (_, x) in all {
             after.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
         }
@@ -141,7 +141,12 @@ impl Judge<'_> {
     }
 
     /// A claimed curve goes to its names by the regression; what that leaves of it goes to the larger.
-    fn put_claimed(&self, of: &Explanation, shared: Vec<(usize, Vec<f64>)>, put: &mut impl FnMut(String, Vec<f64>)) {
+    fn distribute_claimed_curves(
+        &self,
+        of: &Explanation,
+        shared: Vec<(usize, Vec<f64>)>,
+        put: &mut impl FnMut(String, Vec<f64>),
+    ) {
         let mut done: Vec<usize> = Vec::new();
         for (at, _) in &shared {
             let Some(claim) = of.claims[*at].as_ref().filter(|_| !done.contains(at)) else { continue };
@@ -153,7 +158,7 @@ impl Judge<'_> {
                 done.push(*other);
                 left.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
             }
-            let parts: Vec<Vec<f64>> = claim.laws.iter().map(|law| self.naming.contribution(law)).collect();
+            let parts: Vec<Vec<f64>> = claim.laws.iter().map(|law| self.naming.compute_contribution(law)).collect();
             for part in &parts {
                 left.iter_mut().zip(part).for_each(|(left, x)| *left -= x);
             }
@@ -168,7 +173,7 @@ impl Judge<'_> {
     }
 
     /// A level that begins with a run may have begun in the held-out runs before it: their own earlier rows tell.
-    fn begin_earlier(&self, kind: &str, run: usize, after: &mut [f64], all: &mut [Named]) {
+    fn backdate_run_step(&self, kind: &str, run: usize, after: &mut [f64], all: &mut [Named]) {
         let inputs = self.inputs;
         let law = if kind == "hardness_batch" { inputs.cut.as_ref() } else { Some(&inputs.simulated) };
         let (Some(law), Some((_, own))) = (law, all.iter_mut().find(|(name, _)| name == kind)) else { return };
@@ -196,8 +201,8 @@ impl Judge<'_> {
     }
 
     /// What the baseline cannot imitate of a contribution.
-    pub(super) fn remaining(&self, x: &[f64]) -> Vec<f64> {
-        let rows: Vec<usize> = self.inputs.taken(false).collect();
+    pub(super) fn project_out_baseline(&self, x: &[f64]) -> Vec<f64> {
+        let rows: Vec<usize> = self.inputs.fitted_rows(false).collect();
         let sizes: Vec<f64> = self.tangents.iter().map(|t| rms(t) + 1e-30).collect();
         let scaled = self.tangents.iter().zip(&sizes);
         let columns: Vec<Vec<f64>> = scaled.map(|(t, size)| rows.iter().map(|row| t[*row] / size).collect()).collect();

@@ -7,13 +7,13 @@
 //! the best set that the same search finds. The share of these recordings in which as much is found is the chance that noise
 //! alone does as well.
 
-use super::algebra::{CholeskyFactor, block};
-use super::bag::pieces;
-use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
-use super::marginal::{Ground, Saturated, ln_sum};
+use super::linear_algebra::{CholeskyFactor, extract_block};
+use super::marginal::{Ground, Saturated, log_sum_exp};
+use super::resampling::split_into_pieces;
 use super::search::SetSearch;
-use crate::units::Random;
+use super::thresholds::THRESHOLDS;
+use crate::hold_out::Random;
 use ndarray::{Array1, Array2, Axis, s};
 use numerics::statistics::count_to_f64;
 
@@ -34,7 +34,7 @@ pub(super) struct ExistenceTest {
 }
 
 /// Asks of a recording with what the best explanation leaves, and the evidence that this explanation has over nothing.
-pub(super) fn existence(
+pub(super) fn test_existence(
     comparison: &Comparison<'_>,
     (gram, saturated): (&Gram, Saturated),
     priors: &[f64],
@@ -42,9 +42,9 @@ pub(super) fn existence(
     evidence: f64,
 ) -> ExistenceTest {
     let noise = gram.noise;
-    let pieces = pieces(&comparison.blocks, comparison.rows.len(), noise.memory());
-    let tall = comparison.whole(noise, |_| true);
-    let innovations = Array1::from(comparison.whitened(left, noise));
+    let pieces = split_into_pieces(&comparison.blocks, comparison.rows.len(), noise.correlation_rows());
+    let tall = comparison.build_whitened_matrix(noise, |_| true);
+    let innovations = Array1::from(comparison.whiten_column(left, noise));
     let last = tall.ncols() - 1;
     let mut along = Array2::zeros((last, pieces.len()));
     for (index, piece) in pieces.iter().enumerate() {
@@ -52,28 +52,32 @@ pub(super) fn existence(
         let own = innovations.select(Axis(0), piece);
         along.column_mut(index).assign(&rows.slice(s![.., ..last]).t().dot(&own));
     }
-    let fixed: Vec<usize> = (0..comparison.first()).collect();
-    let ridge = comparison.fixed_ridge(&gram.whole, saturated.variance);
-    let mut inner = block(&gram.whole, &fixed, &fixed);
+    let fixed: Vec<usize> = (0..comparison.count_fixed_columns()).collect();
+    let ridge = comparison.build_fixed_ridge(&gram.whole, saturated.variance);
+    let mut inner = extract_block(&gram.whole, &fixed, &fixed);
     ridge.iter().enumerate().for_each(|(index, ridge)| inner[[index, index]] += ridge);
-    let factor = CholeskyFactor::of(&inner);
-    let reach = gram.whole.slice(s![..comparison.first(), ..last]).to_owned();
-    let (ground, _) = comparison.baseline(gram, saturated);
-    let asked = comparison.asked(&ground);
+    let factor = CholeskyFactor::from_matrix(&inner);
+    let reach = gram.whole.slice(s![..comparison.count_fixed_columns(), ..last]).to_owned();
+    let (ground, _) = comparison.prepare_baseline(gram, saturated);
+    let asked = comparison.prepare_variants(&ground);
     let evidence_of = |along: &Array1<f64>, square: f64| -> f64 {
-        ln_sum(
-            asked.iter().zip(priors).map(|(variant, prior)| prior + comparison.answer(&ground, variant, along, square)),
+        log_sum_exp(
+            asked
+                .iter()
+                .zip(priors)
+                .map(|(variant, prior)| prior + comparison.compute_variant_evidence(&ground, variant, along, square)),
         )
     };
-    let singles = evidence_of(&ground.along_output(), ground.square());
+    let singles = evidence_of(&ground.extract_output_products(), ground.output_square());
     let square: f64 = innovations.dot(&innovations);
     let mut random = Random::new(SEED);
     let draws: Vec<(Array1<f64>, f64)> = (0..DRAWS)
         .map(|_| {
-            let signs = Array1::from_iter((0..pieces.len()).map(|_| if random.draw() < 0.5 { 1.0 } else { -1.0 }));
+            let signs =
+                Array1::from_iter((0..pieces.len()).map(|_| if random.draw_uniform() < 0.5 { 1.0 } else { -1.0 }));
             let mut drawn = along.dot(&signs);
-            let baseline = drawn.slice(s![..comparison.first()]).to_owned();
-            let coefficients = factor.solve(&baseline);
+            let baseline = drawn.slice(s![..comparison.count_fixed_columns()]).to_owned();
+            let coefficients = factor.solve_system(&baseline);
             drawn -= &reach.t().dot(&coefficients);
             let kept = (square - baseline.dot(&coefficients)).max(f64::MIN_POSITIVE);
             (drawn, kept)
@@ -81,26 +85,32 @@ pub(super) fn existence(
         .collect();
     let of_draws: Vec<f64> = draws.iter().map(|(along, square)| evidence_of(along, *square)).collect();
     let reaching = |observed: f64| of_draws.iter().filter(|drawn| **drawn >= observed).count();
-    let mut chance = chance_of(reaching(singles.max(evidence)));
-    if chance <= THRESHOLDS.chance_max && chance_of(reaching(singles)) > THRESHOLDS.chance_max {
+    let mut chance = compute_p_value(reaching(singles.max(evidence)));
+    if chance <= THRESHOLDS.chance_max && compute_p_value(reaching(singles)) > THRESHOLDS.chance_max {
         let search = SetSearch { comparison, priors, beam: BEAM };
-        chance = chance_of(sets_reaching(&search, &ground, &draws, evidence));
+        chance = compute_p_value(count_reaching_draws(&search, &ground, &draws, evidence));
     }
-    ExistenceTest { chance, effective_rows: effective_rows(comparison, noise.inflation(), &pieces, &innovations) }
+    ExistenceTest {
+        chance,
+        effective_rows: estimate_effective_rows(comparison, noise.variance_inflation(), &pieces, &innovations),
+    }
 }
 
 /// The chance that so many of the draws stand for.
-fn chance_of(reaching: usize) -> f64 {
+fn compute_p_value(reaching: usize) -> f64 {
     count_to_f64(reaching + 1) / count_to_f64(DRAWS + 1)
 }
 
 /// In how many of these recordings a search finds a set of so much evidence; it ends as soon as they are too many.
-fn sets_reaching(search: &SetSearch<'_>, ground: &Ground, draws: &[(Array1<f64>, f64)], evidence: f64) -> usize {
+fn count_reaching_draws(search: &SetSearch<'_>, ground: &Ground, draws: &[(Array1<f64>, f64)], evidence: f64) -> usize {
     let mut reaching = 0;
     for (along, square) in draws {
-        let best = search.run(&ground.with_output(along, *square), 0.0).into_values().fold(f64::NEG_INFINITY, f64::max);
+        let best = search
+            .search_sets(&ground.with_output(along, *square), 0.0)
+            .into_values()
+            .fold(f64::NEG_INFINITY, f64::max);
         reaching += usize::from(best >= evidence);
-        if chance_of(reaching) > THRESHOLDS.chance_max {
+        if compute_p_value(reaching) > THRESHOLDS.chance_max {
             break;
         }
     }
@@ -108,7 +118,7 @@ fn sets_reaching(search: &SetSearch<'_>, ground: &Ground, draws: &[(Array1<f64>,
 }
 
 /// Rows over what their dependence takes: that which the noise knows, and that which the sums of whole pieces show beyond it.
-fn effective_rows(
+fn estimate_effective_rows(
     comparison: &Comparison<'_>,
     inflation: f64,
     pieces: &[Vec<usize>],

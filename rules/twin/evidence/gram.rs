@@ -4,10 +4,10 @@
 //! Every hypothesis is a Schur complement of it. For the inner test the columns of one hypothesis alone are whitened and
 //! summed unit by unit (`inner.rs`): leaving a unit out is a difference.
 
-use super::algebra::gram;
-use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
+use super::linear_algebra::compute_gram_matrix;
 use super::noise::NoiseModel;
+use super::variant_bank::VariantBank;
 use ndarray::{Array2, ShapeBuilder};
 use numerics::statistics::{count_to_f64, rms};
 use std::ops::Range;
@@ -66,20 +66,20 @@ impl<'a> Comparison<'a> {
         of: &ComparisonInput<'_>,
         rows_max: usize,
     ) -> Self {
-        let (group, rows) = groups(inputs, rows_max);
+        let (group, rows) = group_rows(inputs, rows_max);
         let recorded: Vec<f64> = rows.iter().map(|row| of.recorded[*row]).collect();
         let middle = numerics::statistics::mean(&recorded);
         let around: Vec<f64> = recorded.iter().map(|y| y - middle).collect();
         let deviation = rms(&around) + 1e-12;
-        let mut fixed: Vec<Vec<f64>> = of.tangents.iter().map(|tangent| unit(tangent, &rows)).collect();
+        let mut fixed: Vec<Vec<f64>> = of.tangents.iter().map(|tangent| scale_to_unit_rms(tangent, &rows)).collect();
         let tangents = fixed.len();
-        fixed.extend(run_levels(inputs));
+        fixed.extend(build_run_levels(inputs));
         Self {
             bank,
-            blocks: inputs.unbroken_stretches(&rows),
+            blocks: inputs.list_unbroken_stretches(&rows),
             scale: rows.iter().map(|row| of.scale[*row]).collect(),
             group,
-            ends: ends(&rows, inputs),
+            ends: find_group_ends(&rows, inputs),
             fixed,
             tangents,
             output: of.recorded.iter().zip(&inputs.simulated).map(|(y, f)| y - f).collect(),
@@ -91,23 +91,23 @@ impl<'a> Comparison<'a> {
     }
 
     /// A noise of these rows as it is from one recorded row to the next.
-    pub(super) fn row_by_row(&self, noise: NoiseModel) -> NoiseModel {
+    pub(super) fn convert_noise_to_rows(&self, noise: NoiseModel) -> NoiseModel {
         if self.group == 1 {
             noise
         } else {
-            NoiseModel::of(noise.share, noise.phi.powf(1.0 / count_to_f64(self.group)))
+            NoiseModel::from_share_and_phi(noise.share, noise.phi.powf(1.0 / count_to_f64(self.group)))
         }
     }
 
     /// How many columns stand before those of the bank.
-    pub(super) fn first(&self) -> usize {
+    pub(super) fn count_fixed_columns(&self) -> usize {
         self.fixed.len()
     }
 
     /// Columns of a variant.
-    pub(super) fn columns(&self, variant: usize) -> Range<usize> {
+    pub(super) fn variant_columns(&self, variant: usize) -> Range<usize> {
         let of = &self.bank.variants[variant].columns;
-        self.first() + of.start..self.first() + of.end
+        self.count_fixed_columns() + of.start..self.count_fixed_columns() + of.end
     }
 
     /// Tangents of the baseline, levels of the runs and the output, as they stand in the Gram matrix.
@@ -121,19 +121,19 @@ impl<'a> Comparison<'a> {
     }
 
     /// A full-length column whitened over the fitted rows.
-    pub(super) fn whitened(&self, column: &[f64], noise: NoiseModel) -> Vec<f64> {
+    pub(super) fn whiten_column(&self, column: &[f64], noise: NoiseModel) -> Vec<f64> {
         let mut white: Vec<f64> = if self.group == 1 {
             self.rows.iter().zip(&self.scale).map(|(row, scale)| column[*row] / scale).collect()
         } else {
             let groups = self.rows.iter().zip(&self.ends).zip(&self.scale);
             groups.map(|((row, end), scale)| numerics::statistics::mean(&column[*row..*end]) / scale).collect()
         };
-        noise.whiten(&mut white, &self.blocks);
+        noise.whiten_column(&mut white, &self.blocks);
         white
     }
 
     /// Every column whitened, one after the other: those before the bank, these of the bank, the output.
-    pub(super) fn whole(&self, noise: NoiseModel, takes: impl Fn(usize) -> bool) -> Array2<f64> {
+    pub(super) fn build_whitened_matrix(&self, noise: NoiseModel, takes: impl Fn(usize) -> bool) -> Array2<f64> {
         let of_bank = self.bank.columns.iter().enumerate().filter(|(index, _)| takes(*index)).map(|(_, c)| c);
         let columns: Vec<&[f64]> = self.fixed.iter().chain(of_bank).chain([&self.output]).map(Vec::as_slice).collect();
         self.whiten_columns(&columns, noise)
@@ -143,27 +143,27 @@ impl<'a> Comparison<'a> {
     pub(super) fn whiten_columns(&self, columns: &[&[f64]], noise: NoiseModel) -> Array2<f64> {
         let mut tall = Array2::zeros((self.rows.len(), columns.len()).f());
         for (index, column) in columns.iter().enumerate() {
-            let white = self.whitened(column, noise);
+            let white = self.whiten_column(column, noise);
             tall.column_mut(index).iter_mut().zip(white).for_each(|(cell, x)| *cell = x);
         }
         tall
     }
 
     /// The Gram matrix for this noise.
-    pub(super) fn gram(&self, noise: NoiseModel) -> Gram {
-        self.gram_of(noise, |_| true)
+    pub(super) fn compute_gram(&self, noise: NoiseModel) -> Gram {
+        self.compute_partial_gram(noise, |_| true)
     }
 
     /// The same of some columns of the bank only.
-    pub(super) fn gram_of(&self, noise: NoiseModel, takes: impl Fn(usize) -> bool) -> Gram {
-        Gram { noise, whole: gram(self.whole(noise, takes).view()) }
+    pub(super) fn compute_partial_gram(&self, noise: NoiseModel, takes: impl Fn(usize) -> bool) -> Gram {
+        Gram { noise, whole: compute_gram_matrix(self.build_whitened_matrix(noise, takes).view()) }
     }
 }
 
 /// How many neighbours are averaged, and the first fitted row of each group: groups never cross stretches of unbroken noise
 /// or rows that are not fitted.
-fn groups(inputs: &RecordingInputs<'_>, rows_max: usize) -> (usize, Vec<usize>) {
-    let all: Vec<usize> = inputs.taken(false).collect();
+fn group_rows(inputs: &RecordingInputs<'_>, rows_max: usize) -> (usize, Vec<usize>) {
+    let all: Vec<usize> = inputs.fitted_rows(false).collect();
     let group = all.len().div_ceil(rows_max).max(1);
     let mut rows: Vec<usize> = Vec::with_capacity(all.len() / group + 1);
     let mut size = 0;
@@ -180,7 +180,7 @@ fn groups(inputs: &RecordingInputs<'_>, rows_max: usize) -> (usize, Vec<usize>) 
 }
 
 /// Row after the last fitted one of each group that begins at these rows.
-fn ends(rows: &[usize], inputs: &RecordingInputs<'_>) -> Vec<usize> {
+fn find_group_ends(rows: &[usize], inputs: &RecordingInputs<'_>) -> Vec<usize> {
     let mut ends: Vec<usize> = Vec::with_capacity(rows.len());
     let mut next = rows.iter().skip(1).peekable();
     for row in rows {
@@ -191,19 +191,19 @@ fn ends(rows: &[usize], inputs: &RecordingInputs<'_>) -> Vec<usize> {
     ends
 }
 
-fn unit(column: &[f64], rows: &[usize]) -> Vec<f64> {
+fn scale_to_unit_rms(column: &[f64], rows: &[usize]) -> Vec<f64> {
     let taken: Vec<f64> = rows.iter().map(|row| column[*row]).collect();
     let size = rms(&taken) + 1e-30;
     column.iter().map(|x| x / size).collect()
 }
 
 /// A level of each run with fitted rows; none where a recording has too many or too few of them to tell.
-fn run_levels(inputs: &RecordingInputs<'_>) -> Vec<Vec<f64>> {
+fn build_run_levels(inputs: &RecordingInputs<'_>) -> Vec<Vec<f64>> {
     let runs = inputs.scene.runs();
     let fitted: Vec<usize> = (0..runs.len()).filter(|run| runs[*run].clone().any(|row| inputs.fitted[row])).collect();
     if !(2..=30).contains(&fitted.len()) {
         return Vec::new();
     }
-    let level = |run: &usize| inputs.column(|row| f64::from(u8::from(inputs.run[row] == *run)));
+    let level = |run: &usize| inputs.build_column(|row| f64::from(u8::from(inputs.run[row] == *run)));
     fitted.iter().map(level).collect()
 }

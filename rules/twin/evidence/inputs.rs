@@ -1,6 +1,6 @@
 //! What the families see: the inputs of a recording by the part they play, and which rows are fitted.
 
-use crate::units::Unit;
+use crate::hold_out::Unit;
 use numerics::statistics::{count_to_f64, median};
 use physics::drive::{compute_rate, is_axis_output};
 use physics::{OutputKind, Role, Scene};
@@ -87,20 +87,20 @@ impl<'a> RecordingInputs<'a> {
         let held_out: Vec<bool> = (0..rows).map(|row| comparable[row] && held.contains(&unit[row])).collect();
         let fitted: Vec<bool> = (0..rows).map(|row| comparable[row] && !held_out[row]).collect();
         let engaged = own(Role::Engaged);
-        let clock_s = clock_s(scene);
+        let clock_s = compute_clock_s(scene);
         let mut inputs = Self {
             scene,
             rows,
             period_s: scene.period_s(),
-            block: blocks(&clock_s, scene.period_s(), &unit),
+            block: number_blocks(&clock_s, scene.period_s(), &unit),
             run,
             unit,
             simulated: scene.simulated_output().map_or_else(|| vec![0.0; rows], <[f64]>::to_vec),
             in_cut: engaged.as_ref().map_or_else(|| vec![true; rows], |e| e.iter().map(|e| *e > 0.5).collect()),
             speed: own(Role::Speed).map(|n| n.iter().map(|n| n.abs()).collect()),
-            velocity: own(Role::Velocity).or_else(|| any_axis(scene, "_velocity_mm_min")),
+            velocity: own(Role::Velocity).or_else(|| find_axis_column(scene, "_velocity_mm_min")),
             acceleration: own(Role::Acceleration),
-            position: own(Role::Position).or_else(|| any_axis(scene, "_position_mm")),
+            position: own(Role::Position).or_else(|| find_axis_column(scene, "_position_mm")),
             temperature: own(Role::Temperature),
             ambient: own(Role::Ambient),
             coolant_temperature: column("coolant_temperature_c"),
@@ -126,13 +126,13 @@ impl<'a> RecordingInputs<'a> {
             fitted,
             held_out,
         };
-        inputs.take_cut();
-        inputs.take_edges();
-        inputs.take_passes();
+        inputs.read_cut();
+        inputs.read_edges();
+        inputs.read_passes();
         inputs
     }
 
-    fn take_cut(&mut self) {
+    fn read_cut(&mut self) {
         self.knows_cut = self.cut.is_some();
         if self.cut.is_none() && self.kind != OutputKind::Displacement {
             let usual = self.scene.usual_cut();
@@ -140,7 +140,7 @@ impl<'a> RecordingInputs<'a> {
         }
     }
 
-    fn take_edges(&mut self) {
+    fn read_edges(&mut self) {
         if let Some(tools) = self.scene.text_column("tool") {
             self.edges = tools.words().len().max(1);
             self.edge = (0..self.rows).map(|row| tools.find_code(row).map_or(0, |code| code as usize)).collect();
@@ -159,7 +159,7 @@ impl<'a> RecordingInputs<'a> {
         }
     }
 
-    fn take_passes(&mut self) {
+    fn read_passes(&mut self) {
         for pass in self.scene.passes() {
             let (first, last) = (self.clock_s[pass.start], self.clock_s[pass.end - 1]);
             let whole = last - first + self.period_s;
@@ -178,50 +178,51 @@ impl<'a> RecordingInputs<'a> {
     }
 
     /// One number per row.
-    pub(super) fn column(&self, law: impl Fn(usize) -> f64) -> Vec<f64> {
+    pub(super) fn build_column(&self, law: impl Fn(usize) -> f64) -> Vec<f64> {
         (0..self.rows).map(law).collect()
     }
 
     /// One in the cut, zero outside.
-    pub(super) fn cutting(&self, row: usize) -> f64 {
+    pub(super) fn cut_indicator(&self, row: usize) -> f64 {
         f64::from(u8::from(self.in_cut[row]))
     }
 
     /// Mean over rows that are fitted (and in the cut).
-    pub(super) fn mean_of(&self, values: &[f64], in_cut: bool) -> f64 {
-        let rows: Vec<f64> = self.taken(in_cut).map(|row| values[row]).collect();
+    pub(super) fn compute_mean(&self, values: &[f64], in_cut: bool) -> f64 {
+        let rows: Vec<f64> = self.fitted_rows(in_cut).map(|row| values[row]).collect();
         numerics::statistics::mean(&rows)
     }
 
     /// Standard deviation over rows that are fitted (and in the cut).
-    pub(super) fn deviation_of(&self, values: &[f64], in_cut: bool) -> f64 {
-        let middle = self.mean_of(values, in_cut);
-        let squares: Vec<f64> = self.taken(in_cut).map(|row| (values[row] - middle).powi(2)).collect();
+    pub(super) fn compute_deviation(&self, values: &[f64], in_cut: bool) -> f64 {
+        let middle = self.compute_mean(values, in_cut);
+        let squares: Vec<f64> = self.fitted_rows(in_cut).map(|row| (values[row] - middle).powi(2)).collect();
         numerics::statistics::mean(&squares).sqrt()
     }
 
     /// Values at rows that are fitted (and in the cut), sorted.
-    pub(super) fn sorted(&self, values: &[f64], in_cut: bool) -> Vec<f64> {
-        let mut taken: Vec<f64> = self.taken(in_cut).map(|row| values[row]).collect();
+    pub(super) fn sort_fitted_values(&self, values: &[f64], in_cut: bool) -> Vec<f64> {
+        let mut taken: Vec<f64> = self.fitted_rows(in_cut).map(|row| values[row]).collect();
         taken.sort_by(f64::total_cmp);
         taken
     }
 
     /// Rows that are fitted (and in the cut).
-    pub(super) fn taken(&self, in_cut: bool) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn fitted_rows(&self, in_cut: bool) -> impl Iterator<Item = usize> + '_ {
         (0..self.rows).filter(move |row| self.fitted[*row] && (!in_cut || self.in_cut[*row]))
     }
 
     /// Rows that are held out.
-    pub(super) fn left_out(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn held_out_rows(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.rows).filter(|row| self.held_out[*row])
     }
 
     /// A column for each member of a group, zero elsewhere: those with fitted rows first, then those of rows held out.
-    pub(super) fn of_members(&self, codes: &[usize], values: &[f64]) -> (usize, Vec<Vec<f64>>) {
-        let known: BTreeSet<usize> = self.taken(false).map(|row| codes[row]).collect();
-        let strange: BTreeSet<usize> = self.left_out().map(|row| codes[row]).filter(|c| !known.contains(c)).collect();
-        let of = |code: &usize| self.column(|row| if codes[row] == *code { values[row] } else { 0.0 });
+    pub(super) fn build_member_columns(&self, codes: &[usize], values: &[f64]) -> (usize, Vec<Vec<f64>>) {
+        let known: BTreeSet<usize> = self.fitted_rows(false).map(|row| codes[row]).collect();
+        let strange: BTreeSet<usize> =
+            self.held_out_rows().map(|row| codes[row]).filter(|c| !known.contains(c)).collect();
+        let of = |code: &usize| self.build_column(|row| if codes[row] == *code { values[row] } else { 0.0 });
         (known.len(), known.iter().chain(&strange).map(of).collect())
     }
 
@@ -231,7 +232,7 @@ impl<'a> RecordingInputs<'a> {
     }
 
     /// Ranges of rows of each block.
-    pub(super) fn block_rows(&self) -> Vec<Range<usize>> {
+    pub(super) fn list_block_ranges(&self) -> Vec<Range<usize>> {
         let mut all: Vec<Range<usize>> = Vec::new();
         for row in 0..self.rows {
             match all.last_mut() {
@@ -243,15 +244,15 @@ impl<'a> RecordingInputs<'a> {
     }
 
     /// Median number of fitted rows in a block that has any.
-    pub(super) fn median_block(&self) -> f64 {
+    pub(super) fn median_block_rows(&self) -> f64 {
         let rows = |block: &Range<usize>| count_to_f64(block.clone().filter(|row| self.fitted[*row]).count());
-        median(self.block_rows().iter().map(rows).filter(|rows| *rows > 0.0).collect()).unwrap_or(1.0)
+        median(self.list_block_ranges().iter().map(rows).filter(|rows| *rows > 0.0).collect()).unwrap_or(1.0)
     }
 
     /// `values` so many seconds ago, within the block; held before its start.
-    pub(super) fn lagged(&self, values: &[f64], delay_s: f64) -> Vec<f64> {
+    pub(super) fn delay_values(&self, values: &[f64], delay_s: f64) -> Vec<f64> {
         let mut out = vec![0.0; self.rows];
-        for block in self.block_rows() {
+        for block in self.list_block_ranges() {
             let mut at = block.start;
             for row in block.clone() {
                 let wanted = self.clock_s[row] - delay_s;
@@ -267,19 +268,19 @@ impl<'a> RecordingInputs<'a> {
     }
 
     /// `values` behind a first-order lag, started in each block at its first value.
-    pub(super) fn smoothed(&self, values: &[f64], tau_s: f64) -> Vec<f64> {
+    pub(super) fn smooth_values(&self, values: &[f64], tau_s: f64) -> Vec<f64> {
         let keep = (-self.period_s / tau_s).exp();
         let mut state = 0.0;
-        self.column_in_order(|row, first| {
+        self.build_column_in_order(|row, first| {
             state = if first { values[row] } else { keep * state + (1.0 - keep) * values[row] };
             state
         })
     }
 
     /// The mean over so many rows up to this one, within the block.
-    pub(super) fn averaged(&self, values: &[f64], window: usize) -> Vec<f64> {
+    pub(super) fn compute_moving_average(&self, values: &[f64], window: usize) -> Vec<f64> {
         let mut out = vec![0.0; self.rows];
-        for block in self.block_rows() {
+        for block in self.list_block_ranges() {
             for row in block.clone() {
                 let from = (row + 1).saturating_sub(window).max(block.start);
                 out[row] = numerics::statistics::mean(&values[from..=row]);
@@ -289,9 +290,9 @@ impl<'a> RecordingInputs<'a> {
     }
 
     /// A slow state that is carried through pauses, in which its input is zero.
-    pub(super) fn state(&self, values: &[f64], tau_s: f64, start: f64) -> Vec<f64> {
+    pub(super) fn simulate_slow_state(&self, values: &[f64], tau_s: f64, start: f64) -> Vec<f64> {
         let mut state = start;
-        self.column_in_order(|row, _| {
+        self.build_column_in_order(|row, _| {
             let step_s = row.checked_sub(1).map_or(self.period_s, |before| self.clock_s[row] - self.clock_s[before]);
             let step_s = step_s.max(self.period_s);
             let driven_s = if step_s > GAP_PERIODS * self.period_s { self.period_s } else { step_s };
@@ -303,12 +304,12 @@ impl<'a> RecordingInputs<'a> {
     }
 
     /// Rate of change per second.
-    pub(super) fn rate(&self, values: &[f64]) -> Vec<f64> {
+    pub(super) fn differentiate_values(&self, values: &[f64]) -> Vec<f64> {
         compute_rate(self.scene, values)
     }
 
     /// Stretches of unbroken noise among some rows, as places among them.
-    pub(super) fn unbroken_stretches(&self, rows: &[usize]) -> Vec<Range<usize>> {
+    pub(super) fn list_unbroken_stretches(&self, rows: &[usize]) -> Vec<Range<usize>> {
         let mut stretches: Vec<Range<usize>> = Vec::new();
         for at in 0..rows.len() {
             let goes_on = at > 0 && self.block[rows[at]] == self.block[rows[at - 1]];
@@ -320,17 +321,17 @@ impl<'a> RecordingInputs<'a> {
         stretches
     }
 
-    fn column_in_order(&self, mut law: impl FnMut(usize, bool) -> f64) -> Vec<f64> {
+    fn build_column_in_order(&self, mut law: impl FnMut(usize, bool) -> f64) -> Vec<f64> {
         (0..self.rows).map(|row| law(row, row == 0 || self.block[row - 1] != self.block[row])).collect()
     }
 }
 
-fn any_axis(scene: &Scene, ending: &str) -> Option<Vec<f64>> {
+fn find_axis_column(scene: &Scene, ending: &str) -> Option<Vec<f64>> {
     let name = scene.column_names().find(|name| name.contains("axis") && name.ends_with(ending))?.to_owned();
     scene.column(&name).map(<[f64]>::to_vec)
 }
 
-fn clock_s(scene: &Scene) -> Vec<f64> {
+fn compute_clock_s(scene: &Scene) -> Vec<f64> {
     let time_s = scene.time_s();
     let restarts = time_s.windows(2).any(|pair| pair[1] < pair[0] - 0.5 * scene.period_s());
     let mut clock_s = scene.clock_s().to_vec();
@@ -344,7 +345,7 @@ fn clock_s(scene: &Scene) -> Vec<f64> {
     clock_s
 }
 
-fn blocks(clock_s: &[f64], period_s: f64, unit: &[usize]) -> Vec<usize> {
+fn number_blocks(clock_s: &[f64], period_s: f64, unit: &[usize]) -> Vec<usize> {
     let mut block = vec![0; clock_s.len()];
     for row in 1..clock_s.len() {
         let breaks = unit[row] != unit[row - 1] || clock_s[row] - clock_s[row - 1] > GAP_PERIODS * period_s;

@@ -5,10 +5,10 @@
 //!
 //! `ln E = -(kappa n / 2) ln((q - sum lambda b^2 / (1 + lambda g)) / q) - 1/2 sum ln(1 + lambda g) + ln 2 Phi(sign w0 / sd) + ln p(s)`
 
-use super::algebra::{CholeskyFactor, Resolved, Tridiagonal, block, schur};
-use super::bank::Variant;
 use super::gram::{Comparison, Gram};
+use super::linear_algebra::{CholeskyFactor, Resolved, Tridiagonal, compute_schur_complement, extract_block};
 use super::noise::NoiseModel;
+use super::variant_bank::Variant;
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, Axis, s};
 use numerics::statistics::{count_to_f64, normal_share};
@@ -58,7 +58,7 @@ pub(super) struct MarginalState<'g> {
 
 impl Ground {
     /// Nothing taken out yet.
-    pub(super) fn state(&self) -> MarginalState<'_> {
+    pub(super) fn build_initial_state(&self) -> MarginalState<'_> {
         let size = self.gram.nrows();
         MarginalState {
             ground: self,
@@ -68,13 +68,13 @@ impl Ground {
     }
 
     /// Inner products of every column with the output.
-    pub(super) fn along_output(&self) -> Array1<f64> {
+    pub(super) fn extract_output_products(&self) -> Array1<f64> {
         let last = self.gram.nrows() - 1;
         self.gram.slice(s![..last, last]).to_owned()
     }
 
     /// Sum of squares of the output.
-    pub(super) fn square(&self) -> f64 {
+    pub(super) fn output_square(&self) -> f64 {
         let last = self.gram.nrows() - 1;
         self.gram[[last, last]].max(f64::MIN_POSITIVE)
     }
@@ -90,7 +90,11 @@ impl Ground {
     }
 
     /// The part that holds some variants only.
-    pub(super) fn of(&self, variants: impl Iterator<Item = usize>, columns: impl Fn(usize) -> usize) -> Self {
+    pub(super) fn select_variants(
+        &self,
+        variants: impl Iterator<Item = usize>,
+        columns: impl Fn(usize) -> usize,
+    ) -> Self {
         let mut all = Vec::new();
         let mut starts = vec![None; self.starts.len()];
         for variant in variants {
@@ -101,23 +105,23 @@ impl Ground {
         }
         all.push(self.gram.nrows() - 1);
         let hidden = self.hidden.clone();
-        Self { gram: block(&self.gram, &all, &all), hidden, starts, variance: self.variance }
+        Self { gram: extract_block(&self.gram, &all, &all), hidden, starts, variance: self.variance }
     }
 
     /// Does the baseline leave next to nothing of this variant's law?
-    pub(super) fn hides(&self, variant: usize) -> bool {
+    pub(super) fn is_variant_hidden(&self, variant: usize) -> bool {
         self.hidden[variant]
     }
 }
 
 impl MarginalState<'_> {
     /// Does the baseline leave next to nothing of this variant's law?
-    pub(super) fn hides(&self, variant: usize) -> bool {
-        self.ground.hides(variant)
+    pub(super) fn is_variant_hidden(&self, variant: usize) -> bool {
+        self.ground.is_variant_hidden(variant)
     }
 
     /// The entry that is left.
-    fn at(&self, row: usize, column: usize) -> f64 {
+    fn compute_entry(&self, row: usize, column: usize) -> f64 {
         self.ground.gram[[row, column]] - self.reach.row(row).dot(&self.reach.row(column))
     }
 }
@@ -133,70 +137,73 @@ pub(super) struct EvidenceGain {
 
 impl Comparison<'_> {
     /// Likelihood and variance of the saturated model.
-    pub(super) fn saturated(&self, gram: &Gram) -> Saturated {
+    pub(super) fn fit_saturated_model(&self, gram: &Gram) -> Saturated {
         let last = gram.whole.nrows() - 1;
-        let free = last - self.first();
+        let free = last - self.count_fixed_columns();
         let fixed: Vec<usize> = (0..self.tangents).collect();
         let all: Vec<usize> = fixed.iter().copied().chain(self.tangents..last).collect();
-        let flat = self.flat(&gram.whole, 1e-10);
+        let flat = self.compute_flat_ridge(&gram.whole, 1e-10);
         let rows = count_to_f64(self.rows.len());
-        let (left, _) = schur(&gram.whole, &fixed, &vec![flat; fixed.len()]);
+        let (left, _) = compute_schur_complement(&gram.whole, &fixed, &vec![flat; fixed.len()]);
         let mut variance = left[[last, last]].max(f64::MIN_POSITIVE) / rows;
         let y = Array1::from_iter(all.iter().map(|index| gram.whole[[*index, last]]));
         let mut ln_likelihood = 0.0;
         for _ in 0..2 {
             let own = variance / (SATURATED * self.deviation).powi(2);
             let ridge = |index: usize| if index < self.tangents { flat } else { own };
-            let mut inner = block(&gram.whole, &all, &all);
+            let mut inner = extract_block(&gram.whole, &all, &all);
             all.iter().enumerate().for_each(|(at, index)| inner[[at, at]] += ridge(*index));
-            let factor = CholeskyFactor::of(&inner);
-            let w = factor.solve(&y);
+            let factor = CholeskyFactor::from_matrix(&inner);
+            let w = factor.solve_system(&y);
             let q = (gram.whole[[last, last]] - w.dot(&y)).max(1e-12 * gram.whole[[last, last]]);
-            let kept: f64 = factor.inverse_diagonal().iter().zip(&all).map(|(x, index)| x * ridge(*index)).sum();
+            let kept: f64 =
+                factor.compute_inverse_diagonal().iter().zip(&all).map(|(x, index)| x * ridge(*index)).sum();
             let freedom = count_to_f64(all.len()) - kept;
             let bent: f64 = all.iter().zip(&w).map(|(index, w)| ridge(*index) * w * w).sum();
             variance = (q - bent).max(1e-9 * q) / (rows - freedom).max(0.3 * rows);
             let ln_determinant = gram.noise.ln_determinant(self.rows.len(), self.blocks.len());
-            let priors = factor.ln_determinant() - count_to_f64(free + self.first() - self.tangents) * own.ln();
+            let priors =
+                factor.ln_determinant() - count_to_f64(free + self.count_fixed_columns() - self.tangents) * own.ln();
             ln_likelihood = -0.5 * self.tempering * (rows * (q / rows).ln() + ln_determinant) - 0.5 * priors;
         }
         Saturated { variance, ln_likelihood }
     }
 
     /// Likelihood of a residual by itself in a noise.
-    pub(super) fn likelihood_of(&self, residual: &[f64], noise: NoiseModel) -> f64 {
-        let white = self.whitened(residual, noise);
+    pub(super) fn compute_ln_likelihood(&self, residual: &[f64], noise: NoiseModel) -> f64 {
+        let white = self.whiten_column(residual, noise);
         let rows = count_to_f64(white.len());
         let square: f64 = white.iter().map(|x| x * x).sum();
         let ln_determinant = noise.ln_determinant(self.rows.len(), self.blocks.len());
         -0.5 * self.tempering * (rows * (square.max(f64::MIN_POSITIVE) / rows).ln() + ln_determinant)
     }
 
-    fn flat(&self, gram: &Array2<f64>, share: f64) -> f64 {
+    fn compute_flat_ridge(&self, gram: &Array2<f64>, share: f64) -> f64 {
         let trace: f64 = (0..self.tangents).map(|index| gram[[index, index]]).sum();
         share * trace / count_to_f64(self.tangents.max(1))
     }
 
     /// Evidence of the baseline alone, every run with a random level.
-    pub(super) fn empty_likelihood(&self, gram: &Gram, saturated: Saturated) -> f64 {
+    pub(super) fn compute_empty_evidence(&self, gram: &Gram, saturated: Saturated) -> f64 {
         let last = gram.whole.nrows() - 1;
-        let all: Vec<usize> = (0..self.first()).chain([last]).collect();
-        let fixed: Vec<usize> = (0..self.first()).collect();
-        let ridge = self.fixed_ridge(&gram.whole, saturated.variance);
-        let (left, ln_determinant) = schur(&block(&gram.whole, &all, &all), &fixed, &ridge);
-        let q = left[[self.first(), self.first()]].max(1e-12 * gram.whole[[last, last]]);
-        self.ln_of(gram, q, ln_determinant, &ridge)
+        let all: Vec<usize> = (0..self.count_fixed_columns()).chain([last]).collect();
+        let fixed: Vec<usize> = (0..self.count_fixed_columns()).collect();
+        let ridge = self.build_fixed_ridge(&gram.whole, saturated.variance);
+        let (left, ln_determinant) = compute_schur_complement(&extract_block(&gram.whole, &all, &all), &fixed, &ridge);
+        let q = left[[self.count_fixed_columns(), self.count_fixed_columns()]].max(1e-12 * gram.whole[[last, last]]);
+        self.compute_baseline_evidence(gram, q, ln_determinant, &ridge)
     }
 
     /// The baseline alone, every run with a random level: what every search starts from, and its evidence.
-    pub(super) fn baseline(&self, gram: &Gram, saturated: Saturated) -> (Ground, f64) {
-        let fixed: Vec<usize> = (0..self.first()).collect();
-        let ridge = self.fixed_ridge(&gram.whole, saturated.variance);
-        let (left, ln_determinant) = schur(&gram.whole, &fixed, &ridge);
+    pub(super) fn prepare_baseline(&self, gram: &Gram, saturated: Saturated) -> (Ground, f64) {
+        let fixed: Vec<usize> = (0..self.count_fixed_columns()).collect();
+        let ridge = self.build_fixed_ridge(&gram.whole, saturated.variance);
+        let (left, ln_determinant) = compute_schur_complement(&gram.whole, &fixed, &ridge);
         let last = left.nrows() - 1;
         let q = left[[last, last]].max(1e-12 * gram.whole[[last, last]]);
-        let ln = self.ln_of(gram, q, ln_determinant, &ridge);
-        let first: Vec<usize> = (0..self.bank.variants.len()).map(|variant| self.columns(variant).start).collect();
+        let ln = self.compute_baseline_evidence(gram, q, ln_determinant, &ridge);
+        let first: Vec<usize> =
+            (0..self.bank.variants.len()).map(|variant| self.variant_columns(variant).start).collect();
         let hidden = first.iter().map(|at| left[[*at, *at]] < HIDDEN * gram.whole[[*at, *at]]).collect();
         let starts = first.into_iter().map(Some).collect();
         (Ground { gram: left, hidden, starts, variance: saturated.variance }, ln)
@@ -204,95 +211,103 @@ impl Comparison<'_> {
 
     /// Evidence of a baseline that leaves this square; its tangents have no prior, so what they cost is the same for every
     /// hypothesis and left out.
-    fn ln_of(&self, gram: &Gram, left: f64, ln_determinant: f64, ridge: &[f64]) -> f64 {
+    fn compute_baseline_evidence(&self, gram: &Gram, left: f64, ln_determinant: f64, ridge: &[f64]) -> f64 {
         let rows = count_to_f64(self.rows.len());
         let noise = gram.noise.ln_determinant(self.rows.len(), self.blocks.len());
         let likelihood = -0.5 * self.tempering * (rows * (left / rows).ln() + noise);
         let levels: f64 = ridge[self.tangents..].iter().map(|ridge| ridge.ln()).sum();
-        likelihood - 0.5 * (ln_determinant - self.tangent_determinant(&gram.whole) - levels)
+        likelihood - 0.5 * (ln_determinant - self.ln_tangent_determinant(&gram.whole) - levels)
     }
 
-    pub(super) fn tangent_determinant(&self, gram: &Array2<f64>) -> f64 {
+    pub(super) fn ln_tangent_determinant(&self, gram: &Array2<f64>) -> f64 {
         let fixed: Vec<usize> = (0..self.tangents).collect();
-        let mut inner = block(gram, &fixed, &fixed);
-        let flat = self.flat(gram, FLAT);
+        let mut inner = extract_block(gram, &fixed, &fixed);
+        let flat = self.compute_flat_ridge(gram, FLAT);
         fixed.iter().for_each(|index| inner[[*index, *index]] += flat);
-        CholeskyFactor::of(&inner).ln_determinant()
+        CholeskyFactor::from_matrix(&inner).ln_determinant()
     }
 
     /// Ridges of the tangents and of the levels of the runs.
-    pub(super) fn fixed_ridge(&self, gram: &Array2<f64>, variance: f64) -> Vec<f64> {
-        let flat = self.flat(gram, FLAT).max(f64::MIN_POSITIVE);
+    pub(super) fn build_fixed_ridge(&self, gram: &Array2<f64>, variance: f64) -> Vec<f64> {
+        let flat = self.compute_flat_ridge(gram, FLAT).max(f64::MIN_POSITIVE);
         let level = variance / (RUN_LEVEL * self.size).powi(2);
-        (0..self.first()).map(|index| if index < self.tangents { flat } else { level }).collect()
+        (0..self.count_fixed_columns()).map(|index| if index < self.tangents { flat } else { level }).collect()
     }
 
     /// What a variant adds to a state.
-    pub(super) fn gain(&self, state: &MarginalState<'_>, variant: usize) -> EvidenceGain {
+    pub(super) fn compute_evidence_gain(&self, state: &MarginalState<'_>, variant: usize) -> EvidenceGain {
         let of = &self.bank.variants[variant];
-        let along = self.along(state, variant);
+        let along = self.reduce_variant_block(state, variant);
         let mut best = (0, f64::NEG_INFINITY);
         let mut all = [0.0; SIZES.len()];
         for (index, size) in SIZES.iter().enumerate() {
-            let resolved = along.resolve(self.lambda(state, *size));
-            let ln = self.ln_evidence(state, &resolved) + self.ln_sign(state, of, *size, &resolved);
-            all[index] = ln + ln_size_prior(of, index);
+            let resolved = along.solve_shifted_system(self.compute_prior_ratio(state, *size));
+            let ln =
+                self.compute_ln_evidence(state, &resolved) + self.compute_ln_sign_factor(state, of, *size, &resolved);
+            all[index] = ln + compute_ln_size_prior(of, index);
             if all[index] > best.1 {
                 best = (index, all[index]);
             }
         }
-        EvidenceGain { size: best.0, ln: ln_sum(all) }
+        EvidenceGain { size: best.0, ln: log_sum_exp(all) }
     }
 
     /// Prior variance of a size over that of the noise.
-    fn lambda(&self, state: &MarginalState<'_>, size: f64) -> f64 {
+    fn compute_prior_ratio(&self, state: &MarginalState<'_>, size: f64) -> f64 {
         (size * self.deviation).powi(2) / state.ground.variance
     }
 
     /// The block of a variant that is left, with the output, ready for every size.
-    fn along(&self, state: &MarginalState<'_>, variant: usize) -> Tridiagonal {
+    fn reduce_variant_block(&self, state: &MarginalState<'_>, variant: usize) -> Tridiagonal {
         let d = &self.bank.variants[variant].relative;
         let size = d.len();
         let Some(first) = state.ground.starts[variant] else {
-            return Tridiagonal::of(Array2::zeros((size, size)), vec![0.0; size]);
+            return Tridiagonal::reduce_matrix(Array2::zeros((size, size)), vec![0.0; size]);
         };
         let last = state.ground.gram.nrows() - 1;
         let mut inner = Array2::zeros((size, size));
         for i in 0..size {
             for j in 0..=i {
-                let x = state.at(first + i, first + j) * d[i] * d[j];
+                let x = state.compute_entry(first + i, first + j) * d[i] * d[j];
                 (inner[[i, j]], inner[[j, i]]) = (x, x);
             }
         }
-        let b = (0..size).map(|k| state.at(first + k, last) * d[k]).collect();
-        Tridiagonal::of(inner, b)
+        let b = (0..size).map(|k| state.compute_entry(first + k, last) * d[k]).collect();
+        Tridiagonal::reduce_matrix(inner, b)
     }
 
-    fn ln_evidence(&self, state: &MarginalState<'_>, resolved: &Resolved) -> f64 {
+    fn compute_ln_evidence(&self, state: &MarginalState<'_>, resolved: &Resolved) -> f64 {
         let rows = self.tempering * count_to_f64(self.rows.len());
         let left = (state.left - resolved.square).max(1e-6 * state.left);
         -0.5 * rows * (left / state.left).ln() - 0.5 * resolved.ln_determinant
     }
 
     /// Twice the probability that the law has its sign.
-    fn ln_sign(&self, state: &MarginalState<'_>, of: &Variant, size: f64, resolved: &Resolved) -> f64 {
+    fn compute_ln_sign_factor(&self, state: &MarginalState<'_>, of: &Variant, size: f64, resolved: &Resolved) -> f64 {
         if of.sign() == 0.0 {
             return 0.0;
         }
-        let lambda = self.lambda(state, size);
+        let lambda = self.compute_prior_ratio(state, size);
         let mean = lambda * resolved.first;
         let variance = lambda * resolved.first_variance * state.ground.variance / self.tempering.max(1e-3);
         (2.0 * normal_share(of.sign() * mean / (variance + 1e-300).sqrt()) + 1e-12).ln()
     }
 
     /// The evidence that a variant of exactly this size adds, its sign apart.
-    pub(super) fn gain_at(&self, state: &MarginalState<'_>, variant: usize, size: usize) -> f64 {
-        let resolved = self.along(state, variant).resolve(self.lambda(state, SIZES[size]));
-        self.ln_evidence(state, &resolved) + SIZE_PRIORS[size].ln()
+    pub(super) fn compute_gain_at_size(&self, state: &MarginalState<'_>, variant: usize, size: usize) -> f64 {
+        let resolved = self
+            .reduce_variant_block(state, variant)
+            .solve_shifted_system(self.compute_prior_ratio(state, SIZES[size]));
+        self.compute_ln_evidence(state, &resolved) + SIZE_PRIORS[size].ln()
     }
 
     /// The state once a variant of this size has been taken out as well.
-    pub(super) fn with<'g>(&self, state: &MarginalState<'g>, variant: usize, size: usize) -> MarginalState<'g> {
+    pub(super) fn condition_on_variant<'g>(
+        &self,
+        state: &MarginalState<'g>,
+        variant: usize,
+        size: usize,
+    ) -> MarginalState<'g> {
         let ground = state.ground;
         let of = &self.bank.variants[variant];
         let own = of.relative.len();
@@ -305,7 +320,7 @@ impl Comparison<'_> {
         for (index, d) in of.relative.iter().enumerate() {
             inner[[index, index]] += ground.variance / (SIZES[size] * self.deviation * d).powi(2);
         }
-        CholeskyFactor::of(&inner).forward(&mut reach);
+        CholeskyFactor::from_matrix(&inner).forward_substitute(&mut reach);
         let last = reach.column(reach.ncols() - 1);
         let left = (state.left - last.dot(&last)).max(1e-9 * state.left);
         let known = state.reach.ncols();
@@ -316,19 +331,21 @@ impl Comparison<'_> {
     }
 
     /// The part of a ground that holds these members only.
-    pub(super) fn part_of(&self, ground: &Ground, members: &[(usize, usize)]) -> Ground {
-        ground.of(members.iter().map(|(variant, _)| *variant), |variant| self.bank.variants[variant].relative.len())
+    pub(super) fn select_members(&self, ground: &Ground, members: &[(usize, usize)]) -> Ground {
+        ground.select_variants(members.iter().map(|(variant, _)| *variant), |variant| {
+            self.bank.variants[variant].relative.len()
+        })
     }
 }
 
 /// Logarithm of the prior probability of a size of a variant.
-pub(super) fn ln_size_prior(of: &Variant, size: usize) -> f64 {
+pub(super) fn compute_ln_size_prior(of: &Variant, size: usize) -> f64 {
     let too_large = SIZES[size] > 1.01 * of.largest && size > 0;
     SIZE_PRIORS[size].ln() + if too_large { TOO_LARGE } else { 0.0 }
 }
 
 /// Logarithm of a sum of exponentials.
-pub(super) fn ln_sum(all: impl IntoIterator<Item = f64> + Clone) -> f64 {
+pub(super) fn log_sum_exp(all: impl IntoIterator<Item = f64> + Clone) -> f64 {
     let top = all.clone().into_iter().fold(f64::NEG_INFINITY, f64::max);
     if top == f64::NEG_INFINITY {
         return top;
@@ -342,7 +359,7 @@ mod tests {
 
     #[test]
     fn exponentials_are_summed_without_overflow() {
-        assert!((ln_sum([1000.0, 1000.0]) - (1000.0 + 2.0_f64.ln())).abs() < 1e-12);
-        assert_eq!(ln_sum([f64::NEG_INFINITY]), f64::NEG_INFINITY);
+        assert!((log_sum_exp([1000.0, 1000.0]) - (1000.0 + 2.0_f64.ln())).abs() < 1e-12);
+        assert_eq!(log_sum_exp([f64::NEG_INFINITY]), f64::NEG_INFINITY);
     }
 }

@@ -12,57 +12,57 @@
 //!    held out only withdraw.
 //! 7. The nearest textbook law gives parameters, texts and the experiment (`told.rs`).
 
-mod algebra;
 mod answer;
-mod asked;
-mod bag;
-mod bank;
 mod contributions;
-mod decision;
+mod cross_validation;
 mod existence;
 mod families;
-mod follow;
 mod gram;
-mod hidden;
-mod inner;
+mod hidden_sequence;
 mod inputs;
-mod judge;
+mod linear_algebra;
 mod marginal;
-mod means;
 mod naming;
+mod naming_decision;
 mod noise;
+mod noise_settings;
 mod outliers;
 mod posterior;
+mod posterior_means;
+mod recursive_least_squares;
+mod report;
+mod resampling;
 mod search;
-mod second;
-mod settings;
-mod states;
-mod step;
+mod second_stage;
+mod spectral_line;
+mod step_search;
 mod textbook;
-mod told;
-mod verdict;
-mod wave;
+mod thresholds;
+mod unrecorded_states;
+mod validation;
+mod variant_bank;
+mod variant_evidence;
 
-use super::case::Case;
-use super::diagnosis::{Diagnosis, Experiment, Rows, Verdict, unit_of};
-use super::fit::{Fit, Metric, fit};
+use super::diagnosis::{Diagnosis, Experiment, Rows, Verdict, find_output_unit};
+use super::fit::{Fit, Metric, fit_parts};
 use super::model::Model;
-use super::words;
+use super::prepared_recording::Case;
+use super::summary;
 use adapters::Recording;
 use adapters::bilingual::Bilingual;
 use answer::EvidenceAnswer;
-use existence::existence;
+use existence::test_existence;
 use gram::{Comparison, ComparisonInput};
 use inputs::RecordingInputs;
-use judge::Judge;
 use naming::Naming;
 use noise::NoiseModel;
-use outliers::{Outliers, outliers};
-use posterior::{NoiseSetting, explanations};
-use search::{SetEvidence, SetSearch, priors};
-use second::SecondStage;
-use settings::{NoiseSettings, settings};
-use states::Residuals;
+use noise_settings::{NoiseSettings, select_noise_settings};
+use outliers::{Outliers, detect_outliers};
+use posterior::{NoiseSetting, rank_explanations};
+use search::{SetEvidence, SetSearch, compute_ln_priors};
+use second_stage::SecondStage;
+use unrecorded_states::Residuals;
+use validation::Judge;
 
 /// Rows below which nothing is claimed: the verdict is `cannot_tell`.
 const ROWS_MIN: usize = 40;
@@ -76,29 +76,29 @@ const BEAMS: (usize, usize) = (5, 6);
 ///
 /// # Errors
 /// Everything that makes the input unusable, with what to record instead.
-pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
+pub fn diagnose_recording(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
     let mut case = Case::new(recording, model, seed)?;
-    if let Some(needed) = case.too_little(ROWS_MIN) {
-        return Ok(cannot_tell(&case, &needed));
+    if let Some(needed) = case.describe_missing_data(ROWS_MIN) {
+        return Ok(build_undecided_diagnosis(&case, &needed));
     }
-    let fitted = case.fitted();
+    let fitted = case.list_fitted_rows();
     let recorded = case.scene.recorded_output().to_vec();
     let weigh = |column: &[f64]| -> Vec<f64> { fitted.iter().map(|row| column[*row]).collect() };
     let parts = case.parts.clone();
     let mut scene = case.scene.clone();
     let metric = Metric { recorded: &recorded, weigh: &weigh, bounded: false };
-    let Some(baseline) = fit(&mut scene, &parts, &metric) else {
+    let Some(baseline) = fit_parts(&mut scene, &parts, &metric) else {
         let needed = Bilingual::new("a model that can be fitted to this recording", "能对此记录拟合的模型");
-        return Ok(cannot_tell(&case, &needed));
+        return Ok(build_undecided_diagnosis(&case, &needed));
     };
-    let inputs = RecordingInputs::new(&scene, &case.units, &case.held, comparable(&scene, &baseline));
-    let bank = families::bank(&inputs, model);
-    let outliers = outliers(&inputs, &bank, &baseline.tangents);
+    let inputs = RecordingInputs::new(&scene, &case.units, &case.held, mark_comparable_rows(&scene, &baseline));
+    let bank = families::build_bank(&inputs, model);
+    let outliers = detect_outliers(&inputs, &bank, &baseline.tangents);
     let compared =
         ComparisonInput { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
     let first = Comparison::new(&inputs, &bank, &compared, ROWS_MAX);
-    let (answer, noise) = answer(&inputs, &first, &compared, &baseline, &outliers);
-    let report = told::EvidenceReport {
+    let (answer, noise) = infer_answer(&inputs, &first, &compared, &baseline, &outliers);
+    let report = report::EvidenceReport {
         recording,
         case: &mut case,
         inputs: &inputs,
@@ -109,16 +109,16 @@ pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagn
         recorded: &outliers.recorded,
         ordinary: outliers.ordinary,
     };
-    Ok(report.diagnosis())
+    Ok(report.into_diagnosis())
 }
 
 /// The diagnosis of a recording that does not suffice.
-fn cannot_tell(case: &Case<'_>, needed: &Bilingual) -> Diagnosis {
+fn build_undecided_diagnosis(case: &Case<'_>, needed: &Bilingual) -> Diagnosis {
     Diagnosis {
         output: case.model.output.clone(),
-        unit: unit_of(&case.model.output).to_owned(),
+        unit: find_output_unit(&case.model.output).to_owned(),
         verdict: Verdict::CannotTell,
-        summary: words::needs(needed),
+        summary: summary::describe_needs(needed),
         existence: None,
         fit: None,
         mismatch: Vec::new(),
@@ -139,14 +139,14 @@ fn cannot_tell(case: &Case<'_>, needed: &Bilingual) -> Diagnosis {
 }
 
 /// Rows with a recorded output, every input of the model and finite tangents.
-fn comparable(scene: &physics::Scene, baseline: &Fit) -> Vec<bool> {
+fn mark_comparable_rows(scene: &physics::Scene, baseline: &Fit) -> Vec<bool> {
     let finite =
         |row: usize| baseline.tangents.iter().all(|t| t[row].is_finite()) && baseline.simulated[row].is_finite();
     (0..scene.rows()).map(|row| scene.usable_rows()[row] && finite(row)).collect()
 }
 
 /// Both stages, the test, the names and the decision; and the likeliest noise.
-fn answer(
+fn infer_answer(
     inputs: &RecordingInputs<'_>,
     first: &Comparison<'_>,
     compared: &ComparisonInput<'_>,
@@ -154,10 +154,10 @@ fn answer(
     outliers: &Outliers,
 ) -> (EvidenceAnswer, NoiseModel) {
     let bank = first.bank;
-    let noises = settings(inputs, first, &outliers.left);
-    let own = priors(bank);
-    let (found, prepared) = first_stage(first, &noises, &own);
-    let mut second = SecondStage::of(inputs, bank, &own, &found);
+    let noises = select_noise_settings(inputs, first, &outliers.left);
+    let own = compute_ln_priors(bank);
+    let (found, prepared) = search_first_stage(first, &noises, &own);
+    let mut second = SecondStage::from_first_stage(inputs, bank, &own, &found);
     let residuals = Residuals { inputs, comparison: first, setting: &prepared[0], scale: &outliers.scale };
     let slow = noises.leading.last().copied().unwrap_or(NoiseModel::WHITE);
     residuals.add_states(&found, slow, &mut second);
@@ -167,26 +167,26 @@ fn answer(
         .iter()
         .map(|noise| {
             let known = prepared.iter().find(|setting| setting.gram.noise == *noise);
-            let saturated = known.map_or_else(|| noises.saturated(*noise), |known| known.saturated);
-            NoiseSetting::new(&wide, wide.gram(*noise), saturated)
+            let saturated = known.map_or_else(|| noises.find_saturated_model(*noise), |known| known.saturated);
+            NoiseSetting::new(&wide, wide.compute_gram(*noise), saturated)
         })
         .collect();
     let search = SetSearch { comparison: &wide, priors: &second.priors, beam: BEAMS.1 };
     let mut found = SetEvidence::new();
     for setting in settings.iter().filter(|setting| noises.leading.contains(&setting.gram.noise)) {
-        merge(&mut found, search.run(&setting.ground, setting.ln));
+        merge_set_evidence(&mut found, search.search_sets(&setting.ground, setting.ln));
     }
-    let plain = first.gram(NoiseModel::WHITE);
+    let plain = first.compute_gram(NoiseModel::WHITE);
     let metric = &prepared[0].gram;
     let naming = Naming::new(first, &[metric, &plain]);
-    let all = explanations(&search, &settings, &found, &second, &naming);
+    let all = rank_explanations(&search, &settings, &found, &second, &naming);
     let best = all.first();
-    let left = best.map_or_else(Vec::new, |best| wide.left_by(&settings[best.noise], &best.members));
+    let left = best.map_or_else(Vec::new, |best| wide.compute_residual(&settings[best.noise], &best.members));
     let of = prepared.iter().find(|setting| best.is_some_and(|b| setting.gram.noise == settings[b.noise].gram.noise));
     let of = of.unwrap_or(&prepared[0]);
     let named = best.filter(|best| !best.members.is_empty());
     let over_nothing = named.map_or(f64::NEG_INFINITY, |best| best.over_nothing);
-    let test = existence(first, (&of.gram, of.saturated), &own, &left, over_nothing);
+    let test = test_existence(first, (&of.gram, of.saturated), &own, &left, over_nothing);
     let judge = Judge {
         inputs,
         comparison: &wide,
@@ -197,29 +197,33 @@ fn answer(
         tangents: &baseline.tangents,
         scale: &outliers.scale,
         ordinary: outliers.ordinary,
-        first: (first, metric),
+        first_stage: (first, metric),
         test,
     };
-    let answer = judge.answer(&all);
+    let answer = judge.decide_answer(&all);
     let noise = settings[answer.noise].gram.noise;
     (answer, noise)
 }
 
 /// The search among forms as they are, for the leading noises.
-fn first_stage(first: &Comparison<'_>, noises: &NoiseSettings, priors: &[f64]) -> (SetEvidence, Vec<NoiseSetting>) {
+fn search_first_stage(
+    first: &Comparison<'_>,
+    noises: &NoiseSettings,
+    priors: &[f64],
+) -> (SetEvidence, Vec<NoiseSetting>) {
     let mut found = SetEvidence::new();
     let mut prepared = Vec::new();
     for noise in &noises.leading {
-        let gram = first.gram(*noise);
-        let setting = NoiseSetting::new(first, gram, noises.saturated(*noise));
+        let gram = first.compute_gram(*noise);
+        let setting = NoiseSetting::new(first, gram, noises.find_saturated_model(*noise));
         let search = SetSearch { comparison: first, priors, beam: BEAMS.0 };
-        merge(&mut found, search.run(&setting.ground, setting.ln));
+        merge_set_evidence(&mut found, search.search_sets(&setting.ground, setting.ln));
         prepared.push(setting);
     }
     (found, prepared)
 }
 
-fn merge(into: &mut SetEvidence, from: SetEvidence) {
+fn merge_set_evidence(into: &mut SetEvidence, from: SetEvidence) {
     for (members, ln) in from {
         let known = into.entry(members).or_insert(f64::NEG_INFINITY);
         *known = known.max(ln);

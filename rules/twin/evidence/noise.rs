@@ -30,7 +30,7 @@ impl NoiseModel {
     pub(super) const WHITE: Self = Self { share: 0.0, phi: 0.0, theta: 0.0, variance: 1.0 };
 
     /// The innovations form of this share with this correlation from row to row.
-    pub(super) fn of(share: f64, phi: f64) -> Self {
+    pub(super) fn from_share_and_phi(share: f64, phi: f64) -> Self {
         if share <= 0.0 || phi <= 0.0 {
             return Self::WHITE;
         }
@@ -46,17 +46,17 @@ impl NoiseModel {
     }
 
     /// How many samples it remembers: the correlation time of the share with a memory.
-    pub(super) fn memory(&self) -> f64 {
+    pub(super) fn correlation_rows(&self) -> f64 {
         if self.phi > 0.0 { -1.0 / self.phi.ln() } else { 0.0 }
     }
 
     /// By how much its memory makes the variance of a mean larger than that of as many independent rows.
-    pub(super) fn inflation(&self) -> f64 {
+    pub(super) fn variance_inflation(&self) -> f64 {
         1.0 + 2.0 * self.share * self.phi / (1.0 - self.phi).max(1e-6)
     }
 
     /// Every setting worth trying for blocks of this median length; of endless ones every memory.
-    pub(super) fn grid(median_block: f64, period_s: f64) -> Vec<Self> {
+    pub(super) fn build_grid(median_block: f64, period_s: f64) -> Vec<Self> {
         let longest = (median_block / 4.0).max(3.0);
         let bound = if longest.is_infinite() {
             f64::INFINITY
@@ -66,12 +66,13 @@ impl NoiseModel {
             MEMORY_MAX
         };
         let memories = MEMORIES.into_iter().filter(|memory| *memory <= longest.min(bound));
-        let settings = memories.flat_map(|memory| SHARES.map(|share| Self::of(share, (-1.0 / memory).exp())));
+        let settings =
+            memories.flat_map(|memory| SHARES.map(|share| Self::from_share_and_phi(share, (-1.0 / memory).exp())));
         std::iter::once(Self::WHITE).chain(settings).collect()
     }
 
     /// Innovations of a column, each of unit variance for noise of unit variance; the first of a block in full.
-    pub(super) fn whiten(&self, column: &mut [f64], blocks: &[Range<usize>]) {
+    pub(super) fn whiten_column(&self, column: &mut [f64], blocks: &[Range<usize>]) {
         if self.phi == 0.0 {
             return;
         }
@@ -101,9 +102,9 @@ mod tests {
 
     #[test]
     fn the_innovations_of_an_impulse_follow_the_recursion() {
-        let noise = NoiseModel::of(0.7, 0.8);
+        let noise = NoiseModel::from_share_and_phi(0.7, 0.8);
         let mut column = vec![0.0, 1.0, 0.0];
-        noise.whiten(&mut column, std::slice::from_ref(&(0..3)));
+        noise.whiten_column(&mut column, std::slice::from_ref(&(0..3)));
         let deviation = noise.variance.sqrt();
         assert!((column[1] - 1.0 / deviation).abs() < 1e-12);
         assert!((column[2] - (-0.8 - noise.theta) / deviation).abs() < 1e-12);
@@ -111,7 +112,7 @@ mod tests {
 
     #[test]
     fn no_memory_is_longer_than_a_quarter_of_a_block() {
-        let grid = NoiseModel::grid(60.0, 1.0);
+        let grid = NoiseModel::build_grid(60.0, 1.0);
         assert!(grid.iter().all(|noise| noise.phi <= (-1.0_f64 / 15.0).exp()));
         assert!(grid.len() > 8);
     }

@@ -2,9 +2,9 @@
 //!
 //! Only isolated outliers are cut: plain cutting by size would delete real effects at edges and in short events.
 
-use super::algebra::{CholeskyFactor, gram};
-use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
+use super::linear_algebra::{CholeskyFactor, compute_gram_matrix};
+use super::variant_bank::VariantBank;
 use ndarray::{Array1, Array2, ShapeBuilder};
 use numerics::statistics::{count_to_f64, median, quantile, rms, robust_deviation};
 
@@ -33,12 +33,12 @@ pub(super) struct Outliers {
 }
 
 /// Judges every row.
-pub(super) fn outliers(inputs: &RecordingInputs<'_>, bank: &VariantBank, tangents: &[Vec<f64>]) -> Outliers {
+pub(super) fn detect_outliers(inputs: &RecordingInputs<'_>, bank: &VariantBank, tangents: &[Vec<f64>]) -> Outliers {
     let recorded = inputs.scene.recorded_output();
-    let residual = inputs.column(|row| recorded[row] - inputs.simulated[row]);
-    let (left, ordinary) = wide_residual(inputs, bank, tangents, &residual);
-    let scale = scales(inputs, &left, ordinary);
-    let middle = running_median(inputs, &left);
+    let residual = inputs.build_column(|row| recorded[row] - inputs.simulated[row]);
+    let (left, ordinary) = fit_wide_model(inputs, bank, tangents, &residual);
+    let scale = estimate_noise_scales(inputs, &left, ordinary);
+    let middle = compute_running_median(inputs, &left);
     let moved = |row: usize| {
         let near = row.saturating_sub(1)..(row + 2).min(inputs.rows - 1);
         near.map(|at| (inputs.simulated[at + 1] - inputs.simulated[at]).abs()).fold(0.0, f64::max)
@@ -49,26 +49,26 @@ pub(super) fn outliers(inputs: &RecordingInputs<'_>, bank: &VariantBank, tangent
         let value = recorded[row] - left[row] + middle[row] + alone;
         if inputs.comparable[row] { value } else { inputs.simulated[row] }
     };
-    let recorded = inputs.column(law);
+    let recorded = inputs.build_column(law);
     Outliers { recorded, scale, ordinary, left }
 }
 
 /// What a ridge of smooth curves and edges leaves of the residual, and the ordinary deviation of it.
-fn wide_residual(
+fn fit_wide_model(
     inputs: &RecordingInputs<'_>,
     bank: &VariantBank,
     tangents: &[Vec<f64>],
     residual: &[f64],
 ) -> (Vec<f64>, f64) {
-    let columns = wide_columns(bank, tangents);
-    let all: Vec<usize> = inputs.taken(false).collect();
+    let columns = select_wide_columns(bank, tangents);
+    let all: Vec<usize> = inputs.fitted_rows(false).collect();
     let rows: Vec<usize> = all.iter().copied().step_by(all.len().div_ceil(ROWS_MAX).max(1)).collect();
     let mut tall = Array2::zeros((rows.len(), columns.len()).f());
     for (index, column) in columns.iter().enumerate() {
         let size = if index < tangents.len() { rms(column) + 1e-30 } else { 1.0 };
         tall.column_mut(index).iter_mut().zip(&rows).for_each(|(cell, row)| *cell = column[*row] / size);
     }
-    let gram = gram(tall.view());
+    let gram = compute_gram_matrix(tall.view());
     let output: Vec<f64> = rows.iter().map(|row| residual[*row]).collect();
     let middle =
         numerics::statistics::mean(&rows.iter().map(|row| inputs.scene.recorded_output()[*row]).collect::<Vec<_>>());
@@ -83,7 +83,7 @@ fn wide_residual(
             let own = if index < tangents.len() { 1e-8 } else { 1.0 };
             inner[[index, index]] += own * (ordinary / (0.1 * spread)).powi(2) + 1e-9 * count_to_f64(rows.len());
         }
-        w = CholeskyFactor::of(&inner).solve(&tall.t().dot(&wanted));
+        w = CholeskyFactor::from_matrix(&inner).solve_system(&tall.t().dot(&wanted));
         let fitted = tall.dot(&w);
         let left: Vec<f64> = output.iter().zip(&fitted).map(|(y, f)| y - f).collect();
         ordinary = robust_deviation(left.iter().copied()).unwrap_or(0.0) + 1e-12;
@@ -99,9 +99,11 @@ fn wide_residual(
 }
 
 /// Tangents, smooth curves and everything that acts at edges.
-fn wide_columns<'a>(bank: &'a VariantBank, tangents: &'a [Vec<f64>]) -> Vec<&'a Vec<f64>> {
+fn select_wide_columns<'a>(bank: &'a VariantBank, tangents: &'a [Vec<f64>]) -> Vec<&'a Vec<f64>> {
     let curves = bank.variants.iter().filter(|variant| {
-        variant.drawn().is_some_and(|drawn| drawn.shape == "bumps" && ["1", "cut", "direction"].contains(&drawn.times))
+        variant
+            .nameless_curve()
+            .is_some_and(|drawn| drawn.shape == "bumps" && ["1", "cut", "direction"].contains(&drawn.times))
     });
     let at_edges = bank.variants.iter().filter(|variant| variant.acts_at_edges());
     let variants = curves.take(CURVES_MAX).chain(at_edges);
@@ -109,9 +111,9 @@ fn wide_columns<'a>(bank: &'a VariantBank, tangents: &'a [Vec<f64>]) -> Vec<&'a 
 }
 
 /// Noise of each row relative to the ordinary one, by fifths of the simulated size and by the engagement.
-fn scales(inputs: &RecordingInputs<'_>, left: &[f64], ordinary: f64) -> Vec<f64> {
+fn estimate_noise_scales(inputs: &RecordingInputs<'_>, left: &[f64], ordinary: f64) -> Vec<f64> {
     let size = |row: usize| inputs.simulated[row].abs();
-    let edge = |share: f64| quantile(inputs.taken(false).map(size), share).unwrap_or(0.0);
+    let edge = |share: f64| quantile(inputs.fitted_rows(false).map(size), share).unwrap_or(0.0);
     let edges = [0.2, 0.4, 0.6, 0.8].map(edge);
     let class = |row: usize| {
         let fifth = edges.iter().filter(|edge| size(row) >= **edge).count();
@@ -119,18 +121,19 @@ fn scales(inputs: &RecordingInputs<'_>, left: &[f64], ordinary: f64) -> Vec<f64>
     };
     let mut of_class = [1.0; 10];
     for (number, scale) in of_class.iter_mut().enumerate() {
-        let own: Vec<f64> = inputs.taken(false).filter(|row| class(*row) == number).map(|row| left[row]).collect();
+        let own: Vec<f64> =
+            inputs.fitted_rows(false).filter(|row| class(*row) == number).map(|row| left[row]).collect();
         if own.len() > 60 {
             let middle = median(own.clone()).unwrap_or(0.0);
             let deviation = robust_deviation(own.iter().map(|x| x - middle)).unwrap_or(ordinary);
             *scale = (deviation / ordinary).clamp(SCALES.0, SCALES.1);
         }
     }
-    inputs.column(|row| of_class[class(row)])
+    inputs.build_column(|row| of_class[class(row)])
 }
 
-fn running_median(inputs: &RecordingInputs<'_>, values: &[f64]) -> Vec<f64> {
-    inputs.column(|row| {
+fn compute_running_median(inputs: &RecordingInputs<'_>, values: &[f64]) -> Vec<f64> {
+    inputs.build_column(|row| {
         let near = row.saturating_sub(NEIGHBOURS)..(row + NEIGHBOURS + 1).min(inputs.rows);
         median(near.map(|at| if inputs.comparable[at] { values[at] } else { 0.0 }).collect()).unwrap_or(0.0)
     })

@@ -1,11 +1,11 @@
 //! The posterior: sets of the second stage summed over the likely noises, and by what they say.
 
-use super::bag::{Bag, Candidate};
 use super::gram::{Comparison, Gram};
-use super::marginal::{Ground, Saturated, ln_sum};
+use super::marginal::{Ground, Saturated, log_sum_exp};
 use super::naming::{Claim, Naming};
+use super::resampling::{Bag, Candidate};
 use super::search::{Members, SetEvidence, SetSearch};
-use super::second::SecondStage;
+use super::second_stage::SecondStage;
 use std::collections::BTreeMap;
 
 /// Sets that are evaluated for every noise, and those whose curves are offered names.
@@ -41,15 +41,15 @@ pub(super) struct NoiseSetting {
 
 impl Comparison<'_> {
     /// What a set leaves of the output, full length.
-    pub(super) fn left_by(&self, setting: &NoiseSetting, members: &Members) -> Vec<f64> {
-        let solved = self.solve(&setting.gram.whole, setting.saturated.variance, members);
+    pub(super) fn compute_residual(&self, setting: &NoiseSetting, members: &Members) -> Vec<f64> {
+        let solved = self.solve_posterior_means(&setting.gram.whole, setting.saturated.variance, members);
         let (_, output) = self.fixed_and_output();
         let mut left = output.to_vec();
         for (index, w) in solved.tangents.iter().enumerate() {
             left.iter_mut().zip(self.tangent(index)).for_each(|(left, t)| *left -= w * t);
         }
         for ((variant, _), w) in members.iter().zip(&solved.members) {
-            let x = self.bank.contribution(&self.bank.variants[*variant], w);
+            let x = self.bank.compute_contribution(&self.bank.variants[*variant], w);
             left.iter_mut().zip(&x).for_each(|(left, x)| *left -= x);
         }
         left
@@ -59,13 +59,13 @@ impl Comparison<'_> {
 impl NoiseSetting {
     /// Prepares a noise.
     pub(super) fn new(comparison: &Comparison<'_>, gram: Gram, saturated: Saturated) -> Self {
-        let (ground, ln) = comparison.baseline(&gram, saturated);
+        let (ground, ln) = comparison.prepare_baseline(&gram, saturated);
         Self { gram, saturated, ground, ln }
     }
 }
 
 /// Every explanation, the likeliest first.
-pub(super) fn explanations(
+pub(super) fn rank_explanations(
     search: &SetSearch<'_>,
     settings: &[NoiseSetting],
     found: &SetEvidence,
@@ -82,13 +82,13 @@ pub(super) fn explanations(
     let mut evaluated: BTreeMap<Vec<usize>, Vec<EvaluatedSet>> = BTreeMap::new();
     for (number, setting) in settings.iter().enumerate() {
         for members in &top {
-            let (ln, sized) = search.evaluate(&setting.ground, setting.ln, members);
+            let (ln, sized) = search.evaluate_set(&setting.ground, setting.ln, members);
             let key = sized.iter().map(|(variant, _)| *variant).collect();
             evaluated.entry(key).or_default().push((ln, number, sized));
         }
     }
     let sets: Vec<Vec<EvaluatedSet>> = evaluated.into_values().collect();
-    let averaged = averaged(search, settings, &sets);
+    let averaged = average_set_posterior(search, settings, &sets);
     let mut all: Vec<Explanation> = sets
         .iter()
         .zip(averaged)
@@ -103,9 +103,9 @@ pub(super) fn explanations(
     for (number, explanation) in all.iter_mut().enumerate() {
         if number < OFFERED {
             let setting = &settings[explanation.noise];
-            explanation.claims = claims(search.comparison, setting, explanation, second, naming);
+            explanation.claims = find_claims(search.comparison, setting, explanation, second, naming);
         }
-        explanation.names = names(second, explanation, naming);
+        explanation.names = derive_names(second, explanation, naming);
     }
     all
 }
@@ -114,9 +114,9 @@ pub(super) fn explanations(
 type EvaluatedSet = (f64, usize, Members);
 
 /// Logarithm of the probability of each set, averaged over resamples, under the noises that hold most of it.
-fn averaged(search: &SetSearch<'_>, settings: &[NoiseSetting], sets: &[Vec<EvaluatedSet>]) -> Vec<f64> {
+fn average_set_posterior(search: &SetSearch<'_>, settings: &[NoiseSetting], sets: &[Vec<EvaluatedSet>]) -> Vec<f64> {
     let mut by_noise: Vec<(f64, usize)> = (0..settings.len())
-        .map(|noise| (ln_sum(sets.iter().flatten().filter(|of| of.1 == noise).map(|of| of.0)), noise))
+        .map(|noise| (log_sum_exp(sets.iter().flatten().filter(|of| of.1 == noise).map(|of| of.0)), noise))
         .collect();
     by_noise.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut candidates = Vec::new();
@@ -127,11 +127,11 @@ fn averaged(search: &SetSearch<'_>, settings: &[NoiseSetting], sets: &[Vec<Evalu
             candidates.extend(best.map(|best| Candidate { set, noise: *noise, members: &best.2 }));
         }
     }
-    Bag::new(search.comparison, settings, search.priors, &candidates).averaged(&candidates, sets.len())
+    Bag::new(search.comparison, settings, search.priors, &candidates).average_posterior(&candidates, sets.len())
 }
 
 /// The claims on the nameless members of a set: each by itself, then those that are left together.
-fn claims(
+fn find_claims(
     comparison: &Comparison<'_>,
     setting: &NoiseSetting,
     explanation: &Explanation,
@@ -146,13 +146,14 @@ fn claims(
     if offered.is_empty() {
         return claims;
     }
-    let solved = comparison.solve(&setting.gram.whole, setting.saturated.variance, &explanation.members);
+    let solved =
+        comparison.solve_posterior_means(&setting.gram.whole, setting.saturated.variance, &explanation.members);
     if offered.len() > 1 {
         let parts: Vec<(usize, &[f64])> = offered
             .iter()
             .filter_map(|member| source(*member).map(|of| (of, solved.members[*member].as_slice())))
             .collect();
-        if let Some(claim) = naming.one_law(&parts) {
+        if let Some(claim) = naming.find_common_law(&parts) {
             offered.iter().for_each(|member| claims[*member] = Some(claim.clone()));
             return claims;
         }
@@ -160,7 +161,7 @@ fn claims(
     let mut left = Vec::new();
     for member in offered {
         let Some(of) = source(member) else { continue };
-        claims[member] = naming.claim(&[(of, &solved.members[member])]);
+        claims[member] = naming.find_best_claim(&[(of, &solved.members[member])]);
         if claims[member].is_none() {
             left.push((member, of));
         }
@@ -168,14 +169,18 @@ fn claims(
     if left.len() > 1 {
         let parts: Vec<(usize, &[f64])> =
             left.iter().map(|(member, of)| (*of, solved.members[*member].as_slice())).collect();
-        let claim = naming.claim(&parts);
+        let claim = naming.find_best_claim(&parts);
         left.iter().for_each(|(member, _)| claims[*member] = claim.clone());
     }
     claims
 }
 
 /// The names of a set.
-pub(super) fn names(second: &SecondStage, explanation: &Explanation, naming: &Naming<'_>) -> Vec<Option<String>> {
+pub(super) fn derive_names(
+    second: &SecondStage,
+    explanation: &Explanation,
+    naming: &Naming<'_>,
+) -> Vec<Option<String>> {
     let mut names: Vec<Option<String>> = Vec::new();
     for ((variant, _), claim) in explanation.members.iter().zip(&explanation.claims) {
         match (second.bank.variants[*variant].kind(), claim) {
@@ -191,7 +196,7 @@ pub(super) fn names(second: &SecondStage, explanation: &Explanation, naming: &Na
 
 /// Explanations that say the same, the likeliest group first: their names, the logarithm of their probability together,
 /// and the likeliest of them.
-pub(super) fn grouped(all: &[Explanation]) -> Vec<Group<'_>> {
+pub(super) fn group_by_names(all: &[Explanation]) -> Vec<Group<'_>> {
     let mut by_names: BTreeMap<&Vec<Option<String>>, Vec<&Explanation>> = BTreeMap::new();
     for explanation in all {
         by_names.entry(&explanation.names).or_default().push(explanation);
@@ -200,7 +205,7 @@ pub(super) fn grouped(all: &[Explanation]) -> Vec<Group<'_>> {
         .into_iter()
         .filter_map(|(names, of)| {
             let best = of.iter().copied().max_by(|a, b| a.ln.total_cmp(&b.ln))?;
-            let ln = ln_sum(of.iter().map(|of| of.ln).collect::<Vec<_>>());
+            let ln = log_sum_exp(of.iter().map(|of| of.ln).collect::<Vec<_>>());
             let by_law = of.into_iter().filter(|of| of.claims.iter().all(Option::is_none));
             let by_law =
                 by_law.max_by(|a, b| a.ln.total_cmp(&b.ln)).filter(|_| best.claims.iter().any(Option::is_some));

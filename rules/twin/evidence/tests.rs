@@ -1,6 +1,6 @@
 //! The engine from end to end, on a slide whose simulation knows mass and viscous friction only.
 
-use super::diagnose;
+use super::diagnose_recording;
 use crate::diagnosis::Verdict;
 use crate::{Diagnosis, parse_model};
 use adapters::recording::read_csv;
@@ -37,7 +37,7 @@ fn recorded(level_n: f64) -> String {
 
 fn diagnosed(level_n: f64) -> Diagnosis {
     let recording = read_csv(recorded(level_n).as_bytes(), "t.csv").expect("readable").recording;
-    diagnose(&recording, &parse_model(MODEL).expect("fine"), 1).expect("usable")
+    diagnose_recording(&recording, &parse_model(MODEL).expect("fine"), 1).expect("usable")
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! The textbook law that comes nearest to what was found, refitted together with the baseline: its parameters mean what the
 //! catalogue says, and the extended model can be simulated.
 
-use super::decision::THRESHOLDS;
-use super::told::EvidenceReport;
-use crate::fit::{Fit, Metric, fit};
+use super::report::EvidenceReport;
+use super::thresholds::THRESHOLDS;
+use crate::fit::{Fit, Metric, fit_parts};
 use crate::model::{Parameter, Part};
 use numerics::linear::columns::least_squares;
 use physics::{Bound, Effect, Entry, Form, Scene, find_effect};
@@ -24,43 +24,43 @@ pub(super) struct Textbook {
 
 impl EvidenceReport<'_, '_> {
     /// The nearest law of the catalogue for each name but some, and all of them refitted with the baseline.
-    pub(super) fn textbook(&mut self, without: &[String]) -> Textbook {
+    pub(super) fn fit_textbook_laws(&mut self, without: &[String]) -> Textbook {
         let mut parts = self.baseline.parts.clone();
         let mut laws = Vec::new();
         for name in &self.answer.names {
             let own = self.answer.contributions.iter().find(|(known, _)| known == name && !without.contains(known));
-            let law = own.and_then(|(_, x)| self.nearest(name, x));
+            let law = own.and_then(|(_, x)| self.find_nearest_law(name, x));
             laws.push(law.as_ref().map(|(_, share)| (parts.len(), *share)));
             parts.extend(law.map(|(part, _)| part));
         }
-        let fit = if self.answer.names.is_empty() { None } else { self.refit(&parts) };
+        let fit = if self.answer.names.is_empty() { None } else { self.refit_parts(&parts) };
         Textbook { laws, fit }
     }
 
     /// The parts refitted in the metric of the likeliest noise; a shape that runs to the end of its range says nothing, and
     /// stays as it was.
-    fn refit(&mut self, parts: &[Part]) -> Option<Fit> {
-        let fitted = self.fit(parts)?;
+    fn refit_parts(&mut self, parts: &[Part]) -> Option<Fit> {
+        let fitted = self.fit_in_noise_metric(parts)?;
         let mut held = parts.to_vec();
         let mut ran_away = false;
         for (part, fitted) in held.iter_mut().zip(&fitted.parts).skip(self.baseline.parts.len()) {
             for (parameter, fitted) in part.parameters.iter_mut().zip(&fitted.parameters) {
-                if !parameter.fixed && parameter.entry == Entry::Shape && is_at_end(fitted.value, fitted.range) {
+                if !parameter.fixed && parameter.entry == Entry::Shape && is_at_limit(fitted.value, fitted.range) {
                     parameter.fixed = true;
                     ran_away = true;
                 }
             }
         }
-        if ran_away { self.fit(&held) } else { Some(fitted) }
+        if ran_away { self.fit_in_noise_metric(&held) } else { Some(fitted) }
     }
 
-    fn fit(&mut self, parts: &[Part]) -> Option<Fit> {
-        let weigh = |column: &[f64]| self.comparison.whitened(column, self.noise);
-        fit(&mut self.case.scene, parts, &Metric { recorded: self.recorded, weigh: &weigh, bounded: true })
+    fn fit_in_noise_metric(&mut self, parts: &[Part]) -> Option<Fit> {
+        let weigh = |column: &[f64]| self.comparison.whiten_column(column, self.noise);
+        fit_parts(&mut self.case.scene, parts, &Metric { recorded: self.recorded, weigh: &weigh, bounded: true })
     }
 
     /// Names that are taken back: their sizes are impossible.
-    pub(super) fn refused(&mut self, textbook: &Textbook) -> Vec<String> {
+    pub(super) fn list_refused_names(&mut self, textbook: &Textbook) -> Vec<String> {
         let mut refused = Vec::new();
         for (name, law) in self.answer.names.iter().zip(&textbook.laws) {
             let Some((place, share)) = law else { continue };
@@ -71,7 +71,7 @@ impl EvidenceReport<'_, '_> {
                 (_, Some((_, x))) if self.is_too_large(name, x) => "larger than the machine allows",
                 _ => continue,
             };
-            let sizes = part.map_or_else(String::new, sizes_of);
+            let sizes = part.map_or_else(String::new, format_parameters);
             self.answer.debug.push_str(&format!("\n{name} refused: {why} ({share:.2}){sizes}"));
             refused.push(name.clone());
         }
@@ -79,7 +79,7 @@ impl EvidenceReport<'_, '_> {
     }
 
     /// Names of curves of which the textbook law makes little: they stand beside "unknown", without its parameters.
-    pub(super) fn doubted(&mut self, textbook: &Textbook) -> Vec<String> {
+    pub(super) fn list_doubted_names(&mut self, textbook: &Textbook) -> Vec<String> {
         let makes_little = |law: &Option<(usize, f64)>| law.is_some_and(|(_, share)| share < THRESHOLDS.textbook_share);
         let names = self.answer.names.iter().zip(&textbook.laws);
         let doubted = names.filter(|(name, law)| self.answer.claimed.contains(name) && makes_little(law));
@@ -98,21 +98,21 @@ impl EvidenceReport<'_, '_> {
             (Bound::Cut(times), Some(_)) => (times, &load),
             _ => return false,
         };
-        let top = self.inputs.taken(false).map(|row| contribution[row].abs()).fold(0.0, f64::max);
-        let acting = || self.inputs.taken(false).filter(|row| contribution[*row].abs() > ACTING * top);
+        let top = self.inputs.fitted_rows(false).map(|row| contribution[row].abs()).fold(0.0, f64::max);
+        let acting = || self.inputs.fitted_rows(false).filter(|row| contribution[*row].abs() > ACTING * top);
         let square = |of: &dyn Fn(usize) -> f64| acting().map(|row| of(row).powi(2)).sum::<f64>();
         square(&|row| contribution[row]) > times * times * square(basis)
     }
 
     /// The form of a kind whose law, the baseline beside it, comes nearest to a contribution.
-    fn nearest(&self, kind: &str, contribution: &[f64]) -> Option<(Part, f64)> {
+    fn find_nearest_law(&self, kind: &str, contribution: &[f64]) -> Option<(Part, f64)> {
         let hypothesis = self.case.model.hypotheses.iter().find(|part| part.label() == kind);
         if let Some(part) = hypothesis {
             return Some((part.clone(), 1.0));
         }
         let effect = find_effect(kind)?;
         let scene = self.inputs.scene;
-        let rows: Vec<usize> = self.inputs.taken(false).collect();
+        let rows: Vec<usize> = self.inputs.fitted_rows(false).collect();
         let over = |column: &[f64]| rows.iter().map(|row| column[*row]).collect::<Vec<f64>>();
         let wanted = over(contribution);
         let tangents: Vec<Vec<f64>> = self.baseline.tangents.iter().map(|tangent| over(tangent)).collect();
@@ -126,7 +126,7 @@ impl EvidenceReport<'_, '_> {
             let solution = least_squares(&columns, &wanted);
             if best.as_ref().is_none_or(|(left, _)| solution.rss < *left) {
                 let names: Vec<&'static str> = laws.iter().map(|(name, _)| *name).collect();
-                let part = with_values(effect, scene, &form, (&names, &solution.coefficients[..own]));
+                let part = build_candidate(effect, scene, &form, (&names, &solution.coefficients[..own]));
                 best = Some((solution.rss, part));
             }
         }
@@ -138,13 +138,13 @@ impl EvidenceReport<'_, '_> {
 }
 
 /// Does a value stand at an end of its range?
-fn is_at_end(value: f64, (low, high): (f64, f64)) -> bool {
+fn is_at_limit(value: f64, (low, high): (f64, f64)) -> bool {
     let near = |end: f64| if end.is_finite() { AT_END * end.abs() } else { 0.0 };
     value <= low + near(low) || value >= high - near(high)
 }
 
 /// Parameters of a part with their ranges, for engineers.
-fn sizes_of(part: &Part) -> String {
+fn format_parameters(part: &Part) -> String {
     let of = |p: &Parameter| format!(" {} {:.4} in {:?}", p.name, p.value, p.range);
     part.parameters.iter().map(of).collect()
 }
@@ -154,20 +154,20 @@ fn is_impossible(part: &Part) -> bool {
     let own = || part.parameters.iter().filter(|p| p.entry == Entry::Linear && !p.fixed);
     let is_share = |p: &Parameter| p.range.0 >= -1.0 && p.range.1 <= 1.0;
     let is_whole = |p: &Parameter| is_share(p) && p.value.abs() > 0.5;
-    own().count() > 0 && own().all(|p| is_at_end(p.value, p.range) && !is_whole(p))
+    own().count() > 0 && own().all(|p| is_at_limit(p.value, p.range) && !is_whole(p))
 }
 
 /// A candidate with these values of its linear parameters, within what is possible.
-fn with_values(
+fn build_candidate(
     effect: &'static dyn Effect,
     scene: &Scene,
     form: &Form,
     (names, values): (&[&'static str], &[f64]),
 ) -> Part {
-    let mut part = Part::candidate(effect, form, names);
+    let mut part = Part::from_effect(effect, form, names);
     for parameter in &mut part.parameters {
         if let Some(doc) = effect.doc().find_parameter(&parameter.name) {
-            parameter.range = effect.range(scene, doc);
+            parameter.range = effect.parameter_range(scene, doc);
         }
     }
     for (name, value) in names.iter().zip(values) {

@@ -26,13 +26,13 @@ pub struct SettledSecond {
 /// Seconds that do not make a block yet, by regime and work.
 #[derive(Debug, Clone, Default)]
 pub struct Gathering {
-    open: BTreeMap<(Regime, usize), Vec<SettledSecond>>,
+    open_blocks: BTreeMap<(Regime, usize), Vec<SettledSecond>>,
 }
 
 impl Gathering {
     /// Takes a second; gives the block that it completes.
-    pub fn add(&mut self, regime: Regime, work: usize, second: SettledSecond) -> Option<WorkBlock> {
-        let open = self.open.entry((regime, work)).or_default();
+    pub fn add_second(&mut self, regime: Regime, work: usize, second: SettledSecond) -> Option<WorkBlock> {
+        let open = self.open_blocks.entry((regime, work)).or_default();
         open.retain(|kept| second.at_s - kept.at_s <= OLDEST_S);
         open.push(second);
         if open.len() < BLOCK_SECONDS {

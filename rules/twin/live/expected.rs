@@ -1,9 +1,9 @@
 //! What the model expects of the newest second, from the inputs of that second and of those before.
 
-use super::second::Row;
+use super::second_row::Row;
 use super::window::{CuttingTimes, LookBack, Window};
-use crate::model::{Model, Part, simulate};
-use crate::{bind::bind, inputs::rows_with_inputs};
+use crate::model::{Model, Part, simulate_parts};
+use crate::{bind::bind_model, inputs::mark_rows_with_inputs};
 use adapters::Absence;
 use adapters::recording::{Cells, Numbers};
 use physics::Scene;
@@ -35,7 +35,7 @@ pub enum NoTwin {
 impl NoTwin {
     /// The word in JSON and in the history.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::NotYet => "not_yet_read",
             Self::MachineOff => "machine_off",
@@ -70,7 +70,7 @@ pub struct ComparedSecond {
 impl ComparedSecond {
     /// Neither, for this reason.
     #[must_use]
-    pub fn none(reason: NoTwin) -> Self {
+    pub fn from_reason(reason: NoTwin) -> Self {
         Self { expected: Err(reason), residual: Err(reason) }
     }
 }
@@ -79,10 +79,10 @@ impl ComparedSecond {
 #[derive(Debug, Clone)]
 pub struct Simulation {
     model: Model,
-    memory: LookBack,
+    look_back: LookBack,
     window: Window,
     parts: Option<Vec<Part>>,
-    why: Option<String>,
+    failure: Option<String>,
 }
 
 impl Simulation {
@@ -90,54 +90,54 @@ impl Simulation {
     #[must_use]
     pub fn new(mut model: Model, minutes: CuttingTimes) -> Self {
         model.parts.retain(|part| !OF_THE_PAST.contains(&part.kind.as_str()));
-        let memory = model.parts.iter().map(|part| LookBack::of(&part.kind)).max().unwrap_or(LookBack::Moment);
-        Self { model, memory, window: Window::new(memory, minutes), parts: None, why: None }
+        let memory = model.parts.iter().map(|part| LookBack::from_kind(&part.kind)).max().unwrap_or(LookBack::Moment);
+        Self { model, look_back: memory, window: Window::new(memory, minutes), parts: None, failure: None }
     }
 
     /// Engaged minutes of each tool so far.
     #[must_use]
-    pub fn minutes(&self) -> &CuttingTimes {
-        self.window.minutes()
+    pub fn cutting_times(&self) -> &CuttingTimes {
+        self.window.cutting_times()
     }
 
     /// What the model lacks, in words, while it cannot be simulated.
     #[must_use]
-    pub fn why(&self) -> Option<&str> {
-        self.why.as_deref()
+    pub fn failure_reason(&self) -> Option<&str> {
+        self.failure.as_deref()
     }
 
     /// Takes a second and compares it.
-    pub fn step(&mut self, row: Row) -> ComparedSecond {
+    pub fn compare_second(&mut self, row: Row) -> ComparedSecond {
         let (off, no_output) = (row.off || row.no_output == Some(Absence::MachineOff), row.no_output);
-        let recorded = row.number(&self.model.output);
+        let recorded = row.read_number(&self.model.output);
         self.window.push(row);
         if off {
-            return ComparedSecond::none(NoTwin::MachineOff);
+            return ComparedSecond::from_reason(NoTwin::MachineOff);
         }
-        if self.memory == LookBack::Shift && self.window.span_s() < WARM_S {
-            return ComparedSecond::none(NoTwin::WarmingUp);
+        if self.look_back == LookBack::Shift && self.window.span_s() < WARM_S {
+            return ComparedSecond::from_reason(NoTwin::WarmingUp);
         }
-        let Some(expected) = self.expected() else {
-            return ComparedSecond::none(NoTwin::InputMissing);
+        let Some(expected) = self.simulate_output() else {
+            return ComparedSecond::from_reason(NoTwin::InputMissing);
         };
         let recorded = recorded.filter(|_| no_output.is_none()).ok_or(NoTwin::OutputMissing);
         ComparedSecond { expected: Ok(expected), residual: recorded.map(|recorded| recorded - expected) }
     }
 
-    fn expected(&mut self) -> Option<f64> {
-        let mut recording = self.window.recording();
+    fn simulate_output(&mut self) -> Option<f64> {
+        let mut recording = self.window.to_recording();
         if recording.find_numbers(&self.model.output).is_none() {
             recording.set_column(&self.model.output, Cells::Numbers(Numbers::default()));
         }
         let mut scene = Scene::new(&recording, &self.model.output, &self.model.roles).ok()?;
         let parts = match self.parts.take() {
             Some(parts) => parts,
-            None => bind(&self.model, &scene).map_err(|lacking| self.why = Some(lacking.join("; "))).ok()?,
+            None => bind_model(&self.model, &scene).map_err(|lacking| self.failure = Some(lacking.join("; "))).ok()?,
         };
-        let known = rows_with_inputs(&scene, &parts).last().copied().unwrap_or(false);
-        let total = simulate(&parts, &mut scene).and_then(|simulated| simulated.total.last().copied());
+        let known = mark_rows_with_inputs(&scene, &parts).last().copied().unwrap_or(false);
+        let total = simulate_parts(&parts, &mut scene).and_then(|simulated| simulated.total.last().copied());
         self.parts = Some(parts);
-        self.why = None;
+        self.failure = None;
         total.filter(|total| known && total.is_finite())
     }
 }

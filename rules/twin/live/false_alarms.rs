@@ -97,14 +97,14 @@ impl Machine {
             // Noise of a tenth of the output, so that the least band is a fifth of a deviation.
             let residual = 10.0 * (self.noise.next() + change);
             let second = SettledSecond { at_s: self.at_s, expected: 100.0, residual };
-            let notice = self.watch.step(Some((regime, work.to_owned())), speed, second);
+            let notice = self.watch.update_with_second(Some((regime, work.to_owned())), speed, second);
             noticed.extend(notice.map(|notice| (self.at_s, notice)));
         }
         noticed
     }
 }
 
-fn begins(noticed: &[(f64, Notice)]) -> impl Iterator<Item = (f64, &Mismatch)> {
+fn list_mismatches(noticed: &[(f64, Notice)]) -> impl Iterator<Item = (f64, &Mismatch)> {
     noticed.iter().filter_map(|(at_s, notice)| match notice {
         Notice::Begins(mismatch) => Some((*at_s, mismatch)),
         _ => None,
@@ -120,8 +120,8 @@ fn a_healthy_machine_is_called_different_about_once_in_thirty_days_at_most() {
         let alarms = |seed| {
             let mut machine = Machine::new(kind, seed);
             let learned = machine.run(9.0, 0.0);
-            assert!(begins(&learned).count() == 0, "{kind:?} {seed}: {learned:?}");
-            begins(&machine.run(24.0 * DAYS, 0.0)).count()
+            assert!(list_mismatches(&learned).count() == 0, "{kind:?} {seed}: {learned:?}");
+            list_mismatches(&machine.run(24.0 * DAYS, 0.0)).count()
         };
         let count: usize = (1..=MACHINES).map(alarms).sum();
         table.push((kind, count, count as f64 * 30.0 / (DAYS * MACHINES as f64)));
@@ -147,7 +147,7 @@ fn a_change_is_noticed_within_the_hour_and_its_onset_lies_in_the_interval() {
             machine.run(12.0, 0.0);
             let changed_s = machine.at_s;
             let noticed = machine.run(3.0, deviations);
-            let Some((at_s, mismatch)) = begins(&noticed).next() else { continue };
+            let Some((at_s, mismatch)) = list_mismatches(&noticed).next() else { continue };
             let onset = mismatch.onset.expect("the start was healthy");
             seen += 1;
             delay_s += at_s - changed_s;
@@ -168,17 +168,17 @@ fn a_change_is_noticed_within_the_hour_and_its_onset_lies_in_the_interval() {
 fn a_change_that_goes_away_is_taken_back() {
     let mut machine = Machine::new(Kind::White, 5);
     machine.run(12.0, 0.0);
-    assert_eq!(begins(&machine.run(1.0, 1.0)).count(), 1);
+    assert_eq!(list_mismatches(&machine.run(1.0, 1.0)).count(), 1);
     let after = machine.run(2.0, 0.0);
     assert!(after.iter().any(|(_, notice)| *notice == Notice::Ends(Regime::Cutting)), "{after:?}");
-    assert_eq!(begins(&machine.run(12.0, 0.0)).count(), 0);
+    assert_eq!(list_mismatches(&machine.run(12.0, 0.0)).count(), 0);
 }
 
 #[test]
 fn what_was_learned_survives_a_restart() {
     let mut machine = Machine::new(Kind::SlowAndWhite, 9);
     machine.run(12.0, 0.0);
-    let text = serde_json::to_string(&machine.watch.memory()).expect("plain data");
+    let text = serde_json::to_string(&machine.watch.to_state()).expect("plain data");
     machine.watch = Watch::new(serde_json::from_str(&text).expect("the same"));
-    assert_eq!(begins(&machine.run(1.0, 3.0)).count(), 1);
+    assert_eq!(list_mismatches(&machine.run(1.0, 3.0)).count(), 1);
 }

@@ -3,7 +3,7 @@
 //! Every kind of work (program, tool, operation) keeps its own usual deviation from the simulation, because a model
 //! fits one cut better than another; the noise around it is shared within the regime.
 
-use super::chart::{Healthy, Point};
+use super::control_chart::{Healthy, Point};
 use super::noise::{self, Arma, PHI_MAX};
 use numerics::statistics::{count_to_f64, robust_deviation};
 use serde::{Deserialize, Serialize};
@@ -65,8 +65,8 @@ pub struct Usual {
 
 /// Learns from blocks in the order of time. `None` when no kind of work has enough of them.
 #[must_use]
-pub fn learn(blocks: &[WorkBlock]) -> Option<Learned> {
-    let (usual, shared) = usual(blocks);
+pub fn learn_regime(blocks: &[WorkBlock]) -> Option<Learned> {
+    let (usual, shared) = compute_usual_levels(blocks);
     let known: Vec<&WorkBlock> = blocks.iter().filter(|block| usual.contains_key(&block.work)).collect();
     if known.len() < 2 * BAND_BLOCKS {
         return None;
@@ -77,13 +77,13 @@ pub fn learn(blocks: &[WorkBlock]) -> Option<Learned> {
     let nothing = Healthy { phi: 0.0, theta: 0.0, sd: 0.0, mean_variance: 0.0, band: 0.0 };
     let mut learned = Learned { healthy: nothing, usual, shared, bias, expected, blocks: known.len() };
     let deviations: Vec<f64> =
-        known.iter().filter_map(|block| learned.point(block)).map(|point| point.deviation).collect();
-    learned.healthy = healthy(&deviations, expected, count_to_f64(learned.usual.len()));
+        known.iter().filter_map(|block| learned.standardise_block(block)).map(|point| point.deviation).collect();
+    learned.healthy = fit_healthy_model(&deviations, expected, count_to_f64(learned.usual.len()));
     Some(learned)
 }
 
 /// What is usual for each kind of work that was seen often enough, and the standard deviation within all of it.
-fn usual(blocks: &[WorkBlock]) -> (BTreeMap<usize, Usual>, f64) {
+fn compute_usual_levels(blocks: &[WorkBlock]) -> (BTreeMap<usize, Usual>, f64) {
     let mut works: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     blocks.iter().for_each(|block| works.entry(block.work).or_default().push(block.residual));
     works.retain(|_, residuals| residuals.len() >= WORK_BLOCKS);
@@ -103,11 +103,11 @@ fn usual(blocks: &[WorkBlock]) -> (BTreeMap<usize, Usual>, f64) {
     (usual.collect(), shared.sqrt())
 }
 
-fn healthy(deviations: &[f64], expected: f64, works: f64) -> Healthy {
+fn fit_healthy_model(deviations: &[f64], expected: f64, works: f64) -> Healthy {
     let n = count_to_f64(deviations.len());
     let all = std::iter::once(0..deviations.len()).collect::<Vec<_>>();
-    let noise = cautious(noise::fit(deviations, &all), n);
-    let innovations = noise::whiten(deviations, &all, noise);
+    let noise = correct_memory_bias(noise::fit_arma(deviations, &all), n);
+    let innovations = noise::whiten_column(deviations, &all, noise);
     let rms = (innovations.iter().map(|e| e * e).sum::<f64>() / (n - works).max(1.0)).sqrt();
     let robust = robust_deviation(innovations.iter().copied()).unwrap_or(0.0);
     let level = deviations.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -120,20 +120,20 @@ fn healthy(deviations: &[f64], expected: f64, works: f64) -> Healthy {
         theta: noise.theta,
         sd,
         mean_variance: (sd * gain).powi(2) * works.max(1.0) / n,
-        band: band(deviations, expected, n / noise.inflation()),
+        band: compute_band(deviations, expected, n / noise.variance_inflation()),
     }
 }
 
 /// Memory as long as the data allow: short stretches make it look shorter than it is, and a memory that is believed
 /// too short turns every slow excursion into a change.
-fn cautious(noise: Arma, n: f64) -> Arma {
+fn correct_memory_bias(noise: Arma, n: f64) -> Arma {
     let Arma { phi, theta } = noise;
     let bias = (1.0 + 3.0 * phi.max(0.0)) / n;
     let error = ((1.0 - phi * phi).max(0.0) / n).sqrt();
     Arma { phi: (phi + bias + error).min(PHI_MAX), theta }
 }
 
-fn band(deviations: &[f64], expected: f64, independent: f64) -> f64 {
+fn compute_band(deviations: &[f64], expected: f64, independent: f64) -> f64 {
     let mean = |part: &[f64]| part.iter().sum::<f64>() / count_to_f64(part.len());
     let greatest = deviations.windows(BAND_BLOCKS).map(|part| mean(part).abs()).fold(0.0, f64::max);
     let factor = BAND_FACTOR * (1.0 + BAND_FEW / independent.max(BAND_FEW));
@@ -143,7 +143,7 @@ fn band(deviations: &[f64], expected: f64, independent: f64) -> f64 {
 impl Learned {
     /// A block against what is usual for its work; `None` for work that is new.
     #[must_use]
-    pub fn point(&self, block: &WorkBlock) -> Option<Point> {
+    pub fn standardise_block(&self, block: &WorkBlock) -> Option<Point> {
         let usual = self.usual.get(&block.work)?;
         let difference = block.residual - usual.mean;
         let scale = if usual.sd > 0.0 { self.shared / usual.sd } else { 1.0 };

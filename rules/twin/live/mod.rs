@@ -5,18 +5,18 @@
 //! a minute, and blocks are held against what was learned from a healthy stretch. Nothing here reads a clock.
 
 pub mod block;
-pub mod chart;
+pub mod control_chart;
 pub mod expected;
 #[cfg(test)]
 mod false_alarms;
 pub mod learn;
 pub mod noise;
 pub mod regime;
-pub mod second;
+pub mod second_row;
 pub mod watch;
 pub mod window;
 
-pub use chart::LevelChange;
+pub use control_chart::LevelChange;
 pub use expected::{ComparedSecond, NoTwin};
 pub use regime::Regime;
 pub use watch::{Mismatch, Notice, RegimeStage};
@@ -27,7 +27,7 @@ use adapters::clock::{SECOND_NS, TimeNs};
 use block::SettledSecond;
 use estimators::State;
 use expected::Simulation;
-use second::{Row, Seconds};
+use second_row::{Row, Seconds};
 use serde::{Deserialize, Serialize};
 use watch::Watch;
 use window::CuttingTimes;
@@ -42,7 +42,7 @@ pub struct LiveState {
 impl LiveState {
     /// What still holds under another model: how long the tools have cut.
     #[must_use]
-    pub fn of_the_machine(self) -> Self {
+    pub fn retain_cutting_times(self) -> Self {
         Self { minutes: self.minutes, ..Self::default() }
     }
 }
@@ -65,32 +65,32 @@ impl Live {
             seconds: Seconds::new(&model.output),
             simulation: Simulation::new(model, memory.minutes),
             watch: Watch::new(memory.watch),
-            compared: ComparedSecond::none(NoTwin::NotYet),
+            compared: ComparedSecond::from_reason(NoTwin::NotYet),
             last_ns: None,
         }
     }
 
     /// Takes a tick; gives what has been noticed. Ticks come in the order of time.
-    pub fn step(&mut self, sample: &Sample, state: State) -> Option<Notice> {
-        let row = self.seconds.add(sample, state)?;
+    pub fn update_with_sample(&mut self, sample: &Sample, state: State) -> Option<Notice> {
+        let row = self.seconds.add_sample(sample, state)?;
         let gap = self.last_ns.replace(row.at_ns).is_some_and(|last_ns| row.at_ns - last_ns > SECOND_NS);
         if gap {
-            self.watch.skip();
+            self.watch.skip_second();
         }
-        self.compare(row)
+        self.compare_row(row)
     }
 
-    fn compare(&mut self, row: Row) -> Option<Notice> {
-        let what = regime::of(&row);
-        let speed = row.number("spindle_speed_rpm").unwrap_or(0.0);
-        let at_s = seconds(row.at_ns);
-        self.compared = self.simulation.step(row);
+    fn compare_row(&mut self, row: Row) -> Option<Notice> {
+        let what = regime::classify_row(&row);
+        let speed = row.read_number("spindle_speed_rpm").unwrap_or(0.0);
+        let at_s = ns_to_seconds(row.at_ns);
+        self.compared = self.simulation.compare_second(row);
         match self.compared {
             ComparedSecond { expected: Ok(expected), residual: Ok(residual) } => {
-                self.watch.step(what, speed, SettledSecond { at_s, expected, residual })
+                self.watch.update_with_second(what, speed, SettledSecond { at_s, expected, residual })
             }
             _ => {
-                self.watch.skip();
+                self.watch.skip_second();
                 None
             }
         }
@@ -98,7 +98,7 @@ impl Live {
 
     /// The newest complete second.
     #[must_use]
-    pub fn compared(&self) -> ComparedSecond {
+    pub fn compared_second(&self) -> ComparedSecond {
         self.compared
     }
 
@@ -109,24 +109,24 @@ impl Live {
     }
 
     /// Every regime that has been seen, with its stage.
-    pub fn stages(&self) -> impl Iterator<Item = (Regime, RegimeStage)> {
-        self.watch.stages()
+    pub fn list_stages(&self) -> impl Iterator<Item = (Regime, RegimeStage)> {
+        self.watch.list_stages()
     }
 
     /// What the model lacks, in words, while it cannot be simulated.
     #[must_use]
-    pub fn why(&self) -> Option<&str> {
-        self.simulation.why()
+    pub fn failure_reason(&self) -> Option<&str> {
+        self.simulation.failure_reason()
     }
 
     /// What to remember across a restart.
     #[must_use]
-    pub fn memory(&self) -> LiveState {
-        LiveState { watch: self.watch.memory(), minutes: self.simulation.minutes().clone() }
+    pub fn to_state(&self) -> LiveState {
+        LiveState { watch: self.watch.to_state(), minutes: self.simulation.cutting_times().clone() }
     }
 }
 
-fn seconds(ns: i64) -> f64 {
+fn ns_to_seconds(ns: i64) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "a quarter of a microsecond at the present date")]
     let seconds = ns as f64 / SECOND_NS as f64;
     seconds

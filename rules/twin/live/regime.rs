@@ -1,7 +1,7 @@
 //! What the machine is doing as far as the comparison is concerned: told from the inputs alone, never from the output
 //! that is compared.
 
-use super::second::Row;
+use super::second_row::Row;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fmt;
@@ -33,7 +33,7 @@ impl Regime {
 
     /// The word in JSON.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn as_word(self) -> &'static str {
         match self {
             Self::Standby => "standby",
             Self::Idle => "idle",
@@ -44,7 +44,7 @@ impl Regime {
 
     /// As part of a sentence, English and Chinese.
     #[must_use]
-    pub fn words(self) -> (&'static str, &'static str) {
+    pub fn as_phrases(self) -> (&'static str, &'static str) {
         match self {
             Self::Standby => ("at standstill", "静止时"),
             Self::Idle => ("while idling", "空转时"),
@@ -56,21 +56,21 @@ impl Regime {
 
 impl fmt::Display for Regime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.word())
+        f.write_str(self.as_word())
     }
 }
 
 /// Regime and kind of work of a second; `None` while the machine is off or what it does is not known.
 #[must_use]
-pub fn of(row: &Row) -> Option<(Regime, String)> {
-    let number = |name: &str| row.number(name);
+pub fn classify_row(row: &Row) -> Option<(Regime, String)> {
+    let number = |name: &str| row.read_number(name);
     let rapid = number("rapid").is_some_and(|rapid| rapid > 0.0);
     if row.off || rapid {
         return None;
     }
     let speed = number("spindle_speed_rpm").or_else(|| number("spindle_programmed_rpm")).map(f64::abs);
     let feed = number("axis_velocity_mm_min").or_else(|| number("velocity_m_s")).map(f64::abs);
-    let engaged = row.engaged();
+    let engaged = row.read_engagement();
     let regime = match (speed, engaged, feed) {
         (Some(speed), Some(engaged), _) if speed > 1.0 && engaged >= 1.0 => Regime::Cutting,
         (_, Some(engaged), _) if engaged > 0.0 => return None,
@@ -79,17 +79,17 @@ pub fn of(row: &Row) -> Option<(Regime, String)> {
         (None, _, None) => return None,
         _ => Regime::Standby,
     };
-    Some((regime, work(regime, row)))
+    Some((regime, format_work_key(regime, row)))
 }
 
 /// Program, operation, tool without the number of its edge, and gear stage: what a model fits differently.
-fn work(regime: Regime, row: &Row) -> String {
-    let word = |name: &str| row.word(name).unwrap_or("");
+fn format_work_key(regime: Regime, row: &Row) -> String {
+    let word = |name: &str| row.read_word(name).unwrap_or("");
     let tool = word("tool").split('-').next().unwrap_or("");
-    let stage = row.number("gear_stage").map_or(String::new(), |stage| format!("{stage:.0}"));
+    let stage = row.read_number("gear_stage").map_or(String::new(), |stage| format!("{stage:.0}"));
     match regime {
         Regime::Cutting => format!("{}/{}/{tool}/{stage}", word("program"), word("operation")),
-        Regime::Idle => format!("{:.0}/{stage}", row.number("spindle_speed_rpm").unwrap_or(0.0) / 50.0),
+        Regime::Idle => format!("{:.0}/{stage}", row.read_number("spindle_speed_rpm").unwrap_or(0.0) / 50.0),
         Regime::Standby | Regime::Moving => String::new(),
     }
 }
@@ -111,7 +111,7 @@ impl<T: Copy> Settling<T> {
     }
 
     /// Takes a second with its speed; gives an earlier one that was settled. A gap breaks the stretch.
-    pub fn add(&mut self, what: Option<(Regime, String)>, speed: f64, second: T) -> Option<(Regime, String, T)> {
+    pub fn add_second(&mut self, what: Option<(Regime, String)>, speed: f64, second: T) -> Option<(Regime, String, T)> {
         self.held.push_back((what, speed, second));
         let length = SETTLED_BEFORE + 1 + SETTLED_AFTER;
         while self.held.len() > length {
@@ -128,7 +128,7 @@ impl<T: Copy> Settling<T> {
     }
 
     /// Something is missing in between.
-    pub fn interrupt(&mut self) {
+    pub fn reset_stretch(&mut self) {
         self.held.clear();
     }
 }

@@ -1,8 +1,8 @@
 //! Notices when machine and simulation begin to differ: learns what is usual, then holds every block against it.
 
 use super::block::{Gathering, SettledSecond};
-use super::chart::{Chart, LevelChange};
-use super::learn::{Learned, Usual, WORK_BLOCKS, WorkBlock, learn};
+use super::control_chart::{Chart, LevelChange};
+use super::learn::{Learned, Usual, WORK_BLOCKS, WorkBlock, learn_regime};
 use super::regime::{Regime, Settling};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -45,7 +45,7 @@ pub struct Mismatch {
 impl Mismatch {
     /// Difference over simulated output, %; `None` where nothing is simulated.
     #[must_use]
-    pub fn percent(&self) -> Option<f64> {
+    pub fn difference_percent(&self) -> Option<f64> {
         (self.expected.abs() > 1e-9).then(|| 100.0 * self.mean / self.expected.abs())
     }
 }
@@ -83,7 +83,7 @@ struct Watched {
     blocks: Vec<WorkBlock>,
     learned: Option<Learned>,
     chart: Option<Chart>,
-    differing: Option<Mismatch>,
+    mismatch: Option<Mismatch>,
 }
 
 /// See the [module](self).
@@ -106,7 +106,7 @@ impl Watch {
     /// Goes on from what was learned before.
     #[must_use]
     pub fn new(memory: WatchState) -> Self {
-        let regimes = memory.regimes.into_iter().map(|(regime, before)| (regime, Watched::of(before)));
+        let regimes = memory.regimes.into_iter().map(|(regime, before)| (regime, Watched::from_memory(before)));
         Self {
             settling: Settling::new(),
             gathering: Gathering::default(),
@@ -118,9 +118,9 @@ impl Watch {
 
     /// What to remember across a restart.
     #[must_use]
-    pub fn memory(&self) -> WatchState {
+    pub fn to_state(&self) -> WatchState {
         let of = |(regime, watched): (&Regime, &Watched)| {
-            let Watched { blocks, learned, differing, .. } = watched.clone();
+            let Watched { blocks, learned, mismatch: differing, .. } = watched.clone();
             (*regime, RegimeMemory { blocks, learned, differing })
         };
         WatchState {
@@ -131,26 +131,31 @@ impl Watch {
     }
 
     /// Every regime that has been seen, with its stage.
-    pub fn stages(&self) -> impl Iterator<Item = (Regime, RegimeStage)> {
+    pub fn list_stages(&self) -> impl Iterator<Item = (Regime, RegimeStage)> {
         self.regimes.iter().map(|(regime, watched)| (*regime, watched.stage()))
     }
 
     /// Takes a second without a comparison: absent inputs, machine off.
-    pub fn skip(&mut self) {
-        self.settling.interrupt();
+    pub fn skip_second(&mut self) {
+        self.settling.reset_stretch();
     }
 
     /// Takes a second with what the machine does and its speed.
-    pub fn step(&mut self, what: Option<(Regime, String)>, speed: f64, second: SettledSecond) -> Option<Notice> {
+    pub fn update_with_second(
+        &mut self,
+        what: Option<(Regime, String)>,
+        speed: f64,
+        second: SettledSecond,
+    ) -> Option<Notice> {
         self.compared_s += 1.0;
-        let (regime, work, second) = self.settling.add(what, speed, second)?;
-        let work = self.number_of(work);
-        let block = self.gathering.add(regime, work, second)?;
+        let (regime, work, second) = self.settling.add_second(what, speed, second)?;
+        let work = self.find_work_number(work);
+        let block = self.gathering.add_second(regime, work, second)?;
         let may_learn = self.compared_s >= LEARN_S;
-        self.regimes.entry(regime).or_default().step(regime, block, may_learn)
+        self.regimes.entry(regime).or_default().update_with_block(regime, block, may_learn)
     }
 
-    fn number_of(&mut self, work: String) -> usize {
+    fn find_work_number(&mut self, work: String) -> usize {
         if let Some(number) = self.works.iter().position(|known| *known == work) {
             return number;
         }
@@ -162,42 +167,42 @@ impl Watch {
 }
 
 impl Watched {
-    fn of(memory: RegimeMemory) -> Self {
+    fn from_memory(memory: RegimeMemory) -> Self {
         let chart = memory.learned.as_ref().map(|learned| Chart::new(learned.healthy));
-        Self { blocks: memory.blocks, learned: memory.learned, chart, differing: memory.differing }
+        Self { blocks: memory.blocks, learned: memory.learned, chart, mismatch: memory.differing }
     }
 
     fn stage(&self) -> RegimeStage {
-        match (&self.differing, &self.learned) {
+        match (&self.mismatch, &self.learned) {
             (Some(mismatch), _) => RegimeStage::Differing(*mismatch),
             (None, Some(learned)) => RegimeStage::Watching(learned.healthy.band),
             (None, None) => RegimeStage::Learning(self.blocks.len(), LEARN_BLOCKS),
         }
     }
 
-    fn step(&mut self, regime: Regime, block: WorkBlock, may_learn: bool) -> Option<Notice> {
+    fn update_with_block(&mut self, regime: Regime, block: WorkBlock, may_learn: bool) -> Option<Notice> {
         if self.learned.is_none() {
             self.blocks.push(block);
             let enough = self.blocks.len() >= LEARN_BLOCKS && may_learn || self.blocks.len() >= BLOCKS_MAX;
             let surplus = self.blocks.len().saturating_sub(BLOCKS_MAX);
             self.blocks.drain(..surplus);
-            return if enough { self.learn(regime) } else { None };
+            return if enough { self.finish_learning(regime) } else { None };
         }
-        let point = match self.learned.as_ref().and_then(|learned| learned.point(&block)) {
+        let point = match self.learned.as_ref().and_then(|learned| learned.standardise_block(&block)) {
             Some(point) => point,
             None => return self.learn_work(block),
         };
         let chart = self.chart.as_mut()?;
-        let found = chart.step(point);
-        match (&self.differing, found) {
-            (None, Some(onset)) => Some(self.begin(regime, onset)),
-            (Some(Mismatch { onset: Some(_), .. }), _) if chart.is_back() => self.end(regime),
+        let found = chart.update_with_point(point);
+        match (&self.mismatch, found) {
+            (None, Some(onset)) => Some(self.begin_mismatch(regime, onset)),
+            (Some(Mismatch { onset: Some(_), .. }), _) if chart.has_recovered() => self.end_mismatch(regime),
             _ => None,
         }
     }
 
-    fn learn(&mut self, regime: Regime) -> Option<Notice> {
-        let learned = learn(&self.blocks)?;
+    fn finish_learning(&mut self, regime: Regime) -> Option<Notice> {
+        let learned = learn_regime(&self.blocks)?;
         self.blocks.clear();
         self.chart = Some(Chart::new(learned.healthy));
         let (bias, expected) = (learned.bias, learned.expected);
@@ -207,7 +212,7 @@ impl Watched {
             return Some(Notice::Learned(regime));
         }
         let mismatch = Mismatch { regime, onset: None, mean: bias, expected };
-        self.differing = Some(mismatch);
+        self.mismatch = Some(mismatch);
         Some(Notice::Begins(mismatch))
     }
 
@@ -219,7 +224,7 @@ impl Watched {
         if of_work().count() < 2 * WORK_BLOCKS {
             return None;
         }
-        let differs = self.differing.filter(|mismatch| mismatch.onset.is_some()).map_or(0.0, |mismatch| mismatch.mean);
+        let differs = self.mismatch.filter(|mismatch| mismatch.onset.is_some()).map_or(0.0, |mismatch| mismatch.mean);
         let mean =
             of_work().map(|block| block.residual).sum::<f64>() / numerics::statistics::count_to_f64(2 * WORK_BLOCKS);
         self.blocks.retain(|block| block.work != work);
@@ -230,14 +235,14 @@ impl Watched {
         None
     }
 
-    fn begin(&mut self, regime: Regime, onset: LevelChange) -> Notice {
+    fn begin_mismatch(&mut self, regime: Regime, onset: LevelChange) -> Notice {
         let mismatch = Mismatch { regime, onset: Some(onset), mean: onset.mean, expected: onset.expected };
-        self.differing = Some(mismatch);
+        self.mismatch = Some(mismatch);
         Notice::Begins(mismatch)
     }
 
-    fn end(&mut self, regime: Regime) -> Option<Notice> {
-        self.differing = None;
+    fn end_mismatch(&mut self, regime: Regime) -> Option<Notice> {
+        self.mismatch = None;
         self.chart = self.learned.as_ref().map(|learned| Chart::new(learned.healthy));
         Some(Notice::Ends(regime))
     }

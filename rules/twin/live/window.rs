@@ -1,7 +1,7 @@
 //! The last rows, as a recording that a model can be simulated over: every second of the last moments and, for laws
 //! with a memory of hours, one row per half minute of the shift before them.
 
-use super::second::Row;
+use super::second_row::Row;
 use adapters::channel::{ChannelId, Kind};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::recording::{Cells, Numbers, Recording, Words};
@@ -35,7 +35,7 @@ pub enum LookBack {
 impl LookBack {
     /// How far back the law of this kind looks.
     #[must_use]
-    pub fn of(kind: &str) -> Self {
+    pub fn from_kind(kind: &str) -> Self {
         match kind {
             "bearing_warm_up"
             | "preload_growth"
@@ -56,47 +56,47 @@ pub type CuttingTimes = BTreeMap<String, (f64, TimeNs)>;
 /// See the [module](self).
 #[derive(Debug, Clone)]
 pub struct Window {
-    memory: LookBack,
+    look_back: LookBack,
     fine: VecDeque<(Row, Option<f64>)>,
     coarse: VecDeque<(Row, Option<f64>)>,
-    minutes: CuttingTimes,
+    cutting_times: CuttingTimes,
 }
 
 impl Window {
     /// An empty window; `minutes` is what the tools have cut before.
     #[must_use]
     pub fn new(memory: LookBack, minutes: CuttingTimes) -> Self {
-        Self { memory, fine: VecDeque::new(), coarse: VecDeque::new(), minutes }
+        Self { look_back: memory, fine: VecDeque::new(), coarse: VecDeque::new(), cutting_times: minutes }
     }
 
     /// Engaged minutes of each tool so far.
     #[must_use]
-    pub fn minutes(&self) -> &CuttingTimes {
-        &self.minutes
+    pub fn cutting_times(&self) -> &CuttingTimes {
+        &self.cutting_times
     }
 
     /// Seconds between the first row and the last.
     #[must_use]
     pub fn span_s(&self) -> f64 {
         let first = self.coarse.front().or(self.fine.front());
-        first.zip(self.fine.back()).map_or(0.0, |(first, last)| seconds(last.0.at_ns - first.0.at_ns))
+        first.zip(self.fine.back()).map_or(0.0, |(first, last)| ns_to_seconds(last.0.at_ns - first.0.at_ns))
     }
 
     /// Appends a second.
     pub fn push(&mut self, row: Row) {
-        let minutes = self.cut_on(&row);
+        let minutes = self.add_cutting_time(&row);
         self.fine.push_back((row, minutes));
-        let kept = if self.memory == LookBack::Moment { FINE_ROWS } else { PASS_ROWS };
+        let kept = if self.look_back == LookBack::Moment { FINE_ROWS } else { PASS_ROWS };
         while self.fine.len() > kept {
             let Some(old) = self.fine.pop_front() else { break };
-            if self.memory == LookBack::Shift {
-                self.remember(old);
+            if self.look_back == LookBack::Shift {
+                self.keep_coarse_row(old);
             }
         }
     }
 
     /// One row of every half minute is kept.
-    fn remember(&mut self, old: (Row, Option<f64>)) {
+    fn keep_coarse_row(&mut self, old: (Row, Option<f64>)) {
         let due = self.coarse.back().is_none_or(|(last, _)| old.0.at_ns - last.at_ns >= COARSE_S * SECOND_NS);
         if due {
             self.coarse.push_back(old);
@@ -105,15 +105,16 @@ impl Window {
     }
 
     /// Adds the second to the cutting time of its tool.
-    fn cut_on(&mut self, row: &Row) -> Option<f64> {
-        let engaged = row.engaged()?;
-        let step_s = self.fine.back().map_or(0.0, |(last, _)| seconds(row.at_ns - last.at_ns));
-        let tool = row.word("tool").unwrap_or("");
-        if !self.minutes.contains_key(tool) && self.minutes.len() >= TOOLS_MAX {
-            let oldest = self.minutes.iter().min_by_key(|(_, (_, used_ns))| *used_ns).map(|(tool, _)| tool.clone());
-            oldest.map(|tool| self.minutes.remove(&tool));
+    fn add_cutting_time(&mut self, row: &Row) -> Option<f64> {
+        let engaged = row.read_engagement()?;
+        let step_s = self.fine.back().map_or(0.0, |(last, _)| ns_to_seconds(row.at_ns - last.at_ns));
+        let tool = row.read_word("tool").unwrap_or("");
+        if !self.cutting_times.contains_key(tool) && self.cutting_times.len() >= TOOLS_MAX {
+            let oldest =
+                self.cutting_times.iter().min_by_key(|(_, (_, used_ns))| *used_ns).map(|(tool, _)| tool.clone());
+            oldest.map(|tool| self.cutting_times.remove(&tool));
         }
-        let entry = self.minutes.entry(tool.to_owned()).or_insert((0.0, row.at_ns));
+        let entry = self.cutting_times.entry(tool.to_owned()).or_insert((0.0, row.at_ns));
         if (0.0..=STEP_MAX_S).contains(&step_s) {
             *entry = (entry.0 + engaged * step_s / 60.0, row.at_ns);
         }
@@ -122,10 +123,10 @@ impl Window {
 
     /// The rows as a recording with every channel that had a value in any of them.
     #[must_use]
-    pub fn recording(&self) -> Recording {
+    pub fn to_recording(&self) -> Recording {
         let rows: Vec<&(Row, Option<f64>)> = self.coarse.iter().chain(&self.fine).collect();
         let start_ns = rows.first().map_or(0, |(row, _)| row.at_ns);
-        let time_s = rows.iter().map(|(row, _)| seconds(row.at_ns - start_ns)).collect();
+        let time_s = rows.iter().map(|(row, _)| ns_to_seconds(row.at_ns - start_ns)).collect();
         let mut recording = Recording::new("live", time_s, Some(start_ns));
         let number = |row: &Row, index: usize| row.numbers.get(index).copied().flatten();
         for id in ChannelId::list_all() {
@@ -141,7 +142,7 @@ impl Window {
                 recording.set_column(id.name(), Cells::Numbers(numbers));
             }
         }
-        let engaged = rows.iter().map(|(row, _)| row.engaged()).collect();
+        let engaged = rows.iter().map(|(row, _)| row.read_engagement()).collect();
         recording.set_column("engaged", Cells::Numbers(engaged));
         let minutes = rows.iter().map(|(_, minutes)| *minutes).collect();
         recording.set_column("cutting_time_min", Cells::Numbers(minutes));
@@ -149,7 +150,7 @@ impl Window {
     }
 }
 
-fn seconds(ns: i64) -> f64 {
+fn ns_to_seconds(ns: i64) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "microseconds suffice beyond a hundred days")]
     let seconds = ns as f64 / SECOND_NS as f64;
     seconds

@@ -1,31 +1,35 @@
 //! The cut: what scales with it, changes through a pass, from lot to lot, with speed or with chip thickness.
 
-use super::wear::edge_load;
-use crate::evidence::bank::{Family, Since, VariantBank};
+use super::wear::compute_edge_load;
 use crate::evidence::inputs::RecordingInputs;
+use crate::evidence::variant_bank::{Family, Since, VariantBank};
 use physics::OutputKind;
 
-const CUT: Family = Family::of("cutting_power").beside_catalogue().signed(1.0).through(&["engaged"]);
-const LOAD_LOSS: Family = Family::of("load_loss").through(&["load"]);
-const EDGE_FORCE: Family = Family::of("edge_force").signed(1.0).beside_catalogue();
-const SOFTENING: Family = Family::of("speed_softening").signed(-1.0).through(&["cutting_speed_m_min"]);
-const BUILT_UP: Family = Family::of("built_up_edge").beside_catalogue().signed(-1.0).through(&["cutting_speed_m_min"]);
-const BATCH: Family = Family::of("hardness_batch").through(&["run", "lot", "tool"]);
-const GAIN: Family = Family::of("sensor_gain").rare(-1.0);
-const TAPER: Family = Family::of("depth_taper").at_edges().through(&[
+const CUT: Family =
+    Family::from_kind("cutting_power").with_catalogue_forms().with_sign(1.0).with_channels(&["engaged"]);
+const LOAD_LOSS: Family = Family::from_kind("load_loss").with_channels(&["load"]);
+const EDGE_FORCE: Family = Family::from_kind("edge_force").with_sign(1.0).with_catalogue_forms();
+const SOFTENING: Family = Family::from_kind("speed_softening").with_sign(-1.0).with_channels(&["cutting_speed_m_min"]);
+const BUILT_UP: Family =
+    Family::from_kind("built_up_edge").with_catalogue_forms().with_sign(-1.0).with_channels(&["cutting_speed_m_min"]);
+const BATCH: Family = Family::from_kind("hardness_batch").with_channels(&["run", "lot", "tool"]);
+const GAIN: Family = Family::from_kind("sensor_gain").with_rarity(-1.0);
+const TAPER: Family = Family::from_kind("depth_taper").with_edge_action().with_channels(&[
     "axis_position_mm",
     "z_axis_position_mm",
     "position",
     "pass_progress",
 ]);
-const ENTRY: Family = Family::of("entry_exit").beside_catalogue().rare(-0.5).at_edges();
-const THINNING: Family = Family::of("chip_thinning").beside_catalogue().signed(1.0).through(&["depth_of_cut_mm"]);
-const THINNING_WIDTH: Family = Family::of("chip_thinning").beside_catalogue().rare(-0.5);
-const TIMING: Family = Family::of("engagement_timing").beside_catalogue().rare(-0.7).at_edges();
-const RECIPE: Family = Family::of("recipe_error").beside_catalogue().rare(-0.5);
-const CONSUMER: Family = Family::of("auxiliary_switch").signed(1.0);
-const COOLANT: Family = Family::of("coolant_regime").beside_catalogue();
-const OVERRIDE: Family = Family::of("override_delay").beside_catalogue().signed(1.0).rare(-2.0);
+const ENTRY: Family = Family::from_kind("entry_exit").with_catalogue_forms().with_rarity(-0.5).with_edge_action();
+const THINNING: Family =
+    Family::from_kind("chip_thinning").with_catalogue_forms().with_sign(1.0).with_channels(&["depth_of_cut_mm"]);
+const THINNING_WIDTH: Family = Family::from_kind("chip_thinning").with_catalogue_forms().with_rarity(-0.5);
+const TIMING: Family =
+    Family::from_kind("engagement_timing").with_catalogue_forms().with_rarity(-0.7).with_edge_action();
+const RECIPE: Family = Family::from_kind("recipe_error").with_catalogue_forms().with_rarity(-0.5);
+const CONSUMER: Family = Family::from_kind("auxiliary_switch").with_sign(1.0);
+const COOLANT: Family = Family::from_kind("coolant_regime").with_catalogue_forms();
+const OVERRIDE: Family = Family::from_kind("override_delay").with_catalogue_forms().with_sign(1.0).with_rarity(-2.0);
 
 /// Runs up to which each may be a lot of its own.
 const RUNS_MAX: usize = 30;
@@ -38,62 +42,65 @@ const FEW_RUNS: usize = 16;
 const SHIFTS: [usize; 5] = [1, 2, 4, 8, 15];
 
 /// The families of everything in the cut.
-pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
+pub(super) fn add_variants(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     if inputs.kind == OutputKind::Displacement {
         return;
     }
-    consumers(inputs, bank);
+    add_consumers(inputs, bank);
     if inputs.engaged.is_some() && !inputs.knows_cut {
-        bank.of(CUT, "engaged").column(inputs, inputs.column(|row| inputs.cutting(row)));
+        bank.begin_variant(CUT, "engaged").add_column(inputs, inputs.build_column(|row| inputs.cut_indicator(row)));
     }
     let Some(cut) = &inputs.cut else { return };
     if inputs.knows_cut {
-        let power = |exponent: i32| inputs.column(|row| cut[row].powi(exponent));
-        bank.of(LOAD_LOSS, "").columns(inputs, [(power(2), 1.0), (power(3), 0.2)]);
+        let power = |exponent: i32| inputs.build_column(|row| cut[row].powi(exponent));
+        bank.begin_variant(LOAD_LOSS, "").add_columns(inputs, [(power(2), 1.0), (power(3), 0.2)]);
     }
-    if let Some(edge) = edge_load(inputs) {
-        bank.of(EDGE_FORCE, "").column(inputs, edge);
+    if let Some(edge) = compute_edge_load(inputs) {
+        bank.begin_variant(EDGE_FORCE, "").add_column(inputs, edge);
     }
-    over_speed(inputs, cut, bank);
-    steps(inputs, cut, bank);
-    recipes(inputs, cut, bank);
+    add_speed_laws(inputs, cut, bank);
+    add_steps(inputs, cut, bank);
+    add_recipes(inputs, cut, bank);
     if inputs.engaged.is_some() {
-        through_a_pass(inputs, cut, bank);
-        thin_chips(inputs, cut, bank);
-        edges_of_the_flag(inputs, cut, bank);
+        add_pass_laws(inputs, cut, bank);
+        add_chip_thinning(inputs, cut, bank);
+        add_timing_errors(inputs, cut, bank);
     }
 }
 
-fn over_speed(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
+fn add_speed_laws(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     let Some(speed) = &inputs.cutting_speed else { return };
-    let ln = inputs.column(|row| inputs.cutting(row) * speed[row].max(1.0).ln());
-    let middle = inputs.mean_of(&ln, true);
-    let spread = inputs.deviation_of(&ln, true);
+    let ln = inputs.build_column(|row| inputs.cut_indicator(row) * speed[row].max(1.0).ln());
+    let middle = inputs.compute_mean(&ln, true);
+    let spread = inputs.compute_deviation(&ln, true);
     if spread > 0.02 {
-        let over = |row: usize| inputs.cutting(row) * (ln[row] - middle);
-        let linear = inputs.column(|row| cut[row] * over(row));
-        let bent = inputs.column(|row| cut[row] * (over(row).powi(2) - spread * spread) * inputs.cutting(row));
-        bank.of(SOFTENING, "").columns(inputs, [(linear, 1.0), (bent, 0.3)]);
+        let over = |row: usize| inputs.cut_indicator(row) * (ln[row] - middle);
+        let linear = inputs.build_column(|row| cut[row] * over(row));
+        let bent =
+            inputs.build_column(|row| cut[row] * (over(row).powi(2) - spread * spread) * inputs.cut_indicator(row));
+        bank.begin_variant(SOFTENING, "").add_columns(inputs, [(linear, 1.0), (bent, 0.3)]);
     }
     for (centre, width) in [(25.0_f64, 10.0_f64), (35.0, 12.0), (45.0, 15.0), (60.0, 15.0), (80.0, 20.0)] {
-        let law = inputs.column(|row| cut[row] * (-0.5 * ((speed[row] - centre) / width).powi(2)).exp());
-        bank.of(BUILT_UP, centre).column(inputs, law);
+        let law = inputs.build_column(|row| cut[row] * (-0.5 * ((speed[row] - centre) / width).powi(2)).exp());
+        bank.begin_variant(BUILT_UP, centre).add_column(inputs, law);
     }
 }
 
 /// Levels of the cut, or of the whole output, that begin with a run or within a long one.
-fn steps(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
+fn add_steps(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     if let Some(lots) = inputs.scene.text_column("lot")
         && (2..=12).contains(&lots.words().len())
     {
         let codes: Vec<usize> =
             (0..inputs.rows).map(|row| lots.find_code(row).map_or(usize::MAX, |code| code as usize)).collect();
-        let (_, columns) = inputs.of_members(&codes, cut);
-        bank.of(BATCH, "lot").columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
+        let (_, columns) = inputs.build_member_columns(&codes, cut);
+        bank.begin_variant(BATCH, "lot").add_columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
     }
-    let (known, columns) = inputs.of_members(&inputs.run, cut);
+    let (known, columns) = inputs.build_member_columns(&inputs.run, cut);
     if (3..=RUNS_MAX).contains(&known) {
-        bank.of(BATCH, "runs").prior(-0.5).columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
+        bank.begin_variant(BATCH, "runs")
+            .with_ln_prior(-0.5)
+            .add_columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
     }
     let runs = inputs.scene.runs();
     let is_fitted = |run: &usize| runs[*run].clone().any(|row| inputs.fitted[row]);
@@ -102,13 +109,20 @@ fn steps(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     if size > STEPS_MAX {
         first = (0..STEPS_MAX).map(|k| first[k * (size - 1) / (STEPS_MAX - 1)]).collect();
     }
-    let from = |values: &[f64], start: usize| inputs.column(|row| if row >= start { values[row] } else { 0.0 });
+    let from = |values: &[f64], start: usize| inputs.build_column(|row| if row >= start { values[row] } else { 0.0 });
     for run in first {
         let start = runs[run].start;
         let since = Since::Run(run);
-        bank.of(BATCH, format!("run {run}")).up_to(0.35).since(since).column(inputs, from(cut, start));
+        bank.begin_variant(BATCH, format!("run {run}"))
+            .with_largest_size(0.35)
+            .with_onset(since)
+            .add_column(inputs, from(cut, start));
         let gain = from(&inputs.simulated, start);
-        bank.of(GAIN, format!("run {run}")).prior(-1.5).up_to(0.2).since(since).column(inputs, gain);
+        bank.begin_variant(GAIN, format!("run {run}"))
+            .with_ln_prior(-1.5)
+            .with_largest_size(0.2)
+            .with_onset(since)
+            .add_column(inputs, gain);
     }
     if inputs.rows / runs.len().max(1) <= LONG_RUN || runs.len() > FEW_RUNS {
         return;
@@ -117,50 +131,61 @@ fn steps(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
         for start in [1, 2, 3].map(|quarter| run.start + run.len() * quarter / 4) {
             let since = Since::Row(start);
             let label = format!("row {start}");
-            bank.of(BATCH, &label).prior(-0.5).up_to(0.35).since(since).column(inputs, from(cut, start));
+            bank.begin_variant(BATCH, &label)
+                .with_ln_prior(-0.5)
+                .with_largest_size(0.35)
+                .with_onset(since)
+                .add_column(inputs, from(cut, start));
             let gain = from(&inputs.simulated, start);
-            bank.of(GAIN, &label).prior(-1.0).up_to(0.2).since(since).column(inputs, gain);
+            bank.begin_variant(GAIN, &label)
+                .with_ln_prior(-1.0)
+                .with_largest_size(0.2)
+                .with_onset(since)
+                .add_column(inputs, gain);
         }
     }
 }
 
 /// Legendre polynomials of the first to the third order over 0 to 1.
-fn legendre(u: f64) -> [f64; 3] {
+fn evaluate_legendre(u: f64) -> [f64; 3] {
     [2.0 * u - 1.0, 6.0 * u * u - 6.0 * u + 1.0, 20.0 * u.powi(3) - 30.0 * u * u + 12.0 * u - 1.0]
 }
 
-fn through_a_pass(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
-    let order =
-        |u: &dyn Fn(usize) -> f64, k: usize| inputs.column(|row| cut[row] * inputs.cutting(row) * legendre(u(row))[k]);
+fn add_pass_laws(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
+    let order = |u: &dyn Fn(usize) -> f64, k: usize| {
+        inputs.build_column(|row| cut[row] * inputs.cut_indicator(row) * evaluate_legendre(u(row))[k])
+    };
     let along = |row: usize| inputs.progress[row];
     let columns = [(order(&along, 0), 1.0), (order(&along, 1), 0.5), (order(&along, 2), 0.35)];
-    bank.of(TAPER, "progress").columns(inputs, columns);
+    bank.begin_variant(TAPER, "progress").add_columns(inputs, columns);
     if let Some(position) = &inputs.position {
-        let known = inputs.sorted(position, true);
+        let known = inputs.sort_fitted_values(position, true);
         if let (Some(low), Some(high)) = (known.first(), known.last())
             && high > low
         {
             let at = |row: usize| ((position[row] - low) / (high - low)).clamp(0.0, 1.0);
             let columns = [(order(&at, 0), 1.0), (order(&at, 1), 0.6), (order(&at, 2), 0.4)];
-            bank.of(TAPER, "position").columns(inputs, columns);
+            bank.begin_variant(TAPER, "position").add_columns(inputs, columns);
         }
     }
     for tau_s in [0.5, 1.0, 2.0, 4.0].into_iter().filter(|tau_s| *tau_s >= 0.5 * inputs.period_s) {
         let fading = |since: &[f64]| {
-            inputs.column(|row| cut[row] * inputs.cutting(row) * (-(since[row] + 0.5 * inputs.period_s) / tau_s).exp())
+            inputs.build_column(|row| {
+                cut[row] * inputs.cut_indicator(row) * (-(since[row] + 0.5 * inputs.period_s) / tau_s).exp()
+            })
         };
         let columns = [(fading(&inputs.since_s), 1.0), (fading(&inputs.to_end_s), 1.0)];
-        bank.of(ENTRY, tau_s).columns(inputs, columns);
+        bank.begin_variant(ENTRY, tau_s).add_columns(inputs, columns);
     }
 }
 
-fn thin_chips(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
+fn add_chip_thinning(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     if let Some(depth) = &inputs.depth {
         for radius in [0.4, 0.8, 1.2] {
-            let below = inputs.taken(true).filter(|row| depth[*row] < radius).count();
-            if below > 20 && inputs.taken(true).count() > below + 20 {
-                let law = inputs.column(|row| cut[row] * (1.0 - depth[row] / radius).max(0.0));
-                bank.of(THINNING, radius).column(inputs, law);
+            let below = inputs.fitted_rows(true).filter(|row| depth[*row] < radius).count();
+            if below > 20 && inputs.fitted_rows(true).count() > below + 20 {
+                let law = inputs.build_column(|row| cut[row] * (1.0 - depth[row] / radius).max(0.0));
+                bank.begin_variant(THINNING, radius).add_column(inputs, law);
             }
         }
     }
@@ -169,32 +194,32 @@ fn thin_chips(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank)
             let q = (width[row] / diameter[row].max(0.1)).clamp(0.0, 1.0);
             if q < 0.5 { 1.0 - 2.0 * (q * (1.0 - q)).max(0.0).sqrt() } else { 0.0 }
         };
-        bank.of(THINNING_WIDTH, "width").column(inputs, inputs.column(|row| cut[row] * thin(row)));
+        bank.begin_variant(THINNING_WIDTH, "width").add_column(inputs, inputs.build_column(|row| cut[row] * thin(row)));
     }
 }
 
 /// The cut where a flag that is so many rows late or early would have it, less what is simulated.
-fn edges_of_the_flag(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
+fn add_timing_errors(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     for shift in SHIFTS {
         for late in [true, false] {
             let at = |row: usize| {
                 let other = if late { row.checked_sub(shift) } else { Some(row + shift).filter(|r| *r < inputs.rows) };
                 other.filter(|other| inputs.run[*other] == inputs.run[row]).unwrap_or(row)
             };
-            let held = last_in_cut(inputs, cut, late);
+            let held = hold_last_cut(inputs, cut, late);
             let law = |row: usize| match (inputs.in_cut[at(row)], inputs.in_cut[row]) {
                 (true, false) => held[row],
                 (false, true) => -cut[row],
                 _ => 0.0,
             };
             let label = format!("{shift} rows {}", if late { "late" } else { "early" });
-            bank.of(TIMING, label).column(inputs, inputs.column(law));
+            bank.begin_variant(TIMING, label).add_column(inputs, inputs.build_column(law));
         }
     }
 }
 
 /// The cut, outside of it as it was at its end (or will be at its start), twenty rows at most.
-fn last_in_cut(inputs: &RecordingInputs<'_>, cut: &[f64], behind: bool) -> Vec<f64> {
+fn hold_last_cut(inputs: &RecordingInputs<'_>, cut: &[f64], behind: bool) -> Vec<f64> {
     let mut held = vec![0.0; inputs.rows];
     let (mut last, mut since) = (0.0, usize::MAX);
     let mut take = |row: usize| {
@@ -214,7 +239,7 @@ fn last_in_cut(inputs: &RecordingInputs<'_>, cut: &[f64], behind: bool) -> Vec<f
 }
 
 /// Whatever is told by a word of the recording: an operation whose recipe is wrong, or that runs a consumer.
-fn recipes(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
+fn add_recipes(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     for column in ["operation", "program"] {
         let Some(words) = inputs.scene.text_column(column).filter(|words| (3..=25).contains(&words.words().len()))
         else {
@@ -222,23 +247,23 @@ fn recipes(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
         };
         for (code, word) in words.words().iter().enumerate() {
             let here = |row: usize| f64::from(u8::from(words.find_code(row).is_some_and(|at| at as usize == code)));
-            let law = inputs.column(|row| cut[row] * inputs.cutting(row) * here(row));
-            bank.of(RECIPE, format!("{column} {word}")).up_to(0.5).column(inputs, law);
+            let law = inputs.build_column(|row| cut[row] * inputs.cut_indicator(row) * here(row));
+            bank.begin_variant(RECIPE, format!("{column} {word}")).with_largest_size(0.5).add_column(inputs, law);
         }
     }
     if let Some(coolant) = inputs.scene.column("coolant_on")
-        && cuts_dry(inputs, cut, coolant)
+        && has_dry_cutting(inputs, cut, coolant)
     {
-        bank.of(COOLANT, "recorded").column(inputs, inputs.column(|row| cut[row] * coolant[row]));
+        bank.begin_variant(COOLANT, "recorded").add_column(inputs, inputs.build_column(|row| cut[row] * coolant[row]));
     }
     if inputs.scene.column("feed_mm_min").is_some() && inputs.engaged.is_some() && inputs.knows_cut {
         for rows in [1, 2, 4] {
-            let late = inputs.lagged(cut, f64::from(rows) * inputs.period_s);
+            let late = inputs.delay_values(cut, f64::from(rows) * inputs.period_s);
             let law = |row: usize| {
                 let before = row.checked_sub(rows as usize).is_some_and(|before| inputs.in_cut[before]);
                 if inputs.in_cut[row] && before { late[row] - cut[row] } else { 0.0 }
             };
-            bank.of(OVERRIDE, rows).column(inputs, inputs.column(law));
+            bank.begin_variant(OVERRIDE, rows).add_column(inputs, inputs.build_column(law));
         }
     }
 }
@@ -248,8 +273,8 @@ fn recipes(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
 const DRY_MIN: f64 = 0.01;
 
 /// Is there cutting without coolant, so that its factor can be told from one of every cut?
-fn cuts_dry(inputs: &RecordingInputs<'_>, cut: &[f64], coolant: &[f64]) -> bool {
-    let known = inputs.taken(false).filter(|row| coolant[*row].is_finite());
+fn has_dry_cutting(inputs: &RecordingInputs<'_>, cut: &[f64], coolant: &[f64]) -> bool {
+    let known = inputs.fitted_rows(false).filter(|row| coolant[*row].is_finite());
     let (dry, whole) = known.fold((0.0, 0.0), |(dry, whole), row| {
         (dry + (cut[row] * (1.0 - coolant[row])).powi(2), whole + cut[row].powi(2))
     });
@@ -257,12 +282,12 @@ fn cuts_dry(inputs: &RecordingInputs<'_>, cut: &[f64], coolant: &[f64]) -> bool 
 }
 
 /// Consumers that a flag of the recording tells; what a word of an operation tells has a level without a name.
-fn consumers(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
+fn add_consumers(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     for column in ["coolant_on", "hydraulics_on"] {
         if let Some(flag) = inputs.scene.column(column)
-            && inputs.deviation_of(flag, false) > 0.0
+            && inputs.compute_deviation(flag, false) > 0.0
         {
-            bank.of(CONSUMER, column).column(inputs, flag.to_vec());
+            bank.begin_variant(CONSUMER, column).add_column(inputs, flag.to_vec());
         }
     }
 }

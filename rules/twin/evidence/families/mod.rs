@@ -10,35 +10,35 @@ mod drive;
 mod measurement;
 mod nameless;
 mod spindle;
+pub(super) mod spindle_tones;
 mod thermal;
-pub(super) mod waves;
 mod wear;
 
-use super::bank::VariantBank;
 use super::inputs::RecordingInputs;
-use crate::candidates::{shifts_time_in_vain, wanted};
+use super::variant_bank::VariantBank;
+use crate::candidates::{is_candidate_effect, is_time_shift_trivial};
 use crate::model::Model;
 use physics::find_effect;
 
 /// Every variant that this recording can tell anything about.
-pub(super) fn bank(inputs: &RecordingInputs<'_>, model: &Model) -> VariantBank {
+pub(super) fn build_bank(inputs: &RecordingInputs<'_>, model: &Model) -> VariantBank {
     let mut bank = VariantBank::default();
-    spindle::add(inputs, &mut bank);
-    drive::add(inputs, &mut bank);
-    axis::add(inputs, &mut bank);
-    cutting::add(inputs, &mut bank);
-    wear::add(inputs, &mut bank);
-    measurement::add(inputs, &mut bank);
-    thermal::add(inputs, &mut bank);
-    waves::add(inputs, &mut bank);
-    catalogue::add(inputs, &mut bank);
-    let in_vain = shifts_time_in_vain(model, inputs.scene);
+    spindle::add_variants(inputs, &mut bank);
+    drive::add_variants(inputs, &mut bank);
+    axis::add_variants(inputs, &mut bank);
+    cutting::add_variants(inputs, &mut bank);
+    wear::add_variants(inputs, &mut bank);
+    measurement::add_variants(inputs, &mut bank);
+    thermal::add_variants(inputs, &mut bank);
+    spindle_tones::add_variants(inputs, &mut bank);
+    catalogue::add_variants(inputs, &mut bank);
+    let in_vain = is_time_shift_trivial(model, inputs.scene);
     bank.variants.retain(|variant| {
         let Some(kind) = variant.kind() else { return true };
         let vain = in_vain && ["clock_lag", "meter_window"].contains(&kind);
-        !vain && find_effect(kind).is_none_or(|effect| wanted(effect, model))
+        !vain && find_effect(kind).is_none_or(|effect| is_candidate_effect(effect, model))
     });
-    catalogue::hypotheses(inputs, model, &mut bank);
-    nameless::add(inputs, model, &mut bank);
+    catalogue::add_hypotheses(inputs, model, &mut bank);
+    nameless::add_variants(inputs, model, &mut bank);
     bank
 }

@@ -4,8 +4,8 @@
 //! a named family (`naming.rs`).
 
 use super::drive::is_drive;
-use crate::evidence::bank::{Drawn, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use crate::evidence::variant_bank::{Drawn, VariantBank};
 use crate::model::Model;
 use adapters::channel::quantity::Quantity;
 use physics::OutputKind;
@@ -50,13 +50,14 @@ struct Channel {
 }
 
 /// Adds every nameless curve.
-pub(super) fn add(inputs: &RecordingInputs<'_>, model: &Model, bank: &mut VariantBank) {
-    let carriers = carriers(inputs);
-    for channel in channels(inputs, model) {
+pub(super) fn add_variants(inputs: &RecordingInputs<'_>, model: &Model, bank: &mut VariantBank) {
+    let carriers = build_carriers(inputs);
+    for channel in list_channels(inputs, model) {
         let cut_only = OF_THE_CUT.contains(&channel.name.as_str());
         let in_cut = cut_only && inputs.engaged.is_some();
-        let coarse = bumps(inputs, &channel.values, in_cut, BUMPS);
-        let fine = if channel.fine { bumps(inputs, &channel.values, in_cut, FINE_BUMPS) } else { Vec::new() };
+        let coarse = build_bump_basis(inputs, &channel.values, in_cut, BUMPS);
+        let fine =
+            if channel.fine { build_bump_basis(inputs, &channel.values, in_cut, FINE_BUMPS) } else { Vec::new() };
         for carrier in &carriers {
             let drawn = |shape: &'static str| Drawn { over: channel.name.clone(), times: carrier.name, shape };
             let cuts = carrier.name == "cut" || carrier.name == "engaged";
@@ -71,18 +72,18 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, model: &Model, bank: &mut Varian
             let slow = channel.name == "time" || Quantity::from_column_name(&channel.name) == Quantity::Temperature;
             let skipped = carrier.name == "1" && alone
                 || carrier.name == "speed" && !slow
-                || carrier.name == "engaged" && inputs.knows_cut && !tells_in_cut(&channel.name);
+                || carrier.name == "engaged" && inputs.knows_cut && !allows_cut_offset(&channel.name);
             if !skipped && !coarse.is_empty() {
                 add_curve(inputs, bank, drawn("bumps"), &coarse, carrier);
             }
         }
     }
-    levels(inputs, &carriers, bank);
-    waves(inputs, bank);
+    add_levels(inputs, &carriers, bank);
+    add_waves(inputs, bank);
 }
 
 /// Channels over which something may stand in the cut that does not grow with it.
-fn tells_in_cut(name: &str) -> bool {
+fn allows_cut_offset(name: &str) -> bool {
     let speeds = ["spindle_speed_rpm", "cutting_speed_m_min", "feed_per_rev_mm", "depth_of_cut_mm"];
     speeds.contains(&name) || ["tool_age", "torque"].contains(&name)
 }
@@ -94,15 +95,15 @@ fn add_curve(
     curve: &[Vec<f64>],
     carrier: &Carrier,
 ) {
-    let columns = curve.iter().map(|bump| (inputs.column(|row| bump[row] * carrier.values[row]), 1.0));
-    bank.nameless(drawn).sized().columns(inputs, columns);
+    let columns = curve.iter().map(|bump| (inputs.build_column(|row| bump[row] * carrier.values[row]), 1.0));
+    bank.begin_nameless_curve(drawn).with_given_size().add_columns(inputs, columns);
 }
 
 /// Every carrier at unit size where it acts.
-fn carriers(inputs: &RecordingInputs<'_>) -> Vec<Carrier> {
+fn build_carriers(inputs: &RecordingInputs<'_>) -> Vec<Carrier> {
     let mut all = vec![Carrier { name: "1", values: vec![1.0; inputs.rows] }];
     if inputs.engaged.is_some() {
-        all.push(Carrier { name: "engaged", values: inputs.column(|row| inputs.cutting(row)) });
+        all.push(Carrier { name: "engaged", values: inputs.build_column(|row| inputs.cut_indicator(row)) });
     }
     if let Some(cut) = inputs.cut.as_ref().filter(|_| inputs.knows_cut) {
         all.push(Carrier { name: "cut", values: cut.clone() });
@@ -117,14 +118,15 @@ fn carriers(inputs: &RecordingInputs<'_>) -> Vec<Carrier> {
         all.push(Carrier { name: "speed", values: speed.clone() });
     }
     for carrier in &mut all {
-        let acting: Vec<f64> = inputs.taken(false).map(|row| carrier.values[row]).filter(|x| x.abs() > 1e-9).collect();
+        let acting: Vec<f64> =
+            inputs.fitted_rows(false).map(|row| carrier.values[row]).filter(|x| x.abs() > 1e-9).collect();
         let size = numerics::statistics::rms(&acting).max(f64::MIN_POSITIVE);
         carrier.values.iter_mut().for_each(|x| *x /= size);
     }
     all
 }
 
-fn channels(inputs: &RecordingInputs<'_>, model: &Model) -> Vec<Channel> {
+fn list_channels(inputs: &RecordingInputs<'_>, model: &Model) -> Vec<Channel> {
     let scene = inputs.scene;
     let read: Vec<&str> = model.parts.iter().flat_map(|part| part.inputs()).collect();
     let is_input = |name: &str| {
@@ -134,8 +136,8 @@ fn channels(inputs: &RecordingInputs<'_>, model: &Model) -> Vec<Channel> {
     };
     let mut all: Vec<Channel> = Vec::new();
     let mut add = |name: &str, values: Vec<f64>, fine: bool| {
-        let spread = inputs.deviation_of(&values, false);
-        let size = inputs.mean_of(&values, false).abs() + 1.0;
+        let spread = inputs.compute_deviation(&values, false);
+        let size = inputs.compute_mean(&values, false).abs() + 1.0;
         if spread > 1e-9 * size && !all.iter().any(|known| known.name == name) {
             all.push(Channel { name: name.to_owned(), values, fine });
         }
@@ -152,22 +154,25 @@ fn channels(inputs: &RecordingInputs<'_>, model: &Model) -> Vec<Channel> {
     if let Some(cut) = inputs.cut.as_ref().filter(|_| inputs.knows_cut) {
         add("load", cut.clone(), false);
         if let Some(speed) = &inputs.speed {
-            add("torque", inputs.column(|row| cut[row] / speed[row].max(30.0)), false);
+            add("torque", inputs.build_column(|row| cut[row] / speed[row].max(30.0)), false);
         }
     }
     all
 }
 
 /// Gaussian bumps on knots between the quantiles and an even spacing; levels where a channel has three values or fewer.
-fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usize) -> Vec<Vec<f64>> {
-    let sorted = inputs.sorted(values, in_cut);
+fn build_bump_basis(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usize) -> Vec<Vec<f64>> {
+    let sorted = inputs.sort_fitted_values(values, in_cut);
     let mut distinct = sorted.clone();
     distinct.dedup();
     if distinct.len() < 2 {
         return Vec::new();
     }
     if distinct.len() <= 3 {
-        return distinct[1..].iter().map(|x| inputs.column(|row| f64::from(u8::from(values[row] == *x)))).collect();
+        return distinct[1..]
+            .iter()
+            .map(|x| inputs.build_column(|row| f64::from(u8::from(values[row] == *x))))
+            .collect();
     }
     let last = sorted.len() - 1;
     let at = |share: f64| {
@@ -201,27 +206,27 @@ fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usi
     (0..size)
         .map(|k| {
             let (centre, width) = (knots[k], width(k));
-            inputs.column(|row| (-0.5 * ((values[row] - centre) / width).powi(2)).exp())
+            inputs.build_column(|row| (-0.5 * ((values[row] - centre) / width).powi(2)).exp())
         })
         .collect()
 }
 
-fn levels(inputs: &RecordingInputs<'_>, carriers: &[Carrier], bank: &mut VariantBank) {
+fn add_levels(inputs: &RecordingInputs<'_>, carriers: &[Carrier], bank: &mut VariantBank) {
     for group in GROUPS {
-        let Some(codes) = codes(inputs, group) else { continue };
+        let Some(codes) = read_group_codes(inputs, group) else { continue };
         for carrier in carriers.iter().filter(|carrier| ["1", "cut"].contains(&carrier.name)) {
-            let (known, columns) = inputs.of_members(&codes, &carrier.values);
+            let (known, columns) = inputs.build_member_columns(&codes, &carrier.values);
             if !(2..=LEVELS_MAX).contains(&known) {
                 continue;
             }
             let drawn = Drawn { over: group.to_owned(), times: carrier.name, shape: "levels" };
-            bank.nameless(drawn).columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
+            bank.begin_nameless_curve(drawn).add_columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
         }
     }
 }
 
 /// The member of a group that each row belongs to.
-fn codes(inputs: &RecordingInputs<'_>, group: &str) -> Option<Vec<usize>> {
+fn read_group_codes(inputs: &RecordingInputs<'_>, group: &str) -> Option<Vec<usize>> {
     if group == "run" {
         return Some(inputs.run.clone());
     }
@@ -229,14 +234,15 @@ fn codes(inputs: &RecordingInputs<'_>, group: &str) -> Option<Vec<usize>> {
     Some((0..inputs.rows).map(|row| words.find_code(row).map_or(usize::MAX, |code| code as usize)).collect())
 }
 
-fn waves(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
+fn add_waves(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(position) = &inputs.position else { return };
-    let sorted = inputs.sorted(position, false);
+    let sorted = inputs.sort_fitted_values(position, false);
     let (Some(low), Some(high)) = (sorted.first(), sorted.last()) else { return };
     for turns in WAVES.into_iter().filter(|_| high > low) {
         let angle = |row: usize| std::f64::consts::TAU * turns * position[row] / (high - low);
-        let columns = [(inputs.column(|row| angle(row).cos()), 1.0), (inputs.column(|row| angle(row).sin()), 1.0)];
+        let columns =
+            [(inputs.build_column(|row| angle(row).cos()), 1.0), (inputs.build_column(|row| angle(row).sin()), 1.0)];
         let drawn = Drawn { over: "position".to_owned(), times: "1", shape: "wave" };
-        bank.nameless(drawn).columns(inputs, columns);
+        bank.begin_nameless_curve(drawn).add_columns(inputs, columns);
     }
 }

@@ -1,25 +1,25 @@
 //! The spindle and its motor: friction, windage, inertia, warm-up, stages and losses.
 
-use crate::evidence::bank::{Family, VariantBank};
 use crate::evidence::inputs::RecordingInputs;
+use crate::evidence::variant_bank::{Family, VariantBank};
 use physics::OutputKind;
 
 const SPEED: &[&str] = &["spindle_speed_rpm"];
 const SPEED_AND_TORQUE: &[&str] = &["spindle_speed_rpm", "torque"];
 
-const WINDAGE: Family = Family::of("windage").signed(1.0).through(SPEED);
-const VISCOUS: Family = Family::of("viscous_friction").signed(1.0);
-const DRY: Family = Family::of("dry_friction").signed(1.0);
-const IRON: Family = Family::of("iron_loss").signed(1.0).through(SPEED).rare(-1.0);
-const STRIBECK: Family = Family::of("stribeck").beside_catalogue().signed(1.0).through(SPEED);
-const INERTIA: Family = Family::of("spindle_inertia").signed(1.0).at_edges();
-const REGENERATION: Family = Family::of("regeneration").beside_catalogue().rare(-0.7);
-const WARM_UP: Family = Family::of("bearing_warm_up").signed(1.0).through(&["bearing_temperature_c"]);
-const PRELOAD: Family = Family::of("preload_growth").beside_catalogue().signed(1.0);
-const GEAR: Family = Family::of("gear_stage").through(SPEED).wide();
-const FIELD: Family = Family::of("field_weakening").signed(1.0).through(SPEED_AND_TORQUE);
-const COPPER: Family = Family::of("copper_loss").signed(1.0).through(&["torque"]);
-const INVERTER: Family = Family::of("inverter_loss").signed(1.0).through(&["torque"]);
+const WINDAGE: Family = Family::from_kind("windage").with_sign(1.0).with_channels(SPEED);
+const VISCOUS: Family = Family::from_kind("viscous_friction").with_sign(1.0);
+const DRY: Family = Family::from_kind("dry_friction").with_sign(1.0);
+const IRON: Family = Family::from_kind("iron_loss").with_sign(1.0).with_channels(SPEED).with_rarity(-1.0);
+const STRIBECK: Family = Family::from_kind("stribeck").with_catalogue_forms().with_sign(1.0).with_channels(SPEED);
+const INERTIA: Family = Family::from_kind("spindle_inertia").with_sign(1.0).with_edge_action();
+const REGENERATION: Family = Family::from_kind("regeneration").with_catalogue_forms().with_rarity(-0.7);
+const WARM_UP: Family = Family::from_kind("bearing_warm_up").with_sign(1.0).with_channels(&["bearing_temperature_c"]);
+const PRELOAD: Family = Family::from_kind("preload_growth").with_catalogue_forms().with_sign(1.0);
+const GEAR: Family = Family::from_kind("gear_stage").with_channels(SPEED).without_widening();
+const FIELD: Family = Family::from_kind("field_weakening").with_sign(1.0).with_channels(SPEED_AND_TORQUE);
+const COPPER: Family = Family::from_kind("copper_loss").with_sign(1.0).with_channels(&["torque"]);
+const INVERTER: Family = Family::from_kind("inverter_loss").with_sign(1.0).with_channels(&["torque"]);
 
 /// Time constants of a bearing, s.
 const WARMING_S: [f64; 4] = [240.0, 600.0, 1200.0, 2400.0];
@@ -39,7 +39,7 @@ struct Spindle<'a> {
 }
 
 /// The families of an output that the spindle drives.
-pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
+pub(super) fn add_variants(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(rpm) = &inputs.speed else { return };
     if inputs.is_axis || inputs.kind == OutputKind::Displacement {
         return;
@@ -47,119 +47,119 @@ pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let top_rpm = rpm.iter().fold(1.0_f64, |top, n| top.max(*n));
     let pace = rpm.iter().map(|n| n / top_rpm).collect();
     let spindle = Spindle { inputs, rpm, pace, top_rpm, is_torque: inputs.kind == OutputKind::Force };
-    spindle.friction(bank);
-    spindle.inertia(bank);
-    spindle.warming(bank);
-    spindle.stages(bank);
-    spindle.motor(bank);
+    spindle.add_friction(bank);
+    spindle.add_inertia(bank);
+    spindle.add_warm_up(bank);
+    spindle.add_gear_stages(bank);
+    spindle.add_motor_losses(bank);
 }
 
 impl Spindle<'_> {
     /// A power of this size in the output's own kind.
-    fn as_output(&self, power: impl Fn(usize) -> f64) -> Vec<f64> {
+    fn convert_to_output(&self, power: impl Fn(usize) -> f64) -> Vec<f64> {
         let law = |row: usize| match (self.is_torque, self.pace[row] > 1e-3) {
             (false, _) => power(row),
             (true, true) => power(row) / self.pace[row].max(0.02),
             (true, false) => 0.0,
         };
-        self.inputs.column(law)
+        self.inputs.build_column(law)
     }
 
-    fn friction(&self, bank: &mut VariantBank) {
-        let power = |exponent: f64| self.as_output(|row| self.pace[row].powf(exponent));
+    fn add_friction(&self, bank: &mut VariantBank) {
+        let power = |exponent: f64| self.convert_to_output(|row| self.pace[row].powf(exponent));
         for exponent in [2.6, 2.8, 3.0] {
-            bank.of(WINDAGE, exponent).column(self.inputs, power(exponent));
+            bank.begin_variant(WINDAGE, exponent).add_column(self.inputs, power(exponent));
         }
-        bank.of(VISCOUS, 2).column(self.inputs, power(2.0));
-        bank.of(DRY, 1).column(self.inputs, power(1.0));
+        bank.begin_variant(VISCOUS, 2).add_column(self.inputs, power(2.0));
+        bank.begin_variant(DRY, 1).add_column(self.inputs, power(1.0));
         for exponent in [1.0, 1.3, 2.0] {
             let law = |row: usize| if self.is_torque { self.pace[row] } else { self.pace[row].powf(exponent) };
-            bank.of(IRON, exponent).column(self.inputs, self.inputs.column(law));
+            bank.begin_variant(IRON, exponent).add_column(self.inputs, self.inputs.build_column(law));
         }
         for width in [50.0, 100.0, 180.0, 300.0] {
-            let law = self.as_output(|row| self.pace[row] * (-(self.rpm[row] / width).powi(2)).exp());
-            bank.of(STRIBECK, width).column(self.inputs, law);
+            let law = self.convert_to_output(|row| self.pace[row] * (-(self.rpm[row] / width).powi(2)).exp());
+            bank.begin_variant(STRIBECK, width).add_column(self.inputs, law);
         }
     }
 
-    fn inertia(&self, bank: &mut VariantBank) {
+    fn add_inertia(&self, bank: &mut VariantBank) {
         let recorded = self.inputs.scene.column("spindle_acceleration_rpm_per_s").map(<[f64]>::to_vec);
-        let rate = recorded.unwrap_or_else(|| self.inputs.rate(self.rpm));
-        let whole = self.inputs.column(|row| if self.is_torque { rate[row] } else { self.pace[row] * rate[row] });
+        let rate = recorded.unwrap_or_else(|| self.inputs.differentiate_values(self.rpm));
+        let whole = self.inputs.build_column(|row| if self.is_torque { rate[row] } else { self.pace[row] * rate[row] });
         let braking: Vec<f64> = whole.iter().map(|x| x.min(0.0)).collect();
         let both = |share: f64| [(whole.clone(), 1.0), (braking.clone(), share)];
-        bank.of(INERTIA, "ramps").columns(self.inputs, both(0.15));
-        bank.of(INERTIA, "braking apart").prior(-1.5).columns(self.inputs, both(1.0));
-        bank.of(REGENERATION, "braking").column(self.inputs, braking);
+        bank.begin_variant(INERTIA, "ramps").add_columns(self.inputs, both(0.15));
+        bank.begin_variant(INERTIA, "braking apart").with_ln_prior(-1.5).add_columns(self.inputs, both(1.0));
+        bank.begin_variant(REGENERATION, "braking").add_column(self.inputs, braking);
     }
 
     /// Warmth: as recorded, or as a state that the speed drives.
-    fn warmths(&self) -> Vec<(String, Vec<f64>)> {
+    fn list_warmth_states(&self) -> Vec<(String, Vec<f64>)> {
         let mut all = Vec::new();
         if let Some(recorded) = &self.inputs.temperature {
-            let low = self.inputs.sorted(recorded, false).first().copied().unwrap_or(0.0);
-            let spread = self.inputs.deviation_of(recorded, false).max(0.1);
+            let low = self.inputs.sort_fitted_values(recorded, false).first().copied().unwrap_or(0.0);
+            let spread = self.inputs.compute_deviation(recorded, false).max(0.1);
             all.push(("recorded".to_owned(), recorded.iter().map(|t| (t - low) / spread).collect()));
         }
         for tau_s in WARMING_S.into_iter().filter(|tau_s| *tau_s < 4.0 * self.inputs.span_s()) {
-            all.push((format!("{tau_s} s"), self.inputs.state(&self.pace, tau_s, 0.0)));
+            all.push((format!("{tau_s} s"), self.inputs.simulate_slow_state(&self.pace, tau_s, 0.0)));
         }
         all
     }
 
-    fn warming(&self, bank: &mut VariantBank) {
-        for (label, warmth) in self.warmths() {
-            let top = self.inputs.taken(false).map(|row| warmth[row]).fold(1e-9, f64::max);
+    fn add_warm_up(&self, bank: &mut VariantBank) {
+        for (label, warmth) in self.list_warmth_states() {
+            let top = self.inputs.fitted_rows(false).map(|row| warmth[row]).fold(1e-9, f64::max);
             for exponent in [1.0, 5.0 / 3.0] {
                 let drag = |factor: &dyn Fn(f64) -> f64| {
-                    self.as_output(|row| self.pace[row].powf(exponent) * factor(warmth[row]))
+                    self.convert_to_output(|row| self.pace[row].powf(exponent) * factor(warmth[row]))
                 };
                 let thin = drag(&|z| (-1.2 * z / top).exp());
                 let columns = [(thin, 1.0), (drag(&|z| z), 0.25), (drag(&|z| z * z), 0.15)];
-                bank.of(WARM_UP, format!("{label}, {exponent:.2}")).columns(self.inputs, columns);
+                bank.begin_variant(WARM_UP, format!("{label}, {exponent:.2}")).add_columns(self.inputs, columns);
             }
-            let square = |power: i32| self.as_output(|row| self.pace[row].powi(2) * warmth[row].powi(power));
-            bank.of(PRELOAD, label).columns(self.inputs, [(square(1), 1.0), (square(2), 0.25)]);
+            let square = |power: i32| self.convert_to_output(|row| self.pace[row].powi(2) * warmth[row].powi(power));
+            bank.begin_variant(PRELOAD, label).add_columns(self.inputs, [(square(1), 1.0), (square(2), 0.25)]);
         }
     }
 
-    fn stages(&self, bank: &mut VariantBank) {
+    fn add_gear_stages(&self, bank: &mut VariantBank) {
         let turning = |row: usize| f64::from(u8::from(self.pace[row] > 0.01));
-        for (label, low) in self.stage_columns() {
-            let here = self.inputs.column(|row| low[row] * turning(row));
-            let slope = self.inputs.column(|row| here[row] * self.pace[row]);
+        for (label, low) in self.build_stage_columns() {
+            let here = self.inputs.build_column(|row| low[row] * turning(row));
+            let slope = self.inputs.build_column(|row| here[row] * self.pace[row]);
             let mut columns = vec![(here.clone(), 1.0), (slope, 1.0)];
             if let Some(cut) = self.inputs.cut.as_ref().filter(|_| self.inputs.knows_cut) {
-                columns.push((self.inputs.column(|row| here[row] * cut[row]), 1.0));
+                columns.push((self.inputs.build_column(|row| here[row] * cut[row]), 1.0));
             }
-            bank.of(GEAR, label).columns(self.inputs, columns);
+            bank.begin_variant(GEAR, label).add_columns(self.inputs, columns);
         }
     }
 
     /// Where the lower stage is engaged: as recorded, or below a speed between those that are kept for a while.
-    fn stage_columns(&self) -> Vec<(String, Vec<f64>)> {
-        let below = |limit: f64| self.inputs.column(|row| f64::from(u8::from(self.rpm[row] < limit)));
+    fn build_stage_columns(&self) -> Vec<(String, Vec<f64>)> {
+        let below = |limit: f64| self.inputs.build_column(|row| f64::from(u8::from(self.rpm[row] < limit)));
         if let Some(stage) = self.inputs.scene.column("gear_stage") {
-            let known = self.inputs.sorted(stage, false);
+            let known = self.inputs.sort_fitted_values(stage, false);
             if let (Some(low), Some(high)) = (known.first(), known.last())
                 && low < high
             {
                 return vec![(
                     "recorded".to_owned(),
-                    self.inputs.column(|row| f64::from(u8::from(stage[row] == *low))),
+                    self.inputs.build_column(|row| f64::from(u8::from(stage[row] == *low))),
                 )];
             }
         }
-        self.speeds_between().into_iter().map(|limit| (format!("{limit:.0} rpm"), below(limit))).collect()
+        self.list_speed_limits().into_iter().map(|limit| (format!("{limit:.0} rpm"), below(limit))).collect()
     }
 
-    fn speeds_between(&self) -> Vec<f64> {
-        let kept = self.kept_speeds();
+    fn list_speed_limits(&self) -> Vec<f64> {
+        let kept = self.list_steady_speeds();
         let least = 0.005 * self.top_rpm;
         let mut between: Vec<f64> = if kept.len() > 3 {
             kept.windows(2).map(|pair| f64::midpoint(pair[0], pair[1])).collect()
         } else {
-            let mut all: Vec<f64> = self.inputs.taken(false).map(|row| self.rpm[row]).collect();
+            let mut all: Vec<f64> = self.inputs.fitted_rows(false).map(|row| self.rpm[row]).collect();
             all.retain(|n| *n > 0.02 * self.top_rpm);
             (0..12)
                 .filter_map(|k| numerics::statistics::quantile(all.iter().copied(), 0.12 + 0.069 * f64::from(k)))
@@ -174,7 +174,7 @@ impl Spindle<'_> {
     }
 
     /// Speeds that are kept for five rows, in rising order.
-    fn kept_speeds(&self) -> Vec<f64> {
+    fn list_steady_speeds(&self) -> Vec<f64> {
         let mut kept = Vec::new();
         let mut stretch: Vec<f64> = Vec::new();
         for row in 0..=self.inputs.rows {
@@ -195,30 +195,33 @@ impl Spindle<'_> {
         kept
     }
 
-    fn motor(&self, bank: &mut VariantBank) {
+    fn add_motor_losses(&self, bank: &mut VariantBank) {
         let Some(cut) = self.inputs.cut.as_ref().filter(|_| self.inputs.knows_cut) else { return };
         let torque: Vec<f64> = if self.is_torque {
             cut.clone()
         } else {
-            self.inputs.column(|row| if self.pace[row] > 0.01 { cut[row] / self.pace[row].max(0.02) } else { 0.0 })
+            self.inputs
+                .build_column(|row| if self.pace[row] > 0.01 { cut[row] / self.pace[row].max(0.02) } else { 0.0 })
         };
         let weak = |row: usize, base: f64| ((self.rpm[row] / base).powi(2) - 1.0).max(0.0);
         for base in BASE_SPEEDS.into_iter().filter(|base| *base < 0.9 * self.top_rpm) {
-            let loss = self.inputs.column(|row| torque[row].powi(2) * weak(row, base));
-            let idle = self.inputs.column(|row| (self.rpm[row] / base - 1.0).max(0.0));
-            bank.of(FIELD, base).columns(self.inputs, [(loss.clone(), 1.0), (idle.clone(), 0.4)]);
-            bank.of(FIELD, format!("{base}, idle")).prior(-0.5).columns(self.inputs, [(idle, 1.0), (loss, 0.4)]);
+            let loss = self.inputs.build_column(|row| torque[row].powi(2) * weak(row, base));
+            let idle = self.inputs.build_column(|row| (self.rpm[row] / base - 1.0).max(0.0));
+            bank.begin_variant(FIELD, base).add_columns(self.inputs, [(loss.clone(), 1.0), (idle.clone(), 0.4)]);
+            bank.begin_variant(FIELD, format!("{base}, idle"))
+                .with_ln_prior(-0.5)
+                .add_columns(self.inputs, [(idle, 1.0), (loss, 0.4)]);
         }
         let square: Vec<f64> = torque.iter().map(|t| t * t).collect();
         let warmth = self.inputs.temperature.as_ref().map(|t| {
-            let middle = self.inputs.mean_of(t, false);
-            (self.inputs.column(|row| square[row] * (t[row] - middle)), 0.12)
+            let middle = self.inputs.compute_mean(t, false);
+            (self.inputs.build_column(|row| square[row] * (t[row] - middle)), 0.12)
         });
         for base in [0.0, 1000.0, 1600.0, 2400.0].into_iter().filter(|base| *base < 0.8 * self.top_rpm) {
-            let beyond = (base > 0.0).then(|| (self.inputs.column(|row| square[row] * weak(row, base)), 0.5));
+            let beyond = (base > 0.0).then(|| (self.inputs.build_column(|row| square[row] * weak(row, base)), 0.5));
             let columns = [(square.clone(), 1.0)].into_iter().chain(warmth.clone()).chain(beyond);
-            bank.of(COPPER, base).columns(self.inputs, columns);
+            bank.begin_variant(COPPER, base).add_columns(self.inputs, columns);
         }
-        bank.of(INVERTER, "").columns(self.inputs, [(torque, 1.0), (square, 0.3)]);
+        bank.begin_variant(INVERTER, "").add_columns(self.inputs, [(torque, 1.0), (square, 0.3)]);
     }
 }

@@ -1,0 +1,173 @@
+//! The load of each place of a program, learned from the first parts: program, tool, operation and block make a place.
+
+use super::Loads;
+use super::follower::{FedShare, OverrideFollower};
+use super::limits::LearnedLimits;
+use super::load_inputs::{LoadChannels, LoadMoment};
+use super::place::Place;
+use crate::NoEstimate;
+use adapters::Sample;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Places that are kept; beyond, the one that was not used for longest is forgotten.
+pub const PLACES_MAX: usize = 1024;
+/// Characters of a block that count.
+const BLOCK_MAX: usize = 24;
+/// Standard deviations of the cutting power by which an excess must exceed its limit.
+const SURE_SD: f64 = 2.0;
+
+/// The texts that make a place, as they were seen last.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct PlaceTexts([Option<Arc<str>>; 4]);
+
+/// What was learned, and where the machine is.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct LearnedLoad {
+    places: BTreeMap<String, Place>,
+    /// Changes of place so far.
+    changes: u64,
+    #[serde(skip)]
+    texts: PlaceTexts,
+    #[serde(skip)]
+    key: Option<String>,
+    #[serde(skip)]
+    path_mm: f64,
+    #[serde(skip)]
+    part: Option<f64>,
+    #[serde(skip)]
+    follower: OverrideFollower,
+}
+
+impl LearnedLoad {
+    pub(super) fn forget_program(&mut self, program: &str) {
+        let beginning = format!("{program}/");
+        self.places.retain(|key, _| !key.starts_with(&beginning));
+        self.follower.reset_cut();
+    }
+
+    pub(super) fn update_loads(
+        &mut self,
+        now: &LoadMoment<'_>,
+        sample: &Sample,
+        channels: &LoadChannels,
+        limits: &LearnedLimits,
+        loads: &mut Loads,
+    ) {
+        self.follow_part(sample, channels);
+        self.follow_place(sample, channels);
+        let power = now.cutting_power_w.filter(|_| now.cutting);
+        let (Some((power_w, sd_w)), Some(key), Some(step_s)) = (power, &self.key, now.step_s) else {
+            self.follower.reset_cut();
+            return;
+        };
+        // Along the path where the feed is known, otherwise along the time, as far as the place goes.
+        self.path_mm += step_s * now.feed_mm_min.map_or(1.0, |feed| feed / 60.0);
+        let part = self.part.unwrap_or(0.0);
+        let place = self.places.get_mut(key);
+        let learned = place.as_ref().is_some_and(|place| part - place.first_part >= limits.parts && place.is_known());
+        let feed = now.in_force_pct.map_or(1.0, |pct| pct / 100.0);
+        match place {
+            Some(place) if learned => {
+                let place = place.clone();
+                self.compare_with_place(&place, now, (power_w, sd_w, step_s, feed), limits, loads);
+                return;
+            }
+            Some(place) if now.state_s >= limits.entry_s => {
+                // A counter that was reset begins anew; what was seen before counts on.
+                place.first_part = place.first_part.min(part);
+                place.learn_moment(self.path_mm, power_w, feed, step_s);
+            }
+            None if now.state_s >= limits.entry_s => {
+                let (key, used) = (key.clone(), self.changes);
+                self.make_room();
+                let mut place = Place::new(part, used);
+                place.learn_moment(self.path_mm, power_w, feed, step_s);
+                self.places.insert(key, place);
+            }
+            _ => {}
+        }
+        self.follower.reset_cut();
+        let none = Err(NoEstimate::PlaceNotLearned);
+        (loads.learned_power_w, loads.learned_band_w, loads.learned_peak_w) = (none, none, none);
+        loads.learned_override_pct = none;
+    }
+
+    fn compare_with_place(
+        &mut self,
+        place: &Place,
+        now: &LoadMoment<'_>,
+        (power_w, sd_w, step_s, feed): (f64, f64, f64, f64),
+        limits: &LearnedLimits,
+        loads: &mut Loads,
+    ) {
+        let expected = place.predict_power(self.path_mm);
+        let feed = place.to_relative_feed(feed);
+        let by_feed = feed.powf(limits.exponent);
+        loads.learned_power_w = Ok(expected.power_w * by_feed);
+        loads.learned_band_w = Ok(expected.band_w * by_feed);
+        loads.learned_peak_w = Ok(place.peak_w);
+        if now.state_s < limits.entry_s {
+            self.follower.reset_cut();
+            return;
+        }
+        // The shares between which nothing is asked for; what the meter cannot tell is inside.
+        let doubt = (expected.band_w + SURE_SD * sd_w / by_feed) / expected.power_w;
+        let high = limits.high_share.max(1.0 + doubt);
+        let low = limits.low_share.min(1.0 - doubt);
+        let wanted = |share: f64| match share {
+            share if share > high => place.feed_pct() * (high / share).powf(1.0 / limits.exponent),
+            share if share < low && low > 0.0 => place.feed_pct() * (low / share.max(1e-6)).powf(1.0 / limits.exponent),
+            _ => 100.0,
+        };
+        let share = power_w / expected.power_w;
+        let at = FedShare { at_ns: now.at_ns, step_s, share, feed, exponent: limits.exponent };
+        let pct = self.follower.step_override(at, &limits.range, wanted);
+        loads.learned_override_pct =
+            if (pct - 100.0).abs() < 1e-9 { Err(NoEstimate::NothingToChange) } else { Ok(pct) };
+    }
+
+    fn follow_part(&mut self, sample: &Sample, channels: &LoadChannels) {
+        let part = sample.number(channels.part_count).ok();
+        if part.is_some() && part != self.part {
+            self.part = part;
+            self.path_mm = 0.0;
+        }
+    }
+
+    /// The key is put together only where one of its texts has changed.
+    fn follow_place(&mut self, sample: &Sample, channels: &LoadChannels) {
+        let ids = [channels.program, channels.tool, channels.operation, channels.block];
+        let same = ids.iter().zip(&self.texts.0).all(|(id, known)| sample.text(*id) == known.as_deref());
+        if same {
+            return;
+        }
+        let block_before = self.texts.0[3].clone();
+        self.texts = PlaceTexts(ids.map(|id| sample.text(id).map(Arc::from)));
+        let [program, tool, operation, block] = &self.texts.0;
+        if *block != block_before {
+            self.path_mm = 0.0;
+        }
+        self.key = program.as_ref().zip(tool.as_ref()).map(|(program, tool)| {
+            let block: String = block.as_deref().unwrap_or_default().chars().take(BLOCK_MAX).collect();
+            format!("{program}/{}/{}/{block}", crate::wear::tool_of(tool), operation.as_deref().unwrap_or_default())
+        });
+        self.changes += 1;
+        if let Some(place) = self.key.as_ref().and_then(|key| self.places.get_mut(key)) {
+            place.used = self.changes;
+        }
+    }
+
+    /// Forgets the place that was not used for longest, where there is no room.
+    fn make_room(&mut self) {
+        if self.places.len() < PLACES_MAX {
+            return;
+        }
+        let oldest = self.places.iter().min_by_key(|(_, place)| place.used).map(|(key, _)| key.clone());
+        if let Some(key) = oldest {
+            self.places.remove(&key);
+        }
+    }
+}

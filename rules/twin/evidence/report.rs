@@ -1,0 +1,270 @@
+//! The answer as a diagnosis: texts, textbook parameters with intervals, places, and what to record next.
+//!
+//! What was found is a curve; what is told beside it is the textbook law that comes nearest, refitted together with the
+//! baseline, so that its parameters mean what the catalogue says and the extended model can be simulated. A name that no
+//! textbook law bears out is taken back.
+
+use super::answer::{EvidenceAnswer, sum_contributions};
+use super::gram::Comparison;
+use super::inputs::RecordingInputs;
+use super::noise::NoiseModel;
+use super::textbook::Textbook;
+use crate::diagnosis::{
+    Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
+    find_output_unit,
+};
+use crate::fit::Fit;
+use crate::inputs::mark_rows_with_inputs;
+use crate::intervals::FittedRows;
+use crate::model::{Model, Parameter, Part};
+use crate::next_step::{build_alternative, build_channel_experiment, find_effect_experiment};
+use crate::place_search::PlaceSearch;
+use crate::prepared_recording::Case;
+use crate::region::{Region, compute_usual_size, list_spans, mark_active_rows};
+use crate::summary;
+use adapters::Recording;
+use adapters::bilingual::Bilingual;
+use numerics::statistics::{count_to_f64, rms};
+use physics::find_effect;
+
+/// Times that a name of impossible size is replaced by the nearest law beside it.
+const REPLACED_MAX: usize = 3;
+
+/// Everything that is told.
+pub(super) struct EvidenceReport<'a, 'm> {
+    pub(super) recording: &'a Recording,
+    pub(super) case: &'a mut Case<'m>,
+    pub(super) inputs: &'a RecordingInputs<'a>,
+    pub(super) baseline: &'a Fit,
+    pub(super) answer: EvidenceAnswer,
+    pub(super) comparison: &'a Comparison<'a>,
+    /// The likeliest noise.
+    pub(super) noise: NoiseModel,
+    /// The recorded output with outliers cut.
+    pub(super) recorded: &'a [f64],
+    /// Deviation of the ordinary noise.
+    pub(super) ordinary: f64,
+}
+
+impl EvidenceReport<'_, '_> {
+    /// The diagnosis.
+    pub(super) fn into_diagnosis(mut self) -> Diagnosis {
+        let fits = self.compare_fits();
+        let mut textbook = self.fit_textbook_laws(&[]);
+        for attempt in 0..=REPLACED_MAX {
+            let refused = self.list_refused_names(&textbook);
+            if refused.is_empty() {
+                break;
+            }
+            let unnamed = if attempt < REPLACED_MAX { self.answer.replace_names(&refused) } else { refused };
+            if !unnamed.is_empty() {
+                self.answer.reject_names(&unnamed, |x| self.inputs.fitted_rows(false).map(|row| x[row] * x[row]).sum());
+            }
+            textbook = self.fit_textbook_laws(&[]);
+        }
+        let doubted = self.list_doubted_names(&textbook);
+        if !doubted.is_empty() {
+            self.answer.add_unknown_rivals(&doubted);
+            textbook = self.fit_textbook_laws(&doubted);
+        }
+        let missing = self.list_missing_effects(&fits, &textbook);
+        let alternatives: Vec<Alternative> = self.list_alternatives();
+        let fit = textbook.fit.as_ref();
+        let model = fit.map_or_else(
+            || self.case.model.clone(),
+            |fit| Model { parts: fit.parts.clone(), ..self.case.model.clone() },
+        );
+        let shift = if missing.is_empty() { Vec::new() } else { fit.map_or_else(Vec::new, |f| self.list_shifts(f)) };
+        let withdrawn = self.answer.withdrawn.take();
+        let mut diagnosis = Diagnosis {
+            output: self.case.model.output.clone(),
+            unit: find_output_unit(&self.case.model.output).to_owned(),
+            verdict: self.answer.verdict,
+            summary: Bilingual::default(),
+            next_experiment: self.choose_experiment(&alternatives, withdrawn.as_ref().map_or(&[], |gone| &gone.found)),
+            mismatch: self.locate_regions(),
+            rows: self.build_rows(),
+            existence: Some(self.answer.existence),
+            fit: Some(fits),
+            baseline_shift: shift,
+            missing,
+            alternatives,
+            data_quality: self.case.faults.clone(),
+            model,
+            debug: self.answer.debug.clone(),
+        };
+        diagnosis.summary = match &withdrawn {
+            Some(gone) => summary::describe_withdrawal(&gone.found, gone.among_fitted, gone.errors, &diagnosis.unit),
+            None => summary::summarise_diagnosis(&diagnosis),
+        };
+        diagnosis
+    }
+
+    fn compute_rmse(&self, total: &[f64], rows: &[bool]) -> Option<f64> {
+        let recorded = self.inputs.scene.recorded_output();
+        let left: Vec<f64> = (0..rows.len()).filter(|row| rows[*row]).map(|row| recorded[row] - total[row]).collect();
+        (!left.is_empty()).then(|| rms(&left))
+    }
+
+    fn compare_fits(&self) -> Fits {
+        let quality = |total: &[f64]| Quality {
+            rmse: self.compute_rmse(total, &self.inputs.fitted).unwrap_or(0.0),
+            held_out_rmse: self.compute_rmse(total, &self.inputs.held_out),
+        };
+        Fits {
+            rows: self.inputs.comparable.iter().filter(|comparable| **comparable).count(),
+            runs: self.case.units.len(),
+            held_out_runs: self.case.held.iter().map(|unit| self.case.units[*unit].name.clone()).collect(),
+            noise_floor: self.ordinary,
+            before: quality(&self.inputs.simulated),
+            after: quality(&self.answer.after),
+        }
+    }
+
+    fn list_missing_effects(&mut self, fits: &Fits, textbook: &Textbook) -> Vec<Missing> {
+        let names = self.answer.names.clone();
+        let mut all = Vec::new();
+        for (at, name) in names.iter().enumerate() {
+            let place = textbook.laws.get(at).copied().flatten().map(|(place, _)| place);
+            let parameters: Vec<ParameterEstimate> = match (place, &textbook.fit) {
+                (Some(place), Some(fit)) => self.estimate_parameters(fit, place),
+                _ => self.estimate_curve_size(name),
+            };
+            let part = place.and_then(|place| textbook.fit.as_ref().map(|fit| &fit.parts[place]));
+            let (statement, equation) = describe_law(name, part);
+            all.push(Missing {
+                effect: name.clone(),
+                statement,
+                equation,
+                parameters,
+                delta_ic: self.answer.information,
+                p_value: (-0.5 * self.answer.information).exp().clamp(1e-12, 1.0),
+                held_out_rmse_before: fits.before.held_out_rmse,
+                held_out_rmse_after: fits.after.held_out_rmse,
+                absorbed_share: self.compute_absorbed_share(name),
+            });
+        }
+        all
+    }
+
+    fn estimate_parameters(&self, fit: &Fit, place: usize) -> Vec<ParameterEstimate> {
+        let rows = &self.comparison.rows;
+        let rows = FittedRows {
+            scene: &self.case.scene,
+            fit,
+            recorded: self.recorded,
+            whiten: &|column| self.comparison.whiten_column(column, self.noise),
+            rows,
+            unit: rows.iter().map(|row| self.inputs.unit[*row]).collect(),
+            of_model: self.baseline.parts.len(),
+        };
+        rows.estimate_parameters(place)
+    }
+
+    /// The size of a curve that has no law: its root mean square where it acts.
+    fn estimate_curve_size(&self, name: &str) -> Vec<ParameterEstimate> {
+        let Some((_, x)) = self.answer.contributions.iter().find(|(known, _)| known == name) else { return Vec::new() };
+        let value = rms(x);
+        let unit = find_output_unit(&self.case.model.output).to_owned();
+        vec![ParameterEstimate { name: "rms".to_owned(), value, low: 0.8 * value, high: 1.2 * value, unit }]
+    }
+
+    /// Share of a contribution's square that the baseline can imitate.
+    fn compute_absorbed_share(&self, name: &str) -> f64 {
+        let of = |all: &[(String, Vec<f64>)]| {
+            let own = all.iter().find(|(known, _)| known == name);
+            own.map_or(0.0, |(_, x)| self.inputs.fitted_rows(false).map(|row| x[row] * x[row]).sum::<f64>())
+        };
+        let (whole, left) = (of(&self.answer.contributions), of(&self.answer.remaining));
+        if whole > 0.0 { (1.0 - left / whole).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
+    fn list_alternatives(&self) -> Vec<Alternative> {
+        self.answer
+            .rivals
+            .iter()
+            .map(|rival| build_alternative(&rival.name, &rival.instead_of, 2.0 * rival.nats))
+            .collect()
+    }
+
+    /// What separates what is left; always where the answer is not sure.
+    fn choose_experiment(&self, alternatives: &[Alternative], gone: &[String]) -> Option<Experiment> {
+        if matches!(self.answer.verdict, Verdict::Explained | Verdict::NoMismatch) {
+            return None;
+        }
+        let open = alternatives.iter().flat_map(|other| [other.effect.as_str(), other.instead_of.as_str()]);
+        let kinds = open.chain(self.answer.names.iter().map(String::as_str)).chain(gone.iter().map(String::as_str));
+        let gain = self.answer.information;
+        find_effect_experiment(kinds, gain)
+            .or_else(|| Some(build_channel_experiment(self.answer.drawn_over.as_deref(), gain)))
+    }
+
+    /// One region for each name, the largest share first.
+    fn locate_regions(&self) -> Vec<Region> {
+        let rows = self.inputs.rows;
+        let whole: f64 = sum_contributions(&self.answer.remaining, rows).iter().map(|x| x * x).sum();
+        let size = compute_usual_size(&sum_contributions(&self.answer.contributions, rows));
+        let places = PlaceSearch::new(self.recording, &self.case.model.output);
+        let mut all: Vec<Region> = Vec::new();
+        for (name, left) in &self.answer.remaining {
+            if !self.answer.names.contains(name) {
+                continue;
+            }
+            let own = self.answer.contributions.iter().find(|(known, _)| known == name).map_or(left, |(_, x)| x);
+            let squares: Vec<f64> = left.iter().map(|x| x * x).collect();
+            let of_all = mark_active_rows(own, size);
+            let active = if of_all.contains(&true) { of_all } else { mark_active_rows(own, compute_usual_size(own)) };
+            let inside = active.iter().filter(|active| **active).count();
+            let over = |x: &[f64]| x.iter().zip(&active).filter(|(_, active)| **active).map(|(x, _)| *x).sum::<f64>();
+            all.push(Region {
+                effect: name.clone(),
+                share: over(&squares) / whole.max(f64::MIN_POSITIVE),
+                mean: over(own) / count_to_f64(inside.max(1)),
+                conditions: places.find_conditions(&active),
+                spans: list_spans(self.inputs.scene, &active),
+                onset: None,
+            });
+        }
+        all.retain(|region| !region.spans.is_empty());
+        all.sort_by(|a, b| b.share.total_cmp(&a.share));
+        all
+    }
+
+    fn build_rows(&self) -> Rows {
+        let known = mark_rows_with_inputs(self.inputs.scene, &self.case.parts);
+        let visible = |total: &[f64]| total.iter().zip(&known).map(|(x, known)| known.then_some(*x)).collect();
+        Rows {
+            simulated_before: visible(&self.inputs.simulated),
+            simulated_after: visible(&self.answer.after),
+            compared: self.inputs.comparable.clone(),
+            effects: self.answer.contributions.clone(),
+        }
+    }
+
+    fn list_shifts(&self, fit: &Fit) -> Vec<Shift> {
+        let pairs = self.baseline.parts.iter().zip(&fit.parts);
+        let of = |(before, after): (&Part, &Part)| {
+            let parameters = before.parameters.iter().zip(&after.parameters).filter(|(before, _)| !before.fixed);
+            let shift = |(b, a): (&Parameter, &Parameter)| Shift {
+                parameter: format!("{}.{}", before.label(), b.name),
+                before: b.value,
+                after: a.value,
+            };
+            parameters.map(shift).collect::<Vec<_>>()
+        };
+        pairs.flat_map(of).collect()
+    }
+}
+
+fn describe_law(name: &str, part: Option<&Part>) -> (String, String) {
+    if name == UNKNOWN {
+        let statement = "Something real that no effect of the catalogue explains; described by its shape only";
+        return (statement.to_owned(), "a curve over the inputs, as drawn".to_owned());
+    }
+    let place = part.and_then(Part::effect_and_form).and_then(|(_, form)| form.place);
+    let place = place.map(|(column, word)| format!(" ({column} {word})")).unwrap_or_default();
+    find_effect(name).map_or_else(
+        || ("The user's hypothesis".to_owned(), name.to_owned()),
+        |effect| (format!("{}{place}", effect.doc().en.statement), effect.doc().law.to_owned()),
+    )
+}

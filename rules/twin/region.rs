@@ -1,0 +1,118 @@
+//! Where: the region of time and of operating space in which a missing effect acts.
+
+use numerics::statistics::quantile;
+use physics::Scene;
+
+/// Share of the usual greatest size above which a row counts as affected: a fifth is a change that is seen beside it. Lower: noise
+/// of the estimate and the tails of a curve are called affected; higher: only the peak is.
+const ACTIVE_SHARE: f64 = 0.2;
+/// Share of the rows that are smaller than the usual greatest size: single rows say nothing of a size.
+const USUAL: f64 = 0.99;
+/// A condition on one column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Condition {
+    /// The column lies between these bounds; open where `None`.
+    Range {
+        /// The column.
+        column: String,
+        /// Lower bound.
+        min: Option<f64>,
+        /// Upper bound.
+        max: Option<f64>,
+    },
+    /// The text column is one of these words.
+    Equals {
+        /// The column.
+        column: String,
+        /// The words.
+        words: Vec<String>,
+    },
+}
+
+impl Condition {
+    /// The column it is on.
+    #[must_use]
+    pub fn column(&self) -> &str {
+        match self {
+            Self::Range { column, .. } | Self::Equals { column, .. } => column,
+        }
+    }
+}
+
+/// A stretch of affected rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Span {
+    /// The run.
+    pub run: String,
+    /// Time of its first row.
+    pub from_s: f64,
+    /// Time of its last row.
+    pub to_s: f64,
+}
+
+/// Since when, with an interval.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OnsetInterval {
+    /// The run.
+    pub run: String,
+    /// Time within the recording.
+    pub time_s: f64,
+    /// Earliest plausible time.
+    pub low_s: f64,
+    /// Latest plausible time.
+    pub high_s: f64,
+}
+
+/// Where a missing effect acts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region {
+    /// The missing effect that acts here, by the name the report uses.
+    pub effect: String,
+    /// Share of the missing effects' sum of squares that lies here.
+    pub share: f64,
+    /// Mean contribution here, in the output's unit.
+    pub mean: f64,
+    /// Conditions that hold together.
+    pub conditions: Vec<Condition>,
+    /// Every stretch of affected rows.
+    pub spans: Vec<Span>,
+    /// Since when, where it was not there from the start.
+    pub onset: Option<OnsetInterval>,
+}
+
+/// The usual greatest size of a contribution.
+#[must_use]
+pub fn compute_usual_size(contribution: &[f64]) -> f64 {
+    quantile(contribution.iter().map(|x| x.abs()), USUAL).unwrap_or(0.0)
+}
+
+/// Rows in which a contribution is noticeable beside this size.
+#[must_use]
+pub fn mark_active_rows(contribution: &[f64], size: f64) -> Vec<bool> {
+    contribution.iter().map(|x| x.abs() > ACTIVE_SHARE * size && size > 0.0).collect()
+}
+
+/// Every stretch of affected rows, run by run; gaps of one row are bridged.
+#[must_use]
+pub fn list_spans(scene: &Scene, active: &[bool]) -> Vec<Span> {
+    let mut spans = Vec::new();
+    for (run, name) in scene.runs().iter().zip(scene.run_names()) {
+        let mut open: Option<(usize, usize)> = None;
+        for row in run.clone().filter(|row| active[*row]) {
+            open = match open {
+                Some((first, last)) if row <= last + 2 => Some((first, row)),
+                Some(done) => {
+                    spans.push(build_span(scene, name, done));
+                    Some((row, row))
+                }
+                None => Some((row, row)),
+            };
+        }
+        spans.extend(open.map(|done| build_span(scene, name, done)));
+    }
+    spans
+}
+
+fn build_span(scene: &Scene, run: &str, (first, last): (usize, usize)) -> Span {
+    Span { run: run.to_owned(), from_s: scene.time_s()[first], to_s: scene.time_s()[last] }
+}
