@@ -14,6 +14,7 @@ pub mod clock;
 pub mod commission;
 pub mod config;
 pub mod control;
+pub mod convert;
 pub mod demo;
 pub mod diagnosis;
 pub mod doctor;

@@ -201,7 +201,7 @@ fn damaged_header() -> HistoryError {
 
 /// Notes the size limit, for those who only read.
 pub(crate) fn note_limit(db: &Connection, max_bytes: u64) -> Result<(), HistoryError> {
-    let max_bytes = i64::try_from(max_bytes).unwrap_or(i64::MAX);
+    let max_bytes = crate::convert::clamp_to_signed(max_bytes);
     db.execute("INSERT OR REPLACE INTO meta (key, value) VALUES ('max_bytes', ?1)", [max_bytes])
         .map(drop)
         .with_activity("noting the size limit")
