@@ -47,7 +47,7 @@ enum MaintenanceStage {
     Compact(Option<TimeNs>),
     Age(AgeLimits),
     /// Gives blocks of an older version their checksums: so many are left for this run.
-    Seal(u32),
+    Seal(usize),
     Shrink,
 }
 

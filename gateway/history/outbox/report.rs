@@ -2,6 +2,7 @@
 //! and all of them once in a while, so that a receiver that came late knows everything soon.
 
 use super::item::{Cell, Reading, SeriesInfo};
+use crate::convert::duration_to_ns;
 use crate::history::reason::{NOT_PROVIDED, PRESENT, Reasons};
 use crate::history::rounding::round_to_decimals;
 use crate::history::rows::{Column, SeriesRows, Word};
@@ -86,7 +87,7 @@ impl OutboxReport {
         };
         Self {
             every_nth: u64::from(settings.every_nth.max(1)),
-            refresh_ns: i64::try_from(settings.refresh.as_nanos()).unwrap_or(i64::MAX),
+            refresh_ns: duration_to_ns(settings.refresh),
             bands: series.iter().map(band).collect(),
             last: vec![Last::Missing(NOT_PROVIDED); series.len()],
             ticks: 0,
@@ -174,7 +175,7 @@ fn read_cell(column: &Column, row: usize, decimals: Option<u8>) -> Last {
             None => Last::Missing(NOT_PROVIDED),
         },
         Column::Words(changes) => {
-            let after = changes.partition_point(|(from, _)| *from as usize <= row);
+            let after = changes.partition_point(|(from, _)| *from <= row);
             match after.checked_sub(1).map(|index| &changes[index].1) {
                 Some(Word::Is(text)) => Last::Text(text.clone()),
                 Some(Word::Missing(code)) => Last::Missing(*code),
