@@ -15,6 +15,7 @@ mod withdraw;
 use super::fault::{Fault, UnexpectedReading};
 use super::verdict::{GateOutcome, Verdict};
 use crate::config;
+use crate::convert::duration_to_ns as ns;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use adapters::{Actuator, LadderRequest, LadderRule, SourceError};
@@ -125,7 +126,6 @@ pub struct OverrideWriter<A> {
 impl<A: Actuator> OverrideWriter<A> {
     /// Nothing is written until a verdict says so, but what an earlier run has left enabled is withdrawn.
     pub fn new(actuator: A, limits: &config::GateConfig) -> Self {
-        let ns = |duration: std::time::Duration| i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX);
         let rule = if limits.above_dial { LadderRule::Product } else { LadderRule::Least };
         let settle_ns = ns(actuator.settles_within()).max(SECOND_NS / 100);
         Self {
@@ -330,6 +330,7 @@ impl<A: Actuator> OverrideWriter<A> {
             Some((_, last)) if occasion == Occasion::SignOfLife => *last,
             _ => wanted,
         };
+        debug_assert!(!self.failed, "nothing reaches the machine after a fault, until somebody arms the gate again");
         self.recent.push_back((at_ns, asked));
         let sent = self.actuator.write_feed_override(clock, asked);
         if occasion == Occasion::Change {
