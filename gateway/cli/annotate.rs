@@ -50,7 +50,7 @@ pub(super) fn run(arguments: AnnotateArguments) -> CommandResult {
             Ok(CommandOutcome::No)
         }
         Ok(annotation) => {
-            add(&config.gateway.data_dir, &annotation).map_err(|problem| CannotRun::new(problem, ""))?;
+            add(&config.gateway.data_dir, &annotation).map_err(CannotRun::from_error)?;
             let what = annotation.value.map_or_else(
                 || annotation.file.as_ref().map(|file| file.display().to_string()).unwrap_or_default(),
                 |value| format!("{value} {}", quantity.unit()),

@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
     let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));
     let others = arguments.others.iter().map(|file| read(file)).collect::<Result<Vec<_>, _>>()?;
     let described = Described { machine: &config.gateway.name, box_id: &box_id, prefix: &prefix };
-    let text = devices_xml(described, &created, known, &others).map_err(|what| CannotRun::new(what, ""))?;
+    let text = devices_xml(described, &created, known, &others).map_err(CannotRun::from_error)?;
     match &arguments.out {
         None => print_text(&text),
         Some(file) => std::fs::write(file, text).map_err(|error| {

@@ -235,7 +235,7 @@ fn read_newest_ns(history: &Path) -> Result<i64, CannotRun> {
 fn parse_instant(text: &str, newest_ns: i64) -> Result<i64, CannotRun> {
     let back = text.ends_with(['s', 'm', 'h', 'd']) && text.starts_with(|c: char| c.is_ascii_digit());
     let text = if back { format!("-{text}") } else { text.to_owned() };
-    moment::parse(&text, newest_ns).map_err(|what| CannotRun::new(what, ""))
+    moment::parse(&text, newest_ns).map_err(CannotRun::from_error)
 }
 
 fn load_running_set(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {

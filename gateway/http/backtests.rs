@@ -124,7 +124,7 @@ fn plan_backtest(shared: &ServerState, name: &str, asked: &Asked) -> Result<Back
     let newest = newest.map_err(|error| ApiProblem::unavailable(error.to_string(), "look at the history"))?;
     let nothing = || ApiProblem::conflict("the history holds no samples yet", "let the box run for a while first");
     let (_, newest_ns) = newest.ok_or_else(nothing)?;
-    let bad = |what: String| ApiProblem::bad_request(format!("since: {what}"), "write 24h, 7d or 90m");
+    let bad = |what: moment::MomentError| ApiProblem::bad_request(format!("since: {what}"), "write 24h, 7d or 90m");
     let from_ns = moment::parse(&format!("-{}", asked.since), newest_ns).map_err(bad)?;
     let files = on_disk(shared)?;
     let running = active_scripts::read_texts(&shared.data_dir).unwrap_or_else(|| files.clone());

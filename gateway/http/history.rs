@@ -73,7 +73,8 @@ pub(super) fn describe_history_error(error: &HistoryError) -> ApiProblem {
 
 /// `from` and `to`.
 pub(super) fn parse_range(keys: &QueryKeys, newest_ns: TimeNs) -> Result<(TimeNs, TimeNs), ApiProblem> {
-    let bad = |key: &str, what: String| ApiProblem::bad_request(format!("{key}: {what}"), moment::NOTATION);
+    let bad =
+        |key: &str, what: moment::MomentError| ApiProblem::bad_request(format!("{key}: {what}"), moment::NOTATION);
     let moment =
         |key: &str| keys.find_text(key).map(|text| moment::parse(text, newest_ns).map_err(|what| bad(key, what)));
     let to_ns = moment("to").transpose()?.unwrap_or(newest_ns);

@@ -207,7 +207,7 @@ impl Connection {
 
     async fn receive_operation(&mut self) -> Result<ServerOperation, NatsError> {
         loop {
-            match self.inbox.next_operation().map_err(|came| words::no_nats(&self.at, &came))? {
+            match self.inbox.next_operation().map_err(|came| words::no_nats(&self.at, &came.to_string()))? {
                 Some(ServerOperation::Ping) => self.waiting_out.extend(b"PONG\r\n"),
                 Some(operation) => return Ok(operation),
                 None => {
