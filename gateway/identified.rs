@@ -8,6 +8,7 @@ use crate::files::replace_file;
 use rules::estimators::thermal::{LeftOut, ThermalLearned};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// The subject of the wear model.
 pub const TOOL_WEAR: &str = "tool-wear";
@@ -40,13 +41,26 @@ pub fn of_thermal(learned: &ThermalLearned, left_out: &LeftOut) -> Value {
     document
 }
 
+/// The answer could not be kept.
+#[derive(Debug, Error)]
+#[error("{}: {error}", path.display())]
+pub struct NotSaved {
+    /// Where it should stand.
+    pub path: PathBuf,
+    /// What the system says.
+    pub error: std::io::Error,
+}
+
 /// Keeps what was learned; the newest takes the place of what was there. Where it stands.
 ///
 /// # Errors
 /// The file cannot be written: which, and why.
-pub fn save_answer(data_dir: &Path, subject: &str, learned: &Value) -> Result<PathBuf, String> {
+pub fn save_answer(data_dir: &Path, subject: &str, learned: &Value) -> Result<PathBuf, NotSaved> {
     let path = answer_path(data_dir, subject);
     let text = format!("{:#}\n", build_answer(subject, learned));
     let made = std::fs::create_dir_all(data_dir.join(DIRECTORY)).and_then(|()| replace_file(&path, &text));
-    made.map(|()| path.clone()).map_err(|error| format!("{}: {error}", path.display()))
+    match made {
+        Ok(()) => Ok(path),
+        Err(error) => Err(NotSaved { path, error }),
+    }
 }

@@ -50,7 +50,7 @@ pub mod update;
 pub mod usage;
 pub mod waveform;
 
-pub use gateway_base::{cannot_run, clock, files, log, moment};
+pub use gateway_base::{cannot_run, clock, convert, files, log, moment};
 pub use gateway_control as control;
 pub use gateway_diagnosis as diagnosis;
 pub use gateway_diagnosis::report;

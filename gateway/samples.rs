@@ -1,5 +1,6 @@
 //! Stored samples as JSON and CSV: the same for the API and the command line.
 
+use crate::convert::clamp_to_length;
 use crate::history::{Buckets, Chunk, HistoryError, Overview, Query, Reader, Series, plain_cell};
 use crate::moment;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -45,7 +46,7 @@ pub fn read_bucketed(
 ) -> Result<Value, HistoryError> {
     let width_ns = width_ns(resolution_s);
     let length_ns = query.to_ns.unwrap_or(0).saturating_sub(query.from_ns.unwrap_or(0));
-    let buckets = usize::try_from((length_ns / width_ns).unsigned_abs()).unwrap_or(usize::MAX);
+    let buckets = clamp_to_length((length_ns / width_ns).unsigned_abs());
     if buckets.saturating_mul(query.series.len()) > points_max {
         return Err(too_many(points_max));
     }

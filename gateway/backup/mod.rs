@@ -13,14 +13,14 @@ mod restore;
 mod restored;
 mod schedule;
 
-pub use restore::{RestoreRequest, restore_backup};
+pub use restore::{RestoreError, RestoreRequest, restore_backup};
 pub use restored::install_waiting_files as take_restored;
 pub use schedule::{BackupError, BackupSchedule, take_backup};
 
 use crate::archive::ArchivedFile;
+use crate::convert::seconds_to_instant;
 use crate::history::{HistoryError, Reader};
 use crate::moment;
-use adapters::clock::SECOND_NS;
 use list::{Fate, LIST, of_name};
 use std::path::{Path, PathBuf};
 
@@ -74,7 +74,7 @@ impl BackupPaths {
 /// Name of an archive of this kind that is made at this time, seconds since 1970.
 #[must_use]
 pub fn archive_name(what: &str, at_s: u64) -> String {
-    let at = moment::format_utc(i64::try_from(at_s).unwrap_or_default().saturating_mul(SECOND_NS));
+    let at = moment::format_utc(seconds_to_instant(at_s));
     format!("cnc-gateway-{what}-{}.tar.gz", at.replace([':', '.'], "-"))
 }
 

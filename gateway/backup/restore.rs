@@ -1,11 +1,10 @@
 //! A backup comes back: everything in it is checked, what is there now is kept, and then all of it takes its place.
 
 use super::list::{Fate, of_name};
-use super::restored;
-use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, configured_files, is_of_scripts, list_names};
+use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, configured_files, is_of_scripts, list_names, restored};
 use crate::archive::ArchivedFile;
 use crate::files::{keep_last, replace_durably, replace_file};
-use crate::history::{Reader, store_wear_model};
+use crate::history::{HistoryError, Reader, store_wear_model};
 use crate::reload::read_directory;
 use crate::settings;
 use adapters::clock::TimeNs;
@@ -13,9 +12,79 @@ use rules::estimators::thermal::ThermalModel;
 use rules::estimators::wear::WearRecord;
 use rules::script::{ScriptFile, SettingValues, prepare_with};
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// Archives of what was replaced that are kept.
 const BEFORE_MAX: usize = 5;
+
+/// Why a backup does not come back.
+#[derive(Debug, Error)]
+pub enum RestoreError {
+    /// There is nothing in it that this box has a place for.
+    #[error(
+        "the archive holds nothing that this box has a place for: no script, recipe, model or file of a data directory"
+    )]
+    Empty,
+    /// A file that must be text.
+    #[error("{name} is no text")]
+    NoText {
+        /// Its name in the archive.
+        name: String,
+    },
+    /// A name that would lead elsewhere than to the scripts.
+    #[error("{name:?} is no name of a script")]
+    NoScript {
+        /// The name in the archive.
+        name: String,
+    },
+    /// A file of the data directory that no backup holds.
+    #[error("{name:?} is no file of a backup")]
+    NotOfBackup {
+        /// The name in the archive.
+        name: String,
+    },
+    /// A wear model that is none.
+    #[error("{name}: {what}")]
+    WearModel {
+        /// Its name in the archive.
+        name: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// The law of the thermal error is none, or that of another machine.
+    #[error("the thermal model {0}")]
+    ThermalModel(String),
+    /// What was learned has been changed since it was written.
+    #[error("{name} is not as it was written: no JSON, or another checksum")]
+    Changed {
+        /// Its name in the archive.
+        name: String,
+    },
+    /// Scripts, settings, recipe or model that this version does not take; every problem on a line of its own.
+    #[error("{0}")]
+    Refused(String),
+    /// What is there now could not be kept. Nothing was changed.
+    #[error("what is there now could not be kept: {0}")]
+    NotKept(std::io::Error),
+    /// A file could not be written.
+    #[error("{}: {error}", path.display())]
+    File {
+        /// Which, or the directory that it is in.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// The wear models could not be read or stored.
+    #[error("the wear models: {0}")]
+    WearModels(#[from] HistoryError),
+}
+
+impl RestoreError {
+    /// Adds the path to what the system says.
+    pub(super) fn of_file(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
+        move |error| Self::File { path: path.to_owned(), error }
+    }
+}
 
 /// Who restores, when, and the archive of what is there now with its name.
 #[derive(Debug, Clone, Copy)]
@@ -45,22 +114,24 @@ struct Found {
 ///
 /// # Errors
 /// What is wrong with the backup, before anything was changed; or a file that cannot be written.
-pub fn restore_backup(places: &BackupPaths, files: &[ArchivedFile], ask: RestoreRequest<'_>) -> Result<String, String> {
+pub fn restore_backup(
+    places: &BackupPaths,
+    files: &[ArchivedFile],
+    ask: RestoreRequest<'_>,
+) -> Result<String, RestoreError> {
     let found = Found::from_archive(places, files)?;
     if found.is_empty() {
-        return Err("the archive holds nothing that this box has a place for: no script, recipe, model or file of a data directory"
-            .to_owned());
+        return Err(RestoreError::Empty);
     }
     found.check_contents(places)?;
     keep_before(&places.data_dir, ask.before)?;
     put_scripts(&places.scripts, &found)?;
-    let say = |path: &Path, error: std::io::Error| format!("{}: {error}", path.display());
     for (path, text) in &found.now {
-        replace_durably(path, text).map_err(|error| say(path, error))?;
+        replace_durably(path, text).map_err(RestoreError::of_file(path))?;
     }
     if let Some(body) = &found.settings {
         let path = settings::values_path(&places.data_dir);
-        replace_durably(&path, &settings::sign_text(body, ask.by)).map_err(|error| say(&path, error))?;
+        replace_durably(&path, &settings::sign_text(body, ask.by)).map_err(RestoreError::of_file(&path))?;
     }
     let models = store_wear_models(&places.history, &found.wear, ask.at_ns)?;
     restored::lay_ready(&places.data_dir, &found.later)?;
@@ -68,13 +139,13 @@ pub fn restore_backup(places: &BackupPaths, files: &[ArchivedFile], ask: Restore
 }
 
 impl Found {
-    fn from_archive(places: &BackupPaths, files: &[ArchivedFile]) -> Result<Self, String> {
+    fn from_archive(places: &BackupPaths, files: &[ArchivedFile]) -> Result<Self, RestoreError> {
         let mut found = Self::default();
         for (name, content) in files {
-            let text = || String::from_utf8(content.clone()).map_err(|_| format!("{name} is no text"));
+            let text = || String::from_utf8(content.clone()).map_err(|_| RestoreError::NoText { name: name.clone() });
             if let Some(file) = name.strip_prefix("scripts/") {
                 if !is_of_scripts(file) {
-                    return Err(format!("{name:?} is no name of a script"));
+                    return Err(RestoreError::NoScript { name: name.clone() });
                 }
                 match file {
                     DELIVERED => found.delivered = Some(text()?),
@@ -85,10 +156,11 @@ impl Found {
                     Some(Fate::AtOnce) if file == settings::FILE => found.settings = Some(text()?),
                     Some(Fate::AtOnce) => found.now.push((places.data_dir.join(file), text()?)),
                     Some(Fate::AtStart) => found.later.push((file.to_owned(), text()?)),
-                    _ => return Err(format!("{name:?} is no file of a backup")),
+                    _ => return Err(RestoreError::NotOfBackup { name: name.clone() }),
                 }
             } else if name.starts_with(WEAR_MODELS) {
-                found.wear.push(WearRecord::parse(&text()?).map_err(|what| format!("{name}: {what}"))?);
+                let wrong = |what: String| RestoreError::WearModel { name: name.clone(), what };
+                found.wear.push(WearRecord::parse(&text()?).map_err(wrong)?);
             } else if let Some(path) =
                 configured_files(places).into_iter().find(|it| it.0 == name).and_then(|it| it.1.as_ref())
             {
@@ -103,7 +175,7 @@ impl Found {
     }
 
     /// Everything as the box will read it.
-    fn check_contents(&self, places: &BackupPaths) -> Result<(), String> {
+    fn check_contents(&self, places: &BackupPaths) -> Result<(), RestoreError> {
         let of = |path: &Option<PathBuf>| {
             let path = path.as_ref()?;
             self.now.iter().find(|(it, _)| it == path).map(|(_, text)| text.as_str())
@@ -115,18 +187,18 @@ impl Found {
             rules::twin::parse_model(model).map_err(join_lines)?;
         }
         if let Some(model) = of(&places.thermal_model) {
-            ThermalModel::read(model, &places.machine).map_err(|what| format!("the thermal model {what}"))?;
+            ThermalModel::read(model, &places.machine).map_err(RestoreError::ThermalModel)?;
         }
         for (name, text) in self.later.iter().filter(|(name, _)| name.ends_with(".json")) {
             if crate::learned::state_of(text).is_none() {
-                return Err(format!("{name} is not as it was written: no JSON, or another checksum"));
+                return Err(RestoreError::Changed { name: name.clone() });
             }
         }
         self.check_scripts(places)
     }
 
     /// The scripts with the settings that will be in force, those that are there where the archive has none.
-    fn check_scripts(&self, places: &BackupPaths) -> Result<(), String> {
+    fn check_scripts(&self, places: &BackupPaths) -> Result<(), RestoreError> {
         if self.scripts.is_empty() && self.settings.is_none() {
             return Ok(());
         }
@@ -167,44 +239,44 @@ impl Found {
 }
 
 /// Every problem on a line of its own.
-fn join_lines<P: std::fmt::Display>(all: Vec<P>) -> String {
-    all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+fn join_lines<P: std::fmt::Display>(all: Vec<P>) -> RestoreError {
+    RestoreError::Refused(all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
 }
 
 /// Stores the models that are not in force yet; how many.
-fn store_wear_models(history: &Path, wanted: &[WearRecord], at_ns: TimeNs) -> Result<usize, String> {
-    let say = |error: crate::history::HistoryError| format!("the wear models: {error}");
+fn store_wear_models(history: &Path, wanted: &[WearRecord], at_ns: TimeNs) -> Result<usize, RestoreError> {
     let there = match wanted.is_empty() || !history.exists() {
         true => Vec::new(),
-        false => Reader::open(history).and_then(|reader| reader.wear_models()).map_err(say)?,
+        false => Reader::open(history).and_then(|reader| reader.wear_models())?,
     };
     let fresh = |record: &&WearRecord| !there.iter().any(|it| it.in_force && it.record == **record);
     let mut stored = 0;
     for record in wanted.iter().filter(fresh) {
-        store_wear_model(history, at_ns, record).map_err(say)?;
+        store_wear_model(history, at_ns, record)?;
         stored += 1;
     }
     Ok(stored)
 }
 
-fn keep_before(data_dir: &Path, (archive, name): (&[u8], &str)) -> Result<(), String> {
-    let say = |error: std::io::Error| format!("what is there now could not be kept: {error}");
-    std::fs::create_dir_all(data_dir).map_err(say)?;
-    std::fs::write(data_dir.join(name), archive).map_err(say)?;
-    keep_last(data_dir, BEFORE_MAX, |name| name.contains("-before-restore-") && name.ends_with(".tar.gz")).map_err(say)
+fn keep_before(data_dir: &Path, (archive, name): (&[u8], &str)) -> Result<(), RestoreError> {
+    let is_kept = |name: &str| name.contains("-before-restore-") && name.ends_with(".tar.gz");
+    std::fs::create_dir_all(data_dir)
+        .and_then(|()| std::fs::write(data_dir.join(name), archive))
+        .and_then(|()| keep_last(data_dir, BEFORE_MAX, is_kept))
+        .map_err(RestoreError::NotKept)
 }
 
 /// The scripts of the backup and no others: one that is not in it would still decide.
-fn put_scripts(directory: &Path, found: &Found) -> Result<(), String> {
+fn put_scripts(directory: &Path, found: &Found) -> Result<(), RestoreError> {
     if found.scripts.is_empty() {
         return Ok(());
     }
-    let say = |error: std::io::Error| format!("{}: {error}", directory.display());
+    let say = RestoreError::of_file(directory);
     for file in &found.scripts {
-        replace_file(&directory.join(&file.name), &file.text).map_err(say)?;
+        replace_file(&directory.join(&file.name), &file.text).map_err(&say)?;
     }
     if let Some(list) = &found.delivered {
-        replace_file(&directory.join(DELIVERED), list).map_err(say)?;
+        replace_file(&directory.join(DELIVERED), list).map_err(&say)?;
     }
     let surplus = |name: &String| name.ends_with(".rhai") && !found.scripts.iter().any(|file| file.name == *name);
     list_names(directory)

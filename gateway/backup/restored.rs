@@ -3,6 +3,7 @@
 
 use super::list::{Fate, of_name};
 use super::list_names;
+use super::restore::RestoreError;
 use crate::log::{Notice, Severity};
 use std::path::Path;
 use std::time::Duration;
@@ -13,11 +14,11 @@ const FOLDER: &str = "restored";
 const WAITS_MAX: Duration = Duration::from_secs(24 * 3600);
 
 /// Lays these files ready, in the place of any that wait already.
-pub(super) fn lay_ready(data_dir: &Path, files: &[(String, String)]) -> Result<(), String> {
+pub(super) fn lay_ready(data_dir: &Path, files: &[(String, String)]) -> Result<(), RestoreError> {
     let folder = data_dir.join(FOLDER);
-    let say = |error: std::io::Error| format!("{}: {error}", folder.display());
-    clear(&folder).map_err(say)?;
-    files.iter().try_for_each(|(name, text)| crate::files::replace_durably(&folder.join(name), text).map_err(say))
+    let say = RestoreError::of_file(&folder);
+    clear(&folder).map_err(&say)?;
+    files.iter().try_for_each(|(name, text)| crate::files::replace_durably(&folder.join(name), text).map_err(&say))
 }
 
 fn clear(folder: &Path) -> std::io::Result<()> {

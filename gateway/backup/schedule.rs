@@ -1,10 +1,12 @@
 //! Backups that are taken by themselves: to a directory, a stick or a share that is mounted there; each one is restored into
 //! a scratch folder before it counts.
 
-use super::{BackupPaths, RestoreRequest, archive_name, collect_files, copy_history, restore_backup};
+use super::{BackupPaths, RestoreError, RestoreRequest, archive_name, collect_files, copy_history, restore_backup};
 use crate::archive::{pack, unpack};
 use crate::config::BackupConfig;
+use crate::convert::seconds_to_instant;
 use crate::files::{keep_last, list_named};
+use crate::history::HistoryError;
 use crate::log::{Notice, Severity};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -39,10 +41,13 @@ pub enum BackupError {
     },
     /// What was written does not come back.
     #[error("the backup was written and could not be restored into a scratch folder: {0}")]
-    NotRestorable(String),
-    /// The history cannot be copied.
+    NotRestorable(RestoreError),
+    /// What was written cannot be unpacked.
+    #[error("the backup was written and could not be restored into a scratch folder: {0}")]
+    NotUnpacked(std::io::Error),
+    /// The history cannot be copied, or its wear models cannot be read.
     #[error("the history cannot be copied: {0}")]
-    History(String),
+    History(#[from] HistoryError),
 }
 
 /// One backup: collected, written, restored into a scratch folder. Gives its path.
@@ -54,7 +59,7 @@ pub fn take_backup(paths: &BackupPaths, config: &BackupConfig, at_s: u64) -> Res
     if !directory.is_dir() {
         return Err(BackupError::Directory(directory.clone()));
     }
-    let files = collect_files(paths).map_err(|error| BackupError::History(error.to_string()))?;
+    let files = collect_files(paths)?;
     let file = |path: &Path| {
         let path = path.to_owned();
         move |error| BackupError::File { path, error }
@@ -86,14 +91,14 @@ fn copy_history_beside(paths: &BackupPaths, config: &BackupConfig, at_s: u64) ->
         return Ok(());
     }
     let copy = config.directory.join(archive_name("history", at_s)).with_extension("").with_extension("db");
-    copy_history(&paths.history, &copy).map(drop).map_err(|error| BackupError::History(error.to_string()))
+    copy_history(&paths.history, &copy)?;
+    Ok(())
 }
 
 /// Reads the archive back from where it was written and restores it into a scratch folder.
 fn verify_backup(paths: &BackupPaths, archive: &Path, at_s: u64) -> Result<(), BackupError> {
-    let wrong = |what: String| BackupError::NotRestorable(what);
     let bytes = fs::read(archive).map_err(|error| BackupError::File { path: archive.to_owned(), error })?;
-    let files = unpack(&bytes).map_err(|error| wrong(error.to_string()))?;
+    let files = unpack(&bytes).map_err(BackupError::NotUnpacked)?;
     let scratch = paths.data_dir.join(SCRATCH);
     let _none_left = fs::remove_dir_all(&scratch);
     let below = |path: &Option<PathBuf>| {
@@ -109,9 +114,9 @@ fn verify_backup(paths: &BackupPaths, archive: &Path, at_s: u64) -> Result<(), B
         thermal_model: below(&paths.thermal_model),
         configuration: None,
     };
-    let at_ns = i64::try_from(at_s).unwrap_or_default().saturating_mul(adapters::clock::SECOND_NS);
+    let at_ns = seconds_to_instant(at_s);
     let request = RestoreRequest { by: "backup", at_ns, before: (&[], "none.tar.gz") };
-    let outcome = restore_backup(&places, &files, request).map(|_| ()).map_err(wrong);
+    let outcome = restore_backup(&places, &files, request).map(drop).map_err(BackupError::NotRestorable);
     let _scratch_left = fs::remove_dir_all(&scratch);
     outcome
 }

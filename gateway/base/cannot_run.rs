@@ -16,6 +16,11 @@ impl CannotRun {
     pub fn new(what: impl Into<String>, next: impl Into<String>) -> Self {
         Self { what: what.into(), next: next.into() }
     }
+
+    /// An error whose own words say what to do next.
+    pub fn from_error(error: impl fmt::Display) -> Self {
+        Self::new(error.to_string(), "")
+    }
 }
 
 impl fmt::Display for CannotRun {

@@ -2,6 +2,7 @@
 
 pub mod cannot_run;
 pub mod clock;
+pub mod convert;
 pub mod files;
 pub mod log;
 pub mod moment;

@@ -13,22 +13,39 @@ use jiff::tz::TimeZone;
 pub const NOTATION: &str = "write 2026-01-31 08:15 (time of this box), 2026-01-31T08:15:00Z, 2026-01-31, today, yesterday, now, or a time \
     before the newest sample such as -90s, -10m, -8h, -7d";
 
+/// Why a text is no instant.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, thiserror::Error)]
+pub enum MomentError {
+    /// It is written in no known way.
+    #[error("{text:?} is no time; {NOTATION}")]
+    NoTime {
+        /// What was written.
+        text: String,
+    },
+    /// It is an instant that nanoseconds cannot count to.
+    #[error("{text} is outside the years 1678 to 2261")]
+    OutOfRange {
+        /// What was written.
+        text: String,
+    },
+}
+
 /// The instant that `text` means; `newest_ns` is the time of the newest sample.
 ///
 /// # Errors
 /// What is wrong and how instants are written.
-pub fn parse(text: &str, newest_ns: TimeNs) -> Result<TimeNs, String> {
+pub fn parse(text: &str, newest_ns: TimeNs) -> Result<TimeNs, MomentError> {
     let text = text.trim();
     if text == "now" {
         return Ok(newest_ns);
     }
     if let Some(back) = text.strip_prefix('-') {
-        let span_ns = parse_span(back).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
+        let span_ns = parse_span(back).ok_or_else(|| MomentError::NoTime { text: text.to_owned() })?;
         return Ok(newest_ns.saturating_sub(span_ns));
     }
-    let stamp =
-        parse_stamp(text, &TimeZone::system(), newest_ns).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
-    i64::try_from(stamp.as_nanosecond()).map_err(|_| format!("{text} is outside the years 1678 to 2261"))
+    let stamp = parse_stamp(text, &TimeZone::system(), newest_ns)
+        .ok_or_else(|| MomentError::NoTime { text: text.to_owned() })?;
+    TimeNs::try_from(stamp.as_nanosecond()).map_err(|_| MomentError::OutOfRange { text: text.to_owned() })
 }
 
 /// With a zone as it says; without one in the zone of the box. The first of two moments where a clock is set back.

@@ -1,10 +1,9 @@
 //! `cnc-gateway annotate`: what only a person can measure, noted beside the history.
 
 use super::{CannotRun, CommandOutcome, CommandResult, load_configuration, print_text};
-use crate::clock;
 use crate::commission::annotations::{Quantity, TypedAnnotation, add, parse_annotation};
 use crate::history::Reader;
-use crate::moment;
+use crate::{clock, moment};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -50,7 +49,7 @@ pub(super) fn run(arguments: AnnotateArguments) -> CommandResult {
             Ok(CommandOutcome::No)
         }
         Ok(annotation) => {
-            add(&config.gateway.data_dir, &annotation).map_err(|problem| CannotRun::new(problem, ""))?;
+            add(&config.gateway.data_dir, &annotation).map_err(CannotRun::from_error)?;
             let what = annotation.value.map_or_else(
                 || annotation.file.as_ref().map(|file| file.display().to_string()).unwrap_or_default(),
                 |value| format!("{value} {}", quantity.unit()),

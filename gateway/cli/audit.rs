@@ -39,7 +39,7 @@ pub(super) fn answer_audit(arguments: &AuditArguments, reader: &Reader) -> Comma
         reader.read_present_span().map_err(|error| to_cannot_run(&error))?.map_or(0, |(_, newest_ns)| newest_ns);
     let moment = |text: &Option<String>, otherwise: i64| {
         let parsed = text.as_ref().map(|text| moment::parse(text, newest_ns)).transpose();
-        parsed.map(|ns| ns.unwrap_or(otherwise)).map_err(|what| CannotRun::new(what, ""))
+        parsed.map(|ns| ns.unwrap_or(otherwise)).map_err(CannotRun::from_error)
     };
     let (from_ns, to_ns) = (moment(&arguments.from, i64::MIN)?, moment(&arguments.to, i64::MAX)?);
     let rows = reader.read_audit(from_ns, to_ns, arguments.limit).map_err(|error| to_cannot_run(&error))?;

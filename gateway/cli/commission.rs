@@ -1,7 +1,6 @@
 //! `cnc-gateway commission`: what is known of this machine, what is missing, what to do next and why.
 
 use super::{CannotRun, CommandOutcome, CommandResult, load_configuration, print_json, print_text};
-use crate::clock;
 use crate::commission::annotations::{self, Annotation};
 use crate::commission::columns::Merged;
 use crate::commission::learn::{Learned, learn_parts, prepare_recording};
@@ -10,8 +9,7 @@ use crate::commission::plan::{self, Limits, Which};
 use crate::config::Config;
 use crate::diagnosis::write_output;
 use crate::history::{Reader, store_wear_model};
-use crate::identified;
-use crate::moment;
+use crate::{clock, identified, moment};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -74,8 +72,7 @@ pub(super) fn run(arguments: &CommissionArguments) -> CommandResult {
         return print_plan(which, &arguments.plan);
     }
     let config = load_configuration(arguments.config.as_deref())?;
-    let say = |problem| CannotRun::new(problem, "");
-    let noted = annotations::read(&config.gateway.data_dir).map_err(say)?;
+    let noted = annotations::read(&config.gateway.data_dir).map_err(CannotRun::from_error)?;
     let Some((first_ns, newest_ns)) = read_span(&config.history.path)? else {
         let next = "start the box with this configuration and let it record: `cnc-gateway run --config FILE`";
         return print_answer(
@@ -84,14 +81,20 @@ pub(super) fn run(arguments: &CommissionArguments) -> CommandResult {
             &json!({ "schema": "commission/1", "parts": [], "next": next }),
         );
     };
-    let from = arguments.from.as_deref().map(|text| moment::parse(text, newest_ns)).transpose().map_err(say)?;
-    let (recording, merged) = prepare_recording(&config.history.path, &noted, from).map_err(say)?;
+    let from = arguments
+        .from
+        .as_deref()
+        .map(|text| moment::parse(text, newest_ns))
+        .transpose()
+        .map_err(CannotRun::from_error)?;
+    let (recording, merged) = prepare_recording(&config.history.path, &noted, from).map_err(CannotRun::from_error)?;
     let learned = learn_parts(&recording, merged, &config.gateway.name, arguments.criterion_mm);
     let written = if arguments.write { write(&config, &learned)? } else { Vec::new() };
     let text = describe_learned(&learned, &noted, &written, (from.unwrap_or(first_ns), newest_ns));
     if arguments.write {
         let path = config.gateway.data_dir.join("commission.html");
-        write_output(&path, &render_page(&config.gateway.name, &text, &learned.pictures)).map_err(say)?;
+        write_output(&path, &render_page(&config.gateway.name, &text, &learned.pictures))
+            .map_err(CannotRun::from_error)?;
     }
     let document = learned_to_json(&learned, &written, (from.unwrap_or(first_ns), newest_ns));
     print_answer(arguments, &text, &document)
@@ -130,10 +133,9 @@ fn print_plan(which: Which, arguments: &PlanArguments) -> CommandResult {
     if numbers.into_iter().flatten().chain([&limits.diameter_mm]).any(|number| !usable(number)) {
         return Err(CannotRun::new("a speed, feed, depth or diameter of the list is not greater than 0", ""));
     }
-    let steps = plan::plan_steps(which, &limits).map_err(|problem| CannotRun::new(problem, ""))?;
+    let steps = plan::plan_steps(which, &limits).map_err(CannotRun::from_error)?;
     if let Some(path) = &arguments.out {
-        write_output(path, &plan::format_csv(&steps, limits.diameter_mm))
-            .map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(path, &plan::format_csv(&steps, limits.diameter_mm)).map_err(CannotRun::from_error)?;
     }
     print_text(&plan::format_text(&steps, limits.diameter_mm));
     Ok(CommandOutcome::Fine)
@@ -143,7 +145,7 @@ fn print_plan(which: Which, arguments: &PlanArguments) -> CommandResult {
 fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
     let mut written = Vec::new();
     let mut file = |path: PathBuf, text: &str| {
-        write_output(&path, text).map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(&path, text).map_err(CannotRun::from_error)?;
         written.push(path.display().to_string());
         Ok::<_, CannotRun>(())
     };
@@ -159,7 +161,7 @@ fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
         }
     }
     if let Some(model) = &learned.thermal {
-        let text = model.to_json_text().map_err(|problem| CannotRun::new(problem, ""))?;
+        let text = model.to_json_text().map_err(CannotRun::from_error)?;
         file(config.gateway.data_dir.join("thermal_model.json"), &text)?;
         written.push(
             "write model = \"thermal_model.json\" under [thermal], with its path from the configuration file"
@@ -174,7 +176,7 @@ fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
     }
     for (subject, found) in &learned.found {
         let path = identified::save_answer(&config.gateway.data_dir, subject, found);
-        written.push(path.map_err(|problem| CannotRun::new(problem, ""))?.display().to_string());
+        written.push(path.map_err(CannotRun::from_error)?.display().to_string());
     }
     written.push(config.gateway.data_dir.join("commission.html").display().to_string());
     Ok(written)

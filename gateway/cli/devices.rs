@@ -1,11 +1,9 @@
 //! `cnc-gateway devices`: the `devices.xml` of this machine for an MTConnect agent.
 
 use super::{CannotRun, CommandOutcome, CommandResult, print_text};
-use crate::clock;
-use crate::config;
 use crate::history::{Query, Reader, box_id};
-use crate::moment;
 use crate::sinks::shdr::{Described, devices_xml, is_prefix, prefix_of};
+use crate::{clock, config, moment};
 use clap::Args;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -51,7 +49,7 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
     let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));
     let others = arguments.others.iter().map(|file| read(file)).collect::<Result<Vec<_>, _>>()?;
     let described = Described { machine: &config.gateway.name, box_id: &box_id, prefix: &prefix };
-    let text = devices_xml(described, &created, known, &others).map_err(|what| CannotRun::new(what, ""))?;
+    let text = devices_xml(described, &created, known, &others).map_err(CannotRun::from_error)?;
     match &arguments.out {
         None => print_text(&text),
         Some(file) => std::fs::write(file, text).map_err(|error| {

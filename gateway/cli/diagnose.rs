@@ -76,9 +76,7 @@ pub(super) fn diagnose_recordings(arguments: DiagnoseArguments) -> CommandResult
     if arguments.search {
         eprintln!("{}", diagnosis.debug);
     }
-    collect_outputs(&arguments)
-        .write(&diagnosis, &given.recording, &context)
-        .map_err(|problem| CannotRun::new(problem, ""))?;
+    collect_outputs(&arguments).write(&diagnosis, &given.recording, &context).map_err(CannotRun::from_error)?;
     Ok(CommandOutcome::Fine)
 }
 

@@ -50,7 +50,7 @@ pub(super) fn run_doctor(arguments: &DoctorArguments) -> CommandResult {
             None => address.parse().map_err(|error: AddressError| unusable(error.to_string()))?,
         };
         let report = if arguments.all { doctor::examine_all(&address) } else { doctor::examine_address(&address) };
-        let report = report.map_err(unusable)?;
+        let report = report.map_err(|error| unusable(error.to_string()))?;
         if arguments.json {
             print_json(&report.to_json())
         } else {
@@ -58,7 +58,7 @@ pub(super) fn run_doctor(arguments: &DoctorArguments) -> CommandResult {
         }
         return Ok(to_outcome(report.problems.is_empty()));
     };
-    let comparison = doctor::compare_backends(address, library).map_err(unusable)?;
+    let comparison = doctor::compare_backends(address, library).map_err(|error| unusable(error.to_string()))?;
     if arguments.json {
         print_json(&comparison.to_json());
     } else {

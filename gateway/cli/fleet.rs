@@ -115,7 +115,7 @@ const DUPLICATE_WINDOW: Duration = Duration::from_secs(120);
 
 impl StreamArguments {
     fn parse_settings(&self) -> Result<(NatsTarget, StreamSettings), CannotRun> {
-        let (servers, prefix) = parse_cluster(&self.address).map_err(|what| CannotRun::new(what, ""))?;
+        let (servers, prefix) = parse_cluster(&self.address).map_err(CannotRun::from_error)?;
         let plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';
         if self.stream.is_empty() || !self.stream.chars().all(plain) {
             return Err(CannotRun::new(

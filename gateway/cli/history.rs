@@ -2,9 +2,8 @@
 
 use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::history::{DAY_NS, HistoryError, Query, Reader, SqlValue, day_of, plain_cell};
-use crate::moment;
 use crate::records::{RecordKind, RecordQuery, build_document, read_records};
-use crate::samples;
+use crate::{moment, samples};
 use adapters::clock::TimeNs;
 use clap::{Args, Subcommand, ValueEnum};
 use serde_json::{Map, Value, json};
@@ -129,9 +128,8 @@ impl PartitionArguments {
         let Some((first_ns, newest_ns)) = span else {
             return Err(CannotRun::new("the history holds no samples", "let the gateway run first"));
         };
-        let bad = |what: String| CannotRun::new(what, "");
         let day = |text: &Option<String>, otherwise| match text {
-            Some(text) => moment::parse(text, newest_ns).map(day_of).map_err(bad),
+            Some(text) => moment::parse(text, newest_ns).map(day_of).map_err(CannotRun::from_error),
             None => Ok(day_of(otherwise)),
         };
         let (from_ns, to_ns) = (day(&self.from, first_ns)?, day(&self.to, newest_ns)?);
@@ -212,9 +210,9 @@ impl Selection {
     fn build_query(&self, reader: &Reader) -> Result<(Query, (TimeNs, TimeNs)), CannotRun> {
         let span = reader.read_present_span().map_err(|error| to_cannot_run(&error))?;
         let (first_ns, newest_ns) = span.unwrap_or((0, 0));
-        let bad = |what: String| CannotRun::new(what, "");
-        let moment =
-            |text: &Option<String>| text.as_ref().map(|text| moment::parse(text, newest_ns).map_err(bad)).transpose();
+        let moment = |text: &Option<String>| {
+            text.as_ref().map(|text| moment::parse(text, newest_ns).map_err(CannotRun::from_error)).transpose()
+        };
         let from_ns = moment(&self.from)?.unwrap_or(first_ns);
         let to_ns = moment(&self.to)?.unwrap_or(newest_ns.saturating_add(1));
         let query = Query {

@@ -2,9 +2,8 @@
 
 use super::history::to_cannot_run;
 use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
-use crate::clock;
 use crate::history::{Repaired, repair_history as save, set_apart as move_apart};
-use crate::moment;
+use crate::{clock, moment};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -62,7 +61,7 @@ fn print_repaired(repaired: &Repaired, new: &Path) {
 pub(super) fn set_apart(arguments: &SetApartArguments, path: &Path) -> CommandResult {
     let now_ns = clock::now_ns();
     let after = arguments.after.as_deref().map(|text| moment::parse(text, now_ns)).transpose();
-    let after_ns = after.map_err(|what| CannotRun::new(what, ""))?.unwrap_or(now_ns);
+    let after_ns = after.map_err(CannotRun::from_error)?.unwrap_or(now_ns);
     let apart = move_apart(path, &arguments.new, after_ns).map_err(|error| to_cannot_run(&error))?;
     print_text(&format!(
         "{} samples and {} records that are dated after {} are in {} now\n",

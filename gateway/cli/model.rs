@@ -94,7 +94,7 @@ fn create_model(arguments: NewArguments) -> CommandResult {
         axis: arguments.axis,
     };
     let out = arguments.out.unwrap_or_else(|| PathBuf::from("-"));
-    write_output(&out, &new.to_toml()).map_err(|problem| CannotRun::new(problem, ""))?;
+    write_output(&out, &new.to_toml()).map_err(CannotRun::from_error)?;
     if out.as_os_str() != "-" {
         let path = out.display();
         print_text(pick_text(

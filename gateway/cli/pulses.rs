@@ -53,19 +53,21 @@ pub(super) fn run(arguments: &PulsesArguments) -> CommandResult {
 }
 
 fn write_vectors(directory: &Path) -> CommandResult {
-    let say = |problem: String| CannotRun::new(problem, "");
-    std::fs::create_dir_all(directory).map_err(|error| say(format!("{}: {error}", directory.display())))?;
-    let all = build_vectors().map_err(say)?;
+    std::fs::create_dir_all(directory)
+        .map_err(|error| CannotRun::new(format!("{}: {error}", directory.display()), ""))?;
+    let all = build_vectors().map_err(CannotRun::from_error)?;
     let mut list = Vec::new();
     for vector in &all {
-        write_output(&directory.join(format!("{}.in.csv", vector.name)), &vector.input).map_err(say)?;
-        write_output(&directory.join(format!("{}.out.csv", vector.name)), &vector.expected).map_err(say)?;
+        write_output(&directory.join(format!("{}.in.csv", vector.name)), &vector.input)
+            .map_err(CannotRun::from_error)?;
+        write_output(&directory.join(format!("{}.out.csv", vector.name)), &vector.expected)
+            .map_err(CannotRun::from_error)?;
         list.push(json!({ "name": vector.name, "shows": vector.shows, "spacing_ns": vector.spacing_ns,
             "rows_in": vector.proof.rows, "edges_out": vector.proof.edges_out, "position_in_edges": vector.proof.in_edges,
             "position_out_edges": vector.proof.out_edges, "inserted_pulses": vector.proof.inserted }));
     }
     let document = json!({ "schema": "pulses/1", "edges_per_pulse": 4, "vectors": list });
-    write_output(&directory.join("vectors.json"), &format!("{document:#}\n")).map_err(say)?;
+    write_output(&directory.join("vectors.json"), &format!("{document:#}\n")).map_err(CannotRun::from_error)?;
     print_text(&format!("{} vectors in {}\n", all.len(), directory.display()));
     Ok(CommandOutcome::Fine)
 }

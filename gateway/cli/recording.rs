@@ -105,7 +105,7 @@ fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
     let name = file.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let text = proposal.to_toml(&statement, &name);
     Mapping::parse(&text, "map").map_err(|wrong| CannotRun::new(wrong.to_string(), ""))?;
-    write_output(out, &text).map_err(|problem| CannotRun::new(problem, ""))?;
+    write_output(out, &text).map_err(CannotRun::from_error)?;
     if out.as_os_str() == "-" {
         return Ok(CommandOutcome::Fine);
     }

@@ -2,13 +2,11 @@
 
 use super::lang::language;
 use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text, refuse_scripts};
-use crate::active_scripts;
 use crate::backtest::{BacktestPlan, run_backtest};
 use crate::config::{self, Config};
 use crate::history::Reader;
-use crate::moment;
 use crate::reload::{read_directory, read_file};
-use crate::settings;
+use crate::{active_scripts, moment, settings};
 use ::rules::physics::explain::Language;
 use ::rules::script::{self, ScriptFile, ScriptProblem, ScriptSet, SettingValues, TrialResult};
 use clap::{Args, Subcommand};
@@ -235,7 +233,7 @@ fn read_newest_ns(history: &Path) -> Result<i64, CannotRun> {
 fn parse_instant(text: &str, newest_ns: i64) -> Result<i64, CannotRun> {
     let back = text.ends_with(['s', 'm', 'h', 'd']) && text.starts_with(|c: char| c.is_ascii_digit());
     let text = if back { format!("-{text}") } else { text.to_owned() };
-    moment::parse(&text, newest_ns).map_err(|what| CannotRun::new(what, ""))
+    moment::parse(&text, newest_ns).map_err(CannotRun::from_error)
 }
 
 fn load_running_set(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {

@@ -63,12 +63,11 @@ fn simulate_model(path: &Path, arguments: &SimulateArguments) -> CommandResult {
     let (Ok(model), Ok(given)) = (model, given) else { return Err(cannot_use(&problems)) };
     given.warnings.iter().for_each(|warning| eprintln!("{warning}"));
     let simulation = simulation::run(&given.recording, &model).map_err(|all| cannot_use(&all))?;
-    let say = |problem| CannotRun::new(problem, "");
     if let Some(path) = &arguments.rows {
-        write_output(path, &simulation.rows_csv(&given.recording)).map_err(say)?;
+        write_output(path, &simulation.rows_csv(&given.recording)).map_err(CannotRun::from_error)?;
     }
     let text = if arguments.json { format!("{:#}\n", simulation.to_json()) } else { simulation.format_text() };
-    write_output(Path::new("-"), &text).map_err(say)?;
+    write_output(Path::new("-"), &text).map_err(CannotRun::from_error)?;
     Ok(CommandOutcome::Fine)
 }
 
@@ -78,12 +77,12 @@ fn simulate_experiment(machine: &str, arguments: &SimulateArguments) -> CommandR
     let plan: Vec<String> = arguments.plan.iter().cloned().collect();
     let given = read_recordings(&plan).map_err(|wrong| problems.extend(wrong));
     let (Ok(settings), Ok(given)) = (settings, given) else { return Err(cannot_use(&problems)) };
-    let (recording, instruments) =
-        execute::execute_plan(settings, &given.recording, arguments.rate).map_err(|wrong| cannot_use(&[wrong]))?;
+    let (recording, instruments) = execute::execute_plan(settings, &given.recording, arguments.rate)
+        .map_err(|wrong| cannot_use(&[wrong.to_string()]))?;
     let out = arguments.out.as_deref().unwrap_or(Path::new("-"));
-    write_output(out, &execute::format_csv(&recording)).map_err(|problem| CannotRun::new(problem, ""))?;
+    write_output(out, &execute::format_csv(&recording)).map_err(CannotRun::from_error)?;
     if let Some(path) = &arguments.torque {
-        write_output(path, &instruments.torque_csv()).map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(path, &instruments.torque_csv()).map_err(CannotRun::from_error)?;
     }
     eprintln!("{} rows of {machine} in {}", recording.count_rows(), out.display());
     if let Some((before_mm, after_mm)) = instruments.flank_wear_mm {

@@ -2,12 +2,14 @@
 //!
 //! One line of JSON each in `annotations.jsonl` of the data directory; lines are added and never changed.
 
-use crate::moment;
+use super::columns::TorqueFileError;
+use crate::moment::{self, MomentError};
 use adapters::clock::TimeNs;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// The file, in the data directory.
 pub const FILE: &str = "annotations.jsonl";
@@ -99,52 +101,166 @@ pub struct TypedAnnotation {
     pub of: String,
 }
 
+/// How a torque file is noted, for messages.
+const TORQUE_USAGE: &str =
+    "write annotate torque --file sensor.csv --unit Nm; the file has columns time_s (its own clock) and torque_nm";
+
+/// Why a reading is not noted, or the notes cannot be read.
+#[derive(Debug, Error)]
+pub enum AnnotationError {
+    /// Nothing was read.
+    #[error("{name}: the value is missing: write annotate {name} 0.12 --unit mm")]
+    NoValue {
+        /// The quantity.
+        name: &'static str,
+    },
+    /// A number without a unit means nothing.
+    #[error("{name} {value}: the unit is missing, and 0.12 mm is not 0.12 um: add --unit mm or --unit um")]
+    NoUnit {
+        /// The quantity.
+        name: &'static str,
+        /// What was typed.
+        value: f64,
+    },
+    /// The unit is none of a length.
+    #[error("{name} {value} {unit}: {unit:?} is no unit of length that is known here: write mm, um or in")]
+    UnknownUnit {
+        /// The quantity.
+        name: &'static str,
+        /// What was typed.
+        value: f64,
+        /// The unit that was typed.
+        unit: String,
+    },
+    /// A reading without a time belongs to no cut.
+    #[error(
+        "{name} {value} {unit}: the time is missing: a reading without it belongs to no cut; add --at now, --at -10m or --at 2026-01-31T08:15:00Z"
+    )]
+    NoTime {
+        /// The quantity.
+        name: &'static str,
+        /// What was typed.
+        value: f64,
+        /// The unit that was typed.
+        unit: String,
+    },
+    /// The time is none.
+    #[error("{name} --at {at}: {error}")]
+    Moment {
+        /// The quantity.
+        name: &'static str,
+        /// What was typed.
+        at: String,
+        /// What is wrong with it.
+        error: MomentError,
+    },
+    /// No such value is read on a machine.
+    #[error("{name}: {value} {unit} lies outside {least} to {greatest} {unit}: {why}; is the unit right?")]
+    OutOfRange {
+        /// The quantity.
+        name: &'static str,
+        /// The value, in the unit that is kept.
+        value: f64,
+        /// The unit that is kept.
+        unit: &'static str,
+        /// The least possible value.
+        least: f64,
+        /// The greatest possible value.
+        greatest: f64,
+        /// Why.
+        why: &'static str,
+    },
+    /// A deviation of 0 or less.
+    #[error("{name}: the standard deviation of a reading is greater than 0")]
+    Deviation {
+        /// The quantity.
+        name: &'static str,
+    },
+    /// Torques come in a file.
+    #[error("torque: the file is missing: {TORQUE_USAGE}")]
+    NoTorqueFile,
+    /// The unit of the torques is not said.
+    #[error("torque {}: the unit is missing: {TORQUE_USAGE}", file.display())]
+    NoTorqueUnit {
+        /// The file.
+        file: PathBuf,
+    },
+    /// Torques are kept in N·m.
+    #[error("torque: {unit:?} is not N·m: convert the file, then {TORQUE_USAGE}")]
+    TorqueUnit {
+        /// The unit that was typed.
+        unit: String,
+    },
+    /// The file of the torques cannot be used.
+    #[error(transparent)]
+    TorqueFile(#[from] TorqueFileError),
+    /// A file cannot be found, read or written.
+    #[error("{}: {error}", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// A reading that cannot be written as a line.
+    #[error(transparent)]
+    Line(#[from] serde_json::Error),
+    /// A line of the notes that is none.
+    #[error("{}, line {number}: {error}; put the line right or take it out", path.display())]
+    WrongLine {
+        /// The file.
+        path: PathBuf,
+        /// Its number, from 1.
+        number: usize,
+        /// What is wrong with it.
+        error: serde_json::Error,
+    },
+}
+
 /// An annotation of what a person typed; `newest_ns` is the time of the newest sample of the history.
 ///
 /// # Errors
 /// What is missing or impossible, and what to write.
-pub fn parse_annotation(quantity: Quantity, given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, String> {
+pub fn parse_annotation(
+    quantity: Quantity,
+    given: TypedAnnotation,
+    newest_ns: TimeNs,
+) -> Result<Annotation, AnnotationError> {
     if quantity == Quantity::Torque {
         return parse_torque(given, newest_ns);
     }
     let name = quantity.as_word();
-    let value =
-        given.value.ok_or_else(|| format!("{name}: the value is missing: write annotate {name} 0.12 --unit mm"))?;
-    let unit = given.unit.as_deref().ok_or_else(|| {
-        format!("{name} {value}: the unit is missing, and 0.12 mm is not 0.12 um: add --unit mm or --unit um")
+    let value = given.value.ok_or(AnnotationError::NoValue { name })?;
+    let unit = given.unit.as_deref().ok_or(AnnotationError::NoUnit { name, value })?;
+    let factor = length_factor(unit, quantity.unit()).ok_or_else(|| AnnotationError::UnknownUnit {
+        name,
+        value,
+        unit: unit.to_owned(),
     })?;
-    let factor = length_factor(unit, quantity.unit()).ok_or_else(|| {
-        format!("{name} {value} {unit}: {unit:?} is no unit of length that is known here: write mm, um or in")
-    })?;
-    let at = given.at.as_deref().ok_or_else(|| {
-        format!("{name} {value} {unit}: the time is missing: a reading without it belongs to no cut; add --at now, --at -10m or --at 2026-01-31T08:15:00Z")
-    })?;
-    let at_ns = moment::parse(at, newest_ns).map_err(|problem| format!("{name} --at {at}: {problem}"))?;
+    let at = given.at.as_deref().ok_or_else(|| AnnotationError::NoTime { name, value, unit: unit.to_owned() })?;
+    let at_ns =
+        moment::parse(at, newest_ns).map_err(|error| AnnotationError::Moment { name, at: at.to_owned(), error })?;
     let value = value * factor;
     let (least, greatest, why) = quantity.allowed_range();
     if !(least..=greatest).contains(&value) {
-        let kept = quantity.unit();
-        return Err(format!(
-            "{name}: {value} {kept} lies outside {least} to {greatest} {kept}: {why}; is the unit right?"
-        ));
+        let unit = quantity.unit();
+        return Err(AnnotationError::OutOfRange { name, value, unit, least, greatest, why });
     }
     let sd = given.sd.map(|sd| sd * factor);
     if sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
-        return Err(format!("{name}: the standard deviation of a reading is greater than 0"));
+        return Err(AnnotationError::Deviation { name });
     }
     Ok(Annotation { quantity, at_ns, value: Some(value), sd, file: None, of: given.of })
 }
 
-fn parse_torque(given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, String> {
-    let usage =
-        "write annotate torque --file sensor.csv --unit Nm; the file has columns time_s (its own clock) and torque_nm";
-    let file = given.file.ok_or_else(|| format!("torque: the file is missing: {usage}"))?;
+fn parse_torque(given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, AnnotationError> {
+    let file = given.file.ok_or(AnnotationError::NoTorqueFile)?;
     match given.unit.as_deref() {
-        None => return Err(format!("torque {}: the unit is missing: {usage}", file.display())),
+        None => return Err(AnnotationError::NoTorqueUnit { file }),
         Some("Nm" | "N·m" | "N*m" | "N m") => {}
-        Some(other) => return Err(format!("torque: {other:?} is not N·m: convert the file, then {usage}")),
+        Some(other) => return Err(AnnotationError::TorqueUnit { unit: other.to_owned() }),
     }
-    let file = std::path::absolute(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    let file = std::path::absolute(&file).map_err(|error| AnnotationError::File { path: file.clone(), error })?;
     super::columns::torque_course(&file)?;
     Ok(Annotation {
         quantity: Quantity::Torque,
@@ -171,10 +287,10 @@ fn length_factor(from: &str, to: &str) -> Option<f64> {
 ///
 /// # Errors
 /// What the system said, with the path.
-pub fn add(data_dir: &Path, annotation: &Annotation) -> Result<(), String> {
+pub fn add(data_dir: &Path, annotation: &Annotation) -> Result<(), AnnotationError> {
     let path = data_dir.join(FILE);
-    let say = |error: std::io::Error| format!("{}: {error}", path.display());
-    let line = serde_json::to_string(annotation).map_err(|error| error.to_string())?;
+    let say = |error| AnnotationError::File { path: path.clone(), error };
+    let line = serde_json::to_string(annotation)?;
     std::fs::create_dir_all(data_dir).map_err(say)?;
     let mut file = std::fs::OpenOptions::new().create(true).append(true).open(&path).map_err(say)?;
     file.write_all(format!("{line}\n").as_bytes()).and_then(|()| file.sync_data()).map_err(say)
@@ -184,17 +300,19 @@ pub fn add(data_dir: &Path, annotation: &Annotation) -> Result<(), String> {
 ///
 /// # Errors
 /// A line that is none, with its number.
-pub fn read(data_dir: &Path) -> Result<Vec<Annotation>, String> {
+pub fn read(data_dir: &Path) -> Result<Vec<Annotation>, AnnotationError> {
     let path = data_dir.join(FILE);
     let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => return Err(format!("{}: {error}", path.display())),
+        Err(error) => return Err(AnnotationError::File { path, error }),
     };
     let lines = text.lines().take(LINES_MAX).enumerate().filter(|(_, line)| !line.trim().is_empty());
     let one = |(index, line): (usize, &str)| {
-        serde_json::from_str::<Annotation>(line).map_err(|error| {
-            format!("{}, line {}: {error}; put the line right or take it out", path.display(), index + 1)
+        serde_json::from_str::<Annotation>(line).map_err(|error| AnnotationError::WrongLine {
+            path: path.clone(),
+            number: index + 1,
+            error,
         })
     };
     let mut all = lines.map(one).collect::<Result<Vec<_>, _>>()?;
@@ -217,13 +335,14 @@ mod tests {
 
     #[test]
     fn a_reading_needs_unit_and_time_and_must_be_possible() {
-        let refused = |given| parse_annotation(Quantity::Gauge, given, 0).expect_err("refused");
+        let refused = |given| parse_annotation(Quantity::Gauge, given, 0).expect_err("refused").to_string();
         assert!(refused(given(12.0, None, Some("now"))).contains("unit is missing"));
         assert!(refused(given(12.0, Some("um"), None)).contains("time is missing"));
         assert!(refused(given(12.0, Some("kg"), Some("now"))).contains("mm, um or in"));
         assert!(refused(given(12.0, Some("mm"), Some("now"))).contains("is the unit right?"));
         assert!(refused(TypedAnnotation::default()).contains("value is missing"));
-        let torque = parse_annotation(Quantity::Torque, TypedAnnotation::default(), 0).expect_err("no file");
+        let torque =
+            parse_annotation(Quantity::Torque, TypedAnnotation::default(), 0).expect_err("no file").to_string();
         assert!(torque.contains("--file"), "{torque}");
     }
 
@@ -237,6 +356,6 @@ mod tests {
         let all = read(directory.path()).expect("readable");
         assert_eq!(all.iter().filter_map(|it| it.value).collect::<Vec<f64>>(), [0.1, 0.2]);
         std::fs::write(directory.path().join(FILE), "{}\n").expect("written");
-        assert!(read(directory.path()).expect_err("not one").contains("line 1"));
+        assert!(read(directory.path()).expect_err("not one").to_string().contains("line 1"));
     }
 }

@@ -1,13 +1,14 @@
 //! The history as a recording, with what a person has measured as columns.
 
 use super::annotations::{Annotation, Quantity};
-use crate::history::{Query, Reader, STATE_SERIES};
+use crate::history::{HistoryError, Query, Reader, STATE_SERIES};
 use adapters::Recording;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::recording::{Cells, Numbers};
 use rules::estimators::alignment::{Matched, match_courses};
 use rules::estimators::regression::Refusal;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// Series that the identification looks at, where the history has them.
 const SERIES: [&str; 30] = [
@@ -52,13 +53,12 @@ const GAUGE_REACHES_NS: i64 = 30 * SECOND_NS;
 ///
 /// # Errors
 /// The history cannot be read, or is empty.
-pub fn read(history: &Path, from_ns: Option<TimeNs>) -> Result<Recording, String> {
-    let reader = Reader::open(history).map_err(|error| error.to_string())?;
-    let known: Vec<String> =
-        reader.read_series().map_err(|error| error.to_string())?.into_iter().map(|it| it.name.to_string()).collect();
+pub fn read(history: &Path, from_ns: Option<TimeNs>) -> Result<Recording, HistoryError> {
+    let reader = Reader::open(history)?;
+    let known: Vec<String> = reader.read_series()?.into_iter().map(|it| it.name.to_string()).collect();
     let series: Vec<String> =
         SERIES.iter().filter(|name| known.iter().any(|it| it == *name)).map(|name| (*name).to_owned()).collect();
-    reader.read_recording(&Query { from_ns, series, ..Query::default() }).map_err(|error| error.to_string())
+    reader.read_recording(&Query { from_ns, series, ..Query::default() })
 }
 
 /// Time of every row, ns.
@@ -125,20 +125,41 @@ fn neighbouring_rows(next: usize, rows: usize) -> impl Iterator<Item = usize> {
     [next.checked_sub(1), Some(next)].into_iter().flatten().filter(move |at| *at < rows)
 }
 
+/// Why the file of a torque sensor cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum TorqueFileError {
+    /// It is no recording; every problem on a line of its own.
+    #[error("{0}")]
+    Unreadable(String),
+    /// It has no torques.
+    #[error(
+        "{}: there is no column torque_nm; the file needs time_s, on the sensor's own clock, and torque_nm in N·m",
+        file.display()
+    )]
+    NoTorque {
+        /// The file.
+        file: PathBuf,
+    },
+    /// It is too short to be laid on the clock of the history.
+    #[error("{}: fewer than 10 torques", file.display())]
+    TooFew {
+        /// The file.
+        file: PathBuf,
+    },
+}
+
 /// A torque sensor's file: times on its own clock, s, and torques, N·m.
 ///
 /// # Errors
 /// What is wrong with the file.
-pub fn torque_course(file: &Path) -> Result<Vec<(f64, f64)>, String> {
-    let at = |what: &str| format!("{}: {what}", file.display());
-    let read =
-        crate::diagnosis::read_recordings(&[file.display().to_string()]).map_err(|problems| problems.join("\n"))?;
-    let torque = read.recording.find_numbers("torque_nm").ok_or_else(|| {
-        at("there is no column torque_nm; the file needs time_s, on the sensor's own clock, and torque_nm in N·m")
-    })?;
+pub fn torque_course(file: &Path) -> Result<Vec<(f64, f64)>, TorqueFileError> {
+    let read = crate::diagnosis::read_recordings(&[file.display().to_string()])
+        .map_err(|problems| TorqueFileError::Unreadable(problems.join("\n")))?;
+    let torque =
+        read.recording.find_numbers("torque_nm").ok_or_else(|| TorqueFileError::NoTorque { file: file.to_owned() })?;
     let rows = read.recording.time_s.iter().zip(torque.iter());
     let course: Vec<(f64, f64)> = rows.filter_map(|(time_s, torque)| Some((*time_s, torque?))).collect();
-    if course.len() < 10 { Err(at("fewer than 10 torques")) } else { Ok(course) }
+    if course.len() < 10 { Err(TorqueFileError::TooFew { file: file.to_owned() }) } else { Ok(course) }
 }
 
 /// What became of a torque file.
@@ -154,7 +175,7 @@ pub struct Merged {
 ///
 /// # Errors
 /// A file that can no longer be read.
-pub fn add_torque(recording: &mut Recording, annotations: &[Annotation]) -> Result<Vec<Merged>, String> {
+pub fn add_torque(recording: &mut Recording, annotations: &[Annotation]) -> Result<Vec<Merged>, TorqueFileError> {
     let mut merged = Vec::new();
     let mut sums = vec![(0.0, 0.0); recording.count_rows()];
     let power = torque_like(recording);

@@ -306,6 +306,17 @@ fn wear_levels(cuts: &[Cut]) -> usize {
     usize::from(!wears.is_empty()) + wears.windows(2).filter(|pair| pair[1] - pair[0] > 0.03).count()
 }
 
+/// Why the history cannot be prepared for the identification.
+#[derive(Debug, thiserror::Error)]
+pub enum PrepareError {
+    /// It cannot be read.
+    #[error(transparent)]
+    History(#[from] crate::history::HistoryError),
+    /// A torque file can no longer be read.
+    #[error(transparent)]
+    TorqueFile(#[from] columns::TorqueFileError),
+}
+
 /// The history with everything annotated.
 ///
 /// # Errors
@@ -314,7 +325,7 @@ pub fn prepare_recording(
     history: &std::path::Path,
     annotations: &[super::annotations::Annotation],
     from_ns: Option<i64>,
-) -> Result<(Recording, Vec<Merged>), String> {
+) -> Result<(Recording, Vec<Merged>), PrepareError> {
     let mut recording = columns::read(history, from_ns)?;
     columns::add_wear(&mut recording, annotations);
     columns::add_thermal_error(&mut recording, annotations);

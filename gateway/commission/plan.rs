@@ -78,11 +78,25 @@ fn spindle_rpm(cutting_speed_m_min: f64, diameter_mm: f64) -> f64 {
     (1000.0 * cutting_speed_m_min / (PI * diameter_mm)).round()
 }
 
+/// Why there is no list of steps.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StepPlanError {
+    /// The conditions of cutting have no such factor.
+    #[error("there is no factor {symbol}")]
+    NoFactor {
+        /// Its symbol.
+        symbol: String,
+    },
+    /// The levels make no design; every problem of them.
+    #[error("{0}")]
+    Design(String),
+}
+
 /// The steps of a list.
 ///
 /// # Errors
 /// Levels that make no design.
-pub fn plan_steps(which: Which, limits: &Limits) -> Result<Vec<CommissionStep>, String> {
+pub fn plan_steps(which: Which, limits: &Limits) -> Result<Vec<CommissionStep>, StepPlanError> {
     Ok(match which {
         Which::NoLoad => {
             let warm_rpm = limits.speeds_rpm.get(limits.speeds_rpm.len() / 2).copied();
@@ -127,10 +141,11 @@ fn find_extremes(values: &[f64]) -> (f64, f64) {
 }
 
 /// The nine cuts of one wear, in the order of the design.
-fn plan_l27(limits: &Limits, wear: usize) -> Result<Vec<CommissionStep>, String> {
+fn plan_l27(limits: &Limits, wear: usize) -> Result<Vec<CommissionStep>, StepPlanError> {
     let factor = |symbol: &str, values: &[f64]| {
-        let factor = ConditionFactor::find_by_name(symbol).ok_or_else(|| format!("there is no factor {symbol}"))?;
-        Ok::<_, String>(FactorLevels { factor, values: values.to_vec() })
+        let factor = ConditionFactor::find_by_name(symbol)
+            .ok_or_else(|| StepPlanError::NoFactor { symbol: symbol.to_owned() })?;
+        Ok::<_, StepPlanError>(FactorLevels { factor, values: values.to_vec() })
     };
     // The wears stand for the edges that come: what they are the microscope says.
     let factors = [
@@ -139,7 +154,8 @@ fn plan_l27(limits: &Limits, wear: usize) -> Result<Vec<CommissionStep>, String>
         factor("f", &limits.feeds_mm)?,
         factor("ap", &limits.depths_mm)?,
     ];
-    let design = plan_experiment(Array::L27, &factors, limits.seed).map_err(|problems| problems.join("; "))?;
+    let design = plan_experiment(Array::L27, &factors, limits.seed)
+        .map_err(|problems| StepPlanError::Design(problems.join("; ")))?;
     let own = design.cuts.iter().filter(|cut| cut.levels.first() == Some(&wear));
     let pass = |values: &[f64]| {
         let rpm = spindle_rpm(values[1], limits.diameter_mm);

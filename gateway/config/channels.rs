@@ -132,6 +132,11 @@ mod tests {
     fn what_is_wrong_is_told_with_its_line() {
         let told = refused("name = \"x_bar\"\nread = \"pmc Q20\"\n");
         assert!(told.contains("test.toml:5") && told.contains("pmc D20 word"), "{told}");
+        // Another problem that says "name" does not hide that the name is missing; a misspelt one is told once.
+        let both = refused("read = \"macro 500\"\nunit = 1\n[[sink]]\nname = 1\naddress = \"parquet:/x\"\n");
+        assert!(both.contains("needs the key `name`"), "{both}");
+        let misspelt = refused("names = \"a_bar\"\nread = \"macro 500\"\n");
+        assert!(misspelt.contains("has no key `names`") && !misspelt.contains("needs the key"), "{misspelt}");
         assert!(refused("read = \"macro 500\"\n").contains("needs the key `name`"));
         assert!(refused("name = \"spindle_speed_rpm\"\nread = \"macro 500\"\n").contains("already"));
         assert!(refused("name = \"y_bar\"\nread = \"macro 500\"\nscale = 0\n").contains("scale of 0"));

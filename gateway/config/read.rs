@@ -54,6 +54,20 @@ pub(super) struct ConfigInput<'a> {
     pub(super) sources: Vec<SectionValues>,
     pub(super) sinks: Vec<SectionValues>,
     pub(super) problems: Vec<Problem>,
+    /// Keys that problems are about: whoever has misspelt one is not told that it is missing too.
+    misread: Vec<MisreadKey>,
+}
+
+/// A key that a problem is about.
+#[derive(Debug)]
+struct MisreadKey {
+    section: &'static str,
+    /// Where its section begins in the file; a variable has none.
+    begins: Option<usize>,
+    /// As it was written.
+    name: String,
+    /// The line of the problem.
+    line: Option<usize>,
 }
 
 impl<'a> ConfigInput<'a> {
@@ -72,6 +86,7 @@ impl<'a> ConfigInput<'a> {
         let (found, semantic) = reading.problems.split_at(syntax);
         let semantic = semantic.iter().filter(|problem| !broken.contains(&problem.line));
         reading.problems = found.iter().chain(semantic).cloned().collect();
+        reading.misread.retain(|key| !broken.contains(&key.line));
         reading
     }
 
@@ -90,6 +105,12 @@ impl<'a> ConfigInput<'a> {
             Origin::Default => Problem::in_file(self.file, what, next),
         };
         self.problems.push(problem);
+    }
+
+    /// Notes that a problem is about this key of a section.
+    fn note_misread(&mut self, section: &'static Section, begins: Option<usize>, name: &str) {
+        let line = self.problems.last().and_then(|problem| problem.line);
+        self.misread.push(MisreadKey { section: section.name, begins, name: name.to_owned(), line });
     }
 
     fn read_section(&mut self, name: &Spanned<std::borrow::Cow<'_, str>>, value: &Spanned<DeValue<'_>>) {
@@ -174,17 +195,18 @@ impl<'a> ConfigInput<'a> {
             }
             let Some(key) = find_key(section.name, name.get_ref()) else {
                 let at = Origin::File(name.span().start);
-                self.add_problem(
-                    &at,
-                    format!("[{}] has no key `{}`", section.name, name.get_ref()),
-                    key_hint(section.name, name.get_ref()),
-                );
+                let what = format!("[{}] has no key `{}`", section.name, name.get_ref());
+                self.add_problem(&at, what, key_hint(section.name, name.get_ref()));
+                self.note_misread(section, Some(offset), name.get_ref());
                 continue;
             };
             let origin = Origin::File(value.span().start);
             match check_written(key, value.get_ref()) {
                 Ok(value) => drop(values.found.insert(key.name, LocatedValue { value, origin })),
-                Err((what, next)) => self.add_problem(&origin, what, next),
+                Err((what, next)) => {
+                    self.add_problem(&origin, what, next);
+                    self.note_misread(section, Some(offset), key.name);
+                }
             }
         }
         values
@@ -211,13 +233,17 @@ impl<'a> ConfigInput<'a> {
         }
         let Some(key) = find_key(known.name, key_name) else {
             let what = format!("[{section}] has no key `{key_name}`");
+            self.note_misread(known, None, key_name);
             return self.add_problem(&origin, what, key_hint(known.name, key_name));
         };
         match check_scalar(key, text) {
             Ok(value) => {
                 drop(self.section_values_mut(known, index).found.insert(key.name, LocatedValue { value, origin }))
             }
-            Err((what, next)) => self.add_problem(&origin, what, next),
+            Err((what, next)) => {
+                self.add_problem(&origin, what, next);
+                self.note_misread(known, None, key.name);
+            }
         }
     }
 
@@ -254,14 +280,14 @@ impl<'a> ConfigInput<'a> {
         if section.name == "sink" { &mut self.sinks } else { &mut self.sources }
     }
 
-    fn fill_with_channels(&mut self, section: &Section, values: &mut SectionValues) {
+    fn fill_with_channels(&mut self, section: &'static Section, values: &mut SectionValues) {
         self.fill_section(section, values);
         for channel in &mut values.inner {
             find_section(channel_keys::SECTION).into_iter().for_each(|section| self.fill_section(section, channel));
         }
     }
 
-    fn fill_section(&mut self, section: &Section, values: &mut SectionValues) {
+    fn fill_section(&mut self, section: &'static Section, values: &mut SectionValues) {
         for key in keys_of(section.name) {
             match key.absent {
                 Absent::Default(text) => fill_default(key, text, values),
@@ -273,14 +299,13 @@ impl<'a> ConfigInput<'a> {
         }
     }
 
-    fn report_missing_key(&mut self, section: &Section, key: &ConfigKey, offset: Option<usize>) {
-        let already = offset.map(|offset| Problem::in_file("", "", "").with_position(self.text, offset));
-        let named = |problem: &Problem| {
-            problem.what.contains(key.name) && already.as_ref().is_none_or(|here| problem.line >= here.line)
-        };
-        if !self.problems.iter().any(named) {
+    fn report_missing_key(&mut self, section: &'static Section, key: &ConfigKey, offset: Option<usize>) {
+        // A longer name that holds this one, such as `addresses`, is a misspelt one.
+        let misread = |it: &MisreadKey| it.section == section.name && it.begins == offset && it.name.contains(key.name);
+        if !self.misread.iter().any(misread) {
             let origin = offset.map_or(Origin::Default, Origin::File);
             self.add_problem(&origin, format!("[[{}]] needs the key `{}`", section.name, key.name), key.en);
+            self.note_misread(section, offset, key.name);
         }
     }
 

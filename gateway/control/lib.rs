@@ -24,7 +24,7 @@ mod post;
 mod server;
 
 pub use client::send_order;
-pub use network::{NetworkRequest, RequestedChange};
+pub use network::{NetworkRequest, RequestRefusal, RequestedChange};
 pub use post::{OrderReceiver, OrderSender, PostedRequest, PostedRow, Wake, create_queues};
 pub use server::{Listening, listen_for_orders};
 

@@ -4,11 +4,75 @@
 //! gate like the request of a script, at every tick, and only while the configuration of its sink says `allow_requests`.
 
 use std::fmt;
+use thiserror::Error;
 
 /// Letters of a reason or of a name that are kept.
 const WORDS_MAX: usize = 120;
 /// The gate of a machine that others can reach over the network may be slowed by them and never sped up.
 const GREATEST_PCT: f64 = 100.0;
+
+/// Why a message of the network asks for nothing. Whoever asked is told, and the audit holds it.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum RequestRefusal {
+    /// A feed override that nobody may ask for over the network.
+    #[error(
+        "{pct} % cannot be asked for over the network: write a number from 0 to {GREATEST_PCT}; the gate does not go below min_pct"
+    )]
+    NotAllowedPct {
+        /// What was asked for.
+        pct: f64,
+    },
+    /// The sink takes no requests.
+    #[error(
+        "{what}: the sink {sink} takes no requests; write allow_requests = true under its [[sink]] to let them reach the gate"
+    )]
+    ClosedSink {
+        /// Its name in the configuration.
+        sink: String,
+        /// What was asked for, in words.
+        what: String,
+    },
+    /// The document is longer than a request can be.
+    #[error("a message of {bytes} bytes is no request: at most {most}")]
+    TooLong {
+        /// Its length.
+        bytes: usize,
+        /// The greatest length.
+        most: usize,
+    },
+    /// The document cannot be read.
+    #[error("this is no request: {error}; {forms}")]
+    Unreadable {
+        /// What the reader of JSON says.
+        error: String,
+        /// How requests are written.
+        forms: &'static str,
+    },
+    /// The document asks for nothing that is known.
+    #[error("this is no request; {forms}")]
+    Unknown {
+        /// How requests are written.
+        forms: &'static str,
+    },
+    /// The broker has kept the message: it would come again at every connection, long after whoever asked has gone.
+    #[error("a retained message is no request: publish it without the retain flag, and remove the retained one")]
+    RetainedMessage,
+    /// The same of a command of Sparkplug.
+    #[error("a retained command is no request: publish it without the retain flag")]
+    RetainedCommand,
+    /// A metric that must be a number.
+    #[error("{metric} is no number")]
+    NoNumber {
+        /// Its name.
+        metric: &'static str,
+    },
+    /// A metric that must be a text.
+    #[error("{metric} is no text")]
+    NoText {
+        /// Its name.
+        metric: &'static str,
+    },
+}
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,11 +98,9 @@ impl RequestedChange {
     ///
     /// # Errors
     /// Why it cannot be asked for, and what can.
-    pub fn feed_override(pct: f64, reason: &str) -> Result<Self, String> {
+    pub fn feed_override(pct: f64, reason: &str) -> Result<Self, RequestRefusal> {
         if !(0.0..=GREATEST_PCT).contains(&pct) {
-            return Err(format!(
-                "{pct} % cannot be asked for over the network: write a number from 0 to {GREATEST_PCT}; the gate does not go below min_pct"
-            ));
+            return Err(RequestRefusal::NotAllowedPct { pct });
         }
         Ok(Self::FeedOverride { pct, reason: clean_text(reason) })
     }
@@ -67,7 +129,7 @@ pub struct NetworkRequest {
     /// Name of the sink in the configuration.
     pub sink: String,
     /// What is asked for, or why it is refused before anybody looks at it.
-    pub change: Result<RequestedChange, String>,
+    pub change: Result<RequestedChange, RequestRefusal>,
     /// So many messages before it came too fast and were thrown away.
     pub left_out: u64,
 }
@@ -88,7 +150,7 @@ mod tests {
         }
         for pct in [-1.0, 100.5, 254.0, f64::NAN, f64::INFINITY] {
             let refused = RequestedChange::feed_override(pct, "").expect_err("refused");
-            assert!(refused.contains("from 0 to 100"), "{refused}");
+            assert!(refused.to_string().contains("from 0 to 100"), "{refused}");
         }
     }
 
@@ -100,5 +162,25 @@ mod tests {
             panic!("allowed")
         };
         assert_eq!(reason, "a".repeat(WORDS_MAX));
+    }
+
+    #[test]
+    fn a_refusal_says_what_was_wrong_and_what_to_do() {
+        let told = |refusal: RequestRefusal| refusal.to_string();
+        assert_eq!(
+            told(RequestRefusal::NotAllowedPct { pct: 254.0 }),
+            "254 % cannot be asked for over the network: write a number from 0 to 100; the gate does not go below min_pct"
+        );
+        assert_eq!(
+            told(RequestRefusal::ClosedSink { sink: "plant".to_owned(), what: RequestedChange::Withdraw.to_string() }),
+            "no feed override any more: the sink plant takes no requests; write allow_requests = true under its \
+             [[sink]] to let them reach the gate"
+        );
+        assert_eq!(
+            told(RequestRefusal::TooLong { bytes: 9000, most: 2048 }),
+            "a message of 9000 bytes is no request: at most 2048"
+        );
+        let metric = "request/feed_override_pct";
+        assert_eq!(told(RequestRefusal::NoNumber { metric }), "request/feed_override_pct is no number");
     }
 }

@@ -11,7 +11,7 @@
 use crate::clock;
 use crate::config::Config;
 use crate::files::replace_file;
-use crate::history::{Reader, store_wear_model};
+use crate::history::{HistoryError, Reader, store_wear_model};
 use crate::log::{Notice, Severity};
 use crate::run::open::MachineSpeed;
 use adapters::clock::SECOND_NS;
@@ -19,6 +19,7 @@ use rules::estimators::wear::WearRecord;
 use serde_json::{Value, json};
 use std::ops::Range;
 use std::path::Path;
+use thiserror::Error;
 
 /// The model of the lathe.
 const MODEL: &str = include_str!("lathe.toml");
@@ -68,35 +69,50 @@ pub fn install_data(config: &mut Config, speed: MachineSpeed) {
     }
 }
 
-fn write_models(data_dir: &Path, history: &Path) -> Result<(), String> {
-    let words = |error: std::io::Error| error.to_string();
-    std::fs::create_dir_all(data_dir).map_err(words)?;
+/// Why the demonstration has no models.
+#[derive(Debug, Error)]
+enum FurnishError {
+    /// A file cannot be written.
+    #[error(transparent)]
+    File(#[from] std::io::Error),
+    /// A memory that comes with the program is none.
+    #[error(transparent)]
+    Memory(#[from] serde_json::Error),
+    /// The wear model that comes with the program is none.
+    #[error("{0}")]
+    WearModel(String),
+    /// The history does not take the wear model.
+    #[error(transparent)]
+    History(#[from] HistoryError),
+}
+
+fn write_models(data_dir: &Path, history: &Path) -> Result<(), FurnishError> {
+    std::fs::create_dir_all(data_dir)?;
     let model = data_dir.join("demo-lathe.toml");
     let now_ns = clock::now_ns();
     if !model.exists() {
         let ended_s = (now_ns / SECOND_NS - HOUR_S) as f64;
-        replace_file(&data_dir.join("twin.json"), &shift_times(LEARNED, ended_s)?).map_err(words)?;
-        replace_file(&data_dir.join("wear.json"), &shift_times(WORN, ended_s)?).map_err(words)?;
+        replace_file(&data_dir.join("twin.json"), &shift_times(LEARNED, ended_s)?)?;
+        replace_file(&data_dir.join("wear.json"), &shift_times(WORN, ended_s)?)?;
         // The state that the estimators remember would otherwise seem to have lasted since then.
-        replace_file(&data_dir.join("estimators.json"), &shift_times(ESTIMATED, (now_ns / SECOND_NS) as f64)?)
-            .map_err(words)?;
-        replace_file(&model, MODEL).map_err(words)?;
+        replace_file(&data_dir.join("estimators.json"), &shift_times(ESTIMATED, (now_ns / SECOND_NS) as f64)?)?;
+        replace_file(&model, MODEL)?;
     }
     let recipe = data_dir.join(RECIPE_FILE);
     if !recipe.exists() {
-        replace_file(&recipe, RECIPE).map_err(words)?;
+        replace_file(&recipe, RECIPE)?;
     }
     let known = history.exists() && Reader::open(history).and_then(|it| it.newest_wear_model()).is_ok_and(|id| id > 0);
     if !known {
-        let record = WearRecord::parse(WEAR)?;
-        store_wear_model(history, now_ns, &record).map_err(|error| error.to_string())?;
+        let record = WearRecord::parse(WEAR).map_err(FurnishError::WearModel)?;
+        store_wear_model(history, now_ns, &record)?;
     }
     Ok(())
 }
 
 /// The same memory with all its times moved so that the newest of them is `newest_s`.
-fn shift_times(text: &str, newest_s: f64) -> Result<String, String> {
-    let mut memory: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
+fn shift_times(text: &str, newest_s: f64) -> Result<String, serde_json::Error> {
+    let mut memory: Value = serde_json::from_str(text)?;
     let mut newest: f64 = 0.0;
     each_time(&mut memory, &mut |at_s| {
         newest = newest.max(at_s);

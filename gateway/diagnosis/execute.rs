@@ -32,16 +32,33 @@ pub struct Steps {
     settled: Vec<bool>,
 }
 
+/// Why a plan cannot be carried out.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ExperimentPlanError {
+    /// Nothing says how fast the spindle is to turn.
+    #[error("the plan has no column spindle_programmed_rpm; `diagnose --experiment` writes plans")]
+    NoSpeed,
+    /// It takes more time or more steps than the simulated machine carries out.
+    #[error(
+        "the plan takes {hours:.1} h in {steps} steps; the simulated machine carries out at most {:.0} h in {STEPS_MAX} steps",
+        SECONDS_MAX / 3600.0
+    )]
+    TooLong {
+        /// How long it takes, h.
+        hours: f64,
+        /// In how many steps.
+        steps: usize,
+    },
+}
+
 impl Steps {
     /// Consecutive rows that command the same are one step.
     ///
     /// # Errors
     /// What the plan lacks, or why it is too long.
-    pub fn from_plan(plan: &Recording) -> Result<Self, String> {
+    pub fn from_plan(plan: &Recording) -> Result<Self, ExperimentPlanError> {
         if plan.find_numbers("spindle_programmed_rpm").is_none() {
-            return Err(
-                "the plan has no column spindle_programmed_rpm; `diagnose --experiment` writes plans".to_owned()
-            );
+            return Err(ExperimentPlanError::NoSpeed);
         }
         let mut found = Self { steps: Vec::new(), runs: Vec::new(), settled: Vec::new() };
         let mut last_tool: Option<String> = None;
@@ -57,12 +74,7 @@ impl Steps {
         }
         let seconds: f64 = found.steps.iter().map(|step| step.seconds).sum();
         if seconds > SECONDS_MAX || found.steps.len() > STEPS_MAX {
-            return Err(format!(
-                "the plan takes {:.1} h in {} steps; the simulated machine carries out at most {:.0} h in {STEPS_MAX} steps",
-                seconds / 3600.0,
-                found.steps.len(),
-                SECONDS_MAX / 3600.0
-            ));
+            return Err(ExperimentPlanError::TooLong { hours: seconds / 3600.0, steps: found.steps.len() });
         }
         Ok(found)
     }
@@ -123,7 +135,7 @@ pub fn execute_plan(
     settings: SimulatedSettings,
     plan: &Recording,
     rate_hz: f64,
-) -> Result<(Recording, Instruments), String> {
+) -> Result<(Recording, Instruments), ExperimentPlanError> {
     let steps = Steps::from_plan(plan)?;
     let name = match settings.machine {
         SimulatedMachine::Lathe => "simulated://lathe",

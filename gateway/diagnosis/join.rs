@@ -7,18 +7,39 @@ use adapters::Recording;
 use adapters::clock::SECOND_NS;
 use adapters::recording::{Cells, Numbers, Words, derive_quantity};
 use std::collections::BTreeSet;
+use thiserror::Error;
 
 /// Quantities that follow from others of the same row: computed where only some of the recordings hold them.
 const DERIVED_PER_ROW: [&str; 4] =
     ["feed_per_rev_mm", "cutting_speed_m_min", "feed_per_tooth_mm", "removal_rate_cm3_min"];
 
+/// Why recordings cannot be put together.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum JoinError {
+    /// There are none.
+    #[error("no recording given")]
+    Nothing,
+    /// A column holds numbers in one recording and text in another.
+    #[error(
+        "column {column} holds numbers in {numbers_in} and text in {text_in}: rename one of them or correct its cells"
+    )]
+    TwoKinds {
+        /// Its name.
+        column: String,
+        /// The recording with the numbers.
+        numbers_in: String,
+        /// The recording with the text.
+        text_in: String,
+    },
+}
+
 /// One recording that holds all of them.
 ///
 /// # Errors
 /// Columns that hold numbers in one recording and text in another.
-pub fn join_recordings(mut recordings: Vec<Recording>) -> Result<Recording, String> {
+pub fn join_recordings(mut recordings: Vec<Recording>) -> Result<Recording, JoinError> {
     if recordings.len() < 2 {
-        return recordings.pop().ok_or_else(|| "no recording given".to_owned());
+        return recordings.pop().ok_or(JoinError::Nothing);
     }
     derive_where_some_hold(&mut recordings);
     let names = column_names(&recordings);
@@ -82,17 +103,18 @@ fn to_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }
 
-fn is_text(recordings: &[Recording], name: &str) -> Result<bool, String> {
+fn is_text(recordings: &[Recording], name: &str) -> Result<bool, JoinError> {
     let text =
         recordings.iter().find(|recording| recording.find_words(name).is_some_and(|words| !words.words().is_empty()));
     let number = recordings
         .iter()
         .find(|recording| recording.find_numbers(name).is_some_and(|numbers| numbers.count_present() > 0));
     match (text, number) {
-        (Some(text), Some(number)) => Err(format!(
-            "column {name} holds numbers in {} and text in {}: rename one of them or correct its cells",
-            number.source, text.source
-        )),
+        (Some(text), Some(number)) => Err(JoinError::TwoKinds {
+            column: name.to_owned(),
+            numbers_in: number.source.clone(),
+            text_in: text.source.clone(),
+        }),
         (Some(_), None) => Ok(true),
         (None, Some(_)) => Ok(false),
         (None, None) => Ok(recordings.iter().any(|recording| recording.find_words(name).is_some())),
@@ -196,7 +218,7 @@ mod tests {
         let a = read("time_s,note\n0,1\n", "a.csv");
         let b = read("time_s,note\n0,door\n", "b.csv");
         let problem = join_recordings(vec![a, b]).expect_err("two kinds");
-        assert!(problem.contains("numbers in a.csv and text in b.csv"), "{problem}");
+        assert!(problem.to_string().contains("numbers in a.csv and text in b.csv"), "{problem}");
     }
 
     #[test]

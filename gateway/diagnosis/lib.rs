@@ -26,7 +26,7 @@ pub mod unit_check;
 pub mod words;
 pub mod worker;
 
-pub use join::join_recordings;
+pub use join::{JoinError, join_recordings};
 pub use models::{read_hypotheses, read_model};
 pub use outputs::{DiagnosisOutputs, write_output};
 pub use recordings::{InputRecordings, describe_reading, read_recordings, read_recordings_as};

@@ -43,7 +43,7 @@ impl DiagnosisOutputs {
         diagnosis: &Diagnosis,
         recording: &Recording,
         context: &DiagnosisContext,
-    ) -> Result<(), String> {
+    ) -> Result<(), OutputError> {
         if let Some(path) = &self.json {
             write_output(path, &format!("{:#}\n", diagnosis_to_json(diagnosis, context)))?;
         } else {
@@ -114,17 +114,33 @@ fn trouble_of(path: &Path) -> Option<String> {
     path.is_dir().then(|| format!("{} is a directory; name a file to write", path.display()))
 }
 
+/// Why an output was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// Standard output does not take it.
+    #[error("standard output: {0}")]
+    Standard(std::io::Error),
+    /// The file cannot be written.
+    #[error("{}: {error}", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+}
+
 /// Writes a file as a whole or not at all, so that a reader never sees half of it.
 ///
 /// # Errors
 /// The path and what the system said.
-pub fn write_output(path: &Path, text: &str) -> Result<(), String> {
+pub fn write_output(path: &Path, text: &str) -> Result<(), OutputError> {
     if is_stdout(path) {
         let mut out = std::io::stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-        return written.map_err(|error| format!("standard output: {error}"));
+        return written.map_err(OutputError::Standard);
     }
-    let say = |error: std::io::Error| format!("{}: {error}", path.display());
+    let say = |error| OutputError::File { path: path.to_owned(), error };
     if path.exists() && !path.is_file() {
         // A pipe or a device is written into, never replaced.
         return std::fs::write(path, text).map_err(say);

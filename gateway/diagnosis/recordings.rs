@@ -57,10 +57,11 @@ pub fn read_recordings_as(sources: &[String], map: Option<&PathBuf>) -> Result<I
     if !problems.is_empty() {
         return Err(problems);
     }
-    let refused = read.iter().map(|(_, one)| usize::try_from(one.refused).unwrap_or(usize::MAX)).sum();
+    let refused = read.iter().map(|(_, one)| gateway_base::convert::clamp_to_length(one.refused)).sum();
     let refused_column = read.iter().find_map(|(_, one)| one.problems.first()?.column.clone());
     let recordings = read.into_iter().map(|(_, one)| one.recording).collect();
-    let recording = join_recordings(recordings).map_err(|problem| vec![Bilingual::new(problem.clone(), problem)])?;
+    let recording = join_recordings(recordings)
+        .map_err(|problem| vec![Bilingual::new(problem.to_string(), problem.to_string())])?;
     Ok(InputRecordings { recording, refused, refused_column, warnings })
 }
 
@@ -68,7 +69,7 @@ fn read_one(source: &str, mapping: Option<&Mapping>) -> Result<ReadRecording, Bi
     if let Some(address) = source.strip_prefix("history:") {
         return history::read(address)
             .map(to_read_recording)
-            .map_err(|problem| Bilingual::new(problem.clone(), problem));
+            .map_err(|problem| Bilingual::new(problem.to_string(), problem.to_string()));
     }
     let path = Path::new(source);
     let read = mapping.map_or_else(|| recording::read_path(path), |mapping| recording::read_path_as(path, mapping));

@@ -92,16 +92,41 @@ pub struct WorkerPaths {
     pub kept: DiagnosisStore,
 }
 
+/// Why there is no model in a file.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelFileError {
+    /// The file cannot be read.
+    #[error("{}: {error}", path.display())]
+    Unreadable {
+        /// Which.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// It is no model that can be used.
+    #[error("{}", list_problems(path, problems))]
+    Refused {
+        /// Which.
+        path: PathBuf,
+        /// Everything that is wrong with it.
+        problems: Vec<twin::Problem>,
+    },
+}
+
+/// Every problem on a line of its own.
+fn list_problems(path: &Path, problems: &[twin::Problem]) -> String {
+    problems.iter().map(|problem| format!("{}, {problem}", path.display())).collect::<Vec<_>>().join("\n")
+}
+
 /// Reads a model.
 ///
 /// # Errors
 /// Everything that is wrong with it.
-pub fn read(path: &Path) -> Result<LoadedModel, String> {
-    let toml = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let problems = |problems: Vec<twin::Problem>| {
-        problems.iter().map(|problem| format!("{}, {problem}", path.display())).collect::<Vec<_>>().join("\n")
-    };
-    let model = parse_model(&toml).map_err(problems)?;
+pub fn read(path: &Path) -> Result<LoadedModel, ModelFileError> {
+    let toml =
+        std::fs::read_to_string(path).map_err(|error| ModelFileError::Unreadable { path: path.to_owned(), error })?;
+    let refused = |problems| ModelFileError::Refused { path: path.to_owned(), problems };
+    let model = parse_model(&toml).map_err(refused)?;
     Ok(LoadedModel { model, toml })
 }
 
@@ -170,7 +195,10 @@ impl FileWatch {
             return None;
         }
         self.known = text;
-        Some(read(&self.path).map_or_else(WorkerReport::Refused, |loaded| WorkerReport::Model(Box::new(loaded))))
+        Some(read(&self.path).map_or_else(
+            |error| WorkerReport::Refused(error.to_string()),
+            |loaded| WorkerReport::Model(Box::new(loaded)),
+        ))
     }
 }
 

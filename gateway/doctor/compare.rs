@@ -3,7 +3,7 @@
 //! A machine goes on while it is read. Each value of the library is therefore held against two of ours, one from just
 //! before and one from just after, and a channel differs only if it did so in every one of several rounds.
 
-use super::{DoctorReport, ValueWithUnit, begin_examination};
+use super::{DoctorReport, ExamineError, ValueWithUnit, begin_examination};
 use adapters::address::{FanucBackend, Target};
 use adapters::channel::Kind;
 use adapters::clock::SystemClock;
@@ -48,10 +48,10 @@ type ValuesByIndex = BTreeMap<usize, Value>;
 ///
 /// # Errors
 /// The address is no FANUC controller that we talk to by ourselves, in words.
-pub fn compare_backends(text: &str, library: &Path) -> Result<Comparison, String> {
-    let address: Address = text.parse().map_err(|error| format!("{error}"))?;
+pub fn compare_backends(text: &str, library: &Path) -> Result<Comparison, ExamineError> {
+    let address: Address = text.parse().map_err(ExamineError::Address)?;
     if !matches!(address.target(), Target::Fanuc { backend: FanucBackend::Native, .. }) {
-        return Err(format!("{text}: give a fanuc:// address without backend=vendor to compare with a library"));
+        return Err(ExamineError::NotNative { address: text.to_owned() });
     }
     let clock = SystemClock::new();
     let (ours, mut native) = begin_examination(text, &clock)?;

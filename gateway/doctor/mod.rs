@@ -8,8 +8,10 @@ pub use compare::{ChannelDifference, Comparison, compare_backends};
 pub use computer::{ComputerReport, SystemFiles, examine_computer};
 
 use crate::run::open::open_source;
+use adapters::address::AddressError;
 use adapters::clock::{Clock, SystemClock};
 use adapters::driver::{Fact, FactValue};
+use adapters::open::OpenError;
 use adapters::plausibility::Plausibility;
 use adapters::{Absence, Address, ChannelId, Offer, Reading, Source, SourceError, Value};
 use serde_json::{Map, json};
@@ -63,11 +65,28 @@ pub struct DoctorReport {
     pub offers: Option<Vec<Offer>>,
 }
 
+/// Why nothing can be examined.
+#[derive(Debug, thiserror::Error)]
+pub enum ExamineError {
+    /// What was typed is no address.
+    #[error("{0}")]
+    Address(AddressError),
+    /// It cannot be opened.
+    #[error("{0}")]
+    Open(OpenError),
+    /// There is nothing to compare: a FANUC controller that we talk to by ourselves is needed.
+    #[error("{address}: give a fanuc:// address without backend=vendor to compare with a library")]
+    NotNative {
+        /// What was typed.
+        address: String,
+    },
+}
+
 /// Examines an address, with the channels that a configuration adds to it. Takes as long as its sources' own deadlines at most.
 ///
 /// # Errors
 /// It cannot be opened, in words.
-pub fn examine_address(address: &Address) -> Result<DoctorReport, String> {
+pub fn examine_address(address: &Address) -> Result<DoctorReport, ExamineError> {
     begin_at(address, &SystemClock::new()).map(|(report, _)| report)
 }
 
@@ -75,8 +94,8 @@ pub fn examine_address(address: &Address) -> Result<DoctorReport, String> {
 ///
 /// # Errors
 /// It is no address, or cannot be opened, in words.
-pub fn examine_text(address: &str) -> Result<DoctorReport, String> {
-    let address: Address = address.parse().map_err(|error: adapters::address::AddressError| error.to_string())?;
+pub fn examine_text(address: &str) -> Result<DoctorReport, ExamineError> {
+    let address: Address = address.parse().map_err(ExamineError::Address)?;
     examine_address(&address)
 }
 
@@ -84,7 +103,7 @@ pub fn examine_text(address: &str) -> Result<DoctorReport, String> {
 ///
 /// # Errors
 /// It cannot be opened, in words.
-pub fn examine_all(address: &Address) -> Result<DoctorReport, String> {
+pub fn examine_all(address: &Address) -> Result<DoctorReport, ExamineError> {
     let clock = SystemClock::new();
     let (mut report, mut sources) = begin_at(address, &clock)?;
     let mut offers = Vec::new();
@@ -99,14 +118,14 @@ pub fn examine_all(address: &Address) -> Result<DoctorReport, String> {
 }
 
 /// Examines an address and leaves open what works.
-fn begin_examination(text: &str, clock: &SystemClock) -> Result<(DoctorReport, Vec<Box<dyn Source>>), String> {
-    let address: Address = text.parse().map_err(|error| format!("{error}"))?;
+fn begin_examination(text: &str, clock: &SystemClock) -> Result<(DoctorReport, Vec<Box<dyn Source>>), ExamineError> {
+    let address: Address = text.parse().map_err(ExamineError::Address)?;
     begin_at(&address, clock)
 }
 
-fn begin_at(address: &Address, clock: &SystemClock) -> Result<(DoctorReport, Vec<Box<dyn Source>>), String> {
+fn begin_at(address: &Address, clock: &SystemClock) -> Result<(DoctorReport, Vec<Box<dyn Source>>), ExamineError> {
     let began = Instant::now();
-    let opened = open_source(address, clock.now_ns()).map_err(|error| error.to_string())?;
+    let opened = open_source(address, clock.now_ns()).map_err(ExamineError::Open)?;
     let mut report = DoctorReport {
         address: address.text().to_owned(),
         reachable: false,

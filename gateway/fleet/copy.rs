@@ -19,6 +19,16 @@ pub(super) struct CopyRows {
     rows: u64,
 }
 
+/// A length as the protocol writes it. The server refuses the whole statement where a length does not fit what follows, so that
+/// the bound stores nothing wrong.
+fn to_wire_length(length: usize) -> i32 {
+    debug_assert!(
+        i32::try_from(length).is_ok(),
+        "a field is part of a message of NATS, and those are of megabytes: {length} bytes or items"
+    );
+    i32::try_from(length).unwrap_or(i32::MAX)
+}
+
 impl CopyRows {
     pub(super) fn new() -> Self {
         Self { bytes: SIGNATURE.to_vec(), rows: 0 }
@@ -43,9 +53,7 @@ impl CopyRows {
     }
 
     fn append_field(&mut self, bytes: &[u8]) -> &mut Self {
-        // A field is part of a message of at most a megabyte.
-        let length = i32::try_from(bytes.len()).unwrap_or(i32::MAX);
-        self.bytes.extend(length.to_be_bytes());
+        self.bytes.extend(to_wire_length(bytes.len()).to_be_bytes());
         self.bytes.extend(bytes);
         self
     }
@@ -91,7 +99,7 @@ impl CopyRows {
     fn list_of<B: AsRef<[u8]>>(&mut self, kind: i32, items: impl ExactSizeIterator<Item = Option<B>>) -> &mut Self {
         let start = self.bytes.len();
         self.bytes.extend(0_i32.to_be_bytes());
-        let count = i32::try_from(items.len()).unwrap_or(i32::MAX);
+        let count = to_wire_length(items.len());
         // Dimensions, whether there may be holes, type; then of the only dimension length and first index.
         let head: &[i32] = if count == 0 { &[0, 0, kind] } else { &[1, 1, kind, count, 1] };
         head.iter().for_each(|number| self.bytes.extend(number.to_be_bytes()));
@@ -99,13 +107,12 @@ impl CopyRows {
             match item {
                 None => self.bytes.extend((-1_i32).to_be_bytes()),
                 Some(item) => {
-                    let length = i32::try_from(item.as_ref().len()).unwrap_or(i32::MAX);
-                    self.bytes.extend(length.to_be_bytes());
+                    self.bytes.extend(to_wire_length(item.as_ref().len()).to_be_bytes());
                     self.bytes.extend(item.as_ref());
                 }
             }
         }
-        let length = i32::try_from(self.bytes.len() - start - 4).unwrap_or(i32::MAX);
+        let length = to_wire_length(self.bytes.len() - start - 4);
         self.bytes[start..start + 4].copy_from_slice(&length.to_be_bytes());
         self
     }

@@ -72,16 +72,39 @@ fn describe_error(doing: &str, error: &tokio_postgres::Error) -> NatsError {
         "42501" => "give this user the right: GRANT CREATE, USAGE ON SCHEMA public",
         "28P02" => "sign the client certificate by the authority that ssl_ca_file of the server names",
         "53100" => "make room on the disk of the database; what waits stays in the stream",
-        "" if text.contains("password missing") => {
-            "the server asks for a password: write it into a file that only this user may read, and give --password-file FILE"
-        }
-        "" if text.contains("support TLS") => {
-            "write `ssl = on` into its postgresql.conf, or leave sslmode=require, ca=, cert= and key= out"
-        }
-        "" => "look whether PostgreSQL runs there and listens on this address",
+        "" => ConnectFailure::from_words(&text).next_step(),
         _ => "look up the number in the documentation of PostgreSQL (error codes)",
     };
     NatsError::new(format!("PostgreSQL, {doing}: {text}"), next)
+}
+
+/// Why there is no connection, where the server gives no SQLSTATE. The library tells these apart by the words of its error alone;
+/// a test holds them against a server, so that another version of it cannot change them unnoticed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ConnectFailure {
+    PasswordMissing,
+    WithoutTls,
+    Other,
+}
+
+impl ConnectFailure {
+    fn from_words(text: &str) -> Self {
+        const WORDS: [(&str, ConnectFailure); 2] =
+            [("password missing", ConnectFailure::PasswordMissing), ("support TLS", ConnectFailure::WithoutTls)];
+        WORDS.iter().find(|(words, _)| text.contains(words)).map_or(Self::Other, |(_, failure)| *failure)
+    }
+
+    fn next_step(self) -> &'static str {
+        match self {
+            Self::PasswordMissing => {
+                "the server asks for a password: write it into a file that only this user may read, and give --password-file FILE"
+            }
+            Self::WithoutTls => {
+                "write `ssl = on` into its postgresql.conf, or leave sslmode=require, ca=, cert= and key= out"
+            }
+            Self::Other => "look whether PostgreSQL runs there and listens on this address",
+        }
+    }
 }
 
 /// What TLS says, where it is the reason.
@@ -173,4 +196,33 @@ pub(super) async fn connect(settings: &DatabaseSettings) -> Result<(Client, sche
     client.batch_execute(settings).await.map_err(|error| describe_error("connecting", &error))?;
     let partitioning = schema::bring_up(&mut client).await?;
     Ok((client, partitioning))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+
+    /// What is told of a server that answers the first message of a connection with this.
+    async fn connect_to(answer: &'static [u8], parameters: &str) -> NatsError {
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let port = listener.local_addr().expect("bound").port();
+        tokio::spawn(async move {
+            let (mut stream, _) = listener.accept().await.expect("a client");
+            let _first_message = stream.read(&mut [0; 1024]).await;
+            let _client_has_gone = stream.write_all(answer).await;
+            let _until_it_leaves = stream.read(&mut [0; 1024]).await;
+        });
+        let address = format!("postgres://plant@127.0.0.1:{port}/plant{parameters}");
+        connect(&DatabaseSettings { address, password_file: None }).await.expect_err("refused")
+    }
+
+    #[tokio::test]
+    async fn what_the_library_says_of_passwords_and_tls_is_known() {
+        // AuthenticationCleartextPassword; and what a server says that has no TLS.
+        let asked = connect_to(b"R\0\0\0\x08\0\0\0\x03", "").await;
+        assert_eq!(asked.next, ConnectFailure::PasswordMissing.next_step(), "{}", asked.what);
+        let plain = connect_to(b"N", "?sslmode=require").await;
+        assert_eq!(plain.next, ConnectFailure::WithoutTls.next_step(), "{}", plain.what);
+    }
 }

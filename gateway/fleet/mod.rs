@@ -37,14 +37,28 @@ pub use schema::{TABLES, VIEWS};
 
 use crate::nats::NatsTarget;
 
+/// Why a text names no cluster.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ClusterError {
+    /// It is no address.
+    #[error("{0}")]
+    Address(adapters::address::AddressError),
+    /// It is the address of something else.
+    #[error("{address} is no address of NATS; write nats://SERVER:4222,SERVER:4222/PREFIX")]
+    NotNats {
+        /// What was written.
+        address: String,
+    },
+}
+
 /// Reads `nats://SERVER,SERVER/PREFIX` or `natss://`; gives the servers and the prefix of the subjects.
 ///
 /// # Errors
 /// What is wrong with it, in words.
-pub fn parse_cluster(address: &str) -> Result<(NatsTarget, String), String> {
-    let sink: crate::sinks::SinkAddress = address.parse().map_err(|error| format!("{error}"))?;
+pub fn parse_cluster(address: &str) -> Result<(NatsTarget, String), ClusterError> {
+    let sink: crate::sinks::SinkAddress = address.parse().map_err(ClusterError::Address)?;
     match sink.target() {
         crate::sinks::SinkTarget::Nats(target) => Ok((target.servers.clone(), target.prefix.clone())),
-        _ => Err(format!("{address} is no address of NATS; write nats://SERVER:4222,SERVER:4222/PREFIX")),
+        _ => Err(ClusterError::NotNats { address: address.to_owned() }),
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::limits::GateMode;
 use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_base::convert::duration_to_ns;
 use std::fmt;
 use std::time::Duration;
 use thiserror::Error;
@@ -109,7 +110,7 @@ const SILENT_NS: i64 = 10 * SECOND_NS;
 
 impl Arming {
     pub(super) fn new(mode: GateMode, lasts: Duration) -> Self {
-        let lasts_ns = i64::try_from(lasts.as_nanos()).unwrap_or(i64::MAX);
+        let lasts_ns = duration_to_ns(lasts);
         Self { mode, lasts_ns, state: Err(Disarmed::Start), fresh_ns: TimeNs::MIN }
     }
 
@@ -120,7 +121,7 @@ impl Arming {
         if by.trim().is_empty() {
             return Err(ArmError::Nobody);
         }
-        let lasts_ns = lasts.map_or(self.lasts_ns, |lasts| i64::try_from(lasts.as_nanos()).unwrap_or(i64::MAX));
+        let lasts_ns = lasts.map_or(self.lasts_ns, duration_to_ns);
         if !(1..=self.lasts_ns).contains(&lasts_ns) {
             return Err(ArmError::Lasts(self.lasts_ns.unsigned_abs() / 1_000_000_000));
         }

@@ -49,6 +49,7 @@ use adapters::units::OverridePct;
 use adapters::{ChannelId, Sample};
 use arming::Arming;
 use ask::Asks;
+use gateway_base::convert::duration_to_ns;
 use hold::Interlocks;
 use limit::{Aim, Slew};
 use offset::Circumstances;
@@ -77,7 +78,7 @@ impl Gate {
     /// A gate with these limits. It is disarmed, whatever the configuration says.
     #[must_use]
     pub fn new(limits: GateConfig) -> Self {
-        let stale_ns = i64::try_from(limits.stale.as_nanos()).unwrap_or(i64::MAX);
+        let stale_ns = duration_to_ns(limits.stale);
         Self {
             interlocks: Interlocks::new(stale_ns),
             dial: find_channel("feed_override_dial_pct"),
@@ -170,6 +171,12 @@ impl Gate {
         let moves = hold.is_none() && bound.is_none() && !matches!(outcome, GateOutcome::DialCounts(_));
         let slewing = moves && (self.slew.exact_pct() - target_pct).abs() >= 1.0;
         let outcome = if slewing { GateOutcome::Limited(Bound::Slew) } else { outcome };
+        // The wall between scripts and machine: whatever was asked for, what passes lies between 100 % and the band.
+        let passed_pct = f64::from(permitted.percent());
+        debug_assert!(
+            passed_pct >= self.limits.min_pct.min(100.0) && passed_pct <= self.limits.max_pct.max(100.0),
+            "no request passes the limits of the gate: {passed_pct} %"
+        );
         Verdict { at_ns, wanted_pct, permitted, outcome, armed }
     }
 

@@ -106,7 +106,8 @@ pub(crate) fn rows_of(
 
 /// From the codes of a block to the codes of `reasons`.
 pub(crate) fn own_codes(directory: &Directory, reasons: &mut Reasons) -> [u8; 256] {
-    let mut codes: [u8; 256] = std::array::from_fn(|code| u8::try_from(code).unwrap_or(NOT_PROVIDED));
+    let mut codes = [NOT_PROVIDED; 256];
+    (0..=u8::MAX).zip(&mut codes).for_each(|(code, own)| *own = code);
     for (code, word) in &directory.words {
         codes[usize::from(*code)] = reasons.intern_word(word);
     }
@@ -124,7 +125,7 @@ fn column_of(cells: Cells, codes: &[u8; 256]) -> Column {
                 PRESENT => words.get(*code as usize).map_or(Word::Missing(NOT_PROVIDED), |word| Word::Is(word.clone())),
                 reason => Word::Missing(codes[usize::from(reason)]),
             };
-            let mut changes: Vec<(u32, Word)> = (0u32..).zip(which.iter().zip(&missing).map(word)).collect();
+            let mut changes: Vec<(usize, Word)> = (0..).zip(which.iter().zip(&missing).map(word)).collect();
             changes.dedup_by(|later, earlier| later.1 == earlier.1);
             Column::Words(changes)
         }

@@ -55,8 +55,14 @@ pub(crate) fn is_of_disk(error: &rusqlite::Error) -> bool {
     let extended = error.sqlite_error().map(|error| error.extended_code);
     extended == Some(ffi::SQLITE_IOERR_DATA)
         || matches!(error.sqlite_error_code(), Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase))
-        // A value of another type than its column, or text that is no text: only a changed file has that.
-        || matches!(error, rusqlite::Error::InvalidColumnType(..) | rusqlite::Error::FromSqlConversionFailure(..))
+        // A value of another type than its column, a number that is none of its kind, or text that is no text: only a changed file
+        // has that.
+        || matches!(
+            error,
+            rusqlite::Error::InvalidColumnType(..)
+                | rusqlite::Error::IntegralValueOutOfRange(..)
+                | rusqlite::Error::FromSqlConversionFailure(..)
+        )
 }
 
 /// What `SQLite` keeps beside a database.

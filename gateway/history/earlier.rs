@@ -12,11 +12,13 @@ use super::record::Event;
 use super::schema::{SCHEMA, copy_whole};
 use super::space::disk_room;
 use adapters::clock::TimeNs;
+use gateway_base::convert::clamp_to_unsigned;
 use gateway_base::{clock, files};
 use rusqlite::Connection;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
+use thiserror::Error;
 
 /// What stands between the name of a history and the schema of a copy.
 const COPY: &str = ".schema-";
@@ -49,20 +51,33 @@ pub(crate) fn copy_before_change(path: &Path, db: &Connection, schema: i64) -> E
     Event { at_ns: clock::now_ns(), kind, source, text, detail: String::new() }
 }
 
-fn copy_database(path: &Path, db: &Connection, schema: i64) -> Result<PathBuf, String> {
+/// Why there is no copy.
+#[derive(Debug, Error)]
+enum CopyError {
+    /// A file cannot be read, written or renamed.
+    #[error("{}: {error}", path.display())]
+    File { path: PathBuf, error: std::io::Error },
+    /// The disk is too full.
+    #[error("the disk has room for {} MB, and {} are needed", free / 1_000_000, needed / 1_000_000)]
+    NoRoom { free: u64, needed: u64 },
+    /// The history cannot be read, or its copy cannot be written.
+    #[error(transparent)]
+    Database(#[from] rusqlite::Error),
+    /// The copy cannot be made durable.
+    #[error(transparent)]
+    NotDurable(#[from] std::io::Error),
+}
+
+fn copy_database(path: &Path, db: &Connection, schema: i64) -> Result<PathBuf, CopyError> {
     let (to, fresh) = (name_copy(path, schema), append_suffix(path, COPYING));
     // One that a power cut has left is half a copy.
     let _none_left = fs::remove_file(&fresh);
-    let told = |error: std::io::Error| format!("{}: {error}", fresh.display());
+    let told = |error| CopyError::File { path: fresh.clone(), error };
     let bytes = fs::metadata(path).map_err(told)?.len();
     if let Some(room) = disk_room(path)
         && room.free < bytes + KEEP_FREE
     {
-        return Err(format!(
-            "the disk has room for {} MB, and {} are needed",
-            room.free / 1_000_000,
-            bytes / 1_000_000
-        ));
+        return Err(CopyError::NoRoom { free: room.free, needed: bytes });
     }
     let copied = write_copy(db, &fresh).and_then(|()| fs::rename(&fresh, &to).map_err(told));
     copied.inspect_err(|_| {
@@ -72,17 +87,18 @@ fn copy_database(path: &Path, db: &Connection, schema: i64) -> Result<PathBuf, S
 }
 
 /// With what still stands in the log, also while somebody reads.
-fn write_copy(db: &Connection, fresh: &Path) -> Result<(), String> {
-    copy_whole(db, fresh).map_err(|error| error.to_string())?;
-    let file = fs::OpenOptions::new().write(true).open(fresh).map_err(|error| error.to_string())?;
+fn write_copy(db: &Connection, fresh: &Path) -> Result<(), CopyError> {
+    copy_whole(db, fresh)?;
+    let file = fs::OpenOptions::new().write(true).open(fresh)?;
     // Not dated yet: the clock of this moment may be wrong.
     let undated = file.set_modified(SystemTime::UNIX_EPOCH);
-    undated.and_then(|()| file.sync_all()).map_err(|error| error.to_string())
+    undated.and_then(|()| file.sync_all())?;
+    Ok(())
 }
 
 /// Removes copies that are older than a week at this time, which a confirmed clock says. A copy is dated when it is first met here.
 pub fn remove_old_copies(path: &Path, now_ns: TimeNs) {
-    let now = SystemTime::UNIX_EPOCH + Duration::from_nanos(u64::try_from(now_ns).unwrap_or(0));
+    let now = SystemTime::UNIX_EPOCH + Duration::from_nanos(clamp_to_unsigned(now_ns));
     let (Some(directory), Some(name)) = (path.parent(), path.file_name().and_then(|name| name.to_str())) else {
         return;
     };

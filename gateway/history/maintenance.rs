@@ -1,12 +1,11 @@
 //! Keeping the file in order: the size it may have, a full disk, compaction and ages.
 
-use super::compact;
 use super::error::{Doing, HistoryError};
 use super::lock::append_suffix;
 use super::options::Retention;
 use super::retention::{AgeLimits, remove_aged, remove_oldest, used_bytes};
-use super::seal;
 use super::space::{Reserve, disk_room};
+use super::{compact, seal};
 use adapters::clock::TimeNs;
 use rusqlite::Connection;
 use std::path::{Path, PathBuf};
@@ -47,7 +46,7 @@ enum MaintenanceStage {
     Compact(Option<TimeNs>),
     Age(AgeLimits),
     /// Gives blocks of an older version their checksums: so many are left for this run.
-    Seal(u32),
+    Seal(usize),
     Shrink,
 }
 

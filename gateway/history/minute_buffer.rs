@@ -9,6 +9,7 @@ use super::record::{Event, Record};
 use super::rows::SeriesRows;
 use super::series::Series;
 use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_base::convert::clamp_to_unsigned;
 use std::collections::VecDeque;
 
 /// A block is sealed at this many rows even within its minute: bounds memory at 100 Hz and beyond.
@@ -101,7 +102,8 @@ impl MinuteBuffer {
 
     /// Rows taken on since opening, up to but without row `row`.
     pub(crate) fn rows_through(&self, row: i64) -> u64 {
-        u64::try_from(row - self.opened_row).unwrap_or(0)
+        debug_assert!(row >= self.opened_row, "rows are numbered from the one at which the history was opened");
+        clamp_to_unsigned(row - self.opened_row)
     }
 
     /// How many of the records belong to rows before row `row`.
@@ -192,6 +194,15 @@ impl MinuteBuffer {
             return;
         }
         let first_row = self.open_row();
+        // What leaves here is stored as it is, and every reader relies on both.
+        debug_assert!(
+            self.open.at_ns.is_sorted(),
+            "times within a block rise: a clock that goes back begins a segment"
+        );
+        debug_assert!(
+            self.blocks.back().is_none_or(|block| block.key.first_row + block.key.rows == first_row),
+            "rows are numbered without holes: a block begins where the one before it ends"
+        );
         let block = self.encoder.encode_block(&self.open, &self.series, &self.reasons, self.segment, first_row);
         self.sealed_ns = Some(block.key.end_ns);
         self.open.clear();

@@ -17,6 +17,8 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Level {
     pub(crate) width_ns: i64,
+    /// The same, s.
+    pub(crate) width_s: u32,
     pub(crate) table: &'static str,
     pub(crate) key: &'static str,
     insert: &'static str,
@@ -26,6 +28,7 @@ macro_rules! level {
     ($width_s:expr, $table:literal, $key:literal) => {
         Level {
             width_ns: $width_s * SECOND_NS,
+            width_s: $width_s,
             table: $table,
             key: $key,
             insert: concat!(
@@ -50,11 +53,6 @@ pub(crate) static LEVELS: [Level; 3] =
 pub(crate) const MINUTE_NS: i64 = 60 * SECOND_NS;
 
 impl Level {
-    /// Length of a bucket, s.
-    pub(crate) fn width_s(&self) -> u32 {
-        u32::try_from(self.width_ns / SECOND_NS).unwrap_or(u32::MAX)
-    }
-
     /// Number of the bucket that holds `at_ns`.
     pub(crate) fn bucket_at(&self, at_ns: TimeNs) -> i64 {
         at_ns.div_euclid(self.width_ns)

@@ -15,7 +15,7 @@ const FIRST_OWN: u8 = 11;
 /// The code of the reason of a reading that came after the first ten.
 const FIRST_FURTHER: u8 = 252;
 /// At most this many own words; further ones share the last code. Reasons are a handful of constants.
-const OWN_MAX: usize = 240;
+const OWN_MAX: u8 = 240;
 /// The word of everything beyond [`OWN_MAX`].
 const OTHER: &str = "other";
 
@@ -45,9 +45,9 @@ impl Reasons {
         if let Some(absence) = Absence::from_word(word) {
             return code_of(absence);
         }
-        let word = if self.own.len() < OWN_MAX { word } else { OTHER };
+        let word = if self.own.len() < usize::from(OWN_MAX) { word } else { OTHER };
         self.own.push(word.into());
-        self.own.truncate(OWN_MAX + 1);
+        self.own.truncate(usize::from(OWN_MAX) + 1);
         own_code(self.own.len() - 1)
     }
 
@@ -69,7 +69,7 @@ impl Reasons {
 }
 
 fn own_code(position: usize) -> u8 {
-    FIRST_OWN + u8::try_from(position.min(OWN_MAX)).unwrap_or(0)
+    FIRST_OWN + u8::try_from(position).map_or(OWN_MAX, |position| position.min(OWN_MAX))
 }
 
 #[cfg(test)]

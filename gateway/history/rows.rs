@@ -28,7 +28,7 @@ pub(crate) enum Column {
     /// One value and one reason code per row.
     Numbers { values: Vec<f64>, missing: Vec<u8> },
     /// Text holds from the row where it changed.
-    Words(Vec<(u32, Word)>),
+    Words(Vec<(usize, Word)>),
 }
 
 impl Column {
@@ -107,7 +107,7 @@ impl Column {
             if changes.is_empty() && row > 0 {
                 changes.push((0, Word::Missing(NOT_PROVIDED)));
             }
-            changes.push((u32::try_from(row).unwrap_or(u32::MAX), word));
+            changes.push((row, word));
         }
     }
 
@@ -133,11 +133,11 @@ impl Column {
     }
 }
 
-fn append_words(words: &mut Column, have: usize, more: &[(u32, Word)], rows: &Range<usize>) {
-    let first = more.partition_point(|(row, _)| (*row as usize) <= rows.start);
+fn append_words(words: &mut Column, have: usize, more: &[(usize, Word)], rows: &Range<usize>) {
+    let first = more.partition_point(|(row, _)| *row <= rows.start);
     let before = first.checked_sub(1).map(|index| &more[index].1);
-    let inside = more[first..].iter().take_while(|(row, _)| (*row as usize) < rows.end);
-    let changes = inside.map(|(row, word)| (*row as usize - rows.start, word));
+    let inside = more[first..].iter().take_while(|(row, _)| *row < rows.end);
+    let changes = inside.map(|(row, word)| (*row - rows.start, word));
     for (row, word) in before.map(|word| (0, word)).into_iter().chain(changes) {
         match word {
             Word::Is(text) => words.push_text(have + row, text, || text.clone()),

@@ -4,9 +4,8 @@ use super::damage::{is_of_disk, was_ours};
 use super::error::{Doing, HistoryError};
 use super::lock::append_suffix;
 use super::options::SeriesKind;
-use super::pages;
 use super::series::Series;
-use super::{audit, earlier, record_sql};
+use super::{audit, earlier, pages, record_sql};
 use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
 use std::path::Path;
 
@@ -201,7 +200,7 @@ fn damaged_header() -> HistoryError {
 
 /// Notes the size limit, for those who only read.
 pub(crate) fn note_limit(db: &Connection, max_bytes: u64) -> Result<(), HistoryError> {
-    let max_bytes = i64::try_from(max_bytes).unwrap_or(i64::MAX);
+    let max_bytes = gateway_base::convert::clamp_to_signed(max_bytes);
     db.execute("INSERT OR REPLACE INTO meta (key, value) VALUES ('max_bytes', ?1)", [max_bytes])
         .map(drop)
         .with_activity("noting the size limit")

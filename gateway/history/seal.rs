@@ -6,12 +6,12 @@ use super::error::{Doing, HistoryError};
 use rusqlite::{Connection, OptionalExtension, params};
 
 /// Blocks in one run of maintenance: some hundred megabytes that are written once.
-pub(crate) const BLOCKS_PER_RUN: u32 = 4_000;
+pub(crate) const BLOCKS_PER_RUN: usize = 4_000;
 /// Blocks in one step.
 const STEP: i64 = 16;
 
 /// Seals the next blocks; how many. 0 when there are none left.
-pub(crate) fn seal_next_blocks(db: &mut Connection) -> Result<u32, HistoryError> {
+pub(crate) fn seal_next_blocks(db: &mut Connection) -> Result<usize, HistoryError> {
     let sealing = db.transaction().with_activity("beginning to seal blocks")?;
     let cursor: i64 = sealing
         .query_row("SELECT value FROM meta WHERE key = 'sealed_row'", [], |row| row.get(0))
@@ -41,5 +41,5 @@ pub(crate) fn seal_next_blocks(db: &mut Connection) -> Result<u32, HistoryError>
         .execute("INSERT OR REPLACE INTO meta (key, value) VALUES ('sealed_row', ?1)", [last + 1])
         .with_activity("noting what is sealed")?;
     sealing.commit().with_activity("sealing blocks")?;
-    Ok(u32::try_from(blocks.len()).unwrap_or(u32::MAX))
+    Ok(blocks.len())
 }

@@ -5,6 +5,7 @@
 //! written again once there is room.
 
 use super::lock::append_suffix;
+use gateway_base::convert::clamp_to_length;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -78,7 +79,7 @@ impl Reserve {
         let mut left = self.bytes;
         while left > 0 {
             let take = left.min(chunk.len() as u64);
-            file.write_all(&chunk[..usize::try_from(take).unwrap_or(chunk.len())])?;
+            file.write_all(&chunk[..clamp_to_length(take)])?;
             left -= take;
         }
         file.sync_all()

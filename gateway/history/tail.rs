@@ -82,7 +82,7 @@ pub(super) fn put_missing(out: &mut String, code: u8, reasons: &Reasons) {
     let _ = write!(out, "{{\"m\":{}}}", Json::from(reasons.find_word(code)));
 }
 
-fn put_words(out: &mut String, changes: &[(u32, Word)], range: &Range<usize>, reasons: &Reasons) {
+fn put_words(out: &mut String, changes: &[(usize, Word)], range: &Range<usize>, reasons: &Reasons) {
     let cell = |out: &mut String, word: Option<&Word>| match word {
         Some(Word::Is(text)) => {
             let _ = write!(out, "{}", Json::from(&**text));
@@ -90,7 +90,7 @@ fn put_words(out: &mut String, changes: &[(u32, Word)], range: &Range<usize>, re
         Some(Word::Missing(code)) => put_missing(out, *code, reasons),
         None => put_missing(out, NOT_PROVIDED, reasons),
     };
-    let at = |row: usize| changes.partition_point(|(from, _)| *from as usize <= row).checked_sub(1);
+    let at = |row: usize| changes.partition_point(|(from, _)| *from <= row).checked_sub(1);
     if at(range.start) == at(range.end.saturating_sub(1)) {
         return cell(out, at(range.start).map(|index| &changes[index].1));
     }
@@ -141,7 +141,7 @@ fn column_of(cell: &Json, count: usize, kind: SeriesKind, reasons: &mut Reasons)
                 Json::String(text) => Word::Is(Arc::from(text.as_str())),
                 other => Word::Missing(reason(other)),
             };
-            let mut changes: Vec<(u32, Word)> = (0u32..).zip(cells.iter().map(word)).collect();
+            let mut changes: Vec<(usize, Word)> = (0..).zip(cells.iter().map(word)).collect();
             changes.dedup_by(|later, earlier| later.1 == earlier.1);
             Column::Words(changes)
         }

@@ -146,7 +146,7 @@ impl Thread {
         }
         match self.commit_with_retry(with_tail) {
             Ok(()) => {
-                let took = u64::try_from(began.elapsed().as_micros()).unwrap_or(u64::MAX);
+                let took = gateway_base::convert::duration_to_us(began.elapsed());
                 self.shared.commit_us.store(took, Ordering::Relaxed);
                 self.shared.commits.fetch_add(1, Ordering::Relaxed);
                 self.pace.failures = 0;
@@ -202,7 +202,7 @@ impl Thread {
         if let Some(through_ns) = through_ns {
             self.shared.acknowledged_ns.store(through_ns, Ordering::Release);
         }
-        let rows = u64::try_from(next_row - self.minute_buffer.opened_row).unwrap_or(0);
+        let rows = self.minute_buffer.rows_through(next_row);
         self.shared.rows.store(rows.saturating_sub(self.minute_buffer.lost_rows), Ordering::Relaxed);
         self.shared.acknowledged_record.store(self.minute_buffer.durable_ticket, Ordering::Release);
         if let Some(number) = self.pace.flushing.take() {

@@ -64,9 +64,11 @@ impl Samples {
         let mut letters = String::new();
         for (constraint, mut usage) in info.constraints_and_usages() {
             let letter = encode_constraint(constraint.column(), constraint.operator());
-            if let Some(letter) = letter.filter(|_| constraint.is_usable()) {
+            // A condition without a place is left to `SQLite`.
+            let place = c_int::try_from(letters.len() + 1);
+            if let (Some(letter), Ok(place)) = (letter.filter(|_| constraint.is_usable()), place) {
                 letters.push(letter);
-                usage.set_argv_index(c_int::try_from(letters.len()).unwrap_or(0));
+                usage.set_argv_index(place);
             }
         }
         // A moment is one row; each bound leaves, say, a quarter. The figures only have to order the plans.
@@ -181,11 +183,11 @@ impl Cursor {
             AT_NS => context.set_result(stretch.at_ns[place.rows.start]),
             TIME_UTC => context.set_result(time_text(stretch.at_ns[place.rows.start])),
             SEGMENT => context.set_result(stretch.segment),
-            column => context.set_result(self.read_cell(
-                place,
-                stretch,
-                usize::try_from(column).unwrap_or(0).saturating_sub(FIXED),
-            )?),
+            column => {
+                let unknown = || Error::ModuleError(format!("the table of samples has no column {column}"));
+                let index = usize::try_from(column).ok().and_then(|column| column.checked_sub(FIXED));
+                context.set_result(self.read_cell(place, stretch, index.ok_or_else(unknown)?)?)
+            }
         }
     }
 

@@ -212,8 +212,8 @@ fn cells_of(column: &Column, rows: usize) -> Cells {
         Column::Words(changes) => {
             let mut cells = WordCells::default();
             for (index, (row, word)) in changes.iter().enumerate() {
-                let end = changes.get(index + 1).map_or(rows, |(next, _)| *next as usize);
-                cells.push_run(end.saturating_sub(*row as usize), word);
+                let end = changes.get(index + 1).map_or(rows, |(next, _)| *next);
+                cells.push_run(end.saturating_sub(*row), word);
             }
             Cells::Words(cells)
         }
@@ -229,7 +229,8 @@ impl WordCells {
                     self.words.push(text.clone());
                     self.words.len() - 1
                 });
-                (u32::try_from(position).unwrap_or(0), PRESENT)
+                // A word whose place does not fit is none: another word would be a wrong answer.
+                u32::try_from(position).map_or((0, NOT_PROVIDED), |position| (position, PRESENT))
             }
         };
         self.codes.resize(self.codes.len() + count, code);

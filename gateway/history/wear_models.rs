@@ -28,6 +28,9 @@ pub struct StoredWearModel {
 /// The file cannot be opened or written, or the model has a number that cannot be stored.
 pub fn store_wear_model(path: &Path, at_ns: TimeNs, record: &WearRecord) -> Result<i64, HistoryError> {
     let toml = record.to_toml().map_err(HistoryError::Question)?;
+    let cuts = i64::try_from(record.cuts)
+        .map_err(|error| rusqlite::Error::ToSqlConversionFailure(Box::new(error)))
+        .with_activity("storing a wear model")?;
     let db = schema::open_for_writing(path)?;
     let WearKey { machine, tool, work_material, operation } = &record.key;
     db.execute(
@@ -41,7 +44,7 @@ pub fn store_wear_model(path: &Path, at_ns: TimeNs, record: &WearRecord) -> Resu
             operation,
             record.model.form(),
             record.criterion_mm,
-            i64::try_from(record.cuts).unwrap_or(i64::MAX),
+            cuts,
             residual_sd_w(&record.model),
             record.r2,
             record.origin,

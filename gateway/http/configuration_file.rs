@@ -226,7 +226,8 @@ async fn serve_address_findings(
     let place = shared.doctor.clone().try_acquire_owned().map_err(|_| busy())?;
     let report = run_blocking(move || {
         let _place = place;
-        crate::doctor::examine_text(&asked.address).map_err(|what| ApiProblem::bad_request(what, "look at the address"))
+        crate::doctor::examine_text(&asked.address)
+            .map_err(|error| ApiProblem::bad_request(error.to_string(), "look at the address"))
     });
     let report = report.await?;
     let mut document = report.to_json();

@@ -5,9 +5,8 @@ use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
 use crate::history::{HistoryError, Query, Reader, audit_document};
-use crate::moment;
 use crate::records::{RecordKind, RecordQuery, build_document, read_records};
-use crate::samples;
+use crate::{moment, samples};
 use adapters::clock::{SECOND_NS, TimeNs};
 use axum::Json;
 use axum::extract::{Query as Pairs, State};
@@ -73,7 +72,8 @@ pub(super) fn describe_history_error(error: &HistoryError) -> ApiProblem {
 
 /// `from` and `to`.
 pub(super) fn parse_range(keys: &QueryKeys, newest_ns: TimeNs) -> Result<(TimeNs, TimeNs), ApiProblem> {
-    let bad = |key: &str, what: String| ApiProblem::bad_request(format!("{key}: {what}"), moment::NOTATION);
+    let bad =
+        |key: &str, what: moment::MomentError| ApiProblem::bad_request(format!("{key}: {what}"), moment::NOTATION);
     let moment =
         |key: &str| keys.find_text(key).map(|text| moment::parse(text, newest_ns).map_err(|what| bad(key, what)));
     let to_ns = moment("to").transpose()?.unwrap_or(newest_ns);

@@ -11,10 +11,10 @@ use super::route::Route;
 use super::rules::run_blocking;
 use crate::access::Role;
 use crate::archive::{ArchivedFile, pack, unpack};
-use crate::backup::{self, BackupPaths, RestoreRequest, archive_name};
+use crate::backup::{self, BackupPaths, RestoreError, RestoreRequest, archive_name};
 use crate::config::{Config, GateMode};
+use crate::convert::seconds_to_instant;
 use crate::history::{Reader, RecordSpan, audit_document};
-use adapters::clock::SECOND_NS;
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::State;
@@ -100,7 +100,8 @@ async fn examine_source(
     let place = shared.doctor.clone().try_acquire_owned().map_err(|_| busy())?;
     let report = run_blocking(move || {
         let _place = place;
-        crate::doctor::examine_address(&address).map_err(|what| ApiProblem::conflict(what, "look at the address"))
+        crate::doctor::examine_address(&address)
+            .map_err(|error| ApiProblem::conflict(error.to_string(), "look at the address"))
     });
     let report = report.await?;
     let mut document = report.to_json();
@@ -145,10 +146,10 @@ async fn restore_backup(
         })?;
         let places = shared.configured.backup_paths();
         let before = pack_archive(&collect_files(&places)?, at_s)?;
-        let cannot = |what: String| {
-            ApiProblem::bad_request(what, "nothing was changed; take the backup of a box of this version")
+        let cannot = |error: RestoreError| {
+            ApiProblem::bad_request(error.to_string(), "nothing was changed; take the backup of a box of this version")
         };
-        let at_ns = i64::try_from(at_s).unwrap_or_default().saturating_mul(SECOND_NS);
+        let at_ns = seconds_to_instant(at_s);
         let ask = RestoreRequest { by: &person.name, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
         backup::restore_backup(&places, &files, ask).map_err(cannot)
     });

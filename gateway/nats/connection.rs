@@ -4,9 +4,8 @@ use super::wire::{ReceivedBytes, ServerInfo, ServerOperation};
 use super::{NatsError, NatsTarget, words};
 use adapters::address::Endpoint;
 use serde_json::json;
-use std::fmt;
-use std::io;
 use std::time::Duration;
+use std::{fmt, io};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::time::{Instant, timeout_at};
@@ -207,7 +206,7 @@ impl Connection {
 
     async fn receive_operation(&mut self) -> Result<ServerOperation, NatsError> {
         loop {
-            match self.inbox.next_operation().map_err(|came| words::no_nats(&self.at, &came))? {
+            match self.inbox.next_operation().map_err(|came| words::no_nats(&self.at, &came.to_string()))? {
                 Some(ServerOperation::Ping) => self.waiting_out.extend(b"PONG\r\n"),
                 Some(operation) => return Ok(operation),
                 None => {

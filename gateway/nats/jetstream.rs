@@ -5,6 +5,7 @@
 
 use super::connection::{Connection, DEADLINE, Message};
 use super::{NatsError, words};
+use gateway_base::convert::duration_to_unsigned_ns;
 use serde_json::{Value as Json, json};
 use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
@@ -79,10 +80,6 @@ pub struct Backlog {
     pub pending: u64,
     /// Messages that are given out and not acknowledged.
     pub under_way: u64,
-}
-
-fn to_nanoseconds(span: Duration) -> u64 {
-    u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }
 
 /// The error of an answer, with its number.
@@ -180,8 +177,8 @@ impl Connection {
         }
         let request = json!({
             "name": name, "subjects": [settings.subjects], "retention": "limits", "storage": "file", "discard": "new",
-            "num_replicas": settings.replicas, "max_age": to_nanoseconds(settings.max_age), "max_bytes": settings.max_bytes,
-            "duplicate_window": to_nanoseconds(settings.duplicate_window.min(settings.max_age)),
+            "num_replicas": settings.replicas, "max_age": duration_to_unsigned_ns(settings.max_age), "max_bytes": settings.max_bytes,
+            "duplicate_window": duration_to_unsigned_ns(settings.duplicate_window.min(settings.max_age)),
             "max_msgs": -1, "max_consumers": -1, "max_msg_size": -1,
         });
         self.call_api_or_fail(&format!("STREAM.CREATE.{name}"), &request).await.map(|_created| true)
@@ -205,7 +202,7 @@ impl Connection {
     pub async fn create_consumer(&mut self, stream: &str, name: &str) -> Result<(), NatsError> {
         let request = json!({"stream_name": stream, "config": {
             "durable_name": name, "ack_policy": "explicit", "deliver_policy": "all", "replay_policy": "instant",
-            "ack_wait": to_nanoseconds(ACKNOWLEDGE_WITHIN), "max_deliver": -1, "max_ack_pending": UNDER_WAY_MAX,
+            "ack_wait": duration_to_unsigned_ns(ACKNOWLEDGE_WITHIN), "max_deliver": -1, "max_ack_pending": UNDER_WAY_MAX,
         }});
         self.call_api_or_fail(&format!("CONSUMER.DURABLE.CREATE.{stream}.{name}"), &request).await.map(drop)
     }
@@ -235,7 +232,8 @@ impl Connection {
         let number = self.subscribe(&inbox);
         // A single message that is larger would never be given out.
         let bytes = bytes.max(self.max_payload() + ENVELOPE);
-        let request = json!({"batch": most, "expires": to_nanoseconds(patience), "max_bytes": bytes}).to_string();
+        let request =
+            json!({"batch": most, "expires": duration_to_unsigned_ns(patience), "max_bytes": bytes}).to_string();
         self.queue_message(
             &format!("$JS.API.CONSUMER.MSG.NEXT.{stream}.{consumer}"),
             Some(&inbox),
@@ -250,20 +248,18 @@ impl Connection {
             if came.subscription != number {
                 continue;
             }
-            match came.status {
+            match came.status.as_ref().map(|(code, said)| PullStatus::from_protocol(*code, said)) {
                 None => messages.push(came),
-                // 404 nothing there, 408 the time is over, 409 the request was cut short (limits, a new leader).
-                Some((404 | 408, _)) => break,
-                Some((409, said)) if said.to_ascii_lowercase().contains("deleted") => {
+                Some(PullStatus::Over) => break,
+                Some(PullStatus::Deleted) => {
                     let what = format!("the consumer {consumer} of stream {stream} was deleted");
                     return Err(NatsError::new(what, "it is created again with the next connection"));
                 }
-                Some((409, _)) => break,
-                Some((NO_RESPONDERS, _)) => {
+                Some(PullStatus::Unanswered) => {
                     let what = format!("nobody answers for consumer {consumer} of stream {stream}");
                     return Err(NatsError::new(what, "while a cluster chooses a new leader this passes by itself"));
                 }
-                Some(_) => {}
+                Some(PullStatus::Other) => {}
             }
         }
         self.unsubscribe(number);
@@ -278,6 +274,31 @@ impl Connection {
     pub fn acknowledge_messages<'a>(&mut self, messages: impl IntoIterator<Item = &'a Message>) {
         for reply in messages.into_iter().filter_map(|message| message.reply.clone()) {
             self.queue_message(&reply, None, None, b"+ACK");
+        }
+    }
+}
+
+/// What a status message in answer to a request for messages means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum PullStatus {
+    /// Nothing more comes: there is nothing, the time is over, or the request was cut short (limits, a new leader).
+    Over,
+    /// The consumer is gone.
+    Deleted,
+    /// Nobody listens to the request.
+    Unanswered,
+    Other,
+}
+
+impl PullStatus {
+    /// The protocol has one number for everything that cuts a request short, and tells only by its words (`Consumer Deleted`) that
+    /// the consumer is gone.
+    fn from_protocol(code: u16, said: &str) -> Self {
+        match code {
+            409 if said.to_ascii_lowercase().contains("deleted") => Self::Deleted,
+            404 | 408 | 409 => Self::Over,
+            NO_RESPONDERS => Self::Unanswered,
+            _ => Self::Other,
         }
     }
 }

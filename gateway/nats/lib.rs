@@ -23,7 +23,7 @@ mod words;
 
 pub use connection::{Connection, Message};
 pub use jetstream::{Backlog, FetchLimits, JetStreamFailure, Outgoing, StreamSettings};
-pub use target::NatsTarget;
+pub use target::{ClusterAddressError, NatsTarget};
 
 use gateway_base::cannot_run::CannotRun;
 use std::fmt;

@@ -30,12 +30,26 @@ pub(super) struct Secrets {
     pub(super) token: Option<String>,
 }
 
+/// Why an address names no cluster.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ClusterAddressError {
+    /// A host is none.
+    #[error("{0}")]
+    Host(String),
+    /// More servers than a cluster needs.
+    #[error("{servers} servers; name at most {SERVERS_MAX} of the cluster")]
+    TooMany {
+        /// How many were named.
+        servers: usize,
+    },
+}
+
 impl NatsTarget {
     /// Takes the keys of a cluster from an address `//HOST:PORT,HOST:PORT/REST`, and gives the rest.
     ///
     /// # Errors
     /// A host is none, in words.
-    pub fn parse<'a>(body: &'a str, keys: &mut Keys, secured: bool) -> Result<(Self, &'a str), String> {
+    pub fn parse<'a>(body: &'a str, keys: &mut Keys, secured: bool) -> Result<(Self, &'a str), ClusterAddressError> {
         let tls = tls_files(keys, secured);
         let login = Login::from_keys(keys);
         let token_file = keys.take_text("token_file").map(PathBuf::from);
@@ -44,10 +58,13 @@ impl NatsTarget {
         }
         let body = body.strip_prefix("//").unwrap_or(body);
         let (hosts, rest) = body.split_once('/').unwrap_or((body, ""));
-        let servers: Vec<Endpoint> =
-            hosts.split(',').map(|host| parse_endpoint(host, Some(PORT))).collect::<Result<_, String>>()?;
+        let servers: Vec<Endpoint> = hosts
+            .split(',')
+            .map(|host| parse_endpoint(host, Some(PORT)))
+            .collect::<Result<_, _>>()
+            .map_err(ClusterAddressError::Host)?;
         if servers.len() > SERVERS_MAX {
-            return Err(format!("{} servers; name at most {SERVERS_MAX} of the cluster", servers.len()));
+            return Err(ClusterAddressError::TooMany { servers: servers.len() });
         }
         Ok((Self { servers, tls, login, token_file }, rest.trim_end_matches('/')))
     }

@@ -1,6 +1,7 @@
 //! The server's side of the text protocol: bytes to operations. Pure; refuses what it does not know, never panics.
 
 use serde::Deserialize;
+use thiserror::Error;
 
 /// A control line beyond this is no NATS: the servers' own limit is 4 KiB for clients, an `INFO` of a large cluster is longer.
 const LINE_MAX: usize = 1 << 20;
@@ -71,6 +72,26 @@ pub(super) enum ServerOperation {
     Error(String),
 }
 
+/// What came instead of an operation of NATS.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub(super) enum NotNats {
+    /// A line that is longer than any of NATS.
+    #[error("a line without an end")]
+    EndlessLine,
+    /// A line that is not UTF-8.
+    #[error("a line that is no text")]
+    NoText,
+    /// The server says of itself what cannot be read.
+    #[error("an unreadable INFO: {0}")]
+    Info(String),
+    /// The line of a message has other words than it must have.
+    #[error("an unreadable message line {0:?}")]
+    MessageLine(String),
+    /// A line of something else; its beginning.
+    #[error("{0:?}")]
+    OtherLine(String),
+}
+
 /// Bytes that have come and are not taken yet.
 #[derive(Debug, Default)]
 pub(super) struct ReceivedBytes {
@@ -83,7 +104,7 @@ impl ReceivedBytes {
     ///
     /// # Errors
     /// What came is no NATS, in words.
-    pub(super) fn next_operation(&mut self) -> Result<Option<ServerOperation>, String> {
+    pub(super) fn next_operation(&mut self) -> Result<Option<ServerOperation>, NotNats> {
         let waiting = &self.bytes[self.start..];
         let found = parse(waiting)?;
         let taken = found.map(|(operation, length)| {
@@ -99,12 +120,12 @@ impl ReceivedBytes {
 }
 
 /// The first operation and its length.
-fn parse(bytes: &[u8]) -> Result<Option<(ServerOperation, usize)>, String> {
+fn parse(bytes: &[u8]) -> Result<Option<(ServerOperation, usize)>, NotNats> {
     let Some(end) = bytes.windows(2).take(LINE_MAX).position(|pair| pair == b"\r\n") else {
         let endless = bytes.len() > LINE_MAX;
-        return if endless { Err("a line without an end".to_owned()) } else { Ok(None) };
+        return if endless { Err(NotNats::EndlessLine) } else { Ok(None) };
     };
-    let line = std::str::from_utf8(&bytes[..end]).map_err(|_| "a line that is no text".to_owned())?;
+    let line = std::str::from_utf8(&bytes[..end]).map_err(|_| NotNats::NoText)?;
     let (verb, rest) = line.split_once([' ', '\t']).unwrap_or((line, ""));
     let after = end + 2;
     let operation = match verb.to_ascii_uppercase().as_str() {
@@ -114,17 +135,15 @@ fn parse(bytes: &[u8]) -> Result<Option<(ServerOperation, usize)>, String> {
         "PONG" => ServerOperation::Pong,
         "+OK" => ServerOperation::Fine,
         "-ERR" => ServerOperation::Error(rest.trim().trim_matches('\'').to_owned()),
-        "INFO" => {
-            ServerOperation::Info(serde_json::from_str(rest).map_err(|error| format!("an unreadable INFO: {error}"))?)
-        }
-        _ => return Err(format!("{:?}", line.chars().take(40).collect::<String>())),
+        "INFO" => ServerOperation::Info(serde_json::from_str(rest).map_err(|error| NotNats::Info(error.to_string()))?),
+        _ => return Err(NotNats::OtherLine(line.chars().take(40).collect())),
     };
     Ok(Some((operation, after)))
 }
 
 /// `subject sid [reply] [header bytes] bytes`, then the content.
-fn parse_message(content: &[u8], line: &str, headed: bool) -> Result<Option<(ServerOperation, usize)>, String> {
-    let unreadable = || format!("an unreadable message line {line:?}");
+fn parse_message(content: &[u8], line: &str, headed: bool) -> Result<Option<(ServerOperation, usize)>, NotNats> {
+    let unreadable = || NotNats::MessageLine(line.to_owned());
     let words: Vec<&str> = line.split_ascii_whitespace().collect();
     let lengths = if headed { 2 } else { 1 };
     let (subject, subscription, reply) = match words.len().checked_sub(lengths) {

@@ -48,24 +48,55 @@ pub(super) fn tls_differs(at: &Endpoint, wanted: bool) -> NatsError {
     }
 }
 
+/// What a server complains about with `-ERR`. The protocol gives words and no number, and the words are part of it: the list of
+/// *NATS protocol, +OK/-ERR*. This is the only place that reads them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ServerComplaint {
+    SignIn,
+    Permissions,
+    Connections,
+    Payload,
+    Slowness,
+    Other,
+}
+
+impl ServerComplaint {
+    /// Words of the protocol, and what each is about. Some end with the subject or the user that is meant.
+    const WORDS: [(&str, Self); 7] = [
+        ("authorization", Self::SignIn),
+        ("authentication", Self::SignIn),
+        ("permissions violation", Self::Permissions),
+        ("maximum connections", Self::Connections),
+        ("payload", Self::Payload),
+        ("slow consumer", Self::Slowness),
+        ("stale connection", Self::Slowness),
+    ];
+
+    fn from_protocol(said: &str) -> Self {
+        let low = said.to_ascii_lowercase();
+        Self::WORDS.iter().find(|(words, _)| low.contains(words)).map_or(Self::Other, |(_, about)| *about)
+    }
+
+    fn next_step(self) -> &'static str {
+        match self {
+            Self::SignIn => {
+                "compare user=, password_file=, token_file= or the client certificate with the server's users"
+            }
+            Self::Permissions => {
+                "allow this user to publish and subscribe to the subjects that the handbook lists under NATS (chapter outputs)"
+            }
+            Self::Connections => "raise max_connections of the server, or look who holds so many",
+            Self::Payload => "raise max_payload of the server",
+            Self::Slowness => "look whether the network or this computer is overloaded",
+            Self::Other => "look at the log of the NATS server",
+        }
+    }
+}
+
 /// `-ERR`: what the server says.
 pub(super) fn of_server(at: &Endpoint, said: &str) -> NatsError {
-    let place = format!("{}:{}", at.host, at.port);
-    let low = said.to_ascii_lowercase();
-    let next = if low.contains("authorization") || low.contains("authentication") {
-        "compare user=, password_file=, token_file= or the client certificate with the server's users"
-    } else if low.contains("permissions violation") {
-        "allow this user to publish and subscribe to the subjects that the handbook lists under NATS (chapter outputs)"
-    } else if low.contains("maximum connections") {
-        "raise max_connections of the server, or look who holds so many"
-    } else if low.contains("payload") {
-        "raise max_payload of the server"
-    } else if low.contains("slow consumer") || low.contains("stale connection") {
-        "look whether the network or this computer is overloaded"
-    } else {
-        "look at the log of the NATS server"
-    };
-    NatsError::new(format!("{place} says {said:?}"), next)
+    let next = ServerComplaint::from_protocol(said).next_step();
+    NatsError::new(format!("{}:{} says {said:?}", at.host, at.port), next)
 }
 
 /// Nobody answers a request.
@@ -106,4 +137,25 @@ pub(super) fn of_jetstream(code: u64, said: &str) -> NatsError {
         _ => "look up the number in the documentation of JetStream",
     };
     NatsError::new(format!("JetStream says {said:?} (error {code})"), next)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_words_of_the_protocol_are_known() {
+        for (said, about) in [
+            ("Authorization Violation", ServerComplaint::SignIn),
+            ("User Authentication Expired", ServerComplaint::SignIn),
+            ("Permissions Violation for Publish to \"payload.1\"", ServerComplaint::Permissions),
+            ("Maximum Connections Exceeded", ServerComplaint::Connections),
+            ("Maximum Payload Violation", ServerComplaint::Payload),
+            ("Slow Consumer", ServerComplaint::Slowness),
+            ("Stale Connection", ServerComplaint::Slowness),
+            ("Unknown Protocol Operation", ServerComplaint::Other),
+        ] {
+            assert_eq!(ServerComplaint::from_protocol(said), about, "{said}");
+        }
+    }
 }

@@ -130,7 +130,8 @@ impl CycleFollower {
             // Numbers and texts only: there is nothing in it that JSON could not hold.
             detail: serde_json::to_string(&self.gathering.finish_part()).unwrap_or_default(),
         };
-        self.finished += u64::try_from(count).unwrap_or(0);
+        debug_assert!(count >= 0, "a part is closed when the counter has risen, or when another part begins");
+        self.finished = self.finished.saturating_add(count.unsigned_abs());
         self.last = Some(PartFigures {
             energy_j: if self.energy_known { Ok(self.energy_j) } else { Err(NoEstimate::PowerUnknown) },
             cutting_energy_j: Ok(self.cutting_energy_j),

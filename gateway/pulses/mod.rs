@@ -8,11 +8,88 @@ mod vectors;
 
 pub use vectors::{Vector, build_vectors};
 
-use rules::estimators::thermal::{Decoder, EDGES_PER_PULSE, Lines, PulseInserter};
+use rules::estimators::thermal::{Decoder, EDGES_PER_PULSE, IllegalTransition, InsertionFault, Lines, PulseInserter};
 use std::io::{BufRead, Write};
+use thiserror::Error;
 
 /// After the last row the device goes on so long, in spacings, to let out what waits.
 const TAIL_SPACINGS: u64 = 4096;
+
+/// Why a stream of encoder lines cannot be passed on.
+#[derive(Debug, Error)]
+pub enum PulseError {
+    /// The head lacks a column.
+    #[error("line 1: there is no column {name}; the head is time_ns,a,b[,request][,bypass]")]
+    NoColumn {
+        /// Its name.
+        name: &'static str,
+    },
+    /// A level that is none.
+    #[error("line {line}: {name} is {found:?}; a level is 0 or 1")]
+    Level {
+        /// Where.
+        line: usize,
+        /// Which of the two encoder lines.
+        name: &'static str,
+        /// What stands there.
+        found: String,
+    },
+    /// A time that is none.
+    #[error("line {line}: {found:?} is no time in whole ns")]
+    Time {
+        /// Where.
+        line: usize,
+        /// What stands there.
+        found: String,
+    },
+    /// A request that is none.
+    #[error("line {line}: {found:?} is no whole number of pulses")]
+    Request {
+        /// Where.
+        line: usize,
+        /// What stands there.
+        found: String,
+    },
+    /// A switch that is none.
+    #[error("line {line}: bypass is {found:?}; write 0 or 1")]
+    Bypass {
+        /// Where.
+        line: usize,
+        /// What stands there.
+        found: String,
+    },
+    /// The device or the decoder does not take a row.
+    #[error("line {line}: {fault}")]
+    Row {
+        /// Where.
+        line: usize,
+        /// Why.
+        fault: RowFault,
+    },
+    /// The device does not let out what waits.
+    #[error("{0}")]
+    Tail(RowFault),
+    /// There is a head at most.
+    #[error("there is no row of encoder lines")]
+    NoRows,
+    /// The input cannot be read, or the output cannot be written.
+    #[error("{0}")]
+    Stream(#[from] std::io::Error),
+    /// The output is no text.
+    #[error("{0}")]
+    NoText(#[from] std::string::FromUtf8Error),
+}
+
+/// Why a row is not taken.
+#[derive(Debug, Error)]
+pub enum RowFault {
+    /// Both lines changed at once.
+    #[error("{0}")]
+    Encoder(#[from] IllegalTransition),
+    /// The device has a fault.
+    #[error("{0}")]
+    Device(#[from] InsertionFault),
+}
 
 /// One row that goes in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,36 +179,33 @@ struct Heads {
 }
 
 impl Heads {
-    fn parse_head(line: &str) -> Result<Self, String> {
+    fn parse_head(line: &str) -> Result<Self, PulseError> {
         let names: Vec<&str> = line.trim().split(',').map(str::trim).collect();
         let at = |name: &str| names.iter().position(|it| *it == name);
-        let need = |name: &str| {
-            at(name)
-                .ok_or_else(|| format!("line 1: there is no column {name}; the head is time_ns,a,b[,request][,bypass]"))
-        };
+        let need = |name: &'static str| at(name).ok_or(PulseError::NoColumn { name });
         Ok(Self { time: need("time_ns")?, a: need("a")?, b: need("b")?, request: at("request"), bypass: at("bypass") })
     }
 
-    fn parse_row(&self, line: &str, number: usize) -> Result<PulseRow, String> {
+    fn parse_row(&self, line: &str, number: usize) -> Result<PulseRow, PulseError> {
         let cells: Vec<&str> = line.trim().split(',').map(str::trim).collect();
         let cell = |at: usize| cells.get(at).copied().unwrap_or("");
-        let level = |at: usize, name: &str| match cell(at) {
+        let level = |at: usize, name: &'static str| match cell(at) {
             "0" => Ok(false),
             "1" => Ok(true),
-            other => Err(format!("line {number}: {name} is {other:?}; a level is 0 or 1")),
+            other => Err(PulseError::Level { line: number, name, found: other.to_owned() }),
         };
         let at_ns = cell(self.time)
             .parse()
-            .map_err(|_| format!("line {number}: {:?} is no time in whole ns", cell(self.time)))?;
+            .map_err(|_| PulseError::Time { line: number, found: cell(self.time).to_owned() })?;
         let request = match self.request.map_or("", cell) {
             "" => 0,
-            text => text.parse().map_err(|_| format!("line {number}: {text:?} is no whole number of pulses"))?,
+            text => text.parse().map_err(|_| PulseError::Request { line: number, found: text.to_owned() })?,
         };
         let bypass = match self.bypass.map_or("", cell) {
             "" => None,
             "0" => Some(false),
             "1" => Some(true),
-            other => return Err(format!("line {number}: bypass is {other:?}; write 0 or 1")),
+            other => return Err(PulseError::Bypass { line: number, found: other.to_owned() }),
         };
         Ok(PulseRow { at_ns, lines: Lines { a: level(self.a, "a")?, b: level(self.b, "b")? }, request, bypass })
     }
@@ -161,18 +235,18 @@ impl DecodedDevice {
         }
     }
 
-    fn feed_row(&mut self, row: &PulseRow, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
+    fn feed_row(&mut self, row: &PulseRow, out: &mut Vec<(u64, Lines)>) -> Result<(), RowFault> {
         if let Some(bypass) = row.bypass {
             self.device.set_bypass(bypass);
         }
         self.device.request_pulses(row.request);
         self.proof.asked += row.request;
         self.proof.rows += 1;
-        self.encoder.decode_lines(row.lines, row.at_ns).map_err(|error| error.to_string())?;
+        self.encoder.decode_lines(row.lines, row.at_ns)?;
         self.advance_device(row.at_ns, row.lines, out)
     }
 
-    fn advance_device(&mut self, at_ns: u64, lines: Lines, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
+    fn advance_device(&mut self, at_ns: u64, lines: Lines, out: &mut Vec<(u64, Lines)>) -> Result<(), RowFault> {
         let Self { device, decoder, last_ns, proof, .. } = self;
         let passed = device.advance_to(at_ns, lines, |edge| {
             proof.illegal += u64::from(decoder.decode_lines(edge.lines, edge.at_ns).is_err());
@@ -185,7 +259,7 @@ impl DecodedDevice {
             proof.edges_out += 1;
             out.push((edge.at_ns, edge.lines));
         });
-        passed.map_err(|fault| fault.to_string())
+        passed.map_err(RowFault::Device)
     }
 
     fn finish_proof(&mut self) -> Proof {
@@ -205,15 +279,14 @@ pub fn stream_edges(
     mut output: impl Write,
     spacing_ns: u64,
     first_request: i64,
-) -> Result<Proof, String> {
+) -> Result<Proof, PulseError> {
     let mut heads = None;
     let mut bench: Option<DecodedDevice> = None;
     let mut last: Option<PulseRow> = None;
     let mut out = Vec::new();
-    let io = |error: std::io::Error| error.to_string();
-    writeln!(output, "time_ns,a,b").map_err(io)?;
+    writeln!(output, "time_ns,a,b")?;
     for (index, line) in input.lines().enumerate() {
-        let line = line.map_err(io)?;
+        let line = line?;
         if line.trim().is_empty() {
             continue;
         }
@@ -226,16 +299,16 @@ pub fn stream_edges(
             row.request += first_request;
             DecodedDevice::new(&row, spacing_ns)
         });
-        bench.feed_row(&row, &mut out).map_err(|what| format!("line {}: {what}", index + 1))?;
+        bench.feed_row(&row, &mut out).map_err(|fault| PulseError::Row { line: index + 1, fault })?;
         last = Some(row);
-        flush(&mut out, &mut output).map_err(io)?;
+        flush(&mut out, &mut output)?;
     }
     let (Some(mut bench), Some(last)) = (bench, last) else {
-        return Err("there is no row of encoder lines".to_owned());
+        return Err(PulseError::NoRows);
     };
     let end_ns = last.at_ns.saturating_add(spacing_ns.saturating_mul(TAIL_SPACINGS));
-    bench.advance_device(end_ns, last.lines, &mut out)?;
-    flush(&mut out, &mut output).map_err(io)?;
+    bench.advance_device(end_ns, last.lines, &mut out).map_err(PulseError::Tail)?;
+    flush(&mut out, &mut output)?;
     Ok(bench.finish_proof())
 }
 
@@ -262,7 +335,7 @@ mod tests {
             assert_eq!(vector.proof.inserted, vector.proof.asked, "{}", vector.name);
             assert!(vector.proof.edges_out > 0, "{}", vector.name);
         }
-        let refused = |text: &str| stream_edges(text.as_bytes(), Vec::new(), 250, 0).expect_err("refused");
+        let refused = |text: &str| stream_edges(text.as_bytes(), Vec::new(), 250, 0).expect_err("refused").to_string();
         assert!(refused("time_ns,a\n1,0\n").contains("no column b"));
         assert!(refused("time_ns,a,b\n1,0,2\n").contains("line 2: b is"));
         assert!(refused("time_ns,a,b\n1,0,0\n2,1,1\n").contains("both encoder lines"));

@@ -1,6 +1,6 @@
 //! Reference vectors: what goes into a pulse inserter, and what must come out.
 
-use super::{Proof, stream_edges};
+use super::{Proof, PulseError, stream_edges};
 use rules::estimators::thermal::Lines;
 use std::fmt::Write as _;
 
@@ -25,7 +25,7 @@ pub struct Vector {
 ///
 /// # Errors
 /// A vector that the device refuses: never, a test holds it.
-pub fn build_vectors() -> Result<Vec<Vector>, String> {
+pub fn build_vectors() -> Result<Vec<Vector>, PulseError> {
     VECTORS.iter().map(VectorSource::build_vector).collect()
 }
 
@@ -114,11 +114,11 @@ const VECTORS: &[VectorSource] = &[
 ];
 
 impl VectorSource {
-    fn build_vector(&self) -> Result<Vector, String> {
+    fn build_vector(&self) -> Result<Vector, PulseError> {
         let input = self.format_input();
         let mut expected = Vec::new();
         let proof = stream_edges(input.as_bytes(), &mut expected, self.spacing_ns, 0)?;
-        let expected = String::from_utf8(expected).map_err(|error| error.to_string())?;
+        let expected = String::from_utf8(expected)?;
         let (name, shows, spacing_ns) = (self.name, self.shows, self.spacing_ns);
         Ok(Vector { name, shows, spacing_ns, input, expected, proof })
     }

@@ -132,7 +132,7 @@ impl Commands {
                 self.acknowledge_alarm(code, &network_requests::format_author(sink), at_ns)
             }
             Ok(change) => self.network.accept_change(sink, change, at_ns),
-            Err(why) => Reply::from_refusal(why),
+            Err(why) => Reply::from_refusal(why.to_string()),
         }
     }
 

@@ -1,5 +1,6 @@
 //! What the gateway knows and `rules` must not: how long a run of a script has lasted.
 
+use crate::convert::duration_to_unsigned_ns;
 use rules::script::Deadline;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -20,12 +21,12 @@ impl RunLimit {
     /// With this limit.
     #[must_use]
     pub fn new(limit: Duration) -> Self {
-        let limit_ns = u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX);
+        let limit_ns = duration_to_unsigned_ns(limit);
         Self { origin: Instant::now(), began_ns: AtomicU64::new(0), limit_ns }
     }
 
     fn since_ns(&self) -> u64 {
-        u64::try_from(self.origin.elapsed().as_nanos()).unwrap_or(u64::MAX)
+        duration_to_unsigned_ns(self.origin.elapsed())
     }
 }
 

@@ -162,7 +162,7 @@ fn schedule_backups(plan: &RunPlan, health: &mut Health) -> Result<Option<Backup
     let paths = BackupPaths::from_config(&plan.config, plan.config_file.as_deref());
     let (tell, heard) = std::sync::mpsc::channel();
     health.follow_notices(heard);
-    let now_s = || u64::try_from(clock::now_ns() / SECOND_NS).unwrap_or(0);
+    let now_s = || crate::convert::clamp_to_unsigned(clock::now_ns() / SECOND_NS);
     // Without a tick nobody listens, and the box is about to end.
     let tell = move |notice: &Notice| drop(tell.send(notice.clone()));
     BackupSchedule::start(paths, config.clone(), now_s, tell)

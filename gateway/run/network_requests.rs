@@ -58,7 +58,7 @@ pub fn format_author(sink: &str) -> String {
 /// The row of the audit.
 #[must_use]
 pub fn build_audit_row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -> Audit {
-    let what = request.change.as_ref().map_or_else(Clone::clone, |change| format!("{change}: {}", reply.text));
+    let what = request.change.as_ref().map_or_else(ToString::to_string, |change| format!("{change}: {}", reply.text));
     let also = match request.left_out {
         0 => String::new(),
         count => format!("; {count} messages before it came too fast and were thrown away"),
@@ -76,6 +76,7 @@ pub fn build_audit_row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::RequestRefusal;
 
     fn change(pct: f64) -> RequestedChange {
         RequestedChange::feed_override(pct, "").expect("allowed")
@@ -100,12 +101,16 @@ mod tests {
 
     #[test]
     fn a_row_says_who_what_and_why() {
-        let request = NetworkRequest { sink: "plant".to_owned(), change: Err("no request".to_owned()), left_out: 7 };
+        let request = NetworkRequest {
+            sink: "plant".to_owned(),
+            change: Err(RequestRefusal::Unknown { forms: "write one" }),
+            left_out: 7,
+        };
         let row = build_audit_row(&request, &Reply::from_refusal("no request"), 5);
         assert_eq!(
             (row.kind.as_str(), row.outcome.as_str(), row.script.as_str()),
             ("network_request", "refused", "sink plant")
         );
-        assert!(row.reason.contains("no request; 7 messages"), "{}", row.reason);
+        assert!(row.reason.contains("no request; write one; 7 messages"), "{}", row.reason);
     }
 }

@@ -1,6 +1,7 @@
 //! When the next tick is: on the box's clock, or at a multiple of real time for a machine that is simulated.
 
 use crate::control::Wake;
+use crate::convert::duration_to_ns;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::histogram::Histogram;
 use std::sync::Arc;
@@ -51,9 +52,9 @@ impl TickSchedule {
     /// From now on wakes a little before each tick: for a machine that is written to, by a thread of real-time priority. One of
     /// ordinary priority would be passed over for it when it is needed.
     pub fn wake_early(&mut self) {
-        let lead_ns = i64::try_from(LEAD.as_nanos()).unwrap_or(0);
+        let lead_ns = duration_to_ns(LEAD);
         if let Beat::Clock(_, early_ns) = &mut self.beat
-            && self.period_ns >= i64::try_from(LEAD_PERIOD_MIN.as_nanos()).unwrap_or(0)
+            && self.period_ns >= duration_to_ns(LEAD_PERIOD_MIN)
         {
             *early_ns = lead_ns;
         }
@@ -66,7 +67,7 @@ impl TickSchedule {
     }
 
     fn new(beat: Beat, due_ns: TimeNs, period: Duration) -> Self {
-        let period_ns = i64::try_from(period.as_nanos()).unwrap_or(SECOND_NS).max(1);
+        let period_ns = duration_to_ns(period).max(1);
         Self {
             beat,
             period_ns,
@@ -115,7 +116,7 @@ impl TickSchedule {
                 if late > BEHIND_MAX {
                     *anchor = (Instant::now(), self.due_ns);
                 }
-                self.record_lateness(i64::try_from(late.as_nanos()).unwrap_or(i64::MAX));
+                self.record_lateness(duration_to_ns(late));
             }
         }
         (!stop.load(Ordering::SeqCst)).then_some(self.due_ns)

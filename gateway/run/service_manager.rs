@@ -5,6 +5,7 @@
 //! that is off do not stop them: those are told, and starting again would not mend them. A thread that hangs does; then the
 //! service manager ends the process after its own limit (`WatchdogSec`) and starts it again.
 
+use crate::convert::duration_to_ms;
 use crate::log::{Notice, Severity};
 use crate::update::{WELL_FOR, confirm_running_version};
 use sd_notify::NotifyState;
@@ -63,7 +64,7 @@ impl ProgressMarks {
 
     /// This part has moved.
     pub fn mark_part(&self, part: WatchedPart) {
-        let now_ms = u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX);
+        let now_ms = duration_to_ms(self.began.elapsed());
         self.moved_ms[part as usize].store(now_ms, Ordering::Relaxed);
     }
 
@@ -163,8 +164,8 @@ impl WatchedService {
 
 /// How often a box that opens its files says that it lives; a third of `WatchdogSec`.
 const OPENING_EVERY: Duration = Duration::from_secs(10);
-/// What it asks for each time, longer than [`OPENING_EVERY`].
-const OPENING_EXTENDS: Duration = Duration::from_secs(30);
+/// What it asks for each time, us; longer than [`OPENING_EVERY`].
+const OPENING_EXTENDS_US: u32 = 30_000_000;
 /// No opening takes longer: a history of ten gigabytes is brought to another version in some minutes. A box that hangs here is ended
 /// and started again after this time.
 const OPENING_MAX: Duration = Duration::from_secs(1_200);
@@ -186,10 +187,9 @@ impl OpeningReport {
             while Instant::now() < until
                 && ended.recv_timeout(OPENING_EVERY) == Err(std::sync::mpsc::RecvTimeoutError::Timeout)
             {
-                let micros = u32::try_from(OPENING_EXTENDS.as_micros()).unwrap_or(u32::MAX);
                 notify_manager(&[
                     NotifyState::Watchdog,
-                    NotifyState::ExtendTimeoutUsec(micros),
+                    NotifyState::ExtendTimeoutUsec(OPENING_EXTENDS_US),
                     NotifyState::Status("opening the history"),
                 ]);
             }

@@ -9,8 +9,10 @@ use super::shdr::ShdrTarget;
 use super::sparkplug::SparkplugTarget;
 use adapters::address::{self, AddressError, Keys};
 use adapters::channel::find_nearest_name;
+use gateway_nats::ClusterAddressError;
 use std::fmt;
 use std::str::FromStr;
+use thiserror::Error;
 
 /// The schemes of the notation, each with how an address of it is written.
 pub const SCHEMES: [(&str, &str); 9] = [
@@ -114,7 +116,11 @@ impl FromStr for SinkAddress {
 
     fn from_str(text: &str) -> Result<Self, AddressError> {
         let text = text.trim();
-        let target = address::parse(text, |_| no_scheme(), parse)?;
+        let target = address::parse(
+            text,
+            |_| no_scheme(),
+            |scheme, body, keys| parse(scheme, body, keys).map_err(|error| error.to_string()),
+        )?;
         Ok(Self { text: text.to_owned(), target })
     }
 }
@@ -124,7 +130,44 @@ fn no_scheme() -> String {
     format!("no scheme; write one of {}", forms.join(", "))
 }
 
-fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String> {
+/// What is wrong with the part of an address that its scheme gives a meaning.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub(super) enum TargetError {
+    /// No sink has this scheme.
+    #[error("{}", describe_unknown_scheme(scheme))]
+    UnknownScheme { scheme: String },
+    /// This program was built without this sink.
+    #[cfg(not(feature = "opcua"))]
+    #[error("this program was built without OPC UA; `cargo build --release --features opcua` makes one that has it")]
+    NotBuiltIn,
+    /// A host is none.
+    #[error("{0}")]
+    Host(String),
+    /// The servers of a cluster are none.
+    #[error(transparent)]
+    Cluster(#[from] ClusterAddressError),
+    /// There is no directory to write to.
+    #[error("write the directory, such as parquet:/var/lib/cnc-gateway/lake")]
+    NoDirectory,
+    /// No topic of MQTT can begin so.
+    #[error("{prefix:?} is no beginning of a topic; leave out + and #, and $ at its beginning")]
+    Topic { prefix: String },
+    /// No subject of NATS can begin so.
+    #[error("{prefix:?} is no beginning of a subject; write words with points between, such as cnc.hall-2")]
+    Subject { prefix: String },
+    /// Sparkplug needs a group and a node.
+    #[error("no group and node; write sparkplug://BROKER:1883/GROUP/NODE/DEVICE")]
+    NoNode,
+    /// A name of Sparkplug that is none.
+    #[error("{part:?} is no name of a group, node or device: leave out + and #")]
+    NodeName { part: String },
+    /// A server that lets nobody in.
+    #[cfg(feature = "opcua")]
+    #[error("nobody could sign in: write user= and password_file=, or anonymous=yes")]
+    NoSignIn,
+}
+
+fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, TargetError> {
     match scheme {
         "mqtt" | "mqtts" => MqttTarget::parse(body, keys, scheme == "mqtts").map(SinkTarget::Mqtt),
         "nats" | "natss" => NatsSinkTarget::parse(body, keys, scheme == "natss").map(SinkTarget::Nats),
@@ -137,18 +180,18 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String
         "sparkplug" | "sparkplugs" => {
             SparkplugTarget::parse(body, keys, scheme == "sparkplugs").map(SinkTarget::Sparkplug)
         }
-        _ => Err(describe_unknown_scheme(scheme)),
+        _ => Err(TargetError::UnknownScheme { scheme: scheme.to_owned() }),
     }
 }
 
 /// Which build has it. The keys are right there, and are not told as unknown here.
 #[cfg(not(feature = "opcua"))]
-fn without_opcua(keys: &mut Keys) -> String {
+fn without_opcua(keys: &mut Keys) -> TargetError {
     let _login = adapters::address::Login::from_keys(keys);
     for key in ["anonymous", "certificates", "manufacturer", "model", "serial_number"] {
         let _known_elsewhere = keys.take_text(key);
     }
-    "this program was built without OPC UA; `cargo build --release --features opcua` makes one that has it".to_owned()
+    TargetError::NotBuiltIn
 }
 
 fn describe_unknown_scheme(scheme: &str) -> String {

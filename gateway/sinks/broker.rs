@@ -1,6 +1,7 @@
 //! What every sink that sends through an MQTT broker has in common: address keys, connection, words.
 
 use super::SinkError;
+use super::address::TargetError;
 use adapters::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
 use adapters::mqtt::{MqttClient, MqttError, MqttMessage, Options, Outgoing, Qos, Version, Will};
 use adapters::tls::TlsFiles;
@@ -34,7 +35,7 @@ impl BrokerTarget {
     ///
     /// # Errors
     /// The host is none, in words.
-    pub(super) fn parse<'a>(body: &'a str, keys: &mut Keys, secured: bool) -> Result<(Self, &'a str), String> {
+    pub(super) fn parse<'a>(body: &'a str, keys: &mut Keys, secured: bool) -> Result<(Self, &'a str), TargetError> {
         let tls = tls_files(keys, secured);
         let login = Login::from_keys(keys);
         let version = keys.take_choice("protocol", &[("3.1.1", Version::V3), ("5", Version::V5)]);
@@ -42,7 +43,7 @@ impl BrokerTarget {
         let keep_alive = Duration::from_secs(keys.take_number("keep_alive_s", 20, 2, 3600));
         let body = body.strip_prefix("//").unwrap_or(body);
         let (host, rest) = body.split_once('/').unwrap_or((body, ""));
-        let at = parse_endpoint(host, Some(if secured { 8883 } else { 1883 }))?;
+        let at = parse_endpoint(host, Some(if secured { 8883 } else { 1883 })).map_err(TargetError::Host)?;
         Ok((Self { at, tls, login, version, client_id, keep_alive }, rest.trim_end_matches('/')))
     }
 

@@ -219,6 +219,10 @@ impl SinkTask {
             return Ok(());
         };
         let items = &stretch.items;
+        debug_assert!(
+            items.is_sorted_by(|one, next| one.sequence < next.sequence),
+            "the numbers of a batch grow: what a receiver confirms is everything up to a number"
+        );
         let from = self.skip_missing(turn, from, items);
         let sent = timeout(DEADLINE, sink.send_batch(Batch { items, historical })).await;
         match (turn, sent.unwrap_or_else(|_| Err(too_slow("sending")))) {

@@ -4,6 +4,7 @@
 //! `Nats-Msg-Id` is `<box>-<sequence>`: what a box sends twice within the stream's window is stored once. A message counts as
 //! delivered when the stream has acknowledged it, with replicas when most of them have it.
 
+use super::address::TargetError;
 use super::mqtt::build_document;
 use super::{Batch, Pending, Sink, SinkError};
 use adapters::address::Keys;
@@ -20,14 +21,12 @@ pub struct NatsSinkTarget {
 }
 
 impl NatsSinkTarget {
-    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, String> {
+    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, TargetError> {
         let (servers, prefix) = NatsTarget::parse(body, keys, secured)?;
         let prefix = if prefix.is_empty() { "cnc" } else { prefix };
         let bad = |part: &str| part.is_empty() || part.starts_with('$') || part.contains(['*', '>', ' ', '/']);
         if prefix.split('.').any(bad) {
-            return Err(format!(
-                "{prefix:?} is no beginning of a subject; write words with points between, such as cnc.hall-2"
-            ));
+            return Err(TargetError::Subject { prefix: prefix.to_owned() });
         }
         Ok(Self { servers, prefix: prefix.to_owned() })
     }

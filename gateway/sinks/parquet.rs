@@ -4,6 +4,7 @@
 //! have no file yet are written from the history (see [`Reader::export_day`]). So a box that was off, or a directory that was
 //! away, is made up for as long as the history holds the days.
 
+use super::address::TargetError;
 use super::{Batch, Pending, Sink, SinkError};
 use adapters::address::Keys;
 use adapters::clock::TimeNs;
@@ -20,11 +21,11 @@ pub struct ParquetTarget {
 }
 
 impl ParquetTarget {
-    pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, String> {
+    pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, TargetError> {
         let days = keys.take_number("days", 31, 1, 3660);
         let path = body.strip_prefix("//").unwrap_or(body);
         if path.is_empty() {
-            return Err("write the directory, such as parquet:/var/lib/cnc-gateway/lake".to_owned());
+            return Err(TargetError::NoDirectory);
         }
         Ok(Self { root: PathBuf::from(path), days })
     }

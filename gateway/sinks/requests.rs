@@ -5,7 +5,7 @@
 
 use gateway_base::clock;
 use gateway_base::row_rate::RowRate;
-use gateway_control::{NetworkRequest, OrderSender, Reply, RequestedChange};
+use gateway_control::{NetworkRequest, OrderSender, Reply, RequestRefusal, RequestedChange};
 
 /// Requests per second on average, and at once. A plant's system asks a few times an hour and repeats once in half a minute;
 /// whoever sends more fills the audit and holds up data: each waits for the tick, at most a tenth of a second. What is beyond is
@@ -42,17 +42,15 @@ impl Requests {
     }
 
     /// Asks, and gives what became of it; `None` for what came too fast, which is not answered.
-    pub async fn submit_change(&mut self, change: Result<RequestedChange, String>) -> Option<Reply> {
+    pub async fn submit_change(&mut self, change: Result<RequestedChange, RequestRefusal>) -> Option<Reply> {
         let left_out = self.rate.may_pass(clock::now_ns())?;
         let Some(post) = &self.post else { return Some(Reply::from_refusal("there is no gate here")) };
-        let change = if self.allowed { change } else { Err(describe_refusal(&self.sink, change)) };
+        let change = if self.allowed { change } else { Err(refuse_change(&self.sink, change)) };
         Some(post.send_request(NetworkRequest { sink: self.sink.clone(), change, left_out }).await)
     }
 }
 
-fn describe_refusal(sink: &str, change: Result<RequestedChange, String>) -> String {
+fn refuse_change(sink: &str, change: Result<RequestedChange, RequestRefusal>) -> RequestRefusal {
     let what = change.map_or_else(|_| "a message that is no request".to_owned(), |change| change.to_string());
-    format!(
-        "{what}: the sink {sink} takes no requests; write allow_requests = true under its [[sink]] to let them reach the gate"
-    )
+    RequestRefusal::ClosedSink { sink: sink.to_owned(), what }
 }

@@ -31,6 +31,17 @@ pub(super) struct WaveformChain {
     least_a: f64,
 }
 
+/// Why a stream is no spindle current.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum UnsuitableStream {
+    /// Its rate allows no filter or no window.
+    #[error("{0}")]
+    Rate(#[from] rules::estimators::regression::Refusal),
+    /// It has other channels, or another unit.
+    #[error("{channels} channels in {unit:?}: spindle current is 1 or 3 in \"A\"")]
+    Channels { channels: usize, unit: String },
+}
+
 /// Features of one poll.
 #[derive(Debug, Default)]
 pub(super) struct Sums {
@@ -49,20 +60,19 @@ pub(super) struct Sums {
 }
 
 impl WaveformChain {
-    pub(super) fn new(header: &WaveformHeader) -> Result<Self, String> {
+    pub(super) fn new(header: &WaveformHeader) -> Result<Self, UnsuitableStream> {
         let rate_hz = header.rate_hz;
         let least_a = LEAST_SHARE * f64::from(header.full_scale) * header.scale[0].abs();
-        let text = |refusal: rules::estimators::regression::Refusal| refusal.to_string();
-        let design = LowPassDesign::low_pass(CUTOFF_HZ.min(CUTOFF_SHARE * rate_hz), rate_hz).map_err(text)?;
+        let design = LowPassDesign::low_pass(CUTOFF_HZ.min(CUTOFF_SHARE * rate_hz), rate_hz)?;
         // An amplitude passes no zero: its window has a length of its own.
         let amplitude = header.unit == AMPLITUDE;
         let span = if amplitude { WindowSpan::Known { hz: AMPLITUDE_HZ } } else { WindowSpan::Crossings { least_a } };
-        let phase = PhaseFeature::new(FeatureKind::Rms, span, HALVES, rate_hz).map_err(text)?;
+        let phase = PhaseFeature::new(FeatureKind::Rms, span, HALVES, rate_hz)?;
         let phases = match (header.channels.len(), header.unit.as_str()) {
             (1, "A" | AMPLITUDE) => Phases::One(Box::new((design.build_filter(), phase))),
             (3, "A") => Phases::Three(Box::new(ThreePhase::new(&design, phase))),
             (channels, unit) => {
-                return Err(format!("{channels} channels in {unit:?}: spindle current is 1 or 3 in \"A\""));
+                return Err(UnsuitableStream::Channels { channels, unit: unit.to_owned() });
             }
         };
         Ok(Self { header: header.clone(), phases, delay_s: design.delay_s(), least_a })

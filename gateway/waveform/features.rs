@@ -1,6 +1,6 @@
 //! What every stream of spindle current gives, whoever sends it: filter, feature, raw samples around what is remarkable.
 
-use super::chain::{Sums, WaveformChain};
+use super::chain::{Sums, UnsuitableStream, WaveformChain};
 use super::excerpt_writer::ExcerptWriter;
 use adapters::address::WaveformKeep;
 use adapters::driver::Fact;
@@ -43,10 +43,10 @@ impl Features {
         block: &Block,
     ) -> Result<(), SourceError> {
         if block.gap > 0 || self.chain.as_ref().is_none_or(|chain| !chain.matches_header(header)) {
-            let unsuitable = |what| SourceError::Decode {
+            let unsuitable = |error: UnsuitableStream| SourceError::Decode {
                 source_name: source_name.to_owned(),
                 request: "the header of the stream".to_owned(),
-                what,
+                what: error.to_string(),
             };
             self.chain = Some(WaveformChain::new(header).map_err(unsuitable)?);
         }

@@ -72,7 +72,7 @@ impl SpindleCurrent {
             let block = self.receiver.read(clock)?;
             let Some(header) = self.receiver.intake().header().cloned() else { break };
             let instants = block.raw.len() / header.channels.len();
-            let length_ns = header.duration_ns(f64::from(u32::try_from(instants).unwrap_or(u32::MAX)));
+            let length_ns = header.duration_ns(instants as f64);
             let end_ns = block.first_ns + length_ns;
             self.features.feed_block(&self.name, &header, &block)?;
             if end_ns + length_ns >= began_ns {

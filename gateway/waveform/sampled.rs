@@ -5,6 +5,7 @@
 //! before what is polled of the same current.
 
 use super::features::Features;
+use crate::convert::{duration_to_ms, duration_to_ns};
 use adapters::address::{Address, HncNetTarget, NcLinkTarget, Target, WaveformKeep};
 use adapters::clock::{Clock, TimeNs};
 use adapters::driver::Fact;
@@ -104,7 +105,7 @@ impl ControllerSamples {
         SourceError::Timeout {
             source_name: self.name.clone(),
             request: "the sampled load current of the spindle".to_owned(),
-            deadline_ms: u64::try_from(SILENT.as_millis()).unwrap_or(u64::MAX),
+            deadline_ms: duration_to_ms(SILENT),
             next: "Does the controller's model have a sample channel with the spindle's MOTOR/CURRENT, and is nobody using \
                    the oscilloscope at its panel?"
                 .to_owned(),
@@ -114,7 +115,7 @@ impl ControllerSamples {
 
 /// When it arrived, on the clock of the readings.
 fn arrived_ns(clock: &dyn Clock, arrived: Instant) -> TimeNs {
-    clock.now_ns() - i64::try_from(arrived.elapsed().as_nanos()).unwrap_or(0)
+    clock.now_ns().saturating_sub(duration_to_ns(arrived.elapsed()))
 }
 
 impl Source for ControllerSamples {

@@ -2,6 +2,7 @@
 
 use super::ClockStatus;
 use super::judge::{Certain, ClockNews, ClockRules, Judge, Trust};
+use crate::convert::duration_to_ns;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use rustix::time::{ClockId, clock_gettime};
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -146,8 +147,8 @@ fn since_boot_ns() -> i64 {
 
 fn wall_ns() -> TimeNs {
     match SystemTime::now().duration_since(UNIX_EPOCH) {
-        Ok(since) => i64::try_from(since.as_nanos()).unwrap_or(i64::MAX),
-        Err(before) => i64::try_from(before.duration().as_nanos()).map_or(i64::MIN, |ns| -ns),
+        Ok(since) => duration_to_ns(since),
+        Err(before) => -duration_to_ns(before.duration()),
     }
 }
 

@@ -80,8 +80,7 @@ impl ShownBy {
             (None, None) => history.and_then(Path::parent).map(Path::to_owned),
         };
         let Some(directory) = named else { return Ok(()) };
-        let path = identified::save_answer(&directory, subject, &learned.json)
-            .map_err(|problem| CannotRun::new(problem, ""))?;
+        let path = identified::save_answer(&directory, subject, &learned.json).map_err(CannotRun::from_error)?;
         learned.text += &format!("\nfor the page of the box: {}\n", path.display());
         Ok(())
     }
@@ -110,9 +109,7 @@ impl IdentifyFiles {
         match learned {
             Ok(learned) => {
                 match (&self.out, &learned.file) {
-                    (Some(path), Some(file)) => {
-                        write_output(path, file).map_err(|problem| CannotRun::new(problem, ""))?
-                    }
+                    (Some(path), Some(file)) => write_output(path, file).map_err(CannotRun::from_error)?,
                     (Some(path), None) => eprintln!(
                         "note: nothing was written to {}: nothing in it is of use to the gateway",
                         path.display()

@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &ThermalArguments) -> CommandResult {
         Ok((learned, text))
     });
     if let (Some(path), Ok((_, model))) = (&arguments.model, &learned) {
-        write_output(path, model).map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(path, model).map_err(CannotRun::from_error)?;
     }
     let mut learned = learned.map(|(learned, _)| learned);
     if let Ok(learned) = &mut learned {

@@ -127,10 +127,15 @@ fn build_offset(reading: &ConfigInput<'_>) -> Option<OffsetConfig> {
     })
 }
 
+/// A word that names no axis.
+struct UnknownAxis(String);
+
 /// `x z` or `x,z`, each once.
-fn parse_axes(text: &str) -> Result<Vec<Axis>, String> {
+fn parse_axes(text: &str) -> Result<Vec<Axis>, UnknownAxis> {
     let words = text.split([' ', ',']).filter(|word| !word.is_empty());
-    let mut axes = words.map(|word| Axis::from_word(word).ok_or(word.to_owned())).collect::<Result<Vec<_>, _>>()?;
+    let mut axes = words
+        .map(|word| Axis::from_word(word).ok_or_else(|| UnknownAxis(word.to_owned())))
+        .collect::<Result<Vec<_>, _>>()?;
     axes.sort_unstable();
     axes.dedup();
     Ok(axes)
@@ -253,7 +258,7 @@ fn check_offsets(reading: &mut ConfigInput<'_>) {
     let on = find_text(reading, SECTION, "mode").is_some_and(|mode| mode != "off");
     let (at_mode, at_axes) = (origin(reading, "mode"), origin(reading, "axes"));
     match parse_axes(&find_text(reading, SECTION, "axes").unwrap_or_default()) {
-        Err(word) => {
+        Err(UnknownAxis(word)) => {
             let next = "write \"x\", \"y\", \"z\", or several: \"x z\"";
             reading.add_problem(&at_axes, format!("`axes` names {word:?}, which is no axis"), next);
         }

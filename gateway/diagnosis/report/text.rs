@@ -229,7 +229,7 @@ pub(super) fn decimal_exponent(x: f64) -> i32 {
 
 /// A number with so many decimals, thousands set apart, a true minus sign.
 pub(super) fn format_fixed(x: f64, decimals: i32) -> String {
-    let places = usize::try_from(decimals.clamp(0, 12)).unwrap_or(0);
+    let places = decimals.clamp(0, 12).unsigned_abs() as usize;
     let text = format!("{:.places$}", x.abs());
     let (whole, rest) = text.split_once('.').map_or((text.as_str(), String::new()), |(w, r)| (w, format!(".{r}")));
     let minus = if x < 0.0 && text.chars().any(|c| c.is_ascii_digit() && c != '0') { "\u{2212}" } else { "" };
@@ -251,7 +251,7 @@ fn group_digits(whole: &str) -> String {
 }
 
 fn format_scientific(x: f64, digits: i32) -> String {
-    let places = usize::try_from(digits - 1).unwrap_or(0);
+    let places = (digits - 1).max(0).unsigned_abs() as usize;
     let text = format!("{:.places$e}", x.abs());
     let (mantissa, power) = text.split_once('e').unwrap_or((&text, "0"));
     let minus = if x < 0.0 { "\u{2212}" } else { "" };

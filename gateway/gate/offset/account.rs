@@ -6,7 +6,7 @@
 //! anew from what was found.
 
 use super::book::OffsetJournal;
-use super::order::{Moved, OffsetOrder, Shifted};
+use super::order::{Moved, NotOnDisk, OffsetOrder, Shifted};
 use adapters::SourceError;
 use adapters::clock::Clock;
 use adapters::offset::{Axis, LastWrite, Left, OffsetShares, OffsetSink, is_same_offset};
@@ -37,7 +37,13 @@ impl OffsetAccount {
         let left = self.find_leftover(axis);
         // An open intent is in the book already.
         let kept = if result.is_ok() { self.book.store_leftover(axis, left) } else { Ok(()) };
-        Moved { at_ns, order, result, left, kept: kept.map_err(|error| error.to_string()) }
+        Moved {
+            at_ns,
+            order,
+            result,
+            left,
+            kept: kept.map_err(|error| NotOnDisk { kind: error.kind(), said: error.to_string() }),
+        }
     }
 
     fn find_leftover(&self, axis: Axis) -> Option<Left> {

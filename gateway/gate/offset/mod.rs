@@ -32,6 +32,7 @@ use super::hold::Hold;
 use crate::limits::{GateMode, OffsetConfig};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::offset::Axis;
+use gateway_base::convert::duration_to_ns;
 use rules::script::OffsetProposal;
 
 /// What became of a proposal.
@@ -172,8 +173,7 @@ impl Offsets {
         let strange = proposals.iter().filter(|it| !self.slides.iter().any(|slide| slide.axis == it.axis));
         let mut verdicts: Vec<OffsetVerdict> = strange.map(|it| not_allowed(it, now)).collect();
         let rested = self.ordered_ns.is_none_or(|ordered_ns| {
-            !(0..i64::try_from(self.limits.min_interval.as_nanos()).unwrap_or(i64::MAX))
-                .contains(&(now.at_ns - ordered_ns))
+            !(0..duration_to_ns(self.limits.min_interval)).contains(&(now.at_ns - ordered_ns))
         });
         for slide in &mut self.slides {
             let of_slide = |it: &&OffsetProposal| it.axis == slide.axis && !slide.retired;

@@ -4,6 +4,7 @@ use crate::Fault;
 use adapters::SourceError;
 use adapters::clock::TimeNs;
 use adapters::offset::{Axis, LastWrite, Left, is_same_offset};
+use thiserror::Error;
 
 /// What is to be done at the control.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,6 +69,16 @@ impl Shifted {
     }
 }
 
+/// The account could not be kept on disk: after a restart the control is looked at again.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{said}")]
+pub struct NotOnDisk {
+    /// Of which kind the error is.
+    pub kind: std::io::ErrorKind,
+    /// What the system says.
+    pub said: String,
+}
+
 /// What an order came to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moved {
@@ -80,7 +91,7 @@ pub struct Moved {
     /// What is left in the control, by the account.
     pub left: Option<Left>,
     /// Why the account could not be kept on disk.
-    pub kept: Result<(), String>,
+    pub kept: Result<(), NotOnDisk>,
 }
 
 impl Moved {

@@ -18,6 +18,7 @@ use crate::limits::GateConfig;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use adapters::{Actuator, LadderRequest, LadderRule, SourceError};
+use gateway_base::convert::duration_to_ns as ns;
 use std::collections::VecDeque;
 use withdraw::Owed;
 
@@ -125,7 +126,6 @@ pub struct OverrideWriter<A> {
 impl<A: Actuator> OverrideWriter<A> {
     /// Nothing is written until a verdict says so, but what an earlier run has left enabled is withdrawn.
     pub fn new(actuator: A, limits: &GateConfig) -> Self {
-        let ns = |duration: std::time::Duration| i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX);
         let rule = if limits.above_dial { LadderRule::Product } else { LadderRule::Least };
         let settle_ns = ns(actuator.settles_within()).max(SECOND_NS / 100);
         Self {
@@ -330,6 +330,7 @@ impl<A: Actuator> OverrideWriter<A> {
             Some((_, last)) if occasion == Occasion::SignOfLife => *last,
             _ => wanted,
         };
+        debug_assert!(!self.failed, "nothing reaches the machine after a fault, until somebody arms the gate again");
         self.recent.push_back((at_ns, asked));
         let sent = self.actuator.write_feed_override(clock, asked);
         if occasion == Occasion::Change {

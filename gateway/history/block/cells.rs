@@ -136,17 +136,17 @@ fn put_planes(values: &[f64], out: &mut Vec<u8>) {
     }
 }
 
-fn encode_words(changes: &[(u32, Word)], rows: usize, out: &mut Vec<u8>) -> SeriesWritten {
+fn encode_words(changes: &[(usize, Word)], rows: usize, out: &mut Vec<u8>) -> SeriesWritten {
     let mut words: Vec<&str> = Vec::new();
     let mut runs: Vec<u8> = Vec::new();
     let mut count = 0u64;
     for (index, (row, word)) in changes.iter().enumerate() {
-        let end = changes.get(index + 1).map_or(rows, |(next, _)| *next as usize);
-        append_varint(&mut runs, end.saturating_sub(*row as usize) as u64);
+        let end = changes.get(index + 1).map_or(rows, |(next, _)| *next);
+        append_varint(&mut runs, end.saturating_sub(*row) as u64);
         match word {
             Word::Missing(code) => runs.extend([0, *code]),
             Word::Is(text) => {
-                count += end.saturating_sub(*row as usize) as u64;
+                count += end.saturating_sub(*row) as u64;
                 append_varint(&mut runs, 1 + intern_word(&mut words, text) as u64);
             }
         }

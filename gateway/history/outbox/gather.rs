@@ -14,6 +14,7 @@ use crate::reason::Reasons;
 use crate::rows::SeriesRows;
 use crate::series::Series;
 use adapters::clock::TimeNs;
+use gateway_base::convert::duration_to_ns;
 use rusqlite::Connection;
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -130,8 +131,8 @@ impl Gatherer {
 
     /// Which of these rows come after a gap: index of the row, where the gap begins, and why.
     fn find_gaps(&mut self, rows: &SeriesRows) -> Vec<(usize, TimeNs, &'static str)> {
-        let tick_ns = i64::try_from(self.outbox.settings().tick.as_nanos()).unwrap_or(i64::MAX);
-        let greatest_ns = (GAP.as_nanos() as i64).max(tick_ns.saturating_mul(3));
+        let tick_ns = duration_to_ns(self.outbox.settings().tick);
+        let greatest_ns = duration_to_ns(GAP).max(tick_ns.saturating_mul(3));
         let mut gaps = Vec::new();
         for (row, at_ns) in rows.at_ns.iter().enumerate() {
             let last = self.last.replace((*at_ns, "no_samples"));
@@ -174,7 +175,7 @@ impl Gatherer {
             .into_iter()
             .map(|(at_ns, text)| (at_ns, text.into()))
             .collect();
-        let from_ns = last_ns.saturating_add(i64::try_from(tick.as_nanos()).unwrap_or(0));
+        let from_ns = last_ns.saturating_add(duration_to_ns(tick));
         lines.push((from_ns, line::of_gap(from_ns, None, "stopped").into()));
         let put = store::store_lines(&ending, &self.outbox, &self.stored, &lines, (false, false))?;
         ending.commit().with_activity("ending the outbox")?;
@@ -220,6 +221,10 @@ impl Gatherer {
         for line in self.waiting.drain(..taken.ticks) {
             self.bytes -= line.text.len();
         }
+        debug_assert!(
+            taken.put.stored.next_sequence >= self.stored.next_sequence,
+            "the numbers of items only grow: a receiver takes one that comes again for one it has"
+        );
         self.stored = taken.put.stored;
         self.means = taken.means;
         self.outbox.mark_dropped(&taken.put.dropped);

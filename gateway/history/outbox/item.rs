@@ -141,7 +141,7 @@ impl Item {
             Content::Record(record) => kind_of(record),
             Content::Gap(_) => "gap",
             Content::Means { width_s, .. } => {
-                LEVELS.iter().find(|level| level.width_s() == *width_s).map_or("minute", |level| level.key)
+                LEVELS.iter().find(|level| level.width_s == *width_s).map_or("minute", |level| level.key)
             }
         }
     }

@@ -67,7 +67,7 @@ pub(super) fn format_lines(
         let means = read(db, level, *bucket, tick).with_activity("reading the summaries")?;
         let start_ns = bucket.saturating_mul(level.width_ns);
         if !means.is_empty() {
-            lines.push((start_ns, line::of_means(start_ns, level.width_s(), &means)));
+            lines.push((start_ns, line::of_means(start_ns, level.width_s, &means)));
         }
     }
     Ok(lines)

@@ -26,6 +26,7 @@ mod gather;
 mod item;
 mod line;
 mod means;
+mod number;
 mod position;
 mod reader;
 mod redate;

@@ -2,9 +2,11 @@
 
 use super::item::{Item, SeriesInfo};
 use super::line::{self, SeriesByNumber};
+use super::number::read_item_number;
 use crate::HistoryError;
 use crate::error::Doing;
 use crate::schema::{known_series, open_for_reading};
+use gateway_base::convert::clamp_to_signed;
 use rusqlite::Connection;
 use std::path::Path;
 use std::sync::Arc;
@@ -57,6 +59,10 @@ impl OutboxReader {
                 None => stretch.to = to,
             }
         }
+        debug_assert!(
+            stretch.items.iter().all(|item| (from..stretch.to).contains(&item.sequence)),
+            "only items that were asked for leave the outbox: what is beyond them would be acknowledged unsent"
+        );
         Ok(stretch)
     }
 
@@ -90,7 +96,7 @@ impl OutboxReader {
 
     /// The row that holds item `from`, or the next one below `to`.
     fn row_at(&self, from: u64, to: u64) -> Result<Option<OutboxRow>, HistoryError> {
-        let [from, to] = [from, to].map(|number| i64::try_from(number).unwrap_or(i64::MAX));
+        let [from, to] = [from, to].map(clamp_to_signed);
         let mut select = self
             .db
             .prepare_cached(
@@ -100,9 +106,8 @@ impl OutboxReader {
                  ORDER BY first_sequence LIMIT 1",
             )
             .with_activity("reading the outbox")?;
-        let unsigned = |number: i64| u64::try_from(number).unwrap_or(0);
         let row = select.query_map([from, to], |row| {
-            Ok(OutboxRow { first: unsigned(row.get(0)?), items: unsigned(row.get(1)?), body: row.get(2)? })
+            Ok(OutboxRow { first: read_item_number(row, 0)?, items: read_item_number(row, 1)?, body: row.get(2)? })
         });
         row.and_then(|mut rows| rows.next().transpose()).with_activity("reading the outbox")
     }

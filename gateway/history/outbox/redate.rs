@@ -6,6 +6,7 @@ use super::reader::unpack_lines;
 use super::store::{LEVEL, has_tables};
 use crate::HistoryError;
 use crate::error::Doing;
+use gateway_base::convert::clamp_to_signed;
 use rusqlite::{Connection, params};
 use std::ops::Range;
 
@@ -20,11 +21,12 @@ pub(crate) fn redate_items(
     if from == 0 || !has_tables(db)? {
         return Ok(0..0);
     }
-    let signed = |number: u64| i64::try_from(number).unwrap_or(i64::MAX);
     let mut select = db
         .prepare("SELECT first_sequence, body FROM outbox WHERE first_sequence >= ?1 AND first_sequence < ?2")
         .with_activity("reading the outbox")?;
-    let rows = select.query_map([signed(from), signed(to.unwrap_or(u64::MAX))], |row| Ok((row.get(0)?, row.get(1)?)));
+    let rows = select.query_map([clamp_to_signed(from), clamp_to_signed(to.unwrap_or(u64::MAX))], |row| {
+        Ok((row.get(0)?, row.get(1)?))
+    });
     let rows: Vec<(i64, Vec<u8>)> = rows.and_then(Iterator::collect).with_activity("reading the outbox")?;
     for (first, body) in rows {
         // One that cannot be read is passed over when it is to be sent, too.

@@ -8,6 +8,7 @@ use crate::rows::{Column, SeriesRows, Word};
 use crate::series::Series;
 use crate::tail::{append_comma, put_missing, put_number};
 use adapters::clock::TimeNs;
+use gateway_base::convert::duration_to_ns;
 use serde_json::Value as Json;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -86,7 +87,7 @@ impl OutboxReport {
         };
         Self {
             every_nth: u64::from(settings.every_nth.max(1)),
-            refresh_ns: i64::try_from(settings.refresh.as_nanos()).unwrap_or(i64::MAX),
+            refresh_ns: duration_to_ns(settings.refresh),
             bands: series.iter().map(band).collect(),
             last: vec![Last::Missing(NOT_PROVIDED); series.len()],
             ticks: 0,
@@ -174,7 +175,7 @@ fn read_cell(column: &Column, row: usize, decimals: Option<u8>) -> Last {
             None => Last::Missing(NOT_PROVIDED),
         },
         Column::Words(changes) => {
-            let after = changes.partition_point(|(from, _)| *from as usize <= row);
+            let after = changes.partition_point(|(from, _)| *from <= row);
             match after.checked_sub(1).map(|index| &changes[index].1) {
                 Some(Word::Is(text)) => Last::Text(text.clone()),
                 Some(Word::Missing(code)) => Last::Missing(*code),

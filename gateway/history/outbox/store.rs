@@ -1,11 +1,13 @@
 //! The tables of the outbox: one row for the items of a commit, one for each sink.
 
+use super::number::{read_item_number, to_stored_number};
 use super::position::Position;
 use super::shared::{DeliveryState, Outbox, OutboxFigures};
 use crate::HistoryError;
 use crate::error::Doing;
 use crate::schema::{open_for_reading, open_for_writing};
 use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_base::convert::{clamp_to_signed, clamp_to_unsigned, duration_to_ns};
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use std::borrow::Cow;
 use std::path::Path;
@@ -57,14 +59,6 @@ impl OutboxContents {
     }
 }
 
-fn to_unsigned(number: i64) -> u64 {
-    u64::try_from(number).unwrap_or(0)
-}
-
-fn to_signed(number: u64) -> i64 {
-    i64::try_from(number).unwrap_or(i64::MAX)
-}
-
 /// Creates the tables, takes up what each sink still has to deliver, and forgets sinks that are configured no more.
 pub(super) fn open_outbox(db: &mut Connection, outbox: &Outbox) -> Result<OutboxContents, HistoryError> {
     let opening = db.transaction().with_activity("opening the outbox")?;
@@ -97,7 +91,7 @@ fn measure_outbox(db: &Connection, next_sequence: u64) -> Result<OutboxContents,
     db.query_row(&select, [], |row| {
         Ok(OutboxContents {
             next_sequence,
-            bytes: to_unsigned(row.get(0)?),
+            bytes: clamp_to_unsigned(row.get(0)?),
             oldest_ns: row.get(1)?,
             newest_ns: row.get(2)?,
             added_bytes: 0,
@@ -115,10 +109,11 @@ const NUMBERS_FROM: &str = "outbox_numbers_from";
 /// The newest row is never removed: the numbering goes on from it.
 fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
     let stored: u64 = db
-        .query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| row.get(0).map(to_unsigned))
+        .query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| read_item_number(row, 0))
         .with_activity("numbering the outbox")?;
     let from = read_property(db, NUMBERS_FROM)?.and_then(|text| text.parse().ok()).unwrap_or(1);
-    Ok(stored.max(from))
+    // A number 0 would name no item.
+    Ok(stored.max(from).max(1))
 }
 
 /// An older copy of the history at `path` is to be used again: its numbers may have been given to other items since, so they go on far
@@ -225,8 +220,8 @@ fn load_delivery_state(
         Some((text, dropped, connections)) => {
             // A text that this version cannot read begins anew rather than sending everything twice.
             standing.position = serde_json::from_str(&text).unwrap_or(Position::from_next(next));
-            standing.dropped = to_unsigned(dropped);
-            standing.connections = to_unsigned(connections);
+            standing.dropped = clamp_to_unsigned(dropped);
+            standing.connections = clamp_to_unsigned(connections);
         }
         None => {
             *standing = DeliveryState { linked: standing.linked, ..DeliveryState::from_next(next) };
@@ -242,7 +237,7 @@ fn save_delivery_state(db: &Connection, name: &str, standing: &DeliveryState) ->
         "INSERT OR REPLACE INTO outbox_sinks (name, position, dropped, connections) VALUES (?1, ?2, ?3, ?4)",
     )
     .and_then(|mut save| {
-        save.execute(params![name, position, to_signed(standing.dropped), to_signed(standing.connections)])
+        save.execute(params![name, position, clamp_to_signed(standing.dropped), clamp_to_signed(standing.connections)])
     })
     .map(drop)
     .with_activity("noting what a sink has delivered")
@@ -264,6 +259,7 @@ pub(super) fn store_lines(
     lines: &[(TimeNs, Cow<'_, str>)],
     (tidy, ages): (bool, bool),
 ) -> Result<Put, HistoryError> {
+    debug_assert!(before.next_sequence >= 1, "items are numbered from 1: 0 names none");
     let mut stored = *before;
     if !lines.is_empty() {
         add(db, &mut stored, lines)?;
@@ -298,8 +294,8 @@ fn add(db: &Connection, stored: &mut OutboxContents, lines: &[(TimeNs, Cow<'_, s
         "INSERT INTO outbox (first_sequence, items, start_ns, end_ns, bytes, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
     )
     .and_then(|mut insert| {
-        let first = to_signed(stored.next_sequence);
-        insert.execute(params![first, lines.len() as i64, start_ns, end_ns, to_signed(bytes), body])
+        let first = to_stored_number(stored.next_sequence)?;
+        insert.execute(params![first, lines.len() as i64, start_ns, end_ns, clamp_to_signed(bytes), body])
     })
     .with_activity("storing the outbox")?;
     stored.next_sequence += lines.len() as u64;
@@ -321,7 +317,7 @@ fn remove(
     (tidy, ages): (bool, bool),
 ) -> Result<Vec<(u64, u64)>, HistoryError> {
     let (settings, lowest) = (outbox.settings(), outbox.lowest_undelivered().min(stored.next_sequence));
-    let max_age_ns = i64::try_from(settings.max_age.as_nanos()).unwrap_or(i64::MAX);
+    let max_age_ns = duration_to_ns(settings.max_age);
     let horizon_ns =
         stored.newest_ns.filter(|_| ages).map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(max_age_ns));
     if tidy {
@@ -341,7 +337,7 @@ fn remove(
             break;
         }
         db.prepare_cached("DELETE FROM outbox WHERE first_sequence = ?1")
-            .and_then(|mut delete| delete.execute([to_signed(first)]))
+            .and_then(|mut delete| delete.execute([to_stored_number(first)?]))
             .with_activity("shortening the outbox")?;
         stored.bytes = stored.bytes.saturating_sub(bytes);
         if !delivered {
@@ -353,7 +349,7 @@ fn remove(
 
 /// Removes the oldest rows whose items are all below `lowest`, but never the newest row.
 fn remove_delivered(db: &Connection, lowest: u64, stored: &mut OutboxContents) -> Result<(), HistoryError> {
-    let end = to_signed(lowest.min(stored.next_sequence.saturating_sub(1)));
+    let end = clamp_to_signed(lowest.min(stored.next_sequence.saturating_sub(1)));
     let (last, bytes): (Option<i64>, i64) = db
         .prepare_cached(
             "SELECT max(first_sequence), coalesce(sum(bytes), 0) FROM (
@@ -366,7 +362,7 @@ fn remove_delivered(db: &Connection, lowest: u64, stored: &mut OutboxContents) -
     db.prepare_cached("DELETE FROM outbox WHERE first_sequence <= ?1")
         .and_then(|mut delete| delete.execute([last]))
         .with_activity("shortening the outbox")?;
-    stored.bytes = stored.bytes.saturating_sub(to_unsigned(bytes));
+    stored.bytes = stored.bytes.saturating_sub(clamp_to_unsigned(bytes));
     Ok(())
 }
 
@@ -375,7 +371,7 @@ fn find_oldest_row(db: &Connection) -> Result<Option<(u64, u64, TimeNs, u64)>, H
     db.prepare_cached("SELECT first_sequence, items, end_ns, bytes FROM outbox ORDER BY first_sequence LIMIT 1")
         .and_then(|mut select| {
             let row = |row: &rusqlite::Row<'_>| {
-                Ok((to_unsigned(row.get(0)?), to_unsigned(row.get(1)?), row.get(2)?, to_unsigned(row.get(3)?)))
+                Ok((read_item_number(row, 0)?, read_item_number(row, 1)?, row.get(2)?, clamp_to_unsigned(row.get(3)?)))
             };
             select.query_row([], row).optional()
         })

@@ -183,12 +183,12 @@ unsafe fn check_around(real: *mut ffi::sqlite3_file, page: usize, bytes: u64, pl
 }
 
 unsafe extern "C" fn write(file: *mut ffi::sqlite3_file, from: *const c_void, length: c_int, offset: i64) -> c_int {
-    let source = match usize::try_from(length) {
-        // SAFETY: `SQLite` calls with `length` bytes to write, which stay as they are meanwhile.
-        Ok(bytes) => unsafe { std::slice::from_raw_parts(from.cast::<u8>(), bytes) },
-        Err(_) => return ffi::SQLITE_IOERR_WRITE,
+    // No caller writes before the file; one that did would get an error, and no page a wrong number.
+    let (Ok(bytes), Ok(place)) = (usize::try_from(length), u64::try_from(offset)) else {
+        return ffi::SQLITE_IOERR_WRITE;
     };
-    let place = u64::try_from(offset).unwrap_or(u64::MAX);
+    // SAFETY: `SQLite` calls with `length` bytes to write, which stay as they are meanwhile.
+    let source = unsafe { std::slice::from_raw_parts(from.cast::<u8>(), bytes) };
     if let Some(header) = source.first_chunk::<HEADER>().filter(|_| place == 0) {
         // SAFETY: `SQLite` calls only with files that `open` has made.
         unsafe { (*file.cast::<SealedFile>()).header = FileHeader::from_header(header, SEALED_APPLICATION) };

@@ -10,7 +10,8 @@ pub(super) fn is_page(length: usize, offset: u64) -> bool {
     PAGE_BYTES.contains(&length) && length.is_power_of_two() && offset.is_multiple_of(length as u64)
 }
 
-/// The number of a page, from 1.
+/// The number of a page, from 1. `SQLite` has fewer than 2^32 - 1 pages and never writes a later one; a file that claims to be
+/// longer gives the greatest number, which fits the sum of none.
 pub(super) fn page_number(length: usize, offset: u64) -> u32 {
     u32::try_from(offset / length as u64 + 1).unwrap_or(u32::MAX)
 }

@@ -79,7 +79,10 @@ fn put_header(path: &Path) -> std::io::Result<()> {
     let length = file.metadata()?.len();
     page[..16].copy_from_slice(b"SQLite format 3\0");
     page[16..24].copy_from_slice(&[0x10, 0x00, 2, 2, if sealed { 8 } else { 0 }, 64, 32, 32]);
-    page[28..32].copy_from_slice(&u32::try_from(length / PAGE).unwrap_or(u32::MAX).to_be_bytes());
+    // SQLite counts pages with 32 bits: a longer file was never a database, and a header that says less would cut it off.
+    let pages = u32::try_from(length / PAGE)
+        .map_err(|_| std::io::Error::new(std::io::ErrorKind::FileTooLarge, "more pages than a database has"))?;
+    page[28..32].copy_from_slice(&pages.to_be_bytes());
     page[44..48].copy_from_slice(&4_u32.to_be_bytes());
     page[56..60].copy_from_slice(&1_u32.to_be_bytes());
     let version = i64::from(u32::from_be_bytes([page[60], page[61], page[62], page[63]]));

@@ -1,5 +1,6 @@
 //! Which connections there are, what each is doing, and which one has to go for another.
 
+use crate::convert::duration_to_ms;
 use std::collections::HashMap;
 use std::net::IpAddr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -38,7 +39,7 @@ pub(super) enum Waits {
 impl ConnectionActivity {
     fn now_ms(&self) -> u64 {
         // From 1, so that 0 means never.
-        u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX).saturating_add(1)
+        duration_to_ms(self.opened.elapsed()).saturating_add(1)
     }
 
     /// A request is complete as far as its head goes.

@@ -21,6 +21,7 @@ mod tls;
 pub use tls::{Certificate, CertificateError};
 
 use super::ApiProblem;
+use crate::convert::clamp_to_length;
 use axum::Router;
 use book::ConnectionTable;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -51,8 +52,7 @@ fn raise_connection_limit() -> usize {
     let limit = getrlimit(Resource::Nofile);
     // Where the limit cannot be raised, what there is has to do.
     let _as_it_is = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, maximum: limit.maximum });
-    let files =
-        getrlimit(Resource::Nofile).current.map_or(usize::MAX, |files| usize::try_from(files).unwrap_or(usize::MAX));
+    let files = getrlimit(Resource::Nofile).current.map_or(usize::MAX, clamp_to_length);
     files.saturating_sub(FILES_OF_THE_BOX + CLOSING_MAX).clamp(8, CONNECTIONS_MAX)
 }
 

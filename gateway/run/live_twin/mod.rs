@@ -124,7 +124,7 @@ impl Twin {
                 let remembered = restore_learned(&self.memory, &mut self.told);
                 self.put_in_charge(loaded, remembered);
             }
-            Err(problem) => self.refuse_model(problem),
+            Err(problem) => self.refuse_model(problem.to_string()),
         }
         match Worker::start(self.places.clone(), known) {
             Ok(worker) => {

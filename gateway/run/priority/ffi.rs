@@ -18,10 +18,18 @@ pub(super) struct SchedAttr {
     pub(super) period: u64,
 }
 
+/// Bytes of [`SchedAttr`].
+const SIZE: u32 = 48;
+
 /// Sets how the calling thread is scheduled.
 pub(super) fn set_attr(attr: SchedAttr) -> io::Result<()> {
-    let size = u32::try_from(size_of::<SchedAttr>()).unwrap_or(0);
-    let attr = SchedAttr { size, ..attr };
+    const {
+        assert!(
+            size_of::<SchedAttr>() == SIZE as usize,
+            "the kernel tells versions of the structure apart by its size"
+        );
+    }
+    let attr = SchedAttr { size: SIZE, ..attr };
     // SAFETY: thread 0 is the calling one; `attr` outlives the call, and the kernel reads no more than its `size`.
     let answer = unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attr, 0) };
     if answer == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }

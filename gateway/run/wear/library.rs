@@ -1,6 +1,6 @@
 //! The models of the library, read on a thread of its own whenever a newer one was stored.
 
-use crate::history::Reader;
+use crate::history::{HistoryError, Reader};
 use crate::log::{Notice, Severity};
 use rules::estimators::wear::WearRecord;
 use std::path::Path;
@@ -11,7 +11,7 @@ use std::time::Duration;
 /// Time between two looks at the library.
 const LOOK_EVERY: Duration = Duration::from_secs(5);
 
-type WearRecords = Result<Vec<Arc<WearRecord>>, String>;
+type WearRecords = Result<Vec<Arc<WearRecord>>, HistoryError>;
 
 /// The models in force.
 #[derive(Debug)]
@@ -20,7 +20,7 @@ pub(super) struct Library {
     /// Dropped with the library: the thread ends.
     _ends: Option<std::sync::mpsc::Sender<()>>,
     models: Vec<Arc<WearRecord>>,
-    problem: Option<String>,
+    problem: Option<HistoryError>,
 }
 
 impl Library {
@@ -76,8 +76,11 @@ fn look_again(history: &Path, send: &SyncSender<WearRecords>, ended: &Receiver<(
         let news = match &found {
             Ok(None) => false,
             Ok(Some(_)) => true,
-            // The same trouble is told once.
-            Err(problem) => said.replace(problem.clone()).as_ref() != Some(problem),
+            // The same trouble is told once: what a person would read again is the same.
+            Err(problem) => {
+                let text = problem.to_string();
+                said.replace(text.clone()) != Some(text)
+            }
         };
         if news
             && let Some(found) = found.transpose()
@@ -93,17 +96,16 @@ fn look_again(history: &Path, send: &SyncSender<WearRecords>, ended: &Receiver<(
 }
 
 /// The models in force, when a newer one was stored than is `known`. A history that is not there yet has none.
-fn read_newer_models(history: &Path, known: &mut i64) -> Result<Option<Vec<Arc<WearRecord>>>, String> {
+fn read_newer_models(history: &Path, known: &mut i64) -> Result<Option<Vec<Arc<WearRecord>>>, HistoryError> {
     if !history.exists() {
         return Ok(None);
     }
-    let told = |error: crate::history::HistoryError| error.to_string();
-    let reader = Reader::open(history).map_err(told)?;
-    let newest = reader.newest_wear_model().map_err(told)?;
+    let reader = Reader::open(history)?;
+    let newest = reader.newest_wear_model()?;
     if newest == *known {
         return Ok(None);
     }
-    let models = reader.wear_models().map_err(told)?;
+    let models = reader.wear_models()?;
     *known = newest;
     Ok(Some(models.into_iter().filter(|model| model.in_force).map(|model| Arc::new(model.record)).collect()))
 }

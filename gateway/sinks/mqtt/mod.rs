@@ -17,10 +17,11 @@ pub(super) use layout::build_document;
 
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
+use crate::address::TargetError;
 use adapters::address::Keys;
 use adapters::mqtt::{MqttMessage, Outgoing, Qos, Will};
 use gateway_base::log::{Notice, Severity};
-use gateway_control::Reply;
+use gateway_control::{Reply, RequestRefusal};
 use gateway_history::{Content, Item, Outbox, Record};
 use request::RequestDocument;
 use serde_json::{Value as Json, json};
@@ -46,7 +47,7 @@ pub struct MqttTarget {
 }
 
 impl MqttTarget {
-    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, String> {
+    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, TargetError> {
         let qos = keys.take_choice("qos", &[("1", Qos::AtLeastOnce), ("0", Qos::AtMostOnce)]);
         let layouts = [("items", Layout::Items), ("flat", Layout::Flat), ("topics", Layout::Topics)];
         let layout = keys.take_choice("layout", &layouts);
@@ -57,7 +58,7 @@ impl MqttTarget {
         }
         let (broker, prefix) = BrokerTarget::parse(body, keys, secured)?;
         if prefix.contains(['+', '#']) || prefix.starts_with('$') {
-            return Err(format!("{prefix:?} is no beginning of a topic; leave out + and #, and $ at its beginning"));
+            return Err(TargetError::Topic { prefix: prefix.to_owned() });
         }
         Ok(Self { broker, prefix: prefix.to_owned(), qos, layout, latest, discovery })
     }
@@ -103,7 +104,7 @@ impl MqttSink {
     /// Hands a message to the gate and publishes what became of it.
     async fn answer_request(&mut self, message: MqttMessage) -> Result<(), SinkError> {
         let document = match message.retained {
-            true => Err(request::RETAINED.to_owned()),
+            true => Err(RequestRefusal::RetainedMessage),
             false => request::document_of(&message.payload),
         };
         let id = document.as_ref().map_or(Json::Null, |document| document.id.clone().map_or(Json::Null, Json::from));

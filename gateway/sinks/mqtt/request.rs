@@ -1,11 +1,8 @@
 //! A request of the network as a JSON document. Pure.
 
-use gateway_control::RequestedChange;
+use gateway_control::{RequestRefusal, RequestedChange};
 use serde::Deserialize;
 
-/// What the broker has kept would come again at every connection, long after whoever asked has gone.
-pub(super) const RETAINED: &str =
-    "a retained message is no request: publish it without the retain flag, and remove the retained one";
 /// A request is shorter than this.
 const REQUEST_BYTES_MAX: usize = 2048;
 /// Letters of the asker's own mark that are given back.
@@ -22,12 +19,12 @@ pub(super) struct RequestDocument {
     pub(super) id: Option<String>,
 }
 
-pub(super) fn document_of(payload: &[u8]) -> Result<RequestDocument, String> {
+pub(super) fn document_of(payload: &[u8]) -> Result<RequestDocument, RequestRefusal> {
     if payload.len() > REQUEST_BYTES_MAX {
-        return Err(format!("a message of {} bytes is no request: at most {REQUEST_BYTES_MAX}", payload.len()));
+        return Err(RequestRefusal::TooLong { bytes: payload.len(), most: REQUEST_BYTES_MAX });
     }
-    let mut document: RequestDocument =
-        serde_json::from_slice(payload).map_err(|error| format!("this is no request: {error}; {FORMS}"))?;
+    let mut document: RequestDocument = serde_json::from_slice(payload)
+        .map_err(|error| RequestRefusal::Unreadable { error: error.to_string(), forms: FORMS })?;
     document.id = document.id.map(|id| id.chars().take(ID_MAX).collect());
     Ok(document)
 }
@@ -36,12 +33,12 @@ const FORMS: &str = "write {\"request\":\"feed_override\",\"pct\":80}, {\"reques
                      {\"request\":\"acknowledge_alarm\",\"code\":\"...\"}";
 
 impl RequestDocument {
-    pub(super) fn into_change(self) -> Result<RequestedChange, String> {
+    pub(super) fn into_change(self) -> Result<RequestedChange, RequestRefusal> {
         match (self.request.as_str(), self.pct, self.code) {
             ("feed_override", Some(pct), None) => RequestedChange::feed_override(pct, &self.reason.unwrap_or_default()),
             ("withdraw", None, None) => Ok(RequestedChange::Withdraw),
             ("acknowledge_alarm", None, Some(code)) => Ok(RequestedChange::acknowledge_alarm(&code)),
-            _ => Err(format!("this is no request; {FORMS}")),
+            _ => Err(RequestRefusal::Unknown { forms: FORMS }),
         }
     }
 }

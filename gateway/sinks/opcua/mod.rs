@@ -23,6 +23,7 @@ mod values;
 
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
+use crate::address::TargetError;
 use adapters::address::{Endpoint, Keys, Login, parse_endpoint};
 use gateway_history::{Content, Item, Outbox, Record};
 use server::Running;
@@ -80,15 +81,16 @@ impl MachineIdentity {
 }
 
 impl OpcuaTarget {
-    pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, String> {
+    pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, TargetError> {
         let login = Login::from_keys(keys);
         let anonymous = keys.take_choice("anonymous", &[("no", false), ("yes", true)]);
         let certificates = keys.take_text("certificates").map(PathBuf::from);
         let plate = ["manufacturer", "model", "serial_number"].map(|key| keys.take_text(key));
         if !anonymous && login.user.is_none() {
-            return Err("nobody could sign in: write user= and password_file=, or anonymous=yes".to_owned());
+            return Err(TargetError::NoSignIn);
         }
-        Ok(Self { at: parse_endpoint(body, Some(PORT))?, login, anonymous, certificates, plate })
+        let at = parse_endpoint(body, Some(PORT)).map_err(TargetError::Host)?;
+        Ok(Self { at, login, anonymous, certificates, plate })
     }
 
     /// What is wrong with the files that the address names, each with what to do.

@@ -17,6 +17,23 @@ pub struct Described<'a> {
     pub prefix: &'a str,
 }
 
+/// Why devices of other machines cannot stand in the document.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DevicesError {
+    /// Another program wrote the file, or it is empty.
+    #[error("{name} holds no device that `cnc-gateway devices` wrote")]
+    NoDevice {
+        /// The file.
+        name: String,
+    },
+    /// An agent cannot tell two machines apart.
+    #[error("{name} has a machine with the identifiers of another one: give each its own --prefix")]
+    SameIdentifiers {
+        /// The file.
+        name: String,
+    },
+}
+
 /// The document. `delivered` tells of a channel whether the machine has it; `others` are such documents of other machines, which stand in
 /// the same agent.
 ///
@@ -27,18 +44,16 @@ pub fn devices_xml(
     created_utc: &str,
     delivered: impl Fn(&str) -> bool,
     others: &[(String, String)],
-) -> Result<String, String> {
+) -> Result<String, DevicesError> {
     let mut devices = vec![write_device(described, delivered)];
     for (name, text) in others {
         let found = devices_of(text);
         if found.is_empty() {
-            return Err(format!("{name} holds no device that `cnc-gateway devices` wrote"));
+            return Err(DevicesError::NoDevice { name: name.clone() });
         }
         for one in found {
             if devices.iter().any(|known| first_id(known) == first_id(one)) {
-                return Err(format!(
-                    "{name} has a machine with the identifiers of another one: give each its own --prefix"
-                ));
+                return Err(DevicesError::SameIdentifiers { name: name.clone() });
             }
             devices.push(format!("{one}\n"));
         }

@@ -13,10 +13,11 @@ mod devices;
 mod lines;
 mod model;
 
-pub use devices::{Described, devices_xml, is_prefix, prefix_of};
+pub use devices::{Described, DevicesError, devices_xml, is_prefix, prefix_of};
 
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
+use crate::address::TargetError;
 use adapters::address::{Endpoint, Keys, parse_endpoint};
 use adapters::clock::TimeNs;
 use gateway_base::clock;
@@ -51,9 +52,10 @@ pub struct ShdrTarget {
 }
 
 impl ShdrTarget {
-    pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, String> {
+    pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, TargetError> {
         let heartbeat = Duration::from_secs(keys.take_number("heartbeat_s", 10, 1, 600));
-        Ok(Self { at: parse_endpoint(body, Some(PORT))?, heartbeat })
+        let at = parse_endpoint(body, Some(PORT)).map_err(TargetError::Host)?;
+        Ok(Self { at, heartbeat })
     }
 }
 

@@ -8,6 +8,7 @@
 use super::payload::{Metric, MetricValue, Payload, Property, PropertySet, datatype};
 use adapters::channel::Form;
 use adapters::clock::TimeNs;
+use gateway_base::convert::clamp_to_unsigned;
 use gateway_history::{Cell, Content, Item, Reading, SeriesInfo, SeriesKind};
 use std::collections::BTreeSet;
 
@@ -36,7 +37,7 @@ const STALE: u32 = 500;
 
 /// Milliseconds since 1970, as payloads have them.
 pub(super) fn to_milliseconds(at_ns: TimeNs) -> u64 {
-    u64::try_from(at_ns.div_euclid(1_000_000)).unwrap_or(0)
+    clamp_to_unsigned(at_ns.div_euclid(1_000_000))
 }
 
 /// What stands behind the will: a death is matched to its birth by this number.
@@ -143,7 +144,8 @@ fn build_data_metric(reading: &Reading, at_ms: u64) -> Metric {
 }
 
 fn to_alias(series: &SeriesInfo) -> u64 {
-    SERIES_FROM + u64::try_from(series.id).unwrap_or(0)
+    // Series are numbered from 1; whatever their numbers are, no two of them share an alias.
+    SERIES_FROM.wrapping_add(series.id.cast_unsigned())
 }
 
 /// The metrics of an item.

@@ -9,7 +9,7 @@
 //! A host may name a metric by its alias alone, as the birth gave it.
 
 use super::payload::{Metric, MetricValue, Payload, datatype};
-use gateway_control::RequestedChange;
+use gateway_control::{RequestRefusal, RequestedChange};
 use serde_json::json;
 
 const FEED_OVERRIDE: (&str, u64) = ("request/feed_override_pct", 9);
@@ -44,16 +44,16 @@ pub(super) fn build_answer_metric(done: bool, text: &str, at_ms: u64) -> Metric 
 
 /// What a command asks for; empty where it asks for nothing that is known here. A message that the broker has kept is refused:
 /// it would come again at every connection.
-pub(super) fn parse_changes(payload: &Payload, retained: bool) -> Vec<Result<RequestedChange, String>> {
+pub(super) fn parse_changes(payload: &Payload, retained: bool) -> Vec<Result<RequestedChange, RequestRefusal>> {
     let changes = payload.metrics.iter().filter_map(parse_change).take(CHANGES_MAX);
-    let fresh = |change: Result<RequestedChange, String>| match retained {
-        true => Err("a retained command is no request: publish it without the retain flag".to_owned()),
+    let fresh = |change: Result<RequestedChange, RequestRefusal>| match retained {
+        true => Err(RequestRefusal::RetainedCommand),
         false => change,
     };
     changes.map(fresh).collect()
 }
 
-fn parse_change(metric: &Metric) -> Option<Result<RequestedChange, String>> {
+fn parse_change(metric: &Metric) -> Option<Result<RequestedChange, RequestRefusal>> {
     let is = |(name, alias): (&str, u64)| match &metric.name {
         Some(named) if !named.is_empty() => named == name,
         _ => metric.alias == Some(alias),
@@ -62,14 +62,14 @@ fn parse_change(metric: &Metric) -> Option<Result<RequestedChange, String>> {
         return Some(match (&metric.value, metric.is_null) {
             (None, _) | (_, Some(true)) => Ok(RequestedChange::Withdraw),
             (Some(value), _) => to_number(value).map_or_else(
-                || Err("request/feed_override_pct is no number".to_owned()),
+                || Err(RequestRefusal::NoNumber { metric: FEED_OVERRIDE.0 }),
                 |pct| RequestedChange::feed_override(pct, ""),
             ),
         });
     }
     is(ACKNOWLEDGE_ALARM).then(|| match &metric.value {
         Some(MetricValue::Text(code)) => Ok(RequestedChange::acknowledge_alarm(code)),
-        _ => Err("request/acknowledge_alarm is no text".to_owned()),
+        _ => Err(RequestRefusal::NoText { metric: ACKNOWLEDGE_ALARM.0 }),
     })
 }
 

@@ -27,10 +27,11 @@ mod payload;
 
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
+use crate::address::TargetError;
 use adapters::address::Keys;
 use adapters::mqtt::{Outgoing, Qos, Will};
 use gateway_base::clock;
-use gateway_control::{Reply, RequestedChange};
+use gateway_control::{Reply, RequestRefusal, RequestedChange};
 use gateway_history::{Cell, Outbox};
 use host::PrimaryHost;
 use payload::Payload;
@@ -63,17 +64,17 @@ pub struct SparkplugTarget {
 }
 
 impl SparkplugTarget {
-    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, String> {
+    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, TargetError> {
         let host = keys.take_text("host").filter(|host| !host.contains(['+', '#', '/']));
         let (broker, rest) = BrokerTarget::parse(body, keys, secured)?;
         let parts: Vec<&str> = rest.split('/').collect();
         let (group, node, device) = match parts[..] {
             [group, node] => (group, node, None),
             [group, node, device] => (group, node, Some(device)),
-            _ => return Err("no group and node; write sparkplug://BROKER:1883/GROUP/NODE/DEVICE".to_owned()),
+            _ => return Err(TargetError::NoNode),
         };
         if let Some(part) = parts.iter().find(|part| part.is_empty() || part.contains(['+', '#'])) {
-            return Err(format!("{part:?} is no name of a group, node or device: leave out + and #"));
+            return Err(TargetError::NodeName { part: (*part).to_owned() });
         }
         let device = device.map(str::to_owned);
         Ok(Self { broker, group: group.to_owned(), node: node.to_owned(), device, host })
@@ -106,7 +107,7 @@ pub(super) struct SparkplugSink {
     host: PrimaryHost,
     requests: Requests,
     /// What the network has asked for and is not answered yet.
-    asked: Vec<Result<RequestedChange, String>>,
+    asked: Vec<Result<RequestedChange, RequestRefusal>>,
 }
 
 impl SparkplugSink {
@@ -247,9 +248,9 @@ impl SparkplugSink {
 
     async fn open_connection(&mut self) -> Result<(), SinkError> {
         self.first_values().await;
-        // Kept over restarts (specification, 6.4.19): the death of a connection before must not match this birth.
+        // From 0 to 255, then from 0 again, kept over restarts (specification, 6.4.19): the death of a connection before must not match this birth.
         let number = self.outbox.begin_connection(&self.name, NOTED_WITHIN).await;
-        self.number = u8::try_from(number % 256).unwrap_or(0);
+        self.number = number.to_le_bytes()[0];
         let payload = births::build_death(self.number, now_ms()).encode_to_vec();
         let will = Will {
             topic: self.target.format_topic("NDEATH"),
@@ -289,7 +290,7 @@ impl SparkplugSink {
         let sent = self.publish_messages(messages).await;
         sent.map_err(|(index, failure)| {
             // Those after it did not go out; their numbers are used again.
-            self.next = first.wrapping_add(u8::try_from(index % 256).unwrap_or(0));
+            self.next = first.wrapping_add(index.to_le_bytes()[0]);
             failure.of_item(batch.items.get(index).map(|item| item.sequence))
         })?;
         // Old data says nothing of now.

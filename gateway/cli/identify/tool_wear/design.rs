@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
     let design = plan_experiment(array, &own.levels, own.seed)
         .map_err(|problems| CannotRun::new(format!("this design cannot be made:\n  {}", problems.join("\n  ")), ""))?;
     if let Some(path) = &arguments.out {
-        write_output(path, &format_csv(own, &design)).map_err(|problem| CannotRun::new(problem, ""))?;
+        write_output(path, &format_csv(own, &design)).map_err(CannotRun::from_error)?;
     }
     if arguments.json {
         print_json(&design_to_json(own, &design));
