@@ -1,5 +1,5 @@
 //! Three recordings with one hidden cause each, which anyone can have diagnosed on the page in one click; the truth is told afterwards. They were
-//! written by `tests/recordings/make_gallery.py`, by laws of its own.
+//! written by `tests/records/recordings/make_gallery.py`, by laws of its own.
 
 /// One example.
 #[derive(Debug, Clone, Copy)]

@@ -6,8 +6,8 @@
 //! become one. Each minute adds its summary to minutes, hours and days, from which long ranges are drawn. The running
 //! minute lies in a crash tail of JSON texts that any `SQLite` client can read.
 //!
-//! Measured on one day at 10 Hz with 20 quantities (`cargo test --release --test history figures -- --ignored
-//! --nocapture --test-threads 1`, functions in `tests/history/figures.rs`; synthetic signals, so real machines may
+//! Measured on one day at 10 Hz with 20 quantities (`cargo test --release --test records history::figures -- --ignored
+//! --nocapture --test-threads 1`, functions in `tests/records/history/figures.rs`; synthetic signals, so real machines may
 //! differ by a factor of two):
 //!
 //! | | row per sample | blocks with summaries, fresh | after compaction |

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Operations in one run; a shipped script takes one or two hundred. The interpreter copies a whole map or list in a single
 /// operation, so that this and the sizes below bound the time of a run together: the worst that is known, copying full maps
-/// in a loop, is measured in `tests/scripts/mad.rs`.
+/// in a loop, is measured in `tests/box/scripts/mad.rs`.
 pub const OPERATIONS_MAX: u64 = 3_000;
 /// Bytes of one script file.
 pub const TEXT_MAX: usize = 64 * 1024;

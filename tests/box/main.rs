@@ -1,29 +1,12 @@
-//! The whole box: real child processes, sockets, files, signals and a browser.
+//! The box: what a user reads, who may ask, what scripts decide, what reaches the machine, and the whole of it as a process.
 
-mod backup;
-mod brought;
-mod browser;
-mod clock;
-mod cost;
-mod diagnosing;
-mod editing;
-mod http;
-mod kill;
-mod lives;
-mod operations;
-mod package;
-mod page;
-mod process;
-#[path = "../support/process_status.rs"]
-mod process_status;
-mod replay;
-#[path = "../support/sealed.rs"]
+mod access;
+mod check;
+mod gate;
+mod live_twin;
+mod loops;
+mod messages;
+mod scripts;
+#[path = "../records/sealed.rs"]
 mod sealed;
-mod settings;
-mod system;
-mod twin;
-mod views;
-mod watchdog;
-mod wear;
-mod words;
-mod year;
+mod whole;

@@ -3,7 +3,6 @@
 
 use crate::clocks::{Clocked, LEAPS};
 use crate::kills::status;
-use crate::process::{Gateway, program, run, stderr, stdout, text, wait_for};
 use crate::table::{Row, Scale};
 use adapters::address::SimulatedMachine;
 use adapters::clock::{Clock, SystemClock};
@@ -17,6 +16,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use testkit::process::{Gateway, program, run, stderr, stdout, text, wait_for};
 
 /// How long the control has been on: its spindle has just turned free, so that the gate knows the state of the machine soon.
 const ON_NS: i64 = 260_000_000_000;

@@ -1,12 +1,12 @@
 //! The clock of the computer: leaps while the box runs, wrong years at its start, summer time.
 
 use crate::kills::{queried, status};
-use crate::process::{Gateway, program, run, stdout, wait_for};
 use crate::table::{Row, Scale};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use testkit::process::{Gateway, program, run, stdout, wait_for};
 
 pub(crate) const LIBRARY: &str = "/usr/lib/x86_64-linux-gnu/faketime/libfaketime.so.1";
 

@@ -1,12 +1,12 @@
 //! Disarm by every route, under everything that could be in the way.
 
 use crate::armed::{Machine, Plain, arm_by_socket, disarm_by_socket, fill, on_small_disk};
-use crate::process::{request, wait_for};
 use crate::table::{Row, Scale};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use testkit::process::{request, wait_for};
 
 /// The aim: from the order to its answer.
 const WITHIN: Duration = Duration::from_millis(100);

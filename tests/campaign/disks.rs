@@ -1,7 +1,6 @@
 //! Disks: full, failing, and files that somebody removes, replaces, damages or reads for ever while the box writes.
 
 use crate::kills::{queried, status, strace};
-use crate::process::{Gateway, wait_for};
 use crate::table::{Row, Scale};
 use gateway::history::Reader;
 use serde_json::Value;
@@ -10,6 +9,7 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
+use testkit::process::{Gateway, wait_for};
 
 /// A box at sixty times the pace of a machine, so that its file grows.
 struct Running {

@@ -1,11 +1,7 @@
 //! Memory, descriptors, threads and the files of boxes that run long: hours of a machine that passes quickly, and minutes of a box at the
 //! pace of a machine with many readers. Looked at from outside, in `/proc`.
 
-use crate::box_under_test::Sending;
-use crate::broker::Broker;
 use crate::kills::status;
-use crate::process::{get, wait_for};
-use crate::process_status::status_figure;
 use crate::table::{Row, Scale};
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -14,6 +10,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use testkit::box_under_test::Sending;
+use testkit::broker::Broker;
+use testkit::process::{get, wait_for};
+use testkit::process_status::status_figure;
 
 /// Machine hours that pass in the time of one: 72 h in 20 minutes.
 const PACE: &str = "216";

@@ -1,12 +1,12 @@
 //! SIGKILL and SIGTERM at random moments of a running box.
 
-use crate::process::{Gateway, program, run, stderr, stdout, text, try_get, wait_for};
 use crate::table::{Row, Scale};
 use gateway::history::Reader;
 use rand::{Rng, SeedableRng};
 use serde_json::Value;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use testkit::process::{Gateway, program, run, stderr, stdout, text, try_get, wait_for};
 
 pub(crate) fn random() -> rand_pcg::Pcg64Mcg {
     let seed = std::env::var("CNC_GATEWAY_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(20_261_126);

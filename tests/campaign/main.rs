@@ -8,30 +8,13 @@
 //! Processes, sockets, brokers and databases are real. Where a partner is not installed its rows say so, and fail with
 //! `CNC_GATEWAY_CI` set.
 
-#[path = "../outputs/box_under_test.rs"]
-#[expect(dead_code, reason = "the tests of the sinks use the rest of it")]
-mod box_under_test;
-#[path = "../huazhong/broker.rs"]
-#[expect(dead_code, reason = "the tests of NC-Link use the rest of it")]
-mod broker;
-#[path = "../outputs/host.rs"]
-#[expect(dead_code, reason = "the tests of the sinks use the rest of it")]
-mod host;
-#[path = "../support/port.rs"]
-mod port;
-#[path = "../box/process.rs"]
-#[expect(dead_code, reason = "the tests of the box use the rest of it")]
-mod process;
-#[path = "../support/process_status.rs"]
-mod process_status;
-
 mod armed;
 mod clocks;
 mod disarm;
 mod disks;
+mod fuzz;
 mod growth;
 mod kills;
-#[expect(dead_code, reason = "the fuzzed lines use the rest of it")]
 mod line;
 mod partners;
 mod power;

@@ -1,12 +1,8 @@
 //! Receivers that are away, restart, or take nothing. Truth: what a client that is not ours has heard, by the numbers that every item
 //! carries.
 
-use crate::box_under_test::Sending;
-use crate::broker::{Broker, program as installed};
-use crate::host::Host;
 use crate::kills::random;
 use crate::line::{Fault, Line};
-use crate::process::wait_for;
 use crate::table::{Row, Scale};
 use rand::Rng;
 use serde_json::Value;
@@ -15,6 +11,10 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use testkit::box_under_test::Sending;
+use testkit::broker::{Broker, program as installed};
+use testkit::host::Host;
+use testkit::process::wait_for;
 
 pub(crate) const PATIENCE: Duration = Duration::from_secs(300);
 

@@ -162,7 +162,7 @@ fn every_test_that_is_named_is_there() {
 fn a_line_is_taken_apart_as_a_shell_does() {
     assert_eq!(words("a \"b c\" d=e # f"), ["a", "b c", "d=e"]);
     assert_eq!(words("check --example > file"), ["check", "--example"]);
-    let words = words("SEED=1 cargo test --test gate name -- --ignored");
+    let words = words("SEED=1 cargo test --test box name -- --ignored");
     let given = arguments(&words, "cargo").expect("calls cargo");
     assert_eq!(filters(&given[1..]), ["name"]);
 }

@@ -7,9 +7,6 @@ mod commands;
 mod documents;
 mod driver;
 mod effect;
-#[expect(dead_code, reason = "this program needs a part of it")]
-#[path = "../box/process.rs"]
-mod process;
 mod run;
 mod settings;
 

@@ -6,10 +6,10 @@
 
 use crate::commands::{arguments, is_a_pattern, lines, words};
 use crate::documents::{Document, documents};
-use crate::process::{Gateway, program, stderr, stdout};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use testkit::process::{Gateway, program, stderr, stdout};
 
 /// The documents in the order of somebody who begins: a history must be there before it is asked.
 const ORDER: [&str; 10] = [
@@ -29,11 +29,11 @@ const OTHER_CODES: [(&str, i32, &str); 1] =
     [("commission --config", 1, "parts of the commissioning are still missing, which the code tells")];
 /// Commands that are not run here, and where they are.
 const ELSEWHERE: [(&str, &str); 6] = [
-    ("fleet stream", "tests/fleet: needs a NATS server"),
-    ("fleet ingest", "tests/fleet: needs NATS and PostgreSQL"),
-    ("fleet retain", "tests/fleet: needs PostgreSQL"),
-    ("setup", "tests/box: writes where a service is configured"),
-    ("update", "tests/box: needs the folders of the package"),
+    ("fleet stream", "tests/records/fleet: needs a NATS server"),
+    ("fleet ingest", "tests/records/fleet: needs NATS and PostgreSQL"),
+    ("fleet retain", "tests/records/fleet: needs PostgreSQL"),
+    ("setup", "tests/box/whole: writes where a service is configured"),
+    ("update", "tests/box/whole: needs the folders of the package"),
     ("doctor --box", "gateway/doctor/computer.rs: its answer is that of the computer"),
 ];
 /// What a command that runs until it is stopped says when it serves; others name the address of their page.

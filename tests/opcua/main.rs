@@ -3,19 +3,11 @@
 //! Built with the feature `opcua` only. Where asyncua is not installed the test says that it skips; with `CNC_GATEWAY_CI`
 //! set it fails.
 
-#[path = "../outputs/box_under_test.rs"]
-#[expect(dead_code, reason = "the tests of the sinks use the rest of it")]
-mod box_under_test;
-#[path = "../support/port.rs"]
-mod port;
-#[path = "../box/process.rs"]
-#[expect(dead_code, reason = "the tests of the box use the rest of it")]
-mod process;
-
-use box_under_test::Sending;
 use serde_json::{Value as Json, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use testkit::box_under_test::Sending;
+use testkit::{port, process};
 
 const MACHINE_TOOL: &str = "http://opcfoundation.org/UA/MachineTool/";
 /// An alarm that begins and ends every ten seconds of the machine while its spindle turns.

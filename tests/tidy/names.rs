@@ -36,8 +36,8 @@ const STAY: [(&str, &str, &str); 4] = [
         "the remainder of a division, as in written arithmetic",
     ),
     ("rules/script/functions/thermal.rs", "carried", "the remainder of a division, as in written arithmetic"),
-    ("tests/concealed/groups.rs", "wish", "part of a seed: another word would draw other cases"),
-    ("tests/concealed/spindle_case.rs", "unrest", "part of a seed: another word would draw other cases"),
+    ("tests/inference/concealed/groups.rs", "wish", "part of a seed: another word would draw other cases"),
+    ("tests/inference/concealed/spindle_case.rs", "unrest", "part of a seed: another word would draw other cases"),
 ];
 
 /// The code of a file without its modules of tests.

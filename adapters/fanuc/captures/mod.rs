@@ -2,7 +2,7 @@
 //! (version words 2, 3 and 4): our client must write the same questions and read the same values, our server must give the
 //! same answers. The answers are those of a simulator, not of a control: they show what the library accepts and how it reads
 //! it, and nothing of what a machine sends. That of the modal words (1/22) is our own: the simulator's had its flag in a byte
-//! that the library does not read; what it does read is tested byte by byte in `tests/fanuc/layouts.rs`.
+//! that the library does not read; what it does read is tested byte by byte in `tests/controllers/fanuc/layouts.rs`.
 //!
 //! The frames are written here in a short notation, block by block, and put together by an independent few lines
 //! below, so that a mistake of the codec cannot hide. Questions: `device/function argument ...` in hexadecimal, with

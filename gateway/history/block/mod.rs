@@ -1,7 +1,7 @@
 //! A block: every series of one minute (after compaction: ten minutes), column by column.
 //!
 //! # Why blocks and not a row per sample
-//! Measured with `cargo test --release --test history layouts -- --ignored --nocapture` (20 series at 10 Hz); see the
+//! Measured with `cargo test --release --test records history::figures::layouts -- --ignored --nocapture` (20 series at 10 Hz); see the
 //! figures in the module documentation of [`history`](super). The rows of a minute share one database row: a small
 //! directory with the summary of every series, and one compressed stream per series, so that a query reads the series
 //! it asks for and an overview reads no samples at all.

@@ -1,0 +1,24 @@
+//! The whole box: real child processes, sockets, files, signals and a browser.
+
+mod backup;
+mod brought;
+mod browser;
+mod clock;
+mod cost;
+mod diagnosing;
+mod editing;
+mod http;
+mod kill;
+mod lives;
+mod operations;
+mod package;
+mod page;
+mod replay;
+mod settings;
+mod system;
+mod twin;
+mod views;
+mod watchdog;
+mod wear;
+mod words;
+mod year;

@@ -1,0 +1,8 @@
+//! What is spoken with at the machine: FANUC and Huazhong controllers, and meters.
+//!
+//! The suites of one folder are one program, because each program links everything: `cargo test --test controllers fanuc::` runs
+//! one suite, `cargo test --test controllers fanuc::ages` a part of it.
+
+mod fanuc;
+mod huazhong;
+mod meters;

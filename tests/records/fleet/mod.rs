@@ -1,0 +1,19 @@
+//! Many boxes and one database: real NATS servers and a real PostgreSQL, and what is left when parts of them die.
+//!
+//! `nats-server` and `initdb` are looked for; where one is not installed the tests say that they skip, with `CNC_GATEWAY_CI` set
+//! they fail.
+
+mod boxes;
+mod cluster;
+mod killed;
+mod means;
+mod monitoring;
+mod partitions;
+mod pipeline;
+mod poison;
+mod postgres;
+mod questions;
+mod secured;
+mod sizes;
+mod told;
+mod versions;

@@ -1,0 +1,109 @@
+//! Histories that are written here and sent as a box sends them: through the sink `nats://`, the stream and `fleet ingest`.
+
+use crate::fleet::cluster::Cluster;
+use crate::fleet::postgres::Postgres;
+use adapters::{Absence, ChannelId, Sample, Slot, Value};
+use gateway::history::{ExtraSeries, ExtraValue, Options, Outbox, OutboxSettings, Writer};
+use gateway::sinks::{Board, Sinks, drive};
+use std::time::Duration;
+use testkit::process::{run, stderr, stdout};
+
+/// One stream and one database.
+pub(crate) struct Plant {
+    _cluster: Cluster,
+    pub(crate) postgres: Postgres,
+    /// `nats://127.0.0.1:PORT/cnc`.
+    pub(crate) address: String,
+}
+
+impl Plant {
+    /// `None` where a server is not installed.
+    pub(crate) fn start() -> Option<Self> {
+        Self::with("")
+    }
+
+    /// With these lines in the configuration of the NATS server.
+    pub(crate) fn with(lines: &str) -> Option<Self> {
+        let cluster = Cluster::with(1, &format!("{{store}}\n{lines}"))?;
+        let postgres = Postgres::start()?;
+        let address = format!("{}/cnc", cluster.address());
+        let made = run(&["fleet", "stream", &address, "--max-gb", "4"]);
+        assert!(made.status.success(), "{}", stderr(&made));
+        Some(Self { _cluster: cluster, postgres, address })
+    }
+
+    /// Everything that waits goes into the database; gives what was said.
+    pub(crate) fn ingest(&self) -> String {
+        let done =
+            run(&["fleet", "ingest", &self.address, "--max-gb", "4", "--once", "--database", &self.postgres.address()]);
+        assert!(done.status.success(), "{}", stderr(&done));
+        format!("{}{}", stdout(&done), stderr(&done))
+    }
+}
+
+/// A history with the machine state beside the channels, and its sink.
+pub(crate) struct Recorded {
+    pub(crate) directory: tempfile::TempDir,
+    pub(crate) writer: Option<Writer>,
+    board: Board,
+    sinks: Option<Sinks>,
+    runtime: tokio::runtime::Runtime,
+}
+
+impl Recorded {
+    /// Of a machine whose ticks are so far apart; begins to send.
+    pub(crate) fn start(machine: &str, tick: Duration, address: &str) -> Self {
+        let directory = tempfile::tempdir().expect("a directory");
+        Self::again(directory, machine, tick, address)
+    }
+
+    /// The same history, opened again, perhaps under another name.
+    pub(crate) fn again(directory: tempfile::TempDir, machine: &str, tick: Duration, address: &str) -> Self {
+        let settings = OutboxSettings { tick, drain: Duration::from_secs(60), ..OutboxSettings::default() };
+        let outbox = Outbox::new(machine, settings, ["fleet".to_owned()]);
+        let extras = vec![ExtraSeries::new_text("machine_state", "state", "状态")];
+        let options = Options {
+            extras,
+            group_commit: Duration::from_millis(100),
+            outbox: Some(outbox.clone()),
+            when_full: gateway::history::WhenFull::Wait,
+            ..Options::default()
+        };
+        let path = directory.path().join("history.db");
+        let writer = Writer::open(&path, options).expect("opens");
+        let runtime =
+            tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("threads");
+        let address = address.parse().expect("an address");
+        let sink = gateway::config::SinkConfig { name: "fleet".to_owned(), address, allow_requests: false };
+        let board = Board::new(outbox.clone(), [("fleet".to_owned(), "nats".to_owned())]);
+        let (post, _inbox) = gateway::control::create_queues();
+        let sinks = runtime.block_on(async { drive::start_sinks(&[sink], &post, (&outbox, &board), &path) });
+        Self { directory, writer: Some(writer), board, sinks: Some(sinks), runtime }
+    }
+
+    pub(crate) fn writer(&self) -> &Writer {
+        self.writer.as_ref().expect("open")
+    }
+
+    /// A tick with these values; `Err` is why there is none.
+    pub(crate) fn tick(&self, at_ns: i64, values: &[(ChannelId, Result<f64, Absence>)], state: &str) {
+        let mut sample = Sample::new_empty(at_ns);
+        for (channel, value) in values {
+            let slot = match value {
+                Ok(number) => Slot { value: Ok(Value::Number(*number)), age_ns: 0 },
+                Err(reason) => Slot::from_absence(*reason),
+            };
+            sample.set_slot(*channel, slot);
+        }
+        self.writer().queue_sample(&sample, &[ExtraValue::Text(state)]);
+    }
+
+    /// Ends as a box does: the last commit waits for the sink.
+    pub(crate) fn stop(mut self) -> tempfile::TempDir {
+        drop(self.writer.take());
+        let left = self.board.list_sinks()[0].behind_items;
+        self.runtime.block_on(self.sinks.take().expect("running").stop());
+        assert_eq!(left, 0, "everything is delivered at a clean end: {:?}", self.board.list_sinks());
+        self.directory
+    }
+}
