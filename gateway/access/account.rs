@@ -39,20 +39,20 @@ impl Budget {
 /// See the [module](self).
 #[derive(Debug)]
 pub(super) struct Account {
-    post: OrderSender,
+    orders: OrderSender,
     refusals: Mutex<Budget>,
 }
 
 impl Account {
     pub(super) fn new(post: OrderSender) -> Self {
-        Self { post, refusals: Mutex::default() }
+        Self { orders: post, refusals: Mutex::default() }
     }
 
     /// Something happened; false when it will not be stored.
     pub(super) async fn append_row(&self, kind: &str, outcome: &str, reason: &str, person: &str) -> bool {
         let cut = |text: &str| text.chars().filter(|sign| !sign.is_control()).take(TEXT_MAX).collect();
         let (kind, outcome) = (kind.to_owned(), outcome.to_owned());
-        self.post
+        self.orders
             .send_audit_row(Audit { kind, outcome, reason: cut(reason), person: cut(person), ..Audit::default() })
             .await
     }
@@ -65,7 +65,7 @@ impl Account {
             0 => reason.to_owned(),
             more => format!("{reason} ({more} more refusals before it were left out)"),
         };
-        let (account, kind, person) = (Self::new(self.post.clone()), kind.to_owned(), person.to_owned());
+        let (account, kind, person) = (Self::new(self.orders.clone()), kind.to_owned(), person.to_owned());
         tokio::spawn(async move { account.append_row(&kind, "refused", &reason, &person).await });
     }
 }

@@ -104,7 +104,7 @@ impl Access {
     /// Reads the persons of `file`; where there is none the first administrator is made, and the token is given to be shown
     /// once.
     #[must_use]
-    pub fn open(file: PathBuf, rules: Rules, post: OrderSender) -> (Self, Option<Token>) {
+    pub fn open(file: PathBuf, rules: Rules, orders: OrderSender) -> (Self, Option<Token>) {
         let (persons, first) = match read_or_create_persons(&file) {
             Ok(found) => found,
             Err(error) => {
@@ -124,7 +124,7 @@ impl Access {
             bearers: Mutex::default(),
             changing: tokio::sync::Mutex::default(),
             hashing: [Semaphore::new(1), Semaphore::new(1)],
-            account: Account::new(post),
+            account: Account::new(orders),
             nobody,
         };
         (access, first)

@@ -20,21 +20,21 @@ pub enum Patience {
 pub(super) type LagResult = Result<Lag, NotIdentifiable>;
 
 struct BackgroundThread {
-    ask: SyncSender<Vec<Transient>>,
-    answers: Receiver<LagResult>,
+    transients: SyncSender<Vec<Transient>>,
+    results: Receiver<LagResult>,
 }
 
 /// See the [module](self).
 pub(super) struct Background {
     patience: Patience,
-    line: Option<BackgroundThread>,
+    thread: Option<BackgroundThread>,
     /// For which pair, and when the answer is due.
     asked: Option<(usize, TimeNs)>,
 }
 
 impl Background {
     pub(super) fn new(patience: Patience) -> Self {
-        Self { patience, line: None, asked: None }
+        Self { patience, thread: None, asked: None }
     }
 
     pub(super) fn is_idle(&self) -> bool {
@@ -43,20 +43,20 @@ impl Background {
 
     /// Asks for an estimate. Without a thread there is none, and the next transient asks again.
     pub(super) fn request_estimate(&mut self, pair: usize, transients: Vec<Transient>, now_ns: TimeNs) {
-        if self.line.is_none() {
-            self.line = spawn_thread();
+        if self.thread.is_none() {
+            self.thread = spawn_thread();
         }
-        let asked = self.line.as_ref().is_some_and(|line| line.ask.try_send(transients).is_ok());
+        let asked = self.thread.as_ref().is_some_and(|line| line.transients.try_send(transients).is_ok());
         self.asked = asked.then_some((pair, now_ns + TAKEN_AFTER_NS));
     }
 
     /// The answer for a pair, when it is due and there.
     pub(super) fn take_estimate(&mut self, pair: usize, now_ns: TimeNs) -> Option<LagResult> {
         let due = self.asked.is_some_and(|(asked, due_ns)| asked == pair && due_ns <= now_ns);
-        let line = self.line.as_ref().filter(|_| due)?;
+        let line = self.thread.as_ref().filter(|_| due)?;
         let answer = match self.patience {
-            Patience::Waits => line.answers.recv().map_err(|_| TryRecvError::Disconnected),
-            Patience::GoesOn => line.answers.try_recv(),
+            Patience::Waits => line.results.recv().map_err(|_| TryRecvError::Disconnected),
+            Patience::GoesOn => line.results.try_recv(),
         };
         match answer {
             Ok(found) => {
@@ -65,7 +65,7 @@ impl Background {
             }
             Err(TryRecvError::Empty) => None,
             Err(TryRecvError::Disconnected) => {
-                (self.line, self.asked) = (None, None);
+                (self.thread, self.asked) = (None, None);
                 None
             }
         }
@@ -84,5 +84,5 @@ fn spawn_thread() -> Option<BackgroundThread> {
         }
     };
     std::thread::Builder::new().name("align".to_owned()).spawn(estimate).ok()?;
-    Some(BackgroundThread { ask, answers })
+    Some(BackgroundThread { transients: ask, results: answers })
 }

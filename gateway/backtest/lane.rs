@@ -63,7 +63,7 @@ pub struct Lane {
     /// Spells that have begun, by place in `spells`.
     open: Vec<usize>,
     left_out: u64,
-    asked: RequestTotals,
+    request_totals: RequestTotals,
     pct: Option<f64>,
     notes: u64,
     problems: Vec<ScriptProblem>,
@@ -79,7 +79,7 @@ impl Lane {
             spells: Vec::new(),
             open: Vec::new(),
             left_out: 0,
-            asked: RequestTotals::default(),
+            request_totals: RequestTotals::default(),
             pct: None,
             notes: 0,
             problems: Vec::new(),
@@ -97,7 +97,7 @@ impl Lane {
         let before = std::mem::replace(&mut self.pct, pct);
         if at_ns >= self.from_ns {
             self.tally.count_tick(at_ns, state);
-            self.asked.add(self.pct, before, step_ns);
+            self.request_totals.add(self.pct, before, step_ns);
         }
     }
 
@@ -197,7 +197,7 @@ impl Lane {
     /// What was asked for.
     #[must_use]
     pub fn request_totals(&self) -> &RequestTotals {
-        &self.asked
+        &self.request_totals
     }
 
     /// Every state with its seconds.

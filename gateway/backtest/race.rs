@@ -26,7 +26,7 @@ const BATCHES_MAX: usize = 3;
 struct Inferring {
     estimators: estimators::Inference,
     wear: WearEstimator,
-    parts: CycleFollower,
+    cycles: CycleFollower,
     channels: Channels,
 }
 
@@ -34,8 +34,8 @@ impl Inferring {
     fn infer_estimates(&mut self, sample: &Sample) -> Estimates {
         let mut estimates = *self.estimators.update_with_sample(sample);
         self.wear.update_estimates(sample, &mut estimates);
-        let _finished = self.parts.follow_tick(&self.channels, sample, &estimates);
-        estimates.part = self.parts.last_figures();
+        let _finished = self.cycles.follow_tick(&self.channels, sample, &estimates);
+        estimates.part = self.cycles.last_figures();
         estimates
     }
 }
@@ -54,7 +54,7 @@ impl Runner {
         let estimators = infers.then(|| Inferring {
             estimators: estimators::Inference::new(host.settings().clone()),
             wear: WearEstimator::default(),
-            parts: CycleFollower::default(),
+            cycles: CycleFollower::default(),
             channels: Channels::new(),
         });
         Self { estimators, generation: host.generation(), host }

@@ -87,7 +87,7 @@ impl<M: PartialEq + Clone> Default for Rest<M> {
 #[derive(Debug)]
 pub struct Lookout<T> {
     newest: Receiver<T>,
-    asked: SyncSender<()>,
+    request: SyncSender<()>,
 }
 
 impl<T: Send + 'static> Lookout<T> {
@@ -111,13 +111,13 @@ impl<T: Send + 'static> Lookout<T> {
             }
         };
         std::thread::Builder::new().name(name.to_owned()).spawn(work)?;
-        Ok(Self { newest, asked })
+        Ok(Self { newest, request: asked })
     }
 
     /// Makes it look now. Returns at once.
     pub fn request_look(&self) {
         // A full queue means that it has been asked already.
-        let _asked_before = self.asked.try_send(());
+        let _asked_before = self.request.try_send(());
     }
 
     /// What was found since the last call, if anything was.

@@ -124,7 +124,7 @@ fn with_series(
     };
     let attached = attach_series(&given.recording, &output, &series, None).map_err(|all| cannot_use_as(&all))?;
     given.recording = attached.recording;
-    given.warnings.extend(attached.told);
+    given.warnings.extend(attached.remarks);
     let model = match model {
         Some(model) => model,
         None => series_model(&output).map_err(|wrong| cannot_use(&wrong))?,

@@ -205,7 +205,7 @@ async fn create_stream(arguments: &StreamArguments) -> CommandResult {
 async fn ingest_stream(arguments: &IngestArguments) -> CommandResult {
     let (servers, stream) = arguments.stream.parse_settings()?;
     let settings = IngestSettings {
-        servers,
+        target: servers,
         stream,
         consumer: arguments.consumer.clone(),
         database: arguments.database.to_settings(),

@@ -20,12 +20,12 @@
 
 mod client;
 mod network;
-mod post;
+mod order_channel;
 mod server;
 
 pub use client::send_order;
 pub use network::{NetworkRequest, RequestRefusal, RequestedChange};
-pub use post::{OrderReceiver, OrderSender, PostedRequest, PostedRow, Wake, create_queues};
+pub use order_channel::{OrderReceiver, OrderSender, PostedRequest, PostedRow, Wake, create_queues};
 pub use server::{Listening, listen_for_orders};
 
 use serde::{Deserialize, Serialize};

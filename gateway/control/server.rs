@@ -34,9 +34,9 @@ impl Drop for Listening {
 
 /// Listens in this directory. Without a socket the box goes on; it cannot be armed then, and says so.
 #[must_use]
-pub fn listen_for_orders(data_dir: &Path, post: OrderSender) -> Option<Listening> {
+pub fn listen_for_orders(data_dir: &Path, orders: OrderSender) -> Option<Listening> {
     let path = socket_path(data_dir);
-    match bind_socket(&path).and_then(|listener| start_thread(listener, post)) {
+    match bind_socket(&path).and_then(|listener| start_thread(listener, orders)) {
         Ok(going_on) => Some(Listening { path, _going_on: going_on }),
         Err(error) => {
             let text =

@@ -188,7 +188,7 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
                     .ok_or_else(|| "which recorded quantity does the series simulate? choose a model".to_owned())?;
                 let found = attach_series(&recording, &output, &series, None).map_err(together)?;
                 recording = found.recording;
-                reading.extend(found.told);
+                reading.extend(found.remarks);
                 model = Some(model.map_or_else(|| series_model(&output).map_err(|wrong| wrong.join("; ")), Ok)?);
             }
             let model = model.ok_or_else(|| "no model was given".to_owned())?;

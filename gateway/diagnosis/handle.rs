@@ -99,14 +99,14 @@ pub struct DiagnosisHandle {
     state: Arc<Mutex<DiagnosisState>>,
     requests: SyncSender<DiagnosisRequest>,
     model: PathBuf,
-    kept: DiagnosisStore,
+    store: DiagnosisStore,
 }
 
 impl DiagnosisHandle {
     /// A handle whose requests go there.
     #[must_use]
     pub fn new(requests: SyncSender<DiagnosisRequest>, model: PathBuf, kept: DiagnosisStore) -> Self {
-        Self { state: Arc::default(), requests, model, kept }
+        Self { state: Arc::default(), requests, model, store: kept }
     }
 
     /// A handle of the same diagnoses that asks for none: its thread ends when the others are gone.
@@ -123,7 +123,7 @@ impl DiagnosisHandle {
     /// What was kept of diagnoses.
     #[must_use]
     pub fn diagnosis_store(&self) -> &DiagnosisStore {
-        &self.kept
+        &self.store
     }
 
     /// The model file.
@@ -266,7 +266,7 @@ impl DiagnosisHandle {
                 "only one that names what is missing does; diagnose again",
             )
         };
-        let text = self.kept.read_file(key, DiagnosisFile::Model).ok_or_else(gone)?;
+        let text = self.store.read_file(key, DiagnosisFile::Model).ok_or_else(gone)?;
         let next = "look at the file; `cnc-gateway diagnose --accept` writes one by hand";
         let model =
             parse_model(&text).map_err(|wrong| DiagnosisRefusal::new(format!("the kept model: {}", wrong[0]), next))?;

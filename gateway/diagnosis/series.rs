@@ -82,7 +82,7 @@ pub struct AttachedSeries {
     /// Name of that column.
     pub column: String,
     /// For the user: how it was read and laid beside.
-    pub told: Vec<Bilingual>,
+    pub remarks: Vec<Bilingual>,
 }
 
 /// Share of the rows that must get a value.
@@ -128,7 +128,7 @@ pub fn attach_series(
     let column = series_column(output);
     let mut with = recording.clone();
     with.set_column(&column, Cells::Numbers(cells));
-    Ok(AttachedSeries { recording: with, column, told })
+    Ok(AttachedSeries { recording: with, column, remarks: told })
 }
 
 /// The name of the series as a column of the recording: `spindle_power_w` -> `simulated_spindle_power_w`.

@@ -29,7 +29,7 @@ const REASON_KEPT: usize = 1000;
 #[derive(Debug, Clone)]
 pub struct IngestSettings {
     /// The cluster.
-    pub servers: NatsTarget,
+    pub target: NatsTarget,
     /// The stream; it is created if it is missing.
     pub stream: StreamSettings,
     /// Name of the durable consumer, which all that share the work have in common.
@@ -54,7 +54,7 @@ pub struct Done {
 struct Ingest<'a> {
     settings: &'a IngestSettings,
     done: Done,
-    told: Instant,
+    last_report: Instant,
     /// The server with which the next connection begins.
     server: usize,
 }
@@ -64,7 +64,7 @@ struct Ingest<'a> {
 /// # Errors
 /// With `once`, the failure that ended it.
 pub async fn run(settings: &IngestSettings) -> Result<Done, NatsError> {
-    let mut ingest = Ingest { settings, done: Done::default(), told: Instant::now(), server: 0 };
+    let mut ingest = Ingest { settings, done: Done::default(), last_report: Instant::now(), server: 0 };
     let mut pause = PAUSE_FIRST;
     let mut last = String::new();
     loop {
@@ -91,7 +91,7 @@ pub async fn run(settings: &IngestSettings) -> Result<Done, NatsError> {
 impl Ingest<'_> {
     /// From connecting to the first failure, or to the end of the work.
     async fn run_session(&mut self) -> Result<(), NatsError> {
-        let IngestSettings { servers, stream, consumer, database, once } = self.settings;
+        let IngestSettings { target: servers, stream, consumer, database, once } = self.settings;
         let first = self.server;
         self.server += 1;
         let mut database = Database::open(database).await?;
@@ -118,8 +118,8 @@ impl Ingest<'_> {
                     return Ok(());
                 }
             }
-            if self.told.elapsed() >= TELL_EVERY {
-                self.told = Instant::now();
+            if self.last_report.elapsed() >= TELL_EVERY {
+                self.last_report = Instant::now();
                 let pending = connection.read_backlog(&stream.name, consumer).await?.pending;
                 self.report_progress(pending);
             }

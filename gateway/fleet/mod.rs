@@ -58,7 +58,7 @@ pub enum ClusterError {
 pub fn parse_cluster(address: &str) -> Result<(NatsTarget, String), ClusterError> {
     let sink: crate::sinks::SinkAddress = address.parse().map_err(ClusterError::Address)?;
     match sink.target() {
-        crate::sinks::SinkTarget::Nats(target) => Ok((target.servers.clone(), target.prefix.clone())),
+        crate::sinks::SinkTarget::Nats(target) => Ok((target.target.clone(), target.prefix.clone())),
         _ => Err(ClusterError::NotNats { address: address.to_owned() }),
     }
 }

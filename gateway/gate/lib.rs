@@ -24,13 +24,13 @@
 
 mod arming;
 mod ask;
+pub mod audit;
 mod fault;
 mod hold;
 mod limit;
 pub mod limits;
 pub mod offset;
 mod thread_cycle;
-pub mod trail;
 mod verdict;
 mod write;
 

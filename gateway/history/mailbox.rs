@@ -72,7 +72,7 @@ pub(crate) struct Delivery {
 /// Waiting room of one history.
 #[derive(Debug)]
 pub(crate) struct Mailbox {
-    post: Mutex<MailboxState>,
+    state: Mutex<MailboxState>,
     /// Something has arrived for the writer.
     arrived: Condvar,
     /// The writer has taken something, or has finished a job.
@@ -112,7 +112,7 @@ impl Mailbox {
             stopped: false,
         };
         Self {
-            post: Mutex::new(post),
+            state: Mutex::new(post),
             arrived: Condvar::new(),
             progressed: Condvar::new(),
             queue_rows: options.queue_rows.max(1),
@@ -123,7 +123,7 @@ impl Mailbox {
 
     fn lock_state(&self) -> MutexGuard<'_, MailboxState> {
         // Nothing in here is left half done by a panic: every push is completed before the lock is released.
-        self.post.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn wait_for_progress<'a>(&self, post: MutexGuard<'a, MailboxState>) -> MutexGuard<'a, MailboxState> {

@@ -59,7 +59,7 @@ pub(crate) struct SharedStatus {
     pub(crate) short_of_room: AtomicBool,
     /// Rounds of the thread: it grows unless the thread hangs.
     pub(crate) rounds: AtomicU64,
-    words: Mutex<StatusTexts>,
+    texts: Mutex<StatusTexts>,
 }
 
 #[derive(Debug, Default)]
@@ -86,7 +86,7 @@ impl Default for SharedStatus {
             commit_us: AtomicU64::new(0),
             short_of_room: AtomicBool::new(false),
             rounds: AtomicU64::new(0),
-            words: Mutex::new(StatusTexts::default()),
+            texts: Mutex::new(StatusTexts::default()),
         }
     }
 }
@@ -99,24 +99,24 @@ impl SharedStatus {
 
     /// All is well again.
     pub(crate) fn mark_recovered(&self) {
-        self.words.lock().unwrap_or_else(PoisonError::into_inner).degraded = None;
+        self.texts.lock().unwrap_or_else(PoisonError::into_inner).degraded = None;
     }
 
     /// Nothing is becoming durable, because of `error`.
     pub(crate) fn mark_degraded(&self, error: &str) {
-        let mut words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut words = self.texts.lock().unwrap_or_else(PoisonError::into_inner);
         words.degraded = Some(error.to_owned());
         words.last_error = Some(error.to_owned());
     }
 
     /// The file is not as it was written.
     pub(crate) fn mark_damaged(&self, error: &str) {
-        self.words.lock().unwrap_or_else(PoisonError::into_inner).damaged = Some(error.to_owned());
+        self.texts.lock().unwrap_or_else(PoisonError::into_inner).damaged = Some(error.to_owned());
     }
 
     /// Everything but the queue.
     pub(crate) fn read_figures(&self) -> HistoryFigures {
-        let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
+        let words = self.texts.lock().unwrap_or_else(PoisonError::into_inner);
         HistoryFigures {
             acknowledged_through_ns: self.acknowledged_ns(),
             acknowledged_record: self.acknowledged_record.load(Ordering::Acquire),

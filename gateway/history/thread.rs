@@ -34,7 +34,7 @@ pub(crate) struct Thread {
     pub(crate) mailbox: Arc<Mailbox>,
     pub(crate) shared: Arc<SharedStatus>,
     pub(crate) options: Options,
-    pub(crate) pace: CommitSchedule,
+    pub(crate) schedule: CommitSchedule,
 }
 
 /// When to commit, and what is being waited for.
@@ -75,7 +75,7 @@ impl Thread {
             self.commit_if_due(closing);
             self.run_maintenance();
             let done = rows_too && !self.is_dirty();
-            if closing && (done || self.pace.failures >= LAST_ATTEMPTS) {
+            if closing && (done || self.schedule.failures >= LAST_ATTEMPTS) {
                 return self.finish_writing();
             }
         }
@@ -87,10 +87,10 @@ impl Thread {
     }
 
     fn receive_delivery(&mut self, rows_too: bool) -> Delivery {
-        let until_commit = self.pace.next_commit.saturating_duration_since(Instant::now());
+        let until_commit = self.schedule.next_commit.saturating_duration_since(Instant::now());
         let limit = if self.maintenance.is_busy() { Duration::ZERO } else { until_commit };
         // A flush promises everything before it, so it cannot come before its rows.
-        let job_too = rows_too && self.pace.flushing.is_none() && self.pace.maintaining.is_none();
+        let job_too = rows_too && self.schedule.flushing.is_none() && self.schedule.maintaining.is_none();
         self.mailbox.receive_delivery(limit, rows_too, job_too)
     }
 
@@ -108,20 +108,20 @@ impl Thread {
             }
             self.minute_buffer.ingest_batch(&batch);
             self.mailbox.recycle_batch(batch);
-            if self.minute_buffer.blocks.len() >= BLOCKS_PRESSING && self.pace.failures == 0 {
+            if self.minute_buffer.blocks.len() >= BLOCKS_PRESSING && self.schedule.failures == 0 {
                 // The next regular commit adds what the running minute has by then.
                 self.commit_pending(false);
             }
         }
         match delivery.job {
-            Some((number, WriterJob::Flush)) => self.pace.flushing = Some(number),
+            Some((number, WriterJob::Flush)) => self.schedule.flushing = Some(number),
             Some((number, WriterJob::Maintain(now_ns))) => {
-                self.pace.maintaining = Some(number);
+                self.schedule.maintaining = Some(number);
                 self.maintenance.begin_run(now_ns);
             }
             Some((number, WriterJob::ConfirmClock)) => {
                 self.options.clock.trust = Trust::Confirmed.as_word();
-                self.pace.confirming = true;
+                self.schedule.confirming = true;
                 self.mailbox.finish_job(number);
             }
             None => {}
@@ -129,11 +129,11 @@ impl Thread {
     }
 
     fn commit_if_due(&mut self, closing: bool) {
-        let urgent = self.pace.failures == 0 && (closing || self.pace.flushing.is_some());
-        if urgent || Instant::now() >= self.pace.next_commit {
+        let urgent = self.schedule.failures == 0 && (closing || self.schedule.flushing.is_some());
+        if urgent || Instant::now() >= self.schedule.next_commit {
             self.commit_pending(true);
         } else if closing {
-            std::thread::sleep(self.pace.next_commit.saturating_duration_since(Instant::now()));
+            std::thread::sleep(self.schedule.next_commit.saturating_duration_since(Instant::now()));
         }
     }
 
@@ -141,7 +141,7 @@ impl Thread {
         let began = Instant::now();
         let wait = self.options.group_commit;
         if !self.is_dirty() {
-            self.pace.next_commit = began + wait;
+            self.schedule.next_commit = began + wait;
             return self.acknowledge_rows();
         }
         match self.commit_with_retry(with_tail) {
@@ -149,9 +149,9 @@ impl Thread {
                 let took = gateway_base::convert::duration_to_us(began.elapsed());
                 self.shared.commit_us.store(took, Ordering::Relaxed);
                 self.shared.commits.fetch_add(1, Ordering::Relaxed);
-                self.pace.failures = 0;
+                self.schedule.failures = 0;
                 if with_tail {
-                    self.pace.next_commit = began + wait;
+                    self.schedule.next_commit = began + wait;
                 }
                 self.shared.mark_recovered();
                 self.note_clock();
@@ -159,12 +159,12 @@ impl Thread {
                 self.tidy_after_commit();
             }
             Err(error) => {
-                self.pace.failures += 1;
-                self.pace.next_commit = Instant::now() + wait.max(RETRY);
+                self.schedule.failures += 1;
+                self.schedule.next_commit = Instant::now() + wait.max(RETRY);
                 self.shared.mark_degraded(&degraded_text(&error));
                 if error.is_damage() {
                     // Trying again changes nothing: whoever holds the writer goes on with another file.
-                    self.pace.failures = LAST_ATTEMPTS;
+                    self.schedule.failures = LAST_ATTEMPTS;
                     self.shared.mark_damaged(&error.to_string());
                 }
             }
@@ -205,16 +205,16 @@ impl Thread {
         let rows = self.minute_buffer.rows_through(next_row);
         self.shared.rows.store(rows.saturating_sub(self.minute_buffer.lost_rows), Ordering::Relaxed);
         self.shared.acknowledged_record.store(self.minute_buffer.durable_ticket, Ordering::Release);
-        if let Some(number) = self.pace.flushing.take() {
+        if let Some(number) = self.schedule.flushing.take() {
             self.mailbox.finish_job(number);
         }
     }
 
     /// The rows of the running segment are in the file by now.
     fn note_clock(&mut self) {
-        if self.pace.confirming {
+        if self.schedule.confirming {
             // Where this fails it is tried again after the next commit.
-            self.pace.confirming = segments::confirm_clock(&self.db, &self.options.clock).is_err();
+            self.schedule.confirming = segments::confirm_clock(&self.db, &self.options.clock).is_err();
         }
     }
 
@@ -239,13 +239,13 @@ impl Thread {
             false
         });
         self.shared.retired.store(self.maintenance.retired, Ordering::Relaxed);
-        if let Some(number) = self.pace.maintaining.take_if(|_| !more) {
+        if let Some(number) = self.schedule.maintaining.take_if(|_| !more) {
             self.mailbox.finish_job(number);
         }
     }
 
     fn finish_writing(mut self) {
-        if let Some(number) = self.pace.maintaining {
+        if let Some(number) = self.schedule.maintaining {
             self.mailbox.finish_job(number);
         }
         // The running minute becomes a block, so that its summaries are complete and leave the box; where this fails, the tail has it.

@@ -67,7 +67,7 @@ impl Writer {
             mailbox: mailbox.clone(),
             shared: shared.clone(),
             options,
-            pace: CommitSchedule::default(),
+            schedule: CommitSchedule::default(),
         };
         let thread =
             std::thread::Builder::new().name("history".to_owned()).spawn(|| thread.run()).map_err(add_path(path))?;

@@ -8,7 +8,6 @@
 //! demands stands in the row of the table of routes, see [`Route`].
 
 mod backtests;
-mod brought;
 mod configuration_file;
 mod connection;
 mod description;
@@ -39,6 +38,7 @@ mod settings;
 mod sign_in;
 mod streams;
 mod twin;
+mod uploaded_files;
 mod utilisation;
 mod vocabulary;
 mod wear;
@@ -101,7 +101,7 @@ pub struct ServerParts {
     /// Who may do what.
     pub access: Arc<Access>,
     /// The way of orders to the tick.
-    pub post: OrderSender,
+    pub orders: OrderSender,
     /// Names by which browsers reach the box, besides its own addresses, in lower case.
     pub hosts: Vec<String>,
     /// Where diagnoses are asked for; `None` where no simulation runs beside the machine.
@@ -122,7 +122,7 @@ pub struct ServerState {
     backtests: Backtests,
     language: Option<Language>,
     access: Arc<Access>,
-    post: OrderSender,
+    orders: OrderSender,
     hosts: Arc<[String]>,
     diagnoses: Option<DiagnosisHandle>,
     files: Option<FileDiagnoses>,
@@ -134,8 +134,18 @@ impl ServerState {
     /// From these parts.
     #[must_use]
     pub fn new(parts: ServerParts) -> Self {
-        let ServerParts { live, history, scripts, data_dir, language, access, post, hosts, diagnoses, configured } =
-            parts;
+        let ServerParts {
+            live,
+            history,
+            scripts,
+            data_dir,
+            language,
+            access,
+            orders: post,
+            hosts,
+            diagnoses,
+            configured,
+        } = parts;
         let readers = Arc::new(Semaphore::new(history::READERS_MAX));
         let files = FileDiagnoses::from_data_dir(&data_dir).ok();
         Self {
@@ -148,7 +158,7 @@ impl ServerState {
             backtests: Backtests::default(),
             language,
             access,
-            post,
+            orders: post,
             hosts: hosts.into(),
             diagnoses,
             files,
@@ -182,7 +192,7 @@ const GROUPS: &[&[Route]] = &[
     history::ROUTES,
     twin::ROUTES,
     diagnoses::ROUTES,
-    brought::ROUTES,
+    uploaded_files::ROUTES,
     maintenance::ROUTES,
     configuration_file::ROUTES,
     identified::ROUTES,

@@ -52,7 +52,7 @@ async fn arm_gate(
     again.map_err(|error| describe_sign_in_error(&error))?;
     let order = Order::Arm { by: format_author(&person, &peer), for_s: wanted.for_s };
     respond_to_order(
-        shared.post.send_order(order).await,
+        shared.orders.send_order(order).await,
         "look at [gate] in the configuration, and at the problems of /api/v1/status",
     )
 }
@@ -64,7 +64,7 @@ async fn disarm_gate(
     SignedIn(person): SignedIn,
     headers: HeaderMap,
 ) -> Result<Response, ApiProblem> {
-    let reply = shared.post.send_order(Order::Disarm { by: format_author(&person, &peer) }).await;
+    let reply = shared.orders.send_order(Order::Disarm { by: format_author(&person, &peer) }).await;
     match plain::wants_page(&headers) {
         true => Ok(Redirect::to("/plain").into_response()),
         false => {
@@ -92,7 +92,7 @@ async fn acknowledge_alarms(
         Some(code) => Order::AcknowledgeAlarm { by, code },
         None => Order::Acknowledge { by },
     };
-    respond_to_order(shared.post.send_order(order).await, "GET /api/v1/status lists the alarms that stand")
+    respond_to_order(shared.orders.send_order(order).await, "GET /api/v1/status lists the alarms that stand")
 }
 
 /// The name as it stands in the audit.

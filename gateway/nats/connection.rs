@@ -28,7 +28,7 @@ impl<T: AsyncRead + AsyncWrite + Send + Unpin> Duplex for T {}
 pub struct Connection {
     stream: Box<dyn Duplex>,
     at: Endpoint,
-    inbox: ReceivedBytes,
+    received: ReceivedBytes,
     waiting_out: Vec<u8>,
     info: ServerInfo,
     answers: String,
@@ -73,7 +73,7 @@ impl Connection {
         let mut connection = Self {
             stream: Box::new(stream),
             at: at.clone(),
-            inbox: ReceivedBytes::default(),
+            received: ReceivedBytes::default(),
             waiting_out: Vec::new(),
             info: ServerInfo::default(),
             answers: format!("_INBOX.{}", adapters::mqtt::generate_unique_id()),
@@ -206,13 +206,13 @@ impl Connection {
 
     async fn receive_operation(&mut self) -> Result<ServerOperation, NatsError> {
         loop {
-            match self.inbox.next_operation().map_err(|came| words::no_nats(&self.at, &came.to_string()))? {
+            match self.received.next_operation().map_err(|came| words::no_nats(&self.at, &came.to_string()))? {
                 Some(ServerOperation::Ping) => self.waiting_out.extend(b"PONG\r\n"),
                 Some(operation) => return Ok(operation),
                 None => {
                     self.flush().await?;
-                    self.inbox.bytes.reserve(CHUNK);
-                    let read = self.stream.read_buf(&mut self.inbox.bytes).await;
+                    self.received.bytes.reserve(CHUNK);
+                    let read = self.stream.read_buf(&mut self.received.bytes).await;
                     if read.map_err(|error| words::of_io(&self.at, &error))? == 0 {
                         return Err(words::of_io(&self.at, &io::ErrorKind::UnexpectedEof.into()));
                     }

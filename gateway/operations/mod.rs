@@ -36,7 +36,7 @@ pub struct Operations {
     active: Option<LoadedRecipe>,
     refused: Vec<ScriptProblem>,
     watcher: Option<Lookout<RecipeResult>>,
-    told: Vec<Notice>,
+    notices: Vec<Notice>,
     /// Name of the operation in force, or why there is none.
     in_force: Option<Result<String, &'static str>>,
 }
@@ -51,7 +51,7 @@ impl Operations {
             active: None,
             refused: Vec::new(),
             watcher: None,
-            told: Vec::new(),
+            notices: Vec::new(),
             in_force: None,
         };
         operations.accept_recipe(read(path));
@@ -60,7 +60,7 @@ impl Operations {
             Err(error) => {
                 let text =
                     format!("a changed recipe will not be noticed ({error}); start the box again after a change");
-                operations.told.push(Notice::new(Severity::Warning, "recipe_not_watched", text));
+                operations.notices.push(Notice::new(Severity::Warning, "recipe_not_watched", text));
             }
         }
         operations
@@ -71,7 +71,8 @@ impl Operations {
             Ok(loaded) => {
                 let (count, version) = (loaded.recipe.operations().len(), loaded.recipe.version());
                 let text = format!("{}: {count} operations are in force, version {version}", self.path.display());
-                self.told.push(Notice::new(Severity::Info, "recipe_in_force", text).with_detail(loaded.text.clone()));
+                self.notices
+                    .push(Notice::new(Severity::Info, "recipe_in_force", text).with_detail(loaded.text.clone()));
                 self.refused.clear();
                 self.active = Some(loaded);
             }
@@ -79,7 +80,7 @@ impl Operations {
                 let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
                 let lines = lines.join("\n").replace('\n', "\n  ");
                 let text = format!("the operations recipe is refused, {}:\n  {lines}", self.describe_consequence());
-                self.told.push(Notice::new(Severity::Warning, "recipe_refused", text));
+                self.notices.push(Notice::new(Severity::Warning, "recipe_refused", text));
                 self.refused = problems;
             }
         }
@@ -103,7 +104,7 @@ impl Operations {
                 self.accept_recipe(found);
             }
         }
-        self.told.drain(..).for_each(|notice| tell(&notice));
+        self.notices.drain(..).for_each(|notice| tell(&notice));
         if let Some(loaded) = &self.active {
             let lookup = self.completion.apply_recipe(&loaded.recipe, sample);
             note_operation(&mut self.in_force, lookup);

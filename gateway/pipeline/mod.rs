@@ -72,7 +72,7 @@ pub struct Pipeline {
     estimates: Estimates,
     scripts: Host,
     /// Channels of the scripts' own that are stored.
-    own: Vec<ExtraSeries>,
+    extra_series: Vec<ExtraSeries>,
     extras: Vec<ExtraValue<'static>>,
     stored: StoredEstimates,
     generation: u64,
@@ -80,7 +80,7 @@ pub struct Pipeline {
     verdict: Option<Verdict>,
     decisions: Decisions,
     journal: Journal,
-    parts: CycleFollower,
+    cycles: CycleFollower,
     /// The part that this tick has finished.
     finished: Option<Part>,
     tally: Tally,
@@ -100,7 +100,7 @@ impl Pipeline {
             estimates: *estimators.estimates(),
             estimators,
             wear: WearEstimator::default(),
-            own: list_script_series(&scripts),
+            extra_series: list_script_series(&scripts),
             extras: Vec::new(),
             stored: StoredEstimates::default(),
             generation: scripts.generation(),
@@ -109,7 +109,7 @@ impl Pipeline {
             verdict: None,
             decisions: Decisions::default(),
             journal: Journal::default(),
-            parts: CycleFollower::default(),
+            cycles: CycleFollower::default(),
             finished: None,
             tally: Tally::default(),
             proposal: None,
@@ -120,7 +120,7 @@ impl Pipeline {
     /// These series are stored by somebody else: a script's channel of the same name is not stored a second time. Before
     /// [`Pipeline::extra_series`].
     pub fn exclude_series(&mut self, names: &[ExtraSeries]) {
-        self.own.retain(|own| !names.iter().any(|known| known.name == own.name));
+        self.extra_series.retain(|own| !names.iter().any(|known| known.name == own.name));
     }
 
     /// An offset that the box itself proposes at this tick, before [`Pipeline::decide_commands`].
@@ -136,7 +136,7 @@ impl Pipeline {
     /// What is stored beside the channels: estimates, then the channels of the scripts' own that were there at the start.
     #[must_use]
     pub fn extra_series(&self) -> Vec<ExtraSeries> {
-        [stored_series(), self.own.clone()].concat()
+        [stored_series(), self.extra_series.clone()].concat()
     }
 
     /// Takes one tick. Samples come in the order of time.
@@ -156,8 +156,8 @@ impl Pipeline {
 
     /// The second half of a tick: decides.
     pub fn decide_commands(&mut self, sample: &Sample) {
-        self.finished = self.parts.follow_tick(&self.channels, sample, &self.estimates);
-        self.estimates.part = self.parts.last_figures();
+        self.finished = self.cycles.follow_tick(&self.channels, sample, &self.estimates);
+        self.estimates.part = self.cycles.last_figures();
         let estimates = self.estimates;
         self.tally.count_tick(sample.at_ns, estimates.state);
         let decision = self.scripts.run_due_scripts(sample, &estimates);
@@ -177,7 +177,7 @@ impl Pipeline {
         let estimates = self.estimates;
         self.extras.clear();
         self.extras.extend(self.stored.compute_values(&estimates));
-        self.extras.extend(self.own.iter().map(|series| own_value(&self.scripts, &series.name)));
+        self.extras.extend(self.extra_series.iter().map(|series| own_value(&self.scripts, &series.name)));
         store.store_sample(sample, &self.extras);
         self.journal.record_tick(&self.channels, sample, &estimates, |record| store.store_record(record));
         self.decisions.record_decision(self.scripts.decision(), &verdict, |record| store.store_record(record));
@@ -274,7 +274,7 @@ impl Pipeline {
     /// Finished parts.
     #[must_use]
     pub fn parts(&self) -> &CycleFollower {
-        &self.parts
+        &self.cycles
     }
 
     /// What was last recorded.

@@ -110,7 +110,7 @@ pub fn replay_files(plan: &ReplayPlan, scripts: Host, gate: config::GateConfig) 
     Ok(ReplaySummary {
         files,
         counts,
-        kept,
+        stored_rows: kept,
         seconds_per_state: pipeline.tally().seconds_per_state(),
         parts: pipeline.parts().finished_count(),
         visibility: visibility.judge_visibility(),

@@ -103,7 +103,7 @@ pub struct ReplaySummary {
     /// Sums over all of them.
     pub counts: ReplayCounts,
     /// Where the rows went.
-    pub kept: Option<StoredRows>,
+    pub stored_rows: Option<StoredRows>,
     /// Machine time in each state, s.
     pub seconds_per_state: Vec<(&'static str, f64)>,
     /// Parts finished.
@@ -134,7 +134,7 @@ impl ReplaySummary {
             .iter()
             .map(|(word, s)| ((*word).to_owned(), json!((s * 1e3).round() / 1e3)))
             .collect();
-        let kept = self.kept.as_ref().map(|kept| {
+        let kept = self.stored_rows.as_ref().map(|kept| {
             json!({ "path": kept.path.display().to_string(), "stored_rows": kept.stored, "rows_already_there": kept.already })
         });
         json!({
@@ -178,7 +178,7 @@ impl fmt::Display for ReplaySummary {
             writeln!(f, "what the machine itself calls its motion, and the states of these rows:")?;
         }
         words.iter().take(WORDS_SHOWN).try_for_each(|line| writeln!(f, "  {line}"))?;
-        if let Some(StoredRows { path, stored, already }) = &self.kept {
+        if let Some(StoredRows { path, stored, already }) = &self.stored_rows {
             writeln!(f, "{}: {stored} rows stored, {already} were there already", path.display())?;
         }
         Ok(())

@@ -8,14 +8,14 @@ use adapters::clock::TimeNs;
 #[derive(Debug, Default)]
 pub struct AcknowledgedAlarms {
     standing: Vec<String>,
-    seen: Vec<Acknowledged>,
+    alarms: Vec<Acknowledged>,
 }
 
 impl AcknowledgedAlarms {
     /// These alarms stand now.
     pub fn update_standing(&mut self, alarms: &[AlarmStatus]) {
         self.standing = alarms.iter().map(|alarm| alarm.code.clone()).collect();
-        self.seen.retain(|seen| alarms.iter().any(|alarm| alarm.code == seen.code && alarm.since_ms <= seen.at_ms));
+        self.alarms.retain(|seen| alarms.iter().any(|alarm| alarm.code == seen.code && alarm.since_ms <= seen.at_ms));
     }
 
     /// Somebody has seen this one; false when it does not stand.
@@ -23,16 +23,16 @@ impl AcknowledgedAlarms {
         if !self.standing.iter().any(|standing| standing == code) {
             return false;
         }
-        self.seen.retain(|seen| seen.code != code);
+        self.alarms.retain(|seen| seen.code != code);
         let (code, by, at_ms) = (code.to_owned(), by.to_owned(), at_ns.div_euclid(1_000_000));
-        self.seen.push(Acknowledged { code, by, at_ms });
+        self.alarms.push(Acknowledged { code, by, at_ms });
         true
     }
 
     /// Those that have been seen.
     #[must_use]
     pub fn list_alarms(&self) -> Vec<Acknowledged> {
-        self.seen.clone()
+        self.alarms.clone()
     }
 }
 

@@ -113,7 +113,7 @@ impl ActuatorWorker {
         let thread = std::thread::Builder::new()
             .name("gate".to_owned())
             .spawn(move || run_worker(writers, &of_thread, &*clock, &say))?;
-        Ok(Self::Thread(Remote { mailbox, said, thread: Some(thread) }))
+        Ok(Self::Thread(Remote { mailbox, reports: said, thread: Some(thread) }))
     }
 
     /// At the tick, for accelerated time.
@@ -169,7 +169,7 @@ impl ActuatorWorker {
     pub fn receive_reports(&mut self, mut tell: impl FnMut(ActuatorReport)) {
         let Self::Thread(remote) = self else { return };
         loop {
-            match remote.said.try_recv() {
+            match remote.reports.try_recv() {
                 Ok(said) => tell(said),
                 Err(TryRecvError::Empty) => return,
                 Err(TryRecvError::Disconnected) => return tell(ActuatorReport::Fault(Fault::Gone)),
@@ -192,7 +192,7 @@ impl ActuatorWorker {
 /// The tick's end of the thread.
 pub struct Remote {
     mailbox: Arc<VerdictMailbox>,
-    said: Receiver<ActuatorReport>,
+    reports: Receiver<ActuatorReport>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -201,7 +201,7 @@ impl Remote {
         self.mailbox.close();
         let until = Instant::now() + LET_GO_WITHIN;
         // The sender goes with the thread.
-        while let Ok(said) = self.said.recv_timeout(until.saturating_duration_since(Instant::now())) {
+        while let Ok(said) = self.reports.recv_timeout(until.saturating_duration_since(Instant::now())) {
             tell(said);
         }
         if let Some(thread) = self.thread.take().filter(JoinHandle::is_finished) {

@@ -14,14 +14,14 @@ pub(super) struct ClockStart {
     /// What the rows of the run are dated by.
     pub(super) mark: ClockMark,
     /// For the history, once it is open.
-    pub(super) news: Vec<Notice>,
+    pub(super) notices: Vec<Notice>,
 }
 
 impl ClockStart {
     /// Judges the clock for a run. `follows`: the wall clock has stood long enough to be followed.
     pub(super) fn judge_clock(plan: &RunPlan, follows: bool) -> Self {
         if plan.speed != MachineSpeed::Real {
-            return Self { mark: ClockMark::from_stepped_time(), news: Vec::new() };
+            return Self { mark: ClockMark::from_stepped_time(), notices: Vec::new() };
         }
         let path = &plan.config.history.path;
         let row_ns = Reader::open(path).and_then(|reader| reader.certain_ns()).ok().flatten();
@@ -44,7 +44,7 @@ impl ClockStart {
             Err(error) => tracing::warn!("{}: rows were not dated anew: {error}", path.display()),
         }
         news.extend(find_future_rows(path));
-        Self { mark, news }
+        Self { mark, notices: news }
     }
 }
 

@@ -12,7 +12,7 @@ use crate::control::{
     self, NetworkRequest, OrderReceiver, PostedRequest, PostedRow, QueuedOrder, Reply, RequestedChange,
 };
 use crate::gate::offset::{Moved, OffsetOrder};
-use crate::gate::{ArmError, Armed, AskOutcome, Disarmed, Fault, Gate, Occasion, ScriptRequest, Verdict, trail};
+use crate::gate::{ArmError, Armed, AskOutcome, Disarmed, Fault, Gate, Occasion, ScriptRequest, Verdict, audit};
 use crate::history::{Alarm, AlarmClear, Audit, ReactionTime};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
@@ -32,13 +32,13 @@ const ROWS_AT_ONCE_MAX: usize = 32;
 /// See the [module](self).
 pub struct Commands {
     actuator_worker: ActuatorWorker,
-    shifting: OffsetCommands,
+    offset_commands: OffsetCommands,
     /// Name of the source that is written to.
     target: String,
-    inbox: OrderReceiver,
-    seen: AcknowledgedAlarms,
+    orders: OrderReceiver,
+    acknowledged_alarms: AcknowledgedAlarms,
     network: NetworkRequests,
-    trail: trail::Trail,
+    trail: audit::Trail,
     /// Who armed it last.
     by: String,
     was_armed: bool,
@@ -60,12 +60,12 @@ impl Commands {
     ) -> Self {
         Self {
             actuator_worker,
-            shifting,
+            offset_commands: shifting,
             target,
-            inbox,
-            seen: AcknowledgedAlarms::default(),
+            orders: inbox,
+            acknowledged_alarms: AcknowledgedAlarms::default(),
             network: NetworkRequests::default(),
-            trail: trail::Trail::default(),
+            trail: audit::Trail::default(),
             by: String::new(),
             was_armed: false,
             alarm: None,
@@ -77,7 +77,7 @@ impl Commands {
 
     /// What the page has to account for: who signed in, what was refused, what was changed.
     fn store_posted_rows(&mut self, at_ns: TimeNs, health: &mut Health) {
-        for PostedRow { row, stored } in self.inbox.rows.try_iter().take(ROWS_AT_ONCE_MAX) {
+        for PostedRow { row, stored } in self.orders.rows.try_iter().take(ROWS_AT_ONCE_MAX) {
             let kept = health.is_storing() && health.append_audit(Audit { at_ns, ..row });
             let _gone = stored.send(kept);
         }
@@ -99,9 +99,9 @@ impl Commands {
     /// Before the tick is decided: what persons at the box have ordered meanwhile.
     pub fn run_orders(&mut self, gate: &mut Gate, sample: &Sample, health: &mut Health) {
         if !std::mem::replace(&mut self.begun, true) {
-            self.record_audit(trail::audit_start(gate.limits(), sample.at_ns), gate, health);
+            self.record_audit(audit::audit_start(gate.limits(), sample.at_ns), gate, health);
         }
-        while let Ok(QueuedOrder { order, reply }) = self.inbox.orders.try_recv() {
+        while let Ok(QueuedOrder { order, reply }) = self.orders.orders.try_recv() {
             let answer = self.run_order(&order, gate, sample, health);
             // Whoever has gone meanwhile finds it in the audit.
             let _gone = reply.send(answer);
@@ -116,7 +116,7 @@ impl Commands {
     /// What the network has asked for meanwhile: judged like the request of a script, or refused; a row of the audit each.
     fn hear_network(&mut self, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) {
         for _ in 0..ROWS_AT_ONCE_MAX {
-            let Ok(PostedRequest { request, reply }) = self.inbox.requests.try_recv() else { return };
+            let Ok(PostedRequest { request, reply }) = self.orders.requests.try_recv() else { return };
             let answer = match health.is_storing() {
                 true => self.grant_request(&request, at_ns),
                 false => Reply::from_refusal(ArmError::NoAudit.to_string()),
@@ -137,7 +137,7 @@ impl Commands {
     }
 
     fn acknowledge_alarm(&mut self, code: &str, by: &str, at_ns: TimeNs) -> Reply {
-        match self.seen.acknowledge_alarm(code, by, at_ns) {
+        match self.acknowledged_alarms.acknowledge_alarm(code, by, at_ns) {
             true => Reply::from_success(format!("the alarm {code} was seen; it stands until its reason has gone")),
             false => Reply::from_refusal(format!("no alarm {code:?} stands")),
         }
@@ -157,7 +157,7 @@ impl Commands {
                 gate.disarm(Disarmed::Person);
                 self.by.clone_from(by);
                 if !was {
-                    self.record_audit(trail::audit_order("disarmed", "was_not_armed", "", by, at_ns), gate, health);
+                    self.record_audit(audit::audit_order("disarmed", "was_not_armed", "", by, at_ns), gate, health);
                 }
                 let text = if was { "disarmed; the machine is given back to its dial" } else { "it was not armed" };
                 Reply::from_success(text)
@@ -165,7 +165,7 @@ impl Commands {
             control::Order::Acknowledge { by } => {
                 gate.acknowledge_requests();
                 self.record_audit(
-                    trail::audit_order("acknowledged", "done", "a feed hold or stop was seen to", by, at_ns),
+                    audit::audit_order("acknowledged", "done", "a feed hold or stop was seen to", by, at_ns),
                     gate,
                     health,
                 );
@@ -174,7 +174,7 @@ impl Commands {
             control::Order::AcknowledgeAlarm { by, code } => {
                 let reply = self.acknowledge_alarm(code, by, at_ns);
                 let outcome = if reply.done { "done" } else { "refused" };
-                let row = trail::audit_order("acknowledged", outcome, &format!("alarm {code}"), by, at_ns);
+                let row = audit::audit_order("acknowledged", outcome, &format!("alarm {code}"), by, at_ns);
                 self.record_audit(row, gate, health);
                 reply
             }
@@ -193,7 +193,7 @@ impl Commands {
                 self.by = by.to_owned();
                 // Whoever disarms before the next tick ends an arming too.
                 self.was_armed = true;
-                self.record_audit(trail::audit_arming(&armed), gate, health);
+                self.record_audit(audit::audit_arming(&armed), gate, health);
                 self.clear_alarm(at_ns, health);
                 let arming = describe_arming(&armed, &self.target, gate.limits());
                 let text = format!("{arming}; {}", StateBasis::from_sample(sample));
@@ -201,7 +201,7 @@ impl Commands {
                 Reply::from_success(text)
             }
             Err(why) => {
-                self.record_audit(trail::audit_order("armed", "refused", &why.to_string(), by, at_ns), gate, health);
+                self.record_audit(audit::audit_order("armed", "refused", &why.to_string(), by, at_ns), gate, health);
                 Reply::from_refusal(why.to_string())
             }
         }
@@ -232,7 +232,7 @@ impl Commands {
         for (ask, outcome) in judged {
             match outcome {
                 AskOutcome::Sent => sent.push(ask),
-                _ => self.record_audit(trail::audit_ladder_request(&ask, outcome, None, sample.at_ns), gate, health),
+                _ => self.record_audit(audit::audit_ladder_request(&ask, outcome, None, sample.at_ns), gate, health),
             }
         }
         verdict.armed &= gate.current_arming().is_ok();
@@ -247,7 +247,8 @@ impl Commands {
     /// Offsets: into the audit first, then to the machine.
     fn apply_offsets(&mut self, pipeline: &mut Pipeline, sample: &Sample, now_ns: TimeNs, health: &mut Health) {
         let verdicts = pipeline.judge_offsets(sample);
-        let rows = self.shifting.build_audit_rows(&pipeline.scripts().decision().offsets, &verdicts, pipeline.gate());
+        let rows =
+            self.offset_commands.build_audit_rows(&pipeline.scripts().decision().offsets, &verdicts, pipeline.gate());
         let looks = pipeline.list_readbacks(sample);
         let gate = pipeline.gate_mut();
         rows.into_iter().for_each(|row| self.record_audit(row, gate, health));
@@ -258,12 +259,12 @@ impl Commands {
     }
 
     fn record_offset_result(&mut self, moved: &Moved, sample: &Sample, gate: &mut Gate, health: &mut Health) {
-        if let Some(row) = self.shifting.build_audit_row(moved) {
+        if let Some(row) = self.offset_commands.build_audit_row(moved) {
             let command = offset_commands::build_command(moved, &row, &self.target_of_offsets(gate));
             self.record_audit(row, gate, health);
             command.into_iter().for_each(|row| health.keep_record(row.into()));
         }
-        self.shifting.accept_answer(moved, gate, health);
+        self.offset_commands.accept_answer(moved, gate, health);
         moved.fault().into_iter().for_each(|fault| self.raise_fault(&fault, sample.at_ns, gate, health));
     }
 
@@ -286,16 +287,16 @@ impl Commands {
                 written.fault.into_iter().for_each(|fault| self.raise_fault(&fault, sample.at_ns, gate, health));
             }
             ActuatorReport::Seen(reaction) => {
-                self.record_audit(trail::audit_reaction(&reaction), gate, health);
+                self.record_audit(audit::audit_reaction(&reaction), gate, health);
                 let [program, block, tool] =
                     self.place.map(|id| id.and_then(|id| sample.text(id)).unwrap_or_default().to_owned());
-                health.keep_record(ReactionTime { program, block, tool, ..trail::reaction_times(&reaction) }.into());
+                health.keep_record(ReactionTime { program, block, tool, ..audit::reaction_times(&reaction) }.into());
             }
             ActuatorReport::Fault(fault) => self.raise_fault(&fault, sample.at_ns, gate, health),
             ActuatorReport::Moved(moved) => self.record_offset_result(&moved, sample, gate, health),
             ActuatorReport::Withdrawn(order) => gate.offsets_mut().withdraw_order(order),
             ActuatorReport::Asked(ask, failed) => {
-                let row = trail::audit_ladder_request(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns);
+                let row = audit::audit_ladder_request(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns);
                 self.record_audit(row, gate, health);
                 if let Some(failed) = failed {
                     health.record_event(sample.at_ns, SOURCE, &Notice::new(Severity::Error, "ask_failed", failed));
@@ -330,7 +331,7 @@ impl Commands {
         if std::mem::replace(&mut self.was_armed, armed) && !armed {
             let why = gate.current_arming().err().unwrap_or(Disarmed::Person);
             let by = if why == Disarmed::Person { self.by.clone() } else { String::new() };
-            self.record_audit(trail::audit_disarming(why, &by, at_ns), gate, health);
+            self.record_audit(audit::audit_disarming(why, &by, at_ns), gate, health);
             let text = format!("the gate is disarmed: {why}");
             health.record_event(at_ns, SOURCE, &Notice::new(Severity::Warning, CODE, text));
         }
@@ -355,8 +356,8 @@ impl Commands {
 
     /// Which alarms have been seen; told which ones stand.
     pub fn update_acknowledged(&mut self, standing: &[AlarmStatus]) -> Vec<Acknowledged> {
-        self.seen.update_standing(standing);
-        self.seen.list_alarms()
+        self.acknowledged_alarms.update_standing(standing);
+        self.acknowledged_alarms.list_alarms()
     }
 
     /// What stands in the machine's mailbox, percent.
@@ -380,7 +381,7 @@ impl Commands {
     pub fn list_problems(&self, gate: &Gate) -> impl Iterator<Item = StatusProblem> {
         let next = "find the reason, then arm again with `cnc-gateway arm`".to_owned();
         let alarm = self.alarm.as_ref().map(|(_, text, _)| StatusProblem { what: text.clone(), next });
-        alarm.into_iter().chain(self.shifting.list_problems(gate))
+        alarm.into_iter().chain(self.offset_commands.list_problems(gate))
     }
 }
 

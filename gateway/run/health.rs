@@ -61,7 +61,7 @@ pub struct Health {
     /// What is wrong with files in the data directory, as of the last look: the status asks for it several times a second.
     of_disk: Vec<StatusProblem>,
     /// What threads beside the tick have to say.
-    heard: Option<mpsc::Receiver<Notice>>,
+    notices: Option<mpsc::Receiver<Notice>>,
 }
 
 impl Health {
@@ -96,13 +96,13 @@ impl Health {
             thermal: Vec::new(),
             service,
             of_disk: Vec::new(),
-            heard: None,
+            notices: None,
         }
     }
 
     /// From now on these notices become events.
     pub fn follow_notices(&mut self, notices: mpsc::Receiver<Notice>) {
-        self.heard = Some(notices);
+        self.notices = Some(notices);
     }
 
     /// Remembers and tells that something happened.
@@ -157,7 +157,7 @@ impl Health {
         self.of_disk = problems_of_disk(&self.memory);
         self.stores = self.history_store.is_storing();
         self.service.report_moved_parts(feed.count_steps(), self.history_store.count_rounds());
-        let heard: Vec<Notice> = self.heard.iter().flat_map(mpsc::Receiver::try_iter).take(HEARD_MAX).collect();
+        let heard: Vec<Notice> = self.notices.iter().flat_map(mpsc::Receiver::try_iter).take(HEARD_MAX).collect();
         heard.iter().for_each(|notice| self.record_event(now_ns, "gateway", notice));
         self.look_at_clock(now_ns);
         self.look_at_sources(feed, now_ns);

@@ -17,8 +17,8 @@ pub mod pace;
 pub mod priority;
 mod problems;
 pub mod recent;
-pub mod remembered;
 pub mod report;
+pub mod restored_state;
 pub mod rules;
 pub mod sample_feed;
 pub mod save;
@@ -214,8 +214,8 @@ fn build_pipeline(plan: &RunPlan, memory: &Path, told: &mut Vec<Notice>) -> (Pip
         scripts.set_deadline(Arc::new(RunLimit::new(RUN_MAX)));
     }
     let gate = Gate::new(plan.config.gate.clone());
-    let mut pipeline = Pipeline::new(remembered::restore_estimators(memory, told), scripts, gate);
-    remembered::restore_edge_wear(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY), told);
+    let mut pipeline = Pipeline::new(restored_state::restore_estimators(memory, told), scripts, gate);
+    restored_state::restore_edge_wear(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY), told);
     (pipeline, watched)
 }
 
@@ -245,7 +245,7 @@ fn build_ticker(
     let clock: Arc<dyn Clock> = own.clone();
     let start_ns = start_ns(plan, &history_store, clock.now_ns());
     let opened = open::open_sources(config, plan.speed, &clock, start_ns);
-    let Sources { feed, pace, simulated, ways, machines } =
+    let Sources { feed, schedule: pace, simulated, ways, machines } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
     let wake = inbox.wake.clone();
     let commands = way_to_machine::build_commands(plan, ways, inbox, &clock, pipeline.gate_mut())?;
@@ -269,14 +269,14 @@ fn build_ticker(
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
     health.record_event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     told.iter().for_each(|notice| health.record_event(start_ns, "gateway", notice));
-    started.news.iter().for_each(|notice| health.record_event(start_ns, "clock", notice));
+    started.notices.iter().for_each(|notice| health.record_event(start_ns, "clock", notice));
     let run_flags = run_flags.clone();
     let operations = config.operations.path.as_deref().map(Operations::start_watching);
     let wear = Wear::from_config(config);
     Ok((
         Ticker {
             identity,
-            pace,
+            schedule: pace,
             feed,
             pipeline,
             commands,
@@ -335,7 +335,7 @@ async fn serve_until_end(
                 data_dir,
                 language,
                 access,
-                post,
+                orders: post,
                 hosts,
                 diagnoses,
                 configured,

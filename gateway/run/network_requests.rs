@@ -2,7 +2,7 @@
 //! limited time as if a script asked for it at every tick. The gate judges it like one.
 
 use crate::control::{NetworkRequest, Reply, RequestedChange};
-use crate::gate::trail;
+use crate::gate::audit;
 use crate::history::Audit;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rules::script::OverrideRequest;
@@ -21,20 +21,20 @@ struct ActiveRequest {
 /// See the [module](self). At most one request per sink.
 #[derive(Debug, Default)]
 pub struct NetworkRequests {
-    standing: Vec<ActiveRequest>,
+    active: Vec<ActiveRequest>,
 }
 
 impl NetworkRequests {
     /// Takes a request for a feed override or its end; gives what became of it. An alarm is acknowledged by whoever holds the alarms.
     pub fn accept_change(&mut self, sink: &str, change: &RequestedChange, at_ns: TimeNs) -> Reply {
         let author = format_author(sink);
-        self.standing.retain(|standing| *standing.request.script != *author);
+        self.active.retain(|standing| *standing.request.script != *author);
         let RequestedChange::FeedOverride { pct, reason } = change else {
             return Reply::from_success("nothing is asked for any more");
         };
         let reason = if reason.is_empty() { "asked over the network" } else { reason };
         let request = OverrideRequest { pct: *pct, reason: reason.into(), script: author.into(), version: 0 };
-        self.standing.push(ActiveRequest { request, until_ns: at_ns.saturating_add(STANDS_S * SECOND_NS) });
+        self.active.push(ActiveRequest { request, until_ns: at_ns.saturating_add(STANDS_S * SECOND_NS) });
         Reply::from_success(format!("the gate is asked for {pct} % for {STANDS_S} s; it decides at every tick"))
     }
 
@@ -44,8 +44,8 @@ impl NetworkRequests {
         let stands = |standing: &ActiveRequest| {
             at_ns < standing.until_ns && standing.until_ns.saturating_sub(at_ns) <= STANDS_S * SECOND_NS
         };
-        self.standing.retain(stands);
-        OverrideRequest::find_least(self.standing.iter().map(|standing| &standing.request)).cloned()
+        self.active.retain(stands);
+        OverrideRequest::find_least(self.active.iter().map(|standing| &standing.request)).cloned()
     }
 }
 
@@ -68,7 +68,7 @@ pub fn build_audit_row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -
         _ => None,
     };
     let outcome = if reply.done { "done" } else { "refused" };
-    let row = trail::audit_order("network_request", outcome, &format!("{what}{also}"), "", at_ns);
+    let row = audit::audit_order("network_request", outcome, &format!("{what}{also}"), "", at_ns);
     let unit = if asked.is_some() { "%".to_owned() } else { String::new() };
     Audit { asked, unit, script: format_author(&request.sink), ..row }
 }

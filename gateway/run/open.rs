@@ -42,7 +42,7 @@ pub struct Sources {
     /// The samples.
     pub feed: SampleFeed,
     /// When they are taken.
-    pub pace: TickSchedule,
+    pub schedule: TickSchedule,
     /// Ways to the machines.
     pub ways: Vec<Way>,
     /// The simulated machines among them, which count what is written to them.
@@ -108,7 +108,7 @@ fn open_live_sources(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources,
     let feed = start_workers(found, clock, &config.alignment)
         .map_err(|error| vec![format!("no thread for a source: {error}")])?;
     let pace = TickSchedule::on_clock(clock.clone(), tick_period(config));
-    Ok(Sources { feed, pace, ways, machines, simulated: is_simulated(config) })
+    Ok(Sources { feed, schedule: pace, ways, machines, simulated: is_simulated(config) })
 }
 
 /// As [`open`], and streams that only become a channel in the box.
@@ -157,7 +157,7 @@ fn open_stepped_sources(config: &Config, speed: MachineSpeed, start_ns: TimeNs) 
     let alignment = Alignment::from_plans(&plans, &config.alignment, Patience::Waits);
     let feed = SampleFeed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
     let pace = TickSchedule::with_speed(speed.time_factor(), start_ns, tick_period(config));
-    Ok(Sources { feed, pace, ways, machines, simulated: is_simulated(config) })
+    Ok(Sources { feed, schedule: pace, ways, machines, simulated: is_simulated(config) })
 }
 
 fn describe_speed_error(error: &OpenError) -> String {

@@ -34,8 +34,8 @@ impl ConfiguredSinks {
 
     /// Starts their tasks on the runtime that is running; what the network asks for goes by this post.
     #[must_use]
-    pub fn start(&self, post: &OrderSender) -> Sinks {
-        sinks::start_sinks(&self.sinks, post, (&self.outbox, &self.board), &self.history)
+    pub fn start(&self, orders: &OrderSender) -> Sinks {
+        sinks::start_sinks(&self.sinks, orders, (&self.outbox, &self.board), &self.history)
     }
 
     /// Threads that may be needed for what cannot be waited for asynchronously: reading the outbox, and a line.

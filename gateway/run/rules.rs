@@ -54,7 +54,7 @@ pub fn load_scripts(config: &Config) -> (Host, ScriptWatch) {
         told.push(Notice::new(Severity::Warning, "scripts_not_watched", text));
     }
     let (reloader, data_dir) = (reloader.ok(), config.gateway.data_dir.clone());
-    let watched = ScriptWatch { reloader, data_dir, told, told_of: None, failed: BTreeMap::new() };
+    let watched = ScriptWatch { reloader, data_dir, notices: told, told_of: None, failed: BTreeMap::new() };
     watched.save_active_texts(&host);
     (host, watched)
 }
@@ -75,7 +75,7 @@ fn build_refusal_notice(problems: &[ScriptProblem], consequence: &str) -> Notice
 pub struct ScriptWatch {
     reloader: Option<Reloader>,
     data_dir: PathBuf,
-    told: Vec<Notice>,
+    notices: Vec<Notice>,
     /// The generation whose versions the history has been told.
     told_of: Option<u64>,
     /// What each script has last failed with, since the last reload.
@@ -131,7 +131,7 @@ impl ScriptWatch {
     }
 
     fn apply_reload(&mut self, pipeline: &mut Pipeline, health: &mut Health, run_flags: &RunFlags, now_ns: TimeNs) {
-        for notice in self.told.drain(..) {
+        for notice in self.notices.drain(..) {
             health.record_event(now_ns, "scripts", &notice);
         }
         let Some(reloader) = &self.reloader else { return };

@@ -69,7 +69,7 @@ pub struct Ticker {
     /// See [`Identity`].
     pub identity: Identity,
     /// Gives the times of the ticks.
-    pub pace: TickSchedule,
+    pub schedule: TickSchedule,
     /// Gives the samples.
     pub feed: SampleFeed,
     /// Infers, decides, records.
@@ -113,7 +113,7 @@ impl Ticker {
             let granted = priority::request_priority();
             granted.tell_operator();
             if granted == Granted::RealTime && self.pipeline.gate().limits().greatest_mode() == GateMode::Armed {
-                self.pace.wake_early();
+                self.schedule.wake_early();
             }
         }
         self.wake.bind_current_thread();
@@ -171,7 +171,7 @@ impl Ticker {
 
     /// Waits for the next tick. Orders that come meanwhile are carried out at once: whoever disarms does not wait for it.
     fn next_tick(&mut self, sample: &Sample, last_ns: Option<TimeNs>) -> Option<TimeNs> {
-        let Self { pace, wake, run_flags, commands, pipeline, health, .. } = self;
+        let Self { schedule: pace, wake, run_flags, commands, pipeline, health, .. } = self;
         let mut left = ORDERS_BETWEEN_MAX;
         pace.next_tick_or(&run_flags.stop, wake, || {
             // Before the first tick there is nothing to order about.
@@ -208,7 +208,7 @@ impl Ticker {
         let alarms = self.list_alarms();
         let acknowledged = self.commands.update_acknowledged(&alarms);
         let Identity { machine, simulated, speed, rate_hz } = self.identity.clone();
-        let (late_p50_ms, late_p99_ms) = self.pace.late_ms();
+        let (late_p50_ms, late_p99_ms) = self.schedule.late_ms();
         let count = self.pipeline.tally().ticks();
         let history = self.health.history_status();
         Status {
@@ -225,8 +225,8 @@ impl Ticker {
                 count,
                 late_p50_ms,
                 late_p99_ms,
-                late: self.pace.lateness_histogram(),
-                skipped: self.pace.skipped_ticks(),
+                late: self.schedule.lateness_histogram(),
+                skipped: self.schedule.skipped_ticks(),
             },
             state: report::build_state_status(&self.pipeline),
             channels: report::list_channels(sample),

@@ -29,7 +29,7 @@ const SPIN_AFTER_DUE: Duration = Duration::from_micros(900);
 #[derive(Debug, Default)]
 struct PendingVerdict {
     verdict: Option<(Instant, Verdict)>,
-    asks: TimedQueue<ScriptRequest>,
+    requests: TimedQueue<ScriptRequest>,
     orders: TimedQueue<OffsetOrder>,
     closing: bool,
     /// When the last verdict came, if it was armed: the next is due a period later.
@@ -82,9 +82,9 @@ impl VerdictMailbox {
         pending.armed_at = verdict.armed.then_some(now);
         let mut refused = Vec::new();
         if !verdict.armed {
-            refused.extend(pending.asks.drain(..).map(|(_, ask)| ask));
+            refused.extend(pending.requests.drain(..).map(|(_, ask)| ask));
         }
-        refused.extend(queue_items(&mut pending.asks, ASKS_MAX, asks));
+        refused.extend(queue_items(&mut pending.requests, ASKS_MAX, asks));
         drop(pending);
         self.notify_worker();
         refused
@@ -145,7 +145,7 @@ impl VerdictMailbox {
 
     /// The next request to the ladder, and whether it comes in time.
     pub(super) fn next_ask(&self) -> Option<(ScriptRequest, bool)> {
-        let (laid, ask) = self.lock().asks.pop_front()?;
+        let (laid, ask) = self.lock().requests.pop_front()?;
         Some((ask, laid.elapsed() <= ASK_LASTS))
     }
 

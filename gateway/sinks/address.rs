@@ -70,7 +70,7 @@ impl SinkAddress {
     pub fn find_file_problems(&self) -> Vec<(String, String)> {
         match &self.target {
             SinkTarget::Mqtt(target) => target.broker.find_file_problems(),
-            SinkTarget::Nats(target) => target.servers.check_files(),
+            SinkTarget::Nats(target) => target.target.check_files(),
             #[cfg(feature = "opcua")]
             SinkTarget::Opcua(target) => target.find_file_problems(),
             SinkTarget::Parquet(target) => target.find_file_problems(),

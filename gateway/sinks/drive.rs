@@ -36,9 +36,14 @@ pub struct Sinks {
 /// Starts a task for each of these sinks, which must be known to outbox and board in this order. The history at `path` may be
 /// opened later. What the network asks for goes by `post`. Call it within a runtime.
 #[must_use]
-pub fn start_sinks(sinks: &[SinkConfig], post: &OrderSender, (outbox, board): (&Outbox, &Board), path: &Path) -> Sinks {
+pub fn start_sinks(
+    sinks: &[SinkConfig],
+    orders: &OrderSender,
+    (outbox, board): (&Outbox, &Board),
+    path: &Path,
+) -> Sinks {
     let opened = sinks.iter().map(|SinkConfig { name, address, allow_requests }| {
-        let requests = Requests::new(name, *allow_requests, Some(post.clone()));
+        let requests = Requests::new(name, *allow_requests, Some(orders.clone()));
         (name.clone(), open_sink(address, (name, requests), outbox, path))
     });
     start_with(opened.collect(), outbox, board, path)
@@ -58,7 +63,7 @@ pub fn start_with(sinks: Vec<(String, Box<dyn Sink>)>, outbox: &Outbox, board: &
             board: board.clone(),
             path: path.to_owned(),
             stopping: stopping.clone(),
-            feed: None,
+            outbox_reader: None,
             isolation: Isolation::default(),
         };
         tokio::spawn(task.run(sink))
@@ -87,7 +92,7 @@ struct SinkTask {
     path: PathBuf,
     stopping: watch::Receiver<bool>,
     /// With the name of the history that it reads.
-    feed: Option<(String, OutboxReader)>,
+    outbox_reader: Option<(String, OutboxReader)>,
     isolation: Isolation,
 }
 
@@ -278,7 +283,7 @@ impl SinkTask {
     async fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<OutboxStretch, Left> {
         // Another history lies there when the one before was damaged or removed.
         let box_id = self.outbox.box_id();
-        let (feed, path) = (self.feed.take().filter(|(of, _)| *of == box_id), self.path.clone());
+        let (feed, path) = (self.outbox_reader.take().filter(|(of, _)| *of == box_id), self.path.clone());
         let reading = tokio::task::spawn_blocking(move || {
             let mut feed = feed.map_or_else(|| OutboxReader::open(&path), |(_, feed)| Ok(feed))?;
             feed.read(from, to, items_max).map(|stretch| (feed, stretch))
@@ -287,7 +292,7 @@ impl SinkTask {
             |text: String| Left::Failed(SinkError::failed_line(format!("the outbox cannot be read: {text}"), ""));
         let read = reading.await.map_err(|error| failed(error.to_string()))?;
         let (feed, stretch) = read.map_err(|error| failed(error.to_string()))?;
-        self.feed = Some((box_id, feed));
+        self.outbox_reader = Some((box_id, feed));
         Ok(stretch)
     }
 

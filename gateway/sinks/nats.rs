@@ -15,7 +15,7 @@ use gateway_nats::{Connection, JetStreamFailure, NatsError, NatsTarget, Outgoing
 #[derive(Debug, Clone, PartialEq)]
 pub struct NatsSinkTarget {
     /// The cluster.
-    pub servers: NatsTarget,
+    pub target: NatsTarget,
     /// What every subject begins with.
     pub prefix: String,
 }
@@ -28,7 +28,7 @@ impl NatsSinkTarget {
         if prefix.split('.').any(bad) {
             return Err(TargetError::Subject { prefix: prefix.to_owned() });
         }
-        Ok(Self { servers, prefix: prefix.to_owned() })
+        Ok(Self { target: servers, prefix: prefix.to_owned() })
     }
 }
 
@@ -67,7 +67,7 @@ impl NatsSink {
         let name = format!("{} ({})", self.outbox.box_id(), self.name);
         let first = self.server;
         self.server = self.server.wrapping_add(1);
-        let mut connection = Connection::open(&self.target.servers, first, &name).await?;
+        let mut connection = Connection::open(&self.target.target, first, &name).await?;
         connection.stream_of(&self.format_subject("sample")).await?;
         self.connection = Some(connection);
         Ok(())

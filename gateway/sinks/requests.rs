@@ -18,15 +18,15 @@ const AT_ONCE: f64 = 10.0;
 pub struct Requests {
     sink: String,
     allowed: bool,
-    post: Option<OrderSender>,
+    orders: Option<OrderSender>,
     rate: RowRate,
 }
 
 impl Requests {
     /// Of the sink of this name; `allowed` is what its configuration says.
     #[must_use]
-    pub fn new(sink: &str, allowed: bool, post: Option<OrderSender>) -> Self {
-        Self { sink: sink.to_owned(), allowed, post, rate: RowRate::new(PER_S, AT_ONCE) }
+    pub fn new(sink: &str, allowed: bool, orders: Option<OrderSender>) -> Self {
+        Self { sink: sink.to_owned(), allowed, orders, rate: RowRate::new(PER_S, AT_ONCE) }
     }
 
     /// Of a sink behind which there is no gate.
@@ -44,7 +44,7 @@ impl Requests {
     /// Asks, and gives what became of it; `None` for what came too fast, which is not answered.
     pub async fn submit_change(&mut self, change: Result<RequestedChange, RequestRefusal>) -> Option<Reply> {
         let left_out = self.rate.may_pass(clock::now_ns())?;
-        let Some(post) = &self.post else { return Some(Reply::from_refusal("there is no gate here")) };
+        let Some(post) = &self.orders else { return Some(Reply::from_refusal("there is no gate here")) };
         let change = if self.allowed { change } else { Err(refuse_change(&self.sink, change)) };
         Some(post.send_request(NetworkRequest { sink: self.sink.clone(), change, left_out }).await)
     }

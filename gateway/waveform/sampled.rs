@@ -76,18 +76,18 @@ fn create_queue() -> (SampleQueue, BlockSink) {
 pub struct ControllerSamples {
     name: String,
     current: SampledCurrent,
-    waiting: SampleQueue,
+    queue: SampleQueue,
     features: Features,
     heard: Option<Instant>,
 }
 
 impl ControllerSamples {
     fn new(address: &str, current: SampledCurrent, waiting: SampleQueue, keep: Option<&WaveformKeep>) -> Self {
-        Self { name: format!("{address}#samples"), current, waiting, features: Features::new(keep), heard: None }
+        Self { name: format!("{address}#samples"), current, queue: waiting, features: Features::new(keep), heard: None }
     }
 
     fn receive_blocks(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<bool, SourceError> {
-        let waiting = std::mem::take(&mut *self.waiting.lock().unwrap_or_else(PoisonError::into_inner));
+        let waiting = std::mem::take(&mut *self.queue.lock().unwrap_or_else(PoisonError::into_inner));
         let some = !waiting.is_empty();
         for (block, arrived) in waiting {
             let blocks = self.current.extract_blocks(&block, arrived_ns(clock, arrived));

@@ -29,6 +29,12 @@ pub struct PlainReading {
     last: [f64; 4],
 }
 
+impl Default for PlainReading {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl PlainReading {
     /// Before the first sample: off.
     pub fn new() -> Self {

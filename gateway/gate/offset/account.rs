@@ -5,7 +5,7 @@
 //! changed the offset, or the gate has counted on another shift than there is, nothing is written either; the gate decides
 //! anew from what was found.
 
-use super::book::OffsetJournal;
+use super::journal::OffsetJournal;
 use super::order::{Moved, NotOnDisk, OffsetOrder, Shifted};
 use adapters::SourceError;
 use adapters::clock::Clock;
@@ -17,16 +17,16 @@ const MOST_UM: f64 = 1000.0;
 /// Holds the only sink of offsets there is. Blocks as long as the control takes to answer.
 pub struct OffsetAccount {
     sink: Box<dyn OffsetSink>,
-    ledgers: [OffsetShares; Axis::ALL.len()],
-    book: OffsetJournal,
+    shares: [OffsetShares; Axis::ALL.len()],
+    journal: OffsetJournal,
 }
 
 impl OffsetAccount {
     /// With what the book knows of this control.
     #[must_use]
-    pub fn new(sink: Box<dyn OffsetSink>, book: OffsetJournal) -> Self {
-        let ledgers = Axis::ALL.map(|axis| OffsetShares::with(book.find_leftover(axis)));
-        Self { sink, ledgers, book }
+    pub fn new(sink: Box<dyn OffsetSink>, journal: OffsetJournal) -> Self {
+        let ledgers = Axis::ALL.map(|axis| OffsetShares::with(journal.find_leftover(axis)));
+        Self { sink, shares: ledgers, journal }
     }
 
     /// Carries out an order.
@@ -36,7 +36,7 @@ impl OffsetAccount {
         let result = self.execute_order(order, clock);
         let left = self.find_leftover(axis);
         // An open intent is in the book already.
-        let kept = if result.is_ok() { self.book.store_leftover(axis, left) } else { Ok(()) };
+        let kept = if result.is_ok() { self.journal.store_leftover(axis, left) } else { Ok(()) };
         Moved {
             at_ns,
             order,
@@ -47,7 +47,7 @@ impl OffsetAccount {
     }
 
     fn find_leftover(&self, axis: Axis) -> Option<Left> {
-        self.ledgers[axis.index()].leftover_offset()
+        self.shares[axis.index()].leftover_offset()
     }
 
     fn execute_order(&mut self, order: OffsetOrder, clock: &dyn Clock) -> Result<Option<Shifted>, SourceError> {
@@ -56,7 +56,7 @@ impl OffsetAccount {
             return Ok(None);
         }
         let before_um = self.sink.at_rest(clock, axis)?;
-        let (base_um, last) = self.ledgers[axis.index()].reconcile_offset(before_um);
+        let (base_um, last) = self.shares[axis.index()].reconcile_offset(before_um);
         let asked_um = match order {
             OffsetOrder::Look(_) => before_um,
             _ if last == LastWrite::Replaced => before_um,
@@ -77,14 +77,14 @@ impl OffsetAccount {
         axis: Axis,
         [base_um, before_um, asked_um]: [f64; 3],
     ) -> Result<f64, SourceError> {
-        let settled = self.ledgers[axis.index()];
-        self.ledgers[axis.index()].record_intended_write(base_um, before_um, asked_um);
-        if let Err(error) = self.book.store_leftover(axis, self.find_leftover(axis)) {
-            self.ledgers[axis.index()] = settled;
+        let settled = self.shares[axis.index()];
+        self.shares[axis.index()].record_intended_write(base_um, before_um, asked_um);
+        if let Err(error) = self.journal.store_leftover(axis, self.find_leftover(axis)) {
+            self.shares[axis.index()] = settled;
             return Err(self.accounting_error(axis, &error));
         }
         let after_um = self.sink.write(clock, axis, before_um, asked_um)?;
-        self.ledgers[axis.index()].record_offset(base_um, after_um);
+        self.shares[axis.index()].record_offset(base_um, after_um);
         Ok(after_um)
     }
 
@@ -92,7 +92,7 @@ impl OffsetAccount {
         SourceError::Refused {
             source_name: self.sink.name().to_owned(),
             request: format!("the external offset of {}", axis.as_word()),
-            what: format!("it could not be accounted for in {}: {error}", self.book.path().display()),
+            what: format!("it could not be accounted for in {}: {error}", self.journal.path().display()),
             next: "Nothing is written before that; free some room, or look at the permissions".to_owned(),
         }
     }

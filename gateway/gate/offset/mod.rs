@@ -19,14 +19,14 @@
 //! that arm anew in the middle of a batch and would rather have no step in it.
 
 mod account;
-mod book;
+mod audit;
+mod journal;
 mod order;
-mod trail;
 
 pub use account::OffsetAccount;
-pub use book::OffsetJournal;
+pub use audit::OffsetTrail;
+pub use journal::OffsetJournal;
 pub use order::{Moved, OffsetOrder, Shifted};
-pub use trail::OffsetTrail;
 
 use super::hold::Hold;
 use crate::limits::{GateMode, OffsetConfig};

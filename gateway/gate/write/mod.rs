@@ -105,7 +105,7 @@ struct PendingWrite {
 /// Holds the only actuator there is. Blocks as long as the machine takes to answer, so it belongs on its own thread.
 pub struct OverrideWriter<A> {
     actuator: A,
-    pace: WriteSchedule,
+    schedule: WriteSchedule,
     settle_ns: i64,
     /// What was written while the machine settles, the newest at the end; before the first write, what was in force.
     recent: VecDeque<(TimeNs, OverridePct)>,
@@ -130,7 +130,7 @@ impl<A: Actuator> OverrideWriter<A> {
         let settle_ns = ns(actuator.settles_within()).max(SECOND_NS / 100);
         Self {
             actuator,
-            pace: WriteSchedule { interval_ns: ns(limits.min_interval), heartbeat_ns: ns(limits.heartbeat), rule },
+            schedule: WriteSchedule { interval_ns: ns(limits.min_interval), heartbeat_ns: ns(limits.heartbeat), rule },
             settle_ns,
             recent: VecDeque::new(),
             dials: VecDeque::new(),
@@ -192,13 +192,13 @@ impl<A: Actuator> OverrideWriter<A> {
     /// replace the dial it would raise the feed above what the operator wants.
     fn dial_is_below(&self, asked: OverridePct) -> bool {
         let dial = self.dials.back().filter(|_| self.holding && self.dial_is_known);
-        self.pace.rule == LadderRule::Least && dial.is_some_and(|(_, dial)| *dial <= asked)
+        self.schedule.rule == LadderRule::Least && dial.is_some_and(|(_, dial)| *dial <= asked)
     }
 
     /// Looks at the machine before anything is enabled: while nothing is, the override in force is the dial.
     fn may_begin(&mut self, asked: OverridePct, clock: &dyn Clock) -> Result<bool, Fault> {
         let now_ns = clock.now_ns();
-        let soon = self.looked_ns.is_some_and(|at_ns| (0..self.pace.heartbeat_ns).contains(&(now_ns - at_ns)));
+        let soon = self.looked_ns.is_some_and(|at_ns| (0..self.schedule.heartbeat_ns).contains(&(now_ns - at_ns)));
         if soon {
             return Ok(false);
         }
@@ -211,11 +211,11 @@ impl<A: Actuator> OverrideWriter<A> {
             Err(error) => return Err(Fault::Line(error)),
         };
         let dial = self.dials.back().map_or(found, |(_, dial)| if self.dial_is_known { *dial } else { found });
-        if self.pace.rule == LadderRule::Least && dial <= asked {
+        if self.schedule.rule == LadderRule::Least && dial <= asked {
             return Ok(false);
         }
         // What may be seen until the ladder has taken the first override: what it makes of the dial alone.
-        let neutral = match (self.dial_is_known, self.pace.rule) {
+        let neutral = match (self.dial_is_known, self.schedule.rule) {
             (true, LadderRule::Least) => OverridePct::GREATEST,
             (true, _) => OverridePct::FULL,
             (false, _) => found,
@@ -242,7 +242,7 @@ impl<A: Actuator> OverrideWriter<A> {
     /// More time than the ladder has patience for has passed.
     fn find_delay(&self, from_ns: TimeNs, to_ns: TimeNs) -> Option<Fault> {
         let silent_ns = to_ns - from_ns;
-        let patience_ns = self.pace.heartbeat_ns.saturating_mul(HEARTBEATS_PATIENCE);
+        let patience_ns = self.schedule.heartbeat_ns.saturating_mul(HEARTBEATS_PATIENCE);
         (silent_ns > patience_ns).then_some(Fault::Late { silent_ms: silent_ns / 1_000_000 })
     }
 
@@ -278,7 +278,7 @@ impl<A: Actuator> OverrideWriter<A> {
             Err(error) => return self.give_up(Fault::Line(error)),
         };
         let now_ns = clock.now_ns();
-        let makes = |dial| pending.asked.map_or(dial, |asked| self.pace.rule.combine_overrides(dial, asked));
+        let makes = |dial| pending.asked.map_or(dial, |asked| self.schedule.rule.combine_overrides(dial, asked));
         if self.dials.iter().any(|(_, dial)| makes(*dial) == found) {
             self.pending = None;
             let PendingWrite { asked, sample_ns, issued_ns } = pending;
@@ -304,11 +304,11 @@ impl<A: Actuator> OverrideWriter<A> {
     fn find_due_occasion(&self, verdict: &Verdict, now_ns: TimeNs) -> Option<Occasion> {
         let Some((at_ns, pct)) = self.recent.back().filter(|_| self.holding) else { return Some(Occasion::Change) };
         let back = matches!(verdict.outcome, GateOutcome::Held(_) | GateOutcome::Refused);
-        let rested = self.changed_ns.is_none_or(|changed_ns| now_ns - changed_ns >= self.pace.interval_ns);
+        let rested = self.changed_ns.is_none_or(|changed_ns| now_ns - changed_ns >= self.schedule.interval_ns);
         if *pct != verdict.permitted && (rested || back) {
             return Some(Occasion::Change);
         }
-        (now_ns - at_ns >= self.pace.heartbeat_ns).then_some(Occasion::SignOfLife)
+        (now_ns - at_ns >= self.schedule.heartbeat_ns).then_some(Occasion::SignOfLife)
     }
 
     /// A machine that is switched off is written nothing, which is no fault.
@@ -356,7 +356,7 @@ impl<A: Actuator> OverrideWriter<A> {
         let dial = self.actuator.read_dial(clock)?;
         self.dial_is_known = dial.is_some();
         // A dial that nobody knows does not limit: what is written is what has to be in force.
-        let dial = dial.unwrap_or(match self.pace.rule {
+        let dial = dial.unwrap_or(match self.schedule.rule {
             LadderRule::Least | LadderRule::Replace => OverridePct::GREATEST,
             LadderRule::Product => OverridePct::FULL,
         });
@@ -383,7 +383,7 @@ impl<A: Actuator> OverrideWriter<A> {
 
     fn find_mismatch(&mut self, asked: OverridePct, found: OverridePct, now_ns: TimeNs) -> Option<Fault> {
         self.remove_settled(now_ns);
-        let rule = self.pace.rule;
+        let rule = self.schedule.rule;
         let makes = |pct: OverridePct| self.dials.iter().any(|(_, dial)| rule.combine_overrides(*dial, pct) == found);
         let known = self.recent.iter().any(|(_, pct)| makes(*pct));
         (!known).then(|| self.read_back(asked, found))
@@ -395,6 +395,6 @@ impl<A: Actuator> OverrideWriter<A> {
 
     fn to_unexpected_reading(&self, found: OverridePct) -> UnexpectedReading {
         let dial = self.dials.back().map(|(_, dial)| *dial).filter(|_| self.dial_is_known);
-        UnexpectedReading { found, dial, rule: self.pace.rule }
+        UnexpectedReading { found, dial, rule: self.schedule.rule }
     }
 }

@@ -93,7 +93,7 @@ impl<A: Actuator> OverrideWriter<A> {
 
     /// What is in force right after a withdrawal. It is looked at again until it is the dial.
     fn back_at_dial(&mut self, at_ns: TimeNs, clock: &dyn Clock) -> (Option<OverridePct>, Option<Fault>) {
-        let neutral = if self.pace.rule == LadderRule::Least { OverridePct::GREATEST } else { OverridePct::FULL };
+        let neutral = if self.schedule.rule == LadderRule::Least { OverridePct::GREATEST } else { OverridePct::FULL };
         self.recent.push_back((at_ns, neutral));
         let found = self.read(clock);
         let told = match found {

@@ -51,12 +51,12 @@ struct PendingLine {
 pub(crate) struct Gatherer {
     outbox: Outbox,
     report: OutboxReport,
-    known: Vec<Arc<SeriesInfo>>,
-    waiting: VecDeque<PendingLine>,
+    series: Vec<Arc<SeriesInfo>>,
+    pending_lines: VecDeque<PendingLine>,
     bytes: usize,
     /// Lines dropped because the disk took nothing for too long; they never got a number.
     lost: u64,
-    stored: OutboxContents,
+    contents: OutboxContents,
     tidied: Instant,
     /// Time until the next note.
     tidy_after: Duration,
@@ -90,11 +90,11 @@ impl Gatherer {
         let stored = store::open_outbox(db, &outbox)?;
         let gatherer = Self {
             report: OutboxReport::new(outbox.settings(), series),
-            known: series.iter().map(|series| Arc::new(build_series_info(series, outbox.settings()))).collect(),
-            waiting: VecDeque::new(),
+            series: series.iter().map(|series| Arc::new(build_series_info(series, outbox.settings()))).collect(),
+            pending_lines: VecDeque::new(),
             bytes: 0,
             lost: 0,
-            stored,
+            contents: stored,
             tidied: Instant::now(),
             tidy_after: Duration::ZERO,
             last: newest_ns.map(|newest_ns| (newest_ns, "not_running")),
@@ -108,7 +108,7 @@ impl Gatherer {
     /// Takes on a batch of ticks whose first has the number `first_row`.
     pub(crate) fn gather_rows(&mut self, rows: &SeriesRows, first_row: i64, series: &[Series], reasons: &Reasons) {
         let gaps = self.find_gaps(rows);
-        let Self { report, waiting, bytes, .. } = self;
+        let Self { report, pending_lines: waiting, bytes, .. } = self;
         let mut put = |index: usize, at_ns: TimeNs, text: String| {
             *bytes += text.len();
             waiting.push_back(PendingLine { row: first_row + index as i64, at_ns, text });
@@ -123,7 +123,7 @@ impl Gatherer {
             }
         }
         while self.bytes > WAITING_BYTES_MAX {
-            let Some(oldest) = self.waiting.pop_front() else { break };
+            let Some(oldest) = self.pending_lines.pop_front() else { break };
             self.bytes -= oldest.text.len();
             self.lost += 1;
         }
@@ -159,7 +159,7 @@ impl Gatherer {
     pub(crate) fn close(&mut self, db: &mut Connection, reasons: &Reasons) -> Result<(), HistoryError> {
         self.tell_end(db, reasons)?;
         let until = Instant::now() + self.outbox.settings().drain;
-        while Instant::now() < until && !self.outbox.is_drained(self.stored.next_sequence) {
+        while Instant::now() < until && !self.outbox.is_drained(self.contents.next_sequence) {
             std::thread::sleep(LOOK_EVERY);
         }
         store::note_deliveries(db, &self.outbox, &[])
@@ -177,9 +177,9 @@ impl Gatherer {
             .collect();
         let from_ns = last_ns.saturating_add(duration_to_ns(tick));
         lines.push((from_ns, line::of_gap(from_ns, None, "stopped").into()));
-        let put = store::store_lines(&ending, &self.outbox, &self.stored, &lines, (false, false))?;
+        let put = store::store_lines(&ending, &self.outbox, &self.contents, &lines, (false, false))?;
         ending.commit().with_activity("ending the outbox")?;
-        self.stored = put.stored;
+        self.contents = put.contents;
         self.outbox.mark_dropped(&put.dropped);
         self.publish_state(reasons);
         Ok(())
@@ -197,7 +197,7 @@ impl Gatherer {
         (blocks, ages): (impl Iterator<Item = TimeNs>, bool),
     ) -> Result<TransactionWork, HistoryError> {
         let mut lines: Vec<(TimeNs, Cow<'_, str>)> = Vec::new();
-        let mut ticks = self.waiting.iter().take_while(|line| line.row < end_row).peekable();
+        let mut ticks = self.pending_lines.iter().take_while(|line| line.row < end_row).peekable();
         for posted in records.filter(|posted| is_deliverable(&posted.record)) {
             let before = opened_row.saturating_add_unsigned(posted.after_rows);
             while let Some(tick) = ticks.next_if(|tick| tick.row < before) {
@@ -210,22 +210,22 @@ impl Gatherer {
         let due = means.collect_due_buckets(blocks);
         let told = means::format_lines(db, &due, self.outbox.settings().tick)?;
         lines.extend(told.into_iter().map(|(at_ns, text)| (at_ns, text.into())));
-        let ticks = self.waiting.iter().take_while(|line| line.row < end_row).count();
+        let ticks = self.pending_lines.iter().take_while(|line| line.row < end_row).count();
         let tidy = self.outbox.has_news() && self.is_due();
-        let put = store::store_lines(db, &self.outbox, &self.stored, &lines, (tidy, ages))?;
+        let put = store::store_lines(db, &self.outbox, &self.contents, &lines, (tidy, ages))?;
         Ok(TransactionWork { ticks, put, tidy, means })
     }
 
     /// What was put is durable.
     pub(crate) fn confirm_commit(&mut self, taken: TransactionWork, reasons: &Reasons) {
-        for line in self.waiting.drain(..taken.ticks) {
+        for line in self.pending_lines.drain(..taken.ticks) {
             self.bytes -= line.text.len();
         }
         debug_assert!(
-            taken.put.stored.next_sequence >= self.stored.next_sequence,
+            taken.put.contents.next_sequence >= self.contents.next_sequence,
             "the numbers of items only grow: a receiver takes one that comes again for one it has"
         );
-        self.stored = taken.put.stored;
+        self.contents = taken.put.contents;
         self.means = taken.means;
         self.outbox.mark_dropped(&taken.put.dropped);
         if taken.tidy {
@@ -237,11 +237,11 @@ impl Gatherer {
     }
 
     fn publish_state(&self, reasons: &Reasons) {
-        let OutboxContents { next_sequence, newest_ns, .. } = self.stored;
+        let OutboxContents { next_sequence, newest_ns, .. } = self.contents;
         self.outbox.publish_state(
             OutboxHead { next_sequence, newest_ns, ready: true },
-            self.stored.to_figures(self.lost),
-            self.report.latest_readings(&self.known, reasons),
+            self.contents.to_figures(self.lost),
+            self.report.latest_readings(&self.series, reasons),
         );
     }
 }

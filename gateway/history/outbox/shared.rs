@@ -70,8 +70,8 @@ struct SharedOutbox {
     machine: String,
     settings: OutboxSettings,
     head: watch::Sender<OutboxHead>,
-    sinks: Mutex<BTreeMap<String, DeliveryState>>,
-    news: AtomicBool,
+    deliveries: Mutex<BTreeMap<String, DeliveryState>>,
+    has_new_items: AtomicBool,
     /// Connections that are not noted yet, and how many times they were.
     connecting: AtomicBool,
     noted: watch::Sender<u64>,
@@ -112,8 +112,8 @@ impl Outbox {
             machine: machine.to_owned(),
             settings,
             head: watch::Sender::new(OutboxHead::default()),
-            sinks: Mutex::new(sinks.into_iter().map(|name| (name, standing())).collect()),
-            news: AtomicBool::new(false),
+            deliveries: Mutex::new(sinks.into_iter().map(|name| (name, standing())).collect()),
+            has_new_items: AtomicBool::new(false),
             connecting: AtomicBool::new(false),
             noted: watch::Sender::new(0),
             hurried: AtomicBool::new(false),
@@ -163,7 +163,7 @@ impl Outbox {
     /// What sink `name` has delivered; `None` for a name that is not configured.
     #[must_use]
     pub fn delivery_state(&self, name: &str) -> Option<DeliveryState> {
-        lock_mutex(&self.shared.sinks).get(name).cloned()
+        lock_mutex(&self.shared.deliveries).get(name).cloned()
     }
 
     /// Sink `name` has delivered the items `from..to`. Becomes durable with the next commit.
@@ -219,7 +219,7 @@ impl Outbox {
 
     /// Sink `name` is connected, or is not.
     pub fn set_linked(&self, name: &str, linked: bool) {
-        if let Some(standing) = lock_mutex(&self.shared.sinks).get_mut(name) {
+        if let Some(standing) = lock_mutex(&self.shared.deliveries).get_mut(name) {
             standing.linked = linked;
         }
     }
@@ -230,25 +230,25 @@ impl Outbox {
     }
 
     fn change_state(&self, name: &str, change: impl FnOnce(&mut DeliveryState)) {
-        if let Some(standing) = lock_mutex(&self.shared.sinks).get_mut(name) {
+        if let Some(standing) = lock_mutex(&self.shared.deliveries).get_mut(name) {
             change(standing);
-            self.shared.news.store(true, Ordering::Release);
+            self.shared.has_new_items.store(true, Ordering::Release);
         }
     }
 
     /// The writer's side: has a sink delivered something since the last commit?
     pub(super) fn has_news(&self) -> bool {
-        self.shared.news.load(Ordering::Acquire)
+        self.shared.has_new_items.load(Ordering::Acquire)
     }
 
     /// The writer's side: the names of the sinks.
     pub(super) fn sink_names(&self) -> Vec<String> {
-        lock_mutex(&self.shared.sinks).keys().cloned().collect()
+        lock_mutex(&self.shared.deliveries).keys().cloned().collect()
     }
 
     /// The writer's side: the lowest number that some sink has not delivered.
     pub(super) fn lowest_undelivered(&self) -> u64 {
-        lock_mutex(&self.shared.sinks)
+        lock_mutex(&self.shared.deliveries)
             .values()
             .map(|standing| standing.position.lowest_undelivered())
             .min()
@@ -260,12 +260,12 @@ impl Outbox {
         &self,
         mut each: impl FnMut(&str, &mut DeliveryState) -> Result<(), HistoryError>,
     ) -> Result<(), HistoryError> {
-        self.shared.news.store(false, Ordering::Release);
+        self.shared.has_new_items.store(false, Ordering::Release);
         self.shared.connecting.store(false, Ordering::Release);
-        let mut sinks = lock_mutex(&self.shared.sinks);
+        let mut sinks = lock_mutex(&self.shared.deliveries);
         let done = sinks.iter_mut().try_for_each(|(name, standing)| each(name, standing));
         if done.is_err() {
-            self.shared.news.store(true, Ordering::Release);
+            self.shared.has_new_items.store(true, Ordering::Release);
         }
         done
     }
@@ -275,7 +275,7 @@ impl Outbox {
         if dropped.is_empty() {
             return;
         }
-        for standing in lock_mutex(&self.shared.sinks).values_mut() {
+        for standing in lock_mutex(&self.shared.deliveries).values_mut() {
             for (from, to) in dropped {
                 standing.dropped += standing.position.count_within(*from, *to);
                 standing.position.mark_delivered(*from, *to);
@@ -291,7 +291,7 @@ impl Outbox {
     /// The writer's side: has every sink that is connected delivered everything before `next`, or is it not to be waited for?
     pub(super) fn is_drained(&self, next: u64) -> bool {
         self.shared.hurried.load(Ordering::Acquire)
-            || lock_mutex(&self.shared.sinks)
+            || lock_mutex(&self.shared.deliveries)
                 .values()
                 .all(|standing| !standing.linked || standing.position.count_waiting(next) == 0)
     }

@@ -245,7 +245,7 @@ fn save_delivery_state(db: &Connection, name: &str, standing: &DeliveryState) ->
 
 /// What a transaction did to the outbox.
 pub(super) struct Put {
-    pub(super) stored: OutboxContents,
+    pub(super) contents: OutboxContents,
     /// Stretches of numbers that were dropped before they were delivered everywhere.
     pub(super) dropped: Vec<(u64, u64)>,
 }
@@ -268,7 +268,7 @@ pub(super) fn store_lines(
     if tidy || !dropped.is_empty() {
         note_deliveries(db, outbox, &dropped)?;
     }
-    Ok(Put { stored, dropped })
+    Ok(Put { contents: stored, dropped })
 }
 
 /// Notes what each sink has delivered, as if these stretches had been dropped already.

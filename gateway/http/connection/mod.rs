@@ -13,8 +13,8 @@
 //! | `talk` | one connection: TLS, heads in time, one request after another |
 //! | `tls` | certificate and key: the user's own, or made at the first start |
 
-mod book;
 mod paced;
+mod table;
 mod talk;
 mod tls;
 
@@ -23,11 +23,11 @@ pub use tls::{Certificate, CertificateError};
 use super::ApiProblem;
 use crate::convert::clamp_to_length;
 use axum::Router;
-use book::ConnectionTable;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use std::io::Write;
 use std::sync::Arc;
 use std::time::Duration;
+use table::ConnectionTable;
 use talk::Talk;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, watch};

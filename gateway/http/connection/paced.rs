@@ -1,7 +1,7 @@
 //! A stream whose reader must go on reading: when nothing can be written for too long, the connection is broken off. A client
 //! that asks for a year of history and reads a byte a minute would otherwise hold its answer in memory for a day.
 
-use super::book::ConnectionActivity;
+use super::table::ConnectionActivity;
 use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -16,14 +16,14 @@ const STALLED: Duration = Duration::from_secs(20);
 /// See the [module](self).
 pub(super) struct Paced<S> {
     stream: S,
-    line: Arc<ConnectionActivity>,
+    activity: Arc<ConnectionActivity>,
     /// Runs while nothing can be written.
     patience: Option<Pin<Box<Sleep>>>,
 }
 
 impl<S> Paced<S> {
     pub(super) fn new(stream: S, line: Arc<ConnectionActivity>) -> Self {
-        Self { stream, line, patience: None }
+        Self { stream, activity: line, patience: None }
     }
 
     /// Passes on what the stream says about writing; ends the patience, or lets it run.
@@ -49,7 +49,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Paced<S> {
         let before = buffer.filled().len();
         let said = Pin::new(&mut self.stream).poll_read(context, buffer);
         if buffer.filled().len() > before {
-            self.line.note_first_byte();
+            self.activity.note_first_byte();
         }
         said
     }

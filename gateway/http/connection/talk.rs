@@ -1,8 +1,8 @@
 //! One connection: encrypted where that is wanted, one request after another, each with its head in time.
 
-use super::book::{ConnectionActivity, ConnectionEntry, Waits};
 use super::format_response;
 use super::paced::Paced;
+use super::table::{ConnectionActivity, ConnectionEntry, Waits};
 use crate::http::ApiProblem;
 use crate::http::peer::Peer;
 use axum::Router;
@@ -49,7 +49,7 @@ impl Talk {
     pub(super) async fn run(self, stream: TcpStream, from: SocketAddr, entry: ConnectionEntry) {
         let Ok(to) = stream.local_addr() else { return };
         let _as_it_is = stream.set_nodelay(true);
-        let line = entry.line.clone();
+        let line = entry.activity.clone();
         let peer = Peer::new(from, to, self.tls.is_some());
         let talk = async {
             match self.tls.clone() {

@@ -49,7 +49,7 @@ pub struct HistoryStore {
     lost: u64,
     /// Samples handed to the writer since it was opened.
     handed: u64,
-    told: Option<String>,
+    last_problem: Option<String>,
     /// The file that the writer has open.
     file: Option<FileIdentity>,
     /// The log beside it has been told to be long.
@@ -89,7 +89,7 @@ impl HistoryStore {
             last_ns: 0,
             lost: 0,
             handed: 0,
-            told: None,
+            last_problem: None,
             file: None,
             long_log: false,
             set_aside: Vec::new(),
@@ -161,13 +161,13 @@ impl HistoryStore {
         self.look_at_damage();
         self.look_at_log();
         let trouble = self.writer.as_ref().and_then(|writer| describe_trouble(&writer.status()));
-        if trouble != self.told {
+        if trouble != self.last_problem {
             match &trouble {
                 Some(text) => Notice::new(Severity::Error, "history_degraded", text.clone()).write_to_logs(),
                 None => Notice::new(Severity::Info, "history_recovered", "the history is being written as usual")
                     .write_to_logs(),
             }
-            self.told = trouble;
+            self.last_problem = trouble;
         }
     }
 

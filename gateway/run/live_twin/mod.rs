@@ -60,16 +60,16 @@ struct ActiveModel {
 
 /// See the [module](self).
 pub struct Twin {
-    places: WorkerPaths,
+    paths: WorkerPaths,
     memory: PathBuf,
     active: Option<ActiveModel>,
     /// Unit and end of the name of the stored series; they stay while the box runs.
     suffix: String,
     stored: bool,
     worker: Option<Worker>,
-    told: Vec<Notice>,
+    notices: Vec<Notice>,
     /// A model that has come into force and is not yet in the history.
-    new: Option<LoadedModel>,
+    new_model: Option<LoadedModel>,
     problem: Option<String>,
     /// Stays until the diagnosis is finished.
     due: Option<Due>,
@@ -95,14 +95,14 @@ impl Twin {
             kept: DiagnosisStore::from_data_dir(data_dir),
         };
         let mut twin = Self {
-            places,
+            paths: places,
             memory: data_dir.join("twin.json"),
             active: None,
             suffix: String::new(),
             stored: false,
             worker: None,
-            told: Vec::new(),
-            new: None,
+            notices: Vec::new(),
+            new_model: None,
             problem: None,
             due: None,
             begun_ns: None,
@@ -117,23 +117,23 @@ impl Twin {
     }
 
     fn start_comparison(&mut self) {
-        let loaded = worker::read(&self.places.model);
+        let loaded = worker::read(&self.paths.model);
         let known = loaded.as_ref().map(|loaded| loaded.toml.clone()).unwrap_or_default();
         match loaded {
             Ok(loaded) => {
-                let remembered = restore_learned(&self.memory, &mut self.told);
+                let remembered = restore_learned(&self.memory, &mut self.notices);
                 self.put_in_charge(loaded, remembered);
             }
             Err(problem) => self.refuse_model(problem.to_string()),
         }
-        match Worker::start(self.places.clone(), known) {
+        match Worker::start(self.paths.clone(), known) {
             Ok(worker) => {
                 self.active.iter().for_each(|active| worker.diagnoses().set_model(&active.loaded));
                 self.worker = Some(worker);
             }
             Err(error) => {
                 let text = format!("no thread for the twin ({error}): nothing is diagnosed in the background");
-                self.told.push(Notice::new(Severity::Warning, "twin_alone", text));
+                self.notices.push(Notice::new(Severity::Warning, "twin_alone", text));
             }
         }
     }
@@ -155,11 +155,11 @@ impl Twin {
             "{} is compared with the machine: {} in {}",
             loaded.model.name,
             loaded.model.output,
-            self.places.model.display()
+            self.paths.model.display()
         );
-        self.told.push(Notice::new(Severity::Info, "twin_model", text));
+        self.notices.push(Notice::new(Severity::Info, "twin_model", text));
         self.problem = None;
-        self.new = (!same).then(|| loaded.clone());
+        self.new_model = (!same).then(|| loaded.clone());
         self.worker.iter().for_each(|worker| worker.diagnoses().set_model(&loaded));
         self.active = Some(ActiveModel { live: Live::new(loaded.model.clone(), memory), loaded });
     }
@@ -167,7 +167,7 @@ impl Twin {
     fn refuse_model(&mut self, problem: String) {
         let consequence = if self.active.is_some() { "the one before stays in charge" } else { "nothing is compared" };
         let text = format!("the model cannot be used, {consequence}:\n  {}", problem.replace('\n', "\n  "));
-        self.told.push(Notice::new(Severity::Warning, "twin_refused", text));
+        self.notices.push(Notice::new(Severity::Warning, "twin_refused", text));
         self.problem = Some(problem);
     }
 
@@ -200,9 +200,9 @@ impl Twin {
     pub fn compare_tick(&mut self, sample: &Sample, pipeline: &Pipeline, health: &mut Health) {
         let now_ns = sample.at_ns;
         self.receive_report(health, now_ns);
-        self.told.drain(..).for_each(|notice| health.record_event(now_ns, SOURCE, &notice));
-        if let Some(LoadedModel { model, toml }) = self.new.take() {
-            let origin = self.places.model.display().to_string();
+        self.notices.drain(..).for_each(|notice| health.record_event(now_ns, SOURCE, &notice));
+        if let Some(LoadedModel { model, toml }) = self.new_model.take() {
+            let origin = self.paths.model.display().to_string();
             health.keep_record(history::Model { at_ns: now_ns, name: model.name, origin, toml }.into());
         }
         // What differed before the restart still does; the history has ended its alarms.

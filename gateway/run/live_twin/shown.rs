@@ -47,7 +47,7 @@ impl Twin {
         let reason = compared.residual.err();
         TwinStatus {
             model: active.map(|active| active.loaded.model.name.clone()).unwrap_or_default(),
-            file: self.places.model.display().to_string(),
+            file: self.paths.model.display().to_string(),
             output: active.map(|active| active.loaded.model.output.clone()).unwrap_or_default(),
             unit: self.output_unit(),
             second_ms: active.and_then(|active| active.live.compared_at_ns()).map(|ns| ns.div_euclid(1_000_000)),
@@ -91,7 +91,7 @@ impl Twin {
         let accept = finished
             .improved
             .as_ref()
-            .map_or(String::new(), |improved| format!("cp {} {}", improved.display(), self.places.model.display()));
+            .map_or(String::new(), |improved| format!("cp {} {}", improved.display(), self.paths.model.display()));
         DiagnosisStatus {
             at_ms: record.at_ns.div_euclid(1_000_000),
             from_ms: record.from_ns.div_euclid(1_000_000),

@@ -43,7 +43,7 @@ pub struct Thermal {
     temperatures_c: Vec<Result<f64, Absence>>,
     error: ChannelId,
     memory: PathBuf,
-    told: Vec<Notice>,
+    notices: Vec<Notice>,
     last_ns: Option<TimeNs>,
     read_ns: Option<TimeNs>,
     held: Option<HoldReason>,
@@ -88,7 +88,7 @@ impl Thermal {
             sensors,
             error,
             memory,
-            told,
+            notices: told,
             last_ns: None,
             read_ns: None,
             held: None,
@@ -126,7 +126,7 @@ impl Thermal {
 
     /// What is to be said at the start.
     pub fn report_notices(&mut self, health: &mut Health, at_ns: TimeNs) {
-        for notice in self.told.drain(..) {
+        for notice in self.notices.drain(..) {
             health.record_event(at_ns, SOURCE, &notice);
         }
         health.set_thermal_values(&self.values);

@@ -11,7 +11,7 @@ const INSIDE_NS: i64 = 300 * SECOND_NS;
 /// See the [module](self).
 #[derive(Debug, Default)]
 pub struct OutsideWatch {
-    told: Option<Standing>,
+    last_reported: Option<Standing>,
     inside_since_ns: Option<TimeNs>,
 }
 
@@ -28,10 +28,10 @@ impl OutsideWatch {
         let Some(outside) = prediction.outside else { return self.report_return(at_ns) };
         self.inside_since_ns = None;
         // What is worse than what was told is told; what is better waits for the inside.
-        if self.told.is_some_and(|told| rank_standing(told) >= rank_standing(step.standing)) {
+        if self.last_reported.is_some_and(|told| rank_standing(told) >= rank_standing(step.standing)) {
             return None;
         }
-        self.told = Some(step.standing);
+        self.last_reported = Some(step.standing);
         let (where_to, sd_um) = (describe_outside(outside, sensors), prediction.error_um.sd);
         let what = match step.standing {
             Standing::AtTheEdge => format!(
@@ -50,12 +50,12 @@ impl OutsideWatch {
     }
 
     fn report_return(&mut self, at_ns: TimeNs) -> Option<Notice> {
-        self.told?;
+        self.last_reported?;
         let since_ns = *self.inside_since_ns.get_or_insert(at_ns);
         if (0..INSIDE_NS).contains(&(at_ns - since_ns)) {
             return None;
         }
-        (self.told, self.inside_since_ns) = (None, None);
+        (self.last_reported, self.inside_since_ns) = (None, None);
         let text = "the temperatures are those of the identification again";
         Some(Notice::new(Severity::Info, "thermal_inside", text))
     }

@@ -16,7 +16,7 @@ type WearRecords = Result<Vec<Arc<WearRecord>>, HistoryError>;
 /// The models in force.
 #[derive(Debug)]
 pub(super) struct Library {
-    newest: Option<Receiver<WearRecords>>,
+    records: Option<Receiver<WearRecords>>,
     /// Dropped with the library: the thread ends.
     _ends: Option<std::sync::mpsc::Sender<()>>,
     models: Vec<Arc<WearRecord>>,
@@ -31,9 +31,9 @@ impl Library {
         let history = history.to_owned();
         let started =
             std::thread::Builder::new().name("wear".to_owned()).spawn(move || look_again(&history, &send, &ended));
-        let mut library = Self { newest: Some(newest), _ends: Some(ends), models: Vec::new(), problem: None };
+        let mut library = Self { records: Some(newest), _ends: Some(ends), models: Vec::new(), problem: None };
         let told = started.err().map(|error| {
-            library.newest = None;
+            library.records = None;
             let text = format!("no thread for the wear models ({error}): no limit of the cutting power is shown");
             Notice::new(Severity::Warning, "wear_alone", text)
         });
@@ -42,7 +42,7 @@ impl Library {
 
     /// Takes what was found since the last call. True when the models are others than before.
     pub(super) fn take_newest(&mut self) -> bool {
-        match self.newest.as_ref().and_then(|newest| newest.try_recv().ok()) {
+        match self.records.as_ref().and_then(|newest| newest.try_recv().ok()) {
             None => false,
             Some(Ok(models)) => {
                 self.models = models;

@@ -20,7 +20,7 @@ const SOURCE: &str = "wear";
 pub struct Wear {
     machine: String,
     model_library: Library,
-    told: Option<Notice>,
+    notice: Option<Notice>,
 }
 
 impl Wear {
@@ -28,12 +28,12 @@ impl Wear {
     #[must_use]
     pub fn from_config(config: &Config) -> Self {
         let (model_library, told) = Library::watch_history(&config.history.path);
-        Self { machine: config.gateway.name.clone(), model_library, told }
+        Self { machine: config.gateway.name.clone(), model_library, notice: told }
     }
 
     /// Gives the pipeline what is new in the library; before the tick.
     pub fn supply_models(&mut self, pipeline: &mut Pipeline, at_ns: TimeNs, health: &mut Health) {
-        if let Some(notice) = self.told.take() {
+        if let Some(notice) = self.notice.take() {
             health.record_event(at_ns, SOURCE, &notice);
         }
         if self.model_library.take_newest() {

@@ -72,9 +72,9 @@ pub(super) struct MqttSink {
     link: Link,
     requests: Requests,
     /// A message that has come and is not answered yet.
-    asked: Option<MqttMessage>,
+    request: Option<MqttMessage>,
     /// When everything that is known was written last, and whether something has changed since.
-    told: Option<Instant>,
+    last_written: Option<Instant>,
     changed: bool,
     /// Codes of the alarms that stand.
     alarms: BTreeSet<String>,
@@ -92,8 +92,8 @@ impl MqttSink {
             outbox: outbox.clone(),
             link: Link::default(),
             requests,
-            asked: None,
-            told: None,
+            request: None,
+            last_written: None,
             changed: false,
             alarms: BTreeSet::new(),
             described: BTreeSet::new(),
@@ -149,7 +149,7 @@ impl MqttSink {
 
     /// When everything that is known is to be written again; `None` while nothing has changed.
     fn latest_due_time(&self) -> Option<Instant> {
-        let next = || self.told.map_or_else(Instant::now, |told| told + self.target.latest);
+        let next = || self.last_written.map_or_else(Instant::now, |told| told + self.target.latest);
         (self.changed && !self.target.latest.is_zero()).then(next)
     }
 
@@ -158,7 +158,7 @@ impl MqttSink {
         if self.latest_due_time().is_none_or(|due| Instant::now() < due) {
             return Ok(());
         }
-        (self.told, self.changed) = (Some(Instant::now()), false);
+        (self.last_written, self.changed) = (Some(Instant::now()), false);
         let message = layout::build_latest_message(&self.outbox, &self.topic_prefix(), self.alarms.iter());
         self.publish_messages(vec![message], Qos::AtLeastOnce).await
     }
@@ -172,7 +172,7 @@ impl MqttSink {
             let provided = latest.iter().filter(|reading| !layout::is_unprovided(reading));
             messages.extend(provided.map(|reading| layout::build_value_message(&prefix, reading)));
         }
-        (self.told, self.changed) = (None, true);
+        (self.last_written, self.changed) = (None, true);
         self.publish_messages(messages, Qos::AtLeastOnce).await?;
         self.publish_discovery().await?;
         self.tell_latest().await
@@ -234,7 +234,7 @@ impl Sink for MqttSink {
             let will = Will { topic, payload, qos: Qos::AtLeastOnce, retain, at_leave: false };
             let name = client_name(&self.outbox.box_id(), &self.name);
             self.link.connect(&self.target.broker, &name, Some(will)).await?;
-            self.asked = None;
+            self.request = None;
             self.described.clear();
             if self.requests.is_allowed() {
                 let filter = vec![self.format_topic("request")];
@@ -259,7 +259,7 @@ impl Sink for MqttSink {
                 }
             };
             tokio::select! {
-                message = self.link.next(&self.target.broker) => self.asked = Some(message?),
+                message = self.link.next(&self.target.broker) => self.request = Some(message?),
                 () = until_due => {}
             }
             Ok(())
@@ -269,7 +269,7 @@ impl Sink for MqttSink {
     fn serve_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
             self.tell_latest().await?;
-            match self.asked.take().filter(|message| message.topic == self.format_topic("request")) {
+            match self.request.take().filter(|message| message.topic == self.format_topic("request")) {
                 Some(message) => self.answer_request(message).await,
                 None => Ok(()),
             }

@@ -71,20 +71,20 @@ struct AgentContext {
 pub(super) struct ShdrSink {
     target: ShdrTarget,
     outbox: Outbox,
-    shared: Option<Arc<AgentContext>>,
+    context: Option<Arc<AgentContext>>,
     listening: Option<AbortHandle>,
 }
 
 impl ShdrSink {
     pub(super) fn new(target: ShdrTarget, outbox: &Outbox) -> Self {
-        Self { target, outbox: outbox.clone(), shared: None, listening: None }
+        Self { target, outbox: outbox.clone(), context: None, listening: None }
     }
 
     fn stop(&mut self) {
         if let Some(listening) = self.listening.take() {
             listening.abort();
         }
-        self.shared = None;
+        self.context = None;
     }
 
     async fn start_listening(&mut self) -> Result<(), SinkError> {
@@ -98,7 +98,7 @@ impl ShdrSink {
             heartbeat_ms: self.target.heartbeat.as_millis(),
         });
         self.listening = Some(tokio::spawn(accept_agents(listener, shared.clone())).abort_handle());
-        self.shared = Some(shared);
+        self.context = Some(shared);
         Ok(())
     }
 }
@@ -160,7 +160,7 @@ impl Sink for ShdrSink {
     }
 
     fn send_batch<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
-        let Some(shared) = &self.shared else {
+        let Some(shared) = &self.context else {
             return Box::pin(std::future::ready(Err(SinkError::failed_line("the box does not listen", ""))));
         };
         // An agent that connects meanwhile gets each line once: in its greeting or after it.

@@ -107,7 +107,7 @@ pub(super) struct SparkplugSink {
     host: PrimaryHost,
     requests: Requests,
     /// What the network has asked for and is not answered yet.
-    asked: Vec<Result<RequestedChange, RequestRefusal>>,
+    requested_changes: Vec<Result<RequestedChange, RequestRefusal>>,
 }
 
 impl SparkplugSink {
@@ -124,7 +124,7 @@ impl SparkplugSink {
             dead: false,
             host: PrimaryHost::default(),
             requests,
-            asked: Vec::new(),
+            requested_changes: Vec::new(),
         }
     }
 
@@ -136,13 +136,13 @@ impl SparkplugSink {
         }
         let Ok(payload) = Payload::decode(&message.payload[..]) else { return false };
         self.rebirth |= of_node && births::asks_rebirth(&payload);
-        self.asked = commands::parse_changes(&payload, message.retained);
-        self.rebirth || !self.asked.is_empty()
+        self.requested_changes = commands::parse_changes(&payload, message.retained);
+        self.rebirth || !self.requested_changes.is_empty()
     }
 
     /// Hands to the gate what was asked for, and tells what became of it.
     async fn answer_requests(&mut self) -> Result<(), SinkError> {
-        for change in std::mem::take(&mut self.asked) {
+        for change in std::mem::take(&mut self.requested_changes) {
             let Some(Reply { done, text }) = self.requests.submit_change(change).await else { continue };
             let (at_ms, kind) = (now_ms(), self.data_kind());
             let told = self.build_message(kind, vec![commands::build_answer_metric(done, &text, at_ms)], at_ms);

@@ -7,7 +7,7 @@ use adapters::units::OverridePct;
 use adapters::{Actuator, Axis, LadderRequest, OffsetSink, SourceError};
 use gateway::config::GateMode;
 use gateway::gate::offset::{OffsetAccount, OffsetJournal, OffsetOrder};
-use gateway::gate::{Disarmed, Fault, Gate, GateOutcome, OverrideWriter, ScriptRequest, Verdict, trail};
+use gateway::gate::{Disarmed, Fault, Gate, GateOutcome, OverrideWriter, ScriptRequest, Verdict, audit};
 use gateway::run::actuator_worker::{ActuatorReport, ActuatorWorker, Tools};
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
@@ -253,7 +253,7 @@ fn a_thread_that_dies_is_noticed() {
 fn every_write_says_which_script_of_which_version_asked_for_it_and_why() {
     let mut gate = Gate::new(limits(GateMode::Armed));
     gate.arm("fitter", None, 0).expect("allowed");
-    let (clock, mut trail) = (ManualClock::with_time(0), trail::Trail::default());
+    let (clock, mut trail) = (ManualClock::with_time(0), audit::Trail::default());
     let mut writer = OverrideWriter::new(Controller::default(), gate.limits());
     let mut rows = Vec::new();
     for tick in 0..20 {

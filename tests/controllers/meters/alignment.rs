@@ -42,7 +42,7 @@ fn outcome(text: &str, machine_s: i64) -> Outcome {
     let power = ChannelId::from_name("spindle_power_w").expect("a channel");
     let mut outcome = Outcome { status: Vec::new(), errors_w: Vec::new(), fingerprint: 0, notices: Vec::new() };
     let (mut before_rpm, mut first_ns) = (0.0, None);
-    while let Some(now_ns) = opened.pace.next_tick(&stop) {
+    while let Some(now_ns) = opened.schedule.next_tick(&stop) {
         opened.feed.sample_into(&mut sample, now_ns);
         let state = estimators.update_with_sample(&sample).state;
         opened.feed.alignment_mut().record_state(sample.at_ns, state);

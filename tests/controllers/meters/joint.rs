@@ -127,7 +127,7 @@ fn compared(speed: f64, machine_s: i64) -> Option<Vec<Errors>> {
     let mut opened = open_sources(&config, MachineSpeed::Real, &clock, 0).expect("opens");
     let (mut sample, began_ns) = (Sample::new_empty(0), clock.now_ns());
     let mut errors: Vec<Errors> = COMPARED.iter().map(|_| Errors::default()).collect();
-    while let Some(now_ns) = opened.pace.next_tick(&stop) {
+    while let Some(now_ns) = opened.schedule.next_tick(&stop) {
         opened.feed.sample_into(&mut sample, now_ns);
         if now_ns - began_ns > machine_s * SECOND_NS {
             stop.store(true, Ordering::SeqCst);

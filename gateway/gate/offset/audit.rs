@@ -2,8 +2,8 @@
 
 use super::order::{Moved, OffsetOrder, Shifted};
 use super::{OffsetBound, OffsetOutcome, OffsetVerdict};
+use crate::audit::{Author, truncate_text};
 use crate::limits::OffsetConfig;
-use crate::trail::{Author, truncate_text};
 use adapters::offset::{Axis, LastWrite};
 use gateway_base::row_rate::RowRate;
 use gateway_history::Audit;
@@ -21,10 +21,10 @@ struct LastProposal {
 /// Remembers what was last recorded.
 #[derive(Debug, Default)]
 pub struct OffsetTrail {
-    known: [Option<LastProposal>; Axis::ALL.len()],
+    last_proposals: [Option<LastProposal>; Axis::ALL.len()],
     /// Who proposed what was ordered last.
     authors: [Author; Axis::ALL.len()],
-    pace: RowRate,
+    row_rate: RowRate,
 }
 
 impl OffsetTrail {
@@ -46,12 +46,12 @@ impl OffsetTrail {
             armed: verdict.armed,
             script: proposal.map(|proposal| proposal.version),
         };
-        let last = &mut self.known[verdict.axis.index()];
+        let last = &mut self.last_proposals[verdict.axis.index()];
         if *last == Some(known) {
             return None;
         }
         *last = Some(known);
-        let left_out = self.pace.may_tell(verdict.at_ns)?;
+        let left_out = self.row_rate.may_tell(verdict.at_ns)?;
         let wanted = proposal.map_or("nothing is proposed any more".to_owned(), |it| truncate_text(&it.reason));
         Some(Audit {
             outcome: outcome_word(verdict).to_owned(),

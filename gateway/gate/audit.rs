@@ -48,10 +48,10 @@ const AUTHORS_MAX: usize = 32;
 /// See the [module](self).
 #[derive(Debug, Default)]
 pub struct Trail {
-    told: Option<LastRequest>,
+    last_request: Option<LastRequest>,
     /// Who has asked since when, the newest at the end.
     authors: VecDeque<(TimeNs, Author)>,
-    pace: RowRate,
+    row_rate: RowRate,
 }
 
 impl Trail {
@@ -65,14 +65,14 @@ impl Trail {
             script: request.map(|request| request.version),
         };
         // Nothing asked for, nothing in the way of it: not worth a first row.
-        let quiet = self.told.is_none() && request.is_none();
-        if self.told.as_ref() == Some(&told) || quiet {
+        let quiet = self.last_request.is_none() && request.is_none();
+        if self.last_request.as_ref() == Some(&told) || quiet {
             return None;
         }
         let author = request.map_or(Author::default(), |it| Author::new(&it.script, it.version, &it.reason));
         self.record_author(verdict.at_ns, &author);
-        self.told = Some(told);
-        let also = self.pace.may_tell(verdict.at_ns)?;
+        self.last_request = Some(told);
+        let also = self.row_rate.may_tell(verdict.at_ns)?;
         let wanted =
             request.map_or("nothing is asked for any more".to_owned(), |request| truncate_text(&request.reason));
         Some(Audit {

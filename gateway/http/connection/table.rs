@@ -12,7 +12,7 @@ use tokio::sync::Notify;
 #[derive(Debug)]
 pub(super) struct ConnectionActivity {
     opened: Instant,
-    from: IpAddr,
+    peer: IpAddr,
     answering: AtomicBool,
     /// Since when it waits or answers.
     since_ms: AtomicU64,
@@ -20,7 +20,7 @@ pub(super) struct ConnectionActivity {
     first_byte_ms: AtomicU64,
     /// Requests so far.
     requests: AtomicU64,
-    go: Notify,
+    close_signal: Notify,
 }
 
 /// What a connection waits for, and for how long it has.
@@ -80,7 +80,7 @@ impl ConnectionActivity {
 
     /// Returns when it has to go for another.
     pub(super) async fn has_to_go(&self) {
-        self.go.notified().await;
+        self.close_signal.notified().await;
     }
 }
 
@@ -102,14 +102,14 @@ struct Lines {
 /// A place in the book; it is given back when this goes.
 #[derive(Debug)]
 pub(super) struct ConnectionEntry {
-    pub(super) line: Arc<ConnectionActivity>,
+    pub(super) activity: Arc<ConnectionActivity>,
     number: u64,
-    book: ConnectionTable,
+    table: ConnectionTable,
 }
 
 impl Drop for ConnectionEntry {
     fn drop(&mut self) {
-        self.book.lock_lines().by_number.remove(&self.number);
+        self.table.lock_lines().by_number.remove(&self.number);
     }
 }
 
@@ -126,27 +126,27 @@ impl ConnectionTable {
     /// Another connection of this address. One that waits goes for it where there is no room; `None` where none waits.
     pub(super) fn register_connection(&self, from: IpAddr) -> Option<ConnectionEntry> {
         let mut lines = self.lock_lines();
-        let own = lines.by_number.values().filter(|line| line.from == from).count();
+        let own = lines.by_number.values().filter(|line| line.peer == from).count();
         if own >= self.of_one {
-            lines.close_one(|line| line.from == from)?;
+            lines.close_one(|line| line.peer == from)?;
         } else if lines.by_number.len() >= self.most {
             let crowded = lines.most_waiting()?;
-            lines.close_one(|line| line.from == crowded)?;
+            lines.close_one(|line| line.peer == crowded)?;
         }
         let line = Arc::new(ConnectionActivity {
             opened: self.opened,
-            from,
+            peer: from,
             answering: AtomicBool::new(false),
             since_ms: AtomicU64::new(0),
             first_byte_ms: AtomicU64::new(0),
             requests: AtomicU64::new(0),
-            go: Notify::new(),
+            close_signal: Notify::new(),
         });
         line.mark_waiting();
         let number = lines.next;
         lines.next += 1;
         lines.by_number.insert(number, line.clone());
-        Some(ConnectionEntry { line, number, book: self.clone() })
+        Some(ConnectionEntry { activity: line, number, table: self.clone() })
     }
 }
 
@@ -155,7 +155,7 @@ impl Lines {
     fn most_waiting(&self) -> Option<IpAddr> {
         let mut counts: HashMap<IpAddr, usize> = HashMap::new();
         let waiting = self.by_number.values().filter(|line| line.wait_state() != Waits::No);
-        waiting.for_each(|line| *counts.entry(line.from).or_default() += 1);
+        waiting.for_each(|line| *counts.entry(line.peer).or_default() += 1);
         counts.into_iter().max_by_key(|(_, count)| *count).map(|(from, _)| from)
     }
 
@@ -164,7 +164,7 @@ impl Lines {
         let waiting = self.by_number.iter().filter(|(_, line)| which(line) && line.wait_state() != Waits::No);
         let oldest = waiting.min_by_key(|(number, line)| (line.since_ms.load(Ordering::Relaxed), **number));
         let number = oldest.map(|(number, _)| *number)?;
-        self.by_number.remove(&number)?.go.notify_one();
+        self.by_number.remove(&number)?.close_signal.notify_one();
         Some(())
     }
 }
@@ -185,13 +185,13 @@ mod tests {
         assert_eq!(book.lock_lines().by_number.len(), 10);
         others.extend(book.register_connection(address(7)));
         assert_eq!(
-            book.lock_lines().by_number.values().filter(|line| line.from == address(1)).count(),
+            book.lock_lines().by_number.values().filter(|line| line.peer == address(1)).count(),
             5,
             "the crowd pays"
         );
         book.lock_lines().by_number.values().for_each(|line| line.mark_answering());
         assert!(book.register_connection(address(9)).is_none(), "nobody waits");
-        others[0].line.mark_waiting();
+        others[0].activity.mark_waiting();
         assert!(book.register_connection(address(9)).is_some());
         drop((of_one, others));
         assert!(book.lock_lines().by_number.is_empty());
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn a_line_tells_what_it_waits_for() {
         let entry = ConnectionTable::new(1, 1).register_connection(IpAddr::from([10, 0, 0, 1])).expect("room");
-        let line = &entry.line;
+        let line = &entry.activity;
         assert!(matches!(line.wait_state(), Waits::First(_)));
         line.note_first_byte();
         assert!(matches!(line.wait_state(), Waits::Rest(_)));
