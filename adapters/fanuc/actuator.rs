@@ -9,7 +9,7 @@
 //!
 //! Where the address names the byte with the operator's dial, what is in force is what the control obeys: G012, with the
 //! second override or a macro variable its product with that. Feed hold and stop go through a byte of their own, see
-//! `asking`. Mailbox and requests are laid out in [`server::ladder`](super::server::ladder), with the
+//! `ladder_request`. Mailbox and requests are laid out in [`server::ladder`](super::server::ladder), with the
 //! rungs that a machine's maker needs.
 //! Nothing is looked at sooner than the settling time after a write: a return code 0 says that a byte has arrived, not
 //! that the ladder left it there.

@@ -14,7 +14,7 @@
 //! | `wire` | frames, blocks, numbers: pure |
 //! | `item`, `pmc`, `word`, `answer` | what can be asked and written, what comes back, typed |
 //! | `table` | the one table of what goes over the wire |
-//! | `opening` | generation, axes and spindles from the opening of a connection |
+//! | `generation` | generation, axes and spindles from the opening of a connection |
 //! | `request`, `decode`, `records` | items as blocks and data as answers, in the encoding of the generation |
 //! | `code` | every return code as cause and next step |
 //! | `focas` | the one narrow trait over what the adapter needs |
@@ -26,13 +26,13 @@
 //! | `poll`, `source` | what is asked for at which pace; the groups as sources |
 //! | `states`, `view`, `readings` | status words and signals as states, answers as channels; pure |
 //! | `details` | the slow group: parts, times, texts, codes, tool life |
-//! | `extra`, `own` | further axes and spindles, and what the user can have read |
+//! | `extra`, `own_item` | further axes and spindles, and what the user can have read |
 //! | `refusals` | what is refused, one sentence per return code |
 //! | `feed_override` | the inverted byte, and nothing else |
-//! | `allow` | what may be written |
+//! | `allow_list` | what may be written |
 //! | `dial` | where the operator's dial stands |
 //! | `actuator` | the feed override: mailbox, second override, macro variable, direct |
-//! | `asking` | feed hold and stop, latched once by the ladder |
+//! | `ladder_request` | feed hold and stop, latched once by the ladder |
 //! | `work_offset` | the external work offset between programs |
 //! | `open` | from an address to all of this |
 //! | `server` | the other side of the wire |

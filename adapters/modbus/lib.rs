@@ -11,7 +11,7 @@
 //! | `tcp`, `rtu` | the two carriers |
 //! | `number` | registers to numbers and back: widths, word order, sign and magnitude |
 //! | `profile`, `register` | which register holds what: shipped files, the user's own, everything wrong with one told at once |
-//! | `own` | what the user can have read besides |
+//! | `own_register` | what the user can have read besides |
 //! | `plan` | the fewest blocks that hold all registers of a profile, and what they take on the wire |
 //! | `poll` | one poll, in parts where the meter does not give a block as a whole |
 //! | `outputs` | from registers to channels, and to what [`electric`](adapter_core::electric) judges |

@@ -4,16 +4,16 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `liberal` | reading JSON that several makers write differently |
+//! | `lenient_json` | reading JSON that several makers write differently |
 //! | `topic` | the topics of a device |
 //! | `message` | query and set: requests as JSON, answers as values or reasons |
 //! | `model` | the answer to a probe: data items with their paths, sample channels |
 //! | `sample` | one message of a sample channel: columns of values, their times |
-//! | `map`, `own` | which data item feeds which channel, in which unit; what the user can have read |
+//! | `map`, `own_path` | which data item feeds which channel, in which unit; what the user can have read |
 //! | `decode` | state words from the status item and from the channel's F register |
 //! | `connection` | one client at the broker: probe, query, set, by request identifier |
 //! | `source`, `open` | the [`Source`](crate::Source), and how an address becomes one |
-//! | `track` | what sample channels and events have brought, and whether a millisecond is missing |
+//! | `sample_tracks` | what sample channels and events have brought, and whether a millisecond is missing |
 //! | `mailbox` | the registers through which the ladder is asked for an override |
 //! | `actuator` | the [`Actuator`](crate::Actuator): letters into the mailbox, the override in force read back |
 //! | `offset_mailbox` | the registers through which the ladder is asked to shift axes |
@@ -22,7 +22,7 @@
 //!
 //! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query
 //! for all of them; the answer is stamped with the middle of the request. Messages of sample channels (1 ms data,
-//! uploaded each 200 ms) and events arrive in between: they are followed by `track`, which counts missing milliseconds,
+//! uploaded each 200 ms) and events arrive in between: they are followed by `sample_tracks`, which counts missing milliseconds,
 //! and whole blocks go to whoever asked for them with [`NcLinkSource::on_block`]: with `sample=yes` the box makes a
 //! feature of the spindle's load current out of them. They make no readings here; the values at a tick are those of the
 //! query. A question that is not answered in time, a broker that is gone, a device that says `NG` and an answer without

@@ -14,7 +14,7 @@
 //! | file | what |
 //! |---|---|
 //! | `server` | listens, checks, hands each order to the tick and answers with what the tick says |
-//! | `post` | the way to the tick and back, for the socket, for the page and for the sinks |
+//! | `order_channel` | the way to the tick and back, for the socket, for the page and for the sinks |
 //! | `network` | the little that a computer on the network may ask for over a sink; no order |
 //! | `client` | `cnc-gateway arm`, `disarm`, `acknowledge` |
 

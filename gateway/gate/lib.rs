@@ -20,7 +20,7 @@
 //! | `write` | writing, reading back, restoring |
 //! | `fault` | what ends an arming on the way to the machine |
 //! | `offset` | thermal offsets: the same for shifts of an axis, between programs |
-//! | `trail` | what of it goes into the audit |
+//! | `audit` | what of it goes into the audit |
 
 mod arming;
 mod ask;

@@ -34,7 +34,7 @@ pub struct Sinks {
 }
 
 /// Starts a task for each of these sinks, which must be known to outbox and board in this order. The history at `path` may be
-/// opened later. What the network asks for goes by `post`. Call it within a runtime.
+/// opened later. What the network asks for goes by `orders`. Call it within a runtime.
 #[must_use]
 pub fn start_sinks(
     sinks: &[SinkConfig],

@@ -29,7 +29,7 @@
 //! | `timers`, `script_memory` | what a script remembers |
 //! | `trials` | given and expected, written in the script file itself |
 //! | `decision`, `status`, `problem` | what comes out |
-//! | `shipped`, `recipes` | the scripts that come with the gateway |
+//! | `example_scripts`, `recipes` | the scripts that come with the gateway |
 
 mod api;
 mod callable;

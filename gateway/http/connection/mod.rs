@@ -8,7 +8,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `book` | which connections there are, and which one has to go |
+//! | `table` | which connections there are, and which one has to go |
 //! | `paced` | a stream that is not waited for longer than so when it takes nothing |
 //! | `talk` | one connection: TLS, heads in time, one request after another |
 //! | `tls` | certificate and key: the user's own, or made at the first start |

@@ -6,12 +6,12 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `in_force` | the channels, and the feed override in force |
+//! | `load_inputs` | the channels, and the feed override in force |
 //! | `follower` | from a load to an override: down at once, up only from a steady load |
 //! | `limits` | the settings of a law |
 //! | `curves` | learned curves of the load over the feed, and what they are of |
-//! | `constant` | constant load |
-//! | `place`, `learned` | the load of each place of a program, learned from the first parts |
+//! | `constant_load` | constant load |
+//! | `place`, `learned_load` | the load of each place of a program, learned from the first parts |
 
 mod constant_load;
 mod curves;

@@ -14,7 +14,7 @@
 //! | `noise` | residuals that remember |
 //! | `regression` | multiple linear regression with intervals that hold |
 //! | `lagged` | the same law late: time constant, hysteresis removed |
-//! | `told`, `written` | what was learned in words, and as a script |
+//! | `report`, `script_text` | what was learned in words, and as a script |
 //! | `learn` | all of it, and which law to use |
 //! | `law` | which temperatures, with what weight, late by how much |
 //! | `predictor` | the law at work: error, uncertainty, residual, outside the range |

@@ -13,14 +13,14 @@
 //! | `identify`, `report` | everything learned from a set of cuts, for programs and readers |
 //! | `record` | a model and what it is for: file and library |
 //! | `physical` | the physical form, which extrapolates |
-//! | `short` | the physical form as a script holds it |
+//! | `script_numbers` | the physical form as a script holds it |
 //! | `compare` | both forms on cuts that they have not seen |
-//! | `model`, `predicted` | either form, and what it says of a cut |
+//! | `model`, `power_prediction` | either form, and what it says of a cut |
 //! | `threshold` | the limit `[Pc]`, the wear from a power, observable here or not |
 //! | `tool_name` | tool and edge in a name |
-//! | `choose` | the model of a library for a cut |
+//! | `model_selection` | the model of a library for a cut |
 //! | `work` | what an edge did in one part, against what a sharp one takes |
-//! | `gaussian`, `followed`, `follow` | the wear of every edge, followed by a Kalman filter |
+//! | `gaussian`, `edge_state`, `follow` | the wear of every edge, followed by a Kalman filter |
 //! | `hypotheses` | what may have happened between two parts: another material, a new edge; the limit beside the filter |
 //! | `prior` | what the filter believes beforehand |
 //! | `outlook` | probability of passing the criterion, parts left |

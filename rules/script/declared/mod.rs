@@ -20,7 +20,7 @@
 //! | `scan` | where something stands in a text, outside of texts and comments |
 //! | `find` | the declarations of a text, and the text with values in their place |
 //! | `values` | the file with the values, checked against the declarations |
-//! | `force` | the values in force for one script |
+//! | `values_in_force` | the values in force for one script |
 
 mod find;
 pub(super) mod scan;

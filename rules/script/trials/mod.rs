@@ -16,7 +16,7 @@
 //! |---|---|
 //! | `functions` | what a trial can call |
 //! | `smoke` | a script without trials: does it run at all? |
-//! | `stage` | the script, its inputs, its clock |
+//! | `trial_context` | the script, its inputs, its clock |
 
 mod functions;
 mod smoke;

@@ -2,7 +2,7 @@
 //! and the output, whitened for one noise.
 //!
 //! Every hypothesis is a Schur complement of it. For the inner test the columns of one hypothesis alone are whitened and
-//! summed unit by unit (`inner.rs`): leaving a unit out is a difference.
+//! summed unit by unit (`cross_validation.rs`): leaving a unit out is a difference.
 
 use super::inputs::RecordingInputs;
 use super::linear_algebra::compute_gram_matrix;

@@ -1,16 +1,16 @@
 //! What is missing, by evidence: estimate first, name second, decide once.
 //!
 //! 1. The model is refitted by plain least squares; from then on the simulation stands still (`fit.rs`).
-//! 2. Every family of laws, named by the catalogue or nameless, is columns in one bank (`bank.rs`, `families/`).
+//! 2. Every family of laws, named by the catalogue or nameless, is columns in one bank (`variant_bank.rs`, `families/`).
 //! 3. One Gram matrix for each likely noise, a Schur complement away from every hypothesis (`gram.rs`, `noise.rs`).
 //! 4. The evidence of a set of variants is a Schur complement of it, all sizes summed out (`marginal.rs`, `search.rs`),
-//!    first for the forms as they are, then for the leading ones with their form widened (`second.rs`), beside hidden
-//!    switches (`hidden.rs`).
+//!    first for the forms as they are, then for the leading ones with their form widened (`second_stage.rs`), beside hidden
+//!    switches (`hidden_sequence.rs`).
 //! 5. A nameless curve that is the curve of a named law gets its name (`naming.rs`).
-//! 6. Whether anything is there is one test (`existence.rs`). One rule decides what is told of it (`decision.rs`,
-//!    `judge.rs`, `verdict.rs`): probabilities averaged over resamples (`bag.rs`), better on inner parts of the fitted rows; rows that are
-//!    held out only withdraw.
-//! 7. The nearest textbook law gives parameters, texts and the experiment (`told.rs`).
+//! 6. Whether anything is there is one test (`existence.rs`). One rule decides what is told of it (`thresholds.rs`,
+//!    `validation.rs`, `naming_decision.rs`): probabilities averaged over resamples (`resampling.rs`), better on inner
+//!    parts of the fitted rows; rows that are held out only withdraw.
+//! 7. The nearest textbook law gives parameters, texts and the experiment (`report.rs`).
 
 mod answer;
 mod contributions;

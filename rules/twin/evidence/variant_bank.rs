@@ -131,7 +131,7 @@ pub(super) struct Variant {
     /// How many of its first columns are the law itself; the others are states of an edge or a lot.
     pub(super) law: usize,
     /// Columns that act in rows held out only, each with its relative deviation: hidden states of those rows, which may
-    /// be followed from earlier ones (`follow.rs`).
+    /// be followed from earlier ones (`recursive_least_squares.rs`).
     pub(super) followed: Vec<(Vec<f64>, f64)>,
 }
 
