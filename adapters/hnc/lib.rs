@@ -14,8 +14,8 @@
 //! | `child` | the child's side: one session, items to calls |
 //! | `ffi` | loading, symbols and calls: the only `unsafe` |
 //! | `line` | the parent's side: the child, its deaths, the state of the connection |
-//! | `source` | the [`Source`](crate::Source) |
-//! | `actuator` | the [`Actuator`](crate::Actuator): the register mailbox of [`nclink::mailbox`](nclink::mailbox) |
+//! | `source` | the [`Source`](adapter_core::Source) |
+//! | `actuator` | the [`Actuator`](adapter_core::Actuator): the register mailbox of [`nclink::mailbox`] |
 //! | `offsets` | shifts of axes: registers of the ladder, or the external zero offset |
 //! | `sampling` | the 1 ms sampling channels: which, and whether a millisecond is missing; blocks go to whoever asked for them |
 //!

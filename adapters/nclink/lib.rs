@@ -12,10 +12,10 @@
 //! | `map`, `own_path` | which data item feeds which channel, in which unit; what the user can have read |
 //! | `decode` | state words from the status item and from the channel's F register |
 //! | `connection` | one client at the broker: probe, query, set, by request identifier |
-//! | `source`, `open` | the [`Source`](crate::Source), and how an address becomes one |
+//! | `source`, `open` | the [`Source`](adapter_core::Source), and how an address becomes one |
 //! | `sample_tracks` | what sample channels and events have brought, and whether a millisecond is missing |
 //! | `mailbox` | the registers through which the ladder is asked for an override |
-//! | `actuator` | the [`Actuator`](crate::Actuator): letters into the mailbox, the override in force read back |
+//! | `actuator` | the [`Actuator`](adapter_core::Actuator): letters into the mailbox, the override in force read back |
 //! | `offset_mailbox` | the registers through which the ladder is asked to shift axes |
 //! | `registers`, `offsets` | a connection for whoever writes; the registers of a device for such shifts |
 //! | `device` | the other role: the simulated machine as an NC-Link device |

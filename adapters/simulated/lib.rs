@@ -6,8 +6,8 @@
 //! gateway writes goes through the builder's ladder (`ladder`), behind the operator's dial.
 //!
 //! Everything is a function of the seed, the time and what was written: asking more often, or not at all for a
-//! while, changes nothing. The same machine runs against the clock ([`Source`](crate::Source)) or as fast as possible
-//! ([`Pull`](crate::Pull)).
+//! while, changes nothing. The same machine runs against the clock ([`Source`](adapter_core::Source)) or as fast as possible
+//! ([`Pull`](adapter_core::Pull)).
 //!
 //! [`Simulated::truth`] is for scoring an estimate, never for making one.
 

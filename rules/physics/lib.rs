@@ -34,7 +34,7 @@ pub struct ParameterDoc {
     /// Name in model files and reports.
     pub name: &'static str,
     /// Unit; `output` stands for the unit of the simulated output, `velocity` for m/s or, of a spindle, rad/s.
-    /// [`unit_in`] replaces them.
+    /// [`resolve_unit`] replaces them.
     pub unit: &'static str,
     /// Proportional or shaping.
     pub entry: Entry,
