@@ -14,7 +14,7 @@ pub mod electric;
 pub mod histogram;
 pub mod merge;
 pub mod offset;
-pub mod opened;
+pub mod opened_device;
 pub mod own;
 pub mod plausibility;
 pub mod reading;
@@ -31,6 +31,6 @@ pub use driver::{
     Actuator, Fact, FactValue, LadderRequest, LadderRule, Offer, Pull, Source, SourceError, SourceProblem,
 };
 pub use offset::{Axis, OffsetSink};
-pub use opened::{OpenedDevice, UnreadableSecret};
+pub use opened_device::{OpenedDevice, UnreadableSecret};
 pub use reading::{Absence, Reading, Stamp, Value};
 pub use sample::{Sample, Slot};

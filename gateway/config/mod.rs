@@ -27,7 +27,7 @@ use crate::history::OutboxSettings;
 use crate::log::LogFormat;
 use adapters::{Address, Axis};
 pub use gateway_gate::limits::{GateConfig, GateMode, OffsetConfig};
-pub use gateway_sinks::configured::SinkConfig;
+pub use gateway_sinks::sink_config::SinkConfig;
 use rules::estimators::thermal::CompensationSettings;
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 use super::board::{Board, to_seconds};
 use super::isolation::{Isolation, Turn};
 use super::{Batch, Requests, Sink, SinkError, open_sink};
-use crate::configured::SinkConfig;
+use crate::sink_config::SinkConfig;
 use gateway_base::clock;
 use gateway_base::log::{Notice, Severity};
 use gateway_control::OrderSender;

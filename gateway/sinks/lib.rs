@@ -17,7 +17,6 @@
 pub mod address;
 mod board;
 pub mod broker;
-pub mod configured;
 pub mod doctor;
 pub mod drive;
 mod isolation;
@@ -30,6 +29,7 @@ pub mod open;
 pub mod parquet;
 mod requests;
 pub mod shdr;
+pub mod sink_config;
 pub mod sparkplug;
 pub mod status;
 

@@ -14,13 +14,13 @@ const CONVENTIONS: [&str; 41] = [
 
 /// Greatest share of function names of one word among all that are no convention, by room: what is there today, rounded up.
 /// Whoever names functions better lowers it.
-const ONE_WORD_SHARE_MAX: [(&str, f64); 3] = [("adapters", 0.10), ("gateway", 0.08), ("rules", 0.26)];
+const ONE_WORD_SHARE_MAX: [(&str, f64); 3] = [("adapters", 0.10), ("gateway", 0.08), ("rules", 0.08)];
 
 /// Names of functions that are a participle alone, by room. They do not say what is done or what is asked.
-const PARTICIPLES_MAX: [(&str, usize); 3] = [("adapters", 5), ("gateway", 3), ("rules", 42)];
+const PARTICIPLES_MAX: [(&str, usize); 3] = [("adapters", 3), ("gateway", 1), ("rules", 0)];
 
 /// English words in `-ed` that are no participles, and nouns.
-const NO_PARTICIPLES: [&str; 6] = ["feed", "need", "seed", "shed", "speed", "exceed"];
+pub(super) const NO_PARTICIPLES: [&str; 6] = ["feed", "need", "seed", "shed", "speed", "exceed"];
 
 /// The name of the function that a line declares.
 fn declared(line: &str) -> Option<&str> {

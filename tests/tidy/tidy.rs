@@ -7,6 +7,8 @@ mod advisories;
 mod functions;
 #[path = "names.rs"]
 mod names;
+#[path = "participles.rs"]
+mod participles;
 #[path = "reasons.rs"]
 mod reasons;
 
