@@ -33,7 +33,7 @@ pub mod worker;
 
 pub use adapter_core::{
     bilingual, channel, child, clock, conversion, driver, electric, histogram, merge, offset, own, plausibility,
-    reading, sample, serial, text, tls, units, words,
+    reading, sample, serial, text, tls, unique_id, units, words,
 };
 pub use fanuc;
 pub use hnc;

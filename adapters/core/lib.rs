@@ -23,6 +23,7 @@ pub mod serial;
 pub mod stream;
 pub mod text;
 pub mod tls;
+pub mod unique_id;
 pub mod units;
 pub mod words;
 

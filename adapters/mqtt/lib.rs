@@ -90,18 +90,11 @@ impl Options {
     /// A client with a name that nobody else has, 20 s of keep-alive and a deadline of 2 s.
     #[must_use]
     pub fn new(host: &str, port: u16, role: &str) -> Self {
-        let client_id = format!("{role}-{}", generate_unique_id());
+        let client_id = format!("{role}-{}", adapter_core::unique_id::generate_unique_id());
         let (keep_alive, deadline) = (Duration::from_secs(20), Duration::from_secs(2));
         let (version, tls, will, login) = (Version::default(), None, None, None);
         Self { host: host.to_owned(), port, client_id, login, version, tls, will, keep_alive, deadline }
     }
-}
-
-/// Twelve hexadecimal digits that differ between processes, threads and calls.
-#[must_use]
-pub fn generate_unique_id() -> String {
-    use std::hash::{BuildHasher, Hasher, RandomState};
-    format!("{:012x}", RandomState::new().build_hasher().finish() & 0xffff_ffff_ffff)
 }
 
 /// One message of a subscription.

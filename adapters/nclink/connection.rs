@@ -266,6 +266,10 @@ fn broker_fault(link: &Link, error: MqttError) -> SourceError {
 
 /// An identifier that no other request has, in the form of a UUID.
 fn generate_identifier() -> String {
-    let (a, b, c) = (mqtt::generate_unique_id(), mqtt::generate_unique_id(), mqtt::generate_unique_id());
+    let (a, b, c) = (
+        adapter_core::unique_id::generate_unique_id(),
+        adapter_core::unique_id::generate_unique_id(),
+        adapter_core::unique_id::generate_unique_id(),
+    );
     format!("{}-{}-4{}-8{}-{}", &a[..8], &a[8..], &b[..3], &b[3..6], c)
 }

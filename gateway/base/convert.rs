@@ -1,7 +1,7 @@
 //! Conversions between kinds of numbers in which the greatest value stands for everything beyond it. Each is right for the reason
 //! that its documentation gives; a number that is stored or sent and must be exact is converted with an error instead.
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use std::time::Duration;
 
 /// A duration as a difference of instants. More than 292 years are 292 years: nothing here is waited for that long, and a limit

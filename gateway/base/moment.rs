@@ -4,7 +4,7 @@
 //! A date or a time without a zone is that of the box: whoever stands before the machine reads it from the wall. The zone is that of
 //! the system (`TZ`, `/etc/localtime`).
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use jiff::Timestamp;
 use jiff::civil::{Date, DateTime};
 use jiff::tz::TimeZone;

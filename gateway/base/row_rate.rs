@@ -1,6 +1,6 @@
 //! How many rows of the audit there may be.
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 
 /// Rows of requests per second on average; twenty times as many may come at once.
 const ROWS_PER_S: f64 = 10.0;

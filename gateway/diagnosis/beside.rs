@@ -6,8 +6,9 @@
 //! model in charge as it is, seconds of settled work, and the kinds of work of the watch.
 
 use super::simulation;
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::{ChannelId, Recording};
+use adapter_core::ChannelId;
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use recording::Recording;
 use rules::twin::live::{Regime, regime, second_row::Row};
 use rules::twin::text_report::format_short_number;
 use rules::twin::{Diagnosis, Model};

@@ -3,8 +3,8 @@
 
 use super::series::{error_as_given, series_column};
 use super::unit_check::{self, UnitDoubt};
-use adapters::Recording;
-use adapters::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
+use recording::Recording;
 use rules::physics::explain::Language;
 use rules::twin::text_report::format_short_number;
 use rules::twin::{Diagnosis, Model};

@@ -1,14 +1,15 @@
 //! The simulated machine carries out an experiment: a recording plan in, a recording out.
 
-use adapters::address::SimulatedMachine;
-use adapters::channel::{ChannelId, Kind};
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::driver::Pull;
-use adapters::merge::{Delay, Lockstep};
-use adapters::recording::{Cells, Numbers, Words};
-use adapters::simulated::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep, Simulated, SimulatedSettings, Truth};
-use adapters::{Recording, Sample, Value};
+use adapter_core::channel::{ChannelId, Kind};
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::driver::Pull;
+use adapter_core::merge::{Delay, Lockstep};
+use adapter_core::{Sample, Value};
+use recording::Recording;
+use recording::{Cells, Numbers, Words};
 use rules::twin::plan::TRANSITION;
+use simulated::address::SimulatedMachine;
+use simulated::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep, Simulated, SimulatedSettings, Truth};
 use std::fmt::Write as _;
 
 /// When the machine is switched on: 2026-01-01, so that the same plan gives the same recording.

@@ -5,7 +5,7 @@ use super::beside::Onset;
 use super::child::Stage;
 use super::store::{DiagnosisFile, DiagnosisStore};
 use super::worker::{DiagnosisRequest, LoadedModel};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::files::{read_text, replace_durably};
 use rules::twin::parse_model;
 use std::path::{Path, PathBuf};

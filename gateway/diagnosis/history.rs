@@ -1,8 +1,8 @@
 //! A range of a history as a recording: `history:DB?from=..&to=..`.
 
-use adapters::Recording;
 use gateway_base::moment::{self, MomentError};
 use gateway_history::{HistoryError, Query, Reader};
+use recording::Recording;
 use std::path::Path;
 use thiserror::Error;
 

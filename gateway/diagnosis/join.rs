@@ -3,9 +3,9 @@
 //! Runs stay distinct: a name that an earlier recording used gets the number of its recording, `3 (2)`. Recordings
 //! with `time_utc` share a clock; others share one when their `time_s` goes on increasing.
 
-use adapters::Recording;
-use adapters::clock::SECOND_NS;
-use adapters::recording::{Cells, Numbers, Words, derive_quantity};
+use adapter_core::clock::SECOND_NS;
+use recording::Recording;
+use recording::{Cells, Numbers, Words, derive_quantity};
 use std::collections::BTreeSet;
 use thiserror::Error;
 
@@ -171,7 +171,7 @@ fn distinct_name(name: &str, number: usize, used: &BTreeSet<String>, own: &BTree
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::read_csv;
+    use recording::read_csv;
 
     fn read(text: &str, file: &str) -> Recording {
         read_csv(text.as_bytes(), file).expect("readable").recording

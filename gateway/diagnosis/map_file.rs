@@ -1,9 +1,9 @@
 //! A map that a foreign file is proposed: what is sure is taken, what is not is a question, and the file says why.
 
-use adapters::bilingual::Bilingual;
-use adapters::channel::quantity::unit_of;
-use adapters::recording::Recording;
-use adapters::recording::read::{ColumnPreview, Preview, preview_rows};
+use adapter_core::bilingual::Bilingual;
+use adapter_core::channel::quantity::unit_of;
+use recording::Recording;
+use recording::read::{ColumnPreview, Preview, preview_rows};
 use rules::twin::format_toml_text;
 use std::fmt::Write as _;
 

@@ -2,7 +2,7 @@
 
 use super::context::DiagnosisContext;
 use crate::report::{PageInput, page};
-use adapters::Recording;
+use recording::Recording;
 use rules::physics::explain::Language;
 use rules::twin::plan::plan_experiments;
 use rules::twin::{Diagnosis, diagnosis::Verdict, json_report, text_report, write_model};

@@ -1,9 +1,9 @@
 //! The recordings that a command is given: a file of any kind that people have, or a range of a history, read and put together.
 
 use super::{history, join_recordings};
-use adapters::Recording;
-use adapters::bilingual::Bilingual;
-use adapters::recording::{self, Mapping, NoteKind, ReadRecording, RecordingError};
+use adapter_core::bilingual::Bilingual;
+use recording::Recording;
+use recording::{self, Mapping, NoteKind, ReadRecording, RecordingError};
 use std::path::{Path, PathBuf};
 
 /// Share of refused rows beyond which a recording is not used: what was lost then is no longer a few bad samples.

@@ -4,11 +4,11 @@
 
 use super::recordings::describe_reading;
 use super::series_alignment::align_series;
-use adapters::Recording;
-use adapters::bilingual::Bilingual;
-use adapters::channel::quantity::{Quantity, unit_of};
-use adapters::channel::unit::Unit;
-use adapters::recording::{Cells, Mapping, Numbers, read_path, read_path_as};
+use adapter_core::bilingual::Bilingual;
+use adapter_core::channel::quantity::{Quantity, unit_of};
+use adapter_core::channel::unit::Unit;
+use recording::Recording;
+use recording::{Cells, Mapping, Numbers, read_path, read_path_as};
 use rules::twin::text_report::format_short_number;
 use rules::twin::{Model, format_toml_text, parse_model};
 use std::path::Path;
@@ -252,7 +252,7 @@ pub fn error_as_given(recording: &Recording, output: &str) -> Option<(f64, usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::read_csv;
+    use recording::read_csv;
 
     fn recording(text: &str) -> Recording {
         read_csv(text.as_bytes(), "r.csv").expect("readable").recording

@@ -1,10 +1,10 @@
 //! Where a simulated series lies beside a recording: by time, by its course, by position, by program block.
 
 use super::series::AlignBy;
-use adapters::Recording;
-use adapters::bilingual::Bilingual;
-use adapters::channel::quantity::{Quantity, without_unit};
-use adapters::recording::Numbers;
+use adapter_core::bilingual::Bilingual;
+use adapter_core::channel::quantity::{Quantity, without_unit};
+use recording::Numbers;
+use recording::Recording;
 use rules::estimators::alignment::match_courses;
 use rules::twin::text_report::format_short_number;
 

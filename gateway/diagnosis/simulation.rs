@@ -1,7 +1,7 @@
 //! A model over the inputs of a recording, and how far it is from what was recorded.
 
-use adapters::Recording;
-use adapters::recording::{Cells, Numbers};
+use recording::Recording;
+use recording::{Cells, Numbers};
 use rules::physics::Scene;
 use rules::twin::diagnosis::find_output_unit;
 use rules::twin::text_report::format_short_number;

@@ -1,6 +1,6 @@
 //! A plan as steps that a person can tick off: moves that differ in one commanded number alone are one step.
 
-use adapters::ChannelId;
+use adapter_core::ChannelId;
 use rules::twin::plan::{Move, Plan};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;

@@ -1,10 +1,11 @@
 //! A stretch of the history as a diagnosis needs it: what was measured and commanded, one row per second, a run per
 //! part, and the output only where the work had settled, as the watch looks at it.
 
-use adapters::clock::TimeNs;
-use adapters::recording::{Cells, Numbers, Words};
-use adapters::{ChannelId, Recording};
+use adapter_core::ChannelId;
+use adapter_core::clock::TimeNs;
 use gateway_history::{HistoryError, Query, Reader};
+use recording::Recording;
+use recording::{Cells, Numbers, Words};
 use std::ops::Range;
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! What the twin notices, in plain words.
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rules::twin::live::{LevelChange, Mismatch, Regime};
 use rules::twin::text_report::format_short_number;
 

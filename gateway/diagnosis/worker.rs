@@ -6,7 +6,7 @@ use super::child::{self, ChildMessage, DiagnosisJob, JobInput, Stage};
 use super::handle::DiagnosisHandle;
 use super::outputs;
 use super::store::{self, DiagnosisFile, DiagnosisStore};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::files::{LOOK_EVERY, Mark, Rest, read_mark};
 use gateway_history::Reader;
 use rules::twin::{self, Model, parse_model};

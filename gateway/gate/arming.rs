@@ -1,7 +1,7 @@
 //! Who let the gate write, and until when. Off after every start.
 
 use crate::limits::GateMode;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::convert::duration_to_ns;
 use std::fmt;
 use std::time::Duration;

@@ -6,8 +6,8 @@
 //! box. A limit that chatters therefore stops the machine once and not fifty times.
 
 use super::find_channel;
-use adapters::words::execution;
-use adapters::{ChannelId, LadderRequest, Sample};
+use adapter_core::words::execution;
+use adapter_core::{ChannelId, LadderRequest, Sample};
 use rules::script::{Stop, StopRequest};
 use std::sync::Arc;
 
@@ -135,7 +135,7 @@ impl Asks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::{Slot, Value};
+    use adapter_core::{Slot, Value};
 
     fn sample(word: &str) -> Sample {
         let mut sample = Sample::new_empty(0);

@@ -1,8 +1,8 @@
 //! What ends an arming on the way to the machine, in words for the operator.
 
 use super::arming::Disarmed;
-use adapters::units::OverridePct;
-use adapters::{Axis, LadderRule, SourceError};
+use adapter_core::units::OverridePct;
+use adapter_core::{Axis, LadderRule, SourceError};
 use std::fmt;
 
 /// What the machine shows where something else was expected.

@@ -2,8 +2,8 @@
 
 use super::find_channel;
 use super::thread_cycle::ThreadCycle;
-use adapters::words::{execution, mode, of_channel, operation};
-use adapters::{Absence, ChannelId, Sample};
+use adapter_core::words::{execution, mode, of_channel, operation};
+use adapter_core::{Absence, ChannelId, Sample};
 use rules::estimators::{Estimates, State};
 use std::fmt;
 

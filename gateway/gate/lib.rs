@@ -44,9 +44,9 @@ pub use verdict::{GateOutcome, Verdict};
 pub use write::{Occasion, OverrideWriter, Reaction, WriteRecord};
 
 use crate::limits::{GateConfig, GateMode};
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::units::OverridePct;
-use adapters::{ChannelId, Sample};
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::units::OverridePct;
+use adapter_core::{ChannelId, Sample};
 use arming::Arming;
 use ask::Asks;
 use gateway_base::convert::duration_to_ns;

@@ -1,8 +1,8 @@
 //! The band and the slew limit: no script can widen them.
 
 use super::PAUSE_NS;
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::units::OverridePct;
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::units::OverridePct;
 
 /// Why less, or something else, is let through than was asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

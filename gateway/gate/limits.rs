@@ -1,6 +1,6 @@
 //! The limits that no script can widen, as the configuration gives them.
 
-use adapters::Axis;
+use adapter_core::Axis;
 use std::time::Duration;
 
 /// How far the gate goes.

@@ -2,8 +2,8 @@
 
 use super::hold::Hold;
 use super::limit::Bound;
-use adapters::clock::TimeNs;
-use adapters::units::OverridePct;
+use adapter_core::clock::TimeNs;
+use adapter_core::units::OverridePct;
 
 /// What became of the request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@
 use super::error::{Doing, HistoryError};
 use super::reader::Reader;
 use super::record::Audit;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde::Serialize;
 use sha2::{Digest, Sha256};

@@ -9,7 +9,7 @@ use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
 use super::rows::{Column, SeriesRows, Word};
 use super::schema::known_series;
 use super::series::Series;
-use adapters::clock::SECOND_NS;
+use adapter_core::clock::SECOND_NS;
 use rusqlite::{Connection, OptionalExtension, params};
 
 /// Length of a compacted block.

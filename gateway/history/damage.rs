@@ -3,7 +3,7 @@
 use super::error::{HistoryError, add_path};
 use super::info::format_utc;
 use super::lock::append_suffix;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::{clock, moment};
 use rusqlite::{Connection, ErrorCode, ffi};
 use serde::Serialize;

@@ -11,7 +11,7 @@ use super::outbox::skip_numbers;
 use super::record::Event;
 use super::schema::{SCHEMA, copy_whole};
 use super::space::disk_room;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::convert::clamp_to_unsigned;
 use gateway_base::{clock, files};
 use rusqlite::Connection;

@@ -3,7 +3,7 @@
 use super::error::{Doing, HistoryError};
 use super::info::format_utc;
 use super::schema;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, params};
 use serde::Serialize;
 use std::fmt;

@@ -5,7 +5,7 @@ use super::options::DAY_NS;
 use super::reader::Reader;
 use super::retention::used_bytes;
 use super::space::disk_room;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use serde::Serialize;
 use std::fmt;
 

@@ -3,7 +3,7 @@
 use super::error::{Doing, HistoryError};
 use super::reader::Reader;
 use super::record::{Command, Decision, Diagnosis, Event, Model, Part};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use rusqlite::{Params, Row, params};
 use serde::Serialize;
 

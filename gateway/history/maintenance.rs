@@ -6,7 +6,7 @@ use super::options::Retention;
 use super::retention::{AgeLimits, remove_aged, remove_oldest, used_bytes};
 use super::space::{Reserve, disk_room};
 use super::{compact, seal};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use rusqlite::Connection;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

@@ -8,7 +8,7 @@ use super::reason::Reasons;
 use super::record::{Event, Record};
 use super::rows::SeriesRows;
 use super::series::Series;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::convert::clamp_to_unsigned;
 use std::collections::VecDeque;
 

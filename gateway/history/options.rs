@@ -1,7 +1,7 @@
 //! How a history is kept: durability, limits, and the estimates that are stored beside the channels.
 
 use super::outbox::Outbox;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::clock::ClockMark;
 use std::time::Duration;
 

@@ -8,7 +8,7 @@ use super::query::{Chunk, Query};
 use super::reader::Reader;
 use super::series::Series;
 use super::walk::Walk;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::params;
 use std::collections::BTreeMap;
 use std::ops::{ControlFlow, Range};

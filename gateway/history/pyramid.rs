@@ -7,7 +7,7 @@ use super::options::SeriesKind;
 use super::schema::known_series;
 use super::series::Series;
 use super::walk::Walk;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, params};
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -7,7 +7,7 @@ use super::schema;
 use super::segments;
 use super::series::Series;
 use super::walk::Walk;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::clock;
 use rusqlite::Connection;
 use std::cell::RefCell;

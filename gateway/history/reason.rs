@@ -1,7 +1,7 @@
 //! Reasons of absence as one byte: 0 is a value, 1 to 10 the first ten reasons of a reading, above that words of estimators, and from
 //! 252 on the further reasons of a reading. A code means the same in every history that was ever written.
 
-use adapters::Absence;
+use adapter_core::Absence;
 use std::sync::Arc;
 
 /// The code of a value that is there.

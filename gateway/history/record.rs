@@ -1,6 +1,6 @@
 //! What is remembered besides samples: one struct per kind, one row each.
 
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
 /// Something that happened.

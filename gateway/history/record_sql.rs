@@ -4,7 +4,7 @@ use super::audit;
 use super::record::{
     Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, ReactionTime, Record, StateChange,
 };
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, OptionalExtension, Params, params};
 use std::ops::Range;
 

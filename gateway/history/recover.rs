@@ -10,7 +10,7 @@ use super::record::{Event, Record};
 use super::record_sql::{close_state, store_record};
 use super::rows::SeriesRows;
 use super::{schema, tail};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use rusqlite::{Connection, OptionalExtension};
 
 /// Brings the file into order and says where it ends. If the last rows came from `goes_on`, the state they ended in is

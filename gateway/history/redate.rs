@@ -16,7 +16,7 @@ use super::record_sql::add_to_state_hours;
 use super::recover::recover_file;
 use super::schema;
 use super::segments::{RECORD_TABLES, RecordMarks};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::clock::{ClockMark, Trust, format_span};
 use rusqlite::{Connection, OptionalExtension, params};
 use std::ops::Range;

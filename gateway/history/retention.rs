@@ -4,7 +4,7 @@
 use super::audit;
 use super::error::{Doing, HistoryError};
 use super::options::Retention;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, OptionalExtension, params};
 
 /// A kind of row, in the order in which they go.

@@ -4,8 +4,8 @@
 use super::options::{ExtraValue, SeriesKind};
 use super::reason::{NOT_PROVIDED, OUT_OF_RANGE, PRESENT, Reasons, code_of};
 use super::series::Series;
-use adapters::clock::TimeNs;
-use adapters::{Absence, ChannelId, Sample, Value};
+use adapter_core::clock::TimeNs;
+use adapter_core::{Absence, ChannelId, Sample, Value};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -227,7 +227,7 @@ mod tests {
     use super::super::options::{ExtraSeries, Options};
     use super::super::series::stored_series;
     use super::*;
-    use adapters::Slot;
+    use adapter_core::Slot;
 
     fn series() -> Vec<Series> {
         let extras = vec![ExtraSeries::new_number("a_w", "W", "", ""), ExtraSeries::new_text("state", "", "")];

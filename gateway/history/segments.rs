@@ -7,7 +7,7 @@
 use super::error::{Doing, HistoryError};
 use super::minute_buffer::Segment;
 use super::{outbox, schema};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::clock::ClockMark;
 use rusqlite::{Connection, OptionalExtension, params};
 use serde::{Deserialize, Serialize};

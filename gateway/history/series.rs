@@ -3,8 +3,8 @@
 use super::error::HistoryError;
 use super::options::{ExtraSeries, Fidelity, Options, SeriesKind};
 use super::rounding::{PLACES_MAX, round_to_decimals};
-use adapters::ChannelId;
-use adapters::channel::{Channel, Kind};
+use adapter_core::ChannelId;
+use adapter_core::channel::{Channel, Kind};
 use std::sync::Arc;
 
 /// One stored series.

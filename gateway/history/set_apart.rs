@@ -7,7 +7,7 @@ use super::pyramid::{self, LEVELS, Level, MINUTE_NS};
 use super::recover::recover_file;
 use super::schema;
 use super::segments::RECORD_TABLES;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use rusqlite::{Connection, params};
 use serde::Serialize;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! How the writer is doing, for the page, metrics and the health check.
 
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};

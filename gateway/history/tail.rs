@@ -153,7 +153,7 @@ mod tests {
     use super::super::options::{ExtraSeries, ExtraValue, Options};
     use super::super::series::stored_series;
     use super::*;
-    use adapters::{Absence, ChannelId, Sample, Slot, Value};
+    use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
 
     #[test]
     fn the_tail_gives_back_every_row() {

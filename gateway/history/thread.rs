@@ -11,7 +11,7 @@ use super::outbox::Gatherer;
 use super::record_sql::close_state;
 use super::segments;
 use super::status::SharedStatus;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::clock::Trust;
 use rusqlite::Connection;
 use std::sync::Arc;

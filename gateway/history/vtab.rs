@@ -11,7 +11,7 @@ use super::options::SeriesKind;
 use super::schema;
 use super::series::Series;
 use super::walk::{SegmentStretch, Walk};
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::types::{Value, ValueRef};
 use rusqlite::vtab::{Context, Filters, IndexConstraintOp, IndexInfo};
 use rusqlite::{Connection, Error};

@@ -9,7 +9,7 @@ use super::recover::read_unsealed;
 use super::rows::{Column, SeriesRows, Word};
 use super::series::Series;
 use super::tail;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use rusqlite::{Connection, OptionalExtension, params};
 use std::collections::VecDeque;
 use std::ops::Range;

@@ -3,7 +3,7 @@
 use super::error::{Doing, HistoryError};
 use super::reader::Reader;
 use super::schema;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use rules::estimators::wear::{WearKey, WearModel, WearRecord};
 use rusqlite::{Connection, OptionalExtension, params};
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use super::wire::{ReceivedBytes, ServerInfo, ServerOperation};
 use super::{NatsError, NatsTarget, words};
-use adapters::address::Endpoint;
+use adapter_core::address::Endpoint;
 use serde_json::json;
 use std::time::Duration;
 use std::{fmt, io};
@@ -66,7 +66,7 @@ impl Connection {
     async fn open_one(target: &NatsTarget, at: &Endpoint, name: &str) -> Result<Self, NatsError> {
         let secrets = target.read_secrets()?;
         let broken = |error: io::Error| words::of_io(at, &error);
-        let config = target.tls.as_ref().map(adapters::tls::TlsFiles::build_config).transpose();
+        let config = target.tls.as_ref().map(adapter_core::tls::TlsFiles::build_config).transpose();
         let config = config.map_err(|error| NatsError::new(error.what, error.next))?;
         let stream = TcpStream::connect((at.host.as_str(), at.port)).await.map_err(broken)?;
         stream.set_nodelay(true).map_err(broken)?;
@@ -76,7 +76,7 @@ impl Connection {
             received: ReceivedBytes::default(),
             waiting_out: Vec::new(),
             info: ServerInfo::default(),
-            answers: format!("_INBOX.{}", adapters::mqtt::generate_unique_id()),
+            answers: format!("_INBOX.{}", adapter_core::unique_id::generate_unique_id()),
             next_token: 0,
             next_subscription: ANSWERS + 1,
         };

@@ -228,7 +228,7 @@ impl Connection {
         limits: FetchLimits,
     ) -> Result<Vec<Message>, NatsError> {
         let FetchLimits { messages: most, bytes, patience } = limits;
-        let inbox = format!("_INBOX.{}", adapters::mqtt::generate_unique_id());
+        let inbox = format!("_INBOX.{}", adapter_core::unique_id::generate_unique_id());
         let number = self.subscribe(&inbox);
         // A single message that is larger would never be given out.
         let bytes = bytes.max(self.max_payload() + ENVELOPE);

@@ -1,8 +1,8 @@
 //! The servers of an address: `//HOST:4222,HOST:4222/REST?keys`.
 
 use super::NatsError;
-use adapters::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
-use adapters::tls::TlsFiles;
+use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
+use adapter_core::tls::TlsFiles;
 use std::path::PathBuf;
 
 /// The port that NATS servers listen on.

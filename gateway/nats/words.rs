@@ -1,8 +1,8 @@
 //! What is wrong with a NATS server, and what to do next.
 
 use super::NatsError;
-use adapters::address::Endpoint;
-use adapters::tls::TlsError;
+use adapter_core::address::Endpoint;
+use adapter_core::tls::TlsError;
 use std::io::{self, ErrorKind};
 
 /// The connection could not be made or broke.

@@ -7,8 +7,8 @@ use super::opcua::OpcuaTarget;
 use super::parquet::ParquetTarget;
 use super::shdr::ShdrTarget;
 use super::sparkplug::SparkplugTarget;
-use adapters::address::{self, AddressError, Keys};
-use adapters::channel::find_nearest_name;
+use adapter_core::address::{self, AddressError, Keys};
+use adapter_core::channel::find_nearest_name;
 use gateway_nats::ClusterAddressError;
 use std::fmt;
 use std::str::FromStr;
@@ -187,7 +187,7 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, Target
 /// Which build has it. The keys are right there, and are not told as unknown here.
 #[cfg(not(feature = "opcua"))]
 fn without_opcua(keys: &mut Keys) -> TargetError {
-    let _login = adapters::address::Login::from_keys(keys);
+    let _login = adapter_core::address::Login::from_keys(keys);
     for key in ["anonymous", "certificates", "manufacturer", "model", "serial_number"] {
         let _known_elsewhere = keys.take_text(key);
     }

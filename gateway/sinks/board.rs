@@ -2,8 +2,8 @@
 
 use super::SinkError;
 use super::status::SinkStatus;
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::histogram::Histogram;
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::histogram::Histogram;
 use gateway_base::problem::StatusProblem;
 use gateway_history::Outbox;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -2,9 +2,9 @@
 
 use super::SinkError;
 use super::address::TargetError;
-use adapters::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
-use adapters::mqtt::{MqttClient, MqttError, MqttMessage, Options, Outgoing, Qos, Version, Will};
-use adapters::tls::TlsFiles;
+use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
+use adapter_core::tls::TlsFiles;
+use mqtt::{MqttClient, MqttError, MqttMessage, Options, Outgoing, Qos, Version, Will};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -119,7 +119,7 @@ impl Link {
     /// Connects and leaves, under a name that no running box has.
     pub(super) async fn probe_broker(&mut self, broker: &BrokerTarget) -> Result<(), SinkError> {
         let own = BrokerTarget { client_id: None, ..broker.clone() };
-        self.connect(&own, &format!("doctor-{}", adapters::mqtt::generate_unique_id()), None).await?;
+        self.connect(&own, &format!("doctor-{}", adapter_core::unique_id::generate_unique_id()), None).await?;
         self.disconnect_client().await;
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! A port of the box, for sinks whose readers come to it.
 
 use super::SinkError;
-use adapters::address::Endpoint;
+use adapter_core::address::Endpoint;
 use tokio::net::TcpListener;
 
 /// Opens the port.

@@ -7,7 +7,7 @@
 use super::address::TargetError;
 use super::mqtt::build_document;
 use super::{Batch, Pending, Sink, SinkError};
-use adapters::address::Keys;
+use adapter_core::address::Keys;
 use gateway_history::{Item, Outbox};
 use gateway_nats::{Connection, JetStreamFailure, NatsError, NatsTarget, Outgoing};
 

@@ -6,8 +6,8 @@
 
 use super::address::TargetError;
 use super::{Batch, Pending, Sink, SinkError};
-use adapters::address::Keys;
-use adapters::clock::TimeNs;
+use adapter_core::address::Keys;
+use adapter_core::clock::TimeNs;
 use gateway_history::{DAY_NS, HistoryError, Outbox, Reader, day_of};
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ impl ParquetTarget {
 }
 
 fn try_write(root: &Path) -> std::io::Result<()> {
-    let file = root.join(format!(".{}", adapters::mqtt::generate_unique_id()));
+    let file = root.join(format!(".{}", adapter_core::unique_id::generate_unique_id()));
     std::fs::write(&file, b"").and_then(|()| std::fs::remove_file(&file))
 }
 

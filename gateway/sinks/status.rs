@@ -1,6 +1,6 @@
 //! How each sink is doing, for the status, the page and the metrics.
 
-use adapters::histogram::Histogram;
+use adapter_core::histogram::Histogram;
 use serde::Serialize;
 
 /// One sink.

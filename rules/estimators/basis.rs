@@ -5,7 +5,7 @@
 //! no-load value, so that the unit does not matter to the state; the resolution does. What a percent is in watts is on the
 //! nameplate and not in the control: quantities in watts have no value then.
 
-use adapters::{Absence, ChannelId, Sample};
+use adapter_core::{Absence, ChannelId, Sample};
 use std::fmt;
 
 /// What stands for spindle power.
@@ -126,7 +126,7 @@ impl fmt::Display for StateBasis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::{Slot, Value};
+    use adapter_core::{Slot, Value};
 
     #[test]
     fn the_best_channel_that_is_there_counts_and_a_silent_one_is_there() {

@@ -24,7 +24,7 @@ use super::signals::{Feed, Pace, seconds_between};
 use super::situation::{Situation, Tick};
 use super::state::State;
 use super::window::Means;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
 /// How long a start or speed change without a known no-load power may stay unsettled under feed before the state is

@@ -4,8 +4,8 @@ use super::basis::StateBasis;
 use super::loads::{Figure, Loads};
 use super::part::PartFigures;
 use super::state::State;
-use adapters::clock::TimeNs;
-use adapters::{Absence, ChannelId};
+use adapter_core::clock::TimeNs;
+use adapter_core::{Absence, ChannelId};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -2,8 +2,8 @@
 
 use super::basis::StateBasis;
 use super::settings::{STAGES, Settings};
-use adapters::clock::TimeNs;
-use adapters::{Absence, ChannelId, Sample};
+use adapter_core::clock::TimeNs;
+use adapter_core::{Absence, ChannelId, Sample};
 
 /// The channels in use, looked up once.
 #[derive(Debug, Clone, Copy)]

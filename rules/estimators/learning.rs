@@ -14,7 +14,7 @@ use super::no_load::{NoLoad, NoLoadPoint};
 use super::noise::RelativeVariances;
 use super::settings::Settings;
 use super::signals::{seconds_between, to_window_length};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use numerics::statistics::count_to_f64;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;

@@ -1,6 +1,6 @@
 //! What is inferred: machine state, no-load power, cutting power, load loss, and what is too small to be seen.
 //!
-//! [`Inference::update_with_sample`] takes one [`adapters::Sample`] per tick and yields [`Estimates`]. Every tolerance and length is a
+//! [`Inference::update_with_sample`] takes one [`adapter_core::Sample`] per tick and yields [`Estimates`]. Every tolerance and length is a
 //! row of [`SETTINGS`]. Nothing here reads a clock: time is that of the sample.
 //!
 //! | file | what |

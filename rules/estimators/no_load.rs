@@ -10,7 +10,7 @@ use super::estimate::{NoEstimate, NoLoadOrigin};
 use super::interpolation::{Weights, noise_gain};
 use super::settings::{SPEEDS_PER_STAGE, STAGES, Settings};
 use super::signals::seconds_between;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
 /// Correlation of the drift of two speeds of one stage: bearings and oil warm up together.
@@ -325,7 +325,7 @@ impl NoLoadTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::clock::SECOND_NS;
+    use adapter_core::clock::SECOND_NS;
 
     fn point(speed_rpm: f64, power_w: f64) -> NoLoadPoint {
         NoLoadPoint { stage: 0, speed_rpm, power_w }

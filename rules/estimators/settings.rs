@@ -4,7 +4,7 @@ use super::cutting::LoadLossLaw;
 use super::loads::LoadCurves;
 use super::no_load::NoLoadPoint;
 use super::place_settings::PlaceValues;
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use thiserror::Error;

@@ -5,7 +5,7 @@ use super::inputs::TickInputs;
 use super::noise::RelativeVariances;
 use super::settings::Settings;
 use super::window::{Means, PowerWindow};
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use numerics::statistics::count_to_f64;
 use serde::{Deserialize, Serialize};
 

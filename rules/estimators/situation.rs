@@ -6,7 +6,7 @@ use super::inputs::TickInputs;
 use super::no_load::NoLoad;
 use super::settings::Settings;
 use super::signals::{Feed, Signals};
-use adapters::{Absence, ChannelId};
+use adapter_core::{Absence, ChannelId};
 
 /// Everything the detector looks at in one tick.
 pub(super) struct Tick<'a> {

@@ -12,7 +12,7 @@ use super::inputs::Input;
 use super::no_load::NoLoad;
 use super::settings::Settings;
 use super::signals::seconds_between;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
 /// Doubt of the exponent before anything was learned.
@@ -160,8 +160,8 @@ impl Supply {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::Absence;
-    use adapters::clock::SECOND_NS;
+    use adapter_core::Absence;
+    use adapter_core::clock::SECOND_NS;
 
     /// Idles of one speed every 5 s while the voltage swings by 4 %.
     fn learned(exponent: f64) -> Supply {

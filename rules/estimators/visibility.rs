@@ -2,7 +2,7 @@
 
 use super::estimate::{Estimates, Visibility};
 use super::signals::seconds_between;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use std::fmt;
 
 /// A pause between ticks counts for no more than this, s.

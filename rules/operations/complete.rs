@@ -2,8 +2,9 @@
 
 use super::quantity::QUANTITIES;
 use super::recipe::{Lookup, Operation, Recipe};
-use adapters::recording::{Cells, Numbers, Words};
-use adapters::{Absence, ChannelId, Recording, Sample, Slot, Value};
+use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
+use recording::Recording;
+use recording::{Cells, Numbers, Words};
 use std::sync::Arc;
 
 /// Channels that can be filled in.

@@ -2,7 +2,7 @@
 
 use super::quantity::{QUANTITIES, suggest_key};
 use super::recipe::{Operation, Recipe};
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 use script::ScriptProblem;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;

@@ -1,7 +1,7 @@
 //! The cut as effects see it.
 
 use super::{OutputKind, Role, Scene};
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 

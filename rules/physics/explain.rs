@@ -1,7 +1,7 @@
 //! The catalogue in words and as JSON: what `effects list` and `effects show` print.
 
 use super::{CATALOGUE, EffectDoc, Entry, ParameterDoc, Texts, find_effect};
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use thiserror::Error;

@@ -14,7 +14,7 @@ pub mod state;
 mod tool_load;
 mod unit;
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 pub use catalogue::{CATALOGUE, find_effect};
 pub use scene::{LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError};
 pub use unit::{find_quantity_unit, resolve_unit};

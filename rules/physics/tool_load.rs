@@ -260,7 +260,7 @@ pub(crate) fn mark_moved_rows(scene: &Scene) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::read_csv;
+    use recording::read_csv;
     use std::collections::BTreeMap as Roles;
 
     /// Four tools of five passes of thirty seconds, the load of each growing by `growth` from the third pass on; rows

@@ -1,7 +1,7 @@
 //! Units of parameters in a scene: the catalogue's placeholders replaced by what the output and its drive are.
 
 use super::{OutputKind, Scene, drive};
-use adapters::channel::quantity;
+use adapter_core::channel::quantity;
 
 /// The unit of a quantity by its name, else the name's own last word.
 #[must_use]
@@ -37,7 +37,7 @@ fn convert_to_newtons(unit: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::{Cells, Numbers, Recording};
+    use recording::{Cells, Numbers, Recording};
     use std::collections::BTreeMap;
 
     fn scene(output: &str, input: &str) -> Scene {

@@ -3,7 +3,7 @@
 use super::decision::{Axis, Stop};
 use super::timers::{AlarmText, NAMES_MAX, Timers, too_many};
 use super::vocabulary::Word;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use rhai::{Dynamic, EvalAltResult, ImmutableString};
 use std::sync::Arc;
 

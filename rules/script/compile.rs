@@ -11,7 +11,7 @@ use super::settings::{ChosenSetting, merge_settings, read_choices};
 use super::trials::prove_scripts;
 use super::variables::{self, ScriptBody};
 use super::vocabulary::find_word;
-use adapters::clock::SECOND_NS;
+use adapter_core::clock::SECOND_NS;
 use rhai::{AST, Dynamic, Engine, ImmutableString, Map, Position, Scope};
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,10 +1,10 @@
 //! What the scripts want after one tick.
 
 use super::problem::ScriptProblem;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use std::sync::Arc;
 
-pub use adapters::Axis;
+pub use adapter_core::Axis;
 
 /// What the scripts want. Alarms and notes are changes: an unchanged tick has none. Requests and proposals are what is
 /// wanted now: they are repeated at every tick for as long as the script asks.

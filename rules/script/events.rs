@@ -4,8 +4,8 @@
 //! has not been changed.
 
 use super::problem::ScriptProblem;
-use adapters::channel::find_nearest_name;
-use adapters::{ChannelId, Sample};
+use adapter_core::channel::find_nearest_name;
+use adapter_core::{ChannelId, Sample};
 use estimators::{Estimates, State};
 use rhai::{Dynamic, Position};
 use std::sync::Arc;
@@ -198,7 +198,7 @@ pub(super) fn classify_handler(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::{Absence, Slot, Value};
+    use adapter_core::{Absence, Slot, Value};
 
     fn sample(tool: Option<&str>, count: Option<f64>) -> Sample {
         let mut sample = Sample::new_empty(0);

@@ -10,7 +10,7 @@ use super::order::PublishedChannels;
 use super::problem::ScriptProblem;
 use super::trials::TRIAL_FUNCTIONS;
 use super::vocabulary::{Word, find_word, list_words};
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 use rhai::{AST, ASTNode, BinaryExpr, Expr, FnCallExpr, ImmutableString, Position, Stmt};
 
 /// Longest name of a channel of a script's own.

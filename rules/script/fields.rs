@@ -5,9 +5,9 @@
 //! the file is loaded, and one that nobody reads costs nothing.
 
 use super::vocabulary::{View, Word, WordSource, WordValue, find_word, list_words};
-use adapters::Absence;
-use adapters::channel::find_nearest_name;
-use adapters::clock::SECOND_NS;
+use adapter_core::Absence;
+use adapter_core::channel::find_nearest_name;
+use adapter_core::clock::SECOND_NS;
 use estimators::NoEstimate;
 
 /// What a record tells of its fields.
@@ -154,7 +154,7 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::{ChannelId, Sample, Slot, Value};
+    use adapter_core::{ChannelId, Sample, Slot, Value};
     use estimators::Estimates;
 
     fn field(record_name: &str, name: &str) -> Result<Field, String> {

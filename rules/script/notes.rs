@@ -1,6 +1,6 @@
 //! Keeps a script from flooding the history with notes.
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use std::sync::Arc;
 
 /// Notes of one script in one minute.

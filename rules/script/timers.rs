@@ -3,7 +3,7 @@
 
 use super::collect::ScriptResult;
 use super::decision::AlarmLevel;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rhai::{Dynamic, ImmutableString};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;

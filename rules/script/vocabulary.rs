@@ -5,9 +5,9 @@ use super::events::HANDLERS;
 use super::fields::RECORDS;
 use super::quantities::{FIGURES, QUANTITIES};
 use super::trials::TRIAL_FUNCTIONS;
-use adapters::clock::SECOND_NS;
-use adapters::words::of_channel;
-use adapters::{ChannelId, Sample};
+use adapter_core::clock::SECOND_NS;
+use adapter_core::words::of_channel;
+use adapter_core::{ChannelId, Sample};
 use estimators::loads::Figure;
 use estimators::wear::tool_of;
 use estimators::{Estimated, Estimates, NoLoadOrigin, SETTINGS, State, Visibility};
@@ -235,7 +235,7 @@ static WORDS: LazyLock<Vec<Word>> = LazyLock::new(|| {
     }
     for id in ChannelId::list_all() {
         let row = id.channel();
-        let kind = if row.kind == adapters::channel::Kind::Text { WordKind::Text } else { WordKind::Number };
+        let kind = if row.kind == adapter_core::channel::Kind::Text { WordKind::Text } else { WordKind::Number };
         if row.name != TOOL {
             words.push(define_word(row.name, row.unit, kind, (row.en, row.zh), WordSource::Channel(id)));
             continue;

@@ -125,7 +125,7 @@ fn differentiate_part(part: &Part, index: usize, scene: &Scene) -> Option<Vec<f6
 mod tests {
     use super::*;
     use crate::parse_model;
-    use adapters::recording::read_csv;
+    use recording::read_csv;
     use std::collections::BTreeMap;
     use std::fmt::Write;
 

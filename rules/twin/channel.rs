@@ -1,6 +1,6 @@
 //! Channels by name: those of the recording, and those that nobody records but that formulas may be drawn over - the time in the run and in the cut, the direction of a slide, and what the model itself simulates.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use physics::drive::{compute_directions, has_both_directions, read_slide_velocity};
 use physics::state::{apply_continuous_lag, apply_first_order_lag};
 use physics::{Role, Scene};
@@ -137,7 +137,7 @@ mod tests {
     use super::*;
     use crate::model::simulate_parts;
     use crate::parse_model;
-    use adapters::recording::read_csv;
+    use recording::read_csv;
     use std::collections::BTreeMap;
     use std::fmt::Write;
 

@@ -3,12 +3,12 @@
 use super::model::Model;
 use super::quality::Fault;
 use super::region::Region;
-use adapters::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 
 /// The unit of an output, from its name.
 #[must_use]
 pub fn find_output_unit(output: &str) -> &'static str {
-    adapters::channel::quantity::unit_of(output).unwrap_or("1")
+    adapter_core::channel::quantity::unit_of(output).unwrap_or("1")
 }
 
 /// The name of what no law of the catalogue explains.

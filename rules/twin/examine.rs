@@ -5,11 +5,11 @@ use super::bind::bind_model;
 use super::diagnosis::find_output_unit;
 use super::inputs::list_input_columns;
 use super::model::{Model, Part, simulate_parts};
-use adapters::Recording;
-use adapters::channel::{ChannelId, Kind};
-use adapters::recording::Numbers;
+use adapter_core::channel::{ChannelId, Kind};
 use numerics::statistics::{count_to_f64, median};
 use physics::Scene;
+use recording::Numbers;
+use recording::Recording;
 
 /// Share of values outside the physical range beyond which the unit must be wrong.
 const OUTSIDE_SHARE_MAX: f64 = 0.01;
@@ -119,8 +119,7 @@ fn check_derived_quantities(recording: &Recording, found: &mut Examination) {
         ("feed_per_rev_mm", &[(60.0, "mm/s in feed_mm_min, or rev/s in spindle_speed_rpm")][..]),
         ("cutting_speed_m_min", &[(60.0, "m/s"), (1000.0, "mm/min")][..]),
     ] {
-        let (Some(given), Some(follows)) =
-            (recording.find_numbers(name), adapters::recording::derive_quantity(recording, name))
+        let (Some(given), Some(follows)) = (recording.find_numbers(name), recording::derive_quantity(recording, name))
         else {
             continue;
         };
@@ -181,7 +180,7 @@ fn find_extremes(values: &[f64]) -> Option<(f64, f64)> {
 mod tests {
     use super::*;
     use crate::parse_model;
-    use adapters::recording::read_csv;
+    use recording::read_csv;
 
     const MODEL: &str = "schema = \"model/1\"\noutput = \"spindle_power_w\"\n[[effect]]\nkind = \"no_load_power\"\n\
                          parameters = { p0_w = 120.0, p1_w_per_rpm = 0.22, p2_w_per_rpm2 = 0.0 }\n";

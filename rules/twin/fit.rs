@@ -222,7 +222,7 @@ fn compute_difference_quotient(scene: &mut Scene, parts: &[Part], free: Free, ba
 mod tests {
     use super::*;
     use crate::parse_model;
-    use adapters::recording::read_csv;
+    use recording::read_csv;
     use std::fmt::Write;
 
     const MODEL: &str = "schema = \"model/1\"\noutput = \"force_n\"\n[[effect]]\nkind = \"linear\"\n\

@@ -184,8 +184,8 @@ fn standardise_column(column: Vec<f64>) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::Recording;
-    use adapters::recording::{Cells, Numbers, Words};
+    use recording::Recording;
+    use recording::{Cells, Numbers, Words};
 
     /// Runs of ten rows each: depth and tool by the number of the run.
     fn scene(runs: usize, depth: impl Fn(usize) -> f64, tool: impl Fn(usize) -> String) -> Scene {

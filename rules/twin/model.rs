@@ -349,7 +349,7 @@ fn run_stage<'a>(
 mod tests {
     use super::*;
     use crate::parse_model;
-    use adapters::recording::read_csv;
+    use recording::read_csv;
     use std::fmt::Write;
 
     const MODEL: &str = "schema = \"model/1\"\noutput = \"spindle_power_w\"\n\

@@ -4,7 +4,7 @@ use super::expression::Expression;
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::speed_table::SpeedTable;
 use super::term::Term;
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 use physics::{CATALOGUE, Effect, Entry, Form, Role, find_effect};
 use std::collections::BTreeMap;
 use std::fmt;

@@ -4,10 +4,10 @@
 //! runs.
 
 use super::region::Condition;
-use adapters::Recording;
-use adapters::channel::quantity::Quantity;
-use adapters::recording::{Words, derive_quantity};
+use adapter_core::channel::quantity::Quantity;
 use numerics::statistics::count_to_f64;
+use recording::Recording;
+use recording::{Words, derive_quantity};
 
 /// Price of one condition, in shares of what is covered: a reader takes it in for a thirtieth. Lower: words that cover noise;
 /// higher: one condition where two are needed.
@@ -285,7 +285,7 @@ fn build_range(name: &str, low: f64, high: f64) -> Option<Condition> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::{Cells, Numbers};
+    use recording::{Cells, Numbers};
 
     /// 24 parts, an edge changed every six; an effect from the second minute of an edge on.
     fn recording() -> (Recording, Vec<f64>) {

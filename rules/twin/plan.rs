@@ -5,11 +5,11 @@
 
 use super::diagnosis::Diagnosis;
 use super::experiments::moves;
-use adapters::Recording;
-use adapters::channel::quantity::is_of_spindle;
+use adapter_core::channel::quantity::is_of_spindle;
 use numerics::statistics::median;
 use physics::explain::Language;
 use physics::{Role, Scene, find_effect};
+use recording::Recording;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -224,8 +224,8 @@ impl Move {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::read_csv;
     use physics::CATALOGUE;
+    use recording::read_csv;
 
     fn envelope() -> Envelope {
         Envelope {

@@ -4,9 +4,9 @@ use super::bind::bind_model;
 use super::hold_out::{Unit, list_units, select_held_out_units};
 use super::model::{Model, Part, simulate_parts};
 use super::quality::{Fault, exclude_faulty_rows};
-use adapters::Recording;
-use adapters::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use physics::Scene;
+use recording::Recording;
 use std::collections::BTreeSet;
 
 /// A recording prepared for comparison with a model.

@@ -166,7 +166,7 @@ fn count_quantised_rows(scene: &Scene) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::read_csv;
+    use recording::read_csv;
     use std::collections::BTreeMap;
     use std::fmt::Write;
 

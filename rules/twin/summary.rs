@@ -3,7 +3,7 @@
 use super::diagnosis::{Diagnosis, Existence, UNKNOWN, Verdict};
 use super::region::Condition;
 use super::text_report::format_short_number;
-use adapters::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use physics::find_effect;
 
 /// One or two sentences for the machinist.

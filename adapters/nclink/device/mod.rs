@@ -22,7 +22,7 @@ mod values;
 use super::model::Model;
 use super::topic::Subject;
 use adapter_core::clock::Clock;
-use mqtt::{MqttClient, MqttError, MqttMessage, Options, Qos, generate_unique_id};
+use mqtt::{MqttClient, MqttError, MqttMessage, Options, Qos};
 use registers::SimulatedRegisters;
 use sampling::ChannelSampler;
 use serde_json::{Value, json};
@@ -94,7 +94,8 @@ impl NcLinkDevice {
         let client = MqttClient::connect(broker)?;
         let asked = [Subject::Probe, Subject::Query, Subject::Set, Subject::Ping];
         client.subscribe_filters(&asked.map(|subject| subject.build_filter(&self.serial)), Qos::AtMostOnce)?;
-        let register = json!({"@id": generate_unique_id(), "deviceid": self.serial}).to_string();
+        let register =
+            json!({"@id": adapter_core::unique_id::generate_unique_id(), "deviceid": self.serial}).to_string();
         client.publish_message(&Subject::Register.build_topic(&self.serial), register.as_bytes(), Qos::AtLeastOnce)?;
         let now_ns = self.clock.now_ns();
         self.samplers.iter_mut().for_each(|sampler| sampler.begin_sampling(now_ns));
@@ -158,7 +159,7 @@ impl NcLinkDevice {
         }
         self.alarm = alarm;
         let event = json!({"number": "1", "text": alarm, "active": !alarm.is_empty()});
-        let message = json!({"@id": generate_unique_id(), "id": "WARNING", "time": to_milliseconds(now_ns).to_string(), "event": event});
+        let message = json!({"@id": adapter_core::unique_id::generate_unique_id(), "id": "WARNING", "time": to_milliseconds(now_ns).to_string(), "event": event});
         client.publish_message(
             &Subject::Event.build_topic(&self.serial),
             message.to_string().as_bytes(),

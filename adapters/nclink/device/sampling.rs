@@ -71,7 +71,7 @@ impl ChannelSampler {
         }
         let data: Vec<Value> = columns.into_iter().map(|column| json!({"data": column})).collect();
         Some(json!({
-            "@id": mqtt::generate_unique_id(), "paths": self.names, "id": self.name, "beginTime": begin_ms.to_string(),
+            "@id": adapter_core::unique_id::generate_unique_id(), "paths": self.names, "id": self.name, "beginTime": begin_ms.to_string(),
             "data": data, "interval": self.interval_ms, "uploadInterval": self.upload_ms,
         }))
     }

@@ -3,7 +3,7 @@
 use super::ClockStatus;
 use super::judge::{Certain, ClockNews, ClockRules, Judge, Trust};
 use crate::convert::duration_to_ns;
-use adapters::clock::{Clock, SECOND_NS, TimeNs};
+use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 use rustix::time::{ClockId, clock_gettime};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};

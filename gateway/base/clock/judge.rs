@@ -1,7 +1,7 @@
 //! Which reading of the wall clock is believed, and when another one is followed. Pure.
 
 use crate::convert::duration_to_ns;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use serde::Serialize;
 use std::time::Duration;
 

@@ -32,7 +32,7 @@ mod judge;
 pub use box_clock::{BoxClock, ClockMark, of_box};
 pub use judge::{Certain, ClockNews, ClockRules, Trust};
 
-use adapters::clock::{Clock, SECOND_NS, TimeNs};
+use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 
 /// Nobody runs this program before it was made: 2026-01-01, a lower bound of every true reading.
 pub const MADE_NS: TimeNs = 1_767_225_600 * SECOND_NS;

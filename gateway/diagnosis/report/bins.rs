@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::text::{escape_html, format_number};
-use adapters::recording::{Cells, Numbers, Words, derive_quantity};
+use recording::{Cells, Numbers, Words, derive_quantity};
 use rules::twin::region::Condition;
 use std::borrow::Cow;
 

@@ -2,7 +2,7 @@
 
 use super::PageInput;
 use super::text::{Tongue, escape_html};
-use adapters::recording::{Numbers, Run};
+use recording::{Numbers, Run};
 use rules::twin::diagnosis::Diagnosis;
 use rules::twin::hold_out::{Unit, split_into_units};
 use std::ops::Range;

@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::text::escape_html;
-use adapters::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 
 /// The section; empty where nothing is doubtful.
 pub(super) fn render_section(data: &Data<'_>) -> String {

@@ -24,8 +24,8 @@ mod text;
 mod verdict;
 
 use crate::context::DiagnosisContext;
-use adapters::Recording;
 use data::Data;
+use recording::Recording;
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::Diagnosis;
 use std::fmt::Write as _;

@@ -2,10 +2,10 @@
 
 use super::{PageInput, page};
 use crate::context::DiagnosisContext;
-use adapters::Recording;
-use adapters::recording::{Cells, Numbers, Words};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use recording::Recording;
+use recording::{Cells, Numbers, Words};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::{Diagnosis, Verdict};
 use rules::twin::region::{OnsetInterval, Span};

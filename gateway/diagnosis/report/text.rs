@@ -1,6 +1,6 @@
 //! Words and numbers of the page: two languages, quantities with units, escaping.
 
-use adapters::channel::{ChannelId, quantity};
+use adapter_core::channel::{ChannelId, quantity};
 use rules::physics::explain::Language;
 use rules::physics::{CATALOGUE, EffectDoc, find_effect};
 use rules::twin::region::Condition;

@@ -17,10 +17,10 @@ mod sizes;
 
 pub use refitted::find_parameter_doubts;
 
-use adapters::Recording;
-use adapters::bilingual::Bilingual;
-use adapters::channel::quantity::unit_of;
-use adapters::channel::unit::{Unit, units_of};
+use adapter_core::bilingual::Bilingual;
+use adapter_core::channel::quantity::unit_of;
+use adapter_core::channel::unit::{Unit, units_of};
+use recording::Recording;
 use rules::twin::Model;
 
 /// A column that is probably in another unit.

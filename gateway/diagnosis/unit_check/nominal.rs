@@ -3,9 +3,9 @@
 
 use super::{UnitDoubt, list_possible_units};
 use crate::simulation;
-use adapters::Recording;
-use adapters::channel::quantity::unit_of;
-use adapters::recording::{Cells, Numbers};
+use adapter_core::channel::quantity::unit_of;
+use recording::Recording;
+use recording::{Cells, Numbers};
 use rules::twin::text_report::format_short_number;
 use rules::twin::{Model, PartFunction};
 

@@ -1,8 +1,8 @@
 //! Columns of which one follows from others: a constant factor between both is a unit.
 
 use super::{UnitDoubt, find_nearest_unit, median};
-use adapters::Recording;
-use adapters::recording::derive_quantity;
+use recording::Recording;
+use recording::derive_quantity;
 use rules::twin::text_report::format_short_number;
 
 /// Two courses that belong together keep their ratio within this share of it in half of the rows.

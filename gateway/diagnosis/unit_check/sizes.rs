@@ -1,8 +1,8 @@
 //! A column beside what machines have. The ranges are wide: a value outside of them is another unit, or no machine tool.
 
 use super::{UnitDoubt, median};
-use adapters::Recording;
-use adapters::recording::Numbers;
+use recording::Numbers;
+use recording::Recording;
 use rules::twin::text_report::format_short_number;
 
 /// Column, what its greatest values lie between, and the unit that smaller and greater ones look like.

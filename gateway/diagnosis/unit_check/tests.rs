@@ -1,7 +1,7 @@
 //! Thirty mistakes of units, each in one column of a recording that is right otherwise: every one is told, and the right ones are not.
 
 use super::*;
-use adapters::recording::{Cells, Numbers, Words};
+use recording::{Cells, Numbers, Words};
 use rules::twin::parse_model;
 
 const LATHE: &str = "schema = \"model/1\"\noutput = \"spindle_power_w\"\n\

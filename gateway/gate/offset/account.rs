@@ -7,9 +7,9 @@
 
 use super::journal::OffsetJournal;
 use super::order::{Moved, NotOnDisk, OffsetOrder, Shifted};
-use adapters::SourceError;
-use adapters::clock::Clock;
-use adapters::offset::{Axis, LastWrite, Left, OffsetShares, OffsetSink, is_same_offset};
+use adapter_core::SourceError;
+use adapter_core::clock::Clock;
+use adapter_core::offset::{Axis, LastWrite, Left, OffsetShares, OffsetSink, is_same_offset};
 
 /// No gate may ask for a greater shift than this, whatever its configuration says.
 const MOST_UM: f64 = 1000.0;

@@ -4,7 +4,7 @@ use super::order::{Moved, OffsetOrder, Shifted};
 use super::{OffsetBound, OffsetOutcome, OffsetVerdict};
 use crate::audit::{Author, truncate_text};
 use crate::limits::OffsetConfig;
-use adapters::offset::{Axis, LastWrite};
+use adapter_core::offset::{Axis, LastWrite};
 use gateway_base::row_rate::RowRate;
 use gateway_history::Audit;
 use rules::script::OffsetProposal;
@@ -139,7 +139,7 @@ fn audit_finding(moved: &Moved, shifted: &Shifted) -> Option<Audit> {
 }
 
 /// `z_offset_request` and the like.
-fn new_row(what: &str, axis: Axis, at_ns: adapters::clock::TimeNs) -> Audit {
+fn new_row(what: &str, axis: Axis, at_ns: adapter_core::clock::TimeNs) -> Audit {
     Audit { at_ns, kind: format!("{}_offset_{what}", axis.as_word()), unit: "um".to_owned(), ..Audit::default() }
 }
 

@@ -30,8 +30,8 @@ pub use order::{Moved, OffsetOrder, Shifted};
 
 use super::hold::Hold;
 use crate::limits::{GateMode, OffsetConfig};
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::offset::Axis;
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::offset::Axis;
 use gateway_base::convert::duration_to_ns;
 use rules::script::OffsetProposal;
 

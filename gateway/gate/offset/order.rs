@@ -1,9 +1,9 @@
 //! What is ordered about an offset, and what came of it.
 
 use crate::Fault;
-use adapters::SourceError;
-use adapters::clock::TimeNs;
-use adapters::offset::{Axis, LastWrite, Left, is_same_offset};
+use adapter_core::SourceError;
+use adapter_core::clock::TimeNs;
+use adapter_core::offset::{Axis, LastWrite, Left, is_same_offset};
 use thiserror::Error;
 
 /// What is to be done at the control.

@@ -3,9 +3,9 @@
 
 use super::{Occasion, OverrideWriter, PendingWrite, WriteRecord};
 use crate::fault::Fault;
-use adapters::clock::{Clock, SECOND_NS, TimeNs};
-use adapters::units::OverridePct;
-use adapters::{Actuator, LadderRule, SourceError};
+use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
+use adapter_core::units::OverridePct;
+use adapter_core::{Actuator, LadderRule, SourceError};
 
 /// A withdrawal that the machine refused is tried again after this time.
 const WITHDRAW_AGAIN_NS: i64 = SECOND_NS / 2;

@@ -5,7 +5,7 @@
 //! bit is always noticed, any other change but once in four thousand million.
 
 use super::varint::Bytes;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 
 /// Length of both sums.
 const SUMS: usize = 8;

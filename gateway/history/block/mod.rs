@@ -22,7 +22,7 @@ pub(crate) use stored::{BLOCK_COLUMNS, StoredBlock};
 use super::reason::{PRESENT, Reasons};
 use super::rows::{Column, SeriesRows, Word};
 use super::series::Series;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use cells::Scratch;
 use varint::Bytes;
 

@@ -16,7 +16,7 @@ use super::query::Query;
 use super::reader::Reader;
 use super::series::Series;
 use super::walk::blocks_in;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;

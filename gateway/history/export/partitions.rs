@@ -13,7 +13,7 @@ use super::super::outbox::known_box_id;
 use super::super::query::Query;
 use super::super::reader::Reader;
 use super::parquet;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};

@@ -5,8 +5,8 @@ use super::super::options::SeriesKind;
 use super::super::query::{Chunk, Query};
 use super::super::reader::Reader;
 use super::{ColumnPlan, RUN, run_text};
-use adapters::Recording;
-use adapters::recording::{Cells, Numbers, Words};
+use recording::Recording;
+use recording::{Cells, Numbers, Words};
 use std::ops::ControlFlow;
 
 /// Columns under construction.

@@ -13,7 +13,7 @@ use crate::mailbox::QueuedRecord;
 use crate::reason::Reasons;
 use crate::rows::SeriesRows;
 use crate::series::Series;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::convert::duration_to_ns;
 use rusqlite::Connection;
 use std::borrow::Cow;

@@ -3,9 +3,9 @@
 use crate::pyramid::LEVELS;
 use crate::record::Record;
 use crate::{Series, SeriesKind};
-use adapters::ChannelId;
-use adapters::channel::{Channel, Form};
-use adapters::clock::TimeNs;
+use adapter_core::ChannelId;
+use adapter_core::channel::{Channel, Form};
+use adapter_core::clock::TimeNs;
 use gateway_base::moment;
 use serde_json::{Value as Json, json};
 use std::sync::Arc;

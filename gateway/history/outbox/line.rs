@@ -7,7 +7,7 @@
 use super::item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 use crate::record::Record;
 use crate::tail::{append_comma, put_number};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use serde::Deserialize;
 use serde_json::{Map, Value as Json, json};
 use std::collections::{BTreeMap, HashMap};

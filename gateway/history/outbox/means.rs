@@ -8,7 +8,7 @@ use super::line;
 use crate::HistoryError;
 use crate::error::Doing;
 use crate::pyramid::{LEVELS, Level};
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::Connection;
 use std::collections::BTreeSet;
 use std::time::Duration;

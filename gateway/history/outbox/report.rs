@@ -7,7 +7,7 @@ use crate::rounding::round_to_decimals;
 use crate::rows::{Column, SeriesRows, Word};
 use crate::series::Series;
 use crate::tail::{append_comma, put_missing, put_number};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::convert::duration_to_ns;
 use serde_json::Value as Json;
 use std::fmt::Write;
@@ -207,7 +207,7 @@ mod tests {
     use super::*;
     use crate::series::stored_series;
     use crate::{ExtraSeries, ExtraValue, Options};
-    use adapters::{Absence, ChannelId, Sample, Slot, Value};
+    use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
 
     fn series() -> Vec<Series> {
         let extras = vec![ExtraSeries::new_text("state", "", "")];

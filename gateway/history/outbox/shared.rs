@@ -4,7 +4,7 @@ use super::item::Reading;
 use super::position::Position;
 use super::report::OutboxSettings;
 use crate::HistoryError;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -6,7 +6,7 @@ use super::shared::{DeliveryState, Outbox, OutboxFigures};
 use crate::HistoryError;
 use crate::error::Doing;
 use crate::schema::{open_for_reading, open_for_writing};
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::convert::{clamp_to_signed, clamp_to_unsigned, duration_to_ns};
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use std::borrow::Cow;
@@ -157,8 +157,8 @@ fn box_name(db: &Connection, machine: &str) -> Result<String, HistoryError> {
         return Ok(name);
     }
     // Histories of before had six digits, and the name of the machine as it was at each start.
-    let mark =
-        read_property(db, "outbox_box")?.unwrap_or_else(|| adapters::mqtt::generate_unique_id()[..10].to_owned());
+    let mark = read_property(db, "outbox_box")?
+        .unwrap_or_else(|| adapter_core::unique_id::generate_unique_id()[..10].to_owned());
     let name = format!("{}-{mark}", letters_of(machine));
     db.execute("INSERT INTO meta (key, value) VALUES ('outbox_box_id', ?1)", [&name])
         .with_activity("naming the outbox")?;

@@ -3,8 +3,8 @@
 //! Source: Home Assistant, "MQTT Discovery" and "MQTT Sensor": a retained document for each sensor on
 //! `homeassistant/sensor/BOX/NAME/config`.
 
-use adapters::mqtt::Outgoing;
 use gateway_history::{Outbox, Reading, SeriesKind};
+use mqtt::Outgoing;
 use serde_json::{Value as Json, json};
 
 /// Units as Home Assistant writes them, with its word for the quantity.

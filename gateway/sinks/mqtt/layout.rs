@@ -9,10 +9,10 @@
 //! What a subscriber that comes late must know is retained: the newest state, part and diagnosis, with `topics` the newest value of
 //! each channel, and in every layout `PREFIX/latest` ([`build_latest_message`]).
 
-use adapters::clock::TimeNs;
-use adapters::mqtt::Outgoing;
+use adapter_core::clock::TimeNs;
 use gateway_base::moment;
 use gateway_history::{Cell, Content, Gap, Item, Outbox, Reading, SeriesMean};
+use mqtt::Outgoing;
 use serde_json::{Map, Value as Json, json};
 
 /// How items look on their topics.

@@ -3,7 +3,7 @@
 use super::layout;
 use super::space::Numbers;
 use super::values::to_opcua_time;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_history::Alarm;
 use opcua::nodes::{BaseEventType, Event, EventField};
 use opcua::types::{AttributeId, ByteString, DateTime, LocalizedText, NodeId, NumericRange, QualifiedName, Variant};

@@ -5,7 +5,7 @@
 //! Sources: OPC 40501-1 v1.02 (machine tools, monitoring and job), OPC 40001-1 (machinery); the numbers of types and states are those of
 //! the published node set.
 
-use adapters::words::{execution, mode};
+use adapter_core::words::{execution, mode};
 
 /// The namespaces of the companion specifications.
 pub(super) const MACHINE_TOOL: &str = "http://opcfoundation.org/UA/MachineTool/";
@@ -164,7 +164,7 @@ fn channel_state(word: &str) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::ChannelId;
+    use adapter_core::ChannelId;
 
     #[test]
     fn every_variable_is_of_a_channel_and_in_an_object() {

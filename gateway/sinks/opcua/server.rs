@@ -4,7 +4,7 @@ use super::event::AlarmEvent;
 use super::space::{self, Namespaces, Numbers};
 use super::values::Shown;
 use super::{APPLICATION, MachineIdentity, OpcuaTarget, PRODUCT, SinkError, certificates, layout};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_history::{Alarm, Outbox, Reading};
 use opcua::crypto::{SecurityPolicy, X509Data};
 use opcua::server::node_manager::memory::{SimpleNodeManager, simple_node_manager_imports};

@@ -2,7 +2,7 @@
 
 use super::layout::{self, Form, ProgramState, StatePart};
 use super::space::Numbers;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_history::{Cell, Reading};
 use opcua::server::address_space::AddressSpace;
 use opcua::types::{DataValue, DateTime, LocalizedText, NodeId, StatusCode, Variant};

@@ -4,7 +4,7 @@
 
 use super::conditions::{self, AlarmKind, OWN};
 use super::model::{AVAILABILITY, UNAVAILABLE, of_channel};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::moment;
 use gateway_history::{Alarm, Cell, Content, Item, Reading, Record};
 use std::collections::{BTreeMap, BTreeSet};

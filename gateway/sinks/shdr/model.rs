@@ -176,7 +176,7 @@ pub(super) fn of_channel(channel: &str) -> Option<&'static DataItem> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::ChannelId;
+    use adapter_core::ChannelId;
     use std::collections::BTreeSet;
 
     #[test]

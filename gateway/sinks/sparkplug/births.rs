@@ -6,8 +6,8 @@
 //! `Quality` (0 bad, 500 stale) and the reason as one word in `missing`. Records are metrics of type String that hold JSON.
 
 use super::payload::{Metric, MetricValue, Payload, Property, PropertySet, datatype};
-use adapters::channel::Form;
-use adapters::clock::TimeNs;
+use adapter_core::channel::Form;
+use adapter_core::clock::TimeNs;
 use gateway_base::convert::clamp_to_unsigned;
 use gateway_history::{Cell, Content, Item, Reading, SeriesInfo, SeriesKind};
 use std::collections::BTreeSet;

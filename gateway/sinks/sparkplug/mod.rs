@@ -28,12 +28,12 @@ mod payload;
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
 use crate::address::TargetError;
-use adapters::address::Keys;
-use adapters::mqtt::{Outgoing, Qos, Will};
+use adapter_core::address::Keys;
 use gateway_base::clock;
 use gateway_control::{Reply, RequestRefusal, RequestedChange};
 use gateway_history::{Cell, Outbox};
 use host::PrimaryHost;
+use mqtt::{Outgoing, Qos, Will};
 use payload::Payload;
 use prost::Message;
 use std::collections::BTreeSet;
@@ -129,7 +129,7 @@ impl SparkplugSink {
     }
 
     /// Takes what a message of the network asks for; true when there is something to attend to.
-    fn accept_message(&mut self, message: &adapters::mqtt::MqttMessage) -> bool {
+    fn accept_message(&mut self, message: &mqtt::MqttMessage) -> bool {
         let of_node = message.topic == self.target.format_topic("NCMD");
         if !of_node && message.topic != self.target.format_topic("DCMD") {
             return false;

@@ -16,7 +16,7 @@ use super::signals::{Feed, Pace, Signals};
 use super::situation::{Tick, visible_excess_w};
 use super::state::State;
 use super::supply::Supply;
-use adapters::{ChannelId, Sample};
+use adapter_core::{ChannelId, Sample};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -147,7 +147,7 @@ impl Inference {
         })
     }
 
-    fn explain_missing_input(&self, channel: Option<ChannelId>, absence: adapters::Absence) -> NoEstimate {
+    fn explain_missing_input(&self, channel: Option<ChannelId>, absence: adapter_core::Absence) -> NoEstimate {
         channel.map_or(NoEstimate::NotYet, |channel| NoEstimate::Input { channel, absence })
     }
 

@@ -5,7 +5,7 @@ use crate::basis::StateBasis;
 use crate::estimate::Estimates;
 use crate::no_load::NoLoadTable;
 use crate::settings::Settings;
-use adapters::Absence;
+use adapter_core::Absence;
 
 impl Inference {
     /// No-load powers that were learned from something else are in another unit. A basis is also one that was stored before there

@@ -6,7 +6,7 @@
 use super::load_inputs::LoadMoment;
 use crate::regression::Refusal;
 use crate::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 
 /// Curves hold at speeds this near to their own, as a share.
 const SPEED_SHARE: f64 = 0.02;

@@ -12,7 +12,7 @@
 //!
 //! In a ramp the request therefore never rises, whatever its length up to some twenty times `steady_s`.
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use std::collections::VecDeque;
 
 /// Time constant of the smoothing of the load, s: meters are noisy at every tick.

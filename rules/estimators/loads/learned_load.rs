@@ -6,7 +6,7 @@ use super::limits::LearnedLimits;
 use super::load_inputs::{LoadChannels, LoadMoment};
 use super::place::Place;
 use crate::NoEstimate;
-use adapters::Sample;
+use adapter_core::Sample;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -4,7 +4,7 @@ use super::curves::LoadCurves;
 use super::follower::OverrideRange;
 use super::load_inputs::LoadChannels;
 use crate::settings::Settings;
-use adapters::Sample;
+use adapter_core::Sample;
 use std::sync::Arc;
 
 /// Work that takes more than was learned is no emergency; a disturbed reading of a meter with 5 Hz stands for 0.4 s in the filtered

@@ -2,8 +2,8 @@
 
 use crate::signals::seconds_between;
 use crate::{Estimates, State};
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::{ChannelId, Sample};
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::{ChannelId, Sample};
 
 /// A longer step between two samples is a pause: a cut begins anew after it.
 const STEP_MAX_NS: i64 = 2 * SECOND_NS;

@@ -29,8 +29,8 @@ pub use learned_load::PLACES_MAX;
 
 use super::estimate::{Estimates, NoEstimate};
 use super::settings::Settings;
-use adapters::Sample;
-use adapters::clock::TimeNs;
+use adapter_core::Sample;
+use adapter_core::clock::TimeNs;
 use constant_load::ConstantLoad;
 use learned_load::LearnedLoad;
 use limits::LoadSettings;

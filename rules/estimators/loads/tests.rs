@@ -2,8 +2,8 @@
 
 use super::LoadEstimator;
 use crate::{Estimate, Estimates, Settings, State};
-use adapters::clock::SECOND_NS;
-use adapters::{ChannelId, Sample, Slot, Value};
+use adapter_core::clock::SECOND_NS;
+use adapter_core::{ChannelId, Sample, Slot, Value};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::collections::VecDeque;

@@ -5,8 +5,8 @@ use super::rows::MachineRow;
 use super::stretches::{SAME_SPEED, Stretch, settled_from};
 use crate::State;
 use crate::regression::{SteadyLevel, estimate_level, without_pulses};
-use adapters::Recording;
 use numerics::statistics::count_to_f64;
+use recording::Recording;
 use serde::Serialize;
 
 /// Left out after a cut begins and before it ends, s.

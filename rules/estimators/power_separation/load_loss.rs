@@ -11,8 +11,8 @@ use super::rows::classify_rows;
 use super::stretches::{SAME_SPEED, find_stretches};
 use crate::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, UnequalScatter, t_quantile};
 use crate::{LoadLossLaw, STAGES};
-use adapters::Recording;
 use numerics::statistics::count_to_f64;
+use recording::Recording;
 use serde::Serialize;
 
 /// The heaviest cut must take this many times the power of the lightest, or a0 and a1 cannot be told apart.

@@ -4,8 +4,8 @@ use super::rows::classify_rows;
 use super::stretches::{SAME_SPEED, Stretch, find_stretches};
 use crate::regression::{CONFIDENCE, Coefficient, Column, Intercept, Refusal, RefusalKind, fit_unweighted, t_quantile};
 use crate::{SPEEDS_PER_STAGE, STAGES};
-use adapters::Recording;
 use numerics::statistics::count_to_f64;
+use recording::Recording;
 use serde::Serialize;
 
 /// With so many visits of its own a speed needs no others to tell how much it differs from visit to visit.

@@ -6,7 +6,7 @@
 use super::rows::MachineRow;
 use crate::State;
 use crate::regression::{Plausible, Refusal, RefusalKind};
-use adapters::Recording;
+use recording::Recording;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
@@ -72,7 +72,7 @@ pub(super) fn select_reference(
             |row: &MachineRow| Some(force.get(row.row)? * PI * diameter.get(row.row)? / 1000.0 * row.speed_rpm? / 60.0);
         return Ok(Referenced { reference: PowerReference::Force, power_w: orient_powers(rows, per_row(&power)) });
     }
-    let removal = adapters::recording::with_derived(recording.clone());
+    let removal = recording::with_derived(recording.clone());
     match (removal.find_numbers("removal_rate_cm3_min"), choice.specific_energy_j_mm3) {
         (Some(removal), Some((energy_j_mm3, sd))) if energy_j_mm3 > 0.0 && sd >= 0.0 => {
             let power = |row: &MachineRow| Some(removal.get(row.row)? * 1000.0 / 60.0 * energy_j_mm3);

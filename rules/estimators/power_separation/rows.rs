@@ -2,8 +2,9 @@
 
 use crate::regression::{Plausible, Refusal, RefusalKind};
 use crate::{Inference, Settings, State};
-use adapters::clock::SECOND_NS;
-use adapters::{Absence, ChannelId, Recording, Sample, Slot, Value};
+use adapter_core::clock::SECOND_NS;
+use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
+use recording::Recording;
 
 /// Slower recordings do not show when a state begins.
 const PERIOD_MAX_S: f64 = 5.0;

@@ -9,8 +9,8 @@ use super::plateaus::{Plateau, SAME, find_plateaus};
 use crate::regression::{
     Coefficient, Column, FTest, Intercept, Refusal, RefusalKind, Regression, f_upper_tail, fit_weighted,
 };
-use adapters::Recording;
 use numerics::statistics::count_to_f64;
+use recording::Recording;
 use serde::Serialize;
 
 /// Distinct feeds that a curve needs.

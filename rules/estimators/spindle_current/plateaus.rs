@@ -2,8 +2,8 @@
 
 use crate::power_separation::settled_from;
 use crate::regression::{Plausible, Refusal, RefusalKind, SteadyLevel, estimate_level, without_pulses};
-use adapters::Recording;
 use numerics::statistics::count_to_f64;
+use recording::Recording;
 use serde::Serialize;
 
 /// Values closer than this share are one.

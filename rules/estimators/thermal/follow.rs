@@ -8,7 +8,7 @@
 
 use super::law::ThermalLaw;
 use super::predictor::{PredictedAndMeasured, Predictor, ThermalPrediction};
-use adapters::Absence;
+use adapter_core::Absence;
 use serde::{Deserialize, Serialize};
 
 /// The level wanders by this share of the residual deviation from reading to reading.
@@ -191,7 +191,7 @@ fn correct_law(law: &mut ThermalLaw, gain: &[f64], product: &[f64], residual_um:
 mod tests {
     use super::super::law::{Path, ThermalTerm};
     use super::*;
-    use adapters::clock::SECOND_NS;
+    use adapter_core::clock::SECOND_NS;
 
     fn law() -> ThermalLaw {
         let term = ThermalTerm {

@@ -3,9 +3,9 @@
 use super::course::{Course, Sensor};
 use super::quantities::THERMAL_ERROR;
 use crate::regression::{Refusal, RefusalKind};
-use adapters::Recording;
-use adapters::channel::quantity::{has_word, unit_of};
-use adapters::recording::{Cells, Numbers};
+use adapter_core::channel::quantity::{has_word, unit_of};
+use recording::Recording;
+use recording::{Cells, Numbers};
 use serde::Serialize;
 
 /// A sensor that has no value in more than this share of the rows with an error is left out.
@@ -110,7 +110,7 @@ fn no_temperature(recording: &Recording, out: &[(&str, &Numbers)]) -> Refusal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::Words;
+    use recording::Words;
 
     fn recording(columns: &[(&str, Vec<Option<f64>>)]) -> Recording {
         let rows = columns[0].1.len();

@@ -3,8 +3,8 @@
 use super::conditions::{CUTTING_POWER, Cut, CutConditions, FACTORS};
 use crate::LoadLossLaw;
 use crate::regression::{Refusal, RefusalKind};
-use adapters::Recording;
-use adapters::recording::{Numbers, with_derived};
+use recording::Recording;
+use recording::{Numbers, with_derived};
 
 /// Speed and feed within this share are those of one cut.
 const SAME_SHARE: f64 = 0.02;
@@ -262,7 +262,7 @@ fn average_cuts(cuts: &[Cut]) -> Cut {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::{Cells, Words};
+    use recording::{Cells, Words};
 
     fn recording(rows: usize, columns: &[(&str, f64)]) -> Recording {
         let mut recording = Recording::new("test", (0..rows).map(|row| row as f64).collect(), None);

@@ -13,8 +13,8 @@ use super::threshold::{Observability, PowerLimit, compute_power_limit};
 use super::tool_name::tool_of;
 use super::work::{CutMoment, EdgeWork, ExpectedPower, WorkKey, WorkReference};
 use crate::{Estimate, Estimated, Estimates, NoEstimate, State};
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::{ChannelId, Sample};
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::{ChannelId, Sample};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

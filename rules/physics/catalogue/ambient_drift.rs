@@ -1,6 +1,6 @@
 //! The machine follows the temperature of the shop, late.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::drive::is_displacement;
 use crate::excitation::{build_lag_forms, compute_spread};
 use crate::state::apply_continuous_lag;
@@ -104,7 +104,7 @@ const SKIN_SHARE: f64 = 0.5;
 mod tests {
     use super::*;
     use crate::catalogue::tests::{column, scene, set};
-    use adapters::Recording;
+    use recording::Recording;
 
     #[test]
     fn the_air_changes_while_the_machine_rests() {

@@ -1,6 +1,6 @@
 //! Grease and bearings get thinner and freer as they warm: no-load power falls.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::drive::{read_speed_krpm, raise_velocity_to_exponent, read_slide_velocity, raise_speed_to_exponent};
 use crate::excitation::{build_lag_forms, has_variation};
 use crate::state::{compute_decay, apply_first_order_lag};

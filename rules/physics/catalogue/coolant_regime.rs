@@ -130,7 +130,7 @@ fn list_wet_speeds(scene: &Scene, coolant: &[f64]) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
     use crate::catalogue::tests::{column, scene, set};
-    use adapters::Recording;
+    use recording::Recording;
 
     /// Four seconds in a cut of 800 W, at these speeds in m/min and with the coolant on where it is one.
     fn cut_for_four_seconds(speed: [f64; 4], coolant_on: [f64; 4]) -> Scene {

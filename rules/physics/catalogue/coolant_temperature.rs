@@ -1,6 +1,6 @@
 //! Coolant warms bed, work and fixture.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::drive::is_displacement;
 use crate::excitation::{build_lag_forms, compute_spread, has_variation};
 use crate::state::apply_continuous_lag;

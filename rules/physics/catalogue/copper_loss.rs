@@ -1,6 +1,6 @@
 //! Heat in the windings: grows with the square of torque.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::drive::{is_power, read_speed_krpm, compute_torque_at_1000_rpm};
 use crate::excitation::has_variation;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};

@@ -1,6 +1,6 @@
 //! Coulomb friction: a level with the sign of motion in a force, proportional to speed in a power.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::drive::{RAD_PER_S_OF_RPM, read_motion, compute_soft_sign, is_rotary_drive};
 use crate::excitation::find_greatest_magnitude;
 use crate::state::{compute_presliding_state, measure_strokes};
@@ -127,7 +127,7 @@ fn build_presliding_forms(scene: &Scene, velocity: &[f64]) -> Vec<Form> {
 mod tests {
     use super::*;
     use crate::catalogue::tests::{column, scene, set};
-    use adapters::Recording;
+    use recording::Recording;
 
     #[test]
     fn friction_that_bends_before_it_slips_is_held_at_rest() {

@@ -86,7 +86,7 @@ const MILLED: &str = "milled";
 mod tests {
     use super::*;
     use crate::catalogue::tests::{column, scene, set};
-    use adapters::Recording;
+    use recording::Recording;
 
     #[test]
     fn the_teeth_of_a_cutter_plough_in_turn() {

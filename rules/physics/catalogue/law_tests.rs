@@ -3,7 +3,7 @@
 use super::find_effect;
 use super::tests::{self, scene, set, set_words};
 use crate::{Form, Scene};
-use adapters::recording::Recording;
+use recording::Recording;
 
 fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
     tests::column(find_effect(kind).expect("known"), scene, form)

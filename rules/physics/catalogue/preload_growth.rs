@@ -1,6 +1,6 @@
 //! Inner rings warm before the housing: preload and friction rise, and fall again when the housing follows.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::drive::{read_driven_speed_krpm, read_speed_krpm, raise_speed_to_exponent};
 use crate::excitation::build_lag_forms;
 use crate::state::apply_first_order_lag;

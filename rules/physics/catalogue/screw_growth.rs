@@ -1,6 +1,6 @@
 //! The ball screw grows as its nut rubs: the error grows with the distance from the fixed bearing.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::drive::{read_axis_velocities, convert_to_si, is_displacement};
 use crate::excitation::{build_lag_forms, has_variation};
 use crate::state::apply_first_order_lag;

@@ -1,6 +1,6 @@
 //! The spindle grows as it warms, quickly at the nose and slowly in the housing.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::drive::{is_displacement, read_speed_krpm};
 use crate::excitation::{build_lag_forms, list_time_constants, has_variation};
 use crate::state::{compute_decay, apply_first_order_lag};

@@ -2,7 +2,7 @@
 
 use super::CATALOGUE;
 use crate::{Effect, Entry, Form, ParameterColumns, Role, Scene, Texts};
-use adapters::recording::{Cells, Numbers, Recording, Words};
+use recording::{Cells, Numbers, Recording, Words};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Names of the contract that are laws of the catalogue.

@@ -1,6 +1,6 @@
 //! Friction that grows in proportion to speed.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::drive::{is_power, read_motion};
 use crate::excitation::propose_plain_form;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};

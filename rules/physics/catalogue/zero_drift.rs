@@ -1,6 +1,6 @@
 //! The zero of the meter creeps, with cabinet temperature or age.
 
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use crate::excitation::{compute_clock_elapsed_s, compute_recording_share};
 use crate::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;

@@ -1,7 +1,7 @@
 //! What an effect sees: the inputs of a recording by the part they play.
 
-use adapters::channel::quantity::Quantity;
-use adapters::recording::{Recording, Words, with_derived};
+use adapter_core::channel::quantity::Quantity;
+use recording::{Recording, Words, with_derived};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -208,12 +208,12 @@ impl Scene {
     fn read_columns(&mut self, recording: &Recording) {
         for column in recording.columns() {
             match &column.cells {
-                adapters::recording::Cells::Numbers(numbers) if numbers.count_present() > 0 => {
+                recording::Cells::Numbers(numbers) if numbers.count_present() > 0 => {
                     let values: Vec<Option<f64>> = numbers.iter().collect();
                     self.absent.insert(column.name.clone(), values.iter().map(Option::is_none).collect());
                     self.columns.insert(column.name.clone(), fill_by_holding(&values, &self.runs));
                 }
-                adapters::recording::Cells::Words(words) if !words.words().is_empty() => {
+                recording::Cells::Words(words) if !words.words().is_empty() => {
                     self.words.insert(column.name.clone(), words.clone());
                 }
                 _ => {}

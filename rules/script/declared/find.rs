@@ -4,7 +4,7 @@ use super::scan::{find_calls, to_position};
 use super::{Declared, Per, SettingValue};
 use crate::compile::ScriptFile;
 use crate::problem::{self, ScriptProblem, describe_type};
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 use rhai::{Array, Dynamic, Engine, Expr, ImmutableString, Map, Position, Stmt};
 use std::ops::Range;
 

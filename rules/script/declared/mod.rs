@@ -31,7 +31,7 @@ pub(super) use find::{FoundDeclaration, find_declarations, with_values};
 pub use values::{DeclarationPlace, SETTINGS_TEXT_MAX, SettingValues};
 pub(super) use values_in_force::{Force, LiveValues, Now};
 
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 use std::fmt;
 
 /// Longest text that a setting takes, characters.

@@ -3,7 +3,7 @@
 use super::{Declared, Per, SettingValue};
 use crate::list_shipped_scripts;
 use crate::problem::ScriptProblem;
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use toml::de::{DeTable, DeValue};

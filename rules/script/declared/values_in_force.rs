@@ -1,7 +1,7 @@
 //! The values in force for one script: which stand in its text, and which are looked up by tool and operation.
 
 use super::{DeclarationPlace, Declared, FoundDeclaration, SettingValue, SettingValues};
-use adapters::{ChannelId, Sample};
+use adapter_core::{ChannelId, Sample};
 use estimators::wear::tool_of;
 use rhai::Dynamic;
 use std::collections::BTreeMap;

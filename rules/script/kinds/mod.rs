@@ -15,8 +15,8 @@ pub(super) mod switch;
 
 use super::fields;
 use super::vocabulary::{Word, WordKind, find_word};
-use adapters::ChannelId;
-use adapters::channel::find_nearest_name;
+use adapter_core::ChannelId;
+use adapter_core::channel::find_nearest_name;
 use rhai::{Expr, Position};
 
 /// What to do with a text in the place of a number.

@@ -3,7 +3,7 @@
 use super::{Outputs, Slot};
 use crate::decision::{Alarm, SCRIPT_STOPPED};
 use crate::timers::AlarmText;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use std::sync::Arc;
 
 impl Slot {

@@ -8,9 +8,9 @@ use crate::settings::merge_settings;
 use crate::status::ScriptCondition;
 use crate::vocabulary::{find_word, list_words};
 use crate::{Host, WordKind};
-use adapters::channel::find_nearest_name;
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::{Absence, ChannelId, Sample, Slot, Value};
+use adapter_core::channel::find_nearest_name;
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
 use estimators::loads::{Figure, LoadEstimator};
 use estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use rhai::{Dynamic, ImmutableString};
@@ -162,7 +162,7 @@ impl TrialContext {
     fn give_channel(&mut self, id: ChannelId, value: &Dynamic) -> Result<(), String> {
         let channel = id.channel();
         let text = value.read_lock::<ImmutableString>().map(|text| text.to_string());
-        let value = match (read_number(value), text, channel.kind == adapters::channel::Kind::Text) {
+        let value = match (read_number(value), text, channel.kind == adapter_core::channel::Kind::Text) {
             _ if value.is_unit() => Err(Absence::Timeout),
             (Some(number), _, false) if channel.accepts_number(number) => Ok(Value::Number(number)),
             (Some(number), _, false) => {

@@ -9,7 +9,7 @@ use super::gram::{Comparison, Gram};
 use super::linear_algebra::{CholeskyFactor, compute_schur_complement, extract_block};
 use super::thresholds::THRESHOLDS;
 use super::variant_bank::{Variant, VariantBank};
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use ndarray::{Array1, Array2};
 use numerics::statistics::count_to_f64;
 use physics::find_effect;

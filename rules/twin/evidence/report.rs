@@ -22,10 +22,10 @@ use crate::place_search::PlaceSearch;
 use crate::prepared_recording::Case;
 use crate::region::{Region, compute_usual_size, list_spans, mark_active_rows};
 use crate::summary;
-use adapters::Recording;
-use adapters::bilingual::Bilingual;
+use adapter_core::bilingual::Bilingual;
 use numerics::statistics::{count_to_f64, rms};
 use physics::find_effect;
+use recording::Recording;
 
 /// Times that a name of impossible size is replaced by the nearest law beside it.
 const REPLACED_MAX: usize = 3;

@@ -3,7 +3,7 @@
 use super::diagnose_recording;
 use crate::diagnosis::Verdict;
 use crate::{Diagnosis, parse_model};
-use adapters::recording::read_csv;
+use recording::read_csv;
 use std::fmt::Write;
 
 const MODEL: &str = "schema = \"model/1\"\noutput = \"force_n\"\n[[effect]]\nkind = \"linear\"\n\

@@ -4,9 +4,9 @@ use super::second_row::Row;
 use super::window::{CuttingTimes, LookBack, Window};
 use crate::model::{Model, Part, simulate_parts};
 use crate::{bind::bind_model, inputs::mark_rows_with_inputs};
-use adapters::Absence;
-use adapters::recording::{Cells, Numbers};
+use adapter_core::Absence;
 use physics::Scene;
+use recording::{Cells, Numbers};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -22,8 +22,8 @@ pub use regime::Regime;
 pub use watch::{Mismatch, Notice, RegimeStage};
 
 use super::model::Model;
-use adapters::Sample;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::Sample;
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use block::SettledSecond;
 use estimators::State;
 use expected::Simulation;

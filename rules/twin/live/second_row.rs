@@ -1,8 +1,8 @@
 //! Ticks gathered into seconds: the mean of every number, the last of every word, and how many ticks had one.
 
-use adapters::channel::{ChannelId, Kind};
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::{Absence, Sample, Value};
+use adapter_core::channel::{ChannelId, Kind};
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::{Absence, Sample, Value};
 use estimators::State;
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -2,9 +2,9 @@
 //! with a memory of hours, one row per half minute of the shift before them.
 
 use super::second_row::Row;
-use adapters::channel::{ChannelId, Kind};
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::recording::{Cells, Numbers, Recording, Words};
+use adapter_core::channel::{ChannelId, Kind};
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use recording::{Cells, Numbers, Recording, Words};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 

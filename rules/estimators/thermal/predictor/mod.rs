@@ -3,7 +3,7 @@
 use super::law::{Path, TERMS_MAX, ThermalLaw, first_order};
 use crate::estimate::Estimate;
 use crate::regression::{Refusal, RefusalKind};
-use adapters::Absence;
+use adapter_core::Absence;
 use std::fmt;
 
 /// A reading above this was meant in kelvin: no part of a machine tool that holds a sensor is so hot in °C.

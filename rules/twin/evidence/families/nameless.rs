@@ -7,7 +7,7 @@ use super::drive::is_drive;
 use crate::evidence::inputs::RecordingInputs;
 use crate::evidence::variant_bank::{Drawn, VariantBank};
 use crate::model::Model;
-use adapters::channel::quantity::Quantity;
+use adapter_core::channel::quantity::Quantity;
 use physics::OutputKind;
 
 /// Bumps over a channel, and over one that a machine may resonate or jam along.
