@@ -96,10 +96,24 @@ fn places(given: &[String]) -> Vec<PathBuf> {
     let tests = root().join("tests");
     match (after("--test"), after("-p"), after("--bench")) {
         (Some(test), _, _) => vec![tests.join(format!("{test}.rs")), tests.join(test)],
-        (_, Some(package), _) => vec![root().join(package)],
+        (_, Some(package), _) => vec![find_package(package)],
         (_, _, Some(bench)) => vec![tests.join(format!("bench/{bench}.rs"))],
         _ => ["adapters", "gateway", "rules", "tests"].iter().map(|room| root().join(room)).collect(),
     }
+}
+
+/// The folder of a package; its manifest says the name.
+fn find_package(package: &str) -> PathBuf {
+    let line = format!("name = \"{package}\"\n");
+    let named = |folder: &PathBuf| fs::read_to_string(folder.join("Cargo.toml")).is_ok_and(|text| text.contains(&line));
+    let rooms = ["adapters", "gateway", "rules", "tests"].map(|room| root().join(room));
+    let inside = rooms
+        .iter()
+        .flat_map(|room| fs::read_dir(room).expect("readable"))
+        .map(|entry| entry.expect("readable").path());
+    let mut folders: Vec<PathBuf> = inside.filter(|path| path.is_dir()).chain(rooms.iter().cloned()).collect();
+    folders.sort();
+    folders.into_iter().find(named).unwrap_or_else(|| root().join(package))
 }
 
 fn collect(path: &Path, files: &mut Vec<PathBuf>) {

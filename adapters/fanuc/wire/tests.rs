@@ -80,7 +80,7 @@ proptest! {
     }
 }
 
-/// Ten million frames, for a quiet hour: `cargo test -p adapters --release --lib ten_million -- --ignored`.
+/// Ten million frames, for a quiet hour: `cargo test -p fanuc --release --lib ten_million -- --ignored`.
 #[test]
 #[ignore = "10 minutes: ten million damaged FANUC frames decode or are refused, without a panic"]
 fn ten_million_frames() {

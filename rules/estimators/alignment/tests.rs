@@ -182,7 +182,7 @@ fn told(name: &str, seeds: u64, score: &Score) {
     );
 }
 
-/// The measurement behind the README: `cargo test -p rules --lib alignment -- --nocapture`.
+/// The measurement behind the README: `cargo test -p estimators --lib alignment -- --nocapture`.
 #[test]
 fn the_lag_is_found_within_20_ms_in_95_of_100_seeds() {
     for (name, back) in [("braking comes back", 0.7), ("braking into a resistor", 0.0)] {
