@@ -1,5 +1,5 @@
-// Sentences that the box writes in English (reasons of the gate, troubles of a source), and the same in Chinese. Longer phrases
-// stand before their parts. A test asks the box for all its reasons and finds each of them here.
+// Sentences that the box writes in English (reasons of the gate, troubles of a source), and the same in Chinese. Longer
+// phrases stand before their parts. A test asks the box for all its reasons and finds each of them here.
 export const PHRASES = [
   ["the gate is not armed: recorded, not written", "闸门未允许写入：仅记录，不写入"],
   ["nothing is asked for any more", "不再请求"],
@@ -9,7 +9,10 @@ export const PHRASES = [
   ["the least override is ", "最低倍率为 "],
   ["the greatest override is ", "最高倍率为 "],
   ["nothing above ", "不请求超过 "],
-  [" is asked of the ladder, which takes the lesser of it and the operator's dial; `above_dial` under [gate] would allow it", "：梯形图取其与面板倍率之较小者；[gate] 中 above_dial 可放开"],
+  [
+    " is asked of the ladder, which takes the lesser of it and the operator's dial; `above_dial` under [gate] would allow it",
+    "：梯形图取其与面板倍率之较小者；[gate] 中 above_dial 可放开",
+  ],
   ["the change is limited; ", "变化速率受限；当前 "],
   [" now", ""],
   ["a feed override is a number from 0 to 254 %; back to 100 %", "进给倍率应为 0 至 254 %；回到 100 %"],

@@ -3,10 +3,26 @@ import { language, t } from "./words.js";
 
 const locale = () => (language() === "zh" ? "zh-CN" : "en-GB");
 /** Decimal places by unit. A meter's noise is larger than what is left out. */
-const PLACES = { rpm: 0, "mm/min": 0, "%": 0, W: 0, A: 1, V: 0, "°C": 1, mm: 3, um: 1, "µm": 1, "mm/rev": 3, N: 0, s: 1, ms: 1, "cm3/min": 1 };
-const UNITS = { um: "µm", "cm3/min": "cm³/min", rpm: "min⁻¹", degC: "°C", "1": "" };
+const PLACES = {
+  rpm: 0,
+  "mm/min": 0,
+  "%": 0,
+  W: 0,
+  A: 1,
+  V: 0,
+  "°C": 1,
+  mm: 3,
+  um: 1,
+  µm: 1,
+  "mm/rev": 3,
+  N: 0,
+  s: 1,
+  ms: 1,
+  "cm3/min": 1,
+};
+const UNITS = { um: "µm", "cm3/min": "cm³/min", rpm: "min⁻¹", degC: "°C", 1: "" };
 
-export const unitName = (unit) => (unit === "rpm" ? t("rpm") : UNITS[unit] ?? unit ?? "");
+export const unitName = (unit) => (unit === "rpm" ? t("rpm") : (UNITS[unit] ?? unit ?? ""));
 
 /** A number without its unit. */
 export function number(value, unit) {
@@ -16,7 +32,10 @@ export function number(value, unit) {
   if (unit === "W" && size < 10 && size > 0) places = 1;
   if (unit === "mm" && size >= 10) places = 1;
   const shown = Number(value.toFixed(places));
-  return (Object.is(shown, -0) ? 0 : shown).toLocaleString(locale(), { maximumFractionDigits: places, minimumFractionDigits: Number.isInteger(value) && unit !== "°C" ? 0 : places });
+  return (Object.is(shown, -0) ? 0 : shown).toLocaleString(locale(), {
+    maximumFractionDigits: places,
+    minimumFractionDigits: Number.isInteger(value) && unit !== "°C" ? 0 : places,
+  });
 }
 
 /** A number with its unit. */
@@ -47,7 +66,10 @@ export function duration(seconds) {
 export function bytes(count) {
   const units = ["B", "kB", "MB", "GB", "TB"];
   let unit = 0;
-  while (count >= 1000 && unit < 4) { count /= 1000; unit += 1; }
+  while (count >= 1000 && unit < 4) {
+    count /= 1000;
+    unit += 1;
+  }
   return `${count.toFixed(unit > 0 && count < 100 ? 1 : 0)} ${units[unit]}`;
 }
 
@@ -56,7 +78,8 @@ export const clock = (ms) => time({ hour: "2-digit", minute: "2-digit", second: 
 export const clockMinute = (ms) => time({ hour: "2-digit", minute: "2-digit" })(ms);
 export const day = (ms) => time({ year: "numeric", month: "short", day: "numeric" })(ms);
 export const dayShort = (ms) => time({ month: "short", day: "numeric" })(ms);
-export const dateTime = (ms) => time({ year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit" })(ms);
+export const dateTime = (ms) =>
+  time({ year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit" })(ms);
 export const weekday = (ms) => time({ weekday: "short", month: "short", day: "numeric" })(ms);
 
 /** The clock alone for today (of the box), with the date otherwise. */
@@ -64,3 +87,9 @@ export const when = (ms, nowMs) => (day(ms) === day(nowMs) ? clock(ms) : dateTim
 
 /** The data directory of `DIR/identified/tool-wear.json`. */
 export const folder = (file) => file?.replace(/\/identified\/[^/]*$/, "") ?? "";
+
+/** `simulated://lathe?device=meter` is a meter to whoever looks at the page. */
+export const sourceName = (name) =>
+  name.startsWith("simulated:")
+    ? `${t("simulated")} · ${/device=(\w+)/.exec(name)?.[1] === "meter" ? t("meter") : t("controller")}`
+    : name;

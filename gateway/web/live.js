@@ -1,9 +1,9 @@
 // The stream of status documents, and the watchdog: is what the page shows still true?
 //
-// The clock of the browser may be wrong and may jump, so it is never asked. Two clocks that only go forward are compared: the
-// browser's own count of milliseconds since the page was opened, and the box's count of seconds since it started, which stands in
-// every document. A document is late by as much as the difference between the two has grown above its least value of the last
-// minutes: that finds a connection that delivers everything, but late.
+// The clock of the browser may be wrong and may jump, so it is never asked. Two clocks that only go forward are
+// compared: the browser's own count of milliseconds since the page was opened, and the box's count of seconds since it
+// started, which stands in every document. A document is late by as much as the difference between the two has grown
+// above its least value of the last minutes: that finds a connection that delivers everything, but late.
 
 /** Nothing older than this is shown as fresh. */
 export const FRESH_MS = 2000;
@@ -36,7 +36,9 @@ export class Live {
     this.stream = this.open("/api/v1/live");
     this.stream.addEventListener("status", (event) => this.take(JSON.parse(event.data)));
     // A stream that the server refused is not opened again by the browser.
-    this.stream.onerror = () => { if (this.stream.readyState === 2) setTimeout(() => this.connect(), 2000); };
+    this.stream.onerror = () => {
+      if (this.stream.readyState === 2) setTimeout(() => this.connect(), 2000);
+    };
   }
 
   take(status) {
@@ -73,7 +75,15 @@ export class Live {
 
   look() {
     const age = this.age();
-    const fresh = this.broken?.() ? "no" : age === null ? (this.now() - this.began > 5000 ? "no" : "waiting") : age <= this.limit ? "yes" : "no";
+    const fresh = this.broken?.()
+      ? "no"
+      : age === null
+        ? this.now() - this.began > 5000
+          ? "no"
+          : "waiting"
+        : age <= this.limit
+          ? "yes"
+          : "no";
     this.fresh = fresh;
     for (const listener of this.freshListeners) listener(fresh, age);
   }

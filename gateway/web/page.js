@@ -23,7 +23,8 @@ const context = {
   state: (word) => own(context.vocabulary.states[word]) || word,
   reason: (word) => own(context.vocabulary.absences[word]) || word,
   /** A channel or an estimate of the newest status. */
-  quantity: (name) => live.status?.channels.find((c) => c.name === name) ?? live.status?.estimates.find((e) => e.name === name),
+  quantity: (name) =>
+    live.status?.channels.find((c) => c.name === name) ?? live.status?.estimates.find((e) => e.name === name),
   go,
 };
 
@@ -61,14 +62,28 @@ function go(url, { replace = false } = {}) {
 
 function drawFrame() {
   at("views").setAttribute("aria-label", t("views"));
-  at("views").replaceChildren(...VIEWS.map((word) =>
-    make("a", "", t(`view_${word}`), { href: `/${word}`, "data-view": word, "aria-current": word === view ? "page" : null })));
+  at("views").replaceChildren(
+    ...VIEWS.map((word) =>
+      make("a", "", t(`view_${word}`), {
+        href: `/${word}`,
+        "data-view": word,
+        "aria-current": word === view ? "page" : null,
+      }),
+    ),
+  );
   // On a narrow screen the row of views is wider than the window.
   at("views").querySelector("[aria-current]").scrollIntoView({ block: "nearest", inline: "center" });
   say(at("language"), language() === "zh" ? "English" : "中文");
   at("language").setAttribute("lang", language() === "zh" ? "en" : "zh-CN");
-  const links = [["/api/v1/status", t("status_link")], ["/openapi.json", "OpenAPI"], ["/metrics", "Prometheus"]];
-  at("footer").replaceChildren(make("span", "", `cnc-gateway ${live.status?.version ?? ""}`), ...links.map(([href, name]) => make("a", "", name, { href })));
+  const links = [
+    ["/api/v1/status", t("status_link")],
+    ["/openapi.json", "OpenAPI"],
+    ["/metrics", "Prometheus"],
+  ];
+  at("footer").replaceChildren(
+    make("span", "", `cnc-gateway ${live.status?.version ?? ""}`),
+    ...links.map(([href, name]) => make("a", "", name, { href })),
+  );
   drawPerson();
 }
 
@@ -118,9 +133,11 @@ live.freshListeners.add((fresh, age) => {
   if (document.body.dataset.fresh !== fresh) document.body.dataset.fresh = fresh;
   say(at("link"), t(fresh === "yes" ? "live" : fresh === "no" ? "not_live" : "connecting"));
   if (fresh === "no") {
-    const text = broken ? t("page_broken", broken.message) : live.status
-      ? t("stale_since", duration((age ?? 0) / 1000), clock(live.status.at_ms))
-      : t("stale_never");
+    const text = broken
+      ? t("page_broken", broken.message)
+      : live.status
+        ? t("stale_since", duration((age ?? 0) / 1000), clock(live.status.at_ms))
+        : t("stale_never");
     say(at("stale-text"), text);
   }
   drawTitle(fresh, live.status);
@@ -131,10 +148,16 @@ document.addEventListener("click", (event) => {
   const link = event.target.closest?.("a[data-view]");
   if (!link || event.ctrlKey || event.metaKey || event.shiftKey || event.button) return;
   event.preventDefault();
-  if (link.pathname + link.search !== location.pathname + location.search) { history.pushState(null, "", link.href); show(); }
+  if (link.pathname + link.search !== location.pathname + location.search) {
+    history.pushState(null, "", link.href);
+    show();
+  }
 });
 addEventListener("popstate", show);
-at("language").addEventListener("click", () => { setLanguage(language() === "zh" ? "en" : "zh"); show(); });
+at("language").addEventListener("click", () => {
+  setLanguage(language() === "zh" ? "en" : "zh");
+  show();
+});
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show());
 
 /** For tests and for whoever looks closely: when the newest status is from, in the clock of the box. */
@@ -142,6 +165,16 @@ globalThis.cncGateway = { live, view: () => mounted, when: () => (live.status ? 
 
 show();
 live.start();
-addEventListener("signed-out", () => { if (context.session?.person) whoIsHere(); });
-function whoIsHere() { return ask("/api/v1/session").then((session) => { context.session = session; drawPerson(); mounted?.session?.(session); }).catch(() => {}); }
+addEventListener("signed-out", () => {
+  if (context.session?.person) whoIsHere();
+});
+function whoIsHere() {
+  return ask("/api/v1/session")
+    .then((session) => {
+      context.session = session;
+      drawPerson();
+      mounted?.session?.(session);
+    })
+    .catch(() => {});
+}
 whoIsHere();

@@ -7,7 +7,8 @@ export function make(tag, className, content, attributes = {}) {
   else if (content !== undefined && content !== null) element.textContent = content;
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (value !== null && value !== undefined && value !== false) element.setAttribute(name, value === true ? "" : value);
+    else if (value !== null && value !== undefined && value !== false)
+      element.setAttribute(name, value === true ? "" : value);
   }
   return element;
 }
@@ -37,7 +38,8 @@ export function fill(element, children) {
 
 export function table(head, rows, { caption } = {}) {
   const box = make("div", "scroll", null, { tabindex: "0", role: "region", "aria-label": caption });
-  const cell = (tag) => (it) => make(tag, it?.num ? "num" : "", it?.num ?? it?.text ?? it, tag === "th" ? { scope: "col" } : {});
+  const cell = (tag) => (it) =>
+    make(tag, it?.num ? "num" : "", it?.num ?? it?.text ?? it, tag === "th" ? { scope: "col" } : {});
   const body = rows.map((cells) => make("tr", "", cells.map(cell("td"))));
   box.append(make("table", "", [make("thead", "", make("tr", "", head.map(cell("th")))), make("tbody", "", body)]));
   return box;
@@ -48,10 +50,18 @@ export async function ask(path, options) {
   const answer = await fetch(path, options);
   const text = await answer.text();
   let document;
-  try { document = JSON.parse(text); } catch { document = { title: text || answer.statusText }; }
+  try {
+    document = JSON.parse(text);
+  } catch {
+    document = { title: text || answer.statusText };
+  }
   // A session that is over: the frame asks who is signed in now.
   if (answer.status === 401) dispatchEvent(new Event("signed-out"));
-  if (!answer.ok) throw Object.assign(new Error([document.title, document.hint].filter(Boolean).join(" – ")), { status: answer.status, document });
+  if (!answer.ok)
+    throw Object.assign(new Error([document.title, document.hint].filter(Boolean).join(" – ")), {
+      status: answer.status,
+      document,
+    });
   return document;
 }
 
@@ -60,4 +70,5 @@ export const send = (path, body, method = "POST") =>
   ask(path, { method, headers: { "content-type": "application/json" }, body: JSON.stringify(body ?? {}) });
 
 /** The colour of a custom property at this moment. */
-export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || "#888888";
+export const colour = (name) =>
+  getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || "#888888";

@@ -1,5 +1,6 @@
-// Charts over time: uPlot with the colours of the page, bands between least and greatest value, and one way to move through time
-// with mouse, wheel, finger and keyboard. Draws only what it is given: where there is no value there is a gap.
+// Charts over time: uPlot with the colours of the page, bands between least and greatest value, and one way to move
+// through time with mouse, wheel, finger and keyboard. Draws only what it is given: where there is no value there is a
+// gap.
 import uPlot from "/web/uplot.js";
 import { colour, make } from "./parts.js";
 import { clock, clockMinute, dayShort, number, unitName } from "./format.js";
@@ -11,7 +12,10 @@ export const RIGHT_PX = 12;
 const TOP_PX = 20;
 export const LINES = ["line-a", "line-b", "line-c", "line-d", "line-e", "line-f"];
 
-const timeSplits = [1, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400, 21600, 43200, 86400, 172800, 604800, 1209600, 2678400, 7776000, 31536000];
+const timeSplits = [
+  1, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400, 21600, 43200, 86400, 172800, 604800, 1209600, 2678400,
+  7776000, 31536000,
+];
 
 function timeLabels(_, splits, __, ___, step) {
   let last = null;
@@ -30,7 +34,8 @@ function timeLabels(_, splits, __, ___, step) {
 const localDate = (ts) => new Date(ts * 1000);
 
 export class TimePlot {
-  /** `series`: [{name, label, unit, line (name of a colour), dash, fill}]; `low`: the least value of the axis to be shown. */
+  /** `series`: [{name, label, unit, line (name of a colour), dash, fill}]; `low`: the least value of the axis to be
+      shown. */
   constructor(root, { series, height = 190, onCursor, label, low = null, high = null, sync = "time", times = true }) {
     this.root = root;
     this.series = series;
@@ -53,25 +58,71 @@ export class TimePlot {
 
   make() {
     const unit = this.series[0]?.unit ?? "";
-    const axis = { stroke: colour("soft"), grid: { stroke: colour("grid"), width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
+    const axis = {
+      stroke: colour("soft"),
+      grid: { stroke: colour("grid"), width: 1 },
+      ticks: { show: false },
+      font: "12px system-ui, sans-serif",
+    };
     const lines = [];
     const bands = [];
     this.series.forEach((one, at) => {
       const stroke = colour(one.line ?? LINES[at % LINES.length]);
       const base = 1 + at * 3;
-      lines.push({ label: one.label, stroke, width: 1.6, dash: one.dash, spanGaps: false, points: { show: false }, paths: one.stepped ? uPlot.paths.stepped({ align: 1 }) : undefined, fill: one.fill ? colour(one.fill) : undefined },
-        { show: true, stroke: "transparent", width: 0, points: { show: false } }, { show: true, stroke: "transparent", width: 0, points: { show: false } });
+      lines.push(
+        {
+          label: one.label,
+          stroke,
+          width: 1.6,
+          dash: one.dash,
+          spanGaps: false,
+          points: { show: false },
+          paths: one.stepped ? uPlot.paths.stepped({ align: 1 }) : undefined,
+          fill: one.fill ? colour(one.fill) : undefined,
+        },
+        { show: true, stroke: "transparent", width: 0, points: { show: false } },
+        { show: true, stroke: "transparent", width: 0, points: { show: false } },
+      );
       bands.push({ series: [base + 2, base + 1], fill: `${stroke}38` });
     });
     const { low, high } = this;
-    this.u = new uPlot({
-      width: this.width(), height: this.height, padding: [TOP_PX, RIGHT_PX, 0, 0], legend: { show: false }, tzDate: localDate,
-      cursor: { drag: { x: false, y: false }, sync: this.sync ? { key: this.sync, setSeries: false } : undefined, points: { size: 7 }, y: false },
-      scales: { x: { time: true }, y: { range: (_, least, most) => span(least, most, low, high) } },
-      axes: [{ ...axis, values: this.times ? timeLabels : (_, splits) => splits.map(() => ""), space: 84, size: this.times ? 34 : 8, incrs: timeSplits }, { ...axis, size: AXIS_PX, gap: 6, space: 34, values: (_, splits) => splits.map((v) => number(v, Math.abs(splits.at(-1) - splits[0]) < 4 ? "" : unit)) }],
-      series: [{}, ...lines], bands,
-      hooks: { setCursor: [(u) => this.onCursor?.(u.cursor.idx)], draw: [(u) => this.overlay?.(u)] },
-    }, this.data ?? [[]].concat(lines.map(() => [])), this.box);
+    this.u = new uPlot(
+      {
+        width: this.width(),
+        height: this.height,
+        padding: [TOP_PX, RIGHT_PX, 0, 0],
+        legend: { show: false },
+        tzDate: localDate,
+        cursor: {
+          drag: { x: false, y: false },
+          sync: this.sync ? { key: this.sync, setSeries: false } : undefined,
+          points: { size: 7 },
+          y: false,
+        },
+        scales: { x: { time: true }, y: { range: (_, least, most) => span(least, most, low, high) } },
+        axes: [
+          {
+            ...axis,
+            values: this.times ? timeLabels : (_, splits) => splits.map(() => ""),
+            space: 84,
+            size: this.times ? 34 : 8,
+            incrs: timeSplits,
+          },
+          {
+            ...axis,
+            size: AXIS_PX,
+            gap: 6,
+            space: 34,
+            values: (_, splits) => splits.map((v) => number(v, Math.abs(splits.at(-1) - splits[0]) < 4 ? "" : unit)),
+          },
+        ],
+        series: [{}, ...lines],
+        bands,
+        hooks: { setCursor: [(u) => this.onCursor?.(u.cursor.idx)], draw: [(u) => this.overlay?.(u)] },
+      },
+      this.data ?? [[]].concat(lines.map(() => [])),
+      this.box,
+    );
     const name = make("span", "plot-unit", unitName(unit));
     this.box.append(name);
     this.move?.attach(this.u.over);
@@ -102,8 +153,8 @@ export class TimePlot {
   }
 }
 
-/** From where a chart of this time is to be drawn: where the data begins, if that is later, so that a young history fills its chart
-    and is no line at the right edge. At least a minute is shown. */
+/** From where a chart of this time is to be drawn: where the data begins, if that is later, so that a young history
+    fills its chart and is no line at the right edge. At least a minute is shown. */
 export function drawnFrom(data, from, to) {
   const first = data[0].find((_, at) => data.some((column, of) => of > 0 && typeof column[at] === "number"));
   return first === undefined ? from : Math.max(from, Math.min(first, to - 60));
@@ -142,22 +193,30 @@ export class Movement {
       this.pointers.set(event.pointerId, place(event));
       this.follow();
     });
-    for (const end of ["pointerup", "pointercancel"]) element.addEventListener(end, (event) => {
-      this.pointers.delete(event.pointerId);
-      this.begin = this.pointers.size ? { range: this.get(), places: new Map(this.pointers) } : null;
-    });
-    element.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      const sideways = Math.abs(event.deltaX) > Math.abs(event.deltaY);
-      if (sideways) this.pan(event.deltaX / element.clientWidth);
-      else this.zoom(Math.exp(Math.max(-80, Math.min(80, event.deltaY)) * 0.004), place(event));
-    }, { passive: false });
+    for (const end of ["pointerup", "pointercancel"])
+      element.addEventListener(end, (event) => {
+        this.pointers.delete(event.pointerId);
+        this.begin = this.pointers.size ? { range: this.get(), places: new Map(this.pointers) } : null;
+      });
+    element.addEventListener(
+      "wheel",
+      (event) => {
+        event.preventDefault();
+        const sideways = Math.abs(event.deltaX) > Math.abs(event.deltaY);
+        if (sideways) this.pan(event.deltaX / element.clientWidth);
+        else this.zoom(Math.exp(Math.max(-80, Math.min(80, event.deltaY)) * 0.004), place(event));
+      },
+      { passive: false },
+    );
     element.addEventListener("dblclick", (event) => this.zoom(4, place(event)));
   }
 
   follow() {
     if (!this.begin) return;
-    const { range: [from, to], places } = this.begin;
+    const {
+      range: [from, to],
+      places,
+    } = this.begin;
     const ids = [...this.pointers.keys()].filter((id) => places.has(id));
     const width = to - from;
     if (ids.length === 1) {
@@ -193,7 +252,13 @@ export class Movement {
   }
 
   keys(event) {
-    const acts = { ArrowLeft: () => this.pan(-0.25), ArrowRight: () => this.pan(0.25), "+": () => this.zoom(0.5), "=": () => this.zoom(0.5), "-": () => this.zoom(2) };
+    const acts = {
+      ArrowLeft: () => this.pan(-0.25),
+      ArrowRight: () => this.pan(0.25),
+      "+": () => this.zoom(0.5),
+      "=": () => this.zoom(0.5),
+      "-": () => this.zoom(2),
+    };
     if (!acts[event.key] || event.target.closest("input, select, textarea")) return;
     event.preventDefault();
     acts[event.key]();

@@ -34,7 +34,8 @@ export class StateRibbon {
     if (this.width < 80 || this.from === undefined) return;
     const ratio = devicePixelRatio || 1;
     const wanted = [this.width * ratio, this.height * ratio].map(Math.round);
-    if (this.canvas.width !== wanted[0] || this.canvas.height !== wanted[1]) [this.canvas.width, this.canvas.height] = wanted;
+    if (this.canvas.width !== wanted[0] || this.canvas.height !== wanted[1])
+      [this.canvas.width, this.canvas.height] = wanted;
     this.canvas.style.width = `${this.width}px`;
     this.canvas.style.height = `${this.height}px`;
     const pen = this.canvas.getContext("2d");
@@ -42,7 +43,8 @@ export class StateRibbon {
     pen.clearRect(0, 0, this.width, this.height);
     pen.fillStyle = colour("grid");
     pen.fillRect(AXIS_PX, 2, this.width - AXIS_PX - RIGHT_PX, this.height - 4);
-    if (this.shares.length) this.drawShares(pen); else this.drawSpans(pen);
+    if (this.shares.length) this.drawShares(pen);
+    else this.drawSpans(pen);
     this.drawMarks(pen);
     this.describe();
   }
@@ -83,14 +85,23 @@ export class StateRibbon {
       const x = Math.round(this.x(at)) + 0.5;
       if (x < AXIS_PX || x > this.width - RIGHT_PX) continue;
       pen.strokeStyle = colour("text");
-      pen.beginPath(); pen.moveTo(x, 0); pen.lineTo(x, this.height); pen.stroke();
+      pen.beginPath();
+      pen.moveTo(x, 0);
+      pen.lineTo(x, this.height);
+      pen.stroke();
     }
     for (const { at, tone } of this.marks ?? []) {
       const x = this.x(at);
       if (x < AXIS_PX || x > this.width - RIGHT_PX) continue;
       pen.fillStyle = colour(tone);
       pen.strokeStyle = colour("card");
-      pen.beginPath(); pen.moveTo(x, this.height - 9); pen.lineTo(x + 6, this.height); pen.lineTo(x - 6, this.height); pen.closePath(); pen.fill(); pen.stroke();
+      pen.beginPath();
+      pen.moveTo(x, this.height - 9);
+      pen.lineTo(x + 6, this.height);
+      pen.lineTo(x - 6, this.height);
+      pen.closePath();
+      pen.fill();
+      pen.stroke();
     }
   }
 
@@ -101,7 +112,9 @@ export class StateRibbon {
       const seconds = Math.min(to, this.to) - Math.max(from, this.from);
       if (seconds > 0) sums[word] = (sums[word] ?? 0) + seconds;
     }
-    const words = ORDER.filter((word) => sums[word]).map((word) => `${this.context.state(word)} ${duration(sums[word])}`);
+    const words = ORDER.filter((word) => sums[word]).map(
+      (word) => `${this.context.state(word)} ${duration(sums[word])}`,
+    );
     this.canvas.setAttribute("aria-label", words.join(", ") || "–");
   }
 

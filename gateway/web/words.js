@@ -3,10 +3,20 @@ import { WORDS } from "./word-table.js";
 import { PHRASES } from "./box-texts.js";
 
 const asked = new URLSearchParams(location.search).get("lang");
-const stored = () => { try { return localStorage.getItem("language"); } catch { return null; } };
+const stored = () => {
+  try {
+    return localStorage.getItem("language");
+  } catch {
+    return null;
+  }
+};
 const known = (it) => (it === "zh" || it === "en" ? it : null);
 /** `?lang=zh` goes before what was chosen here, that before the configuration of the box, that before the browser. */
-let chosen = known(asked) ?? known(stored()) ?? known(document.documentElement.dataset.opens) ?? (navigator.language?.startsWith("zh") ? "zh" : "en");
+let chosen =
+  known(asked) ??
+  known(stored()) ??
+  known(document.documentElement.dataset.opens) ??
+  (navigator.language?.startsWith("zh") ? "zh" : "en");
 
 export const language = () => chosen;
 
@@ -20,14 +30,25 @@ export function t(key, ...values) {
 /** Is there such a text? */
 export const has = (key) => key in WORDS;
 
-/** A moment that the box has written in UTC, by the clock of the reader: two kinds of time on one page are read as one. */
+/** A moment that the box has written in UTC, by the clock of the reader: two kinds of time on one page are read as one.
+ */
 const MOMENT = /(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d(?::\d\d)?)(?:\.\d+)?(?:Z| UTC)/g;
-export const localTimes = (text) => text?.replace(MOMENT, (_, day, time) => new Date(`${day}T${time}Z`).toLocaleString(chosen === "zh" ? "zh-CN" : "en-GB", { year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit" })) ?? "";
+export const localTimes = (text) =>
+  text?.replace(MOMENT, (_, day, time) =>
+    new Date(`${day}T${time}Z`).toLocaleString(chosen === "zh" ? "zh-CN" : "en-GB", {
+      year: "numeric",
+      month: "short",
+      day: "numeric",
+      hour: "2-digit",
+      minute: "2-digit",
+    }),
+  ) ?? "";
 
 /** The text of something that carries `en` and `zh` itself. */
 export const own = (thing) => localTimes(thing?.[chosen] ?? thing?.en ?? "");
 
-/** What the box says in English, in Chinese where that is read: the sentences of the gate are put together from known phrases. */
+/** What the box says in English, in Chinese where that is read: the sentences of the gate are put together from known
+    phrases. */
 export function box(text) {
   if (chosen !== "zh" || !text) return localTimes(text);
   return PHRASES.reduce((done, [en, zh]) => done.split(en).join(zh), localTimes(text));
@@ -37,7 +58,14 @@ export function setLanguage(next) {
   chosen = next;
   document.documentElement.lang = next === "zh" ? "zh-CN" : "en";
   const url = new URL(location.href);
-  if (url.searchParams.has("lang")) { url.searchParams.set("lang", next); history.replaceState(history.state, "", url); }
-  try { localStorage.setItem("language", next); } catch { /* a browser that keeps nothing forgets the choice */ }
+  if (url.searchParams.has("lang")) {
+    url.searchParams.set("lang", next);
+    history.replaceState(history.state, "", url);
+  }
+  try {
+    localStorage.setItem("language", next);
+  } catch {
+    /* a browser that keeps nothing forgets the choice */
+  }
 }
 document.documentElement.lang = chosen === "zh" ? "zh-CN" : "en";

@@ -1,12 +1,28 @@
-// Audit: what was asked for, let through, refused and written, who armed; a ramp of the override is one line. Below: the sources,
-// the store, the scripts, as an integrator needs them.
+// Audit: what was asked for, let through, refused and written, who armed; a ramp of the override is one line. Below:
+// the sources, the store, the scripts, as an integrator needs them.
 import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
-import { bytes, clock, dateTime, duration, number, quantity, when } from "/web/format.js";
+import { bytes, clock, dateTime, duration, number, quantity, sourceName, when } from "/web/format.js";
 import { box, has, t } from "/web/words.js";
-import { armDialog, sourceName } from "/web/now.js";
+import { armDialog } from "/web/now-feed.js";
 import { systemView } from "/web/system.js";
 
-const KINDS = ["", "all", "write", "request", "armed", "disarmed", "change", "login", "persons", "request_refused", "stop", "feed_hold", "acknowledged", "reaction", "started"];
+const KINDS = [
+  "",
+  "all",
+  "write",
+  "request",
+  "armed",
+  "disarmed",
+  "change",
+  "login",
+  "persons",
+  "request_refused",
+  "stop",
+  "feed_hold",
+  "acknowledged",
+  "reaction",
+  "started",
+];
 const PAGE = 1000;
 /** Lines that are shown at first: what stands below the list must be found. */
 const LINES = 25;
@@ -18,11 +34,33 @@ export function mount(root, context) {
   const gate = gateCard(context);
   const list = make("div", "");
   const note = make("p", "note", " ", { role: "status" });
-  const select = make("select", "", KINDS.map((kind) => make("option", "", kind === "all" ? t("every_kind") : kind ? t(`kind_${kind}`) : t("what_matters"), { value: kind })), { "aria-label": t("kind") });
-  select.addEventListener("change", () => { state.kind = select.value; draw(); });
+  const select = make(
+    "select",
+    "",
+    KINDS.map((kind) =>
+      make("option", "", kind === "all" ? t("every_kind") : kind ? t(`kind_${kind}`) : t("what_matters"), {
+        value: kind,
+      }),
+    ),
+    { "aria-label": t("kind") },
+  );
+  select.addEventListener("change", () => {
+    state.kind = select.value;
+    draw();
+  });
   const search = make("input", "", null, { type: "search", placeholder: t("search"), "aria-label": t("search") });
-  search.addEventListener("input", () => { state.text = search.value.toLowerCase(); draw(); });
-  const verify = make("button", "", t("verify"), { type: "button", onclick: async () => { verify.disabled = true; say(note, await verified()); verify.disabled = false; } });
+  search.addEventListener("input", () => {
+    state.text = search.value.toLowerCase();
+    draw();
+  });
+  const verify = make("button", "", t("verify"), {
+    type: "button",
+    onclick: async () => {
+      verify.disabled = true;
+      say(note, await verified());
+      verify.disabled = false;
+    },
+  });
   const draw = () => drawRows(list, state, context);
   const read = async () => {
     try {
@@ -31,31 +69,66 @@ export function mount(root, context) {
       if (key === state.last && state.drawn) return;
       [state.rows, state.last, state.drawn] = [found.rows, key, true];
       draw();
-    } catch (error) { fill(list, [make("p", "note bad", error.message)]); }
+    } catch (error) {
+      fill(list, [make("p", "note bad", error.message)]);
+    }
   };
   const system = systemCards(context);
   const more = systemView(context);
-  root.append(gate.box, card("", [make("div", "head", [make("h2", "", t("audit_title")), select, search, verify]), make("p", "note", t("audit_words")), note, list]), system.box, ...more.parts);
+  root.append(
+    gate.box,
+    card("", [
+      make("div", "head", [make("h2", "", t("audit_title")), select, search, verify]),
+      make("p", "note", t("audit_words")),
+      note,
+      list,
+    ]),
+    system.box,
+    ...more.parts,
+  );
   read();
   if (context.session) more.session();
   state.timer = setInterval(read, 3000);
-  return { update(status) { gate.update(status); system.update(status); more.update(status); }, session: () => { gate.update(context.status()); more.session(); }, leave: () => clearInterval(state.timer) };
+  return {
+    update(status) {
+      gate.update(status);
+      system.update(status);
+      more.update(status);
+    },
+    session: () => {
+      gate.update(context.status());
+      more.session();
+    },
+    leave: () => clearInterval(state.timer),
+  };
 }
 
 async function verified() {
   try {
     const found = await ask("/api/v1/audit/verify");
-    return found.broken ? t("audit_broken", found.broken.number, found.broken.what) : t("audit_whole", found.rows, found.last, found.head.slice(0, 16));
-  } catch (error) { return error.message; }
+    return found.broken
+      ? t("audit_broken", found.broken.number, found.broken.what)
+      : t("audit_whole", found.rows, found.last, found.head.slice(0, 16));
+  } catch (error) {
+    return error.message;
+  }
 }
 
-/** Rows that belong together: an override that is followed step by step is one line from its first to its last value. */
+/** Rows that belong together: an override that is followed step by step is one line from its first to its last value.
+ */
 export function grouped(rows) {
   const groups = [];
   for (const entry of rows) {
     const last = groups.at(-1);
-    const same = last && last.kind === entry.kind && last.outcome === entry.outcome && last.script === entry.script && last.person === entry.person && last.unit === entry.unit
-      && ["request", "write", "reaction"].includes(entry.kind) && (entry.at_ns - last.rows.at(-1).at_ns) / 1e9 <= RAMP_S;
+    const same =
+      last &&
+      last.kind === entry.kind &&
+      last.outcome === entry.outcome &&
+      last.script === entry.script &&
+      last.person === entry.person &&
+      last.unit === entry.unit &&
+      ["request", "write", "reaction"].includes(entry.kind) &&
+      (entry.at_ns - last.rows.at(-1).at_ns) / 1e9 <= RAMP_S;
     if (same) last.rows.push(entry);
     else groups.push({ ...entry, rows: [entry] });
   }
@@ -68,36 +141,108 @@ const word = (what, key) => (has(`${what}_${key}`) ? t(`${what}_${key}`) : key.r
 function drawRows(list, state, context) {
   // That nothing is asked for between two cuts is only of interest to whoever asks for everything.
   const quiet = (e) => !state.kind && e.kind === "request" && e.asked === null;
-  const groups = grouped(state.rows.filter((e) => !quiet(e))).filter((g) => (["", "all"].includes(state.kind) || g.kind === state.kind) && (!state.text || JSON.stringify(g).toLowerCase().includes(state.text))).reverse();
+  const groups = grouped(state.rows.filter((e) => !quiet(e)))
+    .filter(
+      (g) =>
+        (["", "all"].includes(state.kind) || g.kind === state.kind) &&
+        (!state.text || JSON.stringify(g).toLowerCase().includes(state.text)),
+    )
+    .reverse();
   if (!groups.length) return fill(list, [make("p", "empty", state.rows.length ? t("no_match") : t("no_audit"))]);
   const now = context.status()?.at_ms ?? 0;
   const value = (v, unit) => (v === null ? "–" : quantity(v, unit));
   const rows = groups.slice(0, state.most).flatMap((g) => {
     const [first, last] = [g.rows[0], g.rows.at(-1)];
     const ramp = g.rows.length > 1;
-    const figures = g.unit ? (ramp ? `${value(first.asked, g.unit)} … ${value(last.asked, g.unit)} → ${value(last.after, g.unit)}` : g.asked === null && g.after === null ? "" : `${value(g.asked, g.unit)} → ${value(g.after, g.unit)}`) : "";
+    const figures = g.unit
+      ? ramp
+        ? `${value(first.asked, g.unit)} … ${value(last.asked, g.unit)} → ${value(last.after, g.unit)}`
+        : g.asked === null && g.after === null
+          ? ""
+          : `${value(g.asked, g.unit)} → ${value(g.after, g.unit)}`
+      : "";
     const time = ramp ? `${when(first.at_ns / 1e6, now)} – ${clock(last.at_ns / 1e6)}` : when(first.at_ns / 1e6, now);
     const words = ramp ? `${t("steps", g.rows.length)} · ${box(last.reason)}` : box(g.reason);
     const tone = ["failed", "refused"].includes(g.outcome) ? "bad" : g.kind === "armed" ? "warn" : "";
-    const line = [time, { text: make("span", tone ? `${tone}-text` : "", `${word("kind", g.kind)} · ${word("outcome", g.outcome)}`) }, figures, words, [g.script, g.person].filter(Boolean).join(" · ") || "–"];
+    const line = [
+      time,
+      { text: make("span", tone ? `${tone}-text` : "", `${word("kind", g.kind)} · ${word("outcome", g.outcome)}`) },
+      figures,
+      words,
+      [g.script, g.person].filter(Boolean).join(" · ") || "–",
+    ];
     if (!ramp) return [line];
     const opened = state.open.has(first.number);
-    line[0] = { text: make("button", "link-button", `${opened ? "▾" : "▸"} ${time}`, { type: "button", "aria-expanded": String(opened), onclick: () => { if (!state.open.delete(first.number)) state.open.add(first.number); drawRows(list, state, context); } }) };
-    return opened ? [line, ...g.rows.slice().reverse().slice(0, 50).map((e) => [`   ${clock(e.at_ns / 1e6)}`, "", `${value(e.asked, e.unit)} → ${value(e.after, e.unit)}`, box(e.reason), ""])] : [line];
+    line[0] = {
+      text: make("button", "link-button", `${opened ? "▾" : "▸"} ${time}`, {
+        type: "button",
+        "aria-expanded": String(opened),
+        onclick: () => {
+          if (!state.open.delete(first.number)) state.open.add(first.number);
+          drawRows(list, state, context);
+        },
+      }),
+    };
+    return opened
+      ? [
+          line,
+          ...g.rows
+            .slice()
+            .reverse()
+            .slice(0, 50)
+            .map((e) => [
+              `   ${clock(e.at_ns / 1e6)}`,
+              "",
+              `${value(e.asked, e.unit)} → ${value(e.after, e.unit)}`,
+              box(e.reason),
+              "",
+            ]),
+        ]
+      : [line];
   });
-  fill(list, [table([t("time"), t("what"), t("asked_let"), t("why"), t("who")], rows, { caption: t("audit_title") }), groups.length > state.most ? make("button", "", t("show_more", groups.length - state.most), { type: "button", onclick: () => { state.most += 300; drawRows(list, state, context); } }) : null]);
+  fill(list, [
+    table([t("time"), t("what"), t("asked_let"), t("why"), t("who")], rows, { caption: t("audit_title") }),
+    groups.length > state.most
+      ? make("button", "", t("show_more", groups.length - state.most), {
+          type: "button",
+          onclick: () => {
+            state.most += 300;
+            drawRows(list, state, context);
+          },
+        })
+      : null,
+  ]);
 }
 
 function gateCard(context) {
   const words = make("p", "armed-words", " ");
   const note = make("p", "note", " ");
   const arm = make("button", "", t("arm"), { type: "button", hidden: true, onclick: () => armDialog(context) });
-  const back = make("button", "danger", t("back_to_dial"), { type: "button", hidden: true, onclick: async () => { try { await send("/api/v1/disarm"); } catch (error) { say(note, error.message); } } });
-  const box_ = make("section", "card ages", [make("div", "head", [make("h2", "", t("gate_title")), make("div", "buttons grow", [arm, back])]), words, note]);
+  const back = make("button", "danger", t("back_to_dial"), {
+    type: "button",
+    hidden: true,
+    onclick: async () => {
+      try {
+        await send("/api/v1/disarm");
+      } catch (error) {
+        say(note, error.message);
+      }
+    },
+  });
+  const box_ = make("section", "card ages", [
+    make("div", "head", [make("h2", "", t("gate_title")), make("div", "buttons grow", [arm, back])]),
+    words,
+    note,
+  ]);
   const update = (status) => {
     if (!status) return;
     const gate = status.gate;
-    say(words, gate.mode === "armed" ? t("gate_armed", gate.armed_by, gate.armed_until_ms ? clock(gate.armed_until_ms) : "–") : t(gate.mode === "off" ? "gate_off" : "gate_shadow"));
+    say(
+      words,
+      gate.mode === "armed"
+        ? t("gate_armed", gate.armed_by, gate.armed_until_ms ? clock(gate.armed_until_ms) : "–")
+        : t(gate.mode === "off" ? "gate_off" : "gate_shadow"),
+    );
     words.classList.toggle("warn-text", gate.mode === "armed");
     if (gate.mode !== "armed") say(note, context.session?.arming_allowed ? t("arm_here") : t("arm_at_box"));
     back.hidden = gate.mode !== "armed";
@@ -108,22 +253,66 @@ function gateCard(context) {
 
 function systemCards(context) {
   const [sources, store, scripts] = [make("div", ""), make("div", ""), make("div", "")];
-  const columns = make("div", "columns", [card(t("sources"), sources), card(t("store"), store), card(t("scripts"), scripts)]);
+  const columns = make("div", "columns", [
+    card(t("sources"), sources),
+    card(t("store"), store),
+    card(t("scripts"), scripts),
+  ]);
   let drawn = 0;
   const update = (status) => {
     // Figures that change at every message are read by nobody: once a second is enough.
     if (performance.now() - drawn < 1000) return;
     drawn = performance.now();
-    fill(sources, status.sources.map((s) => {
-      const facts = [t("polled_every", quantity(s.period_s, "s")), t("readings", s.readings.toLocaleString())];
-      if (s.round_trip_p50_ms !== null) facts.push(t("answers_in", quantity(s.round_trip_p50_ms, "ms")));
-      if (s.failures) facts.push(t("failed_polls", s.failures));
-      return row(sourceName(s.name), t(`source_${s.state}`), s.error ? box(s.error) : facts.join(" · "), { dot: s.error ? "bad" : "good", tone: s.error ? "bad" : "" });
-    }).concat(status.alignment.map((a) => row(t("meter_lag", context.name(a.power).split(/[,，]/)[0]), a.missing ? context.reason(a.missing) : `${number(a.lag_s * 1000, "ms")} ± ${number(a.uncertainty_s * 1000, "ms")} ms`, a.use === "merge" ? t("put_back") : t("shown_only")))));
+    fill(
+      sources,
+      status.sources
+        .map((s) => {
+          const facts = [t("polled_every", quantity(s.period_s, "s")), t("readings", s.readings.toLocaleString())];
+          if (s.round_trip_p50_ms !== null) facts.push(t("answers_in", quantity(s.round_trip_p50_ms, "ms")));
+          if (s.failures) facts.push(t("failed_polls", s.failures));
+          return row(sourceName(s.name), t(`source_${s.state}`), s.error ? box(s.error) : facts.join(" · "), {
+            dot: s.error ? "bad" : "good",
+            tone: s.error ? "bad" : "",
+          });
+        })
+        .concat(
+          status.alignment.map((a) =>
+            row(
+              t("meter_lag", context.name(a.power).split(/[,，]/)[0]),
+              a.missing
+                ? context.reason(a.missing)
+                : `${number(a.lag_s * 1000, "ms")} ± ${number(a.uncertainty_s * 1000, "ms")} ms`,
+              a.use === "merge" ? t("put_back") : t("shown_only"),
+            ),
+          ),
+        ),
+    );
     const h = status.history;
-    fill(store, [row(t("samples_stored"), h.rows.toLocaleString(), h.error ? box(h.error) : h.path, { dot: h.error ? "bad" : "good" }), row(t("size_on_disk"), bytes(h.bytes)), h.lasts_days === null ? null : row(t("disk_lasts"), `${number(Math.round(h.lasts_days))} ${t("d")}`), row(t("running_since"), duration(status.uptime_s)), row(t("parts_finished"), String(status.parts)), row(t("box_version"), status.version), row(t("tick"), `${number(status.tick.rate_hz)} Hz`, t("tick_words", number(status.tick.late_p99_ms, "ms"), status.tick.skipped))]);
+    fill(store, [
+      row(t("samples_stored"), h.rows.toLocaleString(), h.error ? box(h.error) : h.path, {
+        dot: h.error ? "bad" : "good",
+      }),
+      row(t("size_on_disk"), bytes(h.bytes)),
+      h.lasts_days === null ? null : row(t("disk_lasts"), `${number(Math.round(h.lasts_days))} ${t("d")}`),
+      row(t("running_since"), duration(status.uptime_s)),
+      row(t("parts_finished"), String(status.parts)),
+      row(t("box_version"), status.version),
+      row(
+        t("tick"),
+        `${number(status.tick.rate_hz)} Hz`,
+        t("tick_words", number(status.tick.late_p99_ms, "ms"), status.tick.skipped),
+      ),
+    ]);
     const tone = { running: "good", waiting: "warn", reverted: "bad", suspended: "bad", refused: "bad" };
-    fill(scripts, status.scripts.map((s) => row(s.file, t(`script_${s.condition}`), s.error ? box(s.error) : t("version_of", s.version), { dot: tone[s.condition] ?? "warn", tone: tone[s.condition] === "bad" ? "bad" : "" })));
+    fill(
+      scripts,
+      status.scripts.map((s) =>
+        row(s.file, t(`script_${s.condition}`), s.error ? box(s.error) : t("version_of", s.version), {
+          dot: tone[s.condition] ?? "warn",
+          tone: tone[s.condition] === "bad" ? "bad" : "",
+        }),
+      ),
+    );
   };
   return { box: columns, update };
 }

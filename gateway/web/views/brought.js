@@ -1,5 +1,5 @@
-// Files that a person brings: dropped on the view of the twin, shown as understood, mapped by a click, diagnosed, compared with earlier ones. Three
-// examples show what comes of it; their truth is told afterwards.
+// Files that a person brings: dropped on the view of the twin, shown as understood, mapped by a click, diagnosed,
+// compared with earlier ones. Three examples show what comes of it; their truth is told afterwards.
 import { ask, card, fill, make, say, send, table } from "/web/parts.js";
 import { dateTime, duration, number, quantity } from "/web/format.js";
 import { language, own, t } from "/web/words.js";
@@ -13,10 +13,18 @@ export class Brought {
     Object.assign(this, { context, file: null, run: null, known: null });
     this.note = make("p", "note", " ", { role: "status" });
     this.bar = make("progress", "progress", null, { max: "1", hidden: true, "aria-label": t("diagnosing") });
-    this.input = make("input", "", null, { type: "file", hidden: true, onchange: () => this.take(this.input.files[0]) });
+    this.input = make("input", "", null, {
+      type: "file",
+      hidden: true,
+      onchange: () => this.take(this.input.files[0]),
+    });
     this.choose = make("button", "", t("choose_file"), { type: "button", onclick: () => this.input.click() });
     this.zone = make("div", "drop-zone", [make("p", "", t("drop_file")), this.choose, this.input], { tabindex: "0" });
-    for (const name of ["dragenter", "dragover"]) this.zone.addEventListener(name, (event) => { event.preventDefault(); this.zone.dataset.over = "yes"; });
+    for (const name of ["dragenter", "dragover"])
+      this.zone.addEventListener(name, (event) => {
+        event.preventDefault();
+        this.zone.dataset.over = "yes";
+      });
     this.zone.addEventListener("dragleave", () => delete this.zone.dataset.over);
     this.zone.addEventListener("drop", (event) => {
       event.preventDefault();
@@ -29,8 +37,19 @@ export class Brought {
     this.latest = make("div", "");
     this.past = make("div", "");
     const words = make("p", "note", t("brought_words"));
-    this.box = card(t("brought_title"), [words, this.zone, this.kept, this.understood, this.bar, this.note, this.latest, this.past,
-      make("h3", "", t("gallery")), make("p", "note", t("gallery_words")), this.examples]);
+    this.box = card(t("brought_title"), [
+      words,
+      this.zone,
+      this.kept,
+      this.understood,
+      this.bar,
+      this.note,
+      this.latest,
+      this.past,
+      make("h3", "", t("gallery")),
+      make("p", "note", t("gallery_words")),
+      this.examples,
+    ]);
     this.timer = setInterval(() => this.look(), 2000);
     // Until it is known who is signed in, nothing can be brought.
     this.update();
@@ -38,16 +57,26 @@ export class Brought {
     this.look();
   }
 
-  may() { return Boolean(this.context.session?.may?.edit); }
+  may() {
+    return Boolean(this.context.session?.may?.edit);
+  }
 
   update() {
-    for (const button of this.box.querySelectorAll("[data-changes]")) button.disabled = !this.may() || this.run?.state === "running";
+    for (const button of this.box.querySelectorAll("[data-changes]"))
+      button.disabled = !this.may() || this.run?.state === "running";
     this.choose.disabled = !this.may();
-    if (!this.may() && this.context.session && !this.told) { this.told = true; say(this.note, t("sign_in_to_diagnose")); }
+    if (!this.may() && this.context.session && !this.told) {
+      this.told = true;
+      say(this.note, t("sign_in_to_diagnose"));
+    }
   }
 
   async act(what) {
-    try { await what(); } catch (error) { say(this.note, error.message); }
+    try {
+      await what();
+    } catch (error) {
+      say(this.note, error.message);
+    }
     this.update();
   }
 
@@ -55,9 +84,15 @@ export class Brought {
     const known = await ask("/api/v1/files").catch(() => null);
     if (!known) return;
     this.known = known;
-    const open = (file) => make("button", "", file.name, { type: "button", onclick: () => this.act(() => this.open(file.key)) });
+    const open = (file) =>
+      make("button", "", file.name, { type: "button", onclick: () => this.act(() => this.open(file.key)) });
     fill(this.kept, known.files.map(open));
-    const begin = (it) => make("button", "", own(it), { type: "button", "data-changes": "yes", onclick: () => this.act(() => this.example(it.name)) });
+    const begin = (it) =>
+      make("button", "", own(it), {
+        type: "button",
+        "data-changes": "yes",
+        onclick: () => this.act(() => this.example(it.name)),
+      });
     fill(this.examples, known.examples.map(begin));
     this.drawResults();
     this.update();
@@ -66,20 +101,48 @@ export class Brought {
   drawResults() {
     const all = this.known.diagnoses;
     const ticks = { has: () => false, add() {}, delete() {}, [Symbol.iterator]: [][Symbol.iterator] };
-    if (all.length) drawDiagnoses(this.latest, make("div"), all.slice(0, 1), this.context, ticks); else fill(this.latest, []);
+    if (all.length) drawDiagnoses(this.latest, make("div"), all.slice(0, 1), this.context, ticks);
+    else fill(this.latest, []);
     if (all[0]) this.latest.prepend(make("h3", "", all[0].file));
     if (all[0]?.truth) this.latest.append(this.truth(all[0].truth));
-    const fit = (d, which) => quantity(d.diagnosis?.fit?.[which]?.held_out_rmse ?? d.diagnosis?.fit?.[which]?.rmse ?? null, d.diagnosis?.unit ?? "");
-    const link = (d) => make("a", "", t("open_report"), { href: `${d.page}?lang=${language()}`, target: "_blank", rel: "noopener" });
-    const rows = all.map((d) => [d.file, dateTime(d.at_ms), t(`verdict_${d.verdict}`), summaryOf(d), fit(d, "before"), fit(d, "after"), { text: link(d) }]);
-    const head = [t("file"), t("time"), t("verdict"), t("what"), t("error_before_fit"), t("error_after_fit"), t("report")];
-    fill(this.past, rows.length > 1 ? [make("h3", "", t("compared")), table(head, rows, { caption: t("compared") })] : []);
+    const fit = (d, which) =>
+      quantity(
+        d.diagnosis?.fit?.[which]?.held_out_rmse ?? d.diagnosis?.fit?.[which]?.rmse ?? null,
+        d.diagnosis?.unit ?? "",
+      );
+    const link = (d) =>
+      make("a", "", t("open_report"), { href: `${d.page}?lang=${language()}`, target: "_blank", rel: "noopener" });
+    const rows = all.map((d) => [
+      d.file,
+      dateTime(d.at_ms),
+      t(`verdict_${d.verdict}`),
+      summaryOf(d),
+      fit(d, "before"),
+      fit(d, "after"),
+      { text: link(d) },
+    ]);
+    const head = [
+      t("file"),
+      t("time"),
+      t("verdict"),
+      t("what"),
+      t("error_before_fit"),
+      t("error_after_fit"),
+      t("report"),
+    ];
+    fill(
+      this.past,
+      rows.length > 1 ? [make("h3", "", t("compared")), table(head, rows, { caption: t("compared") })] : [],
+    );
   }
 
   /** What was hidden in an example, told when asked for. */
   truth(name) {
     const text = make("p", "note", "", { role: "status" });
-    const tell = make("button", "", t("tell_truth"), { type: "button", onclick: () => this.act(async () => say(text, own(await ask(`/api/v1/gallery/${name}/truth`)))) });
+    const tell = make("button", "", t("tell_truth"), {
+      type: "button",
+      onclick: () => this.act(async () => say(text, own(await ask(`/api/v1/gallery/${name}/truth`)))),
+    });
     return make("div", "buttons", [tell, text]);
   }
 
@@ -87,17 +150,24 @@ export class Brought {
     if (!file) return;
     await this.act(async () => {
       if (!this.may()) throw new Error(t("sign_in_to_diagnose"));
-      if (this.known && file.size > this.known.bytes_max) throw new Error(t("file_too_long", Math.round(this.known.bytes_max / 1048576)));
+      if (this.known && file.size > this.known.bytes_max)
+        throw new Error(t("file_too_long", Math.round(this.known.bytes_max / 1048576)));
       say(this.note, t("reading_file", file.name));
       const headers = { "content-type": "application/octet-stream" };
-      const document = await ask(`/api/v1/files?name=${encodeURIComponent(file.name)}`, { method: "POST", headers, body: await file.arrayBuffer() });
+      const document = await ask(`/api/v1/files?name=${encodeURIComponent(file.name)}`, {
+        method: "POST",
+        headers,
+        body: await file.arrayBuffer(),
+      });
       say(this.note, " ");
       this.show(document);
       await this.reload();
     });
   }
 
-  async open(key) { this.show(await ask(`/api/v1/files/${key}`)); }
+  async open(key) {
+    this.show(await ask(`/api/v1/files/${key}`));
+  }
 
   async example(name) {
     await send(`/api/v1/gallery/${name}`, {});
@@ -109,7 +179,8 @@ export class Brought {
     const parts = [make("h3", "", file.name)];
     if (file.error) parts.push(make("p", "trouble bad-text", own(file.error)));
     if (file.statement?.en) parts.push(make("p", "", `${t("understood_as")} ${own(file.statement)}`));
-    if (file.rows !== undefined) parts.push(make("p", "note", t("rows_read", file.rows.toLocaleString(), file.refused)));
+    if (file.rows !== undefined)
+      parts.push(make("p", "note", t("rows_read", file.rows.toLocaleString(), file.refused)));
     for (const note of file.notes ?? []) parts.push(make("p", note.doubt ? "warn-text" : "note", own(note)));
     for (const problem of file.problems ?? []) parts.push(make("p", "warn-text", problem));
     if (file.columns.length) parts.push(this.mapping(file));
@@ -122,40 +193,111 @@ export class Brought {
   /** Each column with what it becomes; a changed choice is told to the box, which reads the file anew. */
   mapping(file) {
     const ours = [...(this.known?.columns ?? []).map((column) => column.name), ...(this.known?.text_columns ?? [])];
-    const list = make("datalist", "", [...new Set(ours)].map((name) => make("option", "", null, { value: name })), { id: "our-columns" });
-    const input = (name, value, more = {}) => make("input", "", null, { type: "text", value: value ?? "", "aria-label": name, ...more });
+    const list = make(
+      "datalist",
+      "",
+      [...new Set(ours)].map((name) => make("option", "", null, { value: name })),
+      { id: "our-columns" },
+    );
+    const input = (name, value, more = {}) =>
+      make("input", "", null, { type: "text", value: value ?? "", "aria-label": name, ...more });
     this.choices = file.columns.map((column) => ({
       column,
       to: input(`${column.from}: ${t("becomes")}`, column.to ?? column.from, { list: "our-columns" }),
       unit: input(`${column.from}: ${t("unit")}`, column.unit, { size: "7" }),
     }));
-    const hint = (column) => (column.is_time ? t("is_time") : column.asked ? t("may_be", column.candidates.slice(0, 3).join(", ")) : "");
-    const rows = this.choices.map(({ column, to, unit }) => [column.from, column.is_time ? t("time") : { text: to }, column.is_time ? column.unit ?? "" : { text: unit }, hint(column)]);
-    this.time = make("select", "", ["", ...file.columns.map((column) => column.from)].map((name) => make("option", "", name || t("as_found"), { value: name })), { "aria-label": t("time_column") });
+    const hint = (column) =>
+      column.is_time ? t("is_time") : column.asked ? t("may_be", column.candidates.slice(0, 3).join(", ")) : "";
+    const rows = this.choices.map(({ column, to, unit }) => [
+      column.from,
+      column.is_time ? t("time") : { text: to },
+      column.is_time ? (column.unit ?? "") : { text: unit },
+      hint(column),
+    ]);
+    this.time = make(
+      "select",
+      "",
+      ["", ...file.columns.map((column) => column.from)].map((name) =>
+        make("option", "", name || t("as_found"), { value: name }),
+      ),
+      { "aria-label": t("time_column") },
+    );
     this.timeZone = input(t("time_zone"), "", { placeholder: "Europe/Berlin", size: "16" });
-    const use = make("button", "", t("use_map"), { type: "button", "data-changes": "yes", onclick: () => this.act(() => this.map()) });
-    const fields = [make("label", "field", [t("time_column"), this.time]), make("label", "field", [t("time_zone"), this.timeZone]), use];
-    const details = make("details", "", [make("summary", "", t("columns_as_understood")), list, table([t("in_file"), t("becomes"), t("unit"), ""], rows, { caption: t("columns_as_understood") }), make("div", "buttons", fields)]);
+    const use = make("button", "", t("use_map"), {
+      type: "button",
+      "data-changes": "yes",
+      onclick: () => this.act(() => this.map()),
+    });
+    const fields = [
+      make("label", "field", [t("time_column"), this.time]),
+      make("label", "field", [t("time_zone"), this.timeZone]),
+      use,
+    ];
+    const details = make("details", "", [
+      make("summary", "", t("columns_as_understood")),
+      list,
+      table([t("in_file"), t("becomes"), t("unit"), ""], rows, { caption: t("columns_as_understood") }),
+      make("div", "buttons", fields),
+    ]);
     details.open = file.columns.some((column) => column.asked) || Boolean(file.error);
     return details;
   }
 
   async map() {
-    const columns = this.choices.filter(({ column }) => !column.is_time && column.from !== this.time.value)
-      .map(({ column, to, unit }) => ({ from: column.from, to: to.value.trim(), unit: unit.value.trim() === (column.unit ?? "") ? "" : unit.value.trim() }));
-    this.show(await send(`/api/v1/files/${this.file.key}/map`, { columns, time: this.time.value, zone: this.timeZone.value.trim() }, "PUT"));
+    const columns = this.choices
+      .filter(({ column }) => !column.is_time && column.from !== this.time.value)
+      .map(({ column, to, unit }) => ({
+        from: column.from,
+        to: to.value.trim(),
+        unit: unit.value.trim() === (column.unit ?? "") ? "" : unit.value.trim(),
+      }));
+    this.show(
+      await send(
+        `/api/v1/files/${this.file.key}/map`,
+        { columns, time: this.time.value, zone: this.timeZone.value.trim() },
+        "PUT",
+      ),
+    );
   }
 
   /** What the file is compared with. */
   question() {
     const option = (value, text) => make("option", "", text, { value });
     const kinds = (this.known?.kinds ?? []).map((it) => option(it.kind, own(it)));
-    const kind = make("select", "", [...kinds, option("toml", t("model_from_file")), this.context.status()?.twin ? option("active_model", t("model_in_charge")) : null].filter(Boolean), { "aria-label": t("model") });
-    const material = make("select", "", (this.known?.materials ?? []).map((name) => option(name, name)), { "aria-label": t("material") });
-    const axis = make("select", "", AXES.map((name) => option(name, name || t("only_axis"))), { "aria-label": t("axis") });
+    const kind = make(
+      "select",
+      "",
+      [
+        ...kinds,
+        option("toml", t("model_from_file")),
+        this.context.status()?.twin ? option("active_model", t("model_in_charge")) : null,
+      ].filter(Boolean),
+      { "aria-label": t("model") },
+    );
+    const material = make(
+      "select",
+      "",
+      (this.known?.materials ?? []).map((name) => option(name, name)),
+      { "aria-label": t("material") },
+    );
+    const axis = make(
+      "select",
+      "",
+      AXES.map((name) => option(name, name || t("only_axis"))),
+      { "aria-label": t("axis") },
+    );
     const model = make("input", "", null, { type: "file", accept: ".toml", "aria-label": t("model_from_file") });
-    const series = make("select", "", [option("", t("no_series")), ...(this.known?.files ?? []).map((file) => option(file.key, file.name))], { "aria-label": t("series_file") });
-    const column = make("input", "", null, { type: "text", placeholder: t("series_column"), "aria-label": t("series_column") });
+    const series = make(
+      "select",
+      "",
+      [option("", t("no_series")), ...(this.known?.files ?? []).map((file) => option(file.key, file.name))],
+      { "aria-label": t("series_file") },
+    );
+    const column = make("input", "", null, {
+      type: "text",
+      placeholder: t("series_column"),
+      "aria-label": t("series_column"),
+    });
     const draw = () => {
       material.parentElement.hidden = !["lathe", "mill", "drill"].includes(kind.value);
       axis.parentElement.hidden = kind.value !== "axis";
@@ -164,18 +306,34 @@ export class Brought {
     };
     kind.addEventListener("change", draw);
     series.addEventListener("change", draw);
-    const begin = make("button", "primary", t("diagnose"), { type: "button", "data-changes": "yes", onclick: () => this.act(async () => {
-      const asked = { simulated: series.value ? { key: series.value, column: column.value.trim() } : null };
-      if (kind.value === "toml") asked.toml = await model.files[0]?.text();
-      else if (kind.value === "active_model") asked.active_model = true;
-      else Object.assign(asked, { kind: kind.value, material: material.value, axis: axis.value });
-      await send(`/api/v1/files/${this.file.key}/diagnosis`, asked);
-      await this.look();
-    }) });
-    this.end = make("button", "", t("end_diagnosis"), { type: "button", onclick: () => this.act(() => ask("/api/v1/files-diagnosis", { method: "DELETE" })) });
+    const begin = make("button", "primary", t("diagnose"), {
+      type: "button",
+      "data-changes": "yes",
+      onclick: () =>
+        this.act(async () => {
+          const asked = { simulated: series.value ? { key: series.value, column: column.value.trim() } : null };
+          if (kind.value === "toml") asked.toml = await model.files[0]?.text();
+          else if (kind.value === "active_model") asked.active_model = true;
+          else Object.assign(asked, { kind: kind.value, material: material.value, axis: axis.value });
+          await send(`/api/v1/files/${this.file.key}/diagnosis`, asked);
+          await this.look();
+        }),
+    });
+    this.end = make("button", "", t("end_diagnosis"), {
+      type: "button",
+      onclick: () => this.act(() => ask("/api/v1/files-diagnosis", { method: "DELETE" })),
+    });
     const field = (name, input) => make("label", "field", [name, input]);
-    const fields = [field(t("compare_with"), kind), field(t("material"), material), field(t("axis"), axis), field(t("model_from_file"), model),
-      field(t("series_file"), series), field(t("series_column"), column), begin, this.end];
+    const fields = [
+      field(t("compare_with"), kind),
+      field(t("material"), material),
+      field(t("axis"), axis),
+      field(t("model_from_file"), model),
+      field(t("series_file"), series),
+      field(t("series_column"), column),
+      begin,
+      this.end,
+    ];
     const form = make("div", "buttons", fields);
     draw();
     return form;
@@ -190,16 +348,35 @@ export class Brought {
     this.bar.hidden = !running;
     if (this.end) this.end.hidden = !running;
     if (running) {
-      if (run.about_s) this.bar.value = Math.min(0.97, run.seconds / run.about_s); else this.bar.removeAttribute("value");
+      if (run.about_s) this.bar.value = Math.min(0.97, run.seconds / run.about_s);
+      else this.bar.removeAttribute("value");
       const stage = STAGES.indexOf(run.stage);
       const rows = run.rows ? t("rows_compared", number(run.rows)) : "";
-      say(this.note, [t("stage_of", stage + 1, STAGES.length, t(`file_stage_${run.stage}`)), rows, t("running_for", duration(run.seconds))].filter(Boolean).join(" · "));
+      say(
+        this.note,
+        [
+          t("stage_of", stage + 1, STAGES.length, t(`file_stage_${run.stage}`)),
+          rows,
+          t("running_for", duration(run.seconds)),
+        ]
+          .filter(Boolean)
+          .join(" · "),
+      );
     } else if (before?.state === "running") {
-      say(this.note, run.state === "failed" ? t("diagnosis_failed", run.what) : run.state === "cancelled" ? t("diagnosis_ended", run.by) : t("file_diagnosis_done", duration(run.seconds)));
+      say(
+        this.note,
+        run.state === "failed"
+          ? t("diagnosis_failed", run.what)
+          : run.state === "cancelled"
+            ? t("diagnosis_ended", run.by)
+            : t("file_diagnosis_done", duration(run.seconds)),
+      );
       await this.reload();
     }
     this.update();
   }
 
-  leave() { clearInterval(this.timer); }
+  leave() {
+    clearInterval(this.timer);
+  }
 }

@@ -1,5 +1,5 @@
-// Diagnoses in the view of the twin: one asked for over a chosen time, with how far it is; the latest in words; earlier ones; its
-// report, its model to take over, and the experiment it asks for as a list to tick off.
+// Diagnoses in the view of the twin: one asked for over a chosen time, with how far it is; the latest in words; earlier
+// ones; its report, its model to take over, and the experiment it asks for as a list to tick off.
 import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
 import { dateTime, duration, number, quantity } from "/web/format.js";
 import { language, own, t } from "/web/words.js";
@@ -22,12 +22,29 @@ export class Asking {
     Object.assign(this, { context, changed, run: null });
     const input = (label) => make("input", "", null, { type: "datetime-local", "aria-label": label });
     [this.from, this.to] = [input(t("from")), input(t("to"))];
-    const quick = SPANS_H.map((h) => make("button", "", t("last_hours", h), { type: "button", onclick: () => this.last(h) }));
+    const quick = SPANS_H.map((h) =>
+      make("button", "", t("last_hours", h), { type: "button", onclick: () => this.last(h) }),
+    );
     this.begin = make("button", "primary", t("diagnose"), { type: "button", onclick: () => this.start() });
-    this.end = make("button", "", t("end_diagnosis"), { type: "button", hidden: true, onclick: () => this.act(() => ask("/api/v1/diagnosis", { method: "DELETE" })) });
+    this.end = make("button", "", t("end_diagnosis"), {
+      type: "button",
+      hidden: true,
+      onclick: () => this.act(() => ask("/api/v1/diagnosis", { method: "DELETE" })),
+    });
     this.note = make("p", "note", " ", { role: "status" });
     this.bar = make("progress", "progress", null, { max: "1", hidden: true, "aria-label": t("diagnosing") });
-    this.box = card(t("diagnose_title"), [make("p", "note", t("diagnose_words", LONGEST_H)), make("div", "buttons", [make("label", "field", [t("from"), this.from]), make("label", "field", [t("to"), this.to]), ...quick, this.begin, this.end]), this.bar, this.note]);
+    this.box = card(t("diagnose_title"), [
+      make("p", "note", t("diagnose_words", LONGEST_H)),
+      make("div", "buttons", [
+        make("label", "field", [t("from"), this.from]),
+        make("label", "field", [t("to"), this.to]),
+        ...quick,
+        this.begin,
+        this.end,
+      ]),
+      this.bar,
+      this.note,
+    ]);
     const asked = new URLSearchParams(location.search);
     if (asked.get("from")) this.choose(Date.parse(asked.get("from")), Date.parse(asked.get("to") ?? "") || Date.now());
     this.timer = setInterval(() => this.look(), 2000);
@@ -41,7 +58,8 @@ export class Asking {
   }
 
   choose(fromMs, toMs) {
-    if (Number.isFinite(fromMs) && Number.isFinite(toMs)) [this.from.value, this.to.value] = [local(fromMs), local(Math.ceil(toMs / 60000) * 60000)];
+    if (Number.isFinite(fromMs) && Number.isFinite(toMs))
+      [this.from.value, this.to.value] = [local(fromMs), local(Math.ceil(toMs / 60000) * 60000)];
   }
 
   update(status) {
@@ -50,7 +68,10 @@ export class Asking {
     const may = Boolean(this.context.session?.may?.edit);
     this.begin.disabled = !may || this.run?.state === "running";
     this.end.disabled = !may;
-    if (!may && this.context.session && !this.told) { this.told = true; say(this.note, t("sign_in_to_diagnose")); }
+    if (!may && this.context.session && !this.told) {
+      this.told = true;
+      say(this.note, t("sign_in_to_diagnose"));
+    }
   }
 
   start() {
@@ -60,7 +81,12 @@ export class Asking {
   }
 
   async act(what) {
-    try { await what(); await this.look(); } catch (error) { say(this.note, error.message); }
+    try {
+      await what();
+      await this.look();
+    } catch (error) {
+      say(this.note, error.message);
+    }
   }
 
   async look() {
@@ -73,69 +99,179 @@ export class Asking {
     if (running) {
       const stage = STAGES.indexOf(run.stage);
       // Fitting takes nearly all of the time; how long is known from the one before.
-      if (run.about_s) this.bar.value = Math.min(0.97, run.seconds / run.about_s); else this.bar.removeAttribute("value");
+      if (run.about_s) this.bar.value = Math.min(0.97, run.seconds / run.about_s);
+      else this.bar.removeAttribute("value");
       const about = run.about_s ? t("about_in_all", duration(run.about_s)) : "";
-      say(this.note, [t("stage_of", stage + 1, STAGES.length, t(`stage_${run.stage}`)), run.rows ? t("seconds_examined", run.rows.toLocaleString()) : "", t("running_for", duration(run.seconds)), about, run.by ? t("asked_by", run.by) : t("asked_by_box")].filter(Boolean).join(" · "));
+      say(
+        this.note,
+        [
+          t("stage_of", stage + 1, STAGES.length, t(`stage_${run.stage}`)),
+          run.rows ? t("seconds_examined", run.rows.toLocaleString()) : "",
+          t("running_for", duration(run.seconds)),
+          about,
+          run.by ? t("asked_by", run.by) : t("asked_by_box"),
+        ]
+          .filter(Boolean)
+          .join(" · "),
+      );
     } else if (before?.state === "running") {
-      say(this.note, run.state === "failed" ? t("diagnosis_failed", run.what) : run.state === "cancelled" ? t("diagnosis_ended", run.by) : t("diagnosis_done", duration(run.seconds)));
+      say(
+        this.note,
+        run.state === "failed"
+          ? t("diagnosis_failed", run.what)
+          : run.state === "cancelled"
+            ? t("diagnosis_ended", run.by)
+            : t("diagnosis_done", duration(run.seconds)),
+      );
       this.changed();
     }
   }
 
-  leave() { clearInterval(this.timer); }
+  leave() {
+    clearInterval(this.timer);
+  }
 }
 
 /** The latest one in words, the earlier ones as a table. */
 export function drawDiagnoses(latest, past, diagnoses, context, done) {
   const newest = diagnoses[0];
   fill(latest, newest ? [told(newest, context, done)] : [make("p", "empty", t("no_diagnosis"))]);
-  const link = (d) => ({ text: d.page ? make("a", "", t("open_report"), { href: report(d), target: "_blank", rel: "noopener" }) : "–" });
-  const rows = diagnoses.slice(1).map((d) => [dateTime(d.at_ms), verdictOf(d), summaryOf(d), `${dateTime(d.from_ms)} – ${dateTime(d.to_ms)}`, link(d)]);
-  fill(past, rows.length ? [table([t("time"), t("verdict"), t("what"), t("examined"), t("report")], rows, { caption: t("past_diagnoses") })] : [make("p", "empty", t("no_past_diagnosis"))]);
+  const link = (d) => ({
+    text: d.page ? make("a", "", t("open_report"), { href: report(d), target: "_blank", rel: "noopener" }) : "–",
+  });
+  const rows = diagnoses
+    .slice(1)
+    .map((d) => [
+      dateTime(d.at_ms),
+      verdictOf(d),
+      summaryOf(d),
+      `${dateTime(d.from_ms)} – ${dateTime(d.to_ms)}`,
+      link(d),
+    ]);
+  fill(
+    past,
+    rows.length
+      ? [
+          table([t("time"), t("verdict"), t("what"), t("examined"), t("report")], rows, {
+            caption: t("past_diagnoses"),
+          }),
+        ]
+      : [make("p", "empty", t("no_past_diagnosis"))],
+  );
 }
 
 /** What the catalogue says of an effect, in the language of the page. */
 function effectText(found, kind, which, otherwise) {
   const texts = found.effects?.[kind]?.[which];
-  return texts ? own(texts) : kind?.startsWith("unknown") ? t("unknown_effect") : otherwise ?? kind;
+  return texts ? own(texts) : kind?.startsWith("unknown") ? t("unknown_effect") : (otherwise ?? kind);
 }
 
 /** Errors before and after; where no run was left out, those of the fitted rows, and named so. */
 function fitWords({ fit, unit }) {
   const held = fit.before.held_out_rmse ?? null;
-  const of = (quality) => (held === null ? quality?.rmse : quality?.held_out_rmse) ?? (held === null ? fit.before.rmse : held);
-  return t(held === null ? "fit_words_all" : "fit_words", quantity(of(fit.before), unit), quantity(of(fit.after), unit), quantity(fit.noise_floor, unit));
+  const of = (quality) =>
+    (held === null ? quality?.rmse : quality?.held_out_rmse) ?? (held === null ? fit.before.rmse : held);
+  return t(
+    held === null ? "fit_words_all" : "fit_words",
+    quantity(of(fit.before), unit),
+    quantity(of(fit.after), unit),
+    quantity(fit.noise_floor, unit),
+  );
 }
 
 function told(found, context, done) {
   const d = found.diagnosis ?? {};
-  const parts = [make("p", "summary", summaryOf(found)), make("p", "note", `${verdictOf(found)} · ${t("examined")} ${dateTime(found.from_ms)} – ${dateTime(found.to_ms)} · ${dateTime(found.at_ms)}`)];
+  const parts = [
+    make("p", "summary", summaryOf(found)),
+    make(
+      "p",
+      "note",
+      `${verdictOf(found)} · ${t("examined")} ${dateTime(found.from_ms)} – ${dateTime(found.to_ms)} · ${dateTime(found.at_ms)}`,
+    ),
+  ];
   for (const doubt of d.unit_doubts ?? []) parts.push(make("p", "warn-text", own(doubt)));
-  if (d.simulated) parts.push(make("p", "", t("series_words", quantity(d.simulated.as_given_rmse, d.unit), quantity(d.simulated.refitted_rmse, d.unit), number(d.simulated.gain), quantity(d.simulated.offset, d.unit))));
+  if (d.simulated)
+    parts.push(
+      make(
+        "p",
+        "",
+        t(
+          "series_words",
+          quantity(d.simulated.as_given_rmse, d.unit),
+          quantity(d.simulated.refitted_rmse, d.unit),
+          number(d.simulated.gain),
+          quantity(d.simulated.offset, d.unit),
+        ),
+      ),
+    );
   if (d.fit?.before) parts.push(make("p", "", fitWords(d)));
   if (found.beside?.length) {
     const amount = (v) => `${v > 0 ? "+" : ""}${quantity(v, d.unit ?? "")}`;
     const effects = (one) => one.by_effects.reduce((sum, it) => sum + it.difference, 0);
-    parts.push(make("h3", "", t("beside_watch")), ...found.beside.map((one) => row(t(`regime_${one.regime}`), amount(one.difference), `${own({ en: one.text, zh: one.zh })} · ${t("beside_of", amount(one.by_parameters), amount(effects(one)), amount(one.left))}`, { dot: one.differs ? "bad" : "good" })));
+    parts.push(
+      make("h3", "", t("beside_watch")),
+      ...found.beside.map((one) =>
+        row(
+          t(`regime_${one.regime}`),
+          amount(one.difference),
+          `${own({ en: one.text, zh: one.zh })} · ${t("beside_of", amount(one.by_parameters), amount(effects(one)), amount(one.left))}`,
+          { dot: one.differs ? "bad" : "good" },
+        ),
+      ),
+    );
   }
   for (const it of d.missing ?? []) {
-    const numbers = (it.parameters ?? []).map((p) => `${p.name} = ${number(p.value)}${p.low == null ? "" : ` (${number(p.low)} … ${number(p.high)})`} ${p.unit ?? ""}`);
+    const numbers = (it.parameters ?? []).map(
+      (p) =>
+        `${p.name} = ${number(p.value)}${p.low == null ? "" : ` (${number(p.low)} … ${number(p.high)})`} ${p.unit ?? ""}`,
+    );
     const name = effectText(found, it.effect, "name");
-    parts.push(row(effectText(found, it.effect, "statement", it.statement ?? it.effect), name, [it.equation, ...numbers].filter(Boolean).join(" · "), { dot: "bad" }));
+    parts.push(
+      row(
+        effectText(found, it.effect, "statement", it.statement ?? it.effect),
+        name,
+        [it.equation, ...numbers].filter(Boolean).join(" · "),
+        { dot: "bad" },
+      ),
+    );
   }
-  if (d.alternatives?.length) parts.push(make("h3", "", t("alternatives")), ...d.alternatives.map((a) => row(effectText(found, a.effect, "name"), t("instead_of", effectText(found, a.instead_of, "name")), effectText(found, a.effect, "experiment", a.separating_experiment))));
+  if (d.alternatives?.length)
+    parts.push(
+      make("h3", "", t("alternatives")),
+      ...d.alternatives.map((a) =>
+        row(
+          effectText(found, a.effect, "name"),
+          t("instead_of", effectText(found, a.instead_of, "name")),
+          effectText(found, a.effect, "experiment", a.separating_experiment),
+        ),
+      ),
+    );
   parts.push(...experiment(found, d, done), buttons(found, context));
   return make("div", "diagnosis", parts);
 }
 
 function experiment(found, d, done) {
   const steps = (found.steps ?? []).map(own);
-  const statement = d.next_experiment && (language() === "zh" ? effectText(found, d.next_experiment.effect, "experiment", d.next_experiment.statement) : d.next_experiment.statement);
+  const statement =
+    d.next_experiment &&
+    (language() === "zh"
+      ? effectText(found, d.next_experiment.effect, "experiment", d.next_experiment.statement)
+      : d.next_experiment.statement);
   if (!statement && !steps.length) return [];
-  const title = found.minutes ? `${t("experiment")} (${t("about", `${number(Math.ceil(found.minutes))} ${t("min")}`)})` : t("experiment");
+  const title = found.minutes
+    ? `${t("experiment")} (${t("about", `${number(Math.ceil(found.minutes))} ${t("min")}`)})`
+    : t("experiment");
   const list = steps.length ? steps : [statement];
   const tick = list.map((text, at) => step(`${found.key}#${at}`, text, done));
-  return [make("h3", "", title), statement && steps.length ? make("p", "", statement) : null, make("ol", "steps", tick.map((it) => make("li", "", it)))].filter(Boolean);
+  return [
+    make("h3", "", title),
+    statement && steps.length ? make("p", "", statement) : null,
+    make(
+      "ol",
+      "steps",
+      tick.map((it) => make("li", "", it)),
+    ),
+  ].filter(Boolean);
 }
 
 function buttons(found, context) {
@@ -145,7 +281,10 @@ function buttons(found, context) {
   if (found.page) all.push(link(report(found), t("open_report"), { target: "_blank", rel: "noopener" }));
   if (found.steps?.length) all.push(link(`/api/v1/diagnoses/${found.key}/plan?lang=${language()}`, t("plan_csv")));
   if (found.model) {
-    const accept = make("button", "", t("accept_model"), { type: "button", onclick: () => confirmed(accept, found, note) });
+    const accept = make("button", "", t("accept_model"), {
+      type: "button",
+      onclick: () => confirmed(accept, found, note),
+    });
     accept.disabled = !context.session?.may?.edit;
     all.push(accept);
   }
@@ -154,11 +293,32 @@ function buttons(found, context) {
 
 /** Once more: what is watched from now on is learned anew. */
 function confirmed(button, found, note) {
-  const dialog = make("dialog", "", make("form", "", [make("h2", "", t("accept_title")), make("p", "", t("accept_words")), make("div", "buttons", [make("button", "primary", t("accept_model"), { value: "yes" }), make("button", "", t("cancel"), { value: "no" })])], { method: "dialog" }));
+  const dialog = make(
+    "dialog",
+    "",
+    make(
+      "form",
+      "",
+      [
+        make("h2", "", t("accept_title")),
+        make("p", "", t("accept_words")),
+        make("div", "buttons", [
+          make("button", "primary", t("accept_model"), { value: "yes" }),
+          make("button", "", t("cancel"), { value: "no" }),
+        ]),
+      ],
+      { method: "dialog" },
+    ),
+  );
   dialog.addEventListener("close", async () => {
     dialog.remove();
     if (dialog.returnValue !== "yes") return;
-    try { say(note, (await send("/api/v1/twin/model", { key: found.key })).text && t("accepted")); button.disabled = true; } catch (error) { say(note, error.message); }
+    try {
+      say(note, (await send("/api/v1/twin/model", { key: found.key })).text && t("accepted"));
+      button.disabled = true;
+    } catch (error) {
+      say(note, error.message);
+    }
   });
   document.body.append(dialog);
   dialog.showModal();
@@ -168,14 +328,26 @@ function confirmed(button, found, note) {
 function step(key, text, done) {
   const tick = make("input", "", null, { type: "checkbox" });
   tick.checked = done.has(key);
-  tick.addEventListener("change", () => { if (tick.checked) done.add(key); else done.delete(key); remember(done); });
+  tick.addEventListener("change", () => {
+    if (tick.checked) done.add(key);
+    else done.delete(key);
+    remember(done);
+  });
   return make("label", "step", [tick, text]);
 }
 
 const NAME = "experiment";
 function remember(done) {
-  try { localStorage.setItem(NAME, JSON.stringify([...done].slice(-200))); } catch { /* not remembered */ }
+  try {
+    localStorage.setItem(NAME, JSON.stringify([...done].slice(-200)));
+  } catch {
+    /* not remembered */
+  }
 }
 export function ticked() {
-  try { return new Set(JSON.parse(localStorage.getItem(NAME) ?? "[]")); } catch { return new Set(); }
+  try {
+    return new Set(JSON.parse(localStorage.getItem(NAME) ?? "[]"));
+  } catch {
+    return new Set();
+  }
 }

@@ -7,7 +7,12 @@ export function mount(root, context) {
   const menu = make("nav", "chapters", null, { "aria-label": t("chapters") });
   const text = make("article", "card handbook", null, { tabindex: "-1" });
   const search = make("input", "", null, { type: "search", placeholder: t("search"), "aria-label": t("search") });
-  root.append(make("div", "help", [make("div", "card", [search, language() === "en" ? null : make("p", "note", t("handbook_english")), menu]), text]));
+  root.append(
+    make("div", "help", [
+      make("div", "card", [search, language() === "en" ? null : make("p", "note", t("handbook_english")), menu]),
+      text,
+    ]),
+  );
   const chapters = new Map();
   const read = async (name) => {
     if (!chapters.get(name)?.text) {
@@ -22,23 +27,53 @@ export function mount(root, context) {
     // The chapters are part of the program; the policy of the page lets nothing in them run.
     text.innerHTML = marked.parse(body);
     for (const pre of text.querySelectorAll("pre")) pre.tabIndex = 0;
-    for (const wide of text.querySelectorAll("table")) { const scroll = make("div", "scroll", null, { tabindex: "0", role: "region", "aria-label": t("table") }); wide.replaceWith(scroll); scroll.append(wide); }
-    for (const link of text.querySelectorAll("a[href$='.md']")) { const target = link.getAttribute("href").replace(/^.*\//, "").replace(/\.md$/, ""); if (chapters.has(target)) { link.href = `/help?chapter=${target}`; link.addEventListener("click", (event) => { event.preventDefault(); show(target); }); } }
+    for (const wide of text.querySelectorAll("table")) {
+      const scroll = make("div", "scroll", null, { tabindex: "0", role: "region", "aria-label": t("table") });
+      wide.replaceWith(scroll);
+      scroll.append(wide);
+    }
+    for (const link of text.querySelectorAll("a[href$='.md']")) {
+      const target = link.getAttribute("href").replace(/^.*\//, "").replace(/\.md$/, "");
+      if (chapters.has(target)) {
+        link.href = `/help?chapter=${target}`;
+        link.addEventListener("click", (event) => {
+          event.preventDefault();
+          show(target);
+        });
+      }
+    }
     for (const link of menu.querySelectorAll("a")) link.toggleAttribute("aria-current", link.dataset.chapter === name);
   };
-  const list = (names) => fill(menu, names.length ? names.map((name) => make("a", "", chapters.get(name).title, { href: `/help?chapter=${name}`, "data-chapter": name, onclick: (event) => { event.preventDefault(); show(name); } })) : [make("p", "empty", t("no_match"))]);
+  const list = (names) =>
+    fill(
+      menu,
+      names.length
+        ? names.map((name) =>
+            make("a", "", chapters.get(name).title, {
+              href: `/help?chapter=${name}`,
+              "data-chapter": name,
+              onclick: (event) => {
+                event.preventDefault();
+                show(name);
+              },
+            }),
+          )
+        : [make("p", "empty", t("no_match"))],
+    );
   search.addEventListener("input", async () => {
     const wanted = search.value.toLowerCase();
     const names = [...chapters.keys()];
     await Promise.all(names.map(read));
     list(names.filter((name) => !wanted || chapters.get(name).text.toLowerCase().includes(wanted)));
   });
-  ask(`/api/v1/handbook/index?lang=${language()}`).then((found) => {
-    for (const { name, title } of found.chapters) chapters.set(name, { title, text: null });
-    list([...chapters.keys()]);
-    const asked = new URLSearchParams(location.search).get("chapter");
-    const first = chapters.has(asked) ? asked : chapters.keys().next().value;
-    if (first) show(first, true);
-  }).catch((error) => fill(text, [make("p", "note bad", error.message)]));
+  ask(`/api/v1/handbook/index?lang=${language()}`)
+    .then((found) => {
+      for (const { name, title } of found.chapters) chapters.set(name, { title, text: null });
+      list([...chapters.keys()]);
+      const asked = new URLSearchParams(location.search).get("chapter");
+      const first = chapters.has(asked) ? asked : chapters.keys().next().value;
+      if (first) show(first, true);
+    })
+    .catch((error) => fill(text, [make("p", "note bad", error.message)]));
   return {};
 }

@@ -1,27 +1,27 @@
-// Rules: a script is edited as a draft, tried, run over the history, and only then put in charge; every version before it is one
-// click away. Nothing that is typed here counts before "Activate".
-import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
+// Rules: a script is edited as a draft, tried, run over the history, and only then put in charge; every version before
+// it is one click away. Nothing that is typed here counts before "Activate".
+import { ask, card, fill, make, say, send, table } from "/web/parts.js";
 import { dateTime, duration, number } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { Editor, vocabulary } from "/web/editor.js";
+import { createRule } from "/web/rules-new.js";
+import { showBacktest, showTrials } from "/web/rules-results.js";
 import { SettingsForm } from "/web/settings.js";
 
 const BACKTESTS = ["1h", "8h", "24h", "7d", "30d"];
-/** What a new rule begins with: one handler and one trial that passes. */
-const NEW_RULE = [
-  "// What this rule is for. 该规则的用途。",
-  "fn on_part_finished(count) {",
-  "    if count > 100.0 {",
-  "        raise_alarm(\"many_parts\", \"info\", `Part ${count} is finished`, `工件 ${count} 已完成`);",
-  "    }",
-  "}",
-  "",
-].join("\n");
 
 export function mount(root, context) {
   const view = new RulesView(root, context);
   view.begin();
-  return { rules: view, update: (status) => view.update(status), session: () => { view.enable(); view.settings.enable(); }, leave: () => view.leave() };
+  return {
+    rules: view,
+    update: (status) => view.update(status),
+    session: () => {
+      view.enable();
+      view.settings.enable();
+    },
+    leave: () => view.leave(),
+  };
 }
 
 class RulesView {
@@ -33,15 +33,59 @@ class RulesView {
     this.result = make("div", "");
     this.words = make("div", "words-list", null, { tabindex: "0", role: "region", "aria-label": t("words_title") });
     this.versions = make("div", "");
-    const button = (key, act, className = "") => make("button", className, t(key), { type: "button", onclick: () => this.run(act) });
-    this.since = make("select", "", BACKTESTS.map((s) => make("option", "", t("last_span", s.replace(/(\d+)([hd])/, (_, n, u) => `${n} ${t(u)}`)), { value: s, selected: s === "24h" })), { "aria-label": t("backtest_span") });
-    this.actions = { save: button("save_draft", () => this.save()), trial: button("run_trials", () => this.trial()), backtest: button("backtest", () => this.backtest()), activate: button("activate", () => this.activate(), "primary"), discard: button("discard_draft", () => this.discard()) };
-    const tools = make("div", "head", [make("div", "buttons", [this.actions.save, this.actions.trial]), make("div", "buttons", [this.actions.backtest, this.since]), make("div", "buttons", [this.actions.activate, this.actions.discard])]);
+    const button = (key, act, className = "") =>
+      make("button", className, t(key), { type: "button", onclick: () => this.run(act) });
+    this.since = make(
+      "select",
+      "",
+      BACKTESTS.map((s) =>
+        make(
+          "option",
+          "",
+          t(
+            "last_span",
+            s.replace(/(\d+)([hd])/, (_, n, u) => `${n} ${t(u)}`),
+          ),
+          { value: s, selected: s === "24h" },
+        ),
+      ),
+      { "aria-label": t("backtest_span") },
+    );
+    this.actions = {
+      save: button("save_draft", () => this.save()),
+      trial: button("run_trials", () => this.trial()),
+      backtest: button("backtest", () => this.backtest()),
+      activate: button("activate", () => this.activate(), "primary"),
+      discard: button("discard_draft", () => this.discard()),
+    };
+    const tools = make("div", "head", [
+      make("div", "buttons", [this.actions.save, this.actions.trial]),
+      make("div", "buttons", [this.actions.backtest, this.since]),
+      make("div", "buttons", [this.actions.activate, this.actions.discard]),
+    ]);
     this.title = make("h2", "", t("scripts"));
-    this.fresh = make("button", "", t("new_rule"), { type: "button", onclick: () => this.create() });
-    const words = make("input", "", null, { type: "search", placeholder: t("search_words"), "aria-label": t("search_words") });
+    this.fresh = make("button", "", t("new_rule"), { type: "button", onclick: () => createRule(this) });
+    const words = make("input", "", null, {
+      type: "search",
+      placeholder: t("search_words"),
+      "aria-label": t("search_words"),
+    });
     words.addEventListener("input", () => this.drawWords(words.value.toLowerCase()));
-    root.append(make("div", "rules", [card(t("scripts"), [this.list, this.fresh, make("p", "note", t("rules_words"))]), make("section", "card editing", [this.title, tools, this.note, this.host, this.result, make("h3", "", t("earlier_versions")), this.versions]), card(t("words_title"), [words, this.words])]));
+    root.append(
+      make("div", "rules", [
+        card(t("scripts"), [this.list, this.fresh, make("p", "note", t("rules_words"))]),
+        make("section", "card editing", [
+          this.title,
+          tools,
+          this.note,
+          this.host,
+          this.result,
+          make("h3", "", t("earlier_versions")),
+          this.versions,
+        ]),
+        card(t("words_title"), [words, this.words]),
+      ]),
+    );
     this.settings = new SettingsForm(context);
     root.append(this.settings.box);
   }
@@ -50,37 +94,30 @@ class RulesView {
     try {
       const [found, api] = await Promise.all([ask("/api/v1/rules"), ask("/api/v1/rules/words")]);
       [this.files, this.api] = [found.scripts, api];
-      this.editor = new Editor(this.host, { words: vocabulary(api), label: t("editor"), onChange: (text) => this.typed(text) });
+      this.editor = new Editor(this.host, {
+        words: vocabulary(api),
+        label: t("editor"),
+        onChange: (text) => this.typed(text),
+      });
       this.drawWords("");
       const asked = new URLSearchParams(location.search).get("file");
       const first = this.files.find((f) => f.file === asked) ?? this.files[0];
-      if (first) this.open(first.file); else say(this.note, t("no_scripts"));
-    } catch (error) { say(this.note, error.message); }
+      if (first) this.open(first.file);
+      else say(this.note, t("no_scripts"));
+    } catch (error) {
+      say(this.note, error.message);
+    }
     this.enable();
   }
 
-  /** A new rule begins as a text of its own; nothing is on the box before it is saved as a draft or activated. */
-  create() {
-    if (!this.may()) { location.href = `/sign-in?next=${encodeURIComponent(location.pathname + location.search)}`; return; }
-    const name = make("input", "", null, { type: "text", pattern: "[a-z0-9_]+", required: true, maxlength: "40", placeholder: "my_rule", "aria-label": t("new_rule_name") });
-    const answers = make("div", "buttons", [make("button", "primary", t("new_rule"), { value: "yes" }), make("button", "", t("cancel"), { value: "no", formnovalidate: true })]);
-    const form = make("form", "", [make("h2", "", t("new_rule")), make("p", "", t("new_rule_words")), make("label", "field", [t("new_rule_name"), name]), answers], { method: "dialog" });
-    const dialog = make("dialog", "", form);
-    dialog.addEventListener("close", () => {
-      dialog.remove();
-      if (dialog.returnValue !== "yes") return;
-      const file = `${name.value}.rhai`;
-      if (this.file(file)) { this.open(file); say(this.note, t("rule_exists", file)); return; }
-      this.files.push({ file, digest: "", text: "", draft: null, versions: [] });
-      this.texts.set(file, NEW_RULE);
-      this.open(file);
-    });
-    document.body.append(dialog);
-    dialog.showModal();
+  file(name = this.current) {
+    return this.files.find((f) => f.file === name);
   }
-
-  file(name = this.current) { return this.files.find((f) => f.file === name); }
-  changed(name = this.current) { const f = this.file(name); const text = this.texts.get(name); return f && text !== undefined && text !== f.text; }
+  changed(name = this.current) {
+    const f = this.file(name);
+    const text = this.texts.get(name);
+    return f && text !== undefined && text !== f.text;
+  }
 
   open(name) {
     this.current = name;
@@ -105,24 +142,42 @@ class RulesView {
     if (this.may()) this.timer = setTimeout(() => this.check().catch(() => {}), 700);
   }
 
-  may() { return Boolean(this.context.session?.may?.edit); }
+  may() {
+    return Boolean(this.context.session?.may?.edit);
+  }
 
   enable() {
     const may = this.may();
-    for (const [name, button] of Object.entries(this.actions)) button.disabled = !may || this.busy || (name === "save" && !this.changed()) || (name === "discard" && !this.changed() && !this.file()?.draft) || (name === "activate" && !this.changed() && !this.file()?.draft);
+    for (const [name, button] of Object.entries(this.actions))
+      button.disabled =
+        !may ||
+        this.busy ||
+        (name === "save" && !this.changed()) ||
+        (name === "discard" && !this.changed() && !this.file()?.draft) ||
+        (name === "activate" && !this.changed() && !this.file()?.draft);
     if (!may && this.context.session) say(this.note, t("sign_in_to_edit"));
   }
 
   async run(act) {
-    if (!this.may()) { location.href = `/sign-in?next=${encodeURIComponent(location.pathname + location.search)}`; return; }
+    if (!this.may()) {
+      location.href = `/sign-in?next=${encodeURIComponent(location.pathname + location.search)}`;
+      return;
+    }
     this.busy = true;
     this.enable();
-    try { await act(); } catch (error) { say(this.note, error.message); this.show(error.document); }
+    try {
+      await act();
+    } catch (error) {
+      say(this.note, error.message);
+      this.show(error.document);
+    }
     this.busy = false;
     this.enable();
   }
 
-  body() { return { text: this.editor.text, digest: this.file().draft?.digest ?? this.file().digest }; }
+  body() {
+    return { text: this.editor.text, digest: this.file().draft?.digest ?? this.file().digest };
+  }
 
   async check() {
     const found = await send(`/api/v1/rules/${this.current}/check`, this.body());
@@ -139,7 +194,7 @@ class RulesView {
   async trial() {
     const found = await send(`/api/v1/rules/${this.current}/trials`, this.body());
     this.editor.problems([...found.problems, ...found.trials.map((r) => r.problem).filter(Boolean)]);
-    this.showTrials(found);
+    showTrials(this, found);
   }
 
   async backtest() {
@@ -155,7 +210,7 @@ class RulesView {
     if (run.state !== "done") throw new Error(run.what ?? run.state);
     const found = run.report;
     say(this.note, t("backtest_done", number(found.rows), duration(found.covered_s), number(found.took_s, "s")));
-    this.showBacktest(found);
+    showBacktest(this, found);
   }
 
   async activate() {
@@ -182,38 +237,41 @@ class RulesView {
 
   show(document) {
     if (document?.problems) this.editor.problems(document.problems);
-    if (document?.trials) this.showTrials(document);
-  }
-
-  showTrials(found) {
-    const lines = found.trials.map((r) => row(r.name, r.problem ? t("trial_failed") : t("trial_passed"), r.problem ? `${t("line")} ${r.problem.line}: ${r.problem.what}` : t("trial_words", r.met, number(r.seconds, "s")), { dot: r.problem ? "bad" : "good", tone: r.problem ? "bad" : "" }));
-    const problems = found.problems.map((p) => row(`${t("line")} ${p.line}`, "", [p.what, p.next].filter(Boolean).join(" – "), { dot: "bad", tone: "bad" }));
-    say(this.note, found.fine ? t("trials_fine", found.trials.length) : t("trials_failed"));
-    fill(this.result, [make("h3", "", t("trials")), ...problems, ...(lines.length ? lines : [make("p", "empty", t("no_trials"))])]);
-  }
-
-  showBacktest(found) {
-    const head = [t("what"), t("alarm_or_stop"), t("time"), t("why")];
-    const rows = ["lost", "gained", "shifted"].flatMap((word) => found[word].map((d) => [t(`backtest_${word}`), d.name ?? d.what ?? "", d.from ?? d.at ?? "", [d.script, d.evidence, d.text].filter(Boolean).join(" · ")]));
-    const states = found.seconds_per_state.filter((s) => Math.abs(s.running_s - s.edited_s) > 1).map((s) => row(this.context.state(s.state), `${duration(s.running_s)} → ${duration(s.edited_s)}`));
-    fill(this.result, [make("h3", "", t("backtest_title")), make("p", "note", t("backtest_sum", found.lost.length, found.gained.length, found.shifted.length, duration(found.override_differs_s))), rows.length ? table(head, rows.slice(0, 300), { caption: t("backtest_title") }) : make("p", "empty", t("backtest_same")), ...states]);
+    if (document?.trials) showTrials(this, document);
   }
 
   drawFiles() {
     const status = new Map((this.context.status()?.scripts ?? []).map((s) => [s.file, s]));
     const tone = { running: "good", waiting: "warn", reverted: "bad", suspended: "bad", refused: "bad" };
-    fill(this.list, this.files.map((f) => {
-      const s = status.get(f.file);
-      const state = this.changed(f.file) || f.draft ? t("is_draft") : s ? t(`script_${s.condition}`) : "";
-      return make("button", `file dot ${tone[s?.condition] ?? ""}`, [f.file, make("span", "more", state)], { type: "button", "aria-pressed": String(f.file === this.current), onclick: () => this.open(f.file) });
-    }));
+    fill(
+      this.list,
+      this.files.map((f) => {
+        const s = status.get(f.file);
+        const state = this.changed(f.file) || f.draft ? t("is_draft") : s ? t(`script_${s.condition}`) : "";
+        return make("button", `file dot ${tone[s?.condition] ?? ""}`, [f.file, make("span", "more", state)], {
+          type: "button",
+          "aria-pressed": String(f.file === this.current),
+          onclick: () => this.open(f.file),
+        });
+      }),
+    );
     say(this.title, this.current ?? t("scripts"));
   }
 
   drawVersions() {
     const versions = this.file()?.versions ?? [];
-    const rows = versions.map((v) => [dateTime(v.at_ms), v.by || "–", v.digest.slice(0, 8), { text: make("button", "link-button", t("look_at_it"), { type: "button", onclick: () => this.lookAt(v) }) }]);
-    fill(this.versions, rows.length ? [table([t("time"), t("who"), t("version"), ""], rows, { caption: t("earlier_versions") })] : [make("p", "empty", t("no_versions"))]);
+    const rows = versions.map((v) => [
+      dateTime(v.at_ms),
+      v.by || "–",
+      v.digest.slice(0, 8),
+      { text: make("button", "link-button", t("look_at_it"), { type: "button", onclick: () => this.lookAt(v) }) },
+    ]);
+    fill(
+      this.versions,
+      rows.length
+        ? [table([t("time"), t("who"), t("version"), ""], rows, { caption: t("earlier_versions") })]
+        : [make("p", "empty", t("no_versions"))],
+    );
   }
 
   /** An earlier version comes into the editor as a draft; "Activate" puts it back in charge. */
@@ -225,20 +283,41 @@ class RulesView {
   }
 
   drawWords(wanted) {
-    const entry = (name, detail, text) => make("button", "word-entry", [make("code", "", name), make("span", "note", ` ${detail}`), make("span", "more", text)], { type: "button", onclick: () => this.editor.insert(name) });
+    const entry = (name, detail, text) =>
+      make(
+        "button",
+        "word-entry",
+        [make("code", "", name), make("span", "note", ` ${detail}`), make("span", "more", text)],
+        { type: "button", onclick: () => this.editor.insert(name) },
+      );
     const all = [
-      ...this.api.functions.map((f) => [f.signature, "", own(f)]), ...this.api.variables.map((v) => [v.name, v.unit === "1" ? "" : v.unit, own(v)]),
-      ...this.api.methods.map((m) => [m.signature, `→ ${m.returns}`, own(m)]), ...this.api.handlers.map((h) => [h.signature, "", own(h)]),
+      ...this.api.functions.map((f) => [f.signature, "", own(f)]),
+      ...this.api.variables.map((v) => [v.name, v.unit === "1" ? "" : v.unit, own(v)]),
+      ...this.api.methods.map((m) => [m.signature, `→ ${m.returns}`, own(m)]),
+      ...this.api.handlers.map((h) => [h.signature, "", own(h)]),
     ].filter((it) => !wanted || it.join(" ").toLowerCase().includes(wanted));
-    fill(this.words, all.slice(0, 250).map((it) => entry(...it)));
+    fill(
+      this.words,
+      all.slice(0, 250).map((it) => entry(...it)),
+    );
   }
 
   update(status) {
     const key = JSON.stringify(status.scripts);
-    if (key !== this.drawn) { this.drawn = key; if (this.files.length) this.drawFiles(); }
+    if (key !== this.drawn) {
+      this.drawn = key;
+      if (this.files.length) this.drawFiles();
+    }
     const mine = status.scripts.find((s) => s.file === this.current);
-    if (mine?.error && mine.error !== this.told) { this.told = mine.error; say(this.note, box(mine.error)); }
+    if (mine?.error && mine.error !== this.told) {
+      this.told = mine.error;
+      say(this.note, box(mine.error));
+    }
   }
 
-  leave() { clearTimeout(this.timer); this.settings.leave(); this.editor?.destroy(); }
+  leave() {
+    clearTimeout(this.timer);
+    this.settings.leave();
+    this.editor?.destroy();
+  }
 }

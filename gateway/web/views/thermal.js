@@ -1,4 +1,5 @@
-// Thermal error: what was measured, what the law predicts, what is left; the temperatures it is made of; offsets proposed and written.
+// Thermal error: what was measured, what the law predicts, what is left; the temperatures it is made of; offsets
+// proposed and written.
 import { ask, card, fill, make, row, say, table } from "/web/parts.js";
 import { folder, number, quantity } from "/web/format.js";
 import { t } from "/web/words.js";
@@ -16,7 +17,16 @@ export function mount(root, context) {
   const note = make("p", "note", " ");
   const list = make("div", "legend");
   const points = make("div", "");
-  root.append(make("div", "columns", [card(t("thermal_now"), now, "ages"), card(t("thermal_offsets"), offsets, "ages")]), card("", [make("div", "head", [make("h2", "", t("thermal_error_figure")), make("span", "note", t("last_eight_hours"))]), error, note]), card("", [make("h2", "", t("temperatures")), list, warmth]), card(t("thermal_points"), points));
+  root.append(
+    make("div", "columns", [card(t("thermal_now"), now, "ages"), card(t("thermal_offsets"), offsets, "ages")]),
+    card("", [
+      make("div", "head", [make("h2", "", t("thermal_error_figure")), make("span", "note", t("last_eight_hours"))]),
+      error,
+      note,
+    ]),
+    card("", [make("h2", "", t("temperatures")), list, warmth]),
+    card(t("thermal_points"), points),
+  );
   drawPoints(points, context);
   let plots = [];
   const read = async () => {
@@ -25,12 +35,16 @@ export function mount(root, context) {
     try {
       const known = (await ask("/api/v1/series")).series.map((s) => s.name);
       const wanted = known.filter((n) => TEMPERATURE.test(n) && context.quantity(n)).slice(0, 6);
-      const [measured, predicted] = ["thermal_error_um", "thermal_predicted_um"].map((n) => (known.includes(n) ? n : null));
+      const [measured, predicted] = ["thermal_error_um", "thermal_predicted_um"].map((n) =>
+        known.includes(n) ? n : null,
+      );
       const names = [...wanted, measured, predicted].filter(Boolean);
       const [from, to] = [new Date(status.at_ms - SPAN_S * 1000).toISOString(), new Date(status.at_ms).toISOString()];
       const found = await ask(`/api/v1/samples?from=${from}&to=${to}&channels=${names.join(",")}&resolution_s=60`);
       draw(found.series, wanted, measured, predicted, status);
-    } catch (problem) { say(note, problem.message); }
+    } catch (problem) {
+      say(note, problem.message);
+    }
   };
   const draw = (series, wanted, measured, predicted, status) => {
     plots.forEach((plot) => plot.destroy());
@@ -43,29 +57,91 @@ export function mount(root, context) {
       const names = [measured, predicted].filter(Boolean);
       const data = columns(series, names);
       const [m, p] = [names.indexOf(measured), names.indexOf(predicted)];
-      const drawn = names.map((name, at) => ({ label: t(name === measured ? "thermal_measured" : "thermal_predicted"), unit: "um", line: at ? "line-b" : "line-a" }));
-      if (m >= 0 && p >= 0) { const left = data[0].map((_, i) => (data[1 + 3 * m][i] === null || data[1 + 3 * p][i] === null ? null : data[1 + 3 * m][i] - data[1 + 3 * p][i])); data.push(left, left.map(() => null), left.map(() => null)); drawn.push({ label: t("thermal_left"), unit: "um", line: "line-c" }); }
-      const plot = new TimePlot(error, { series: drawn, height: 240, label: t("thermal_error_figure"), low: 0, sync: "thermal" });
-      plot.give(data); plot.show(drawnFrom(data, ...range), range[1]);
+      const drawn = names.map((name, at) => ({
+        label: t(name === measured ? "thermal_measured" : "thermal_predicted"),
+        unit: "um",
+        line: at ? "line-b" : "line-a",
+      }));
+      if (m >= 0 && p >= 0) {
+        const left = data[0].map((_, i) =>
+          data[1 + 3 * m][i] === null || data[1 + 3 * p][i] === null ? null : data[1 + 3 * m][i] - data[1 + 3 * p][i],
+        );
+        data.push(
+          left,
+          left.map(() => null),
+          left.map(() => null),
+        );
+        drawn.push({ label: t("thermal_left"), unit: "um", line: "line-c" });
+      }
+      const plot = new TimePlot(error, {
+        series: drawn,
+        height: 240,
+        label: t("thermal_error_figure"),
+        low: 0,
+        sync: "thermal",
+      });
+      plot.give(data);
+      plot.show(drawnFrom(data, ...range), range[1]);
       plots.push(plot);
       say(note, drawn.map((d) => d.label).join(" · "));
     } else say(note, t("no_thermal"));
-    const plot = new TimePlot(warmth, { series: wanted.map((name) => ({ label: context.name(name), unit: "°C" })), height: 240, label: t("temperatures"), sync: "thermal" });
+    const plot = new TimePlot(warmth, {
+      series: wanted.map((name) => ({ label: context.name(name), unit: "°C" })),
+      height: 240,
+      label: t("temperatures"),
+      sync: "thermal",
+    });
     const warm = columns(series, wanted);
-    plot.give(warm); plot.show(drawnFrom(warm, ...range), range[1]);
+    plot.give(warm);
+    plot.show(drawnFrom(warm, ...range), range[1]);
     plots.push(plot);
-    fill(list, wanted.map((name, at) => { const mark = make("i"); mark.style.background = `var(--line-${"abcdef"[at]})`; return make("span", "", [mark, `${context.name(name)} ${last(name) === null ? "–" : quantity(last(name), "°C")}`]); }));
+    fill(
+      list,
+      wanted.map((name, at) => {
+        const mark = make("i");
+        mark.style.background = `var(--line-${"abcdef"[at]})`;
+        return make("span", "", [
+          mark,
+          `${context.name(name)} ${last(name) === null ? "–" : quantity(last(name), "°C")}`,
+        ]);
+      }),
+    );
   };
   const timer = setInterval(read, 20000);
   let begun = false;
   return {
     update(status) {
-      if (!begun) { begun = true; read(); }
-      fill(now, status.channels.filter((c) => TEMPERATURE.test(c.name) || c.name === "thermal_error_um").map((c) => row(context.name(c.name), c.missing ? context.reason(c.missing) : quantity(c.value, c.unit))));
+      if (!begun) {
+        begun = true;
+        read();
+      }
+      fill(
+        now,
+        status.channels
+          .filter((c) => TEMPERATURE.test(c.name) || c.name === "thermal_error_um")
+          .map((c) => row(context.name(c.name), c.missing ? context.reason(c.missing) : quantity(c.value, c.unit))),
+      );
       const offset = status.gate.offset;
-      fill(offsets, offset ? [row(t("offset_mode"), t(offset.mode === "armed" ? "armed_short" : "only_noted")), ...offset.axes.map((a) => row(a.axis.toUpperCase(), `${number(a.shift_um, "um")} µm`, a.wanted_um === null ? t("no_proposal") : t("proposed", quantity(a.wanted_um, "um"))))] : [make("p", "empty", t("no_offsets"))]);
+      fill(
+        offsets,
+        offset
+          ? [
+              row(t("offset_mode"), t(offset.mode === "armed" ? "armed_short" : "only_noted")),
+              ...offset.axes.map((a) =>
+                row(
+                  a.axis.toUpperCase(),
+                  `${number(a.shift_um, "um")} µm`,
+                  a.wanted_um === null ? t("no_proposal") : t("proposed", quantity(a.wanted_um, "um")),
+                ),
+              ),
+            ]
+          : [make("p", "empty", t("no_offsets"))],
+      );
     },
-    leave() { clearInterval(timer); plots.forEach((plot) => plot.destroy()); },
+    leave() {
+      clearInterval(timer);
+      plots.forEach((plot) => plot.destroy());
+    },
   };
 }
 
@@ -75,7 +151,23 @@ async function drawPoints(root, context) {
   const selection = found.identified?.learned?.selection;
   if (!selection) return fill(root, [make("p", "empty", found.error ?? t("no_thermal_points", folder(found.file)))]);
   const cell = (value, unit) => ({ num: value === null || value === undefined ? "–" : quantity(value, unit) });
-  const rows = selection.sensors.map((s) => [context.name(s.sensor), t(s.chosen ? "chosen" : "not_chosen"), s.reason, cell(s.correlation), cell(s.grade_initial_image), cell(s.variance_inflation), cell(s.held_out_rms_um, "um")]);
-  const head = [t("temperatures"), "", t("why"), ...["correlation", "grade", "inflation", "held_out_error"].map((key) => ({ num: t(key) }))];
-  fill(root, [table(head, rows, { caption: t("thermal_points") }), make("p", "note", found.identified.learned.reason ?? "")]);
+  const rows = selection.sensors.map((s) => [
+    context.name(s.sensor),
+    t(s.chosen ? "chosen" : "not_chosen"),
+    s.reason,
+    cell(s.correlation),
+    cell(s.grade_initial_image),
+    cell(s.variance_inflation),
+    cell(s.held_out_rms_um, "um"),
+  ]);
+  const head = [
+    t("temperatures"),
+    "",
+    t("why"),
+    ...["correlation", "grade", "inflation", "held_out_error"].map((key) => ({ num: t(key) })),
+  ];
+  fill(root, [
+    table(head, rows, { caption: t("thermal_points") }),
+    make("p", "note", found.identified.learned.reason ?? ""),
+  ]);
 }

@@ -1,4 +1,5 @@
-// Twin: the machine beside its simulation. What is watched, what differs, what the latest diagnosis says, what to try next.
+// Twin: the machine beside its simulation. What is watched, what differs, what the latest diagnosis says, what to try
+// next.
 import { ask, card, fill, make, row, say } from "/web/parts.js";
 import { clock, number, quantity, when } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
@@ -19,12 +20,53 @@ export function mount(root, context) {
   const note = make("p", "note", " ");
   const latest = make("div", "");
   const past = make("div", "");
-  const ranges = make("div", "buttons", SPANS.map((s) => make("button", "", s < 86400 ? `${s / 3600} ${t("h")}` : `${s / 86400} ${t("d")}`, { type: "button", "data-span": s, onclick: () => { state.span = s; press(); read(); } })));
-  const press = () => { for (const b of ranges.children) b.setAttribute("aria-pressed", String(Number(b.dataset.span) === state.span)); };
+  const ranges = make(
+    "div",
+    "buttons",
+    SPANS.map((s) =>
+      make("button", "", s < 86400 ? `${s / 3600} ${t("h")}` : `${s / 86400} ${t("d")}`, {
+        type: "button",
+        "data-span": s,
+        onclick: () => {
+          state.span = s;
+          press();
+          read();
+        },
+      }),
+    ),
+  );
+  const press = () => {
+    for (const b of ranges.children) b.setAttribute("aria-pressed", String(Number(b.dataset.span) === state.span));
+  };
   press();
   const asking = new Asking(context, () => setTimeout(() => read(), 1500));
   const brought = new Brought(context);
-  root.append(make("div", "columns", [card(t("twin_now"), [verdict, facts], "ages"), card(t("twin_watched"), regimes, "ages")]), card("", [make("div", "head", [make("h2", "", t("twin_figure")), ranges]), make("div", "legend", [["line-a", "recorded_value"], ["line-c", "simulated_value"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); })), figure, make("h3", "", t("twin_residual")), left, note]), card(t("latest_diagnosis"), latest), brought.box, asking.box, card(t("past_diagnoses"), past));
+  root.append(
+    make("div", "columns", [card(t("twin_now"), [verdict, facts], "ages"), card(t("twin_watched"), regimes, "ages")]),
+    card("", [
+      make("div", "head", [make("h2", "", t("twin_figure")), ranges]),
+      make(
+        "div",
+        "legend",
+        [
+          ["line-a", "recorded_value"],
+          ["line-c", "simulated_value"],
+        ].map(([name, key]) => {
+          const mark = make("i");
+          mark.style.background = `var(--${name})`;
+          return make("span", "", [mark, t(key)]);
+        }),
+      ),
+      figure,
+      make("h3", "", t("twin_residual")),
+      left,
+      note,
+    ]),
+    card(t("latest_diagnosis"), latest),
+    brought.box,
+    asking.box,
+    card(t("past_diagnoses"), past),
+  );
   const read = async () => {
     const status = context.status();
     if (!status) return;
@@ -41,32 +83,67 @@ export function mount(root, context) {
       const [from, to] = [status.at_ms / 1000 - state.span, status.at_ms / 1000];
       const utc = (s) => new Date(s * 1000).toISOString();
       const resolution = state.span > 50000 ? 600 : state.span > 10000 ? 60 : 4;
-      const found = await ask(`/api/v1/samples?from=${utc(from)}&to=${utc(to)}&channels=${names.join(",")}&resolution_s=${resolution}`);
+      const found = await ask(
+        `/api/v1/samples?from=${utc(from)}&to=${utc(to)}&channels=${names.join(",")}&resolution_s=${resolution}`,
+      );
       state.plots.forEach((plot) => plot.destroy());
       const unit = status.twin.unit;
-      const both = new TimePlot(figure, { height: 230, low: 0, sync: "twin", label: t("twin_figure"), series: [{ label: t("recorded_value"), unit, line: "line-a" }, { label: t("simulated_value"), unit, line: "line-c" }] });
-      const rest = new TimePlot(left, { height: 150, sync: "twin", label: t("twin_residual"), series: [{ label: t("twin_residual"), unit, line: "line-d" }] });
-      // What is compared is the mean of a second: recorded is simulated plus difference, so that the three add up at every point.
+      const both = new TimePlot(figure, {
+        height: 230,
+        low: 0,
+        sync: "twin",
+        label: t("twin_figure"),
+        series: [
+          { label: t("recorded_value"), unit, line: "line-a" },
+          { label: t("simulated_value"), unit, line: "line-c" },
+        ],
+      });
+      const rest = new TimePlot(left, {
+        height: 150,
+        sync: "twin",
+        label: t("twin_residual"),
+        series: [{ label: t("twin_residual"), unit, line: "line-d" }],
+      });
+      // What is compared is the mean of a second: recorded is simulated plus difference, so that the three add up at
+      // every point.
       const [simulated, difference] = [columns(found.series, names.slice(0, 1)), columns(found.series, names.slice(1))];
       const sum = (a, b) => a.map((v, at) => (v === null || b[at] === null || b[at] === undefined ? null : v + b[at]));
-      const pair = [simulated[0], sum(simulated[1], difference[1]), simulated[2].map(() => null), simulated[3].map(() => null), ...simulated.slice(1)];
+      const pair = [
+        simulated[0],
+        sum(simulated[1], difference[1]),
+        simulated[2].map(() => null),
+        simulated[3].map(() => null),
+        ...simulated.slice(1),
+      ];
       const shown = drawnFrom(pair, from, to);
-      both.give(pair); both.show(shown, to);
-      rest.give(difference); rest.show(shown, to);
+      both.give(pair);
+      both.show(shown, to);
+      rest.give(difference);
+      rest.show(shown, to);
       state.plots = [both, rest];
-    } catch (error) { say(note, error.message); }
+    } catch (error) {
+      say(note, error.message);
+    }
   };
   const timer = setInterval(read, 15000);
   let begun = false;
   return {
     update(status) {
-      if (!begun) { begun = true; read(); }
+      if (!begun) {
+        begun = true;
+        read();
+      }
       drawNow(verdict, facts, regimes, status, context);
       asking.update(status);
       brought.update();
     },
     session: () => read(),
-    leave() { clearInterval(timer); asking.leave(); brought.leave(); state.plots.forEach((plot) => plot.destroy()); },
+    leave() {
+      clearInterval(timer);
+      asking.leave();
+      brought.leave();
+      state.plots.forEach((plot) => plot.destroy());
+    },
   };
 }
 
@@ -82,17 +159,42 @@ function drawNow(verdict, facts, regimes, status, context) {
   const learning = twin.regimes.filter((r) => r.stage === "learning");
   const tone = differing.length ? "bad" : learning.length || !twin.regimes.length ? "" : "good";
   verdict.dataset.tone = tone;
-  say(verdict, t(differing.length ? "twin_differs" : learning.length || !twin.regimes.length ? "twin_learning" : "twin_agrees"));
+  say(
+    verdict,
+    t(differing.length ? "twin_differs" : learning.length || !twin.regimes.length ? "twin_learning" : "twin_agrees"),
+  );
   const value = (v) => (v === null || v === undefined ? "–" : quantity(v, twin.unit));
   const second = twin.second_ms ? t("of_second", clock(twin.second_ms)) : null;
-  fill(facts, [row(t("recorded_value"), value(twin.twin_recorded)), row(t("simulated_value"), value(twin.twin_expected)),
-    row(t("twin_residual"), value(twin.twin_residual), twin.missing ? context.reason(twin.missing) : second), row(t("model"), twin.model, twin.file),
+  fill(facts, [
+    row(t("recorded_value"), value(twin.twin_recorded)),
+    row(t("simulated_value"), value(twin.twin_expected)),
+    row(t("twin_residual"), value(twin.twin_residual), twin.missing ? context.reason(twin.missing) : second),
+    row(t("model"), twin.model, twin.file),
     twin.problem ? row(t("model_refused"), "", box(twin.problem), { dot: "bad", tone: "bad" }) : null,
-    twin.diagnosing_since_ms ? row(t("diagnosing"), t("since_clock", clock(twin.diagnosing_since_ms)), null, { dot: "warn" }) : null]);
+    twin.diagnosing_since_ms
+      ? row(t("diagnosing"), t("since_clock", clock(twin.diagnosing_since_ms)), null, { dot: "warn" })
+      : null,
+  ]);
   const line = (r) => {
-    const share = r.learned ? t("learned_of", r.learned[0], r.learned[1]) : r.stage === "differing" ? `${value(r.difference)}${r.difference_pct == null ? "" : ` (${number(r.difference_pct, "%")} %)`}` : `± ${value(r.usual)}`;
-    const since = r.since_ms ? t("twin_differs_since", when(r.since_ms[0], status.at_ms), when(r.since_ms[1], status.at_ms), when(r.since_ms[2], status.at_ms)) : t("twin_differs_always");
-    return row(t(`regime_${r.regime}`), share, r.text ? `${own({ en: r.text, zh: r.zh ?? r.text })}, ${since}` : t(`stage_${r.stage}`), { dot: { watching: "good", differing: "bad" }[r.stage] ?? "" });
+    const share = r.learned
+      ? t("learned_of", r.learned[0], r.learned[1])
+      : r.stage === "differing"
+        ? `${value(r.difference)}${r.difference_pct == null ? "" : ` (${number(r.difference_pct, "%")} %)`}`
+        : `± ${value(r.usual)}`;
+    const since = r.since_ms
+      ? t(
+          "twin_differs_since",
+          when(r.since_ms[0], status.at_ms),
+          when(r.since_ms[1], status.at_ms),
+          when(r.since_ms[2], status.at_ms),
+        )
+      : t("twin_differs_always");
+    return row(
+      t(`regime_${r.regime}`),
+      share,
+      r.text ? `${own({ en: r.text, zh: r.zh ?? r.text })}, ${since}` : t(`stage_${r.stage}`),
+      { dot: { watching: "good", differing: "bad" }[r.stage] ?? "" },
+    );
   };
   fill(regimes, twin.regimes.length ? twin.regimes.map(line) : [make("p", "empty", t("twin_nothing_yet"))]);
 }

@@ -1,5 +1,5 @@
-// Tool wear: as the source's figure has it, the limit of the cutting power in red against the measured power in green, part by
-// part; how worn the edge is, and how many parts are left.
+// Tool wear: as the source's figure has it, the limit of the cutting power in red against the measured power in green,
+// part by part; how worn the edge is, and how many parts are left.
 import uPlot from "/web/uplot.js";
 import { ask, card, colour, fill, make, row, say, table } from "/web/parts.js";
 import { dateTime, folder, number, quantity } from "/web/format.js";
@@ -22,8 +22,15 @@ export function mount(root, context) {
   const below = make("p", "note", " ");
   const models = make("div", "");
   const variance = make("div", "");
-  tools.addEventListener("change", () => { state.tool = tools.value; draw(); });
-  root.append(make("div", "columns", [card(t("edge_now"), [lamp, facts], "ages"), card(t("wear_models"), models)]), card("", [make("div", "head", [make("h2", "", t("wear_figure")), tools]), legend(), figure, below]), card(t("anova"), variance));
+  tools.addEventListener("change", () => {
+    state.tool = tools.value;
+    draw();
+  });
+  root.append(
+    make("div", "columns", [card(t("edge_now"), [lamp, facts], "ages"), card(t("wear_models"), models)]),
+    card("", [make("div", "head", [make("h2", "", t("wear_figure")), tools]), legend(), figure, below]),
+    card(t("anova"), variance),
+  );
   let plot = null;
   const draw = () => {
     plot?.destroy();
@@ -31,25 +38,51 @@ export function mount(root, context) {
   };
   const read = async () => {
     try {
-      const [parts, library] = await Promise.all([ask(`/api/v1/parts?from=1990-01-01&limit=${PARTS}`), ask("/api/v1/wear")]);
+      const [parts, library] = await Promise.all([
+        ask(`/api/v1/parts?from=1990-01-01&limit=${PARTS}`),
+        ask("/api/v1/wear"),
+      ]);
       [state.parts, state.models] = [parts.rows.filter((p) => p.tools), library.models];
       const known = [...new Set(state.parts.flatMap((p) => p.tools.map((u) => u.tool)))].filter(Boolean).sort();
       if (!known.includes(state.tool)) state.tool = context.quantity("tool")?.value ?? null;
       if (!known.includes(state.tool)) state.tool = known[0] ?? null;
-      fill(tools, known.map((tool) => make("option", "", tool, { value: tool, selected: tool === state.tool })));
+      fill(
+        tools,
+        known.map((tool) => make("option", "", tool, { value: tool, selected: tool === state.tool })),
+      );
       tools.hidden = !known.length;
       drawModels(models, state.models);
       draw();
-    } catch (error) { say(below, error.message); }
+    } catch (error) {
+      say(below, error.message);
+    }
   };
   read();
   drawVariance(variance);
   const timer = setInterval(read, READ_EVERY_MS);
-  return { update: (status) => drawEdge(lamp, facts, status, context), leave() { clearInterval(timer); plot?.destroy(); } };
+  return {
+    update: (status) => drawEdge(lamp, facts, status, context),
+    leave() {
+      clearInterval(timer);
+      plot?.destroy();
+    },
+  };
 }
 
 function legend() {
-  return make("div", "legend", [["bad", "wear_limit"], ["good", "measured_power"], ["line-d", "flank_wear"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); }));
+  return make(
+    "div",
+    "legend",
+    [
+      ["bad", "wear_limit"],
+      ["good", "measured_power"],
+      ["line-d", "flank_wear"],
+    ].map(([name, key]) => {
+      const mark = make("i");
+      mark.style.background = `var(--${name})`;
+      return make("span", "", [mark, t(key)]);
+    }),
+  );
 }
 
 function drawEdge(lamp, facts, status, context) {
@@ -61,44 +94,166 @@ function drawEdge(lamp, facts, status, context) {
   const named = (text) => text.split(/[^\w-]+/).includes(name);
   const [worn, look] = [standing("tool_worn"), standing("tool_wear")];
   const own_ = worn.some((a) => named(a.text));
-  // A lamp that is grey beside a standing alarm is read as a fault: it is red for whichever edge is meant, and says which.
+  // A lamp that is grey beside a standing alarm is read as a fault: it is red for whichever edge is meant, and says
+  // which.
   lamp.dataset.tone = worn.length ? "bad" : look.length ? "warn" : wear?.flank_wear_mm != null ? "good" : "";
-  const word = t(own_ ? "lamp_worn" : look.some((a) => named(a.text)) ? "lamp_look" : wear?.flank_wear_mm != null ? "lamp_good" : "lamp_unknown");
-  say(lamp, worn.length && !own_ ? `${t("other_edges")}: ${own({ en: worn[0].text, zh: worn[0].zh || worn[0].text })}` : `${name}: ${word}`);
+  const word = t(
+    own_
+      ? "lamp_worn"
+      : look.some((a) => named(a.text))
+        ? "lamp_look"
+        : wear?.flank_wear_mm != null
+          ? "lamp_good"
+          : "lamp_unknown",
+  );
+  say(
+    lamp,
+    worn.length && !own_
+      ? `${t("other_edges")}: ${own({ en: worn[0].text, zh: worn[0].zh || worn[0].text })}`
+      : `${name}: ${word}`,
+  );
   const left = wear?.parts_left ?? null;
-  const rows = wear ? [
-    row(t("flank_wear"), wear.flank_wear_mm === null ? "–" : `${number(wear.flank_wear_mm, "mm")} ± ${quantity(wear.flank_wear_uncertainty_mm, "mm")}`, wear.why ? box(wear.why) : t("criterion", quantity(wear.criterion_mm, "mm"))),
-    row(t("wear_limit"), wear.limit_w === null ? "–" : `${number(wear.limit_w, "W")} ± ${quantity(wear.limit_uncertainty_w, "W")}`, wear.observability === "not_observable_here" ? t("not_observable") : wear.extrapolated?.length ? t("outside_model", wear.extrapolated.join(", ")) : null),
-    row(t("wear_form"), t(`form_${wear.form}`))] : [row(t("no_wear_model"), "", t("no_wear_model_words"))];
+  const rows = wear
+    ? [
+        row(
+          t("flank_wear"),
+          wear.flank_wear_mm === null
+            ? "–"
+            : `${number(wear.flank_wear_mm, "mm")} ± ${quantity(wear.flank_wear_uncertainty_mm, "mm")}`,
+          wear.why ? box(wear.why) : t("criterion", quantity(wear.criterion_mm, "mm")),
+        ),
+        row(
+          t("wear_limit"),
+          wear.limit_w === null ? "–" : `${number(wear.limit_w, "W")} ± ${quantity(wear.limit_uncertainty_w, "W")}`,
+          wear.observability === "not_observable_here"
+            ? t("not_observable")
+            : wear.extrapolated?.length
+              ? t("outside_model", wear.extrapolated.join(", "))
+              : null,
+        ),
+        row(t("wear_form"), t(`form_${wear.form}`)),
+      ]
+    : [row(t("no_wear_model"), "", t("no_wear_model_words"))];
   const cutting = context.quantity("cutting_power_w");
-  rows.unshift(row(t("short_cutting_power_w"), cutting && !cutting.missing ? quantity(cutting.value, "W") : context.reason(cutting?.missing ?? "not_provided"), t("wear_judged")));
-  rows.push(row(t("remaining_parts"), left === null ? "–" : parts(left[0]), left === null ? t("remaining_unknown") : t("remaining_words", parts(left[1]), parts(left[2]))));
-  const found = (key) => { const it = context.quantity(key); return it && !it.missing ? it : null; };
-  const [probability, limit, life, material] = ["tool_worn_probability", "tool_limit_parts", "tool_life_share", "material_level_pct"].map(found);
+  rows.unshift(
+    row(
+      t("short_cutting_power_w"),
+      cutting && !cutting.missing ? quantity(cutting.value, "W") : context.reason(cutting?.missing ?? "not_provided"),
+      t("wear_judged"),
+    ),
+  );
+  rows.push(
+    row(
+      t("remaining_parts"),
+      left === null ? "–" : parts(left[0]),
+      left === null ? t("remaining_unknown") : t("remaining_words", parts(left[1]), parts(left[2])),
+    ),
+  );
+  const found = (key) => {
+    const it = context.quantity(key);
+    return it && !it.missing ? it : null;
+  };
+  const [probability, limit, life, material] = [
+    "tool_worn_probability",
+    "tool_limit_parts",
+    "tool_life_share",
+    "material_level_pct",
+  ].map(found);
   const why = (key) => context.reason(context.quantity(key)?.missing ?? "no_part_yet");
   const pct = (share) => `${number(100 * share)} %`;
-  rows.push(make("h3", "", t("witnesses")),
-    row(t("witness_filter"), probability ? pct(probability.value) : "–", probability ? null : why("tool_worn_probability"), { dot: !probability ? "" : probability.value >= 0.5 ? "bad" : "good" }),
-    row(t("witness_limit"), limit ? number(limit.value) : "–", limit ? t("witness_limit_words", LIMIT_PARTS) : why("tool_limit_parts"), { dot: !limit ? "" : limit.value >= LIMIT_PARTS ? "bad" : limit.value > 0 ? "warn" : "good" }),
-    row(t("witness_time"), life ? pct(life.value) : "–", life ? t("witness_time_words") : why("tool_life_share"), { dot: !life ? "" : life.value >= 1 ? "warn" : "good" }),
-    row(t("material_level"), material ? `${material.value > 0 ? "+" : ""}${number(material.value)} ± ${number(material.uncertainty)} %` : "–", t("material_words")));
+  rows.push(
+    make("h3", "", t("witnesses")),
+    row(
+      t("witness_filter"),
+      probability ? pct(probability.value) : "–",
+      probability ? null : why("tool_worn_probability"),
+      { dot: !probability ? "" : probability.value >= 0.5 ? "bad" : "good" },
+    ),
+    row(
+      t("witness_limit"),
+      limit ? number(limit.value) : "–",
+      limit ? t("witness_limit_words", LIMIT_PARTS) : why("tool_limit_parts"),
+      { dot: !limit ? "" : limit.value >= LIMIT_PARTS ? "bad" : limit.value > 0 ? "warn" : "good" },
+    ),
+    row(t("witness_time"), life ? pct(life.value) : "–", life ? t("witness_time_words") : why("tool_life_share"), {
+      dot: !life ? "" : life.value >= 1 ? "warn" : "good",
+    }),
+    row(
+      t("material_level"),
+      material ? `${material.value > 0 ? "+" : ""}${number(material.value)} ± ${number(material.uncertainty)} %` : "–",
+      t("material_words"),
+    ),
+  );
   fill(facts, rows);
 }
 
 function drawFigure(figure, below, state) {
   figure.replaceChildren();
-  const use = state.parts.map((p, i) => ({ at: i + 1, part: p, tool: p.tools.find((u) => u.tool === state.tool) })).filter((u) => u.tool);
-  if (!use.length) { fill(figure, [make("p", "empty", t("no_wear_parts"))]); say(below, ""); return null; }
+  const use = state.parts
+    .map((p, i) => ({ at: i + 1, part: p, tool: p.tools.find((u) => u.tool === state.tool) }))
+    .filter((u) => u.tool);
+  if (!use.length) {
+    fill(figure, [make("p", "empty", t("no_wear_parts"))]);
+    say(below, "");
+    return null;
+  }
   const pick = (key) => use.map((u) => u.tool[key]);
-  const axis = { stroke: colour("soft"), grid: { stroke: colour("grid") }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
+  const axis = {
+    stroke: colour("soft"),
+    grid: { stroke: colour("grid") },
+    ticks: { show: false },
+    font: "12px system-ui, sans-serif",
+  };
   const dots = { show: true, size: 7 };
-  const plot = new uPlot({
-    width: Math.max(200, figure.clientWidth), height: 320, legend: { show: false }, cursor: { drag: { x: false, y: false }, y: false },
-    scales: { x: { time: false }, y: { range: (_, a, b) => [0, Math.max(100, b * 1.12)] }, mm: { range: (_, a, b) => [0, Math.max(0.4, (b ?? 0) * 1.2)] } },
-    axes: [{ ...axis, incrs: [1, 2, 5, 10, 20, 50, 100], label: t("part_number"), labelSize: 22, labelFont: "12px system-ui" }, { ...axis, size: 64, label: "W", labelSize: 18, labelFont: "12px system-ui" }, { ...axis, scale: "mm", side: 1, size: 56, grid: { show: false }, label: "mm", labelSize: 18, labelFont: "12px system-ui" }],
-    series: [{}, { label: t("wear_limit"), stroke: colour("bad"), width: 2 }, { label: t("measured_power"), stroke: colour("good"), width: 2, points: dots }, { label: t("flank_wear"), scale: "mm", stroke: colour("line-d"), width: 1.5, dash: [4, 4] }],
-    hooks: { setCursor: [(u) => { const i = u.cursor.idx; if (i !== null && i !== undefined) say(below, told(use[i])); }] },
-  }, [use.map((u) => u.at), pick("limit_w"), pick("cutting_power_w"), pick("wear_mm")], figure);
+  const plot = new uPlot(
+    {
+      width: Math.max(200, figure.clientWidth),
+      height: 320,
+      legend: { show: false },
+      cursor: { drag: { x: false, y: false }, y: false },
+      scales: {
+        x: { time: false },
+        y: { range: (_, a, b) => [0, Math.max(100, b * 1.12)] },
+        mm: { range: (_, a, b) => [0, Math.max(0.4, (b ?? 0) * 1.2)] },
+      },
+      axes: [
+        {
+          ...axis,
+          incrs: [1, 2, 5, 10, 20, 50, 100],
+          label: t("part_number"),
+          labelSize: 22,
+          labelFont: "12px system-ui",
+        },
+        { ...axis, size: 64, label: "W", labelSize: 18, labelFont: "12px system-ui" },
+        {
+          ...axis,
+          scale: "mm",
+          side: 1,
+          size: 56,
+          grid: { show: false },
+          label: "mm",
+          labelSize: 18,
+          labelFont: "12px system-ui",
+        },
+      ],
+      series: [
+        {},
+        { label: t("wear_limit"), stroke: colour("bad"), width: 2 },
+        { label: t("measured_power"), stroke: colour("good"), width: 2, points: dots },
+        { label: t("flank_wear"), scale: "mm", stroke: colour("line-d"), width: 1.5, dash: [4, 4] },
+      ],
+      hooks: {
+        setCursor: [
+          (u) => {
+            const i = u.cursor.idx;
+            if (i !== null && i !== undefined) say(below, told(use[i]));
+          },
+        ],
+      },
+    },
+    [use.map((u) => u.at), pick("limit_w"), pick("cutting_power_w"), pick("wear_mm")],
+    figure,
+  );
   say(below, told(use.at(-1)));
   return plot;
 }
@@ -106,15 +261,43 @@ function drawFigure(figure, below, state) {
 function told({ part, tool }) {
   const power = tool.cutting_power_w === null ? "–" : quantity(tool.cutting_power_w, "W");
   const limit = tool.limit_w === null ? "–" : quantity(tool.limit_w, "W");
-  const wear = tool.wear_mm === null ? "–" : `${number(tool.wear_mm, "mm")} ± ${quantity(tool.wear_uncertainty_mm ?? 0, "mm")}`;
+  const wear =
+    tool.wear_mm === null ? "–" : `${number(tool.wear_mm, "mm")} ± ${quantity(tool.wear_uncertainty_mm ?? 0, "mm")}`;
   return t("wear_told", dateTime(part.to_ms), power, limit, wear);
 }
 
 function drawModels(root, models) {
   if (!models.length) return fill(root, [make("p", "empty", t("no_models_yet"))]);
   const any = (text) => text || t("any");
-  const rows = models.map((m) => [any(m.machine), any(m.tool), any(m.work_material), any(m.operation), t(`form_${m.form}`), { num: quantity(m.criterion_mm, "mm") }, { num: String(m.cuts) }, { num: `${number(100 * m.r2)} %` }, m.in_force ? t("in_charge") : t("replaced")]);
-  fill(root, [table([t("machine"), t("tool"), t("material"), t("operation"), t("wear_form"), { num: t("criterion_short") }, { num: t("cuts") }, { num: "R²" }, ""], rows, { caption: t("wear_models") }), ...models.filter((m) => m.in_force).map((m) => make("pre", "note", m.formula))]);
+  const rows = models.map((m) => [
+    any(m.machine),
+    any(m.tool),
+    any(m.work_material),
+    any(m.operation),
+    t(`form_${m.form}`),
+    { num: quantity(m.criterion_mm, "mm") },
+    { num: String(m.cuts) },
+    { num: `${number(100 * m.r2)} %` },
+    m.in_force ? t("in_charge") : t("replaced"),
+  ]);
+  fill(root, [
+    table(
+      [
+        t("machine"),
+        t("tool"),
+        t("material"),
+        t("operation"),
+        t("wear_form"),
+        { num: t("criterion_short") },
+        { num: t("cuts") },
+        { num: "R²" },
+        "",
+      ],
+      rows,
+      { caption: t("wear_models") },
+    ),
+    ...models.filter((m) => m.in_force).map((m) => make("pre", "note", m.formula)),
+  ]);
 }
 
 /** The table that tells which factors count, from the answer of `identify tool-wear`. */
@@ -122,11 +305,29 @@ async function drawVariance(root) {
   const found = await ask("/api/v1/identified/tool-wear").catch((error) => ({ error: error.message }));
   const anova = found.identified?.learned?.surface?.anova;
   const refused = found.identified?.learned?.surface?.refused;
-  if (refused) return fill(root, [make("p", "empty", `${t("anova_refused")}: ${[refused.what, refused.next].filter(Boolean).join("; ")}`)]);
+  if (refused)
+    return fill(root, [
+      make("p", "empty", `${t("anova_refused")}: ${[refused.what, refused.next].filter(Boolean).join("; ")}`),
+    ]);
   if (!anova) return fill(root, [make("p", "empty", found.error ?? t("anova_where", folder(found.file)))]);
   const cell = (value) => ({ num: value === null || value === undefined ? "–" : number(value) });
   const percent = (share) => (share === null ? "–" : number(100 * share));
-  const rows = anova.sources.map((s) => [s.source, cell(s.sum_of_squares), { num: String(s.degrees_of_freedom) }, cell(s.mean_square), cell(s.f), { num: s.p === null || s.p === undefined ? "–" : s.p < 0.0001 ? "< 0.0001" : s.p.toFixed(4) }]);
-  const head = [t("anova_source"), ...["sum_of_squares", "degrees_of_freedom", "mean_square"].map((key) => ({ num: t(key) })), { num: "F" }, { num: "p" }];
-  fill(root, [table(head, rows, { caption: t("anova") }), make("p", "note", t("anova_shares", percent(anova.r2), percent(anova.adjusted_r2), percent(anova.predicted_r2)))]);
+  const rows = anova.sources.map((s) => [
+    s.source,
+    cell(s.sum_of_squares),
+    { num: String(s.degrees_of_freedom) },
+    cell(s.mean_square),
+    cell(s.f),
+    { num: s.p === null || s.p === undefined ? "–" : s.p < 0.0001 ? "< 0.0001" : s.p.toFixed(4) },
+  ]);
+  const head = [
+    t("anova_source"),
+    ...["sum_of_squares", "degrees_of_freedom", "mean_square"].map((key) => ({ num: t(key) })),
+    { num: "F" },
+    { num: "p" },
+  ];
+  fill(root, [
+    table(head, rows, { caption: t("anova") }),
+    make("p", "note", t("anova_shares", percent(anova.r2), percent(anova.adjusted_r2), percent(anova.predicted_r2))),
+  ]);
 }

@@ -13,11 +13,40 @@ fn read(name: &str) -> String {
     std::fs::read_to_string(web().join(name)).expect("a file of the page")
 }
 
-/// Name, English and Chinese of every row of the table.
+/// Every module of the page with its text; what others wrote is left out.
+fn modules() -> Vec<(PathBuf, String)> {
+    fn collect(folder: &Path, found: &mut Vec<(PathBuf, String)>) {
+        for entry in std::fs::read_dir(folder).expect("readable").map(|entry| entry.expect("readable").path()) {
+            if entry.is_dir() && !entry.ends_with("vendor") {
+                collect(&entry, found);
+            } else if entry.extension().is_some_and(|end| end == "js") {
+                let text = std::fs::read_to_string(&entry).expect("text");
+                found.push((entry, text));
+            }
+        }
+    }
+    let mut found = Vec::new();
+    collect(&web(), &mut found);
+    found
+}
+
+/// Name, English and Chinese of every row of the tables.
 fn table() -> Vec<(String, String, String)> {
-    let text = read("word-table.js");
+    let whole = read("word-table.js");
+    let tables = modules().into_iter().filter(|(path, _)| path.parent().is_some_and(|it| it.ends_with("words")));
+    let rows = tables.flat_map(|(path, text)| {
+        let subject = path.file_stem().expect("a name").to_string_lossy().into_owned();
+        assert!(whole.contains(&format!("/web/words-{subject}.js")), "{subject} is not part of the whole table");
+        rows_of(&text)
+    });
+    rows.collect()
+}
+
+/// The rows of one table. A row that is too long for one line stands on several.
+fn rows_of(text: &str) -> Vec<(String, String, String)> {
+    let text = text.replace(": [\n    \"", ": [\"").replace("\",\n    \"", "\", \"").replace("\",\n  ]", "\"]");
     let mut rows = Vec::new();
-    let mut rest = text.split_once("WORDS = {").expect("the table").1;
+    let mut rest = text.split_once(" = {").expect("the table").1;
     while let Some(at) = rest.find(": [\"") {
         let key: String = rest[..at]
             .chars()
@@ -53,21 +82,18 @@ fn every_text_stands_in_both_languages_and_every_used_word_in_the_table() {
     }
     let keys: BTreeSet<&str> = rows.iter().map(|(key, ..)| key.as_str()).collect();
     assert_eq!(keys.len(), rows.len(), "a key stands twice");
-    for folder in [web(), web().join("views")] {
-        for entry in std::fs::read_dir(folder).expect("readable").map(|entry| entry.expect("readable").path()) {
-            if entry.extension().is_none_or(|end| end != "js") {
-                continue;
-            }
-            let text = std::fs::read_to_string(&entry).expect("text");
-            for part in text.split("t(\"").skip(1) {
-                let before = &text[..part.as_ptr() as usize - text.as_ptr() as usize - 3];
-                let word =
-                    before.chars().next_back().is_some_and(|c| c.is_ascii_alphanumeric() || c == '_' || c == '.');
-                let key = part.split('"').next().unwrap_or_default();
-                assert!(word || keys.contains(key), "{}: no word {key:?} in the table", entry.display());
-            }
+    let mut used = 0;
+    for (path, text) in modules() {
+        for part in text.split("t(").skip(1) {
+            let before = &text[..part.as_ptr() as usize - text.as_ptr() as usize - 2];
+            let word = before.chars().next_back().is_some_and(|c| c.is_ascii_alphanumeric() || c == '_' || c == '.');
+            let Some(key) = part.trim_start().strip_prefix('"').filter(|_| !word) else { continue };
+            let key = key.split('"').next().unwrap_or_default();
+            assert!(keys.contains(key), "{}: no word {key:?} in the table", path.display());
+            used += 1;
         }
     }
+    assert!(used > 400, "the modules were not understood: {used} words are used");
 }
 
 #[test]

@@ -1,0 +1,51 @@
+// The frame of the page, units of time, the handbook. Key, English, Chinese.
+export const FRAME = {
+  // frame
+  views: ["Views", "页面"],
+  view_now: ["Now", "实时"],
+  view_history: ["History", "历史"],
+  view_wear: ["Tool wear", "刀具磨损"],
+  view_thermal: ["Thermal", "热误差"],
+  view_twin: ["Twin", "仿真对照"],
+  view_rules: ["Rules", "规则"],
+  view_audit: ["Audit", "审计"],
+  view_help: ["Help", "手册"],
+  live: ["live", "实时"],
+  not_live: ["not live", "数据中断"],
+  connecting: ["connecting", "连接中"],
+  old: ["old:", "过时："],
+  stale_since: [
+    "No news from the box for {0}. Everything here is from {1}: look at the machine itself.",
+    "网关已 {0} 无数据。此处内容停留在 {1}，请以机床实际状态为准。",
+  ],
+  stale_never: ["The box does not answer. Is it switched on and in the network?", "网关无应答。请检查电源与网络。"],
+  page_broken: [
+    "This page cannot show what the box says ({0}). Load it again.",
+    "页面无法显示数据（{0}），请重新加载。",
+  ],
+  sign_in: ["Sign in", "登录"],
+  role_viewer: ["viewer", "查看"],
+  role_setter: ["setter", "调机"],
+  role_armer: ["armer", "允许写入"],
+  role_admin: ["admin", "管理"],
+  armed_short: ["armed", "已允许写入"],
+  cancel: ["Cancel", "取消"],
+  token: ["Token", "令牌"],
+  back: ["Back", "返回"],
+  loading: ["loading …", "读取中……"],
+  status_link: ["status", "状态"],
+  // units
+  s: ["s", "秒"],
+  min: ["min", "分"],
+  h: ["h", "时"],
+  d: ["d", "天"],
+  rpm: ["rpm", "r/min"],
+  // help
+  handbook_english: [
+    "The chapters for installing and operating the box are in Chinese, too.",
+    "集成与操作所需章节为中文，其余章节为英文。",
+  ],
+  chapters: ["Chapters", "章节"],
+  no_chapter: ["This chapter is not part of this box.", "无此章节。"],
+  table: ["Table", "表格"],
+};

@@ -1,0 +1,31 @@
+// The view "Thermal": temperatures, errors, offsets, the choice of points. Key, English, Chinese.
+export const THERMAL = {
+  thermal_points: ["Points of measurement, and why", "测点选择及原因"],
+  chosen: ["chosen", "选用"],
+  not_chosen: ["left out", "未选"],
+  correlation: ["Correlation", "相关系数"],
+  grade: ["Grey grade", "灰色关联度"],
+  inflation: ["Variance inflation", "方差膨胀"],
+  held_out_error: ["Error in blocks left out", "留出误差"],
+  no_thermal_points: [
+    "Which points were chosen and why stands here as soon as a thermal law is identified for this box: cnc-gateway commission --write, or cnc-gateway identify thermal --data-dir {0}",
+    "为本机辨识热误差规律后，此处显示测点选择及原因：cnc-gateway commission --write，或 cnc-gateway identify thermal --data-dir {0}",
+  ],
+  thermal_now: ["Temperatures now", "当前温度"],
+  thermal_offsets: ["Offsets", "补偿量"],
+  thermal_error_figure: ["Thermal error: measured, predicted, what is left", "热误差：实测、预测、残差"],
+  thermal_measured: ["measured", "实测"],
+  thermal_predicted: ["predicted", "预测"],
+  thermal_left: ["left", "残差"],
+  last_eight_hours: ["last eight hours", "最近八小时"],
+  temperatures: ["Temperatures", "温度"],
+  no_thermal: [
+    "No thermal error is measured or predicted here. Identify a law with cnc-gateway identify thermal and put its coefficients into thermal.rhai.",
+    "此处无实测或预测热误差。请用 cnc-gateway identify thermal 辨识，并将系数写入 thermal.rhai。",
+  ],
+  offset_mode: ["Offsets are", "补偿方式"],
+  only_noted: ["only noted", "仅记录"],
+  no_proposal: ["nothing proposed", "无建议"],
+  proposed: ["proposed {0}", "建议 {0}"],
+  no_offsets: ["Offsets are switched off ([gate.offset]).", "补偿功能关闭（[gate.offset]）。"],
+};
