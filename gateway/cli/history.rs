@@ -4,7 +4,7 @@ use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::history::{DAY_NS, HistoryError, Query, Reader, SqlValue, day_of, plain_cell};
 use crate::records::{RecordKind, RecordQuery, build_document, read_records};
 use crate::{moment, samples};
-use adapters::clock::TimeNs;
+use adapters::clock::{SECOND_NS, TimeNs};
 use clap::{Args, Subcommand, ValueEnum};
 use serde_json::{Map, Value, json};
 use std::io::{BufWriter, Write};
@@ -205,6 +205,10 @@ fn print_info(reader: &Reader, json: bool) -> CommandResult {
     Ok(CommandOutcome::Fine)
 }
 
+/// Samples trail the clock by what the merge waits for the slowest source: 0.4 s at ordinary periods, 20 times as much at
+/// `--speed 20`. Records are dated by the clock. A minute is more than that, and less than a wrong clock is worth.
+const SAMPLES_BEHIND_NS: TimeNs = 60 * SECOND_NS;
+
 impl Selection {
     /// The question, and its range with both ends named.
     fn build_query(&self, reader: &Reader) -> Result<(Query, (TimeNs, TimeNs)), CannotRun> {
@@ -255,6 +259,8 @@ impl QueryArguments {
         json: bool,
         out: impl Write,
     ) -> Result<(), HistoryError> {
+        // Without an end, everything up to the end is meant, and a record may be newer than the newest sample.
+        let to_ns = if self.selection.to.is_some() { to_ns } else { to_ns.saturating_add(SAMPLES_BEHIND_NS) };
         let query = RecordQuery { from_ns, to_ns, state: self.selection.state.clone(), limit: self.limit };
         let found = read_records(reader, kind, &query)?;
         if json {
