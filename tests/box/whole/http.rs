@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::process::{Command, Stdio};
 use std::time::Duration;
-use testkit::process::{Gateway, get, request, wait_for};
+use testkit::process::{Gateway, get, request, try_request, wait_for};
 
 fn started() -> (tempfile::TempDir, Gateway, String) {
     let directory = tempfile::tempdir().expect("a directory");
@@ -92,8 +92,10 @@ fn whatever_is_asked_is_answered_and_the_tick_goes_on() {
         request(&address, &format!("POST /api/v1/status HTTP/1.0\r\nHost: {address}\r\nContent-Length: 0\r\n\r\n"));
     assert_eq!(posted.status, 405);
     assert_eq!(request(&address, "GET /api/v1/status HTTP/1.0\r\n\r\n").status, 400, "no Host");
-    let long = request(&address, &format!("GET /{} HTTP/1.0\r\n\r\n", "x".repeat(1 << 20)));
-    assert!([400, 414, 431, 0].contains(&long.status), "{}", long.status);
+    // The box closes without reading the rest; whether its answer still reaches the sender is up to the two kernels.
+    if let Ok(long) = try_request(&address, &format!("GET /{} HTTP/1.0\r\n\r\n", "x".repeat(1 << 20))) {
+        assert!([400, 414, 431].contains(&long.status), "{}", long.status);
+    }
     let before = get(&address, "/api/v1/status").json()["tick"]["count"].as_u64();
     let runner = ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() };
     proptest!(runner, |(key in "(from|to|limit|channels|resolution_s|state|tool|[a-z]{1,8})",
