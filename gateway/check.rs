@@ -49,13 +49,6 @@ impl fmt::Display for CheckReport {
     }
 }
 
-impl From<script::ScriptProblem> for Problem {
-    fn from(problem: script::ScriptProblem) -> Self {
-        let script::ScriptProblem { file, line, column, what, next } = problem;
-        Self { file, line, column, what, next }
-    }
-}
-
 /// Checks the file, or without one the built-in configuration, and everything it names.
 #[must_use]
 pub fn check_configuration(

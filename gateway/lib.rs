@@ -12,49 +12,39 @@
 //!
 //! This crate puts them together: configuration, tick, page, command line.
 
-pub mod access;
-pub mod active_scripts;
-pub mod alignment;
-pub mod archive;
-pub mod backtest;
-pub mod backup;
 pub mod bench;
 pub mod check;
 pub mod cli;
-pub mod commission;
-pub mod config;
 pub mod demo;
-pub mod doctor;
-pub mod drafts;
-#[cfg(feature = "fleet")]
-pub mod fleet;
-pub mod gallery;
-pub mod handbook;
-pub mod http;
-pub mod identified;
-pub mod learned;
 pub mod monitoring;
-pub mod operations;
-pub mod pipeline;
-pub mod pulses;
-pub mod records;
-pub mod reload;
 pub mod replay;
-pub mod run;
-pub mod samples;
-pub mod settings;
 pub mod setup;
-pub mod signals;
-pub mod status;
-pub mod update;
-pub mod usage;
-pub mod waveform;
 
-pub use gateway_base::{cannot_run, clock, convert, files, log, moment};
+pub use gateway_access as access;
+pub use gateway_backtest as backtest;
+pub use gateway_backup as backup;
+pub use gateway_backup::archive;
+pub use gateway_base::{cannot_run, clock, convert, files, learned, log, moment, usage};
+pub use gateway_commission as commission;
+pub use gateway_commission::{identified, pulses};
+pub use gateway_config as config;
 pub use gateway_control as control;
 pub use gateway_diagnosis as diagnosis;
 pub use gateway_diagnosis::report;
+#[cfg(feature = "fleet")]
+pub use gateway_fleet as fleet;
 pub use gateway_gate as gate;
+pub use gateway_handbook as handbook;
 pub use gateway_history as history;
+pub use gateway_http as http;
+pub use gateway_http::{gallery, records, samples};
 pub use gateway_nats as nats;
+pub use gateway_pipeline as pipeline;
+pub use gateway_run as run;
+pub use gateway_run::{operations, signals, update};
+pub use gateway_scripts::{active_scripts, drafts, reload, settings};
 pub use gateway_sinks as sinks;
+pub use gateway_sources as sources;
+pub use gateway_sources::{doctor, waveform};
+pub use gateway_status as status;
+pub use gateway_status::alignment;

@@ -3,8 +3,8 @@
 //! A refusal costs whoever provokes it nothing, so their number is limited: beyond it they are counted, and the next row says
 //! how many were left out.
 
-use crate::control::OrderSender;
-use crate::history::Audit;
+use gateway_control::OrderSender;
+use gateway_history::Audit;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 

@@ -5,8 +5,8 @@
 
 use super::role::Role;
 use super::token::{Token, TokenError};
-use crate::files;
-use crate::status::StatusProblem;
+use gateway_base::files;
+use gateway_status::StatusProblem;
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::os::unix::fs::PermissionsExt;

@@ -126,7 +126,7 @@ impl fmt::Debug for Token {
 ///
 /// # Errors
 /// The system gives none.
-pub(crate) fn random_bytes<const N: usize>() -> Result<[u8; N], TokenError> {
+pub fn random_bytes<const N: usize>() -> Result<[u8; N], TokenError> {
     let mut bytes = [0; N];
     getrandom::fill(&mut bytes).map_err(|_| TokenError::NoRandomness)?;
     Ok(bytes)

@@ -2,8 +2,8 @@
 
 use super::compare::{Spell, SpellKind};
 use super::to_seconds;
-use crate::pipeline::Tally;
 use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_pipeline::Tally;
 use rules::estimators::State;
 use rules::script::{Decision, OverrideRequest, ScriptProblem, Stop};
 use std::sync::Arc;

@@ -7,10 +7,10 @@
 
 use super::lane::{self, Lane};
 use super::to_seconds;
-use crate::history::HistoryError;
-use crate::pipeline::{Channels, CycleFollower};
 use adapters::Sample;
 use adapters::clock::TimeNs;
+use gateway_history::HistoryError;
+use gateway_pipeline::{Channels, CycleFollower};
 use rules::estimators::wear::WearEstimator;
 use rules::estimators::{self, Estimates};
 use rules::script::{Decision, Host, ScriptSet};

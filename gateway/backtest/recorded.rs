@@ -5,9 +5,9 @@
 //! against what was raised, as far as the scripts that raised it are the running ones.
 
 use super::compare::{Spell, SpellKind};
-use crate::active_scripts::{self, Versions};
-use crate::history::{AlarmEntry, Event, HistoryError, Reader, RecordSpan};
 use adapters::clock::TimeNs;
+use gateway_history::{AlarmEntry, Event, HistoryError, Reader, RecordSpan};
+use gateway_scripts::active_scripts::{self, Versions};
 use rules::script::{AlarmLevel, SCRIPT_STOPPED, ScriptSet};
 use std::collections::BTreeMap;
 

@@ -4,7 +4,7 @@ use super::compare::{Evidence, Spell, SpellDifference};
 use super::lane::{Lane, RequestTotals};
 use super::recorded::Recorded;
 use super::to_seconds;
-use crate::moment::format_utc;
+use gateway_base::moment::format_utc;
 use rules::script::ScriptProblem;
 use serde_json::{Value, json};
 use std::fmt;

@@ -1,8 +1,8 @@
 //! From stored columns to samples.
 
-use crate::history::{Cells, Chunk, HistoryError, Reader};
 use adapters::clock::TimeNs;
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
+use gateway_history::{Cells, Chunk, HistoryError, Reader};
 
 /// The series of a history that are channels; estimates are inferred anew.
 pub(super) fn list_channels(reader: &Reader) -> Result<Vec<String>, HistoryError> {

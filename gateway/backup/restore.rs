@@ -3,11 +3,11 @@
 use super::list::{Fate, of_name};
 use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, configured_files, is_of_scripts, list_names, restored};
 use crate::archive::ArchivedFile;
-use crate::files::{keep_last, replace_durably, replace_file};
-use crate::history::{HistoryError, Reader, store_wear_model};
-use crate::reload::read_directory;
-use crate::settings;
 use adapters::clock::TimeNs;
+use gateway_base::files::{keep_last, replace_durably, replace_file};
+use gateway_history::{HistoryError, Reader, store_wear_model};
+use gateway_scripts::reload::read_directory;
+use gateway_scripts::settings;
 use rules::estimators::thermal::ThermalModel;
 use rules::estimators::wear::WearRecord;
 use rules::script::{ScriptFile, SettingValues, prepare_with};
@@ -190,7 +190,7 @@ impl Found {
             ThermalModel::read(model, &places.machine).map_err(RestoreError::ThermalModel)?;
         }
         for (name, text) in self.later.iter().filter(|(name, _)| name.ends_with(".json")) {
-            if crate::learned::state_of(text).is_none() {
+            if gateway_base::learned::state_of(text).is_none() {
                 return Err(RestoreError::Changed { name: name.clone() });
             }
         }

@@ -4,7 +4,7 @@
 use super::list::{Fate, of_name};
 use super::list_names;
 use super::restore::RestoreError;
-use crate::log::{Notice, Severity};
+use gateway_base::log::{Notice, Severity};
 use std::path::Path;
 use std::time::Duration;
 
@@ -18,7 +18,9 @@ pub(super) fn lay_ready(data_dir: &Path, files: &[(String, String)]) -> Result<(
     let folder = data_dir.join(FOLDER);
     let say = RestoreError::of_file(&folder);
     clear(&folder).map_err(&say)?;
-    files.iter().try_for_each(|(name, text)| crate::files::replace_durably(&folder.join(name), text).map_err(&say))
+    files
+        .iter()
+        .try_for_each(|(name, text)| gateway_base::files::replace_durably(&folder.join(name), text).map_err(&say))
 }
 
 fn clear(folder: &Path) -> std::io::Result<()> {

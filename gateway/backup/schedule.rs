@@ -3,11 +3,11 @@
 
 use super::{BackupPaths, RestoreError, RestoreRequest, archive_name, collect_files, copy_history, restore_backup};
 use crate::archive::{pack, unpack};
-use crate::config::BackupConfig;
-use crate::convert::seconds_to_instant;
-use crate::files::{keep_last, list_named};
-use crate::history::HistoryError;
-use crate::log::{Notice, Severity};
+use gateway_base::convert::seconds_to_instant;
+use gateway_base::files::{keep_last, list_named};
+use gateway_base::log::{Notice, Severity};
+use gateway_config::BackupConfig;
+use gateway_history::HistoryError;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};

@@ -1,8 +1,8 @@
 //! A backup taken and put back, in place and into an empty box.
 
 use super::*;
-use crate::files::replace_file;
-use crate::settings::{self, NewSetting};
+use gateway_base::files::replace_file;
+use gateway_scripts::settings::{self, NewSetting};
 use rules::script::{DeclarationPlace, SettingValue, list_shipped_scripts};
 
 fn places(below: &Path) -> BackupPaths {
@@ -90,8 +90,8 @@ fn an_empty_box_gets_everything_that_decides() {
     let (from, to) = (tempfile::tempdir().expect("a directory"), tempfile::tempdir().expect("a directory"));
     let (old, new) = (places(from.path()), places(&to.path().join("data")));
     furnish(&old);
-    let record = rules::estimators::wear::WearRecord::parse(crate::demo::WEAR).expect("a model");
-    crate::history::store_wear_model(&old.history, 5, &record).expect("stored");
+    let record = rules::estimators::wear::WearRecord::parse(include_str!("../demo/wear.toml")).expect("a model");
+    gateway_history::store_wear_model(&old.history, 5, &record).expect("stored");
     let first = taken(&old);
     restore_backup(&new, &first, ask("x-before-restore-1.tar.gz")).expect("restored");
     assert!(take_restored(&new.data_dir).is_some());

@@ -3,7 +3,8 @@
 use super::{CannotRun, CommandOutcome, CommandResult, LogArguments};
 use crate::config;
 use crate::demo;
-use crate::run::{self, RunPlan, open::MachineSpeed};
+use crate::run::{self, RunPlan};
+use crate::sources::open::MachineSpeed;
 use clap::Args;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};

@@ -3,9 +3,9 @@
 //! One line of JSON each in `annotations.jsonl` of the data directory; lines are added and never changed.
 
 use super::columns::TorqueFileError;
-use crate::moment::{self, MomentError};
 use adapters::clock::TimeNs;
 use clap::ValueEnum;
+use gateway_base::moment::{self, MomentError};
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,10 @@
 //! The history as a recording, with what a person has measured as columns.
 
 use super::annotations::{Annotation, Quantity};
-use crate::history::{HistoryError, Query, Reader, STATE_SERIES};
 use adapters::Recording;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::recording::{Cells, Numbers};
+use gateway_history::{HistoryError, Query, Reader, STATE_SERIES};
 use rules::estimators::alignment::{Matched, match_courses};
 use rules::estimators::regression::Refusal;
 use std::path::{Path, PathBuf};
@@ -153,7 +153,7 @@ pub enum TorqueFileError {
 /// # Errors
 /// What is wrong with the file.
 pub fn torque_course(file: &Path) -> Result<Vec<(f64, f64)>, TorqueFileError> {
-    let read = crate::diagnosis::read_recordings(&[file.display().to_string()])
+    let read = gateway_diagnosis::read_recordings(&[file.display().to_string()])
         .map_err(|problems| TorqueFileError::Unreadable(problems.join("\n")))?;
     let torque =
         read.recording.find_numbers("torque_nm").ok_or_else(|| TorqueFileError::NoTorque { file: file.to_owned() })?;

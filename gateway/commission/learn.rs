@@ -2,10 +2,10 @@
 
 use super::columns::{self, Merged};
 use super::picture::{Dot, Picture};
-use crate::history::STATE_SERIES;
 use crate::identified::{self, THERMAL, TOOL_WEAR};
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
+use gateway_history::STATE_SERIES;
 use rules::estimators::power_separation::{
     LoadLossLearned, NoLoadLearned, ReferenceChoice, identify_load_loss, identify_no_load,
 };
@@ -311,7 +311,7 @@ fn wear_levels(cuts: &[Cut]) -> usize {
 pub enum PrepareError {
     /// It cannot be read.
     #[error(transparent)]
-    History(#[from] crate::history::HistoryError),
+    History(#[from] gateway_history::HistoryError),
     /// A torque file can no longer be read.
     #[error(transparent)]
     TorqueFile(#[from] columns::TorqueFileError),

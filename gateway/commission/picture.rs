@@ -1,6 +1,6 @@
 //! The fits as pictures: dots in a frame, on one page that needs nothing else.
 
-use crate::report::escape_html;
+use gateway_diagnosis::report::escape_html;
 use std::fmt::Write as _;
 
 /// Size of a picture, in units of the picture.

@@ -106,7 +106,7 @@ fn new_channel(values: &SectionValues, name: String, read: &str) -> NewChannel {
 
 #[cfg(test)]
 mod tests {
-    use crate::config::{Config, Problem, parse};
+    use crate::{Config, Problem, parse};
     use std::path::Path;
 
     fn read(channel: &str) -> Result<Config, Vec<Problem>> {

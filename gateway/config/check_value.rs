@@ -1,10 +1,10 @@
 //! One value against one row of the table of keys.
 
 use super::keys::{ConfigKey, NAME_MAX, ValueKind};
-use crate::sinks::SinkAddress;
 use adapters::Address;
 use adapters::address::AddressError;
 use adapters::channel::find_nearest_name;
+use gateway_sinks::SinkAddress;
 use toml::de::DeValue;
 
 /// A checked value.

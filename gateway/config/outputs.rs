@@ -4,9 +4,9 @@ use super::SinkConfig;
 use super::build::{as_text, find_number, find_text, origin_of_name, source_name};
 use super::check_value::Scalar;
 use super::read::{ConfigInput, Origin, SectionValues};
-use crate::history::OutboxSettings;
-use crate::sinks::SinkAddress;
 use adapters::channel::{CHANNELS, find_nearest_name};
+use gateway_history::OutboxSettings;
+use gateway_sinks::SinkAddress;
 use std::time::Duration;
 
 /// The sinks; names that are there twice are reported.
@@ -115,7 +115,7 @@ fn named_value<T>(
     let (name, written) = (name.trim(), written.trim());
     let value =
         value(written).ok_or_else(|| (format!("`{key}` of {name} is {written:?}, which is not {kind}"), form))?;
-    let stored: Vec<String> = crate::pipeline::stored_series().into_iter().map(|series| series.name).collect();
+    let stored: Vec<String> = gateway_pipeline::stored_series().into_iter().map(|series| series.name).collect();
     let names = || CHANNELS.iter().map(|channel| channel.name).chain(stored.iter().map(String::as_str));
     if !names().any(|known| known == name) {
         let next = match find_nearest_name(name, names()) {

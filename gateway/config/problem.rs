@@ -1,5 +1,6 @@
 //! One thing that is wrong, where, and what to do about it.
 
+use rules::script::ScriptProblem;
 use serde::Serialize;
 use std::fmt;
 
@@ -34,6 +35,13 @@ impl Problem {
         self.line = Some(line);
         self.column = Some(column);
         self
+    }
+}
+
+impl From<ScriptProblem> for Problem {
+    fn from(problem: ScriptProblem) -> Self {
+        let ScriptProblem { file, line, column, what, next } = problem;
+        Self { file, line, column, what, next }
     }
 }
 

@@ -13,7 +13,7 @@ use crate::config::Config;
 use crate::files::replace_file;
 use crate::history::{HistoryError, Reader, store_wear_model};
 use crate::log::{Notice, Severity};
-use crate::run::open::MachineSpeed;
+use crate::sources::open::MachineSpeed;
 use adapters::clock::SECOND_NS;
 use rules::estimators::wear::WearRecord;
 use serde_json::{Value, json};
@@ -32,7 +32,7 @@ const WORN: &str = include_str!("wear.json");
 /// What is cut: no controller can be asked for the material.
 const RECIPE: &str = include_str!("operations.toml");
 /// Cutting power over the wear, in the cuts of the short part.
-pub(crate) const WEAR: &str = include_str!("wear.toml");
+const WEAR: &str = include_str!("wear.toml");
 
 /// The recipe, in the data directory.
 const RECIPE_FILE: &str = "demo-operations.toml";

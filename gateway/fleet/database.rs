@@ -2,9 +2,9 @@
 
 use super::schema;
 use super::secured::{self, Securing};
-use crate::log::{Notice, Severity};
-use crate::nats::NatsError;
 use adapters::tls::{TlsError, TlsFiles};
+use gateway_base::log::{Notice, Severity};
+use gateway_nats::NatsError;
 use std::path::PathBuf;
 use std::time::Duration;
 use tokio_postgres::config::{Host, SslMode};

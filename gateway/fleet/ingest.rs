@@ -6,8 +6,8 @@
 use super::database::DatabaseSettings;
 use super::row::{FleetRow, RefusedMessage};
 use super::write::{Arrived, BatchResult, Database, RefusalRecord};
-use crate::log::{Notice, Severity};
-use crate::nats::{Connection, FetchLimits, Message, NatsError, NatsTarget, StreamSettings};
+use gateway_base::log::{Notice, Severity};
+use gateway_nats::{Connection, FetchLimits, Message, NatsError, NatsTarget, StreamSettings};
 use std::time::{Duration, Instant};
 
 /// A batch is one transaction of some megabytes: larger ones gain little, and are given out again when they take longer than the

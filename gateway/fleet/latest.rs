@@ -74,7 +74,7 @@ impl Latest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fleet::row::SeriesName;
+    use crate::row::SeriesName;
 
     #[test]
     fn the_newest_value_stays_whatever_comes_last() {

@@ -2,7 +2,7 @@
 
 use super::database::{self, DatabaseError, DatabaseSettings};
 use super::schema::{PARTITIONED, Partitioning};
-use crate::nats::NatsError;
+use gateway_nats::NatsError;
 use serde::Serialize;
 use tokio_postgres::Client;
 
@@ -135,7 +135,7 @@ async fn delete_rows(
     let before = read_horizon(client, days).await?;
     let verb = if dry { "SELECT" } else { "DELETE" };
     let statement = format!("{verb} FROM {table} WHERE {column} < '{before}+00'");
-    let rows = crate::convert::clamp_to_signed(client.execute(&statement, &[]).await?);
+    let rows = gateway_base::convert::clamp_to_signed(client.execute(&statement, &[]).await?);
     let going = Going { table: table.to_owned(), before, rows, bytes: 0 };
     Ok(if rows > 0 { vec![going] } else { Vec::new() })
 }

@@ -1,7 +1,7 @@
 //! A message of the stream as a row. Pure.
 
-use crate::history::parse_nested_json;
 use adapters::clock::TimeNs;
+use gateway_history::parse_nested_json;
 use serde::Deserialize;
 use serde_json::Value as Json;
 use std::borrow::Cow;

@@ -1,8 +1,8 @@
 //! The tables: their version, what brings an older one up to it, and partitions by time, as PostgreSQL or TimescaleDB makes them.
 
 use super::database::DatabaseError;
-use crate::log::{Notice, Severity};
-use crate::nats::NatsError;
+use gateway_base::log::{Notice, Severity};
+use gateway_nats::NatsError;
 use jiff::{Span, Timestamp, civil::Date, tz::TimeZone};
 use std::collections::BTreeSet;
 use tokio_postgres::{Client, Transaction};

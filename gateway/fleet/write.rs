@@ -7,7 +7,7 @@ use super::means::{self, MeanRows};
 use super::names::Names;
 use super::row::FleetRow;
 use super::schema::{self, Partition, Partitioning};
-use crate::nats::NatsError;
+use gateway_nats::NatsError;
 use std::collections::BTreeSet;
 use tokio_postgres::error::SqlState;
 use tokio_postgres::{Client, Transaction};

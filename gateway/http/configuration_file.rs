@@ -13,14 +13,14 @@ use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::run_blocking;
-use crate::access::Role;
-use crate::config::{self, Config, Problem};
-use crate::drafts::digest_of;
-use crate::files::{advise_on_read_error, read_text, replace_durably};
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use axum::routing::{get, post, put};
+use gateway_access::Role;
+use gateway_base::files::{advise_on_read_error, read_text, replace_durably};
+use gateway_config::{self as config, Config, Problem};
+use gateway_scripts::drafts::digest_of;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -226,7 +226,7 @@ async fn serve_address_findings(
     let place = shared.doctor.clone().try_acquire_owned().map_err(|_| busy())?;
     let report = run_blocking(move || {
         let _place = place;
-        crate::doctor::examine_text(&asked.address)
+        gateway_sources::doctor::examine_text(&asked.address)
             .map_err(|error| ApiProblem::bad_request(error.to_string(), "look at the address"))
     });
     let report = report.await?;

@@ -9,15 +9,15 @@ use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
-use crate::access::Role;
-use crate::diagnosis::handle::{DiagnosisHandle, DiagnosisRefusal, Run};
-use crate::diagnosis::store::{DiagnosisFile, is_key};
 use adapters::clock::SECOND_NS;
 use axum::Json;
 use axum::extract::{Path, Query as Pairs, State};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use axum::routing::{delete, get, post};
+use gateway_access::Role;
+use gateway_diagnosis::handle::{DiagnosisHandle, DiagnosisRefusal, Run};
+use gateway_diagnosis::store::{DiagnosisFile, is_key};
 use rules::physics::explain::Language;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -111,8 +111,11 @@ async fn begin_diagnosis(
         .require_diagnoses()?
         .request_diagnosis(Some(person.name), from_ns, to_ns)
         .map_err(describe_diagnosis_refusal)?;
-    let words =
-        format!("a diagnosis of {} to {}", crate::moment::format_utc(from_ns), crate::moment::format_utc(to_ns));
+    let words = format!(
+        "a diagnosis of {} to {}",
+        gateway_base::moment::format_utc(from_ns),
+        gateway_base::moment::format_utc(to_ns)
+    );
     Ok(with_audit_note(Json(json!({ "schema": "diagnosis-run/1", "state": "running" })), words))
 }
 

@@ -6,12 +6,12 @@ use super::peer::Peer;
 use super::person::{SignedIn, find_cookie, name_of_cookie};
 use super::problem::ApiProblem;
 use super::route::{Needs, Route};
-use crate::access::{Person, Role, SignInError, Token, Urgency};
 use axum::body::Body;
 use axum::extract::{Form, FromRequest, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Redirect, Response};
+use gateway_access::{Person, Role, SignInError, Token, Urgency};
 use serde::Deserialize;
 use std::time::Duration;
 use thiserror::Error;
@@ -169,7 +169,7 @@ struct NameAndToken {
 /// Why nobody was recognised.
 pub(super) fn describe_sign_in_error(error: &SignInError) -> ApiProblem {
     match error {
-        SignInError::Wrong(0) => ApiProblem::too_many(crate::access::LOCKED_FOR),
+        SignInError::Wrong(0) => ApiProblem::too_many(gateway_access::LOCKED_FOR),
         SignInError::Wrong(left) => ApiProblem::unauthorised(
             "name or token is wrong",
             format!("{left} tries are left; an administrator gives a new token with `cnc-gateway person token NAME`"),

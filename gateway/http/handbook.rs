@@ -2,11 +2,11 @@
 
 use super::problem::ApiProblem;
 use super::route::Route;
-use crate::handbook::{CHAPTERS, Chapter};
 use axum::extract::{Path, Query};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use gateway_handbook::{CHAPTERS, Chapter};
 use rules::physics::explain::Language;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -28,7 +28,7 @@ async fn serve_chapter(Path(name): Path<String>, Query(asked): Query<ChapterQuer
         let list: Vec<Value> = CHAPTERS.iter().map(row).collect();
         return axum::Json(json!({ "schema": "handbook/1", "chapters": list })).into_response();
     }
-    match crate::handbook::find_chapter(&name) {
+    match gateway_handbook::find_chapter(&name) {
         Some(chapter) => {
             ([(header::CONTENT_TYPE, "text/markdown; charset=utf-8")], chapter.text_in(language)).into_response()
         }

@@ -7,7 +7,7 @@ use axum::response::{IntoResponse, Response};
 use std::fmt::Write;
 use tower_http::set_header::SetResponseHeaderLayer;
 
-use crate::access::TokenError;
+use gateway_access::TokenError;
 
 /// The policy without a nonce. Nothing inline is allowed, neither script nor style.
 pub(super) const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; font-src 'self'; \
@@ -76,7 +76,7 @@ fn without_style_attributes(html: &str) -> (String, String) {
 }
 
 fn create_nonce() -> Result<String, TokenError> {
-    Ok(crate::access::random_bytes::<16>()?.iter().fold(String::with_capacity(32), |mut hex, byte| {
+    Ok(gateway_access::random_bytes::<16>()?.iter().fold(String::with_capacity(32), |mut hex, byte| {
         let _infallible = write!(hex, "{byte:02x}");
         hex
     }))

@@ -4,13 +4,14 @@ use super::ServerState;
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
-use crate::history::{HistoryError, Query, Reader, audit_document};
 use crate::records::{RecordKind, RecordQuery, build_document, read_records};
-use crate::{moment, samples};
+use crate::samples;
 use adapters::clock::{SECOND_NS, TimeNs};
 use axum::Json;
 use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
+use gateway_base::moment;
+use gateway_history::{HistoryError, Query, Reader, audit_document};
 use serde_json::{Value, json};
 use std::time::Duration;
 

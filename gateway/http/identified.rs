@@ -1,16 +1,16 @@
 //! `GET /api/v1/identified/{subject}`: what `identify tool-wear` and `identify thermal` have found, for the tables beside the figures.
 //!
-//! `identify` and `commission --write` keep these answers: see [`crate::identified`].
+//! `identify` and `commission --write` keep these answers: see [`gateway_commission::identified`].
 
 use super::ServerState;
 use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::run_blocking;
-use crate::files::read_text;
-use crate::identified::{SUBJECTS, answer_path};
 use axum::Json;
 use axum::extract::{Path, State};
 use axum::routing::get;
+use gateway_base::files::read_text;
+use gateway_commission::identified::{SUBJECTS, answer_path};
 use serde_json::{Value, json};
 
 /// Such a document is some ten kilobytes.

@@ -9,17 +9,17 @@ use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::run_blocking;
-use crate::access::Role;
-use crate::archive::{ArchivedFile, pack, unpack};
-use crate::backup::{self, BackupPaths, RestoreError, RestoreRequest, archive_name};
-use crate::config::{Config, GateMode};
-use crate::convert::seconds_to_instant;
-use crate::history::{Reader, RecordSpan, audit_document};
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::response::Response;
 use axum::routing::{get, post};
+use gateway_access::Role;
+use gateway_backup::archive::{ArchivedFile, pack, unpack};
+use gateway_backup::{self as backup, BackupPaths, RestoreError, RestoreRequest, archive_name};
+use gateway_base::convert::seconds_to_instant;
+use gateway_config::{Config, GateMode};
+use gateway_history::{Reader, RecordSpan, audit_document};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -100,7 +100,7 @@ async fn examine_source(
     let place = shared.doctor.clone().try_acquire_owned().map_err(|_| busy())?;
     let report = run_blocking(move || {
         let _place = place;
-        crate::doctor::examine_address(&address)
+        gateway_sources::doctor::examine_address(&address)
             .map_err(|error| ApiProblem::conflict(error.to_string(), "look at the address"))
     });
     let report = report.await?;

@@ -4,14 +4,14 @@
 use super::ServerState;
 use super::problem::ApiProblem;
 use super::route::Route;
-use crate::alignment::AlignmentStatus;
-use crate::sinks::SinkStatus;
-use crate::status::{NumberOrWord, Status};
 use adapters::histogram::Histogram;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
+use gateway_sinks::SinkStatus;
+use gateway_status::alignment::AlignmentStatus;
+use gateway_status::{NumberOrWord, Status};
 use std::fmt::Write;
 
 /// Our unit suffix, the base unit of Prometheus, and the factor to it.
@@ -122,7 +122,7 @@ fn write_quantities(page: &mut Page, status: &Status) {
 
 #[expect(clippy::cast_precision_loss, reason = "a counter beyond 2^53 may lose its last digit")]
 fn write_sources(page: &mut Page, status: &Status) {
-    let each = |value: fn(&crate::status::SourceStatus) -> Option<f64>| {
+    let each = |value: fn(&gateway_status::SourceStatus) -> Option<f64>| {
         status
             .sources
             .iter()
@@ -264,10 +264,10 @@ fn write_process(page: &mut Page, status: &Status) {
     page.write_counter(
         "cncgw_log_lines_dropped_total",
         "Lines for standard output and standard error left out because nobody read them",
-        crate::log::count_dropped_lines(),
+        gateway_base::log::count_dropped_lines(),
     );
     page.write_gauge("cncgw_problems", "Things that do not work while the box goes on", status.problems.len() as f64);
-    if let Some(usage) = crate::usage::read() {
+    if let Some(usage) = gateway_base::usage::read() {
         page.write_gauge("process_resident_memory_bytes", "Resident memory", usage.resident_bytes as f64);
         page.write_family("process_cpu_seconds_total", "counter", "Processor time", [(String::new(), usage.cpu_s)]);
     }

@@ -8,13 +8,13 @@ use super::person::{JsonBody, SignedIn};
 use super::plain;
 use super::problem::ApiProblem;
 use super::route::Route;
-use crate::access::{Person, Role, Token, Urgency};
-use crate::control::{Order, Reply};
 use axum::Json;
 use axum::extract::{Extension, State};
 use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::post;
+use gateway_access::{Person, Role, Token, Urgency};
+use gateway_control::{Order, Reply};
 use serde::Deserialize;
 use serde_json::json;
 

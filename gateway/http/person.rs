@@ -2,10 +2,10 @@
 
 use super::peer::Peer;
 use super::problem::ApiProblem;
-use crate::access::Person;
 use axum::extract::{FromRequest, FromRequestParts, OptionalFromRequestParts, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, header};
+use gateway_access::Person;
 use serde::de::DeserializeOwned;
 use std::convert::Infallible;
 

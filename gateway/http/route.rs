@@ -6,9 +6,9 @@
 //! alone, whatever handler it was given.
 
 use super::ServerState;
-use crate::access::{Role, Urgency};
 use axum::http::Method;
 use axum::routing::MethodRouter;
+use gateway_access::{Role, Urgency};
 
 /// The method of a route.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -1,7 +1,7 @@
 //! The listening socket: bound before anything else starts when the user asked for it, retried otherwise.
 
 use super::{Certificate, ServerState, build_router, connection};
-use crate::log::{Notice, Severity};
+use gateway_base::log::{Notice, Severity};
 use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::net::TcpListener;

@@ -4,12 +4,12 @@ use super::ServerState;
 use super::history::{Answer, HistoryQuery, describe_history_error, read_history};
 use super::query::QueryKeys;
 use super::route::Route;
-use crate::diagnosis::beside::BesideModel;
-use crate::diagnosis::store::{self, DiagnosisFile, DiagnosisStore};
-use crate::history::{Diagnosis, RecordSpan};
 use adapters::clock::TimeNs;
 use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
+use gateway_diagnosis::beside::BesideModel;
+use gateway_diagnosis::store::{self, DiagnosisFile, DiagnosisStore};
+use gateway_history::{Diagnosis, RecordSpan};
 use serde_json::{Value, json};
 
 /// Diagnoses told when nobody says otherwise.

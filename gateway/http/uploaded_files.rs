@@ -8,10 +8,6 @@ use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
 use super::rules::run_blocking;
-use crate::access::Role;
-use crate::diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis};
-use crate::diagnosis::map_file::{MapProposal, ProposedColumn};
-use crate::diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
 use crate::gallery;
 use adapters::bilingual::Bilingual;
 use adapters::channel::CHANNELS;
@@ -23,6 +19,10 @@ use axum::body::Bytes;
 use axum::extract::{Path, Query as Pairs, State};
 use axum::response::Response;
 use axum::routing::{delete, get, post, put};
+use gateway_access::Role;
+use gateway_diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis};
+use gateway_diagnosis::map_file::{MapProposal, ProposedColumn};
+use gateway_diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
 use rules::twin::format_toml_text;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -88,7 +88,7 @@ fn result_document(files: &FileDiagnoses, result: &FileDiagnosis) -> Value {
     let has_model = files
         .handle()
         .diagnosis_store()
-        .read_file(&result.key, crate::diagnosis::store::DiagnosisFile::Model)
+        .read_file(&result.key, gateway_diagnosis::store::DiagnosisFile::Model)
         .is_some();
     json!({
         "key": result.key, "file": result.file, "by": result.by, "at_ms": result.at_ms, "from_ms": result.at_ms, "to_ms": result.at_ms,
@@ -334,7 +334,7 @@ fn model_text(shared: &ServerState, asked: &FileDiagnosisRequest) -> Result<Stri
     if asked.active_model {
         let none = || ApiProblem::conflict("no simulation runs beside this machine", "choose a kind of machine");
         let path = shared.diagnoses.as_ref().ok_or_else(none)?.model_path().to_owned();
-        return crate::files::read_text(&path, 4 << 20).map_err(describe_io_error);
+        return gateway_base::files::read_text(&path, 4 << 20).map_err(describe_io_error);
     }
     let Some(kind) = asked.kind.filter(|kind| *kind != ModelKind::Series) else { return Ok(String::new()) };
     let filled = |text: &Option<String>| text.clone().filter(|text| !text.is_empty());

@@ -5,11 +5,11 @@ use super::history::{Answer, HistoryQuery, describe_history_error, parse_range, 
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
-use crate::history::{Reader, RecordSpan, StateHour};
-use crate::moment::time_of_day;
 use adapters::clock::{SECOND_NS, TimeNs};
 use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
+use gateway_base::moment::time_of_day;
+use gateway_history::{Reader, RecordSpan, StateHour};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 

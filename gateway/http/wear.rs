@@ -4,9 +4,9 @@ use super::ServerState;
 use super::history::{Answer, HistoryQuery, describe_history_error, read_history};
 use super::query::QueryKeys;
 use super::route::Route;
-use crate::history::StoredWearModel;
 use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
+use gateway_history::StoredWearModel;
 use rules::estimators::wear::WearModel;
 use serde_json::{Value, json};
 

@@ -1,8 +1,8 @@
 //! What the scripts decided, as records: alarms raised and cleared, notes, and every change of what they ask for.
 
-use crate::gate::Verdict;
-use crate::history::{Alarm, AlarmClear, Decision as DecisionRow, Event, Record};
 use adapters::clock::TimeNs;
+use gateway_gate::Verdict;
+use gateway_history::{Alarm, AlarmClear, Decision as DecisionRow, Event, Record};
 use rules::script::{AlarmChange, Axis, Decision, OffsetProposal, OverrideRequest, Stop, StopRequest};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -191,7 +191,7 @@ mod tests {
 
     fn verdict(at_ns: TimeNs) -> Verdict {
         let permitted = adapters::units::OverridePct::FULL;
-        Verdict { at_ns, wanted_pct: None, permitted, outcome: crate::gate::GateOutcome::Permitted, armed: false }
+        Verdict { at_ns, wanted_pct: None, permitted, outcome: gateway_gate::GateOutcome::Permitted, armed: false }
     }
 
     #[test]

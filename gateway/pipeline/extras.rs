@@ -4,7 +4,7 @@
 //! An estimate that is known to within watts has no tenths of a watt; a standard deviation is known to within a tenth of itself.
 //! Digits beyond that are noise, which no compression takes away: they were a third of the bytes of a tick.
 
-use crate::history::{ExtraSeries, ExtraValue, STATE_SERIES};
+use gateway_history::{ExtraSeries, ExtraValue, STATE_SERIES};
 use rules::estimators::{Estimated, Estimates, NoEstimate};
 use rules::script::Host;
 

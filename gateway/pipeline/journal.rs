@@ -1,9 +1,9 @@
 //! What changed from one tick to the next, as records: the state, and the alarm that the controller shows.
 
 use super::channels::Channels;
-use crate::history::{Alarm, AlarmClear, Record, StateChange};
 use adapters::Sample;
 use adapters::clock::TimeNs;
+use gateway_history::{Alarm, AlarmClear, Record, StateChange};
 use rules::estimators::wear::tool_of;
 use rules::estimators::{Estimates, State};
 use std::sync::Arc;

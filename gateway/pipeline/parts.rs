@@ -2,9 +2,9 @@
 
 use super::channels::Channels;
 use super::part_detail::Gathering;
-use crate::history::Part;
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_history::Part;
 use rules::estimators::{Estimates, NoEstimate, PartFigures, State};
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! What the follower of the wear tells once, as a notice for the log and the history.
 
-use crate::log::{Notice, Severity};
+use gateway_base::log::{Notice, Severity};
 use rules::estimators::wear::WearNews;
 
 pub(super) fn describe_news(news: &WearNews) -> Notice {

@@ -1,8 +1,8 @@
 //! Which of the alarms that stand a person has seen. To have seen one changes nothing about it: it stands until its reason has
 //! gone, and when it comes again it has not been seen.
 
-use crate::status::{Acknowledged, AlarmStatus};
 use adapters::clock::TimeNs;
+use gateway_status::{Acknowledged, AlarmStatus};
 
 /// See the [module](self).
 #[derive(Debug, Default)]

@@ -7,11 +7,11 @@
 
 use super::priority::{self, Granted};
 use super::verdict_mailbox::VerdictMailbox;
-use crate::config;
-use crate::gate::offset::{Moved, OffsetAccount, OffsetOrder};
-use crate::gate::{Fault, OverrideWriter, Reaction, ScriptRequest, Verdict, WriteRecord};
 use adapters::Actuator;
 use adapters::clock::{Clock, ManualClock, TimeNs};
+use gateway_config as config;
+use gateway_gate::offset::{Moved, OffsetAccount, OffsetOrder};
+use gateway_gate::{Fault, OverrideWriter, Reaction, ScriptRequest, Verdict, WriteRecord};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::JoinHandle;

@@ -1,12 +1,12 @@
 //! Before a run: which time it is, and which rows were dated wrongly.
 
 use super::RunPlan;
-use super::open::MachineSpeed;
-use crate::clock::{self, Certain, ClockMark, ClockRules, Trust, format_span, of_box};
-use crate::history::{self, Reader, Redated};
-use crate::log::{Notice, Severity};
-use crate::moment;
 use adapters::clock::Clock;
+use gateway_base::clock::{self, Certain, ClockMark, ClockRules, Trust, format_span, of_box};
+use gateway_base::log::{Notice, Severity};
+use gateway_base::moment;
+use gateway_history::{self as history, Reader, Redated};
+use gateway_sources::open::MachineSpeed;
 use std::path::Path;
 
 /// By which clock a run begins, and what there is to tell about it.

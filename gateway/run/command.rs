@@ -7,18 +7,18 @@ use super::health::Health;
 use super::network_requests::{self, NetworkRequests};
 use super::offset_commands::{self, OffsetCommands};
 use super::report::to_milliseconds;
-use crate::config::{self, GateMode};
-use crate::control::{
-    self, NetworkRequest, OrderReceiver, PostedRequest, PostedRow, QueuedOrder, Reply, RequestedChange,
-};
-use crate::gate::offset::{Moved, OffsetOrder};
-use crate::gate::{ArmError, Armed, AskOutcome, Disarmed, Fault, Gate, Occasion, ScriptRequest, Verdict, audit};
-use crate::history::{Alarm, AlarmClear, Audit, ReactionTime};
-use crate::log::{Notice, Severity};
-use crate::pipeline::Pipeline;
-use crate::status::{Acknowledged, AlarmStatus, StatusProblem};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
+use gateway_base::log::{Notice, Severity};
+use gateway_config::{self as config, GateMode};
+use gateway_control::{
+    self as control, NetworkRequest, OrderReceiver, PostedRequest, PostedRow, QueuedOrder, Reply, RequestedChange,
+};
+use gateway_gate::offset::{Moved, OffsetOrder};
+use gateway_gate::{ArmError, Armed, AskOutcome, Disarmed, Fault, Gate, Occasion, ScriptRequest, Verdict, audit};
+use gateway_history::{Alarm, AlarmClear, Audit, ReactionTime};
+use gateway_pipeline::Pipeline;
+use gateway_status::{Acknowledged, AlarmStatus, StatusProblem};
 use rules::estimators::StateBasis;
 use rules::script::OverrideRequest;
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! What the gateway knows and `rules` must not: how long a run of a script has lasted.
 
-use crate::convert::duration_to_unsigned_ns;
+use gateway_base::convert::duration_to_unsigned_ns;
 use rules::script::Deadline;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

@@ -2,9 +2,9 @@
 
 use super::outputs::ConfiguredSinks;
 use super::tick::RunFlags;
-use crate::http::Published;
-use crate::log::{Notice, Severity};
 use crate::signals::{SignalRequest, Signals};
+use gateway_base::log::{Notice, Severity};
+use gateway_http::Published;
 use std::sync::atomic::Ordering;
 use tokio::sync::watch;
 

@@ -3,18 +3,18 @@
 
 use super::history_store::HistoryStore;
 use super::problems::{clock_problem, describe_clock_offset, problems_of_disk, problems_of_history};
-use super::sample_feed::{SampleFeed, SourcePace};
 use super::save::Saver;
 use super::service_manager::{ProgressMarks, WatchedService};
-use crate::alignment::{self, Alignment};
-use crate::clock::{BoxClock, ClockNews};
-use crate::history::{Audit, ExtraValue, Record};
-use crate::log::{Notice, Severity};
-use crate::pipeline::{Pipeline, Store, event_of};
-use crate::status::{ClockStatus, HistoryStatus, SourceStatus, StatusProblem};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::worker::WorkerState;
+use gateway_base::clock::{BoxClock, ClockNews};
+use gateway_base::log::{Notice, Severity};
+use gateway_history::{Audit, ExtraValue, Record};
+use gateway_pipeline::{Pipeline, Store, event_of};
+use gateway_sources::sample_feed::{SampleFeed, SourcePace};
+use gateway_status::alignment::{self, Alignment};
+use gateway_status::{ClockStatus, HistoryStatus, SourceStatus, StatusProblem};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};

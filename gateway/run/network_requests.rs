@@ -1,10 +1,10 @@
 //! What the network asks of the gate, at the tick: each request is one row of the audit, and a feed override stands for a
 //! limited time as if a script asked for it at every tick. The gate judges it like one.
 
-use crate::control::{NetworkRequest, Reply, RequestedChange};
-use crate::gate::audit;
-use crate::history::Audit;
 use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_control::{NetworkRequest, Reply, RequestedChange};
+use gateway_gate::audit;
+use gateway_history::Audit;
 use rules::script::OverrideRequest;
 
 /// A feed override stands for so long after it was asked for; whoever wants it to stay asks again before. Longer, and a machine
@@ -76,7 +76,7 @@ pub fn build_audit_row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::RequestRefusal;
+    use gateway_control::RequestRefusal;
 
     fn change(pct: f64) -> RequestedChange {
         RequestedChange::feed_override(pct, "").expect("allowed")

@@ -1,14 +1,14 @@
 //! Thermal offsets on their way to the control and into the history, and what is left in the controls when the gateway ends.
 
 use super::health::Health;
-use crate::cannot_run::CannotRun;
-use crate::gate::offset::{Moved, OffsetAccount, OffsetJournal, OffsetOrder, OffsetTrail};
-use crate::gate::{Gate, OffsetVerdict};
-use crate::history::{Audit, Command};
-use crate::log::{Notice, Severity};
-use crate::status::StatusProblem;
 use adapters::SourceError;
 use adapters::offset::{Axis, Left, OffsetSink};
+use gateway_base::cannot_run::CannotRun;
+use gateway_base::log::{Notice, Severity};
+use gateway_gate::offset::{Moved, OffsetAccount, OffsetJournal, OffsetOrder, OffsetTrail};
+use gateway_gate::{Gate, OffsetVerdict};
+use gateway_history::{Audit, Command};
+use gateway_status::StatusProblem;
 use rules::script::OffsetProposal;
 use std::path::{Path, PathBuf};
 

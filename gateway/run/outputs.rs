@@ -1,9 +1,9 @@
 //! The sinks of a running box: what they need to begin, and where they tell how they are.
 
-use crate::config::{self, Config};
-use crate::control::OrderSender;
-use crate::history::Outbox;
-use crate::sinks::{self, Board, Sinks};
+use gateway_config::{self as config, Config};
+use gateway_control::OrderSender;
+use gateway_history::Outbox;
+use gateway_sinks::{self as sinks, Board, Sinks};
 use std::path::PathBuf;
 
 /// Sinks that are configured.

@@ -1,11 +1,11 @@
 //! What is wrong with clock and files, in words for the status.
 
 use super::history_store::upkeep::{LOG_TOLD_BYTES, long_log};
-use crate::access;
-use crate::clock::{Trust, format_span};
-use crate::learned;
-use crate::status::{ClockStatus, HistoryStatus, StatusProblem};
 use adapters::clock::SECOND_NS;
+use gateway_access as access;
+use gateway_base::clock::{Trust, format_span};
+use gateway_base::learned;
+use gateway_status::{ClockStatus, HistoryStatus, StatusProblem};
 use std::path::Path;
 
 /// What the disk has changed, and nobody has looked at yet. Reads the directory.

@@ -5,9 +5,9 @@
 //! the system at once, by a thread of its own; the system keeps it however the process ends. Against a power cut only the
 //! history helps.
 
-use crate::files::replace_file;
-use crate::history::{Audit, Reader, Writer};
 use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_base::files::replace_file;
+use gateway_history::{Audit, Reader, Writer};
 use std::collections::VecDeque;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -147,8 +147,8 @@ fn find_missing_rows(history: &Path) -> Option<Vec<Audit>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::Options;
     use adapters::Sample;
+    use gateway_history::Options;
 
     fn row(at_s: i64, asked: f64) -> Audit {
         let (kind, outcome) = ("write".to_owned(), "written".to_owned());

@@ -1,15 +1,15 @@
 //! From the pipeline's figures to the status document.
 
-use crate::config::GateMode;
-use crate::gate::{Gate, GateOutcome, Verdict};
-use crate::http::ESTIMATES;
-use crate::pipeline::Pipeline;
-use crate::status::{
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::{Axis, Sample, Slot, Value};
+use gateway_config::GateMode;
+use gateway_gate::{Gate, GateOutcome, Verdict};
+use gateway_http::ESTIMATES;
+use gateway_pipeline::Pipeline;
+use gateway_status::{
     AlarmStatus, AxisShift, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, NumberOrWord, OffsetStatus,
     ScriptStatus, StateStatus,
 };
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::{Axis, Sample, Slot, Value};
 use rules::estimators::{Estimated, Estimates, NoEstimate};
 
 /// Half the 95 % interval of a normal distribution, in standard deviations.

@@ -1,9 +1,9 @@
 //! What the estimators knew before the box was last stopped: read from files of the data directory, told where one cannot be used.
 
-use crate::learned;
-use crate::log::{Notice, Severity};
-use crate::pipeline::Pipeline;
 use ::rules::estimators;
+use gateway_base::learned;
+use gateway_base::log::{Notice, Severity};
+use gateway_pipeline::Pipeline;
 use std::path::Path;
 
 /// The wear of the edges, as it was known before.

@@ -2,14 +2,14 @@
 
 use super::health::{Health, SCRIPTS_MEMORY};
 use super::tick::RunFlags;
-use crate::active_scripts;
-use crate::config::Config;
-use crate::learned;
-use crate::log::{Notice, Severity};
-use crate::pipeline::Pipeline;
-use crate::reload::{Fallback, Reloaded, Reloader, load_now, load_rest, write_shipped_scripts};
-use crate::settings;
 use adapters::clock::TimeNs;
+use gateway_base::learned;
+use gateway_base::log::{Notice, Severity};
+use gateway_config::Config;
+use gateway_pipeline::Pipeline;
+use gateway_scripts::active_scripts;
+use gateway_scripts::reload::{Fallback, Reloaded, Reloader, load_now, load_rest, write_shipped_scripts};
+use gateway_scripts::settings;
 use rules::script::{Host, ScriptProblem, SettingValues, list_shipped_scripts};
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! What the box has learned goes to disk beside the tick, so that a slow disk never delays a write to the machine.
 
-use crate::files::replace_file;
-use crate::learned;
+use gateway_base::files::replace_file;
+use gateway_base::learned;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;

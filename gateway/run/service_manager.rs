@@ -5,9 +5,9 @@
 //! that is off do not stop them: those are told, and starting again would not mend them. A thread that hangs does; then the
 //! service manager ends the process after its own limit (`WatchdogSec`) and starts it again.
 
-use crate::convert::duration_to_ms;
-use crate::log::{Notice, Severity};
 use crate::update::{WELL_FOR, confirm_running_version};
+use gateway_base::convert::duration_to_ms;
+use gateway_base::log::{Notice, Severity};
 use sd_notify::NotifyState;
 use std::path::PathBuf;
 use std::sync::Arc;

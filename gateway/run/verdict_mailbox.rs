@@ -5,9 +5,9 @@
 //! therefore wakes by itself shortly before the next verdict is due, and looks for it until it is there. A thread of ordinary
 //! priority that looked would have used up its turn when the verdict comes.
 
-use super::pace::{LEAD, LEAD_PERIOD_MIN};
-use crate::gate::offset::OffsetOrder;
-use crate::gate::{ScriptRequest, Verdict};
+use gateway_gate::offset::OffsetOrder;
+use gateway_gate::{ScriptRequest, Verdict};
+use gateway_sources::pace::{LEAD, LEAD_PERIOD_MIN};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};

@@ -4,13 +4,13 @@ use super::RunPlan;
 use super::actuator_worker::{ActuatorWorker, Tools};
 use super::command::Commands;
 use super::offset_commands::OffsetCommands;
-use super::open::{self, MachineSpeed, Way};
-use crate::cannot_run::CannotRun;
-use crate::config::{self, GateMode};
-use crate::control::OrderReceiver;
-use crate::gate::Gate;
 use adapters::clock::Clock;
 use adapters::{Actuator, OffsetSink};
+use gateway_base::cannot_run::CannotRun;
+use gateway_config::{self as config, GateMode};
+use gateway_control::OrderReceiver;
+use gateway_gate::Gate;
+use gateway_sources::open::{self, MachineSpeed, Way};
 use std::sync::Arc;
 
 /// The ways to the feed override and to the offsets, where they may be written.

@@ -1,8 +1,8 @@
 //! `[backup]`: backups that the box takes by itself.
 
 use super::{find_flag, find_number, find_text};
-use crate::config::BackupConfig;
-use crate::config::read::{ConfigInput, Origin};
+use crate::BackupConfig;
+use crate::read::{ConfigInput, Origin};
 use std::path::Path;
 use std::time::Duration;
 

@@ -1,8 +1,8 @@
 //! `[http]`: what is served, and what a page that other computers reach must have.
 
 use super::{find_flag, find_seconds, find_text};
-use crate::config::HttpConfig;
-use crate::config::read::{ConfigInput, Origin};
+use crate::HttpConfig;
+use crate::read::{ConfigInput, Origin};
 use std::net::SocketAddr;
 use std::path::Path;
 
@@ -35,7 +35,7 @@ const SHIFTS_MAX: usize = 12;
 /// are none, or more than twelve.
 fn parse_shifts(text: &str) -> Option<Vec<i64>> {
     let words = text.split([' ', ',']).filter(|word| !word.is_empty());
-    let mut starts: Vec<i64> = words.map(crate::moment::time_of_day).collect::<Option<_>>()?;
+    let mut starts: Vec<i64> = words.map(gateway_base::moment::time_of_day).collect::<Option<_>>()?;
     starts.sort_unstable();
     starts.dedup();
     (1..=SHIFTS_MAX).contains(&starts.len()).then_some(starts)

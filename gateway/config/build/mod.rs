@@ -11,10 +11,10 @@ use super::{
     AlignmentConfig, AlignmentUse, Config, GateConfig, GateMode, GatewayConfig, HistoryConfig, LogConfig, OffsetConfig,
     OperationsConfig, ScriptsConfig, SourceConfig, TwinConfig, channels,
 };
-use crate::log::LogFormat;
 use adapters::Axis;
 use adapters::address::{Target, WriteMethod};
 use adapters::channel::find_nearest_name;
+use gateway_base::log::LogFormat;
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -1,8 +1,8 @@
 //! `[thermal]`.
 
 use super::{find_flag, find_number, find_text};
-use crate::config::ThermalConfig;
-use crate::config::read::ConfigInput;
+use crate::ThermalConfig;
+use crate::read::ConfigInput;
 use adapters::Axis;
 use rules::estimators::thermal::CompensationSettings;
 use std::path::Path;

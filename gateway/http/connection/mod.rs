@@ -21,8 +21,8 @@ mod tls;
 pub use tls::{Certificate, CertificateError};
 
 use super::ApiProblem;
-use crate::convert::clamp_to_length;
 use axum::Router;
+use gateway_base::convert::clamp_to_length;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use std::io::Write;
 use std::sync::Arc;

@@ -1,6 +1,6 @@
 //! Which connections there are, what each is doing, and which one has to go for another.
 
-use crate::convert::duration_to_ms;
+use gateway_base::convert::duration_to_ms;
 use std::collections::HashMap;
 use std::net::IpAddr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

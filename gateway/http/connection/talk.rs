@@ -3,8 +3,8 @@
 use super::format_response;
 use super::paced::Paced;
 use super::table::{ConnectionActivity, ConnectionEntry, Waits};
-use crate::http::ApiProblem;
-use crate::http::peer::Peer;
+use crate::ApiProblem;
+use crate::peer::Peer;
 use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::http::{Request, Response};

@@ -4,9 +4,9 @@
 //! fingerprint that is told at every start is what to compare then. It lasts for 825 days, the longest that every browser
 //! takes, and is made anew at a start in its last 60 days.
 
-use crate::clock::{self, Trust};
-use crate::files;
 use adapters::clock::{Clock, TimeNs};
+use gateway_base::clock::{self, Trust};
+use gateway_base::files;
 use rcgen::{CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, KeyPair, date_time_ymd};
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
@@ -96,7 +96,7 @@ impl Certificate {
         Self::read(&certificate, &key)
     }
 
-    pub(in crate::http) fn acceptor(&self) -> TlsAcceptor {
+    pub(crate) fn acceptor(&self) -> TlsAcceptor {
         self.acceptor.clone()
     }
 }

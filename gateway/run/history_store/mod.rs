@@ -3,17 +3,17 @@
 pub(super) mod upkeep;
 
 use super::recent::{self, Recent};
-use crate::clock::{ClockMark, Trust};
-use crate::config;
-use crate::history::{
-    self, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Outbox, Reader, Record, RecordSpan,
-    Retention, Writer, disk_room,
-};
-use crate::log::{Notice, Severity};
-use crate::pipeline::Store;
-use crate::status::HistoryStatus;
 use adapters::Sample;
 use adapters::clock::TimeNs;
+use gateway_base::clock::{ClockMark, Trust};
+use gateway_base::log::{Notice, Severity};
+use gateway_config as config;
+use gateway_history::{
+    self as history, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Outbox, Reader, Record,
+    RecordSpan, Retention, Writer, disk_room,
+};
+use gateway_pipeline::Store;
+use gateway_status::HistoryStatus;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -254,7 +254,7 @@ impl HistoryStore {
 }
 
 impl Store for HistoryStore {
-    fn store_sample(&mut self, sample: &Sample, extras: &[crate::history::ExtraValue<'_>]) {
+    fn store_sample(&mut self, sample: &Sample, extras: &[gateway_history::ExtraValue<'_>]) {
         self.first_ns.get_or_insert(sample.at_ns);
         self.last_ns = sample.at_ns;
         match &self.writer {

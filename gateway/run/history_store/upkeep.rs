@@ -1,15 +1,15 @@
 //! What befalls the file of the history while the box runs: it is gone, another one, damaged, or its log does not end.
 
 use super::{HistoryStore, read_identity};
-use crate::clock;
-use crate::history::{self, Aside, Audit, Event, HistoryError};
-use crate::log::{Notice, Severity};
+use gateway_base::clock;
+use gateway_base::log::{Notice, Severity};
+use gateway_history::{self as history, Aside, Audit, Event, HistoryError};
 
 /// A log of this length is told: three times what it has otherwise.
-pub(in crate::run) const LOG_TOLD_BYTES: u64 = 12_000_000;
+pub(crate) const LOG_TOLD_BYTES: u64 = 12_000_000;
 
 /// What a long log means.
-pub(in crate::run) fn long_log(bytes: u64) -> String {
+pub(crate) fn long_log(bytes: u64) -> String {
     format!(
         "somebody reads the history and does not end: the log beside it has grown to {:.1} MB and goes on growing until that \
          reader ends its transaction",

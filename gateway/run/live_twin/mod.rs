@@ -4,17 +4,17 @@
 mod shown;
 
 use super::health::Health;
-use crate::config::Config;
-use crate::diagnosis::handle::DiagnosisHandle;
-use crate::diagnosis::store::DiagnosisStore;
-use crate::diagnosis::words;
-use crate::diagnosis::worker::{self, Finished, LoadedModel, Worker, WorkerPaths, WorkerReport};
-use crate::history::{self, Alarm, AlarmClear, ExtraSeries, ExtraValue};
-use crate::learned;
-use crate::log::{Notice, Severity};
-use crate::pipeline::Pipeline;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
+use gateway_base::learned;
+use gateway_base::log::{Notice, Severity};
+use gateway_config::Config;
+use gateway_diagnosis::handle::DiagnosisHandle;
+use gateway_diagnosis::store::DiagnosisStore;
+use gateway_diagnosis::words;
+use gateway_diagnosis::worker::{self, Finished, LoadedModel, Worker, WorkerPaths, WorkerReport};
+use gateway_history::{self as history, Alarm, AlarmClear, ExtraSeries, ExtraValue};
+use gateway_pipeline::Pipeline;
 use rules::twin::diagnosis::find_output_unit;
 use rules::twin::live::{self, ComparedSecond, Live, Mismatch, Regime, RegimeStage};
 use serde::{Deserialize, Serialize};

@@ -1,10 +1,10 @@
 //! The twin in the status document: differences that stand, what is compared, what was found.
 
 use super::{Twin, alarm_code};
-use crate::diagnosis::status::{DiagnosisStatus, RegimeStatus, TwinStatus};
-use crate::diagnosis::words;
-use crate::diagnosis::worker::Finished;
-use crate::status::AlarmStatus;
+use gateway_diagnosis::status::{DiagnosisStatus, RegimeStatus, TwinStatus};
+use gateway_diagnosis::words;
+use gateway_diagnosis::worker::Finished;
+use gateway_status::AlarmStatus;
 use rules::twin::live::{self, ComparedSecond, Live, Mismatch, Regime, RegimeStage};
 
 impl Twin {

@@ -9,7 +9,7 @@
 #[cfg(target_os = "linux")]
 mod ffi;
 
-use crate::log::{Notice, Severity};
+use gateway_base::log::{Notice, Severity};
 use std::fmt;
 
 /// Below the kernel's own threads (50) and above everything ordinary.

@@ -8,13 +8,13 @@
 pub mod outside;
 
 use super::health::Health;
-use crate::cannot_run::CannotRun;
-use crate::config::{self, Config};
-use crate::history::{ExtraSeries, ExtraValue};
-use crate::learned;
-use crate::log::{Notice, Severity};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, ChannelId, Sample};
+use gateway_base::cannot_run::CannotRun;
+use gateway_base::learned;
+use gateway_base::log::{Notice, Severity};
+use gateway_config::{self as config, Config};
+use gateway_history::{ExtraSeries, ExtraValue};
 use outside::OutsideWatch;
 use rules::estimators::thermal::{
     AxisSituation, Compensator, Corrected, FollowSettings, HoldReason, ThermalFollower, ThermalModel, ThermalPrediction,

@@ -1,8 +1,8 @@
 //! Tells when temperatures leave the range of the identification, and what the compensation does then. Nobody notices by himself
 //! that an offset stands still.
 
-use crate::log::{Notice, Severity};
 use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_base::log::{Notice, Severity};
 use rules::estimators::thermal::{CompensationStep, Outside, Standing, ThermalPrediction};
 
 /// The temperatures must be inside for so long before that is told: a sensor at the border goes to and fro.

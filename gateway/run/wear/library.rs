@@ -1,7 +1,7 @@
 //! The models of the library, read on a thread of its own whenever a newer one was stored.
 
-use crate::history::{HistoryError, Reader};
-use crate::log::{Notice, Severity};
+use gateway_base::log::{Notice, Severity};
+use gateway_history::{HistoryError, Reader};
 use rules::estimators::wear::WearRecord;
 use std::path::Path;
 use std::sync::Arc;

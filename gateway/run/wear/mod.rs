@@ -5,11 +5,11 @@
 mod library;
 
 use super::health::Health;
-use crate::config::Config;
-use crate::log::Notice;
-use crate::pipeline::Pipeline;
-use crate::status::WearStatus;
 use adapters::clock::TimeNs;
+use gateway_base::log::Notice;
+use gateway_config::Config;
+use gateway_pipeline::Pipeline;
+use gateway_status::WearStatus;
 use library::Library;
 use rules::estimators::wear::{Observability, WorkReference};
 

@@ -5,7 +5,7 @@ use super::served::program;
 use adapters::clock::{Clock, ManualClock};
 use adapters::{ChannelId, Sample};
 use gateway::alignment::AlignmentStatus;
-use gateway::run::open::{MachineSpeed, open_sources};
+use gateway::sources::open::{MachineSpeed, open_sources};
 use rules::estimators::{Inference, Settings};
 use serde_json::Value;
 use std::path::Path;

@@ -10,7 +10,7 @@ use adapters::nclink::device::NcLinkDevice;
 use adapters::simulated::{Moment, Simulated, SimulatedSettings};
 use adapters::waveform::{Producer, SimulatedCurrent};
 use adapters::{ChannelId, Sample};
-use gateway::run::open::{MachineSpeed, open_sources};
+use gateway::sources::open::{MachineSpeed, open_sources};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};

@@ -1,0 +1,165 @@
+//! From the configuration to something that gives samples at its pace.
+
+use super::pace::TickSchedule;
+use super::sample_feed::SampleFeed;
+use adapters::address::Target;
+use adapters::clock::{Clock, TimeNs};
+use adapters::merge::{Delay, Lockstep, Merge, SourcePlan};
+use adapters::open::{OpenError, Opened, open_address, open_pull};
+use adapters::simulated::Simulated;
+use adapters::worker::{Worker, WorkerSettings};
+use adapters::{Actuator, Address, OffsetSink, Pull, Source};
+use gateway_config::{self as config, Config};
+use gateway_status::alignment::{Alignment, Patience};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How fast machine time runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MachineSpeed {
+    /// As fast as real time.
+    Real,
+    /// So many times as fast; simulated machines and recordings only.
+    Times(f64),
+    /// As fast as possible; simulated machines and recordings only.
+    Max,
+}
+
+impl MachineSpeed {
+    /// Machine time over real time; `None` as fast as possible.
+    #[must_use]
+    pub fn time_factor(self) -> Option<f64> {
+        match self {
+            Self::Real => Some(1.0),
+            Self::Times(times) => Some(times),
+            Self::Max => None,
+        }
+    }
+}
+
+/// What the sources give.
+pub struct Sources {
+    /// The samples.
+    pub feed: SampleFeed,
+    /// When they are taken.
+    pub schedule: TickSchedule,
+    /// Ways to the machines.
+    pub ways: Vec<Way>,
+    /// The simulated machines among them, which count what is written to them.
+    pub machines: Vec<Simulated>,
+    /// Is every source simulated?
+    pub simulated: bool,
+}
+
+/// What can be written at one source. Only the gate may hold it.
+pub struct Way {
+    /// Name of the source.
+    pub name: String,
+    /// The way to the feed override.
+    pub actuator: Option<Box<dyn Actuator>>,
+    /// The way to the offsets.
+    pub offsets: Option<Box<dyn OffsetSink>>,
+}
+
+/// Opens every source of the configuration. An accelerated machine begins at `start_ns`.
+///
+/// # Errors
+/// Everything that cannot be opened, in words.
+pub fn open_sources(
+    config: &Config,
+    speed: MachineSpeed,
+    clock: &Arc<dyn Clock>,
+    start_ns: TimeNs,
+) -> Result<Sources, Vec<String>> {
+    match speed {
+        MachineSpeed::Real => open_live_sources(config, clock),
+        MachineSpeed::Times(_) | MachineSpeed::Max => open_stepped_sources(config, speed, start_ns),
+    }
+}
+
+/// Time between two ticks.
+pub fn tick_period(config: &Config) -> Duration {
+    Duration::from_secs_f64(1.0 / config.gateway.tick_hz)
+}
+
+fn is_simulated(config: &Config) -> bool {
+    config.sources.iter().all(|source| matches!(source.address.target(), Target::Simulated(_)))
+}
+
+fn open_live_sources(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>> {
+    let (mut found, mut ways, mut problems) = (Vec::new(), Vec::new(), Vec::new());
+    let mut machines = Vec::new();
+    for source in &config.sources {
+        match open_source(&source.address, clock.now_ns()) {
+            Ok(opened) => {
+                let (deadline, period) = (source.deadline, source.period);
+                let settings = WorkerSettings { deadline, period, ..WorkerSettings::default() };
+                found.extend(opened.sources.into_iter().map(|driver| (driver, settings)));
+                let (name, actuator, offsets) = (source.name.clone(), opened.actuator, opened.offsets);
+                ways.push(Way { name, actuator, offsets });
+                machines.extend(opened.simulated);
+            }
+            Err(error) => problems.push(error.to_string()),
+        }
+    }
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    let feed = start_workers(found, clock, &config.alignment)
+        .map_err(|error| vec![format!("no thread for a source: {error}")])?;
+    let pace = TickSchedule::on_clock(clock.clone(), tick_period(config));
+    Ok(Sources { feed, schedule: pace, ways, machines, simulated: is_simulated(config) })
+}
+
+/// As [`open`], and streams that only become a channel in the box.
+///
+/// # Errors
+/// See [`OpenError`].
+pub(crate) fn open_source(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
+    crate::waveform::open_source(address).unwrap_or_else(|| open_address(address, now_ns))
+}
+
+fn start_workers(
+    sources: Vec<(Box<dyn Source>, WorkerSettings)>,
+    clock: &Arc<dyn Clock>,
+    alignment: &config::AlignmentConfig,
+) -> std::io::Result<SampleFeed> {
+    let plan = |(source, settings): &(Box<dyn Source>, WorkerSettings)| {
+        let plan = SourcePlan::from_source(source.as_ref());
+        SourcePlan { period: settings.period.unwrap_or(plan.period), ..plan }
+    };
+    let plans: Vec<SourcePlan> = sources.iter().map(plan).collect();
+    let merge = Merge::new(&plans, Delay::SlowestPeriod);
+    let start = |(source, settings)| Worker::start(source, clock.clone(), settings);
+    let workers = sources.into_iter().map(start).collect::<Result<_, _>>()?;
+    Ok(SampleFeed::Threads { workers, merge, alignment: Alignment::from_plans(&plans, alignment, Patience::GoesOn) })
+}
+
+fn open_stepped_sources(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
+    let (mut found, mut ways, mut problems) = (Vec::<Box<dyn Pull>>::new(), Vec::new(), Vec::new());
+    let mut machines = Vec::new();
+    for source in &config.sources {
+        match open_pull(&source.address, start_ns) {
+            Ok(opened) => {
+                found.extend(opened.sources);
+                let (name, actuator, offsets) = (source.name.clone(), opened.actuator, opened.offsets);
+                ways.push(Way { name, actuator, offsets });
+                machines.extend(opened.simulated);
+            }
+            Err(error) => problems.push(describe_speed_error(&error)),
+        }
+    }
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    let names = found.iter().map(|source| (source.name().to_owned(), source.period())).collect();
+    let plans: Vec<SourcePlan> = found.iter().map(|source| SourcePlan::of_pull(source.as_ref())).collect();
+    let alignment = Alignment::from_plans(&plans, &config.alignment, Patience::Waits);
+    let feed = SampleFeed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
+    let pace = TickSchedule::with_speed(speed.time_factor(), start_ns, tick_period(config));
+    Ok(Sources { feed, schedule: pace, ways, machines, simulated: is_simulated(config) })
+}
+
+fn describe_speed_error(error: &OpenError) -> String {
+    format!("{error} (with --speed only simulated machines and recordings can be read)")
+}

@@ -1,0 +1,201 @@
+//! Where samples come from: sources on their own threads for a real machine, sources in step for an accelerated one.
+
+use adapters::clock::TimeNs;
+use adapters::histogram::Histogram;
+use adapters::merge::{Lockstep, Merge, MergeCounts, SourceId};
+use adapters::worker::{Poll, Worker, WorkerState, WorkerStats};
+use adapters::{Fact, FactValue, Sample, SourceError, SourceProblem};
+use gateway_status::alignment::Alignment;
+use gateway_status::{FactStatus, NumberOrWord, SourceStatus, StatusProblem};
+use std::time::Duration;
+
+/// See the [module](self).
+pub enum SampleFeed {
+    /// One thread per source.
+    Threads {
+        /// The sources, in the order of precedence.
+        workers: Vec<Worker>,
+        /// Their readings.
+        merge: Merge,
+        /// Lag of each meter.
+        alignment: Alignment,
+    },
+    /// Sources that bring their own time.
+    Stepped {
+        /// Sources and merge.
+        lockstep: Lockstep,
+        /// Name and period of each source.
+        sources: Vec<(String, Duration)>,
+        /// Lag of each meter.
+        alignment: Alignment,
+    },
+}
+
+/// At which pace a source is read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SourcePace {
+    /// The address.
+    pub name: String,
+    /// The pace that was wanted.
+    pub wanted: Duration,
+    /// The pace that the device keeps at the moment.
+    pub kept: Duration,
+}
+
+impl SampleFeed {
+    /// The pace of each source that has been read.
+    #[must_use]
+    pub fn list_paces(&self, now_ns: TimeNs) -> Vec<Option<SourcePace>> {
+        let Self::Threads { workers, .. } = self else { return Vec::new() };
+        let pace = |worker: &Worker| {
+            let WorkerStats { period, pace, polls, .. } = worker.stats(now_ns);
+            (polls > 1).then(|| SourcePace { name: worker.name().to_owned(), wanted: period, kept: pace })
+        };
+        workers.iter().map(pace).collect()
+    }
+
+    /// Samples at the tick `now_ns` (minus the merge's delay). `false` when every source has come to its end.
+    pub fn sample_into(&mut self, sample: &mut Sample, now_ns: TimeNs) -> bool {
+        match self {
+            Self::Threads { workers, merge, alignment } => {
+                for (index, worker) in workers.iter().enumerate() {
+                    let source = SourceId(index);
+                    let see = |poll: &Poll| {
+                        alignment.observe_readings(source, poll.error.is_none().then_some(&poll.readings))
+                    };
+                    worker.drain_seen_into(merge, source, see);
+                }
+                alignment.update_lags(now_ns, merge);
+                merge.sample_into(sample, now_ns.saturating_sub(merge.delay_ns()));
+                !workers.iter().all(Worker::is_finished)
+            }
+            Self::Stepped { lockstep, alignment, .. } => {
+                alignment.update_lags(now_ns, lockstep.merge_mut());
+                lockstep
+                    .sample_seen_into(sample, now_ns, |source, readings| alignment.observe_readings(source, readings))
+            }
+        }
+    }
+
+    /// Lag of each meter.
+    #[must_use]
+    pub fn alignment(&self) -> &Alignment {
+        match self {
+            Self::Threads { alignment, .. } | Self::Stepped { alignment, .. } => alignment,
+        }
+    }
+
+    /// Lag of each meter, to be told what the machine does.
+    pub fn alignment_mut(&mut self) -> &mut Alignment {
+        match self {
+            Self::Threads { alignment, .. } | Self::Stepped { alignment, .. } => alignment,
+        }
+    }
+
+    /// How each source is doing.
+    #[must_use]
+    pub fn list_sources(&self, now_ns: TimeNs) -> Vec<SourceStatus> {
+        match self {
+            Self::Threads { workers, merge, .. } => {
+                let each = workers.iter().enumerate();
+                each.map(|(i, worker)| of_worker(worker.name(), &worker.stats(now_ns), merge.counts(SourceId(i))))
+                    .collect()
+            }
+            Self::Stepped { lockstep, sources, .. } => {
+                let each = sources.iter().enumerate();
+                each.map(|(i, (name, period))| {
+                    of_step(name, *period, lockstep.last_error(SourceId(i)), lockstep.merge().counts(SourceId(i)))
+                })
+                .collect()
+            }
+        }
+    }
+
+    /// Polls and waits of all threads that are over; `None` without threads. Whoever looks twice sees whether any of them moves.
+    #[must_use]
+    pub fn count_steps(&self) -> Option<u64> {
+        match self {
+            Self::Threads { workers, .. } => Some(workers.iter().map(Worker::count_steps).sum()),
+            Self::Stepped { .. } => None,
+        }
+    }
+
+    /// Stops every thread; does not wait for a vendor library that hangs.
+    pub fn stop(&self) {
+        if let Self::Threads { workers, .. } = self {
+            workers.iter().for_each(Worker::stop);
+        }
+    }
+}
+
+fn to_milliseconds(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}
+
+fn count_dropped(counts: MergeCounts) -> u64 {
+    counts.too_late + counts.clock_steps + counts.unannounced
+}
+
+fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStatus {
+    let failing = matches!(stats.state, WorkerState::Failing | WorkerState::Stuck);
+    let known = stats.polls > 1;
+    SourceStatus {
+        name: name.to_owned(),
+        state: stats.state.as_word(),
+        error: stats.last_error.as_ref().filter(|_| failing).map(ToString::to_string),
+        period_s: stats.period.as_secs_f64(),
+        period_kept_s: known.then_some(stats.period_kept.p50.as_secs_f64()),
+        jitter_p50_ms: known.then(|| to_milliseconds(stats.lateness.p50)),
+        jitter_p99_ms: known.then(|| to_milliseconds(stats.lateness.p99)),
+        round_trip_p50_ms: known.then(|| to_milliseconds(stats.round_trip.p50)),
+        round_trip_p99_ms: known.then(|| to_milliseconds(stats.round_trip.p99)),
+        round_trips: stats.round_trips,
+        lag_s: stats.lag_s,
+        readings: counts.readings,
+        failures: stats.failures,
+        missed: stats.missed,
+        dropped: count_dropped(counts) + stats.dropped,
+        facts: stats.facts.iter().map(to_fact_status).collect(),
+        problems: stats.problems.iter().map(to_status_problem).collect(),
+    }
+}
+
+fn to_status_problem(problem: &SourceProblem) -> StatusProblem {
+    StatusProblem { what: problem.what.clone(), next: problem.next.clone() }
+}
+
+fn to_fact_status(fact: &Fact) -> FactStatus {
+    let value = match &fact.value {
+        FactValue::Number(number) => NumberOrWord::Number(*number),
+        FactValue::Text(text) => NumberOrWord::Text(text.clone()),
+    };
+    FactStatus { name: fact.name.clone(), value }
+}
+
+fn of_step(name: &str, period: Duration, error: Option<&SourceError>, counts: MergeCounts) -> SourceStatus {
+    let (state, error) = match error {
+        None => ("reading", None),
+        Some(SourceError::Off { .. }) => ("off", None),
+        Some(SourceError::End { .. }) => ("ended", None),
+        Some(error) => ("failing", Some(error.to_string())),
+    };
+    SourceStatus {
+        name: name.to_owned(),
+        state,
+        error,
+        period_s: period.as_secs_f64(),
+        period_kept_s: None,
+        jitter_p50_ms: None,
+        jitter_p99_ms: None,
+        round_trip_p50_ms: None,
+        round_trip_p99_ms: None,
+        round_trips: Histogram::default(),
+        lag_s: None,
+        readings: counts.readings,
+        failures: counts.failures,
+        missed: 0,
+        dropped: count_dropped(counts),
+        facts: Vec::new(),
+        problems: Vec::new(),
+    }
+}

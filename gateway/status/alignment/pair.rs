@@ -1,0 +1,153 @@
+//! A controller and a meter: what is gathered, what is known, what is in force.
+
+use super::background::LagResult;
+use super::shown::AlignmentStatus;
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::merge::SourceId;
+use adapters::{ChannelId, Reading};
+use gateway_config::AlignmentUse;
+use rules::estimators::alignment::{Collector, Lag, LagFollower, NotIdentifiable, PowerPoint, SpeedPoint};
+
+/// Pause between two estimates: at first, and at most.
+const PAUSE_NS: (i64, i64) = (60 * SECOND_NS, 600 * SECOND_NS);
+
+/// See the [module](self).
+pub(super) struct Pair {
+    controller: SourceId,
+    pub(super) meter: SourceId,
+    speed: ChannelId,
+    power: ChannelId,
+    names: [String; 2],
+    purpose: AlignmentUse,
+    pub(super) collector: Collector,
+    pub(super) follower: LagFollower,
+    found: Option<LagResult>,
+    pause_ns: i64,
+    due_ns: TimeNs,
+}
+
+impl Pair {
+    /// Controller and meter, their channels, and their names.
+    pub(super) fn new(
+        [controller, meter]: [SourceId; 2],
+        [speed, power]: [ChannelId; 2],
+        names: [String; 2],
+        purpose: AlignmentUse,
+    ) -> Self {
+        Self {
+            controller,
+            meter,
+            speed,
+            power,
+            names,
+            purpose,
+            collector: Collector::new(),
+            follower: LagFollower::default(),
+            found: None,
+            pause_ns: PAUSE_NS.0,
+            due_ns: TimeNs::MIN,
+        }
+    }
+
+    pub(super) fn observe_readings(
+        &mut self,
+        source: SourceId,
+        readings: Option<&[Reading]>,
+        mut seconds: impl FnMut(TimeNs) -> f64,
+    ) {
+        if source != self.controller && source != self.meter {
+            return;
+        }
+        let Some(readings) = readings else { return self.collector.discard_collected() };
+        let wanted = if source == self.controller { self.speed } else { self.power };
+        for reading in readings.iter().filter(|reading| reading.channel == wanted) {
+            let Some(number) = reading.value.as_ref().ok().and_then(|value| value.as_number()) else { continue };
+            let time_s = seconds(reading.stamp.mid_ns);
+            if source == self.controller {
+                self.collector.record_speed(SpeedPoint { time_s, speed_rpm: number });
+            } else {
+                self.collector.record_power(PowerPoint { time_s, power_w: number });
+            }
+        }
+    }
+
+    pub(super) fn is_for_merge(&self) -> bool {
+        self.purpose == AlignmentUse::Merge
+    }
+
+    pub(super) fn is_due(&self, now_ns: TimeNs) -> bool {
+        now_ns >= self.due_ns
+    }
+
+    /// Takes an answer. The kind and the text of an event when there is something to tell.
+    pub(super) fn accept_estimate(
+        &mut self,
+        found: LagResult,
+        now_ns: TimeNs,
+        now_s: f64,
+    ) -> Option<(&'static str, String)> {
+        self.pause_ns = match &found {
+            Ok(_) => PAUSE_NS.1,
+            // That costs nothing, and the next change of speed may be the one that was missing.
+            Err(NotIdentifiable::TooFewTransients { .. }) => PAUSE_NS.0,
+            Err(_) => (2 * self.pause_ns).min(PAUSE_NS.1),
+        };
+        self.due_ns = now_ns + self.pause_ns;
+        let aim_s = found.as_ref().ok().and_then(|lag| self.follower.aim_at_estimate(lag, now_s));
+        let event = match (&self.found, &found) {
+            (_, Ok(lag)) => aim_s.map(|aim_s| self.describe_lag(lag, aim_s)),
+            (Some(Ok(_)), Err(reason)) => Some(("lag_unknown", format!("{}: {reason}", self.names[1]))),
+            _ => None,
+        };
+        self.found = Some(found);
+        event
+    }
+
+    fn describe_lag(&self, lag: &Lag, aim_s: f64) -> (&'static str, String) {
+        let [controller, meter] = &self.names;
+        let (lag_ms, width_ms) = (1e3 * lag.lag_s, 1e3 * lag.uncertainty_s);
+        let text = format!("{meter} is {lag_ms:.0} ms (95 %: +-{width_ms:.0} ms) later than {controller}");
+        let used = match self.purpose {
+            AlignmentUse::Merge => format!("; its readings will be put back by {:.0} ms", 1e3 * aim_s),
+            _ => "; it is shown only".to_owned(),
+        };
+        ("lag_known", format!("{text}{used}"))
+    }
+
+    pub(super) fn power_name(&self) -> &'static str {
+        self.power.name()
+    }
+
+    /// The lag, or a word for why there is none.
+    pub(super) fn lag(&self) -> Result<Lag, &'static str> {
+        match &self.found {
+            Some(found) => found.as_ref().copied().map_err(NotIdentifiable::as_word),
+            None => Err("not_yet"),
+        }
+    }
+
+    pub(super) fn build_status(&self) -> AlignmentStatus {
+        let (lag, missing) = (self.lag().ok(), self.lag().err());
+        let why = match &self.found {
+            Some(Err(reason)) => Some(reason.to_string()),
+            Some(Ok(_)) => None,
+            None => Some("no change of spindle speed without cutting has been seen yet".to_owned()),
+        };
+        let drift = lag.and_then(|lag| lag.drift);
+        AlignmentStatus {
+            controller: self.names[0].clone(),
+            meter: self.names[1].clone(),
+            power: self.power.name(),
+            purpose: self.purpose.as_word(),
+            lag_s: lag.map(|lag| lag.lag_s),
+            uncertainty_s: lag.map(|lag| lag.uncertainty_s),
+            window_s: lag.map(|lag| lag.window_s),
+            drift_ppm: drift.map(|drift| drift.ppm),
+            drift_uncertainty_ppm: drift.map(|drift| drift.uncertainty_ppm),
+            transients: lag.map(|lag| lag.transients),
+            applied_s: if self.is_for_merge() { self.follower.applied_s() } else { 0.0 },
+            missing,
+            why,
+        }
+    }
+}

@@ -1,0 +1,383 @@
+//! What the box says of itself at this moment: one document (`status/1`) for the page, the API and the metrics.
+//!
+//! The tick builds it a few times per second and hands it over whole, so that no reader ever waits for the tick or the
+//! tick for a reader. Every number carries its unit in its name or beside it; a missing one carries its reason.
+
+pub mod alignment;
+
+use adapters::histogram::Histogram;
+pub use gateway_base::clock::ClockStatus;
+pub use gateway_base::problem::StatusProblem;
+use serde::Serialize;
+
+/// A number or a word.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum NumberOrWord {
+    /// In the unit beside it.
+    Number(f64),
+    /// A state word or name.
+    Text(String),
+}
+
+/// One measured channel: a value with unit and age, or the reason for none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelStatus {
+    /// Name, as everywhere.
+    pub name: &'static str,
+    /// The value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<NumberOrWord>,
+    /// Unit of the value; `1` for pure numbers, empty for text.
+    pub unit: &'static str,
+    /// Seconds since the value was true; 0 between two readings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub age_s: Option<f64>,
+    /// Why there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<&'static str>,
+}
+
+/// One inferred quantity: a value with its uncertainty, or the reason for none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EstimateStatus {
+    /// Name, ending in the unit.
+    pub name: &'static str,
+    /// The value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Half the width of the 95 % interval (1.96 standard deviations), in the same unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<f64>,
+    /// Unit of both.
+    pub unit: &'static str,
+    /// The reason for none, as a word.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<&'static str>,
+    /// The same in plain words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+}
+
+/// What the machine is doing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateStatus {
+    /// The word.
+    pub word: &'static str,
+    /// Since when, milliseconds since 1970.
+    pub since_ms: i64,
+    /// For how long, seconds.
+    pub seconds: f64,
+    /// Seconds of machine time in each state since the start.
+    pub seconds_per_state: Vec<(&'static str, f64)>,
+    /// Why it is unknown, where it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+    /// What it was inferred from.
+    pub basis: &'static str,
+    /// What that means, in words.
+    pub basis_text: String,
+    /// Can cutting be seen in the spindle power?
+    pub visibility: &'static str,
+    /// Where the no-load power comes from.
+    pub no_load_origin: &'static str,
+}
+
+/// An alarm that stands.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AlarmStatus {
+    /// Its name in the script that raised it.
+    pub code: String,
+    /// `warning` or `critical`.
+    pub severity: String,
+    /// What the operator reads.
+    pub text: String,
+    /// The same in Chinese.
+    pub zh: String,
+    /// Since when, milliseconds since 1970.
+    pub since_ms: i64,
+}
+
+/// An alarm that stands and that a person has seen.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Acknowledged {
+    /// Code of the alarm.
+    pub code: String,
+    /// Who has seen it.
+    pub by: String,
+    /// When, milliseconds since 1970.
+    pub at_ms: i64,
+}
+
+/// A decision worth showing: a change of what scripts ask for or of what the gate lets through.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DecisionStatus {
+    /// When, milliseconds since 1970.
+    pub at_ms: i64,
+    /// In plain words.
+    pub text: String,
+}
+
+/// The way of a feed override to the machine.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GateStatus {
+    /// `off`, `shadow` (decide and record, write nothing) or `armed`.
+    pub mode: &'static str,
+    /// What the scripts ask for, %.
+    pub wanted_pct: Option<f64>,
+    /// Why they ask, in their words.
+    pub reason: Option<String>,
+    /// What the gate lets through (or would, in shadow), %.
+    pub permitted_pct: Option<f64>,
+    /// Why the gate holds back, where it does.
+    pub held: Option<String>,
+    /// What was really written, %; `null` in shadow.
+    pub written_pct: Option<f64>,
+    /// Who armed the gate, while it is armed.
+    pub armed_by: Option<String>,
+    /// When the arming ends by itself, milliseconds since 1970.
+    pub armed_until_ms: Option<i64>,
+    /// Why it is not armed.
+    pub disarmed: Option<String>,
+    /// Thermal offsets, where they are decided about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Option<OffsetStatus>,
+    /// The latest changes, newest first.
+    pub recent: Vec<DecisionStatus>,
+}
+
+/// Thermal offsets on their way to the control.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OffsetStatus {
+    /// `shadow` (decide and record, write nothing) or `armed`.
+    pub mode: &'static str,
+    /// The axes that may be shifted.
+    pub axes: Vec<AxisShift>,
+}
+
+/// One axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AxisShift {
+    /// `x`, `y` or `z`.
+    pub axis: &'static str,
+    /// What the scripts propose, um.
+    pub wanted_um: Option<f64>,
+    /// What is shifted in the control, um.
+    pub shift_um: f64,
+}
+
+/// What a source knows of itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FactStatus {
+    /// What it is; a number's name ends in its unit.
+    pub name: String,
+    /// What is known.
+    pub value: NumberOrWord,
+}
+
+/// A source and how it keeps its pace.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SourceStatus {
+    /// Its address.
+    pub name: String,
+    /// What it is doing: `reading`, `off` (the machine is switched off), `failing`, `stuck`, `ended`, ...
+    pub state: &'static str,
+    /// What went wrong last and what to do, while it lasts.
+    pub error: Option<String>,
+    /// Pace it promises, s.
+    pub period_s: f64,
+    /// Median of the pace it keeps, s, once known.
+    pub period_kept_s: Option<f64>,
+    /// How late polls begin against their beat, ms, once known: median and 99th percentile.
+    pub jitter_p50_ms: Option<f64>,
+    /// See `jitter_p50_ms`.
+    pub jitter_p99_ms: Option<f64>,
+    /// From asking to answer, ms, once known: median and 99th percentile.
+    pub round_trip_p50_ms: Option<f64>,
+    /// See `round_trip_p50_ms`.
+    pub round_trip_p99_ms: Option<f64>,
+    /// From asking to answer, of all polls; for the metrics.
+    #[serde(skip)]
+    pub round_trips: Histogram,
+    /// Since the last poll that succeeded, s; for the metrics.
+    #[serde(skip)]
+    pub lag_s: Option<f64>,
+    /// Readings since the start.
+    pub readings: u64,
+    /// Failed polls since the start.
+    pub failures: u64,
+    /// Beats left out because a poll took too long.
+    pub missed: u64,
+    /// Readings and polls dropped: too late, by a stepping clock, unannounced, or nobody took them.
+    pub dropped: u64,
+    /// Device, register map, effective refresh, load of the wire and the like.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub facts: Vec<FactStatus>,
+    /// What is wrong although it answers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub problems: Vec<StatusProblem>,
+}
+
+/// A script and whether its newest text is in charge.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScriptStatus {
+    /// File name.
+    pub file: String,
+    /// Version in charge (start of the text's digest).
+    pub version: String,
+    /// `running`, `waiting` (for a value), `reverted`, `suspended` or `refused`.
+    pub condition: &'static str,
+    /// Why it does not run as written, with line and column.
+    pub error: Option<String>,
+}
+
+/// The operations recipe.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OperationsStatus {
+    /// The file.
+    pub path: String,
+    /// Version in force; `null` when there is none.
+    pub version: Option<String>,
+    /// How many operations it holds.
+    pub operations: usize,
+    /// Operation of the block that runs now, with the version of the recipe.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub in_force: Option<String>,
+    /// Why no operation is in force, where none is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<String>,
+    /// Why the newest text of the file is not in force, with line and column.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+}
+
+/// Wear of the edge in use, followed over its parts. The limit is that of the last moment of cutting, where the library has a
+/// model for the cut.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WearStatus {
+    /// `surface` or `physical`.
+    pub form: &'static str,
+    /// What of its key spoke for the model: `edge`, `tool`, `operation`, `work material`, `machine`, `any`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model_by: Option<&'static str>,
+    /// Flank wear at which the edge is worn, mm.
+    pub criterion_mm: f64,
+    /// Limit `[Pc]` of the cut, W.
+    pub limit_w: Option<f64>,
+    /// Half the 95 % interval of a single cut at the limit, W.
+    pub limit_uncertainty_w: Option<f64>,
+    /// Flank wear that the power means, mm.
+    pub flank_wear_mm: Option<f64>,
+    /// Half its 95 % interval, mm.
+    pub flank_wear_uncertainty_mm: Option<f64>,
+    /// Probability that the edge passes the criterion by the end of the next part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worn_probability: Option<f64>,
+    /// Parts until it does: the middle, and the ends of an 80 % interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parts_left: Option<[f64; 3]>,
+    /// `observable` or `not_observable_here`.
+    pub observability: Option<&'static str>,
+    /// Factors in which the cut lies outside what the model was fitted on.
+    pub extrapolated: Vec<&'static str>,
+    /// Why a number is missing, where one is.
+    pub why: Option<String>,
+}
+
+/// The store.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HistoryStatus {
+    /// The file.
+    pub path: String,
+    /// Samples acknowledged since the start of the file.
+    pub rows: u64,
+    /// Bytes on disk.
+    pub bytes: u64,
+    /// Days until the disk (or the limit) is full at this rate.
+    pub lasts_days: Option<f64>,
+    /// Samples that could not be stored since the start.
+    pub lost: u64,
+    /// What is wrong and what to do, while it lasts.
+    pub error: Option<String>,
+    /// Bytes of the log beside the file.
+    pub log_bytes: u64,
+    /// Histories that the disk has changed and that were therefore set aside.
+    pub set_aside: Vec<String>,
+}
+
+/// The tick.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TickStatus {
+    /// Ticks per second of machine time.
+    pub rate_hz: f64,
+    /// Ticks since the start.
+    pub count: u64,
+    /// Lateness against the plan, ms: median and 99th percentile of the last minute.
+    pub late_p50_ms: f64,
+    /// See `late_p50_ms`.
+    pub late_p99_ms: f64,
+    /// Lateness of all ticks; for the metrics.
+    #[serde(skip)]
+    pub late: Histogram,
+    /// Ticks left out because the box was too late for them.
+    pub skipped: u64,
+}
+
+/// The whole document.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Status {
+    /// `status/1`.
+    pub schema: &'static str,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Name of the machine.
+    pub machine: String,
+    /// Is the machine simulated?
+    pub simulated: bool,
+    /// Machine time over real time; `null` when as fast as possible.
+    pub speed: Option<f64>,
+    /// The instant this document is about, milliseconds since 1970.
+    pub at_ms: i64,
+    /// Seconds since the start of the process.
+    pub uptime_s: f64,
+    /// What is thought of the clock; `null` where the machine brings its own time.
+    pub clock: Option<ClockStatus>,
+    /// The tick.
+    pub tick: TickStatus,
+    /// What the machine is doing.
+    pub state: StateStatus,
+    /// Every channel that a source provides.
+    pub channels: Vec<ChannelStatus>,
+    /// Everything inferred.
+    pub estimates: Vec<EstimateStatus>,
+    /// Alarms that stand.
+    pub alarms: Vec<AlarmStatus>,
+    /// Those of them that a person has seen.
+    pub acknowledged: Vec<Acknowledged>,
+    /// The simulation beside the machine, where a model is configured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twin: Option<gateway_diagnosis::status::TwinStatus>,
+    /// Finished parts since the start.
+    pub parts: u64,
+    /// The way of an override to the machine.
+    pub gate: GateStatus,
+    /// Sources.
+    pub sources: Vec<SourceStatus>,
+    /// How late each meter is against the controller.
+    pub alignment: Vec<crate::alignment::AlignmentStatus>,
+    /// Scripts.
+    pub scripts: Vec<ScriptStatus>,
+    /// The operations recipe, where one is configured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub operations: Option<OperationsStatus>,
+    /// Wear of the tool, where the library has a model for the cut.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wear: Option<WearStatus>,
+    /// The store.
+    pub history: HistoryStatus,
+    /// What leaves the box, where a sink is configured.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sinks: Vec<gateway_sinks::SinkStatus>,
+    /// What does not work while the box goes on.
+    pub problems: Vec<StatusProblem>,
+}
