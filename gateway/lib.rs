@@ -4,13 +4,26 @@
 //! |---|---|---|
 //! | [`gateway_base`] | clock, messages, files | |
 //! | [`gateway_history`] | everything in SQLite | `gateway_base` |
-//! | [`gateway_gate`] | the only way to the controller | `gateway_base`, `gateway_history` |
-//! | [`gateway_control`] | orders to a running box | `gateway_base`, `gateway_history` |
+//! | [`gateway_gate`] | the only way to the controller | `gateway_history` |
+//! | [`gateway_control`] | orders to a running box | `gateway_history` |
 //! | [`gateway_nats`] | a client of NATS JetStream | `gateway_base` |
-//! | [`gateway_sinks`] | what leaves the box | `gateway_control`, `gateway_history`, `gateway_nats` |
-//! | [`gateway_diagnosis`] | the twin at work, and its report | `gateway_base`, `gateway_history` |
+//! | [`gateway_sinks`] | what leaves the box | `gateway_control`, `gateway_nats` |
+//! | [`gateway_fleet`] | from NATS JetStream into PostgreSQL | `gateway_sinks` |
+//! | [`gateway_diagnosis`] | the twin at work, and its report | `gateway_history` |
+//! | [`gateway_commission`] | from measurements in the workshop to models | `gateway_diagnosis` |
+//! | [`gateway_pipeline`] | from a sample to estimates, decisions and records | `gateway_gate` |
+//! | [`gateway_config`] | the configuration file | `gateway_pipeline`, `gateway_sinks` |
+//! | [`gateway_status`] | what the box says of itself; delays of its sources | `gateway_config`, `gateway_diagnosis` |
+//! | [`gateway_sources`] | from the configuration to samples; what an address answers | `gateway_status` |
+//! | [`gateway_scripts`] | the shop's scripts on disk, their settings and drafts | `gateway_history` |
+//! | [`gateway_backtest`] | edited scripts over the stored history | `gateway_pipeline`, `gateway_scripts` |
+//! | [`gateway_backup`] | backups, and archives that a person takes | `gateway_config`, `gateway_scripts` |
+//! | [`gateway_access`] | persons, roles, sessions, tokens | `gateway_control` |
+//! | [`gateway_handbook`] | the chapters of the handbook | |
+//! | [`gateway_http`] | the page and the interface | the six above |
+//! | [`gateway_run`] | one machine, live: the tick and everything beside it | `gateway_http` |
 //!
-//! This crate puts them together: configuration, tick, page, command line.
+//! This crate is the command line, and what only the command line needs.
 
 pub mod bench;
 pub mod check;

@@ -6,7 +6,7 @@
 use super::role::Role;
 use super::token::{Token, TokenError};
 use gateway_base::files;
-use gateway_status::StatusProblem;
+use gateway_base::problem::StatusProblem;
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::os::unix::fs::PermissionsExt;

@@ -1,6 +1,6 @@
 //! Alarms and stops that one side has and the other has not.
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

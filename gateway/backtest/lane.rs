@@ -2,7 +2,7 @@
 
 use super::compare::{Spell, SpellKind};
 use super::to_seconds;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_pipeline::Tally;
 use rules::estimators::State;
 use rules::script::{Decision, OverrideRequest, ScriptProblem, Stop};

@@ -30,7 +30,7 @@ pub use lane::{Lane, RequestTotals};
 pub use recorded::{Other, Recorded};
 pub use report::BacktestReport;
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use compare::Sides;
 use gateway_history::{HistoryError, Query, Reader};
 use recorded::Concerned;

@@ -7,8 +7,8 @@
 
 use super::lane::{self, Lane};
 use super::to_seconds;
-use adapters::Sample;
-use adapters::clock::TimeNs;
+use adapter_core::Sample;
+use adapter_core::clock::TimeNs;
 use gateway_history::HistoryError;
 use gateway_pipeline::{Channels, CycleFollower};
 use rules::estimators::wear::WearEstimator;

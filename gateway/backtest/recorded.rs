@@ -5,7 +5,7 @@
 //! against what was raised, as far as the scripts that raised it are the running ones.
 
 use super::compare::{Spell, SpellKind};
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_history::{AlarmEntry, Event, HistoryError, Reader, RecordSpan};
 use gateway_scripts::active_scripts::{self, Versions};
 use rules::script::{AlarmLevel, SCRIPT_STOPPED, ScriptSet};

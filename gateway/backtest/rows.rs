@@ -1,7 +1,7 @@
 //! From stored columns to samples.
 
-use adapters::clock::TimeNs;
-use adapters::{Absence, ChannelId, Sample, Slot, Value};
+use adapter_core::clock::TimeNs;
+use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
 use gateway_history::{Cells, Chunk, HistoryError, Reader};
 
 /// The series of a history that are channels; estimates are inferred anew.

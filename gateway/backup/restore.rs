@@ -3,7 +3,7 @@
 use super::list::{Fate, of_name};
 use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, configured_files, is_of_scripts, list_names, restored};
 use crate::archive::ArchivedFile;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_base::files::{keep_last, replace_durably, replace_file};
 use gateway_history::{HistoryError, Reader, store_wear_model};
 use gateway_scripts::reload::read_directory;

@@ -3,7 +3,7 @@
 //! One line of JSON each in `annotations.jsonl` of the data directory; lines are added and never changed.
 
 use super::columns::TorqueFileError;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use clap::ValueEnum;
 use gateway_base::moment::{self, MomentError};
 use serde::{Deserialize, Serialize};

@@ -1,10 +1,9 @@
 //! The history as a recording, with what a person has measured as columns.
 
 use super::annotations::{Annotation, Quantity};
-use adapters::Recording;
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::recording::{Cells, Numbers};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_history::{HistoryError, Query, Reader, STATE_SERIES};
+use recording::{Cells, Numbers, Recording};
 use rules::estimators::alignment::{Matched, match_courses};
 use rules::estimators::regression::Refusal;
 use std::path::{Path, PathBuf};

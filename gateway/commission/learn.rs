@@ -3,9 +3,8 @@
 use super::columns::{self, Merged};
 use super::picture::{Dot, Picture};
 use crate::identified::{self, THERMAL, TOOL_WEAR};
-use adapters::Recording;
-use adapters::recording::{Cells, Numbers};
 use gateway_history::STATE_SERIES;
+use recording::{Cells, Numbers, Recording};
 use rules::estimators::power_separation::{
     LoadLossLearned, NoLoadLearned, ReferenceChoice, identify_load_loss, identify_no_load,
 };

@@ -1,6 +1,6 @@
 //! The channels that the box itself looks at, found once.
 
-use adapters::ChannelId;
+use adapter_core::ChannelId;
 
 /// See the fields' names.
 #[derive(Debug, Clone, Copy)]

@@ -1,6 +1,6 @@
 //! What the scripts decided, as records: alarms raised and cleared, notes, and every change of what they ask for.
 
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_gate::Verdict;
 use gateway_history::{Alarm, AlarmClear, Decision as DecisionRow, Event, Record};
 use rules::script::{AlarmChange, Axis, Decision, OffsetProposal, OverrideRequest, Stop, StopRequest};
@@ -190,7 +190,7 @@ mod tests {
     }
 
     fn verdict(at_ns: TimeNs) -> Verdict {
-        let permitted = adapters::units::OverridePct::FULL;
+        let permitted = adapter_core::units::OverridePct::FULL;
         Verdict { at_ns, wanted_pct: None, permitted, outcome: gateway_gate::GateOutcome::Permitted, armed: false }
     }
 

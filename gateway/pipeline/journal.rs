@@ -1,8 +1,8 @@
 //! What changed from one tick to the next, as records: the state, and the alarm that the controller shows.
 
 use super::channels::Channels;
-use adapters::Sample;
-use adapters::clock::TimeNs;
+use adapter_core::Sample;
+use adapter_core::clock::TimeNs;
 use gateway_history::{Alarm, AlarmClear, Record, StateChange};
 use rules::estimators::wear::tool_of;
 use rules::estimators::{Estimates, State};
@@ -77,7 +77,7 @@ impl Journal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::{ChannelId, Slot, Value};
+    use adapter_core::{ChannelId, Slot, Value};
 
     fn records(journal: &mut Journal, at_ns: TimeNs, state: State, alarm: Option<&str>) -> Vec<Record> {
         let mut sample = Sample::new_empty(at_ns);

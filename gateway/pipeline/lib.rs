@@ -21,8 +21,8 @@ pub use part_detail::{OperationUse, PartDetail, ToolUse};
 pub use parts::CycleFollower;
 pub use tally::Tally;
 
-use adapters::Sample;
-use adapters::clock::TimeNs;
+use adapter_core::Sample;
+use adapter_core::clock::TimeNs;
 use gateway_base::log::Notice;
 use gateway_gate::{Gate, OffsetVerdict, Verdict, offset};
 use gateway_history::{Event, ExtraSeries, ExtraValue, Part, Record};

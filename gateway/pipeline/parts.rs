@@ -2,8 +2,8 @@
 
 use super::channels::Channels;
 use super::part_detail::Gathering;
-use adapters::Sample;
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::Sample;
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_history::Part;
 use rules::estimators::{Estimates, NoEstimate, PartFigures, State};
 use std::sync::Arc;
@@ -146,7 +146,7 @@ impl CycleFollower {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::{Absence, ChannelId, Slot, Value};
+    use adapter_core::{Absence, ChannelId, Slot, Value};
 
     fn sample(at_s: i64, count: Result<f64, Absence>, part: &str) -> Sample {
         let mut sample = Sample::new_empty(at_s * SECOND_NS);

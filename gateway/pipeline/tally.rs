@@ -1,6 +1,6 @@
 //! Sums since the start: ticks, and machine time in each state.
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rules::estimators::State;
 
 /// A longer step between two ticks is a pause that belongs to no state.

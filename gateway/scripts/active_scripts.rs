@@ -3,7 +3,7 @@
 
 use crate::reload::prepare_with_settings;
 use crate::settings;
-use adapters::clock::TimeNs;
+use adapter_core::clock::TimeNs;
 use gateway_history::Event;
 use rules::script::{Host, ScriptFile, ScriptProblem, ScriptSet, prepare_scripts};
 use serde_json::{Map, Value, json};

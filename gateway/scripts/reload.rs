@@ -2,7 +2,7 @@
 //! of them compile and all their trials pass.
 
 use crate::settings;
-use adapters::channel::find_nearest_name;
+use adapter_core::channel::find_nearest_name;
 pub use gateway_base::files::compute_digest;
 use gateway_base::files::{Lookout, Mark, Rest, advise_on_read_error, read_mark, read_text, replace_file};
 use rules::script::{

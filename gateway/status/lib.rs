@@ -5,7 +5,7 @@
 
 pub mod alignment;
 
-use adapters::histogram::Histogram;
+use adapter_core::histogram::Histogram;
 pub use gateway_base::clock::ClockStatus;
 pub use gateway_base::problem::StatusProblem;
 use serde::Serialize;

@@ -34,7 +34,7 @@ const ELSEWHERE: [(&str, &str); 6] = [
     ("fleet retain", "tests/records/fleet: needs PostgreSQL"),
     ("setup", "tests/box/whole: writes where a service is configured"),
     ("update", "tests/box/whole: needs the folders of the package"),
-    ("doctor --box", "gateway/doctor/computer.rs: its answer is that of the computer"),
+    ("doctor --box", "gateway/sources/doctor/computer.rs: its answer is that of the computer"),
 ];
 /// What a command that runs until it is stopped says when it serves; others name the address of their page.
 const SERVES: [(&str, &str); 2] = [("fanuc", "fanuc://"), ("modbus", "modbus-tcp://")];

@@ -1,6 +1,6 @@
 //! The thread that estimates: one estimate at a time, started with the first one.
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use rules::estimators::alignment::{Lag, LagSettings, NotIdentifiable, Transient, estimate_lag};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 

@@ -31,9 +31,9 @@ mod shown;
 pub use background::Patience;
 pub use shown::{AlignmentStatus, SERIES, list_series};
 
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::merge::{Merge, SourceId, SourcePlan};
-use adapters::{ChannelId, Reading};
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::merge::{Merge, SourceId, SourcePlan};
+use adapter_core::{ChannelId, Reading};
 use background::Background;
 use gateway_base::log::{Notice, Severity};
 use gateway_config::{self as config, AlignmentUse};

@@ -2,9 +2,9 @@
 
 use super::background::LagResult;
 use super::shown::AlignmentStatus;
-use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::merge::SourceId;
-use adapters::{ChannelId, Reading};
+use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::merge::SourceId;
+use adapter_core::{ChannelId, Reading};
 use gateway_config::AlignmentUse;
 use rules::estimators::alignment::{Collector, Lag, LagFollower, NotIdentifiable, PowerPoint, SpeedPoint};
 

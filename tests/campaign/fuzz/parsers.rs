@@ -53,7 +53,7 @@ pub(crate) fn all() -> Vec<Parser> {
         parser("map", maps, |bytes| drop(Mapping::parse(&text(bytes), "own.map.toml"))),
         parser(
             "model",
-            || files("gateway/gallery", "toml"),
+            || files("gateway/http/gallery", "toml"),
             |bytes| {
                 let text = text(bytes);
                 drop((parse_model(&text), parse_hypotheses(&text)));

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the three examples of the page, each with one hidden cause, into a directory: python3 make_gallery.py gateway/gallery
+"""Writes the three examples of the page, each with one hidden cause, into a directory: python3 make_gallery.py gateway/http/gallery
 
 Laws of their own, from textbooks, and not from the catalogue of effects, so that the product is not shown with itself.
 """
