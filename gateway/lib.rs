@@ -20,7 +20,7 @@
 //! | [`gateway_backup`] | backups, and archives that a person takes | `gateway_config`, `gateway_scripts` |
 //! | [`gateway_access`] | persons, roles, sessions, tokens | `gateway_control` |
 //! | [`gateway_handbook`] | the chapters of the handbook | |
-//! | [`gateway_http`] | the page and the interface | the six above |
+//! | [`gateway_http`] | the page and the interface | `gateway_sources`, `gateway_backtest`, `gateway_backup`, `gateway_access`, `gateway_commission`, `gateway_handbook` |
 //! | [`gateway_run`] | one machine, live: the tick and everything beside it | `gateway_http` |
 //!
 //! This crate is the command line, and what only the command line needs.

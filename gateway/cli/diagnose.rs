@@ -145,7 +145,11 @@ pub(super) fn cannot_use_as(problems: &[adapters::bilingual::Bilingual]) -> Cann
 fn note_refusals(diagnosis: &mut Diagnosis, given: &InputRecordings) {
     if given.refused > 0 {
         let column = given.refused_column.clone().unwrap_or_else(|| "time_s".to_owned());
-        diagnosis.data_quality.push(twin::quality::Fault { fault: "refused_rows", column, rows: given.refused });
+        diagnosis.data_quality.push(twin::quality::Fault {
+            kind: twin::quality::FaultKind::RefusedRows,
+            column,
+            rows: given.refused,
+        });
     }
 }
 

@@ -210,3 +210,16 @@ pub struct Diagnosis {
     /// The leading explanations with their probabilities, for engineers.
     pub debug: String,
 }
+
+impl Diagnosis {
+    /// The unit of the parameter `label.parameter` of the extended model, with the output's unit in the place of the word
+    /// `output`; `None` for a pure number and for a name that the model does not have.
+    #[must_use]
+    pub fn find_parameter_unit(&self, name: &str) -> Option<String> {
+        let unit = self.model.parts.iter().find_map(|part| {
+            let parameter = name.strip_prefix(part.label())?.strip_prefix('.')?;
+            part.find_parameter(parameter).map(|parameter| parameter.unit.as_str())
+        })?;
+        (unit != "1").then(|| unit.replace("output", &self.unit))
+    }
+}

@@ -39,7 +39,7 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         "missing": diagnosis.missing.iter().map(encode_missing).collect::<Vec<_>>(),
         "alternatives": diagnosis.alternatives.iter().map(encode_alternative).collect::<Vec<_>>(),
         "baseline_shift": diagnosis.baseline_shift.iter().map(encode_shift).collect::<Vec<_>>(),
-        "data_quality": faults.map(|f| json!({ "fault": f.fault, "column": f.column, "rows": f.rows })).collect::<Vec<_>>(),
+        "data_quality": faults.map(|f| json!({ "fault": f.kind.as_word(), "column": f.column, "rows": f.rows })).collect::<Vec<_>>(),
         "next_experiment": diagnosis.next_experiment.as_ref().map_or(Value::Null, encode_experiment),
     })
 }

@@ -2,16 +2,59 @@
 
 use numerics::statistics::{median, robust_deviation};
 use physics::Scene;
+use physics::explain::Language;
 
 /// One kind of fault found in one column.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// `dropouts`, `spikes`, `quantisation` or `duplicate_time`.
-    pub fault: &'static str,
+    /// What is wrong with the rows.
+    pub kind: FaultKind,
     /// The column.
     pub column: String,
     /// Rows concerned.
     pub rows: usize,
+}
+
+/// What is wrong with rows of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FaultKind {
+    /// No value, a value that was held, or a zero where the simulation is far from zero.
+    Dropouts,
+    /// Single rows far from their neighbours.
+    Spikes,
+    /// Steps of the recorded value that are coarse beside the noise.
+    Quantisation,
+    /// Time that stands still or runs backwards.
+    DuplicateTime,
+    /// Rows that could not be read.
+    RefusedRows,
+}
+
+impl FaultKind {
+    /// The word in the contract `diagnosis/1`.
+    #[must_use]
+    pub fn as_word(self) -> &'static str {
+        match self {
+            Self::Dropouts => "dropouts",
+            Self::Spikes => "spikes",
+            Self::Quantisation => "quantisation",
+            Self::DuplicateTime => "duplicate_time",
+            Self::RefusedRows => "refused_rows",
+        }
+    }
+
+    /// What a reader of a report is told.
+    #[must_use]
+    pub fn describe(self, language: Language) -> &'static str {
+        let (en, zh) = match self {
+            Self::Dropouts => ("values missing, held or zero", "数据缺失、保持或为零"),
+            Self::Spikes => ("isolated spikes", "孤立尖峰"),
+            Self::Quantisation => ("recorded in coarse steps", "量化步长较粗"),
+            Self::DuplicateTime => ("time stands still or runs backwards", "时间停滞或倒退"),
+            Self::RefusedRows => ("rows refused while reading", "读取时被拒绝的行"),
+        };
+        if language == Language::En { en } else { zh }
+    }
 }
 
 /// Neighbours on each side against which a row is judged.
@@ -25,13 +68,13 @@ const HELD_ROWS: usize = 4;
 pub fn exclude_faulty_rows(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
     let mut faults = Vec::new();
     let output = scene.output_name().to_owned();
-    let mut note = |fault: &'static str, column: &str, rows: usize| {
+    let mut note = |kind: FaultKind, column: &str, rows: usize| {
         if rows > 0 {
-            faults.push(Fault { fault, column: column.to_owned(), rows });
+            faults.push(Fault { kind, column: column.to_owned(), rows });
         }
     };
-    note("duplicate_time", "time_s", count_duplicate_times(scene));
-    note("quantisation", &output, count_quantised_rows(scene));
+    note(FaultKind::DuplicateTime, "time_s", count_duplicate_times(scene));
+    note(FaultKind::Quantisation, &output, count_quantised_rows(scene));
     let mut dropped = find_absent_rows(scene);
     let held = find_held_rows(scene, &mark_rows_at_limit(scene));
     let zeros = find_zero_rows(scene, simulated);
@@ -39,10 +82,10 @@ pub fn exclude_faulty_rows(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
     dropped.sort_unstable();
     dropped.dedup();
     scene.exclude_rows(dropped.iter().copied());
-    note("dropouts", &output, dropped.len());
+    note(FaultKind::Dropouts, &output, dropped.len());
     let spikes = find_spike_rows(scene, simulated);
     scene.exclude_rows(spikes.iter().copied());
-    note("spikes", &output, spikes.len());
+    note(FaultKind::Spikes, &output, spikes.len());
     faults
 }
 
@@ -187,7 +230,7 @@ mod tests {
         let simulated = vec![1.0; scene.rows()];
         exclude_faulty_rows(&mut scene, &simulated)
             .iter()
-            .filter(|fault| fault.fault == "dropouts")
+            .filter(|fault| fault.kind == FaultKind::Dropouts)
             .map(|fault| fault.rows)
             .sum()
     }

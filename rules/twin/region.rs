@@ -1,7 +1,9 @@
 //! Where: the region of time and of operating space in which a missing effect acts.
 
+use super::text_report::format_short_number;
 use numerics::statistics::quantile;
 use physics::Scene;
+use physics::explain::Language;
 
 /// Share of the usual greatest size above which a row counts as affected: a fifth is a change that is seen beside it. Lower: noise
 /// of the estimate and the tails of a curve are called affected; higher: only the peak is.
@@ -30,6 +32,25 @@ pub enum Condition {
 }
 
 impl Condition {
+    /// The condition in words, with the column's name as it stands in the recording.
+    #[must_use]
+    pub fn describe(&self, language: Language) -> String {
+        let words = |en: String, zh: String| if language == Language::En { en } else { zh };
+        match self {
+            Self::Range { column, min, max } => match (min.map(format_short_number), max.map(format_short_number)) {
+                (Some(min), Some(max)) => {
+                    words(format!("{column} is between {min} and {max}"), format!("{column}在{min}与{max}之间"))
+                }
+                (Some(min), None) => words(format!("{column} is above {min}"), format!("{column}大于{min}")),
+                (None, Some(max)) => words(format!("{column} is below {max}"), format!("{column}小于{max}")),
+                (None, None) => words(format!("{column} has any value"), format!("{column}任意")),
+            },
+            Self::Equals { column, words: any_of } => {
+                words(format!("{column} is {}", any_of.join(" or ")), format!("{column}为{}", any_of.join("或")))
+            }
+        }
+    }
+
     /// The column it is on.
     #[must_use]
     pub fn column(&self) -> &str {
@@ -115,4 +136,16 @@ pub fn list_spans(scene: &Scene, active: &[bool]) -> Vec<Span> {
 
 fn build_span(scene: &Scene, run: &str, (first, last): (usize, usize)) -> Span {
     Span { run: run.to_owned(), from_s: scene.time_s()[first], to_s: scene.time_s()[last] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_of_a_condition_keep_their_digits_in_both_languages() {
+        let small = Condition::Range { column: "feed_per_tooth_mm".to_owned(), min: Some(0.000_412_34), max: None };
+        assert_eq!(small.describe(Language::En), "feed_per_tooth_mm is above 0.0004123");
+        assert_eq!(small.describe(Language::Zh), "feed_per_tooth_mm大于0.0004123");
+    }
 }

@@ -1,9 +1,9 @@
 //! The diagnosis in plain words, in both languages.
 
 use super::diagnosis::{Diagnosis, Existence, UNKNOWN, Verdict};
-use super::region::Condition;
-use super::text_report::format_short_number;
+use super::text_report::{format_short_number, format_signed_number};
 use adapter_core::bilingual::Bilingual;
+use physics::explain::Language;
 use physics::find_effect;
 
 /// One or two sentences for the machinist.
@@ -98,9 +98,10 @@ pub(super) fn describe_withdrawal(
         false => Bilingual::new("runs that took no part in fitting", "未参与拟合的批次"),
     };
     let errors = errors.map_or_else(Bilingual::default, |(before, after)| {
+        let [before, after] = [before, after].map(format_short_number);
         Bilingual::new(
-            format!(" ({before:.3} {unit} without it, {after:.3} {unit} with it)"),
-            format!("（不含它{before:.3} {unit}，含它{after:.3} {unit}）"),
+            format!(" ({before} {unit} without it, {after} {unit} with it)"),
+            format!("（不含它{before} {unit}，含它{after} {unit}）"),
         )
     });
     Bilingual::new(
@@ -121,20 +122,24 @@ pub(super) fn describe_withdrawal(
 
 fn describe_improvement(diagnosis: &Diagnosis) -> Bilingual {
     let Some(fit) = &diagnosis.fit else { return Bilingual::default() };
-    let (unit, floor) = (&diagnosis.unit, fit.noise_floor);
+    let unit = &diagnosis.unit;
+    let shown = |before: f64, after: f64| [before, after, fit.noise_floor].map(format_short_number);
     match (fit.before.held_out_rmse, fit.after.held_out_rmse) {
-        (Some(before), Some(after)) => Bilingual::new(
-            format!(
-                "On runs that took no part in fitting the error falls from {before:.3} to {after:.3} {unit}; the noise is \
-                 {floor:.3} {unit}."
-            ),
-            format!("未参与拟合的批次的误差由{before:.3}降至{after:.3} {unit}；噪声为{floor:.3} {unit}。"),
-        ),
-        _ => {
-            let (before, after) = (fit.before.rmse, fit.after.rmse);
+        (Some(before), Some(after)) => {
+            let [before, after, floor] = shown(before, after);
             Bilingual::new(
-                format!("The error falls from {before:.3} to {after:.3} {unit}."),
-                format!("误差由{before:.3}降至{after:.3} {unit}。"),
+                format!(
+                    "On runs that took no part in fitting the error falls from {before} to {after} {unit}; the noise is \
+                     {floor} {unit}."
+                ),
+                format!("未参与拟合的批次的误差由{before}降至{after} {unit}；噪声为{floor} {unit}。"),
+            )
+        }
+        _ => {
+            let [before, after, _] = shown(fit.before.rmse, fit.after.rmse);
+            Bilingual::new(
+                format!("The error falls from {before} to {after} {unit}."),
+                format!("误差由{before}降至{after} {unit}。"),
             )
         }
     }
@@ -142,48 +147,20 @@ fn describe_improvement(diagnosis: &Diagnosis) -> Bilingual {
 
 fn describe_region(diagnosis: &Diagnosis) -> Bilingual {
     let Some(first) = diagnosis.mismatch.first() else { return Bilingual::default() };
-    let (mean, unit) = (first.mean, &diagnosis.unit);
-    let joined = |words: &dyn Fn(&Condition) -> String, between: &str| {
-        first.conditions.iter().map(words).collect::<Vec<_>>().join(between)
+    let (mean, unit) = (format_signed_number(first.mean), &diagnosis.unit);
+    let joined = |language: Language, between: &str| {
+        first.conditions.iter().map(|condition| condition.describe(language)).collect::<Vec<_>>().join(between)
     };
     let mut place = Bilingual::default();
     if !first.conditions.is_empty() {
-        place.en = format!(", where {}", joined(&describe_condition, " and "));
-        place.zh = format!("，位于{}处", joined(&describe_condition_zh, "且"));
+        place.en = format!(", where {}", joined(Language::En, " and "));
+        place.zh = format!("，位于{}处", joined(Language::Zh, "且"));
     }
     if let Some(onset) = &first.onset {
         place.en.push_str(&format!(", since run {} at {:.0} s", onset.run, onset.time_s));
         place.zh.push_str(&format!("，始于批次{}的{:.0} s", onset.run, onset.time_s));
     }
-    place.en.push_str(&format!(" (on average {mean:+.3} {unit})"));
-    place.zh.push_str(&format!("（平均{mean:+.3} {unit}）"));
+    place.en.push_str(&format!(" (on average {mean} {unit})"));
+    place.zh.push_str(&format!("（平均{mean} {unit}）"));
     place
-}
-
-/// A condition in Chinese words.
-#[must_use]
-pub fn describe_condition_zh(condition: &Condition) -> String {
-    match condition {
-        Condition::Range { column, min: Some(min), max: Some(max) } => {
-            format!("{column}在{}与{}之间", format_short_number(*min), format_short_number(*max))
-        }
-        Condition::Range { column, min: Some(min), max: None } => format!("{column}大于{}", format_short_number(*min)),
-        Condition::Range { column, min: None, max: Some(max) } => format!("{column}小于{}", format_short_number(*max)),
-        Condition::Range { column, .. } => format!("{column}任意"),
-        Condition::Equals { column, words } => format!("{column}为{}", words.join("或")),
-    }
-}
-
-/// A condition in words.
-#[must_use]
-pub fn describe_condition(condition: &Condition) -> String {
-    match condition {
-        Condition::Range { column, min: Some(min), max: Some(max) } => {
-            format!("{column} is between {min:.3} and {max:.3}")
-        }
-        Condition::Range { column, min: Some(min), max: None } => format!("{column} is above {min:.3}"),
-        Condition::Range { column, min: None, max: Some(max) } => format!("{column} is below {max:.3}"),
-        Condition::Range { column, .. } => format!("{column} has any value"),
-        Condition::Equals { column, words } => format!("{column} is {}", words.join(" or ")),
-    }
 }

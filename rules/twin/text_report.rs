@@ -1,8 +1,7 @@
 //! The whole diagnosis in plain words for standard output, in English or Chinese.
 
 use super::diagnosis::{Alternative, Diagnosis, Fits, Missing, ParameterEstimate, Shift, Verdict};
-use super::region::{Condition, Region};
-use super::summary;
+use super::region::Region;
 use physics::explain::Language;
 use physics::find_effect;
 use std::fmt::Write as _;
@@ -53,6 +52,13 @@ pub fn format_short_number(x: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
+/// The same with a plus before a positive number.
+#[must_use]
+pub fn format_signed_number(x: f64) -> String {
+    let sign = if x > 0.0 { "+" } else { "" };
+    format!("{sign}{}", format_short_number(x))
+}
+
 struct Say<'a> {
     language: Language,
     unit: &'a str,
@@ -90,16 +96,15 @@ impl Say<'_> {
     }
 
     fn describe_region(&self, region: &Region) -> Vec<String> {
-        let (share, mean, unit) = (100.0 * region.share, format_short_number(region.mean), self.unit);
-        let place: Vec<String> = region.conditions.iter().map(|condition| self.describe_condition(condition)).collect();
+        let (share, mean, unit) = (100.0 * region.share, format_signed_number(region.mean), self.unit);
+        let place: Vec<String> = region.conditions.iter().map(|condition| condition.describe(self.language)).collect();
         let place = match place.is_empty() {
             true => self.select_text("everywhere", "所有工况").to_owned(),
             false => place.join(self.select_text(" and ", "，且")),
         };
-        let sign = if region.mean > 0.0 { "+" } else { "" };
         let mut lines = vec![self.select_sentence(
-            format!("{place}: {share:.0} % of it, on average {sign}{mean} {unit}"),
-            format!("{place}：占{share:.0} %，平均{sign}{mean} {unit}"),
+            format!("{place}: {share:.0} % of it, on average {mean} {unit}"),
+            format!("{place}：占{share:.0} %，平均{mean} {unit}"),
         )];
         if let Some(onset) = &region.onset {
             let (run, at, low, high) = (&onset.run, onset.time_s, onset.low_s, onset.high_s);
@@ -110,14 +115,6 @@ impl Say<'_> {
         }
         lines.push(self.describe_spans(region));
         lines
-    }
-
-    fn describe_condition(&self, condition: &Condition) -> String {
-        if self.language == Language::En {
-            summary::describe_condition(condition)
-        } else {
-            summary::describe_condition_zh(condition)
-        }
     }
 
     fn describe_spans(&self, region: &Region) -> String {
@@ -240,7 +237,7 @@ impl Say<'_> {
     fn list_shifts(&self, diagnosis: &Diagnosis) -> Vec<String> {
         let moved = |shift: &&Shift| format_short_number(shift.before) != format_short_number(shift.after);
         let line = |shift: &Shift| {
-            let unit = find_shift_unit(diagnosis, &shift.parameter).replace("output", self.unit);
+            let unit = diagnosis.find_parameter_unit(&shift.parameter).unwrap_or_default();
             format!(
                 "{}: {} -> {} {unit}",
                 shift.parameter,
@@ -276,22 +273,10 @@ impl Say<'_> {
         let faults = diagnosis.data_quality.iter();
         faults
             .map(|fault| {
-                let (kind, column, rows) = (self.describe_fault(fault.fault), &fault.column, fault.rows);
+                let (kind, column, rows) = (fault.kind.describe(self.language), &fault.column, fault.rows);
                 self.select_sentence(format!("{kind} in {column}: {rows} rows"), format!("{column}：{kind}，{rows}行"))
             })
             .collect()
-    }
-
-    fn describe_fault<'t>(&self, fault: &'t str) -> &'t str {
-        let (en, zh) = match fault {
-            "dropouts" => ("values missing, held or zero", "数据缺失、保持或为零"),
-            "spikes" => ("isolated spikes", "孤立尖峰"),
-            "quantisation" => ("coarse steps", "量化过粗"),
-            "duplicate_time" => ("time that does not advance", "时间未递增"),
-            "refused_rows" => ("refused rows", "被拒绝的行"),
-            other => (other, other),
-        };
-        self.select_text(en, zh)
     }
 }
 
@@ -311,16 +296,6 @@ fn describe_odds(delta_ic: f64) -> String {
 fn describe_odds_zh(delta_ic: f64) -> String {
     let odds = format_odds(delta_ic).map(|odds| odds.replace("over ", "超过"));
     odds.map_or_else(|| "可能性大致相同".to_owned(), |odds| format!("可能性为其{odds}分之一"))
-}
-
-/// The unit of `label.parameter`; empty for pure numbers.
-fn find_shift_unit(diagnosis: &Diagnosis, name: &str) -> String {
-    let parts = diagnosis.model.parts.iter();
-    let unit = parts.filter_map(|part| {
-        let parameter = name.strip_prefix(part.label())?.strip_prefix('.')?;
-        part.find_parameter(parameter).map(|parameter| parameter.unit.clone())
-    });
-    unit.into_iter().next().filter(|unit| unit != "1").unwrap_or_default()
 }
 
 #[cfg(test)]

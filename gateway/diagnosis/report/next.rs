@@ -103,11 +103,7 @@ fn signed_whole(x: f64) -> String {
 
 /// The unit of `part.parameter` in the model, escaped.
 fn unit_of(data: &Data<'_>, name: &str) -> String {
-    let parameters = data.diagnosis.model.parts.iter().flat_map(|part| {
-        part.parameters.iter().map(move |parameter| (format!("{}.{}", part.label(), parameter.name), &parameter.unit))
-    });
-    let unit = parameters.into_iter().find(|(full, _)| full == name).map(|(_, unit)| unit.as_str());
-    let unit = unit_text(&unit.unwrap_or("").replace("output", &data.diagnosis.unit));
+    let unit = unit_text(&data.diagnosis.find_parameter_unit(name).unwrap_or_default());
     if unit.is_empty() { "\u{2013}".to_owned() } else { unit }
 }
 
@@ -136,17 +132,9 @@ pub(super) fn render_data_quality(data: &Data<'_>) -> String {
 }
 
 fn render_fault(data: &Data<'_>, fault: &Fault) -> String {
-    let known = match fault.fault {
-        "dropouts" => data.pick_text("no value, or a value that was held", "无值或保持的旧值"),
-        "spikes" => data.pick_text("isolated spikes", "孤立尖峰"),
-        "quantisation" => data.pick_text("recorded in coarse steps", "量化步长较粗"),
-        "duplicate_time" => data.pick_text("time stands still or runs backwards", "时间停滞或倒退"),
-        "refused_rows" => data.pick_text("rows refused while reading", "读取时被拒绝的行"),
-        other => other,
-    };
     format!(
         "<tr><td>{}</td><td><code>{}</code></td><td class=\"n\">{}</td></tr>",
-        escape_html(known),
+        escape_html(fault.kind.describe(data.tongue.0)),
         escape_html(&fault.column),
         format_fixed(fault.rows as f64, 0)
     )
