@@ -44,8 +44,8 @@ pub(super) struct Account {
 }
 
 impl Account {
-    pub(super) fn new(post: OrderSender) -> Self {
-        Self { orders: post, refusals: Mutex::default() }
+    pub(super) fn new(orders: OrderSender) -> Self {
+        Self { orders, refusals: Mutex::default() }
     }
 
     /// Something happened; false when it will not be stored.

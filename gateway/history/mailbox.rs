@@ -93,7 +93,7 @@ pub(crate) struct QueueFigures {
 
 impl Mailbox {
     pub(crate) fn new(series: &[Series], options: &Options) -> Self {
-        let post = MailboxState {
+        let state = MailboxState {
             current: SeriesRows::for_series(series),
             full: VecDeque::new(),
             free: Vec::new(),
@@ -112,7 +112,7 @@ impl Mailbox {
             stopped: false,
         };
         Self {
-            state: Mutex::new(post),
+            state: Mutex::new(state),
             arrived: Condvar::new(),
             progressed: Condvar::new(),
             queue_rows: options.queue_rows.max(1),
@@ -126,55 +126,55 @@ impl Mailbox {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn wait_for_progress<'a>(&self, post: MutexGuard<'a, MailboxState>) -> MutexGuard<'a, MailboxState> {
-        self.progressed.wait(post).unwrap_or_else(PoisonError::into_inner)
+    fn wait_for_progress<'a>(&self, state: MutexGuard<'a, MailboxState>) -> MutexGuard<'a, MailboxState> {
+        self.progressed.wait(state).unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Queues one tick; the samples dropped so far.
     pub(crate) fn queue_sample(&self, sample: &Sample, extras: &[ExtraValue<'_>]) -> u64 {
-        let mut post = self.lock_state();
-        while post.queued_rows >= self.queue_rows && self.when_full == WhenFull::Wait && !post.stopped {
+        let mut state = self.lock_state();
+        while state.queued_rows >= self.queue_rows && self.when_full == WhenFull::Wait && !state.stopped {
             self.arrived.notify_one();
-            post = self.wait_for_progress(post);
+            state = self.wait_for_progress(state);
         }
-        if post.queued_rows >= self.queue_rows || post.stopped {
-            post.dropped_samples += 1;
-            return post.dropped_samples;
+        if state.queued_rows >= self.queue_rows || state.stopped {
+            state.dropped_samples += 1;
+            return state.dropped_samples;
         }
-        let MailboxState { current, reasons, .. } = &mut *post;
+        let MailboxState { current, reasons, .. } = &mut *state;
         current.push(sample, extras, reasons);
-        post.queued_rows += 1;
-        post.taken_rows += 1;
-        if post.current.len() >= BATCH_ROWS.min(self.queue_rows) {
-            post.close_batch();
+        state.queued_rows += 1;
+        state.taken_rows += 1;
+        if state.current.len() >= BATCH_ROWS.min(self.queue_rows) {
+            state.close_batch();
             self.arrived.notify_one();
         }
-        post.dropped_samples
+        state.dropped_samples
     }
 
     /// Queues one record; its ticket, or `None` when the queue is full.
     pub(crate) fn queue_record(&self, record: Record) -> Option<u64> {
-        let mut post = self.lock_state();
-        while post.waiting_records() >= self.queue_records && self.when_full == WhenFull::Wait && !post.stopped {
+        let mut state = self.lock_state();
+        while state.waiting_records() >= self.queue_records && self.when_full == WhenFull::Wait && !state.stopped {
             self.arrived.notify_one();
-            post = self.wait_for_progress(post);
+            state = self.wait_for_progress(state);
         }
-        if post.waiting_records() >= self.queue_records || post.stopped {
-            post.dropped_records += 1;
+        if state.waiting_records() >= self.queue_records || state.stopped {
+            state.dropped_records += 1;
             return None;
         }
-        post.last_ticket += 1;
-        let (ticket, after_rows) = (post.last_ticket, post.taken_rows);
-        post.records.push_back(QueuedRecord { record, ticket, after_rows });
+        state.last_ticket += 1;
+        let (ticket, after_rows) = (state.last_ticket, state.taken_rows);
+        state.records.push_back(QueuedRecord { record, ticket, after_rows });
         Some(ticket)
     }
 
     /// Asks for a job and returns its number.
     pub(crate) fn queue_job(&self, job: WriterJob) -> u64 {
-        let mut post = self.lock_state();
-        post.last_job += 1;
-        let number = post.last_job;
-        post.jobs.push_back((number, job));
+        let mut state = self.lock_state();
+        state.last_job += 1;
+        let number = state.last_job;
+        state.jobs.push_back((number, job));
         self.arrived.notify_one();
         number
     }
@@ -182,15 +182,15 @@ impl Mailbox {
     /// Waits until job `number` is finished; false when it was not within `limit` or the writer has stopped.
     pub(crate) fn await_job(&self, number: u64, limit: Duration) -> bool {
         let until = Instant::now() + limit;
-        let mut post = self.lock_state();
-        while post.finished_job < number && !post.stopped {
+        let mut state = self.lock_state();
+        while state.finished_job < number && !state.stopped {
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return false;
             }
-            post = self.progressed.wait_timeout(post, left).unwrap_or_else(PoisonError::into_inner).0;
+            state = self.progressed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
         }
-        post.finished_job >= number
+        state.finished_job >= number
     }
 
     /// Asks the writer to finish.
@@ -202,15 +202,15 @@ impl Mailbox {
     /// The writer's side: waits until there is a full batch, a job or `limit` has passed, then takes what is there.
     /// `rows_too` false leaves the samples where they are.
     pub(crate) fn receive_delivery(&self, limit: Duration, rows_too: bool, job_too: bool) -> Delivery {
-        let mut post = self.lock_state();
-        let ready = |post: &MailboxState| {
-            (rows_too && !post.full.is_empty()) || (job_too && !post.jobs.is_empty()) || post.closing
+        let mut state = self.lock_state();
+        let ready = |state: &MailboxState| {
+            (rows_too && !state.full.is_empty()) || (job_too && !state.jobs.is_empty()) || state.closing
         };
-        if !ready(&post) && !limit.is_zero() {
-            let waited = self.arrived.wait_timeout_while(post, limit, |post| !ready(post));
-            post = waited.unwrap_or_else(PoisonError::into_inner).0;
+        if !ready(&state) && !limit.is_zero() {
+            let waited = self.arrived.wait_timeout_while(state, limit, |state| !ready(state));
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
-        let delivery = post.collect_delivery(rows_too, job_too);
+        let delivery = state.collect_delivery(rows_too, job_too);
         self.progressed.notify_all();
         delivery
     }
@@ -218,9 +218,9 @@ impl Mailbox {
     /// The writer's side: an emptied batch, and how many records it still holds.
     pub(crate) fn recycle_batch(&self, mut batch: SeriesRows) {
         batch.clear();
-        let mut post = self.lock_state();
-        if post.free.len() < FREE_MAX {
-            post.free.push(batch);
+        let mut state = self.lock_state();
+        if state.free.len() < FREE_MAX {
+            state.free.push(batch);
         }
     }
 
@@ -243,12 +243,12 @@ impl Mailbox {
     }
 
     pub(crate) fn measure_queue(&self) -> QueueFigures {
-        let post = self.lock_state();
+        let state = self.lock_state();
         QueueFigures {
-            rows: post.queued_rows,
-            records: post.waiting_records(),
-            dropped_samples: post.dropped_samples,
-            dropped_records: post.dropped_records,
+            rows: state.queued_rows,
+            records: state.waiting_records(),
+            dropped_samples: state.dropped_samples,
+            dropped_records: state.dropped_records,
         }
     }
 }

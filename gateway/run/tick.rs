@@ -171,9 +171,9 @@ impl Ticker {
 
     /// Waits for the next tick. Orders that come meanwhile are carried out at once: whoever disarms does not wait for it.
     fn next_tick(&mut self, sample: &Sample, last_ns: Option<TimeNs>) -> Option<TimeNs> {
-        let Self { schedule: pace, wake, run_flags, commands, pipeline, health, .. } = self;
+        let Self { schedule, wake, run_flags, commands, pipeline, health, .. } = self;
         let mut left = ORDERS_BETWEEN_MAX;
-        pace.next_tick_or(&run_flags.stop, wake, || {
+        schedule.next_tick_or(&run_flags.stop, wake, || {
             // Before the first tick there is nothing to order about.
             let Some(last_ns) = last_ns.filter(|_| left > 0) else { return };
             left -= 1;

@@ -3,7 +3,7 @@
 
 use super::functions::NO_PARTICIPLES;
 use super::names::production;
-use super::texts;
+use super::production_files;
 use std::collections::BTreeMap;
 
 /// Participles without `-ed` that stood for things. Those that are a term of the field or of the language (`set`, `cut`,
@@ -20,7 +20,7 @@ const FILES_MAX: [(&str, usize); 3] = [("adapters", 7), ("gateway", 15), ("rules
 const FIELDS_MAX: [(&str, usize); 3] = [("adapters", 82), ("gateway", 193), ("rules", 92)];
 
 fn is_participle(name: &str) -> bool {
-    let regular = name.ends_with("ed") && !NO_PARTICIPLES.contains(&name) && name != "bed";
+    let regular = name.ends_with("ed") && !NO_PARTICIPLES.contains(&name);
     !name.contains('_') && (regular || IRREGULAR.contains(&name))
 }
 
@@ -51,11 +51,7 @@ struct Participles {
 
 fn count_participles() -> BTreeMap<String, Participles> {
     let mut rooms: BTreeMap<String, Participles> = BTreeMap::new();
-    for (path, text) in texts(&["rs"]) {
-        let room = path.split('/').next().unwrap_or_default().to_owned();
-        if room == "tests" || path.ends_with("tests.rs") {
-            continue;
-        }
+    for (room, path, text) in production_files() {
         let count = rooms.entry(room).or_default();
         let stem = path.rsplit('/').next().unwrap_or_default().trim_end_matches(".rs");
         if is_participle(stem) {

@@ -5,6 +5,8 @@
 mod advisories;
 #[path = "functions.rs"]
 mod functions;
+#[path = "habits.rs"]
+mod habits;
 #[path = "names.rs"]
 mod names;
 #[path = "participles.rs"]
@@ -83,6 +85,16 @@ fn texts(endings: &[&str]) -> Vec<(String, String)> {
         .iter()
         .filter(|path| wanted(path))
         .map(|path| (relative(path), fs::read_to_string(path).expect("text")))
+        .collect()
+}
+
+/// Room, path and text of every file of production code.
+fn production_files() -> Vec<(String, String, String)> {
+    let room = |path: &str| path.split('/').next().unwrap_or_default().to_owned();
+    texts(&["rs"])
+        .into_iter()
+        .map(|(path, text)| (room(&path), path, text))
+        .filter(|(room, path, _)| room != "tests" && !path.ends_with("tests.rs") && !path.contains("/tests/"))
         .collect()
 }
 
