@@ -11,7 +11,8 @@
 //! | [`simulated`] | the built-in machine | `adapter_core` |
 //! | [`mqtt`] | a client of MQTT | `adapter_core` |
 //! | [`modbus`] | meters by Modbus | `adapter_core`, `simulated` |
-//! | [`fanuc`] | FANUC controllers, natively and through the vendor's library | `adapter_core`, `simulated` |
+//! | [`fanuc`] | FANUC controllers, natively and through the vendor's library | `adapter_core` |
+//! | [`fanuc_server`] | the simulated machine as a FANUC control | `fanuc`, `simulated` |
 //! | [`nclink`] | Huazhong controllers by NC-Link | `adapter_core`, `mqtt`, `simulated` |
 //! | [`hnc`] | Huazhong controllers through the vendor's library | `adapter_core`, `nclink` |
 //!
@@ -36,6 +37,7 @@ pub use adapter_core::{
     reading, sample, serial, text, tls, unique_id, units, words,
 };
 pub use fanuc;
+pub use fanuc_server;
 pub use hnc;
 pub use modbus;
 pub use mqtt;

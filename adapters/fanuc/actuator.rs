@@ -9,8 +9,8 @@
 //!
 //! Where the address names the byte with the operator's dial, what is in force is what the control obeys: G012, with the
 //! second override or a macro variable its product with that. Feed hold and stop go through a byte of their own, see
-//! `ladder_request`. Mailbox and requests are laid out in [`server::ladder`](super::server::ladder), with the
-//! rungs that a machine's maker needs.
+//! `ladder_request`. Mailbox and requests are laid out in [`ladder`](super::ladder); the crate `fanuc_server` has the rungs
+//! that a machine's maker needs.
 //! Nothing is looked at sooner than the settling time after a write: a return code 0 says that a byte has arrived, not
 //! that the ladder left it there.
 
@@ -18,10 +18,10 @@ use super::answer::{FocasAnswer, FocasItemResult};
 use super::dial::Dial;
 use super::feed_override;
 use super::item::{Area, FocasItem, Stretch, Write};
+use super::ladder::ENABLED;
 use super::ladder_request::Asking;
 use super::line::{Asked, FanucLine};
 use super::poll::find_signal_address;
-use super::server::ladder::ENABLED;
 use crate::address::{FanucOptions, WriteMethod};
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::{Actuator, LadderRequest, LadderRule, SourceError};

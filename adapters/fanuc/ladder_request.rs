@@ -6,8 +6,8 @@
 
 use super::answer::FocasAnswer;
 use super::item::{Area, FocasItem, Stretch, Write};
+use super::ladder::request_bit;
 use super::line::FanucLine;
-use super::server::ladder::request_bit;
 use adapter_core::clock::Clock;
 use adapter_core::driver::{LadderRequest, SEE_DOCTOR, SourceError};
 

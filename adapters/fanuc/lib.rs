@@ -32,10 +32,10 @@
 //! | `allow_list` | what may be written |
 //! | `dial` | where the operator's dial stands |
 //! | `actuator` | the feed override: mailbox, second override, macro variable, direct |
+//! | `ladder` | bytes that gateway and ladder write for each other |
 //! | `ladder_request` | feed hold and stop, latched once by the ladder |
 //! | `work_offset` | the external work offset between programs |
 //! | `open` | from an address to all of this |
-//! | `server` | the other side of the wire |
 //!
 //! **Several paths** (`paths=1,2`, up to 3) share the connection: every block of a frame names its path, so the quick
 //! group of all of them is one round trip where the control's longest answer holds it (two paths do on every
@@ -66,6 +66,7 @@ pub mod feed_override;
 pub mod focas;
 pub mod generation;
 pub mod item;
+pub mod ladder;
 mod ladder_request;
 pub mod line;
 pub mod native;
@@ -78,7 +79,6 @@ pub mod readings;
 mod records;
 mod refusals;
 pub mod request;
-pub mod server;
 pub mod source;
 pub mod states;
 pub mod statistics;
@@ -90,8 +90,4 @@ mod word;
 pub mod work_offset;
 
 #[cfg(test)]
-mod captures;
-#[cfg(test)]
 mod line_tests;
-#[cfg(test)]
-mod tests;

@@ -7,7 +7,7 @@ use crate::table::{Row, Scale};
 use adapters::address::SimulatedMachine;
 use adapters::clock::{Clock, SystemClock};
 use adapters::fanuc::item::Area;
-use adapters::fanuc::server::{Server, ServerSettings, SimulatedControl};
+use adapters::fanuc_server::{Server, ServerSettings, SimulatedControl};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;

@@ -4,11 +4,11 @@ use super::axes::{self, encode_places};
 use super::controller::{Controller, Data};
 use super::encode::{clamp_to_i32, encode_longs, encode_shorts, encode_text};
 use super::{message, program, tool, write};
-use crate::answer::System;
-use crate::generation::Generation;
-use crate::item::{Area, PmcWidth, Spindle, Stretch};
-use crate::request::function as f;
-use crate::wire::{CncOrPmc, Number, ReplyBlock, Request, reply_body};
+use fanuc::answer::System;
+use fanuc::generation::Generation;
+use fanuc::item::{Area, PmcWidth, Spindle, Stretch};
+use fanuc::request::function as f;
+use fanuc::wire::{CncOrPmc, Number, ReplyBlock, Request, reply_body};
 
 /// What a question yields: data, or a return code.
 pub(super) type Data8 = Result<Vec<u8>, i16>;

@@ -3,11 +3,11 @@
 use super::answer::{ATTRIB, Data8};
 use super::controller::{Controller, ControllerAxis};
 use super::encode::{encode_longs, encode_shorts};
-use crate::answer::SpeedUnit;
-use crate::generation::Generation;
-use crate::item::{Position, Servo, Spindle};
-use crate::request::UNIT_OF_FEED;
-use crate::wire::Number;
+use fanuc::answer::SpeedUnit;
+use fanuc::generation::Generation;
+use fanuc::item::{Position, Servo, Spindle};
+use fanuc::request::UNIT_OF_FEED;
+use fanuc::wire::Number;
 
 /// Numbers of positions besides those of [`Position::ALL`], as `cnc_absolute2`, `cnc_relative2` and `cnc_rdposition` ask
 /// for them: absolute, relative and to go as the screen shows them.

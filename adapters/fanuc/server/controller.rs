@@ -1,11 +1,11 @@
 //! What a control holds, as plain values.
 
 use super::Memory;
-use crate::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit, Status, System};
-use crate::generation::{Generation, Opening};
-use crate::item::BlockWord;
-use crate::poll;
-use crate::wire::Number;
+use fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit, Status, System};
+use fanuc::generation::{Generation, Opening};
+use fanuc::item::BlockWord;
+use fanuc::poll;
+use fanuc::wire::Number;
 use std::collections::BTreeMap;
 
 /// The modal group of feed per minute and per revolution, and the parameter that shows the feed per revolution.

@@ -1,14 +1,6 @@
 //! The ladder of the sample machine: who decides about the feed override. A machine's maker can build the same rungs.
 //!
-//! Mailbox, five bytes from a configurable byte on (R900 by default; R is cleared when the power comes on):
-//!
-//! | byte | written by | what |
-//! |---|---|---|
-//! | +0 | gateway | 0xA5 while the gateway asks for an override, anything else: it does not |
-//! | +1 | gateway | wanted override, % |
-//! | +2 | gateway | heartbeat: another number at every write |
-//! | +3 | ladder | override taken from the gateway, %; 100 when none is |
-//! | +4 | ladder | 0 not asked, 1 taken, 2 heartbeat lost, 3 taken within the ladder's own limits |
+//! Mailbox and requests are laid out in [`fanuc::ladder`].
 //!
 //! Every scan: the wanted override counts while byte +0 says so and the heartbeat has changed within the last 1.5 s,
 //! and never outside the ladder's own limits (50 to 120 %). With the operator's dial it becomes one override by the
@@ -16,30 +8,18 @@
 //! a dial at 0 % stays sovereign either way. The result goes to G012 in every scan, whatever anybody else wrote there. A
 //! second byte (R910 by default) goes, inverted, to the second override G013; 0 there is no request.
 //!
-//! Requests, two bytes from another configurable byte on (R905 by default), and the dial behind them:
-//!
-//! | byte | written by | what |
-//! |---|---|---|
-//! | +0 | gateway | bit 0 feed hold, bit 1 stop after this part; on for a few scans, then off again |
-//! | +1 | ladder | the same bits, latched when a bit comes on, until the operator acknowledges |
-//! | +2 | ladder | the operator's dial, %, before the gateway's override |
-//!
-//! A further path has the same bytes 20 higher and its own signals: R920 and G1012 for path 2.
-//!
 //! A bit that is on when the ladder starts is a leftover and latches nothing. While feed hold is latched, *SP (G008.5)
 //! is off and the axes stand. While a stop is latched, the ladder lets the running part end and no cycle start through.
 //! The gateway can neither end what it has asked for nor ask for the same a second time before it was acknowledged.
 
 use super::Memory;
-use crate::feed_override;
-use crate::item::Area;
-use crate::poll::find_signal_address;
 use adapter_core::clock::TimeNs;
 use adapter_core::driver::{LadderRequest, LadderRule};
 use adapter_core::units::OverridePct;
-
-/// Value of the first byte while an override is asked for.
-pub const ENABLED: u8 = 0xA5;
+use fanuc::feed_override;
+use fanuc::item::Area;
+use fanuc::ladder::{ENABLED, request_bit};
+use fanuc::poll::find_signal_address;
 
 /// One turn of the ladder.
 pub const SCAN_NS: i64 = 8_000_000;
@@ -49,15 +29,6 @@ const SILENT_NS: i64 = 1_500_000_000;
 
 /// The ladder's own limits, %.
 const LIMITS_PCT: (u8, u8) = (50, 120);
-
-/// The bit of a request.
-#[must_use]
-pub fn request_bit(request: LadderRequest) -> u8 {
-    match request {
-        LadderRequest::FeedHold => 1,
-        LadderRequest::Stop => 2,
-    }
-}
 
 /// *IT, *ESP and *SP of G008: off means interlock, emergency stop and feed hold.
 const RUNNING: u8 = 0x31;

@@ -3,7 +3,7 @@
 use super::answer::answer_body;
 use super::controller::Controller;
 use super::fault::InjectedFault;
-use crate::wire::{FocasFrame, FocasHeader, FrameKind, HEADER_LEN, encode_frame, parse_requests};
+use fanuc::wire::{FocasFrame, FocasHeader, FrameKind, HEADER_LEN, encode_frame, parse_requests};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};

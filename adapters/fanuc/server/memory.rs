@@ -1,6 +1,6 @@
 //! PMC memory: areas of bytes, numbers in them little-endian.
 
-use crate::item::{Area, PmcWidth, Stretch};
+use fanuc::item::{Area, PmcWidth, Stretch};
 use std::collections::BTreeMap;
 
 /// Bytes of each area. The signals of path 2 begin at G1000 and F1000, those of path 3 at 2000.

@@ -3,8 +3,8 @@
 use super::answer::{Data8, NUMBER};
 use super::controller::Controller;
 use super::encode::{clamp_to_i32, encode_longs, encode_shorts, encode_text};
-use crate::answer::{Alarm, OperatorMessage, PastAlarm};
-use crate::request::{ALARM_TEXT_LEN, HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
+use fanuc::answer::{Alarm, OperatorMessage, PastAlarm};
+use fanuc::request::{ALARM_TEXT_LEN, HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 
 /// At most so many records in one answer.
 const RECORDS_MAX: usize = 10;

@@ -3,8 +3,8 @@
 use super::answer::{ATTRIB, Data8, NUMBER};
 use super::controller::{Controller, ProgramFile};
 use super::encode::{clamp_to_i32, encode_longs, encode_shorts, encode_text};
-use crate::item::BlockWord;
-use crate::wire::{Number, Request};
+use fanuc::item::BlockWord;
+use fanuc::wire::{Number, Request};
 
 /// The folder that older clients and the library mean when they name none.
 pub(super) const FOLDER: &str = "//CNC_MEM/USER/PATH1/";

@@ -3,11 +3,11 @@
 
 use super::controller::{Controller, Data, ProgramFile, ToolGroup};
 use super::machine::round_to_number;
-use crate::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit};
-use crate::item::BlockWord;
-use crate::wire::Number;
 use adapter_core::clock::TimeNs;
 use adapter_core::words::execution;
+use fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit};
+use fanuc::item::BlockWord;
+use fanuc::wire::Number;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use simulated::{Moment, Panel};

@@ -6,10 +6,10 @@ use super::controller::Controller;
 use super::ladder::PmcLadder;
 use super::machine::{build_status, round_to_number};
 use super::memory::Memory;
-use crate::item::{Area, BlockWord};
-use crate::poll::find_signal_address;
-use crate::wire::Number;
 use adapter_core::driver::LadderRequest;
+use fanuc::item::{Area, BlockWord};
+use fanuc::poll::find_signal_address;
+use fanuc::wire::Number;
 use simulated::Moment;
 
 /// Its programs have numbers this much higher.

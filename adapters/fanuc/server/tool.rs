@@ -3,7 +3,7 @@
 use super::answer::{ATTRIB, Data8, NUMBER};
 use super::controller::{Controller, ToolGroup};
 use super::encode::{encode_longs, encode_shorts};
-use crate::wire::Number;
+use fanuc::wire::Number;
 
 /// A single offset is asked for with its type and this besides; a range with the type alone.
 const SINGLE: i32 = 1000;

@@ -2,9 +2,9 @@
 
 use super::answer::{ATTRIB, FUNC, LENGTH, NUMBER, parse_stretch};
 use super::controller::Controller;
-use crate::item::Area;
-use crate::request::function as f;
-use crate::wire::{Cursor, Number, Request};
+use fanuc::item::Area;
+use fanuc::request::function as f;
+use fanuc::wire::{Cursor, Number, Request};
 
 /// Not now.
 const REJECT: i16 = 13;

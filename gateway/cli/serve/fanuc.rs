@@ -4,7 +4,7 @@ use super::{Common, RunningMachine, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print_text};
 use adapters::LadderRule;
 use adapters::clock::Clock;
-use adapters::fanuc::server::{Server, ServerSettings, SimulatedControl};
+use adapters::fanuc_server::{Server, ServerSettings, SimulatedControl};
 use adapters::simulated::Simulated;
 use adapters::units::OverridePct;
 use clap::{Args, ValueEnum};

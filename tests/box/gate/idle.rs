@@ -5,7 +5,7 @@ use super::cut::{TICK_NS, asking, cutting, limits, set_number};
 use adapters::address::SimulatedMachine;
 use adapters::clock::{Clock, ManualClock, SECOND_NS, SystemClock};
 use adapters::fanuc::item::Area;
-use adapters::fanuc::server::{Controller, Memory, ServedControl, Server, ServerSettings, SimulatedControl};
+use adapters::fanuc_server::{Controller, Memory, ServedControl, Server, ServerSettings, SimulatedControl};
 use adapters::simulated::{LadderSettings, Simulated, SimulatedSettings};
 use adapters::units::OverridePct;
 use adapters::{Actuator, LadderRule};

@@ -6,7 +6,7 @@
 use adapters::address::SimulatedMachine;
 use adapters::clock::{Clock, SystemClock};
 use adapters::fanuc::item::Area;
-use adapters::fanuc::server::{Server, ServerSettings, SimulatedControl};
+use adapters::fanuc_server::{Server, ServerSettings, SimulatedControl};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};

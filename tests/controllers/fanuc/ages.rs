@@ -6,7 +6,7 @@
 use crate::fanuc::support::{controller, opened};
 use crate::fanuc::vendor::{library, opened_in, settings};
 use adapters::clock::{Clock, SystemClock};
-use adapters::fanuc::server::{Controller, InjectedFault, ServedControl, Server, ServerSettings};
+use adapters::fanuc_server::{Controller, InjectedFault, ServedControl, Server, ServerSettings};
 use adapters::merge::{Delay, Merge, SourceId, SourcePlan};
 use adapters::worker::{Worker, WorkerSettings, WorkerState};
 use adapters::{ChannelId, Sample, Source};

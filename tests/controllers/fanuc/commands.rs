@@ -2,7 +2,7 @@
 
 use crate::fanuc::support::{controller, serve};
 use crate::fanuc::vendor::library;
-use adapters::fanuc::server::ServerSettings;
+use adapters::fanuc_server::ServerSettings;
 use serde_json::Value;
 use std::process::Output;
 use std::time::{Duration, Instant};

@@ -2,8 +2,8 @@
 
 use crate::fanuc::support::{controller, number, opened, poll, serve, text, value};
 use adapters::Absence;
-use adapters::fanuc::server::{InjectedFault, ServerSettings};
 use adapters::fanuc::wire::Number;
+use adapters::fanuc_server::{InjectedFault, ServerSettings};
 
 /// Everything that is asked of a control, by its function.
 const FUNCTIONS: [u16; 18] =

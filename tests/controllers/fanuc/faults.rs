@@ -1,7 +1,7 @@
 //! Everything that goes wrong on a line, seeded: typed results, no panic, nothing left open, and the way back.
 
 use crate::fanuc::support::{controller, number, opened, poll, serve};
-use adapters::fanuc::server::{InjectedFault, ServerSettings};
+use adapters::fanuc_server::{InjectedFault, ServerSettings};
 use adapters::{Source, SourceError};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -21,7 +21,7 @@ fn kind(result: &Result<Vec<adapters::Reading>, SourceError>) -> &'static str {
     }
 }
 
-fn after(fault: InjectedFault, source: &mut dyn Source, server: &adapters::fanuc::server::Server) -> &'static str {
+fn after(fault: InjectedFault, source: &mut dyn Source, server: &adapters::fanuc_server::Server) -> &'static str {
     poll(source).expect("well before the fault");
     server.inject_fault(fault);
     let found = kind(&poll(source));

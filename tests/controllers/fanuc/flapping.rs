@@ -5,7 +5,7 @@ use crate::fanuc::support::{address, controller, serve};
 use adapters::address::Target;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::fanuc::open::open_native;
-use adapters::fanuc::server::{InjectedFault, Server, ServerSettings};
+use adapters::fanuc_server::{InjectedFault, Server, ServerSettings};
 use adapters::worker::{Worker, WorkerSettings, WorkerState};
 use adapters::{ChannelId, Reading, Source, SourceError};
 use rand::{Rng, SeedableRng};

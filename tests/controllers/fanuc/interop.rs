@@ -10,9 +10,9 @@ use crate::fanuc::vendor::opened_in;
 use adapters::address::Endpoint;
 use adapters::fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit, Status, System};
 use adapters::fanuc::item::{Area, BlockWord};
-use adapters::fanuc::server::{Controller, ProgramFile, Server, ServerSettings, ToolGroup};
 use adapters::fanuc::vendor::VendorSettings;
 use adapters::fanuc::wire::Number;
+use adapters::fanuc_server::{Controller, ProgramFile, Server, ServerSettings, ToolGroup};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::net::SocketAddr;
@@ -102,10 +102,10 @@ fn variables(control: &mut Controller) {
     }
     [3106, 9936].into_iter().for_each(|number| control.set_parameter(number, 3, Number::from_decimal(0, 0)));
     let each = |values: [i32; 3], places| values.map(|value| Number::from_decimal(value, places)).to_vec();
-    control.parameters.insert(3115, adapters::fanuc::server::Data { kind: 0, values: each([0; 3], 0) });
+    control.parameters.insert(3115, adapters::fanuc_server::Data { kind: 0, values: each([0; 3], 0) });
     control
         .parameters
-        .insert(1420, adapters::fanuc::server::Data { kind: 3, values: each([24_000, 24_001, 24_002], 0) });
+        .insert(1420, adapters::fanuc_server::Data { kind: 3, values: each([24_000, 24_001, 24_002], 0) });
     control.set_parameter(1410, 3, Number::from_decimal(3000, 0));
     control.diagnosis_of_axes(308, 2, each([41, 42, 43], 0));
     control.diagnosis_of_axes(301, 2, each([11, 12, 13], 0));

@@ -3,7 +3,7 @@
 
 use crate::fanuc::commands::doctor;
 use crate::fanuc::support::{controller, serve};
-use adapters::fanuc::server::{Server, ServerSettings};
+use adapters::fanuc_server::{Server, ServerSettings};
 use serde_json::Value;
 use std::time::Duration;
 use testkit::process::{get, wait_for};

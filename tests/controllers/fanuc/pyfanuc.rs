@@ -2,7 +2,7 @@
 
 use crate::fanuc::interop::{machine, partner, python};
 use crate::fanuc::support::serve;
-use adapters::fanuc::server::ServerSettings;
+use adapters::fanuc_server::ServerSettings;
 use serde_json::{Value, json};
 
 #[test]

@@ -3,8 +3,8 @@
 use crate::fanuc::support::{CUT, address, controller, number, opened, poll, serve, text, value};
 use adapters::fanuc::answer::{Alarm, SpeedUnit};
 use adapters::fanuc::item::Area;
-use adapters::fanuc::server::ServerSettings;
 use adapters::fanuc::wire::Number;
+use adapters::fanuc_server::ServerSettings;
 use adapters::open::open_address;
 use adapters::{Absence, SourceError};
 

@@ -3,8 +3,8 @@
 use adapters::address::Address;
 use adapters::clock::{Clock, SystemClock};
 use adapters::fanuc::item::{Area, BlockWord};
-use adapters::fanuc::server::{Controller, Server, ServerSettings};
 use adapters::fanuc::wire::Number;
+use adapters::fanuc_server::{Controller, Server, ServerSettings};
 use adapters::open::{Opened, open_address};
 use adapters::{Absence, Reading, Source, SourceError, Value};
 use std::net::TcpListener;

@@ -1,9 +1,9 @@
 //! The control that stood behind the captured frames.
 
-use crate::answer::{Alarm, Status, System};
-use crate::item::{Area, BlockWord};
-use crate::server::{Controller, ControllerAxis};
-use crate::wire::Number;
+use crate::{Controller, ControllerAxis};
+use fanuc::answer::{Alarm, Status, System};
+use fanuc::item::{Area, BlockWord};
+use fanuc::wire::Number;
 
 pub(super) fn build_controller(version: u16) -> Controller {
     let mut control = Controller::new(version, &['X', 'Y', 'Z']);

@@ -13,13 +13,13 @@ mod fixture;
 mod rows;
 mod values;
 
-use super::answer::FocasItemResult;
-use super::decode;
-use super::generation::Generation;
-use super::item::{FocasItem, Write};
-use super::request;
-use super::server::{Controller, answer_body};
-use super::wire::{FocasFrame, FrameKind, Request, encode_frame, parse_replies, parse_requests, request_body};
+use crate::{Controller, answer_body};
+use fanuc::answer::FocasItemResult;
+use fanuc::decode;
+use fanuc::generation::Generation;
+use fanuc::item::{FocasItem, Write};
+use fanuc::request;
+use fanuc::wire::{FocasFrame, FrameKind, Request, encode_frame, parse_replies, parse_requests, request_body};
 use rows::{CapturedCall, Says};
 
 const VERSIONS: [u16; 3] = [2, 3, 4];
@@ -140,13 +140,13 @@ fn decode_answers(items: &[FocasItem], generation: Generation, bytes: &[u8]) -> 
     let frame = FocasFrame::from_bytes(bytes).expect("a frame");
     assert_eq!((frame.kind, Generation::from_version(frame.version)), (FrameKind::Answer, generation));
     let replies = parse_replies(&frame.body).expect("blocks");
-    let one = |(item, reply): (&FocasItem, &super::wire::Reply<'_>)| {
+    let one = |(item, reply): (&FocasItem, &fanuc::wire::Reply<'_>)| {
         reply.check_request(&request::build_read_request(*item, generation)).expect("the answer to the question");
         match reply.code {
             0 => decode::read_answer(*item, generation, reply.data)
-                .map_err(|error| super::answer::FocasItemError::Malformed(error.to_string())),
-            code => Err(super::answer::FocasItemError::Refused(super::answer::Refusal {
-                code: super::code::FocasReturnCode(code),
+                .map_err(|error| fanuc::answer::FocasItemError::Malformed(error.to_string())),
+            code => Err(fanuc::answer::FocasItemError::Refused(fanuc::answer::Refusal {
+                code: fanuc::code::FocasReturnCode(code),
                 detail: reply.detail,
             })),
         }
@@ -186,6 +186,6 @@ fn a_write_and_its_reading_agree_in_every_generation() {
         let items = [FocasItem::Macro(512)];
         let body = request_body(&[request::build_read_request(items[0], generation)]);
         let answer = serve_request(&mut controller, version, &encode_frame(1, FrameKind::Request, &body));
-        assert_eq!(decode_answers(&items, generation, &answer), [Ok(super::answer::FocasAnswer::Number(Some(-2.5)))]);
+        assert_eq!(decode_answers(&items, generation, &answer), [Ok(fanuc::answer::FocasAnswer::Number(Some(-2.5)))]);
     }
 }

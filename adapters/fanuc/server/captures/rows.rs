@@ -1,8 +1,8 @@
 //! The captured calls about state, speeds, program and positions; the others stand in `values`.
 
-use crate::answer::{FocasAnswer, FocasItemError, FocasItemResult, Refusal, SpeedUnit, Status, System};
-use crate::code::FocasReturnCode;
-use crate::item::{Area, FocasItem, Position, Servo, Spindle, Stretch, Write};
+use fanuc::answer::{FocasAnswer, FocasItemError, FocasItemResult, Refusal, SpeedUnit, Status, System};
+use fanuc::code::FocasReturnCode;
+use fanuc::item::{Area, FocasItem, Position, Servo, Spindle, Stretch, Write};
 
 /// What the row is about.
 pub(super) enum Says {

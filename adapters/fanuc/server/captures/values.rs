@@ -3,8 +3,8 @@
 use super::rows::{
     ALL, CapturedCall, NEWER, OLDER, build_data, build_modal, build_number, define_refusal, read, write,
 };
-use crate::answer::{Alarm, FocasAnswer};
-use crate::item::{Area, BlockWord, FocasItem, PmcWidth, Stretch, Timer, Write};
+use fanuc::answer::{Alarm, FocasAnswer};
+use fanuc::item::{Area, BlockWord, FocasItem, PmcWidth, Stretch, Timer, Write};
 
 pub(super) fn list_calls() -> Vec<CapturedCall> {
     [list_value_calls(), list_variable_calls(), list_parameter_calls(), list_write_calls(), list_remaining_calls()]

@@ -1,15 +1,15 @@
 //! Writing to a served simulated control over a real socket: every way of writing, the ladder that fights, the offset.
 
-use super::item::Area;
-use super::line::FanucLine;
-use super::open::{OpenedFanuc, open_native};
-use super::server::{Controller, ServedControl, Server, ServerSettings, SimulatedControl};
-use super::work_offset::ExternalOffsets;
-use crate::address::parse_fanuc;
+use crate::{Controller, ServedControl, Server, ServerSettings, SimulatedControl};
 use adapter_core::clock::{Clock, ScaledClock, SystemClock};
 use adapter_core::driver::{Actuator, LadderRequest, SourceError};
 use adapter_core::offset::{Axis, OffsetSink};
 use adapter_core::units::OverridePct;
+use fanuc::address::parse_fanuc;
+use fanuc::item::Area;
+use fanuc::line::FanucLine;
+use fanuc::open::{OpenedFanuc, open_native};
+use fanuc::work_offset::ExternalOffsets;
 use simulated::{Simulated, SimulatedSettings};
 use std::net::TcpListener;
 use std::sync::Arc;
@@ -77,10 +77,10 @@ fn the_ladder_takes_what_comes_through_the_mailbox() {
     assert_eq!(write(actuator.as_mut(), 80), Ok(pct(80)));
     assert_eq!(write(actuator.as_mut(), 20), Ok(pct(50)), "the ladder has limits of its own");
     let g12 = || server.with(|control| control.map(|control| control.memory.read_byte(Area::G, 12)));
-    assert_eq!(g12(), Some(super::feed_override::encode(pct(50))));
+    assert_eq!(g12(), Some(fanuc::feed_override::encode(pct(50))));
     actuator.release_override(&SystemClock::new()).expect("given back");
     std::thread::sleep(std::time::Duration::from_millis(30));
-    assert_eq!(g12(), Some(super::feed_override::encode(OverridePct::FULL)));
+    assert_eq!(g12(), Some(fanuc::feed_override::encode(OverridePct::FULL)));
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn the_path_that_is_named_first_is_written_to_on_the_one_connection() {
     assert_eq!(actuator.read_dial(&clock), Ok(Some(pct(90))));
     let overrides = || {
         let byte = |at| move |control: &mut Controller| control.memory.read_byte(Area::G, at);
-        [12, 1012].map(|at| server.with(|control| control.map(byte(at))).map(super::feed_override::decode))
+        [12, 1012].map(|at| server.with(|control| control.map(byte(at))).map(fanuc::feed_override::decode))
     };
     assert_eq!(overrides(), [Some(pct(90)), Some(pct(70))], "path 1 keeps its dial");
     actuator.release_override(&clock).expect("given back");

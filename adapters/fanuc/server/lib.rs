@@ -38,3 +38,8 @@ pub use fault::InjectedFault;
 pub use listen::{ServedControl, Server, ServerSettings};
 pub use machine::SimulatedControl;
 pub use memory::Memory;
+
+#[cfg(test)]
+mod captures;
+#[cfg(test)]
+mod tests;
