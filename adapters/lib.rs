@@ -10,10 +10,12 @@
 //! | [`recording`](mod@recording) | recordings in every format that is read | `adapter_core` |
 //! | [`simulated`] | the built-in machine | `adapter_core` |
 //! | [`mqtt`] | a client of MQTT | `adapter_core` |
-//! | [`modbus`] | meters by Modbus | `adapter_core`, `simulated` |
+//! | [`modbus`] | meters by Modbus | `adapter_core` |
+//! | [`modbus_server`] | the simulated machine as a meter | `modbus`, `simulated` |
 //! | [`fanuc`] | FANUC controllers, natively and through the vendor's library | `adapter_core` |
 //! | [`fanuc_server`] | the simulated machine as a FANUC control | `fanuc`, `simulated` |
-//! | [`nclink`] | Huazhong controllers by NC-Link | `adapter_core`, `mqtt`, `simulated` |
+//! | [`nclink`] | Huazhong controllers by NC-Link | `adapter_core`, `mqtt` |
+//! | [`nclink_device`] | the simulated machine as an NC-Link device | `nclink`, `simulated` |
 //! | [`hnc`] | Huazhong controllers through the vendor's library | `adapter_core`, `nclink` |
 //!
 //! This crate reads addresses, opens what they name and runs the threads that poll it.
@@ -40,8 +42,10 @@ pub use fanuc;
 pub use fanuc_server;
 pub use hnc;
 pub use modbus;
+pub use modbus_server;
 pub use mqtt;
 pub use nclink;
+pub use nclink_device;
 pub use recording;
 pub use simulated;
 

@@ -17,7 +17,6 @@
 //! | `outputs` | from registers to channels, and to what [`electric`](adapter_core::electric) judges |
 //! | `refresh` | how often the meter really has something new |
 //! | `meter` | the source |
-//! | `server` | the other side: the simulated machine as a meter |
 //!
 //! A poll is one request as a rule: a profile's registers are read as one block wherever they lie close enough together.
 //! Every request has a deadline of its own (`timeout_ms`, 500 unless given). When it passes, or the answer cannot be
@@ -44,8 +43,7 @@ pub mod profile;
 mod refresh;
 pub mod register;
 mod rtu;
-pub mod server;
-mod tcp;
+pub mod tcp;
 
 pub use meter::ModbusMeter;
 pub use number::{Format, WordOrder};

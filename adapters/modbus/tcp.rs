@@ -267,7 +267,7 @@ fn build_broken_error(error: &io::Error) -> ModbusError {
 }
 
 /// Header and PDU as one write, so that they leave in one packet.
-pub(super) fn encode_frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
+pub fn encode_frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
     let length = u16::try_from(pdu.len() + 1).unwrap_or(u16::MAX);
     let mut frame = Vec::with_capacity(HEADER + pdu.len());
     frame.extend(transaction.to_be_bytes());
@@ -280,15 +280,17 @@ pub(super) fn encode_frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
 
 /// What a frame begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct MbapHeader {
-    pub(super) transaction: u16,
-    pub(super) unit: u8,
+pub struct MbapHeader {
+    /// Transaction identifier: the answer carries the one of its request.
+    pub transaction: u16,
+    /// Unit identifier: the device behind a gateway, as the address of a serial line.
+    pub unit: u8,
     /// Bytes of the PDU, 1 to 253.
-    pub(super) pdu: usize,
+    pub pdu: usize,
 }
 
 /// `None`: this is not Modbus.
-pub(super) fn parse_header(bytes: [u8; HEADER]) -> Option<MbapHeader> {
+pub fn parse_header(bytes: [u8; HEADER]) -> Option<MbapHeader> {
     let [t_high, t_low, p_high, p_low, l_high, l_low, unit] = bytes;
     let pdu = usize::from(u16::from_be_bytes([l_high, l_low])).checked_sub(1)?;
     let modbus = (p_high, p_low) == (0, 0) && (1..=PDU_MAX).contains(&pdu);

@@ -8,7 +8,7 @@ pub(super) fn find_field<'a>(object: &'a Value, names: &[&str]) -> Option<&'a Va
 }
 
 /// A field as text; a number becomes its digits.
-pub(super) fn find_text(object: &Value, names: &[&str]) -> Option<String> {
+pub fn find_text(object: &Value, names: &[&str]) -> Option<String> {
     match find_field(object, names)? {
         Value::String(text) => Some(text.clone()),
         Value::Number(number) => Some(number.to_string()),
@@ -17,7 +17,7 @@ pub(super) fn find_text(object: &Value, names: &[&str]) -> Option<String> {
 }
 
 /// A field as a list; one thing alone is a list of one.
-pub(super) fn find_list<'a>(object: &'a Value, names: &[&str]) -> &'a [Value] {
+pub fn find_list<'a>(object: &'a Value, names: &[&str]) -> &'a [Value] {
     match find_field(object, names) {
         Some(Value::Array(list)) => list,
         Some(other) => std::slice::from_ref(other),
@@ -47,7 +47,7 @@ pub(super) fn parse_number(value: &Value) -> Option<f64> {
 }
 
 /// A whole number that fits.
-pub(super) fn parse_integer(value: &Value) -> Option<i64> {
+pub fn parse_integer(value: &Value) -> Option<i64> {
     let number = parse_number(value).filter(|number| number.fract() == 0.0 && number.abs() < 9e15)?;
     #[expect(clippy::cast_possible_truncation, reason = "whole and below 2^53")]
     let integer = number as i64;

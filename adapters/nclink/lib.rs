@@ -18,7 +18,6 @@
 //! | `actuator` | the [`Actuator`](adapter_core::Actuator): letters into the mailbox, the override in force read back |
 //! | `offset_mailbox` | the registers through which the ladder is asked to shift axes |
 //! | `registers`, `offsets` | a connection for whoever writes; the registers of a device for such shifts |
-//! | `device` | the other role: the simulated machine as an NC-Link device |
 //!
 //! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query
 //! for all of them; the answer is stamped with the middle of the request. Messages of sample channels (1 ms data,
@@ -50,11 +49,10 @@ mod actuator;
 pub mod address;
 pub mod connection;
 mod decode;
-pub mod device;
-mod lenient_json;
+pub mod lenient_json;
 pub mod mailbox;
 mod map;
-mod message;
+pub mod message;
 pub mod model;
 pub mod offset_mailbox;
 mod offsets;

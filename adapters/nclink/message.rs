@@ -81,7 +81,7 @@ pub(super) fn encode_request(id: &str, asks: &[RequestedItem]) -> Vec<u8> {
 }
 
 /// The identifier by which an answer belongs to its request.
-pub(super) fn find_identifier(message: &Value) -> Option<String> {
+pub fn find_identifier(message: &Value) -> Option<String> {
     find_text(message, &["@id", "@ID", "id@"])
 }
 

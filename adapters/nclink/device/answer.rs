@@ -1,10 +1,10 @@
 //! One request in, one answer out.
 
 use super::{NcLinkDevice, to_milliseconds, values};
-use crate::lenient_json::{find_list, find_text, parse_integer};
-use crate::mailbox::ControllerRegister;
-use crate::message::find_identifier;
-use crate::topic::Subject;
+use nclink::lenient_json::{find_list, find_text, parse_integer};
+use nclink::mailbox::ControllerRegister;
+use nclink::message::find_identifier;
+use nclink::topic::Subject;
 use serde_json::{Value, json};
 
 /// At most so many elements of a list are answered.

@@ -2,11 +2,11 @@
 //! the mailboxes from which the ladder takes the gateway's override and its shifts.
 
 use super::values::channel_word;
-use crate::mailbox::{ControllerRegister, Mailbox, MailboxRequest, request_of};
-use crate::offset_mailbox::OffsetMailbox;
 use adapter_core::clock::Clock;
 use adapter_core::driver::Actuator;
 use adapter_core::offset::{Axis, OffsetSink};
+use nclink::mailbox::{ControllerRegister, Mailbox, MailboxRequest, request_of};
+use nclink::offset_mailbox::OffsetMailbox;
 use simulated::{Moment, Simulated, SimulatedOffsets, SimulatedOverride};
 use std::collections::BTreeMap;
 

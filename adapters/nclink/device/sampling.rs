@@ -1,7 +1,7 @@
 //! Messages of a sample channel: a column per item, one value per interval.
 
 use super::{to_milliseconds, values};
-use crate::model::{Model, SampleChannel};
+use nclink::model::{Model, SampleChannel};
 use serde_json::{Value, json};
 use simulated::Simulated;
 
@@ -22,7 +22,7 @@ pub(super) struct ChannelSampler {
 impl ChannelSampler {
     /// `None` for a channel whose times are not whole milliseconds or whose upload holds no value.
     pub(super) fn new(channel: &SampleChannel, model: &Model) -> Option<Self> {
-        let whole = |ms: f64| crate::lenient_json::parse_integer(&json!(ms)).filter(|ms| *ms > 0);
+        let whole = |ms: f64| nclink::lenient_json::parse_integer(&json!(ms)).filter(|ms| *ms > 0);
         let (interval_ms, upload_ms) = (whole(channel.interval_ms)?, whole(channel.upload_ms)?);
         let path = |name: &String| model.find_item(name).map(|item| item.path.clone());
         let paths: Vec<String> = channel.items.iter().filter_map(path).collect();

@@ -3,7 +3,7 @@
 use super::{CannotRun, CommandResult, Common, until_stopped};
 use crate::cli::print_text;
 use adapters::modbus::profile;
-use adapters::modbus::server::ModbusServer;
+use adapters::modbus_server::ModbusServer;
 use clap::Args;
 use std::path::PathBuf;
 

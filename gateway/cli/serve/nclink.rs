@@ -3,7 +3,7 @@
 use super::{Common, RunningMachine, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print_text};
 use adapters::mqtt::Options;
-use adapters::nclink::device::{DeviceEvent, MAILBOX, NcLinkDevice, OFFSETS};
+use adapters::nclink_device::{DeviceEvent, MAILBOX, NcLinkDevice, OFFSETS};
 use clap::Args;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

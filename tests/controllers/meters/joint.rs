@@ -4,9 +4,10 @@
 
 use adapters::address::{Address, Target};
 use adapters::clock::{Clock, SECOND_NS, ScaledClock};
-use adapters::modbus::{profile, server::ModbusServer};
+use adapters::modbus::profile;
+use adapters::modbus_server::ModbusServer;
 use adapters::mqtt::Options;
-use adapters::nclink::device::NcLinkDevice;
+use adapters::nclink_device::NcLinkDevice;
 use adapters::simulated::{Moment, Simulated, SimulatedSettings};
 use adapters::waveform::{Producer, SimulatedCurrent};
 use adapters::{ChannelId, Sample};

@@ -7,11 +7,11 @@
 //!
 //! Limits: 16 connections, a minute of silence on each.
 
-use super::pdu::{self, RegisterBlock};
-use super::profile::Profile;
-use super::register::RegisterMeaning;
-use super::tcp::{encode_frame, parse_header};
 use adapter_core::clock::Clock;
+use modbus::pdu::{self, RegisterBlock};
+use modbus::profile::Profile;
+use modbus::register::RegisterMeaning;
+use modbus::tcp::{encode_frame, parse_header};
 use simulated::{MeterValues, Simulated, SimulatedMeter};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};

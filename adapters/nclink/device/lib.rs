@@ -19,10 +19,10 @@ mod sampling;
 mod tree;
 mod values;
 
-use super::model::Model;
-use super::topic::Subject;
 use adapter_core::clock::Clock;
 use mqtt::{MqttClient, MqttError, MqttMessage, Options, Qos};
+use nclink::model::Model;
+use nclink::topic::Subject;
 use registers::SimulatedRegisters;
 use sampling::ChannelSampler;
 use serde_json::{Value, json};
@@ -31,10 +31,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Where the gateway posts its override: see the table in [`mailbox`](super::mailbox).
+/// Where the gateway posts its override: see the table in [`mailbox`](nclink::mailbox).
 pub const MAILBOX: &str = "D100";
 
-/// Where the gateway posts its shifts: see the table in [`offset_mailbox`](super::offset_mailbox).
+/// Where the gateway posts its shifts: see the table in [`offset_mailbox`](nclink::offset_mailbox).
 pub const OFFSETS: &str = "D110";
 
 /// Between two attempts to reach the broker.
