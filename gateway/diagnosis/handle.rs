@@ -20,7 +20,7 @@ const MODEL_MAX: usize = 4 << 20;
 /// What is being done, or was done last.
 #[derive(Debug, Clone, Default)]
 pub enum Run {
-    /// Nothing yet.
+    /// None was asked for since the start.
     #[default]
     None,
     /// A diagnosis is under way.
@@ -29,7 +29,7 @@ pub enum Run {
     Done {
         /// Who asked for it; `None`: the box itself.
         by: Option<String>,
-        /// See `store::diagnosis_key`.
+        /// Key of the row, as `store::diagnosis_key` makes it.
         key: String,
         /// How long it took, s.
         seconds: f64,
@@ -38,12 +38,12 @@ pub enum Run {
     Failed {
         /// Who asked for it.
         by: Option<String>,
-        /// Why.
+        /// The reason in words, for the person who asked.
         what: String,
     },
     /// A person ended it.
     Cancelled {
-        /// Who did.
+        /// Name of the person who ended it.
         by: String,
     },
 }
@@ -53,11 +53,11 @@ pub enum Run {
 pub struct RunningDiagnosis {
     /// Who asked for it; `None`: the box itself.
     pub by: Option<String>,
-    /// The stretch.
+    /// Beginning of the stretch, ns since 1970.
     pub from_ns: TimeNs,
-    /// Its end.
+    /// End of the stretch, ns since 1970.
     pub to_ns: TimeNs,
-    /// Since when.
+    /// When it was begun, on the monotonic clock.
     pub since: Instant,
     /// How far it is.
     pub stage: Stage,
@@ -126,7 +126,7 @@ impl DiagnosisHandle {
         &self.store
     }
 
-    /// The model file.
+    /// Path of the model file in charge.
     #[must_use]
     pub fn model_path(&self) -> &Path {
         &self.model

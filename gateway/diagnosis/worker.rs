@@ -21,9 +21,9 @@ const WAIT_MAX: Duration = Duration::from_secs(10);
 /// A model as read from its file.
 #[derive(Debug, Clone)]
 pub struct LoadedModel {
-    /// The model.
+    /// The parsed model, checked.
     pub model: Model,
-    /// Its text.
+    /// The text that the model was read from (model/1).
     pub toml: String,
 }
 
@@ -34,9 +34,9 @@ pub struct DiagnosisRequest {
     pub toml: String,
     /// The person who asks for it; `None`: the box itself.
     pub by: Option<String>,
-    /// Beginning.
+    /// Beginning of the stretch, ns since 1970.
     pub from_ns: TimeNs,
-    /// End.
+    /// End of the stretch, ns since 1970.
     pub to_ns: TimeNs,
     /// Since when the watch sees which kinds of work differ.
     pub onsets: Vec<Onset>,
@@ -57,14 +57,14 @@ pub enum WorkerReport {
     NotDiagnosed(String, Option<String>),
 }
 
-/// A finished diagnosis.
+/// A diagnosis that the tick has to store and to tell.
 #[derive(Debug, Clone)]
 pub struct Finished {
     /// The person who had asked for it; `None`: the box itself.
     pub by: Option<String>,
     /// As stored; `at_ns` is for the tick to fill in.
     pub record: gateway_history::Diagnosis,
-    /// What is missing.
+    /// Kinds of the missing effects, most important first.
     pub missing: Vec<String>,
     /// Where the improved model was written, if there is one.
     pub improved: Option<PathBuf>,
@@ -82,9 +82,9 @@ pub struct Worker {
 /// Where the worker finds and leaves things.
 #[derive(Debug, Clone)]
 pub struct WorkerPaths {
-    /// The model file.
+    /// Path of the model in charge; the worker watches it for changes.
     pub model: PathBuf,
-    /// The history.
+    /// Path of the database, which the worker only reads.
     pub history: PathBuf,
     /// Where the improved model of a diagnosis goes.
     pub improved: PathBuf,
@@ -98,7 +98,7 @@ pub enum ModelFileError {
     /// The file cannot be read.
     #[error("{}: {error}", path.display())]
     Unreadable {
-        /// Which.
+        /// The model file that could not be read.
         path: PathBuf,
         /// What the system says.
         error: std::io::Error,
@@ -106,7 +106,7 @@ pub enum ModelFileError {
     /// It is no model that can be used.
     #[error("{}", list_problems(path, problems))]
     Refused {
-        /// Which.
+        /// The model file that was read.
         path: PathBuf,
         /// Everything that is wrong with it.
         problems: Vec<twin::Problem>,

@@ -4,7 +4,7 @@
 use crate::status::{Acknowledged, AlarmStatus};
 use adapters::clock::TimeNs;
 
-/// See the [module](self).
+/// Which of the alarms that stand a person has seen.
 #[derive(Debug, Default)]
 pub struct AcknowledgedAlarms {
     standing: Vec<String>,
