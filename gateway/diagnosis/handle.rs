@@ -4,7 +4,7 @@
 use super::beside::Onset;
 use super::child::Stage;
 use super::store::{DiagnosisFile, DiagnosisStore};
-use super::worker::{DiagnosisRequest, LoadedModel};
+use super::worker::{ChildFailure, DiagnosisRequest, LoadedModel};
 use adapter_core::clock::TimeNs;
 use gateway_base::files::{read_text, replace_durably};
 use rules::twin::parse_model;
@@ -235,8 +235,8 @@ impl DiagnosisHandle {
         }
     }
 
-    /// What came of it.
-    pub(super) fn record_outcome(&self, outcome: Result<String, String>) {
+    /// Ends the run with the key of the row, or with the failure; what a person has ended counts as cancelled in either case.
+    pub(super) fn record_outcome(&self, outcome: Result<String, ChildFailure>) {
         let mut state = self.lock();
         let Run::Running(RunningDiagnosis { by, since, rows, cancelled, .. }) = std::mem::take(&mut state.run) else {
             return;
@@ -244,7 +244,7 @@ impl DiagnosisHandle {
         let seconds = since.elapsed().as_secs_f64();
         state.run = match (cancelled, outcome) {
             (Some(by), _) => Run::Cancelled { by },
-            (None, Err(what)) => Run::Failed { by, what },
+            (None, Err(failure)) => Run::Failed { by, what: failure.to_string() },
             (None, Ok(key)) => {
                 #[expect(clippy::cast_precision_loss, reason = "at most some ten thousand rows")]
                 let pace_s = (rows > 0).then(|| seconds / rows as f64);

@@ -211,19 +211,36 @@ fn diagnose_stretch(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: 
     diagnoses.record_outcome(found.as_ref().map(|(record, _)| store::diagnosis_key(record)).map_err(Clone::clone));
     match found {
         Ok((record, missing)) => WorkerReport::Diagnosed(Box::new(finish_diagnosis(by, places, record, missing))),
-        Err(problem) => WorkerReport::NotDiagnosed(problem, by),
+        Err(failure) => WorkerReport::NotDiagnosed(failure.to_string(), by),
     }
 }
 
 /// Row of the history and what is missing.
 pub(super) type FoundDiagnosis = (gateway_history::Diagnosis, Vec<String>);
 
-pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, String> {
-    let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled_by().map(|by| format!("{by} has ended it"));
+/// Why a process has given no diagnosis.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(super) enum ChildFailure {
+    /// A person has ended it, before the process was started or while it ran.
+    #[error("{by} has ended it")]
+    Ended { by: String },
+    /// The system gave no process.
+    #[error("no process for the diagnosis: {0}")]
+    NotStarted(String),
+    /// The process says why nothing can be diagnosed.
+    #[error("{0}")]
+    Refused(String),
+    /// The process ended without an answer; with its exit status, empty where that is not known.
+    #[error("its process broke off ({0})")]
+    BrokeOff(String),
+}
+
+pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, ChildFailure> {
+    let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled_by().map(|by| ChildFailure::Ended { by });
     if let Some(ended) = ended_by(diagnoses) {
         return Err(ended);
     }
-    let mut child = child::start(job).map_err(|error| format!("no process for the diagnosis: {error}"))?;
+    let mut child = child::start(job).map_err(|error| ChildFailure::NotStarted(error.to_string()))?;
     let output = child.stdout.take();
     diagnoses.put_child(child);
     let mut outcome = None;
@@ -231,13 +248,11 @@ pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Resul
         child::read_messages(output, |said| match said {
             ChildMessage::Stage(stage, rows) => diagnoses.record_stage(stage, rows),
             ChildMessage::Finished(record, missing) => outcome = Some(Ok((*record, missing))),
-            ChildMessage::Refused(problem) => outcome = Some(Err(problem)),
+            ChildMessage::Refused(problem) => outcome = Some(Err(ChildFailure::Refused(problem))),
         });
     }
     let status = diagnoses.take_child().map(|mut child| child.wait());
-    let broken = || {
-        format!("its process broke off ({})", status.and_then(Result::ok).map_or(String::new(), |it| it.to_string()))
-    };
+    let broken = || ChildFailure::BrokeOff(status.and_then(Result::ok).map_or(String::new(), |it| it.to_string()));
     ended_by(diagnoses).map_or_else(|| outcome.unwrap_or_else(|| Err(broken())), Err)
 }
 
