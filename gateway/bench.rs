@@ -23,7 +23,7 @@ use std::time::Instant;
 const WARM_UP_NS: i64 = 240 * SECOND_NS;
 /// Length of the stretch that is gone through again and again.
 const STRETCH_NS: i64 = 600 * SECOND_NS;
-/// 10 Hz.
+/// Between two ticks of machine time: 10 Hz.
 const TICK_NS: i64 = SECOND_NS / 10;
 /// How many channels are merged, inferred from, decided on and stored.
 pub const CHANNELS: usize = 20;
@@ -35,7 +35,7 @@ struct Poll {
     readings: Vec<Reading>,
 }
 
-/// Readings made beforehand.
+/// The readings of every source, made before the clock of the benchmark starts.
 pub struct Course {
     plans: Vec<SourcePlan>,
     polls: Vec<Poll>,
@@ -129,7 +129,7 @@ fn push(merge: &mut Merge, poll: &Poll, shift_ns: i64) {
     }
 }
 
-/// One run.
+/// What one run over the same readings costs, with the stages up to `through`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// The last stage that took part.
@@ -143,10 +143,10 @@ pub struct Figure {
     pub allocations_per_tick: Option<f64>,
 }
 
-/// All runs.
+/// The costs of every run, stage by stage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BenchFigures {
-    /// Ticks per run.
+    /// Number of ticks that each run lasts.
     pub ticks: u64,
     /// In the order of the stages; the last one is the whole box.
     pub runs: Vec<Figure>,

@@ -26,7 +26,7 @@ pub struct CheckReport {
 }
 
 impl CheckReport {
-    /// Nothing is wrong.
+    /// Whether no problem was found.
     #[must_use]
     pub fn is_fine(&self) -> bool {
         self.problems.is_empty()

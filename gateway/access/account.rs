@@ -36,7 +36,6 @@ impl Budget {
     }
 }
 
-/// See the [module](self).
 #[derive(Debug)]
 pub(super) struct Account {
     orders: OrderSender,

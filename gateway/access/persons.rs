@@ -66,10 +66,10 @@ pub enum PersonsError {
     /// Somebody has to be able to manage the persons.
     #[error("{0:?} is the last administrator; make another one first")]
     LastAdmin(String),
-    /// Too many.
+    /// The greatest number of persons is reached.
     #[error("there are {PERSONS_MAX} persons already; remove one first")]
     Full,
-    /// No token.
+    /// A new token cannot be made.
     #[error(transparent)]
     Token(#[from] TokenError),
 }
@@ -227,7 +227,7 @@ impl Persons {
 pub struct PersonDifference {
     /// `added`, `removed`, `role` or `token`.
     pub outcome: &'static str,
-    /// In words.
+    /// One English sentence that names the person and what is different.
     pub text: String,
     /// Who wrote the entry; empty when nobody can be named.
     pub by: String,

@@ -15,20 +15,15 @@ const PER_PERSON_MAX: usize = 8;
 /// The digest by which a session is found.
 pub type SessionKey = [u8; 32];
 
-/// One of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Session {
-    /// Who.
     pub(super) name: String,
-    /// Since when.
     pub(super) since: Instant,
-    /// It ends then.
     pub(super) until: Instant,
     /// Hash of the token with which it began: a new token ends it.
     pub(super) token_hash: String,
 }
 
-/// All of them.
 #[derive(Debug, Default)]
 pub(super) struct Sessions {
     by_key: HashMap<SessionKey, Session>,
@@ -69,7 +64,6 @@ impl Sessions {
         self.by_key.get(key).filter(|session| now < session.until)
     }
 
-    /// Ends one.
     pub(super) fn end_session(&mut self, key: &SessionKey) {
         self.by_key.remove(key);
     }

@@ -59,7 +59,7 @@ pub enum SignInError {
 pub struct NewSession {
     /// What the cookie shall hold.
     pub cookie: String,
-    /// Who signed in.
+    /// Whom the cookie stands for, with the role.
     pub person: Person,
 }
 
@@ -312,7 +312,7 @@ impl Access {
         lock(&self.known).persons.find_by_name(name).map(|entry| entry.token_hash.clone())
     }
 
-    /// Ends a session.
+    /// Ends the session of this cookie and writes a row of the audit; an unknown cookie changes nothing.
     pub async fn sign_out(&self, cookie: &str, from: IpAddr) {
         if let Some((person, _)) = self.of_cookie(cookie) {
             lock(&self.sessions).end_session(&digest_cookie(cookie));

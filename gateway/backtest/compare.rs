@@ -19,9 +19,9 @@ pub enum SpellKind {
 /// Something that a script kept up for a while.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Spell {
-    /// What it is.
+    /// An alarm that stands, or a stop that is asked for.
     pub kind: SpellKind,
-    /// Which script.
+    /// File name of the script that raised the alarm or asked for the stop.
     pub script: Arc<str>,
     /// Name of the alarm, or `feed_hold`, `tool_change`.
     pub name: Arc<str>,
@@ -29,7 +29,7 @@ pub struct Spell {
     pub text: Arc<str>,
     /// Level of the alarm; empty for a stop.
     pub level: &'static str,
-    /// When it began.
+    /// When it began, ns since 1970.
     pub from_ns: TimeNs,
     /// When it ended; `None`: not within the stretch.
     pub to_ns: Option<TimeNs>,
@@ -68,7 +68,7 @@ impl Evidence {
     }
 }
 
-/// One difference.
+/// A spell that only one of the two sets has, or that both have at other times.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SpellDifference {
     /// The running scripts have it, the edited ones do not.
@@ -80,7 +80,7 @@ pub enum SpellDifference {
 }
 
 impl SpellDifference {
-    /// When it begins.
+    /// Beginning of the spell, ns since 1970; of a shifted one that of the running scripts.
     #[must_use]
     pub fn at_ns(&self) -> TimeNs {
         match self {

@@ -14,7 +14,7 @@ pub(super) const STEP_MAX_NS: i64 = 10 * SECOND_NS;
 const SPELLS_MAX: usize = 100_000;
 /// Requests nearer to each other than this are the same, %.
 const SAME_PCT: f64 = 0.5;
-/// Problems kept.
+/// Further problems of the scripts are not kept.
 const PROBLEMS_MAX: usize = 20;
 
 /// What was asked for in all.
@@ -22,9 +22,9 @@ const PROBLEMS_MAX: usize = 20;
 pub struct RequestTotals {
     /// For how long, ns.
     asked_ns: i64,
-    /// Least request, %.
+    /// Least request of a feed override, %; `None`: nothing was asked for.
     pub least_pct: Option<f64>,
-    /// Greatest request, %.
+    /// Greatest request of a feed override, %; `None`: nothing was asked for.
     pub greatest_pct: Option<f64>,
     integral: f64,
     /// How often a request began.
@@ -206,7 +206,7 @@ impl Lane {
         self.tally.seconds_per_state()
     }
 
-    /// Notes written.
+    /// Number of notes that the scripts wrote in the compared stretch.
     #[must_use]
     pub fn note_count(&self) -> u64 {
         self.notes

@@ -43,9 +43,9 @@ use std::time::Instant;
 /// So much of the history before the stretch is gone through without being compared.
 pub const LEAD_IN_NS: i64 = 3600 * SECOND_NS;
 
-/// What to compare.
+/// Which stretch of which history is gone through with which two sets of scripts.
 pub struct BacktestPlan {
-    /// The history.
+    /// Path of the database; it is only read.
     pub history: PathBuf,
     /// Beginning of the stretch.
     pub from_ns: TimeNs,

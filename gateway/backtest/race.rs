@@ -99,7 +99,6 @@ impl SampleBatch {
     }
 }
 
-/// Who runs what.
 struct Split {
     /// What both have in common; where the settings differ, everything of the running set.
     first: Runner,
@@ -120,7 +119,6 @@ impl Split {
     }
 }
 
-/// What both did.
 pub(super) struct Raced {
     pub(super) running: Lane,
     pub(super) edited: Lane,

@@ -16,13 +16,13 @@ const SHOWN: usize = 200;
 
 /// What a backtest found; written out as words, and as `backtest/1`.
 pub struct BacktestReport {
-    /// The history.
+    /// Path of the database that was read.
     pub history: PathBuf,
     /// First sample that was compared.
     pub from_ns: i64,
-    /// Last sample.
+    /// Last sample that was compared, ns since 1970.
     pub to_ns: i64,
-    /// Samples compared.
+    /// Number of samples that were compared.
     pub rows: u64,
     /// Time they cover, gaps left out, s.
     pub covered_s: f64,
@@ -58,7 +58,7 @@ impl BacktestReport {
         self.rows as f64 / self.took.as_secs_f64().max(1e-9)
     }
 
-    /// The whole report.
+    /// The document `backtest/1`, with every difference listed.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let listed = |word: &str| -> Vec<Value> {

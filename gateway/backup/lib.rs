@@ -34,24 +34,24 @@ const WEAR_MODELS: &str = "wear_models/";
 /// Which of the shipped scripts were delivered, beside the scripts: what a person has deleted stays deleted.
 const DELIVERED: &str = ".shipped";
 
-/// Where everything is.
+/// The files and directories that a backup is taken from, as the configuration in force names them.
 #[derive(Debug, Clone)]
 pub struct BackupPaths {
     /// Name of the machine.
     pub machine: String,
-    /// The data directory.
+    /// Directory of everything the gateway writes; its files stand below `data/` in an archive.
     pub data_dir: PathBuf,
-    /// The scripts.
+    /// Directory of the `.rhai` files; they stand below `scripts/` in an archive.
     pub scripts: PathBuf,
-    /// The history.
+    /// Path of the database; an archive takes only the wear models from it.
     pub history: PathBuf,
-    /// The recipe.
+    /// The operations recipe; `None`: none is configured.
     pub operations: Option<PathBuf>,
     /// The model of the machine.
     pub model: Option<PathBuf>,
     /// The law of the thermal error.
     pub thermal_model: Option<PathBuf>,
-    /// The configuration.
+    /// The file that the configuration was read from; `None`: the built-in one holds.
     pub configuration: Option<PathBuf>,
 }
 

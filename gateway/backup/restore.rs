@@ -89,9 +89,9 @@ impl RestoreError {
 /// Who restores, when, and the archive of what is there now with its name.
 #[derive(Debug, Clone, Copy)]
 pub struct RestoreRequest<'a> {
-    /// Who.
+    /// Name of the person who restores.
     pub by: &'a str,
-    /// When.
+    /// When, ns since 1970.
     pub at_ns: TimeNs,
     /// What is there now, and the name of its archive.
     pub before: (&'a [u8], &'a str),

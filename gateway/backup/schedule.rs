@@ -34,7 +34,7 @@ pub enum BackupError {
     /// A file cannot be written or read.
     #[error("{}: {error}", path.display())]
     File {
-        /// Which.
+        /// The file or directory that was written or read.
         path: PathBuf,
         /// What the system says.
         error: std::io::Error,

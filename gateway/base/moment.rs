@@ -19,13 +19,13 @@ pub enum MomentError {
     /// It is written in no known way.
     #[error("{text:?} is no time; {NOTATION}")]
     NoTime {
-        /// What was written.
+        /// What was written, without the blanks around it.
         text: String,
     },
     /// It is an instant that nanoseconds cannot count to.
     #[error("{text} is outside the years 1678 to 2261")]
     OutOfRange {
-        /// What was written.
+        /// What was written, without the blanks around it.
         text: String,
     },
 }

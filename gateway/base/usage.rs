@@ -5,7 +5,7 @@ use std::time::Duration;
 /// Memory and processor time of this process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Usage {
-    /// Resident memory.
+    /// Resident memory of the process, bytes.
     pub resident_bytes: u64,
     /// User and system time since the start.
     pub cpu_s: f64,

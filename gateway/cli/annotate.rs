@@ -7,7 +7,6 @@ use crate::{clock, moment};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Arguments of `annotate`.
 #[derive(Debug, Args)]
 pub(super) struct AnnotateArguments {
     /// What was measured.

@@ -15,7 +15,6 @@ pub(super) struct OrderOptions {
     at: GatewayOptions,
 }
 
-/// Arguments of `arm`.
 #[derive(Debug, Args)]
 pub(super) struct ArmArguments {
     /// For how long: 90s, 30m, 8h; as long as the configuration allows when left out.

@@ -28,7 +28,6 @@ pub(super) struct AuditArguments {
     json: bool,
 }
 
-/// Lists or checks.
 pub(super) fn answer_audit(arguments: &AuditArguments, reader: &Reader) -> CommandResult {
     if arguments.verify {
         let check = reader.verify_audit().map_err(|error| to_cannot_run(&error))?;

@@ -9,7 +9,6 @@ use adapters::clock::SECOND_NS;
 use clap::Args;
 use std::path::PathBuf;
 
-/// Arguments of `backup`.
 #[derive(Debug, Args)]
 pub(super) struct BackupArguments {
     /// Configuration of the box; without it the built-in one.
@@ -23,7 +22,6 @@ pub(super) struct BackupArguments {
     history: Option<PathBuf>,
 }
 
-/// Arguments of `restore`.
 #[derive(Debug, Args)]
 pub(super) struct RestoreArguments {
     /// Archive that `backup` or the page has made.

@@ -5,7 +5,6 @@ use crate::bench::{self, TICKS_MIN};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Arguments of `bench`.
 #[derive(Debug, Args)]
 pub(super) struct BenchArguments {
     /// Ticks per run; there is one run per stage.

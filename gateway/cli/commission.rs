@@ -15,7 +15,6 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `commission`.
 #[derive(Debug, Args)]
 pub(super) struct CommissionArguments {
     /// Configuration of the box; without it the built-in one.

@@ -8,7 +8,6 @@ use clap::Args;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `devices`.
 #[derive(Debug, Args)]
 pub(super) struct DevicesArguments {
     /// Configuration file; without one the built-in configuration.

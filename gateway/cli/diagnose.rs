@@ -9,7 +9,6 @@ use clap::Args;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
 
-/// Arguments of `diagnose`.
 #[derive(Debug, Args)]
 pub(super) struct DiagnoseArguments {
     /// What the simulation believes (model/1).

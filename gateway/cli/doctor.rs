@@ -11,7 +11,6 @@ use clap::Args;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `doctor`.
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
     /// The address, as in the configuration, for example fanuc://10.0.0.5:8193; with --config the name of a source.
@@ -72,7 +71,6 @@ pub(super) fn run_doctor(arguments: &DoctorArguments) -> CommandResult {
     Ok(to_outcome(comparison.is_well()))
 }
 
-/// The computer itself.
 fn examine_box(arguments: &DoctorArguments) -> CommandOutcome {
     let report = doctor::examine_computer(&SystemFiles::default(), &arguments.data_dir);
     if arguments.json {
@@ -95,7 +93,6 @@ fn examine_box(arguments: &DoctorArguments) -> CommandOutcome {
     to_outcome(report.problems.is_empty())
 }
 
-/// Tries a receiver.
 fn examine_sink(address: &str, json: bool) -> CommandResult {
     let address: SinkAddress = address.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();

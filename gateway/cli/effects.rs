@@ -5,7 +5,6 @@ use super::{CannotRun, CommandOutcome, CommandResult};
 use clap::{Args, Subcommand};
 use rules::physics::explain;
 
-/// Arguments of `effects`.
 #[derive(Debug, Args)]
 pub(super) struct EffectsArguments {
     #[command(subcommand)]

@@ -27,7 +27,6 @@ pub(super) enum Fleet {
     },
 }
 
-/// The database.
 #[derive(Debug, Args)]
 pub(super) struct DatabaseArguments {
     /// The database: postgres://USER@HOST:5432/DATABASE; on another computer with ?sslmode=require&ca=/etc/cnc/ca.pem, which encrypts
@@ -76,7 +75,6 @@ pub(super) struct RetainArguments {
     json: bool,
 }
 
-/// The stream.
 #[derive(Debug, Args)]
 pub(super) struct StreamArguments {
     /// The cluster and the beginning of the subjects: nats://SERVER:4222,SERVER:4222/PREFIX, the same as in the boxes' [[sink]].

@@ -8,7 +8,6 @@ use ::rules::script::{RECIPES, find_recipe};
 use adapters::channel::find_nearest_name;
 use clap::Args;
 
-/// Arguments of `help`.
 #[derive(Debug, Args)]
 pub(super) struct HelpArguments {
     /// Topic of a chapter, name of a recipe or of a command; without one the chapters are listed.

@@ -6,7 +6,7 @@ use clap::builder::StyledStr;
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// English, tab, Chinese.
+/// Each line holds an English text of the help, a tab, and the same text in Chinese.
 const TABLE: &str = include_str!("help_zh.tsv");
 
 static WORDS: LazyLock<HashMap<String, &'static str>> = LazyLock::new(|| {

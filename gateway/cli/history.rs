@@ -12,7 +12,6 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Arguments of `history`.
 #[derive(Debug, Args)]
 pub(super) struct HistoryArguments {
     /// History database.
@@ -152,7 +151,6 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Answers.
 pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
     let path = &arguments.history;
     let open = || Reader::open(path).map_err(|error| to_cannot_run(&error));

@@ -17,7 +17,6 @@ pub(super) enum Metrics {
     Alerts,
 }
 
-/// Prints it.
 pub(super) fn run(metrics: Metrics) -> CommandResult {
     print_text(match metrics {
         Metrics::Dashboard => DASHBOARD,

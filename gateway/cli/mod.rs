@@ -52,7 +52,7 @@ use std::process::ExitCode;
 /// How a command ended when it could run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CommandOutcome {
-    /// Exit code 0.
+    /// The command ran and its answer is yes: exit code 0.
     Fine,
     /// The command ran and its answer is no: exit code 1.
     No,

@@ -14,7 +14,6 @@ use rules::twin::{self};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `model`.
 #[derive(Debug, Args)]
 pub(super) struct ModelArguments {
     #[command(subcommand)]

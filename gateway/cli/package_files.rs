@@ -6,7 +6,6 @@ use clap_complete::{Shell, generate_to};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `package-files`.
 #[derive(Debug, Args)]
 pub(super) struct PackageFilesArguments {
     /// Directory to write into.

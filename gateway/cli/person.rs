@@ -8,7 +8,6 @@ use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Arguments of `person`.
 #[derive(Debug, Args)]
 pub(super) struct PersonArguments {
     #[command(subcommand)]

@@ -9,7 +9,6 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Arguments of `pulses`.
 #[derive(Debug, Args)]
 pub(super) struct PulsesArguments {
     /// Encoder lines: CSV with time_ns,a,b and optionally request and bypass; - is standard input, row by row.

@@ -15,7 +15,6 @@ use std::path::{Path, PathBuf};
 /// Rows and columns that are shown.
 const SHOWN: (usize, usize) = (5, 8);
 
-/// Arguments of `recording`.
 #[derive(Debug, Args)]
 pub(super) struct RecordingArguments {
     #[command(subcommand)]

@@ -7,7 +7,6 @@ use clap::Args;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
-/// Arguments of `replay`.
 #[derive(Debug, Args)]
 pub(super) struct ReplayArguments {
     /// Recordings (.csv, .csv.gz), in order.

@@ -13,7 +13,6 @@ use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Arguments of `rules`.
 #[derive(Debug, Args)]
 pub(super) struct RulesArguments {
     #[command(subcommand)]

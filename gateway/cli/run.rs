@@ -9,7 +9,6 @@ use clap::Args;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
-/// RunArguments of `run`.
 #[derive(Debug, Args)]
 pub(super) struct RunArguments {
     /// Configuration file; without one the embedded simulated lathe runs.

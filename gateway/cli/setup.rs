@@ -82,7 +82,6 @@ impl Dialogue {
     }
 }
 
-/// Asks, tries, writes.
 pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
     let asks = !arguments.yes && std::io::stdin().is_terminal();
     let zh = lang::language() == Language::Zh;

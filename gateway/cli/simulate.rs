@@ -8,7 +8,6 @@ use adapters::simulated::SimulatedSettings;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub(super) struct SimulateArguments {
     /// What the simulation believes (model/1).
@@ -45,7 +44,6 @@ fn parse_rate(text: &str) -> Result<f64, String> {
     rate.ok_or_else(|| "give a rate from 0.01 to 100 rows per second".to_owned())
 }
 
-/// Simulates and prints.
 pub(super) fn run_simulation(arguments: SimulateArguments) -> CommandResult {
     match (&arguments.machine, &arguments.model) {
         (Some(machine), _) => simulate_experiment(machine, &arguments),

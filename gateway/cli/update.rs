@@ -9,7 +9,6 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Arguments of `update`.
 #[derive(Debug, Args)]
 pub(super) struct UpdateArguments {
     /// The update, a .tar.gz with the program; its signature stands beside it as FILE.minisig. Without it: which version runs.

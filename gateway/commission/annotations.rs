@@ -16,7 +16,7 @@ pub const FILE: &str = "annotations.jsonl";
 /// More lines than this are not read: nobody measures so much by hand.
 const LINES_MAX: usize = 100_000;
 
-/// What was measured.
+/// What a person can measure at the machine; each quantity has a unit and a range of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
@@ -62,11 +62,11 @@ impl Quantity {
     }
 }
 
-/// One annotation.
+/// One reading that a person noted, as one line of the notes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Annotation {
-    /// What was measured.
+    /// What was measured; decides unit and range of `value`.
     pub quantity: Quantity,
     /// When, ns since 1970; for a file when it was given, its own clock says the rest.
     pub at_ns: TimeNs,
@@ -76,7 +76,7 @@ pub struct Annotation {
     /// Standard deviation of the reading, same unit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sd: Option<f64>,
-    /// The file.
+    /// The file of a torque sensor; `None` for every other quantity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Edge, axis or sensor, in the person's words.
@@ -87,15 +87,15 @@ pub struct Annotation {
 /// What a person typed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TypedAnnotation {
-    /// The value.
+    /// The number in `unit`; `None` for a file.
     pub value: Option<f64>,
-    /// Its unit.
+    /// Unit symbol as typed; `None` where none was given.
     pub unit: Option<String>,
-    /// When.
+    /// Instant as typed; `None` only where `file` is given.
     pub at: Option<String>,
     /// Standard deviation, same unit.
     pub sd: Option<f64>,
-    /// The file.
+    /// The file of a torque sensor, as typed.
     pub file: Option<PathBuf>,
     /// Edge, axis or sensor.
     pub of: String,
@@ -108,26 +108,26 @@ const TORQUE_USAGE: &str =
 /// Why a reading is not noted, or the notes cannot be read.
 #[derive(Debug, Error)]
 pub enum AnnotationError {
-    /// Nothing was read.
+    /// Neither a value nor a file was given.
     #[error("{name}: the value is missing: write annotate {name} 0.12 --unit mm")]
     NoValue {
-        /// The quantity.
+        /// Word of the quantity on the command line.
         name: &'static str,
     },
     /// A number without a unit means nothing.
     #[error("{name} {value}: the unit is missing, and 0.12 mm is not 0.12 um: add --unit mm or --unit um")]
     NoUnit {
-        /// The quantity.
+        /// Word of the quantity on the command line.
         name: &'static str,
-        /// What was typed.
+        /// The number as typed, in no unit.
         value: f64,
     },
     /// The unit is none of a length.
     #[error("{name} {value} {unit}: {unit:?} is no unit of length that is known here: write mm, um or in")]
     UnknownUnit {
-        /// The quantity.
+        /// Word of the quantity on the command line.
         name: &'static str,
-        /// What was typed.
+        /// The number as typed.
         value: f64,
         /// The unit that was typed.
         unit: String,
@@ -137,9 +137,9 @@ pub enum AnnotationError {
         "{name} {value} {unit}: the time is missing: a reading without it belongs to no cut; add --at now, --at -10m or --at 2026-01-31T08:15:00Z"
     )]
     NoTime {
-        /// The quantity.
+        /// Word of the quantity on the command line.
         name: &'static str,
-        /// What was typed.
+        /// The number as typed, in `unit`.
         value: f64,
         /// The unit that was typed.
         unit: String,
@@ -147,9 +147,9 @@ pub enum AnnotationError {
     /// The time is none.
     #[error("{name} --at {at}: {error}")]
     Moment {
-        /// The quantity.
+        /// Word of the quantity on the command line.
         name: &'static str,
-        /// What was typed.
+        /// The instant as typed.
         at: String,
         /// What is wrong with it.
         error: MomentError,
@@ -157,7 +157,7 @@ pub enum AnnotationError {
     /// No such value is read on a machine.
     #[error("{name}: {value} {unit} lies outside {least} to {greatest} {unit}: {why}; is the unit right?")]
     OutOfRange {
-        /// The quantity.
+        /// Word of the quantity on the command line.
         name: &'static str,
         /// The value, in the unit that is kept.
         value: f64,
@@ -167,13 +167,13 @@ pub enum AnnotationError {
         least: f64,
         /// The greatest possible value.
         greatest: f64,
-        /// Why.
+        /// Where the range comes from.
         why: &'static str,
     },
     /// A deviation of 0 or less.
     #[error("{name}: the standard deviation of a reading is greater than 0")]
     Deviation {
-        /// The quantity.
+        /// Word of the quantity on the command line.
         name: &'static str,
     },
     /// Torques come in a file.
@@ -182,7 +182,7 @@ pub enum AnnotationError {
     /// The unit of the torques is not said.
     #[error("torque {}: the unit is missing: {TORQUE_USAGE}", file.display())]
     NoTorqueUnit {
-        /// The file.
+        /// Path of the torque file, as typed.
         file: PathBuf,
     },
     /// Torques are kept in N·m.
@@ -197,7 +197,7 @@ pub enum AnnotationError {
     /// A file cannot be found, read or written.
     #[error("{}: {error}", path.display())]
     File {
-        /// Which.
+        /// Path of the notes or of a torque file.
         path: PathBuf,
         /// What the system says.
         error: std::io::Error,
@@ -208,7 +208,7 @@ pub enum AnnotationError {
     /// A line of the notes that is none.
     #[error("{}, line {number}: {error}; put the line right or take it out", path.display())]
     WrongLine {
-        /// The file.
+        /// Path of the notes.
         path: PathBuf,
         /// Its number, from 1.
         number: usize,

@@ -136,13 +136,13 @@ pub enum TorqueFileError {
         file.display()
     )]
     NoTorque {
-        /// The file.
+        /// Absolute path of the torque file.
         file: PathBuf,
     },
     /// It is too short to be laid on the clock of the history.
     #[error("{}: fewer than 10 torques", file.display())]
     TooFew {
-        /// The file.
+        /// Absolute path of the torque file.
         file: PathBuf,
     },
 }
@@ -164,7 +164,7 @@ pub fn torque_course(file: &Path) -> Result<Vec<(f64, f64)>, TorqueFileError> {
 /// What became of a torque file.
 #[derive(Debug, Clone)]
 pub struct Merged {
-    /// The file.
+    /// Absolute path of the torque file, for the report.
     pub file: String,
     /// Where it lies in the history, or why it cannot be told.
     pub matched: Result<Matched, Refusal>,

@@ -18,7 +18,7 @@ use serde_json::Value;
 /// One part of the job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobPart {
-    /// Its word.
+    /// The word of the part in the report and in JSON, as in `no-load`.
     pub name: &'static str,
     /// What is known, or why not.
     pub known: Result<String, Refusal>,
@@ -40,7 +40,7 @@ pub struct Learned {
     pub wear: Option<WearRecord>,
     /// The thermal law, where learned.
     pub thermal: Option<ThermalModel>,
-    /// The fits.
+    /// What the page draws of each fit that succeeded.
     pub pictures: Vec<Picture>,
     /// How the models were found, by subject: what the page of the box shows.
     pub found: Vec<(&'static str, Value)>,
@@ -245,7 +245,6 @@ struct WearLack {
 }
 
 impl WearLack {
-    /// Nothing is there.
     fn of_all(refusal: Refusal) -> Self {
         Self { refusal, made: 0, most_mm: None }
     }

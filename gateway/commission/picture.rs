@@ -8,18 +8,18 @@ const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 300.0;
 const MARGIN: f64 = 56.0;
 
-/// One dot.
+/// One measured point of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dot {
-    /// Across.
+    /// Across, in the unit of the horizontal axis.
     pub x: f64,
-    /// Up.
+    /// Up, in the unit of the vertical axis.
     pub y: f64,
     /// Half of the bar through it; 0 for none.
     pub sd: f64,
 }
 
-/// One picture.
+/// A scatter of dots with two labelled axes, drawn as SVG.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     title: String,
@@ -116,7 +116,7 @@ impl Picture {
     }
 }
 
-/// The page.
+/// A whole page of HTML: the report as it was printed, then every picture that has dots.
 #[must_use]
 pub fn render_page(machine: &str, text: &str, pictures: &[Picture]) -> String {
     let mut page = format!(

@@ -6,7 +6,7 @@ use rules::estimators::wear::{Array, ConditionFactor, FactorLevels, plan_experim
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-/// Which list.
+/// Which list of cuts or idle runs is to be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Which {
     /// Idle runs.
@@ -31,9 +31,9 @@ pub struct Limits {
     pub speeds_rpm: Vec<f64>,
     /// Three cutting speeds, m/min: of the L27 and, as spindle speeds, of the cuts with the torque sensor.
     pub cutting_speeds_m_min: Vec<f64>,
-    /// Three feeds, mm/rev.
+    /// Three feeds, mm per revolution, for the L27 and the cuts with the torque sensor.
     pub feeds_mm: Vec<f64>,
-    /// Three depths, mm.
+    /// Three depths of cut, mm, for the L27 and the cuts with the torque sensor.
     pub depths_mm: Vec<f64>,
     /// Diameter of the work, mm.
     pub diameter_mm: f64,
@@ -41,12 +41,12 @@ pub struct Limits {
     pub seed: u64,
 }
 
-/// One step.
+/// A stretch at one spindle speed, idling or in cut.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommissionStep {
-    /// How long, s.
+    /// How long the step lasts, s.
     pub seconds: f64,
-    /// Spindle speed, rpm.
+    /// Spindle speed of the step, rpm.
     pub rpm: f64,
     /// Feed, mm/min, and depth, mm; none while idling.
     pub cut: Option<(f64, f64)>,
@@ -84,7 +84,7 @@ pub enum StepPlanError {
     /// The conditions of cutting have no such factor.
     #[error("there is no factor {symbol}")]
     NoFactor {
-        /// Its symbol.
+        /// Symbol of the factor, as the experiment's table writes it.
         symbol: String,
     },
     /// The levels make no design; every problem of them.

@@ -7,14 +7,12 @@ use adapters::channel::find_nearest_name;
 use gateway_sinks::SinkAddress;
 use toml::de::DeValue;
 
-/// A checked value.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Scalar {
     /// Text, a word, a path or an address.
     Text(String),
     /// A finite number within its range.
     Number(f64),
-    /// Yes or no.
     Flag(bool),
 }
 

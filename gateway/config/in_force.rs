@@ -8,7 +8,7 @@ use super::read::{ConfigInput, Origin, SectionValues};
 use adapters::address::mask_secrets;
 use serde::Serialize;
 
-/// One key.
+/// A key of the configuration with the value that holds and where it was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct InForce {
     /// `[section] key`, or `[[section]] 1 key` where a section may stand several times.

@@ -21,7 +21,7 @@ pub enum ValueKind {
     OneOf(&'static [&'static str]),
     /// A number from the first to the second limit, both included.
     Number(f64, f64),
-    /// `true` or `false`.
+    /// A switch, written `true` or `false`.
     Flag,
     /// A file or directory.
     Path,
@@ -51,7 +51,7 @@ pub struct ConfigKey {
     pub section: &'static str,
     /// Its name in that section; the unit comes last.
     pub name: &'static str,
-    /// What it accepts.
+    /// Form and range of its values.
     pub kind: ValueKind,
     /// What holds when it is absent.
     pub absent: Absent,
@@ -64,7 +64,7 @@ pub struct ConfigKey {
 /// A section of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Section {
-    /// Its name.
+    /// What stands between the brackets of the head, without them.
     pub name: &'static str,
     /// Written as `[[name]]`, any number of times.
     pub repeated: bool,
@@ -367,7 +367,7 @@ pub fn find_section(name: &str) -> Option<&'static Section> {
 }
 
 impl ConfigKey {
-    /// `section.name`.
+    /// Section and name with a dot between them, as in `history.max_gb`.
     #[must_use]
     pub fn dotted_path(&self) -> String {
         format!("{}.{}", self.section, self.name)

@@ -4,7 +4,6 @@ use super::keys::Absent::{Default, Optional};
 use super::keys::ValueKind::{Flag, Number, Path};
 use super::keys::{ConfigKey, new_key};
 
-/// The rows.
 pub(super) const BACKUP: &[ConfigKey] = &[
     new_key(
         ("backup", "directory"),

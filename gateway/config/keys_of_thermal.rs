@@ -4,7 +4,6 @@ use super::keys::Absent::{Default, Optional};
 use super::keys::ValueKind::{Flag, Number, OneOf, Path};
 use super::keys::{ConfigKey, new_key};
 
-/// The rows.
 pub(super) const THERMAL: &[ConfigKey] = &[
     new_key(
         ("thermal", "model"),

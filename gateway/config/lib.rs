@@ -47,39 +47,39 @@ pub const BUILT_IN_TEXT: &str =
 /// A complete, checked configuration. Every path in it is ready to be opened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Config {
-    /// The box itself.
+    /// Name, tick rate, clock, language and data directory of the box.
     pub gateway: GatewayConfig,
     /// At least one source.
     pub sources: Vec<SourceConfig>,
     /// One time base for controller and meters.
     pub alignment: AlignmentConfig,
-    /// The scripts.
+    /// Where the scripts are, and whether changed ones are read again.
     pub scripts: ScriptsConfig,
     /// How each stretch of an NC program cuts.
     pub operations: OperationsConfig,
     /// What may be written to the machine.
     pub gate: GateConfig,
-    /// What is remembered.
+    /// Path, ages and greatest size of the history.
     pub history: HistoryConfig,
     /// Where it is sent to.
     pub sinks: Vec<SinkConfig>,
     /// What the sinks are sent, and how much of it is kept for them.
     pub outbox: OutboxSettings,
-    /// The page.
+    /// Address, TLS and sign-in of the page and of the interface.
     pub http: HttpConfig,
-    /// The simulation.
+    /// The model that the machine is compared with.
     pub twin: TwinConfig,
-    /// The thermal law.
+    /// The thermal law and what may be done with its prediction.
     pub thermal: ThermalConfig,
     /// Backups taken by itself; `None`: none are.
     pub backup: Option<BackupConfig>,
-    /// The log.
+    /// Level and form of the engineer's log.
     pub log: LogConfig,
     /// Every key with its value and where that was written.
     pub in_force: Vec<InForce>,
 }
 
-/// `[gateway]`.
+/// The section `[gateway]`: the box itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GatewayConfig {
     /// Name of the machine.
@@ -94,7 +94,7 @@ pub struct GatewayConfig {
     pub data_dir: PathBuf,
 }
 
-/// One `[[source]]`.
+/// One section `[[source]]`: a controller, meter or recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceConfig {
     /// Where it is and how to talk to it.
@@ -112,7 +112,7 @@ pub struct SourceConfig {
 pub enum AlignmentUse {
     /// It is not looked for.
     Off,
-    /// It is shown.
+    /// It is estimated and shown, and nothing else.
     Show,
     /// It is shown, and the meter's readings are put back by it.
     Merge,
@@ -130,7 +130,7 @@ impl AlignmentUse {
     }
 }
 
-/// `[alignment]`.
+/// The section `[alignment]`: lag of the power meters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AlignmentConfig {
     /// For the source of `spindle_power_w`.
@@ -139,7 +139,7 @@ pub struct AlignmentConfig {
     pub total_power: AlignmentUse,
 }
 
-/// `[scripts]`.
+/// The section `[scripts]`: the rules that the integrator edits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ScriptsConfig {
     /// Directory of the `.rhai` files.
@@ -148,17 +148,17 @@ pub struct ScriptsConfig {
     pub reload: bool,
 }
 
-/// `[operations]`.
+/// The section `[operations]`: how each stretch of a program cuts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OperationsConfig {
-    /// The recipe file.
+    /// The operations recipe; `None`: none is used.
     pub path: Option<PathBuf>,
 }
 
-/// `[history]`.
+/// The section `[history]`: what is remembered, and for how long.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HistoryConfig {
-    /// The database.
+    /// Path of the SQLite database.
     pub path: PathBuf,
     /// Age at which raw samples are dropped, days.
     pub retention_days: f64,
@@ -168,14 +168,14 @@ pub struct HistoryConfig {
     pub commit: Duration,
 }
 
-/// `[http]`.
+/// The section `[http]`: the page and the interface on the network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HttpConfig {
-    /// `HOST:PORT`.
+    /// Address and port of the page, `HOST:PORT`.
     pub listen: String,
-    /// Serve at all.
+    /// Whether page and interface are served at all.
     pub enabled: bool,
-    /// Serve over TLS.
+    /// Whether they are served over TLS; any other address than 127.0.0.1 needs it.
     pub tls: bool,
     /// Certificate chain and private key; `None`: made at the first start.
     pub certificate: Option<(PathBuf, PathBuf)>,
@@ -191,14 +191,14 @@ pub struct HttpConfig {
     pub shifts: Vec<i64>,
 }
 
-/// `[twin]`.
+/// The section `[twin]`: the simulation beside the machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TwinConfig {
-    /// Model file.
+    /// Model file (model/1); `None`: no simulation runs.
     pub model: Option<PathBuf>,
 }
 
-/// `[thermal]`.
+/// The section `[thermal]`: the thermal law that the box runs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalConfig {
     /// Model file that `identify thermal --model` writes.
@@ -217,12 +217,12 @@ pub struct ThermalConfig {
     pub compensation: CompensationSettings,
 }
 
-/// `[backup]`.
+/// The section `[backup]`: backups that the box takes by itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BackupConfig {
-    /// Where they go.
+    /// Where the archives go; a stick or share may be mounted there.
     pub directory: PathBuf,
-    /// Time between two.
+    /// Time between two backups.
     pub every: Duration,
     /// So many are kept.
     pub keep: usize,
@@ -230,10 +230,10 @@ pub struct BackupConfig {
     pub history: bool,
 }
 
-/// `[log]`.
+/// The section `[log]`: the engineer's log on standard error.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogConfig {
-    /// Least important message.
+    /// Less important events are left out; `--log-level` goes before it.
     pub level: Level,
     /// Text, JSON, or none at all.
     pub format: LogFormat,

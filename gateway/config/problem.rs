@@ -15,7 +15,7 @@ pub struct Problem {
     /// Column from 1, in characters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<usize>,
-    /// What is wrong.
+    /// What is wrong, without the place and the advice.
     pub what: String,
     /// What to do next.
     pub next: String,

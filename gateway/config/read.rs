@@ -14,7 +14,7 @@ use toml::de::{DeTable, DeValue};
 pub(super) enum Origin {
     /// Byte offset in the file.
     File(usize),
-    /// An environment variable.
+    /// The environment variable of this name.
     Variable(String),
     /// Nowhere: the default of the table.
     Default,

@@ -41,7 +41,7 @@ const ANSWER_WITHIN: Duration = Duration::from_secs(15);
 /// Orders that wait for the tick.
 const WAITING_MAX: usize = 16;
 
-/// What is wanted.
+/// What a person orders; written as one JSON document with the key `order`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "order", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Order {
@@ -54,7 +54,7 @@ pub enum Order {
     },
     /// Give the machine back to its dial.
     Disarm {
-        /// Who wants it.
+        /// Name of the person who disarms, for the audit.
         by: String,
     },
     /// A feed hold or stop has been seen to: the next one may pass.
@@ -66,13 +66,13 @@ pub enum Order {
     AcknowledgeAlarm {
         /// Who has seen it.
         by: String,
-        /// Its code.
+        /// Code of the alarm, as the status shows it.
         code: String,
     },
 }
 
 impl Order {
-    /// Who orders.
+    /// Name of the person who orders, for the audit.
     #[must_use]
     pub fn ordered_by(&self) -> &str {
         match self {
@@ -98,19 +98,19 @@ impl Order {
 /// What became of it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reply {
-    /// Was it done?
+    /// Whether the order was carried out.
     pub done: bool,
     /// What was done, or why not, and what to do next.
     pub text: String,
 }
 
 impl Reply {
-    /// It was done.
+    /// The answer to an order that was carried out; the text says what was done.
     pub fn from_success(text: impl Into<String>) -> Self {
         Self { done: true, text: text.into() }
     }
 
-    /// It was not.
+    /// The answer to an order that was not carried out; the text says why and what to do.
     pub fn from_refusal(text: impl Into<String>) -> Self {
         Self { done: false, text: text.into() }
     }
@@ -119,7 +119,7 @@ impl Reply {
 /// An order on its way to the tick, with the way back.
 #[derive(Debug)]
 pub struct QueuedOrder {
-    /// What is wanted.
+    /// The order with the name of who gives it.
     pub order: Order,
     /// Where the answer goes.
     pub reply: tokio::sync::oneshot::Sender<Reply>,

@@ -35,9 +35,9 @@ pub enum RequestRefusal {
     /// The document is longer than a request can be.
     #[error("a message of {bytes} bytes is no request: at most {most}")]
     TooLong {
-        /// Its length.
+        /// Length of the document, bytes.
         bytes: usize,
-        /// The greatest length.
+        /// The greatest length that is read, bytes.
         most: usize,
     },
     /// The document cannot be read.
@@ -63,13 +63,13 @@ pub enum RequestRefusal {
     /// A metric that must be a number.
     #[error("{metric} is no number")]
     NoNumber {
-        /// Its name.
+        /// Name of the metric at the broker.
         metric: &'static str,
     },
     /// A metric that must be a text.
     #[error("{metric} is no text")]
     NoText {
-        /// Its name.
+        /// Name of the metric at the broker.
         metric: &'static str,
     },
 }
@@ -88,7 +88,7 @@ pub enum RequestedChange {
     Withdraw,
     /// An alarm has been seen; it stands until its reason has gone.
     AcknowledgeAlarm {
-        /// Its code.
+        /// Code of the alarm that was seen.
         code: String,
     },
 }

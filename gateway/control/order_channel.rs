@@ -35,7 +35,7 @@ impl Wake {
         let _only_once = self.0.thread.set(std::thread::current());
     }
 
-    /// Wakes it.
+    /// Ends the wait of the bound thread at once; its next `take_wakeup` is true.
     pub fn wake_thread(&self) {
         self.0.wanted.store(true, Ordering::SeqCst);
         self.0.thread.get().map(Thread::unpark);
@@ -78,7 +78,7 @@ pub struct OrderSender {
 /// The end of the tick.
 #[derive(Debug)]
 pub struct OrderReceiver {
-    /// Orders of persons.
+    /// What persons order, at the box or on the page.
     pub orders: Receiver<QueuedOrder>,
     /// What is to be accounted for.
     pub rows: Receiver<PostedRow>,
@@ -88,7 +88,7 @@ pub struct OrderReceiver {
     pub wake: Wake,
 }
 
-/// Both ends.
+/// The sender for all who order, and the receiver of the tick; every queue is bounded.
 #[must_use]
 pub fn create_queues() -> (OrderSender, OrderReceiver) {
     let (orders, to_obey) = sync_channel(WAITING_MAX);

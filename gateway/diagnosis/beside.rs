@@ -32,14 +32,14 @@ pub struct BesideModel {
     pub regime: Regime,
     /// From when on, ns since 1970: since the watch has seen a difference, or the whole stretch.
     pub from_ns: TimeNs,
-    /// Seconds of it.
+    /// Number of seconds of this kind of work that were compared.
     pub seconds: usize,
     /// Mean output that the model in charge says.
     pub expected: f64,
     /// Noise of a second.
     #[serde(default)]
     pub noise: f64,
-    /// Recorded less that.
+    /// Mean recorded output less mean expected one.
     pub difference: f64,
     /// How much of it comes of parameters that the diagnosis has moved.
     pub by_parameters: f64,
@@ -47,7 +47,7 @@ pub struct BesideModel {
     pub by_effects: Vec<(String, f64)>,
     /// What nothing accounts for.
     pub left: f64,
-    /// In plain words.
+    /// What the page says of this kind of work, in English.
     pub en: String,
     /// The same in Chinese.
     pub zh: String,
@@ -56,13 +56,13 @@ pub struct BesideModel {
 /// A parameter of the model in charge that the diagnosis has moved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MovedParameter {
-    /// Part and parameter.
+    /// Effect and parameter in the model, joined by a dot.
     pub name: String,
     /// In the model in charge.
     pub before: f64,
-    /// As refitted.
+    /// Value that the diagnosis has fitted.
     pub after: f64,
-    /// Unit.
+    /// Unit symbol of both values.
     pub unit: String,
 }
 

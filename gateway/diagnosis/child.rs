@@ -47,18 +47,18 @@ pub struct DiagnosisJob {
 pub enum JobInput {
     /// A stretch of the history.
     Stretch {
-        /// The history.
+        /// Path of the database, which is only read.
         history: PathBuf,
         /// Beginning of the stretch.
         from_ns: TimeNs,
-        /// Its end.
+        /// End of the stretch.
         to_ns: TimeNs,
         /// Since when the watch sees which kinds of work differ.
         onsets: Vec<Onset>,
     },
     /// A file, read under the map beside it.
     File {
-        /// The recording.
+        /// Path of the recording; its map lies beside it.
         path: PathBuf,
         /// A simulated series, `FILE:COLUMN`.
         simulated: Option<String>,

@@ -10,7 +10,7 @@ use rules::twin::text_report::format_short_number;
 use rules::twin::{Diagnosis, Model};
 use serde_json::{Value, json};
 
-/// See the [module](self).
+/// How the recordings were understood, which units are doubtful, and how far a given series was off.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DiagnosisContext {
     /// How the recordings were understood.
@@ -24,13 +24,13 @@ pub struct DiagnosisContext {
 /// The error of a series as given and with gain and offset fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeriesErrors {
-    /// Rows compared.
+    /// Rows that hold both the output and the series.
     pub rows: usize,
-    /// As given.
+    /// Root mean square of recorded minus series, in the unit of the output.
     pub as_given: f64,
     /// With gain and offset.
     pub refitted: f64,
-    /// Fitted gain.
+    /// Factor of the series in the least squares fit.
     pub gain: f64,
     /// Fitted offset, in the unit of the output.
     pub offset: f64,
@@ -92,7 +92,7 @@ impl DiagnosisContext {
 }
 
 impl SeriesErrors {
-    /// One sentence.
+    /// One sentence with both errors, in `unit`, in both languages.
     #[must_use]
     pub fn describe_errors(&self, unit: &str) -> Bilingual {
         let [given, fitted, gain, offset] =

@@ -17,13 +17,13 @@ use std::sync::mpsc::{Receiver, sync_channel};
 const FILES_MAX: usize = 20;
 /// Diagnoses that are listed.
 const RESULTS_MAX: usize = 40;
-/// The longest index.
+/// A longer index is not read, bytes.
 const INDEX_MAX: usize = 8 << 20;
 
 /// A file that was brought.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BroughtFile {
-    /// Its key.
+    /// Digest of the content, 16 hexadecimal digits; names the file in the interface and on disk.
     pub key: String,
     /// As it was called.
     pub name: String,
@@ -40,17 +40,17 @@ pub struct FileDiagnosis {
     pub key: String,
     /// Name of the file.
     pub file: String,
-    /// Who asked.
+    /// The person who asked for it, where one is known.
     pub by: Option<String>,
     /// When, milliseconds since 1970.
     pub at_ms: i64,
-    /// The verdict.
+    /// The word of the verdict, as in `diagnosis/1`.
     pub verdict: String,
-    /// In words.
+    /// What was found, in English, as the history keeps it.
     pub summary: String,
-    /// What is missing.
+    /// Kinds of the missing effects, most important first.
     pub missing: Vec<String>,
-    /// The document.
+    /// The whole diagnosis, `diagnosis/1`.
     pub diagnosis: serde_json::Value,
 }
 

@@ -4,7 +4,7 @@
 use super::beside::Onset;
 use super::child::Stage;
 use super::store::{DiagnosisFile, DiagnosisStore};
-use super::worker::{DiagnosisRequest, LoadedModel};
+use super::worker::{ChildFailure, DiagnosisRequest, LoadedModel};
 use adapter_core::clock::TimeNs;
 use gateway_base::files::{read_text, replace_durably};
 use rules::twin::parse_model;
@@ -20,7 +20,7 @@ const MODEL_MAX: usize = 4 << 20;
 /// What is being done, or was done last.
 #[derive(Debug, Clone, Default)]
 pub enum Run {
-    /// Nothing yet.
+    /// None was asked for since the start.
     #[default]
     None,
     /// A diagnosis is under way.
@@ -29,7 +29,7 @@ pub enum Run {
     Done {
         /// Who asked for it; `None`: the box itself.
         by: Option<String>,
-        /// See `store::diagnosis_key`.
+        /// Key of the row, as `store::diagnosis_key` makes it.
         key: String,
         /// How long it took, s.
         seconds: f64,
@@ -38,12 +38,12 @@ pub enum Run {
     Failed {
         /// Who asked for it.
         by: Option<String>,
-        /// Why.
+        /// The reason in words, for the person who asked.
         what: String,
     },
     /// A person ended it.
     Cancelled {
-        /// Who did.
+        /// Name of the person who ended it.
         by: String,
     },
 }
@@ -53,11 +53,11 @@ pub enum Run {
 pub struct RunningDiagnosis {
     /// Who asked for it; `None`: the box itself.
     pub by: Option<String>,
-    /// The stretch.
+    /// Beginning of the stretch, ns since 1970.
     pub from_ns: TimeNs,
-    /// Its end.
+    /// End of the stretch, ns since 1970.
     pub to_ns: TimeNs,
-    /// Since when.
+    /// When it was begun, on the monotonic clock.
     pub since: Instant,
     /// How far it is.
     pub stage: Stage,
@@ -126,7 +126,7 @@ impl DiagnosisHandle {
         &self.store
     }
 
-    /// The model file.
+    /// Path of the model file in charge.
     #[must_use]
     pub fn model_path(&self) -> &Path {
         &self.model
@@ -235,8 +235,8 @@ impl DiagnosisHandle {
         }
     }
 
-    /// What came of it.
-    pub(super) fn record_outcome(&self, outcome: Result<String, String>) {
+    /// Ends the run with the key of the row, or with the failure; what a person has ended counts as cancelled in either case.
+    pub(super) fn record_outcome(&self, outcome: Result<String, ChildFailure>) {
         let mut state = self.lock();
         let Run::Running(RunningDiagnosis { by, since, rows, cancelled, .. }) = std::mem::take(&mut state.run) else {
             return;
@@ -244,7 +244,7 @@ impl DiagnosisHandle {
         let seconds = since.elapsed().as_secs_f64();
         state.run = match (cancelled, outcome) {
             (Some(by), _) => Run::Cancelled { by },
-            (None, Err(what)) => Run::Failed { by, what },
+            (None, Err(failure)) => Run::Failed { by, what: failure.to_string() },
             (None, Ok(key)) => {
                 #[expect(clippy::cast_precision_loss, reason = "at most some ten thousand rows")]
                 let pace_s = (rows > 0).then(|| seconds / rows as f64);

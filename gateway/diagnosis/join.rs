@@ -16,7 +16,7 @@ const DERIVED_PER_ROW: [&str; 4] =
 /// Why recordings cannot be put together.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum JoinError {
-    /// There are none.
+    /// The list of recordings is empty.
     #[error("no recording given")]
     Nothing,
     /// A column holds numbers in one recording and text in another.
@@ -24,7 +24,7 @@ pub enum JoinError {
         "column {column} holds numbers in {numbers_in} and text in {text_in}: rename one of them or correct its cells"
     )]
     TwoKinds {
-        /// Its name.
+        /// Name of the column that both recordings have.
         column: String,
         /// The recording with the numbers.
         numbers_in: String,

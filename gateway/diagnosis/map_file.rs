@@ -22,7 +22,7 @@ pub struct ProposedColumn {
     pub is_time: bool,
 }
 
-/// A proposal.
+/// How the columns of a file could be read, before a person has confirmed it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MapProposal {
     /// The columns in the order of the file.

@@ -4,7 +4,7 @@ use super::series::series_model_text;
 use rules::twin::format_toml_text;
 use std::fmt::Write as _;
 
-/// What is modelled.
+/// Which quantity of which kind of machine the model describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ModelKind {
@@ -50,7 +50,7 @@ pub const MATERIALS: [(&str, f64, f64); 8] = [
 /// What a first model is made from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewModel {
-    /// What is modelled.
+    /// Which quantity is modelled; decides the effects that the model begins with.
     pub kind: ModelKind,
     /// Name of the machine.
     pub name: String,
@@ -83,7 +83,7 @@ impl NewModel {
         self.axis.as_ref().map_or_else(String::new, |axis| format!("{axis}_"))
     }
 
-    /// The model file.
+    /// The model as text (model/1), with first guesses and comments in both languages.
     #[must_use]
     pub fn to_toml(&self) -> String {
         if self.kind == ModelKind::Series {

@@ -14,11 +14,11 @@ use std::path::{Path, PathBuf};
 pub struct DiagnosisOutputs {
     /// The diagnosis as JSON.
     pub json: Option<PathBuf>,
-    /// The page.
+    /// The report as one HTML page.
     pub html: Option<PathBuf>,
-    /// Row by row.
+    /// Recorded and simulated output row by row, as CSV.
     pub rows: Option<PathBuf>,
-    /// The extended model.
+    /// The model with what was missing; not written where the diagnosis cannot tell.
     pub accept: Option<PathBuf>,
     /// The next experiment as a plan.
     pub experiment: Option<PathBuf>,
@@ -123,7 +123,7 @@ pub enum OutputError {
     /// The file cannot be written.
     #[error("{}: {error}", path.display())]
     File {
-        /// Which.
+        /// The file that was to be written.
         path: PathBuf,
         /// What the system says.
         error: std::io::Error,

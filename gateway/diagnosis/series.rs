@@ -32,7 +32,7 @@ pub enum AlignBy {
 /// A series that is asked for: `FILE` or `FILE:COLUMN`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedSeries {
-    /// The file.
+    /// Path of the recording that holds the series.
     pub file: String,
     /// Its column; without one, the only one of the output's quantity.
     pub column: Option<String>,
@@ -146,7 +146,7 @@ pub fn series_model(output: &str) -> Result<Model, Vec<String>> {
     parse_model(&text).map_err(|problems| problems.iter().map(ToString::to_string).collect())
 }
 
-/// Its text.
+/// The text of [`series_model`] (model/1), with gain 1 and offset 0.
 #[must_use]
 pub fn series_model_text(output: &str) -> String {
     let column = series_column(output);

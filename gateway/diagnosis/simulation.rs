@@ -75,7 +75,7 @@ impl Simulation {
         })
     }
 
-    /// For the reader.
+    /// Lines for the reader: total, then mean and range of each part, in the unit of the output.
     #[must_use]
     pub fn format_text(&self) -> String {
         let unit = find_output_unit(&self.output);
@@ -100,7 +100,7 @@ impl Simulation {
         text
     }
 
-    /// For programs.
+    /// The document `simulation/1` for programs.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let part = |(label, mean, low, high): (&str, f64, f64, f64)| json!({ "effect": label, "mean": mean, "min": low, "max": high });

@@ -24,7 +24,7 @@ pub struct RegimeStatus {
     /// Since when, with the ends of the 95 % interval, milliseconds since 1970: most likely, earliest, latest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub since_ms: Option<[i64; 3]>,
-    /// In plain words.
+    /// One sentence for the operator, in English; absent while nothing differs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,
     /// The same in Chinese.
@@ -39,11 +39,11 @@ pub struct DiagnosisStatus {
     pub at_ms: i64,
     /// The stretch that was examined.
     pub from_ms: i64,
-    /// See `from_ms`.
+    /// End of the stretch, milliseconds since 1970.
     pub to_ms: i64,
-    /// The verdict.
+    /// The word of the verdict, as in `diagnosis/1`.
     pub verdict: String,
-    /// In plain words.
+    /// What was found, in English, as the history keeps it.
     pub summary: String,
     /// What is missing, most important first.
     pub missing: Vec<String>,
@@ -51,12 +51,12 @@ pub struct DiagnosisStatus {
     pub accept: String,
 }
 
-/// The twin.
+/// The model beside the running machine, and how far the machine is from it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TwinStatus {
     /// Name of the model in charge.
     pub model: String,
-    /// Its file.
+    /// Path of the model file in charge.
     pub file: String,
     /// The quantity that is simulated.
     pub output: String,
@@ -69,7 +69,7 @@ pub struct TwinStatus {
     pub twin_recorded: Option<f64>,
     /// What the model expects at this second.
     pub twin_expected: Option<f64>,
-    /// Recorded minus expected.
+    /// Recorded minus expected output of this second, in `unit`.
     pub twin_residual: Option<f64>,
     /// The reason for none, as a word.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -13,9 +13,9 @@ const LEVELS_MAX: usize = 8;
 /// One step in both languages.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DiagnosisStep {
-    /// English.
+    /// The text in English.
     pub en: String,
-    /// Chinese.
+    /// The text in Chinese.
     pub zh: String,
 }
 

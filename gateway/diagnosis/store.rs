@@ -30,13 +30,13 @@ pub struct DiagnosisStore {
 /// One file of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DiagnosisFile {
-    /// The report page.
+    /// The report as an HTML page in one language.
     Page(Language),
     /// The experiment it asks for, as a recording plan.
     Plan(Language),
     /// The model with what was missing.
     Model,
-    /// [`DiagnosisTexts`].
+    /// The [`DiagnosisTexts`] as JSON.
     Words,
 }
 
@@ -60,9 +60,9 @@ pub struct DiagnosisTexts {
 /// What the catalogue says of an effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectTexts {
-    /// Its name.
+    /// The name of the effect in the catalogue.
     pub name: DiagnosisStep,
-    /// One sentence.
+    /// What the effect does, one sentence of the catalogue.
     pub statement: DiagnosisStep,
     /// What tells it apart.
     pub experiment: DiagnosisStep,
@@ -109,13 +109,13 @@ impl DiagnosisStore {
         Self { directory: data_dir.join("diagnoses") }
     }
 
-    /// In this folder.
+    /// Keeps diagnoses directly in this folder.
     #[must_use]
     pub fn from_directory(directory: PathBuf) -> Self {
         Self { directory }
     }
 
-    /// The folder.
+    /// Where the files of every diagnosis lie side by side.
     #[must_use]
     pub fn directory(&self) -> &Path {
         &self.directory

@@ -21,9 +21,9 @@ const WAIT_MAX: Duration = Duration::from_secs(10);
 /// A model as read from its file.
 #[derive(Debug, Clone)]
 pub struct LoadedModel {
-    /// The model.
+    /// The parsed model, checked.
     pub model: Model,
-    /// Its text.
+    /// The text that the model was read from (model/1).
     pub toml: String,
 }
 
@@ -34,9 +34,9 @@ pub struct DiagnosisRequest {
     pub toml: String,
     /// The person who asks for it; `None`: the box itself.
     pub by: Option<String>,
-    /// Beginning.
+    /// Beginning of the stretch, ns since 1970.
     pub from_ns: TimeNs,
-    /// End.
+    /// End of the stretch, ns since 1970.
     pub to_ns: TimeNs,
     /// Since when the watch sees which kinds of work differ.
     pub onsets: Vec<Onset>,
@@ -57,14 +57,14 @@ pub enum WorkerReport {
     NotDiagnosed(String, Option<String>),
 }
 
-/// A finished diagnosis.
+/// A diagnosis that the tick has to store and to tell.
 #[derive(Debug, Clone)]
 pub struct Finished {
     /// The person who had asked for it; `None`: the box itself.
     pub by: Option<String>,
     /// As stored; `at_ns` is for the tick to fill in.
     pub record: gateway_history::Diagnosis,
-    /// What is missing.
+    /// Kinds of the missing effects, most important first.
     pub missing: Vec<String>,
     /// Where the improved model was written, if there is one.
     pub improved: Option<PathBuf>,
@@ -82,9 +82,9 @@ pub struct Worker {
 /// Where the worker finds and leaves things.
 #[derive(Debug, Clone)]
 pub struct WorkerPaths {
-    /// The model file.
+    /// Path of the model in charge; the worker watches it for changes.
     pub model: PathBuf,
-    /// The history.
+    /// Path of the database, which the worker only reads.
     pub history: PathBuf,
     /// Where the improved model of a diagnosis goes.
     pub improved: PathBuf,
@@ -98,7 +98,7 @@ pub enum ModelFileError {
     /// The file cannot be read.
     #[error("{}: {error}", path.display())]
     Unreadable {
-        /// Which.
+        /// The model file that could not be read.
         path: PathBuf,
         /// What the system says.
         error: std::io::Error,
@@ -106,7 +106,7 @@ pub enum ModelFileError {
     /// It is no model that can be used.
     #[error("{}", list_problems(path, problems))]
     Refused {
-        /// Which.
+        /// The model file that was read.
         path: PathBuf,
         /// Everything that is wrong with it.
         problems: Vec<twin::Problem>,
@@ -211,19 +211,36 @@ fn diagnose_stretch(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: 
     diagnoses.record_outcome(found.as_ref().map(|(record, _)| store::diagnosis_key(record)).map_err(Clone::clone));
     match found {
         Ok((record, missing)) => WorkerReport::Diagnosed(Box::new(finish_diagnosis(by, places, record, missing))),
-        Err(problem) => WorkerReport::NotDiagnosed(problem, by),
+        Err(failure) => WorkerReport::NotDiagnosed(failure.to_string(), by),
     }
 }
 
 /// Row of the history and what is missing.
 pub(super) type FoundDiagnosis = (gateway_history::Diagnosis, Vec<String>);
 
-pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, String> {
-    let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled_by().map(|by| format!("{by} has ended it"));
+/// Why a process has given no diagnosis.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(super) enum ChildFailure {
+    /// A person has ended it, before the process was started or while it ran.
+    #[error("{by} has ended it")]
+    Ended { by: String },
+    /// The system gave no process.
+    #[error("no process for the diagnosis: {0}")]
+    NotStarted(String),
+    /// The process says why nothing can be diagnosed.
+    #[error("{0}")]
+    Refused(String),
+    /// The process ended without an answer; with its exit status, empty where that is not known.
+    #[error("its process broke off ({0})")]
+    BrokeOff(String),
+}
+
+pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, ChildFailure> {
+    let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled_by().map(|by| ChildFailure::Ended { by });
     if let Some(ended) = ended_by(diagnoses) {
         return Err(ended);
     }
-    let mut child = child::start(job).map_err(|error| format!("no process for the diagnosis: {error}"))?;
+    let mut child = child::start(job).map_err(|error| ChildFailure::NotStarted(error.to_string()))?;
     let output = child.stdout.take();
     diagnoses.put_child(child);
     let mut outcome = None;
@@ -231,13 +248,11 @@ pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Resul
         child::read_messages(output, |said| match said {
             ChildMessage::Stage(stage, rows) => diagnoses.record_stage(stage, rows),
             ChildMessage::Finished(record, missing) => outcome = Some(Ok((*record, missing))),
-            ChildMessage::Refused(problem) => outcome = Some(Err(problem)),
+            ChildMessage::Refused(problem) => outcome = Some(Err(ChildFailure::Refused(problem))),
         });
     }
     let status = diagnoses.take_child().map(|mut child| child.wait());
-    let broken = || {
-        format!("its process broke off ({})", status.and_then(Result::ok).map_or(String::new(), |it| it.to_string()))
-    };
+    let broken = || ChildFailure::BrokeOff(status.and_then(Result::ok).map_or(String::new(), |it| it.to_string()));
     ended_by(diagnoses).map_or_else(|| outcome.unwrap_or_else(|| Err(broken())), Err)
 }
 

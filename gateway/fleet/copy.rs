@@ -34,7 +34,6 @@ impl CopyRows {
         Self { bytes: SIGNATURE.to_vec(), rows: 0 }
     }
 
-    /// How many rows.
     pub(super) fn row_count(&self) -> u64 {
         self.rows
     }

@@ -27,7 +27,6 @@ pub struct DatabaseSettings {
 /// What went wrong with a statement.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct DatabaseError {
-    /// In words.
     pub(super) said: NatsError,
     /// The database does not take these data; without them it would go on.
     pub(super) of_the_data: bool,

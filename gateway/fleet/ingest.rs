@@ -28,13 +28,13 @@ const REASON_KEPT: usize = 1000;
 /// From where to where.
 #[derive(Debug, Clone)]
 pub struct IngestSettings {
-    /// The cluster.
+    /// The NATS cluster that the boxes send to.
     pub target: NatsTarget,
     /// The stream; it is created if it is missing.
     pub stream: StreamSettings,
     /// Name of the durable consumer, which all that share the work have in common.
     pub consumer: String,
-    /// The database.
+    /// The PostgreSQL database that is written into.
     pub database: DatabaseSettings,
     /// End when nothing is left to do.
     pub once: bool,

@@ -5,7 +5,6 @@ use serde_json::{Map, Value as Json, json};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-/// Of one box.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LatestOfBox {
     /// The oldest of the values.
@@ -18,7 +17,7 @@ pub(super) struct LatestOfBox {
 }
 
 impl LatestOfBox {
-    /// `{"12":[microseconds,2249.5],"13":[microseconds,null,"stale"]}`.
+    /// Time and value by number of the series, as in `{"12":[microseconds,2249.5],"13":[microseconds,null,"stale"]}`.
     pub(super) fn to_json(&self) -> String {
         let cell = |(id, (at_us, value, reason)): (&i32, &(i64, Json, Option<String>))| {
             let cell = match reason {

@@ -46,7 +46,7 @@ pub enum ClusterError {
     /// It is the address of something else.
     #[error("{address} is no address of NATS; write nats://SERVER:4222,SERVER:4222/PREFIX")]
     NotNats {
-        /// What was written.
+        /// The address as it was given.
         address: String,
     },
 }

@@ -16,7 +16,6 @@ pub(super) struct MeanLevel {
     pub(super) places: usize,
 }
 
-/// Every level.
 pub(super) const LEVELS: [MeanLevel; 3] = [
     MeanLevel { kind: "minute", table: "minute_means", row: "hour", places: 60 },
     MeanLevel { kind: "hour", table: "hour_means", row: "day", places: 24 },

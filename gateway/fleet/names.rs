@@ -9,7 +9,6 @@ use tokio_postgres::Client;
 /// Names that are remembered; beyond that they are asked for again. A thousand boxes of a hundred series each.
 const REMEMBERED_MAX: usize = 100_000;
 
-/// See the [module](self).
 #[derive(Debug, Default)]
 pub(super) struct Names {
     /// Number and name of the machine.

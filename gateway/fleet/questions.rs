@@ -1,11 +1,11 @@
 //! What a shop asks of many machines, in SQL: printed by `fleet sql`, and run by the tests against what the boxes know.
 
-/// A question.
+/// A query over the machines of the fleet database or of the lake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FleetQuestion {
     /// Name on the command line.
     pub name: &'static str,
-    /// The text.
+    /// The whole query, with a comment that says what it asks.
     pub sql: &'static str,
 }
 

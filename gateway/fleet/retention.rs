@@ -15,7 +15,7 @@ pub struct Keeping {
     pub tables: &'static [(&'static str, &'static str)],
     /// Days, where nobody says otherwise.
     pub days: u32,
-    /// What it is.
+    /// What its rows are, in words.
     pub what: &'static str,
 }
 

@@ -9,7 +9,7 @@ use tokio_postgres::{Client, Transaction};
 
 /// The version of the tables that this program writes.
 const VERSION: i32 = 2;
-/// The tables.
+/// The statements that create the tables of the fleet database.
 pub const TABLES: &str = include_str!("schema/tables.sql");
 /// The views and functions.
 pub const VIEWS: &str = include_str!("schema/views.sql");
@@ -96,7 +96,6 @@ impl Period {
     }
 }
 
-/// A partition.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Partition {
     name: String,

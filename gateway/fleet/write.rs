@@ -43,7 +43,7 @@ pub(super) struct RefusalRecord {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Arrived<'a> {
     pub(super) row: &'a FleetRow<'a>,
-    /// Microseconds since 1970.
+    /// When the stream had the row, microseconds since 1970.
     pub(super) arrived_us: i64,
 }
 

@@ -10,9 +10,9 @@ use thiserror::Error;
 /// Somebody armed the gate.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Armed {
-    /// Who.
+    /// Name of the person, for status and audit.
     pub by: String,
-    /// Since when.
+    /// When it was armed, ns since 1970.
     pub since_ns: TimeNs,
     /// Until when, by itself.
     pub until_ns: TimeNs,
@@ -23,7 +23,7 @@ pub struct Armed {
 pub enum Disarmed {
     /// Nobody has armed it since the start.
     Start,
-    /// Somebody disarmed it.
+    /// A person has disarmed it.
     Person,
     /// The time was over.
     Expired,

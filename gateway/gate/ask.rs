@@ -14,11 +14,11 @@ use std::sync::Arc;
 /// A request of a script.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ScriptRequest {
-    /// For what.
+    /// A feed hold, or a stop after this part.
     pub request: LadderRequest,
     /// Why, in the script's words.
     pub reason: Arc<str>,
-    /// Which script.
+    /// File name of the script that asks.
     pub script: Arc<str>,
     /// Which version of it.
     pub version: u64,

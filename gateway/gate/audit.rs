@@ -45,7 +45,7 @@ impl Author {
 /// A write is told at most so many changes of what is asked for after the one that led to it.
 const AUTHORS_MAX: usize = 32;
 
-/// See the [module](self).
+/// What the audit holds of requests, writes and arming, with a limit on the rows per second.
 #[derive(Debug, Default)]
 pub struct Trail {
     last_request: Option<LastRequest>,

@@ -21,9 +21,9 @@ pub struct UnexpectedReading {
 pub enum Fault {
     /// The machine shows another override than any that was written while it had time to settle.
     ReadBack {
-        /// Written last.
+        /// The override that was written last.
         asked: OverridePct,
-        /// Read back.
+        /// What the machine showed instead.
         shown: UnexpectedReading,
     },
     /// The override was withdrawn and the dial is not in force again.
@@ -34,18 +34,18 @@ pub enum Fault {
     Line(SourceError),
     /// The control shows another offset than the one that was written.
     Offset {
-        /// Which axis.
+        /// The axis whose offset differs.
         axis: Axis,
-        /// Written, um.
+        /// The offset that was written, um.
         asked_um: f64,
-        /// Read back, um.
+        /// The offset that was read back, um.
         found_um: f64,
     },
     /// An offset could not be written or read back.
     OffsetLine(SourceError),
     /// For so long no sign of life reached the ladder, which therefore may have taken the dial back in between.
     Late {
-        /// How long, ms.
+        /// Time since the last sign of life, ms.
         silent_ms: i64,
     },
     /// The thread that writes has ended.

@@ -20,7 +20,7 @@ pub enum Hold {
     StateUnknown,
     /// The controller shows an alarm.
     Alarm,
-    /// Handwheel, jog, reference.
+    /// The controller is in handwheel, jog or reference mode.
     Manual,
     /// Single commands typed in.
     Mdi,
@@ -34,11 +34,11 @@ pub enum Hold {
     UnknownWord(ChannelId),
     /// Feed hold was pressed.
     FeedHold,
-    /// No program runs.
+    /// No program runs at the controller.
     NotRunning,
     /// A program runs or stands in the middle, which matters to offsets only.
     Running,
-    /// Rapid traverse.
+    /// The machine moves in rapid traverse.
     Rapid,
     /// A thread is cut: the feed follows the spindle.
     Threading,

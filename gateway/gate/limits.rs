@@ -6,7 +6,7 @@ use std::time::Duration;
 /// How far the gate goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GateMode {
-    /// Nothing is decided.
+    /// Nothing is decided; 100 % is held.
     Off,
     /// Decided and recorded, never written.
     Shadow,
@@ -53,7 +53,7 @@ pub struct GateConfig {
     pub stale: Duration,
     /// Arming ends by itself after this.
     pub armed_for: Duration,
-    /// Thermal offsets.
+    /// The limits of thermal offsets, `[gate.offset]`.
     pub offset: OffsetConfig,
 }
 

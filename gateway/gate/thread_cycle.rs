@@ -24,7 +24,6 @@ const TAPPING: [u32; 4] = [63, 74, 84, 88];
 const ENDING: [u32; 6] = [0, 1, 2, 3, 64, 80];
 
 impl ThreadCycle {
-    /// Takes one block.
     pub(super) fn follow_block(&mut self, block: &str) {
         let mut ended = false;
         let mut begun = None;

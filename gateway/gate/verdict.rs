@@ -23,7 +23,7 @@ pub enum GateOutcome {
 /// The decision of one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
-    /// The tick.
+    /// Time of the tick, ns since 1970.
     pub at_ns: TimeNs,
     /// What was asked for, as it was; may be no number.
     pub wanted_pct: Option<f64>,

@@ -12,7 +12,7 @@ use rules::physics::explain::Language;
 pub struct Chapter {
     /// What `cnc-gateway help` calls it; the name of the file without its ending.
     pub topic: &'static str,
-    /// The chapter, Markdown.
+    /// The whole chapter in English, Markdown.
     pub text: &'static str,
     /// The same in Chinese, where it is written.
     pub zh: Option<&'static str>,

@@ -23,7 +23,7 @@ pub(crate) const BEGINNING: &str = "00000000000000000000000000000000000000000000
 pub struct AuditEntry {
     /// From 1, without holes.
     pub number: i64,
-    /// What it says.
+    /// What was asked for, what became of it, and who was behind it.
     #[serde(flatten)]
     pub audit: Audit,
     /// Hash of the row before.
@@ -56,7 +56,7 @@ pub struct AuditRemoval {
     pub through: i64,
     /// When the last of them was removed.
     pub at_ns: TimeNs,
-    /// Why.
+    /// Why they were removed, in words.
     pub because: String,
     /// Hash of the last of them: the oldest row there is has to follow from it.
     #[serde(skip)]
@@ -66,7 +66,7 @@ pub struct AuditRemoval {
 /// The first row that is not as it was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Break {
-    /// Its number.
+    /// Its number in the chain, from 1.
     pub number: i64,
     /// What is wrong with it.
     pub what: String,

@@ -14,7 +14,7 @@ pub enum HistoryError {
         path.display()
     )]
     InUse {
-        /// The database.
+        /// Path of the database that is in use.
         path: PathBuf,
         /// Process number and start, as the other one wrote them into the lock file.
         holder: String,
@@ -25,7 +25,7 @@ pub enum HistoryError {
         path.display()
     )]
     NewerSchema {
-        /// The database.
+        /// Path of the database that is too new.
         path: PathBuf,
         /// Schema of the file.
         found: i64,
@@ -35,7 +35,7 @@ pub enum HistoryError {
     /// The file is something else.
     #[error("{}: not a cnc-gateway history ({what}). Choose another file with --history; nothing was changed.", path.display())]
     NotAHistory {
-        /// The file.
+        /// Path of the file that is no history.
         path: PathBuf,
         /// What it is instead.
         what: String,
@@ -43,14 +43,14 @@ pub enum HistoryError {
     /// There is no such file.
     #[error("{}: no history there. Check the path, or run the gateway first so that it writes one.", path.display())]
     Missing {
-        /// The file.
+        /// The path at which no file is.
         path: PathBuf,
     },
     /// The directory or the file cannot be written.
     #[error("{}: cannot be written ({error}). Give the gateway's user write permission to {}, or choose another place with --history.",
         path.display(), place.display())]
     ReadOnly {
-        /// The database.
+        /// Path of the database that cannot be written.
         path: PathBuf,
         /// What lacks the permission.
         place: PathBuf,
@@ -60,17 +60,17 @@ pub enum HistoryError {
     /// A file operation failed.
     #[error("{}: {error}", path.display())]
     Io {
-        /// The file.
+        /// The file that the operation was about.
         path: PathBuf,
         /// What the system said.
         error: std::io::Error,
     },
-    /// `SQLite` refused.
+    /// `SQLite` refused a statement.
     #[error("history, while {doing}: {error}")]
     Sqlite {
         /// What was being done.
         doing: &'static str,
-        /// What `SQLite` said.
+        /// The error as `SQLite` gave it.
         error: rusqlite::Error,
     },
     /// `SQLite` found that the file is not as it was written.
@@ -80,7 +80,7 @@ pub enum HistoryError {
         doing: &'static str,
         /// The page, where it is known.
         page: Option<u32>,
-        /// What `SQLite` said.
+        /// The error as `SQLite` gave it.
         error: rusqlite::Error,
     },
     /// A block cannot be decoded.

@@ -14,7 +14,7 @@ pub(crate) const AHEAD_NS: i64 = 60 * SECOND_NS;
 /// Rows from the future.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct FutureRows {
-    /// How many samples.
+    /// Number of samples with a time after now.
     pub samples: i64,
     /// The first of them.
     pub first_ns: TimeNs,

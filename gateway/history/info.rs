@@ -15,9 +15,9 @@ const RATE_OVER_NS: i64 = 7 * DAY_NS;
 /// Rows of one table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct TableRows {
-    /// The table.
+    /// Name of the table in the database.
     pub table: &'static str,
-    /// Its rows.
+    /// Number of rows in it.
     pub rows: i64,
 }
 
@@ -26,7 +26,7 @@ pub struct TableRows {
 pub struct Dropped {
     /// Raw samples, minute summaries, ...
     pub kind: String,
-    /// How many.
+    /// How many rows were removed.
     pub rows: i64,
     /// Time of the newest of them.
     pub through_ns: TimeNs,
@@ -37,13 +37,13 @@ pub struct Dropped {
 /// The figures of a history. Sizes in bytes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Info {
-    /// The file.
+    /// Path of the database file.
     pub path: String,
     /// Time of the first row.
     pub first_ns: Option<TimeNs>,
     /// Time of the last row.
     pub last_ns: Option<TimeNs>,
-    /// Rows of samples.
+    /// Number of rows of samples.
     pub samples: i64,
     /// Stretches of increasing time: starts of the gateway and steps of the clock.
     pub segments: i64,

@@ -12,7 +12,7 @@ use serde::Serialize;
 pub struct RecordSpan {
     /// From this time on.
     pub from_ns: TimeNs,
-    /// Before this time.
+    /// Before this time, ns since 1970.
     pub to_ns: TimeNs,
     /// At most this many.
     pub limit: u32,
@@ -35,9 +35,9 @@ impl RecordSpan {
 /// A stretch of time in one machine state.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StateInterval {
-    /// The state.
+    /// Word of the state: `idle`, `cutting`, ...
     pub state: String,
-    /// Since when.
+    /// Beginning of the stretch, ns since 1970.
     pub since_ns: TimeNs,
     /// Until when; `None` while it lasts.
     pub until_ns: Option<TimeNs>,
@@ -54,11 +54,11 @@ pub struct StateInterval {
 pub struct AlarmEntry {
     /// Identifies it together with the source.
     pub code: String,
-    /// Who raised it.
+    /// Who raised it: the controller, a script, `gateway`.
     pub source: String,
-    /// `info`, `warning`, `critical`.
+    /// One of `info`, `warning`, `critical`.
     pub severity: String,
-    /// Since when.
+    /// When it was raised first, ns since 1970.
     pub raised_ns: TimeNs,
     /// Until when; `None` while it lasts.
     pub cleared_ns: Option<TimeNs>,
@@ -75,9 +75,9 @@ pub struct AlarmEntry {
 pub struct StateHour {
     /// Beginning of the hour.
     pub start_ns: TimeNs,
-    /// The state.
+    /// Word of the state: `idle`, `cutting`, ...
     pub state: String,
-    /// How long, seconds.
+    /// Time in the state within the hour, s.
     pub seconds: f64,
 }
 

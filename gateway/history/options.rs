@@ -27,12 +27,12 @@ pub enum Fidelity {
     Exact,
 }
 
-/// Number or text.
+/// Whether the values of a series are numbers or words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SeriesKind {
     /// A quantity in its unit.
     Number,
-    /// A state word.
+    /// A word, as of a state or a mode.
     Text,
 }
 
@@ -48,7 +48,7 @@ pub struct ExtraSeries {
     pub en: String,
     /// What it is, in Chinese.
     pub zh: String,
-    /// Number or text.
+    /// Whether the values are numbers or words.
     pub kind: SeriesKind,
     /// Decimal places that are kept of numbers with a longer fraction; `None` takes the usual ones of the unit.
     pub decimals: Option<u8>,
@@ -68,7 +68,7 @@ impl ExtraSeries {
         }
     }
 
-    /// A state word.
+    /// A series of words, which has no unit.
     #[must_use]
     pub fn new_text(name: &str, en: &str, zh: &str) -> Self {
         Self { kind: SeriesKind::Text, ..Self::new_number(name, "", en, zh) }
@@ -80,7 +80,7 @@ impl ExtraSeries {
 pub enum ExtraValue<'a> {
     /// Finite, in the unit of the series; anything else is stored as `out_of_range`.
     Number(f64),
-    /// A state word.
+    /// A word, as of a state or a mode.
     Text(&'a str),
     /// No value, with the reason as one word (`not_learned`, `stale`, ...).
     Missing(&'a str),
@@ -96,9 +96,9 @@ impl<'a> From<Result<f64, &'a str>> for ExtraValue<'a> {
 /// summaries, then hours, states and parts, then events and diagnoses, and alarms, decisions and commands last.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Retention {
-    /// Raw samples, days.
+    /// Age at which raw samples are removed, days.
     pub raw_days: f64,
-    /// Minute summaries, days.
+    /// Age at which summaries of minutes are removed, days.
     pub minutes_days: f64,
     /// Hour and day summaries, states, parts, events, models and diagnoses, days.
     pub records_days: f64,
@@ -146,7 +146,7 @@ pub struct Options {
     pub when_full: WhenFull,
     /// How exactly numbers are kept.
     pub fidelity: Fidelity,
-    /// Ages and sizes.
+    /// Ages and sizes at which rows are removed.
     pub retention: Retention,
     /// What is stored beside the channels of the table, in the order in which values are handed to `sample`.
     pub extras: Vec<ExtraSeries>,

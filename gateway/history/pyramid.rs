@@ -17,7 +17,6 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Level {
     pub(crate) width_ns: i64,
-    /// The same, s.
     pub(crate) width_s: u32,
     pub(crate) table: &'static str,
     pub(crate) key: &'static str,
@@ -45,7 +44,6 @@ macro_rules! level {
     };
 }
 
-/// Minutes, hours, days.
 pub(crate) static LEVELS: [Level; 3] =
     [level!(60, "minutes", "minute"), level!(3_600, "hours", "hour"), level!(86_400, "days", "day")];
 

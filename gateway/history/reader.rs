@@ -42,7 +42,7 @@ impl Reader {
         self.damaged.borrow_mut().extend(walk.damaged.iter().map(|damaged| (damaged.first_row, *damaged)));
     }
 
-    /// The database.
+    /// Path of the database that was opened.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path

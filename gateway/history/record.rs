@@ -3,10 +3,10 @@
 use adapter_core::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
-/// Something that happened.
+/// Something that happened at one moment, for the operator's list.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Event {
-    /// When.
+    /// When it happened, ns since 1970.
     pub at_ns: TimeNs,
     /// One word: `started`, `script_reloaded`, `source_lost`, ...
     pub kind: String,
@@ -27,7 +27,7 @@ pub struct Alarm {
     pub code: String,
     /// Who raises it: the controller, a script, `gateway`.
     pub source: String,
-    /// `info`, `warning`, `critical`.
+    /// One of `info`, `warning`, `critical`.
     pub severity: String,
     /// For the operator, English.
     pub en: String,
@@ -49,7 +49,7 @@ pub struct AlarmClear {
 /// The machine enters a state; the one before ends at this moment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StateChange {
-    /// Since when.
+    /// When the state began, ns since 1970.
     pub at_ns: TimeNs,
     /// `off`, `standby`, `spindle_start`, `idle`, `cutting`, ...
     pub state: String,
@@ -74,7 +74,7 @@ pub struct Part {
     pub count: i64,
     /// Time in cut, seconds.
     pub cutting_s: Option<f64>,
-    /// Energy drawn, joules.
+    /// Energy drawn, J; `None` where no power was known.
     pub energy_j: Option<f64>,
     /// Further figures, JSON; empty when there are none.
     pub detail: String,
@@ -83,9 +83,9 @@ pub struct Part {
 /// What a script wanted, and what the gate made of it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Decision {
-    /// The tick.
+    /// Time of the tick, ns since 1970.
     pub at_ns: TimeNs,
-    /// Script that decided.
+    /// Name of the script that decided, or of the part of the box.
     pub script: String,
     /// Version (hash) of that script.
     pub script_version: String,
@@ -108,13 +108,13 @@ pub struct Decision {
 pub struct Command {
     /// When it was sent.
     pub at_ns: TimeNs,
-    /// `feed_override_pct`, ...
+    /// Name of what was set, for example `feed_override_pct`.
     pub command: String,
     /// Which machine or controller.
     pub target: String,
     /// Value before, as read.
     pub before: Option<f64>,
-    /// Value asked for.
+    /// The value that was asked for.
     pub asked: Option<f64>,
     /// Value after, as read back.
     pub after: Option<f64>,
@@ -133,9 +133,9 @@ pub struct Command {
 /// A model in force from now on.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Model {
-    /// Since when.
+    /// When it came into force, ns since 1970.
     pub at_ns: TimeNs,
-    /// Its name.
+    /// The name that stands in the model.
     pub name: String,
     /// Where it came from: a file, `identify`, `diagnose --accept`.
     pub origin: String,
@@ -143,7 +143,7 @@ pub struct Model {
     pub toml: String,
 }
 
-/// A finished diagnosis.
+/// What a finished diagnosis of a stretch has found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// When it was finished.
@@ -152,9 +152,9 @@ pub struct Diagnosis {
     pub from_ns: TimeNs,
     /// End of the stretch that was examined.
     pub to_ns: TimeNs,
-    /// `explained`, `ambiguous`, ...
+    /// Word of the verdict: `explained`, `ambiguous`, ...
     pub verdict: String,
-    /// In plain words.
+    /// What was found, in English sentences.
     pub summary: String,
     /// The whole diagnosis, `diagnosis/1`.
     pub json: String,
@@ -163,7 +163,7 @@ pub struct Diagnosis {
 /// A row of the gate's audit: what was asked for, what became of it, who or which script was behind it. See the table `audit`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Audit {
-    /// When.
+    /// When it happened, ns since 1970.
     pub at_ns: TimeNs,
     /// `started`, `request`, `write`, `reaction`, `feed_hold`, `stop`, `armed`, `disarmed`, `acknowledged`;
     /// of offsets `z_offset_request`, `z_offset_write`, `z_offset_restore`, and so for `x` and `y`.
@@ -178,7 +178,7 @@ pub struct Audit {
     pub after: Option<f64>,
     /// Unit of the three.
     pub unit: String,
-    /// Why, in words.
+    /// The reason of this row, in words.
     pub reason: String,
     /// Script that asked; empty when none did.
     pub script: String,
@@ -229,27 +229,27 @@ pub struct ReactionTime {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Record {
-    /// See [`Event`].
+    /// Something that happened at one moment.
     Event(Event),
-    /// See [`Alarm`].
+    /// An alarm was raised.
     Alarm(Alarm),
-    /// See [`AlarmClear`].
+    /// An alarm was cleared.
     AlarmClear(AlarmClear),
-    /// See [`StateChange`].
+    /// The machine entered a state.
     State(StateChange),
-    /// See [`Part`].
+    /// A part or cycle was finished.
     Part(Part),
-    /// See [`Decision`].
+    /// A script wanted something, and the gate decided.
     Decision(Decision),
-    /// See [`Command`].
+    /// The machine was sent a command.
     Command(Command),
-    /// See [`Model`].
+    /// A model came into force.
     Model(Model),
-    /// See [`Diagnosis`].
+    /// A diagnosis of a stretch was finished.
     Diagnosis(Diagnosis),
-    /// See [`Audit`].
+    /// A row of the gate's audit.
     Audit(Audit),
-    /// See [`ReactionTime`].
+    /// An override was seen in force at the machine.
     Reaction(ReactionTime),
 }
 

@@ -23,7 +23,6 @@ fn execute_change(db: &Connection, sql: &str, values: impl Params) -> Result<(),
     db.prepare_cached(sql)?.execute(values).map(drop)
 }
 
-/// Stores one record.
 pub(crate) fn store_record(db: &Connection, record: &Record) -> Result<(), rusqlite::Error> {
     match record {
         Record::Event(event) => store_event(db, event),

@@ -25,9 +25,9 @@ use std::path::Path;
 /// What was dated anew.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Redated {
-    /// Segments.
+    /// Number of segments that were moved.
     pub segments: u64,
-    /// Samples in them.
+    /// Number of samples in those segments.
     pub samples: i64,
     /// By how much they were moved: least and greatest, ns.
     pub by_ns: (i64, i64),

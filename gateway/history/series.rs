@@ -7,7 +7,7 @@ use adapter_core::ChannelId;
 use adapter_core::channel::{Channel, Kind};
 use std::sync::Arc;
 
-/// One stored series.
+/// A series as the history stores it: name, unit, kind and texts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Number in the table `series` of the database; stable for the life of the file.
@@ -16,7 +16,7 @@ pub struct Series {
     pub name: Arc<str>,
     /// Unit symbol; `1` for pure numbers, empty for text.
     pub unit: Arc<str>,
-    /// Number or text.
+    /// Whether the values are numbers or words.
     pub kind: SeriesKind,
     /// Decimal places kept of long fractions; `None` keeps every bit.
     pub decimals: Option<u8>,

@@ -15,7 +15,7 @@ use std::path::Path;
 /// What was set apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct SetApart {
-    /// Samples.
+    /// Number of samples that were moved.
     pub samples: i64,
     /// Events, states, parts and the like.
     pub records: usize,

@@ -30,7 +30,7 @@ pub fn disk_room(path: &Path) -> Option<DiskRoom> {
     })
 }
 
-/// The reserve file.
+/// The file that is given back when the disk is full.
 #[derive(Debug)]
 pub(crate) struct Reserve {
     path: PathBuf,
@@ -45,7 +45,6 @@ impl Reserve {
         Self { path: append_suffix(path, ".reserve"), bytes: bytes.min(total / 16), held: false }
     }
 
-    /// Its size.
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes
     }

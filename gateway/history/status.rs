@@ -5,7 +5,7 @@ use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// A moment's figures.
+/// What the writer has done and what waits for it, at one moment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct HistoryFigures {
     /// Samples up to and including this time survive a power cut; `None` before the first commit.
@@ -28,7 +28,7 @@ pub struct HistoryFigures {
     pub lost_samples: u64,
     /// Samples removed by age or size since opening.
     pub retired_samples: u64,
-    /// Commits since opening.
+    /// Commits since the history was opened.
     pub commits: u64,
     /// Duration of the last commit, fsync included, milliseconds.
     pub last_commit_ms: f64,

@@ -32,7 +32,6 @@ pub(super) fn module_error(error: HistoryError) -> Error {
     Error::ModuleError(error.to_string())
 }
 
-/// The table.
 pub(super) struct Samples {
     path: PathBuf,
     series: Arc<[Series]>,

@@ -157,7 +157,7 @@ impl Writer {
         self.shared.rounds.load(std::sync::atomic::Ordering::Relaxed)
     }
 
-    /// The database.
+    /// Path of the database that is written.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path

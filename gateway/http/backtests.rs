@@ -62,7 +62,7 @@ impl Backtests {
     }
 }
 
-/// `GET /api/v1/backtest`
+/// `GET /api/v1/backtest`: the backtest under way, or the report of the last one.
 async fn serve_backtest(State(shared): State<ServerState>) -> Json<Value> {
     Json(match &*shared.backtests.lock_run() {
         Run::None => json!({ "schema": "backtest-run/1", "state": "none" }),

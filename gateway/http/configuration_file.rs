@@ -144,7 +144,7 @@ fn is_started_by_service_manager() -> bool {
     std::env::var_os("INVOCATION_ID").is_some() || std::env::var_os("NOTIFY_SOCKET").is_some()
 }
 
-/// `GET /api/v1/configuration/file`
+/// `GET /api/v1/configuration/file`: text and digest of the file, with what is wrong in it.
 async fn read_file(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     run_blocking(move || {
         let path = file_path(&shared)?;
@@ -156,7 +156,7 @@ async fn read_file(State(shared): State<ServerState>) -> Result<Json<Value>, Api
     .await
 }
 
-/// `POST /api/v1/configuration/check`
+/// `POST /api/v1/configuration/check`: what is wrong with a text that is not saved.
 async fn check_text(
     State(shared): State<ServerState>,
     JsonBody(asked): JsonBody<ConfigurationText>,

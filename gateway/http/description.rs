@@ -25,7 +25,6 @@ pub fn description() -> &'static str {
     &DESCRIPTION
 }
 
-/// The whole document.
 fn build_document() -> Value {
     let mut parts = WRITTEN.iter().map(|text| serde_json::from_str::<Value>(text).unwrap_or(Value::Null));
     let mut document = parts.next().unwrap_or(Value::Null);

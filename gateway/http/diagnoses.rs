@@ -63,7 +63,7 @@ pub(super) fn describe_diagnosis_refusal(refusal: DiagnosisRefusal) -> ApiProble
     ApiProblem::conflict(refusal.what, refusal.next)
 }
 
-/// `GET /api/v1/diagnosis`
+/// `GET /api/v1/diagnosis`: the diagnosis under way, or how the last one ended.
 async fn serve_diagnosis(State(shared): State<ServerState>) -> Json<Value> {
     Json(run_document(shared.diagnoses.as_ref().map(DiagnosisHandle::current_run).unwrap_or_default()))
 }

@@ -20,7 +20,7 @@ macro_rules! files {
 /// The one document; every view is this with another address.
 pub(super) const INDEX: &str = include_str!("../web/index.html");
 
-/// Everything below `/web/`.
+/// Every file that is served below `/web/`.
 pub(super) static FILES: &[WebFile] = files! {
     SVG "icon.svg" from "icon.svg",
     CSS "theme.css" from "theme.css",

@@ -40,7 +40,6 @@ pub(super) struct Guarded {
     pub(super) route: Route,
 }
 
-/// See the [module](self).
 pub(super) async fn guard_route(State(guarded): State<Guarded>, request: Request, next: Next) -> Response {
     match admit_request(&guarded, request).await {
         Ok((request, person)) => answer_and_audit(&guarded, request, person, next).await,

@@ -71,7 +71,7 @@ pub(super) fn describe_history_error(error: &HistoryError) -> ApiProblem {
     }
 }
 
-/// `from` and `to`.
+/// The keys `from` and `to`; without them the last stretch up to the newest sample.
 pub(super) fn parse_range(keys: &QueryKeys, newest_ns: TimeNs) -> Result<(TimeNs, TimeNs), ApiProblem> {
     let bad =
         |key: &str, what: moment::MomentError| ApiProblem::bad_request(format!("{key}: {what}"), moment::NOTATION);
@@ -99,27 +99,27 @@ async fn serve_records(shared: ServerState, kind: RecordKind, pairs: Vec<(String
     .await
 }
 
-/// `GET /api/v1/states`
+/// `GET /api/v1/states`: the stretches in each machine state.
 pub(super) async fn serve_states(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     serve_records(shared, RecordKind::States, pairs).await
 }
 
-/// `GET /api/v1/alarms`
+/// `GET /api/v1/alarms`: the alarms of a time range.
 pub(super) async fn serve_alarms(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     serve_records(shared, RecordKind::Alarms, pairs).await
 }
 
-/// `GET /api/v1/decisions`
+/// `GET /api/v1/decisions`: what scripts wanted and what the gate made of it.
 pub(super) async fn serve_decisions(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     serve_records(shared, RecordKind::Decisions, pairs).await
 }
 
-/// `GET /api/v1/events`
+/// `GET /api/v1/events`: what happened in a time range.
 pub(super) async fn serve_events(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     serve_records(shared, RecordKind::Events, pairs).await
 }
 
-/// `GET /api/v1/parts`
+/// `GET /api/v1/parts`: the parts that were finished.
 pub(super) async fn serve_parts(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     serve_records(shared, RecordKind::Parts, pairs).await
 }
@@ -162,7 +162,7 @@ pub(super) async fn verify_audit(State(shared): State<ServerState>, Pairs(pairs)
     .await
 }
 
-/// `GET /api/v1/samples`
+/// `GET /api/v1/samples`: some series over a time range, by columns.
 pub(super) async fn sample_series(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     let known = ["from", "to", "channels", "resolution_s", "state", "program", "tool"];
     let keys = QueryKeys::from_pairs(pairs, &known)?;

@@ -82,7 +82,7 @@ const ALIVE_WITHIN: Duration = Duration::from_secs(5);
 /// The latest status and when it came.
 #[derive(Debug, Clone)]
 pub struct Published {
-    /// The document.
+    /// The document of `/api/v1/status`.
     pub status: Arc<Status>,
     /// When it was published, on the monotonic clock of this process.
     pub at: Instant,
@@ -109,7 +109,7 @@ pub struct ServerParts {
     pub hosts: Vec<String>,
     /// Where diagnoses are asked for; `None` where no simulation runs beside the machine.
     pub diagnoses: Option<DiagnosisHandle>,
-    /// The configuration.
+    /// The configuration in force, and the file it came from.
     pub configured: Configured,
 }
 
@@ -134,7 +134,7 @@ pub struct ServerState {
 }
 
 impl ServerState {
-    /// From these parts.
+    /// What the routes share, made from these parts.
     #[must_use]
     pub fn new(parts: ServerParts) -> Self {
         let ServerParts {

@@ -17,7 +17,7 @@ use tokio_stream::wrappers::WatchStream;
 
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/live", || get(stream_live))];
 
-/// `GET /api/v1/live`
+/// `GET /api/v1/live`: every new status as an event of a stream.
 async fn stream_live(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,

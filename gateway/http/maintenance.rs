@@ -66,7 +66,7 @@ impl Configured {
     }
 }
 
-/// `GET /api/v1/configuration`
+/// `GET /api/v1/configuration`: every key with its value and where that was written.
 async fn serve_configuration(State(shared): State<ServerState>) -> Json<Value> {
     Json(shared.configured.to_json())
 }
@@ -123,7 +123,7 @@ fn collect_files(places: &BackupPaths) -> Result<Vec<ArchivedFile>, ApiProblem> 
     backup::collect_files(places).map_err(|error| describe_history_error(&error))
 }
 
-/// `GET /api/v1/backup`
+/// `GET /api/v1/backup`: a new backup as a download, without the rows of the history.
 async fn download_backup(State(shared): State<ServerState>) -> Result<Response, ApiProblem> {
     let at_s = now_s(&shared)?;
     let bytes = run_blocking(move || pack_archive(&collect_files(&shared.configured.backup_paths())?, at_s)).await?;
@@ -157,7 +157,7 @@ async fn restore_backup(
     Ok(with_audit_note(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
 }
 
-/// `GET /api/v1/support`
+/// `GET /api/v1/support`: an archive for support, without secrets.
 async fn download_support_bundle(State(shared): State<ServerState>) -> Result<Response, ApiProblem> {
     let (at_s, status) = (now_s(&shared)?, shared.require_status()?);
     let bytes = run_blocking(move || {

@@ -288,7 +288,7 @@ pub fn render_metrics(status: &Status) -> String {
 
 pub(super) const ROUTES: &[Route] = &[Route::read("/metrics", || get(serve_metrics))];
 
-/// `GET /metrics`
+/// `GET /metrics`: the status in the text format of Prometheus.
 pub(super) async fn serve_metrics(State(shared): State<ServerState>) -> Result<impl IntoResponse, ApiProblem> {
     let text = render_metrics(&*shared.require_status()?);
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text))

@@ -48,7 +48,7 @@ fn on_disk(path: &std::path::Path) -> Result<String, ApiProblem> {
     }
 }
 
-/// `GET /api/v1/operations`
+/// `GET /api/v1/operations`: text and rows of the recipe file, with what is wrong in it.
 async fn serve_recipe(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     run_blocking(move || {
         let path = require_path(&shared)?;

@@ -80,7 +80,7 @@ struct Acknowledge {
     code: Option<String>,
 }
 
-/// `POST /api/v1/alarms/acknowledge`
+/// `POST /api/v1/alarms/acknowledge`: an alarm has been seen; without a code, a feed hold or stop.
 async fn acknowledge_alarms(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,

@@ -76,4 +76,16 @@ mod tests {
         names.dedup();
         assert_eq!(names.len(), FILES.len());
     }
+
+    #[test]
+    fn every_module_of_the_words_is_preloaded() {
+        let named = |text: &str, before: &str| -> Vec<String> {
+            text.split(before).skip(1).filter_map(|rest| Some(rest.split_once('"')?.0.to_owned())).collect()
+        };
+        let preloaded = named(INDEX, "rel=\"modulepreload\" href=\"/web/");
+        let table = FILES.iter().find(|file| file.name == "word-table.js").expect("the table is served");
+        let words = named(table.content, "from \"/web/");
+        assert!(words.len() >= 9 && words.iter().all(|name| preloaded.contains(name)), "{words:?}");
+        assert!(preloaded.iter().all(|name| FILES.iter().any(|file| file.name == *name)), "{preloaded:?}");
+    }
 }

@@ -19,7 +19,6 @@ impl Peer {
         Self { from: from.ip().to_canonical(), to: SocketAddr::new(to.ip().to_canonical(), to.port()), tls }
     }
 
-    /// `http` or `https`.
     pub(super) fn scheme(&self) -> &'static str {
         if self.tls { "https" } else { "http" }
     }

@@ -88,7 +88,7 @@ async fn serve_style() -> Response {
     ([(header::CONTENT_TYPE, "text/css; charset=utf-8")], STYLE).into_response()
 }
 
-/// `GET /sign-in`
+/// `GET /sign-in`: the form without scripts.
 async fn sign_in(
     State(shared): State<ServerState>,
     Query(asked): Query<LanguageQuery>,
@@ -145,7 +145,7 @@ fn render_form(zh: bool, next: &str, trouble: &str, more: &str) -> Response {
     render_page(zh, say("Sign in", "登录"), "", &body)
 }
 
-/// `GET /plain`
+/// `GET /plain`: the status as a page without scripts.
 async fn serve_plain(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,

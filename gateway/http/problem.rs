@@ -8,7 +8,7 @@ use std::time::Duration;
 /// What a client did or met, and what to do about it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ApiProblem {
-    /// HTTP status code.
+    /// HTTP status code of the answer.
     pub status: u16,
     /// What is wrong, in one sentence.
     pub title: String,

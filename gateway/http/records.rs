@@ -40,12 +40,12 @@ impl RecordKind {
     }
 }
 
-/// Which records.
+/// The time range, and which of the records in it are wanted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordQuery {
     /// From this time on.
     pub from_ns: TimeNs,
-    /// Before this time.
+    /// Before this time, ns since 1970.
     pub to_ns: TimeNs,
     /// Only this state; for [`RecordKind::States`].
     pub state: Option<String>,

@@ -13,13 +13,13 @@ use gateway_access::{Role, Urgency};
 /// The method of a route.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Verb {
-    /// Reads.
+    /// `GET`: reads and changes nothing.
     Get,
-    /// Does something.
+    /// `POST`: does something once for each request.
     Post,
     /// Puts something in the place of what was there.
     Put,
-    /// Removes something.
+    /// `DELETE`: removes what is at the path.
     Delete,
 }
 
@@ -121,7 +121,7 @@ impl Route {
         self.urgency
     }
 
-    /// The method.
+    /// Method of the requests that it answers.
     #[must_use]
     pub const fn verb(&self) -> Verb {
         self.verb

@@ -79,7 +79,7 @@ pub(super) fn with(files: Vec<ScriptFile>, name: &str, text: &str) -> Vec<Script
     files
 }
 
-/// `GET /api/v1/rules`
+/// `GET /api/v1/rules`: every script and draft, and which of them are in charge.
 async fn serve_rules(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     run_blocking(move || {
         let drafts = Drafts::from_data_dir(&shared.data_dir);
@@ -116,7 +116,7 @@ async fn serve_rule_words() -> Json<Value> {
     Json(script::api_json())
 }
 
-/// `GET /api/v1/rules/{file}/versions/{digest}`
+/// `GET /api/v1/rules/{file}/versions/{digest}`: a text that was in charge.
 async fn serve_version(
     State(shared): State<ServerState>,
     Path((name, digest)): Path<(String, String)>,
@@ -147,7 +147,7 @@ async fn check_rule(
     .await
 }
 
-/// `POST /api/v1/rules/{file}/trials`
+/// `POST /api/v1/rules/{file}/trials`: the trials of an edited script, which is not saved.
 async fn run_script_trials(
     State(shared): State<ServerState>,
     Path(name): Path<String>,
@@ -211,7 +211,7 @@ fn now_ms(shared: &ServerState) -> i64 {
     shared.require_status().map(|status| status.at_ms).unwrap_or_default()
 }
 
-/// `PUT /api/v1/rules/{file}/draft`
+/// `PUT /api/v1/rules/{file}/draft`: keeps an edited script without putting it in charge.
 async fn save_draft(
     State(shared): State<ServerState>,
     Path(name): Path<String>,
@@ -235,7 +235,7 @@ async fn save_draft(
     Ok(with_audit_note(Json(answer), words))
 }
 
-/// `DELETE /api/v1/rules/{file}/draft`
+/// `DELETE /api/v1/rules/{file}/draft`: discards what was edited.
 async fn discard_draft(State(shared): State<ServerState>, Path(name): Path<String>) -> Result<Response, ApiProblem> {
     check_name(&name)?;
     let words = format!("{name}: its draft is discarded");

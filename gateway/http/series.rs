@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/series", || get(serve_series))];
 
-/// `GET /api/v1/series`
+/// `GET /api/v1/series`: every series of the history, with its unit.
 async fn serve_series(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     QueryKeys::from_pairs(pairs, &[])?;
     read_history(shared, |reader, _| {

@@ -99,7 +99,7 @@ async fn read_changes(shared: &ServerState) -> Vec<Value> {
     }
 }
 
-/// `GET /api/v1/settings`
+/// `GET /api/v1/settings`: the settings that the scripts declare, with their values.
 async fn serve_settings(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     let changes = read_changes(&shared).await;
     run_blocking(move || {

@@ -88,7 +88,7 @@ async fn begin_session(shared: &ServerState, peer: &Peer, login: &Login) -> Resu
     Ok((begun, set))
 }
 
-/// `POST /api/v1/logout`
+/// `POST /api/v1/logout`: ends the session of the cookie and removes the cookie.
 async fn sign_out_person(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
@@ -104,7 +104,7 @@ async fn sign_out_person(
     }
 }
 
-/// `GET /api/v1/session`
+/// `GET /api/v1/session`: who is signed in and what that person may do.
 async fn serve_session(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
@@ -145,7 +145,7 @@ fn session_to_json(shared: &ServerState, person: Option<(Person, Option<Instant>
     })
 }
 
-/// `GET /api/v1/persons`
+/// `GET /api/v1/persons`: names and roles of all persons.
 async fn serve_persons(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     QueryKeys::from_pairs(pairs, &[])?;
     let persons = shared.access.persons();
@@ -182,7 +182,7 @@ struct NewRole {
     role: Role,
 }
 
-/// `PUT /api/v1/persons/{name}`
+/// `PUT /api/v1/persons/{name}`: gives a person another role.
 async fn give_role(
     State(shared): State<ServerState>,
     SignedIn(by): SignedIn,
@@ -214,7 +214,7 @@ async fn give_token(
     Ok(with_audit_note(Json(body), format!("{name} has a new token")))
 }
 
-/// `DELETE /api/v1/persons/{name}`
+/// `DELETE /api/v1/persons/{name}`: removes a person; the last administrator stays.
 async fn remove(State(shared): State<ServerState>, Path(name): Path<String>) -> Result<Response, ApiProblem> {
     shared.access.change_persons(|persons| persons.remove(&name)).await.map_err(describe_persons_error)?;
     Ok(with_audit_note(

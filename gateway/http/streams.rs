@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Streams at once.
+/// Streams of all addresses at once.
 pub(super) const STREAMS_MAX: usize = 32;
 /// Streams of one address at once: some tabs of some persons behind it.
 pub(super) const STREAMS_OF_ONE_MAX: usize = 8;

@@ -17,7 +17,7 @@ const DIAGNOSES_DEFAULT: u32 = 5;
 
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/twin", || get(serve_twin))];
 
-/// `GET /api/v1/twin`
+/// `GET /api/v1/twin`: the simulation beside the machine, and its newest diagnoses.
 pub(super) async fn serve_twin(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     let keys = QueryKeys::from_pairs(pairs, &["limit"])?;
     let limit = keys.parse_number("limit", 1, 100)?.unwrap_or(DIAGNOSES_DEFAULT);

@@ -231,7 +231,7 @@ impl ClickedMap {
     }
 }
 
-/// `PUT /api/v1/files/{key}/map`
+/// `PUT /api/v1/files/{key}/map`: keeps how the columns of a file are to be read.
 async fn map(
     State(shared): State<ServerState>,
     Path(key): Path<String>,
@@ -265,7 +265,7 @@ struct FileDiagnosisRequest {
     axis: Option<String>,
     #[serde(default)]
     output: Option<String>,
-    /// or this model,
+    /// or a model as text (model/1),
     #[serde(default)]
     toml: Option<String>,
     /// or the one that runs beside the machine.
@@ -284,7 +284,7 @@ struct SeriesChoice {
     column: String,
 }
 
-/// `POST /api/v1/files/{key}/diagnosis`
+/// `POST /api/v1/files/{key}/diagnosis`: begins a diagnosis of a file.
 async fn begin_file_diagnosis(
     State(shared): State<ServerState>,
     Path(key): Path<String>,
@@ -354,7 +354,7 @@ async fn serve_file_diagnosis(State(shared): State<ServerState>) -> Json<Value> 
     Json(run_document(run))
 }
 
-/// `DELETE /api/v1/files-diagnosis`
+/// `DELETE /api/v1/files-diagnosis`: ends the diagnosis that is under way.
 async fn cancel_file_diagnosis(
     State(shared): State<ServerState>,
     SignedIn(person): SignedIn,
@@ -386,7 +386,7 @@ async fn diagnose_example(
     ))
 }
 
-/// `GET /api/v1/gallery/{name}/truth`
+/// `GET /api/v1/gallery/{name}/truth`: what is hidden in an example.
 async fn serve_truth(Path(name): Path<String>) -> Result<Json<Value>, ApiProblem> {
     let it = gallery::find_example(&name).ok_or_else(|| ApiProblem::not_found(&format!("an example {name:?}")))?;
     Ok(Json(json!({ "schema": "truth/1", "name": it.name, "en": it.truth_en, "zh": it.truth_zh })))

@@ -89,7 +89,7 @@ fn parse_group_by(keys: &QueryKeys, usual: &[i64]) -> Result<GroupBy, ApiProblem
 
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/utilisation", || get(serve_utilisation))];
 
-/// `GET /api/v1/utilisation`
+/// `GET /api/v1/utilisation`: time in each machine state, by hour, shift, day or week.
 async fn serve_utilisation(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     let keys = QueryKeys::from_pairs(pairs, &["from", "to", "by", "shifts", "offset_min"])?;
     let usual = shared.configured.config.http.shifts.clone();

@@ -153,7 +153,7 @@ pub fn build_vocabulary() -> Value {
 
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/channels", || get(serve_channels))];
 
-/// `GET /api/v1/channels`
+/// `GET /api/v1/channels`: every channel that a script or a request can name.
 pub(super) async fn serve_channels() -> Json<Value> {
     Json(build_vocabulary())
 }

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/wear", || get(serve_wear_models))];
 
-/// `GET /api/v1/wear`
+/// `GET /api/v1/wear`: the wear models of the library, newest first.
 async fn serve_wear_models(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     QueryKeys::from_pairs(pairs, &[])?;
     read_history(shared, |reader, _| {
@@ -23,7 +23,6 @@ async fn serve_wear_models(State(shared): State<ServerState>, Pairs(pairs): Hist
     .await
 }
 
-/// Newest first.
 fn wear_model_to_json(stored: &StoredWearModel) -> Value {
     let record = &stored.record;
     let (formula, residual_sd_w) = match &record.model {

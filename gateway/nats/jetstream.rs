@@ -28,11 +28,11 @@ const ENVELOPE: usize = 65_536;
 /// A message to be stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outgoing {
-    /// Its subject.
+    /// The subject that it is published under.
     pub subject: String,
     /// What makes a second copy recognisable within the stream's window.
     pub id: String,
-    /// Its content.
+    /// The bytes as they are stored.
     pub payload: Vec<u8>,
 }
 
@@ -48,7 +48,7 @@ pub enum JetStreamFailure {
 /// How a stream is created.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StreamSettings {
-    /// Its name.
+    /// The name that the cluster knows the stream by.
     pub name: String,
     /// What it takes, such as `cnc.>`.
     pub subjects: String,
@@ -65,7 +65,7 @@ pub struct StreamSettings {
 /// How much is fetched at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FetchLimits {
-    /// Messages.
+    /// Greatest number of messages of one fetch.
     pub messages: usize,
     /// Bytes; a single message may be larger.
     pub bytes: usize,

@@ -17,7 +17,7 @@ pub struct NatsTarget {
     pub servers: Vec<Endpoint>,
     /// The files of TLS, where the line is secured.
     pub tls: Option<TlsFiles>,
-    /// User and password.
+    /// User and password file; both empty where the server wants none.
     pub login: Login,
     /// The file whose first line is a token, where the server wants one.
     pub token_file: Option<PathBuf>,

@@ -16,7 +16,6 @@ const COMPACT_AT: usize = 1 << 16;
 pub(super) struct ServerInfo {
     /// Greatest payload it takes, bytes.
     pub(super) max_payload: usize,
-    /// It wants TLS.
     pub(super) tls_required: bool,
     /// It can do TLS.
     pub(super) tls_available: bool,
@@ -27,7 +26,7 @@ pub(super) struct ServerInfo {
 /// A message as it came.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {
-    /// Its subject.
+    /// The subject that it was published under.
     pub subject: String,
     /// The number of the subscription it came through.
     pub(super) subscription: u64,
@@ -35,7 +34,7 @@ pub struct Message {
     pub reply: Option<String>,
     /// The status line of its header: 503 nobody listens, 404 and 408 nothing there, ...
     pub(super) status: Option<(u16, String)>,
-    /// Its content.
+    /// The bytes after the header.
     pub payload: Vec<u8>,
 }
 

@@ -30,9 +30,9 @@ impl RoundedRequest {
 /// A change worth showing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShownChange {
-    /// When.
+    /// Time of the tick, ns since 1970.
     pub at_ns: TimeNs,
-    /// In plain words.
+    /// The sentence that the page shows.
     pub text: String,
 }
 

@@ -54,7 +54,7 @@ pub fn event_of(at_ns: TimeNs, source: &str, notice: &Notice) -> Event {
     Event { at_ns, kind: notice.code.to_owned(), source: source.to_owned(), text: notice.operator.clone(), detail }
 }
 
-/// Remembers nothing.
+/// A store that drops everything, for the benchmark.
 #[derive(Debug, Default)]
 pub struct NoStore;
 
@@ -208,7 +208,7 @@ impl Pipeline {
         &mut self.wear
     }
 
-    /// The scripts.
+    /// The scripts in charge, with their channels and problems.
     #[must_use]
     pub fn scripts(&self) -> &Host {
         &self.scripts
@@ -219,7 +219,7 @@ impl Pipeline {
         &mut self.scripts
     }
 
-    /// The gate.
+    /// The gate that judges what the scripts ask for.
     #[must_use]
     pub fn gate(&self) -> &Gate {
         &self.gate
@@ -271,7 +271,7 @@ impl Pipeline {
         &self.tally
     }
 
-    /// Finished parts.
+    /// The cycle under way and the parts that were finished.
     #[must_use]
     pub fn parts(&self) -> &CycleFollower {
         &self.cycles

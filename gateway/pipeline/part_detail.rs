@@ -28,9 +28,9 @@ pub struct PartDetail {
 pub struct OperationUse {
     /// As the process plan names it; empty for what is named by none.
     pub operation: String,
-    /// Seconds in it.
+    /// Time in the operation, s.
     pub seconds: f64,
-    /// Seconds of cutting.
+    /// Time in cut within the operation, s.
     pub cutting_s: f64,
     /// Energy over the time in which the power was known, J: of the whole machine where it is measured, else of the spindle.
     pub energy_j: Option<f64>,
@@ -55,7 +55,7 @@ pub struct ToolUse {
     /// The edge, as the controller names it; empty where it names none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub edge: String,
-    /// Seconds of cutting.
+    /// Time in cut with the tool, s.
     pub cutting_s: f64,
     /// Mean cutting power over the time in which it was known, W.
     pub cutting_power_w: Option<f64>,

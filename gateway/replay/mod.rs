@@ -36,7 +36,7 @@ const PROGRESS_ROWS: u64 = 2048;
 /// What to replay, and where to.
 #[derive(Debug)]
 pub struct ReplayPlan {
-    /// Recordings, in order.
+    /// Paths of the recordings in the order in which they are run.
     pub files: Vec<PathBuf>,
     /// What the recordings do not say of the cut; fills in channels that they lack.
     pub operations: Option<Recipe>,

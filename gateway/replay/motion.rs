@@ -26,7 +26,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Takes one row.
+    /// Compares one row with the estimated state; counts nothing where the channels are absent.
     pub fn add(&mut self, sample: &Sample, estimates: &Estimates) {
         let found = || Some((ChannelId::from_name("motion")?, ChannelId::from_name("spindle_speed_rpm")?));
         let Some((motion, speed)) = self.channels.or_else(found) else { return };

@@ -33,7 +33,6 @@ pub(super) fn origin_of(path: &Path) -> std::io::Result<String> {
     Ok(format!("replay:{name}#{hash:016x}"))
 }
 
-/// See the [module](self).
 #[derive(Debug, Default)]
 pub(super) struct Before {
     /// Where the recording began, when some of it is there.

@@ -19,16 +19,15 @@ pub struct ReplayCounts {
     pub rows: u64,
     /// Rows that were stored now.
     pub stored: u64,
-    /// Alarms raised.
+    /// Number of alarms that were raised.
     pub alarms: u64,
     /// Changes of what the scripts ask for.
     pub decisions: u64,
-    /// Changes of state.
+    /// Number of changes of the machine state.
     pub state_changes: u64,
 }
 
 impl ReplayCounts {
-    /// Counts a record.
     pub(super) fn count_record(&mut self, record: &Record) {
         match record {
             Record::Alarm(_) => self.alarms += 1,
@@ -50,10 +49,10 @@ impl ReplayCounts {
 /// Words of the machine described in words.
 const WORDS_SHOWN: usize = 20;
 
-/// One recording.
+/// What became of the rows of one recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileSummary {
-    /// The file.
+    /// Path of the recording as it was given.
     pub file: PathBuf,
     /// Rows that could be used.
     pub rows: u64,
@@ -81,9 +80,9 @@ impl FileSummary {
 /// Where the rows went.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredRows {
-    /// The history.
+    /// Path of the database that was written.
     pub path: PathBuf,
-    /// Rows stored now.
+    /// Rows that this replay has stored.
     pub stored: u64,
     /// Rows that were there already.
     pub already: u64,
@@ -98,7 +97,7 @@ impl StoredRows {
 /// What a replay ends with: rows, seconds per state, parts, alarms, refused rows, visibility of the cut.
 #[derive(Debug)]
 pub struct ReplaySummary {
-    /// The recordings.
+    /// One row for each recording, in order.
     pub files: Vec<FileSummary>,
     /// Sums over all of them.
     pub counts: ReplayCounts,
@@ -106,7 +105,7 @@ pub struct ReplaySummary {
     pub stored_rows: Option<StoredRows>,
     /// Machine time in each state, s.
     pub seconds_per_state: Vec<(&'static str, f64)>,
-    /// Parts finished.
+    /// Number of finished parts.
     pub parts: u64,
     /// Could cutting be seen?
     pub visibility: VisibilityVerdict,
@@ -126,7 +125,7 @@ impl ReplaySummary {
         self.counts.rows as f64 / self.took.as_secs_f64().max(1e-9)
     }
 
-    /// The whole summary.
+    /// The document that `replay --json` prints.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let seconds: Map<String, Value> = self

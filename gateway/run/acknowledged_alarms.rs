@@ -4,7 +4,7 @@
 use adapters::clock::TimeNs;
 use gateway_status::{Acknowledged, AlarmStatus};
 
-/// See the [module](self).
+/// Which of the alarms that stand a person has seen.
 #[derive(Debug, Default)]
 pub struct AcknowledgedAlarms {
     standing: Vec<String>,

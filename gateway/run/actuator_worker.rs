@@ -36,7 +36,7 @@ const NOT_PASSED_ON: &str = "not handed over: the gate was disarmed before the c
 /// What the worker reports.
 #[derive(Debug)]
 pub enum ActuatorReport {
-    /// It wrote.
+    /// An override was written to the machine.
     Written(WriteRecord),
     /// A change was seen in force.
     Seen(Reaction),
@@ -85,13 +85,13 @@ impl Writers {
 
 type AnyWriter = OverrideWriter<Box<dyn Actuator>>;
 
-/// See the [module](self).
+/// What carries out the writes: nothing, the tick itself, or a thread.
 pub enum ActuatorWorker {
     /// Nothing can be written: the default.
     None,
     /// A machine in accelerated time: written at the tick, on the machine's clock.
     Inline(Box<Writers>, ManualClock),
-    /// A thread.
+    /// A real machine: written by a thread of its own.
     Thread(Remote),
 }
 

@@ -29,7 +29,7 @@ const CODE: &str = "gate_disarmed";
 /// Rows of the page that are accounted for at a time, and requests of the network.
 const ROWS_AT_ONCE_MAX: usize = 32;
 
-/// See the [module](self).
+/// The way from the gate's verdict to the machine, and back into history and audit.
 pub struct Commands {
     actuator_worker: ActuatorWorker,
     offset_commands: OffsetCommands,

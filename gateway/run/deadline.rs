@@ -18,7 +18,7 @@ pub struct RunLimit {
 }
 
 impl RunLimit {
-    /// With this limit.
+    /// Stops runs that last longer than `limit` of real time.
     #[must_use]
     pub fn new(limit: Duration) -> Self {
         let limit_ns = duration_to_unsigned_ns(limit);

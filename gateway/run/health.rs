@@ -36,7 +36,7 @@ pub(super) const SCRIPTS_MEMORY: &str = "scripts.json";
 /// What is known of the edges, beside the memory of the estimators.
 pub(super) const WEAR_MEMORY: &str = "wear.json";
 
-/// See the [module](self).
+/// What does not work while the box goes on; each failure is told once and shown while it lasts.
 pub struct Health {
     history_store: HistoryStore,
     clock: Option<Arc<BoxClock>>,
@@ -285,7 +285,7 @@ impl Health {
         self.history_store.close();
     }
 
-    /// The store.
+    /// How the history is, for the status document.
     #[must_use]
     pub fn history_status(&self) -> HistoryStatus {
         self.history_store.build_status()

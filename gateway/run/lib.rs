@@ -74,7 +74,7 @@ const PAGE_BEAT: Duration = Duration::from_secs(1);
 /// What the box shall do.
 #[derive(Debug)]
 pub struct RunPlan {
-    /// The configuration.
+    /// The checked configuration that the box runs with.
     pub config: Config,
     /// Its file; `None`: the built-in one.
     pub config_file: Option<PathBuf>,

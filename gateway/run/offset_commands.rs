@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 const SOURCE: &str = "gate";
 
-/// See the [module](self).
+/// Thermal offsets on their way to the control and into the history.
 #[derive(Debug, Default)]
 pub struct OffsetCommands {
     /// The control that is written to; none where nothing can be.

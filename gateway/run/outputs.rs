@@ -11,7 +11,7 @@ use std::path::PathBuf;
 pub struct ConfiguredSinks {
     /// What waits for them.
     pub outbox: Outbox,
-    /// How they are.
+    /// State and counts of each sink, for the status.
     pub board: Board,
     sinks: Vec<config::SinkConfig>,
     history: PathBuf,

@@ -32,7 +32,7 @@ pub fn audit_path(history: &Path) -> PathBuf {
     name.into()
 }
 
-/// See the [module](self).
+/// Keeps the newest rows of the audit in a file beside the history, against the end of the process.
 #[derive(Debug)]
 pub struct Recent {
     rows: Option<SyncSender<Audit>>,

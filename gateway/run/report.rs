@@ -15,7 +15,7 @@ use rules::estimators::{Estimated, Estimates, NoEstimate};
 /// Half the 95 % interval of a normal distribution, in standard deviations.
 const HALF_INTERVAL: f64 = 1.96;
 
-/// Milliseconds since 1970.
+/// Time of the box in milliseconds since 1970, rounded down.
 #[must_use]
 pub fn to_milliseconds(at_ns: TimeNs) -> i64 {
     at_ns.div_euclid(1_000_000)
@@ -26,7 +26,7 @@ fn to_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }
 
-/// Every provided channel.
+/// Every channel that a source provides, with value, unit and age.
 #[must_use]
 pub fn list_channels(sample: &Sample) -> Vec<ChannelStatus> {
     sample.provided_slots().map(|(id, slot)| build_channel_status(id.name(), id.channel().unit, slot)).collect()
@@ -45,7 +45,7 @@ fn build_channel_status(name: &'static str, unit: &'static str, slot: &Slot) -> 
 /// Figures without a standard deviation that are shown: of the load, and the witnesses of the wear.
 const FIGURES: [&str; 4] = ["tool_limit_parts", "tool_life_share", "feed_in_force_pct", "learned_power_w"];
 
-/// Everything inferred.
+/// Every quantity that the estimators infer, with its uncertainty.
 #[must_use]
 pub fn list_estimates(estimates: &Estimates) -> Vec<EstimateStatus> {
     let mut all: Vec<EstimateStatus> = estimates

@@ -31,7 +31,7 @@ impl SaveJob {
     }
 }
 
-/// See the [module](self).
+/// Writes to disk what the box has learned, on a thread beside the tick.
 #[derive(Debug)]
 pub struct Saver {
     jobs: Option<SyncSender<SaveJob>>,

@@ -38,7 +38,7 @@ const ORDERS_BETWEEN_MAX: u32 = 32;
 pub struct RunFlags {
     /// Finish this tick and end.
     pub stop: AtomicBool,
-    /// Read scripts again.
+    /// The scripts are to be read again.
     pub reload: AtomicBool,
 }
 
@@ -56,7 +56,7 @@ pub enum RunEnd {
 pub struct Identity {
     /// Name of the machine.
     pub machine: String,
-    /// Is it simulated?
+    /// Whether every source is simulated.
     pub simulated: bool,
     /// Machine time over real time; `None` as fast as possible.
     pub speed: Option<f64>,
@@ -66,13 +66,13 @@ pub struct Identity {
 
 /// Everything the tick thread owns.
 pub struct Ticker {
-    /// See [`Identity`].
+    /// Name of the machine, and at which pace its time runs.
     pub identity: Identity,
     /// Gives the times of the ticks.
     pub schedule: TickSchedule,
-    /// Gives the samples.
+    /// Gives the samples of the ticks.
     pub feed: SampleFeed,
-    /// Infers, decides, records.
+    /// Infers, decides and records with each sample.
     pub pipeline: Pipeline,
     /// Orders, audit, and the worker that writes.
     pub commands: Commands,

@@ -46,7 +46,6 @@ fn queue_items<T: Clone>(waiting: &mut TimedQueue<T>, most: usize, new: &[T]) ->
     left.to_vec()
 }
 
-/// See the [module](self).
 #[derive(Debug, Default)]
 pub(super) struct VerdictMailbox {
     pending: Mutex<PendingVerdict>,

@@ -20,9 +20,9 @@ const NAME_MAX: usize = 80;
 /// A script that is being written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Draft {
-    /// The text.
+    /// The whole text of the script.
     pub text: String,
-    /// Who saved it.
+    /// Name of the person who saved it last.
     pub by: String,
     /// When, milliseconds since 1970.
     pub at_ms: i64,
@@ -31,7 +31,7 @@ pub struct Draft {
 /// A text that was in charge.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Version {
-    /// The text.
+    /// The whole text of the script.
     pub text: String,
     /// Who put it in charge; empty where it was there before anybody used the page.
     pub by: String,

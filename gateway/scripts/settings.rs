@@ -79,7 +79,7 @@ pub struct NewSetting {
 pub enum Refused {
     /// Somebody else has changed it since the person began.
     Meanwhile {
-        /// `constant_load.target_w`
+        /// Section and setting with a dot between them, as in `constant_load.target_w`.
         path: String,
         /// What stands in the file now; empty where nothing is chosen.
         now: String,
@@ -156,15 +156,15 @@ pub fn find_author(text: &str) -> String {
 /// A setting that has another value than before.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettingChange {
-    /// `constant_load.target_w`
+    /// Section and setting with a dot between them, as in `constant_load.target_w`.
     pub path: String,
-    /// For what.
+    /// Machine, tool or operation that it holds for.
     pub place: DeclarationPlace,
-    /// Unit symbol.
+    /// Unit symbol of both values.
     pub unit: String,
-    /// What held before.
+    /// The value before; of the machine the default where none was set.
     pub before: String,
-    /// What holds now.
+    /// The value now; `as the machine` where a tool or operation has none.
     pub after: String,
 }
 

@@ -41,7 +41,7 @@ pub enum SinkTarget {
     Parquet(ParquetTarget),
     /// Lines for MTConnect agents.
     Shdr(ShdrTarget),
-    /// Sparkplug B.
+    /// Sparkplug B at an MQTT broker.
     Sparkplug(SparkplugTarget),
 }
 
@@ -59,7 +59,7 @@ impl SinkAddress {
         &self.text
     }
 
-    /// What it means.
+    /// The kind of sink, with everything that the address says.
     #[must_use]
     pub fn target(&self) -> &SinkTarget {
         &self.target

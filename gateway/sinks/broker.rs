@@ -16,17 +16,17 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// A broker as an address names it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BrokerTarget {
-    /// Host and port.
+    /// Host and port of the broker.
     pub at: Endpoint,
     /// The files of TLS, where the line is secured.
     pub tls: Option<TlsFiles>,
-    /// User and password.
+    /// User and password file; both empty where the broker wants none.
     pub login: Login,
     /// The version that is spoken.
     pub version: Version,
     /// Name of the client; `None`: one that is made of the names of box and sink.
     pub client_id: Option<String>,
-    /// Longest silence.
+    /// Keep-alive time of MQTT; 20 s by default.
     pub keep_alive: Duration,
 }
 

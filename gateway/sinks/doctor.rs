@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 /// A receiver that takes longer than this does not answer.
 const DEADLINE: Duration = Duration::from_secs(20);
 
-/// What was found.
+/// Whether a receiver takes what the box sends, and how long connecting took.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SinkFinding {
     /// From nothing to ready to send, ms.
     pub connected_ms: f64,
-    /// What is wrong.
+    /// Why it takes nothing; `None`: it is ready.
     pub error: Option<SinkError>,
 }
 
@@ -34,7 +34,7 @@ pub async fn examine_sink(address: &SinkAddress) -> SinkFinding {
 }
 
 impl SinkFinding {
-    /// As a document.
+    /// Address, reachability, time and problem as JSON.
     #[must_use]
     pub fn to_json(&self, address: &SinkAddress) -> serde_json::Value {
         let problem = |error: &SinkError| {
@@ -49,7 +49,7 @@ impl SinkFinding {
         })
     }
 
-    /// In lines.
+    /// The same in lines for a person.
     #[must_use]
     pub fn to_text(&self, address: &SinkAddress) -> String {
         match &self.error {

@@ -26,7 +26,7 @@ const FAREWELL: Duration = Duration::from_secs(2);
 /// fewer are sent in their order. At ten items a second this is the delay of a second.
 const JUMP_ITEMS: u64 = 10;
 
-/// The running sinks.
+/// The tasks of all sinks, and how they are told to end.
 #[derive(Debug)]
 pub struct Sinks {
     stop: watch::Sender<bool>,

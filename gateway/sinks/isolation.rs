@@ -22,13 +22,12 @@ const REACH_MAX: u64 = 63;
 pub(super) enum Turn {
     /// As many as fit.
     Many,
-    /// One.
+    /// The first item alone.
     Alone,
     /// The one after this number, alone: it tells whether the line stands.
     Past(u64),
 }
 
-/// See the [module](self).
 #[derive(Debug, Default)]
 pub(super) struct Isolation {
     /// The first of the items at which the connection broke last, and how often in a row.
@@ -96,7 +95,6 @@ impl Isolation {
         }
     }
 
-    /// Nothing is suspected.
     fn clear(&mut self) {
         *self = Self { alone_until: self.alone_until, ..Self::default() };
     }

@@ -113,7 +113,7 @@ pub enum SinkError {
     /// The receiver will never take this item. Everything before it in the batch is delivered; the item is left out and
     /// counted, and the connection goes on.
     Item {
-        /// Its number.
+        /// Number of the item in the outbox.
         sequence: u64,
         /// What happened and where, one sentence without the full stop.
         what: String,
@@ -123,7 +123,7 @@ pub enum SinkError {
 }
 
 impl SinkError {
-    /// A failed line.
+    /// No connection, or a broken one: it is tried again.
     pub fn failed_line(what: impl Into<String>, next: impl Into<String>) -> Self {
         Self::Line { what: what.into(), next: next.into() }
     }

@@ -14,7 +14,7 @@ use gateway_nats::{Connection, JetStreamFailure, NatsError, NatsTarget, Outgoing
 /// Where to, and under which subjects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NatsSinkTarget {
-    /// The cluster.
+    /// Servers, TLS files and login of the cluster.
     pub target: NatsTarget,
     /// What every subject begins with.
     pub prefix: String,
@@ -32,7 +32,6 @@ impl NatsSinkTarget {
     }
 }
 
-/// See the [module](self).
 pub(super) struct NatsSink {
     target: NatsSinkTarget,
     name: String,

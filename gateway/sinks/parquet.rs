@@ -11,7 +11,7 @@ use adapter_core::clock::TimeNs;
 use gateway_history::{DAY_NS, HistoryError, Outbox, Reader, day_of};
 use std::path::{Path, PathBuf};
 
-/// Where to.
+/// The directory of the files, and how far back missing ones are made up for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParquetTarget {
     /// The directory that holds `samples` and `diagnoses`.
@@ -48,7 +48,6 @@ fn describe_unwritable(root: &Path, error: &std::io::Error) -> (String, String) 
     (format!("the directory {} cannot be written to: {error}", root.display()), next.to_owned())
 }
 
-/// See the [module](self).
 pub(super) struct ParquetSink {
     target: ParquetTarget,
     outbox: Outbox,

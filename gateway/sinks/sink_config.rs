@@ -2,7 +2,7 @@
 
 use crate::SinkAddress;
 
-/// One `[[sink]]`.
+/// One section `[[sink]]`: a receiver of what leaves the box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SinkConfig {
     /// Where it is and how to talk to it.

@@ -3,12 +3,12 @@
 use adapter_core::histogram::Histogram;
 use serde::Serialize;
 
-/// One sink.
+/// How one sink is doing now.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SinkStatus {
     /// Its name in the configuration.
     pub name: String,
-    /// Its address.
+    /// Its address as it was written; it holds no password.
     pub address: String,
     /// `waiting` (for the history, or for the next try), `connecting`, `connected`, `stopped`.
     pub state: &'static str,

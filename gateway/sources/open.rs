@@ -39,7 +39,7 @@ impl MachineSpeed {
 
 /// What the sources give.
 pub struct Sources {
-    /// The samples.
+    /// Gives the samples of the ticks.
     pub feed: SampleFeed,
     /// When they are taken.
     pub schedule: TickSchedule,

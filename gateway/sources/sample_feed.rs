@@ -9,20 +9,20 @@ use gateway_status::alignment::Alignment;
 use gateway_status::{FactStatus, NumberOrWord, SourceStatus, StatusProblem};
 use std::time::Duration;
 
-/// See the [module](self).
+/// Where samples come from: sources on threads of their own, or sources in step with machine time.
 pub enum SampleFeed {
     /// One thread per source.
     Threads {
         /// The sources, in the order of precedence.
         workers: Vec<Worker>,
-        /// Their readings.
+        /// Makes one sample of their readings.
         merge: Merge,
         /// Lag of each meter.
         alignment: Alignment,
     },
     /// Sources that bring their own time.
     Stepped {
-        /// Sources and merge.
+        /// Advances the sources and merges their readings.
         lockstep: Lockstep,
         /// Name and period of each source.
         sources: Vec<(String, Duration)>,
@@ -34,7 +34,7 @@ pub enum SampleFeed {
 /// At which pace a source is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourcePace {
-    /// The address.
+    /// Address of the source, as in the configuration.
     pub name: String,
     /// The pace that was wanted.
     pub wanted: Duration,

@@ -23,9 +23,9 @@ pub enum NumberOrWord {
 /// One measured channel: a value with unit and age, or the reason for none.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelStatus {
-    /// Name, as everywhere.
+    /// Name of the channel, ending in its unit.
     pub name: &'static str,
-    /// The value.
+    /// The value; absent where `missing` says why.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<NumberOrWord>,
     /// Unit of the value; `1` for pure numbers, empty for text.
@@ -43,13 +43,13 @@ pub struct ChannelStatus {
 pub struct EstimateStatus {
     /// Name, ending in the unit.
     pub name: &'static str,
-    /// The value.
+    /// The value; absent where `missing` says why.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
     /// Half the width of the 95 % interval (1.96 standard deviations), in the same unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<f64>,
-    /// Unit of both.
+    /// Unit of value and uncertainty.
     pub unit: &'static str,
     /// The reason for none, as a word.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -62,7 +62,7 @@ pub struct EstimateStatus {
 /// What the machine is doing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StateStatus {
-    /// The word.
+    /// The word of the state.
     pub word: &'static str,
     /// Since when, milliseconds since 1970.
     pub since_ms: i64,
@@ -88,7 +88,7 @@ pub struct StateStatus {
 pub struct AlarmStatus {
     /// Its name in the script that raised it.
     pub code: String,
-    /// `warning` or `critical`.
+    /// `info`, `warning` or `critical`, as in the history.
     pub severity: String,
     /// What the operator reads.
     pub text: String,
@@ -114,7 +114,7 @@ pub struct Acknowledged {
 pub struct DecisionStatus {
     /// When, milliseconds since 1970.
     pub at_ms: i64,
-    /// In plain words.
+    /// One sentence for the operator, in English.
     pub text: String,
 }
 
@@ -155,7 +155,7 @@ pub struct OffsetStatus {
     pub axes: Vec<AxisShift>,
 }
 
-/// One axis.
+/// One axis that may be shifted, and how far it is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AxisShift {
     /// `x`, `y` or `z`.
@@ -171,14 +171,14 @@ pub struct AxisShift {
 pub struct FactStatus {
     /// What it is; a number's name ends in its unit.
     pub name: String,
-    /// What is known.
+    /// The value of the fact.
     pub value: NumberOrWord,
 }
 
 /// A source and how it keeps its pace.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SourceStatus {
-    /// Its address.
+    /// Address or name in the configuration.
     pub name: String,
     /// What it is doing: `reading`, `off` (the machine is switched off), `failing`, `stuck`, `ended`, ...
     pub state: &'static str,
@@ -190,11 +190,11 @@ pub struct SourceStatus {
     pub period_kept_s: Option<f64>,
     /// How late polls begin against their beat, ms, once known: median and 99th percentile.
     pub jitter_p50_ms: Option<f64>,
-    /// See `jitter_p50_ms`.
+    /// The 99th percentile of the same, ms.
     pub jitter_p99_ms: Option<f64>,
     /// From asking to answer, ms, once known: median and 99th percentile.
     pub round_trip_p50_ms: Option<f64>,
-    /// See `round_trip_p50_ms`.
+    /// The 99th percentile of the same, ms.
     pub round_trip_p99_ms: Option<f64>,
     /// From asking to answer, of all polls; for the metrics.
     #[serde(skip)]
@@ -221,7 +221,7 @@ pub struct SourceStatus {
 /// A script and whether its newest text is in charge.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScriptStatus {
-    /// File name.
+    /// Name of the file in the directory of scripts.
     pub file: String,
     /// Version in charge (start of the text's digest).
     pub version: String,
@@ -231,10 +231,10 @@ pub struct ScriptStatus {
     pub error: Option<String>,
 }
 
-/// The operations recipe.
+/// The operations recipe and whether its newest text is in force.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OperationsStatus {
-    /// The file.
+    /// Path of the recipe file.
     pub path: String,
     /// Version in force; `null` when there is none.
     pub version: Option<String>,
@@ -255,7 +255,7 @@ pub struct OperationsStatus {
 /// model for the cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WearStatus {
-    /// `surface` or `physical`.
+    /// Which law the model is: `surface` or `physical`.
     pub form: &'static str,
     /// What of its key spoke for the model: `edge`, `tool`, `operation`, `work material`, `machine`, `any`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -276,7 +276,7 @@ pub struct WearStatus {
     /// Parts until it does: the middle, and the ends of an 80 % interval.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parts_left: Option<[f64; 3]>,
-    /// `observable` or `not_observable_here`.
+    /// Whether the wear can be seen in the power: `observable` or `not_observable_here`.
     pub observability: Option<&'static str>,
     /// Factors in which the cut lies outside what the model was fitted on.
     pub extrapolated: Vec<&'static str>,
@@ -284,14 +284,14 @@ pub struct WearStatus {
     pub why: Option<String>,
 }
 
-/// The store.
+/// How the history is doing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HistoryStatus {
-    /// The file.
+    /// Path of the database file.
     pub path: String,
     /// Samples acknowledged since the start of the file.
     pub rows: u64,
-    /// Bytes on disk.
+    /// Bytes in use in the database.
     pub bytes: u64,
     /// Days until the disk (or the limit) is full at this rate.
     pub lasts_days: Option<f64>,
@@ -305,7 +305,7 @@ pub struct HistoryStatus {
     pub set_aside: Vec<String>,
 }
 
-/// The tick.
+/// Rate and punctuality of the tick.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TickStatus {
     /// Ticks per second of machine time.
@@ -314,7 +314,7 @@ pub struct TickStatus {
     pub count: u64,
     /// Lateness against the plan, ms: median and 99th percentile of the last minute.
     pub late_p50_ms: f64,
-    /// See `late_p50_ms`.
+    /// The 99th percentile of the same, ms.
     pub late_p99_ms: f64,
     /// Lateness of all ticks; for the metrics.
     #[serde(skip)]
@@ -323,10 +323,10 @@ pub struct TickStatus {
     pub skipped: u64,
 }
 
-/// The whole document.
+/// The document `status/1` of one tick.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Status {
-    /// `status/1`.
+    /// Always `status/1`; another layout gets another number.
     pub schema: &'static str,
     /// Version of the program.
     pub version: &'static str,
@@ -342,15 +342,15 @@ pub struct Status {
     pub uptime_s: f64,
     /// What is thought of the clock; `null` where the machine brings its own time.
     pub clock: Option<ClockStatus>,
-    /// The tick.
+    /// Rate and punctuality of the tick.
     pub tick: TickStatus,
     /// What the machine is doing.
     pub state: StateStatus,
     /// Every channel that a source provides.
     pub channels: Vec<ChannelStatus>,
-    /// Everything inferred.
+    /// Every quantity that is inferred from the channels.
     pub estimates: Vec<EstimateStatus>,
-    /// Alarms that stand.
+    /// Alarms that have not been cleared.
     pub alarms: Vec<AlarmStatus>,
     /// Those of them that a person has seen.
     pub acknowledged: Vec<Acknowledged>,
@@ -361,11 +361,11 @@ pub struct Status {
     pub parts: u64,
     /// The way of an override to the machine.
     pub gate: GateStatus,
-    /// Sources.
+    /// The controllers and meters that are read.
     pub sources: Vec<SourceStatus>,
     /// How late each meter is against the controller.
     pub alignment: Vec<crate::alignment::AlignmentStatus>,
-    /// Scripts.
+    /// The scripts of the directory, each with its condition.
     pub scripts: Vec<ScriptStatus>,
     /// The operations recipe, where one is configured.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -373,7 +373,7 @@ pub struct Status {
     /// Wear of the tool, where the library has a model for the cut.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wear: Option<WearStatus>,
-    /// The store.
+    /// How the history is doing.
     pub history: HistoryStatus,
     /// What leaves the box, where a sink is configured.
     #[serde(skip_serializing_if = "Vec::is_empty")]

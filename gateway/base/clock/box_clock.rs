@@ -37,7 +37,7 @@ impl ClockMark {
     }
 }
 
-/// See the [module](super).
+/// The time of the box: the wall clock of one moment, carried on by the processor.
 #[derive(Debug)]
 pub struct BoxClock {
     /// Time of the box minus time since the computer was started, ns. Moved only while no run is going on.
@@ -116,7 +116,7 @@ impl BoxClock {
         ClockMark { trust: trust.as_word(), boot, anchor_ns: self.anchor_ns.load(Ordering::SeqCst) }
     }
 
-    /// For the status.
+    /// Whether the wall clock is believed, and by how many seconds it is ahead.
     #[must_use]
     pub fn build_status(&self) -> ClockStatus {
         let judge = self.lock_judge();

@@ -83,7 +83,7 @@ pub enum ClockNews {
         /// Wall clock minus box, ns.
         ahead_ns: i64,
     },
-    /// It agrees again.
+    /// It agrees with the box again after it had leapt.
     Returned,
     /// Another reading has stood long enough: the box is to begin again with it.
     Follow {

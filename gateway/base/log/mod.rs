@@ -82,7 +82,7 @@ impl Severity {
 /// Something worth telling, in two texts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Notice {
-    /// How serious.
+    /// Decides the level of the event in the engineer's log.
     pub severity: Severity,
     /// A stable word for filters: `source_lost`, `port_in_use`, ...
     pub code: &'static str,

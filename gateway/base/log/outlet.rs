@@ -27,7 +27,6 @@ struct LineCounts {
     dropped: AtomicU64,
 }
 
-/// See the [module](self).
 #[derive(Debug)]
 pub(super) struct Outlet {
     lines: Option<SyncSender<Vec<u8>>>,

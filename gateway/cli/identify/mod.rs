@@ -19,7 +19,6 @@ use rules::estimators::regression::Refusal;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Arguments of `identify`.
 #[derive(Debug, Args)]
 pub(super) struct IdentifyArguments {
     #[command(subcommand)]
@@ -88,9 +87,7 @@ impl ShownBy {
 
 /// What a subcommand learned.
 struct IdentifyOutput {
-    /// For the reader.
     text: String,
-    /// For programs.
     json: Value,
     /// The form that the gateway reads.
     file: Option<String>,
@@ -137,7 +134,6 @@ impl IdentifyFiles {
     }
 }
 
-/// Learns, prints, writes.
 pub(super) fn run_identification(arguments: &IdentifyArguments) -> CommandResult {
     match &arguments.what {
         IdentifyCommand::NoLoad(arguments) => no_load::run(arguments),

@@ -49,7 +49,6 @@ enum Rule {
     Replace,
 }
 
-/// Generations of controls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Generation {
     /// 30i, 31i, 32i, 35i and later (version word 4).

@@ -21,7 +21,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// seconds and then starts.
 const STARTED_S: f64 = 30.0;
 
-/// What is served.
 #[derive(Debug, Subcommand)]
 pub(super) enum Served {
     /// A FANUC control that answers FOCAS2/Ethernet, with a ladder that owns the feed override.
@@ -57,7 +56,6 @@ impl Common {
         self.listen.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], port)))
     }
 
-    /// Starts the machine.
     fn start_machine(&self) -> Result<RunningMachine, CannotRun> {
         let whole = self.machine.contains(':');
         let text = if whole { self.machine.clone() } else { format!("simulated://{}", self.machine) };

@@ -21,49 +21,49 @@ pub enum PulseError {
     /// The head lacks a column.
     #[error("line 1: there is no column {name}; the head is time_ns,a,b[,request][,bypass]")]
     NoColumn {
-        /// Its name.
+        /// Name of the column in the head.
         name: &'static str,
     },
     /// A level that is none.
     #[error("line {line}: {name} is {found:?}; a level is 0 or 1")]
     Level {
-        /// Where.
+        /// Number of the line in the input, from 1.
         line: usize,
         /// Which of the two encoder lines.
         name: &'static str,
-        /// What stands there.
+        /// The cell as it stands there.
         found: String,
     },
     /// A time that is none.
     #[error("line {line}: {found:?} is no time in whole ns")]
     Time {
-        /// Where.
+        /// Number of the line in the input, from 1.
         line: usize,
-        /// What stands there.
+        /// The cell as it stands there.
         found: String,
     },
     /// A request that is none.
     #[error("line {line}: {found:?} is no whole number of pulses")]
     Request {
-        /// Where.
+        /// Number of the line in the input, from 1.
         line: usize,
-        /// What stands there.
+        /// The cell as it stands there.
         found: String,
     },
     /// A switch that is none.
     #[error("line {line}: bypass is {found:?}; write 0 or 1")]
     Bypass {
-        /// Where.
+        /// Number of the line in the input, from 1.
         line: usize,
-        /// What stands there.
+        /// The cell as it stands there.
         found: String,
     },
     /// The device or the decoder does not take a row.
     #[error("line {line}: {fault}")]
     Row {
-        /// Where.
+        /// Number of the line in the input, from 1.
         line: usize,
-        /// Why.
+        /// What the device or the decoder says.
         fault: RowFault,
     },
     /// The device does not let out what waits.
@@ -94,30 +94,30 @@ pub enum RowFault {
 /// One row that goes in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PulseRow {
-    /// When, ns.
+    /// When the levels begin to hold, ns.
     pub at_ns: u64,
     /// The levels from then on.
     pub lines: Lines,
     /// Pulses asked for from then on.
     pub request: i64,
-    /// Switches the bypass.
+    /// Switches the bypass of the device on or off; `None` leaves it as it is.
     pub bypass: Option<bool>,
 }
 
 /// What the decoder found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Proof {
-    /// Rows in.
+    /// Number of rows that came in.
     pub rows: u64,
-    /// Edges out.
+    /// Number of edges that went out.
     pub edges_out: u64,
     /// Edges of position on the way in.
     pub in_edges: i64,
-    /// ... and out.
+    /// Edges of position on the way out.
     pub out_edges: i64,
     /// Pulses asked for, in sum.
     pub asked: i64,
-    /// Pulses inserted.
+    /// Pulses that the device has inserted, up less down.
     pub inserted: i64,
     /// Transitions of both lines at once on the way out; must be 0.
     pub illegal: u64,
@@ -141,7 +141,7 @@ impl Proof {
         self.asked - self.inserted
     }
 
-    /// In words.
+    /// The figures and whether the proof holds, in lines; edges have to be `spacing_ns` apart.
     #[must_use]
     pub fn to_text(&self, spacing_ns: u64) -> String {
         let least = self.least_ns.map_or_else(|| "-".to_owned(), |least| least.to_string());

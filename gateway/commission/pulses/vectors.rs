@@ -9,13 +9,13 @@ use std::fmt::Write as _;
 pub struct Vector {
     /// Its name, also of its files.
     pub name: &'static str,
-    /// What it shows.
+    /// What the vector shows, in words.
     pub shows: &'static str,
     /// Least time between two edges, ns.
     pub spacing_ns: u64,
-    /// Input.
+    /// CSV that goes into the device.
     pub input: String,
-    /// Output.
+    /// CSV that must come out.
     pub expected: String,
     /// Proof of the output.
     pub proof: Proof,

@@ -32,7 +32,7 @@ enum ColumnSource<'a> {
 enum Cut {
     /// One bin per value.
     Levels(Vec<f64>),
-    /// Bins between edges.
+    /// One bin between each two neighbouring edges.
     Edges(Vec<f64>),
     /// One bin per word.
     Words(Vec<String>),
@@ -46,7 +46,6 @@ pub(super) struct Binned<'a> {
 }
 
 impl Binned<'_> {
-    /// How many bins.
     pub(super) fn len(&self) -> usize {
         match &self.cut {
             Cut::Levels(levels) => levels.len(),

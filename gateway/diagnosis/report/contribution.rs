@@ -9,7 +9,7 @@ use super::text::escape_html;
 /// Runs above which their beginnings are no longer marked, and no longer named.
 const MARKED_MAX: usize = 60;
 const NAMED_MAX: usize = 14;
-/// Effects drawn.
+/// Only the first effects have a chart, so many of them.
 const EFFECTS_MAX: usize = 6;
 
 /// The section; empty where nothing was added.

@@ -7,12 +7,11 @@ use rules::twin::diagnosis::Diagnosis;
 use rules::twin::hold_out::{Unit, split_into_units};
 use std::ops::Range;
 
-/// Which simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fit {
     /// Refitted without the missing physics.
     Before,
-    /// With it.
+    /// Refitted with the missing physics.
     After,
 }
 
@@ -52,17 +51,15 @@ impl<'a> Data<'a> {
         self.input.recording.count_rows()
     }
 
-    /// Seconds as recorded.
+    /// Time of the row as recorded, s; 0 beyond the last row.
     pub(super) fn time_s(&self, row: usize) -> f64 {
         self.input.recording.time_s.get(row).copied().unwrap_or(0.0)
     }
 
-    /// The recorded output.
     pub(super) fn recorded_value(&self, row: usize) -> Option<f64> {
         self.recorded?.get(row)
     }
 
-    /// The simulated output.
     pub(super) fn simulated_value(&self, row: usize, fit: Fit) -> Option<f64> {
         let rows = &self.diagnosis.rows;
         let values = if fit == Fit::Before { &rows.simulated_before } else { &rows.simulated_after };

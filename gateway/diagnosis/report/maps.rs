@@ -19,7 +19,6 @@ const DESCRIBING_WEIGHT: f64 = 1.5;
 /// Steps of colour on each side of zero.
 const STEPS: f64 = 4.0;
 
-/// The section.
 pub(super) fn render_section(data: &Data<'_>) -> String {
     if data.diagnosis.fit.is_none() {
         return String::new();

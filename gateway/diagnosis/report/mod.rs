@@ -39,7 +39,7 @@ const READ_OUT: &str = include_str!("read_out.js");
 /// What the page is made from.
 #[derive(Debug, Clone, Copy)]
 pub struct PageInput<'a> {
-    /// The diagnosis.
+    /// What the page tells of; its rows are those of `recording`.
     pub diagnosis: &'a Diagnosis,
     /// The recording it was made from, with the same rows in the same order.
     pub recording: &'a Recording,

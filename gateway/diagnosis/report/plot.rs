@@ -23,11 +23,8 @@ pub(super) struct Curve {
     pub(super) pieces: Pieces,
 }
 
-/// A chart.
 pub(super) struct Plot {
-    /// Horizontal axis.
     pub(super) x: Axis,
-    /// Vertical axis.
     pub(super) y: Axis,
     /// Words under and over the chart, escaped.
     pub(super) x_title: String,
@@ -84,7 +81,6 @@ fn find_extremes(rows: Range<usize>, y: &impl Fn(usize) -> Option<f64>) -> Vec<(
 }
 
 impl Plot {
-    /// The chart.
     pub(super) fn render_html(&self) -> String {
         let mut html = format!(
             "<div class=\"plot{}\" data-x=\"{} {}\" data-y=\"{} {}\" data-ux=\"{}\" data-uy=\"{}\">",

@@ -11,7 +11,7 @@ const LANES_MAX: usize = 40;
 const TILES_MAX: usize = 400;
 /// Columns over all lanes at most.
 const COLUMNS_MAX: usize = 6000;
-/// Regions drawn.
+/// Only the first regions are drawn, so many of them.
 pub(super) const REGIONS_MAX: usize = 4;
 /// Steps of colour strength.
 const STEPS: usize = 4;
@@ -31,7 +31,6 @@ pub(super) fn render_strip(data: &Data<'_>) -> String {
     format!("<div class=\"strip\">{body}</div>{}", render_legend(data))
 }
 
-/// Columns per lane.
 fn count_lane_columns(data: &Data<'_>) -> usize {
     if data.runs.len() > LANES_MAX { 1 } else { (COLUMNS_MAX / data.runs.len()).clamp(20, 600) }
 }

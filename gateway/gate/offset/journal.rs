@@ -66,7 +66,7 @@ impl OffsetJournal {
         Self::open(data_dir, target).map(|book| (book, aside))
     }
 
-    /// Where it is.
+    /// Path of the book in the data directory.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path

@@ -62,9 +62,9 @@ pub enum OffsetBound {
 /// The decision about one axis at one tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OffsetVerdict {
-    /// The tick.
+    /// Time of the tick, ns since 1970.
     pub at_ns: TimeNs,
-    /// Which axis.
+    /// The axis that the decision is about.
     pub axis: Axis,
     /// What is proposed, as it was; may be no number.
     pub wanted_um: Option<f64>,

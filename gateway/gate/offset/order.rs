@@ -11,11 +11,11 @@ use thiserror::Error;
 pub enum OffsetOrder {
     /// This shift from what the operator has set.
     Shift {
-        /// Which axis.
+        /// The axis that is to be shifted.
         axis: Axis,
         /// The shift that the gate counts on, um. Where there is another, nothing is written.
         from_um: f64,
-        /// How far, um.
+        /// The shift that is to hold, um from what the operator has set.
         wanted_um: f64,
     },
     /// What the operator has set, in one step.
@@ -25,7 +25,7 @@ pub enum OffsetOrder {
 }
 
 impl OffsetOrder {
-    /// Which axis.
+    /// The axis that the order is about.
     #[must_use]
     pub fn axis(self) -> Axis {
         match self {
@@ -37,7 +37,7 @@ impl OffsetOrder {
 /// What a shift came to, um.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shifted {
-    /// The offset before.
+    /// The offset in the control before the order.
     pub before_um: f64,
     /// What the operator had set: the offset without the shift.
     pub base_um: f64,
@@ -62,7 +62,7 @@ impl Shifted {
         is_same_offset(self.asked_um, self.after_um)
     }
 
-    /// Was anything written?
+    /// Whether another offset than the one before was written.
     #[must_use]
     pub fn is_written(&self) -> bool {
         !is_same_offset(self.asked_um, self.before_um)
@@ -84,7 +84,7 @@ pub struct NotOnDisk {
 pub struct Moved {
     /// When it was carried out.
     pub at_ns: TimeNs,
-    /// What was ordered.
+    /// The order that was carried out.
     pub order: OffsetOrder,
     /// What is in force now; nothing where there was nothing to give back.
     pub result: Result<Option<Shifted>, SourceError>,

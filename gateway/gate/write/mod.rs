@@ -27,7 +27,7 @@ use withdraw::Owed;
 pub enum Occasion {
     /// Another override than before.
     Change,
-    /// The same again.
+    /// The same override again, so that the ladder keeps it.
     SignOfLife,
     /// The machine is given back to its dial.
     Release,
@@ -55,22 +55,22 @@ pub struct WriteRecord {
     pub at_ns: TimeNs,
     /// The sample that led to it.
     pub sample_ns: TimeNs,
-    /// Why.
+    /// What made the writer write.
     pub occasion: Occasion,
     /// The override in force before, as read, where it could be read.
     pub before: Option<OverridePct>,
-    /// What was written.
+    /// The override that was written.
     pub asked: OverridePct,
     /// What was read back right after, where it could be read; a ladder needs a few scans.
     pub after: Option<OverridePct>,
-    /// What went wrong.
+    /// What went wrong; `None`: nothing did.
     pub fault: Option<Fault>,
 }
 
 /// A step of the override that the machine has been seen to take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reaction {
-    /// What was written.
+    /// The override that was written.
     pub asked: OverridePct,
     /// What is in force.
     pub found: OverridePct,

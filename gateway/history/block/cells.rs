@@ -18,14 +18,14 @@ pub(crate) enum Encoding {
     Scaled(u8),
     /// Byte planes of doubles.
     Planes,
-    /// Words and runs.
+    /// The distinct words, and runs of their numbers.
     Words,
 }
 
 /// Count, least, greatest and mean of the values that are there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ValueSummary {
-    /// How many values.
+    /// How many values there are.
     pub count: u64,
     /// The least, in the unit of the series; 0 when there is none.
     pub min: f64,
@@ -178,7 +178,7 @@ pub struct NumberCells {
 /// Decoded text: `words[codes[row]]` counts only where `missing[row]` is 0.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WordCells {
-    /// The distinct words.
+    /// The distinct words of the column; `codes` are indices of it.
     pub words: Vec<Arc<str>>,
     /// Which word; 0 where missing.
     pub codes: Vec<u32>,
@@ -189,9 +189,9 @@ pub struct WordCells {
 /// The decoded cells of one series.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cells {
-    /// A quantity.
+    /// The values of a quantity in its unit.
     Numbers(NumberCells),
-    /// Text.
+    /// The words of a text series.
     Words(WordCells),
 }
 

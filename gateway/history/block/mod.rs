@@ -40,7 +40,7 @@ pub(crate) const LEVEL_COMPACT: i32 = 9;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Block {
     pub(crate) key: BlockKey,
-    /// With its checksums.
+    /// The encoded directory, with its checksums.
     pub(crate) directory: Vec<u8>,
     pub(crate) columns: Vec<u8>,
     /// Series number and summary of every quantity that has a value.

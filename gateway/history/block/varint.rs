@@ -1,7 +1,7 @@
 //! Variable-length integers: seven bits per byte, least significant first, as in Protocol Buffers; signed numbers are
 //! zigzagged first so that small magnitudes stay small.
 
-/// Appends `value`.
+/// Appends `value` in groups of 7 bits, the lowest first; bit 7 marks that another byte follows.
 #[inline]
 pub(crate) fn append_varint(out: &mut Vec<u8>, mut value: u64) {
     while value >= 0x80 {

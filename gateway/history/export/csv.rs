@@ -11,7 +11,6 @@ use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// Writes gzipped CSV.
 pub(super) fn write_gzip(
     reader: &Reader,
     query: &Query,
@@ -25,7 +24,6 @@ pub(super) fn write_gzip(
     Ok(rows)
 }
 
-/// Writes CSV.
 pub(super) fn write(
     reader: &Reader,
     query: &Query,

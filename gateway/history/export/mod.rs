@@ -28,9 +28,9 @@ const RUN: &str = "run";
 /// A file format of recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Comma-separated text.
+    /// Comma-separated text with a header, `.csv`.
     Csv,
-    /// The same, gzipped.
+    /// The same text, gzipped, `.csv.gz`.
     CsvGz,
     /// Columns, compressed; for data frames and data lakes.
     Parquet,
@@ -60,7 +60,6 @@ struct ColumnPlan {
     /// The series, and whether a column of reasons goes with it.
     series: Vec<(Series, bool)>,
     first_ns: TimeNs,
-    /// Time never decreases.
     monotone: bool,
 }
 

@@ -28,7 +28,6 @@ enum ColumnValues {
     Texts(Vec<ByteArray>, Vec<i16>),
 }
 
-/// Writes Parquet.
 pub(super) fn write(
     reader: &Reader,
     query: &Query,

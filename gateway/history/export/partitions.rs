@@ -21,9 +21,9 @@ use std::path::{Path, PathBuf};
 /// What a day brought.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DayWritten {
-    /// Rows of samples.
+    /// Rows in the file of samples.
     pub samples: u64,
-    /// Diagnoses.
+    /// Rows in the file of diagnoses.
     pub diagnoses: u64,
 }
 

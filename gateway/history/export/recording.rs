@@ -9,7 +9,6 @@ use recording::Recording;
 use recording::{Cells, Numbers, Words};
 use std::ops::ControlFlow;
 
-/// Columns under construction.
 struct ColumnBuilder<'a> {
     plan: &'a ColumnPlan,
     time_s: Vec<f64>,

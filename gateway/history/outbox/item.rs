@@ -30,7 +30,7 @@ pub struct SeriesInfo {
     pub name: Arc<str>,
     /// Unit symbol; `1` for pure numbers, empty for text.
     pub unit: Arc<str>,
-    /// Number or text.
+    /// Whether the values are numbers or words.
     pub kind: SeriesKind,
     /// Least and greatest value of this machine, in the unit; `None` where nobody has said.
     pub range: Option<(f64, f64)>,
@@ -72,7 +72,7 @@ fn natural_range(channel: &Channel) -> Option<(f64, f64)> {
 pub struct Reading {
     /// What was read or inferred.
     pub series: Arc<SeriesInfo>,
-    /// What it is.
+    /// The value, or the reason for none.
     pub value: Cell,
 }
 
@@ -94,9 +94,9 @@ pub struct SeriesMean {
     pub seconds: f64,
     /// Mean over that time, in the unit of the series.
     pub mean: f64,
-    /// Least value.
+    /// Least value over that time, in the unit of the series.
     pub least: f64,
-    /// Greatest value.
+    /// Greatest value over that time, in the unit of the series.
     pub greatest: f64,
 }
 
@@ -113,7 +113,7 @@ pub enum Content {
     /// The summaries of a minute, hour or day that begins at the time of the item, as the history holds them by now. A later item
     /// of the same time replaces it.
     Means {
-        /// Its length, s.
+        /// Length of the stretch, s: 60, 3600 or 86400.
         width_s: u32,
         /// Every series that had a value.
         means: Vec<SeriesMean>,
@@ -127,7 +127,7 @@ pub struct Item {
     pub sequence: u64,
     /// When it was true, nanoseconds since 1970-01-01 UTC.
     pub at_ns: TimeNs,
-    /// What it tells.
+    /// The values, record, gap or summaries that the item carries.
     pub content: Content,
 }
 

@@ -94,7 +94,6 @@ pub(super) fn shift_line(text: &str, by_ns: i64) -> String {
 /// Series by their numbers.
 pub(super) type SeriesByNumber = HashMap<i64, Arc<SeriesInfo>>;
 
-/// A line, parsed.
 #[derive(Debug)]
 pub(super) struct Parsed(OutboxLine);
 

@@ -20,7 +20,7 @@ pub struct OutboxStretch {
     pub to: u64,
 }
 
-/// Reads items.
+/// Reads the items of the outbox in the order of their numbers.
 #[derive(Debug)]
 pub struct OutboxReader {
     db: Connection,

@@ -68,7 +68,6 @@ enum Last {
     Missing(u8),
 }
 
-/// See the [module](self).
 #[derive(Debug)]
 pub(super) struct OutboxReport {
     every_nth: u64,

@@ -25,7 +25,7 @@ pub struct OutboxHead {
 /// How full the outbox is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OutboxFigures {
-    /// Bytes on disk.
+    /// Size of all its items on disk, bytes.
     pub bytes: u64,
     /// Growth while nothing is delivered, bytes per second of machine time; `None` in the first minute.
     pub bytes_per_s: Option<f64>,

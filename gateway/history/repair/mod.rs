@@ -21,7 +21,7 @@ use std::path::Path;
 /// What was saved of one table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct RepairedTable {
-    /// Its name.
+    /// Name of the table in both files.
     pub table: &'static str,
     /// Rows in the new file.
     pub saved: u64,
@@ -32,14 +32,14 @@ pub struct RepairedTable {
 /// What a repair has saved.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Repaired {
-    /// Table by table.
+    /// What was saved of each table.
     pub tables: Vec<RepairedTable>,
     /// Samples that are lost.
     pub damaged: Vec<DamagedRows>,
 }
 
 impl Repaired {
-    /// Was everything saved?
+    /// Whether no row of any table was lost.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.damaged.is_empty() && self.tables.iter().all(|table| table.lost.is_empty())

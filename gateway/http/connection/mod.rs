@@ -34,7 +34,7 @@ use tokio::sync::{Semaphore, watch};
 use tokio::task::JoinSet;
 use tokio_rustls::TlsAcceptor;
 
-/// Connections at once.
+/// Connections of all addresses at once.
 const CONNECTIONS_MAX: usize = 256;
 /// Connections of one address at once.
 const OF_ONE_MAX: usize = 96;

@@ -13,7 +13,6 @@ use tokio::time::{Sleep, sleep};
 /// A reader who takes nothing for so long has gone, or means harm.
 const STALLED: Duration = Duration::from_secs(20);
 
-/// See the [module](self).
 pub(super) struct Paced<S> {
     stream: S,
     activity: Arc<ConnectionActivity>,

@@ -18,7 +18,6 @@ pub(super) struct ConnectionActivity {
     since_ms: AtomicU64,
     /// When the first byte of a request came for which it waits; 0: none has come.
     first_byte_ms: AtomicU64,
-    /// Requests so far.
     requests: AtomicU64,
     close_signal: Notify,
 }
@@ -56,7 +55,6 @@ impl ConnectionActivity {
         self.answering.store(false, Ordering::Release);
     }
 
-    /// Something came.
     pub(super) fn note_first_byte(&self) {
         if !self.answering.load(Ordering::Acquire) && self.first_byte_ms.load(Ordering::Relaxed) == 0 {
             self.first_byte_ms.store(self.now_ms(), Ordering::Relaxed);
@@ -84,7 +82,6 @@ impl ConnectionActivity {
     }
 }
 
-/// All of them.
 #[derive(Debug, Clone)]
 pub(super) struct ConnectionTable {
     opened: Instant,

@@ -1,7 +1,7 @@
 //! Three recordings with one hidden cause each, which anyone can have diagnosed on the page in one click; the truth is told afterwards. They were
 //! written by `tests/records/recordings/make_gallery.py`, by laws of its own.
 
-/// One example.
+/// A recording with one hidden cause, and the model that lacks it.
 #[derive(Debug, Clone, Copy)]
 pub struct Example {
     /// Its name in addresses.
@@ -12,7 +12,7 @@ pub struct Example {
     pub zh: &'static str,
     /// The name of its file.
     pub file: &'static str,
-    /// The recording, gzipped.
+    /// The recording as gzipped CSV.
     pub recording: &'static [u8],
     /// The model that lacks the cause.
     pub model: &'static str,
@@ -22,7 +22,7 @@ pub struct Example {
     pub truth_zh: &'static str,
 }
 
-/// Every example.
+/// The examples, each with its recording and model.
 pub const EXAMPLES: [Example; 3] = [
     Example {
         name: "turning",

@@ -226,7 +226,7 @@ impl HistoryStore {
         }
     }
 
-    /// For the status.
+    /// Path, size, losses and error of the history, for the status document.
     #[must_use]
     pub fn build_status(&self) -> HistoryStatus {
         let writer = self.writer.as_ref().map(Writer::status).unwrap_or_default();

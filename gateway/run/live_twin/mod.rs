@@ -58,7 +58,7 @@ struct ActiveModel {
     loaded: LoadedModel,
 }
 
-/// See the [module](self).
+/// The model beside the running machine, its watch, and the worker that diagnoses.
 pub struct Twin {
     paths: WorkerPaths,
     memory: PathBuf,

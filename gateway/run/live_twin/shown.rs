@@ -8,7 +8,7 @@ use gateway_status::AlarmStatus;
 use rules::twin::live::{self, ComparedSecond, Live, Mismatch, Regime, RegimeStage};
 
 impl Twin {
-    /// Differences that stand.
+    /// One alarm for each kind of work that differs from the model now.
     #[must_use]
     pub fn list_alarms(&self) -> Vec<AlarmStatus> {
         let alarm = |mismatch: &Mismatch| {

@@ -22,13 +22,13 @@ pub const SOURCE: &str = "operations";
 /// A recipe and the text it was read from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadedRecipe {
-    /// The table.
+    /// The operations as they are looked up.
     pub recipe: Recipe,
-    /// The file.
+    /// The whole text of the file.
     pub text: String,
 }
 
-/// See the [module](self).
+/// The operations recipe in force: read at the start, watched, swapped when the whole file is right.
 #[derive(Debug)]
 pub struct Operations {
     path: PathBuf,

@@ -18,7 +18,7 @@ pub(super) struct SchedAttr {
     pub(super) period: u64,
 }
 
-/// Bytes of [`SchedAttr`].
+/// Bytes of [`SchedAttr`], by which the kernel knows its version.
 const SIZE: u32 = 48;
 
 /// Sets how the calling thread is scheduled.

@@ -24,11 +24,11 @@ const NICE_OF_PAGE: i32 = 5;
 /// What was granted to a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Granted {
-    /// Real-time priority.
+    /// Tick and writing go before every ordinary thread.
     RealTime,
     /// A short slice among ordinary threads.
     ShortSlice,
-    /// Nothing.
+    /// The priority of any other thread.
     Nothing,
 }
 
@@ -46,7 +46,7 @@ impl fmt::Display for Granted {
 }
 
 impl Granted {
-    /// Tells the operator.
+    /// Writes one notice of severity `info` to both logs.
     pub fn tell_operator(self) {
         Notice::new(Severity::Info, "priority", self.to_string()).write_to_logs();
     }

@@ -34,7 +34,7 @@ const READING_EVERY_NS: i64 = 60 * SECOND_NS;
 /// How many series there are.
 const COUNT: usize = 6;
 
-/// See the [module](self).
+/// The thermal law beside the running machine: prediction, correction, offset and pulses.
 pub struct Thermal {
     settings: config::ThermalConfig,
     follower: ThermalFollower,

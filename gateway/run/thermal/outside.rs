@@ -8,7 +8,7 @@ use rules::estimators::thermal::{CompensationStep, Outside, Standing, ThermalPre
 /// The temperatures must be inside for so long before that is told: a sensor at the border goes to and fro.
 const INSIDE_NS: i64 = 300 * SECOND_NS;
 
-/// See the [module](self).
+/// Tells when temperatures leave the range that the law was identified in.
 #[derive(Debug, Default)]
 pub struct OutsideWatch {
     last_reported: Option<Standing>,

@@ -40,7 +40,7 @@ impl PublicKeySource {
 /// An archive whose signature fits.
 #[derive(Debug)]
 pub struct Bundle {
-    /// The program.
+    /// The executable as it was unpacked.
     pub program: Vec<u8>,
     /// What the signer wrote beside it.
     pub comment: String,

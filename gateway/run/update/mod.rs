@@ -44,7 +44,7 @@ pub enum UpdateError {
     /// A file cannot be read or written.
     #[error("{path}: {error}", path = path.display())]
     File {
-        /// Which.
+        /// The file that cannot be read or written.
         path: PathBuf,
         /// What the system says.
         error: std::io::Error,
@@ -57,7 +57,7 @@ pub enum UpdateError {
     Signature {
         /// Where it was looked for.
         path: PathBuf,
-        /// What is wrong.
+        /// What is wrong with the signature.
         reason: String,
     },
     /// The signature does not belong to this file and key.
@@ -66,9 +66,9 @@ pub enum UpdateError {
     /// The archive is not one of this program.
     #[error("{path} is no update of this program: {reason}", path = path.display())]
     Content {
-        /// The archive.
+        /// Path of the archive as it was given.
         path: PathBuf,
-        /// What is wrong.
+        /// What is wrong with the archive.
         reason: String,
     },
     /// The new program runs on another kind of processor, or does not run at all.
@@ -82,7 +82,7 @@ pub enum UpdateError {
     Older {
         /// Version of the update.
         new: String,
-        /// Version that runs.
+        /// Version of the program that runs now.
         running: String,
     },
     /// The box was not installed from a package.

@@ -48,7 +48,7 @@ pub enum TrialOutcome {
     Confirmed,
     /// It was not; the one before runs again.
     RolledBack {
-        /// What was seen.
+        /// What spoke against the new version.
         reason: String,
     },
 }

@@ -16,7 +16,7 @@ use rules::estimators::wear::{Observability, WorkReference};
 /// Who writes the events.
 const SOURCE: &str = "wear";
 
-/// See the [module](self).
+/// The library of wear models beside the running machine, and what is told of the edge in use.
 pub struct Wear {
     machine: String,
     model_library: Library,

@@ -32,13 +32,13 @@ use tokio::time::Instant;
 /// Where to, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MqttTarget {
-    /// The broker.
+    /// Address, TLS files and login of the broker.
     pub broker: BrokerTarget,
     /// What every topic begins with; empty: the name of the box.
     pub prefix: String,
     /// How hard a message is delivered.
     pub qos: Qos,
-    /// How items look.
+    /// Which topics the items get, and in which form.
     pub layout: Layout,
     /// How often everything that is known is written; zero: never.
     pub latest: Duration,
@@ -64,7 +64,6 @@ impl MqttTarget {
     }
 }
 
-/// See the [module](self).
 pub(super) struct MqttSink {
     target: MqttTarget,
     name: String,

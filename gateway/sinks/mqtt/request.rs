@@ -8,7 +8,7 @@ const REQUEST_BYTES_MAX: usize = 2048;
 /// Letters of the asker's own mark that are given back.
 const ID_MAX: usize = 64;
 
-/// `{"request":"feed_override","pct":80,"reason":"...","id":"..."}`.
+/// A request as it comes, for example `{"request":"feed_override","pct":80,"reason":"...","id":"..."}`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RequestDocument {

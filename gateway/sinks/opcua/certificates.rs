@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// The box's own certificate and its key, in the directory.
 pub(super) const OWN: &str = "own/cert.der";
-/// See [`OWN`].
+/// The private key that belongs to [`OWN`].
 pub(super) const KEY: &str = "own/private.pem";
 /// Certificates of strangers that are kept for a person to look at: anybody may show as many as he likes.
 const REJECTED_MAX: usize = 32;

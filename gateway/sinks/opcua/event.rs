@@ -14,7 +14,6 @@ const WARNING: u16 = 500;
 const INFO: u16 = 100;
 const ENDED: u16 = 1;
 
-/// See the [module](self).
 pub(super) struct AlarmEvent {
     base: BaseEventType,
     code: String,
@@ -22,7 +21,6 @@ pub(super) struct AlarmEvent {
 }
 
 impl AlarmEvent {
-    /// The alarm begins.
     pub(super) fn from_raised_alarm(numbers: Numbers, alarm: &Alarm) -> Self {
         let severity = match alarm.severity.as_str() {
             "critical" => CRITICAL,

@@ -66,7 +66,7 @@ pub(super) enum Form {
     Percent,
     /// The text as it is.
     Text,
-    /// Turns, whichever way.
+    /// Whether it turns, whichever way.
     Rotating,
     /// A word, as the number of an enumeration: its type, and what stands for which word.
     Word(u32, fn(&str) -> i32),

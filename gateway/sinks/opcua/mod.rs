@@ -100,7 +100,6 @@ impl OpcuaTarget {
     }
 }
 
-/// See the [module](self).
 pub(super) struct OpcuaSink {
     target: OpcuaTarget,
     outbox: Outbox,

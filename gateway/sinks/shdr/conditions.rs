@@ -6,7 +6,6 @@
 use super::lines::replace_separators;
 use super::model::Component;
 
-/// A condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct AlarmKind {
     /// Name in the lines.
@@ -31,7 +30,6 @@ const TRAVEL: AlarmKind = define_condition("travel", "POSITION", Component::Axes
 const OVERHEAT: AlarmKind = define_condition("overheat", "TEMPERATURE", Component::Axes);
 const SPINDLE: AlarmKind = define_condition("spindle_drive", "ACTUATOR", Component::Spindle);
 
-/// Every condition.
 pub(super) const ALL: [AlarmKind; 9] = [OWN, SYSTEM, LOGIC, MOTION, COMMUNICATIONS, SERVO, TRAVEL, OVERHEAT, SPINDLE];
 
 /// The two letters of a code, and the condition.

@@ -23,13 +23,13 @@ pub enum DevicesError {
     /// Another program wrote the file, or it is empty.
     #[error("{name} holds no device that `cnc-gateway devices` wrote")]
     NoDevice {
-        /// The file.
+        /// Name of the file, for the message.
         name: String,
     },
     /// An agent cannot tell two machines apart.
     #[error("{name} has a machine with the identifiers of another one: give each its own --prefix")]
     SameIdentifiers {
-        /// The file.
+        /// Name of the file, for the message.
         name: String,
     },
 }

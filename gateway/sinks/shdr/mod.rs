@@ -67,7 +67,6 @@ struct AgentContext {
     heartbeat_ms: u128,
 }
 
-/// See the [module](self).
 pub(super) struct ShdrSink {
     target: ShdrTarget,
     outbox: Outbox,

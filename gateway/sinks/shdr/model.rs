@@ -8,7 +8,6 @@
 use super::lines::replace_separators;
 use gateway_history::Cell;
 
-/// A data item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct DataItem {
     /// Channel, and identifier of the data item.
@@ -28,7 +27,7 @@ pub(super) struct DataItem {
 /// How a value of the channel stands on a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ValueForm {
-    /// As it is.
+    /// The value as it is.
     Plain,
     /// The number behind the letter: 30 of `N30`.
     Number,

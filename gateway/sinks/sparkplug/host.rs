@@ -17,7 +17,6 @@ struct HostState {
 pub(super) struct PrimaryHost {
     /// Of the last message that counted.
     timestamp: Option<i64>,
-    /// Is it there?
     pub(super) online: bool,
 }
 

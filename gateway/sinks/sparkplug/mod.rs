@@ -51,11 +51,11 @@ const HOST_WITHIN: Duration = Duration::from_secs(10);
 /// Where to, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SparkplugTarget {
-    /// The broker.
+    /// Address, TLS files and login of the broker.
     pub broker: BrokerTarget,
     /// Group of nodes, for example the plant.
     pub group: String,
-    /// The edge node.
+    /// Name of the edge node in its group.
     pub node: String,
     /// The machine; `None`: the metrics are those of the node.
     pub device: Option<String>,
@@ -89,7 +89,6 @@ impl SparkplugTarget {
     }
 }
 
-/// See the [module](self).
 pub(super) struct SparkplugSink {
     target: SparkplugTarget,
     name: String,

@@ -7,21 +7,14 @@ use prost::{Message, Oneof};
 
 /// Numbers of the data types (specification, 6.4.16).
 pub(super) mod datatype {
-    /// `Int32`.
     pub(in super::super) const INT32: u32 = 3;
-    /// `Int64`.
     pub(in super::super) const INT64: u32 = 4;
-    /// `UInt64`.
     pub(in super::super) const UINT64: u32 = 8;
-    /// `Double`.
     pub(in super::super) const DOUBLE: u32 = 10;
-    /// `Boolean`.
     pub(in super::super) const BOOLEAN: u32 = 11;
-    /// `String`.
     pub(in super::super) const STRING: u32 = 12;
 }
 
-/// One message.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct Payload {
     #[prost(uint64, optional, tag = "1")]
@@ -79,7 +72,6 @@ pub(super) struct PropertySet {
     pub(super) values: Vec<PropertyValue>,
 }
 
-/// A property.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct PropertyValue {
     #[prost(uint32, optional, tag = "1")]

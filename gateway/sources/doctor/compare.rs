@@ -17,7 +17,7 @@ const ROUNDS: u32 = 3;
 /// A channel on which the two do not agree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelDifference {
-    /// Which channel.
+    /// The channel that both ways of reading give.
     pub channel: ChannelId,
     /// What we read by ourselves.
     pub native: Value,
@@ -204,7 +204,7 @@ impl Comparison {
 }
 
 impl ChannelDifference {
-    /// For `doctor --json`.
+    /// Names and both values, for `doctor --json`.
     #[must_use]
     pub fn to_json(&self) -> serde_json::Value {
         let value = |value: &Value| match value {

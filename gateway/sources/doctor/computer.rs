@@ -19,12 +19,12 @@ const REAL_TIME_MIN: u64 = 40;
 /// Memory that a day under load needs besides, MB.
 const MEMORY_MIN_MB: u64 = 200;
 
-/// What was found.
+/// What is known of the computer that the gateway runs on, and what is wrong with it.
 #[derive(Debug, Clone, Default)]
 pub struct ComputerReport {
-    /// What is known.
+    /// Figures and words; the name of a figure ends in its unit.
     pub facts: Vec<Fact>,
-    /// What is wrong.
+    /// What is wrong, each with what to do.
     pub problems: Vec<Trouble>,
 }
 
@@ -41,7 +41,7 @@ impl ComputerReport {
         self.problems.push(Trouble { what, next: next.to_owned() });
     }
 
-    /// The document `doctor-box/1`.
+    /// The document `doctor-box/1`, as `doctor --box --json` prints it.
     #[must_use]
     pub fn to_json(&self) -> Value {
         use adapters::driver::FactValue;

@@ -44,14 +44,14 @@ impl fmt::Display for ValueWithUnit {
     }
 }
 
-/// What was found.
+/// Who answers at an address, what the channels say, and what is wrong.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DoctorReport {
-    /// As given.
+    /// The address in the form in which it was given.
     pub address: String,
-    /// Did anything answer?
+    /// Whether anything answered at the address.
     pub reachable: bool,
-    /// Who answered.
+    /// What the device says of itself; empty where nothing answered.
     pub identity: Vec<Fact>,
     /// What the channels say, in the order of the sources.
     pub readings: Vec<(ChannelId, Result<ValueWithUnit, Absence>)>,
@@ -59,7 +59,7 @@ pub struct DoctorReport {
     pub open_ms: f64,
     /// Reading everything once on the open connection.
     pub read_ms: f64,
-    /// What is wrong.
+    /// What is wrong, each with what to do.
     pub problems: Vec<Trouble>,
     /// Everything that the device offers, where that was asked for; `None` where it was not.
     pub offers: Option<Vec<Offer>>,
@@ -77,7 +77,7 @@ pub enum ExamineError {
     /// There is nothing to compare: a FANUC controller that we talk to by ourselves is needed.
     #[error("{address}: give a fanuc:// address without backend=vendor to compare with a library")]
     NotNative {
-        /// What was typed.
+        /// The address as typed.
         address: String,
     },
 }

@@ -13,7 +13,7 @@ const CUTOFF_HZ: f64 = 350.0;
 const CUTOFF_SHARE: f64 = 0.35;
 /// Currents below this share of full scale are none.
 const LEAST_SHARE: f64 = 0.002;
-/// A whole period.
+/// Half periods of a window: a whole period.
 const HALVES: usize = 2;
 /// The window of an amplitude is a period of this, Hz: a tenth of a second.
 const AMPLITUDE_HZ: f64 = 10.0;
@@ -23,7 +23,6 @@ enum Phases {
     Three(Box<ThreePhase>),
 }
 
-/// See the [module](self).
 pub(super) struct WaveformChain {
     header: WaveformHeader,
     phases: Phases,

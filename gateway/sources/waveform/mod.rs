@@ -107,7 +107,6 @@ impl Source for SpindleCurrent {
     }
 }
 
-/// Seconds as nanoseconds.
 #[expect(clippy::cast_possible_truncation, reason = "a cast from a double saturates")]
 fn to_nanoseconds(seconds: f64) -> TimeNs {
     (seconds * SECOND_NS as f64) as i64

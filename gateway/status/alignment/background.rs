@@ -16,7 +16,6 @@ pub enum Patience {
     Waits,
 }
 
-/// What is found.
 pub(super) type LagResult = Result<Lag, NotIdentifiable>;
 
 struct BackgroundThread {
@@ -24,7 +23,6 @@ struct BackgroundThread {
     results: Receiver<LagResult>,
 }
 
-/// See the [module](self).
 pub(super) struct Background {
     patience: Patience,
     thread: Option<BackgroundThread>,

@@ -45,7 +45,7 @@ use rules::estimators::State;
 const POWERS: [&str; 2] = ["spindle_power_w", "total_power_w"];
 const SPEED: &str = "spindle_speed_rpm";
 
-/// See the [module](self).
+/// Estimates how late each power meter is against the controller, and gives the merge what it puts back.
 pub struct Alignment {
     pairs: Vec<Pair>,
     background: Background,

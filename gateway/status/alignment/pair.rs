@@ -11,7 +11,6 @@ use rules::estimators::alignment::{Collector, Lag, LagFollower, NotIdentifiable,
 /// Pause between two estimates: at first, and at most.
 const PAUSE_NS: (i64, i64) = (60 * SECOND_NS, 600 * SECOND_NS);
 
-/// See the [module](self).
 pub(super) struct Pair {
     controller: SourceId,
     pub(super) meter: SourceId,

@@ -9,7 +9,6 @@ use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-/// Which cuts.
 #[derive(Debug, Args)]
 pub(super) struct DesignArguments {
     /// Print the cuts to make instead: L4, L8, L9, L12, L16, L18 or L27.
@@ -55,7 +54,6 @@ impl DesignArguments {
     }
 }
 
-/// Prints the list.
 pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
     let own = &arguments.design;
     let Some(array) = own.design else { return Ok(CommandOutcome::Fine) };
