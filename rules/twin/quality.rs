@@ -9,9 +9,9 @@ use physics::explain::Language;
 pub struct Fault {
     /// What is wrong with the rows.
     pub kind: FaultKind,
-    /// The column.
+    /// The column with the fault.
     pub column: String,
-    /// Rows concerned.
+    /// How many rows have it.
     pub rows: usize,
 }
 
