@@ -233,7 +233,7 @@ impl LadderRule {
             Self::Replace => mailbox,
             Self::Product => {
                 let product = u32::from(dial.percent()) * u32::from(mailbox.percent()) / 100;
-                u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(dial.min(mailbox))
+                u8::try_from(product).ok().and_then(OverridePct::new).unwrap_or(OverridePct::GREATEST)
             }
         }
     }

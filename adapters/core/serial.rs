@@ -6,6 +6,7 @@
 //! transaction numbers that is the only way not to take an old answer for a new one.
 
 use crate::address::{Parity, SerialTarget};
+use crate::integer::count_to_f64;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{FlockOperation, OFlags, flock};
 use rustix::termios::{ControlModes, OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};
@@ -28,7 +29,7 @@ fn bits_per_character(parity: Parity) -> u32 {
 /// How long so many characters take on the wire.
 #[must_use]
 pub fn wire_time(target: &SerialTarget, characters: usize) -> Duration {
-    let bits = f64::from(bits_per_character(target.parity)) * f64::from(u32::try_from(characters).unwrap_or(u32::MAX));
+    let bits = f64::from(bits_per_character(target.parity)) * count_to_f64(characters);
     Duration::from_secs_f64(bits / f64::from(target.baud))
 }
 
@@ -49,7 +50,7 @@ fn open_port(target: &SerialTarget) -> io::Result<OpenPort> {
     // Without NONBLOCK the open itself waits for a modem's carrier.
     let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits();
     let mut options = OpenOptions::new();
-    options.read(true).write(true).custom_flags(i32::try_from(flags).unwrap_or(0));
+    options.read(true).write(true).custom_flags(flags.cast_signed());
     let file = options.open(&target.port)?;
     flock(&file, FlockOperation::NonBlockingLockExclusive)
         .map_err(|_| io::Error::new(ErrorKind::ResourceBusy, "another program holds the line"))?;
@@ -198,6 +199,7 @@ fn read_port(line: &mut OpenPort, until: Instant, into: &mut Vec<u8>) -> io::Res
         if left.is_zero() {
             return Ok(false);
         }
+        // A time that no `Timespec` holds is waited for in parts of a second.
         let wait = Timespec::try_from(left).unwrap_or(Timespec { tv_sec: 1, tv_nsec: 0 });
         match poll(&mut [PollFd::new(&line.file, PollFlags::IN)], Some(&wait)) {
             Ok(_) | Err(rustix::io::Errno::INTR) => {}
