@@ -12,6 +12,7 @@ use super::generation::Opening;
 use super::item::{FocasItem, Question, Write};
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::SourceError;
+use adapter_core::integer::saturate_to_ms;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -371,16 +372,13 @@ pub fn source_error(name: &str, error: &FocasError, request: &str) -> SourceErro
 fn build_source_error(name: &str, error: &FocasError, request: &str, next: String) -> SourceError {
     let (source_name, request, what) = (name.to_owned(), request.to_owned(), error.to_string());
     match error {
-        FocasError::Timeout(waited) => SourceError::Timeout {
-            source_name,
-            request,
-            deadline_ms: u64::try_from(waited.as_millis()).unwrap_or(u64::MAX),
-            next,
-        },
+        FocasError::Timeout(waited) => {
+            SourceError::Timeout { source_name, request, deadline_ms: saturate_to_ms(*waited), next }
+        }
         FocasError::Cut { waited: Some(waited), .. } => SourceError::Timeout {
             source_name,
             request: format!("{request} ({what})"),
-            deadline_ms: u64::try_from(waited.as_millis()).unwrap_or(u64::MAX),
+            deadline_ms: saturate_to_ms(*waited),
             next,
         },
         FocasError::Protocol(_) => SourceError::Decode { source_name, request, what: format!("{what}. {next}") },

@@ -3,6 +3,7 @@
 use super::generation::{Generation, Opening};
 use super::item::{FocasItem, PositionFrame, Write};
 use super::wire::{Number, Request};
+use adapter_core::integer::convert_bounded;
 
 pub use super::table::function;
 
@@ -64,7 +65,9 @@ pub fn build_read_request(item: FocasItem, generation: Generation) -> Request {
         FocasItem::Sequence => Request::new_cnc(f::SEQUENCE, &[]),
         FocasItem::BlockCount => Request::new_cnc(f::BLOCK_COUNT, &[]),
         FocasItem::AlarmBits => Request::new_cnc(f::ALARM_BITS, &[]),
-        FocasItem::Alarms(most) => Request::new_cnc(f::ALARMS, &[-1, i32::from(most), 2, clamp_to_i32(ALARM_TEXT_LEN)]),
+        FocasItem::Alarms(most) => {
+            Request::new_cnc(f::ALARMS, &[-1, i32::from(most), 2, convert_bounded(ALARM_TEXT_LEN, i32::MAX)])
+        }
         FocasItem::ModalGroup(group) => Request::new_cnc(f::MODAL_GROUP, &[number(group)]),
         FocasItem::ModalWord(word) => Request::new_cnc(f::MODAL_WORD, &[word.wire_number()]),
         FocasItem::Position(what, axis) => Request::new_cnc(f::POSITION, &[what.wire_number(), number(axis)]),
@@ -95,10 +98,6 @@ pub fn build_read_request(item: FocasItem, generation: Generation) -> Request {
         FocasItem::ToolGroup => Request::new_cnc(f::TOOL_GROUP, &[]),
         FocasItem::ToolLife(group) => Request::new_cnc(f::TOOL_LIFE, &repeat_number(group)),
     }
-}
-
-fn clamp_to_i32(length: usize) -> i32 {
-    i32::try_from(length).unwrap_or(i32::MAX)
 }
 
 fn repeat_number(number: u16) -> [i32; 2] {

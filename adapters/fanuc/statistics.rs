@@ -1,5 +1,6 @@
 //! What the round trips cost.
 
+use adapter_core::integer::{saturate_to_us, widen_to_u64};
 use std::time::Duration;
 
 /// Bounds of the buckets, microseconds; the last bucket is open.
@@ -29,14 +30,13 @@ pub struct Statistics {
 impl Statistics {
     /// Counts one frame.
     pub fn count_frame(&mut self, blocks: usize, sent: usize, received: usize, took: Duration) {
-        let wide = |count: usize| u64::try_from(count).unwrap_or(u64::MAX);
         self.frames += 1;
-        self.blocks += wide(blocks);
-        self.sent_bytes += wide(sent);
-        self.received_bytes += wide(received);
+        self.blocks += widen_to_u64(blocks);
+        self.sent_bytes += widen_to_u64(sent);
+        self.received_bytes += widen_to_u64(received);
         self.waited += took;
         self.longest = self.longest.max(took);
-        let us = u64::try_from(took.as_micros()).unwrap_or(u64::MAX);
+        let us = saturate_to_us(took);
         self.buckets[BOUNDS_US.partition_point(|bound| *bound < us)] += 1;
     }
 

@@ -8,6 +8,7 @@ use crate::generation::Generation;
 use crate::item::{Position, Servo, Spindle};
 use crate::request::UNIT_OF_FEED;
 use crate::wire::Number;
+use adapter_core::integer::convert_bounded;
 
 /// Numbers of positions besides those of [`Position::ALL`], as `cnc_absolute2`, `cnc_relative2` and `cnc_rdposition` ask
 /// for them: absolute, relative and to go as the screen shows them.
@@ -78,7 +79,7 @@ pub(super) fn encode_shown_axes(controller: &Controller) -> Vec<u8> {
 
 pub(super) fn encode_count(controller: &Controller, which: i32) -> Vec<u8> {
     let count = if matches!(which, 1 | 3) { controller.spindles.len() } else { controller.axes.len() };
-    encode_shorts(&[i16::try_from(count).unwrap_or(0)])
+    encode_shorts(&[convert_bounded(count, i16::MAX)])
 }
 
 /// Units as numbered on the wire: of the feed (3 on newer controls, 0 on older ones), of the spindle's speed, and of the

@@ -6,6 +6,7 @@ use crate::generation::{Generation, Opening};
 use crate::item::BlockWord;
 use crate::poll;
 use crate::wire::Number;
+use adapter_core::integer::convert_bounded;
 use std::collections::BTreeMap;
 
 /// The modal group of feed per minute and per revolution, and the parameter that shows the feed per revolution.
@@ -173,7 +174,7 @@ impl Controller {
         let generation = Generation::from_version(version);
         let older = matches!(generation, Generation::Older(_));
         let (family, axes_max, spindles_max) = if older { (3, 8, 4) } else { (5, 32, 8) };
-        let count = u16::try_from(axes.len()).unwrap_or(0);
+        let count = convert_bounded(axes.len(), u16::MAX);
         let opening = Opening { generation, family, axes_max, spindles_max, paths: 1, axes: count, spindles: 1 };
         let zero = Number::from_decimal(0, 0);
         Self {
@@ -222,7 +223,7 @@ impl Controller {
     #[must_use]
     pub fn with_axes(mut self, axes: &[impl ToString]) -> Self {
         self.axes = axes.iter().map(|name| ControllerAxis::new(&name.to_string())).collect();
-        self.opening.axes = u16::try_from(axes.len()).unwrap_or(0);
+        self.opening.axes = convert_bounded(axes.len(), u16::MAX);
         self.system.axes = format!("{:02}", axes.len());
         self
     }
@@ -231,7 +232,7 @@ impl Controller {
     #[must_use]
     pub fn with_path(mut self, axes: &[impl ToString]) -> Self {
         self.further.push(Self::new(self.opening.generation.version(), axes));
-        self.opening.paths = u16::try_from(self.further.len() + 1).unwrap_or(u16::MAX);
+        self.opening.paths = convert_bounded(self.further.len() + 1, u16::MAX);
         self
     }
 

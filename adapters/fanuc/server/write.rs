@@ -10,8 +10,7 @@ use crate::wire::{Cursor, Number, Request};
 const REJECT: i16 = 13;
 
 pub(super) fn apply_write(controller: &mut Controller, request: &Request) -> Result<(), i16> {
-    let announced = usize::try_from(request.arguments[4]).unwrap_or(usize::MAX);
-    if announced != request.data.len() {
+    if usize::try_from(request.arguments[4]) != Ok(request.data.len()) {
         return Err(LENGTH);
     }
     let [first, _, third, ..] = request.arguments;

@@ -104,7 +104,7 @@ impl Vendor {
 
 /// Whole seconds, at least one: zero would mean for ever.
 fn round_up_seconds(timeout: Duration) -> i32 {
-    i32::try_from(timeout.as_secs_f64().ceil().max(1.0) as u32).unwrap_or(1)
+    timeout.as_secs_f64().ceil().max(1.0) as i32
 }
 
 fn open_connection(child: &mut ChildClient<Question>, settings: &VendorSettings) -> Result<Opening, FocasError> {

@@ -1,6 +1,7 @@
 //! The outer frame.
 
 use super::{BODY_MAX, Cursor, WireError};
+use adapter_core::integer::convert_bounded;
 
 /// Bytes before the body.
 pub const HEADER_LEN: usize = 10;
@@ -117,7 +118,7 @@ pub fn encode_frame(version: u16, kind: FrameKind, body: &[u8]) -> Vec<u8> {
     bytes.extend_from_slice(&MAGIC);
     bytes.extend_from_slice(&version.to_be_bytes());
     bytes.extend_from_slice(&kind.wire_number().to_be_bytes());
-    bytes.extend_from_slice(&u16::try_from(body.len()).unwrap_or(u16::MAX).to_be_bytes());
+    bytes.extend_from_slice(&convert_bounded(body.len(), u16::MAX).to_be_bytes());
     bytes.extend_from_slice(body);
     bytes
 }
