@@ -116,6 +116,11 @@ pub fn register_type(at: ControllerRegister) -> Option<i32> {
     i32::try_from(at).ok()
 }
 
+/// A register as the library numbers it; `None` where it has no number for the kind, or the index exceeds 31 bits.
+pub(super) fn define_register(at: ControllerRegister) -> Option<HncItem> {
+    Some(HncItem::Register(register_type(at)?, i32::try_from(at.index).ok()?))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,5 +130,6 @@ mod tests {
         let of = |kind| register_type(ControllerRegister { kind, index: 0 });
         assert_eq!(['X', 'G', 'R', 'D', 'P'].map(of), [0, 3, 4, 6, 8].map(Some));
         assert_eq!(of('Q'), None);
+        assert_eq!(define_register(ControllerRegister { kind: 'R', index: 1 << 31 }), None);
     }
 }

@@ -7,7 +7,7 @@
 //! ```
 
 use super::answer::{HncAnswer, HncItemResult};
-use super::item::{HncItem, HncWidth, register_type};
+use super::item::{HncItem, HncWidth, define_register};
 use adapter_core::own::OwnRead;
 use adapter_core::reading::{Absence, Value};
 use nclink::mailbox::ControllerRegister;
@@ -73,12 +73,11 @@ fn parse_width(words: &[&str]) -> Option<HncWidth> {
 fn parse_register(place: &str) -> Option<OwnValue> {
     let (name, bit) = place.split_once('.').map_or((place, None), |(name, bit)| (name, Some(bit)));
     let at: ControllerRegister = name.parse().ok()?;
-    let index = i32::try_from(at.index).ok()?;
     let bit = match bit {
         None => None,
         Some(bit) => Some(bit.parse::<u8>().ok().filter(|bit| *bit < 32)?),
     };
-    Some(OwnValue { item: HncItem::Register(register_type(at)?, index), bit })
+    Some(OwnValue { item: define_register(at)?, bit })
 }
 
 impl OwnValue {

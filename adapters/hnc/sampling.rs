@@ -3,6 +3,7 @@
 //! The first channel always is the system's counter of milliseconds (F register of the system, word 149). By it a missing
 //! millisecond is counted, and a library that gives the same values twice is seen through.
 
+use adapter_core::integer::length_to_i64;
 use nclink::sample::{ItemColumn, SampleBlock};
 use serde::{Deserialize, Serialize};
 
@@ -112,7 +113,7 @@ impl Sampling {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low half is meant")]
             let count = counter[row] as u16;
             let Some(step) = self.count_step(count) else { continue };
-            let newest = i64::try_from(rows - row).unwrap_or(0);
+            let newest = length_to_i64(rows - row);
             let at_ms = self.last.map_or(now_ms - newest, |(_, last_ms)| last_ms + i64::from(step));
             self.last = Some((count, at_ms));
             if blocks.is_empty() || step > 1 {
