@@ -4,6 +4,7 @@ use crate::pdu;
 use adapter_core::address::{Parity, SerialTarget};
 use adapter_core::clock::Clock;
 use adapter_core::driver::SourceError;
+use adapter_core::integer::saturate_to_ms;
 use adapter_core::reading::Stamp;
 use std::io::{self, ErrorKind};
 use std::time::Duration;
@@ -45,7 +46,7 @@ impl ModbusError {
         match self {
             Self::Line { what, next } => SourceError::Line { source_name, what, next },
             Self::Timeout { next } => {
-                let deadline_ms = u64::try_from(deadline.as_millis()).unwrap_or(u64::MAX);
+                let deadline_ms = saturate_to_ms(deadline);
                 SourceError::Timeout { source_name, request, deadline_ms, next }
             }
             Self::Refused(code) => {

@@ -16,6 +16,7 @@ use adapter_core::channel::ChannelId;
 use adapter_core::clock::Clock;
 use adapter_core::driver::{Fact, Offer, Source, SourceError, SourceProblem};
 use adapter_core::electric::{Doubts, SupplyCheck};
+use adapter_core::integer::count_to_f64;
 use adapter_core::own::Own;
 use adapter_core::reading::{Absence, Reading};
 use adapter_core::serial::Bus;
@@ -210,8 +211,7 @@ impl Source for ModbusMeter {
             facts.push(Fact::from_number("wire_share_pct", 100.0 * wire.as_secs_f64() / self.period.as_secs_f64()));
         }
         if self.poll.is_split() {
-            let requests = u32::try_from(self.poll.count_requests()).unwrap_or(u32::MAX);
-            facts.push(Fact::from_number("requests_per_poll", f64::from(requests)));
+            facts.push(Fact::from_number("requests_per_poll", count_to_f64(self.poll.count_requests())));
         }
         match self.refresh.estimate_interval() {
             Some(found) if found.at_least_as_fast => {

@@ -7,6 +7,7 @@ use crate::address::MeterTarget;
 use adapter_core::address::Circuit;
 use adapter_core::channel::ChannelId;
 use adapter_core::electric::{Doubts, SupplyValues};
+use adapter_core::integer::count_to_f64;
 use adapter_core::reading::Reading;
 
 /// How the registers of an output are put together.
@@ -46,7 +47,7 @@ pub(super) struct MeterChannel {
 impl Law {
     fn combine_numbers(self, numbers: &[f64]) -> f64 {
         let sum: f64 = numbers.iter().sum();
-        let count = f64::from(u32::try_from(numbers.len()).unwrap_or(1)).max(1.0);
+        let count = count_to_f64(numbers.len()).max(1.0);
         match self {
             Self::Sum => sum,
             Self::Mean => sum / count,

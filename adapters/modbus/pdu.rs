@@ -2,6 +2,8 @@
 //!
 //! Source: Modbus Application Protocol Specification V1.1b3: 6.3 (03), 6.4 (04), 7 (exceptions).
 
+use adapter_core::integer::convert_bounded;
+
 /// At most so many registers in one answer (6.3).
 pub const REGISTERS_MAX: u16 = 125;
 
@@ -126,7 +128,7 @@ pub fn parse_request(request: &[u8]) -> Result<RegisterBlock, u8> {
 /// The answer that carries these registers (at most 125).
 #[must_use]
 pub fn encode_answer(table: RegisterTable, registers: &[u16]) -> Vec<u8> {
-    let bytes = u8::try_from(2 * registers.len()).unwrap_or(u8::MAX);
+    let bytes = convert_bounded(2 * registers.len(), u8::MAX);
     let mut answer = vec![table.function_code(), bytes];
     answer.extend(registers.iter().flat_map(|register| register.to_be_bytes()));
     answer

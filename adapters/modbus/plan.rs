@@ -7,6 +7,7 @@
 use super::pdu::{RegisterBlock, RegisterTable};
 use super::register::MeterRegister;
 use adapter_core::address::SerialTarget;
+use adapter_core::integer::convert_bounded;
 use adapter_core::serial;
 use std::time::Duration;
 
@@ -107,7 +108,8 @@ fn join_spans(spans: &[NumberSpan], most: u16, gap: u16) -> Vec<RegisterBlock> {
             None => joined.push(*span),
         }
     }
-    let word = |number: u32| u16::try_from(number).unwrap_or(u16::MAX);
+    // An address has 16 bits, and a block is no longer than `most` or one number.
+    let word = |number: u32| convert_bounded(number, u16::MAX);
     let block = |span: NumberSpan| RegisterBlock {
         table: span.table,
         start: word(span.from),

@@ -8,6 +8,7 @@ use super::line::{ModbusError, ModbusLine, ModbusResponse};
 use super::rtu;
 use adapter_core::address::Endpoint;
 use adapter_core::clock::Clock;
+use adapter_core::integer::convert_bounded;
 use adapter_core::reading::Stamp;
 use adapter_core::stream::{self, Short};
 use std::collections::HashMap;
@@ -268,7 +269,7 @@ fn build_broken_error(error: &io::Error) -> ModbusError {
 
 /// Header and PDU as one write, so that they leave in one packet.
 pub(super) fn encode_frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let length = u16::try_from(pdu.len() + 1).unwrap_or(u16::MAX);
+    let length = convert_bounded(pdu.len() + 1, u16::MAX);
     let mut frame = Vec::with_capacity(HEADER + pdu.len());
     frame.extend(transaction.to_be_bytes());
     frame.extend([0, 0]);
