@@ -5,6 +5,7 @@ use super::model::Model;
 use super::topic::Subject;
 use crate::address::NcLinkTarget;
 use adapter_core::driver::SourceError;
+use adapter_core::integer::saturate_to_ms;
 use adapter_core::text::TextEncoding;
 use adapter_core::tls::TlsFiles;
 use mqtt::{self, MqttClient, MqttError, MqttMessage, Qos};
@@ -227,7 +228,7 @@ impl Connection {
         SourceError::Timeout {
             source_name: self.link.name.clone(),
             request: what.to_owned(),
-            deadline_ms: u64::try_from(self.link.deadline.as_millis()).unwrap_or(u64::MAX),
+            deadline_ms: saturate_to_ms(self.link.deadline),
             next: format!(
                 "The broker answers, the device {} does not: check that the machine is on, that its NC-Link adapter \
                  is connected to this broker, and its serial number.",

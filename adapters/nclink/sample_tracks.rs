@@ -3,6 +3,7 @@
 use super::decode;
 use super::sample::SampleBlock;
 use adapter_core::driver::Fact;
+use adapter_core::integer::widen_to_u64;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -121,7 +122,7 @@ impl ChannelTrack {
             }
         }
         self.messages += 1;
-        self.instants += u64::try_from(block.instants).unwrap_or(u64::MAX);
+        self.instants += widen_to_u64(block.instants);
         self.expected_ms = Some(begin_ms + block.duration_ms());
     }
 }

@@ -62,7 +62,7 @@ impl ChannelSampler {
         let begin_ms = self.begin_ms;
         let instants = self.upload_ms / self.interval_ms;
         self.begin_ms += instants * self.interval_ms;
-        let mut columns = vec![Vec::with_capacity(usize::try_from(instants).unwrap_or(0)); self.paths.len()];
+        let mut columns = vec![Vec::new(); self.paths.len()];
         for instant in 0..instants {
             let moment = machine.moment((begin_ms + instant * self.interval_ms) * 1_000_000);
             for (column, path) in columns.iter_mut().zip(&self.paths) {
