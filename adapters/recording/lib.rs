@@ -12,6 +12,7 @@ pub use read::plan::{Note, NoteKind};
 pub use read::{ReadRecording, RecordingError, RowProblem, read_csv, read_path, read_path_as};
 
 use adapter_core::clock::TimeNs;
+use adapter_core::integer::convert_bounded;
 use std::collections::HashMap;
 
 /// Columns that hold text even when their cells look like numbers.
@@ -122,7 +123,7 @@ impl Words {
         if let Some(known) = self.numbers.get(text) {
             return *known;
         }
-        let code = u32::try_from(self.words.len()).unwrap_or(u32::MAX);
+        let code = convert_bounded(self.words.len(), u32::MAX);
         self.words.push(text.to_owned());
         self.numbers.insert(text.to_owned(), code);
         code
