@@ -1,6 +1,7 @@
 //! Experiments: stretches of commanded speed, feed and auxiliaries, run once.
 
 use super::{Action, Cut, ProgramWriter, Rate};
+use adapter_core::integer::convert_bounded;
 use adapter_core::words::{execution, mode};
 
 /// Number of the program that an experiment runs under.
@@ -56,7 +57,7 @@ pub(super) fn write(out: &mut ProgramWriter<'_>, steps: &[ExperimentStep]) {
         (mode::AUTOMATIC, execution::ACTIVE, EXPERIMENT_PROGRAM, "experiment");
     let mut place = Place { stage: 1, z_mm: 160.0 };
     for (index, step) in steps.iter().enumerate() {
-        out.set_number(u16::try_from(index + 1).unwrap_or(u16::MAX));
+        out.set_number(convert_bounded(index + 1, u16::MAX));
         write_step(out, step, &mut place);
     }
 }
