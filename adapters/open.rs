@@ -10,6 +10,7 @@ use crate::recording::{RecordingError, RowProblem, read_path};
 use crate::replay::{LiveReplay, Replay};
 use crate::simulated::{Simulated, SimulatedSettings};
 use crate::temperature::Temperatures;
+use adapter_core::integer::widen_to_u64;
 use adapter_core::{OpenedDevice, UnreadableSecret};
 use thiserror::Error;
 
@@ -139,8 +140,7 @@ pub fn open_pull(address: &Address, origin_ns: TimeNs) -> Result<OpenedPull, Ope
         Target::Simulated(target) => Ok(simulated_pull(address, target, origin_ns)),
         Target::Replay(target) => {
             let (replay, refused) = read(address, target, origin_ns)?;
-            let (rows, ignored) =
-                (u64::try_from(replay.count_rows()).unwrap_or(u64::MAX), replay.ignored_columns().to_vec());
+            let (rows, ignored) = (widen_to_u64(replay.count_rows()), replay.ignored_columns().to_vec());
             let sources: Vec<Box<dyn Pull>> = vec![Box::new(replay)];
             Ok(OpenedPull { sources, actuator: None, offsets: None, simulated: None, refused, rows, ignored })
         }

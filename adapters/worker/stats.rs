@@ -3,6 +3,7 @@
 use crate::clock::{SECOND_NS, TimeNs};
 use crate::driver::{Fact, SourceError, SourceProblem};
 use crate::histogram::Histogram;
+use adapter_core::integer::saturate_to_ns;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -292,7 +293,7 @@ impl WorkerCounters {
     }
 
     pub(super) fn build_stats(&self, now_ns: TimeNs, dropped: u64) -> WorkerStats {
-        let deadline_ns = i64::try_from(self.deadline.as_nanos()).unwrap_or(i64::MAX);
+        let deadline_ns = saturate_to_ns(self.deadline);
         let stuck_ns = self.in_poll_since_ns.filter(|since_ns| now_ns - since_ns > deadline_ns);
         WorkerStats {
             state: if stuck_ns.is_some() { WorkerState::Stuck } else { self.state },
