@@ -37,7 +37,7 @@ pub struct OwnChannel {
     pub scale: f64,
     /// Added after the factor, in the unit.
     pub offset: f64,
-    /// With which group.
+    /// The group with which the channel is read.
     pub pace: ReadWith,
     /// Path from 1; `None` is the one that is written to.
     pub path: Option<u8>,
@@ -79,11 +79,11 @@ pub trait OwnRead: Sized {
 /// A channel with its item, in the words of its source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Own<T> {
-    /// The channel.
+    /// The channel as the user described it.
     pub channel: OwnChannel,
     /// Its place in the table of channels.
     pub id: ChannelId,
-    /// What is read.
+    /// The item that `read` of the channel names.
     pub item: T,
 }
 

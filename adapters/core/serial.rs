@@ -39,7 +39,6 @@ pub fn compute_silence(target: &SerialTarget) -> Duration {
     (wire_time(target, 7) / 2).max(SILENCE_MIN)
 }
 
-/// An open line.
 #[derive(Debug)]
 struct OpenPort {
     file: File,

@@ -16,7 +16,7 @@ pub enum TextEncoding {
     /// UTF-8 where it is that, else GB 18030 where it is that.
     #[default]
     Found,
-    /// This one.
+    /// This character set; UTF-8 is tried before it.
     Named(&'static Encoding),
 }
 

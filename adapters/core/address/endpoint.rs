@@ -9,7 +9,7 @@ use std::path::PathBuf;
 pub struct Endpoint {
     /// Name or number of the host, without brackets.
     pub host: String,
-    /// TCP port.
+    /// TCP port from 1 to 65535.
     pub port: u16,
 }
 

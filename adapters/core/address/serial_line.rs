@@ -6,22 +6,22 @@ use std::path::PathBuf;
 /// Parity of a serial line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parity {
-    /// No parity bit.
+    /// No parity bit: ten bits per character.
     None,
-    /// Even parity.
+    /// An even number of ones with the parity bit.
     Even,
-    /// Odd parity.
+    /// An odd number of ones with the parity bit.
     Odd,
 }
 
-/// A serial line.
+/// The device file of a serial line and how it is set up.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SerialTarget {
-    /// The device file.
+    /// The device file, such as `/dev/ttyUSB0`.
     pub port: PathBuf,
-    /// Bits per second.
+    /// Bits per second, 300 to 4000000; 9600 where the address says nothing.
     pub baud: u32,
-    /// Parity bit.
+    /// Parity bit; none where the address says nothing.
     pub parity: Parity,
 }
 

@@ -25,7 +25,7 @@ pub fn describe_load_error(error: &libloading::Error, file: &Path) -> String {
 
 /// A Rust value as the library takes it.
 pub trait Argument<Raw> {
-    /// The C value.
+    /// The value as the C function takes it.
     fn raw(self) -> Raw;
 }
 
@@ -54,7 +54,7 @@ arguments! {
 pub trait Returned {
     /// As it is looked at.
     type Code;
-    /// The return code.
+    /// The return code of the C function.
     fn code(self) -> Self::Code;
 }
 

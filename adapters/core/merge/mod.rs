@@ -45,7 +45,7 @@ pub struct SourcePlan {
     pub name: String,
     /// The channels it can deliver.
     pub channels: Vec<ChannelId>,
-    /// Its pace.
+    /// From one poll to the next, as the source promises it.
     pub period: Duration,
 }
 
