@@ -177,7 +177,6 @@ impl FanucActuator {
         dial.read(self.find_bytes(asked, FocasItem::Pmc(dial.to_stretch()))?).ok_or_else(none)
     }
 
-    /// An inverted byte.
     fn override_of(&self, asked: &Asked, item: FocasItem) -> Result<OverridePct, SourceError> {
         let byte = self.find_bytes(asked, item)?.first().and_then(|byte| u8::try_from(*byte).ok());
         byte.map(feed_override::decode).ok_or_else(|| self.build_decode_error("an override signal is a byte"))

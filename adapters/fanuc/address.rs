@@ -24,14 +24,14 @@ pub enum WriteMethod {
     Mailbox {
         /// Area of the mailbox: R, D or E.
         area: Area,
-        /// Its first byte.
+        /// Address of its first byte.
         at: u16,
     },
     /// Through a byte from which the ladder makes the second override; the operator's dial stays sovereign.
     SecondOverride {
         /// Area of the byte.
         area: Area,
-        /// Which.
+        /// Address of the byte.
         at: u16,
     },
     /// Through a custom macro variable in percent, for programs that say `F[#501*...]` or a ladder that reads it.
@@ -46,7 +46,7 @@ pub enum WriteMethod {
 /// How FOCAS2 is spoken.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FanucBackend {
-    /// By ourselves.
+    /// In Rust over TCP, without the vendor's library.
     Native,
     /// Through this vendor library, in a child process.
     Vendor(PathBuf),
@@ -55,11 +55,11 @@ pub enum FanucBackend {
 /// A controller that an address names.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FanucTarget {
-    /// Where.
+    /// Host and port of the controller; 8193 where none is named.
     pub endpoint: Endpoint,
     /// Path (channel) of the controller, from 1.
     pub path: u8,
-    /// How.
+    /// How it is spoken to: natively, or through the vendor's library.
     pub backend: FanucBackend,
     /// Pace, limits and the way of writing.
     pub options: FanucOptions,

@@ -16,7 +16,7 @@ use adapter_core::integer::saturate_to_ms;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Makes a connection.
+/// Opens a connection; called again after every one that broke.
 pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Focas>, FocasError> + Send>;
 
 /// A controller that refuses connections this long after it was lost is starting or off; afterwards something is wrong
@@ -35,11 +35,11 @@ const NEVER_OPENED: &str = "Something listens there and opens no session: is it 
 /// How a line has been doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LineCounts {
-    /// Connections opened.
+    /// Connections that were opened, those that broke later included.
     pub connections: u64,
     /// Connections that could not be opened.
     pub refused: u64,
-    /// Connections that broke.
+    /// Connections that broke after they were opened.
     pub broken: u64,
 }
 
@@ -76,7 +76,7 @@ pub struct Asked {
     pub facts: Arc<Facts>,
     /// The path that is meant when none is named.
     pub path: u8,
-    /// What was asked.
+    /// The questions, in the order of the results.
     pub questions: Vec<Question>,
     /// One result per question.
     pub results: Vec<FocasItemResult>,

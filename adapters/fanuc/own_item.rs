@@ -17,10 +17,10 @@ use adapter_core::reading::{Absence, Value};
 use adapter_core::text::TextEncoding;
 use std::sync::Arc;
 
-/// What is read.
+/// What a channel of the user's reads from the control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OwnItem {
-    /// The item.
+    /// The item that the control is asked for.
     pub item: FocasItem,
     /// A single bit of a byte of PMC memory.
     pub bit: Option<u8>,

@@ -9,13 +9,13 @@ pub use super::table::function;
 
 /// Whose unit is asked for, on newer controls; older ones know the feed only, as 0.
 pub const UNIT_OF_FEED: i32 = 3;
-/// See [`UNIT_OF_FEED`].
+/// The unit of the spindle's speed, asked for as [`UNIT_OF_FEED`] is.
 pub const UNIT_OF_SPINDLE: i32 = 4;
 
 /// Units of positions: in pairs, work and machine coordinates, with this number; newer controls are asked with
 /// [`UNIT_OF_WORK`] for those of the work coordinates.
 pub const UNIT_OF_POSITIONS: i32 = 2;
-/// See [`UNIT_OF_POSITIONS`].
+/// The units of the work coordinates, asked for as [`UNIT_OF_POSITIONS`] is.
 pub const UNIT_OF_WORK: i32 = 1;
 
 /// Longest text of an alarm that is asked for.

@@ -18,7 +18,6 @@ use adapter_core::text::TextEncoding;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Which group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum PolledGroup {
     Fast,

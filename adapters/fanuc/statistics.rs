@@ -14,21 +14,21 @@ const BOUNDS_US: [u64; 20] = [
 pub struct Statistics {
     /// Frames there and back.
     pub frames: u64,
-    /// Questions in them.
+    /// Questions that these frames carried.
     pub blocks: u64,
-    /// Bytes sent.
+    /// Bytes sent in all of them.
     pub sent_bytes: u64,
-    /// Bytes received.
+    /// Bytes received in all of them.
     pub received_bytes: u64,
     /// Time spent waiting for answers.
     pub waited: Duration,
-    /// Longest round trip.
+    /// The longest round trip so far.
     pub longest: Duration,
     buckets: [u64; 21],
 }
 
 impl Statistics {
-    /// Counts one frame.
+    /// Counts a request with so many questions and bytes, and its answer, which took `took`.
     pub fn count_frame(&mut self, blocks: usize, sent: usize, received: usize, took: Duration) {
         self.frames += 1;
         self.blocks += widen_to_u64(blocks);

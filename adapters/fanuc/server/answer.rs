@@ -19,7 +19,6 @@ pub(super) const FUNC: i16 = 1;
 pub(super) const LENGTH: i16 = 2;
 pub(super) const NUMBER: i16 = 3;
 pub(super) const ATTRIB: i16 = 4;
-/// No such path.
 const PATH: i16 = 11;
 
 /// Answers every question of a frame, in order.

@@ -6,7 +6,6 @@ use crate::item::Area;
 use crate::request::function as f;
 use crate::wire::{Cursor, Number, Request};
 
-/// Not now.
 const REJECT: i16 = 13;
 
 pub(super) fn apply_write(controller: &mut Controller, request: &Request) -> Result<(), i16> {

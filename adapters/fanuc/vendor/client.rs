@@ -21,11 +21,11 @@ const GRACE: Duration = Duration::from_millis(1500);
 /// How the library is used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VendorSettings {
-    /// The library's file.
+    /// The file of the vendor's library.
     pub vendor_library: PathBuf,
     /// Where the controller is.
     pub endpoint: Endpoint,
-    /// Path from 1.
+    /// Path of the control, counted from 1.
     pub path: u8,
     /// The library's patience with the controller; whole seconds, at least one.
     pub timeout: Duration,

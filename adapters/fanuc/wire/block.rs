@@ -11,7 +11,7 @@ const REPLY_LEN: usize = 16;
 /// Which half of the controller is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum CncOrPmc {
-    /// The numerical control.
+    /// The numerical control, number 1 on the wire.
     Cnc,
     /// The programmable machine controller, where the ladder runs.
     Pmc,
@@ -34,14 +34,14 @@ impl CncOrPmc {
     }
 }
 
-/// One question.
+/// A question as a block of a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Request {
-    /// Who is asked.
+    /// The half of the controller that is asked.
     pub device: CncOrPmc,
     /// Path of the control from 1; PMC blocks always carry 1.
     pub path: u16,
-    /// What is asked.
+    /// Number of the function that is asked for.
     pub function: u16,
     /// Its arguments; the last one counts the bytes that are written.
     pub arguments: [i32; 5],
@@ -152,11 +152,11 @@ fn read_block_count(cursor: &mut Cursor<'_>) -> Result<usize, WireError> {
 /// One answer, within the body that carried it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reply<'a> {
-    /// Who answers.
+    /// The half of the controller that answers.
     pub device: CncOrPmc,
-    /// Path, as asked.
+    /// Path of the control, the same as in the question.
     pub path: u16,
-    /// Function, as asked.
+    /// Number of the function, the same as in the question.
     pub function: u16,
     /// Return code; 0 when the data are good.
     pub code: i16,
@@ -211,9 +211,9 @@ pub fn parse_replies(body: &[u8]) -> Result<Vec<Reply<'_>>, WireError> {
 /// An answer to be sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReplyBlock {
-    /// Return code.
+    /// Return code; 0 means that the data are good.
     pub code: i16,
-    /// More about it.
+    /// The detail beside the return code.
     pub detail: i16,
     /// What was asked for; empty unless the code is 0.
     pub data: Vec<u8>,
