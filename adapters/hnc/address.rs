@@ -10,9 +10,9 @@ use std::path::PathBuf;
 /// A Huazhong controller through its vendor's library.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HncNetTarget {
-    /// Where.
+    /// Host and port of the controller; 10001 where none is named.
     pub endpoint: Endpoint,
-    /// The vendor's library.
+    /// The file of the vendor's library.
     pub vendor_library: PathBuf,
     /// Number of this computer in the controller's network; found out when not given.
     pub local_host: Option<String>,

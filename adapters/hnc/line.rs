@@ -26,7 +26,7 @@ pub(super) const DEAD_LINK: Duration = Duration::from_millis(2500);
 pub struct HncSettings {
     /// The address, as in the configuration.
     pub name: String,
-    /// The library's file.
+    /// The file of the vendor's library.
     pub vendor_library: PathBuf,
     /// Where the controller is.
     pub endpoint: Endpoint,
@@ -79,7 +79,7 @@ impl HncLine {
         Self { connection: Arc::new(Mutex::new(inner)), name }
     }
 
-    /// The address.
+    /// The address, as in the configuration.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name

@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// A value of the library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OwnValue {
-    /// What is asked.
+    /// The item that the library is asked for.
     pub item: HncItem,
     /// A single bit of a register.
     pub bit: Option<u8>,

@@ -23,18 +23,18 @@ const ACT_TRQ: i32 = 6;
 pub enum SampledItem {
     /// A property of a logical axis (types below 100).
     OfAxis {
-        /// `SAMPL` type.
+        /// `SAMPL` type of the header, below 100.
         kind: i32,
-        /// Logical axis.
+        /// Number of the logical axis.
         axis: i32,
     },
     /// A register or system value (types from 101).
     OfRegister {
-        /// `SAMPL` type.
+        /// `SAMPL` type of the header, from 101.
         kind: i32,
-        /// Word.
+        /// The word within the registers of this type.
         offset: i32,
-        /// Bytes.
+        /// Bytes of the value from that word on.
         length: i32,
     },
 }
@@ -42,14 +42,14 @@ pub enum SampledItem {
 /// What the library gave: per sampling channel the values since the last time.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Columns {
-    /// The counter first.
+    /// One column per sampling channel, the counter first.
     pub values: Vec<Vec<i32>>,
 }
 
 /// How the sampling has been doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sampled {
-    /// Milliseconds taken.
+    /// Milliseconds that were taken, one row each.
     pub instants: u64,
     /// Milliseconds that the counter shows and that never came.
     pub missing: u64,
