@@ -9,13 +9,13 @@ use std::time::Duration;
 /// A Modbus meter on its line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeterTarget {
-    /// Unit identifier.
+    /// Unit identifier of the meter, at most 247.
     pub unit: u8,
     /// Name of the register profile.
     pub profile: String,
     /// Directory of the user's own profiles.
     pub profiles: Option<PathBuf>,
-    /// What it measures.
+    /// The supply that the meter sits in.
     pub circuit: Circuit,
     /// Ratio of the current transformers, where the meter does not count it in.
     pub ct: f64,

@@ -9,7 +9,6 @@ use adapter_core::reading::Stamp;
 use std::io::{self, ErrorKind};
 use std::time::Duration;
 
-/// What came back.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ModbusResponse {
     /// Without address and check.
@@ -21,16 +20,16 @@ pub(crate) struct ModbusResponse {
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ModbusError {
-    /// The line itself.
+    /// The line cannot be opened, or it broke.
     Line {
-        /// What happened.
+        /// What the system says, in words.
         what: String,
-        /// What to do.
+        /// What to do next, a sentence.
         next: String,
     },
     /// Nothing came in time.
     Timeout {
-        /// What to do.
+        /// What to do next, a sentence.
         next: String,
     },
     /// The device said no, with this exception code.

@@ -71,7 +71,7 @@ impl WordOrder {
 }
 
 impl Format {
-    /// How many registers.
+    /// Registers that a number takes, 1 to 4.
     #[must_use]
     pub fn register_count(self) -> u16 {
         match self {

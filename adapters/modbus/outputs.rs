@@ -26,11 +26,9 @@ enum Believed {
     Always,
     /// Its value, while all of the answer is in doubt.
     WithAll,
-    /// As a power.
     AsPower,
     /// As the voltage of the supply.
     AsVoltage,
-    /// As its frequency.
     AsFrequency,
 }
 

@@ -23,7 +23,7 @@ const TEXT_MAX: u16 = 64;
 /// What is in the registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InRegisters {
-    /// A number.
+    /// A number with its format and the order of its bytes.
     Number(Format, WordOrder),
     /// A text of so many registers.
     Text(u16),
@@ -32,11 +32,11 @@ pub enum InRegisters {
 /// Registers of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OwnRegister {
-    /// In which table.
+    /// The table in which they stand.
     pub table: RegisterTable,
     /// Protocol address of the first one.
     pub address: u16,
-    /// What they hold.
+    /// How their bits are read.
     pub content: InRegisters,
 }
 

@@ -10,9 +10,9 @@ pub const REGISTERS_MAX: u16 = 125;
 /// Which table of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RegisterTable {
-    /// Function 3.
+    /// Holding registers, read by function 3.
     Holding,
-    /// Function 4.
+    /// Input registers, read by function 4.
     Input,
 }
 
@@ -30,7 +30,7 @@ impl RegisterTable {
 /// A run of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegisterBlock {
-    /// Of which table.
+    /// The table in which they stand.
     pub table: RegisterTable,
     /// Protocol address of the first one, counted from 0.
     pub start: u16,

@@ -174,7 +174,6 @@ struct TcpRequest<'a> {
 enum Attempt {
     /// The other side had closed before a byte came.
     ClosedIdle(ModbusError),
-    /// Anything else.
     Failed(ModbusError),
 }
 
