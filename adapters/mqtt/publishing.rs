@@ -9,9 +9,9 @@ use std::collections::VecDeque;
 /// A message to send.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outgoing {
-    /// Its topic.
+    /// The topic under which it is published.
     pub topic: String,
-    /// What it says.
+    /// The bytes that are published.
     pub payload: Vec<u8>,
     /// Does the broker keep it for later subscribers?
     pub retain: bool,
