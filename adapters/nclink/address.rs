@@ -13,7 +13,7 @@ use adapter_core::tls::TlsFiles;
 /// A Huazhong controller behind a broker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NcLinkTarget {
-    /// The broker.
+    /// Host and port of the broker.
     pub endpoint: Endpoint,
     /// Serial number of the device.
     pub serial: String,

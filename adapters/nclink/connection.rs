@@ -25,7 +25,7 @@ pub struct Link {
     pub name: String,
     /// Host of the broker.
     pub host: String,
-    /// Its port.
+    /// TCP port of the broker.
     pub port: u16,
     /// Serial number of the device.
     pub serial: String,
@@ -59,13 +59,13 @@ impl Link {
 /// A message that nobody asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unasked {
-    /// Sample or event.
+    /// [`Subject::Sample`] or [`Subject::Event`].
     pub subject: Subject,
     /// What stood behind the serial number in its topic.
     pub tail: String,
     /// When it had arrived.
     pub arrived: Instant,
-    /// What it says.
+    /// The message as JSON, out of the character set of the link.
     pub message: Value,
 }
 

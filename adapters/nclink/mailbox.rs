@@ -24,7 +24,7 @@ use std::str::FromStr;
 pub struct ControllerRegister {
     /// Its kind: X, Y, F, G, R, W, D, B or P.
     pub kind: char,
-    /// Its number.
+    /// Its number within the kind, below 60000 where it is read from a text.
     pub index: u32,
 }
 
@@ -53,7 +53,7 @@ impl FromStr for ControllerRegister {
 pub enum MailboxRequest {
     /// This override beside the dial.
     Override(OverridePct),
-    /// The dial alone.
+    /// The override of the dial alone counts.
     Release,
 }
 
@@ -69,7 +69,7 @@ impl MailboxRequest {
     }
 }
 
-/// The four registers.
+/// The four registers through which the gateway asks the ladder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mailbox {
     first: ControllerRegister,
@@ -77,16 +77,16 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// Wanted override.
+    /// Register +0: the wanted override, %.
     pub const OVERRIDE: u32 = 0;
-    /// Does it count?
+    /// Register +1: it is 1 while the override counts.
     pub const ENABLE: u32 = 1;
     /// Feed hold or stop.
     pub const REQUEST: u32 = 2;
-    /// Sign of life.
+    /// Register +3: the sign of life.
     pub const HEARTBEAT: u32 = 3;
 
-    /// Registers in all.
+    /// Registers of the mailbox in all.
     pub const LENGTH: u32 = 4;
 
     /// The mailbox that begins at this register.

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 pub struct Params {
     /// Elements of a list, `"7"` or `"3-5"`.
     pub indexes: Vec<String>,
-    /// Write this.
+    /// The value to write; `None` reads.
     pub value: Option<Value>,
     /// To this element of a list.
     pub index: Option<u32>,
@@ -22,7 +22,7 @@ pub struct Params {
 pub struct RequestedItem {
     /// Node number or path.
     pub id: String,
-    /// What of it.
+    /// Which elements are meant, and what is written.
     pub params: Params,
 }
 

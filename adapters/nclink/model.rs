@@ -15,7 +15,7 @@ const DEPTH_MAX: usize = 16;
 /// A data item or configuration item.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelItem {
-    /// Node number.
+    /// Node number by which the device knows it.
     pub id: String,
     /// See the [module](self); in capitals, without a leading `/`.
     pub path: String,

@@ -20,7 +20,7 @@ pub struct OwnPath {
     pub name: String,
     /// Element of a list.
     pub index: Option<u32>,
-    /// Bit of it.
+    /// Bit of the element, 0 to 31; `None` is the whole of it.
     pub bit: Option<u8>,
 }
 

@@ -12,10 +12,10 @@ const CHANNELS_MAX: usize = 64;
 /// So many last events are kept.
 const EVENTS_KEPT: usize = 32;
 
-/// One sample channel.
+/// What has come of one sample channel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ChannelTrack {
-    /// Messages.
+    /// Messages of the channel so far.
     pub messages: u64,
     /// Instants: rows of the messages.
     pub instants: u64,
@@ -49,7 +49,7 @@ impl SampleTracks {
         &self.events
     }
 
-    /// Events so far.
+    /// Events that have come so far, forgotten ones included.
     #[must_use]
     pub fn event_count(&self) -> u64 {
         self.event_count

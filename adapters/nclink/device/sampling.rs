@@ -8,7 +8,6 @@ use simulated::Simulated;
 /// A device that is further behind than this goes on from now.
 const BEHIND_NS: i64 = 2_000_000_000;
 
-/// One sample channel.
 pub(super) struct ChannelSampler {
     name: String,
     paths: Vec<String>,
