@@ -61,7 +61,7 @@ impl Numbers {
         (*self.present.get(row)?).then(|| self.values[row])
     }
 
-    /// Row by row.
+    /// The cells row by row; `None` is absent.
     pub fn iter(&self) -> impl Iterator<Item = Option<f64>> + '_ {
         self.values.iter().zip(&self.present).map(|(value, present)| present.then_some(*value))
     }
@@ -77,7 +77,7 @@ impl Numbers {
         self.present.iter().filter(|present| **present).count()
     }
 
-    /// How many rows.
+    /// How many rows, absent cells included.
     #[must_use]
     pub fn len(&self) -> usize {
         self.values.len()
@@ -154,7 +154,7 @@ impl Words {
         &self.words
     }
 
-    /// How many rows.
+    /// How many rows, absent cells included.
     #[must_use]
     pub fn len(&self) -> usize {
         self.codes.len()
@@ -196,7 +196,7 @@ impl Cells {
     }
 }
 
-/// A named column.
+/// A column of a recording with its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     /// Name, ending in its unit for quantities.
@@ -214,7 +214,7 @@ pub struct Run {
     pub rows: std::ops::Range<usize>,
 }
 
-/// Samples over time.
+/// A table of samples over time, all columns of one length.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
     /// Where it came from, for messages.
@@ -250,7 +250,7 @@ impl Recording {
         }
     }
 
-    /// How many rows.
+    /// How many rows every column has.
     #[must_use]
     pub fn count_rows(&self) -> usize {
         self.time_s.len()
