@@ -3,7 +3,7 @@
 use adapter_core::address::{Keys, Speed, parse_speed};
 use adapter_core::driver::LadderRule;
 
-/// Which built-in machine.
+/// The machines that are built in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimulatedMachine {
     /// A two-axis lathe with a turret.
@@ -17,9 +17,9 @@ pub enum SimulatedMachine {
 pub enum SimulatedDevice {
     /// The controller and the meter.
     Both,
-    /// Only the controller.
+    /// The controller without the meter.
     Controller,
-    /// Only the meter.
+    /// The meter without the controller.
     Meter,
 }
 
@@ -34,10 +34,10 @@ pub enum SimulatedDay {
     Short,
 }
 
-/// The built-in machine.
+/// The built-in machine as an address describes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimulatedTarget {
-    /// Lathe or mill.
+    /// The machine that the address names.
     pub machine: SimulatedMachine,
     /// Which of its devices are sources.
     pub device: SimulatedDevice,

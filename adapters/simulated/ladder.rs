@@ -50,7 +50,7 @@ impl Default for LadderSettings {
 pub struct LadderCounts {
     /// Overrides, signs of life among them.
     pub overrides: u64,
-    /// Releases.
+    /// Releases of the override by the gateway.
     pub releases: u64,
     /// Requests for a feed hold.
     pub feed_holds: u64,
@@ -88,13 +88,11 @@ struct Mail {
     alive_ns: TimeNs,
 }
 
-/// A latched request.
 #[derive(Debug, Clone, Copy)]
 struct Latch {
     since_ns: TimeNs,
 }
 
-/// See the [module](self).
 #[derive(Debug)]
 pub(super) struct Ladder {
     settings: LadderSettings,
@@ -136,7 +134,6 @@ impl Ladder {
         self.inputs.push_back((due_ns.max(earliest_ns), letter));
     }
 
-    /// One scan.
     pub(super) fn run_scan(&mut self, at_ns: TimeNs) {
         while let Some((due_ns, letter)) = self.inputs.pop_front_if(|(due_ns, _)| *due_ns <= at_ns) {
             self.apply_letter(due_ns, letter);

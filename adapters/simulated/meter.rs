@@ -37,9 +37,9 @@ pub struct MeterValues {
     pub spindle_current_a: f64,
     /// Supply, V phase to phase.
     pub supply_voltage_v: f64,
-    /// Spindle bearing, °C.
+    /// Temperature of the spindle bearing, °C.
     pub bearing_temperature_c: f64,
-    /// Air, °C.
+    /// Temperature of the air, °C.
     pub ambient_temperature_c: f64,
 }
 
