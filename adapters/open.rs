@@ -26,7 +26,7 @@ pub enum OpenError {
     /// What the address says does not go together, or names something that is not there.
     #[error("{address}: {what}")]
     Refused {
-        /// The address.
+        /// The address, as in the configuration.
         address: String,
         /// Why, and what to do.
         what: String,
@@ -34,7 +34,7 @@ pub enum OpenError {
     /// The address needs another way of running.
     #[error("{address}: {what}")]
     Unsuitable {
-        /// The address.
+        /// The address, as in the configuration.
         address: String,
         /// Why, and what to do.
         what: &'static str,
@@ -83,7 +83,7 @@ pub struct OpenedPull {
 /// Rows of a recording that could not be used.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Refused {
-    /// How many.
+    /// How many rows were refused.
     pub rows: u64,
     /// At most a hundred of them, with line, column and reason.
     pub problems: Vec<RowProblem>,

@@ -159,7 +159,7 @@ fn text_of(file: &Path, most: u64) -> io::Result<String> {
 }
 
 impl Sensor {
-    /// °C.
+    /// The temperature of the sensor, °C.
     fn read(&mut self, sys: &Path) -> Result<f64, Absence> {
         match self {
             Self::Hwmon { chip, input, found } => {

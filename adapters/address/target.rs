@@ -13,29 +13,29 @@ use nclink::address::{NcLinkTarget, parse_nclink};
 use simulated::address::{SimulatedTarget, parse_simulated};
 use std::path::PathBuf;
 
-/// A recording.
+/// A recording that is replayed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReplayTarget {
     /// The file, `.csv` or `.csv.gz`.
     pub file: PathBuf,
-    /// Against the clock.
+    /// How fast it runs against the clock.
     pub speed: Speed,
 }
 
 /// What an address means.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Target {
-    /// The built-in machine.
+    /// The built-in machine, scheme `simulated`.
     Simulated(SimulatedTarget),
-    /// A recording.
+    /// A recording, scheme `replay`.
     Replay(ReplayTarget),
-    /// A FANUC controller.
+    /// A FANUC controller, scheme `fanuc`.
     Fanuc {
-        /// Where.
+        /// Host and port of the controller.
         at: Endpoint,
         /// Path (channel) of the controller, from 1.
         path: u8,
-        /// How.
+        /// Natively, or through the vendor's library.
         backend: FanucBackend,
         /// Pace, limits and the way of writing.
         options: Box<FanucOptions>,
@@ -46,21 +46,21 @@ pub enum Target {
     HncNet(HncNetTarget),
     /// A Modbus device on the network.
     ModbusTcp {
-        /// Where.
+        /// Host and port of the meter.
         at: Endpoint,
         /// Which meter, and what it measures.
         meter: MeterTarget,
     },
     /// A Modbus device on a serial line.
     ModbusRtu {
-        /// Where.
+        /// The serial line with its speed and parity.
         line: SerialTarget,
         /// Which meter, and what it measures.
         meter: MeterTarget,
     },
     /// An EDA9033A meter in its native protocol.
     Eda9033a {
-        /// Where.
+        /// The serial line with its speed and parity.
         line: SerialTarget,
         /// Which meter, and what it measures.
         meter: EdaTarget,
@@ -74,7 +74,7 @@ pub enum Target {
     },
     /// A framed stream of samples.
     Waveform {
-        /// Where.
+        /// Host and port of the sampler.
         at: Endpoint,
         /// Raw samples that stay.
         keep: Option<WaveformKeep>,

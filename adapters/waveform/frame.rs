@@ -19,7 +19,7 @@ pub const AMPLITUDE: &str = "A rms";
 /// What a stream carries.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WaveformHeader {
-    /// `waveform/1`.
+    /// The version of the stream: `waveform/1`.
     pub format: String,
     /// Samples per second and channel.
     pub rate_hz: f64,

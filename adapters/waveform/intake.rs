@@ -21,15 +21,15 @@ pub struct Block {
 /// What a stream has gone through since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// Blocks.
+    /// Blocks of samples that came.
     pub blocks: u64,
-    /// Instants.
+    /// Instants that were sampled; all channels count once.
     pub samples: u64,
     /// Times at which blocks were missing.
     pub gaps: u64,
     /// Instants that were missing.
     pub missing: u64,
-    /// Clipped samples.
+    /// Samples at or beyond full scale, of all channels.
     pub clipped: u64,
     /// Connections, the first one included.
     pub connections: u64,

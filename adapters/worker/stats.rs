@@ -38,7 +38,7 @@ pub enum WorkerState {
     Stuck,
     /// The recording is over.
     Ended,
-    /// Stopped on request.
+    /// The worker was asked to stop and has.
     Stopped,
 }
 
@@ -72,7 +72,7 @@ pub struct Spread {
 pub struct WorkerStats {
     /// What it is doing now.
     pub state: WorkerState,
-    /// Since when.
+    /// Since when it is in this state.
     pub state_since_ns: TimeNs,
     /// The pace it promised.
     pub period: Duration,
@@ -88,7 +88,7 @@ pub struct WorkerStats {
     pub round_trips: Histogram,
     /// Since the last poll that succeeded, s; `None` before the first.
     pub lag_s: Option<f64>,
-    /// Polls that ended.
+    /// Polls that ended, failed ones included.
     pub polls: u64,
     /// Polls that failed; a machine that is off does not count.
     pub failures: u64,
