@@ -64,11 +64,14 @@ impl fmt::Display for OwnChannelError {
 
 /// A kind of item that a source can be asked for by the user.
 pub trait OwnRead: Sized {
+    /// What is wrong with a text, and an example.
+    type Error: fmt::Display;
+
     /// Reads the text of a configuration.
     ///
     /// # Errors
-    /// What is wrong with it, and an example.
-    fn read(text: &str) -> Result<Self, String>;
+    /// The text is nothing that can be read.
+    fn read(text: &str) -> Result<Self, Self::Error>;
 
     /// Is it a text? `None`: what comes may be either, and the unit of the channel says what it is taken for.
     fn is_text(&self) -> Option<bool> {
@@ -98,7 +101,7 @@ impl<T: OwnRead> Own<T> {
 
     fn new(channel: OwnChannel, delivered: &[ChannelId]) -> Result<Self, OwnChannelError> {
         let refused = |key, what| OwnChannelError { channel: channel.new.name.clone(), key, what };
-        let item = T::read(&channel.read).map_err(|what| refused("read", what))?;
+        let item = T::read(&channel.read).map_err(|what| refused("read", what.to_string()))?;
         let as_text = channel.new.kind == Kind::Text;
         if item.is_text().is_some_and(|is_text| is_text != as_text) {
             let what =

@@ -17,6 +17,7 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
+use thiserror::Error;
 
 /// Modbus over Serial Line 1.02, 2.5.1.1: above 19 200 Bd the silence of 3.5 characters is fixed.
 const SILENCE_MIN: Duration = Duration::from_micros(1750);
@@ -83,6 +84,14 @@ pub struct Bus {
 /// A line that several sources share.
 pub type SharedBus = Arc<Mutex<Bus>>;
 
+/// Two addresses name one serial line and differ in its speed or parity.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("two addresses use {} with different baud or parity; one line has one of each", .port.display())]
+pub struct LineConflict {
+    /// The device file that both name.
+    pub port: PathBuf,
+}
+
 static LINES: Mutex<Option<HashMap<PathBuf, Weak<Mutex<Bus>>>>> = Mutex::new(None);
 
 fn lock_mutex<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -94,7 +103,7 @@ impl Bus {
     ///
     /// # Errors
     /// When another address uses the same line at another speed or parity.
-    pub fn from_target(target: &SerialTarget) -> Result<SharedBus, String> {
+    pub fn from_target(target: &SerialTarget) -> Result<SharedBus, LineConflict> {
         let mut lines = lock_mutex(&LINES);
         let lines = lines.get_or_insert_with(HashMap::new);
         lines.retain(|_, line| line.strong_count() > 0);
@@ -105,8 +114,7 @@ impl Bus {
             return Ok(shared);
         };
         if lock_mutex(&shared).target != *target {
-            let port = target.port.display();
-            return Err(format!("two addresses use {port} with different baud or parity; one line has one of each"));
+            return Err(LineConflict { port: target.port.clone() });
         }
         Ok(shared)
     }

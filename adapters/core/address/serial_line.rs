@@ -1,6 +1,7 @@
 //! A serial line as an address says it.
 
 use super::keys::Keys;
+use super::problem::AddressProblem;
 use std::path::PathBuf;
 
 /// Parity of a serial line.
@@ -28,13 +29,13 @@ pub struct SerialTarget {
 /// The device file of `//DEVICE`, with the keys `baud` and `parity`.
 ///
 /// # Errors
-/// No device file is named.
-pub fn parse_serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
+/// [`AddressProblem::NoSerialPort`].
+pub fn parse_serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, AddressProblem> {
     let baud = keys.take_number("baud", 9600, 300, 4_000_000);
     let parity = keys.take_choice("parity", &[("none", Parity::None), ("even", Parity::Even), ("odd", Parity::Odd)]);
     let port = body.strip_prefix("//").unwrap_or(body);
     if port.is_empty() {
-        return Err("no serial port; write it like :///dev/ttyUSB0".to_owned());
+        return Err(AddressProblem::NoSerialPort);
     }
     Ok(SerialTarget { port: PathBuf::from(port), baud, parity })
 }
