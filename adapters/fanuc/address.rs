@@ -5,7 +5,7 @@ use crate::extra::AxisName;
 use crate::feed_override;
 use crate::item::{Area, Position};
 use crate::own_item::OwnItem;
-use adapter_core::address::{Endpoint, Keys, parse_encoding, parse_endpoint, parse_library};
+use adapter_core::address::{AddressProblem, Endpoint, Keys, parse_encoding, parse_endpoint, parse_library};
 use adapter_core::channel::PATHS;
 use adapter_core::own::Own;
 use adapter_core::text::TextEncoding;
@@ -150,7 +150,7 @@ impl FanucOptions {
 ///
 /// # Errors
 /// No host is named, or no library where one is needed.
-pub fn parse_fanuc(body: &str, keys: &mut Keys) -> Result<FanucTarget, String> {
+pub fn parse_fanuc(body: &str, keys: &mut Keys) -> Result<FanucTarget, AddressProblem> {
     let named = keys.take_optional_number("path", 1, 10);
     let vendor = keys.take_choice("backend", &[("native", false), ("vendor", true)]);
     let backend = if vendor { parse_library(keys).map(FanucBackend::Vendor) } else { Ok(FanucBackend::Native) };

@@ -23,10 +23,10 @@ use std::path::Path;
 /// The line to the parent failed.
 pub fn serve_parent() -> std::io::Result<()> {
     let mut session: Option<FocasSession> = None;
-    serve_words(|ask: Result<FocasRequest, String>, tell| match (ask, &mut session) {
+    serve_words(|ask: Result<FocasRequest, _>, tell| match (ask, &mut session) {
         (Ok(FocasRequest::Read(questions)), Some(session)) => session.read_each(&questions, tell),
         (Ok(ask), _) => tell(&answer_request(&mut session, ask)),
-        (Err(confused), _) => tell(&FocasReply::Confused(confused)),
+        (Err(confused), _) => tell(&FocasReply::Confused(confused.to_string())),
     })
 }
 
@@ -90,7 +90,7 @@ impl FocasSession {
         path: u8,
         timeout_s: i32,
     ) -> Result<(Self, Opening), Box<FocasReply>> {
-        let functions = Functions::load(library).map_err(|why| Box::new(FocasReply::Unloadable(why)))?;
+        let functions = Functions::load(library).map_err(|why| Box::new(FocasReply::Unloadable(why.to_string())))?;
         let host = CString::new(host).map_err(|error| Box::new(FocasReply::Unloadable(error.to_string())))?;
         // Level 0 never writes a file, whatever is named.
         let started = functions.cnc_startupprocess(0, c"focas.log");
