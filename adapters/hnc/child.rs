@@ -33,10 +33,10 @@ const LEVEL_ERROR: i32 = 0;
 /// The line to the parent failed.
 pub fn serve_parent() -> std::io::Result<()> {
     let mut session: Option<HncSession> = None;
-    serve_words(|ask: Result<HncRequest, String>, tell| match (ask, &session) {
+    serve_words(|ask: Result<HncRequest, _>, tell| match (ask, &session) {
         (Ok(HncRequest::Read(items)), Some(session)) => session.read_each(&items, tell),
         (Ok(ask), _) => tell(&answer_request(&mut session, ask)),
-        (Err(confused), _) => tell(&HncReply::Confused(confused)),
+        (Err(confused), _) => tell(&HncReply::Confused(confused.to_string())),
     })
 }
 
@@ -129,7 +129,7 @@ fn write_value(name: &str, value: i64, set: impl FnOnce(&mut Guarded) -> Result<
 
 impl HncSession {
     fn open(library: &Path, local: (&str, u16), at: (&str, u16), long_bytes: usize) -> Result<Self, HncReply> {
-        let functions = Functions::load(library).map_err(HncReply::Unloadable)?;
+        let functions = Functions::load(library).map_err(|why| HncReply::Unloadable(why.to_string()))?;
         let text = |text: &str| CString::new(text).map_err(|error| HncReply::Unloadable(error.to_string()));
         let (local_host, host) = (text(local.0)?, text(at.0)?);
         let without = |Missing(name)| HncReply::Unloadable(format!("the library has no {name}"));
