@@ -32,6 +32,7 @@
 
 pub mod address;
 mod crc;
+mod error;
 pub mod line;
 mod meter;
 mod number;
@@ -47,6 +48,7 @@ mod rtu;
 pub mod server;
 mod tcp;
 
+pub use error::MeterError;
 pub use meter::ModbusMeter;
 pub use number::{Format, WordOrder};
 pub use own_register::{InRegisters, OwnRegister};

@@ -1,5 +1,6 @@
 //! From the registers of a meter to channels, and to what they say about each other.
 
+use super::error::MeterError;
 use super::poll::RegisterPoll;
 use super::profile::Profile;
 use super::register::{MeterRegister, RegisterMeaning};
@@ -93,10 +94,10 @@ impl MeterChannel {
 ///
 /// # Errors
 /// Transformers were given for a meter that counts them in.
-pub(super) fn list_registers(profile: &Profile, meter: &MeterTarget) -> Result<Vec<MeterRegister>, String> {
+pub(super) fn list_registers(profile: &Profile, meter: &MeterTarget) -> Result<Vec<MeterRegister>, MeterError> {
     let given = (meter.ct - 1.0).abs() > 1e-12 || (meter.pt - 1.0).abs() > 1e-12;
     if given && !profile.secondary {
-        return Err(format!("{} counts its transformers in: leave ct and pt out", profile.meter));
+        return Err(MeterError::TransformersCounted { meter: profile.meter.clone() });
     }
     let ratio = |quantity| match quantity {
         RegisterMeaning::Power
@@ -119,7 +120,7 @@ pub(super) fn list_registers(profile: &Profile, meter: &MeterTarget) -> Result<V
 ///
 /// # Errors
 /// It gives none, or one twice.
-pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel>, String> {
+pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel>, MeterError> {
     let all = |wanted: &dyn Fn(RegisterMeaning) -> bool| -> Vec<usize> {
         let each = profile.registers.iter().enumerate();
         each.filter(|(_, register)| wanted(register.meaning)).map(|(at, _)| at).collect()
@@ -160,11 +161,11 @@ pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<M
     let mut seen = Vec::new();
     for output in &outputs {
         if seen.contains(&output.channel) {
-            return Err(format!("profile {} gives {} twice", profile.name, output.channel));
+            return Err(MeterError::ChannelTwice { profile: profile.name.clone(), channel: output.channel });
         }
         seen.push(output.channel);
     }
-    if outputs.is_empty() { Err(format!("profile {} gives no channel", profile.name)) } else { Ok(outputs) }
+    if outputs.is_empty() { Err(MeterError::NoChannel { profile: profile.name.clone() }) } else { Ok(outputs) }
 }
 
 /// What the last poll says of the supply.

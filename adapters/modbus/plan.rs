@@ -4,6 +4,7 @@
 //! exception (2 or 3), and the block is then read in parts: first without what nobody reads, then in halves, down to single
 //! numbers. What was found out is remembered as long as the source lives.
 
+use super::error::MeterError;
 use super::pdu::{RegisterBlock, RegisterTable};
 use super::register::MeterRegister;
 use adapter_core::address::SerialTarget;
@@ -39,12 +40,12 @@ impl PollBlocks {
     /// The fewest blocks of at most `most` registers that run across at most `gap` which nobody reads.
     ///
     /// # Errors
-    /// In words: a profile that needs too many requests.
+    /// [`MeterError::TooManyRequests`].
     pub fn from_registers<'a>(
         registers: impl IntoIterator<Item = &'a MeterRegister>,
         most: u16,
         gap: u16,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, MeterError> {
         let span = |register: &MeterRegister| {
             let from = u32::from(register.address);
             NumberSpan { table: register.table, from, to: from + u32::from(register.format.register_count()) }
@@ -54,7 +55,7 @@ impl PollBlocks {
         spans.dedup();
         let blocks = join_spans(&spans, most, gap);
         if blocks.len() > BLOCKS_MAX {
-            return Err(format!("{} requests per poll; at most {BLOCKS_MAX}, so make it two profiles", blocks.len()));
+            return Err(MeterError::TooManyRequests { requests: blocks.len(), most: BLOCKS_MAX });
         }
         Ok(Self { blocks, spans })
     }
