@@ -1,6 +1,6 @@
 //! One client of one device: a connection to the broker, and questions with their answers.
 
-use super::message::{self, NcLinkAnswer, RequestedItem};
+use super::message::{self, AnswersError, NcLinkAnswer, RequestedItem};
 use super::model::Model;
 use super::topic::Subject;
 use crate::address::NcLinkTarget;
@@ -109,7 +109,7 @@ impl Connection {
         if let Some(reason) = message::find_refusal(&answer) {
             return Err(self.build_refusal(what, reason));
         }
-        Model::parse(&answer).map_err(|why| self.build_decode_error(what, why))
+        Model::parse(&answer).map_err(|why| self.build_decode_error(what, why.to_string()))
     }
 
     /// Asks for values; one answer per ask, `None` where the device said nothing of it.
@@ -155,9 +155,9 @@ impl Connection {
     ) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
         let id = generate_identifier();
         let answer = self.exchange_messages(subject, &id, &message::encode_request(&id, asks), what)?;
-        message::parse_answers(&answer, asks).map_err(|why| match message::find_refusal(&answer) {
-            Some(reason) => self.build_refusal(what, reason),
-            None => self.build_decode_error(what, why),
+        message::parse_answers(&answer, asks).map_err(|why| match why {
+            AnswersError::Refused(reason) => self.build_refusal(what, reason),
+            AnswersError::NoAnswers => self.build_decode_error(what, why.to_string()),
         })
     }
 

@@ -18,6 +18,7 @@ use adapter_core::reading::Absence;
 use adapter_core::units::OverridePct;
 use std::fmt;
 use std::str::FromStr;
+use thiserror::Error;
 
 /// A register of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -34,16 +35,21 @@ impl fmt::Display for ControllerRegister {
     }
 }
 
-impl FromStr for ControllerRegister {
-    type Err = String;
+/// A text that is no kind and number of a register below 60000.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{0} is no register; write it like D100")]
+pub struct NoRegister(pub String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for ControllerRegister {
+    type Err = NoRegister;
+
+    fn from_str(text: &str) -> Result<Self, NoRegister> {
         let mut letters = text.trim().chars();
         let kind = letters.next().map(|kind| kind.to_ascii_uppercase()).filter(|kind| "XYFGRWDBP".contains(*kind));
         let index = letters.as_str().parse().ok().filter(|index| *index < 60_000);
         match (kind, index) {
             (Some(kind), Some(index)) => Ok(Self { kind, index }),
-            _ => Err(format!("{text} is no register; write it like D100")),
+            _ => Err(NoRegister(text.to_owned())),
         }
     }
 }
