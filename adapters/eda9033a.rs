@@ -16,6 +16,8 @@ use crate::electric::{Doubts, SupplyCheck, SupplyValues};
 pub use crate::modbus::line::{ModbusError, serial_fault, serial_silence};
 use crate::reading::{Reading, Stamp};
 use crate::serial::{Bus, SharedBus, wire_time};
+use adapter_core::integer::saturate_to_wait_ns;
+use adapter_core::serial::LineConflict;
 use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
@@ -47,8 +49,8 @@ impl Eda9033a {
     /// A meter on this line. `name` is the address.
     ///
     /// # Errors
-    /// In words: a line that another address uses at another speed.
-    pub fn new(name: &str, line: &SerialTarget, meter: &EdaTarget) -> Result<Self, String> {
+    /// A line that another address uses at another speed or parity.
+    pub fn new(name: &str, line: &SerialTarget, meter: &EdaTarget) -> Result<Self, LineConflict> {
         let EdaTarget { address, ct, circuit, timeout: deadline } = *meter;
         let names: &[&str] = match circuit {
             Circuit::Machine => &["total_power_w", "supply_voltage_v"],
@@ -103,7 +105,7 @@ fn exchange_frames(
     while bytes.len() < BYTES_MAX && bus.receive_bytes(until, &mut bytes).map_err(failed)? {
         if let Some(frame) = find_answer(&bytes, address) {
             let wire = wire_time(&target, REQUEST_BYTES + ANSWER_BYTES);
-            let wire_ns = i64::try_from(wire.as_nanos()).unwrap_or(0);
+            let wire_ns = saturate_to_wait_ns(wire);
             let ended_ns = clock.now_ns();
             // Where the line is real, the answer took the later part of that time.
             let spent_ns = if wire_ns < ended_ns - began_ns { wire_ns } else { 0 };

@@ -10,7 +10,9 @@ use crate::recording::{RecordingError, RowProblem, read_path};
 use crate::replay::{LiveReplay, Replay};
 use crate::simulated::{Simulated, SimulatedSettings};
 use crate::temperature::Temperatures;
+use adapter_core::integer::widen_to_u64;
 use adapter_core::{OpenedDevice, UnreadableSecret};
+use std::fmt::Display;
 use thiserror::Error;
 
 /// Why an address could not be opened.
@@ -25,7 +27,7 @@ pub enum OpenError {
     /// What the address says does not go together, or names something that is not there.
     #[error("{address}: {what}")]
     Refused {
-        /// The address.
+        /// The address, as in the configuration.
         address: String,
         /// Why, and what to do.
         what: String,
@@ -33,7 +35,7 @@ pub enum OpenError {
     /// The address needs another way of running.
     #[error("{address}: {what}")]
     Unsuitable {
-        /// The address.
+        /// The address, as in the configuration.
         address: String,
         /// Why, and what to do.
         what: &'static str,
@@ -82,7 +84,7 @@ pub struct OpenedPull {
 /// Rows of a recording that could not be used.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Refused {
-    /// How many.
+    /// How many rows were refused.
     pub rows: u64,
     /// At most a hundred of them, with line, column and reason.
     pub problems: Vec<RowProblem>,
@@ -123,8 +125,12 @@ pub fn open_address(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenErr
 }
 
 /// A device that is read and never written.
-fn read_only<S: Source + 'static>(address: &Address, source: Result<S, String>) -> Result<Opened, OpenError> {
-    let refused = |what| OpenError::Refused { address: address.text().to_owned(), what };
+fn read_only<S, E>(address: &Address, source: Result<S, E>) -> Result<Opened, OpenError>
+where
+    S: Source + 'static,
+    E: Display,
+{
+    let refused = |error: E| OpenError::Refused { address: address.text().to_owned(), what: error.to_string() };
     let sources: Vec<Box<dyn Source>> = vec![Box::new(source.map_err(refused)?)];
     Ok(Opened { sources, actuator: None, offsets: None, simulated: None, refused: Refused::default() })
 }
@@ -139,8 +145,7 @@ pub fn open_pull(address: &Address, origin_ns: TimeNs) -> Result<OpenedPull, Ope
         Target::Simulated(target) => Ok(simulated_pull(address, target, origin_ns)),
         Target::Replay(target) => {
             let (replay, refused) = read(address, target, origin_ns)?;
-            let (rows, ignored) =
-                (u64::try_from(replay.count_rows()).unwrap_or(u64::MAX), replay.ignored_columns().to_vec());
+            let (rows, ignored) = (widen_to_u64(replay.count_rows()), replay.ignored_columns().to_vec());
             let sources: Vec<Box<dyn Pull>> = vec![Box::new(replay)];
             Ok(OpenedPull { sources, actuator: None, offsets: None, simulated: None, refused, rows, ignored })
         }

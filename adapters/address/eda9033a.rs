@@ -6,11 +6,11 @@ use std::time::Duration;
 /// An EDA9033A in its native protocol.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdaTarget {
-    /// Device address.
+    /// Address of the meter on its line, 0 to 255.
     pub address: u8,
     /// Ratio of the current transformers.
     pub ct: f64,
-    /// What it measures.
+    /// The supply that the meter sits in.
     pub circuit: Circuit,
     /// How long a request may take.
     pub timeout: Duration,

@@ -71,7 +71,7 @@ impl Address {
         Ok(self)
     }
 
-    /// What it means.
+    /// What the address means, typed by its scheme.
     #[must_use]
     pub fn target(&self) -> &Target {
         &self.target

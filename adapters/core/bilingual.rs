@@ -5,9 +5,9 @@ use std::fmt;
 /// English and Chinese, side by side.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Bilingual {
-    /// English.
+    /// The sentence in English.
     pub en: String,
-    /// Chinese.
+    /// The sentence in simplified Chinese.
     pub zh: String,
 }
 

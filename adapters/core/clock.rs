@@ -1,5 +1,6 @@
 //! Time as an argument: the one interface through which drivers and the gateway see a clock.
 
+use crate::integer::saturate_to_ns;
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -49,12 +50,12 @@ impl Default for SystemClock {
 
 fn wall_ns() -> TimeNs {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+    saturate_to_ns(since)
 }
 
 impl Clock for SystemClock {
     fn now_ns(&self) -> TimeNs {
-        self.started_ns + i64::try_from(self.started.elapsed().as_nanos()).unwrap_or(i64::MAX)
+        self.started_ns + saturate_to_ns(self.started.elapsed())
     }
 
     fn sleep_until(&self, until_ns: TimeNs) {
@@ -86,7 +87,7 @@ impl ScaledClock {
 impl Clock for ScaledClock {
     fn now_ns(&self) -> TimeNs {
         let elapsed = self.started.elapsed().mul_f64(self.speed);
-        self.started_ns.saturating_add(i64::try_from(elapsed.as_nanos()).unwrap_or(i64::MAX))
+        self.started_ns.saturating_add(saturate_to_ns(elapsed))
     }
 
     fn sleep_until(&self, until_ns: TimeNs) {

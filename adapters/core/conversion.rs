@@ -7,7 +7,7 @@ use crate::channel::unit::Unit;
 /// What a number in one unit is in another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conversion {
-    /// Factor.
+    /// By which the number is multiplied first.
     pub scale: f64,
     /// Added after the factor, in the other unit.
     pub offset: f64,

@@ -19,7 +19,7 @@ pub enum SourceError {
     Line {
         /// Which source, as its address.
         source_name: String,
-        /// What happened.
+        /// What the system or the driver says of the line, in words.
         what: String,
         /// What to do next.
         next: String,
@@ -29,7 +29,7 @@ pub enum SourceError {
     Timeout {
         /// Which source, as its address.
         source_name: String,
-        /// What was asked.
+        /// What was asked for, in words that fit into the message.
         request: String,
         /// How long was waited.
         deadline_ms: u64,
@@ -41,7 +41,7 @@ pub enum SourceError {
     Refused {
         /// Which source, as its address.
         source_name: String,
-        /// What was asked.
+        /// What was asked for, in words that fit into the message.
         request: String,
         /// What it answered, in words.
         what: String,
@@ -53,7 +53,7 @@ pub enum SourceError {
     Decode {
         /// Which source, as its address.
         source_name: String,
-        /// What was asked.
+        /// What was asked for, in words that fit into the message.
         request: String,
         /// What was found instead.
         what: String,
@@ -92,7 +92,7 @@ impl SourceError {
 pub struct Fact {
     /// What it is; a number's name ends in its unit.
     pub name: String,
-    /// What is known.
+    /// The number or text that is shown beside the name.
     pub value: FactValue,
 }
 
@@ -233,7 +233,7 @@ impl LadderRule {
             Self::Replace => mailbox,
             Self::Product => {
                 let product = u32::from(dial.percent()) * u32::from(mailbox.percent()) / 100;
-                u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(dial.min(mailbox))
+                u8::try_from(product).ok().and_then(OverridePct::new).unwrap_or(OverridePct::GREATEST)
             }
         }
     }
@@ -250,7 +250,7 @@ pub enum LadderRequest {
 }
 
 impl LadderRequest {
-    /// Every request.
+    /// Every request: feed hold, then stop.
     pub const ALL: [Self; 2] = [Self::FeedHold, Self::Stop];
 
     /// The word in the history and in scripts.

@@ -27,15 +27,15 @@ const LASTS: u32 = 2;
 pub struct SupplyValues {
     /// Of all phases together.
     pub power: Option<f64>,
-    /// Of each phase.
+    /// Active power of each phase, W.
     pub phase_power: [Option<f64>; 3],
-    /// Of each phase.
+    /// Current of each phase, A.
     pub current: [Option<f64>; 3],
     /// Of each phase against neutral.
     pub voltage: [Option<f64>; 3],
-    /// Between two phases.
+    /// Between two phases, V.
     pub line_voltage: Option<f64>,
-    /// Of the supply.
+    /// Frequency of the supply, Hz.
     pub frequency: Option<f64>,
     /// Of all phases together.
     pub power_factor: Option<f64>,
@@ -46,15 +46,15 @@ pub struct SupplyValues {
 /// What is not believed of an answer.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Doubts {
-    /// All of it.
+    /// No value of the answer is believed.
     pub everything: bool,
     /// The voltage of the supply.
     pub voltage: bool,
-    /// Powers, power factor.
+    /// Powers of every kind and the power factor.
     pub power: bool,
-    /// Frequency.
+    /// The frequency of the supply.
     pub frequency: bool,
-    /// Why, in words.
+    /// Why something is not believed; empty when nothing is doubted.
     pub problems: Vec<SourceProblem>,
 }
 

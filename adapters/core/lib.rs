@@ -12,6 +12,7 @@ pub mod conversion;
 pub mod driver;
 pub mod electric;
 pub mod histogram;
+pub mod integer;
 pub mod merge;
 pub mod offset;
 pub mod opened_device;

@@ -12,16 +12,16 @@ use serde::{Deserialize, Serialize};
 /// An axis whose offset can be shifted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Axis {
-    /// X.
+    /// The linear axis X of the machine.
     X,
-    /// Y.
+    /// The linear axis Y of the machine.
     Y,
-    /// Z.
+    /// The linear axis Z of the machine.
     Z,
 }
 
 impl Axis {
-    /// Every axis.
+    /// X, Y and Z, in this order.
     pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
 
     /// The letter, in lower case.

@@ -37,7 +37,7 @@ pub struct OwnChannel {
     pub scale: f64,
     /// Added after the factor, in the unit.
     pub offset: f64,
-    /// With which group.
+    /// The group with which the channel is read.
     pub pace: ReadWith,
     /// Path from 1; `None` is the one that is written to.
     pub path: Option<u8>,
@@ -64,11 +64,14 @@ impl fmt::Display for OwnChannelError {
 
 /// A kind of item that a source can be asked for by the user.
 pub trait OwnRead: Sized {
+    /// What is wrong with a text, and an example.
+    type Error: fmt::Display;
+
     /// Reads the text of a configuration.
     ///
     /// # Errors
-    /// What is wrong with it, and an example.
-    fn read(text: &str) -> Result<Self, String>;
+    /// The text is nothing that can be read.
+    fn read(text: &str) -> Result<Self, Self::Error>;
 
     /// Is it a text? `None`: what comes may be either, and the unit of the channel says what it is taken for.
     fn is_text(&self) -> Option<bool> {
@@ -79,11 +82,11 @@ pub trait OwnRead: Sized {
 /// A channel with its item, in the words of its source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Own<T> {
-    /// The channel.
+    /// The channel as the user described it.
     pub channel: OwnChannel,
     /// Its place in the table of channels.
     pub id: ChannelId,
-    /// What is read.
+    /// The item that `read` of the channel names.
     pub item: T,
 }
 
@@ -98,7 +101,7 @@ impl<T: OwnRead> Own<T> {
 
     fn new(channel: OwnChannel, delivered: &[ChannelId]) -> Result<Self, OwnChannelError> {
         let refused = |key, what| OwnChannelError { channel: channel.new.name.clone(), key, what };
-        let item = T::read(&channel.read).map_err(|what| refused("read", what))?;
+        let item = T::read(&channel.read).map_err(|what| refused("read", what.to_string()))?;
         let as_text = channel.new.kind == Kind::Text;
         if item.is_text().is_some_and(|is_text| is_text != as_text) {
             let what =

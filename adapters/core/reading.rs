@@ -155,9 +155,9 @@ impl Stamp {
 /// One channel, one time, a value or a reason for none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
-    /// Which quantity.
+    /// The channel that the value belongs to.
     pub channel: ChannelId,
-    /// When.
+    /// The time for which the value holds.
     pub stamp: Stamp,
     /// What, or why not.
     pub value: Result<Value, Absence>,
@@ -182,7 +182,7 @@ impl Reading {
         Self { channel, stamp, value: Err(Absence::OutOfRange), implausible: Some(number) }
     }
 
-    /// A state word.
+    /// A text, which is taken as it is.
     #[must_use]
     pub fn from_text(channel: ChannelId, stamp: Stamp, text: Arc<str>) -> Self {
         Self { channel, stamp, value: Ok(Value::Text(text)), implausible: None }

@@ -6,6 +6,7 @@
 //! transaction numbers that is the only way not to take an old answer for a new one.
 
 use crate::address::{Parity, SerialTarget};
+use crate::integer::count_to_f64;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{FlockOperation, OFlags, flock};
 use rustix::termios::{ControlModes, OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};
@@ -16,6 +17,7 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
+use thiserror::Error;
 
 /// Modbus over Serial Line 1.02, 2.5.1.1: above 19 200 Bd the silence of 3.5 characters is fixed.
 const SILENCE_MIN: Duration = Duration::from_micros(1750);
@@ -28,7 +30,7 @@ fn bits_per_character(parity: Parity) -> u32 {
 /// How long so many characters take on the wire.
 #[must_use]
 pub fn wire_time(target: &SerialTarget, characters: usize) -> Duration {
-    let bits = f64::from(bits_per_character(target.parity)) * f64::from(u32::try_from(characters).unwrap_or(u32::MAX));
+    let bits = f64::from(bits_per_character(target.parity)) * count_to_f64(characters);
     Duration::from_secs_f64(bits / f64::from(target.baud))
 }
 
@@ -38,7 +40,6 @@ pub fn compute_silence(target: &SerialTarget) -> Duration {
     (wire_time(target, 7) / 2).max(SILENCE_MIN)
 }
 
-/// An open line.
 #[derive(Debug)]
 struct OpenPort {
     file: File,
@@ -49,7 +50,7 @@ fn open_port(target: &SerialTarget) -> io::Result<OpenPort> {
     // Without NONBLOCK the open itself waits for a modem's carrier.
     let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits();
     let mut options = OpenOptions::new();
-    options.read(true).write(true).custom_flags(i32::try_from(flags).unwrap_or(0));
+    options.read(true).write(true).custom_flags(flags.cast_signed());
     let file = options.open(&target.port)?;
     flock(&file, FlockOperation::NonBlockingLockExclusive)
         .map_err(|_| io::Error::new(ErrorKind::ResourceBusy, "another program holds the line"))?;
@@ -83,6 +84,14 @@ pub struct Bus {
 /// A line that several sources share.
 pub type SharedBus = Arc<Mutex<Bus>>;
 
+/// Two addresses name one serial line and differ in its speed or parity.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("two addresses use {} with different baud or parity; one line has one of each", .port.display())]
+pub struct LineConflict {
+    /// The device file that both name.
+    pub port: PathBuf,
+}
+
 static LINES: Mutex<Option<HashMap<PathBuf, Weak<Mutex<Bus>>>>> = Mutex::new(None);
 
 fn lock_mutex<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -94,7 +103,7 @@ impl Bus {
     ///
     /// # Errors
     /// When another address uses the same line at another speed or parity.
-    pub fn from_target(target: &SerialTarget) -> Result<SharedBus, String> {
+    pub fn from_target(target: &SerialTarget) -> Result<SharedBus, LineConflict> {
         let mut lines = lock_mutex(&LINES);
         let lines = lines.get_or_insert_with(HashMap::new);
         lines.retain(|_, line| line.strong_count() > 0);
@@ -105,8 +114,7 @@ impl Bus {
             return Ok(shared);
         };
         if lock_mutex(&shared).target != *target {
-            let port = target.port.display();
-            return Err(format!("two addresses use {port} with different baud or parity; one line has one of each"));
+            return Err(LineConflict { port: target.port.clone() });
         }
         Ok(shared)
     }
@@ -198,6 +206,7 @@ fn read_port(line: &mut OpenPort, until: Instant, into: &mut Vec<u8>) -> io::Res
         if left.is_zero() {
             return Ok(false);
         }
+        // A time that no `Timespec` holds is waited for in parts of a second.
         let wait = Timespec::try_from(left).unwrap_or(Timespec { tv_sec: 1, tv_nsec: 0 });
         match poll(&mut [PollFd::new(&line.file, PollFlags::IN)], Some(&wait)) {
             Ok(_) | Err(rustix::io::Errno::INTR) => {}

@@ -8,6 +8,7 @@
 use encoding_rs::{Encoding, GB18030, UTF_8};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use thiserror::Error;
 
 /// The character set of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -16,7 +17,7 @@ pub enum TextEncoding {
     /// UTF-8 where it is that, else GB 18030 where it is that.
     #[default]
     Found,
-    /// This one.
+    /// This character set; UTF-8 is tried before it.
     Named(&'static Encoding),
 }
 
@@ -82,11 +83,16 @@ impl From<TextEncoding> for String {
     }
 }
 
-impl TryFrom<String> for TextEncoding {
-    type Error = String;
+/// No character set has this label.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("no character set is called {0}")]
+pub struct UnknownCharacterSet(pub String);
 
-    fn try_from(label: String) -> Result<Self, String> {
-        Self::of_label(&label).ok_or_else(|| format!("no character set is called {label}"))
+impl TryFrom<String> for TextEncoding {
+    type Error = UnknownCharacterSet;
+
+    fn try_from(label: String) -> Result<Self, UnknownCharacterSet> {
+        Self::of_label(&label).ok_or(UnknownCharacterSet(label))
     }
 }
 

@@ -105,7 +105,7 @@ impl OverridePct {
     /// The greatest override that can be written.
     pub const GREATEST: Self = Self(254);
 
-    /// `None` for 255.
+    /// An override of 0 to 254 %; `None` for 255.
     #[must_use]
     pub fn new(percent: u8) -> Option<Self> {
         (percent <= 254).then_some(Self(percent))

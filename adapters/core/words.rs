@@ -14,7 +14,7 @@ pub mod mode {
     /// A program is being edited.
     pub const EDIT: &str = "EDIT";
 
-    /// Every word.
+    /// Every word that the channel `mode` can have.
     pub const ALL: [&str; 5] = [AUTOMATIC, MANUAL, MANUAL_DATA_INPUT, SEMI_AUTOMATIC, EDIT];
 }
 
@@ -22,7 +22,7 @@ pub mod mode {
 pub mod execution {
     /// Nothing runs; a program can be started.
     pub const READY: &str = "READY";
-    /// A program runs.
+    /// A program runs and nothing holds it.
     pub const ACTIVE: &str = "ACTIVE";
     /// Running, but the feed is at 0 % or waits for something.
     pub const INTERRUPTED: &str = "INTERRUPTED";
@@ -33,7 +33,7 @@ pub mod execution {
     /// The program came to its end.
     pub const PROGRAM_COMPLETED: &str = "PROGRAM_COMPLETED";
 
-    /// Every word.
+    /// Every word that the channel `execution` can have.
     pub const ALL: [&str; 6] = [READY, ACTIVE, INTERRUPTED, FEED_HOLD, STOPPED, PROGRAM_COMPLETED];
 }
 

@@ -25,6 +25,7 @@ use super::poll::find_signal_address;
 use crate::address::{FanucOptions, WriteMethod};
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::{Actuator, LadderRequest, LadderRule, SourceError};
+use adapter_core::integer::{convert_bounded, saturate_to_ns};
 use adapter_core::units::OverridePct;
 use std::time::Duration;
 
@@ -59,7 +60,7 @@ impl FanucActuator {
     /// `None` when the address names no way of writing.
     #[must_use]
     pub fn new(name: &str, line: FanucLine, path: u8, options: &FanucOptions) -> Option<Self> {
-        let settle_ns = i64::try_from(options.settle.as_nanos()).unwrap_or(i64::MAX);
+        let settle_ns = saturate_to_ns(options.settle);
         let asking = options.request.map(|at| Asking::new(name, line.clone(), at, settle_ns));
         let (name, method, dial) = (name.to_owned(), options.write, options.dial);
         let (heartbeat, written, before, beside) = (0, None, None, None);
@@ -70,7 +71,7 @@ impl FanucActuator {
     fn build_write(&mut self, wanted: OverridePct) -> Result<Write, SourceError> {
         let percent = i32::from(wanted.percent());
         let bytes = |area, at, values: Vec<i32>| {
-            let count = u16::try_from(values.len()).unwrap_or(0);
+            let count = convert_bounded(values.len(), u16::MAX);
             Write::Pmc { stretch: Stretch::from_byte_range(area, at, count), values }
         };
         Ok(match self.method {
@@ -176,7 +177,6 @@ impl FanucActuator {
         dial.read(self.find_bytes(asked, FocasItem::Pmc(dial.to_stretch()))?).ok_or_else(none)
     }
 
-    /// An inverted byte.
     fn override_of(&self, asked: &Asked, item: FocasItem) -> Result<OverridePct, SourceError> {
         let byte = self.find_bytes(asked, item)?.first().and_then(|byte| u8::try_from(*byte).ok());
         byte.map(feed_override::decode).ok_or_else(|| self.build_decode_error("an override signal is a byte"))

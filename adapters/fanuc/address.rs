@@ -5,7 +5,7 @@ use crate::extra::AxisName;
 use crate::feed_override;
 use crate::item::{Area, Position};
 use crate::own_item::OwnItem;
-use adapter_core::address::{Endpoint, Keys, parse_encoding, parse_endpoint, parse_library};
+use adapter_core::address::{AddressProblem, Endpoint, Keys, parse_encoding, parse_endpoint, parse_library};
 use adapter_core::channel::PATHS;
 use adapter_core::own::Own;
 use adapter_core::text::TextEncoding;
@@ -24,14 +24,14 @@ pub enum WriteMethod {
     Mailbox {
         /// Area of the mailbox: R, D or E.
         area: Area,
-        /// Its first byte.
+        /// Address of its first byte.
         at: u16,
     },
     /// Through a byte from which the ladder makes the second override; the operator's dial stays sovereign.
     SecondOverride {
         /// Area of the byte.
         area: Area,
-        /// Which.
+        /// Address of the byte.
         at: u16,
     },
     /// Through a custom macro variable in percent, for programs that say `F[#501*...]` or a ladder that reads it.
@@ -46,7 +46,7 @@ pub enum WriteMethod {
 /// How FOCAS2 is spoken.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FanucBackend {
-    /// By ourselves.
+    /// In Rust over TCP, without the vendor's library.
     Native,
     /// Through this vendor library, in a child process.
     Vendor(PathBuf),
@@ -55,11 +55,11 @@ pub enum FanucBackend {
 /// A controller that an address names.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FanucTarget {
-    /// Where.
+    /// Host and port of the controller; 8193 where none is named.
     pub endpoint: Endpoint,
     /// Path (channel) of the controller, from 1.
     pub path: u8,
-    /// How.
+    /// How it is spoken to: natively, or through the vendor's library.
     pub backend: FanucBackend,
     /// Pace, limits and the way of writing.
     pub options: FanucOptions,
@@ -150,7 +150,7 @@ impl FanucOptions {
 ///
 /// # Errors
 /// No host is named, or no library where one is needed.
-pub fn parse_fanuc(body: &str, keys: &mut Keys) -> Result<FanucTarget, String> {
+pub fn parse_fanuc(body: &str, keys: &mut Keys) -> Result<FanucTarget, AddressProblem> {
     let named = keys.take_optional_number("path", 1, 10);
     let vendor = keys.take_choice("backend", &[("native", false), ("vendor", true)]);
     let backend = if vendor { parse_library(keys).map(FanucBackend::Vendor) } else { Ok(FanucBackend::Native) };

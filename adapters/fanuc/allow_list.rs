@@ -8,18 +8,18 @@ use super::item::{Area, Stretch, Write};
 pub enum Allowed {
     /// Bytes of PMC memory, both ends included.
     Memory {
-        /// Which area.
+        /// Area of the bytes: R, D or E where the user names it.
         area: Area,
-        /// First byte.
+        /// Address of the first byte.
         from: u16,
-        /// Last byte.
+        /// Address of the last byte, which is included.
         to: u16,
     },
     /// Custom macro variables, both ends included.
     Macros {
-        /// First number.
+        /// Number of the first variable.
         from: u16,
-        /// Last number.
+        /// Number of the last variable, which is included.
         to: u16,
     },
     /// The external work offset.
@@ -48,7 +48,7 @@ impl Allowed {
         }
     }
 
-    /// These bytes.
+    /// `count` bytes of an area from the address `from`.
     #[must_use]
     pub fn from_byte_range(area: Area, from: u16, count: u16) -> Self {
         let Stretch { from, to, .. } = Stretch::from_byte_range(area, from, count);

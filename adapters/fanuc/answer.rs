@@ -17,11 +17,11 @@ pub struct System {
     pub kind: String,
     /// M milling, T turning, L laser and so on.
     pub machine: String,
-    /// Four characters.
+    /// Series of the control's software, four characters.
     pub series: String,
-    /// Four characters.
+    /// Version of that software, four characters.
     pub version: String,
-    /// Two digits.
+    /// Controlled axes as two digits.
     pub axes: String,
 }
 
@@ -41,7 +41,7 @@ pub struct Status {
     pub emergency: i16,
     /// 1 alarm; 2 battery low, 3 fan and further warnings, which stop nothing.
     pub alarm: i16,
-    /// Editing state.
+    /// Editing state, as the control numbers it.
     pub edit: i16,
 }
 
@@ -50,9 +50,9 @@ pub struct Status {
 pub enum SpeedUnit {
     /// Millimetres (degrees of a rotary axis) per minute.
     MmMin,
-    /// Inches per minute.
+    /// Inches per minute along the path.
     InchMin,
-    /// Revolutions per minute.
+    /// Revolutions per minute of a spindle.
     Rpm,
     /// Millimetres per revolution of the spindle.
     MmRev,
@@ -141,11 +141,11 @@ impl SpeedUnit {
 /// Unit of a position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PositionUnit {
-    /// Millimetres.
+    /// Millimetres, number 0 of `POSELM.unit`.
     Mm,
-    /// Inches.
+    /// Inches, number 1 of `POSELM.unit`.
     Inch,
-    /// Degrees.
+    /// Degrees, number 2 of `POSELM.unit`.
     Degrees,
 }
 
@@ -157,7 +157,7 @@ impl PositionUnit {
     }
 }
 
-/// One alarm.
+/// An alarm as the control tells it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Alarm {
     /// Number within its type.
@@ -166,14 +166,14 @@ pub struct Alarm {
     pub kind: i32,
     /// Axis from 1; 0 none.
     pub axis: i32,
-    /// Its text.
+    /// Its text; empty where the control sends none.
     pub text: String,
 }
 
 /// An alarm that has been.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct PastAlarm {
-    /// Which.
+    /// The alarm that was on.
     pub alarm: Alarm,
     /// Year, month, day, hour, minute and second at which it came, on the control's clock.
     pub at: [i16; 6],
@@ -186,35 +186,35 @@ pub struct OperatorMessage {
     pub number: i32,
     /// 0 to 3 messages of the ladder, 4 of a macro program.
     pub kind: i32,
-    /// Its text.
+    /// Its text as the ladder or the program wrote it.
     pub text: String,
 }
 
 /// What was asked for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum FocasAnswer {
-    /// To [`Item::System`](super::item::FocasItem::System).
+    /// The answer to [`Item::System`](super::item::FocasItem::System).
     System(System),
-    /// To a status.
+    /// The answer to [`Item::Status`](super::item::FocasItem::Status).
     Status(Status),
     /// One number; `None` when the control says that there is none.
     Number(Option<f64>),
     /// One number per axis or spindle.
     Numbers(Vec<Option<f64>>),
-    /// A whole number.
+    /// A whole number, such as a count.
     Whole(i32),
     /// Numbers of the running and the main program.
     Program {
-        /// Running now.
+        /// Number of the program that runs, as in O1234.
         running: i32,
-        /// Main program.
+        /// Number of the main program, as in O1234.
         main: i32,
     },
     /// A name and a number.
     Named {
-        /// The number.
+        /// The number that came with the name.
         number: i32,
-        /// The name.
+        /// The name, or the text of the program.
         name: String,
     },
     /// The unit of a speed.
@@ -223,7 +223,7 @@ pub enum FocasAnswer {
     Units(Vec<i16>),
     /// Names of axes or spindles.
     Names(Vec<String>),
-    /// A text.
+    /// A text out of the control's character set.
     Text(String),
     /// The alarms that are on.
     Alarms(Vec<Alarm>),
@@ -256,14 +256,14 @@ pub enum FocasAnswer {
     Data {
         /// Kind as on the wire.
         kind: i16,
-        /// Values.
+        /// One value, or one per axis; `None` where the control tells none.
         values: Vec<Option<f64>>,
     },
     /// Elements of PMC memory.
     Memory(Vec<i32>),
     /// Minutes and milliseconds beyond them.
     Time {
-        /// Whole minutes.
+        /// Whole minutes of the meter.
         minutes: i32,
         /// Milliseconds within the minute.
         milliseconds: i32,
@@ -275,16 +275,16 @@ pub enum FocasAnswer {
 /// The control answered and said no.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
-    /// Why.
+    /// The return code that says why.
     pub code: FocasReturnCode,
-    /// More about it.
+    /// The detail beside the return code.
     pub detail: i16,
 }
 
 /// Why one item of a poll has no value, while the others have.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FocasItemError {
-    /// The control refused.
+    /// The control refused this item alone.
     Refused(Refusal),
     /// Its answer makes no sense.
     Malformed(String),

@@ -129,23 +129,23 @@ const TABLE: [CodeRow; 35] = [
 ];
 
 impl FocasReturnCode {
-    /// The reset button.
+    /// Code -1: the controller is busy.
     pub const BUSY: Self = Self(-1);
-    /// No such function.
+    /// Code 1: there is no such function.
     pub const FUNC: Self = Self(1);
-    /// Wrong length.
+    /// Code 2: the length does not fit.
     pub const LENGTH: Self = Self(2);
-    /// Wrong number.
+    /// Code 3: the number or range does not exist.
     pub const NUMBER: Self = Self(3);
-    /// Wrong type.
+    /// Code 4: the type does not fit.
     pub const ATTRIB: Self = Self(4);
-    /// Wrong value.
+    /// Code 5: the value is not possible there.
     pub const DATA: Self = Self(5);
-    /// Option missing.
+    /// Code 6: the control lacks the option.
     pub const NOOPT: Self = Self(6);
-    /// No such path.
+    /// Code 11: there is no such path.
     pub const PATH: Self = Self(11);
-    /// Not now.
+    /// Code 13: refused in the present state.
     pub const REJECT: Self = Self(13);
     /// Connection lost, as the vendor's library says it.
     pub const SOCKET: Self = Self(-16);
@@ -160,7 +160,7 @@ impl FocasReturnCode {
         self.find_row().map_or("EW_?", |row| row.name)
     }
 
-    /// What happened.
+    /// What happened, in words, for messages.
     #[must_use]
     pub fn describe_cause(self) -> &'static str {
         self.find_row().map_or("a return code that is in no manual", |row| row.what)

@@ -7,6 +7,7 @@ use super::item::{FocasItem, PmcWidth, PositionFrame, Spindle};
 use super::records;
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, Number, WireError};
+use adapter_core::integer::{clamp_count, length_to_i64};
 use adapter_core::text::TextEncoding;
 
 /// Types of parameters and diagnosis numbers whose values are reals.
@@ -135,8 +136,7 @@ fn decode_speed_unit(generation: Generation, number: i16) -> SpeedUnit {
 }
 
 fn build_mismatch(what: &'static str, expected: usize, found: usize) -> WireError {
-    let signed = |length| i64::try_from(length).unwrap_or(i64::MAX);
-    WireError::Mismatch { what, expected: signed(expected), found: signed(found) }
+    WireError::Mismatch { what, expected: length_to_i64(expected), found: length_to_i64(found) }
 }
 
 fn read_number(cursor: &mut Cursor<'_>) -> Result<Number, WireError> {
@@ -198,7 +198,7 @@ fn read_status(cursor: &mut Cursor<'_>) -> Result<Status, WireError> {
 fn read_alarm(cursor: &mut Cursor<'_>, encoding: TextEncoding) -> Result<Alarm, WireError> {
     let (number, kind, axis, length) = (cursor.read_i32()?, cursor.read_i32()?, cursor.read_i32()?, cursor.read_i32()?);
     let bytes = cursor.read_bytes(super::request::ALARM_TEXT_LEN)?;
-    let length = usize::try_from(length).unwrap_or(0).min(bytes.len());
+    let length = clamp_count(length, bytes.len());
     Ok(Alarm { number, kind, axis, text: encoding.decode_trimmed(&bytes[..length]) })
 }
 

@@ -30,7 +30,6 @@ const ALARMS_SHOWN: u16 = 3;
 const NUMBERS: [(&str, FocasItem); 4] =
     [("part_count", PARTS), ("gear_stage", GEAR), ("parts_total", PARTS_TOTAL), ("parts_required", PARTS_REQUIRED)];
 
-/// Meters of time.
 const TIMES: [(&str, FocasItem); 4] = [
     ("power_on_time_s", FocasItem::Timer(Timer::PowerOn)),
     ("operating_time_s", FocasItem::Timer(Timer::Operating)),

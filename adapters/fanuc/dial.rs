@@ -13,7 +13,7 @@ use adapter_core::units::OverridePct;
 pub struct Dial {
     /// Its area. Signals to the control (G) are coded like G012, inverted; every other area holds plain percent.
     pub area: Area,
-    /// Which byte.
+    /// Address of the byte within its area.
     pub at: u16,
 }
 

@@ -28,7 +28,7 @@ pub type KnownFact<T> = Result<T, Absence>;
 /// What does not change while a connection lasts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
-    /// Generation, axes, spindles.
+    /// Generation, axes and spindles, known since the connection was opened.
     pub opening: Opening,
     /// Kind and series, if the control says them.
     pub system: Option<System>,

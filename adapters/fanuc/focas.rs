@@ -30,7 +30,7 @@ pub trait Focas: Send {
 /// Why a connection gave nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum FocasError {
-    /// Nobody listens there.
+    /// The host is there and nobody listens on the port.
     #[error("nobody answers on this port: {0}")]
     NobodyThere(String),
     /// The host does not answer at all.
@@ -42,13 +42,13 @@ pub enum FocasError {
     /// Every connection that the controller can serve is in use.
     #[error("the controller has no free connection")]
     NoSession,
-    /// The connection broke.
+    /// The connection broke while it was used.
     #[error("the connection broke: {0}")]
     Broken(String),
     /// An answer began and did not end: the control lives, and the line or the control is at fault.
     #[error("the answer ended after {got} bytes{}", if .waited.is_some() { "; nothing more came" } else { ", then the connection" })]
     Cut {
-        /// Bytes that came.
+        /// Bytes that came of the answer.
         got: usize,
         /// How long more was waited for; `None` when the connection was closed.
         waited: Option<Duration>,

@@ -19,7 +19,7 @@ impl Generation {
         if version <= 2 { Self::Older(version) } else { Self::Newer(version) }
     }
 
-    /// The version word.
+    /// The version word as the control sent it.
     #[must_use]
     pub fn version(self) -> u16 {
         match self {
@@ -47,7 +47,7 @@ pub struct Opening {
     pub family: u16,
     /// Places for axes in every answer about all axes.
     pub axes_max: u16,
-    /// Places for spindles.
+    /// Places for spindles in every answer about all spindles.
     pub spindles_max: u16,
     /// Paths of this controller.
     pub paths: u16,

@@ -50,15 +50,15 @@ impl Position {
 pub enum Spindle {
     /// Load in whole percent, as older controls give it.
     PlainLoad,
-    /// Greatest speed, rpm.
+    /// Greatest speed of the spindle, rpm.
     MaxSpeed,
-    /// Gear stage.
+    /// Gear stage that is engaged.
     Gear,
     /// Speed from the position coder, rpm.
     Speed,
-    /// Load meter, percent.
+    /// Load meter of the spindle, percent.
     Load,
-    /// Speed meter, rpm.
+    /// Speed meter of the spindle motor, rpm.
     MotorSpeed,
 }
 
@@ -87,7 +87,7 @@ pub enum Servo {
     Load,
     /// Speed of the motor, rpm.
     Speed,
-    /// Current, A.
+    /// Current of the motor, A.
     Current,
 }
 
@@ -107,16 +107,16 @@ fn find_wire_number<T: PartialEq>(table: &[(T, i32)], wanted: T) -> i32 {
     table.iter().find(|(known, _)| *known == wanted).map_or(0, |(_, number)| *number)
 }
 
-/// Meters of time.
+/// The meters of time that a control keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Timer {
-    /// Power is on.
+    /// Time with the power on.
     PowerOn,
-    /// A program runs.
+    /// Time in which a program ran.
     Operating,
-    /// Cutting feed.
+    /// Time in cutting feed.
     Cutting,
-    /// This cycle.
+    /// Time of the cycle that runs.
     Cycle,
 }
 
@@ -140,7 +140,7 @@ pub enum FocasItem {
     Status,
     /// The same with more words.
     StatusLong,
-    /// Handle retrace.
+    /// State of the handle retrace function.
     HandleRetrace,
     /// T or M mode.
     ToolMode,
@@ -158,9 +158,9 @@ pub enum FocasItem {
     AxisNames,
     /// Names of the spindles; the argument that the generations want differently.
     SpindleNames(i16),
-    /// Unit of [`FocasItem::Feed`].
+    /// Unit in which [`FocasItem::Feed`] is told.
     FeedUnit,
-    /// Unit of [`FocasItem::SpindleSpeed`].
+    /// Unit in which [`FocasItem::SpindleSpeed`] is told.
     SpindleUnit,
     /// Units of the positions of every axis.
     PositionUnit(PositionFrame),
@@ -168,11 +168,11 @@ pub enum FocasItem {
     Program,
     /// Name and number of the program running.
     ProgramName,
-    /// Its full path.
+    /// Full path of the program running.
     ProgramPath,
     /// Path of the main program.
     MainProgram,
-    /// Sequence number N.
+    /// Sequence number N of the block that runs.
     Sequence,
     /// Blocks run since the start.
     BlockCount,
@@ -182,7 +182,7 @@ pub enum FocasItem {
     Alarms(u16),
     /// Modal G codes: of one group, or all with -1.
     ModalGroup(i16),
-    /// A modal word.
+    /// A modal word with its value in force.
     ModalWord(BlockWord),
     /// A position of one axis from 1, or all with -1.
     Position(Position, i16),
@@ -192,7 +192,7 @@ pub enum FocasItem {
     Parameter(u16, i16),
     /// A diagnosis number; axis 0 none, -1 all.
     Diagnosis(u16, i16),
-    /// PMC memory.
+    /// A stretch of PMC memory, element by element.
     Pmc(Stretch),
     /// A tool offset: number and type.
     ToolOffset(u16, u16),
@@ -225,9 +225,9 @@ pub enum FocasItem {
 /// An item of one path of the control. PMC memory belongs to no path: it is the same whichever path asks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Question {
-    /// Path from 1.
+    /// Path of the control, counted from 1.
     pub path: u8,
-    /// What is asked.
+    /// The item that is read on that path.
     pub item: FocasItem,
 }
 
@@ -244,16 +244,16 @@ impl FocasItem {
 pub enum Write {
     /// `mantissa / 10^places` into a custom macro variable.
     Macro {
-        /// Which.
+        /// Number of the variable.
         number: u16,
-        /// Whole number.
+        /// The value without its decimal point.
         mantissa: i32,
         /// Places after the point.
         places: i16,
     },
     /// Elements into PMC memory.
     Pmc {
-        /// Where.
+        /// The bytes that are written, with the width of an element.
         stretch: Stretch,
         /// As many as the stretch has elements.
         values: Vec<i32>,
@@ -262,25 +262,25 @@ pub enum Write {
     WorkOffset {
         /// 0 external, 1 is G54.
         number: u16,
-        /// From 1.
+        /// Number of the axis, counted from 1.
         axis: i16,
-        /// New value.
+        /// New value, least input increments.
         value: i32,
     },
     /// A tool offset in least input increments.
     ToolOffset {
-        /// Which.
+        /// Number of the offset.
         number: u16,
         /// Which of its values.
         kind: u16,
-        /// New value.
+        /// New value, least input increments.
         value: i32,
     },
     /// Signals of the software operator's panel; `mask` says which of them count.
     PanelSignals {
         /// One bit per signal.
         mask: u16,
-        /// The signals.
+        /// The signals, as sixteen words.
         signals: [i16; 16],
     },
 }

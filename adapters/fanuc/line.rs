@@ -12,10 +12,11 @@ use super::generation::Opening;
 use super::item::{FocasItem, Question, Write};
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::SourceError;
+use adapter_core::integer::saturate_to_ms;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Makes a connection.
+/// Opens a connection; called again after every one that broke.
 pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Focas>, FocasError> + Send>;
 
 /// A controller that refuses connections this long after it was lost is starting or off; afterwards something is wrong
@@ -34,11 +35,11 @@ const NEVER_OPENED: &str = "Something listens there and opens no session: is it 
 /// How a line has been doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LineCounts {
-    /// Connections opened.
+    /// Connections that were opened, those that broke later included.
     pub connections: u64,
     /// Connections that could not be opened.
     pub refused: u64,
-    /// Connections that broke.
+    /// Connections that broke after they were opened.
     pub broken: u64,
 }
 
@@ -75,7 +76,7 @@ pub struct Asked {
     pub facts: Arc<Facts>,
     /// The path that is meant when none is named.
     pub path: u8,
-    /// What was asked.
+    /// The questions, in the order of the results.
     pub questions: Vec<Question>,
     /// One result per question.
     pub results: Vec<FocasItemResult>,
@@ -371,16 +372,13 @@ pub fn source_error(name: &str, error: &FocasError, request: &str) -> SourceErro
 fn build_source_error(name: &str, error: &FocasError, request: &str, next: String) -> SourceError {
     let (source_name, request, what) = (name.to_owned(), request.to_owned(), error.to_string());
     match error {
-        FocasError::Timeout(waited) => SourceError::Timeout {
-            source_name,
-            request,
-            deadline_ms: u64::try_from(waited.as_millis()).unwrap_or(u64::MAX),
-            next,
-        },
+        FocasError::Timeout(waited) => {
+            SourceError::Timeout { source_name, request, deadline_ms: saturate_to_ms(*waited), next }
+        }
         FocasError::Cut { waited: Some(waited), .. } => SourceError::Timeout {
             source_name,
             request: format!("{request} ({what})"),
-            deadline_ms: u64::try_from(waited.as_millis()).unwrap_or(u64::MAX),
+            deadline_ms: saturate_to_ms(*waited),
             next,
         },
         FocasError::Protocol(_) => SourceError::Decode { source_name, request, what: format!("{what}. {next}") },

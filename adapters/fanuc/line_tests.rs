@@ -72,7 +72,6 @@ impl Focas for Mock {
     }
 }
 
-/// Sleeping moves it.
 struct Standing(Arc<Told>);
 
 impl Clock for Standing {

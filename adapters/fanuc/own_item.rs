@@ -16,11 +16,12 @@ use adapter_core::own::{OwnChannel, OwnRead};
 use adapter_core::reading::{Absence, Value};
 use adapter_core::text::TextEncoding;
 use std::sync::Arc;
+use thiserror::Error;
 
-/// What is read.
+/// What a channel of the user's reads from the control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OwnItem {
-    /// The item.
+    /// The item that the control is asked for.
     pub item: FocasItem,
     /// A single bit of a byte of PMC memory.
     pub bit: Option<u8>,
@@ -28,8 +29,19 @@ pub struct OwnItem {
     pub text: bool,
 }
 
+/// A text after `read =` that names nothing of this source.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "`{0}` is nothing that can be read; write `macro 500`, `parameter 6711`, `parameter 1420 axis 2`, \
+     `diagnosis 301 axis 1`, `pmc R100`, `pmc R100.3`, `pmc D20 word`, `pmc D100 text 20`, \
+     `tool_offset 1 type 3` or `work_offset 1 axis 3`"
+)]
+pub struct UnreadableItem(pub String);
+
 impl OwnRead for OwnItem {
-    fn read(text: &str) -> Result<Self, String> {
+    type Error = UnreadableItem;
+
+    fn read(text: &str) -> Result<Self, UnreadableItem> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let found = match words.as_slice() {
             ["macro", number] => parse_whole(number, 1, 65_535).map(FocasItem::Macro).map(Self::from_item),
@@ -59,13 +71,7 @@ impl OwnRead for OwnItem {
                 .map(Self::from_item),
             _ => None,
         };
-        found.ok_or_else(|| {
-            format!(
-                "`{text}` is nothing that can be read; write `macro 500`, `parameter 6711`, `parameter 1420 axis 2`, \
-                 `diagnosis 301 axis 1`, `pmc R100`, `pmc R100.3`, `pmc D20 word`, `pmc D100 text 20`, \
-                 `tool_offset 1 type 3` or `work_offset 1 axis 3`"
-            )
-        })
+        found.ok_or_else(|| UnreadableItem(text.to_owned()))
     }
 
     fn is_text(&self) -> Option<bool> {
@@ -190,7 +196,7 @@ mod tests {
             "diagnosis 1 axis 0",
             "spindle 1",
         ] {
-            assert!(OwnItem::read(wrong).is_err_and(|error| error.contains("macro 500")), "{wrong}");
+            assert!(OwnItem::read(wrong).is_err_and(|error| error.to_string().contains("macro 500")), "{wrong}");
         }
     }
 }

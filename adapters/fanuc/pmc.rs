@@ -13,17 +13,17 @@ pub enum Area {
     Y,
     /// Inputs from the machine.
     X,
-    /// Message requests.
+    /// Message requests of the ladder.
     A,
     /// Internal relays; cleared at power-on up to the battery-backed part.
     R,
-    /// Timers.
+    /// Timers of the ladder.
     T,
-    /// Keep relays.
+    /// Keep relays of the ladder.
     K,
-    /// Counters.
+    /// Counters of the ladder.
     C,
-    /// Data table, battery-backed.
+    /// Data table of the ladder, battery-backed.
     D,
     /// Extra relays, shared between PMCs.
     E,
@@ -51,7 +51,7 @@ impl Area {
         Self::ALL.iter().find(|(area, ..)| *area == self).map_or(0, |(.., number)| *number)
     }
 
-    /// Its letter.
+    /// Its letter, as in R900.
     #[must_use]
     pub fn letter(self) -> char {
         Self::ALL.iter().find(|(area, ..)| *area == self).map_or('?', |(_, letter, _)| *letter)
@@ -75,14 +75,14 @@ impl Area {
 pub enum PmcWidth {
     /// One byte, 0 to 255.
     Byte,
-    /// Two bytes, signed.
+    /// Two bytes, -32768 to 32767.
     Word,
-    /// Four bytes, signed.
+    /// Four bytes, the range of `i32`.
     Long,
 }
 
 impl PmcWidth {
-    /// Number of bytes.
+    /// Bytes of an element: 1, 2 or 4.
     #[must_use]
     pub fn byte_count(self) -> u16 {
         match self {
@@ -112,11 +112,11 @@ impl PmcWidth {
 /// A stretch of PMC memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Stretch {
-    /// Where.
+    /// Area of all its bytes.
     pub area: Area,
-    /// First byte.
+    /// Address of its first byte.
     pub from: u16,
-    /// Last byte.
+    /// Address of its last byte, which is included.
     pub to: u16,
     /// Size of the elements.
     pub width: PmcWidth,

@@ -24,14 +24,14 @@ pub fn ladder_signals(path: u8) -> Stretch {
     Stretch::from_byte_range(Area::G, find_signal_address(FIRST_LADDER_BYTE, path), 25)
 }
 
-/// Where [`ladder_signals`] begins.
+/// Address of the byte with which [`ladder_signals`] begins on path 1.
 pub const FIRST_LADDER_BYTE: u16 = 6;
 
 /// The modal words F, S and T.
 pub const MODAL_F: FocasItem = FocasItem::ModalWord(BlockWord::F);
-/// See [`MODAL_F`].
+/// The modal word S, the commanded spindle speed.
 pub const MODAL_S: FocasItem = FocasItem::ModalWord(BlockWord::S);
-/// See [`MODAL_F`].
+/// The modal word T, the commanded tool.
 pub const MODAL_T: FocasItem = FocasItem::ModalWord(BlockWord::T);
 
 /// The modal group of feed per minute (0) and per revolution ([`PER_REVOLUTION`]): group 05 of the manuals, G94 and G95

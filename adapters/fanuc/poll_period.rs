@@ -25,7 +25,6 @@ const SMOOTH: f64 = 0.25;
 /// No group is asked less often than this, however slow the control is.
 const PERIOD_MAX: Duration = Duration::from_secs(60);
 
-/// One group.
 #[derive(Debug, Clone, Copy)]
 struct PollGroup {
     wanted_s: f64,

@@ -92,7 +92,7 @@ pub fn describe_warning(asked: &Asked, path: u8) -> Option<(String, &'static str
 /// How answers are read besides what they say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Manner {
-    /// Path from 1.
+    /// Path of the control, counted from 1.
     pub path: u8,
     /// Is the second feed override in use on this machine?
     pub second_override: bool,

@@ -4,6 +4,7 @@
 use super::answer::{Alarm, FocasAnswer, OperatorMessage, PastAlarm};
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, WireError};
+use adapter_core::integer::clamp_count;
 use adapter_core::text::TextEncoding;
 
 type Read<T> = Result<T, WireError>;
@@ -17,7 +18,7 @@ pub(super) fn cnc_id(cursor: &mut Cursor<'_>) -> Read<String> {
 /// Text of so many bytes, of which the first `told` count.
 fn read_counted_text(cursor: &mut Cursor<'_>, told: i32, length: usize, encoding: TextEncoding) -> Read<String> {
     let bytes = cursor.read_bytes(length)?;
-    let told = usize::try_from(told).unwrap_or(0).min(bytes.len());
+    let told = clamp_count(told, bytes.len());
     Ok(encoding.decode_trimmed(&bytes[..told]))
 }
 
@@ -44,8 +45,8 @@ pub(super) fn g_code(cursor: &mut Cursor<'_>) -> Read<String> {
     Ok(match places {
         0 => format!("G{code:02}"),
         _ => {
-            let places = usize::try_from(places).unwrap_or(0).min(4);
-            let power = 10f64.powi(i32::try_from(places).unwrap_or(0));
+            let power = 10f64.powi(i32::from(places.clamp(0, 4)));
+            let places = clamp_count(places, 4);
             format!("G{:.places$}", f64::from(code) / power)
         }
     })

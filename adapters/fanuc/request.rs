@@ -3,18 +3,19 @@
 use super::generation::{Generation, Opening};
 use super::item::{FocasItem, PositionFrame, Write};
 use super::wire::{Number, Request};
+use adapter_core::integer::convert_bounded;
 
 pub use super::table::function;
 
 /// Whose unit is asked for, on newer controls; older ones know the feed only, as 0.
 pub const UNIT_OF_FEED: i32 = 3;
-/// See [`UNIT_OF_FEED`].
+/// The unit of the spindle's speed, asked for as [`UNIT_OF_FEED`] is.
 pub const UNIT_OF_SPINDLE: i32 = 4;
 
 /// Units of positions: in pairs, work and machine coordinates, with this number; newer controls are asked with
 /// [`UNIT_OF_WORK`] for those of the work coordinates.
 pub const UNIT_OF_POSITIONS: i32 = 2;
-/// See [`UNIT_OF_POSITIONS`].
+/// The units of the work coordinates, asked for as [`UNIT_OF_POSITIONS`] is.
 pub const UNIT_OF_WORK: i32 = 1;
 
 /// Longest text of an alarm that is asked for.
@@ -64,7 +65,9 @@ pub fn build_read_request(item: FocasItem, generation: Generation) -> Request {
         FocasItem::Sequence => Request::new_cnc(f::SEQUENCE, &[]),
         FocasItem::BlockCount => Request::new_cnc(f::BLOCK_COUNT, &[]),
         FocasItem::AlarmBits => Request::new_cnc(f::ALARM_BITS, &[]),
-        FocasItem::Alarms(most) => Request::new_cnc(f::ALARMS, &[-1, i32::from(most), 2, clamp_to_i32(ALARM_TEXT_LEN)]),
+        FocasItem::Alarms(most) => {
+            Request::new_cnc(f::ALARMS, &[-1, i32::from(most), 2, convert_bounded(ALARM_TEXT_LEN, i32::MAX)])
+        }
         FocasItem::ModalGroup(group) => Request::new_cnc(f::MODAL_GROUP, &[number(group)]),
         FocasItem::ModalWord(word) => Request::new_cnc(f::MODAL_WORD, &[word.wire_number()]),
         FocasItem::Position(what, axis) => Request::new_cnc(f::POSITION, &[what.wire_number(), number(axis)]),
@@ -95,10 +98,6 @@ pub fn build_read_request(item: FocasItem, generation: Generation) -> Request {
         FocasItem::ToolGroup => Request::new_cnc(f::TOOL_GROUP, &[]),
         FocasItem::ToolLife(group) => Request::new_cnc(f::TOOL_LIFE, &repeat_number(group)),
     }
-}
-
-fn clamp_to_i32(length: usize) -> i32 {
-    i32::try_from(length).unwrap_or(i32::MAX)
 }
 
 fn repeat_number(number: u16) -> [i32; 2] {

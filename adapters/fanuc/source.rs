@@ -12,12 +12,12 @@ use crate::address::FanucOptions;
 use adapter_core::channel::{ChannelId, on_path};
 use adapter_core::clock::Clock;
 use adapter_core::driver::{Fact, Source, SourceError, SourceProblem};
+use adapter_core::integer::widen_to_u64;
 use adapter_core::reading::{Absence, Reading};
 use adapter_core::text::TextEncoding;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Which group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum PolledGroup {
     Fast,
@@ -270,6 +270,6 @@ fn collect_line_facts(line: &FanucLine) -> Vec<Fact> {
         count("connections", counts.connections),
         count("connections_broken", counts.broken),
         count("connections_refused", counts.refused),
-        count("items_not_supported", u64::try_from(unsupported).unwrap_or(u64::MAX)),
+        count("items_not_supported", widen_to_u64(unsupported)),
     ]
 }

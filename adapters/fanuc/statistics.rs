@@ -1,5 +1,6 @@
 //! What the round trips cost.
 
+use adapter_core::integer::{saturate_to_us, widen_to_u64};
 use std::time::Duration;
 
 /// Bounds of the buckets, microseconds; the last bucket is open.
@@ -13,30 +14,29 @@ const BOUNDS_US: [u64; 20] = [
 pub struct Statistics {
     /// Frames there and back.
     pub frames: u64,
-    /// Questions in them.
+    /// Questions that these frames carried.
     pub blocks: u64,
-    /// Bytes sent.
+    /// Bytes sent in all of them.
     pub sent_bytes: u64,
-    /// Bytes received.
+    /// Bytes received in all of them.
     pub received_bytes: u64,
     /// Time spent waiting for answers.
     pub waited: Duration,
-    /// Longest round trip.
+    /// The longest round trip so far.
     pub longest: Duration,
     buckets: [u64; 21],
 }
 
 impl Statistics {
-    /// Counts one frame.
+    /// Counts a request with so many questions and bytes, and its answer, which took `took`.
     pub fn count_frame(&mut self, blocks: usize, sent: usize, received: usize, took: Duration) {
-        let wide = |count: usize| u64::try_from(count).unwrap_or(u64::MAX);
         self.frames += 1;
-        self.blocks += wide(blocks);
-        self.sent_bytes += wide(sent);
-        self.received_bytes += wide(received);
+        self.blocks += widen_to_u64(blocks);
+        self.sent_bytes += widen_to_u64(sent);
+        self.received_bytes += widen_to_u64(received);
         self.waited += took;
         self.longest = self.longest.max(took);
-        let us = u64::try_from(took.as_micros()).unwrap_or(u64::MAX);
+        let us = saturate_to_us(took);
         self.buckets[BOUNDS_US.partition_point(|bound| *bound < us)] += 1;
     }
 

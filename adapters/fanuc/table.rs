@@ -13,7 +13,7 @@
 /// Which controls have a function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Era {
-    /// All.
+    /// Every control, whatever its version word.
     All,
     /// Version word 3 and more: 30i, 31i, 32i, 35i, 0i-D, 0i-F.
     Newer,
@@ -58,7 +58,7 @@ pub struct TableRow {
     pub device: u8,
     /// Number of the function.
     pub function: u16,
-    /// Who has it.
+    /// Which controls have the function.
     pub era: Era,
     /// Its arguments, in order.
     pub arguments: &'static str,
@@ -80,7 +80,7 @@ macro_rules! table {
             )*
         }
 
-        /// Every function.
+        /// Every function that is known, a row for each.
         pub const TABLE: &[TableRow] = &[$(TableRow {
             name: stringify!($name),
             device: $device,

@@ -22,7 +22,7 @@ pub enum BlockWord {
     M3,
     /// Not used by the controls that are known.
     Unused14,
-    /// See [`BlockWord::Unused14`].
+    /// Not used either, as [`BlockWord::Unused14`].
     Unused15,
     N,
     O,

@@ -1,7 +1,7 @@
 //! What an `hncnet://` address says.
 
 use crate::OwnValue;
-use adapter_core::address::{Endpoint, Keys, WaveformKeep, parse_endpoint, parse_library};
+use adapter_core::address::{AddressProblem, Endpoint, Keys, WaveformKeep, parse_endpoint, parse_library};
 use adapter_core::own::Own;
 use nclink::address::{parse_mailbox, parse_offset_register, parse_sampled_keep};
 use nclink::mailbox::ControllerRegister;
@@ -10,9 +10,9 @@ use std::path::PathBuf;
 /// A Huazhong controller through its vendor's library.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HncNetTarget {
-    /// Where.
+    /// Host and port of the controller; 10001 where none is named.
     pub endpoint: Endpoint,
-    /// The vendor's library.
+    /// The file of the vendor's library.
     pub vendor_library: PathBuf,
     /// Number of this computer in the controller's network; found out when not given.
     pub local_host: Option<String>,
@@ -53,7 +53,7 @@ pub enum HncOffset {
 ///
 /// # Errors
 /// What is missing.
-pub fn parse_hncnet(body: &str, keys: &mut Keys) -> Result<HncNetTarget, String> {
+pub fn parse_hncnet(body: &str, keys: &mut Keys) -> Result<HncNetTarget, AddressProblem> {
     let vendor_library = parse_library(keys);
     let (local_host, local_port) = (keys.take_text("local_host"), keys.take_number("local_port", 10001, 1, u16::MAX));
     let long_bytes = match keys.take_text("long_bytes").as_deref() {

@@ -4,10 +4,10 @@ use adapter_core::reading::Absence;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// One answer.
+/// The value of an item, by its kind.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum HncAnswer {
-    /// A whole number.
+    /// A whole number of 32 bits.
     Whole(i32),
     /// A real number; always finite.
     Real(f64),
@@ -22,7 +22,7 @@ pub enum HncAnswer {
 pub enum HncItemError {
     /// Return code 1: the value has not arrived yet. Ask again; there is no value now.
     NotYet,
-    /// Another return code.
+    /// Another return code of the library than 0 and 1.
     Refused(i32),
     /// The library has not the function.
     NotOffered,
@@ -46,7 +46,7 @@ impl HncItemError {
     }
 }
 
-/// One item.
+/// The value of one item, or why it has none.
 pub type HncItemResult = Result<HncAnswer, HncItemError>;
 
 /// A return code of opening or writing, in words.

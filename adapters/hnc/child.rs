@@ -8,6 +8,7 @@ use super::line::DEAD_LINK;
 use super::message::{HncReply, HncRequest};
 use super::sampling::{Columns, POINTS_MAX, SAMPLED_MAX, SampledItem};
 use adapter_core::child::{Guarded, Missing, serve_words};
+use adapter_core::integer::{convert_bounded, length_to_i64, saturate_to_ms};
 use std::ffi::CString;
 use std::path::Path;
 use std::time::Instant;
@@ -32,10 +33,10 @@ const LEVEL_ERROR: i32 = 0;
 /// The line to the parent failed.
 pub fn serve_parent() -> std::io::Result<()> {
     let mut session: Option<HncSession> = None;
-    serve_words(|ask: Result<HncRequest, String>, tell| match (ask, &session) {
+    serve_words(|ask: Result<HncRequest, _>, tell| match (ask, &session) {
         (Ok(HncRequest::Read(items)), Some(session)) => session.read_each(&items, tell),
         (Ok(ask), _) => tell(&answer_request(&mut session, ask)),
-        (Err(confused), _) => tell(&HncReply::Confused(confused)),
+        (Err(confused), _) => tell(&HncReply::Confused(confused.to_string())),
     })
 }
 
@@ -128,7 +129,7 @@ fn write_value(name: &str, value: i64, set: impl FnOnce(&mut Guarded) -> Result<
 
 impl HncSession {
     fn open(library: &Path, local: (&str, u16), at: (&str, u16), long_bytes: usize) -> Result<Self, HncReply> {
-        let functions = Functions::load(library).map_err(HncReply::Unloadable)?;
+        let functions = Functions::load(library).map_err(|why| HncReply::Unloadable(why.to_string()))?;
         let text = |text: &str| CString::new(text).map_err(|error| HncReply::Unloadable(error.to_string()));
         let (local_host, host) = (text(local.0)?, text(at.0)?);
         let without = |Missing(name)| HncReply::Unloadable(format!("the library has no {name}"));
@@ -169,7 +170,7 @@ impl HncSession {
             let began = Instant::now();
             let result = self.read(*item);
             if began.elapsed() > DEAD_LINK {
-                return tell(&HncReply::DeadLink(u64::try_from(began.elapsed().as_millis()).unwrap_or(u64::MAX)));
+                return tell(&HncReply::DeadLink(saturate_to_ms(began.elapsed())));
             }
             let malformed = matches!(result, Err(HncItemError::Malformed(_)));
             tell(&HncReply::Read(result));
@@ -233,7 +234,7 @@ impl HncSession {
     fn start_sampling(&mut self, items: &[SampledItem]) -> HncReply {
         let (f, c) = (&self.functions, self.client);
         let items = &items[..items.len().min(SAMPLED_MAX)];
-        let count = i32::try_from(items.len()).unwrap_or(0);
+        let count = convert_bounded(items.len(), i32::MAX);
         let configure = || -> Result<(), HncItemError> {
             check_code(f.HNC_SamplReset(c))?;
             check_code(f.HNC_SamplSetChannel(count, c))?;
@@ -282,9 +283,8 @@ impl HncSession {
 
     /// The values of one sampling channel. A count beyond what was asked for is an answer without sense.
     fn read_column(&self, channel: i32) -> Result<Vec<i32>, HncItemError> {
-        let wanted = i32::try_from(POINTS_MAX).unwrap_or(i32::MAX);
         let mut count = Guarded::new(8);
-        count.write_bytes(&i64::from(wanted).to_le_bytes());
+        count.write_bytes(&length_to_i64(POINTS_MAX).to_le_bytes());
         let call = |out: &mut Guarded| self.functions.HNC_SamplGetData(channel, &mut count, out, self.client);
         let bytes = fill_value(POINTS_MAX * self.long_bytes, call)?;
         let count = count.read_bytes().map_err(|overrun| HncItemError::Malformed(overrun.to_string()))?;

@@ -8,22 +8,22 @@ use serde::{Deserialize, Serialize};
 pub enum HncWidth {
     /// The low four bytes, signed, whatever `Bit32` is.
     Whole,
-    /// `fBit64`.
+    /// A `fBit64` of the header: eight bytes, a double.
     Real,
     /// Text up to the first zero, GBK.
     Text,
 }
 
-/// One question.
+/// A value that the library can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum HncItem {
-    /// `HNC_SystemGetValue`.
+    /// `HNC_SystemGetValue`: type of the value.
     System(i32, HncWidth),
     /// `HNC_ChannelGetValue` of channel 0: type, index.
     Channel(i32, i32, HncWidth),
     /// `HNC_AxisGetValue`: type, logical axis.
     Axis(i32, i32, HncWidth),
-    /// `HNC_RegGetValue`: type, index.
+    /// `HNC_RegGetValue`: type and index of the register.
     Register(i32, i32),
     /// `HNC_CrdsGetValue` of channel 0: its external zero offset, of a logical axis.
     ExternalZero(i32),
@@ -35,7 +35,7 @@ pub enum HncItem {
 
 /// Version of the controller.
 pub const NC_VERSION: HncItem = HncItem::System(24, HncWidth::Text);
-/// Serial number.
+/// Serial number of the controller.
 pub const SERIAL: HncItem = HncItem::System(25, HncWidth::Text);
 /// Counts of a position per millimetre.
 pub const MOVE_UNIT: HncItem = HncItem::System(1, HncWidth::Whole);
@@ -55,19 +55,19 @@ pub const fn define_real_item(kind: i32) -> HncItem {
 /// `HNC_CRDS_CH_G5X_OFFSET_ZERO`: the channel's external zero offset, in counts of [`MOVE_UNIT`].
 pub const EXTERNAL_ZERO: i32 = 9;
 
-/// Numbers of `HncChannel`.
+/// Types of the values of a channel, numbers of `HncChannel`.
 pub mod channel {
-    /// Actual feed, f64.
+    /// Actual feed, a real number.
     pub const ACT_FEEDRATE: i32 = 7;
-    /// Programmed feed, f64.
+    /// Programmed feed, a real number.
     pub const PROG_FEEDRATE: i32 = 8;
-    /// Feed override.
+    /// Feed override, a whole number.
     pub const FEED_OVERRIDE: i32 = 9;
-    /// Tool in use.
+    /// Number of the tool in use.
     pub const TOOL_USE: i32 = 14;
     /// 0 reset, 1 automatic, 2 jog, 3 step, 4 handwheel, 5 reference, 6 PLC, 7 single block or MDI.
     pub const MODE: i32 = 16;
-    /// MDI?
+    /// Is the channel in MDI?
     pub const IS_MDI: i32 = 17;
     /// A program runs? Setting it would start one; that is never done.
     pub const CYCLE: i32 = 18;
@@ -75,17 +75,17 @@ pub mod channel {
     pub const HOLD: i32 = 19;
     /// A thread is cut?
     pub const IS_THREADING: i32 = 22;
-    /// Rigid tapping?
+    /// Is a thread tapped rigidly?
     pub const IS_RIGID: i32 = 23;
-    /// Emergency stop?
+    /// Is the emergency stop active?
     pub const IS_ESTOP: i32 = 25;
-    /// Resetting?
+    /// Is the channel being reset?
     pub const IS_RESETTING: i32 = 26;
     /// The program is only checked?
     pub const VERIFY: i32 = 31;
-    /// Line that runs.
+    /// Line of the program that runs.
     pub const RUN_ROW: i32 = 32;
-    /// Parts.
+    /// Counter of finished parts.
     pub const PART_CNTR: i32 = 36;
     /// Logical axis of the spindle.
     pub const SPDL_LAX: i32 = 45;
@@ -93,19 +93,19 @@ pub mod channel {
     pub const CMD_SPDL_SPEED: i32 = 47;
     /// Actual spindle speed, f64.
     pub const ACT_SPDL_SPEED: i32 = 48;
-    /// Spindle override.
+    /// Spindle override, a whole number.
     pub const SPDL_OVERRIDE: i32 = 49;
 }
 
-/// Numbers of `HncAxis`.
+/// Types of the values of an axis, numbers of `HncAxis`.
 pub mod axis {
-    /// Name, text.
+    /// Name of the axis, a text.
     pub const NAME: i32 = 0;
-    /// Actual position, counts.
+    /// Actual position, counts of [`MOVE_UNIT`](super::MOVE_UNIT).
     pub const ACT_POS: i32 = 6;
-    /// Actual speed, f64.
+    /// Actual speed, a real number.
     pub const ACT_VEL: i32 = 18;
-    /// Load current, f64.
+    /// Load current, a real number.
     pub const LOAD_CUR: i32 = 29;
 }
 
@@ -114,6 +114,11 @@ pub mod axis {
 pub fn register_type(at: ControllerRegister) -> Option<i32> {
     let at = ['X', 'Y', 'F', 'G', 'R', 'W', 'D', 'B', 'P'].iter().position(|kind| *kind == at.kind)?;
     i32::try_from(at).ok()
+}
+
+/// A register as the library numbers it; `None` where it has no number for the kind, or the index exceeds 31 bits.
+pub(super) fn define_register(at: ControllerRegister) -> Option<HncItem> {
+    Some(HncItem::Register(register_type(at)?, i32::try_from(at.index).ok()?))
 }
 
 #[cfg(test)]
@@ -125,5 +130,6 @@ mod tests {
         let of = |kind| register_type(ControllerRegister { kind, index: 0 });
         assert_eq!(['X', 'G', 'R', 'D', 'P'].map(of), [0, 3, 4, 6, 8].map(Some));
         assert_eq!(of('Q'), None);
+        assert_eq!(define_register(ControllerRegister { kind: 'R', index: 1 << 31 }), None);
     }
 }

@@ -8,11 +8,15 @@ use super::sampling::{Columns, SampledItem};
 use adapter_core::address::Endpoint;
 use adapter_core::child::{ChildClient, ChildCounts, ChildError, ChildSettings, Taken};
 use adapter_core::driver::SourceError;
+use adapter_core::integer::saturate_to_ms;
 use nclink::mailbox::ControllerRegister;
 use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+
+/// Why a register is refused that the library has no number for.
+const NO_REGISTER: &str = "there is no such register";
 
 /// A call that takes longer has met a dead link: the library waits for 3 s then.
 pub(super) const DEAD_LINK: Duration = Duration::from_millis(2500);
@@ -22,7 +26,7 @@ pub(super) const DEAD_LINK: Duration = Duration::from_millis(2500);
 pub struct HncSettings {
     /// The address, as in the configuration.
     pub name: String,
-    /// The library's file.
+    /// The file of the vendor's library.
     pub vendor_library: PathBuf,
     /// Where the controller is.
     pub endpoint: Endpoint,
@@ -75,7 +79,7 @@ impl HncLine {
         Self { connection: Arc::new(Mutex::new(inner)), name }
     }
 
-    /// The address.
+    /// The address, as in the configuration.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -138,13 +142,17 @@ impl HncLine {
         let mut inner = self.lock_connection();
         for (at, value) in words {
             let request = format!("writing {at}");
-            let Some(kind) = register_type(*at) else {
-                return Err(inner.build_refusal(&request, "there is no such register".to_owned()));
+            let (Some(kind), Ok(index)) = (register_type(*at), i32::try_from(at.index)) else {
+                return Err(inner.build_refusal(&request, NO_REGISTER.to_owned()));
             };
-            let index = i32::try_from(at.index).unwrap_or(i32::MAX);
             inner.request_action(&HncRequest::Write(kind, index, *value), &request)?;
         }
         Ok(())
+    }
+
+    /// The refusal of registers that the library has no number for.
+    pub(super) fn refuse_register(&self, request: &str) -> SourceError {
+        self.lock_connection().build_refusal(request, NO_REGISTER.to_owned())
     }
 
     /// Writes the channel's external zero offset of a logical axis, counts.
@@ -284,7 +292,7 @@ impl HncConnection {
             ChildError::Hung(deadline) => SourceError::Timeout {
                 source_name: self.settings.name.clone(),
                 request: request.to_owned(),
-                deadline_ms: u64::try_from(deadline.as_millis()).unwrap_or(u64::MAX),
+                deadline_ms: saturate_to_ms(*deadline),
                 next: "The library hung and was ended; it is started again.".to_owned(),
             },
             other => self.line_failed(other.to_string(), "The child with the library is started again by itself."),
@@ -295,7 +303,7 @@ impl HncConnection {
         SourceError::Timeout {
             source_name: self.settings.name.clone(),
             request: "one of its values".to_owned(),
-            deadline_ms: u64::try_from(took.as_millis()).unwrap_or(u64::MAX),
+            deadline_ms: saturate_to_ms(took),
             next: "The link to the controller is dead; the library connects again by itself.".to_owned(),
         }
     }

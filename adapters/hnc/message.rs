@@ -6,20 +6,16 @@ use super::sampling::{Columns, SampledItem};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// From the parent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) enum HncRequest {
     /// Load the library, listen, connect.
     Open {
-        /// The library's file.
         vendor_library: PathBuf,
         /// Number of this computer in the controller's network.
         local_host: String,
         /// Port of the library's own listener.
         local_port: u16,
-        /// The controller.
         host: String,
-        /// Its port.
         port: u16,
         /// Bytes of `Bit32` in arrays.
         long_bytes: usize,
@@ -33,16 +29,13 @@ pub(super) enum HncRequest {
     Write(i32, i32, i64),
     /// Write the channel's external zero offset: logical axis, counts.
     WriteZero(i32, i32),
-    /// Begin to sample.
     Sample(Vec<SampledItem>),
     /// What has been sampled since.
     Sampled,
 }
 
-/// From the child.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) enum HncReply {
-    /// Connected.
     Opened,
     /// The library could not be loaded, or lacks what nothing works without.
     Unloadable(String),
@@ -52,18 +45,14 @@ pub(super) enum HncReply {
     Alive {
         /// 0 connected, otherwise a code.
         code: i32,
-        /// Connections so far.
         connected: u64,
-        /// Losses so far.
         lost: u64,
     },
-    /// One item.
     Read(HncItemResult),
     /// A call took so long, ms, that the link must be dead.
     DeadLink(u64),
     /// Written, or sampling.
     Done,
-    /// Samples.
     Sampled(Columns),
     /// The request made no sense, or there is no connection.
     Confused(String),

@@ -8,7 +8,7 @@
 
 use super::answer::{HncAnswer, HncItemError, HncItemResult};
 use super::decode::{extract_text, extract_whole};
-use super::item::{self, HncItem, HncWidth, axis, channel, define_whole_item, register_type};
+use super::item::{self, HncItem, HncWidth, axis, channel, define_register, define_whole_item};
 use super::line::HncLine;
 use adapter_core::clock::Clock;
 use adapter_core::driver::{SEE_DOCTOR, SourceError};
@@ -40,9 +40,12 @@ impl RegisterAccess for HncRegisters {
         first: ControllerRegister,
         count: u32,
     ) -> Result<(Vec<i64>, Option<bool>), SourceError> {
-        let kind = register_type(first).unwrap_or(-1);
-        let registers =
-            (first.index..first.index + count).map(|at| HncItem::Register(kind, i32::try_from(at).unwrap_or(-1)));
+        let register =
+            |offset| define_register(ControllerRegister { index: first.index.checked_add(offset)?, ..first });
+        let registers: Option<Vec<HncItem>> = (0..count).map(register).collect();
+        let Some(registers) = registers else {
+            return Err(self.0.refuse_register(&format!("reading {count} registers from {first}")));
+        };
         let items: Vec<HncItem> = STATE.into_iter().chain(registers).collect();
         let mut results = self.0.read_each(&items)?;
         let words = results.split_off(STATE.len());

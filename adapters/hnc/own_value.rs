@@ -7,23 +7,34 @@
 //! ```
 
 use super::answer::{HncAnswer, HncItemResult};
-use super::item::{HncItem, HncWidth, register_type};
+use super::item::{HncItem, HncWidth, define_register};
 use adapter_core::own::OwnRead;
 use adapter_core::reading::{Absence, Value};
 use nclink::mailbox::ControllerRegister;
 use std::sync::Arc;
+use thiserror::Error;
 
 /// A value of the library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OwnValue {
-    /// What is asked.
+    /// The item that the library is asked for.
     pub item: HncItem,
     /// A single bit of a register.
     pub bit: Option<u8>,
 }
 
+/// A text after `read =` that names nothing of this source.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "`{0}` is nothing that can be read; write `register D120`, `register G2560.3`, `channel 7 real`, \
+     `axis 5 29 real` or `system 24 text`"
+)]
+pub struct UnreadableValue(pub String);
+
 impl OwnRead for OwnValue {
-    fn read(text: &str) -> Result<Self, String> {
+    type Error = UnreadableValue;
+
+    fn read(text: &str) -> Result<Self, UnreadableValue> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let plain = |item| Some(Self { item, bit: None });
         let found = match words.as_slice() {
@@ -40,12 +51,7 @@ impl OwnRead for OwnValue {
             }
             _ => None,
         };
-        found.ok_or_else(|| {
-            format!(
-                "`{text}` is nothing that can be read; write `register D120`, `register G2560.3`, `channel 7 real`, \
-                 `axis 5 29 real` or `system 24 text`"
-            )
-        })
+        found.ok_or_else(|| UnreadableValue(text.to_owned()))
     }
 
     fn is_text(&self) -> Option<bool> {
@@ -73,12 +79,11 @@ fn parse_width(words: &[&str]) -> Option<HncWidth> {
 fn parse_register(place: &str) -> Option<OwnValue> {
     let (name, bit) = place.split_once('.').map_or((place, None), |(name, bit)| (name, Some(bit)));
     let at: ControllerRegister = name.parse().ok()?;
-    let index = i32::try_from(at.index).ok()?;
     let bit = match bit {
         None => None,
         Some(bit) => Some(bit.parse::<u8>().ok().filter(|bit| *bit < 32)?),
     };
-    Some(OwnValue { item: HncItem::Register(register_type(at)?, index), bit })
+    Some(OwnValue { item: define_register(at)?, bit })
 }
 
 impl OwnValue {
@@ -111,7 +116,7 @@ mod tests {
         assert_eq!(of("axis 5 29 real"), Ok((HncItem::Axis(29, 5, HncWidth::Real), None)));
         assert_eq!(OwnValue::read("system 24 text").map(|value| value.is_text()), Ok(Some(true)));
         for wrong in ["", "register", "register Q1", "register D1.40", "channel x", "axis 5", "channel 7 float"] {
-            assert!(of(wrong).is_err_and(|why| why.contains("register D120")), "{wrong}");
+            assert!(of(wrong).is_err_and(|why| why.to_string().contains("register D120")), "{wrong}");
         }
     }
 }

@@ -3,6 +3,7 @@
 //! The first channel always is the system's counter of milliseconds (F register of the system, word 149). By it a missing
 //! millisecond is counted, and a library that gives the same values twice is seen through.
 
+use adapter_core::integer::length_to_i64;
 use nclink::sample::{ItemColumn, SampleBlock};
 use serde::{Deserialize, Serialize};
 
@@ -22,18 +23,18 @@ const ACT_TRQ: i32 = 6;
 pub enum SampledItem {
     /// A property of a logical axis (types below 100).
     OfAxis {
-        /// `SAMPL` type.
+        /// `SAMPL` type of the header, below 100.
         kind: i32,
-        /// Logical axis.
+        /// Number of the logical axis.
         axis: i32,
     },
     /// A register or system value (types from 101).
     OfRegister {
-        /// `SAMPL` type.
+        /// `SAMPL` type of the header, from 101.
         kind: i32,
-        /// Word.
+        /// The word within the registers of this type.
         offset: i32,
-        /// Bytes.
+        /// Bytes of the value from that word on.
         length: i32,
     },
 }
@@ -41,14 +42,14 @@ pub enum SampledItem {
 /// What the library gave: per sampling channel the values since the last time.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Columns {
-    /// The counter first.
+    /// One column per sampling channel, the counter first.
     pub values: Vec<Vec<i32>>,
 }
 
 /// How the sampling has been doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sampled {
-    /// Milliseconds taken.
+    /// Milliseconds that were taken, one row each.
     pub instants: u64,
     /// Milliseconds that the counter shows and that never came.
     pub missing: u64,
@@ -112,7 +113,7 @@ impl Sampling {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low half is meant")]
             let count = counter[row] as u16;
             let Some(step) = self.count_step(count) else { continue };
-            let newest = i64::try_from(rows - row).unwrap_or(0);
+            let newest = length_to_i64(rows - row);
             let at_ms = self.last.map_or(now_ms - newest, |(_, last_ms)| last_ms + i64::from(step));
             self.last = Some((count, at_ms));
             if blocks.is_empty() || step > 1 {

@@ -31,6 +31,7 @@
 
 pub mod address;
 mod crc;
+mod error;
 pub mod line;
 mod meter;
 mod number;
@@ -45,6 +46,7 @@ pub mod register;
 mod rtu;
 pub mod tcp;
 
+pub use error::MeterError;
 pub use meter::ModbusMeter;
 pub use number::{Format, WordOrder};
 pub use own_register::{InRegisters, OwnRegister};

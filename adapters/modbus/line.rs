@@ -4,11 +4,11 @@ use crate::pdu;
 use adapter_core::address::{Parity, SerialTarget};
 use adapter_core::clock::Clock;
 use adapter_core::driver::SourceError;
+use adapter_core::integer::saturate_to_ms;
 use adapter_core::reading::Stamp;
 use std::io::{self, ErrorKind};
 use std::time::Duration;
 
-/// What came back.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ModbusResponse {
     /// Without address and check.
@@ -20,16 +20,16 @@ pub(crate) struct ModbusResponse {
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ModbusError {
-    /// The line itself.
+    /// The line cannot be opened, or it broke.
     Line {
-        /// What happened.
+        /// What the system says, in words.
         what: String,
-        /// What to do.
+        /// What to do next, a sentence.
         next: String,
     },
     /// Nothing came in time.
     Timeout {
-        /// What to do.
+        /// What to do next, a sentence.
         next: String,
     },
     /// The device said no, with this exception code.
@@ -45,7 +45,7 @@ impl ModbusError {
         match self {
             Self::Line { what, next } => SourceError::Line { source_name, what, next },
             Self::Timeout { next } => {
-                let deadline_ms = u64::try_from(deadline.as_millis()).unwrap_or(u64::MAX);
+                let deadline_ms = saturate_to_ms(deadline);
                 SourceError::Timeout { source_name, request, deadline_ms, next }
             }
             Self::Refused(code) => {

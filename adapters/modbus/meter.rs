@@ -1,5 +1,6 @@
 //! A Modbus meter as a source.
 
+use super::error::MeterError;
 use super::line::{ModbusError, ModbusLine};
 use super::outputs::{self, MeterChannel};
 use super::own_register::OwnRegister;
@@ -16,6 +17,7 @@ use adapter_core::channel::ChannelId;
 use adapter_core::clock::Clock;
 use adapter_core::driver::{Fact, Offer, Source, SourceError, SourceProblem};
 use adapter_core::electric::{Doubts, SupplyCheck};
+use adapter_core::integer::count_to_f64;
 use adapter_core::own::Own;
 use adapter_core::reading::{Absence, Reading};
 use adapter_core::serial::Bus;
@@ -46,8 +48,8 @@ impl ModbusMeter {
     /// A meter on the network.
     ///
     /// # Errors
-    /// In words: an unusable profile; another address that uses the same host and port with other frames.
-    pub fn with_tcp_line(name: &str, at: &Endpoint, meter: &MeterTarget) -> Result<Self, String> {
+    /// See [`MeterError`]: an unusable profile; another address that uses the same host and port with other frames.
+    pub fn with_tcp_line(name: &str, at: &Endpoint, meter: &MeterTarget) -> Result<Self, MeterError> {
         let line = TcpLine::new(at, meter.framing, meter.timeout)?;
         Self::new(name, Box::new(line), meter, None)
     }
@@ -55,8 +57,8 @@ impl ModbusMeter {
     /// A meter on a serial line.
     ///
     /// # Errors
-    /// In words: an unusable profile; a line that another address uses at another speed.
-    pub fn with_rtu_line(name: &str, target: &SerialTarget, meter: &MeterTarget) -> Result<Self, String> {
+    /// See [`MeterError`]: an unusable profile; a line that another address uses at another speed.
+    pub fn with_rtu_line(name: &str, target: &SerialTarget, meter: &MeterTarget) -> Result<Self, MeterError> {
         let line = RtuLine::new(Bus::from_target(target)?, meter.timeout);
         Self::new(name, Box::new(line), meter, Some(target.clone()))
     }
@@ -66,9 +68,8 @@ impl ModbusMeter {
         line: Box<dyn ModbusLine>,
         meter: &MeterTarget,
         serial: Option<SerialTarget>,
-    ) -> Result<Self, String> {
-        let profile =
-            profile::find_profile(&meter.profile, meter.profiles.as_deref()).map_err(|error| error.to_string())?;
+    ) -> Result<Self, MeterError> {
+        let profile = profile::find_profile(&meter.profile, meter.profiles.as_deref())?;
         let mut registers = outputs::list_registers(&profile, meter)?;
         let outputs = outputs::list_channels(&profile, meter.circuit)?;
         let mut own = Vec::new();
@@ -124,8 +125,9 @@ impl ModbusMeter {
     fn try_profile(&mut self, clock: &dyn Clock, name: &str) -> Result<String, String> {
         let profile =
             profile::find_profile(name, self.target.profiles.as_deref()).map_err(|error| error.to_string())?;
-        let outputs = outputs::list_channels(&profile, self.target.circuit)?;
-        let blocks = PollBlocks::from_registers(&profile.registers, profile.block_max, profile.block_gap)?;
+        let outputs = outputs::list_channels(&profile, self.target.circuit).map_err(|error| error.to_string())?;
+        let blocks = PollBlocks::from_registers(&profile.registers, profile.block_max, profile.block_gap)
+            .map_err(|error| error.to_string())?;
         let mut poll = RegisterPoll::new(blocks);
         poll.read(self.line.as_mut(), clock, self.target.unit).map_err(|(error, request)| match error {
             ModbusError::Refused(code) => {
@@ -210,8 +212,7 @@ impl Source for ModbusMeter {
             facts.push(Fact::from_number("wire_share_pct", 100.0 * wire.as_secs_f64() / self.period.as_secs_f64()));
         }
         if self.poll.is_split() {
-            let requests = u32::try_from(self.poll.count_requests()).unwrap_or(u32::MAX);
-            facts.push(Fact::from_number("requests_per_poll", f64::from(requests)));
+            facts.push(Fact::from_number("requests_per_poll", count_to_f64(self.poll.count_requests())));
         }
         match self.refresh.estimate_interval() {
             Some(found) if found.at_least_as_fast => {

@@ -3,6 +3,7 @@
 //! A register is 16 bits, high byte first (Modbus Application Protocol 1.1b3, 4.2). How two or four of them make a number
 //! is the meter's own choice.
 
+use adapter_core::integer::{take_low_u16, take_low_u32};
 use serde::Deserialize;
 
 /// How a number lies in registers.
@@ -70,7 +71,7 @@ impl WordOrder {
 }
 
 impl Format {
-    /// How many registers.
+    /// Registers that a number takes, 1 to 4.
     #[must_use]
     pub fn register_count(self) -> u16 {
         match self {
@@ -122,14 +123,13 @@ impl Format {
     #[expect(clippy::cast_precision_loss, reason = "no meter counts beyond 2^53")]
     pub fn decode(self, registers: &[u16], order: WordOrder) -> Option<f64> {
         let bits = join_bits(registers.get(..usize::from(self.register_count()))?, order);
-        let low = |bits: u64| u32::try_from(bits & 0xFFFF_FFFF).unwrap_or(0);
         let number = match self {
             Self::U16 | Self::U32 => bits as f64,
-            Self::I16 => f64::from(u16::try_from(bits & 0xFFFF).unwrap_or(0).cast_signed()),
-            Self::I32 => f64::from(low(bits).cast_signed()),
+            Self::I16 => f64::from(take_low_u16(bits).cast_signed()),
+            Self::I32 => f64::from(take_low_u32(bits).cast_signed()),
             Self::Sm16 => decode_sign_magnitude(bits, 15),
             Self::Sm32 => decode_sign_magnitude(bits, 31),
-            Self::F32 => f64::from(f32::from_bits(low(bits))),
+            Self::F32 => f64::from(f32::from_bits(take_low_u32(bits))),
             Self::I64 => bits.cast_signed() as f64,
             Self::F64 => f64::from_bits(bits),
         };
@@ -152,7 +152,7 @@ impl Format {
             Self::I64 => (whole as i64).cast_unsigned(),
             Self::F64 => number.to_bits(),
         };
-        let words = (0..self.register_count()).map(|word| u16::try_from((bits >> (16 * word)) & 0xFFFF).unwrap_or(0));
+        let words = (0..self.register_count()).map(|word| take_low_u16(bits >> (16 * word)));
         let words = words.map(|word| order.to_big_endian(word));
         if order.low_word_first() { words.collect() } else { words.rev().collect() }
     }

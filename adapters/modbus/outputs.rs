@@ -1,5 +1,6 @@
 //! From the registers of a meter to channels, and to what they say about each other.
 
+use super::error::MeterError;
 use super::poll::RegisterPoll;
 use super::profile::Profile;
 use super::register::{MeterRegister, RegisterMeaning};
@@ -7,6 +8,7 @@ use crate::address::MeterTarget;
 use adapter_core::address::Circuit;
 use adapter_core::channel::ChannelId;
 use adapter_core::electric::{Doubts, SupplyValues};
+use adapter_core::integer::count_to_f64;
 use adapter_core::reading::Reading;
 
 /// How the registers of an output are put together.
@@ -25,11 +27,9 @@ enum Believed {
     Always,
     /// Its value, while all of the answer is in doubt.
     WithAll,
-    /// As a power.
     AsPower,
     /// As the voltage of the supply.
     AsVoltage,
-    /// As its frequency.
     AsFrequency,
 }
 
@@ -46,7 +46,7 @@ pub(super) struct MeterChannel {
 impl Law {
     fn combine_numbers(self, numbers: &[f64]) -> f64 {
         let sum: f64 = numbers.iter().sum();
-        let count = f64::from(u32::try_from(numbers.len()).unwrap_or(1)).max(1.0);
+        let count = count_to_f64(numbers.len()).max(1.0);
         match self {
             Self::Sum => sum,
             Self::Mean => sum / count,
@@ -94,10 +94,10 @@ impl MeterChannel {
 ///
 /// # Errors
 /// Transformers were given for a meter that counts them in.
-pub(super) fn list_registers(profile: &Profile, meter: &MeterTarget) -> Result<Vec<MeterRegister>, String> {
+pub(super) fn list_registers(profile: &Profile, meter: &MeterTarget) -> Result<Vec<MeterRegister>, MeterError> {
     let given = (meter.ct - 1.0).abs() > 1e-12 || (meter.pt - 1.0).abs() > 1e-12;
     if given && !profile.secondary {
-        return Err(format!("{} counts its transformers in: leave ct and pt out", profile.meter));
+        return Err(MeterError::TransformersCounted { meter: profile.meter.clone() });
     }
     let ratio = |quantity| match quantity {
         RegisterMeaning::Power
@@ -120,7 +120,7 @@ pub(super) fn list_registers(profile: &Profile, meter: &MeterTarget) -> Result<V
 ///
 /// # Errors
 /// It gives none, or one twice.
-pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel>, String> {
+pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<MeterChannel>, MeterError> {
     let all = |wanted: &dyn Fn(RegisterMeaning) -> bool| -> Vec<usize> {
         let each = profile.registers.iter().enumerate();
         each.filter(|(_, register)| wanted(register.meaning)).map(|(at, _)| at).collect()
@@ -161,11 +161,11 @@ pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<M
     let mut seen = Vec::new();
     for output in &outputs {
         if seen.contains(&output.channel) {
-            return Err(format!("profile {} gives {} twice", profile.name, output.channel));
+            return Err(MeterError::ChannelTwice { profile: profile.name.clone(), channel: output.channel });
         }
         seen.push(output.channel);
     }
-    if outputs.is_empty() { Err(format!("profile {} gives no channel", profile.name)) } else { Ok(outputs) }
+    if outputs.is_empty() { Err(MeterError::NoChannel { profile: profile.name.clone() }) } else { Ok(outputs) }
 }
 
 /// What the last poll says of the supply.

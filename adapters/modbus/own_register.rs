@@ -16,6 +16,7 @@ use adapter_core::conversion::Conversion;
 use adapter_core::own::{OwnChannel, OwnRead};
 use adapter_core::reading::{Absence, Value};
 use std::sync::Arc;
+use thiserror::Error;
 
 /// Longest text, registers.
 const TEXT_MAX: u16 = 64;
@@ -23,7 +24,7 @@ const TEXT_MAX: u16 = 64;
 /// What is in the registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InRegisters {
-    /// A number.
+    /// A number with its format and the order of its bytes.
     Number(Format, WordOrder),
     /// A text of so many registers.
     Text(u16),
@@ -32,16 +33,26 @@ pub enum InRegisters {
 /// Registers of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OwnRegister {
-    /// In which table.
+    /// The table in which they stand.
     pub table: RegisterTable,
     /// Protocol address of the first one.
     pub address: u16,
-    /// What they hold.
+    /// How their bits are read.
     pub content: InRegisters,
 }
 
+/// A text after `read =` that names nothing of this source.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "`{0}` is nothing that can be read; write table, address from 0 and type: `input 52 f32`, `holding 0x34 i16`, \
+     `input 52 f32 badc` or `holding 100 text 8`"
+)]
+pub struct UnreadableRegister(pub String);
+
 impl OwnRead for OwnRegister {
-    fn read(text: &str) -> Result<Self, String> {
+    type Error = UnreadableRegister;
+
+    fn read(text: &str) -> Result<Self, UnreadableRegister> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let found = match words.as_slice() {
             [table, address, "text", count] => {
@@ -55,12 +66,7 @@ impl OwnRead for OwnRegister {
                 .and_then(|(format, order)| parse_register(table, address, InRegisters::Number(format, order))),
             _ => None,
         };
-        found.ok_or_else(|| {
-            format!(
-                "`{text}` is nothing that can be read; write table, address from 0 and type: `input 52 f32`, `holding 0x34 i16`, \
-                 `input 52 f32 badc` or `holding 100 text 8`"
-            )
-        })
+        found.ok_or_else(|| UnreadableRegister(text.to_owned()))
     }
 
     fn is_text(&self) -> Option<bool> {
@@ -162,7 +168,7 @@ mod tests {
         for wrong in
             ["", "coil 1 u16", "input x f32", "input 65535 f32", "input 1 f31", "input 1 text 0", "input 1 f32 xyz"]
         {
-            assert!(OwnRegister::read(wrong).is_err_and(|why| why.contains("input 52 f32")), "{wrong}");
+            assert!(OwnRegister::read(wrong).is_err_and(|why| why.to_string().contains("input 52 f32")), "{wrong}");
         }
     }
 }

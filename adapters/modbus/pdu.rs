@@ -2,15 +2,17 @@
 //!
 //! Source: Modbus Application Protocol Specification V1.1b3: 6.3 (03), 6.4 (04), 7 (exceptions).
 
+use adapter_core::integer::convert_bounded;
+
 /// At most so many registers in one answer (6.3).
 pub const REGISTERS_MAX: u16 = 125;
 
 /// Which table of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RegisterTable {
-    /// Function 3.
+    /// Holding registers, read by function 3.
     Holding,
-    /// Function 4.
+    /// Input registers, read by function 4.
     Input,
 }
 
@@ -28,7 +30,7 @@ impl RegisterTable {
 /// A run of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegisterBlock {
-    /// Of which table.
+    /// The table in which they stand.
     pub table: RegisterTable,
     /// Protocol address of the first one, counted from 0.
     pub start: u16,
@@ -126,7 +128,7 @@ pub fn parse_request(request: &[u8]) -> Result<RegisterBlock, u8> {
 /// The answer that carries these registers (at most 125).
 #[must_use]
 pub fn encode_answer(table: RegisterTable, registers: &[u16]) -> Vec<u8> {
-    let bytes = u8::try_from(2 * registers.len()).unwrap_or(u8::MAX);
+    let bytes = convert_bounded(2 * registers.len(), u8::MAX);
     let mut answer = vec![table.function_code(), bytes];
     answer.extend(registers.iter().flat_map(|register| register.to_be_bytes()));
     answer

@@ -4,9 +4,11 @@
 //! exception (2 or 3), and the block is then read in parts: first without what nobody reads, then in halves, down to single
 //! numbers. What was found out is remembered as long as the source lives.
 
+use super::error::MeterError;
 use super::pdu::{RegisterBlock, RegisterTable};
 use super::register::MeterRegister;
 use adapter_core::address::SerialTarget;
+use adapter_core::integer::convert_bounded;
 use adapter_core::serial;
 use std::time::Duration;
 
@@ -38,12 +40,12 @@ impl PollBlocks {
     /// The fewest blocks of at most `most` registers that run across at most `gap` which nobody reads.
     ///
     /// # Errors
-    /// In words: a profile that needs too many requests.
+    /// [`MeterError::TooManyRequests`].
     pub fn from_registers<'a>(
         registers: impl IntoIterator<Item = &'a MeterRegister>,
         most: u16,
         gap: u16,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, MeterError> {
         let span = |register: &MeterRegister| {
             let from = u32::from(register.address);
             NumberSpan { table: register.table, from, to: from + u32::from(register.format.register_count()) }
@@ -53,7 +55,7 @@ impl PollBlocks {
         spans.dedup();
         let blocks = join_spans(&spans, most, gap);
         if blocks.len() > BLOCKS_MAX {
-            return Err(format!("{} requests per poll; at most {BLOCKS_MAX}, so make it two profiles", blocks.len()));
+            return Err(MeterError::TooManyRequests { requests: blocks.len(), most: BLOCKS_MAX });
         }
         Ok(Self { blocks, spans })
     }
@@ -107,7 +109,8 @@ fn join_spans(spans: &[NumberSpan], most: u16, gap: u16) -> Vec<RegisterBlock> {
             None => joined.push(*span),
         }
     }
-    let word = |number: u32| u16::try_from(number).unwrap_or(u16::MAX);
+    // An address has 16 bits, and a block is no longer than `most` or one number.
+    let word = |number: u32| convert_bounded(number, u16::MAX);
     let block = |span: NumberSpan| RegisterBlock {
         table: span.table,
         start: word(span.from),

@@ -57,18 +57,18 @@ pub const SHIPPED: [(&str, &str); 9] = [
     ("generic", include_str!("profiles/generic.toml")),
 ];
 
-/// A meter's map.
+/// Which registers of a kind of meter hold what.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
     /// As it is named in an address.
     pub name: String,
-    /// The meter.
+    /// What the meter is called, as the profile writes it.
     pub meter: String,
     /// Where its numbers are.
     pub table: RegisterTable,
     /// Are the numbers those of the secondary side of transformers?
     pub secondary: bool,
-    /// Pace of polling.
+    /// From one poll to the next.
     pub period: Duration,
     /// Registers per request at most.
     pub block_max: u16,
@@ -78,7 +78,7 @@ pub struct Profile {
     pub confirmed: bool,
     /// Where the map comes from.
     pub source: String,
-    /// Its numbers.
+    /// The numbers of the meter, each with its place.
     pub registers: Vec<MeterRegister>,
 }
 

@@ -6,6 +6,7 @@
 //! is the refresh; at every poll something new means that the meter is at least as fast as the polling.
 
 use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::integer::count_to_f64;
 use std::collections::VecDeque;
 
 /// The last so many renewals count.
@@ -71,11 +72,11 @@ impl Refresh {
         // A renewal with the same digits hides one; a stall of the line shows as a long one.
         let near = |ns: &i64| (0.5 * middle..=1.5 * middle).contains(&to_seconds(*ns));
         let kept: Vec<f64> = sorted.iter().filter(|ns| near(ns)).map(|ns| to_seconds(*ns)).collect();
-        let count = f64::from(u32::try_from(kept.len()).unwrap_or(u32::MAX)).max(1.0);
+        let count = count_to_f64(kept.len()).max(1.0);
         let mean = kept.iter().sum::<f64>() / count;
         let variance = kept.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
         let every = self.intervals.iter().filter(|(_, polls)| *polls == 1).count();
-        let share = f64::from(u32::try_from(every).unwrap_or(0)) / f64::from(u32::try_from(sorted.len()).unwrap_or(1));
+        let share = count_to_f64(every) / count_to_f64(sorted.len());
         Some(Effective {
             refresh_s: mean,
             uncertainty_s: 1.96 * (variance / count).sqrt(),

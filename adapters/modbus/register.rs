@@ -34,9 +34,9 @@ pub enum RegisterMeaning {
 /// One number of the meter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeterRegister {
-    /// What it means.
+    /// The quantity or the channel that it stands for.
     pub meaning: RegisterMeaning,
-    /// In which table.
+    /// The table in which it stands.
     pub table: RegisterTable,
     /// Protocol address of its first register.
     pub address: u16,

@@ -7,6 +7,7 @@
 use super::crc::{compute_crc, is_whole};
 use super::line::{ModbusError, ModbusLine, ModbusResponse, serial_fault, serial_silence};
 use adapter_core::clock::Clock;
+use adapter_core::integer::saturate_to_wait_ns;
 use adapter_core::reading::Stamp;
 use adapter_core::serial::{Bus, SharedBus, wire_time};
 use std::sync::PoisonError;
@@ -100,8 +101,7 @@ pub(super) fn encode_frame(unit: u8, request: &[u8]) -> Vec<u8> {
 
 /// The value was taken after the request had left and before the answer began to come; the wire's own time is known.
 fn estimate_stamp(began_ns: i64, ended_ns: i64, sent: Duration, received: Duration) -> Stamp {
-    let nanoseconds = |time: Duration| i64::try_from(time.as_nanos()).unwrap_or(0);
-    let wire_ns = (nanoseconds(sent), nanoseconds(received));
+    let wire_ns = (saturate_to_wait_ns(sent), saturate_to_wait_ns(received));
     if wire_ns.0 + wire_ns.1 > ended_ns - began_ns {
         // A line that is faster than its baud rate says: a pseudo terminal, or an adapter with a buffer.
         return Stamp::of_request(began_ns, ended_ns);

@@ -4,10 +4,12 @@
 //! unit) and 4.2 (TCP_NODELAY; a connection per server). Every source that names the same host and port shares the connection,
 //! as those on one serial line share the line.
 
+use super::error::MeterError;
 use super::line::{ModbusError, ModbusLine, ModbusResponse};
 use super::rtu;
 use adapter_core::address::Endpoint;
 use adapter_core::clock::Clock;
+use adapter_core::integer::convert_bounded;
 use adapter_core::reading::Stamp;
 use adapter_core::stream::{self, Short};
 use std::collections::HashMap;
@@ -58,7 +60,7 @@ type PortsByEndpoint = HashMap<(String, u16), Weak<Mutex<TcpPort>>>;
 static PORTS: Mutex<Option<PortsByEndpoint>> = Mutex::new(None);
 
 /// The connection of this host and port; the same one for every address that names it.
-fn open_shared_port(at: &Endpoint, framing: TcpFraming) -> Result<SharedPort, String> {
+fn open_shared_port(at: &Endpoint, framing: TcpFraming) -> Result<SharedPort, MeterError> {
     let mut ports = PORTS.lock().unwrap_or_else(PoisonError::into_inner);
     let ports = ports.get_or_insert_with(HashMap::new);
     ports.retain(|_, port| port.strong_count() > 0);
@@ -70,9 +72,7 @@ fn open_shared_port(at: &Endpoint, framing: TcpFraming) -> Result<SharedPort, St
         return Ok(port);
     };
     let same = port.lock().unwrap_or_else(PoisonError::into_inner).framing == framing;
-    let differs =
-        || format!("two addresses use {}:{} with different framing=; one connection has one of them", at.host, at.port);
-    same.then_some(port).ok_or_else(differs)
+    same.then_some(port).ok_or_else(|| MeterError::Framing { host: at.host.clone(), port: at.port })
 }
 
 pub(super) struct TcpLine {
@@ -85,8 +85,8 @@ impl TcpLine {
     /// A line to a host and port.
     ///
     /// # Errors
-    /// In words: another address uses them with other frames.
-    pub(super) fn new(at: &Endpoint, framing: TcpFraming, deadline: Duration) -> Result<Self, String> {
+    /// [`MeterError::Framing`].
+    pub(super) fn new(at: &Endpoint, framing: TcpFraming, deadline: Duration) -> Result<Self, MeterError> {
         Ok(Self { port: open_shared_port(at, framing)?, deadline, stray: 0 })
     }
 }
@@ -173,7 +173,6 @@ struct TcpRequest<'a> {
 enum Attempt {
     /// The other side had closed before a byte came.
     ClosedIdle(ModbusError),
-    /// Anything else.
     Failed(ModbusError),
 }
 
@@ -268,7 +267,7 @@ fn build_broken_error(error: &io::Error) -> ModbusError {
 
 /// Header and PDU as one write, so that they leave in one packet.
 pub fn encode_frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let length = u16::try_from(pdu.len() + 1).unwrap_or(u16::MAX);
+    let length = convert_bounded(pdu.len() + 1, u16::MAX);
     let mut frame = Vec::with_capacity(HEADER + pdu.len());
     frame.extend(transaction.to_be_bytes());
     frame.extend([0, 0]);

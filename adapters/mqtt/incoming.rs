@@ -33,7 +33,6 @@ pub(super) struct Allows {
     pub(super) receive_maximum: Option<u16>,
     /// Bytes of a packet.
     pub(super) packet_max: Option<u32>,
-    /// Seconds of keep-alive.
     pub(super) keep_alive_s: Option<u16>,
 }
 

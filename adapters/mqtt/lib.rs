@@ -51,9 +51,9 @@ pub enum Version {
 /// What the broker publishes in our name when the connection breaks.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Will {
-    /// Its topic.
+    /// The topic under which the broker publishes it.
     pub topic: String,
-    /// What it says.
+    /// The bytes that the broker publishes.
     pub payload: Vec<u8>,
     /// How hard it is delivered.
     pub qos: Qos,
@@ -68,7 +68,7 @@ pub struct Will {
 pub struct Options {
     /// Host name or number.
     pub host: String,
-    /// TCP port.
+    /// TCP port of the broker.
     pub port: u16,
     /// Name of this client at the broker; another client of the same name is thrown out by the broker.
     pub client_id: String,
@@ -100,9 +100,9 @@ impl Options {
 /// One message of a subscription.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MqttMessage {
-    /// Its topic.
+    /// The topic under which it was published.
     pub topic: String,
-    /// Its payload.
+    /// The bytes as they came.
     pub payload: Vec<u8>,
     /// When its last byte had arrived.
     pub arrived: Instant,
@@ -116,7 +116,7 @@ pub enum MqttError {
     /// No connection to the broker.
     #[error("no connection to the broker {broker}: {what}")]
     Unreachable {
-        /// Host and port.
+        /// Host and port of the broker.
         broker: String,
         /// What the system said.
         what: String,
@@ -127,7 +127,7 @@ pub enum MqttError {
     /// The broker refused the connection, a subscription or a message.
     #[error("the broker refuses: {0}")]
     Refused(String),
-    /// The connection broke.
+    /// The connection broke; the text says why.
     #[error("the connection to the broker broke: {0}")]
     Closed(String),
     /// The broker did not acknowledge in time.

@@ -1,6 +1,7 @@
 //! What this client sends, as bytes (MQTT 3.1.1, sections 2 and 3). Pure.
 
 use super::{MqttError, Options, PACKET_MAX, Version};
+use adapter_core::integer::convert_bounded;
 
 /// How hard a message is delivered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,6 +37,7 @@ pub(super) fn encode_connect(options: &Options) -> Result<Vec<u8>, MqttError> {
     append_text(&mut body, "MQTT")?;
     let login = if options.login.is_some() { 0xc0 } else { 0 };
     let will = options.will.as_ref().map_or(0, |will| 0x04 | (will.qos.level() << 3) | (u8::from(will.retain) << 5));
+    // Two bytes hold 18 hours; who wishes for more is content with them.
     let keep_alive_s = u16::try_from(options.keep_alive.as_secs()).unwrap_or(u16::MAX);
     body.extend([if five { 5 } else { 4 }, 0x02 | login | will]);
     body.extend(keep_alive_s.to_be_bytes());
@@ -111,7 +113,7 @@ fn frame_packet(first: u8, body: &[u8]) -> Result<Vec<u8>, MqttError> {
     let mut packet = vec![first];
     let mut rest = body.len();
     loop {
-        let seven = u8::try_from(rest & 0x7f).unwrap_or(0);
+        let seven = convert_bounded(rest & 0x7f, 0x7f_u8);
         rest >>= 7;
         packet.push(if rest > 0 { seven | 0x80 } else { seven });
         if rest == 0 {

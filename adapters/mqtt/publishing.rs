@@ -3,14 +3,15 @@
 use super::client::MqttClient;
 use super::packet::{self, Qos};
 use super::{MqttError, words};
+use adapter_core::integer::widen_to_usize;
 use std::collections::VecDeque;
 
 /// A message to send.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outgoing {
-    /// Its topic.
+    /// The topic under which it is published.
     pub topic: String,
-    /// What it says.
+    /// The bytes that are published.
     pub payload: Vec<u8>,
     /// Does the broker keep it for later subscribers?
     pub retain: bool,
@@ -69,8 +70,7 @@ impl MqttClient {
     fn send_one(&self, message: &Outgoing, id: Option<u16>) -> Result<(), MqttError> {
         let Outgoing { topic, payload, retain } = message;
         let packet = packet::encode_publish(self.version(), topic, payload, id, *retain)?;
-        let limit =
-            self.broker_limits().packet_max.map_or(usize::MAX, |limit| usize::try_from(limit).unwrap_or(usize::MAX));
+        let limit = self.broker_limits().packet_max.map_or(usize::MAX, widen_to_usize);
         if packet.len() > limit {
             let what = format!("{} bytes on {topic}; the broker takes at most {limit}", packet.len());
             return Err(MqttError::Unsendable(what));

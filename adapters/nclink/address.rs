@@ -4,16 +4,17 @@ use crate::OwnPath;
 use crate::mailbox::{ControllerRegister, Mailbox};
 use crate::offset_mailbox::OffsetMailbox;
 use adapter_core::address::{
-    Endpoint, Keys, Login, WaveformKeep, parse_encoding, parse_endpoint, parse_waveform_keep, tls_files,
+    AddressProblem, Endpoint, Keys, Login, WaveformKeep, parse_encoding, parse_endpoint, parse_waveform_keep, tls_files,
 };
 use adapter_core::own::Own;
 use adapter_core::text::TextEncoding;
 use adapter_core::tls::TlsFiles;
+use thiserror::Error;
 
 /// A Huazhong controller behind a broker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NcLinkTarget {
-    /// The broker.
+    /// Host and port of the broker.
     pub endpoint: Endpoint,
     /// Serial number of the device.
     pub serial: String,
@@ -41,11 +42,22 @@ pub struct NcLinkTarget {
     pub own: Vec<Own<OwnPath>>,
 }
 
+/// Why an address names no device.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum NcLinkAddressError {
+    /// No serial number stands behind the broker, or one that would be a pattern of topics.
+    #[error("no serial number; write nclink://BROKER:1883/SERIAL")]
+    NoSerialNumber,
+    /// The broker or a key that other schemes have as well.
+    #[error(transparent)]
+    Address(#[from] AddressProblem),
+}
+
 /// The device that the address names.
 ///
 /// # Errors
 /// What is missing.
-pub fn parse_nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<NcLinkTarget, String> {
+pub fn parse_nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<NcLinkTarget, NcLinkAddressError> {
     let (login, files) = (Login::from_keys(keys), tls_files(keys, tls));
     let period_ms = keys.take_number("period_ms", 100, 10, 60_000);
     let f_channel = keys.take_number("f_channel", 2560, 0, 65_535);
@@ -58,7 +70,7 @@ pub fn parse_nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<NcLinkTarg
     let rest = body.strip_prefix("//").unwrap_or(body);
     let (broker, serial) = rest.split_once('/').unwrap_or((rest, ""));
     if serial.is_empty() || serial.contains(['+', '#']) {
-        return Err("no serial number; write nclink://BROKER:1883/SERIAL".to_owned());
+        return Err(NcLinkAddressError::NoSerialNumber);
     }
     let at = parse_endpoint(broker, Some(if tls { 8883 } else { 1883 }))?;
     let serial = serial.to_owned();
@@ -105,7 +117,7 @@ pub fn parse_offset_register(
 }
 
 /// `keep=` and `keep_above_a=`, where there are samples to be kept.
-pub fn parse_sampled_keep(keys: &mut Keys, sampled: bool, next: &str) -> Result<Option<WaveformKeep>, String> {
+pub fn parse_sampled_keep(keys: &mut Keys, sampled: bool, next: &str) -> Result<Option<WaveformKeep>, AddressProblem> {
     let keep = parse_waveform_keep(keys)?;
     if keep.is_some() && !sampled {
         keys.add_problem(format!("keep needs samples: write {next} as well"));

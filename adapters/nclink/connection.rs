@@ -1,10 +1,11 @@
 //! One client of one device: a connection to the broker, and questions with their answers.
 
-use super::message::{self, NcLinkAnswer, RequestedItem};
+use super::message::{self, AnswersError, NcLinkAnswer, RequestedItem};
 use super::model::Model;
 use super::topic::Subject;
 use crate::address::NcLinkTarget;
 use adapter_core::driver::SourceError;
+use adapter_core::integer::saturate_to_ms;
 use adapter_core::text::TextEncoding;
 use adapter_core::tls::TlsFiles;
 use mqtt::{self, MqttClient, MqttError, MqttMessage, Qos};
@@ -24,7 +25,7 @@ pub struct Link {
     pub name: String,
     /// Host of the broker.
     pub host: String,
-    /// Its port.
+    /// TCP port of the broker.
     pub port: u16,
     /// Serial number of the device.
     pub serial: String,
@@ -58,13 +59,13 @@ impl Link {
 /// A message that nobody asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unasked {
-    /// Sample or event.
+    /// [`Subject::Sample`] or [`Subject::Event`].
     pub subject: Subject,
     /// What stood behind the serial number in its topic.
     pub tail: String,
     /// When it had arrived.
     pub arrived: Instant,
-    /// What it says.
+    /// The message as JSON, out of the character set of the link.
     pub message: Value,
 }
 
@@ -108,7 +109,7 @@ impl Connection {
         if let Some(reason) = message::find_refusal(&answer) {
             return Err(self.build_refusal(what, reason));
         }
-        Model::parse(&answer).map_err(|why| self.build_decode_error(what, why))
+        Model::parse(&answer).map_err(|why| self.build_decode_error(what, why.to_string()))
     }
 
     /// Asks for values; one answer per ask, `None` where the device said nothing of it.
@@ -154,9 +155,9 @@ impl Connection {
     ) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
         let id = generate_identifier();
         let answer = self.exchange_messages(subject, &id, &message::encode_request(&id, asks), what)?;
-        message::parse_answers(&answer, asks).map_err(|why| match message::find_refusal(&answer) {
-            Some(reason) => self.build_refusal(what, reason),
-            None => self.build_decode_error(what, why),
+        message::parse_answers(&answer, asks).map_err(|why| match why {
+            AnswersError::Refused(reason) => self.build_refusal(what, reason),
+            AnswersError::NoAnswers => self.build_decode_error(what, why.to_string()),
         })
     }
 
@@ -227,7 +228,7 @@ impl Connection {
         SourceError::Timeout {
             source_name: self.link.name.clone(),
             request: what.to_owned(),
-            deadline_ms: u64::try_from(self.link.deadline.as_millis()).unwrap_or(u64::MAX),
+            deadline_ms: saturate_to_ms(self.link.deadline),
             next: format!(
                 "The broker answers, the device {} does not: check that the machine is on, that its NC-Link adapter \
                  is connected to this broker, and its serial number.",

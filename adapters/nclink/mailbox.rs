@@ -18,13 +18,14 @@ use adapter_core::reading::Absence;
 use adapter_core::units::OverridePct;
 use std::fmt;
 use std::str::FromStr;
+use thiserror::Error;
 
 /// A register of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ControllerRegister {
     /// Its kind: X, Y, F, G, R, W, D, B or P.
     pub kind: char,
-    /// Its number.
+    /// Its number within the kind, below 60000 where it is read from a text.
     pub index: u32,
 }
 
@@ -34,16 +35,21 @@ impl fmt::Display for ControllerRegister {
     }
 }
 
-impl FromStr for ControllerRegister {
-    type Err = String;
+/// A text that is no kind and number of a register below 60000.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{0} is no register; write it like D100")]
+pub struct NoRegister(pub String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for ControllerRegister {
+    type Err = NoRegister;
+
+    fn from_str(text: &str) -> Result<Self, NoRegister> {
         let mut letters = text.trim().chars();
         let kind = letters.next().map(|kind| kind.to_ascii_uppercase()).filter(|kind| "XYFGRWDBP".contains(*kind));
         let index = letters.as_str().parse().ok().filter(|index| *index < 60_000);
         match (kind, index) {
             (Some(kind), Some(index)) => Ok(Self { kind, index }),
-            _ => Err(format!("{text} is no register; write it like D100")),
+            _ => Err(NoRegister(text.to_owned())),
         }
     }
 }
@@ -53,7 +59,7 @@ impl FromStr for ControllerRegister {
 pub enum MailboxRequest {
     /// This override beside the dial.
     Override(OverridePct),
-    /// The dial alone.
+    /// The override of the dial alone counts.
     Release,
 }
 
@@ -69,7 +75,7 @@ impl MailboxRequest {
     }
 }
 
-/// The four registers.
+/// The four registers through which the gateway asks the ladder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mailbox {
     first: ControllerRegister,
@@ -77,16 +83,16 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// Wanted override.
+    /// Register +0: the wanted override, %.
     pub const OVERRIDE: u32 = 0;
-    /// Does it count?
+    /// Register +1: it is 1 while the override counts.
     pub const ENABLE: u32 = 1;
     /// Feed hold or stop.
     pub const REQUEST: u32 = 2;
-    /// Sign of life.
+    /// Register +3: the sign of life.
     pub const HEARTBEAT: u32 = 3;
 
-    /// Registers in all.
+    /// Registers of the mailbox in all.
     pub const LENGTH: u32 = 4;
 
     /// The mailbox that begins at this register.

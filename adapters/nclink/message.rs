@@ -3,13 +3,14 @@
 
 use super::lenient_json::{find_field, find_list, find_text, parse_number};
 use serde_json::{Value, json};
+use thiserror::Error;
 
 /// What is asked of one data item.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Params {
     /// Elements of a list, `"7"` or `"3-5"`.
     pub indexes: Vec<String>,
-    /// Write this.
+    /// The value to write; `None` reads.
     pub value: Option<Value>,
     /// To this element of a list.
     pub index: Option<u32>,
@@ -22,7 +23,7 @@ pub struct Params {
 pub struct RequestedItem {
     /// Node number or path.
     pub id: String,
-    /// What of it.
+    /// Which elements are meant, and what is written.
     pub params: Params,
 }
 
@@ -73,6 +74,17 @@ impl RequestedItem {
 /// What a device said about one item.
 pub type NcLinkAnswer = Result<Vec<Value>, String>;
 
+/// Why a message holds no answers.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub(super) enum AnswersError {
+    /// The device refuses the request as a whole, with this reason.
+    #[error("{0}")]
+    Refused(String),
+    /// There is no list of answers, and no refusal.
+    #[error("there is neither \"values\" nor \"results\" in it")]
+    NoAnswers,
+}
+
 /// The request for values, or to write them.
 pub(super) fn encode_request(id: &str, asks: &[RequestedItem]) -> Vec<u8> {
     let items: Vec<Value> = asks.iter().map(RequestedItem::to_json).collect();
@@ -89,12 +101,15 @@ pub fn find_identifier(message: &Value) -> Option<String> {
 ///
 /// # Errors
 /// The message as a whole is a refusal, or has no list of answers.
-pub(super) fn parse_answers(message: &Value, asks: &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, String> {
+pub(super) fn parse_answers(
+    message: &Value,
+    asks: &[RequestedItem],
+) -> Result<Vec<Option<NcLinkAnswer>>, AnswersError> {
     let items = find_list(message, &["values", "results"]);
     if items.is_empty() {
         return match find_refusal(message) {
-            Some(reason) => Err(reason),
-            None => Err("there is neither \"values\" nor \"results\" in it".to_owned()),
+            Some(reason) => Err(AnswersError::Refused(reason)),
+            None => Err(AnswersError::NoAnswers),
         };
     }
     let id = |item: &Value| find_text(item, &["id"]);
@@ -203,7 +218,10 @@ mod tests {
     #[test]
     fn a_refusal_of_everything_and_nonsense_are_told() {
         let asks = [RequestedItem::from_id("STATUS")];
-        assert_eq!(parse_answers(&parsed(r#"{"code":"NG","reason":"busy"}"#), &asks), Err("busy".to_owned()));
-        assert!(parse_answers(&parsed("[1]"), &asks).is_err_and(|why| why.contains("values")));
+        assert_eq!(
+            parse_answers(&parsed(r#"{"code":"NG","reason":"busy"}"#), &asks),
+            Err(AnswersError::Refused("busy".to_owned()))
+        );
+        assert!(parse_answers(&parsed("[1]"), &asks).is_err_and(|why| why.to_string().contains("values")));
     }
 }

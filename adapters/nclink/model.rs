@@ -6,6 +6,7 @@
 use super::lenient_json::{find_flag, find_list, find_text, parse_number};
 use serde_json::Value;
 use std::collections::HashMap;
+use thiserror::Error;
 
 /// At most so many data items are kept of a model; the rest is left out.
 pub const ITEMS_MAX: usize = 20_000;
@@ -15,7 +16,7 @@ const DEPTH_MAX: usize = 16;
 /// A data item or configuration item.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelItem {
-    /// Node number.
+    /// Node number by which the device knows it.
     pub id: String,
     /// See the [module](self); in capitals, without a leading `/`.
     pub path: String,
@@ -52,19 +53,24 @@ pub struct Model {
     by_name: HashMap<String, usize>,
 }
 
+/// A model without a list of devices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("the model has no \"devices\"")]
+pub struct NoDevices;
+
 impl Model {
     /// Reads the answer to a probe, or a model alone.
     ///
     /// # Errors
-    /// What is missing, in words.
-    pub fn parse(message: &Value) -> Result<Self, String> {
+    /// The message holds no device.
+    pub fn parse(message: &Value) -> Result<Self, NoDevices> {
         let root = message.get("probe").unwrap_or(message);
         // Some devices send the model as text within the text.
         let inner = root.as_str().and_then(|text| serde_json::from_str(text).ok());
         let root = inner.as_ref().unwrap_or(root);
         let devices = find_list(root, &["devices", "device"]);
         if devices.is_empty() {
-            return Err("the model has no \"devices\"".to_owned());
+            return Err(NoDevices);
         }
         let mut model = Self::default();
         for device in devices {

@@ -29,7 +29,7 @@ const LOOKS: u32 = 10;
 
 /// Registers of a controller, however they are reached.
 pub trait RegisterAccess: Send {
-    /// The address.
+    /// The address, as in the configuration.
     fn name(&self) -> &str;
 
     /// These registers from the first on; and is nothing running and nothing held, where the controller says so?
@@ -58,11 +58,11 @@ pub struct OffsetMailbox {
 /// What stands in the registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Letters {
-    /// Wanted, µm.
+    /// Offsets of X, Y and Z that are wanted, µm.
     pub wanted_um: [i64; 3],
     /// Number of the letter.
     pub number: i64,
-    /// In force, µm.
+    /// Offsets of X, Y and Z in force, µm.
     pub in_force_um: [i64; 3],
     /// Number of the letter taken.
     pub taken: i64,
@@ -73,7 +73,7 @@ impl OffsetMailbox {
     const NUMBER: u32 = 3;
     /// The first of the ladder's registers.
     pub const LADDERS: u32 = 4;
-    /// Registers in all.
+    /// Registers of the mailbox in all.
     pub const LENGTH: u32 = 8;
 
     /// The mailbox that begins at this register.

@@ -14,7 +14,6 @@ use adapter_core::words::execution;
 const CHANNEL_WORDS: &str = "CONTROLLER/VARIABLE@REG_F";
 const STATUS: &str = "STATUS";
 
-/// See the [module](self).
 pub(super) struct NcLinkRegisters {
     line: RegisterLine,
     /// Index of the channel's first F word.

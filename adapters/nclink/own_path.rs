@@ -12,6 +12,7 @@ use adapter_core::channel::Kind;
 use adapter_core::own::{OwnChannel, OwnRead};
 use adapter_core::reading::{Absence, Value};
 use std::sync::Arc;
+use thiserror::Error;
 
 /// An item of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,12 +21,23 @@ pub struct OwnPath {
     pub name: String,
     /// Element of a list.
     pub index: Option<u32>,
-    /// Bit of it.
+    /// Bit of the element, 0 to 31; `None` is the whole of it.
     pub bit: Option<u8>,
 }
 
+/// A text after `read =` that names nothing of this source.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "`{0}` is nothing that can be read; write the path of an item as `doctor --all` lists it, with the number of \
+     an element where it is a list: `AXIS@5/MOTOR/TEMPERATURE`, `CONTROLLER/VARIABLE@REG_D 120` or \
+     `CONTROLLER/VARIABLE@REG_X 12.3`"
+)]
+pub struct UnreadablePath(pub String);
+
 impl OwnRead for OwnPath {
-    fn read(text: &str) -> Result<Self, String> {
+    type Error = UnreadablePath;
+
+    fn read(text: &str) -> Result<Self, UnreadablePath> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let found = match words.as_slice() {
             [name] => Some(Self { name: (*name).to_owned(), index: None, bit: None }),
@@ -34,13 +46,7 @@ impl OwnRead for OwnPath {
             }
             _ => None,
         };
-        found.ok_or_else(|| {
-            format!(
-                "`{text}` is nothing that can be read; write the path of an item as `doctor --all` lists it, with the number of \
-                 an element where it is a list: `AXIS@5/MOTOR/TEMPERATURE`, `CONTROLLER/VARIABLE@REG_D 120` or \
-                 `CONTROLLER/VARIABLE@REG_X 12.3`"
-            )
-        })
+        found.ok_or_else(|| UnreadablePath(text.to_owned()))
     }
 
     fn is_text(&self) -> Option<bool> {
@@ -92,7 +98,7 @@ mod tests {
         assert_eq!(of("CONTROLLER/VARIABLE@REG_D 120"), Ok(("CONTROLLER/VARIABLE@REG_D".to_owned(), Some(120), None)));
         assert_eq!(of("REG_X 12.3"), Ok(("REG_X".to_owned(), Some(12), Some(3))));
         for wrong in ["", "A B C", "REG x", "REG 1.40", "REG -1"] {
-            assert!(of(wrong).is_err_and(|why| why.contains("doctor --all")), "{wrong}");
+            assert!(of(wrong).is_err_and(|why| why.to_string().contains("doctor --all")), "{wrong}");
         }
     }
 }

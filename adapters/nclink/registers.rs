@@ -19,7 +19,6 @@ impl RegisterLine {
         Self { link, session: None }
     }
 
-    /// The address.
     pub(super) fn name(&self) -> &str {
         &self.link.name
     }

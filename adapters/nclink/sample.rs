@@ -3,6 +3,7 @@
 use super::lenient_json::{find_field, find_list, find_text, parse_integer, parse_number};
 use super::model::Model;
 use serde_json::Value;
+use thiserror::Error;
 
 /// At most so many values are taken from one message.
 pub const VALUES_MAX: usize = 1_000_000;
@@ -35,25 +36,50 @@ pub struct SampleBlock {
     pub columns: Vec<ItemColumn>,
 }
 
+/// Why a message of a sample channel makes no sense.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum SampleError {
+    /// It does not say when its first instant was.
+    #[error("there is no \"beginTime\" in it")]
+    NoBegin,
+    /// The time of its first instant is no whole number; the value as JSON.
+    #[error("{0} is no time in milliseconds")]
+    BadBegin(String),
+    /// Neither the message nor the model says how far apart the instants are.
+    #[error("there is no interval in it, nor in the model")]
+    NoInterval,
+    /// It holds so many values, more than are taken from one message.
+    #[error("{0} values; at most {VALUES_MAX} are taken from one message")]
+    TooMany(usize),
+    /// Its columns are not as many as their names.
+    #[error("it has {columns} columns and names for {names}")]
+    Names {
+        /// Columns of values in the message.
+        columns: usize,
+        /// Names from the message, or from the model where the message has none.
+        names: usize,
+    },
+}
+
 impl SampleBlock {
     /// Reads a message of the channel named in its topic; what it leaves out is taken from the model.
     ///
     /// # Errors
     /// What makes no sense in it.
-    pub fn parse(message: &Value, tail: &str, model: &Model) -> Result<Self, String> {
+    pub fn parse(message: &Value, tail: &str, model: &Model) -> Result<Self, SampleError> {
         let channel = find_text(message, &["id"]).unwrap_or_else(|| tail.to_owned());
         let known = model.samples.iter().find(|known| known.id == channel || known.id == tail);
         let data = find_list(message, &["data"]);
-        let begin = find_field(message, &["beginTime", "begintime"]).ok_or("there is no \"beginTime\" in it")?;
-        let begin_ms = parse_integer(begin).ok_or_else(|| format!("{begin} is no time in milliseconds"))?;
+        let begin = find_field(message, &["beginTime", "begintime"]).ok_or(SampleError::NoBegin)?;
+        let begin_ms = parse_integer(begin).ok_or_else(|| SampleError::BadBegin(begin.to_string()))?;
         let interval = find_field(message, &["interval", "sampleInterval"]).and_then(parse_number);
         let interval_ms = interval.or(known.map(|known| known.interval_ms)).filter(|ms| *ms > 0.0);
-        let interval_ms = interval_ms.ok_or("there is no interval in it, nor in the model")?;
+        let interval_ms = interval_ms.ok_or(SampleError::NoInterval)?;
         let names = resolve_names(message, known.map(|known| known.items.as_slice()), data.len())?;
         let sizes = data.iter().map(|column| find_list(column, &["data"]));
         let total: usize = sizes.clone().flatten().map(|value| value.as_array().map_or(1, Vec::len)).sum();
         if total > VALUES_MAX {
-            return Err(format!("{total} values; at most {VALUES_MAX} are taken from one message"));
+            return Err(SampleError::TooMany(total));
         }
         let instants = sizes.map(<[Value]>::len).max().unwrap_or(0);
         let path = |name: &String| model.find_item(name).map_or_else(|| name.clone(), |item| item.path.clone());
@@ -73,13 +99,13 @@ impl SampleBlock {
 }
 
 /// The names of the columns: from the message, else the order of the model.
-fn resolve_names(message: &Value, model: Option<&[String]>, columns: usize) -> Result<Vec<String>, String> {
+fn resolve_names(message: &Value, model: Option<&[String]>, columns: usize) -> Result<Vec<String>, SampleError> {
     let said: Vec<String> = find_list(message, &["paths", "ids"]).iter().filter_map(parse_name).collect();
     let names = if said.is_empty() { model.unwrap_or_default().to_vec() } else { said };
     if names.len() == columns {
         return Ok(names);
     }
-    Err(format!("it has {columns} columns and names for {}", names.len()))
+    Err(SampleError::Names { columns, names: names.len() })
 }
 
 fn parse_name(value: &Value) -> Option<String> {
@@ -152,11 +178,11 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused_in_words() {
-        let said = |message: Value| SampleBlock::parse(&message, "s1", &model()).expect_err("refused");
+        let said = |message: Value| SampleBlock::parse(&message, "s1", &model()).expect_err("refused").to_string();
         assert!(said(json!({"data": []})).contains("beginTime"));
         assert!(said(json!({"beginTime": "noon", "data": []})).contains("noon"));
         assert!(said(json!({"beginTime": 1, "data": [{"data": [1]}]})).contains("1 columns and names for 2"));
         let other = json!({"id": "sx", "beginTime": 1, "data": []});
-        assert!(SampleBlock::parse(&other, "sx", &model()).expect_err("refused").contains("interval"));
+        assert!(SampleBlock::parse(&other, "sx", &model()).expect_err("refused").to_string().contains("interval"));
     }
 }

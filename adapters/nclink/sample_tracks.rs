@@ -3,6 +3,7 @@
 use super::decode;
 use super::sample::SampleBlock;
 use adapter_core::driver::Fact;
+use adapter_core::integer::widen_to_u64;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -11,10 +12,10 @@ const CHANNELS_MAX: usize = 64;
 /// So many last events are kept.
 const EVENTS_KEPT: usize = 32;
 
-/// One sample channel.
+/// What has come of one sample channel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ChannelTrack {
-    /// Messages.
+    /// Messages of the channel so far.
     pub messages: u64,
     /// Instants: rows of the messages.
     pub instants: u64,
@@ -48,7 +49,7 @@ impl SampleTracks {
         &self.events
     }
 
-    /// Events so far.
+    /// Events that have come so far, forgotten ones included.
     #[must_use]
     pub fn event_count(&self) -> u64 {
         self.event_count
@@ -121,7 +122,7 @@ impl ChannelTrack {
             }
         }
         self.messages += 1;
-        self.instants += u64::try_from(block.instants).unwrap_or(u64::MAX);
+        self.instants += widen_to_u64(block.instants);
         self.expected_ms = Some(begin_ms + block.duration_ms());
     }
 }

@@ -108,7 +108,7 @@ impl NcLinkSource {
                         sink(&block, message.arrived);
                     }
                 }
-                Err(why) => self.track.record_nonsense(why),
+                Err(why) => self.track.record_nonsense(why.to_string()),
             },
             _ => self.track.record_event(&message.message),
         }

@@ -9,21 +9,21 @@ pub enum Subject {
     Probe,
     /// The answer to it.
     ProbeAnswer,
-    /// Ask for values.
+    /// Ask for values of data items.
     Query,
     /// The answer to it.
     QueryAnswer,
-    /// Write values.
+    /// Write values of data items.
     Set,
     /// The answer to it.
     SetAnswer,
     /// Values of a sample channel.
     Sample,
-    /// Something happened.
+    /// The device tells that something happened.
     Event,
-    /// Are you there?
+    /// Ask whether the device is there.
     Ping,
-    /// I am.
+    /// The answer of a device that is there.
     Pong,
 }
 

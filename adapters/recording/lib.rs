@@ -12,6 +12,7 @@ pub use read::plan::{Note, NoteKind};
 pub use read::{ReadRecording, RecordingError, RowProblem, read_csv, read_path, read_path_as};
 
 use adapter_core::clock::TimeNs;
+use adapter_core::integer::convert_bounded;
 use std::collections::HashMap;
 
 /// Columns that hold text even when their cells look like numbers.
@@ -60,7 +61,7 @@ impl Numbers {
         (*self.present.get(row)?).then(|| self.values[row])
     }
 
-    /// Row by row.
+    /// The cells row by row; `None` is absent.
     pub fn iter(&self) -> impl Iterator<Item = Option<f64>> + '_ {
         self.values.iter().zip(&self.present).map(|(value, present)| present.then_some(*value))
     }
@@ -76,7 +77,7 @@ impl Numbers {
         self.present.iter().filter(|present| **present).count()
     }
 
-    /// How many rows.
+    /// How many rows, absent cells included.
     #[must_use]
     pub fn len(&self) -> usize {
         self.values.len()
@@ -122,7 +123,7 @@ impl Words {
         if let Some(known) = self.numbers.get(text) {
             return *known;
         }
-        let code = u32::try_from(self.words.len()).unwrap_or(u32::MAX);
+        let code = convert_bounded(self.words.len(), u32::MAX);
         self.words.push(text.to_owned());
         self.numbers.insert(text.to_owned(), code);
         code
@@ -153,7 +154,7 @@ impl Words {
         &self.words
     }
 
-    /// How many rows.
+    /// How many rows, absent cells included.
     #[must_use]
     pub fn len(&self) -> usize {
         self.codes.len()
@@ -195,7 +196,7 @@ impl Cells {
     }
 }
 
-/// A named column.
+/// A column of a recording with its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     /// Name, ending in its unit for quantities.
@@ -213,7 +214,7 @@ pub struct Run {
     pub rows: std::ops::Range<usize>,
 }
 
-/// Samples over time.
+/// A table of samples over time, all columns of one length.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
     /// Where it came from, for messages.
@@ -249,7 +250,7 @@ impl Recording {
         }
     }
 
-    /// How many rows.
+    /// How many rows every column has.
     #[must_use]
     pub fn count_rows(&self) -> usize {
         self.time_s.len()

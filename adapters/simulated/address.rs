@@ -2,8 +2,9 @@
 
 use adapter_core::address::{Keys, Speed, parse_speed};
 use adapter_core::driver::LadderRule;
+use thiserror::Error;
 
-/// Which built-in machine.
+/// The machines that are built in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimulatedMachine {
     /// A two-axis lathe with a turret.
@@ -17,9 +18,9 @@ pub enum SimulatedMachine {
 pub enum SimulatedDevice {
     /// The controller and the meter.
     Both,
-    /// Only the controller.
+    /// The controller without the meter.
     Controller,
-    /// Only the meter.
+    /// The meter without the controller.
     Meter,
 }
 
@@ -34,10 +35,10 @@ pub enum SimulatedDay {
     Short,
 }
 
-/// The built-in machine.
+/// The built-in machine as an address describes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimulatedTarget {
-    /// Lathe or mill.
+    /// The machine that the address names.
     pub machine: SimulatedMachine,
     /// Which of its devices are sources.
     pub device: SimulatedDevice,
@@ -75,11 +76,16 @@ pub struct SimulatedTarget {
     pub ladder: LadderRule,
 }
 
+/// The body of the address is neither `lathe` nor `mill`.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("no simulated machine {0:?}; there are simulated://lathe and simulated://mill")]
+pub struct NoSuchMachine(pub String);
+
 /// The machine that the address names.
 ///
 /// # Errors
 /// There is no such machine.
-pub fn parse_simulated(body: &str, keys: &mut Keys) -> Result<SimulatedTarget, String> {
+pub fn parse_simulated(body: &str, keys: &mut Keys) -> Result<SimulatedTarget, NoSuchMachine> {
     use SimulatedDevice::{Both, Controller, Meter};
     let target = SimulatedTarget {
         machine: SimulatedMachine::Lathe,
@@ -110,6 +116,6 @@ pub fn parse_simulated(body: &str, keys: &mut Keys) -> Result<SimulatedTarget, S
     match body.strip_prefix("//").unwrap_or(body) {
         "lathe" => Ok(target),
         "mill" => Ok(SimulatedTarget { machine: SimulatedMachine::Mill, ..target }),
-        other => Err(format!("no simulated machine {other:?}; there are simulated://lathe and simulated://mill")),
+        other => Err(NoSuchMachine(other.to_owned())),
     }
 }

@@ -1,13 +1,14 @@
 //! The controller of the simulated machine as a source.
 
 use super::Simulated;
-use super::device::{PolledDevice, to_nanoseconds};
+use super::device::PolledDevice;
 use super::moment::{Moment, Panel};
 use super::noise::{Purpose, sample_normal};
 use crate::address::SimulatedMachine;
 use adapter_core::channel::ChannelId;
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::{Pull, Source, SourceError};
+use adapter_core::integer::saturate_to_wait_ns;
 use adapter_core::reading::{Reading, Stamp};
 use std::sync::Arc;
 use std::time::Duration;
@@ -214,7 +215,7 @@ impl Pull for SimulatedController {
     fn pull_readings(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let began_ns = self.device.next_begin_ns();
         let stamp = Stamp::of_request(began_ns, began_ns + self.device.round_trip_ns());
-        self.device.schedule_next_poll(began_ns + to_nanoseconds(self.device.period()));
+        self.device.schedule_next_poll(began_ns + saturate_to_wait_ns(self.device.period()));
         self.append_readings(stamp, out)
     }
 }

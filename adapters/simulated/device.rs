@@ -4,6 +4,7 @@ use super::noise::{Purpose, sample_uniform};
 use super::settings::DeviceSettings;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::driver::SourceError;
+use adapter_core::integer::saturate_to_wait_ns;
 use std::time::Duration;
 
 /// A request is given up after this time.
@@ -30,7 +31,7 @@ impl PolledDevice {
 
     /// When the next poll begins if it keeps its beat.
     pub(super) fn next_begin_ns(&self) -> TimeNs {
-        self.origin_ns + self.poll * to_nanoseconds(self.settings.period)
+        self.origin_ns + self.poll * saturate_to_wait_ns(self.settings.period)
     }
 
     /// How long the next request takes.
@@ -38,19 +39,19 @@ impl PolledDevice {
         let excess = -(1.0 - sample_uniform(self.seed, Purpose::RoundTrip, self.poll)).ln();
         let slow = if sample_uniform(self.seed, Purpose::SlowRoundTrip, self.poll) < 0.01 { 5.0 } else { 1.0 };
         let jitter = self.settings.jitter.mul_f64((excess * slow).min(20.0));
-        to_nanoseconds((self.settings.round_trip + jitter).min(DEADLINE))
+        saturate_to_wait_ns((self.settings.round_trip + jitter).min(DEADLINE))
     }
 
     /// The next poll is the first one that begins at or after `after_ns`.
     pub(super) fn schedule_next_poll(&mut self, after_ns: TimeNs) {
-        let period_ns = to_nanoseconds(self.settings.period).max(1);
+        let period_ns = saturate_to_wait_ns(self.settings.period).max(1);
         let beats = (after_ns - self.origin_ns + period_ns - 1).div_euclid(period_ns);
         self.poll = (self.poll + 1).max(beats);
     }
 
     /// Number of the newest beat of the device's own clock that is published by `at_ns`.
     pub(super) fn newest_beat(&self, at_ns: TimeNs) -> i64 {
-        let published_ns = at_ns - to_nanoseconds(self.settings.latency);
+        let published_ns = at_ns - saturate_to_wait_ns(self.settings.latency);
         #[expect(clippy::cast_possible_truncation, reason = "beats of centuries fit")]
         let beat = (self.device_s(published_ns) / self.settings.refresh.as_secs_f64()).floor() as i64;
         beat
@@ -85,8 +86,4 @@ pub(super) fn build_timeout_error(name: &str) -> SourceError {
         next: "It is a simulated one that is silent now and then on purpose (dropouts_per_h); nothing is to be done."
             .to_owned(),
     }
-}
-
-pub(super) fn to_nanoseconds(duration: Duration) -> i64 {
-    i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX / 8)
 }

@@ -20,7 +20,6 @@ pub(super) struct Stage {
     pub(super) copper: f64,
 }
 
-/// A machine's numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MachineSnapshot {
     pub(super) lathe: bool,

@@ -13,6 +13,7 @@
 
 use adapter_core::clock::TimeNs;
 use adapter_core::driver::{LadderRequest, LadderRule};
+use adapter_core::integer::saturate_to_wait_ns;
 use adapter_core::units::OverridePct;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -49,7 +50,7 @@ impl Default for LadderSettings {
 pub struct LadderCounts {
     /// Overrides, signs of life among them.
     pub overrides: u64,
-    /// Releases.
+    /// Releases of the override by the gateway.
     pub releases: u64,
     /// Requests for a feed hold.
     pub feed_holds: u64,
@@ -87,13 +88,11 @@ struct Mail {
     alive_ns: TimeNs,
 }
 
-/// A latched request.
 #[derive(Debug, Clone, Copy)]
 struct Latch {
     since_ns: TimeNs,
 }
 
-/// See the [module](self).
 #[derive(Debug)]
 pub(super) struct Ladder {
     settings: LadderSettings,
@@ -130,17 +129,16 @@ impl Ladder {
         if self.inputs.len() >= LETTERS_MAX {
             self.inputs.pop_back();
         }
-        let due_ns = at_ns.saturating_add(to_nanoseconds(self.settings.scan));
+        let due_ns = at_ns.saturating_add(saturate_to_wait_ns(self.settings.scan));
         let earliest_ns = self.inputs.back().map_or(due_ns, |(due_ns, _)| *due_ns);
         self.inputs.push_back((due_ns.max(earliest_ns), letter));
     }
 
-    /// One scan.
     pub(super) fn run_scan(&mut self, at_ns: TimeNs) {
         while let Some((due_ns, letter)) = self.inputs.pop_front_if(|(due_ns, _)| *due_ns <= at_ns) {
             self.apply_letter(due_ns, letter);
         }
-        let heartbeat_ns = to_nanoseconds(self.settings.heartbeat);
+        let heartbeat_ns = saturate_to_wait_ns(self.settings.heartbeat);
         if self.mail.is_some_and(|mail| at_ns - mail.alive_ns >= heartbeat_ns) {
             self.mail = None;
             self.counts.heartbeats_lost += 1;
@@ -173,7 +171,7 @@ impl Ladder {
 
     /// Do the axes stand because of a feed hold? The operator ends it when his time has come.
     pub(super) fn is_holding_feed(&mut self, at_ns: TimeNs) -> bool {
-        let attended_ns = to_nanoseconds(self.settings.attended_after);
+        let attended_ns = saturate_to_wait_ns(self.settings.attended_after);
         self.feed_hold = self.feed_hold.filter(|latch| at_ns - latch.since_ns < attended_ns);
         self.feed_hold.is_some()
     }
@@ -200,10 +198,6 @@ impl Ladder {
     pub(super) fn counts(&self) -> LadderCounts {
         self.counts
     }
-}
-
-fn to_nanoseconds(duration: Duration) -> i64 {
-    i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX / 8)
 }
 
 #[cfg(test)]

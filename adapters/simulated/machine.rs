@@ -9,6 +9,7 @@ use super::program::{Control, Cut, ExperimentStep, Motion, Planner};
 use super::settings::{CutLevel, SimulatedSettings};
 use crate::address::SimulatedMachine;
 use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::integer::{clamp_count, convert_bounded, length_to_i64};
 use adapter_core::offset::Axis;
 use adapter_core::units::OverridePct;
 use adapter_core::words::{execution, mode};
@@ -134,8 +135,8 @@ impl Machine {
     }
 
     fn remembered_step(&self, step: i64) -> Moment {
-        let first = self.steps - i64::try_from(self.moments.len()).unwrap_or(0);
-        let index = usize::try_from(step - first).unwrap_or(0).min(self.moments.len() - 1);
+        let first = self.steps - length_to_i64(self.moments.len());
+        let index = clamp_count(step - first, self.moments.len() - 1);
         self.moments[index]
     }
 
@@ -145,7 +146,7 @@ impl Machine {
         let since_ns = (at_ns - self.origin_ns).max(0);
         let (step, rest_ns) = (since_ns / STEP_NS, since_ns % STEP_NS);
         let (a, b) = (self.remembered_step(step).integrals, self.remembered_step(step + 1).integrals);
-        let share = f64::from(i32::try_from(rest_ns).unwrap_or(0)) / (STEP_S * 1e9);
+        let share = f64::from(convert_bounded(rest_ns, i32::MAX)) / (STEP_S * 1e9);
         let mix = |a: f64, b: f64| a + (b - a) * share;
         Integrals {
             spindle_j: mix(a.spindle_j, b.spindle_j),

@@ -2,12 +2,13 @@
 //! meters add.
 
 use super::Simulated;
-use super::device::{DEADLINE, PolledDevice, build_timeout_error, to_nanoseconds};
+use super::device::{DEADLINE, PolledDevice, build_timeout_error};
 use super::noise::{Purpose, sample_normal, sample_uniform};
 use super::settings::MeterSettings;
 use adapter_core::channel::ChannelId;
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::{Pull, Source, SourceError};
+use adapter_core::integer::saturate_to_wait_ns;
 use adapter_core::reading::{Reading, Stamp};
 use std::f64::consts::TAU;
 use std::time::Duration;
@@ -36,9 +37,9 @@ pub struct MeterValues {
     pub spindle_current_a: f64,
     /// Supply, V phase to phase.
     pub supply_voltage_v: f64,
-    /// Spindle bearing, °C.
+    /// Temperature of the spindle bearing, °C.
     pub bearing_temperature_c: f64,
-    /// Air, °C.
+    /// Temperature of the air, °C.
     pub ambient_temperature_c: f64,
 }
 
@@ -183,7 +184,7 @@ impl Source for SimulatedMeter {
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let began_ns = clock.now_ns();
         let silent = self.drops_out(began_ns);
-        let wait_ns = if silent { to_nanoseconds(DEADLINE) } else { self.device.round_trip_ns() };
+        let wait_ns = if silent { saturate_to_wait_ns(DEADLINE) } else { self.device.round_trip_ns() };
         clock.sleep_until(began_ns + wait_ns);
         let ended_ns = clock.now_ns();
         self.device.schedule_next_poll(ended_ns);
@@ -211,14 +212,14 @@ impl Pull for SimulatedMeter {
     fn next_ns(&self) -> Option<TimeNs> {
         let began_ns = self.device.next_begin_ns();
         let silent = self.drops_out(began_ns);
-        Some(began_ns + if silent { to_nanoseconds(DEADLINE) } else { self.device.round_trip_ns() })
+        Some(began_ns + if silent { saturate_to_wait_ns(DEADLINE) } else { self.device.round_trip_ns() })
     }
 
     fn pull_readings(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let began_ns = self.device.next_begin_ns();
         let ended_ns = self.next_ns().unwrap_or(began_ns);
         let silent = self.drops_out(began_ns);
-        self.device.schedule_next_poll(ended_ns.max(began_ns + to_nanoseconds(self.device.period())));
+        self.device.schedule_next_poll(ended_ns.max(began_ns + saturate_to_wait_ns(self.device.period())));
         if silent {
             return Err(build_timeout_error(&self.name));
         }

@@ -22,7 +22,7 @@ pub enum TrueState {
 }
 
 impl TrueState {
-    /// Every state.
+    /// Every state, from off to rapid traverse.
     pub const ALL: [Self; 7] =
         [Self::Off, Self::Standby, Self::SpindleStart, Self::Idle, Self::Cutting, Self::SpeedChange, Self::Rapid];
 
@@ -46,11 +46,11 @@ impl TrueState {
 pub struct Panel {
     /// Has the control finished starting?
     pub booted: bool,
-    /// Drives ready.
+    /// Are the drives on and ready?
     pub drives_on: bool,
-    /// One of [`words::mode`](adapter_core::words::mode).
+    /// A word of [`words::mode`](adapter_core::words::mode).
     pub mode: &'static str,
-    /// One of [`words::execution`](adapter_core::words::execution).
+    /// A word of [`words::execution`](adapter_core::words::execution).
     pub execution: &'static str,
     /// Number after the O.
     pub program: u16,
@@ -66,11 +66,11 @@ pub struct Panel {
     pub part_count: u32,
     /// Text of the alarm, empty without one.
     pub alarm: &'static str,
-    /// Commanded speed, signed.
+    /// Commanded speed with the sign of the direction.
     pub spindle_programmed_rpm: f64,
-    /// Actual speed, signed.
+    /// Actual speed with the sign of the direction.
     pub spindle_speed_rpm: f64,
-    /// Commanded feed.
+    /// Feed that the program commands.
     pub feed_programmed_mm_min: f64,
     /// Actual feed, also in rapid.
     pub feed_mm_min: f64,
@@ -78,19 +78,19 @@ pub struct Panel {
     pub feed_override_pct: u8,
     /// The operator's dial, 0 to 254 %.
     pub dial_pct: u8,
-    /// Rapid traverse active.
+    /// Do the axes traverse rapidly?
     pub rapid: bool,
     /// The override is without effect: threading and tapping.
     pub override_locked: bool,
     /// Gear stage of the spindle.
     pub gear_stage: u8,
-    /// Coolant pump.
+    /// Does the coolant pump run?
     pub coolant_on: bool,
-    /// Hydraulic pump.
+    /// Does the hydraulic pump run?
     pub hydraulics_on: bool,
     /// X (a diameter on the lathe), Y, Z.
     pub position_mm: [f64; 3],
-    /// X, Y, Z.
+    /// Velocities of X, Y and Z, signed.
     pub velocity_mm_min: [f64; 3],
     /// Planned depth of cut of the block, 0 outside cutting blocks.
     pub depth_of_cut_mm: f64,
@@ -105,11 +105,11 @@ pub struct Panel {
 /// What only a scorer may know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// When.
+    /// The instant of these values.
     pub at_ns: TimeNs,
     /// What the machine truly does.
     pub state: TrueState,
-    /// True speed, signed.
+    /// True speed with the sign of the direction.
     pub spindle_speed_rpm: f64,
     /// Power into the spindle drive.
     pub spindle_power_w: f64,
@@ -127,7 +127,7 @@ pub struct Truth {
     pub engaged: f64,
     /// Flank wear of the tool in use.
     pub flank_wear_mm: f64,
-    /// Cutting force.
+    /// Cutting force at the edge.
     pub cutting_force_n: f64,
     /// Displacement of the tool against the work.
     pub thermal_error_um: f64,
@@ -138,15 +138,15 @@ pub struct Truth {
 /// What can be measured with electrical and temperature sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Electric {
-    /// Phase to phase.
+    /// Voltage of the supply from phase to phase.
     pub supply_voltage_v: f64,
     /// Spindle motor current, rms.
     pub spindle_current_a: f64,
-    /// Spindle bearing.
+    /// Temperature of the spindle bearing.
     pub bearing_temperature_c: f64,
-    /// Spindle motor.
+    /// Temperature of the spindle motor.
     pub motor_temperature_c: f64,
-    /// Air.
+    /// Temperature of the air around the machine.
     pub ambient_temperature_c: f64,
     /// Load display of the drive, percent of rated power.
     pub spindle_load_pct: f64,

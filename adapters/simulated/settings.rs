@@ -78,7 +78,7 @@ pub struct LaterChange {
     pub friction: f64,
 }
 
-/// The working day.
+/// How the working days of the machine go.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DaySettings {
     /// From power-up to the end of work, s.
@@ -135,7 +135,7 @@ impl Default for DaySettings {
 /// The simulated machine with its controller and meter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimulatedSettings {
-    /// Lathe or mill.
+    /// Which of the built-in machines.
     pub machine: SimulatedMachine,
     /// Seed of everything random.
     pub seed: u64,
@@ -157,9 +157,9 @@ pub struct SimulatedSettings {
     pub ladder: LadderSettings,
     /// The controller's clock and line.
     pub controller: DeviceSettings,
-    /// The meter.
+    /// The meter's clock, line, noise and pulses.
     pub meter: MeterSettings,
-    /// The working day.
+    /// How the working days go.
     pub day: DaySettings,
 }
 

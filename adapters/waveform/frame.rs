@@ -1,5 +1,6 @@
 //! The stream, both directions.
 
+use adapter_core::integer::convert_bounded;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -18,7 +19,7 @@ pub const AMPLITUDE: &str = "A rms";
 /// What a stream carries.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WaveformHeader {
-    /// `waveform/1`.
+    /// The version of the stream: `waveform/1`.
     pub format: String,
     /// Samples per second and channel.
     pub rate_hz: f64,
@@ -128,7 +129,8 @@ impl WaveformFrame {
     /// The frame on the wire. At most 4096 samples per channel are sent.
     #[must_use]
     pub fn to_bytes(&self, channels: usize) -> Vec<u8> {
-        let count = u16::try_from(self.samples.len() / channels.max(1)).unwrap_or(COUNT_MAX).min(COUNT_MAX);
+        let count = (self.samples.len() / channels.max(1)).min(usize::from(COUNT_MAX));
+        let count: u16 = convert_bounded(count, COUNT_MAX);
         let mut bytes = Vec::with_capacity(FRAME_HEAD + 2 * self.samples.len());
         bytes.extend(MARK);
         bytes.extend(self.sequence.to_le_bytes());

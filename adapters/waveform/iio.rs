@@ -8,6 +8,7 @@
 use super::frame::WaveformHeader;
 use super::producer::Sampler;
 use crate::clock::{Clock, SECOND_NS};
+use adapter_core::integer::{convert_bounded, count_to_f64};
 use std::fs::File;
 use std::io::{self, Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -175,7 +176,7 @@ impl Sampler for Iio {
             .map(|element| element.scale_a * f64::from(1_u32 << Self::count_dropped_bits(element)))
             .collect();
         let bits = self.iter_channels().map(|element| element.layout.bits.min(16)).min().unwrap_or(16);
-        let full_scale = i16::try_from((1_i32 << (bits - 1)) - 1).unwrap_or(i16::MAX).max(1);
+        let full_scale = (i16::MAX >> (16 - bits)).max(1);
         WaveformHeader { scale, ..WaveformHeader::with_currents(self.rate_hz, &names, 1.0, full_scale) }
     }
 
@@ -191,10 +192,10 @@ impl Sampler for Iio {
             for element in self.iter_channels() {
                 let value = element.layout.read(&scan[element.offset..element.offset + element.layout.bytes]);
                 let value = value >> Self::count_dropped_bits(element);
-                samples.push(i16::try_from(value).unwrap_or(if value < 0 { i16::MIN } else { i16::MAX }));
+                samples.push(convert_bounded(value, i16::MAX));
             }
         }
-        let count = f64::from(u32::try_from(self.block).unwrap_or(1));
+        let count = count_to_f64(self.block);
         #[expect(clippy::cast_possible_truncation, reason = "a block lasts a fiftieth of a second")]
         let block_ns = (count / self.rate_hz * SECOND_NS as f64) as i64;
         let first_ns = self.time_ns(&bytes).unwrap_or_else(|| self.clock.now_ns() - block_ns);

@@ -3,6 +3,7 @@
 use super::frame::WaveformHeader;
 use super::timebase::TimeBase;
 use crate::clock::TimeNs;
+use adapter_core::integer::{convert_bounded, count_to_f64, widen_to_u64};
 
 /// Some samples of every channel, in the header's unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,15 +21,15 @@ pub struct Block {
 /// What a stream has gone through since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// Blocks.
+    /// Blocks of samples that came.
     pub blocks: u64,
-    /// Instants.
+    /// Instants that were sampled; all channels count once.
     pub samples: u64,
     /// Times at which blocks were missing.
     pub gaps: u64,
     /// Instants that were missing.
     pub missing: u64,
-    /// Clipped samples.
+    /// Samples at or beyond full scale, of all channels.
     pub clipped: u64,
     /// Connections, the first one included.
     pub connections: u64,
@@ -80,10 +81,10 @@ impl Intake {
         let count = raw.len() / header.channels.len().max(1);
         let full = header.full_scale.unsigned_abs();
         let clipped = raw.iter().filter(|sample| sample.unsigned_abs() >= full).count();
-        let clipped = u32::try_from(clipped).unwrap_or(u32::MAX);
+        let clipped = convert_bounded(clipped, u32::MAX);
         self.time.push(end_ns(header, first_ns, count), arrived_ns);
         self.counts.blocks += 1;
-        self.counts.samples += u64::try_from(count).unwrap_or(0);
+        self.counts.samples += widen_to_u64(count);
         self.counts.gaps += u64::from(gap > 0);
         self.counts.missing += gap;
         self.counts.clipped += u64::from(clipped);
@@ -93,7 +94,7 @@ impl Intake {
 
 /// When the sample behind `count` of them is due.
 pub(super) fn end_ns(header: &WaveformHeader, first_ns: TimeNs, count: usize) -> TimeNs {
-    first_ns.saturating_add(header.duration_ns(f64::from(u32::try_from(count).unwrap_or(u32::MAX))))
+    first_ns.saturating_add(header.duration_ns(count_to_f64(count)))
 }
 
 /// How many samples are missing between the time that was due and the time that came; rounded, and negative where some came

@@ -14,7 +14,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Something that samples, at its own pace.
 pub trait Sampler: Send {
-    /// What it samples.
+    /// What it samples, at which rate and scale.
     fn header(&self) -> WaveformHeader;
 
     /// Waits for the next samples: time of the first one, ns since 1970, and the samples, all channels of one instant
@@ -49,7 +49,7 @@ impl Producer {
         Ok(Self { at, stop, thread: Some(thread) })
     }
 
-    /// Where it listens.
+    /// Address and port on which it listens.
     #[must_use]
     pub fn listen_address(&self) -> SocketAddr {
         self.at

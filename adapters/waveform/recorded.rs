@@ -3,6 +3,7 @@
 use super::frame::{COUNT_MAX, WaveformHeader};
 use super::producer::Sampler;
 use crate::clock::{Clock, SECOND_NS, TimeNs};
+use adapter_core::integer::length_to_i64;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Error, ErrorKind};
 use std::path::Path;
@@ -86,7 +87,7 @@ impl Sampler for Recorded {
         if count == 0 {
             return Ok(None);
         }
-        self.sent += i64::try_from(count).unwrap_or(0);
+        self.sent += length_to_i64(count);
         self.clock.sleep_until(self.time_ns(self.sent));
         Ok(Some((first_ns, samples)))
     }

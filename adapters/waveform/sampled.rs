@@ -10,6 +10,7 @@ use super::frame::WaveformHeader;
 use super::intake::{Block, Intake, count_missing, end_ns};
 use crate::clock::TimeNs;
 use crate::nclink::sample::{self, ItemColumn};
+use adapter_core::integer::{clamp_count, count_to_f64};
 
 /// Resolution in which the values are kept, A: 0.01, up to 327 A.
 const SCALE_A: f64 = 0.01;
@@ -81,11 +82,11 @@ impl SampledCurrent {
         arrived_ns: TimeNs,
     ) -> Option<Block> {
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-        let after_ns = |count: usize| (f64::from(u32::try_from(count).unwrap_or(u32::MAX)) * step_ms * MS_NS) as i64;
+        let after_ns = |count: usize| (count_to_f64(count) * step_ms * MS_NS) as i64;
         let first_ns = begin_ns.saturating_add(after_ns(at));
         let lost = self.due_ns.map_or(0, |due_ns| count_missing(header, due_ns, first_ns));
         // A device whose clock was set back begins anew; a few values that come twice are passed over.
-        let again = if lost < 0 { usize::try_from(-lost).unwrap_or(usize::MAX) } else { 0 };
+        let again = clamp_count(lost.saturating_neg(), usize::MAX);
         let again = if again > part.len() { 0 } else { again };
         let raw: Vec<i16> = part[again..].iter().flatten().map(|value| self.counts_of(*value)).collect();
         if raw.is_empty() {

@@ -4,6 +4,7 @@ use super::frame::WaveformHeader;
 use super::producer::Sampler;
 use crate::clock::{Clock, SECOND_NS, TimeNs};
 use crate::simulated::Simulated;
+use adapter_core::integer::take_low_u32;
 use std::f64::consts::TAU;
 use std::io;
 use std::sync::Arc;
@@ -48,7 +49,7 @@ impl SimulatedCurrent {
         self.noise ^= self.noise << 13;
         self.noise ^= self.noise >> 7;
         self.noise ^= self.noise << 17;
-        let share = f64::from(u32::try_from(self.noise >> 40).unwrap_or(0)) / f64::from(1_u32 << 24);
+        let share = f64::from(take_low_u32(self.noise >> 40)) / f64::from(1_u32 << 24);
         2.0 * share - 1.0
     }
 

@@ -20,6 +20,7 @@ use crate::driver::{Source, SourceError};
 use crate::merge::{Merge, SourceId};
 use crate::plausibility::Plausibility;
 use crate::reading::Reading;
+use adapter_core::integer::saturate_to_wait_ns;
 use queue::Queue;
 use stats::WorkerCounters;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -279,12 +280,12 @@ impl Poller {
 
     /// The next beat after `ended_ns`, or the end of the pause after a failure.
     fn next_due(&mut self, due_ns: TimeNs, ended_ns: TimeNs, error: Option<&SourceError>) -> TimeNs {
-        let period_ns = nanoseconds(self.period).max(1);
+        let period_ns = saturate_to_wait_ns(self.period).max(1);
         let failing_ns = self.failing_ns;
         self.failing_ns = error.map(|_| failing_ns.unwrap_or(ended_ns));
         match (error, failing_ns) {
             (Some(SourceError::Off { .. }), _) => {
-                return ended_ns + nanoseconds(self.settings.off_pause).max(period_ns);
+                return ended_ns + saturate_to_wait_ns(self.settings.off_pause).max(period_ns);
             }
             (Some(_), Some(since_ns)) => return ended_ns + self.backoff_ns(ended_ns - since_ns).max(period_ns),
             _ => {}
@@ -298,7 +299,8 @@ impl Poller {
 
     /// The pause when nothing has come for so long.
     fn backoff_ns(&self, failing_ns: i64) -> i64 {
-        let (least_ns, most_ns) = (nanoseconds(self.settings.backoff_min), nanoseconds(self.settings.backoff_max));
+        let (least_ns, most_ns) =
+            (saturate_to_wait_ns(self.settings.backoff_min), saturate_to_wait_ns(self.settings.backoff_max));
         (failing_ns / 4).clamp(least_ns, most_ns.max(least_ns))
     }
 
@@ -320,8 +322,4 @@ fn panicked(name: &str) -> SourceError {
         request: "the whole poll".to_owned(),
         what: "the driver failed on it; please report this with the log".to_owned(),
     }
-}
-
-fn nanoseconds(duration: Duration) -> i64 {
-    i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX / 8)
 }

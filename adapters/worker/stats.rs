@@ -3,6 +3,7 @@
 use crate::clock::{SECOND_NS, TimeNs};
 use crate::driver::{Fact, SourceError, SourceProblem};
 use crate::histogram::Histogram;
+use adapter_core::integer::saturate_to_ns;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -37,7 +38,7 @@ pub enum WorkerState {
     Stuck,
     /// The recording is over.
     Ended,
-    /// Stopped on request.
+    /// The worker was asked to stop and has.
     Stopped,
 }
 
@@ -71,7 +72,7 @@ pub struct Spread {
 pub struct WorkerStats {
     /// What it is doing now.
     pub state: WorkerState,
-    /// Since when.
+    /// Since when it is in this state.
     pub state_since_ns: TimeNs,
     /// The pace it promised.
     pub period: Duration,
@@ -87,7 +88,7 @@ pub struct WorkerStats {
     pub round_trips: Histogram,
     /// Since the last poll that succeeded, s; `None` before the first.
     pub lag_s: Option<f64>,
-    /// Polls that ended.
+    /// Polls that ended, failed ones included.
     pub polls: u64,
     /// Polls that failed; a machine that is off does not count.
     pub failures: u64,
@@ -292,7 +293,7 @@ impl WorkerCounters {
     }
 
     pub(super) fn build_stats(&self, now_ns: TimeNs, dropped: u64) -> WorkerStats {
-        let deadline_ns = i64::try_from(self.deadline.as_nanos()).unwrap_or(i64::MAX);
+        let deadline_ns = saturate_to_ns(self.deadline);
         let stuck_ns = self.in_poll_since_ns.filter(|since_ns| now_ns - since_ns > deadline_ns);
         WorkerStats {
             state: if stuck_ns.is_some() { WorkerState::Stuck } else { self.state },

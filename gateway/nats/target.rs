@@ -1,7 +1,7 @@
 //! The servers of an address: `//HOST:4222,HOST:4222/REST?keys`.
 
 use super::NatsError;
-use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
+use adapter_core::address::{AddressProblem, Endpoint, Keys, Login, parse_endpoint, tls_files};
 use adapter_core::tls::TlsFiles;
 use std::path::PathBuf;
 
@@ -34,8 +34,8 @@ pub(super) struct Secrets {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ClusterAddressError {
     /// A host is none.
-    #[error("{0}")]
-    Host(String),
+    #[error(transparent)]
+    Host(AddressProblem),
     /// More servers than a cluster needs.
     #[error("{servers} servers; name at most {SERVERS_MAX} of the cluster")]
     TooMany {

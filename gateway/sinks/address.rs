@@ -7,7 +7,7 @@ use super::opcua::OpcuaTarget;
 use super::parquet::ParquetTarget;
 use super::shdr::ShdrTarget;
 use super::sparkplug::SparkplugTarget;
-use adapter_core::address::{self, AddressError, Keys};
+use adapter_core::address::{self, AddressError, AddressProblem, Keys};
 use adapter_core::channel::find_nearest_name;
 use gateway_nats::ClusterAddressError;
 use std::fmt;
@@ -141,8 +141,8 @@ pub(super) enum TargetError {
     #[error("this program was built without OPC UA; `cargo build --release --features opcua` makes one that has it")]
     NotBuiltIn,
     /// A host is none.
-    #[error("{0}")]
-    Host(String),
+    #[error(transparent)]
+    Host(AddressProblem),
     /// The servers of a cluster are none.
     #[error(transparent)]
     Cluster(#[from] ClusterAddressError),

@@ -12,12 +12,12 @@ pub enum Circuit {
     Spindle,
 }
 
-/// The key `circuit`.
+/// The key `circuit`: `machine`, which is the default, or `spindle`.
 pub fn parse_circuit(keys: &mut Keys) -> Circuit {
     keys.take_choice("circuit", &[("machine", Circuit::Machine), ("spindle", Circuit::Spindle)])
 }
 
-/// The key `timeout_ms`.
+/// The key `timeout_ms`: 10 to 60000, 500 where it is not given.
 pub fn parse_timeout(keys: &mut Keys) -> Duration {
     Duration::from_millis(keys.take_number("timeout_ms", 500, 10, 60_000))
 }

@@ -34,7 +34,7 @@ impl Keys {
         self.given.push((key.to_owned(), unescape_percent(value)));
     }
 
-    /// Notes a problem.
+    /// Adds what is wrong with a key, in words; the address is refused with all of them.
     pub fn add_problem(&mut self, problem: String) {
         self.problems.push(problem);
     }

@@ -4,6 +4,7 @@ mod circuit;
 mod endpoint;
 mod keys;
 mod masked;
+mod problem;
 mod secured;
 mod serial_line;
 mod speed;
@@ -13,11 +14,13 @@ pub use circuit::{Circuit, parse_circuit, parse_timeout};
 pub use endpoint::{Endpoint, parse_endpoint, parse_library};
 pub use keys::{Keys, parse_encoding};
 pub use masked::{NO_SECRETS, mask_secrets};
+pub use problem::AddressProblem;
 pub use secured::{Login, tls_files};
 pub use serial_line::{Parity, SerialTarget, parse_serial};
 pub use speed::{Speed, parse_speed};
 pub use waveform_keep::{WaveformKeep, parse_waveform_keep};
 
+use std::fmt::Display;
 use thiserror::Error;
 
 /// A text that is no usable address, with everything that is wrong with it.
@@ -35,10 +38,10 @@ pub struct AddressError {
 ///
 /// # Errors
 /// Everything that is wrong: what `target` says comes first, then keys that are unknown, doubled or out of range.
-pub fn parse<T>(
+pub fn parse<T, E: Display>(
     text: &str,
     no_scheme: impl Fn(&str) -> String,
-    target: impl Fn(&str, &str, &mut Keys) -> Result<T, String>,
+    target: impl Fn(&str, &str, &mut Keys) -> Result<T, E>,
 ) -> Result<T, AddressError> {
     let fail = |problems| AddressError { address: mask_secrets(text), problems };
     let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme(text)]))?;
@@ -52,6 +55,6 @@ pub fn parse<T>(
     match target {
         Ok(target) if problems.is_empty() => Ok(target),
         Ok(_) => Err(fail(problems)),
-        Err(problem) => Err(fail(std::iter::once(problem).chain(problems).collect())),
+        Err(problem) => Err(fail(std::iter::once(problem.to_string()).chain(problems).collect())),
     }
 }

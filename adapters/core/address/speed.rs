@@ -11,7 +11,7 @@ pub enum Speed {
     Max,
 }
 
-/// The key `speed`.
+/// The key `speed`: `max`, or a factor from 0.001 to 100000; 1 where it is not given.
 pub fn parse_speed(keys: &mut Keys) -> Speed {
     let Some(text) = keys.take_text("speed") else { return Speed::Times(1.0) };
     if text == "max" {

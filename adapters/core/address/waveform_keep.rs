@@ -1,6 +1,7 @@
 //! Raw samples that stay around high currents.
 
 use super::keys::Keys;
+use super::problem::AddressProblem;
 use std::path::PathBuf;
 
 /// Raw samples that stay around high currents.
@@ -16,13 +17,13 @@ pub struct WaveformKeep {
 ///
 /// # Errors
 /// One of them is given without the other.
-pub fn parse_waveform_keep(keys: &mut Keys) -> Result<Option<WaveformKeep>, String> {
+pub fn parse_waveform_keep(keys: &mut Keys) -> Result<Option<WaveformKeep>, AddressProblem> {
     let directory = keys.take_text("keep").map(PathBuf::from);
     let above_a = keys.take_number("keep_above_a", 0.0, 0.0, 100_000.0);
     match directory {
         Some(directory) if above_a > 0.0 => Ok(Some(WaveformKeep { directory, above_a })),
-        Some(_) => Err("keep needs a limit: write keep_above_a=40 as well".to_owned()),
-        None if above_a > 0.0 => Err("keep_above_a needs a directory: write keep=DIRECTORY as well".to_owned()),
+        Some(_) => Err(AddressProblem::KeepWithoutLimit),
+        None if above_a > 0.0 => Err(AddressProblem::LimitWithoutKeep),
         None => Ok(None),
     }
 }

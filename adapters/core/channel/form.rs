@@ -5,7 +5,7 @@
 pub enum Form {
     /// Any number within the range.
     Real,
-    /// Whole numbers.
+    /// Whole numbers within the range.
     Whole,
     /// 0 for no, 1 for yes.
     Flag,

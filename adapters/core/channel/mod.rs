@@ -344,7 +344,7 @@ impl ChannelId {
         CHANNELS.get(index).or_else(|| declared::find_by_index(index - CHANNELS.len())).unwrap_or(&CHANNELS[0])
     }
 
-    /// Name, as everywhere.
+    /// The name of the channel in the table, which is its name everywhere.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.channel().name

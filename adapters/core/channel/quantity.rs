@@ -76,21 +76,21 @@ pub fn without_unit(name: &str) -> &str {
 pub enum Quantity {
     /// Electrical or mechanical power.
     Power,
-    /// Current.
+    /// Electric current in any of its units.
     Current,
-    /// Torque.
+    /// Torque in any of its units.
     Torque,
-    /// Force.
+    /// Force in any of its units.
     Force,
     /// Load of a drive as a share of its rating.
     Load,
-    /// Temperature.
+    /// Temperature in any of its units.
     Temperature,
     /// Position of a slide.
     Position,
     /// A small displacement, such as the thermal error of a tool's tip.
     Displacement,
-    /// Anything else.
+    /// Neither the unit nor the name tells one of these.
     Other,
 }
 

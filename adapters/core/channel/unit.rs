@@ -5,45 +5,45 @@
 /// What a unit measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Dimension {
-    /// Base: s.
+    /// A duration; its base unit is s.
     Time,
-    /// Base: mm.
+    /// A length or a position; its base unit is mm.
     Length,
-    /// Base: mm/min.
+    /// A velocity along a path; its base unit is mm/min.
     Velocity,
-    /// Base: m/s2.
+    /// An acceleration along a path; its base unit is m/s2.
     Acceleration,
-    /// Base: rpm.
+    /// A rotational speed; its base unit is rpm.
     Rotation,
-    /// Base: rpm/s.
+    /// A change of rotational speed; its base unit is rpm/s.
     RotationRate,
-    /// Base: mm/rev.
+    /// A feed per revolution; its base unit is mm/rev.
     FeedPerRevolution,
-    /// Base: cm3/min.
+    /// A volume of chips per time; its base unit is cm3/min.
     RemovalRate,
-    /// Base: W.
+    /// Active power; its base unit is W.
     Power,
-    /// Base: A.
+    /// An electric current; its base unit is A.
     Current,
-    /// Base: V.
+    /// An electric voltage; its base unit is V.
     Voltage,
-    /// Base: N.
+    /// A force; its base unit is N.
     Force,
-    /// Base: N m.
+    /// A torque; its base unit is N m.
     Torque,
-    /// Base: °C.
+    /// A temperature; its base unit is °C.
     Temperature,
-    /// Base: %.
+    /// A share of a whole; its base unit is %.
     Share,
-    /// Base: l/min.
+    /// A volume of fluid per time; its base unit is l/min.
     Flow,
-    /// Base: bar.
+    /// A pressure; its base unit is bar.
     Pressure,
-    /// Base: Wh.
+    /// An energy; its base unit is Wh.
     Energy,
-    /// Base: VA.
+    /// Apparent power; its base unit is VA.
     ApparentPower,
-    /// Base: °.
+    /// An angle; its base unit is °.
     Angle,
     /// A number without a unit.
     Number,
@@ -52,11 +52,11 @@ pub enum Dimension {
 /// A unit: `base = factor * x + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
-    /// What it measures.
+    /// The dimension whose base unit the numbers are turned into.
     pub dimension: Dimension,
-    /// See [`Unit`].
+    /// By which a number is multiplied to be one of the base unit.
     pub factor: f64,
-    /// See [`Unit`].
+    /// Added after the factor, in the base unit.
     pub offset: f64,
 }
 

@@ -33,7 +33,7 @@ impl<Q: Copy + Eq + Hash> ChildClient<Q> {
         Self { child: Supervised::new(settings), deaths: HashMap::new() }
     }
 
-    /// The process.
+    /// The process itself, which may not be running.
     #[must_use]
     pub fn child(&self) -> &Supervised {
         &self.child

@@ -11,21 +11,29 @@
 use super::Guarded;
 use std::ffi::{CStr, c_char, c_void};
 use std::path::Path;
+use thiserror::Error;
 
 /// The function is not in this library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Missing(pub &'static str);
 
-/// Why the library in this file cannot be loaded, in the system's own words where it has some.
-#[must_use]
-pub fn describe_load_error(error: &libloading::Error, file: &Path) -> String {
-    let words = std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string);
-    words.strip_prefix(&format!("{}: ", file.display())).map_or(words.clone(), str::to_owned)
+/// Why a library cannot be loaded, in the system's own words where it has some.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{0}")]
+pub struct LoadError(String);
+
+impl LoadError {
+    /// What was said of this file, without the name of the file that the system puts before it.
+    #[must_use]
+    pub fn new(error: &libloading::Error, file: &Path) -> Self {
+        let words = std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string);
+        Self(words.strip_prefix(&format!("{}: ", file.display())).map_or(words.clone(), str::to_owned))
+    }
 }
 
 /// A Rust value as the library takes it.
 pub trait Argument<Raw> {
-    /// The C value.
+    /// The value as the C function takes it.
     fn raw(self) -> Raw;
 }
 
@@ -54,7 +62,7 @@ arguments! {
 pub trait Returned {
     /// As it is looked at.
     type Code;
-    /// The return code.
+    /// The return code of the C function.
     fn code(self) -> Self::Code;
 }
 
@@ -99,11 +107,11 @@ macro_rules! vendor_functions {
             ///
             /// # Errors
             /// The file is missing, is for another processor, or needs something that is not there.
-            pub(super) fn load(path: &std::path::Path) -> Result<Self, String> {
+            pub(super) fn load(path: &std::path::Path) -> Result<Self, $crate::child::LoadError> {
                 // SAFETY: loading runs the library's initialisers. This happens only in a child process that holds
                 // nothing but its line to the parent, and the user named the file.
                 let library = unsafe { $crate::child::Library::new(path) };
-                let library = library.map_err(|error| $crate::child::describe_load_error(&error, path))?;
+                let library = library.map_err(|error| $crate::child::LoadError::new(&error, path))?;
                 $(
                     // SAFETY: the signature is that of the vendor's header, as the one who listed it says; the pointer
                     // is kept beside the library and not used after it.

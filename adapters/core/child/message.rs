@@ -1,5 +1,6 @@
 //! Length and bytes, bounded.
 
+use crate::integer::widen_to_usize;
 use std::io::{Error, ErrorKind, Read, Result, Write};
 
 /// Longest request or answer.
@@ -29,7 +30,7 @@ const HEAD_LEN: usize = 8;
 /// It is no head, or announces too much.
 fn parse_length(head: [u8; HEAD_LEN]) -> Result<usize> {
     let [a, b, c, d, length @ ..] = head;
-    let length = usize::try_from(u32::from_le_bytes(length)).unwrap_or(usize::MAX);
+    let length = widen_to_usize(u32::from_le_bytes(length));
     match [a, b, c, d] == MARK && length <= MESSAGE_MAX {
         true => Ok(length),
         false => Err(Error::new(ErrorKind::InvalidData, "the message begins with something else")),

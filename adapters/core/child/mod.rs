@@ -39,7 +39,7 @@ mod tests;
 
 pub use crate::vendor_functions as functions;
 pub use client::{ChildClient, Taken};
-pub use ffi::{Argument, Missing, Returned, describe_load_error};
+pub use ffi::{Argument, LoadError, Missing, Returned};
 pub use guard::{Guarded, MARGIN_LEN, Overrun};
 #[doc(hidden)]
 pub use libloading::Library;

@@ -35,16 +35,16 @@ pub fn serve_requests(mut handler: impl FnMut(&[u8], &mut dyn FnMut(&[u8]))) -> 
     }
 }
 
-/// The same in words of one's own, as JSON: small, and legible in a debugger. What cannot be read is an `Err` with the
-/// reason.
+/// The same in words of one's own, as JSON: small, and legible in a debugger. What cannot be read is an `Err`
+/// that says where.
 ///
 /// # Errors
 /// As [`serve_requests`].
 pub fn serve_words<Ask: DeserializeOwned, Tell: Serialize>(
-    mut handler: impl FnMut(Result<Ask, String>, &mut dyn FnMut(&Tell)),
+    mut handler: impl FnMut(Result<Ask, serde_json::Error>, &mut dyn FnMut(&Tell)),
 ) -> std::io::Result<()> {
     serve_requests(|request, give| {
-        handler(serde_json::from_slice(request).map_err(|error| error.to_string()), &mut |told| {
+        handler(serde_json::from_slice(request), &mut |told| {
             give(&serde_json::to_vec(told).unwrap_or_default());
         });
     })

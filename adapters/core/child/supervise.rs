@@ -65,7 +65,7 @@ pub enum ChildError {
 /// How a child has been doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ChildCounts {
-    /// Starts.
+    /// Starts of the process, the first one included.
     pub starts: u64,
     /// Ends in the middle of a request.
     pub died: u64,

@@ -5,7 +5,7 @@ use super::Put;
 /// Counters since the start; they only grow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MergeCounts {
-    /// Readings that arrived.
+    /// Readings that arrived, those that were dropped included.
     pub readings: u64,
     /// Readings older than one that had arrived before them.
     pub out_of_order: u64,

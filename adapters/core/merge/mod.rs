@@ -27,6 +27,7 @@ pub use lockstep::Lockstep;
 use crate::channel::{ChannelId, Kind};
 use crate::clock::TimeNs;
 use crate::driver::{Pull, Source, SourceError};
+use crate::integer::{convert_bounded, saturate_to_wait_ns, widen_to_usize};
 use crate::reading::{Absence, Reading};
 use crate::sample::{Sample, Slot};
 use std::ops::Range;
@@ -44,7 +45,7 @@ pub struct SourcePlan {
     pub name: String,
     /// The channels it can deliver.
     pub channels: Vec<ChannelId>,
-    /// Its pace.
+    /// From one poll to the next, as the source promises it.
     pub period: Duration,
 }
 
@@ -112,7 +113,7 @@ struct Lane {
     tracks: Range<usize>,
 }
 
-const NO_TRACK: u16 = u16::MAX;
+const NO_TRACK: u32 = u32::MAX;
 
 /// Readings in, samples out. See the [module](self).
 pub struct Merge {
@@ -120,7 +121,7 @@ pub struct Merge {
     lanes: Vec<Lane>,
     tracks: Vec<ReadingTrack>,
     /// Track of (source, channel), or [`NO_TRACK`].
-    lookup: Vec<u16>,
+    lookup: Vec<u32>,
     /// Channels that there were when the merge was made.
     channels: usize,
     delay_ns: i64,
@@ -135,7 +136,7 @@ impl Merge {
     pub fn new(plans: &[SourcePlan], delay: Delay) -> Self {
         let delay_ns = delay_of(plans, delay);
         let channels = ChannelId::count_channels();
-        let pace = |plan: &SourcePlan| PeriodLimits::new(to_nanoseconds(plan.period), delay_ns);
+        let pace = |plan: &SourcePlan| PeriodLimits::new(saturate_to_wait_ns(plan.period), delay_ns);
         let mut merge = Self {
             sources: plans
                 .iter()
@@ -163,7 +164,7 @@ impl Merge {
         let first = self.tracks.len();
         for (source, _) in plans.iter().enumerate().filter(|(_, plan)| plan.channels.contains(&channel)) {
             let track = self.tracks.len();
-            self.lookup[source * self.channels + channel.index()] = u16::try_from(track).unwrap_or(NO_TRACK);
+            self.lookup[source * self.channels + channel.index()] = convert_bounded(track, NO_TRACK);
             self.tracks.push(ReadingTrack::new(channel, source, self.sources[source].period_limits));
         }
         if self.tracks.len() > first {
@@ -180,7 +181,7 @@ impl Merge {
     /// What this source says from now on was true so much before its stamps (behind them where negative). Whoever changes
     /// it does so slowly, by less than the time that passes; beyond [`LAG_MAX`] it is cut off.
     pub fn set_lag_ns(&mut self, source: SourceId, lag_ns: i64) {
-        let most_ns = to_nanoseconds(LAG_MAX);
+        let most_ns = saturate_to_wait_ns(LAG_MAX);
         if let Some(state) = self.sources.get_mut(source.0) {
             state.lag_ns = lag_ns.clamp(-most_ns, most_ns);
         }
@@ -195,7 +196,7 @@ impl Merge {
     /// A source turned out to be slower (or faster) than it promised: gaps are measured with this period from now on.
     pub fn set_period(&mut self, source: SourceId, period: Duration) {
         let Some(state) = self.sources.get_mut(source.0) else { return };
-        state.period_limits = PeriodLimits::new(to_nanoseconds(period), self.delay_ns);
+        state.period_limits = PeriodLimits::new(saturate_to_wait_ns(period), self.delay_ns);
     }
 
     /// Takes a reading. One of a channel that the source did not announce is counted and dropped.
@@ -205,7 +206,7 @@ impl Merge {
         // A channel that was declared later has no track.
         let known = reading.channel.index() < self.channels;
         let track = if known { self.lookup[source.0 * self.channels + reading.channel.index()] } else { NO_TRACK };
-        let Some(track) = self.tracks.get_mut(usize::from(track)) else {
+        let Some(track) = self.tracks.get_mut(widen_to_usize(track)) else {
             state.counts.unannounced += 1;
             return;
         };
@@ -305,13 +306,9 @@ fn delay_of(plans: &[SourcePlan], delay: Delay) -> i64 {
     let slowest = plans.iter().filter(waits).map(|plan| plan.period).max();
     let slowest = slowest.or_else(|| plans.iter().map(|plan| plan.period).max()).unwrap_or_default();
     match delay {
-        Delay::Fixed(delay) => to_nanoseconds(delay),
-        Delay::SlowestPeriod => to_nanoseconds((slowest * 5 / 4).min(DELAY_MAX)),
+        Delay::Fixed(delay) => saturate_to_wait_ns(delay),
+        Delay::SlowestPeriod => saturate_to_wait_ns((slowest * 5 / 4).min(DELAY_MAX)),
     }
-}
-
-fn to_nanoseconds(duration: Duration) -> i64 {
-    i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX / 8).min(i64::MAX / 8)
 }
 
 #[cfg(test)]

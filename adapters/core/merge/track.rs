@@ -2,6 +2,7 @@
 
 use crate::channel::{ChannelId, Kind};
 use crate::clock::TimeNs;
+use crate::integer::convert_bounded;
 use crate::reading::{Absence, Value};
 use crate::sample::Slot;
 use std::collections::VecDeque;
@@ -25,7 +26,7 @@ impl PeriodLimits {
         let gap_ns = period_ns.saturating_mul(super::GAP_PERIODS);
         let horizon_ns = gap_ns.saturating_add(delay_ns.max(0));
         let depth = (2 * (delay_ns / period_ns) + 8).clamp(DEPTH.0, DEPTH.1);
-        Self { gap_ns, horizon_ns, depth: usize::try_from(depth).unwrap_or(8) }
+        Self { gap_ns, horizon_ns, depth: convert_bounded(depth, usize::MAX) }
     }
 }
 

@@ -38,7 +38,7 @@ impl TcpConnection {
         Ok(Self { tcp, host: host.to_owned(), tls: Some(Mutex::new(connection)) })
     }
 
-    /// Is it TLS?
+    /// Is the line TLS, or plain TCP?
     #[must_use]
     pub fn is_secured(&self) -> bool {
         self.tls.is_some()

@@ -27,7 +27,7 @@ pub struct TlsFiles {
     pub ca: Option<PathBuf>,
     /// The client's own certificate, followed by those that vouch for it.
     pub certificate: Option<PathBuf>,
-    /// Its private key.
+    /// The private key of the certificate.
     pub key: Option<PathBuf>,
 }
 

@@ -2,8 +2,9 @@
 
 use super::axes::{self, encode_places};
 use super::controller::{Controller, Data};
-use super::encode::{clamp_to_i32, encode_longs, encode_shorts, encode_text};
+use super::encode::{convert_to_i32, encode_longs, encode_shorts, encode_text};
 use super::{message, program, tool, write};
+use adapter_core::integer::clamp_count;
 use fanuc::answer::System;
 use fanuc::generation::Generation;
 use fanuc::item::{Area, PmcWidth, Spindle, Stretch};
@@ -18,7 +19,6 @@ pub(super) const FUNC: i16 = 1;
 pub(super) const LENGTH: i16 = 2;
 pub(super) const NUMBER: i16 = 3;
 pub(super) const ATTRIB: i16 = 4;
-/// No such path.
 const PATH: i16 = 11;
 
 /// Answers every question of a frame, in order.
@@ -79,7 +79,7 @@ fn answer_state(controller: &Controller, request: &Request) -> Option<Data8> {
         f::PROGRAM_COUNTS => program::encode_counts(controller),
         f::ALARM_BITS => encode_longs(&[controller.alarm_bits]),
         f::ALARMS => message::encode_alarms(controller, second, fourth),
-        f::ALARM_HISTORY_COUNT => encode_longs(&[clamp_to_i32(controller.alarm_history.len())]),
+        f::ALARM_HISTORY_COUNT => encode_longs(&[convert_to_i32(controller.alarm_history.len())]),
         f::ALARM_HISTORY => return Some(message::encode_history(controller, first, second)),
         f::MESSAGES_OLDER => message::encode_messages(controller, first, usize::MAX),
         f::CLOCK => encode_shorts(&controller.clock),
@@ -87,7 +87,7 @@ fn answer_state(controller: &Controller, request: &Request) -> Option<Data8> {
         // The mask stands before the signals in the vendor's structure, not on the wire.
         f::PANEL_SIGNALS => encode_shorts(&controller.panel),
         _ if !is_newer(controller) => return None,
-        f::MESSAGES => message::encode_messages(controller, second, usize::try_from(third).unwrap_or(0)),
+        f::MESSAGES => message::encode_messages(controller, second, clamp_count(third, usize::MAX)),
         f::CURRENT_FOLDER => encode_text(program::FOLDER, 256),
         f::FOLDER => return Some(program::encode_folder(controller, request)),
         f::FOLDER_COUNTS => return Some(program::folder_counts(controller, request)),
@@ -134,7 +134,7 @@ fn answer_motion(controller: &Controller, request: &Request) -> Data8 {
         f::TOOL_OFFSET_INFO => Ok(tool::encode_offset_info(controller)),
         f::WORK_OFFSET => tool::encode_work_offsets(controller, first, second, third),
         f::TOOL_GROUP => Ok(encode_longs(&controller.tool_group)),
-        f::TOOL_GROUP_COUNT => Ok(encode_longs(&[clamp_to_i32(controller.tool_groups.len())])),
+        f::TOOL_GROUP_COUNT => Ok(encode_longs(&[convert_to_i32(controller.tool_groups.len())])),
         f::TOOL_GROUP_OPTION if is_newer(controller) => Ok(encode_longs(&[first, 0])),
         f::TOOL_LIFE => tool::encode_tool_life(controller, first, second),
         _ => Err(FUNC),
@@ -144,7 +144,7 @@ fn answer_motion(controller: &Controller, request: &Request) -> Data8 {
 /// Places after the point of the positions of every axis, in and out.
 fn encode_figures(controller: &Controller) -> Vec<u8> {
     let places: Vec<i16> = controller.axes.iter().flat_map(|axis| [axis.positions[1].exponent; 2]).collect();
-    [encode_longs(&[clamp_to_i32(controller.axes.len())]), encode_shorts(&places)].concat()
+    [encode_longs(&[convert_to_i32(controller.axes.len())]), encode_shorts(&places)].concat()
 }
 
 /// Variables as doubles; a vacant one is no number.
@@ -179,9 +179,9 @@ fn encode_parameter(
         return Err(FUNC);
     }
     let data = table.get(&number).ok_or(NUMBER)?;
-    let skip = usize::try_from(axis - 1).unwrap_or(0);
-    let value = |place: usize| data.values.get(place + skip).copied().filter(|_| axis == -1 || place == 0);
     let axis = i16::try_from(axis).map_err(|_| ATTRIB)?;
+    let skip = clamp_count(i32::from(axis) - 1, usize::MAX);
+    let value = |place: usize| data.values.get(place + skip).copied().filter(|_| axis == -1 || place == 0);
     let head = [encode_longs(&[number]), encode_shorts(&[axis, data.kind])].concat();
     let places_of = usize::from(controller.opening.axes_max);
     let older = || (0..places_of).flat_map(|place| value(place).map_or(0, |number| number.mantissa).to_be_bytes());

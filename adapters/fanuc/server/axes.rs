@@ -3,6 +3,7 @@
 use super::answer::{ATTRIB, Data8};
 use super::controller::{Controller, ControllerAxis};
 use super::encode::{encode_longs, encode_shorts};
+use adapter_core::integer::convert_bounded;
 use fanuc::answer::SpeedUnit;
 use fanuc::generation::Generation;
 use fanuc::item::{Position, Servo, Spindle};
@@ -78,7 +79,7 @@ pub(super) fn encode_shown_axes(controller: &Controller) -> Vec<u8> {
 
 pub(super) fn encode_count(controller: &Controller, which: i32) -> Vec<u8> {
     let count = if matches!(which, 1 | 3) { controller.spindles.len() } else { controller.axes.len() };
-    encode_shorts(&[i16::try_from(count).unwrap_or(0)])
+    encode_shorts(&[convert_bounded(count, i16::MAX)])
 }
 
 /// Units as numbered on the wire: of the feed (3 on newer controls, 0 on older ones), of the spindle's speed, and of the

@@ -1,6 +1,7 @@
 //! What a control holds, as plain values.
 
 use super::Memory;
+use adapter_core::integer::convert_bounded;
 use fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit, Status, System};
 use fanuc::generation::{Generation, Opening};
 use fanuc::item::BlockWord;
@@ -13,7 +14,7 @@ const FEED_GROUP: i32 = 4;
 const FEED_CODES: i16 = 4;
 const FEED_SHOWN: i32 = 3107;
 
-/// One axis.
+/// An axis as the control shows it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ControllerAxis {
     /// Its name: a letter, or a letter and a number.
@@ -24,7 +25,7 @@ pub struct ControllerAxis {
     pub load: Number,
     /// Speed of the motor.
     pub speed: Number,
-    /// Current.
+    /// Current of its motor.
     pub current: Number,
     /// Absolute, machine, relative, still to go.
     pub positions: [Number; 4],
@@ -47,7 +48,7 @@ impl ControllerAxis {
     }
 }
 
-/// One spindle.
+/// A spindle as the control shows it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SpindleState {
     /// The six quantities in the order of their numbers: plain load, greatest speed, gear, speed, load, motor speed.
@@ -59,7 +60,7 @@ pub struct SpindleState {
 pub struct ProgramFile {
     /// Number, as in O1234.
     pub number: i32,
-    /// Size.
+    /// Its length in bytes.
     pub bytes: i32,
     /// Comment behind the number.
     pub comment: String,
@@ -90,7 +91,7 @@ pub struct Data {
 pub struct Controller {
     /// Generation, axes, spindles, paths.
     pub opening: Opening,
-    /// Kind and series.
+    /// Kind, series and version that the control tells.
     pub system: System,
     /// The number of the control, four words.
     pub id: [u32; 4],
@@ -104,17 +105,17 @@ pub struct Controller {
     pub feed: Number,
     /// Unit of `feed`, as newer controls tell it; see [`Controller::feed_in`].
     pub feed_unit: SpeedUnit,
-    /// Its spindles.
+    /// The spindles, in the order of their numbers.
     pub spindles: Vec<SpindleState>,
-    /// Its axes.
+    /// The controlled axes, in the order of their numbers.
     pub axes: Vec<ControllerAxis>,
     /// Numbers of the running and the main program.
     pub program: (i32, i32),
     /// Path of the running program.
     pub program_path: String,
-    /// Sequence number.
+    /// Sequence number N of the block that runs.
     pub sequence: i32,
-    /// Blocks run.
+    /// Number that the question for the block count is answered with.
     pub blocks: i32,
     /// One bit per kind of alarm.
     pub alarm_bits: i32,
@@ -124,21 +125,21 @@ pub struct Controller {
     pub alarm_history: Vec<PastAlarm>,
     /// Messages to the operator.
     pub messages: Vec<OperatorMessage>,
-    /// Programs in memory.
+    /// The files in the memory for programs.
     pub programs: Vec<ProgramFile>,
     /// G codes in force by their group, as the program writes them.
     pub g_codes: BTreeMap<i16, Number>,
-    /// Modal words.
+    /// The value in force of each modal word.
     pub modal_words: BTreeMap<BlockWord, Number>,
     /// Modal codes by their group.
     pub modal_groups: BTreeMap<i32, u8>,
     /// Custom macro variables; `None` is vacant. What is not here does not exist.
     pub macros: BTreeMap<i32, Option<f64>>,
-    /// Parameters.
+    /// Parameters by their number; others do not exist.
     pub parameters: BTreeMap<i32, Data>,
-    /// Diagnosis numbers.
+    /// Diagnosis data by their number; others do not exist.
     pub diagnoses: BTreeMap<i32, Data>,
-    /// PMC memory.
+    /// All areas of PMC memory.
     pub memory: Memory,
     /// How many tool offsets there are.
     pub tool_offset_count: i32,
@@ -173,7 +174,7 @@ impl Controller {
         let generation = Generation::from_version(version);
         let older = matches!(generation, Generation::Older(_));
         let (family, axes_max, spindles_max) = if older { (3, 8, 4) } else { (5, 32, 8) };
-        let count = u16::try_from(axes.len()).unwrap_or(0);
+        let count = convert_bounded(axes.len(), u16::MAX);
         let opening = Opening { generation, family, axes_max, spindles_max, paths: 1, axes: count, spindles: 1 };
         let zero = Number::from_decimal(0, 0);
         Self {
@@ -222,7 +223,7 @@ impl Controller {
     #[must_use]
     pub fn with_axes(mut self, axes: &[impl ToString]) -> Self {
         self.axes = axes.iter().map(|name| ControllerAxis::new(&name.to_string())).collect();
-        self.opening.axes = u16::try_from(axes.len()).unwrap_or(0);
+        self.opening.axes = convert_bounded(axes.len(), u16::MAX);
         self.system.axes = format!("{:02}", axes.len());
         self
     }
@@ -231,7 +232,7 @@ impl Controller {
     #[must_use]
     pub fn with_path(mut self, axes: &[impl ToString]) -> Self {
         self.further.push(Self::new(self.opening.generation.version(), axes));
-        self.opening.paths = u16::try_from(self.further.len() + 1).unwrap_or(u16::MAX);
+        self.opening.paths = convert_bounded(self.further.len() + 1, u16::MAX);
         self
     }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 /// What happens to the next answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum InjectedFault {
-    /// Nothing.
+    /// Every answer is what the control says.
     #[default]
     None,
     /// No answer to a question; connections are opened.

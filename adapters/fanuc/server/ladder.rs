@@ -38,7 +38,7 @@ const INTERLOCKS_AT: u16 = 8;
 /// What byte +4 says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MailboxState {
-    /// Nobody asks.
+    /// Nobody asks for an override.
     NotAsked,
     /// The wanted override is taken.
     Taken,
@@ -96,7 +96,7 @@ impl PmcLadder {
         }
     }
 
-    /// One turn.
+    /// One scan of the ladder over the memory at `now_ns`.
     pub fn scan_memory(&mut self, memory: &mut Memory, now_ns: TimeNs) {
         let (area, at) = self.mailbox;
         let (taken, state) = self.read_mailbox(memory, now_ns);

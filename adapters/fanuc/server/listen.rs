@@ -87,7 +87,7 @@ impl Server {
         Ok(Self { shared, address })
     }
 
-    /// Where it listens.
+    /// Address and port on which it listens.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
@@ -109,13 +109,13 @@ impl Server {
         self.shared.sessions.load(Ordering::SeqCst)
     }
 
-    /// Connections ever opened.
+    /// Connections that were opened since the start.
     #[must_use]
     pub fn count_opened(&self) -> u64 {
         self.shared.opened.load(Ordering::SeqCst)
     }
 
-    /// Requests answered.
+    /// Requests that were answered since the start.
     #[must_use]
     pub fn count_frames(&self) -> u64 {
         self.shared.frames.load(Ordering::SeqCst)

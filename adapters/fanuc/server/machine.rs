@@ -1,6 +1,7 @@
 //! The simulated machine behind a control.
 
 use super::controller::{Controller, Data};
+use super::encode::saturate_counter;
 use super::ladder::{PmcLadder, SCAN_NS};
 use super::listen::ServedControl;
 use super::{screen, second_path};
@@ -168,7 +169,7 @@ fn show_moment(control: &mut Controller, moment: &Moment) {
     let modal = [(BlockWord::F, panel.feed_programmed_mm_min), (BlockWord::S, panel.spindle_programmed_rpm.abs())];
     control.modal_words.extend(modal.map(|(word, value)| (word, round_to_number(value))));
     control.set_modal_words([(BlockWord::T, i32::from(panel.tool))]);
-    let parts = i32::try_from(panel.part_count).unwrap_or(i32::MAX);
+    let parts = saturate_counter(i64::from(panel.part_count));
     control.parameters.insert(6711, Data { kind: 3, values: vec![Number::from_decimal(parts, 0)] });
     control.set_diagnosis(403, 1, round_to_number(moment.electric.motor_temperature_c));
     // What the drive shows of itself, in steps of ten watts.

@@ -18,7 +18,7 @@ const SIZES: [(Area, usize); 11] = [
     (Area::E, 8000),
 ];
 
-/// All areas.
+/// The bytes of all areas of PMC memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Memory {
     areas: BTreeMap<Area, Vec<u8>>,

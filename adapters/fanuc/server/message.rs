@@ -2,7 +2,8 @@
 
 use super::answer::{Data8, NUMBER};
 use super::controller::Controller;
-use super::encode::{clamp_to_i32, encode_longs, encode_shorts, encode_text};
+use super::encode::{convert_to_i32, encode_longs, encode_shorts, encode_text};
+use adapter_core::integer::clamp_count;
 use fanuc::answer::{Alarm, OperatorMessage, PastAlarm};
 use fanuc::request::{ALARM_TEXT_LEN, HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 
@@ -11,14 +12,14 @@ const RECORDS_MAX: usize = 10;
 
 /// Texts of the alarms, in records as long as the client wants them.
 pub(super) fn encode_alarms(controller: &Controller, most: i32, length: i32) -> Vec<u8> {
-    let most = usize::try_from(most).unwrap_or(0);
+    let most = clamp_count(most, usize::MAX);
     let length = usize::try_from(length).ok().filter(|length| (1..=ALARM_TEXT_LEN).contains(length));
     let length = length.unwrap_or(ALARM_TEXT_LEN);
     controller.alarms.iter().take(most).flat_map(|alarm| encode_alarm(alarm, length)).collect()
 }
 
 fn encode_alarm(alarm: &Alarm, length: usize) -> Vec<u8> {
-    let told = clamp_to_i32(alarm.text.len().min(length));
+    let told = convert_to_i32(alarm.text.len().min(length));
     [encode_longs(&[alarm.number, alarm.kind, alarm.axis, told]), encode_text(&alarm.text, length)].concat()
 }
 
@@ -28,7 +29,7 @@ pub(super) fn encode_history(controller: &Controller, first: i32, last: i32) -> 
     let past = controller.alarm_history.get(first - 1..last.min(controller.alarm_history.len())).ok_or(NUMBER)?;
     let record = |past: &PastAlarm| {
         let PastAlarm { alarm, at } = past;
-        let told = clamp_to_i32(alarm.text.len().min(HISTORY_TEXT_LEN));
+        let told = convert_to_i32(alarm.text.len().min(HISTORY_TEXT_LEN));
         let head = encode_longs(&[alarm.number, alarm.kind, alarm.axis]);
         [head, encode_shorts(at), encode_longs(&[told]), encode_text(&alarm.text, HISTORY_TEXT_LEN)].concat()
     };
@@ -38,7 +39,7 @@ pub(super) fn encode_history(controller: &Controller, first: i32, last: i32) -> 
 /// Messages to the operator: all of them, or those of one kind.
 pub(super) fn encode_messages(controller: &Controller, kind: i32, most: usize) -> Vec<u8> {
     let record = |message: &OperatorMessage| {
-        let told = clamp_to_i32(message.text.len().min(MESSAGE_TEXT_LEN));
+        let told = convert_to_i32(message.text.len().min(MESSAGE_TEXT_LEN));
         [encode_longs(&[message.number, message.kind, told]), encode_text(&message.text, MESSAGE_TEXT_LEN)].concat()
     };
     let wanted = controller.messages.iter().filter(|message| kind == -1 || message.kind == kind);

@@ -2,7 +2,8 @@
 
 use super::answer::{ATTRIB, Data8, NUMBER};
 use super::controller::{Controller, ProgramFile};
-use super::encode::{clamp_to_i32, encode_longs, encode_shorts, encode_text};
+use super::encode::{convert_to_i32, encode_longs, encode_shorts, encode_text};
+use adapter_core::integer::clamp_count;
 use fanuc::item::BlockWord;
 use fanuc::wire::{Number, Request};
 
@@ -24,14 +25,14 @@ pub(super) fn encode_name(controller: &Controller) -> Vec<u8> {
 }
 
 pub(super) fn encode_executed_text(controller: &Controller, most: i32) -> Vec<u8> {
-    let most = usize::try_from(most).unwrap_or(0).min(controller.executed.1.len());
+    let most = clamp_count(most, controller.executed.1.len());
     let text = controller.executed.1.as_bytes().get(..most).unwrap_or_default();
     [&encode_longs(&[controller.executed.0])[..], text].concat()
 }
 
 /// Programs from a number on; what there is besides the number follows from the kind.
 pub(super) fn encode_list(controller: &Controller, first: i32, most: i32) -> Vec<u8> {
-    let most = usize::try_from(most).unwrap_or(0).min(LISTED_MAX);
+    let most = clamp_count(most, LISTED_MAX);
     let record =
         |file: &ProgramFile| [encode_longs(&[file.number, file.bytes]), encode_text(&file.comment, 64)].concat();
     controller.programs.iter().filter(|file| file.number >= first).take(most).flat_map(record).collect()
@@ -39,7 +40,7 @@ pub(super) fn encode_list(controller: &Controller, first: i32, most: i32) -> Vec
 
 pub(super) fn encode_counts(controller: &Controller) -> Vec<u8> {
     let used: i32 = controller.programs.iter().map(|file| file.bytes).sum();
-    let known = clamp_to_i32(controller.programs.len());
+    let known = convert_to_i32(controller.programs.len());
     encode_longs(&[known, 400 - known.min(400), used, MEMORY_BYTES - used.min(MEMORY_BYTES)])
 }
 
@@ -51,7 +52,7 @@ fn is_folder(request: &Request) -> bool {
 }
 
 pub(super) fn folder_counts(controller: &Controller, request: &Request) -> Data8 {
-    if is_folder(request) { Ok(encode_longs(&[0, clamp_to_i32(controller.programs.len())])) } else { Err(NUMBER) }
+    if is_folder(request) { Ok(encode_longs(&[0, convert_to_i32(controller.programs.len())])) } else { Err(NUMBER) }
 }
 
 /// Files of the folder: kind, time, size, attributes, name, comment, and the time of the last run.
@@ -59,7 +60,7 @@ pub(super) fn encode_folder(controller: &Controller, request: &Request) -> Data8
     if !is_folder(request) {
         return Err(NUMBER);
     }
-    let [first, most, ..] = request.arguments.map(|argument| usize::try_from(argument).unwrap_or(0));
+    let [first, most, ..] = request.arguments.map(|argument| clamp_count(argument, usize::MAX));
     let entry = |file: &ProgramFile| {
         let time = encode_shorts(&controller.clock);
         let sizes = encode_longs(&[file.bytes, 0]);

@@ -2,6 +2,7 @@
 //! temperatures, and the parameters that integrators look at first.
 
 use super::controller::{Controller, Data, ProgramFile, ToolGroup};
+use super::encode::saturate_counter;
 use super::machine::round_to_number;
 use adapter_core::clock::TimeNs;
 use adapter_core::words::execution;
@@ -106,10 +107,7 @@ fn show_temperatures(control: &mut Controller, moment: &Moment) {
 
 /// The meters of time follow from the parts that were made, so that they are the same in every run.
 fn show_times(control: &mut Controller, panel: &Panel) {
-    let seconds = |seconds: i64| {
-        let milliseconds = i32::try_from(seconds % 60 * 1000).unwrap_or(0);
-        (i32::try_from(seconds / 60).unwrap_or(i32::MAX), milliseconds)
-    };
+    let seconds = |seconds: i64| (saturate_counter(seconds / 60), saturate_counter(seconds % 60 * 1000));
     let parts = i64::from(panel.part_count);
     control.timers = [seconds(3600 + 100 * parts), seconds(90 * parts), seconds(60 * parts), seconds(90)];
     control.blocks = i32::from(panel.block);
@@ -126,7 +124,7 @@ fn show_programs(control: &mut Controller, panel: &Panel) {
 /// A group per tool; every part uses each of them once.
 fn show_tools(control: &mut Controller, panel: &Panel) {
     let group = i32::from(panel.tool);
-    let used = i32::try_from(panel.part_count).unwrap_or(0) % TOOL_LIFE;
+    let used = saturate_counter(i64::from(panel.part_count) % i64::from(TOOL_LIFE));
     let tools = i32::from(panel.edge).min(1000) + 1;
     control.tool_groups.insert(group, ToolGroup { tools, life: TOOL_LIFE, count: used });
     control.tool_group = [group, group, group];

@@ -18,7 +18,6 @@ const PROGRAM_STEP: i32 = 1000;
 const STARTED: u8 = 0x20;
 const READY: u8 = 0x40;
 const FULL: u8 = 100;
-/// Spindle override.
 const SPINDLE_AT: u16 = 30;
 
 /// The moment on the screen of a path from 2.

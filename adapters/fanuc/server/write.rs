@@ -6,12 +6,10 @@ use fanuc::item::Area;
 use fanuc::request::function as f;
 use fanuc::wire::{Cursor, Number, Request};
 
-/// Not now.
 const REJECT: i16 = 13;
 
 pub(super) fn apply_write(controller: &mut Controller, request: &Request) -> Result<(), i16> {
-    let announced = usize::try_from(request.arguments[4]).unwrap_or(usize::MAX);
-    if announced != request.data.len() {
+    if usize::try_from(request.arguments[4]) != Ok(request.data.len()) {
         return Err(LENGTH);
     }
     let [first, _, third, ..] = request.arguments;

@@ -10,17 +10,22 @@ use crate::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, Refusal
 use crate::code::FocasReturnCode;
 use crate::item::{BlockWord, FocasItem, PmcWidth, PositionFrame, Servo, Spindle, Stretch};
 use adapter_core::child::Guarded;
+use adapter_core::integer::{clamp_count, const_to_i16, convert_bounded};
 use std::mem::{offset_of, size_of};
 
 /// Most alarms, spindles and PMC bytes that are asked for at a time.
 const COUNT_MAX: u16 = 64;
 
+/// Axes that every call about all of them is asked for.
+const AXES_ASKED: i16 = const_to_i16(MAX_AXIS);
+
 /// Bytes that a value of a parameter or a diagnosis number can have: byte or bits, word, two words, real. The library
 /// refuses with `EW_LENGTH` what is too short.
 const SIZES: [usize; 4] = [1, 2, 4, 8];
 
-fn clamp_count(found: i16, most: usize) -> usize {
-    usize::try_from(found).unwrap_or(0).min(most)
+/// A number of an item as the library takes it: what is beyond 32767 it cannot be asked for.
+fn convert_number(number: u16) -> Result<i16, FocasItemError> {
+    i16::try_from(number).map_err(|_| FocasItemError::NotOffered)
 }
 
 impl FocasSession {
@@ -59,13 +64,13 @@ impl FocasSession {
             FocasItem::Macro(number) => self.read_macro_variable(number),
             FocasItem::Parameter(..) | FocasItem::Diagnosis(..) => self.read_data(item),
             FocasItem::Timer(timer) => {
-                let which = i16::try_from(timer.wire_number()).unwrap_or(0);
+                let which = convert_bounded(timer.wire_number(), i16::MAX);
                 let bytes = fill_structure(8, |out| f.cnc_rdtimer(h, which, out))?;
                 Ok(FocasAnswer::Time { minutes: bytes.read_i32(0), milliseconds: bytes.read_i32(4) })
             }
             FocasItem::ToolOffset(number, kind) => {
-                let short = |number: u16| i16::try_from(number).unwrap_or(i16::MAX);
-                let bytes = fill_structure(8, |out| f.cnc_rdtofs(h, short(number), short(kind), 8, out))?;
+                let (number, kind) = (convert_number(number)?, convert_number(kind)?);
+                let bytes = fill_structure(8, |out| f.cnc_rdtofs(h, number, kind, 8, out))?;
                 Ok(FocasAnswer::Number(scale_decimal(bytes.read_i32(4), POSITION_PLACES)))
             }
             FocasItem::ExecutedText(_) | FocasItem::Messages(_) | FocasItem::GCodes => self.read_text(item),
@@ -82,7 +87,7 @@ impl FocasSession {
             FocasItem::PositionUnit(frame) => self.position_units(frame),
             FocasItem::Pmc(stretch) => self.read_memory(stretch),
             FocasItem::WorkOffset(number, axis) => {
-                let number = i16::try_from(number).unwrap_or(i16::MAX);
+                let number = convert_number(number)?;
                 let bytes = fill_structure(ZOFS_LEN, |out| f.cnc_rdzofs(h, number, axis, 8, out))?;
                 Ok(FocasAnswer::Number(scale_decimal(bytes.read_i32(4), POSITION_PLACES)))
             }
@@ -151,7 +156,7 @@ impl FocasSession {
     }
 
     fn servo_meter(&self) -> Result<(Vec<String>, Vec<Option<f64>>), FocasItemError> {
-        let mut found = i16::try_from(MAX_AXIS).unwrap_or(32);
+        let mut found = AXES_ASKED;
         let length = size_of::<LoadElm>() * MAX_AXIS;
         let bytes = fill_structure(length, |out| self.functions.cnc_rdsvmeter(self.handle, &mut found, out))?;
         let at = |axis| axis * size_of::<LoadElm>();
@@ -162,7 +167,7 @@ impl FocasSession {
 
     /// Class 2 (axis drives), type 2 (current in amperes).
     fn servo_current(&self) -> FocasItemResult {
-        let (mut kind, mut found) = (2, i16::try_from(MAX_AXIS).unwrap_or(32));
+        let (mut kind, mut found) = (2, AXES_ASKED);
         let length = size_of::<OdbAxDt>() * MAX_AXIS;
         let call = |out: &mut Guarded| self.functions.cnc_rdaxisdata(self.handle, 2, &mut kind, 1, &mut found, out);
         let bytes = fill_structure(length, call)?;
@@ -174,7 +179,7 @@ impl FocasSession {
     }
 
     fn read_alarms(&self, most: u16) -> FocasItemResult {
-        let mut found = i16::try_from(most).unwrap_or(8);
+        let mut found = convert_bounded(most, i16::MAX);
         let length = size_of::<OdbAlmMsg2>() * usize::from(most);
         let bytes = fill_structure(length, |out| self.functions.cnc_rdalmmsg2(self.handle, -1, &mut found, out))?;
         let alarm = |index: usize| {
@@ -211,13 +216,13 @@ impl FocasSession {
     }
 
     pub(super) fn every_axis(&self) -> Result<Bytes, FocasItemError> {
-        let length = i16::try_from(ODBDY2_ALL_LEN).unwrap_or(540);
-        fill_structure(ODBDY2_ALL_LEN, |out| self.functions.cnc_rddynamic2(self.handle, -1, length, out))
+        const LENGTH: i16 = const_to_i16(ODBDY2_ALL_LEN);
+        fill_structure(ODBDY2_ALL_LEN, |out| self.functions.cnc_rddynamic2(self.handle, -1, LENGTH, out))
     }
 
     /// Places after the point of the positions of every axis: three in millimetres, four in inches on most machines.
     pub(super) fn read_decimal_places(&self) -> Result<Vec<i16>, FocasItemError> {
-        let (mut found, mut entered) = (i16::try_from(MAX_AXIS).unwrap_or(32), Guarded::new(2 * MAX_AXIS));
+        let (mut found, mut entered) = (AXES_ASKED, Guarded::new(2 * MAX_AXIS));
         let call = |out: &mut Guarded| self.functions.cnc_getfigure(self.handle, 0, &mut found, &mut entered, out);
         let bytes = fill_structure(2 * MAX_AXIS, call)?;
         Ok((0..clamp_count(found, MAX_AXIS)).map(|axis| bytes.read_i16(2 * axis)).collect())
@@ -225,7 +230,7 @@ impl FocasSession {
 
     /// Units of the positions of every axis: of one that the frame has.
     fn position_units(&self, frame: PositionFrame) -> FocasItemResult {
-        let mut found = i16::try_from(MAX_AXIS).unwrap_or(32);
+        let mut found = AXES_ASKED;
         let length = POSITIONS_LEN * MAX_AXIS;
         let (kind, place) = if frame == PositionFrame::Machine { (1, 1) } else { (0, 0) };
         let call = |out: &mut Guarded| self.functions.cnc_rdposition(self.handle, kind, &mut found, out);
@@ -252,7 +257,7 @@ impl FocasSession {
         let places = if axis == -1 { MAX_AXIS } else { 1 };
         let known = self.sizes.get(&item).copied();
         for size in SIZES.into_iter().filter(|size| known.is_none_or(|known| known == *size)) {
-            let length = i16::try_from(4 + size * places).unwrap_or(i16::MAX);
+            let length = convert_bounded(4 + size * places, i16::MAX);
             let (f, h) = (&self.functions, self.handle);
             let found = fill_structure(4 + 8 * MAX_AXIS, |out| match item {
                 FocasItem::Parameter(..) => f.cnc_rdparam(h, number, axis, length, out),
@@ -263,7 +268,7 @@ impl FocasSession {
                     self.sizes.insert(item, size);
                     let count = if axis == -1 { self.axes_max } else { 1 };
                     let values = (0..count).map(|at| decode_sized(&bytes, 4 + at * size, size)).collect();
-                    return Ok(FocasAnswer::Data { kind: i16::try_from(size).unwrap_or(0), values });
+                    return Ok(FocasAnswer::Data { kind: convert_bounded(size, i16::MAX), values });
                 }
                 Err(FocasItemError::Refused(refusal)) if refusal.code == FocasReturnCode::LENGTH => {}
                 Err(error) => return Err(error),
@@ -295,7 +300,7 @@ fn decode_sized(bytes: &Bytes, at: usize, size: usize) -> Option<f64> {
         1 => Some(f64::from(bytes.read_array::<1>(at)[0])),
         2 => Some(f64::from(bytes.read_i16(at))),
         4 => Some(f64::from(bytes.read_i32(at))),
-        _ => scale_decimal(bytes.read_i32(at), i16::try_from(bytes.read_i32(at + 4)).unwrap_or(-1)),
+        _ => i16::try_from(bytes.read_i32(at + 4)).ok().and_then(|places| scale_decimal(bytes.read_i32(at), places)),
     }
 }
 

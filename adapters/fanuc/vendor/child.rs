@@ -10,6 +10,7 @@ use crate::code::{Consequence, FocasReturnCode};
 use crate::generation::{Generation, Opening};
 use crate::item::{FocasItem, Question, Stretch, Write};
 use adapter_core::child::{Guarded, Missing, serve_words};
+use adapter_core::integer::convert_bounded;
 use adapter_core::reading::Absence;
 use adapter_core::text::TextEncoding;
 use std::collections::HashMap;
@@ -22,10 +23,10 @@ use std::path::Path;
 /// The line to the parent failed.
 pub fn serve_parent() -> std::io::Result<()> {
     let mut session: Option<FocasSession> = None;
-    serve_words(|ask: Result<FocasRequest, String>, tell| match (ask, &mut session) {
+    serve_words(|ask: Result<FocasRequest, _>, tell| match (ask, &mut session) {
         (Ok(FocasRequest::Read(questions)), Some(session)) => session.read_each(&questions, tell),
         (Ok(ask), _) => tell(&answer_request(&mut session, ask)),
-        (Err(confused), _) => tell(&FocasReply::Confused(confused)),
+        (Err(confused), _) => tell(&FocasReply::Confused(confused.to_string())),
     })
 }
 
@@ -89,7 +90,7 @@ impl FocasSession {
         path: u8,
         timeout_s: i32,
     ) -> Result<(Self, Opening), Box<FocasReply>> {
-        let functions = Functions::load(library).map_err(|why| Box::new(FocasReply::Unloadable(why)))?;
+        let functions = Functions::load(library).map_err(|why| Box::new(FocasReply::Unloadable(why.to_string())))?;
         let host = CString::new(host).map_err(|error| Box::new(FocasReply::Unloadable(error.to_string())))?;
         // Level 0 never writes a file, whatever is named.
         let started = functions.cnc_startupprocess(0, c"focas.log");
@@ -140,11 +141,11 @@ impl FocasSession {
     fn build_opening(&self) -> Opening {
         let system = self.read_system().ok();
         let of = |text: Option<&str>| text.and_then(|text| text.trim().parse::<u16>().ok()).unwrap_or(0);
-        let axes_max = system.as_ref().and_then(|system| u16::try_from(system.axes_max).ok()).unwrap_or(0);
+        let axes_max = system.as_ref().map_or(0, |system| system.axes_max.max(0).unsigned_abs());
         let axes = of(system.as_ref().map(|system| system.axes.as_str()));
         let (mut path, mut paths) = (0, 0);
         let told = self.functions.cnc_getpath(self.handle, &mut path, &mut paths);
-        let paths = if told == Ok(0) { u16::try_from(paths).unwrap_or(0) } else { 0 };
+        let paths = if told == Ok(0) { i16::max(paths, 0).unsigned_abs() } else { 0 };
         let generation = Generation::Newer(0);
         Opening { generation, family: 0, axes_max, spindles_max: 0, paths, axes, spindles: 0 }
     }
@@ -204,9 +205,13 @@ impl FocasSession {
 
     fn call_write_function(&self, write: &Write) -> Result<i16, Missing> {
         let (f, h) = (&self.functions, self.handle);
-        let short = |number: u16| i16::try_from(number).unwrap_or(i16::MAX);
+        // What the library's 16 bits do not hold is refused as the library refuses a number that it does not know.
+        let (bad_number, bad_length) = (Ok(FocasReturnCode::NUMBER.0), Ok(FocasReturnCode::LENGTH.0));
         match write {
-            Write::Macro { number, mantissa, places } => f.cnc_wrmacro(h, short(*number), 10, *mantissa, *places),
+            Write::Macro { number, mantissa, places } => match i16::try_from(*number) {
+                Ok(number) => f.cnc_wrmacro(h, number, 10, *mantissa, *places),
+                Err(_) => bad_number,
+            },
             Write::Pmc { stretch, values } => {
                 let (area, width) = pmc_words(*stretch);
                 let step = usize::from(stretch.width.byte_count());
@@ -214,12 +219,14 @@ impl FocasSession {
                     [area.to_le_bytes(), width.to_le_bytes(), stretch.from.to_le_bytes(), stretch.to.to_le_bytes()];
                 let data = values.iter().flat_map(|value| value.to_le_bytes()[..step].to_vec());
                 let bytes: Vec<u8> = head.concat().into_iter().chain(data).collect();
+                let Ok(length) = u16::try_from(bytes.len()) else { return bad_length };
                 let mut buffer = Guarded::new(bytes.len());
                 buffer.write_bytes(&bytes);
-                f.pmc_wrpmcrng(h, u16::try_from(bytes.len()).unwrap_or(u16::MAX), &mut buffer)
+                f.pmc_wrpmcrng(h, length, &mut buffer)
             }
             Write::WorkOffset { number, axis, value } => {
-                let head = [short(*number).to_le_bytes(), axis.to_le_bytes()].concat();
+                let Ok(number) = i16::try_from(*number) else { return bad_number };
+                let head = [number.to_le_bytes(), axis.to_le_bytes()].concat();
                 let mut buffer = Guarded::new(ZOFS_LEN);
                 buffer.write_bytes(&[head, value.to_le_bytes().to_vec()].concat());
                 f.cnc_wrzofs(h, 8, &mut buffer)
@@ -235,6 +242,6 @@ fn is_dead(error: &FocasItemError) -> bool {
 }
 
 pub(super) fn pmc_words(stretch: Stretch) -> (i16, i16) {
-    let word = |number: i32| i16::try_from(number).unwrap_or(-1);
+    let word = |number: i32| convert_bounded(number, i16::MAX);
     (word(stretch.area.wire_number()), word(stretch.width.wire_number()))
 }

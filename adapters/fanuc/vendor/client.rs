@@ -21,11 +21,11 @@ const GRACE: Duration = Duration::from_millis(1500);
 /// How the library is used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VendorSettings {
-    /// The library's file.
+    /// The file of the vendor's library.
     pub vendor_library: PathBuf,
     /// Where the controller is.
     pub endpoint: Endpoint,
-    /// Path from 1.
+    /// Path of the control, counted from 1.
     pub path: u8,
     /// The library's patience with the controller; whole seconds, at least one.
     pub timeout: Duration,
@@ -104,7 +104,7 @@ impl Vendor {
 
 /// Whole seconds, at least one: zero would mean for ever.
 fn round_up_seconds(timeout: Duration) -> i32 {
-    i32::try_from(timeout.as_secs_f64().ceil().max(1.0) as u32).unwrap_or(1)
+    timeout.as_secs_f64().ceil().max(1.0) as i32
 }
 
 fn open_connection(child: &mut ChildClient<Question>, settings: &VendorSettings) -> Result<Opening, FocasError> {

@@ -5,6 +5,7 @@ use super::child::FocasSession;
 use super::structure::{Bytes, check_code, fill_structure};
 use crate::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, OperatorMessage, PastAlarm};
 use crate::item::FocasItem;
+use adapter_core::integer::{clamp_count, convert_bounded};
 use adapter_core::text::TextEncoding;
 
 /// `ODBGCD`: group, flag, text of eight bytes.
@@ -32,9 +33,9 @@ impl FocasSession {
                 })
             }
             FocasItem::Messages(most) => {
-                let mut found = i16::try_from(most.clamp(1, 5)).unwrap_or(1);
+                let mut found = convert_bounded(most.clamp(1, 5), i16::MAX);
                 let bytes = fill_structure(MESSAGE_LEN * 5, |out| f.cnc_rdopmsg3(h, -1, &mut found, out))?;
-                let count = usize::try_from(found).unwrap_or(0).min(5);
+                let count = clamp_count(found, 5);
                 Ok(FocasAnswer::Messages(
                     (0..count).map(|at| decode_message(&bytes, at * MESSAGE_LEN, self.encoding)).collect(),
                 ))
@@ -43,7 +44,7 @@ impl FocasSession {
                 let mut found = G_CODES_MAX;
                 let room = G_CODE_LEN * usize::from(G_CODES_MAX.unsigned_abs());
                 let bytes = fill_structure(room, |out| f.cnc_rdgcode(h, -1, 0, &mut found, out))?;
-                let count = usize::try_from(found.min(G_CODES_MAX)).unwrap_or(0);
+                let count = clamp_count(found.min(G_CODES_MAX), usize::MAX);
                 Ok(FocasAnswer::Names((0..count).map(|at| bytes.read_text(at * G_CODE_LEN + 4, 8)).collect()))
             }
             _ => Err(FocasItemError::NotOffered),
@@ -61,7 +62,7 @@ impl FocasSession {
                 let last = last.min(first.saturating_add(HISTORY_MAX - 1));
                 let count = usize::from(last.saturating_sub(first)) + 1;
                 let length = HISTORY_HEAD_LEN + HISTORY_LEN * count;
-                let asked = u16::try_from(length).unwrap_or(u16::MAX);
+                let asked = convert_bounded(length, u16::MAX);
                 let bytes = fill_structure(length, |out| f.cnc_rdalmhistry(h, first, last, asked, out))?;
                 let record = |at: usize| past_alarm(&bytes, HISTORY_HEAD_LEN + at * HISTORY_LEN, self.encoding);
                 Ok(FocasAnswer::History((0..count).map(record).collect()))
@@ -89,14 +90,14 @@ impl FocasSession {
 }
 
 fn decode_message(bytes: &Bytes, at: usize, encoding: TextEncoding) -> OperatorMessage {
-    let length = usize::try_from(bytes.read_i16(at + 4)).unwrap_or(0).min(256);
+    let length = clamp_count(bytes.read_i16(at + 4), 256);
     let (number, kind) = (i32::from(bytes.read_i16(at)), i32::from(bytes.read_i16(at + 2)));
     OperatorMessage { number, kind, text: bytes.text_in(at + 6, length, encoding) }
 }
 
 fn past_alarm(bytes: &Bytes, at: usize, encoding: TextEncoding) -> PastAlarm {
     let byte = |offset: usize| i16::from(bytes.read_array::<1>(at + offset)[0]);
-    let length = usize::try_from(bytes.read_i16(at + 12)).unwrap_or(0).min(32);
+    let length = clamp_count(bytes.read_i16(at + 12), 32);
     let (kind, number) = (i32::from(bytes.read_i16(at)), i32::from(bytes.read_i16(at + 2)));
     let alarm = Alarm { number, kind, axis: i32::from(byte(4)), text: bytes.text_in(at + 14, length, encoding) };
     PastAlarm { alarm, at: [byte(5), byte(6), byte(7), byte(8), byte(9), byte(10)] }

@@ -1,6 +1,7 @@
 //! The blocks of a body: questions and their answers.
 
 use super::{BLOCKS_MAX, Cursor, WireError};
+use adapter_core::integer::{convert_bounded, length_to_i64};
 
 /// Bytes of a question without what is written.
 const REQUEST_LEN: usize = 28;
@@ -10,7 +11,7 @@ const REPLY_LEN: usize = 16;
 /// Which half of the controller is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum CncOrPmc {
-    /// The numerical control.
+    /// The numerical control, number 1 on the wire.
     Cnc,
     /// The programmable machine controller, where the ladder runs.
     Pmc,
@@ -33,14 +34,14 @@ impl CncOrPmc {
     }
 }
 
-/// One question.
+/// A question as a block of a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Request {
-    /// Who is asked.
+    /// The half of the controller that is asked.
     pub device: CncOrPmc,
     /// Path of the control from 1; PMC blocks always carry 1.
     pub path: u16,
-    /// What is asked.
+    /// Number of the function that is asked for.
     pub function: u16,
     /// Its arguments; the last one counts the bytes that are written.
     pub arguments: [i32; 5],
@@ -64,7 +65,7 @@ impl Request {
     /// The same, writing these bytes.
     #[must_use]
     pub fn with_data(mut self, data: Vec<u8>) -> Self {
-        self.arguments[4] = i32::try_from(data.len()).unwrap_or(0);
+        self.arguments[4] = convert_bounded(data.len(), i32::MAX);
         self.data = data;
         self
     }
@@ -85,7 +86,7 @@ impl Request {
     }
 
     fn write(&self, bytes: &mut Vec<u8>) {
-        let length = u16::try_from(self.wire_len()).unwrap_or(u16::MAX);
+        let length: u16 = convert_bounded(self.wire_len(), u16::MAX);
         for word in [length, self.device.wire_number(), self.path, self.function] {
             bytes.extend_from_slice(&word.to_be_bytes());
         }
@@ -113,12 +114,8 @@ fn pad_arguments(first: &[i32]) -> [i32; 5] {
 
 /// Bytes of a block beyond its fixed part.
 fn compute_data_len(what: &'static str, length: usize, fixed: usize) -> Result<usize, WireError> {
-    let short = || WireError::Mismatch { what, expected: clamp_to_i64(fixed), found: clamp_to_i64(length) };
+    let short = || WireError::Mismatch { what, expected: length_to_i64(fixed), found: length_to_i64(length) };
     length.checked_sub(fixed).ok_or_else(short)
-}
-
-fn clamp_to_i64(length: usize) -> i64 {
-    i64::try_from(length).unwrap_or(i64::MAX)
 }
 
 /// The body of a request.
@@ -130,7 +127,7 @@ pub fn request_body(requests: &[Request]) -> Vec<u8> {
 }
 
 fn encode_count(blocks: usize) -> Vec<u8> {
-    u16::try_from(blocks).unwrap_or(u16::MAX).to_be_bytes().to_vec()
+    convert_bounded(blocks, u16::MAX).to_be_bytes().to_vec()
 }
 
 /// The questions of a body.
@@ -147,19 +144,19 @@ pub fn parse_requests(body: &[u8]) -> Result<Vec<Request>, WireError> {
 
 fn read_block_count(cursor: &mut Cursor<'_>) -> Result<usize, WireError> {
     let blocks = usize::from(cursor.read_u16()?);
-    let most = clamp_to_i64(BLOCKS_MAX);
-    let many = WireError::Mismatch { what: "number of blocks", expected: most, found: clamp_to_i64(blocks) };
+    let most = length_to_i64(BLOCKS_MAX);
+    let many = WireError::Mismatch { what: "number of blocks", expected: most, found: length_to_i64(blocks) };
     if blocks > BLOCKS_MAX { Err(many) } else { Ok(blocks) }
 }
 
 /// One answer, within the body that carried it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reply<'a> {
-    /// Who answers.
+    /// The half of the controller that answers.
     pub device: CncOrPmc,
-    /// Path, as asked.
+    /// Path of the control, the same as in the question.
     pub path: u16,
-    /// Function, as asked.
+    /// Number of the function, the same as in the question.
     pub function: u16,
     /// Return code; 0 when the data are good.
     pub code: i16,
@@ -179,7 +176,7 @@ impl<'a> Reply<'a> {
         let data_len = usize::from(cursor.read_u16()?);
         if data_len != room {
             let what = "length of the data of an answer";
-            return Err(WireError::Mismatch { what, expected: clamp_to_i64(room), found: clamp_to_i64(data_len) });
+            return Err(WireError::Mismatch { what, expected: length_to_i64(room), found: length_to_i64(data_len) });
         }
         Ok(Self { device, path, function, code, detail, data: cursor.read_bytes(data_len)? })
     }
@@ -214,9 +211,9 @@ pub fn parse_replies(body: &[u8]) -> Result<Vec<Reply<'_>>, WireError> {
 /// An answer to be sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReplyBlock {
-    /// Return code.
+    /// Return code; 0 means that the data are good.
     pub code: i16,
-    /// More about it.
+    /// The detail beside the return code.
     pub detail: i16,
     /// What was asked for; empty unless the code is 0.
     pub data: Vec<u8>,
@@ -227,7 +224,7 @@ pub struct ReplyBlock {
 pub fn reply_body(answers: &[(&Request, ReplyBlock)]) -> Vec<u8> {
     let mut bytes = encode_count(answers.len());
     for (request, answer) in answers {
-        let length = u16::try_from(answer.data.len()).unwrap_or(0);
+        let length: u16 = convert_bounded(answer.data.len(), u16::MAX);
         let head = [length.saturating_add(16), request.device.wire_number(), request.path, request.function];
         head.iter().for_each(|word| bytes.extend_from_slice(&word.to_be_bytes()));
         [answer.code, answer.detail, 0].iter().for_each(|word| bytes.extend_from_slice(&word.to_be_bytes()));

@@ -1,6 +1,7 @@
 //! The outer frame.
 
 use super::{BODY_MAX, Cursor, WireError};
+use adapter_core::integer::convert_bounded;
 
 /// Bytes before the body.
 pub const HEADER_LEN: usize = 10;
@@ -12,17 +13,17 @@ const MAGIC: [u8; 4] = [0xA0; 4];
 pub enum FrameKind {
     /// A client wants a connection.
     Open,
-    /// It is open.
+    /// The controller has opened the connection.
     Opened,
     /// It is not: every connection the controller has is in use.
     OpenRefused,
-    /// A client leaves.
+    /// A client ends the connection.
     Close,
-    /// It has left.
+    /// The controller confirms the end.
     Closed,
-    /// Questions.
+    /// Questions in one or several blocks.
     Request,
-    /// Their answers.
+    /// The answers, a block for each question.
     Answer,
     /// The controller could not make sense of the request.
     Error,
@@ -82,14 +83,14 @@ impl FocasHeader {
     }
 }
 
-/// A whole frame.
+/// A frame with its whole body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FocasFrame {
-    /// See [`FocasHeader::version`].
+    /// The same as [`FocasHeader::version`] of its header.
     pub version: u16,
-    /// What it is.
+    /// What the frame is for.
     pub kind: FrameKind,
-    /// What it carries.
+    /// The bytes behind the header, at most [`BODY_MAX`].
     pub body: Vec<u8>,
 }
 
@@ -117,7 +118,7 @@ pub fn encode_frame(version: u16, kind: FrameKind, body: &[u8]) -> Vec<u8> {
     bytes.extend_from_slice(&MAGIC);
     bytes.extend_from_slice(&version.to_be_bytes());
     bytes.extend_from_slice(&kind.wire_number().to_be_bytes());
-    bytes.extend_from_slice(&u16::try_from(body.len()).unwrap_or(u16::MAX).to_be_bytes());
+    bytes.extend_from_slice(&convert_bounded(body.len(), u16::MAX).to_be_bytes());
     bytes.extend_from_slice(body);
     bytes
 }

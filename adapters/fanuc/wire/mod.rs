@@ -45,7 +45,7 @@ pub enum WireError {
     Short {
         /// What was being read.
         what: &'static str,
-        /// Bytes it needs.
+        /// Bytes that are needed for it.
         needed: usize,
         /// Bytes that are there.
         left: usize,
@@ -55,17 +55,17 @@ pub enum WireError {
     Long {
         /// What was being read.
         what: &'static str,
-        /// Bytes too many.
+        /// Bytes that nothing was read from.
         left: usize,
     },
     /// A count or length that contradicts another.
     #[error("{what}: {found} where {expected} was expected")]
     Mismatch {
-        /// What was compared.
+        /// What was compared, in words.
         what: &'static str,
-        /// What was expected.
+        /// The number that was expected.
         expected: i64,
-        /// What came.
+        /// The number that came instead.
         found: i64,
     },
 }

@@ -5,7 +5,7 @@ use super::{Cursor, WireError};
 /// `mantissa / base^exponent`; exponent -1 stands for no value at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Number {
-    /// Whole number.
+    /// The number without its point.
     pub mantissa: i32,
     /// 10 in newer controllers, 2 in the macro variables of older ones. Some answers carry garbage here.
     pub base: u16,
@@ -20,7 +20,7 @@ impl Number {
     /// No value: a macro variable that is vacant.
     pub const VACANT: Self = Self { mantissa: 0, base: 0xFFFF, exponent: -1 };
 
-    /// `mantissa / 10^places`.
+    /// The number `mantissa / 10^places`.
     #[must_use]
     pub fn from_decimal(mantissa: i32, places: i16) -> Self {
         Self { mantissa, base: 10, exponent: places }
@@ -65,7 +65,7 @@ impl Number {
         Ok(Self { mantissa: cursor.read_i32()?, base: cursor.read_u16()?, exponent: cursor.read_i16()? })
     }
 
-    /// The bytes.
+    /// The bytes on the wire.
     #[must_use]
     pub fn to_bytes(self) -> [u8; Self::LEN] {
         let mut bytes = [0; Self::LEN];

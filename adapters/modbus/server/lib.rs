@@ -63,7 +63,7 @@ impl ModbusServer {
         Ok(Self { at, stop, thread: Some(thread) })
     }
 
-    /// Where it listens.
+    /// Address and port on which it listens.
     #[must_use]
     pub fn listen_address(&self) -> SocketAddr {
         self.at

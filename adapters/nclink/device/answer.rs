@@ -1,6 +1,7 @@
 //! One request in, one answer out.
 
 use super::{NcLinkDevice, to_milliseconds, values};
+use adapter_core::integer::widen_to_usize;
 use nclink::lenient_json::{find_list, find_text, parse_integer};
 use nclink::mailbox::ControllerRegister;
 use nclink::message::find_identifier;
@@ -105,7 +106,7 @@ fn parse_indexes(params: &Value) -> Result<Vec<u32>, &'static str> {
         let (first, last) = part.split_once('-').unwrap_or((&part, &part));
         let number = |text: &str| text.trim().parse::<u32>().map_err(|_| "BAD_INDEX");
         let (first, last) = (number(first)?, number(last)?);
-        if last < first || found.len() + usize::try_from(last - first).unwrap_or(ELEMENTS_MAX) >= ELEMENTS_MAX {
+        if last < first || found.len() + widen_to_usize(last - first) >= ELEMENTS_MAX {
             return Err("BAD_INDEX");
         }
         found.extend(first..=last);

@@ -21,7 +21,6 @@ const HEARTBEAT: u32 = 149;
 /// Memory that can be written, with its size and the width of a register in bits.
 const MEMORY: [(char, u32, u32); 4] = [('R', 2288, 8), ('W', 200, 16), ('D', 200, 32), ('B', 8304, 32)];
 
-/// See the [module](self).
 pub(super) struct SimulatedRegisters {
     memory: BTreeMap<ControllerRegister, i64>,
     mailbox: Mailbox,

@@ -8,7 +8,6 @@ use simulated::Simulated;
 /// A device that is further behind than this goes on from now.
 const BEHIND_NS: i64 = 2_000_000_000;
 
-/// One sample channel.
 pub(super) struct ChannelSampler {
     name: String,
     paths: Vec<String>,
@@ -62,7 +61,7 @@ impl ChannelSampler {
         let begin_ms = self.begin_ms;
         let instants = self.upload_ms / self.interval_ms;
         self.begin_ms += instants * self.interval_ms;
-        let mut columns = vec![Vec::with_capacity(usize::try_from(instants).unwrap_or(0)); self.paths.len()];
+        let mut columns = vec![Vec::new(); self.paths.len()];
         for instant in 0..instants {
             let moment = machine.moment((begin_ms + instant * self.interval_ms) * 1_000_000);
             for (column, path) in columns.iter_mut().zip(&self.paths) {

@@ -6,7 +6,6 @@ use simulated::address::SimulatedMachine;
 /// Number of the spindle's axis.
 const SPINDLE: u32 = 5;
 
-/// The whole tree.
 pub(super) fn build_tree(machine: SimulatedMachine, serial: &str) -> Value {
     let (name, axes): (&str, &[(u32, &str)]) = match machine {
         SimulatedMachine::Lathe => ("simulated lathe", &[(0, "X"), (2, "Z")]),

@@ -149,6 +149,10 @@ impl<'p> BlockBuilder<'p> {
             Ok(time) => time,
             Err(reason) => return self.problems.push(RowProblem { line, column, reason }),
         };
+        let Ok(stored_line) = u32::try_from(line) else {
+            let reason = format!("only the first {} lines of a file are read", u32::MAX);
+            return done.record_refusal(RowProblem { line, column: None, reason });
+        };
         std::mem::take(&mut self.problems).into_iter().for_each(|problem| done.record_refusal(problem));
         for builder in self.columns.iter().filter(|builder| builder.plan.strict) {
             if let Err(reason) = builder.check_cell(at(builder.plan.index)) {
@@ -156,7 +160,7 @@ impl<'p> BlockBuilder<'p> {
             }
         }
         self.columns.iter_mut().for_each(|builder| builder.push(line, at(builder.plan.index)));
-        self.lines.push(u32::try_from(line).unwrap_or(u32::MAX));
+        self.lines.push(stored_line);
         self.times.push(time);
     }
 

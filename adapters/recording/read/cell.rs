@@ -88,14 +88,14 @@ pub fn flag_words(pair: usize) -> (&'static str, &'static str) {
 /// The sign before the decimals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Decimal {
-    /// 1.5
+    /// The point, as in 1.5
     Point,
-    /// 1,5
+    /// The comma, as in 1,5
     Comma,
 }
 
 impl Decimal {
-    /// The sign itself.
+    /// The sign as a character.
     #[must_use]
     pub fn sign(self) -> char {
         if self == Self::Point { '.' } else { ',' }
@@ -123,7 +123,7 @@ pub struct WrittenNumber<'a> {
     digits: &'a str,
     /// What stands behind the digits: `sec`, `%`; mostly nothing.
     pub suffix: &'a str,
-    /// See [`Shape`].
+    /// What it says about the decimal sign.
     pub shape: Shape,
 }
 

@@ -10,7 +10,6 @@ use std::io::Read;
 
 const CHUNK: usize = 64 << 10;
 
-/// What was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct DetectedEncoding {
     pub(super) encoding: &'static Encoding,

@@ -42,7 +42,7 @@ pub enum RecordingError {
     /// The file cannot be opened or read.
     #[error("{file}: {error}. {}", next_step(.error))]
     Io {
-        /// The file.
+        /// Name of the file, as it was given.
         file: String,
         /// What the system said.
         error: std::io::Error,
@@ -50,9 +50,9 @@ pub enum RecordingError {
     /// The header makes the whole file unusable.
     #[error("{file}, line {line}: {reason}")]
     Header {
-        /// The file.
+        /// Name of the file, as it was given.
         file: String,
-        /// Where.
+        /// Line of the file, counted from 1.
         line: u64,
         /// What is wrong and what was expected.
         reason: Bilingual,
@@ -60,17 +60,17 @@ pub enum RecordingError {
     /// The format is not read, or a bound is met.
     #[error("{file}: {reason}")]
     Format {
-        /// The file.
+        /// Name of the file, as it was given.
         file: String,
         /// What is wrong and what to do.
         reason: Bilingual,
     },
-    /// No usable row.
+    /// No row of the file can be used.
     #[error("{file}: no usable row{}; a recording is a line of column names, with time_s or a clock among them, and rows of values", describe_first(.problems))]
     Empty {
-        /// The file.
+        /// Name of the file, as it was given.
         file: String,
-        /// The refused rows.
+        /// Refused rows with their reasons.
         problems: Vec<RowProblem>,
     },
 }

@@ -5,7 +5,6 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
-/// See the [module](self).
 #[derive(Debug, Clone)]
 pub(super) struct Input {
     /// The name for messages.

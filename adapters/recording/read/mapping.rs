@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mapping {
-    /// `map/1`.
+    /// The version of the notation: `map/1`.
     #[serde(default)]
     pub schema: String,
     /// Name of the encoding: `GBK`, `windows-1252`, `UTF-16LE`.
@@ -26,7 +26,7 @@ pub struct Mapping {
     /// What is said about time.
     #[serde(default)]
     pub time: TimeMapping,
-    /// Column by column.
+    /// What is said about single columns.
     #[serde(default)]
     pub column: Vec<ColumnMapping>,
 }
@@ -71,9 +71,9 @@ pub struct ColumnMapping {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: {reason}")]
 pub struct MappingError {
-    /// The map.
+    /// Name of the file with the map.
     pub file: String,
-    /// What is wrong.
+    /// What is wrong with it, in words.
     pub reason: String,
 }
 

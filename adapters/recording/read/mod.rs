@@ -56,7 +56,7 @@ use table::Table;
 /// What was read, and what was refused.
 #[derive(Debug)]
 pub struct ReadRecording {
-    /// The accepted rows.
+    /// The rows that were accepted.
     pub recording: Recording,
     /// The refused rows, at most a hundred of them described.
     pub problems: Vec<RowProblem>,

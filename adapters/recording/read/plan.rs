@@ -20,9 +20,9 @@ pub enum NoteKind {
 /// A sentence about the reading, for the user.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Note {
-    /// See [`NoteKind`].
+    /// What sort of note it is.
     pub kind: NoteKind,
-    /// The sentence.
+    /// The sentence in both languages.
     pub text: Bilingual,
 }
 
@@ -95,7 +95,6 @@ pub(super) struct BlockPlan {
     pub(super) columns: Vec<PlannedColumn>,
 }
 
-/// See the [module](self).
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ReadPlan {
     pub(super) blocks: Vec<BlockPlan>,

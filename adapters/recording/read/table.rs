@@ -10,7 +10,6 @@ use adapter_core::clock::TimeNs;
 pub(super) struct Row<'a> {
     /// Line of the file, from 1.
     pub(super) line: u64,
-    /// The cells.
     pub(super) cells: &'a [Cell<'a>],
 }
 
@@ -23,7 +22,6 @@ pub(super) enum VisitStep {
 /// Takes a row; an error ends the reading.
 pub(super) type Visit<'v> = dyn FnMut(&Row<'_>) -> Result<VisitStep, RecordingError> + 'v;
 
-/// See the [module](self).
 pub(super) trait Table {
     /// Every row in order.
     fn visit_rows(&self, see: &mut Visit<'_>) -> Result<(), RecordingError>;
@@ -70,7 +68,6 @@ impl OwnedCell {
 pub(super) struct MemoryTable {
     /// Line and cells of each row.
     pub(super) rows: Vec<(u64, Vec<OwnedCell>)>,
-    /// See [`Table::describe_form`].
     pub(super) form: Vec<Bilingual>,
 }
 
@@ -101,7 +98,6 @@ impl Table for MemoryTable {
 pub(super) struct ColumnTable {
     /// Name and cells of each column.
     pub(super) columns: Vec<(String, ColumnCells)>,
-    /// See [`Table::describe_form`].
     pub(super) form: Vec<Bilingual>,
 }
 

@@ -57,7 +57,6 @@ impl Separator {
     }
 }
 
-/// See the [module](self).
 #[derive(Debug)]
 pub(super) struct TextTable {
     pub(super) input: Input,

@@ -14,7 +14,6 @@ use crate::TEXT_COLUMNS;
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::{ChannelId, Kind};
 
-/// Makes the plan.
 pub(super) fn build_plan(
     head: &Head,
     survey: &Survey,

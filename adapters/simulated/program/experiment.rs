@@ -1,6 +1,7 @@
 //! Experiments: stretches of commanded speed, feed and auxiliaries, run once.
 
 use super::{Action, Cut, ProgramWriter, Rate};
+use adapter_core::integer::convert_bounded;
 use adapter_core::words::{execution, mode};
 
 /// Number of the program that an experiment runs under.
@@ -12,7 +13,7 @@ const START_S: f64 = 20.0;
 /// A cut of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExperimentCut {
-    /// Feed, mm/min.
+    /// Feed of the cut, mm/min.
     pub feed_mm_min: f64,
     /// Depth of cut, mm.
     pub depth_mm: f64,
@@ -25,7 +26,7 @@ pub struct ExperimentCut {
 /// What is commanded over a stretch of time. A change of the spindle speed takes its time on top.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExperimentStep {
-    /// How long, s.
+    /// How long the step lasts, s.
     pub seconds: f64,
     /// Spindle speed, rpm; 0 is a stop.
     pub spindle_rpm: f64,
@@ -35,11 +36,11 @@ pub struct ExperimentStep {
     pub cut: Option<ExperimentCut>,
     /// Velocity of Z without a cut, mm/min, signed.
     pub axis_mm_min: f64,
-    /// Coolant pump.
+    /// Does the coolant pump run?
     pub coolant_on: bool,
-    /// Hydraulic pump.
+    /// Does the hydraulic pump run?
     pub hydraulics_on: bool,
-    /// Feed override, %.
+    /// Feed override during the step, %.
     pub override_pct: u8,
     /// A fresh edge before the step.
     pub new_edge: bool,
@@ -56,7 +57,7 @@ pub(super) fn write(out: &mut ProgramWriter<'_>, steps: &[ExperimentStep]) {
         (mode::AUTOMATIC, execution::ACTIVE, EXPERIMENT_PROGRAM, "experiment");
     let mut place = Place { stage: 1, z_mm: 160.0 };
     for (index, step) in steps.iter().enumerate() {
-        out.set_number(u16::try_from(index + 1).unwrap_or(u16::MAX));
+        out.set_number(convert_bounded(index + 1, u16::MAX));
         write_step(out, step, &mut place);
     }
 }

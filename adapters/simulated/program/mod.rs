@@ -22,7 +22,6 @@ pub(super) enum Rate {
     PerTurn(f64),
 }
 
-/// A planned engagement.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Cut {
     pub(super) depth_mm: f64,

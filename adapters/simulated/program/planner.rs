@@ -5,6 +5,7 @@ use super::experiment::{self, ExperimentStep};
 use super::short_day;
 use super::{Action, NcBlock, ProgramWriter, lathe, mill};
 use crate::address::SimulatedMachine;
+use adapter_core::integer::widen_to_usize;
 use adapter_core::words::{execution, mode};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -127,7 +128,7 @@ impl Planner {
         let rng = &mut self.rng;
         let changes = self.settings.speed_changes;
         let mut vary = || if changes { rng.random_range(0.8..1.2) } else { 1.0 };
-        let lot = usize::try_from(lot).unwrap_or(0);
+        let lot = widen_to_usize(lot);
         match self.settings.machine {
             SimulatedMachine::Lathe => lathe::write_part(out, lot, &mut vary),
             SimulatedMachine::Mill => mill::write_part(out, lot, &mut vary),

@@ -8,7 +8,6 @@ use fanuc::item::{Area, FocasItem, Position, Servo, Spindle, Stretch, Write};
 pub(super) enum Says {
     /// Items and their values.
     Read(Vec<FocasItem>, Vec<FocasItemResult>),
-    /// A write.
     Written(Write),
 }
 

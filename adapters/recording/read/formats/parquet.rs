@@ -25,7 +25,8 @@ pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
     };
     let reader = SerializedFileReader::new(Bytes::from(super::read_whole(input)?)).map_err(bad)?;
     let schema = reader.metadata().file_metadata().schema_descr();
-    let rows = usize::try_from(reader.metadata().file_metadata().num_rows()).unwrap_or(usize::MAX);
+    let rows = reader.metadata().file_metadata().num_rows();
+    let rows = usize::try_from(rows).map_err(|_| bad(ParquetError::General(format!("{rows} rows"))))?;
     if rows.saturating_mul(schema.num_columns()) > CELLS_MAX {
         let en = format!(
             "{rows} rows of {} columns are more than {CELLS_MAX} cells: write fewer columns, or parts",
