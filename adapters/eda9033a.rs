@@ -17,6 +17,7 @@ pub use crate::modbus::line::{ModbusError, serial_fault, serial_silence};
 use crate::reading::{Reading, Stamp};
 use crate::serial::{Bus, SharedBus, wire_time};
 use adapter_core::integer::saturate_to_wait_ns;
+use adapter_core::serial::LineConflict;
 use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
@@ -48,8 +49,8 @@ impl Eda9033a {
     /// A meter on this line. `name` is the address.
     ///
     /// # Errors
-    /// In words: a line that another address uses at another speed.
-    pub fn new(name: &str, line: &SerialTarget, meter: &EdaTarget) -> Result<Self, String> {
+    /// A line that another address uses at another speed or parity.
+    pub fn new(name: &str, line: &SerialTarget, meter: &EdaTarget) -> Result<Self, LineConflict> {
         let EdaTarget { address, ct, circuit, timeout: deadline } = *meter;
         let names: &[&str] = match circuit {
             Circuit::Machine => &["total_power_w", "supply_voltage_v"],

@@ -12,6 +12,7 @@ use crate::simulated::{Simulated, SimulatedSettings};
 use crate::temperature::Temperatures;
 use adapter_core::integer::widen_to_u64;
 use adapter_core::{OpenedDevice, UnreadableSecret};
+use std::fmt::Display;
 use thiserror::Error;
 
 /// Why an address could not be opened.
@@ -124,8 +125,12 @@ pub fn open_address(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenErr
 }
 
 /// A device that is read and never written.
-fn read_only<S: Source + 'static>(address: &Address, source: Result<S, String>) -> Result<Opened, OpenError> {
-    let refused = |what| OpenError::Refused { address: address.text().to_owned(), what };
+fn read_only<S, E>(address: &Address, source: Result<S, E>) -> Result<Opened, OpenError>
+where
+    S: Source + 'static,
+    E: Display,
+{
+    let refused = |error: E| OpenError::Refused { address: address.text().to_owned(), what: error.to_string() };
     let sources: Vec<Box<dyn Source>> = vec![Box::new(source.map_err(refused)?)];
     Ok(Opened { sources, actuator: None, offsets: None, simulated: None, refused: Refused::default() })
 }

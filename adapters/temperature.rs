@@ -32,6 +32,7 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use thiserror::Error;
 
 const POINTS_MAX: usize = 32;
 const FILE_MAX: u64 = 64 * 1024;
@@ -91,16 +92,44 @@ pub struct Temperatures {
     period: Duration,
 }
 
+/// Why a file names no sensors.
+#[derive(Debug, Error)]
+pub enum TemperatureFileError {
+    /// The file cannot be read.
+    #[error("{}: {error}; write temperature:FILE with a file that names the sensors", .file.display())]
+    Unread {
+        /// The file of the address.
+        file: PathBuf,
+        /// What the system said.
+        error: io::Error,
+    },
+    /// Its text is not TOML, or has other keys.
+    #[error("{}: {error}", .file.display())]
+    NoToml {
+        /// The file of the address.
+        file: PathBuf,
+        /// Line and reason, as the parser says them.
+        error: toml::de::Error,
+    },
+    /// Its values make no sensors.
+    #[error("{}: {}", .file.display(), .problems.join("; "))]
+    Wrong {
+        /// The file of the address.
+        file: PathBuf,
+        /// Each problem, with what to do.
+        problems: Vec<String>,
+    },
+}
+
 impl Temperatures {
     /// The sensors that `file` names, below `sys` (`/sys` on every Linux).
     ///
     /// # Errors
-    /// Everything that is wrong with the file, in words.
-    pub fn open(address: &str, file: &Path, sys: &Path) -> Result<Self, String> {
-        let place = file.display();
-        let unread = |error| format!("{place}: {error}; write temperature:FILE with a file that names the sensors");
-        let text = text_of(file, FILE_MAX).map_err(unread)?;
-        let raw: Raw = toml::from_str(&text).map_err(|error| format!("{place}: {error}"))?;
+    /// Everything that is wrong with the file.
+    pub fn open(address: &str, file: &Path, sys: &Path) -> Result<Self, TemperatureFileError> {
+        let place = || file.to_owned();
+        let text = text_of(file, FILE_MAX).map_err(|error| TemperatureFileError::Unread { file: place(), error })?;
+        let raw: Raw = toml::from_str(&text).map_err(|error| TemperatureFileError::NoToml { file: place(), error })?;
         let mut problems = Vec::new();
         if raw.format != "temperatures/1" {
             problems.push(format!("format = {:?}: this version reads temperatures/1", raw.format));
@@ -122,7 +151,7 @@ impl Temperatures {
             }
         }
         if !problems.is_empty() {
-            return Err(format!("{place}: {}", problems.join("; ")));
+            return Err(TemperatureFileError::Wrong { file: place(), problems });
         }
         let channels = points.iter().map(|point| point.channel).collect();
         let period = Duration::from_secs_f64(raw.period_s);
@@ -309,7 +338,7 @@ mod tests {
         let file = directory.path().join("points.toml");
         let text = FILE.replace("temperatures/1", "temperatures/9").replace("motor_temp", "moter_temp");
         write(&file, &text.replace("max31865/temp1", "../../etc/passwd"));
-        let error = Temperatures::open("x", &file, Path::new("/sys")).err().expect("refused");
+        let error = Temperatures::open("x", &file, Path::new("/sys")).err().expect("refused").to_string();
         for part in ["temperatures/1", "did you mean motor_temperature_c", "chip/temp1"] {
             assert!(error.contains(part), "{part}: {error}");
         }

@@ -3,15 +3,17 @@
 use super::SCHEMES;
 use super::eda9033a::{EdaTarget, parse_eda9033a};
 use adapter_core::address::{
-    Endpoint, Keys, SerialTarget, Speed, WaveformKeep, parse_endpoint, parse_serial, parse_speed, parse_waveform_keep,
+    AddressProblem, Endpoint, Keys, SerialTarget, Speed, WaveformKeep, parse_endpoint, parse_serial, parse_speed,
+    parse_waveform_keep,
 };
 use adapter_core::channel::find_nearest_name;
 use fanuc::address::{FanucBackend, FanucOptions, FanucTarget, parse_fanuc};
 use hnc::address::{HncNetTarget, parse_hncnet};
-use modbus::address::{MeterTarget, parse_framing, parse_modbus};
-use nclink::address::{NcLinkTarget, parse_nclink};
-use simulated::address::{SimulatedTarget, parse_simulated};
+use modbus::address::{MeterTarget, NoProfile, parse_framing, parse_modbus};
+use nclink::address::{NcLinkAddressError, NcLinkTarget, parse_nclink};
+use simulated::address::{NoSuchMachine, SimulatedTarget, parse_simulated};
 use std::path::PathBuf;
+use thiserror::Error;
 
 /// A recording that is replayed.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,7 +83,34 @@ pub enum Target {
     },
 }
 
-pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target, String> {
+/// Why an address names no source.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub(super) enum TargetError {
+    /// No scheme has this name.
+    #[error("unknown scheme {scheme}; {hint}")]
+    UnknownScheme {
+        /// The scheme as written.
+        scheme: String,
+        /// The nearest scheme, or all of them.
+        hint: String,
+    },
+    /// A scheme that reads a file, without one.
+    #[error("no file; write {0}:FILE")]
+    NoFile(&'static str),
+    /// What several schemes read alike.
+    #[error(transparent)]
+    Address(#[from] AddressProblem),
+    #[error(transparent)]
+    Simulated(#[from] NoSuchMachine),
+    /// A meter without a profile.
+    #[error(transparent)]
+    Modbus(#[from] NoProfile),
+    /// A device behind a broker.
+    #[error(transparent)]
+    NcLink(#[from] NcLinkAddressError),
+}
+
+pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target, TargetError> {
     match scheme {
         "simulated" => Ok(Target::Simulated(parse_simulated(body, keys)?)),
         "replay" => parse_replay(body, keys),
@@ -111,27 +140,26 @@ pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target,
             let named = !file.is_empty();
             named
                 .then(|| Target::Temperature { file: PathBuf::from(file), sys })
-                .ok_or_else(|| "no file; write temperature:FILE".to_owned())
+                .ok_or(TargetError::NoFile("temperature"))
         }
         "waveform" => {
             let keep = parse_waveform_keep(keys);
             Ok(Target::Waveform { at: parse_endpoint(body, None)?, keep: keep? })
         }
-        other => Err(unknown_scheme(other)),
+        other => Err(TargetError::UnknownScheme { scheme: other.to_owned(), hint: hint_at_schemes(other) }),
     }
 }
 
-fn unknown_scheme(scheme: &str) -> String {
-    let hint = find_nearest_name(scheme, SCHEMES)
-        .map_or_else(|| format!("the schemes are {}", SCHEMES.join(", ")), |near| format!("did you mean {near}?"));
-    format!("unknown scheme {scheme}; {hint}")
+fn hint_at_schemes(scheme: &str) -> String {
+    find_nearest_name(scheme, SCHEMES)
+        .map_or_else(|| format!("the schemes are {}", SCHEMES.join(", ")), |near| format!("did you mean {near}?"))
 }
 
-fn parse_replay(body: &str, keys: &mut Keys) -> Result<Target, String> {
+fn parse_replay(body: &str, keys: &mut Keys) -> Result<Target, TargetError> {
     let speed = parse_speed(keys);
     let file = body.strip_prefix("//").unwrap_or(body);
     if file.is_empty() {
-        return Err("no file; write replay:FILE".to_owned());
+        return Err(TargetError::NoFile("replay"));
     }
     Ok(Target::Replay(ReplayTarget { file: PathBuf::from(file), speed }))
 }
