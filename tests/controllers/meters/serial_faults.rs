@@ -2,7 +2,7 @@
 
 use super::partner::{Cable, cable, number, poll, socat_is_there, source};
 use adapters::SourceError;
-use adapters::modbus::ModbusMeter;
+use adapters::modbus::{MeterError, ModbusMeter};
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::thread;
@@ -135,5 +135,5 @@ fn one_line_has_one_speed() {
     let error = adapters::open::open_address(&fast, 0).err().expect("another speed").to_string();
     assert!(error.contains("baud"), "{error}");
     drop(first);
-    let _meter: fn(&str, _, _) -> Result<ModbusMeter, String> = ModbusMeter::with_tcp_line;
+    let _meter: fn(&str, _, _) -> Result<ModbusMeter, MeterError> = ModbusMeter::with_tcp_line;
 }
