@@ -59,7 +59,11 @@ pub fn correlate_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     (if spread > 0.0 { (n * sxy - sx * sy) / spread.sqrt() } else { 0.0 }, n)
 }
 
-/// The complementary error function, relative error below 1.2e-7.
+/// The complementary error function, relative error below 1.2e-7 (measured from -6 to 27: 1.1e-7).
+///
+/// `libm` 0.2 errs by 2.9e-16 and takes 53 ns instead of 37 ns; `statrs` 0.19 errs by 1.0e-10. Either moves nearly every
+/// value in its seventh digit: the no-load powers that are learned, the evidences of a diagnosis, of which six digits are
+/// printed, and with them the replay of what was recorded.
 /// Source: Press et al., Numerical Recipes, section 6.2 (Chebyshev fit).
 #[must_use]
 pub fn erfc(x: f64) -> f64 {

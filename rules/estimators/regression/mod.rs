@@ -17,7 +17,7 @@ mod refusal;
 mod series;
 mod unequal;
 
-pub use distributions::{f_quantile, f_upper_tail, t_quantile, t_two_sided};
+pub use distributions::{f_upper_tail, t_quantile, t_two_sided};
 pub use least_squares::{Coefficient, Column, Intercept, Regression, fit_unweighted, fit_weighted};
 pub use plausible::{Mistake, Plausible};
 pub use prediction::{FTest, FitPrediction};

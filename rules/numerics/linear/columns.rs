@@ -2,8 +2,14 @@
 //!
 //! Columns are many rows long and few; everything goes through an orthonormal basis (modified Gram-Schmidt, applied
 //! twice), so that collinear columns are dropped instead of inverted.
+//!
+//! `nalgebra` 0.34 was measured for 5 to 40 columns of 1000 to 20 000 rows: its QR takes 0.4 to 0.9 of the time. The sums
+//! of squared residuals agree to 1e-13 for independent columns, the coefficients to 3e-12; where a column differs from
+//! another by 1e-6 of it, the coefficients here leave up to 2e-7 more. Its QR drops no column: where one repeats another,
+//! coefficients of 5e9 to 2e11 come out. QR with pivots drops the shortest column, not the later one,
+//! so that another law would be named.
 
-/// Sum of products.
+/// Sum of the products of two columns of equal height, in a fixed order of four partial sums.
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four independent sums let the compiler keep four lanes busy; the order is fixed, so results are repeatable.

@@ -2,6 +2,11 @@
 //!
 //! Source: Golub and Van Loan, Matrix Computations, 4th edition, sections 5.2.2 (Householder QR) and 8.6.3 (one-sided
 //! Jacobi).
+//!
+//! `nalgebra` 0.34 was measured for 3 to 8 columns of 12 to 2000 rows: its QR with singular values takes 0.4 to 1.0 of the
+//! time, and both give orthonormal columns to 4e-15. Its singular values lose the small ones: 6.9e-10 is relatively off
+//! by 5e-9, 6.9e-13 by 5e-5, and 6.9e-16 comes out as zero; one-sided Jacobi keeps all digits, and the condition number is
+//! printed. A change would bring 8 packages and other last digits in every printed coefficient.
 
 /// Rows down, columns across: `columns[j][i]`.
 pub type MatrixColumns = Vec<Vec<f64>>;
