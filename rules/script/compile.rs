@@ -22,9 +22,9 @@ const SCRIPTS_MAX: usize = 64;
 /// The text of a script and the name it has in messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ScriptFile {
-    /// File name, `alarms.rhai`.
+    /// File name with its ending, `alarms.rhai`; stands in messages.
     pub name: String,
-    /// The whole text.
+    /// The text as saved, before values of settings are put in.
     pub text: String,
 }
 
@@ -316,16 +316,16 @@ fn list_constants(ast: &AST) -> Vec<(String, Dynamic)> {
 /// Where `word` first stands in `text` as a word of its own.
 pub(super) fn position_of(text: &str, word: &str) -> Position {
     let part = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    for (number, line) in text.lines().enumerate() {
+    let mut begin = 0;
+    for line in text.split_inclusive('\n') {
         let code = line.split("//").next().unwrap_or_default();
         let stands = code
             .match_indices(word)
             .find(|(at, _)| !code[..*at].ends_with(part) && !code[at + word.len()..].starts_with(part));
         if let Some((at, _)) = stands {
-            let column = code[..at].chars().count() + 1;
-            let number = u16::try_from(number + 1).unwrap_or(u16::MAX);
-            return Position::new(number, u16::try_from(column).unwrap_or(u16::MAX));
+            return declared::scan::to_position(text, begin + at);
         }
+        begin += line.len();
     }
     Position::NONE
 }

@@ -125,7 +125,9 @@ fn read_curves(value: &Dynamic) -> Result<Option<LoadCurves>, String> {
         .ok_or_else(|| wrong("each row is depth mm, feed from, feed to, c0, c1, c2, c3, standard deviation"))?;
     let speed_rpm = map.get("speed_rpm").and_then(as_number).unwrap_or(0.0);
     let (quantity, feed, tool, material) = (text("quantity"), text("feed"), text("tool"), text("material"));
-    LoadCurves::new((&quantity, &feed), speed_rpm, (&tool, &material), &rows).map(Some).map_err(|what| wrong(&what))
+    LoadCurves::new((&quantity, &feed), speed_rpm, (&tool, &material), &rows)
+        .map(Some)
+        .map_err(|what| wrong(&what.to_string()))
 }
 
 fn read_pair(value: &Dynamic) -> Option<(f64, f64)> {

@@ -30,7 +30,6 @@ impl AlarmText {
     }
 }
 
-/// See the [module](self).
 #[derive(Debug, Default, Clone)]
 pub(super) struct Timers {
     held_since: BTreeMap<ImmutableString, TimeNs>,
@@ -90,7 +89,6 @@ impl Timers {
         Ok(())
     }
 
-    /// The alarm ends.
     pub(super) fn clear(&mut self, name: &str) {
         self.latched.remove(name);
         if let Some(timer) = self.alarms.get_mut(name) {
@@ -149,6 +147,7 @@ impl Timers {
 
     /// How many numbers are put away.
     pub(super) fn count_remembered(&self) -> i64 {
+        // At most KEPT_MAX: the conversion never fails.
         i64::try_from(self.kept.len()).unwrap_or(i64::MAX)
     }
 

@@ -3,7 +3,7 @@
 use super::channel::{SIMULATED_OUTPUT, is_simulated, read_channel_values};
 use super::model::Parameter;
 use physics::{LinearLaw, Scene};
-use rhai::{AST, Engine, EvalAltResult, Scope};
+use rhai::{AST, Engine, EvalAltResult, ParseError, Scope};
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Operations one row may cost.
 const OPERATIONS_PER_ROW_MAX: u64 = 10_000;
 
-/// A compiled expression.
+/// A user's expression, ready to be evaluated on every row.
 #[derive(Clone)]
 pub struct Expression {
     text: String,
@@ -31,19 +31,19 @@ impl Expression {
     ///
     /// # Errors
     /// What the compiler says, with the column of the text.
-    pub fn compile_text(text: &str, parameters: &[String]) -> Result<Self, String> {
+    pub fn compile_text(text: &str, parameters: &[String]) -> Result<Self, ParseError> {
         let mut engine = Engine::new();
         engine.set_max_operations(OPERATIONS_PER_ROW_MAX);
         engine.set_max_expr_depths(64, 64);
         engine.set_max_string_size(1024);
         engine.set_max_array_size(64);
         engine.set_max_map_size(64);
-        let ast = engine.compile_expression(replace_ternaries(text)).map_err(|error| error.to_string())?;
+        let ast = engine.compile_expression(replace_ternaries(text))?;
         let inputs = list_identifiers(text).into_iter().filter(|name| !parameters.contains(name)).collect();
         Ok(Self { text: text.to_owned(), engine: Arc::new(engine), ast: Arc::new(ast), inputs })
     }
 
-    /// As written.
+    /// The expression as the user wrote it.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
@@ -261,6 +261,6 @@ mod tests {
     #[test]
     fn a_broken_expression_says_where() {
         let error = Expression::compile_text("k * (", &["k".to_owned()]).expect_err("broken");
-        assert!(error.contains("position"), "{error}");
+        assert!(error.to_string().contains("position"), "{error}");
     }
 }

@@ -187,7 +187,7 @@ impl<'t> Reader<'t> {
                     parameters.push(build_free_parameter(term.text(), value, Entry::Linear));
                     terms.push(term);
                 }
-                Err(reason) => self.report_problem(offset, reason),
+                Err(reason) => self.report_problem(offset, reason.to_string()),
             }
         }
         Some(build_part("linear", PartFunction::Linear(terms), parameters))

@@ -3,7 +3,7 @@
 //! A plan stays within the speeds, feeds and depths that the recording shows the machine in, and begins and ends with
 //! the drives on at standstill, which is the zero of the meter. Two repetitions are two runs.
 
-use super::diagnosis::Diagnosis;
+use super::diagnosis::{Diagnosis, Verdict};
 use super::experiments::moves;
 use adapter_core::channel::quantity::is_of_spindle;
 use numerics::statistics::median;
@@ -12,6 +12,7 @@ use physics::{Role, Scene, find_effect};
 use recording::Recording;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use thiserror::Error;
 
 /// A plan holds the experiments of several explanations when they take no longer than this together, minutes.
 const TOGETHER_MINUTES_MAX: f64 = 40.0;
@@ -32,7 +33,7 @@ pub struct Envelope {
     pub feed_mm: (f64, f64),
     /// Least and greatest depth of cut, mm.
     pub depth_mm: (f64, f64),
-    /// Usual diameter, mm.
+    /// Usual diameter of the work or the tool, mm.
     pub diameter_mm: f64,
     /// Fastest motion of the axis, in the unit of its column.
     pub axis_speed: f64,
@@ -45,7 +46,7 @@ pub struct Envelope {
 /// What is commanded over a stretch of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Move {
-    /// How long, s.
+    /// How long it is held, s.
     pub seconds: f64,
     /// Repetition, from 1: the run.
     pub run: u32,
@@ -68,17 +69,22 @@ pub struct Plan {
     pub moves: Vec<Move>,
 }
 
+/// No plan: a diagnosis that leaves no explanations to choose between, or none whose kind has an experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("the verdict is {}: there is nothing left to tell apart, so no plan was written", .verdict.as_word())]
+pub struct NothingToTellApart {
+    /// That of the diagnosis.
+    pub verdict: Verdict,
+}
+
 /// The plan that tells the explanations of a diagnosis apart, within what the recording shows.
 ///
 /// # Errors
-/// Why no experiment is needed, or none is known.
-pub fn plan_experiments(diagnosis: &Diagnosis, recording: &Recording) -> Result<Plan, String> {
+/// [`NothingToTellApart`].
+pub fn plan_experiments(diagnosis: &Diagnosis, recording: &Recording) -> Result<Plan, NothingToTellApart> {
     let kinds = list_experiment_kinds(diagnosis);
     if kinds.is_empty() {
-        return Err(format!(
-            "the verdict is {}: there is nothing left to tell apart, so no plan was written",
-            diagnosis.verdict.as_word()
-        ));
+        return Err(NothingToTellApart { verdict: diagnosis.verdict });
     }
     Ok(build_plan(&kinds, &Envelope::from_recording(recording, diagnosis)))
 }

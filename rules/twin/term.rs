@@ -2,8 +2,26 @@
 
 use physics::Scene;
 use physics::state::delay_values;
+use thiserror::Error;
 
-/// One term.
+/// Why a text is no term.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum TermError {
+    /// A power other than 2 and 3; holds the whole text.
+    #[error("{0}: the power must be 2 or 3")]
+    Power(String),
+    /// A delay without a comma; holds the whole text.
+    #[error("{0}: write delay(column, seconds)")]
+    DelayForm(String),
+    /// A delay that is no finite number; holds the whole text.
+    #[error("{0}: the delay must be a number of seconds")]
+    DelaySeconds(String),
+    /// Where a column should stand: empty, or with characters that no name has.
+    #[error("{0:?} is not the name of a column")]
+    ColumnName(String),
+}
+
+/// One term, read from its text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
     text: String,
@@ -24,36 +42,30 @@ impl Term {
     /// Parses `one`, `column`, `column^2`, `column^3`, `sign(column)`, `abs(column)` or `delay(column, 0.5)`.
     ///
     /// # Errors
-    /// What is wrong, in words.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    /// [`TermError`].
+    pub fn parse(text: &str) -> Result<Self, TermError> {
+        let whole = || text.to_owned();
         let trimmed = text.trim();
         let law = if trimmed == "one" {
             TermKind::One
         } else if let Some((column, power)) = trimmed.split_once('^') {
             let power = power.trim().parse().ok().filter(|power| [2, 3].contains(power));
-            TermKind::Power(
-                parse_column_name(column)?,
-                power.ok_or_else(|| format!("{text}: the power must be 2 or 3"))?,
-            )
+            TermKind::Power(parse_column_name(column)?, power.ok_or_else(|| TermError::Power(whole()))?)
         } else if let Some(inside) = parse_call_argument(trimmed, "sign") {
             TermKind::Sign(parse_column_name(inside)?)
         } else if let Some(inside) = parse_call_argument(trimmed, "abs") {
             TermKind::Abs(parse_column_name(inside)?)
         } else if let Some(inside) = parse_call_argument(trimmed, "delay") {
-            let (column, delay) =
-                inside.split_once(',').ok_or_else(|| format!("{text}: write delay(column, seconds)"))?;
+            let (column, delay) = inside.split_once(',').ok_or_else(|| TermError::DelayForm(whole()))?;
             let delay = delay.trim().parse().ok().filter(|delay: &f64| delay.is_finite());
-            TermKind::Delay(
-                parse_column_name(column)?,
-                delay.ok_or_else(|| format!("{text}: the delay must be a number of seconds"))?,
-            )
+            TermKind::Delay(parse_column_name(column)?, delay.ok_or_else(|| TermError::DelaySeconds(whole()))?)
         } else {
             TermKind::Column(parse_column_name(trimmed)?)
         };
         Ok(Self { text: trimmed.to_owned(), law })
     }
 
-    /// As written.
+    /// The term as the file has it, without spaces around it.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
@@ -91,10 +103,10 @@ fn parse_call_argument<'a>(text: &'a str, function: &str) -> Option<&'a str> {
     text.strip_prefix(function)?.trim_start().strip_prefix('(')?.strip_suffix(')')
 }
 
-fn parse_column_name(text: &str) -> Result<String, String> {
+fn parse_column_name(text: &str) -> Result<String, TermError> {
     let text = text.trim();
     let fine = !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || c == '_');
-    if fine { Ok(text.to_owned()) } else { Err(format!("{text:?} is not the name of a column")) }
+    if fine { Ok(text.to_owned()) } else { Err(TermError::ColumnName(text.to_owned())) }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Transients out of a running machine: kept around every change of speed, without anything that was measured while it cut.
 
 use super::speed::{PowerPoint, SpeedPoint, Transient};
+use numerics::statistics::count_to_f64;
 use std::collections::VecDeque;
 
 /// A transient reaches so far before and behind the change of speed, s.
@@ -29,7 +30,7 @@ const GAP_S: f64 = 1.0;
 /// What has been collected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct AlignmentData {
-    /// Transients kept.
+    /// Changes of speed that are kept to fit the lag from.
     pub transients: usize,
     /// Changes of speed that were not used because something was cut.
     pub while_cutting: u64,
@@ -150,10 +151,6 @@ impl Collector {
 
 fn is_speed_change(from_rpm: f64, to_rpm: f64) -> bool {
     (to_rpm - from_rpm).abs() > CHANGE_RPM.max(CHANGE_SHARE * from_rpm.abs().max(to_rpm.abs()))
-}
-
-fn count_to_f64(number: usize) -> f64 {
-    f64::from(u32::try_from(number).unwrap_or(u32::MAX))
 }
 
 fn trim_readings<T>(points: &mut VecDeque<T>, time_s: impl Fn(&T) -> f64, from_s: f64) {

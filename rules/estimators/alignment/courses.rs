@@ -70,10 +70,9 @@ impl Grid {
     }
 
     /// Correlation with another grid of the same step whose beginning lies at this place, and how many points overlap.
-    fn correlate_shifted(&self, other: &Self, place: i64) -> (f64, usize) {
+    fn correlate_shifted(&self, other: &Self, place: isize) -> (f64, usize) {
         let pairs = other.values.iter().enumerate().filter_map(|(index, y)| {
-            let at = i64::try_from(index).unwrap_or(i64::MAX).saturating_add(place);
-            Some((self.values.get(usize::try_from(at).ok()?).copied().flatten()?, (*y)?))
+            Some((self.values.get(index.checked_add_signed(place)?).copied().flatten()?, (*y)?))
         });
         let (correlation, n) = correlate_pairs(pairs);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
@@ -139,12 +138,12 @@ fn check_course(course: &[(f64, f64)]) -> Result<(), Refusal> {
 }
 
 /// Place of the highest magnitude of correlation, that correlation, and the highest magnitude anywhere else.
-fn search_coarse_lag(one: &Grid, other: &Grid) -> Result<(i64, f64, f64), Refusal> {
+fn search_coarse_lag(one: &Grid, other: &Grid) -> Result<(isize, f64, f64), Refusal> {
     let known = |grid: &Grid| grid.values.iter().flatten().count();
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
     let least = (OVERLAP_MIN * known(one).min(known(other)) as f64) as usize;
-    let length = |grid: &Grid| i64::try_from(grid.values.len()).unwrap_or(i64::MAX);
-    let tried: Vec<(i64, f64)> = (-length(other)..=length(one))
+    let length = |grid: &Grid| grid.values.len().cast_signed();
+    let tried: Vec<(isize, f64)> = (-length(other)..=length(one))
         .filter_map(|place| {
             let (correlation, overlap) = one.correlate_shifted(other, place);
             (overlap >= least.max(10)).then_some((place, correlation))
@@ -156,7 +155,7 @@ fn search_coarse_lag(one: &Grid, other: &Grid) -> Result<(i64, f64, f64), Refusa
         Refusal::new(RefusalKind::TooFew, what, "give the stretch of the history in which the sensor recorded")
     })?;
     #[expect(clippy::cast_precision_loss, reason = "at most a day of seconds")]
-    let apart = |at: i64| (at - place).abs() as f64 * one.step_s > RIVAL_APART_S;
+    let apart = |at: isize| (at - place).abs() as f64 * one.step_s > RIVAL_APART_S;
     let rival = tried.iter().filter(|(at, _)| apart(*at)).map(|(_, it)| it.abs()).fold(0.0, f64::max);
     Ok((place, correlation, rival))
 }

@@ -3,6 +3,7 @@
 use super::fit::{FittedLag, PowerModel, PredictorSet, Ready, fit_transients, residual_sum_of_squares};
 use super::profile::{Best, find_minimum, search_at, search_lags};
 use super::speed::Transient;
+use numerics::statistics::count_to_f64;
 use std::fmt;
 
 /// What is looked for and what is asked of an answer.
@@ -50,7 +51,7 @@ pub struct Drift {
     pub uncertainty_ppm: f64,
 }
 
-/// One time base.
+/// The lag between two clocks, and how well it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lag {
     /// Power stamped `t` belongs to the speed stamped `t - lag_s`; at `at_s` when there is a drift.
@@ -97,7 +98,7 @@ pub enum NotIdentifiable {
     },
     /// The model explains too little of the power: something else takes it.
     Unexplained {
-        /// Share explained.
+        /// Share of the power's variance that the model explains, 0 to 1.
         explained: f64,
     },
     /// The speed changes too slowly to be felt in the power.
@@ -107,7 +108,7 @@ pub enum NotIdentifiable {
     },
     /// The best lag lies at the end of the range that was looked at.
     OutOfRange {
-        /// That end, s.
+        /// The end of the range at which it lies, s.
         lag_s: f64,
     },
     /// Another lag explains the power as well.
@@ -322,10 +323,6 @@ fn curvature_s(ready: &[Ready], best: &Best, transients: usize) -> f64 {
     let variance = best.fitted.rss / freedom;
     let student = 1.0 + 2.5 / count_to_f64(transients).max(2.0);
     if bend > 0.0 { student * Z95 * (2.0 * 4.0 * variance / bend).sqrt() } else { f64::INFINITY }
-}
-
-fn count_to_f64(number: usize) -> f64 {
-    f64::from(u32::try_from(number).unwrap_or(u32::MAX))
 }
 
 /// Lag over time: level, its interval, and the slope where the times allow one.

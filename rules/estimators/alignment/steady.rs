@@ -7,6 +7,7 @@
 //! the line through its neighbours.
 
 use super::speed::SpeedPoint;
+use numerics::statistics::count_to_f64;
 
 /// Readings to either side through which the beat is drawn.
 const REACH: usize = 8;
@@ -55,10 +56,6 @@ fn scatter_s(speed: &[SpeedPoint]) -> Option<f64> {
     offs_s.sort_by(f64::total_cmp);
     // The median of the absolute value of a normal distribution of standard deviation 1 is 0.6745.
     offs_s.get(offs_s.len() / 2).map(|median_s| median_s / 0.6745)
-}
-
-fn count_to_f64(number: usize) -> f64 {
-    f64::from(u32::try_from(number).unwrap_or(u32::MAX))
 }
 
 #[cfg(test)]

@@ -282,6 +282,7 @@ impl Inference {
             no_load_origin: reference.map_or(NoLoadOrigin::None, |known| known.origin),
             noise_gain: reference.map_or(0.0, |known| known.noise_gain),
             visibility: self.classify_visibility(inputs, no_load, verdict),
+            // A stage is less than STAGES: the conversion never fails.
             gear_stage: u8::try_from(self.state.signals.stage()).unwrap_or(0),
             ..Estimates::without_samples(inputs.at_ns)
         };

@@ -7,6 +7,7 @@ use super::load_inputs::LoadMoment;
 use crate::regression::Refusal;
 use crate::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
 use adapter_core::channel::find_nearest_name;
+use thiserror::Error;
 
 /// Curves hold at speeds this near to their own, as a share.
 const SPEED_SHARE: f64 = 0.02;
@@ -28,6 +29,33 @@ const QUANTITIES: [(&str, LoadQuantity); 4] = [
     ("spindle_load_pct", LoadQuantity::SpindleLoad),
     ("spindle_current_a", LoadQuantity::SpindleCurrent),
 ];
+
+/// Why curves of a load cannot be followed.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum LoadCurvesError {
+    /// Curves of something that is not followed.
+    #[error("curves of \"{given}\" cannot be followed: identify them of {known}{near}")]
+    Quantity {
+        /// The quantity as the script names it.
+        given: String,
+        /// The quantities that can be, separated by commas.
+        known: String,
+        /// The one that was probably meant, as a question; empty where none is near.
+        near: String,
+    },
+    /// Over another quantity than the two feeds; holds its name as written.
+    #[error("the feed of the curves is feed_mm_min or feed_per_rev_mm, not \"{0}\"")]
+    Feed(String),
+    /// A spindle speed that is not positive and finite.
+    #[error("the curves need the spindle speed that they are of, not {speed_rpm} rpm")]
+    Speed {
+        /// The speed as the script gives it, rpm; 0 where it gives none.
+        speed_rpm: f64,
+    },
+    /// Coefficients, ranges or depths that do not belong together.
+    #[error(transparent)]
+    Family(#[from] Refusal),
+}
 
 /// Curves of a load over the feed, each with what it holds for.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,13 +84,13 @@ impl LoadCurves {
     /// coefficients and a standard deviation. Empty texts of tool and material hold for every one.
     ///
     /// # Errors
-    /// A quantity or feed that is none, a speed that is not positive, curves that cannot be used.
+    /// [`LoadCurvesError`].
     pub fn new(
         (quantity, feed): (&str, &str),
         speed_rpm: f64,
         (tool, material): (&str, &str),
         rows: &[[f64; 8]],
-    ) -> Result<Self, String> {
+    ) -> Result<Self, LoadCurvesError> {
         let known = QUANTITIES.iter().find(|(name, _)| *name == quantity).map(|(_, quantity)| *quantity);
         let names = || QUANTITIES.iter().map(|(name, _)| *name);
         let Some(known) = known else {
@@ -70,25 +98,22 @@ impl LoadCurves {
                 .map(|near| format!("; did you mean \"{near}\"?"))
                 .unwrap_or_default();
             let all: Vec<&str> = names().collect();
-            return Err(format!(
-                "curves of \"{quantity}\" cannot be followed: identify them of {}{near}",
-                all.join(", ")
-            ));
+            return Err(LoadCurvesError::Quantity { given: quantity.to_owned(), known: all.join(", "), near });
         };
         let per_rev = match feed {
             "feed_mm_min" => false,
             "feed_per_rev_mm" => true,
-            other => return Err(format!("the feed of the curves is feed_mm_min or feed_per_rev_mm, not \"{other}\"")),
+            other => return Err(LoadCurvesError::Feed(other.to_owned())),
         };
         if !(speed_rpm > 0.0 && speed_rpm.is_finite()) {
-            return Err(format!("the curves need the spindle speed that they are of, not {speed_rpm} rpm"));
+            return Err(LoadCurvesError::Speed { speed_rpm });
         }
         let at = |&[depth_mm, feed_min, feed_max, c0, c1, c2, c3, sd]: &[f64; 8]| CurveAtDepth {
             depth_mm,
             curve: Cubic { coefficients: [c0, c1, c2, c3], feed_min, feed_max },
             sd,
         };
-        let family = CurveFamily::new(rows.iter().map(at).collect()).map_err(|refusal: Refusal| refusal.to_string())?;
+        let family = CurveFamily::new(rows.iter().map(at).collect())?;
         let (tool, material) = (tool.to_owned(), material.to_owned());
         Ok(Self { quantity: known, per_rev, speed_rpm, tool, material, family })
     }

@@ -24,7 +24,7 @@ mod place;
 #[cfg(test)]
 mod tests;
 
-pub use curves::LoadCurves;
+pub use curves::{LoadCurves, LoadCurvesError};
 pub use learned_load::PLACES_MAX;
 
 use super::estimate::{Estimates, NoEstimate};

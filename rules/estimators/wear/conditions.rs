@@ -1,5 +1,6 @@
 //! The four conditions of a cut that its power depends on, their units and believed ranges, and what is measured.
 
+use crate::regression::{Refusal, RefusalKind};
 use std::fmt;
 
 /// One of the four conditions.
@@ -7,11 +8,11 @@ use std::fmt;
 pub struct ConditionFactor {
     /// Column in a recording; ends in the unit.
     pub name: &'static str,
-    /// Symbol in formulas.
+    /// Symbol in formulas and reports, as `vc`.
     pub symbol: &'static str,
     /// Letter of the coded variable.
     pub letter: char,
-    /// Unit.
+    /// Unit of its values, as in the name of the column.
     pub unit: &'static str,
     /// Least and greatest value that is believed.
     pub range: (f64, f64),
@@ -79,13 +80,13 @@ const ENERGY_J_MM3: (f64, f64) = (0.02, 60.0);
 /// The conditions of one cut, in the units of [`FACTORS`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CutConditions {
-    /// VB, mm.
+    /// Width of the flank wear land VB, mm; 0 for a sharp edge.
     pub flank_wear_mm: f64,
-    /// vc, m/min.
+    /// Cutting speed vc, m/min.
     pub cutting_speed_m_min: f64,
-    /// f, mm/rev.
+    /// Feed f of one turn, mm/rev.
     pub feed_per_rev_mm: f64,
-    /// ap, mm.
+    /// Depth of cut ap, mm.
     pub depth_of_cut_mm: f64,
 }
 
@@ -159,13 +160,14 @@ impl fmt::Display for CutConditions {
 /// The cutting speed of a diameter at a spindle speed, m/min: `vc = pi D n / 1000`.
 ///
 /// # Errors
-/// What is wrong with the two numbers, in words.
-pub fn cutting_speed_m_min(diameter_mm: f64, spindle_speed_rpm: f64) -> Result<f64, String> {
+/// A diameter outside 0.01 to 10 000 mm, or more than 200 000 rpm.
+pub fn cutting_speed_m_min(diameter_mm: f64, spindle_speed_rpm: f64) -> Result<f64, Refusal> {
     if !(diameter_mm.is_finite() && (0.01..=10_000.0).contains(&diameter_mm)) {
-        return Err(format!("a diameter of {diameter_mm} mm cannot be"));
+        return Err(Refusal::new(RefusalKind::OutOfRange, format!("a diameter of {diameter_mm} mm cannot be"), ""));
     }
     if !(spindle_speed_rpm.is_finite() && spindle_speed_rpm.abs() <= 200_000.0) {
-        return Err(format!("a spindle speed of {spindle_speed_rpm} rpm cannot be"));
+        let what = format!("a spindle speed of {spindle_speed_rpm} rpm cannot be");
+        return Err(Refusal::new(RefusalKind::OutOfRange, what, ""));
     }
     Ok(std::f64::consts::PI * diameter_mm * spindle_speed_rpm.abs() / 1000.0)
 }
@@ -173,7 +175,7 @@ pub fn cutting_speed_m_min(diameter_mm: f64, spindle_speed_rpm: f64) -> Result<f
 /// One cut: its conditions and the power that it took.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cut {
-    /// Conditions.
+    /// Wear, speed, feed and depth of this cut.
     pub conditions: CutConditions,
     /// Power that removes material, W.
     pub cutting_power_w: f64,

@@ -6,7 +6,7 @@ use super::tool_name::tool_of;
 /// A model, and what speaks for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChosenModel<'a, R> {
-    /// The model.
+    /// The model that was chosen.
     pub record: &'a R,
     /// Of what it names most: `edge`, `tool`, `operation`, `work material`, `machine`, `any`.
     pub by: &'static str,
@@ -42,9 +42,10 @@ pub fn choose_model<'a, R>(
 ) -> Option<ChosenModel<'a, R>> {
     let fitting = models.iter().filter_map(|model| Some((key(model).key.rank_fit(cut)?, model)));
     let (rank, record) = fitting.max_by_key(|(rank, _)| *rank)?;
-    let words = ["any", "machine", "work material", "operation", "tool", "edge"];
-    let highest = usize::try_from(u8::BITS - rank.leading_zeros()).unwrap_or(0);
-    Some(ChosenModel { record, by: words.get(highest).copied().unwrap_or("any") })
+    // From the lowest bit of the rank upwards.
+    let words = ["machine", "work material", "operation", "tool", "edge"];
+    let highest = words.iter().enumerate().rfind(|(bit, _)| rank >> bit & 1 == 1);
+    Some(ChosenModel { record, by: highest.map_or("any", |(_, word)| *word) })
 }
 
 #[cfg(test)]

@@ -101,7 +101,7 @@ pub(crate) fn read_quoted(text: &str) -> Option<&str> {
     text.split_once('"').map(|(inside, _)| inside)
 }
 
-/// Line and column of a byte of the text.
+/// Line and column of a byte of the text, from 1. The engine counts both in 16 bits: what lies beyond 65535 stands there.
 pub(crate) fn to_position(text: &str, at: usize) -> Position {
     let before = &text[..at];
     let line = before.matches('\n').count() + 1;

@@ -23,10 +23,7 @@ static METHODS: &[Method] = &[
         returns: "m/min",
         en: "Cutting speed of a diameter at a spindle speed: pi D n / 1000",
         zh: "由直径和转速求切削速度",
-        run: |given| {
-            let speed = cutting_speed_m_min(given.number(0), given.number(1));
-            speed.map(MethodResult::Number).map_err(|what| Refusal::new(RefusalKind::OutOfRange, what, ""))
-        },
+        run: |given| cutting_speed_m_min(given.number(0), given.number(1)).map(MethodResult::Number),
     },
     Method {
         name: "wear_threshold_w",

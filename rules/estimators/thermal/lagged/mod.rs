@@ -20,14 +20,13 @@ use std::ops::Range;
 /// Which terms are late.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LagForm {
-    /// Every sensor.
     All,
     /// The first one as it is and late, the others as they are.
     FirstTwice,
 }
 
 /// Time constants that are tried: from a few rows to half of the longest run, in these many steps.
-const TAUS: usize = 18;
+const TAUS: i32 = 18;
 /// Steps of narrowing down after that.
 const NARROW: usize = 24;
 /// The derivative by the logarithm of tau is a difference over this much.
@@ -105,8 +104,8 @@ impl LaggedCourse<'_> {
             let next = "record runs of an hour or more, at least one row a minute";
             return Err(Refusal::new(RefusalKind::TooFew, what, next).with_place("time_s"));
         }
-        let ratio = (greatest / least).powf(1.0 / (TAUS - 1) as f64);
-        Ok((0..TAUS).map(|step| least * ratio.powi(i32::try_from(step).unwrap_or(0))).collect())
+        let ratio = (greatest / least).powf(1.0 / f64::from(TAUS - 1));
+        Ok((0..TAUS).map(|step| least * ratio.powi(step)).collect())
     }
 
     /// Columns of the terms, in the order of [`LaggedCourse::list_terms`].
