@@ -18,7 +18,7 @@ pub enum StateBasis {
     TotalPower,
     /// The load meter of the spindle drive.
     SpindleLoad,
-    /// Spindle current.
+    /// Current of the spindle drive, A.
     SpindleCurrent,
     /// Speed and feed alone: cutting cannot be told from moving through the air.
     Motion,

@@ -16,7 +16,7 @@ use serde::Serialize;
 pub struct Balance {
     /// Power that removes material. Negative when the drive takes less than its no-load power.
     pub cutting_power_w: f64,
-    /// Additional load loss.
+    /// Loss that exists only under load: the excess over no-load power less the cutting power.
     pub load_loss_w: f64,
     /// Change of cutting power per watt of measured power.
     pub slope: f64,
@@ -39,7 +39,7 @@ pub fn solve_power_balance(excess_w: f64, linear: f64, quadratic_per_w: f64) -> 
 /// Load loss of one gear stage, `Pad = a0 Pc + a1(n) Pc^2`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LoadLossLaw {
-    /// a0, 1.
+    /// a0, loss per watt of cutting power; a pure number.
     pub linear: f64,
     /// a1 at [`speed_rpm`](Self::speed_rpm), 1/W.
     pub quadratic_per_w: f64,

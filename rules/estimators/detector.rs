@@ -55,11 +55,9 @@ const NOT_BEGUN: TimeNs = TimeNs::MAX;
 enum Phase {
     /// Nothing is known of the past: start of the gateway, or after a gap.
     Fresh,
-    /// At rest.
     Rest,
     /// Started from rest before our eyes.
     Starting,
-    /// Changed speed.
     Changing,
     /// The power has settled.
     Settled,
@@ -250,7 +248,6 @@ impl Detector {
         }
     }
 
-    /// Not settled yet.
     fn judge_unsettled_spindle(&self, tick: &Tick<'_>) -> Detected {
         let overdue =
             tick.no_load.is_err() && seconds_between(self.phase_since_ns, tick.inputs.at_ns) > SETTLING_LIMIT_S;

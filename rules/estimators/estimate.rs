@@ -12,7 +12,7 @@ use std::fmt;
 /// A value and one standard deviation, both in the unit that the quantity's name ends in, both finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// The value.
+    /// The expected value, in the unit of the quantity.
     pub value: f64,
     /// One standard deviation, not negative.
     pub sd: f64,
@@ -28,9 +28,9 @@ pub enum NoEstimate {
     NotYet,
     /// An input is missing.
     Input {
-        /// Which channel.
+        /// The channel that the estimate needs.
         channel: ChannelId,
-        /// Why.
+        /// Why that channel has no value.
         absence: Absence,
     },
     /// The machine is off.
@@ -47,7 +47,7 @@ pub enum NoEstimate {
     NotLearned,
     /// The speed lies so far outside the learned ones that extrapolation would amplify noise too much.
     Extrapolated {
-        /// By how much.
+        /// By how much the noise of the known powers would be amplified; 1: not at all.
         noise_gain: f64,
     },
     /// The load-loss coefficients contradict the measured power (negative discriminant).
@@ -194,7 +194,7 @@ impl fmt::Display for NoEstimate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoLoadOrigin {
-    /// There is none.
+    /// There is no no-load power at this tick.
     None,
     /// Measured, or configured, at this very speed.
     Measured,
@@ -208,7 +208,7 @@ pub enum NoLoadOrigin {
 }
 
 impl NoLoadOrigin {
-    /// Every origin.
+    /// Every origin, for tables of words.
     pub const ALL: [Self; 5] = [Self::None, Self::Measured, Self::Interpolated, Self::Extrapolated, Self::UpperBound];
 
     /// The word used in SQL, scripts, JSON and CSV.
@@ -239,7 +239,7 @@ pub enum Visibility {
 }
 
 impl Visibility {
-    /// Every answer.
+    /// Every answer, for tables of words.
     pub const ALL: [Self; 4] = [Self::NotAsked, Self::Visible, Self::BelowVisibility, Self::NoReference];
 
     /// The word used in SQL, scripts, JSON and CSV.
@@ -257,13 +257,13 @@ impl Visibility {
 /// Everything inferred at one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimates {
-    /// The tick.
+    /// Time of the sample that they were inferred from, ns.
     pub at_ns: TimeNs,
     /// What the machine is doing.
     pub state: State,
     /// What the state was inferred from.
     pub basis: StateBasis,
-    /// Since when.
+    /// Time of the sample from which on the state has held, ns.
     pub since_ns: TimeNs,
     /// Does the spindle turn? Known also where the state is not; `None` without a speed.
     pub spindle_turns: Option<bool>,

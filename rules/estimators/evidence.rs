@@ -23,19 +23,19 @@ impl Evidence {
         }
     }
 
-    /// Enough for load.
+    /// Is the sum full? Load begins then.
     #[must_use]
     pub fn is_sufficient(&self, full: f64) -> bool {
         self.sum >= full
     }
 
-    /// None left.
+    /// Is nothing of the sum left? Load ends then.
     #[must_use]
     pub fn is_exhausted(&self) -> bool {
         self.sum <= 0.0
     }
 
-    /// Forgets.
+    /// Sets the sum to zero, whatever was seen before.
     pub fn clear(&mut self) {
         self.sum = 0.0;
     }

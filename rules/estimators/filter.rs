@@ -44,7 +44,7 @@ impl AntiPulse {
         (self.values.len() == self.length).then(|| trimmed_mean(&self.values))
     }
 
-    /// Forgets every value.
+    /// Forgets every value; the next one is the first again.
     pub fn clear(&mut self) {
         self.values.clear();
         self.next = 0;

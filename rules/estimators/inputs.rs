@@ -24,21 +24,21 @@ pub(super) type Input = Result<f64, Absence>;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TickInputs {
     pub(super) at_ns: TimeNs,
-    /// What `power` is.
+    /// What stands for the spindle power in `power`.
     pub(super) basis: StateBasis,
     /// Spindle power, W; or what stands for it, in parts of [`StateBasis::stand_in`].
     pub(super) power: Input,
-    /// Total power, W.
+    /// Power of the whole machine, W.
     pub(super) total: Input,
     /// Spindle speed, rpm, signed.
     pub(super) speed: Input,
-    /// Feed, mm/min.
+    /// Feed along the path, mm/min.
     pub(super) feed: Input,
     /// Rapid traverse by flag or by feed.
     pub(super) rapid: bool,
     /// Gear stage; 0 where the machine has none.
     pub(super) stage: Result<usize, Absence>,
-    /// Supply voltage, V.
+    /// Voltage of the supply, V.
     pub(super) voltage: Input,
     /// Logarithm of that voltage over its reference; 0 where it is not known.
     pub(super) supply_log: f64,

@@ -49,7 +49,6 @@ const PAUSE_S: f64 = 0.5;
 /// At most this many samples wait for the guard time.
 const WAITING: usize = 512;
 
-/// A block's power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Observation {
     pub(super) point: NoLoadPoint,

@@ -34,9 +34,9 @@ const SURPRISE_SD: f64 = 4.0;
 /// A known no-load power.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoLoadPoint {
-    /// Gear stage.
+    /// Gear stage, the place of its table; 0 where the machine has none.
     pub stage: usize,
-    /// Speed, positive.
+    /// Spindle speed, rpm; positive in both directions.
     pub speed_rpm: f64,
     /// Power at this speed, steady, not cutting.
     pub power_w: f64,
@@ -45,7 +45,7 @@ pub struct NoLoadPoint {
 /// No-load power at a speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoLoad {
-    /// The power.
+    /// The power of the spindle when nothing is cut, W.
     pub power_w: f64,
     /// One standard deviation: noise, age and interpolation.
     pub sd_w: f64,
@@ -246,7 +246,7 @@ impl NoLoadTable {
         table
     }
 
-    /// Every known power.
+    /// The powers of all gear stages, measured or configured, stage by stage.
     pub fn points(&self) -> impl Iterator<Item = NoLoadPoint> + '_ {
         self.stages.iter().enumerate().flat_map(|(stage, known)| {
             let pairs = known.speeds_rpm.iter().zip(&known.powers_w);

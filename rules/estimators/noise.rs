@@ -12,7 +12,6 @@ const SLOW: f64 = 0.02;
 /// A single difference counts at most this many standard deviations, so that pulses and steps do not count as noise.
 const CLIP_SD: f64 = 3.0;
 
-/// Relative variances.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct RelativeVariances {
     fast: f64,
@@ -46,7 +45,6 @@ impl RelativeVariances {
         self.resolution_w = resolution_w;
     }
 
-    /// See [`RelativeVariances::set_resolution`].
     pub(super) fn resolution_w(&self) -> f64 {
         self.resolution_w
     }

@@ -37,7 +37,7 @@ pub struct Setting {
 /// Why a setting was not accepted. The text is what the integrator reads.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SettingError {
-    /// No such name.
+    /// There is no setting of this name.
     #[error("there is no estimator setting {name:?}{}", .nearest.map(|near| format!("; did you mean {near}?")).unwrap_or_default())]
     Unknown {
         /// What was asked for.
@@ -48,15 +48,15 @@ pub enum SettingError {
     /// Outside the range, or not a whole number where one is needed.
     #[error("{name} = {value} {unit} is outside {least} to {greatest} {unit}{}", if *.whole { " or not a whole number" } else { "" })]
     Range {
-        /// Which setting.
+        /// Name of the setting, as given.
         name: String,
-        /// What was given.
+        /// The number that was refused.
         value: f64,
         /// Unit of the value and the range.
         unit: &'static str,
-        /// Least value accepted.
+        /// Least value accepted, itself included.
         least: f64,
-        /// Greatest value accepted.
+        /// Greatest value accepted, itself included.
         greatest: f64,
         /// Whether only whole numbers are accepted.
         whole: bool,

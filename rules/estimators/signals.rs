@@ -30,7 +30,6 @@ const HALF_STEP: f64 = 0.5;
 pub(super) enum Pace {
     /// Before it may count as settled.
     Settling,
-    /// While it idles.
     Idling,
     /// While cutting: constant cutting speed (G96) drives it with the diameter.
     Cutting,
@@ -70,7 +69,6 @@ pub(super) struct Signals {
 pub(super) struct Break {
     /// Time jumped, or a sample is missing for too long.
     pub(super) gap: bool,
-    /// Another gear stage.
     pub(super) stage: bool,
 }
 

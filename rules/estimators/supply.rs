@@ -54,7 +54,6 @@ pub(super) struct MeasuredIdlePower {
     pub(super) speed_rpm: f64,
     /// As it would be at the reference voltage by the exponent in force, W.
     pub(super) power_w: f64,
-    /// Standard deviation, W.
     pub(super) sd_w: f64,
     /// Logarithm of voltage over its reference while it was measured.
     pub(super) supply_log: f64,

@@ -61,7 +61,7 @@ impl PowerWindow {
         self.values.push_back(filtered_w);
     }
 
-    /// Forgets every value.
+    /// Forgets every value; the window is empty again.
     pub fn clear(&mut self) {
         self.values.clear();
     }

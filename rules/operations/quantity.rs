@@ -7,7 +7,7 @@ pub struct OperationQuantity {
     pub key: &'static str,
     /// Least and greatest value that is believed.
     pub range: (f64, f64),
-    /// What it is.
+    /// What it is, in English, for messages.
     pub en: &'static str,
     /// Other names under which people write it.
     aliases: &'static [&'static str],

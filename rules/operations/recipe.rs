@@ -21,9 +21,9 @@ pub struct Operation {
     pub diameter_mm: Option<f64>,
     /// Teeth of the tool; milling only.
     pub teeth: Option<f64>,
-    /// Tool.
+    /// Tool of the operation; `None` where the file names none.
     pub tool: Option<Arc<str>>,
-    /// Work material.
+    /// Work material; `None` where the file does not say.
     pub work_material: Option<Arc<str>>,
     /// Line of the file, from 1.
     pub line: usize,
@@ -52,7 +52,7 @@ impl Operation {
 /// What the table says of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lookup<'a> {
-    /// This operation.
+    /// The block belongs to this operation.
     Found(&'a Operation),
     /// The controller does not say which program runs.
     ProgramUnknown,

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use thiserror::Error;
 
-/// Language of texts.
+/// Language in which an effect is described.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Language {
     /// English.
@@ -22,7 +22,7 @@ pub enum Language {
 pub struct UnknownEffect {
     /// The name asked for.
     pub kind: String,
-    /// What to do.
+    /// What to do: the name that was probably meant, and where all names are listed.
     pub hint: String,
 }
 

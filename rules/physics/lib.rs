@@ -36,7 +36,7 @@ pub struct ParameterDoc {
     /// Unit; `output` stands for the unit of the simulated output, `velocity` for m/s or, of a spindle, rad/s.
     /// [`resolve_unit`] replaces them.
     pub unit: &'static str,
-    /// Proportional or shaping.
+    /// Is the contribution proportional to it, or does it bend the shape?
     pub entry: Entry,
     /// Least and greatest value that is physically possible. A range on one side of zero is the sign of the effect.
     pub range: (f64, f64),
@@ -96,7 +96,7 @@ pub struct EffectDoc {
     pub family: &'static str,
     /// The law, in plain ASCII.
     pub law: &'static str,
-    /// Its parameters.
+    /// The numbers of the law that are fitted.
     pub parameters: &'static [ParameterDoc],
     /// What it needs: roles or columns; alternatives separated by `|`.
     pub needs: &'static [&'static str],
@@ -106,9 +106,9 @@ pub struct EffectDoc {
     pub experiment_minutes: f64,
     /// Kinds it is confused with.
     pub rivals: &'static [&'static str],
-    /// English texts.
+    /// The texts of the effect in English.
     pub en: Texts,
-    /// Chinese texts.
+    /// The texts of the effect in Chinese.
     pub zh: Texts,
 }
 
@@ -169,7 +169,7 @@ pub type ParameterColumns = Vec<(&'static str, Vec<f64>)>;
 /// How large a contribution can be beside what the machine takes anyway, in the same rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bound {
-    /// No such bound.
+    /// Nothing bounds the contribution.
     Any,
     /// So many times what the machine takes without a cut.
     NoLoad(f64),
@@ -177,7 +177,7 @@ pub enum Bound {
     Cut(f64),
 }
 
-/// One physical law.
+/// One physical law: what it needs of a recording, and its columns of one number per row.
 pub trait Effect: Sync + Send {
     /// Everything a user is told.
     fn doc(&self) -> &'static EffectDoc;

@@ -13,7 +13,6 @@ use estimators::Settings;
 use rhai::{AST, Dynamic, ImmutableString};
 use std::sync::Arc;
 
-/// A compiled script.
 pub(super) struct Script {
     pub(super) file: Arc<str>,
     pub(super) version: u64,

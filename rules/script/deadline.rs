@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Somebody who knows when a run has lasted too long.
 pub trait Deadline: Send + Sync {
-    /// A run begins.
+    /// A run begins now: the time counts from here.
     fn begin_run(&self);
 
     /// Has the run lasted too long?

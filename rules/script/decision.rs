@@ -10,7 +10,7 @@ pub use adapter_core::Axis;
 /// wanted now: they are repeated at every tick for as long as the script asks.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Decision {
-    /// The tick.
+    /// Time of the sample that was decided on, ns.
     pub at_ns: TimeNs,
     /// The feed override asked for; `None` means the programmed feed, 100 %.
     pub request: Option<OverrideRequest>,
@@ -35,7 +35,7 @@ pub struct OverrideRequest {
     pub pct: f64,
     /// Why, in the script's words.
     pub reason: Arc<str>,
-    /// Which script.
+    /// File name of the script that asks.
     pub script: Arc<str>,
     /// Which version of it.
     pub version: u64,
@@ -52,7 +52,7 @@ impl OverrideRequest {
 /// What a script can ask the operator's machine to do besides another feed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stop {
-    /// Hold the feed.
+    /// A feed hold, through the ladder.
     FeedHold,
     /// Change the tool, at the next occasion that the ladder allows.
     ToolChange,
@@ -72,11 +72,11 @@ impl Stop {
 /// A request to hold the feed or to change the tool. Whether it is passed on, latched and only once, is the gate's.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StopRequest {
-    /// What.
+    /// Feed hold or tool change.
     pub stop: Stop,
     /// Why, in the script's words.
     pub reason: Arc<str>,
-    /// Which script.
+    /// File name of the script that asks.
     pub script: Arc<str>,
     /// Which version of it.
     pub version: u64,
@@ -86,13 +86,13 @@ pub struct StopRequest {
 /// NaN included.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OffsetProposal {
-    /// Which axis.
+    /// The axis whose position is to be corrected.
     pub axis: Axis,
     /// The whole offset, not an increment, um.
     pub offset_um: f64,
     /// Why, in the script's words.
     pub reason: Arc<str>,
-    /// Which script.
+    /// File name of the script that proposes it.
     pub script: Arc<str>,
     /// Which version of it.
     pub version: u64,
@@ -101,11 +101,11 @@ pub struct OffsetProposal {
 /// A channel of a script's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Published<'a> {
-    /// Its name.
+    /// Name of the channel, as the script gave it.
     pub name: &'a str,
     /// Unit symbol; `1` for pure numbers.
     pub unit: &'a str,
-    /// Which script.
+    /// File name of the script that publishes it.
     pub script: &'a Arc<str>,
     /// The newest value, finite, while the script publishes one.
     pub value: Option<f64>,
@@ -114,16 +114,16 @@ pub struct Published<'a> {
 /// How grave an alarm is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AlarmLevel {
-    /// To know.
+    /// Something to know; nothing has to be done.
     Info,
-    /// To look at.
+    /// Something to look at in time.
     Warning,
     /// To act on at once.
     Critical,
 }
 
 impl AlarmLevel {
-    /// Every level.
+    /// Every level, the least first.
     pub const ALL: [Self; 3] = [Self::Info, Self::Warning, Self::Critical];
 
     /// The word in scripts, in the history and in JSON.
@@ -148,15 +148,15 @@ impl AlarmLevel {
 pub struct AlarmChange {
     /// Name given by the script; [`SCRIPT_STOPPED`] for the host's own.
     pub name: Arc<str>,
-    /// Which script.
+    /// File name of the script that raised it.
     pub script: Arc<str>,
-    /// How grave.
+    /// How grave the alarm is.
     pub level: AlarmLevel,
     /// What the operator reads, English.
     pub en: Arc<str>,
     /// What the operator reads, Chinese; the same as `en` where the script gives one text.
     pub zh: Arc<str>,
-    /// Began, or ended.
+    /// Did it begin at this tick? Otherwise it ended.
     pub raised: bool,
 }
 
@@ -168,15 +168,15 @@ pub const SCRIPT_STOPPED: &str = "script_stopped";
 pub struct Alarm {
     /// Name given by the script.
     pub name: Arc<str>,
-    /// Which script.
+    /// File name of the script that raised it.
     pub script: Arc<str>,
-    /// How grave.
+    /// How grave the alarm is.
     pub level: AlarmLevel,
     /// What the operator reads, English.
     pub en: Arc<str>,
     /// What the operator reads, Chinese.
     pub zh: Arc<str>,
-    /// Since when.
+    /// Time of the sample at which it was raised, ns.
     pub since_ns: TimeNs,
 }
 
@@ -192,8 +192,8 @@ impl Alarm {
 /// A line for the history.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Note {
-    /// Which script.
+    /// File name of the script that wrote it.
     pub script: Arc<str>,
-    /// What it says.
+    /// The line, as the script wrote it.
     pub text: Arc<str>,
 }

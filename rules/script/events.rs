@@ -45,7 +45,7 @@ pub struct Handler {
     kind: EventKind,
 }
 
-/// Every handler.
+/// Every handler that a script may define, with its parameters.
 pub const HANDLERS: [Handler; 5] = [
     Handler {
         signature: "on_state_change(before, now)",
@@ -79,7 +79,6 @@ pub const HANDLERS: [Handler; 5] = [
     },
 ];
 
-/// What happened.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Event {
     State(State, State),

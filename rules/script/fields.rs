@@ -19,7 +19,7 @@ enum Tells {
     Absence,
 }
 
-/// A record.
+/// A record of fields that a script reads, as `sample`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Record {
     /// Its name in scripts.
@@ -33,7 +33,7 @@ pub struct Record {
     tells: Tells,
 }
 
-/// Every record.
+/// Every record that a script can read.
 pub const RECORDS: [Record; 4] = [
     Record {
         name: "sample",

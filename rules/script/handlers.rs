@@ -27,7 +27,6 @@ pub(super) struct Written {
     name: ImmutableString,
     pub(super) parameters: Vec<ImmutableString>,
     text: String,
-    /// To look through.
     pub(super) plain: AST,
 }
 

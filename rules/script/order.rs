@@ -35,7 +35,6 @@ impl PublishedChannels {
         self.0.get(name).map(String::as_str)
     }
 
-    /// Every name.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)
     }

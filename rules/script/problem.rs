@@ -10,9 +10,9 @@ pub struct ScriptProblem {
     pub file: String,
     /// Line from 1, where it lies in a line.
     pub line: Option<usize>,
-    /// Column from 1.
+    /// Column from 1, where it lies at one.
     pub column: Option<usize>,
-    /// What is wrong.
+    /// What is wrong, in words, without the place.
     pub what: String,
     /// What to do next; may be empty.
     pub next: String,

@@ -7,7 +7,6 @@ use estimators::{Estimated, Estimates};
 pub(super) type QuantityRow =
     (&'static str, &'static str, &'static str, &'static str, &'static str, fn(&Estimates) -> Estimated);
 
-/// The estimated quantities.
 pub(super) const QUANTITIES: [QuantityRow; 11] = [
     (
         "filtered_power_w",

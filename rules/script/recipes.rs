@@ -8,13 +8,13 @@ use super::compile::ScriptFile;
 pub struct ScriptRecipe {
     /// What `cnc-gateway help` calls it; the name of the script without its ending.
     pub name: &'static str,
-    /// The script.
+    /// The script as it can be saved, its head included.
     pub text: &'static str,
 }
 
 macro_rules! recipes {
     ($($name:literal),* $(,)?) => {
-        /// Every recipe.
+        /// Every recipe that the program brings along.
         pub static RECIPES: &[ScriptRecipe] =
             &[$(ScriptRecipe { name: $name, text: include_str!(concat!("../recipes/", $name, ".rhai")) }),*];
     };

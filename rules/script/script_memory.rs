@@ -4,7 +4,6 @@ use super::timers::Timers;
 use rhai::{Dynamic, Map};
 use serde_json::Value;
 
-/// See the [module](self).
 #[derive(Debug, Default, Clone)]
 pub(super) struct ScriptMemory {
     pub(super) memory: Map,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 /// How a script is doing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ScriptCondition {
-    /// It runs.
+    /// It runs when it is due.
     Running,
     /// It worked on a value that is not there; it asks for nothing and tries again when due.
     Waiting(ScriptProblem),
@@ -47,10 +47,10 @@ impl ScriptCondition {
     }
 }
 
-/// One script.
+/// How one script of the set in charge is doing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScriptStatus {
-    /// File name.
+    /// File name of the script.
     pub file: Arc<str>,
     /// FNV-1a hash of the text in charge, as decisions are recorded with; shown as 16 hexadecimal digits.
     pub version: u64,

@@ -49,7 +49,6 @@ impl ScriptBody {
         Ok(Self { ast: engine.compile(text)?, skip: 0, lines: 0 })
     }
 
-    /// What runs.
     pub(super) fn statements(&self) -> &[Stmt] {
         &self.ast.statements()[self.skip.min(self.ast.statements().len())..]
     }

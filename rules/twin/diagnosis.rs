@@ -48,13 +48,13 @@ impl Verdict {
 pub struct ParameterEstimate {
     /// Name of the parameter.
     pub name: String,
-    /// Fitted value.
+    /// Fitted value, in `unit`.
     pub value: f64,
     /// Lower end of the 95 % interval.
     pub low: f64,
     /// Upper end of the 95 % interval.
     pub high: f64,
-    /// Unit.
+    /// Unit symbol of value and interval.
     pub unit: String,
 }
 
@@ -63,11 +63,11 @@ pub struct ParameterEstimate {
 pub struct Missing {
     /// Kind, hypothesis, or `unknown`.
     pub effect: String,
-    /// One sentence.
+    /// One sentence that says what is missing.
     pub statement: String,
-    /// The law.
+    /// The law of the effect as a line of text.
     pub equation: String,
-    /// Fitted parameters.
+    /// Its parameters as fitted, with intervals.
     pub parameters: Vec<ParameterEstimate>,
     /// Information lost without it.
     pub delta_ic: f64,
@@ -84,7 +84,7 @@ pub struct Missing {
 /// Another explanation that this data cannot rule out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alternative {
-    /// The other kind.
+    /// The kind that would explain it as well.
     pub effect: String,
     /// The kind it would replace.
     pub instead_of: String,
@@ -97,11 +97,11 @@ pub struct Alternative {
 /// A parameter of the baseline that had been bent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shift {
-    /// `kind.parameter`.
+    /// The parameter, as `kind.parameter`.
     pub parameter: String,
     /// Refitted without the missing effect.
     pub before: f64,
-    /// Refitted with it.
+    /// The value when refitted with it.
     pub after: f64,
 }
 
@@ -125,7 +125,7 @@ pub struct Existence {
     pub false_alarm_rate: f64,
 }
 
-/// The fits compared.
+/// The model with and without the missing physics, on the same rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fits {
     /// Rows that took part.
@@ -138,7 +138,7 @@ pub struct Fits {
     pub noise_floor: f64,
     /// The model refitted without the missing physics.
     pub before: Quality,
-    /// With it.
+    /// The model refitted with it.
     pub after: Quality,
 }
 
@@ -153,7 +153,7 @@ impl Fits {
 /// What to record next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
-    /// What to do.
+    /// What to do, in words.
     pub statement: String,
     /// How long it takes.
     pub minutes: f64,
@@ -168,7 +168,7 @@ pub struct Experiment {
 pub struct Rows {
     /// Refitted without the missing physics; `None` where an input is absent.
     pub simulated_before: Vec<Option<f64>>,
-    /// With it.
+    /// Refitted with it; `None` where an input is absent.
     pub simulated_after: Vec<Option<f64>>,
     /// Rows that took part in the comparison: recorded, with every input, and free of faults.
     pub compared: Vec<bool>,
@@ -176,14 +176,14 @@ pub struct Rows {
     pub effects: Vec<(String, Vec<f64>)>,
 }
 
-/// The whole diagnosis.
+/// What a comparison of model and recording found.
 #[derive(Debug, Clone)]
 pub struct Diagnosis {
-    /// The simulated quantity.
+    /// Column of the quantity that is simulated and was recorded.
     pub output: String,
-    /// Its unit.
+    /// Unit symbol of that quantity.
     pub unit: String,
-    /// The answer.
+    /// The answer in one word.
     pub verdict: Verdict,
     /// The answer for a machinist.
     pub summary: Bilingual,
@@ -191,7 +191,7 @@ pub struct Diagnosis {
     pub existence: Option<Existence>,
     /// The fits; `None` when nothing could be fitted.
     pub fit: Option<Fits>,
-    /// Where, largest first.
+    /// Where model and recording differ, the largest first.
     pub mismatch: Vec<Region>,
     /// What is missing, most important first.
     pub missing: Vec<Missing>,
@@ -203,7 +203,7 @@ pub struct Diagnosis {
     pub data_quality: Vec<Fault>,
     /// What to record next.
     pub next_experiment: Option<Experiment>,
-    /// Row by row.
+    /// The simulations row by row, before and after.
     pub rows: Rows,
     /// The extended, refitted model.
     pub model: Model,

@@ -38,12 +38,10 @@ pub(super) struct Metric<'a> {
     pub(super) bounded: bool,
 }
 
-/// Fitted parts.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     /// The parts with fitted values.
     pub(super) parts: Vec<Part>,
-    /// The fitted parameters.
     pub(super) free: Vec<Free>,
     /// The simulated output, every row.
     pub(super) simulated: Vec<f64>,

@@ -30,7 +30,7 @@ const WORDS_MAX: usize = 64;
 pub struct Unit {
     /// The run's name; with a part number where one run is cut into several units.
     pub name: String,
-    /// Its rows.
+    /// The rows of the scene that it covers.
     pub rows: Range<usize>,
 }
 
@@ -64,7 +64,6 @@ fn split_run(rows: &Range<usize>, name: &str, wanted: usize) -> Vec<Unit> {
 pub(super) struct Random(u64);
 
 impl Random {
-    /// From this seed.
     pub(super) fn new(seed: u64) -> Self {
         Self(seed)
     }

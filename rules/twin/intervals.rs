@@ -38,15 +38,12 @@ const OF_THE_CUT: [&str; 1] = ["recipe_error"];
 
 /// A fit, and the rows that it was made from.
 pub(super) struct FittedRows<'a> {
-    /// The recording.
     pub(super) scene: &'a Scene,
-    /// The fit.
     pub(super) fit: &'a Fit,
     /// The recorded output, every row.
     pub(super) recorded: &'a [f64],
     /// From a column of every row to innovations of the fitted rows.
     pub(super) whiten: &'a dyn Fn(&[f64]) -> Vec<f64>,
-    /// The fitted rows.
     pub(super) rows: &'a [usize],
     /// Unit of hold-out of each of them.
     pub(super) unit: Vec<usize>,

@@ -23,7 +23,7 @@ fn encode_optional(x: Option<f64>) -> Value {
     x.map_or(Value::Null, encode_number)
 }
 
-/// The whole diagnosis.
+/// The diagnosis as JSON, numbers with six significant digits.
 #[must_use]
 pub fn to_json(diagnosis: &Diagnosis) -> Value {
     let faults = diagnosis.data_quality.iter();

@@ -13,13 +13,13 @@ use std::fmt;
 pub struct Parameter {
     /// Name, as in the file.
     pub name: String,
-    /// Present value.
+    /// The value it has now, in `unit`.
     pub value: f64,
-    /// Never refitted.
+    /// Is it never refitted?
     pub fixed: bool,
-    /// Proportional or shaping.
+    /// Is the contribution proportional to it, or does it bend the shape?
     pub entry: Entry,
-    /// Physically possible values.
+    /// Least and greatest value that is physically possible.
     pub range: (f64, f64),
     /// Unit; `output` stands for the output's unit.
     pub unit: String,
@@ -56,9 +56,9 @@ pub struct Part {
     pub kind: String,
     /// The user's name for it, where given.
     pub name: Option<String>,
-    /// What it computes.
+    /// The law that the parameters enter.
     pub body: PartFunction,
-    /// Its parameters.
+    /// The numbers of the law, with values and ranges.
     pub parameters: Vec<Parameter>,
     /// Line of the file, 0 when it was not read from one.
     pub line: usize,
@@ -235,11 +235,11 @@ fn build_parameter(effect: &'static dyn Effect, name: &str, value: f64, entry: E
 pub struct Model {
     /// Name of the machine or model.
     pub name: String,
-    /// The simulated quantity.
+    /// Column of the quantity that is simulated.
     pub output: String,
     /// The effects whose sum is the output.
     pub parts: Vec<Part>,
-    /// Declared roles.
+    /// Columns that the file assigns to roles.
     pub roles: BTreeMap<Role, String>,
     /// Kinds that the search must not consider.
     pub exclude: Vec<String>,

@@ -17,7 +17,6 @@ pub(super) struct Case<'a> {
     pub(super) scene: Scene,
     /// The parts, complete for this recording.
     pub(super) parts: Vec<Part>,
-    /// Units of hold-out.
     pub(super) units: Vec<Unit>,
     /// Units that take no part in fitting, choosing or stopping.
     pub(super) held: BTreeSet<usize>,

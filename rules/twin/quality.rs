@@ -8,9 +8,9 @@ use physics::Scene;
 pub struct Fault {
     /// `dropouts`, `spikes`, `quantisation` or `duplicate_time`.
     pub fault: &'static str,
-    /// The column.
+    /// The column with the fault.
     pub column: String,
-    /// Rows concerned.
+    /// How many rows have it.
     pub rows: usize,
 }
 

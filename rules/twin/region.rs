@@ -13,18 +13,18 @@ const USUAL: f64 = 0.99;
 pub enum Condition {
     /// The column lies between these bounds; open where `None`.
     Range {
-        /// The column.
+        /// Name of a column of numbers.
         column: String,
-        /// Lower bound.
+        /// Least value; `None`: however small.
         min: Option<f64>,
-        /// Upper bound.
+        /// Greatest value; `None`: however large.
         max: Option<f64>,
     },
     /// The text column is one of these words.
     Equals {
-        /// The column.
+        /// Name of a column of words.
         column: String,
-        /// The words.
+        /// The words, any of which it may be.
         words: Vec<String>,
     },
 }
@@ -42,7 +42,7 @@ impl Condition {
 /// A stretch of affected rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
-    /// The run.
+    /// Name of the run that it lies in.
     pub run: String,
     /// Time of its first row.
     pub from_s: f64,
@@ -53,13 +53,13 @@ pub struct Span {
 /// Since when, with an interval.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OnsetInterval {
-    /// The run.
+    /// Name of the run that it lies in.
     pub run: String,
     /// Time within the recording.
     pub time_s: f64,
-    /// Earliest plausible time.
+    /// Earliest plausible time of the onset, s.
     pub low_s: f64,
-    /// Latest plausible time.
+    /// Latest plausible time of the onset, s.
     pub high_s: f64,
 }
 

@@ -5,7 +5,7 @@ use physics::{Role, Scene};
 /// Speeds of a no-load table; the powers are the part's parameters `power_w[0]`, `power_w[1]`, ...
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpeedTable {
-    /// Increasing speeds.
+    /// Spindle speeds, rpm, increasing.
     pub speeds_rpm: Vec<f64>,
     /// The gear stage it holds for; `None` for every stage.
     pub gear_stage: Option<f64>,

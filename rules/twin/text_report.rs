@@ -14,7 +14,7 @@ const ODDS_MAX: f64 = 1000.0;
 /// Odds below which two explanations are told to be about as likely.
 const ODDS_MIN: f64 = 1.5;
 
-/// The report.
+/// The report for a person, in one language.
 #[must_use]
 pub fn format_report(diagnosis: &Diagnosis, language: Language) -> String {
     let say = Say { language, unit: &diagnosis.unit };

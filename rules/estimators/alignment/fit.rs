@@ -61,7 +61,6 @@ impl Ready {
     }
 }
 
-/// A fit.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FittedLag {
     pub(super) model: [f64; COLUMNS],
@@ -101,7 +100,6 @@ pub(super) struct PredictorSet {
 }
 
 impl PredictorSet {
-    /// Every predictor.
     pub(super) const WHOLE: Self = Self { cube: true, turning: true, inertia: true, excess: true };
 }
 

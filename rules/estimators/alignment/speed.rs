@@ -17,7 +17,7 @@ pub struct SpeedPoint {
 pub struct PowerPoint {
     /// Stamp of the meter's reading, s, on the same clock.
     pub time_s: f64,
-    /// Power, W.
+    /// Power that the meter reads, W.
     pub power_w: f64,
 }
 

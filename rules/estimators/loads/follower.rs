@@ -45,11 +45,10 @@ pub(super) struct OverrideRange {
     pub(super) sure_s: f64,
 }
 
-/// Follows one cut.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct OverrideFollower {
     smooth: Option<f64>,
-    /// Time, smoothed share.
+    /// Time in ns, and the smoothed share then.
     shares: VecDeque<(TimeNs, f64)>,
     /// Time, feed in force over the programmed one.
     feeds: VecDeque<(TimeNs, f64)>,

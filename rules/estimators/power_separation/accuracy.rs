@@ -19,13 +19,13 @@ pub const FIXED_LOSSES: [f64; 2] = [0.15, 0.25];
 pub struct GroupAccuracy {
     /// Middle of the cut, s.
     pub at_s: f64,
-    /// Spindle speed.
+    /// Spindle speed during the cut, rpm.
     pub speed_rpm: f64,
     /// Cutting power by the reference, W.
     pub measured_w: f64,
     /// Cutting power from spindle power, with coefficients learned from the other cuts, W.
     pub estimated_w: f64,
-    /// E, relative.
+    /// E of this cut; 0.05 is 5 % of the measured cutting power.
     pub error: f64,
     /// E with each of [`FIXED_LOSSES`].
     pub error_fixed: [f64; 2],
@@ -34,11 +34,11 @@ pub struct GroupAccuracy {
 /// Accuracy over all cuts of a gear stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Accuracy {
-    /// Each cut.
+    /// Every cut, each judged by coefficients learned without it.
     pub groups: Vec<GroupAccuracy>,
-    /// Mean of E.
+    /// Mean of E over the cuts.
     pub mean: f64,
-    /// Greatest E.
+    /// Greatest E of a cut.
     pub greatest: f64,
     /// Mean of E with each of [`FIXED_LOSSES`].
     pub mean_fixed: [f64; 2],

@@ -17,13 +17,13 @@ const LEAST_S: f64 = 3.0;
 /// A steady cut, or an idle stretch (reference 0).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SteadyPoint {
-    /// Gear stage.
+    /// Gear stage; 0 where the recording has none.
     pub stage: usize,
-    /// Spindle speed.
+    /// Spindle speed, rpm, the same throughout.
     pub speed_rpm: f64,
-    /// Middle, s.
+    /// Middle of the stretch on the clock of the recording, s.
     pub at_s: f64,
-    /// Spindle power.
+    /// Spindle power over the stretch: level and trend, W.
     pub power: SteadyLevel,
     /// Cutting power by the reference, less what the reference shows on the mean of idling at this speed, W.
     pub cutting_power_w: f64,

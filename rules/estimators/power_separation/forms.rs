@@ -22,7 +22,7 @@ use serde::Serialize;
 pub struct FormResiduals {
     /// a1 the same at every speed.
     pub same_at_every_speed_w: f64,
-    /// a1 with 1/n^2.
+    /// a1 that goes with 1/n^2, n the spindle speed.
     pub with_torque_squared_w: f64,
 }
 
@@ -40,7 +40,6 @@ pub(super) struct FittedLoss {
 }
 
 impl FittedLoss {
-    /// The coefficients.
     pub(super) fn load_loss(&self) -> LoadLossLaw {
         LoadLossLaw {
             linear: self.regression.coefficients[self.at].value - 1.0,

@@ -31,9 +31,9 @@ const QUADRATIC_RANGE: (f64, f64) = (-0.001, 0.01);
 /// A number with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct IntervalEstimate {
-    /// The value.
+    /// The estimate, in the unit that its field tells.
     pub value: f64,
-    /// Standard error.
+    /// Standard error of the estimate, in the same unit.
     pub standard_error: f64,
     /// Ends of the 95 % interval.
     pub interval: (f64, f64),
@@ -46,7 +46,7 @@ pub struct StageLearned {
     pub stage: usize,
     /// a0, load loss per watt of cutting power.
     pub linear: IntervalEstimate,
-    /// a1, 1/W.
+    /// a1, load loss per square watt of cutting power, 1/W.
     pub quadratic_per_w: IntervalEstimate,
     /// Spindle speed at which a1 is as stated, where it goes with 1/n^2; `None` where it is the same at every speed, or where the cuts
     /// were made at one speed, so that nothing tells.
@@ -61,7 +61,7 @@ pub struct StageLearned {
     pub speeds_rpm: Vec<f64>,
     /// Cuts and idle stretches that it rests on.
     pub cuts: usize,
-    /// Idle stretches.
+    /// How many of these are idle stretches.
     pub idle: usize,
     /// Residual standard deviation, W.
     pub residual_sd_w: f64,
@@ -90,7 +90,7 @@ impl StageLearned {
 pub struct LoadLossLearned {
     /// What told the cutting power.
     pub reference: PowerReference,
-    /// By gear stage.
+    /// The gear stages whose load loss could be told.
     pub stages: Vec<StageLearned>,
     /// The cuts and idle stretches.
     pub points: Vec<SteadyPoint>,

@@ -25,11 +25,11 @@ const TWO_LEVELS_SCATTER: f64 = 3.0;
 pub struct SpeedLearned {
     /// Gear stage; 0 where the recording has none.
     pub stage: usize,
-    /// Speed.
+    /// Magnitude of the spindle speed, rpm.
     pub speed_rpm: f64,
-    /// No-load power.
+    /// Power of the spindle at this speed when nothing is cut, W.
     pub power_w: f64,
-    /// Standard error.
+    /// Standard error of that power, W.
     pub standard_error_w: f64,
     /// Ends of the 95 % interval.
     pub interval_w: (f64, f64),

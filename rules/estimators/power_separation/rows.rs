@@ -18,7 +18,6 @@ const LOOKED_AT: [&str; 7] =
 pub(super) struct MachineRow {
     /// Row of the recording.
     pub(super) row: usize,
-    /// Seconds.
     pub(super) time_s: f64,
     /// Spindle power; total power above standby stands for it where there is none.
     pub(super) power_w: Option<f64>,

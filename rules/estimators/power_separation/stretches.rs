@@ -20,13 +20,13 @@ const SETTLED_SD: f64 = 3.0;
 /// A settled stretch of idling at one speed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stretch {
-    /// Gear stage.
+    /// Gear stage; 0 where the recording has none.
     pub stage: usize,
-    /// Mean speed.
+    /// Mean magnitude of the spindle speed, rpm.
     pub speed_rpm: f64,
     /// From where on it counts as settled, s.
     pub from_s: f64,
-    /// To, s.
+    /// Until when it lasts, s.
     pub to_s: f64,
     /// Time that was left out because the power still settled, s.
     pub settling_s: f64,

@@ -8,7 +8,7 @@ use serde::Serialize;
 /// The value of a fit at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FitPrediction {
-    /// The value.
+    /// What the fit gives there, in the unit of y.
     pub value: f64,
     /// Standard error of the mean at this point: how well the law is known there.
     pub standard_error: f64,

@@ -54,7 +54,7 @@ impl RefusalKind {
 /// No number, and why: what stands in the way, where, and what to do or to record instead.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Refusal {
-    /// The obstacle.
+    /// The kind of obstacle, for programs.
     pub kind: RefusalKind,
     /// What is wrong, in words, with the numbers that show it.
     pub what: String,

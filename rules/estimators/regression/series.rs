@@ -16,7 +16,7 @@ const PULSE_SD: f64 = 6.0;
 /// What a steady stretch says about its level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SteadyLevel {
-    /// Mean.
+    /// Mean of the stretch, in the unit of the values.
     pub mean: f64,
     /// Standard error of the mean, the memory of the noise counted.
     pub standard_error: f64,
@@ -24,7 +24,7 @@ pub struct SteadyLevel {
     pub sd: f64,
     /// As many independent samples would say the same.
     pub independent: f64,
-    /// Change per second.
+    /// Change of the level per second, in the unit of the values.
     pub slope_per_s: f64,
     /// Standard error of the slope, the memory of the noise counted.
     pub slope_standard_error: f64,

@@ -23,7 +23,7 @@ struct Section {
     a: [f64; 2],
 }
 
-/// A designed low-pass.
+/// A low-pass for one rate of samples; [`LowPassDesign::build_filter`] gives one that runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowPassDesign {
     sections: [Section; SECTIONS],
@@ -54,7 +54,7 @@ impl LowPassDesign {
         Ok(Self { sections, rate_hz, cutoff_hz })
     }
 
-    /// The cutoff, Hz.
+    /// Frequency at which the gain is 1/sqrt(2), Hz.
     #[must_use]
     pub fn cutoff_hz(&self) -> f64 {
         self.cutoff_hz
@@ -142,7 +142,7 @@ impl LowPass {
         Some(x)
     }
 
-    /// Forgets everything.
+    /// Sets both sections to rest, as before the first sample.
     pub fn reset_state(&mut self) {
         self.states = [[0.0; 2]; SECTIONS];
     }

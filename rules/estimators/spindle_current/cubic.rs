@@ -6,7 +6,7 @@ use serde::Serialize;
 /// `I(f) = c0 + c1 f + c2 f^2 + c3 f^3` for feeds from `feed_min` to `feed_max`, in one unit of feed throughout.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cubic {
-    /// Constant first.
+    /// c0 to c3, the constant first; zero beyond the degree that was fitted.
     pub coefficients: [f64; 4],
     /// Least feed it holds for.
     pub feed_min: f64,
@@ -17,7 +17,7 @@ pub struct Cubic {
 /// A feed that gives a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Inversion {
-    /// The feed.
+    /// The feed, in the unit of the curve.
     pub feed: f64,
     /// Change of feed per change of the feature, there.
     pub feed_per_feature: f64,

@@ -21,7 +21,7 @@ const COMPARED: u32 = 16;
 pub struct CurveAtDepth {
     /// Depth of cut, mm.
     pub depth_mm: f64,
-    /// The curve.
+    /// The feature over the feed at this depth.
     pub curve: Cubic,
     /// Standard deviation of one cut about the curve, the error of the curve counted, in the unit of the feature.
     pub sd: f64,
@@ -32,7 +32,7 @@ pub struct CurveAtDepth {
 pub struct Inferred {
     /// Equivalent depth of cut, mm.
     pub depth_mm: f64,
-    /// Standard deviation, mm.
+    /// Standard deviation of the depth, mm.
     pub sd_mm: f64,
 }
 

@@ -30,16 +30,16 @@ pub enum Scatter {
     Proportional,
 }
 
-/// One curve.
+/// A curve of the feature over the feed at one speed and depth, with what it takes to believe it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CurveLearned {
-    /// Spindle speed.
+    /// Spindle speed of the plateaus, rpm.
     pub speed_rpm: f64,
-    /// Depth of cut.
+    /// Depth of cut of the plateaus, mm.
     pub depth_mm: f64,
     /// Plateaus, and how many different feeds they have.
     pub plateaus: usize,
-    /// Different feeds.
+    /// How many different feeds the plateaus have.
     pub feeds: usize,
     /// Degree that was chosen.
     pub degree: usize,
@@ -51,13 +51,13 @@ pub struct CurveLearned {
     pub scatter: Scatter,
     /// Residual standard deviation from cut to cut.
     pub residual_sd: f64,
-    /// Share explained.
+    /// Share of the feature's variation that the curve explains, at most 1.
     pub r2: f64,
     /// Share explained of plateaus left out one at a time.
     pub predicted_r2: Option<f64>,
     /// Does the curve miss the repeated feeds by more than their scatter? Probability of that by chance.
     pub lack_of_fit_p: Option<f64>,
-    /// The curve.
+    /// The curve and the feeds that it holds for.
     pub curve: Cubic,
     /// Greatest standard deviation of one cut about the curve in its range, the error of the curve counted, in the unit of
     /// the feature.

@@ -16,15 +16,15 @@ const LEAST_S: f64 = 2.0;
 /// A settled cut at one speed, depth and feed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plateau {
-    /// Spindle speed.
+    /// Spindle speed, rpm.
     pub speed_rpm: f64,
-    /// Depth of cut.
+    /// Depth of cut, mm.
     pub depth_mm: f64,
     /// Feed, in the unit of its column.
     pub feed: f64,
-    /// From, s.
+    /// Where it begins on the clock of the recording, s.
     pub from_s: f64,
-    /// To, s.
+    /// Where it ends, s.
     pub to_s: f64,
     /// Tool in use, where the recording says.
     pub tool: Option<String>,

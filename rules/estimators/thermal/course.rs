@@ -8,7 +8,7 @@ use std::ops::Range;
 /// A named temperature, one value per row, °C.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
-    /// Channel.
+    /// Channel or column that it was read from.
     pub name: String,
     /// One finite number per row.
     pub values: Vec<f64>,
@@ -79,25 +79,25 @@ impl Course {
         Ok(usable)
     }
 
-    /// How many rows.
+    /// Number of rows: each has a time, an error and a value of every sensor.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.clock_s.len()
     }
 
-    /// Times, s.
+    /// Time of each row, s.
     #[must_use]
     pub fn clock_s(&self) -> &[f64] {
         &self.clock_s
     }
 
-    /// Thermal error, um.
+    /// Measured thermal error of each row, um.
     #[must_use]
     pub fn error_um(&self) -> &[f64] {
         &self.error_um
     }
 
-    /// The temperatures.
+    /// The temperatures, in the order in which they were given.
     #[must_use]
     pub fn sensors(&self) -> &[Sensor] {
         &self.sensors
@@ -184,13 +184,13 @@ impl Course {
 }
 
 impl Sensor {
-    /// A sensor.
+    /// A sensor of this name with one temperature per row, °C.
     #[must_use]
     pub fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
         Self { name: name.into(), values }
     }
 
-    /// As a series.
+    /// Its values under its name, as a [`Series`].
     #[must_use]
     pub fn as_series(&self) -> Series<'_> {
         Series { name: &self.name, values: &self.values }

@@ -29,9 +29,9 @@ pub struct FollowSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Corrected {
-    /// As identified.
+    /// The law before any reading corrected it.
     pub identified: ThermalLaw,
-    /// As corrected.
+    /// The law with every reading so far: the one to predict with.
     pub law: ThermalLaw,
     /// Readings that corrected it.
     pub readings: u64,

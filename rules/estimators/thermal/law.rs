@@ -12,7 +12,7 @@ pub const TERMS_MAX: usize = 2 * POINTS_MAX;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Path {
-    /// As measured.
+    /// The temperature as it is measured, without delay.
     Direct,
     /// Through a first-order state: the structure warms later than the sensor.
     Lagged,
@@ -24,7 +24,7 @@ pub enum Path {
 pub struct ThermalTerm {
     /// Channel of the sensor.
     pub sensor: String,
-    /// Directly or late.
+    /// Does the temperature act at once, or through a lag?
     pub path: Path,
     /// Error per kelvin, um/K.
     pub um_per_k: f64,
@@ -55,7 +55,7 @@ pub struct ThermalLaw {
     /// Root mean square of `T - w` during identification, K: how far a state is off whose beginning is not known.
     #[serde(default)]
     pub lag_spread_k: f64,
-    /// The terms.
+    /// What is added to the intercept, one term per sensor and path.
     pub terms: Vec<ThermalTerm>,
     /// Covariance of intercept and terms, in their order, row by row.
     pub covariance: Vec<Vec<f64>>,

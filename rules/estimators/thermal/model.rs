@@ -10,12 +10,12 @@ pub const SCHEMA: &str = "thermal/1";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ThermalModel {
-    /// [`SCHEMA`].
+    /// [`SCHEMA`]; a file with another one is refused.
     pub schema: String,
     /// Name of the machine; a law of another machine is refused. Empty: of any.
     #[serde(default)]
     pub machine: String,
-    /// The law.
+    /// The law that predicts the error from temperatures.
     pub law: ThermalLaw,
 }
 

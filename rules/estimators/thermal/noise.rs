@@ -188,7 +188,7 @@ pub(super) fn average_over_noises(course: &Course, columns: &[Column], y: &[f64]
 /// Noises of less weight than this change nothing.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// Adds `scale X'VX`.
+/// Adds `scale X'VX` to `middle`, X the columns and V the covariance of the noise.
 fn add_spread(middle: &mut [Vec<f64>], course: &Course, columns: &[Column], noise: ThermalNoise, scale: f64) {
     for (j, column) in columns.iter().enumerate() {
         let spread = apply_covariance(course, &column.values, noise);

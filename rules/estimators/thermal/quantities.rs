@@ -5,7 +5,7 @@ use crate::regression::{Mistake, Plausible, Refusal, RefusalKind};
 /// A named series, one value per row; the name ends in the unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Series<'a> {
-    /// What it is.
+    /// Name of the column, as messages tell it.
     pub name: &'a str,
     /// One finite number per row.
     pub values: &'a [f64],

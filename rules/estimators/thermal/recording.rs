@@ -14,7 +14,7 @@ const ABSENT_MAX: f64 = 0.2;
 /// Rows to learn from, and what was left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalRows {
-    /// The rows.
+    /// Times, errors and temperatures that are complete.
     pub course: Course,
     /// What was left out and why.
     pub left_out: LeftOut,

@@ -14,7 +14,7 @@ pub struct AnovaRow {
     pub source: String,
     /// Sum of squares, W^2.
     pub sum_of_squares: f64,
-    /// Degrees of freedom.
+    /// Degrees of freedom of this source.
     pub degrees_of_freedom: f64,
     /// Sum over degrees of freedom, W^2.
     pub mean_square: f64,
@@ -29,7 +29,7 @@ pub struct AnovaRow {
 pub struct Anova {
     /// Rows: the model, each term as if it came last, residual, lack of fit where cuts were repeated, total.
     pub sources: Vec<AnovaRow>,
-    /// Share explained.
+    /// Share of the variance of the power that the model explains, at most 1.
     pub r2: f64,
     /// The same, for the number of terms.
     pub adjusted_r2: f64,

@@ -11,9 +11,9 @@ const MARGIN: f64 = 0.05;
 /// Least and greatest value of each factor that a model was fitted on, in the order and units of [`FACTORS`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Range {
-    /// Least values.
+    /// Least value of each factor.
     pub least: [f64; 4],
-    /// Greatest values.
+    /// Greatest value of each factor.
     pub greatest: [f64; 4],
 }
 
@@ -57,7 +57,7 @@ impl Range {
 /// Centre and half range of each factor; the half range of a factor that was held is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Coding {
-    /// Coded 0.
+    /// The value of each factor that is coded 0, in its unit.
     pub centre: [f64; 4],
     /// Distance from 0 to 1.
     pub half: [f64; 4],

@@ -17,7 +17,7 @@ use serde::Serialize;
 /// Errors of one form, W, root mean square; `None` where a fit was not possible.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FormErrors {
-    /// `surface` or `physical`.
+    /// Which of the two forms: `surface` or `physical`.
     pub form: &'static str,
     /// Schwarz's criterion; the smaller one has the better evidence. `None` where a fit was not possible.
     pub bic: Option<f64>,

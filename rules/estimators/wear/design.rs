@@ -15,7 +15,7 @@ const CHOICES_MAX: usize = 20_000;
 /// The levels of one factor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FactorLevels {
-    /// Which factor.
+    /// The condition that takes these levels.
     pub factor: &'static ConditionFactor,
     /// The values, in the unit of the factor, increasing.
     pub values: Vec<f64>,
@@ -37,16 +37,16 @@ pub struct PlannedCut {
 pub struct Alias {
     /// One term, in the symbols of the factors.
     pub one: String,
-    /// The other.
+    /// The other term, in the same symbols.
     pub other: String,
     /// Correlation of the two over the runs, -1 to 1.
     pub correlation: f64,
 }
 
-/// The work list.
+/// The cuts to make for a wear model, and what they can tell apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExperimentDesign {
-    /// The array.
+    /// The orthogonal array behind the cuts.
     pub array: Array,
     /// The factors with their levels.
     pub factors: Vec<FactorLevels>,

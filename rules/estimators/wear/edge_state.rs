@@ -9,17 +9,17 @@ use serde::{Deserialize, Serialize};
 pub enum WearNews {
     /// The wear of this edge is not known well enough any more to be acted upon.
     NotObservable {
-        /// The edge.
+        /// The edge, as the controller names it.
         edge: String,
     },
     /// It is known again.
     Observable {
-        /// The edge.
+        /// The edge, as the controller names it.
         edge: String,
     },
     /// The power fell as with a new edge, and nobody had announced one.
     NewEdge {
-        /// The tool.
+        /// The tool whose power fell.
         tool: String,
     },
     /// All tools take more or less than before: another lot of material. What was taken for it might have been wear.
@@ -31,7 +31,7 @@ pub enum WearNews {
     },
     /// An edge has taken more than its limit in several parts, and is believed to have far less wear than the criterion.
     LimitByMaterial {
-        /// The edge.
+        /// The edge, as the controller names it.
         edge: String,
         /// Its wear as believed, mm.
         wear_mm: f64,

@@ -14,9 +14,9 @@ const LEVEL_SHARE: f64 = 0.1;
 /// Which terms the fit begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// The factors alone.
+    /// The constant and the factors alone.
     Linear,
-    /// And their products.
+    /// These, and products of two factors.
     Interactions,
     /// And their squares, of factors with at least three values.
     Second,
@@ -44,7 +44,7 @@ impl Default for SurfaceOptions {
 /// A term that was dropped, in the order of dropping.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Dropped {
-    /// The term.
+    /// The term, named as in the surface.
     pub term: String,
     /// Its F with one degree of freedom, when it was dropped.
     pub f: f64,
@@ -55,11 +55,11 @@ pub struct Dropped {
 /// A fitted surface with everything that it takes to judge it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceFit {
-    /// The surface.
+    /// The surface with the terms that stayed.
     pub surface: Surface,
     /// The regression behind it: coefficients with intervals, R2, condition number.
     pub regression: Regression,
-    /// Analysis of variance.
+    /// Analysis of variance of the terms that stayed.
     pub anova: Anova,
     /// Terms that were dropped.
     pub dropped: Vec<Dropped>,

@@ -48,7 +48,7 @@ impl Default for CutColumns {
 pub struct GatheredCuts {
     /// The cuts, in the order of the recording.
     pub cuts: Vec<Cut>,
-    /// Rows behind them.
+    /// Rows of the recording behind them.
     pub rows: usize,
     /// Rows left out: not cutting, or without one of the values.
     pub left_out: usize,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Gaussian {
     mean: Vec<f64>,
-    /// Row by row.
+    /// The covariance matrix, row by row.
     covariance: Vec<Vec<f64>>,
 }
 

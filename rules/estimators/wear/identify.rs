@@ -10,7 +10,7 @@ use crate::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// What is wanted.
+/// How a wear model is fitted, and which criterion it is for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WearOptions {
     /// How the surface is fitted; factors that were held count for both forms.
@@ -30,21 +30,21 @@ impl Default for WearOptions {
 /// The limit at one place of the design.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignPoint {
-    /// Cutting speed, m/min.
+    /// Cutting speed of this place, m/min.
     pub cutting_speed_m_min: f64,
-    /// Feed, mm/rev.
+    /// Feed of this place, mm/rev.
     pub feed_per_rev_mm: f64,
-    /// Depth, mm.
+    /// Depth of cut of this place, mm.
     pub depth_of_cut_mm: f64,
-    /// The limit there.
+    /// The power limit of such a cut.
     #[serde(flatten)]
     pub threshold: PowerLimit,
 }
 
-/// What was learned.
+/// Both forms fitted to the cuts, which one was taken, and its limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LearnedWear {
-    /// The cuts.
+    /// The cuts that both were fitted to.
     pub cuts: Vec<Cut>,
     /// The response surface, or why there is none.
     pub surface: Result<SurfaceFit, Refusal>,
@@ -52,11 +52,11 @@ pub struct LearnedWear {
     pub physical: Result<PhysicalFit, Refusal>,
     /// Both on cuts that they have not seen.
     pub comparison: FormComparison,
-    /// The form taken.
+    /// The form that was asked for, or that the comparison recommends.
     pub model: WearModel,
     /// Share of the variance that it explains.
     pub r2: f64,
-    /// The criterion, mm.
+    /// Flank wear at which an edge is worn, mm.
     pub criterion_mm: f64,
     /// The limit at the middle and at the corners of speed, feed and depth.
     pub places: Vec<DesignPoint>,
@@ -117,7 +117,7 @@ fn list_design_points(model: &WearModel, criterion_mm: f64) -> Vec<DesignPoint> 
 }
 
 impl LearnedWear {
-    /// For programs.
+    /// All of it as JSON, for programs.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let surface = self.surface.as_ref().map_or_else(refusal_to_json, |fit| {

@@ -67,7 +67,7 @@ struct SavedWear {
 /// The model in use, and what spoke for it.
 #[derive(Debug, Clone)]
 pub struct ModelInUse {
-    /// The model.
+    /// The model and what it is for.
     pub record: Arc<WearRecord>,
     /// What of its key spoke for it: see [`super::ChosenModel`].
     pub by: &'static str,

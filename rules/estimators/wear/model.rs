@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "form", rename_all = "snake_case")]
 pub enum WearModel {
-    /// Second-order response surface.
+    /// A second-order response surface over the four conditions.
     Surface(Surface),
-    /// Physical form.
+    /// The form that mechanics suggests, see [`Physical`].
     Physical(Physical),
 }
 

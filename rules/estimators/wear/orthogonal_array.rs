@@ -45,7 +45,7 @@ impl Array {
     /// Every array, from the smallest.
     pub const ALL: [Self; 7] = [Self::L4, Self::L8, Self::L9, Self::L12, Self::L16, Self::L18, Self::L27];
 
-    /// The name: `L27`.
+    /// The usual name, as `L27` for 27 runs.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -15,7 +15,7 @@ const HALVINGS: usize = 40;
 /// Wear and rate of an edge with their covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Known {
-    /// mm.
+    /// Flank wear, mm.
     pub(super) wear: f64,
     /// Millimetres per metre that slides along the edge.
     pub(super) rate: f64,

@@ -39,7 +39,7 @@ pub struct Physical {
     pub covariance: Vec<Vec<f64>>,
     /// Standard deviation of one cut about the law, W.
     pub residual_sd_w: f64,
-    /// Cuts less numbers.
+    /// Cuts less fitted numbers.
     pub degrees_of_freedom: f64,
     /// What it was fitted on.
     pub range: Range,
@@ -93,7 +93,7 @@ fn power_law(ratios: &[f64; 3], exponents: &[f64; 3]) -> f64 {
     ratios.iter().zip(exponents).map(|(ratio, exponent)| ratio.powf(*exponent)).product()
 }
 
-/// VB vc ap.
+/// The product VB vc ap, with which the friction of the worn flank goes.
 fn friction_term(conditions: &CutConditions) -> f64 {
     conditions.flank_wear_mm * conditions.cutting_speed_m_min * conditions.depth_of_cut_mm
 }
@@ -101,7 +101,7 @@ fn friction_term(conditions: &CutConditions) -> f64 {
 /// A fitted form with what it takes to judge it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalFit {
-    /// The form.
+    /// The fitted form, as a model holds it.
     pub physical: Physical,
     /// Its five numbers (those that were fitted) as the last linearisation gives them: values, errors, intervals.
     pub coefficients: Vec<FittedNumber>,
@@ -122,9 +122,9 @@ pub struct PhysicalFit {
 pub struct FittedNumber {
     /// Name, ending in the unit.
     pub name: &'static str,
-    /// The value.
+    /// The fitted value, in the unit that the name ends in.
     pub value: f64,
-    /// Standard error.
+    /// Standard error of the value, in the same unit.
     pub standard_error: f64,
     /// Ends of the 95 % interval.
     pub interval: (f64, f64),

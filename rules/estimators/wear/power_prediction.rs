@@ -5,7 +5,7 @@ use crate::regression::{CONFIDENCE, t_quantile};
 /// A power with what is known of its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Predicted {
-    /// Cutting power, W.
+    /// Cutting power that the model expects, W.
     pub power_w: f64,
     /// Standard error of the law there, W; 0 where it is not known.
     pub law_sd_w: f64,

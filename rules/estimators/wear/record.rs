@@ -13,7 +13,7 @@ pub struct WearKey {
     pub machine: String,
     /// Tool, as the controller or the recipe names it.
     pub tool: String,
-    /// Work material.
+    /// Work material, as the recipe names it.
     pub work_material: String,
     /// Operation, as the recipe names it.
     pub operation: String,
@@ -22,7 +22,7 @@ pub struct WearKey {
 /// A model, what it is for, and where it comes from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WearRecord {
-    /// `wear/1`.
+    /// `wear/1`; a file with another one is refused.
     pub schema: String,
     /// What it is for.
     #[serde(flatten)]
@@ -31,11 +31,11 @@ pub struct WearRecord {
     pub criterion_mm: f64,
     /// Where the cuts came from.
     pub origin: String,
-    /// How many cuts.
+    /// How many cuts the model was fitted to.
     pub cuts: usize,
     /// Share of the variance explained.
     pub r2: f64,
-    /// The model.
+    /// The fitted surface or physical form.
     pub model: WearModel,
 }
 

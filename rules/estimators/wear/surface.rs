@@ -13,13 +13,13 @@ pub struct Surface {
     pub coding: Coding,
     /// The terms, the constant first.
     pub terms: Vec<WearTerm>,
-    /// Coefficients, W.
+    /// One coefficient per term, W.
     pub coefficients_w: Vec<f64>,
     /// Covariance of the coefficients, W^2; empty where none is known.
     pub covariance_w2: Vec<Vec<f64>>,
     /// Standard deviation of one cut about the surface, W.
     pub residual_sd_w: f64,
-    /// Cuts less coefficients.
+    /// Cuts less coefficients of the fit.
     pub degrees_of_freedom: f64,
     /// What the surface was fitted on.
     pub range: Range,

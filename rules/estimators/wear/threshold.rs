@@ -42,7 +42,7 @@ impl Observability {
 pub struct PowerLimit {
     /// Criterion of the flank wear, mm.
     pub criterion_mm: f64,
-    /// `[Pc]`, W.
+    /// Cutting power `[Pc]` of this cut with an edge worn to the criterion, W.
     pub power_w: f64,
     /// Standard deviation of a single cut with an edge worn to the criterion, W.
     pub sd_w: f64,

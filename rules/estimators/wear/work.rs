@@ -25,7 +25,7 @@ const SPEED_M_S: f64 = 2.5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WorkReference {
-    /// The learned model.
+    /// The learned wear model for this cut.
     Model,
     /// Typical numbers for this depth, feed and speed.
     Typical,
@@ -38,11 +38,11 @@ pub enum WorkReference {
 pub struct CutMoment {
     /// Cutting power and its standard deviation, W.
     pub power_w: (f64, f64),
-    /// Spindle speed, rpm.
+    /// Spindle speed, rpm; `None` where it is not known.
     pub speed_rpm: Option<f64>,
     /// Feed along the path, mm/min.
     pub feed_mm_min: Option<f64>,
-    /// Depth, mm.
+    /// Depth of cut, mm; `None` where no recipe tells it.
     pub depth_mm: Option<f64>,
     /// Diameter of work or tool, mm.
     pub diameter_mm: Option<f64>,
@@ -140,7 +140,7 @@ pub struct WorkKey {
     pub reference: WorkReference,
     /// Tool, without its edge.
     pub tool: String,
-    /// NC program.
+    /// NC program, as the controller names it.
     pub program: String,
     /// Operation, empty where none is named.
     pub operation: String,
@@ -160,13 +160,13 @@ impl WorkKey {
 /// The work of one edge in one part, with one reference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EdgeWork {
-    /// Whose.
+    /// Whose work it is and what it is compared with.
     pub key: WorkKey,
     /// The edge, as the controller names it.
     pub edge: String,
     /// Flank wear at which it is worn, mm.
     pub criterion_mm: f64,
-    /// Seconds of cutting.
+    /// Time in the cut, s.
     pub seconds: f64,
     /// Length of the cut path, mm.
     pub path_mm: f64,
@@ -181,7 +181,7 @@ pub struct EdgeWork {
 }
 
 impl EdgeWork {
-    /// Nothing yet.
+    /// The work of an edge before its first cut: every sum is zero.
     #[must_use]
     pub fn new(key: WorkKey, edge: String, criterion_mm: f64) -> Self {
         Self {

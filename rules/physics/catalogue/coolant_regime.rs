@@ -104,7 +104,6 @@ const FADING: &str = "fading";
 const ARRIVING: &str = "arriving";
 /// Time constants to start from, s, and the shortest that rows can tell, in sampling periods.
 const ARRIVING_S: [f64; 3] = [0.3, 1.0, 4.0];
-/// See [`ARRIVING_S`].
 const ARRIVING_PERIODS: f64 = 0.4;
 /// Share of the usual cutting speed below which coolant does no more.
 const SLOW_SHARE: f64 = 0.1;

@@ -135,7 +135,6 @@ const SETTLING_PERIODS: f64 = 8.0;
 
 /// Names of the lengths of entry and exit, as times and as ways.
 const TIMES: [&str; 2] = ["length_s", "exit_length_s"];
-/// See [`TIMES`].
 const WAYS: [&str; 2] = ["length_mm", "exit_length_mm"];
 
 /// Forms of this name with an entry of this length, and an exit half as long and as long.

@@ -5,7 +5,7 @@ use super::Effect;
 macro_rules! catalogue {
     ($($module:ident :: $effect:ident),* $(,)?) => {
         $(pub mod $module;)*
-        /// Every effect.
+        /// Every effect, in the order in which `effects` lists them.
         pub static CATALOGUE: &[&dyn Effect] = &[$(&$module::$effect),*];
     };
 }

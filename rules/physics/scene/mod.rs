@@ -16,7 +16,7 @@ pub const PAUSE_PERIODS: f64 = 10.0;
 /// The parts that columns play for the effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// Spindle speed, rpm.
+    /// Speed of the spindle, rpm.
     Speed,
     /// Acceleration of an axis or drive.
     Acceleration,
@@ -32,14 +32,14 @@ pub enum Role {
     Temperature,
     /// Temperature of the shop, degrees Celsius.
     Ambient,
-    /// Supply voltage, V.
+    /// Voltage of the supply, V.
     Voltage,
     /// Position of the axis that moves against gravity, or the word that names the axis.
     Vertical,
 }
 
 impl Role {
-    /// Every role.
+    /// Every role, for tables of words.
     pub const ALL: [Self; 10] = [
         Self::Speed,
         Self::Acceleration,
@@ -103,7 +103,7 @@ pub enum OutputKind {
     Force,
     /// Displacement of the tool against the work.
     Displacement,
-    /// Anything else.
+    /// Any other quantity, temperature and position among them.
     Other,
 }
 
@@ -128,7 +128,7 @@ pub enum SceneError {
     NoOutput {
         /// The output named by the model.
         output: String,
-        /// What to do.
+        /// What to do, as one sentence.
         hint: String,
     },
 }
@@ -270,7 +270,7 @@ impl Scene {
         passes
     }
 
-    /// How many rows.
+    /// Number of rows; every column has as many values.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows

@@ -10,7 +10,6 @@ use std::ops::Range;
 
 /// At most so many settings in one script.
 const SETTINGS_MAX: usize = 48;
-/// Longest name.
 const NAME_MAX: usize = 48;
 const KEYS: [&str; 8] = ["unit", "min", "max", "whole", "one_of", "per", "en", "zh"];
 const EXAMPLE: &str =

@@ -72,7 +72,7 @@ pub enum Per {
 }
 
 impl Per {
-    /// Both.
+    /// Every kind of place, for tables of words.
     pub const ALL: [Self; 2] = [Self::Tool, Self::Operation];
 
     /// The word in declarations and in the file of values; also the name of the channel.
@@ -85,7 +85,7 @@ impl Per {
     }
 }
 
-/// One declared setting.
+/// A setting that a script declares at its top.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Declared {
     /// File of the script, `constant_load.rhai`.

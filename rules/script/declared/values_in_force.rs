@@ -7,7 +7,6 @@ use rhai::Dynamic;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// See the [module](self).
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Force {
     /// The value of each declaration as it stands in the text; `None` where it is looked up.

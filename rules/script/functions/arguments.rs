@@ -140,7 +140,7 @@ fn read_row(value: &Dynamic) -> Option<Vec<f64>> {
 pub enum MethodResult {
     /// A number in the unit of the method's name.
     Number(f64),
-    /// Yes or no.
+    /// Yes or no, a boolean in the script.
     Flag(bool),
     /// Several numbers by name; each name ends in its unit.
     Map(Vec<(&'static str, f64)>),

@@ -57,11 +57,11 @@ impl Method {
 
 /// Methods that belong together.
 pub struct Subject {
-    /// Heading, in English.
+    /// Heading of the subject in English.
     pub en: &'static str,
-    /// Heading, in Chinese.
+    /// Heading of the subject in Chinese.
     pub zh: &'static str,
-    /// The methods.
+    /// The methods of the subject.
     pub methods: &'static [Method],
 }
 

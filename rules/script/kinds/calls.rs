@@ -170,7 +170,7 @@ pub(crate) struct AlarmNames {
 }
 
 impl AlarmNames {
-    /// Takes a call.
+    /// Notes the alarm that a call raises, clears or expects.
     pub(crate) fn add(&mut self, call: &FnCallExpr) {
         let raises = ["alarm", "raise_alarm", "alarm_when", "alarm_above", "alarm_below"].contains(&call.name.as_str());
         let uses = ["clear_alarm", "expect_alarm", "expect_no_alarm"].contains(&call.name.as_str());

@@ -122,7 +122,7 @@ fn infer_word_kind(name: &str, like: LikeWords<'_>) -> ExpressionKind<'static> {
     }
 }
 
-/// `sample.x`, `age_s.x`, `missing.x`.
+/// Kind of a field of a record: `sample.x`, `age_s.x`, `missing.x`.
 fn infer_field_kind(left: &Expr, right: &Expr) -> ExpressionKind<'static> {
     let (Expr::Variable(record, ..), Expr::Property(property, _)) = (left, right) else {
         return ExpressionKind::Unknown;

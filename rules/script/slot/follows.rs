@@ -6,7 +6,6 @@ use crate::vocabulary::{View, Word, WordValue};
 use rhai::ImmutableString;
 use std::sync::Arc;
 
-/// See the [module](self).
 #[derive(Default)]
 pub(super) struct Follows {
     word: Option<(&'static Word, Arc<str>)>,

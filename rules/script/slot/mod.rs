@@ -53,7 +53,6 @@ struct Previous {
     script_memory: ScriptMemory,
 }
 
-/// One active script.
 pub(super) struct Slot {
     script: Arc<Script>,
     previous: Option<Previous>,

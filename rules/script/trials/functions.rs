@@ -50,7 +50,6 @@ pub const TRIAL_FUNCTIONS: &[Function] = &[
 type TrialText = ImmutableString;
 type Expectation = Result<(), String>;
 
-/// Makes them callable.
 pub(super) fn register_trial_functions(engine: &mut Engine, theatre: &Theatre) {
     register_time(engine, theatre);
     register_overrides(engine, theatre);

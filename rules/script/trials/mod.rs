@@ -52,7 +52,7 @@ pub(super) struct Trial {
 /// How a trial went.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrialResult {
-    /// The file.
+    /// File name of the script that holds the trial.
     pub file: Arc<str>,
     /// Its name in words: `a heavy cut is slowed down`.
     pub name: String,

@@ -43,7 +43,6 @@ impl Theatre {
     }
 }
 
-/// See the [module](self).
 pub(super) struct TrialContext {
     host: Host,
     sample: Sample,
@@ -57,7 +56,6 @@ pub(super) struct TrialContext {
     /// Stops asked for since time last began to pass.
     stops: Vec<Stop>,
     notes: Vec<Arc<str>>,
-    /// Expectations met.
     pub(super) met: usize,
     /// The script failed; where and why.
     pub(super) failure: Option<ScriptProblem>,

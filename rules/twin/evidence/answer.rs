@@ -31,7 +31,6 @@ pub(super) struct Withdrawn {
     pub(super) errors: Option<(f64, f64)>,
 }
 
-/// The answer.
 #[derive(Debug)]
 pub(super) struct EvidenceAnswer {
     pub(super) verdict: Verdict,
@@ -55,7 +54,6 @@ pub(super) struct EvidenceAnswer {
     pub(super) drawn_over: Option<String>,
     /// Number of the likeliest noise.
     pub(super) noise: usize,
-    /// For engineers.
     pub(super) debug: String,
 }
 

@@ -38,7 +38,6 @@ pub(super) struct Inner<'a> {
 }
 
 impl<'a> Inner<'a> {
-    /// Prepares a hypothesis.
     pub(super) fn new(
         inputs: &'a RecordingInputs<'a>,
         comparison: &'a Comparison<'a>,

@@ -15,7 +15,6 @@ const GAP_PERIODS: f64 = 6.0;
 /// The inputs of a recording; columns are full length, absent inputs are `None`.
 pub(super) struct RecordingInputs<'a> {
     pub(super) scene: &'a Scene,
-    /// Number of rows.
     pub(super) rows: usize,
     pub(super) period_s: f64,
     /// Seconds on a clock that never restarts.
@@ -32,7 +31,6 @@ pub(super) struct RecordingInputs<'a> {
     pub(super) fitted: Vec<bool>,
     /// Comparable rows that are held out.
     pub(super) held_out: Vec<bool>,
-    /// The refitted simulation.
     pub(super) simulated: Vec<f64>,
     /// Share of the tool in the work; `None` where nothing is cut.
     pub(super) engaged: Option<Vec<f64>>,
@@ -59,7 +57,6 @@ pub(super) struct RecordingInputs<'a> {
     pub(super) knows_cut: bool,
     /// Edge of each row, by number; zero where nobody tells.
     pub(super) edge: Vec<usize>,
-    /// How many edges.
     pub(super) edges: usize,
     /// Minutes that each edge has been in the cut.
     pub(super) edge_age_min: Vec<f64>,

@@ -42,7 +42,6 @@ fn mirror_upper_triangle(gram: &mut Array2<f64>) {
     }
 }
 
-/// A Cholesky factor.
 pub(super) struct CholeskyFactor {
     lower: Array2<f64>,
 }
@@ -93,7 +92,7 @@ impl CholeskyFactor {
         x
     }
 
-    /// `b' matrix^-1 b`.
+    /// The number `b' matrix^-1 b`.
     pub(super) fn compute_quadratic_form(&self, b: &Array1<f64>) -> f64 {
         let mut x = b.clone();
         let mut sum = 0.0;

@@ -62,7 +62,6 @@ struct CurveRegression {
 }
 
 impl<'a> Naming<'a> {
-    /// In these metrics.
     pub(super) fn new(comparison: &Comparison<'a>, grams: &[&Gram]) -> Self {
         let bank = comparison.bank;
         let fixed: Vec<usize> = (0..comparison.tangents).collect();

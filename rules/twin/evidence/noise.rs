@@ -26,7 +26,6 @@ pub(super) struct NoiseModel {
 }
 
 impl NoiseModel {
-    /// Noise without memory.
     pub(super) const WHITE: Self = Self { share: 0.0, phi: 0.0, theta: 0.0, variance: 1.0 };
 
     /// The innovations form of this share with this correlation from row to row.

@@ -32,7 +32,6 @@ pub(super) struct Outliers {
     pub(super) left: Vec<f64>,
 }
 
-/// Judges every row.
 pub(super) fn detect_outliers(inputs: &RecordingInputs<'_>, bank: &VariantBank, tangents: &[Vec<f64>]) -> Outliers {
     let recorded = inputs.scene.recorded_output();
     let residual = inputs.build_column(|row| recorded[row] - inputs.simulated[row]);

@@ -57,7 +57,6 @@ impl Comparison<'_> {
 }
 
 impl NoiseSetting {
-    /// Prepares a noise.
     pub(super) fn new(comparison: &Comparison<'_>, gram: Gram, saturated: Saturated) -> Self {
         let (ground, ln) = comparison.prepare_baseline(&gram, saturated);
         Self { gram, saturated, ground, ln }

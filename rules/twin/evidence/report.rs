@@ -38,7 +38,6 @@ pub(super) struct EvidenceReport<'a, 'm> {
     pub(super) baseline: &'a Fit,
     pub(super) answer: EvidenceAnswer,
     pub(super) comparison: &'a Comparison<'a>,
-    /// The likeliest noise.
     pub(super) noise: NoiseModel,
     /// The recorded output with outliers cut.
     pub(super) recorded: &'a [f64],
@@ -47,7 +46,6 @@ pub(super) struct EvidenceReport<'a, 'm> {
 }
 
 impl EvidenceReport<'_, '_> {
-    /// The diagnosis.
     pub(super) fn into_diagnosis(mut self) -> Diagnosis {
         let fits = self.compare_fits();
         let mut textbook = self.fit_textbook_laws(&[]);

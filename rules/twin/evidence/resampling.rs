@@ -33,7 +33,6 @@ pub(super) struct Candidate<'a> {
     pub(super) set: usize,
     /// Number of the noise.
     pub(super) noise: usize,
-    /// Its members.
     pub(super) members: &'a Members,
 }
 

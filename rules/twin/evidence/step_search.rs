@@ -14,7 +14,6 @@ const NATS_MIN: f64 = 3.0;
 /// Where a level begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Step {
-    /// The row.
     pub(super) row: usize,
     /// Logarithm of the number of rows that were tried.
     pub(super) ln_choices: f64,

@@ -80,7 +80,6 @@ pub(super) struct Thresholds {
     pub(super) beside: f64,
 }
 
-/// The table.
 pub(super) const THRESHOLDS: Thresholds = Thresholds {
     chance_max: 0.01,
     nothing_max: 0.2,

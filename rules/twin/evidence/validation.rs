@@ -44,7 +44,6 @@ struct Prediction {
 }
 
 impl Judge<'_> {
-    /// The answer.
     pub(super) fn decide_answer(&self, all: &[Explanation]) -> EvidenceAnswer {
         let groups = group_by_names(all);
         let nothing = groups.iter().find(|group| group.names.is_empty()).map_or(-60.0, |group| group.ln);

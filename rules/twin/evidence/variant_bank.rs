@@ -95,7 +95,6 @@ impl Family {
 /// What a nameless variant is drawn over.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Drawn {
-    /// The channel.
     pub(super) over: String,
     /// What multiplies the curve.
     pub(super) times: &'static str,
@@ -138,9 +137,7 @@ pub(super) struct Variant {
 /// Where a step begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Since {
-    /// With this run.
     Run(usize),
-    /// At this row.
     Row(usize),
 }
 

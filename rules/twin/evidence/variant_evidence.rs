@@ -9,7 +9,6 @@ use numerics::statistics::{count_to_f64, normal_share};
 /// A variant with what its evidence needs for any output.
 pub(super) struct AskedVariant {
     variant: usize,
-    /// Its first column.
     start: usize,
     sizes: Vec<AskedSize>,
 }

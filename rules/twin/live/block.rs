@@ -15,11 +15,11 @@ const TRIMMED: usize = 3;
 /// One second of settled work.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SettledSecond {
-    /// When, s.
+    /// Time of the second, s.
     pub at_s: f64,
-    /// Simulated output.
+    /// What the model gives, in the unit of the output.
     pub expected: f64,
-    /// Recorded minus simulated.
+    /// Recorded minus simulated, in the unit of the output.
     pub residual: f64,
 }
 

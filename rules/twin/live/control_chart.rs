@@ -78,7 +78,7 @@ pub struct Point {
     pub deviation: f64,
     /// The same in the unit of the output.
     pub difference: f64,
-    /// Simulated output.
+    /// Simulated output, in the unit of the output.
     pub expected: f64,
 }
 
@@ -89,7 +89,6 @@ struct CandidateOnset {
     low_s: f64,
     /// The first block after the change.
     from_s: f64,
-    /// See `from_s`.
     to_s: f64,
     /// Present value of the signature.
     signature: f64,
@@ -97,7 +96,6 @@ struct CandidateOnset {
     sum: f64,
     /// Sum of the signature, and of its squares.
     length: f64,
-    /// See `length`.
     weight: f64,
     /// Sums of differences and of simulated outputs, and how many.
     difference: f64,

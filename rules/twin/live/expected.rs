@@ -63,7 +63,7 @@ impl fmt::Display for NoTwin {
 pub struct ComparedSecond {
     /// What the model expects.
     pub expected: Result<f64, NoTwin>,
-    /// Recorded minus expected.
+    /// Recorded minus expected, or why there is none.
     pub residual: Result<f64, NoTwin>,
 }
 

@@ -27,11 +27,11 @@ const BAND_SHARE: f64 = 0.02;
 pub struct WorkBlock {
     /// When it began and ended, s.
     pub from_s: f64,
-    /// See `from_s`.
+    /// When it ended, on the same clock, s.
     pub to_s: f64,
-    /// Recorded minus simulated.
+    /// Recorded minus simulated over the block, in the unit of the output.
     pub residual: f64,
-    /// Simulated.
+    /// Simulated output over the block.
     pub expected: f64,
     /// Which kind of work.
     pub work: usize,
@@ -46,9 +46,9 @@ pub struct Learned {
     pub usual: BTreeMap<usize, Usual>,
     /// Standard deviation that the work of the regime shares.
     pub shared: f64,
-    /// Mean residual.
+    /// Mean residual of the regime, in the unit of the output.
     pub bias: f64,
-    /// Mean simulated output.
+    /// Mean simulated output of the regime.
     pub expected: f64,
     /// From how many blocks.
     pub blocks: usize,
@@ -57,7 +57,7 @@ pub struct Learned {
 /// What is usual for a kind of work.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Usual {
-    /// Mean residual.
+    /// Mean residual of its blocks, in the unit of the output.
     pub mean: f64,
     /// Standard deviation of its blocks.
     pub sd: f64,

@@ -47,7 +47,7 @@ impl LiveState {
     }
 }
 
-/// See the [module](self).
+/// The running comparison of machine and model: takes samples, gives what is expected.
 #[derive(Debug, Clone)]
 pub struct Live {
     seconds: Seconds,

@@ -17,7 +17,7 @@ pub struct Arma {
 }
 
 impl Arma {
-    /// White noise.
+    /// Noise without memory: every row counts as one.
     pub const WHITE: Self = Self { phi: 0.0, theta: 0.0 };
 
     /// The nearest noise that is a slow process with white noise on top. What is smoother than a slow process is no noise

@@ -28,7 +28,7 @@ pub enum Regime {
 }
 
 impl Regime {
-    /// Every regime.
+    /// Every regime, for tables of words.
     pub const ALL: [Self; 4] = [Self::Standby, Self::Idle, Self::Cutting, Self::Moving];
 
     /// The word in JSON.
@@ -104,7 +104,7 @@ pub struct Settling<T> {
 type Held<T> = (Option<(Regime, String)>, f64, T);
 
 impl<T: Copy> Settling<T> {
-    /// Nothing seen yet.
+    /// No second is held yet.
     #[must_use]
     pub fn new() -> Self {
         Self { held: VecDeque::new() }

@@ -47,7 +47,7 @@ impl Row {
     }
 }
 
-/// Gathers ticks.
+/// Gathers the ticks of one second into a row.
 #[derive(Debug, Clone)]
 pub struct Seconds {
     output: Option<ChannelId>,

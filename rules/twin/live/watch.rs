@@ -25,14 +25,14 @@ pub enum Notice {
     Learned(Regime),
     /// Machine and simulation begin to differ.
     Begins(Mismatch),
-    /// They agree again.
+    /// Machine and simulation agree again.
     Ends(Regime),
 }
 
 /// A difference between machine and simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Mismatch {
-    /// Where.
+    /// The kind of work in which they differ.
     pub regime: Regime,
     /// Since when; `None`: ever since the comparison began.
     pub onset: Option<LevelChange>,
@@ -57,7 +57,7 @@ pub enum RegimeStage {
     Learning(usize, usize),
     /// Watching: differences up to this size, in the unit of the output, are usual.
     Watching(f64),
-    /// They differ.
+    /// Machine and simulation differ, as told.
     Differing(Mismatch),
 }
 
@@ -76,7 +76,6 @@ struct RegimeMemory {
     differing: Option<Mismatch>,
 }
 
-/// One regime.
 #[derive(Debug, Clone, Default)]
 struct Watched {
     /// While learning; afterwards blocks of work that is new.
@@ -86,7 +85,7 @@ struct Watched {
     mismatch: Option<Mismatch>,
 }
 
-/// See the [module](self).
+/// Learns what is usual in each regime, then watches it.
 #[derive(Debug, Clone)]
 pub struct Watch {
     settling: Settling<SettledSecond>,

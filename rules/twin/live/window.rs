@@ -24,11 +24,11 @@ const STEP_MAX_S: f64 = 3.0;
 /// How far back a model looks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LookBack {
-    /// Only the moment.
+    /// No further than the present moment.
     Moment,
-    /// The pass.
+    /// As long as a pass takes.
     Pass,
-    /// The shift: heat.
+    /// A whole shift: what warms up slowly.
     Shift,
 }
 
@@ -53,7 +53,7 @@ impl LookBack {
 /// Engaged minutes of each tool.
 pub type CuttingTimes = BTreeMap<String, (f64, TimeNs)>;
 
-/// See the [module](self).
+/// The seconds behind the present one that a model looks back at.
 #[derive(Debug, Clone)]
 pub struct Window {
     look_back: LookBack,
@@ -82,7 +82,7 @@ impl Window {
         first.zip(self.fine.back()).map_or(0.0, |(first, last)| ns_to_seconds(last.0.at_ns - first.0.at_ns))
     }
 
-    /// Appends a second.
+    /// Appends a second. The oldest are dropped; of a shift one of every half minute is kept.
     pub fn push(&mut self, row: Row) {
         let minutes = self.add_cutting_time(&row);
         self.fine.push_back((row, minutes));

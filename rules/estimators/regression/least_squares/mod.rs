@@ -21,14 +21,14 @@ const SAME: f64 = 1e-12;
 /// A named column of numbers; the name ends in the unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// What it is.
+    /// What it is; stands in coefficients and refusals.
     pub name: String,
     /// One number per row.
     pub values: Vec<f64>,
 }
 
 impl Column {
-    /// A column.
+    /// A column of this name; the values are checked by the fit.
     #[must_use]
     pub fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
         Self { name: name.into(), values }
@@ -49,9 +49,9 @@ pub enum Intercept {
 pub struct Coefficient {
     /// Name of the column; `intercept` for the constant.
     pub name: String,
-    /// The value.
+    /// Change of y per unit of the column; for the constant, y where every column is 0.
     pub value: f64,
-    /// Standard error.
+    /// Standard error of the value, in its unit.
     pub standard_error: f64,
     /// Ends of the 95 % interval.
     pub interval: (f64, f64),
@@ -66,9 +66,9 @@ pub struct Coefficient {
 pub struct Regression {
     /// Constant first where there is one, then the columns in their order.
     pub coefficients: Vec<Coefficient>,
-    /// Rows.
+    /// How many rows were fitted.
     pub rows: usize,
-    /// Rows less coefficients.
+    /// Rows less coefficients; at least 1.
     pub degrees_of_freedom: f64,
     /// Residual standard deviation, in the unit of y (per unit weight where rows are weighted).
     pub residual_sd: f64,
@@ -76,7 +76,7 @@ pub struct Regression {
     pub rss: f64,
     /// Sum of squares that the fit explains: about the mean with a constant, about zero without.
     pub explained: f64,
-    /// Share explained.
+    /// Share of the variation of y that the fit explains, at most 1; 0 where y does not vary.
     pub r2: f64,
     /// Share explained, with the number of coefficients taken into account.
     pub adjusted_r2: f64,
@@ -87,7 +87,7 @@ pub struct Regression {
     /// What the fit gives in each row.
     #[serde(skip)]
     pub fitted: Vec<f64>,
-    /// y less fitted.
+    /// y less fitted, row by row, in the unit of y.
     #[serde(skip)]
     pub residuals: Vec<f64>,
     /// Leverage of each row, 0 to 1.

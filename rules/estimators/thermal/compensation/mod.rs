@@ -50,9 +50,9 @@ impl Default for CompensationSettings {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("compensation: {name} = {value}, but {need}")]
 pub struct CompensationSettingError {
-    /// Which setting.
+    /// Name of the field of [`CompensationSettings`].
     pub name: &'static str,
-    /// Its value.
+    /// The number given, in the unit of that field.
     pub value: f64,
     /// What it must be.
     pub need: &'static str,
@@ -86,7 +86,7 @@ impl CompensationSettings {
 /// Why the compensation does not follow a prediction now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Standing {
-    /// It follows.
+    /// Nothing stands in the way: the value follows the prediction.
     Follows,
     /// The prediction moved less than the dead band.
     DeadBand,

@@ -38,9 +38,9 @@ pub struct Grade {
 pub struct Grades {
     /// How the curves were made dimensionless.
     pub normalisation: Normalisation,
-    /// The resolution coefficient.
+    /// The resolution coefficient rho of every grade; usually [`RHO_USUAL`].
     pub rho: f64,
-    /// One per sensor.
+    /// One grade per sensor.
     pub grades: Vec<Grade>,
 }
 

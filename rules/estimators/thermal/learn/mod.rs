@@ -20,7 +20,7 @@ const LIKELIHOOD_MIN: f64 = 8.13;
 /// A fitted law and how it predicts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CandidateLaw {
-    /// Coefficients, memory, residuals.
+    /// Coefficients with intervals, memory of the noise, residuals.
     pub fit: ThermalFit,
     /// Error of blocks left out.
     pub held_out: HeldOut,
@@ -29,7 +29,7 @@ pub struct CandidateLaw {
     pub hysteresis_um: Option<f64>,
 }
 
-/// What was learned.
+/// Both laws that were tried, and which of them to use.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThermalLearned {
     /// The sensors of the law to use, and why.
@@ -41,11 +41,11 @@ pub struct ThermalLearned {
     pub with_lag: Result<CandidateLaw, Refusal>,
     /// Is the law with lag the one to use?
     pub lag_chosen: bool,
-    /// Why.
+    /// Why that law and not the other, in words.
     pub reason: String,
     /// Are the blocks that were left out whole runs?
     pub blocks_are_runs: bool,
-    /// How many blocks.
+    /// How many blocks were left out, one at a time.
     pub blocks: usize,
     /// Neighbouring rows that are averaged before errors of blocks left out are told.
     pub rows_averaged: usize,

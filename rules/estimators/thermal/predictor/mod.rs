@@ -67,11 +67,11 @@ impl fmt::Display for NoPrediction {
 /// What lies outside of what the law was learned from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outside {
-    /// One temperature.
+    /// One temperature lies outside what was seen during identification.
     Sensor {
         /// Position among the sensors.
         sensor: usize,
-        /// Its value, °C.
+        /// The temperature now, °C.
         temperature_c: f64,
         /// What was seen during identification, °C.
         range_c: (f64, f64),
@@ -123,7 +123,7 @@ impl ThermalPrediction {
 pub struct PredictedAndMeasured {
     /// The measured error, um, or why there is none.
     pub measured_um: Result<f64, Absence>,
-    /// The prediction.
+    /// What the law says at the same time.
     pub predicted: ThermalPrediction,
     /// Measured less predicted, um, with the deviation that is expected of it.
     pub residual_um: Result<Estimate, Absence>,
@@ -183,7 +183,7 @@ impl Predictor {
         if self.law.tau_s.is_some() { self.unsettled } else { 0.0 }
     }
 
-    /// The law.
+    /// The law that it predicts with.
     #[must_use]
     pub fn law(&self) -> &ThermalLaw {
         &self.law

@@ -18,7 +18,7 @@ const WAITING_MAX: i64 = 64;
 /// One edge that leaves the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SignalEdge {
-    /// When, in nanoseconds.
+    /// When it leaves, ns, on the clock of the edges that come in.
     pub at_ns: u64,
     /// The levels from then on.
     pub lines: Lines,
@@ -33,19 +33,19 @@ pub enum InsertionFault {
     /// More edges arrive than may leave.
     #[error("{waiting} encoder edges wait at {at_ns} ns: the axis is too fast for edges {spacing_ns} ns apart")]
     TooFast {
-        /// When.
+        /// When it was noticed, ns, on the clock of the edges that come in.
         at_ns: u64,
         /// How many edges wait.
         waiting: i64,
         /// The least time between two edges.
         spacing_ns: u64,
     },
-    /// Time went backwards.
+    /// A time earlier than one seen before.
     #[error("time went back from {before_ns} ns to {at_ns} ns")]
     TimeWentBack {
         /// The latest time seen.
         before_ns: u64,
-        /// The time given.
+        /// The time given, which is earlier, ns.
         at_ns: u64,
     },
 }

@@ -41,7 +41,7 @@ pub struct ThermalCoefficient {
 /// A fitted law with what it takes to believe it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThermalFit {
-    /// The law.
+    /// The law with its covariance, as a file holds it.
     #[serde(skip)]
     pub law: ThermalLaw,
     /// Coefficients with intervals that respect the memory of the residuals.
@@ -56,7 +56,7 @@ pub struct ThermalFit {
     pub adjusted_r2: f64,
     /// Belsley's condition number of the columns.
     pub condition_number: f64,
-    /// Rows.
+    /// How many rows were fitted.
     pub rows: usize,
     /// Measured less fitted, row by row, um.
     #[serde(skip)]

@@ -24,7 +24,7 @@ pub use verdict::SensorVerdict;
 /// What is asked of a selection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SelectionSettings {
-    /// Sensors at most.
+    /// How many sensors a law may have at most.
     pub sensors_max: usize,
     /// Greatest variance inflation factor.
     pub inflation_max: f64,

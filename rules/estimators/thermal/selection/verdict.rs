@@ -10,11 +10,11 @@ use serde::Serialize;
 /// One sensor and why it is in or out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensorVerdict {
-    /// Channel.
+    /// Name of the sensor's channel.
     pub sensor: String,
-    /// In or out.
+    /// Is it one of the sensors to use?
     pub chosen: bool,
-    /// Why.
+    /// Why it is in or out, in words.
     pub reason: String,
     /// Correlation with the error; none where the sensor cannot be used.
     pub correlation: Option<f64>,

@@ -12,7 +12,6 @@ const EDGES_MAX: usize = 12;
 const RATE: f64 = 0.4;
 const STATE: f64 = 0.15;
 
-/// The family.
 pub(super) fn add_variants(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(cut) = inputs.cut.as_ref().filter(|_| inputs.engaged.is_some()) else { return };
     if inputs.kind == OutputKind::Displacement {
