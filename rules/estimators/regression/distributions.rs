@@ -132,8 +132,9 @@ mod tests {
         }
         for (df1, df2, expected) in [(1.0, 1.0, 161.448), (2.0, 10.0, 4.103), (5.0, 18.0, 2.773), (10.0, 100.0, 1.927)]
         {
+            // The table has three decimals: half of the last one is up to 7e-5 of probability.
             let p = f_upper_tail(expected, df1, df2);
-            assert!((p - 0.05).abs() < 2e-5, "{df1} {df2}: {p}");
+            assert!((p - 0.05).abs() < 7e-5, "{df1} {df2}: {p}");
         }
         assert!((t_quantile(0.975, 1e7) - 1.959_964).abs() < 1e-5, "the normal distribution");
     }
