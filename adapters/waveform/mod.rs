@@ -17,32 +17,32 @@
 //! |---|---|
 //! | `frame` | the stream, both directions |
 //! | `receiver` | a connection to a stream with its deadline |
-//! | `sampled` | a controller's own sampling (NC-Link, HNC) as the same blocks |
+//! | `control_sampler` | a controller's own sampling (NC-Link, HNC) as the same blocks |
 //! | `intake` | what every stream goes through: gaps, clipping, clock, counts |
 //! | `timebase` | the sampler's clock on the gateway's |
 //! | `producer` | the other side: serves blocks from anything that samples |
 //! | `iio` | a Linux IIO device as a sampler |
-//! | `recorded` | a file of samples as a sampler |
-//! | `simulated` | the built-in machine's spindle current as a sampler |
+//! | `file_sampler` | a file of samples as a sampler |
+//! | `machine_sampler` | the built-in machine's spindle current as a sampler |
 //!
 //! Limits: 8 channels, 4096 samples per frame, 1 MHz; 4 listeners.
 
+mod control_sampler;
+mod file_sampler;
 mod frame;
 mod iio;
 mod intake;
+mod machine_sampler;
 mod producer;
 mod receiver;
-mod recorded;
-mod sampled;
-mod simulated;
 mod timebase;
 
+pub use control_sampler::SampledCurrent;
+pub use file_sampler::Recorded;
 pub use frame::{AMPLITUDE, FrameError, WaveformFrame, WaveformHeader};
 pub use iio::Iio;
 pub use intake::{Block, Counts, Intake};
+pub use machine_sampler::SimulatedCurrent;
 pub use producer::{Producer, Sampler};
 pub use receiver::Receiver;
-pub use recorded::Recorded;
-pub use sampled::SampledCurrent;
-pub use simulated::SimulatedCurrent;
 pub use timebase::TimeBase;

@@ -14,26 +14,26 @@
 //! | `rows` | from stored columns to samples |
 //! | `race` | both sets side by side, what they have in common once |
 //! | `lane` | what one set did |
-//! | `recorded` | the alarms that were raised then, as the history has them |
+//! | `history_alarms` | the alarms that were raised then, as the history has them |
 //! | `compare` | alarms and stops that one side has and the other has not |
 //! | `report` | the answer in words and as JSON |
 
 mod compare;
+mod history_alarms;
 mod lane;
 mod race;
-mod recorded;
 mod report;
 mod rows;
 
 pub use compare::{Evidence, Spell, SpellDifference, SpellKind};
+pub use history_alarms::{Other, Recorded};
 pub use lane::{Lane, RequestTotals};
-pub use recorded::{Other, Recorded};
 pub use report::BacktestReport;
 
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use compare::Sides;
 use gateway_history::{HistoryError, Query, Reader};
-use recorded::Concerned;
+use history_alarms::Concerned;
 use rows::ChunkRows;
 use rules::script::ScriptSet;
 use std::ops::ControlFlow;
@@ -83,7 +83,7 @@ pub fn run_backtest(plan: BacktestPlan) -> Result<BacktestReport, HistoryError> 
     })?;
     let span = raced.first_ns.zip(raced.last_ns);
     let recorded =
-        span.map(|(first_ns, last_ns)| recorded::read(&reader, &concerned, first_ns, last_ns)).transpose()?;
+        span.map(|(first_ns, last_ns)| history_alarms::read(&reader, &concerned, first_ns, last_ns)).transpose()?;
     let recorded = recorded.unwrap_or_default();
     Ok(BacktestReport {
         history,

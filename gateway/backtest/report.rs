@@ -1,8 +1,8 @@
 //! What a backtest found, in words and as JSON (`backtest/1`).
 
 use super::compare::{Evidence, Spell, SpellDifference};
+use super::history_alarms::Recorded;
 use super::lane::{Lane, RequestTotals};
-use super::recorded::Recorded;
 use super::to_seconds;
 use gateway_base::moment::format_utc;
 use rules::script::ScriptProblem;

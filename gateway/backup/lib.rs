@@ -9,13 +9,13 @@
 //! configuration is not put back: it says which machine is polled, and a restart with the wrong one would poll another.
 
 pub mod archive;
+mod handover;
 pub mod list;
 mod restore;
-mod restored;
 mod schedule;
 
+pub use handover::install_waiting_files as take_restored;
 pub use restore::{RestoreError, RestoreRequest, restore_backup};
-pub use restored::install_waiting_files as take_restored;
 pub use schedule::{BackupError, BackupSchedule, take_backup};
 
 use crate::archive::ArchivedFile;

@@ -1,7 +1,7 @@
 //! A backup comes back: everything in it is checked, what is there now is kept, and then all of it takes its place.
 
 use super::list::{Fate, of_name};
-use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, configured_files, is_of_scripts, list_names, restored};
+use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, configured_files, handover, is_of_scripts, list_names};
 use crate::archive::ArchivedFile;
 use adapter_core::clock::TimeNs;
 use gateway_base::files::{keep_last, replace_durably, replace_file};
@@ -134,7 +134,7 @@ pub fn restore_backup(
         replace_durably(&path, &settings::sign_text(body, ask.by)).map_err(RestoreError::of_file(&path))?;
     }
     let models = store_wear_models(&places.history, &found.wear, ask.at_ns)?;
-    restored::lay_ready(&places.data_dir, &found.later)?;
+    handover::lay_ready(&places.data_dir, &found.later)?;
     Ok(found.describe_restore(models, ask.before.1))
 }
 
@@ -190,7 +190,7 @@ impl Found {
             ThermalModel::read(model, &places.machine).map_err(RestoreError::ThermalModel)?;
         }
         for (name, text) in self.later.iter().filter(|(name, _)| name.ends_with(".json")) {
-            if gateway_base::learned::state_of(text).is_none() {
+            if gateway_base::state_file::state_of(text).is_none() {
                 return Err(RestoreError::Changed { name: name.clone() });
             }
         }

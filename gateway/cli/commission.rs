@@ -9,7 +9,7 @@ use crate::commission::plan::{self, Limits, Which};
 use crate::config::Config;
 use crate::diagnosis::write_output;
 use crate::history::{Reader, store_wear_model};
-use crate::{clock, identified, moment};
+use crate::{clock, identification, moment};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -174,7 +174,7 @@ fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
         written.push(format!("wear model {id} in {}", config.history.path.display()));
     }
     for (subject, found) in &learned.found {
-        let path = identified::save_answer(&config.gateway.data_dir, subject, found);
+        let path = identification::save_answer(&config.gateway.data_dir, subject, found);
         written.push(path.map_err(CannotRun::from_error)?.display().to_string());
     }
     written.push(config.gateway.data_dir.join("commission.html").display().to_string());

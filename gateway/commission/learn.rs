@@ -2,7 +2,7 @@
 
 use super::columns::{self, Merged};
 use super::picture::{Dot, Picture};
-use crate::identified::{self, THERMAL, TOOL_WEAR};
+use crate::identification::{self, THERMAL, TOOL_WEAR};
 use gateway_history::STATE_SERIES;
 use recording::{Cells, Numbers, Recording};
 use rules::estimators::power_separation::{
@@ -206,7 +206,7 @@ impl Learned {
             180.0,
         );
         let Ok((learned, left_out)) = found else { return };
-        self.found.push((THERMAL, identified::of_thermal(&learned, &left_out)));
+        self.found.push((THERMAL, identification::of_thermal(&learned, &left_out)));
         self.thermal = Some(ThermalModel::new(machine.to_owned(), learned.best_candidate().fit.law.clone()));
     }
 }

@@ -15,7 +15,7 @@
 
 pub mod annotations;
 pub mod columns;
-pub mod identified;
+pub mod identification;
 pub mod learn;
 pub mod picture;
 pub mod plan;

@@ -1,11 +1,11 @@
 //! The one table of configuration keys: what is read, refused, suggested, printed by `check --keys` and explained.
 
 use super::channel_keys;
+pub use super::key_list::{format_example, format_table};
 use super::keys_of_backup::BACKUP;
 use super::keys_of_gate::GATE;
 use super::keys_of_outputs::OUTPUTS;
 use super::keys_of_thermal::THERMAL;
-pub use super::shown::{format_example, format_table};
 
 /// Most letters of a name.
 pub const NAME_MAX: usize = 100;

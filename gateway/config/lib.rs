@@ -10,6 +10,7 @@ mod channel_keys;
 mod channels;
 mod check_value;
 mod in_force;
+mod key_list;
 pub mod keys;
 mod keys_of_backup;
 mod keys_of_gate;
@@ -18,7 +19,6 @@ mod keys_of_thermal;
 mod outputs;
 mod problem;
 mod read;
-mod shown;
 
 pub use in_force::InForce;
 pub use problem::Problem;

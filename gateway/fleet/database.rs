@@ -1,7 +1,7 @@
 //! PostgreSQL: the address, the connection, and what it says in words.
 
 use super::schema;
-use super::secured::{self, Securing};
+use super::tls_connection::{self, Securing};
 use adapters::tls::{TlsError, TlsFiles};
 use gateway_base::log::{Notice, Severity};
 use gateway_nats::NatsError;
@@ -123,7 +123,7 @@ fn is_here(config: &Config) -> bool {
 
 impl DatabaseSettings {
     fn parse_config(&self) -> Result<(Config, Option<TlsFiles>), NatsError> {
-        let (address, files) = secured::files_of(&self.address);
+        let (address, files) = tls_connection::files_of(&self.address);
         let mut config: Config = address.parse().map_err(|error: tokio_postgres::Error| {
             let cause = std::error::Error::source(&error).map_or(String::new(), |cause| format!(": {cause}"));
             NatsError::new(

@@ -13,7 +13,7 @@
 //! | `names` | the numbers of boxes and series, and machines that get another name |
 //! | `write` | a batch in one transaction |
 //! | `schema` | tables, their version, partitions; the SQL is in the folder `schema` |
-//! | `database`, `secured` | the connection, what it says in words, TLS |
+//! | `database`, `tls_connection` | the connection, what it says in words, TLS |
 //! | `ingest` | the loop |
 //! | `retention` | what is too old goes |
 //! | `questions` | what a shop asks, in SQL |
@@ -28,7 +28,7 @@ pub mod questions;
 pub mod retention;
 mod row;
 mod schema;
-mod secured;
+mod tls_connection;
 mod write;
 
 pub use database::DatabaseSettings;

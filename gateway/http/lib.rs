@@ -19,7 +19,7 @@ mod handbook;
 mod headers;
 mod history;
 mod host;
-mod identified;
+mod identification;
 mod live;
 mod maintenance;
 mod metrics;
@@ -198,7 +198,7 @@ const GROUPS: &[&[Route]] = &[
     uploaded_files::ROUTES,
     maintenance::ROUTES,
     configuration_file::ROUTES,
-    identified::ROUTES,
+    identification::ROUTES,
     operations::ROUTES,
     series::ROUTES,
     utilisation::ROUTES,

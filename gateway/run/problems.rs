@@ -4,14 +4,14 @@ use super::history_store::upkeep::{LOG_TOLD_BYTES, long_log};
 use adapters::clock::SECOND_NS;
 use gateway_access as access;
 use gateway_base::clock::{Trust, format_span};
-use gateway_base::learned;
+use gateway_base::state_file;
 use gateway_status::{ClockStatus, HistoryStatus, StatusProblem};
 use std::path::Path;
 
 /// What the disk has changed, and nobody has looked at yet. Reads the directory.
 pub(super) fn problems_of_disk(memory: &Path) -> Vec<StatusProblem> {
     let directory = memory.parent().unwrap_or(Path::new("."));
-    let mut problems = learned::list_damaged(directory);
+    let mut problems = state_file::list_damaged(directory);
     problems.extend(access::permission_problem(directory));
     problems
 }

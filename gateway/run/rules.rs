@@ -3,8 +3,8 @@
 use super::health::{Health, SCRIPTS_MEMORY};
 use super::tick::RunFlags;
 use adapters::clock::TimeNs;
-use gateway_base::learned;
 use gateway_base::log::{Notice, Severity};
+use gateway_base::state_file;
 use gateway_config::Config;
 use gateway_pipeline::Pipeline;
 use gateway_scripts::active_scripts;
@@ -61,7 +61,7 @@ pub fn load_scripts(config: &Config) -> (Host, ScriptWatch) {
 
 /// What the scripts remembered when the box last saved it.
 fn read_memory(config: &Config, told: &mut Vec<Notice>) -> Option<serde_json::Value> {
-    let state = learned::read(&config.gateway.data_dir.join(SCRIPTS_MEMORY), |notice| told.push(notice))?;
+    let state = state_file::read(&config.gateway.data_dir.join(SCRIPTS_MEMORY), |notice| told.push(notice))?;
     serde_json::from_str(&state).ok()
 }
 

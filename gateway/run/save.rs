@@ -1,7 +1,7 @@
 //! What the box has learned goes to disk beside the tick, so that a slow disk never delays a write to the machine.
 
 use gateway_base::files::replace_file;
-use gateway_base::learned;
+use gateway_base::state_file;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
@@ -21,7 +21,7 @@ struct SaveJob {
 impl SaveJob {
     fn write_file(&self) {
         let saved = if self.learned {
-            learned::save_state(&self.path, &self.text)
+            state_file::save_state(&self.path, &self.text)
         } else {
             replace_file(&self.path, &self.text)
         };
@@ -98,6 +98,6 @@ mod tests {
         saver.put_file(&path, "3".to_owned());
         assert_eq!(std::fs::read_to_string(&path).expect("written"), "3", "afterwards at once");
         saver.put_learned(&path, "4".to_owned());
-        assert_eq!(learned::read(&path, |_| {}).as_deref(), Some("4"));
+        assert_eq!(state_file::read(&path, |_| {}).as_deref(), Some("4"));
     }
 }

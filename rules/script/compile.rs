@@ -1,12 +1,12 @@
 //! From texts to a set of scripts that can run, or everything that is wrong with them.
 
-use super::compiled::{Script, ScriptSet};
 use super::declared::{self, DeclarationPlace as Where, Declared, Force, FoundDeclaration, LiveValues, SettingValues};
 use super::engine::{self, OPERATIONS_MAX, Shared, TEXT_MAX};
 use super::examine::{Findings, ScriptPlace, Walk};
 use super::handlers::{Called, find_called_functions};
 use super::order::{self, PublishedChannels};
 use super::problem::{self, ScriptProblem};
+use super::script_set::{Script, ScriptSet};
 use super::settings::{ChosenSetting, merge_settings, read_choices};
 use super::trials::prove_scripts;
 use super::variables::{self, ScriptBody};

@@ -1,13 +1,13 @@
 //! Runs the scripts, one tick at a time.
 
 use super::compile::{ScriptFile, compile_scripts};
-use super::compiled::ScriptSet;
 use super::deadline::{self, Deadline};
 use super::decision::{Alarm, AlarmChange, Decision, OverrideRequest, Published};
 use super::declared::{Declared, SettingValues};
 use super::engine::{Shared, build_engine};
 use super::events::Happenings;
 use super::problem::ScriptProblem;
+use super::script_set::ScriptSet;
 use super::settings::merge_settings;
 use super::slot::{Moment, Outputs, Slot};
 use super::status::{ScriptStatus, Status};

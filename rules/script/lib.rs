@@ -23,7 +23,7 @@
 //! | `functions` | the methods that scripts call by name, one table per subject |
 //! | `api` | everything of it as a document |
 //! | `declared` | the settings that scripts declare, and their values |
-//! | `compile`, `compiled`, `examine`, `kinds`, `handlers`, `settings` | from text to a script, and everything that is wrong with it |
+//! | `compile`, `script_set`, `examine`, `kinds`, `handlers`, `settings` | from text to a script, and everything that is wrong with it |
 //! | `order` | channels that one script reads of another, and the order of running |
 //! | `host`, `slot`, `variables`, `running`, `collect`, `notes` | running |
 //! | `timers`, `script_memory` | what a script remembers |
@@ -35,7 +35,6 @@ mod api;
 mod callable;
 mod collect;
 mod compile;
-mod compiled;
 mod deadline;
 mod decision;
 mod declared;
@@ -56,6 +55,7 @@ mod quantities;
 mod recipes;
 mod running;
 mod script_memory;
+mod script_set;
 mod settings;
 mod slot;
 mod status;
@@ -69,7 +69,6 @@ pub use callable::{FUNCTIONS, Function};
 pub use compile::{
     ScriptFile, compile_one, compile_scripts, compile_with, list_declarations, prepare_scripts, prepare_with,
 };
-pub use compiled::ScriptSet;
 pub use deadline::Deadline;
 pub use decision::{
     Alarm, AlarmChange, AlarmLevel, Axis, Decision, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED,
@@ -83,6 +82,7 @@ pub use fields::{RECORDS, Record};
 pub use host::Host;
 pub use problem::ScriptProblem;
 pub use recipes::{RECIPES, ScriptRecipe, find_recipe};
+pub use script_set::ScriptSet;
 pub use status::{ScriptCondition, ScriptStatus, Status};
 pub use trials::{TRIAL_FUNCTIONS, TrialResult, prove_scripts, run_trials};
 pub use vocabulary::{Word, WordKind, format_vocabulary, list_words};

@@ -5,9 +5,9 @@
 //! order and are refused.
 
 use super::compile::ScriptFile;
-use super::compiled::Script;
 use super::declared::scan::{find_calls, read_quoted};
 use super::problem::ScriptProblem;
+use super::script_set::Script;
 use rhai::Position;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

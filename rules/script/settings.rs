@@ -1,9 +1,9 @@
 //! The settings of the estimators, as scripts give them in `fn settings()`.
 
 use super::compile::{ScriptFile, position_of};
-use super::compiled::Script;
 use super::declared::DeclarationPlace;
 use super::problem::{ScriptProblem, describe_type};
+use super::script_set::Script;
 use estimators::loads::LoadCurves;
 use estimators::{SettingError, Settings};
 use rhai::{Array, Dynamic, Map, Position};

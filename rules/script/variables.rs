@@ -4,9 +4,9 @@
 //! then a place that the interpreter knows, and no name is searched at run time. The declarations themselves are never run, nor
 //! are the constants at the head of the script, whose values stand in the scope once and for all.
 
-use super::compiled::Script;
 use super::declared::LiveValues;
 use super::examine::Findings;
+use super::script_set::Script;
 use super::vocabulary::{View, WordValue};
 use rhai::{AST, ASTFlags, Dynamic, Engine, ImmutableString, Map, ParseError, Scope, Stmt};
 

@@ -13,8 +13,8 @@ const IRREGULAR: [&str; 14] = [
     "written",
 ];
 
-/// Files of production code: what is there today. Most are the participle of a standard term (`simulated`, `sampled`).
-const FILES_MAX: [(&str, usize); 3] = [("adapters", 7), ("gateway", 15), ("rules", 2)];
+/// Files of production code: there is none.
+const FILES_MAX: [(&str, usize); 3] = [("adapters", 0), ("gateway", 0), ("rules", 0)];
 
 /// Fields of structures: what is there today.
 const FIELDS_MAX: [(&str, usize); 3] = [("adapters", 82), ("gateway", 193), ("rules", 92)];

@@ -1,21 +1,21 @@
 //! The notation of addresses, `SCHEME:BODY?KEYS`: what all schemes share. What one scheme means stands with its device.
 
+mod broker_keys;
 mod circuit;
 mod endpoint;
 mod keys;
-mod masked;
 mod problem;
-mod secured;
+mod secrets;
 mod serial_line;
 mod speed;
 mod waveform_keep;
 
+pub use broker_keys::{Login, tls_files};
 pub use circuit::{Circuit, parse_circuit, parse_timeout};
 pub use endpoint::{Endpoint, parse_endpoint, parse_library};
 pub use keys::{Keys, parse_encoding};
-pub use masked::{NO_SECRETS, mask_secrets};
 pub use problem::AddressProblem;
-pub use secured::{Login, tls_files};
+pub use secrets::{NO_SECRETS, mask_secrets};
 pub use serial_line::{Parity, SerialTarget, parse_serial};
 pub use speed::{Speed, parse_speed};
 pub use waveform_keep::{WaveformKeep, parse_waveform_keep};
@@ -46,7 +46,7 @@ pub fn parse<T, E: Display>(
     let fail = |problems| AddressError { address: mask_secrets(text), problems };
     let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme(text)]))?;
     let (body, query) = rest.rsplit_once('?').unwrap_or((rest, ""));
-    if masked::names_somebody(body) {
+    if secrets::names_somebody(body) {
         return Err(fail(vec![NO_SECRETS.to_owned()]));
     }
     let mut keys = Keys::from_query(query);

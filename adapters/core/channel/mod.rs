@@ -2,14 +2,14 @@
 //!
 //! A channel's name ends in its unit; the names are those of the recording format.
 
-mod appended;
-mod declared;
+mod declarations;
+mod details;
 mod form;
 mod paths;
 pub mod quantity;
 pub mod unit;
 
-pub use declared::{DECLARED_MAX, DeclareError, NewChannel, declare_channel};
+pub use declarations::{DECLARED_MAX, DeclareError, NewChannel, declare_channel};
 pub use form::Form;
 pub use paths::{PATHS, on_path};
 
@@ -96,8 +96,8 @@ pub static CHANNELS: &[Channel] = &ALL;
 
 const PATH_ROWS: &[Channel] = paths::FURTHER.as_flattened();
 
-static ALL: [Channel; FIRST.len() + PATH_ROWS.len() + appended::LATER.len()] = {
-    let mut all = [FIRST[0]; FIRST.len() + PATH_ROWS.len() + appended::LATER.len()];
+static ALL: [Channel; FIRST.len() + PATH_ROWS.len() + details::LATER.len()] = {
+    let mut all = [FIRST[0]; FIRST.len() + PATH_ROWS.len() + details::LATER.len()];
     let mut index = 0;
     while index < all.len() {
         let behind = FIRST.len() + PATH_ROWS.len();
@@ -106,7 +106,7 @@ static ALL: [Channel; FIRST.len() + PATH_ROWS.len() + appended::LATER.len()] = {
         } else if index < behind {
             PATH_ROWS[index - FIRST.len()]
         } else {
-            appended::LATER[index - behind]
+            details::LATER[index - behind]
         };
         index += 1;
     }
@@ -308,14 +308,14 @@ impl ChannelId {
     /// once, and meets a later channel as one that is not there.
     #[must_use]
     pub fn count_channels() -> usize {
-        CHANNELS.len() + declared::count_declared()
+        CHANNELS.len() + declarations::count_declared()
     }
 
     /// The channel of this name. A linear search: look names up once, not in a loop.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let known = CHANNELS.iter().position(|channel| channel.name == name);
-        let index = known.or_else(|| declared::find_by_name(name).map(|place| CHANNELS.len() + place))?;
+        let index = known.or_else(|| declarations::find_by_name(name).map(|place| CHANNELS.len() + place))?;
         u16::try_from(index).ok().map(Self)
     }
 
@@ -341,7 +341,7 @@ impl ChannelId {
     pub fn channel(self) -> &'static Channel {
         let index = usize::from(self.0);
         // An id is only made of a row that is there, and no row is ever taken away.
-        CHANNELS.get(index).or_else(|| declared::find_by_index(index - CHANNELS.len())).unwrap_or(&CHANNELS[0])
+        CHANNELS.get(index).or_else(|| declarations::find_by_index(index - CHANNELS.len())).unwrap_or(&CHANNELS[0])
     }
 
     /// The name of the channel in the table, which is its name everywhere.

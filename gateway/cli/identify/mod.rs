@@ -12,7 +12,7 @@ mod tool_wear;
 use super::diagnose::cannot_use;
 use super::{CannotRun, CommandOutcome, CommandResult, load_configuration, print_json, print_text};
 use crate::diagnosis::{read_recordings, write_output};
-use crate::identified;
+use crate::identification;
 use adapters::Recording;
 use clap::{Args, Subcommand};
 use rules::estimators::regression::Refusal;
@@ -79,7 +79,7 @@ impl ShownBy {
             (None, None) => history.and_then(Path::parent).map(Path::to_owned),
         };
         let Some(directory) = named else { return Ok(()) };
-        let path = identified::save_answer(&directory, subject, &learned.json).map_err(CannotRun::from_error)?;
+        let path = identification::save_answer(&directory, subject, &learned.json).map_err(CannotRun::from_error)?;
         learned.text += &format!("\nfor the page of the box: {}\n", path.display());
         Ok(())
     }
@@ -113,7 +113,7 @@ impl IdentifyFiles {
                     ),
                     (None, _) => {}
                 }
-                let document = identified::build_answer(what, &learned.json);
+                let document = identification::build_answer(what, &learned.json);
                 if self.json {
                     print_json(&document)
                 } else {

@@ -3,7 +3,7 @@
 use super::{IdentifyFiles, IdentifyOutput, ShownBy};
 use crate::cli::{CannotRun, CommandResult};
 use crate::diagnosis::write_output;
-use crate::identified::{self, THERMAL};
+use crate::identification::{self, THERMAL};
 use adapters::Recording;
 use clap::Args;
 use rules::estimators::regression::{Refusal, RefusalKind};
@@ -63,7 +63,7 @@ fn identify_law(
     let learned = learn_law(&collected.course, settings, arguments.sensors.as_deref())?;
     let text = format!("{}{learned}", left_out(&collected.left_out));
     let model = ThermalModel::new(arguments.machine.clone(), learned.best_candidate().fit.law.clone());
-    let json = identified::of_thermal(&learned, &collected.left_out);
+    let json = identification::of_thermal(&learned, &collected.left_out);
     Ok((IdentifyOutput { text, json, file: Some(learned.format_script()) }, model))
 }
 

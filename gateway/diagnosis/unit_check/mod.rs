@@ -6,16 +6,16 @@
 //! | `relations` | columns of which one follows from others |
 //! | `sizes` | a column with what machines have, time with itself |
 //! | `nominal` | the output with the model as it was given, under each unit that a column might be in |
-//! | `refitted` | the refitted parameters with the nominal ones |
+//! | `parameter_ratio` | the refitted parameters with the nominal ones |
 //!
 //! What is found is told and refuses nothing: a person knows the machine, this does not.
 
 mod nominal;
-mod refitted;
+mod parameter_ratio;
 mod relations;
 mod sizes;
 
-pub use refitted::find_parameter_doubts;
+pub use parameter_ratio::find_parameter_doubts;
 
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::quantity::unit_of;

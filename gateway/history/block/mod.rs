@@ -6,18 +6,18 @@
 //! directory with the summary of every series, and one compressed stream per series, so that a query reads the series
 //! it asks for and an overview reads no samples at all.
 
+mod block_row;
 mod cells;
 mod checksum;
 mod directory;
 mod integers;
-mod stored;
 mod varint;
 
+pub(crate) use block_row::{BLOCK_COLUMNS, StoredBlock};
 pub(crate) use cells::Encoding;
 pub use cells::{Cells, NumberCells, ValueSummary, WordCells};
 pub(crate) use checksum::BlockKey;
 pub(crate) use directory::{ByteSpan, Directory, SeriesEntry};
-pub(crate) use stored::{BLOCK_COLUMNS, StoredBlock};
 
 use super::reason::{PRESENT, Reasons};
 use super::rows::{Column, SeriesRows, Word};

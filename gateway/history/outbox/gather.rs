@@ -1,11 +1,11 @@
 //! On the writer thread: lines of ticks wait here until the commit that makes their rows durable gives them their
 //! numbers.
 
+use super::handle::{Outbox, OutboxHead};
 use super::item::{SeriesInfo, is_deliverable};
 use super::line;
 use super::means::{self, MeanSchedule};
 use super::report::{OutboxReport, OutboxSettings};
-use super::shared::{Outbox, OutboxHead};
 use super::store::{self, OutboxContents, Put};
 use crate::HistoryError;
 use crate::error::Doing;

@@ -23,6 +23,7 @@
 //! which sinks read ([`OutboxReader`]) and acknowledge.
 
 mod gather;
+mod handle;
 mod item;
 mod line;
 mod means;
@@ -31,16 +32,15 @@ mod position;
 mod reader;
 mod redate;
 mod report;
-mod shared;
 mod store;
 
 pub(crate) use gather::Gatherer;
+pub use handle::{DeliveryState, Outbox, OutboxFigures, OutboxHead};
 pub use item::parse_nested_json;
 pub use item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 pub use position::Position;
 pub use reader::{OutboxReader, OutboxStretch};
 pub(crate) use redate::redate_items;
 pub use report::OutboxSettings;
-pub use shared::{DeliveryState, Outbox, OutboxFigures, OutboxHead};
 pub use store::box_id;
 pub(crate) use store::{create_like, known_box_id, next_sequence_of, skip_numbers};

@@ -1,8 +1,8 @@
 //! The tables of the outbox: one row for the items of a commit, one for each sink.
 
+use super::handle::{DeliveryState, Outbox, OutboxFigures};
 use super::number::{read_item_number, to_stored_number};
 use super::position::Position;
-use super::shared::{DeliveryState, Outbox, OutboxFigures};
 use crate::HistoryError;
 use crate::error::Doing;
 use crate::schema::{open_for_reading, open_for_writing};

@@ -9,11 +9,11 @@
 //! | file | what |
 //! |---|---|
 //! | `table` | which connections there are, and which one has to go |
-//! | `paced` | a stream that is not waited for longer than so when it takes nothing |
+//! | `slow_reader` | a stream that is not waited for longer than so when it takes nothing |
 //! | `talk` | one connection: TLS, heads in time, one request after another |
 //! | `tls` | certificate and key: the user's own, or made at the first start |
 
-mod paced;
+mod slow_reader;
 mod table;
 mod talk;
 mod tls;

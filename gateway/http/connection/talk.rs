@@ -1,7 +1,7 @@
 //! One connection: encrypted where that is wanted, one request after another, each with its head in time.
 
 use super::format_response;
-use super::paced::Paced;
+use super::slow_reader::Paced;
 use super::table::{ConnectionActivity, ConnectionEntry, Waits};
 use crate::ApiProblem;
 use crate::peer::Peer;

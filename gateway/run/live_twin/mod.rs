@@ -1,13 +1,13 @@
 //! The model beside the running machine: compared every second, watched, and, when the two begin to differ, told and
 //! diagnosed in the background.
 
-mod shown;
+mod twin_status;
 
 use super::health::Health;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
-use gateway_base::learned;
 use gateway_base::log::{Notice, Severity};
+use gateway_base::state_file;
 use gateway_config::Config;
 use gateway_diagnosis::handle::DiagnosisHandle;
 use gateway_diagnosis::store::DiagnosisStore;
@@ -359,7 +359,7 @@ fn alarm_code(regime: Regime) -> String {
 
 /// What was learned before; nothing where that cannot be read.
 fn restore_learned(path: &Path, told: &mut Vec<Notice>) -> Remembered {
-    let Some(state) = learned::read(path, |notice| told.push(notice)) else { return Remembered::default() };
+    let Some(state) = state_file::read(path, |notice| told.push(notice)) else { return Remembered::default() };
     serde_json::from_str(&state).unwrap_or_else(|error| {
         let text = format!("{}: what the twin had learned cannot be read ({error}); it learns anew", path.display());
         told.push(Notice::new(Severity::Warning, "twin_forgot", text));

@@ -11,8 +11,8 @@ use super::health::Health;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, ChannelId, Sample};
 use gateway_base::cannot_run::CannotRun;
-use gateway_base::learned;
 use gateway_base::log::{Notice, Severity};
+use gateway_base::state_file;
 use gateway_config::{self as config, Config};
 use gateway_history::{ExtraSeries, ExtraValue};
 use outside::OutsideWatch;
@@ -221,7 +221,7 @@ impl Thermal {
 fn restore_corrections(memory: &Path, model: &ThermalModel) -> (Corrected, Vec<Notice>) {
     let mut told = Vec::new();
     let fresh = || Corrected { identified: model.law.clone(), law: model.law.clone(), readings: 0 };
-    let Some(state) = learned::read(memory, |notice| told.push(notice)) else { return (fresh(), told) };
+    let Some(state) = state_file::read(memory, |notice| told.push(notice)) else { return (fresh(), told) };
     match serde_json::from_str::<Corrected>(&state) {
         Ok(corrected) if corrected.identified == model.law => return (corrected, told),
         Ok(_) => {

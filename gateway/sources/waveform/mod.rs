@@ -6,7 +6,7 @@
 //! | `chain` | filter and feature of one stream |
 //! | `features` | blocks in, one value per poll out, whoever sends the blocks |
 //! | `keep` | raw samples around what is remarkable |
-//! | `sampled` | a controller's own sampling (NC-Link, HNC) as such a sender |
+//! | `control_sampling` | a controller's own sampling (NC-Link, HNC) as such a sender |
 //!
 //! The receiver (`adapters::waveform`) knows nothing of features and the estimator (`rules::estimators::spindle_current`)
 //! nothing of sockets; here they meet, on the source's own thread. Each poll takes every block that has arrived and gives
@@ -15,11 +15,11 @@
 //! anew; a poll with clipped samples has no value, because its value would be too low.
 
 mod chain;
+mod control_sampling;
 mod excerpt_writer;
 mod features;
-mod sampled;
 
-pub use sampled::ControllerSamples;
+pub use control_sampling::ControllerSamples;
 
 use adapters::address::{Address, Endpoint, Target, WaveformKeep};
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
@@ -39,7 +39,7 @@ const BLOCKS_MAX: usize = 512;
 /// every other address.
 #[must_use]
 pub fn open_source(address: &Address) -> Option<Result<Opened, OpenError>> {
-    let Target::Waveform { at, keep } = address.target() else { return sampled::open_sampled_source(address) };
+    let Target::Waveform { at, keep } = address.target() else { return control_sampling::open_sampled_source(address) };
     let source: Box<dyn Source> = Box::new(SpindleCurrent::new(address.text(), at, keep.as_ref()));
     Some(Ok(Opened {
         sources: vec![source],

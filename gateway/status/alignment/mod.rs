@@ -15,7 +15,7 @@
 //! |---|---|
 //! | `pair` | a controller and a meter: what is gathered, what is known, what is in force |
 //! | `background` | the thread that estimates |
-//! | `shown` | what of it is shown and stored |
+//! | `delay_status` | what of it is shown and stored |
 //!
 //! **Deterministic where time is simulated.** With `--speed` the answer of an estimate is waited for and taken at a fixed
 //! time after it was asked for, so that the same readings give the same samples. Against the clock it is taken when it has
@@ -25,11 +25,11 @@
 //! where that is another source; a meter that delivers both is aligned by the spindle's power.
 
 mod background;
+mod delay_status;
 mod pair;
-mod shown;
 
 pub use background::Patience;
-pub use shown::{AlignmentStatus, SERIES, list_series};
+pub use delay_status::{AlignmentStatus, SERIES, list_series};
 
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::merge::{Merge, SourceId, SourcePlan};
@@ -124,7 +124,7 @@ impl Alignment {
     /// The newest values of [`list_series`].
     #[must_use]
     pub fn current_values(&self) -> [ExtraValue<'static>; SERIES] {
-        shown::collect_values(POWERS.map(|name| self.pairs.iter().find(|pair| pair.power_name() == name)))
+        delay_status::collect_values(POWERS.map(|name| self.pairs.iter().find(|pair| pair.power_name() == name)))
     }
 }
 

@@ -1,7 +1,7 @@
 //! A controller and a meter: what is gathered, what is known, what is in force.
 
 use super::background::LagResult;
-use super::shown::AlignmentStatus;
+use super::delay_status::AlignmentStatus;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::merge::SourceId;
 use adapter_core::{ChannelId, Reading};

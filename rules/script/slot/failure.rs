@@ -2,10 +2,10 @@
 
 use super::{Outputs, Previous, ScriptCondition, Slot};
 use crate::compile::{ScriptFile, compile_scripts};
-use crate::compiled::Script;
 use crate::decision::{AlarmLevel, SCRIPT_STOPPED};
 use crate::example_scripts::list_shipped_scripts;
 use crate::script_memory::ScriptMemory;
+use crate::script_set::Script;
 use crate::timers::AlarmText;
 use rhai::EvalAltResult;
 

@@ -1,7 +1,7 @@
 //! A feed override that a script follows: an estimate whose value is asked for at every tick, also between two runs of the script.
 
-use crate::compiled::Script;
 use crate::decision::OverrideRequest;
+use crate::script_set::Script;
 use crate::vocabulary::{View, Word, WordValue};
 use rhai::ImmutableString;
 use std::sync::Arc;

@@ -5,7 +5,6 @@ mod failure;
 mod follows;
 
 use super::collect::{RunOutput, ScriptResult};
-use super::compiled::Script;
 use super::deadline::{LATE_MAX, is_late};
 use super::decision::{Alarm, Decision, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest};
 use super::declared::Now;
@@ -15,6 +14,7 @@ use super::notes::NoteLimit;
 use super::problem::{self, ScriptProblem};
 use super::running::RunningScript;
 use super::script_memory::ScriptMemory;
+use super::script_set::Script;
 use super::status::{ScriptCondition, ScriptStatus};
 use super::timers::{AlarmText, Timers};
 use super::variables::{fill_scope, has_absent, scope_of, why_absent};

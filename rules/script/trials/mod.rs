@@ -25,11 +25,11 @@ mod trial_context;
 pub use functions::TRIAL_FUNCTIONS;
 
 use super::compile::compile_variant;
-use super::compiled::{Script, ScriptSet};
 use super::declared::{DeclarationPlace, SettingValues};
 use super::engine::{OPERATIONS_MAX, Shared, build_engine};
 use super::problem::{self, ScriptProblem};
 use super::running::RunningScript;
+use super::script_set::{Script, ScriptSet};
 use rhai::{AST, Engine, Position, Scope};
 use std::sync::Arc;
 use trial_context::{Theatre, TrialContext};

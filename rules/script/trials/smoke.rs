@@ -3,7 +3,7 @@
 
 use super::TrialResult;
 use super::trial_context::TrialContext;
-use crate::compiled::Script;
+use crate::script_set::Script;
 use estimators::State;
 use rhai::{Dynamic, ImmutableString};
 use std::sync::Arc;

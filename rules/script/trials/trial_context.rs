@@ -1,9 +1,9 @@
 //! What a trial is played on: one script, what it sees, and a clock of its own.
 
-use crate::compiled::{Script, ScriptSet};
 use crate::decision::{Alarm, Axis, Decision, Stop};
 use crate::problem::ScriptProblem;
 use crate::quantities::QUANTITIES;
+use crate::script_set::{Script, ScriptSet};
 use crate::settings::merge_settings;
 use crate::status::ScriptCondition;
 use crate::vocabulary::{find_word, list_words};

@@ -6,7 +6,7 @@
 
 pub mod block;
 pub mod control_chart;
-pub mod expected;
+pub mod expectation;
 #[cfg(test)]
 mod false_alarms;
 pub mod learn;
@@ -17,7 +17,7 @@ pub mod watch;
 pub mod window;
 
 pub use control_chart::LevelChange;
-pub use expected::{ComparedSecond, NoTwin};
+pub use expectation::{ComparedSecond, NoTwin};
 pub use regime::Regime;
 pub use watch::{Mismatch, Notice, RegimeStage};
 
@@ -26,7 +26,7 @@ use adapter_core::Sample;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use block::SettledSecond;
 use estimators::State;
-use expected::Simulation;
+use expectation::Simulation;
 use second_row::{Row, Seconds};
 use serde::{Deserialize, Serialize};
 use watch::Watch;

@@ -14,7 +14,7 @@ use adapters::nclink::sample::SampleBlock;
 use adapters::recording::{Mapping, read_csv, read_path};
 use adapters::waveform::WaveformHeader;
 use gateway::sinks::SinkAddress;
-use gateway::{archive, config, learned};
+use gateway::{archive, config, state_file};
 use rules::script::{ScriptFile, list_shipped_scripts, prepare_scripts};
 use rules::twin::{parse_hypotheses, parse_model};
 use serde_json::json;
@@ -69,7 +69,7 @@ pub(crate) fn all() -> Vec<Parser> {
         }),
         parser("archive", archives, |bytes| drop(archive::unpack(bytes))),
         parser("learned", learned_states, |bytes| {
-            let _state = learned::state_of(&text(bytes));
+            let _state = state_file::state_of(&text(bytes));
         }),
     ]
 }
@@ -266,6 +266,6 @@ fn archives() -> Vec<Vec<u8>> {
 fn learned_states() -> Vec<Vec<u8>> {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("wear.json");
-    learned::save_state(&path, "{\"edges\":[1,2,3]}").expect("saved");
+    state_file::save_state(&path, "{\"edges\":[1,2,3]}").expect("saved");
     vec![fs::read(&path).expect("readable"), b"{\"edges\":[1]}".to_vec()]
 }

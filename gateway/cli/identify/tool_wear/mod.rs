@@ -6,7 +6,7 @@ mod library;
 
 use super::{IdentifyFiles, IdentifyOutput, ShownBy};
 use crate::cli::{CommandResult, recipe_from};
-use crate::identified::TOOL_WEAR;
+use crate::identification::TOOL_WEAR;
 use adapters::Recording;
 use clap::{Args, ValueEnum};
 use rules::estimators::LoadLossLaw;

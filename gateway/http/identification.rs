@@ -1,6 +1,6 @@
 //! `GET /api/v1/identified/{subject}`: what `identify tool-wear` and `identify thermal` have found, for the tables beside the figures.
 //!
-//! `identify` and `commission --write` keep these answers: see [`gateway_commission::identified`].
+//! `identify` and `commission --write` keep these answers: see [`gateway_commission::identification`].
 
 use super::ServerState;
 use super::problem::ApiProblem;
@@ -10,7 +10,7 @@ use axum::Json;
 use axum::extract::{Path, State};
 use axum::routing::get;
 use gateway_base::files::read_text;
-use gateway_commission::identified::{SUBJECTS, answer_path};
+use gateway_commission::identification::{SUBJECTS, answer_path};
 use serde_json::{Value, json};
 
 /// Such a document is some ten kilobytes.
