@@ -118,26 +118,47 @@ impl CutConditions {
 
     /// Everything that is wrong with the four values; empty when they can be computed with.
     #[must_use]
-    pub fn list_problems(&self) -> Vec<String> {
-        FACTORS.iter().zip(self.to_vector()).filter_map(|(factor, value)| factor.describe_problem(value)).collect()
+    pub fn list_problems(&self) -> Vec<ConditionProblem> {
+        FACTORS.iter().zip(self.to_vector()).filter_map(|(factor, value)| factor.find_problem(value)).collect()
+    }
+}
+
+/// A condition of a cut that cannot be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConditionProblem {
+    factor: &'static ConditionFactor,
+    value: f64,
+    /// The unit in which the value would be possible.
+    mistaken_unit: Option<&'static str>,
+}
+
+impl ConditionProblem {
+    /// A mistaken unit, or a value that no unit explains.
+    #[must_use]
+    pub fn kind(&self) -> RefusalKind {
+        if self.mistaken_unit.is_some() { RefusalKind::Unit } else { RefusalKind::OutOfRange }
+    }
+}
+
+impl fmt::Display for ConditionProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (ConditionFactor { name, unit, .. }, (least, greatest)) = (self.factor, self.factor.range);
+        write!(f, "{name} = {} is outside {least} to {greatest} {unit}", self.value)?;
+        self.mistaken_unit.map_or(Ok(()), |mistaken| write!(f, ": is it in {mistaken}?"))
     }
 }
 
 impl ConditionFactor {
     /// What is wrong with a value, and in which unit it probably is.
     #[must_use]
-    pub fn describe_problem(&self, value: f64) -> Option<String> {
+    pub fn find_problem(&'static self, value: f64) -> Option<ConditionProblem> {
         let (least, greatest) = self.range;
         if value.is_finite() && value >= least && value <= greatest {
             return None;
         }
         let (unit, size) = self.mistaken;
-        let range = format!("{} to {} {}", least, greatest, self.unit);
         let fits = value.is_finite() && value > greatest && (least..=greatest).contains(&(value * size));
-        Some(match fits {
-            true => format!("{} = {value} is outside {range}: is it in {unit}?", self.name),
-            false => format!("{} = {value} is outside {range}", self.name),
-        })
+        Some(ConditionProblem { factor: self, value, mistaken_unit: fits.then_some(unit) })
     }
 
     /// The factor of this column.
@@ -228,7 +249,7 @@ mod tests {
             conditions: CutConditions::from_vector([wear, 200.0, 0.15, 1.0]),
             cutting_power_w: power,
         };
-        assert!(cut(790.0, 195.0).conditions.list_problems()[0].contains("is it in um?"));
+        assert!(cut(790.0, 195.0).conditions.list_problems()[0].to_string().contains("is it in um?"));
         assert!(unit_trouble(&[cut(0.79, 0.2)]).is_some_and(|text| text.contains("kW")));
         assert!(unit_trouble(&[cut(790_000.0, 0.2)]).is_some_and(|text| text.contains("mW")));
         assert_eq!(unit_trouble(&[cut(790.0, 0.2)]), None);

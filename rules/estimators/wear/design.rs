@@ -98,7 +98,8 @@ fn list_problems(array: Array, factors: &[FactorLevels]) -> Vec<String> {
     let mut free = array.column_levels();
     for FactorLevels { factor, values } in factors {
         let name = factor.name;
-        problems.extend(values.iter().filter_map(|value| factor.describe_problem(*value)));
+        problems
+            .extend(values.iter().filter_map(|value| factor.find_problem(*value)).map(|problem| problem.to_string()));
         if values.windows(2).any(|pair| pair[1] <= pair[0]) {
             problems.push(format!("{name}: give the levels in increasing order, each once"));
         }

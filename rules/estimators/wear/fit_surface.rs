@@ -99,8 +99,8 @@ fn f_of(regression: &Regression, at: usize) -> f64 {
 pub(super) fn check_cuts(cuts: &[Cut]) -> Result<(), Refusal> {
     for (index, cut) in cuts.iter().enumerate() {
         if let Some(problem) = cut.conditions.list_problems().into_iter().next() {
-            let kind = if problem.contains("is it in") { RefusalKind::Unit } else { RefusalKind::OutOfRange };
-            return Err(Refusal::new(kind, problem, "correct the table").with_place(format!("row {}", index + 1)));
+            return Err(Refusal::new(problem.kind(), problem.to_string(), "correct the table")
+                .with_place(format!("row {}", index + 1)));
         }
         if !(cut.cutting_power_w.is_finite() && cut.cutting_power_w > 0.0) {
             let what = format!("{CUTTING_POWER} = {} is no power that removes material", cut.cutting_power_w);

@@ -67,8 +67,10 @@ pub struct LearnedWear {
 /// # Errors
 /// The reason when neither form can be fitted, or not the one that was asked for.
 pub fn identify_tool_wear(cuts: Vec<Cut>, options: &WearOptions) -> Result<LearnedWear, Refusal> {
-    if let Some(problem) =
-        FACTORS[0].describe_problem(options.criterion_mm).or_else(|| describe_zero_criterion(options.criterion_mm))
+    if let Some(problem) = FACTORS[0]
+        .find_problem(options.criterion_mm)
+        .map(|problem| problem.to_string())
+        .or_else(|| describe_zero_criterion(options.criterion_mm))
     {
         return Err(Refusal::new(RefusalKind::Unit, problem, "give the criterion in mm, for example 0.3")
             .with_place("criterion"));

@@ -63,7 +63,7 @@ impl WearRecord {
         if record.schema != SCHEMA {
             return Err(format!("schema {:?} is not known; {SCHEMA} is", record.schema));
         }
-        if let Some(problem) = FACTORS[0].describe_problem(record.criterion_mm) {
+        if let Some(problem) = FACTORS[0].find_problem(record.criterion_mm) {
             return Err(format!("the criterion: {problem}"));
         }
         if record.model.is_sound() { Ok(record) } else { Err("its numbers do not belong together".to_owned()) }

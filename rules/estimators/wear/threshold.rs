@@ -82,7 +82,9 @@ fn list_names(outside: Vec<&'static ConditionFactor>) -> Vec<&'static str> {
 fn check_conditions(conditions: &CutConditions) -> Result<(), Refusal> {
     match conditions.list_problems().into_iter().next() {
         None => Ok(()),
-        Some(problem) => Err(Refusal::new(RefusalKind::OutOfRange, problem, "look at the sources of this cut")),
+        Some(problem) => {
+            Err(Refusal::new(RefusalKind::OutOfRange, problem.to_string(), "look at the sources of this cut"))
+        }
     }
 }
 
