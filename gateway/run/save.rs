@@ -53,7 +53,7 @@ impl Saver {
         self.queue_job(SaveJob { path: path.to_owned(), text, learned: false });
     }
 
-    /// The same for what was learned: see [`learned`].
+    /// The same for what was learned: see [`state_file`].
     pub fn put_learned(&self, path: &Path, state: String) {
         self.queue_job(SaveJob { path: path.to_owned(), text: state, learned: true });
     }
