@@ -193,35 +193,21 @@ pub fn try_get(address: &str, path: &str) -> std::io::Result<Answer> {
     try_request(address, &format!("GET {path} HTTP/1.0\r\nHost: {address}\r\n\r\n"))
 }
 
-/// The same as [`try_request`] of a box that must answer.
+/// Sends a request as it is and reads until the server closes.
 pub fn request(address: &str, text: &str) -> Answer {
     try_request(address, text).expect("it listens and answers")
 }
 
-/// Sends a request as it is and reads until the server closes.
-///
-/// A server may answer and close before it has read a request that is too large. Then writing fails, or reading ends with
-/// a reset behind the answer. The answer counts; only a connection that brought no answer is an error.
-pub fn try_request(address: &str, text: &str) -> std::io::Result<Answer> {
+fn try_request(address: &str, text: &str) -> std::io::Result<Answer> {
     let mut stream = TcpStream::connect(address)?;
     stream.set_read_timeout(Some(Duration::from_secs(20)))?;
-    let sent = stream.write_all(text.as_bytes());
+    stream.write_all(text.as_bytes())?;
     let mut answer = Vec::new();
-    let received = stream.read_to_end(&mut answer);
-    for outcome in [sent, received.map(drop)] {
-        match outcome {
-            Err(error) if answer.is_empty() || !was_closed_by_peer(&error) => return Err(error),
-            _ => {}
-        }
-    }
+    stream.read_to_end(&mut answer)?;
     let answer = String::from_utf8_lossy(&answer).into_owned();
     let (head, body) = answer.split_once("\r\n\r\n").unwrap_or((&answer, ""));
     let status = head.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
     Ok(Answer { status, head: head.to_owned(), body: body.to_owned() })
-}
-
-fn was_closed_by_peer(error: &std::io::Error) -> bool {
-    matches!(error.kind(), std::io::ErrorKind::BrokenPipe | std::io::ErrorKind::ConnectionReset)
 }
 
 /// The real recordings beside the checkout, or by `CNC_GATEWAY_SHARED`; says so when they are absent.
