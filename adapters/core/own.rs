@@ -16,6 +16,7 @@ use crate::reading::{Absence, Reading, Stamp, Value};
 use crate::text::TextEncoding;
 use std::fmt;
 use std::sync::Arc;
+use thiserror::Error;
 
 /// With which group a channel is read, where a source has two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,16 +63,31 @@ impl fmt::Display for OwnChannelError {
     }
 }
 
+/// A text after `read =` that names nothing of its source.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("`{text}` is nothing that can be read; write {examples}")]
+pub struct UnreadableItem {
+    /// The text as written.
+    pub text: String,
+    /// [`OwnRead::EXAMPLES`] of the source.
+    pub examples: &'static str,
+}
+
 /// A kind of item that a source can be asked for by the user.
 pub trait OwnRead: Sized {
-    /// What is wrong with a text, and an example.
-    type Error: fmt::Display;
+    /// Examples of every form that a text may have, as they stand in a message.
+    const EXAMPLES: &'static str;
 
-    /// Reads the text of a configuration.
+    /// The item that a text of a configuration names; `None` when it names none.
+    fn parse(text: &str) -> Option<Self>;
+
+    /// The same with what to write instead.
     ///
     /// # Errors
-    /// The text is nothing that can be read.
-    fn read(text: &str) -> Result<Self, Self::Error>;
+    /// The text names nothing of this source.
+    fn read(text: &str) -> Result<Self, UnreadableItem> {
+        Self::parse(text).ok_or_else(|| UnreadableItem { text: text.to_owned(), examples: Self::EXAMPLES })
+    }
 
     /// Is it a text? `None`: what comes may be either, and the unit of the channel says what it is taken for.
     fn is_text(&self) -> Option<bool> {

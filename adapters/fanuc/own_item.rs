@@ -16,7 +16,6 @@ use adapter_core::own::{OwnChannel, OwnRead};
 use adapter_core::reading::{Absence, Value};
 use adapter_core::text::TextEncoding;
 use std::sync::Arc;
-use thiserror::Error;
 
 /// What a channel of the user's reads from the control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,21 +28,14 @@ pub struct OwnItem {
     pub text: bool,
 }
 
-/// A text after `read =` that names nothing of this source.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error(
-    "`{0}` is nothing that can be read; write `macro 500`, `parameter 6711`, `parameter 1420 axis 2`, \
-     `diagnosis 301 axis 1`, `pmc R100`, `pmc R100.3`, `pmc D20 word`, `pmc D100 text 20`, \
-     `tool_offset 1 type 3` or `work_offset 1 axis 3`"
-)]
-pub struct UnreadableItem(pub String);
-
 impl OwnRead for OwnItem {
-    type Error = UnreadableItem;
+    const EXAMPLES: &'static str = "`macro 500`, `parameter 6711`, `parameter 1420 axis 2`, \
+     `diagnosis 301 axis 1`, `pmc R100`, `pmc R100.3`, `pmc D20 word`, `pmc D100 text 20`, \
+     `tool_offset 1 type 3` or `work_offset 1 axis 3`";
 
-    fn read(text: &str) -> Result<Self, UnreadableItem> {
+    fn parse(text: &str) -> Option<Self> {
         let words: Vec<&str> = text.split_whitespace().collect();
-        let found = match words.as_slice() {
+        match words.as_slice() {
             ["macro", number] => parse_whole(number, 1, 65_535).map(FocasItem::Macro).map(Self::from_item),
             ["parameter", number] => {
                 parse_whole(number, 0, 32_767).map(|number| FocasItem::Parameter(number, 0)).map(Self::from_item)
@@ -70,8 +62,7 @@ impl OwnRead for OwnItem {
                 .map(|(number, axis)| FocasItem::WorkOffset(number, axis))
                 .map(Self::from_item),
             _ => None,
-        };
-        found.ok_or_else(|| UnreadableItem(text.to_owned()))
+        }
     }
 
     fn is_text(&self) -> Option<bool> {

@@ -2,7 +2,7 @@
 
 use super::KIND;
 use super::answer::{HncItemError, HncItemResult, HncReturnCode};
-use super::item::{HncItem, register_type};
+use super::item::{HncItem, define_register};
 use super::message::{HncReply, HncRequest};
 use super::sampling::{Columns, SampledItem};
 use adapter_core::address::Endpoint;
@@ -142,7 +142,7 @@ impl HncLine {
         let mut inner = self.lock_connection();
         for (at, value) in words {
             let request = format!("writing {at}");
-            let (Some(kind), Ok(index)) = (register_type(*at), i32::try_from(at.index)) else {
+            let Some(HncItem::Register(kind, index)) = define_register(*at) else {
                 return Err(inner.build_refusal(&request, NO_REGISTER.to_owned()));
             };
             inner.request_action(&HncRequest::Write(kind, index, *value), &request)?;

@@ -12,7 +12,6 @@ use adapter_core::own::OwnRead;
 use adapter_core::reading::{Absence, Value};
 use nclink::mailbox::ControllerRegister;
 use std::sync::Arc;
-use thiserror::Error;
 
 /// A value of the library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,21 +22,14 @@ pub struct OwnValue {
     pub bit: Option<u8>,
 }
 
-/// A text after `read =` that names nothing of this source.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error(
-    "`{0}` is nothing that can be read; write `register D120`, `register G2560.3`, `channel 7 real`, \
-     `axis 5 29 real` or `system 24 text`"
-)]
-pub struct UnreadableValue(pub String);
-
 impl OwnRead for OwnValue {
-    type Error = UnreadableValue;
+    const EXAMPLES: &'static str = "`register D120`, `register G2560.3`, `channel 7 real`, \
+     `axis 5 29 real` or `system 24 text`";
 
-    fn read(text: &str) -> Result<Self, UnreadableValue> {
+    fn parse(text: &str) -> Option<Self> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let plain = |item| Some(Self { item, bit: None });
-        let found = match words.as_slice() {
+        match words.as_slice() {
             ["register", place] => parse_register(place),
             ["channel", kind, rest @ ..] => parse_number(kind)
                 .zip(parse_width(rest))
@@ -50,8 +42,7 @@ impl OwnRead for OwnValue {
                 parse_number(kind).zip(parse_width(rest)).and_then(|(kind, width)| plain(HncItem::System(kind, width)))
             }
             _ => None,
-        };
-        found.ok_or_else(|| UnreadableValue(text.to_owned()))
+        }
     }
 
     fn is_text(&self) -> Option<bool> {

@@ -16,7 +16,6 @@ use adapter_core::conversion::Conversion;
 use adapter_core::own::{OwnChannel, OwnRead};
 use adapter_core::reading::{Absence, Value};
 use std::sync::Arc;
-use thiserror::Error;
 
 /// Longest text, registers.
 const TEXT_MAX: u16 = 64;
@@ -41,20 +40,13 @@ pub struct OwnRegister {
     pub content: InRegisters,
 }
 
-/// A text after `read =` that names nothing of this source.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error(
-    "`{0}` is nothing that can be read; write table, address from 0 and type: `input 52 f32`, `holding 0x34 i16`, \
-     `input 52 f32 badc` or `holding 100 text 8`"
-)]
-pub struct UnreadableRegister(pub String);
-
 impl OwnRead for OwnRegister {
-    type Error = UnreadableRegister;
+    const EXAMPLES: &'static str = "table, address from 0 and type: `input 52 f32`, `holding 0x34 i16`, \
+     `input 52 f32 badc` or `holding 100 text 8`";
 
-    fn read(text: &str) -> Result<Self, UnreadableRegister> {
+    fn parse(text: &str) -> Option<Self> {
         let words: Vec<&str> = text.split_whitespace().collect();
-        let found = match words.as_slice() {
+        match words.as_slice() {
             [table, address, "text", count] => {
                 let count = count.parse().ok().filter(|count| (1..=TEXT_MAX).contains(count));
                 count.and_then(|count| parse_register(table, address, InRegisters::Text(count)))
@@ -65,8 +57,7 @@ impl OwnRead for OwnRegister {
                 .zip(WordOrder::of_name(order))
                 .and_then(|(format, order)| parse_register(table, address, InRegisters::Number(format, order))),
             _ => None,
-        };
-        found.ok_or_else(|| UnreadableRegister(text.to_owned()))
+        }
     }
 
     fn is_text(&self) -> Option<bool> {

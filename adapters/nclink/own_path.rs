@@ -12,7 +12,6 @@ use adapter_core::channel::Kind;
 use adapter_core::own::{OwnChannel, OwnRead};
 use adapter_core::reading::{Absence, Value};
 use std::sync::Arc;
-use thiserror::Error;
 
 /// An item of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,28 +24,20 @@ pub struct OwnPath {
     pub bit: Option<u8>,
 }
 
-/// A text after `read =` that names nothing of this source.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error(
-    "`{0}` is nothing that can be read; write the path of an item as `doctor --all` lists it, with the number of \
-     an element where it is a list: `AXIS@5/MOTOR/TEMPERATURE`, `CONTROLLER/VARIABLE@REG_D 120` or \
-     `CONTROLLER/VARIABLE@REG_X 12.3`"
-)]
-pub struct UnreadablePath(pub String);
-
 impl OwnRead for OwnPath {
-    type Error = UnreadablePath;
+    const EXAMPLES: &'static str = "the path of an item as `doctor --all` lists it, with the number of \
+     an element where it is a list: `AXIS@5/MOTOR/TEMPERATURE`, `CONTROLLER/VARIABLE@REG_D 120` or \
+     `CONTROLLER/VARIABLE@REG_X 12.3`";
 
-    fn read(text: &str) -> Result<Self, UnreadablePath> {
+    fn parse(text: &str) -> Option<Self> {
         let words: Vec<&str> = text.split_whitespace().collect();
-        let found = match words.as_slice() {
+        match words.as_slice() {
             [name] => Some(Self { name: (*name).to_owned(), index: None, bit: None }),
             [name, place] => {
                 parse_element(place).map(|(index, bit)| Self { name: (*name).to_owned(), index: Some(index), bit })
             }
             _ => None,
-        };
-        found.ok_or_else(|| UnreadablePath(text.to_owned()))
+        }
     }
 
     fn is_text(&self) -> Option<bool> {
