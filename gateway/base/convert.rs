@@ -2,31 +2,13 @@
 //! that its documentation gives; a number that is stored or sent and must be exact is converted with an error instead.
 
 use adapter_core::clock::{SECOND_NS, TimeNs};
+pub use adapter_core::integer::{saturate_to_ms, saturate_to_ns, saturate_to_us};
 use std::time::Duration;
 
-/// A duration as a difference of instants. More than 292 years are 292 years: nothing here is waited for that long, and a limit
-/// beyond every instant is no limit, before and after.
-#[must_use]
-pub fn duration_to_ns(duration: Duration) -> TimeNs {
-    TimeNs::try_from(duration.as_nanos()).unwrap_or(TimeNs::MAX)
-}
-
-/// A duration without sign, ns. More than 584 years are 584 years, for the same reason.
+/// A duration without sign, ns. More than 584 years are 584 years: nothing here is waited for that long.
 #[must_use]
 pub fn duration_to_unsigned_ns(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
-}
-
-/// A duration in whole microseconds. The greatest number stands for half a million years and more.
-#[must_use]
-pub fn duration_to_us(duration: Duration) -> u64 {
-    u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
-}
-
-/// A duration in whole milliseconds. The greatest number stands for half a billion years and more.
-#[must_use]
-pub fn duration_to_ms(duration: Duration) -> u64 {
-    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
 }
 
 /// An instant from seconds since 1970. Instants end in 2262; a clock that says more is wrong, and no instant is farther off than
@@ -63,9 +45,9 @@ mod tests {
     #[test]
     fn what_fits_is_exact_and_what_does_not_is_the_bound() {
         let span = Duration::new(3, 500_000_001);
-        assert_eq!((duration_to_ns(span), duration_to_unsigned_ns(span)), (3_500_000_001, 3_500_000_001));
-        assert_eq!((duration_to_us(span), duration_to_ms(span)), (3_500_000, 3_500));
-        assert_eq!((duration_to_ns(Duration::MAX), duration_to_unsigned_ns(Duration::MAX)), (i64::MAX, u64::MAX));
+        assert_eq!((saturate_to_ns(span), duration_to_unsigned_ns(span)), (3_500_000_001, 3_500_000_001));
+        assert_eq!((saturate_to_us(span), saturate_to_ms(span)), (3_500_000, 3_500));
+        assert_eq!((saturate_to_ns(Duration::MAX), duration_to_unsigned_ns(Duration::MAX)), (i64::MAX, u64::MAX));
         assert_eq!((seconds_to_instant(2), seconds_to_instant(u64::MAX)), (2 * SECOND_NS, TimeNs::MAX));
         assert_eq!((clamp_to_unsigned(-1), clamp_to_unsigned(7)), (0, 7));
         assert_eq!((clamp_to_signed(u64::MAX), clamp_to_signed(7)), (i64::MAX, 7));

@@ -2,7 +2,7 @@
 
 use crate::limits::GateMode;
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use gateway_base::convert::duration_to_ns;
+use gateway_base::convert::saturate_to_ns;
 use std::fmt;
 use std::time::Duration;
 use thiserror::Error;
@@ -110,7 +110,7 @@ const SILENT_NS: i64 = 10 * SECOND_NS;
 
 impl Arming {
     pub(super) fn new(mode: GateMode, lasts: Duration) -> Self {
-        let lasts_ns = duration_to_ns(lasts);
+        let lasts_ns = saturate_to_ns(lasts);
         Self { mode, lasts_ns, state: Err(Disarmed::Start), fresh_ns: TimeNs::MIN }
     }
 
@@ -121,7 +121,7 @@ impl Arming {
         if by.trim().is_empty() {
             return Err(ArmError::Nobody);
         }
-        let lasts_ns = lasts.map_or(self.lasts_ns, duration_to_ns);
+        let lasts_ns = lasts.map_or(self.lasts_ns, saturate_to_ns);
         if !(1..=self.lasts_ns).contains(&lasts_ns) {
             return Err(ArmError::Lasts(self.lasts_ns.unsigned_abs() / 1_000_000_000));
         }

@@ -49,7 +49,7 @@ use adapter_core::units::OverridePct;
 use adapter_core::{ChannelId, Sample};
 use arming::Arming;
 use ask::Asks;
-use gateway_base::convert::duration_to_ns;
+use gateway_base::convert::saturate_to_ns;
 use hold::Interlocks;
 use limit::{Aim, Slew};
 use offset::Circumstances;
@@ -78,7 +78,7 @@ impl Gate {
     /// A gate with these limits. It is disarmed, whatever the configuration says.
     #[must_use]
     pub fn new(limits: GateConfig) -> Self {
-        let stale_ns = duration_to_ns(limits.stale);
+        let stale_ns = saturate_to_ns(limits.stale);
         Self {
             interlocks: Interlocks::new(stale_ns),
             dial: find_channel("feed_override_dial_pct"),

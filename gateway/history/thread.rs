@@ -146,7 +146,7 @@ impl Thread {
         }
         match self.commit_with_retry(with_tail) {
             Ok(()) => {
-                let took = gateway_base::convert::duration_to_us(began.elapsed());
+                let took = gateway_base::convert::saturate_to_us(began.elapsed());
                 self.shared.commit_us.store(took, Ordering::Relaxed);
                 self.shared.commits.fetch_add(1, Ordering::Relaxed);
                 self.schedule.failures = 0;

@@ -6,7 +6,7 @@
 //! service manager ends the process after its own limit (`WatchdogSec`) and starts it again.
 
 use crate::update::{WELL_FOR, confirm_running_version};
-use gateway_base::convert::duration_to_ms;
+use gateway_base::convert::saturate_to_ms;
 use gateway_base::log::{Notice, Severity};
 use sd_notify::NotifyState;
 use std::path::PathBuf;
@@ -64,7 +64,7 @@ impl ProgressMarks {
 
     /// This part has moved.
     pub fn mark_part(&self, part: WatchedPart) {
-        let now_ms = duration_to_ms(self.began.elapsed());
+        let now_ms = saturate_to_ms(self.began.elapsed());
         self.moved_ms[part as usize].store(now_ms, Ordering::Relaxed);
     }
 

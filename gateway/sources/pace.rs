@@ -2,7 +2,7 @@
 
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::histogram::Histogram;
-use gateway_base::convert::duration_to_ns;
+use gateway_base::convert::saturate_to_ns;
 use gateway_control::Wake;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -52,9 +52,9 @@ impl TickSchedule {
     /// From now on wakes a little before each tick: for a machine that is written to, by a thread of real-time priority. One of
     /// ordinary priority would be passed over for it when it is needed.
     pub fn wake_early(&mut self) {
-        let lead_ns = duration_to_ns(LEAD);
+        let lead_ns = saturate_to_ns(LEAD);
         if let Beat::Clock(_, early_ns) = &mut self.beat
-            && self.period_ns >= duration_to_ns(LEAD_PERIOD_MIN)
+            && self.period_ns >= saturate_to_ns(LEAD_PERIOD_MIN)
         {
             *early_ns = lead_ns;
         }
@@ -67,7 +67,7 @@ impl TickSchedule {
     }
 
     fn new(beat: Beat, due_ns: TimeNs, period: Duration) -> Self {
-        let period_ns = duration_to_ns(period).max(1);
+        let period_ns = saturate_to_ns(period).max(1);
         Self {
             beat,
             period_ns,
@@ -116,7 +116,7 @@ impl TickSchedule {
                 if late > BEHIND_MAX {
                     *anchor = (Instant::now(), self.due_ns);
                 }
-                self.record_lateness(duration_to_ns(late));
+                self.record_lateness(saturate_to_ns(late));
             }
         }
         (!stop.load(Ordering::SeqCst)).then_some(self.due_ns)

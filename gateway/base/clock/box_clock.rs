@@ -2,7 +2,7 @@
 
 use super::ClockStatus;
 use super::judge::{Certain, ClockNews, ClockRules, Judge, Trust};
-use crate::convert::duration_to_ns;
+use crate::convert::saturate_to_ns;
 use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 use rustix::time::{ClockId, clock_gettime};
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -147,8 +147,8 @@ fn since_boot_ns() -> i64 {
 
 fn wall_ns() -> TimeNs {
     match SystemTime::now().duration_since(UNIX_EPOCH) {
-        Ok(since) => duration_to_ns(since),
-        Err(before) => -duration_to_ns(before.duration()),
+        Ok(since) => saturate_to_ns(since),
+        Err(before) => -saturate_to_ns(before.duration()),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Which reading of the wall clock is believed, and when another one is followed. Pure.
 
-use crate::convert::duration_to_ns;
+use crate::convert::saturate_to_ns;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use serde::Serialize;
 use std::time::Duration;
@@ -51,7 +51,7 @@ impl ClockRules {
     /// A reading that has stood for so long is believed.
     #[must_use]
     pub fn new(confirm: Duration) -> Self {
-        Self { confirm_ns: duration_to_ns(confirm).max(SECOND_NS) }
+        Self { confirm_ns: saturate_to_ns(confirm).max(SECOND_NS) }
     }
 
     fn supported_ns(self) -> i64 {

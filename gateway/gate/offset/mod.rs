@@ -32,7 +32,7 @@ use super::hold::Hold;
 use crate::limits::{GateMode, OffsetConfig};
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::offset::Axis;
-use gateway_base::convert::duration_to_ns;
+use gateway_base::convert::saturate_to_ns;
 use rules::script::OffsetProposal;
 
 /// What became of a proposal.
@@ -173,7 +173,7 @@ impl Offsets {
         let strange = proposals.iter().filter(|it| !self.slides.iter().any(|slide| slide.axis == it.axis));
         let mut verdicts: Vec<OffsetVerdict> = strange.map(|it| not_allowed(it, now)).collect();
         let rested = self.ordered_ns.is_none_or(|ordered_ns| {
-            !(0..duration_to_ns(self.limits.min_interval)).contains(&(now.at_ns - ordered_ns))
+            !(0..saturate_to_ns(self.limits.min_interval)).contains(&(now.at_ns - ordered_ns))
         });
         for slide in &mut self.slides {
             let of_slide = |it: &&OffsetProposal| it.axis == slide.axis && !slide.retired;

@@ -18,7 +18,7 @@ use crate::limits::GateConfig;
 use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 use adapter_core::units::OverridePct;
 use adapter_core::{Actuator, LadderRequest, LadderRule, SourceError};
-use gateway_base::convert::duration_to_ns as ns;
+use gateway_base::convert::saturate_to_ns as ns;
 use std::collections::VecDeque;
 use withdraw::Owed;
 

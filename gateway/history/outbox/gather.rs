@@ -14,7 +14,7 @@ use crate::reason::Reasons;
 use crate::rows::SeriesRows;
 use crate::series::Series;
 use adapter_core::clock::TimeNs;
-use gateway_base::convert::duration_to_ns;
+use gateway_base::convert::saturate_to_ns;
 use rusqlite::Connection;
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -131,8 +131,8 @@ impl Gatherer {
 
     /// Which of these rows come after a gap: index of the row, where the gap begins, and why.
     fn find_gaps(&mut self, rows: &SeriesRows) -> Vec<(usize, TimeNs, &'static str)> {
-        let tick_ns = duration_to_ns(self.outbox.settings().tick);
-        let greatest_ns = duration_to_ns(GAP).max(tick_ns.saturating_mul(3));
+        let tick_ns = saturate_to_ns(self.outbox.settings().tick);
+        let greatest_ns = saturate_to_ns(GAP).max(tick_ns.saturating_mul(3));
         let mut gaps = Vec::new();
         for (row, at_ns) in rows.at_ns.iter().enumerate() {
             let last = self.last.replace((*at_ns, "no_samples"));
@@ -175,7 +175,7 @@ impl Gatherer {
             .into_iter()
             .map(|(at_ns, text)| (at_ns, text.into()))
             .collect();
-        let from_ns = last_ns.saturating_add(duration_to_ns(tick));
+        let from_ns = last_ns.saturating_add(saturate_to_ns(tick));
         lines.push((from_ns, line::of_gap(from_ns, None, "stopped").into()));
         let put = store::store_lines(&ending, &self.outbox, &self.contents, &lines, (false, false))?;
         ending.commit().with_activity("ending the outbox")?;

@@ -8,7 +8,7 @@ use crate::rows::{Column, SeriesRows, Word};
 use crate::series::Series;
 use crate::tail::{append_comma, put_missing, put_number};
 use adapter_core::clock::TimeNs;
-use gateway_base::convert::duration_to_ns;
+use gateway_base::convert::saturate_to_ns;
 use serde_json::Value as Json;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -86,7 +86,7 @@ impl OutboxReport {
         };
         Self {
             every_nth: u64::from(settings.every_nth.max(1)),
-            refresh_ns: duration_to_ns(settings.refresh),
+            refresh_ns: saturate_to_ns(settings.refresh),
             bands: series.iter().map(band).collect(),
             last: vec![Last::Missing(NOT_PROVIDED); series.len()],
             ticks: 0,

@@ -7,7 +7,7 @@ use crate::HistoryError;
 use crate::error::Doing;
 use crate::schema::{open_for_reading, open_for_writing};
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use gateway_base::convert::{clamp_to_signed, clamp_to_unsigned, duration_to_ns};
+use gateway_base::convert::{clamp_to_signed, clamp_to_unsigned, saturate_to_ns};
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use std::borrow::Cow;
 use std::path::Path;
@@ -317,7 +317,7 @@ fn remove(
     (tidy, ages): (bool, bool),
 ) -> Result<Vec<(u64, u64)>, HistoryError> {
     let (settings, lowest) = (outbox.settings(), outbox.lowest_undelivered().min(stored.next_sequence));
-    let max_age_ns = duration_to_ns(settings.max_age);
+    let max_age_ns = saturate_to_ns(settings.max_age);
     let horizon_ns =
         stored.newest_ns.filter(|_| ages).map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(max_age_ns));
     if tidy {

@@ -1,6 +1,6 @@
 //! Which connections there are, what each is doing, and which one has to go for another.
 
-use gateway_base::convert::duration_to_ms;
+use gateway_base::convert::saturate_to_ms;
 use std::collections::HashMap;
 use std::net::IpAddr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -38,7 +38,7 @@ pub(super) enum Waits {
 impl ConnectionActivity {
     fn now_ms(&self) -> u64 {
         // From 1, so that 0 means never.
-        duration_to_ms(self.opened.elapsed()).saturating_add(1)
+        saturate_to_ms(self.opened.elapsed()).saturating_add(1)
     }
 
     /// A request is complete as far as its head goes.

@@ -13,7 +13,7 @@ use adapters::nclink::sample::SampleBlock;
 use adapters::open::{OpenError, Opened};
 use adapters::waveform::SampledCurrent;
 use adapters::{ChannelId, Reading, Source, SourceError};
-use gateway_base::convert::{duration_to_ms, duration_to_ns};
+use gateway_base::convert::{saturate_to_ms, saturate_to_ns};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -105,7 +105,7 @@ impl ControllerSamples {
         SourceError::Timeout {
             source_name: self.name.clone(),
             request: "the sampled load current of the spindle".to_owned(),
-            deadline_ms: duration_to_ms(SILENT),
+            deadline_ms: saturate_to_ms(SILENT),
             next: "Does the controller's model have a sample channel with the spindle's MOTOR/CURRENT, and is nobody using \
                    the oscilloscope at its panel?"
                 .to_owned(),
@@ -115,7 +115,7 @@ impl ControllerSamples {
 
 /// When it arrived, on the clock of the readings.
 fn arrived_ns(clock: &dyn Clock, arrived: Instant) -> TimeNs {
-    clock.now_ns().saturating_sub(duration_to_ns(arrived.elapsed()))
+    clock.now_ns().saturating_sub(saturate_to_ns(arrived.elapsed()))
 }
 
 impl Source for ControllerSamples {
