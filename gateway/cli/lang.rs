@@ -81,5 +81,5 @@ pub(super) fn localize_text(text: &Bilingual) -> &str {
 
 /// One of two texts.
 pub(super) fn pick_text<'t>(en: &'t str, zh: &'t str) -> &'t str {
-    if language() == Language::En { en } else { zh }
+    language().select_text(en, zh)
 }

@@ -57,10 +57,10 @@ impl DiagnosisContext {
     /// Before everything else in a report of words.
     #[must_use]
     pub fn to_words(&self, language: Language, unit: &str) -> String {
-        let pick = |text: &Bilingual| if language == Language::En { text.en.clone() } else { text.zh.clone() };
+        let pick = |text: &Bilingual| language.select_text(&text.en, &text.zh).clone();
         let mut text = String::new();
         for doubt in &self.doubts {
-            let mark = if language == Language::En { "unit? " } else { "单位？" };
+            let mark = language.select_text("unit? ", "单位？");
             text.push_str(&format!("{mark}{}\n", pick(&doubt.text)));
         }
         if let Some(series) = &self.series {

@@ -16,6 +16,17 @@ pub enum Language {
     Zh,
 }
 
+impl Language {
+    /// The one of two texts that is in this language.
+    #[must_use]
+    pub fn select_text<T>(self, en: T, zh: T) -> T {
+        match self {
+            Self::En => en,
+            Self::Zh => zh,
+        }
+    }
+}
+
 /// An effect that the catalogue does not hold.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("there is no effect {kind}. {hint}")]
@@ -166,7 +177,7 @@ fn list_placeholder_notes(doc: &EffectDoc, language: Language) -> impl Iterator<
         ),
     ];
     let used = |word: &str| doc.parameters.iter().any(|parameter| parameter.unit.contains(word));
-    let note = move |(_, en, zh): (&str, &'static str, &'static str)| if language == Language::En { en } else { zh };
+    let note = move |(_, en, zh): (&str, &'static str, &'static str)| language.select_text(en, zh);
     notes.into_iter().filter(move |(word, _, _)| used(word)).map(note)
 }
 
@@ -175,7 +186,7 @@ fn format_parameter_line(parameter: &ParameterDoc, language: Language) -> String
         Entry::Linear => String::new(),
         Entry::Shape => format!(" ({})", select_labels(language).shape),
     };
-    let meaning = if language == Language::En { parameter.en } else { parameter.zh };
+    let meaning = language.select_text(parameter.en, parameter.zh);
     format!("  {} [{}] {}{shape}: {meaning}\n", parameter.name, parameter.unit, format_range(parameter.range))
 }
 
@@ -255,7 +266,7 @@ mod tests {
                 }
                 doc.parameters.iter().for_each(|parameter| assert!(text.contains(parameter.name)));
                 let stands_in = doc.parameters.iter().any(|parameter| parameter.unit.contains("output"));
-                let note = if language == Language::En { "output: " } else { "output：" };
+                let note = language.select_text("output: ", "output：");
                 assert_eq!(text.contains(note), stands_in, "{}", doc.kind);
                 assert!(format_effect_list(language).contains(texts.statement));
             }

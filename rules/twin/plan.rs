@@ -222,7 +222,7 @@ impl Move {
         let words = words.iter().map(|name| self.words.get(name).copied().unwrap_or("").to_owned());
         let numbers = numbers.iter().map(|name| self.commands.get(*name).map(f64::to_string).unwrap_or_default());
         let (en, zh) = self.instruction;
-        let instruction = if language == Language::En { en } else { zh };
+        let instruction = language.select_text(en, zh);
         words.chain(numbers).chain([format!("\"{instruction}\"")]).collect::<Vec<_>>().join(",")
     }
 }

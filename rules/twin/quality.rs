@@ -53,7 +53,7 @@ impl FaultKind {
             Self::DuplicateTime => ("time stands still or runs backwards", "时间停滞或倒退"),
             Self::RefusedRows => ("rows refused while reading", "读取时被拒绝的行"),
         };
-        if language == Language::En { en } else { zh }
+        language.select_text(en, zh)
     }
 }
 

@@ -35,7 +35,7 @@ impl Condition {
     /// The condition in words, with the column's name as it stands in the recording.
     #[must_use]
     pub fn describe(&self, language: Language) -> String {
-        let words = |en: String, zh: String| if language == Language::En { en } else { zh };
+        let words = |en: String, zh: String| language.select_text(en, zh);
         match self {
             Self::Range { column, min, max } => match (min.map(format_short_number), max.map(format_short_number)) {
                 (Some(min), Some(max)) => {

@@ -29,7 +29,7 @@ pub fn format_report(diagnosis: &Diagnosis, language: Language) -> String {
     ];
     for ((en, zh), lines) in sections {
         if !lines.is_empty() {
-            let _ = writeln!(text, "\n{}", say.select_text(en, zh));
+            let _ = writeln!(text, "\n{}", language.select_text(en, zh));
             lines.iter().for_each(|line| text.push_str(&format!("  {line}\n")));
         }
     }
@@ -65,20 +65,11 @@ struct Say<'a> {
 }
 
 impl Say<'_> {
-    fn select_text<'t>(&self, en: &'t str, zh: &'t str) -> &'t str {
-        if self.language == Language::En { en } else { zh }
-    }
-
-    /// A sentence in the language of the report.
-    fn select_sentence(&self, en: String, zh: String) -> String {
-        if self.language == Language::En { en } else { zh }
-    }
-
     /// The name of an effect: its kind, which `effects show` takes, and what it is called.
     fn describe_effect(&self, kind: &str) -> String {
         let Some(effect) = find_effect(kind) else {
             return if kind.starts_with("unknown") {
-                self.select_text("unknown", "未知效应").to_owned()
+                self.language.select_text("unknown", "未知效应").to_owned()
             } else {
                 kind.to_owned()
             };
@@ -87,8 +78,8 @@ impl Say<'_> {
     }
 
     fn format_headline(&self, diagnosis: &Diagnosis) -> String {
-        let summary = self.select_text(&diagnosis.summary.en, &diagnosis.summary.zh);
-        format!("{}{}{summary}\n", diagnosis.verdict.as_word(), self.select_text(": ", "："))
+        let summary = self.language.select_text(&diagnosis.summary.en, &diagnosis.summary.zh);
+        format!("{}{}{summary}\n", diagnosis.verdict.as_word(), self.language.select_text(": ", "："))
     }
 
     fn list_regions(&self, diagnosis: &Diagnosis) -> Vec<String> {
@@ -99,16 +90,16 @@ impl Say<'_> {
         let (share, mean, unit) = (100.0 * region.share, format_signed_number(region.mean), self.unit);
         let place: Vec<String> = region.conditions.iter().map(|condition| condition.describe(self.language)).collect();
         let place = match place.is_empty() {
-            true => self.select_text("everywhere", "所有工况").to_owned(),
-            false => place.join(self.select_text(" and ", "，且")),
+            true => self.language.select_text("everywhere", "所有工况").to_owned(),
+            false => place.join(self.language.select_text(" and ", "，且")),
         };
-        let mut lines = vec![self.select_sentence(
+        let mut lines = vec![self.language.select_text(
             format!("{place}: {share:.0} % of it, on average {mean} {unit}"),
             format!("{place}：占{share:.0} %，平均{mean} {unit}"),
         )];
         if let Some(onset) = &region.onset {
             let (run, at, low, high) = (&onset.run, onset.time_s, onset.low_s, onset.high_s);
-            lines.push(self.select_sentence(
+            lines.push(self.language.select_text(
                 format!("since run {run} at {at:.0} s (between {low:.0} and {high:.0} s)"),
                 format!("始于批次{run}的{at:.0} s（{low:.0}至{high:.0} s之间）"),
             ));
@@ -119,17 +110,17 @@ impl Say<'_> {
 
     fn describe_spans(&self, region: &Region) -> String {
         let shown: Vec<String> = region.spans.iter().take(SPANS_SHOWN).map(|span| self.describe_span(span)).collect();
-        let shown = shown.join(self.select_text("; ", "；"));
+        let shown = shown.join(self.language.select_text("; ", "；"));
         let more = region.spans.len().saturating_sub(SPANS_SHOWN);
         if more == 0 {
             return shown;
         }
-        self.select_sentence(format!("{shown}; and {more} more stretches"), format!("{shown}；另有{more}段"))
+        self.language.select_text(format!("{shown}; and {more} more stretches"), format!("{shown}；另有{more}段"))
     }
 
     fn describe_span(&self, span: &super::region::Span) -> String {
         let (run, from_s, to_s) = (&span.run, span.from_s, span.to_s);
-        self.select_sentence(
+        self.language.select_text(
             format!("run {run}, {from_s:.0} to {to_s:.0} s"),
             format!("批次{run}，{from_s:.0}至{to_s:.0} s"),
         )
@@ -158,7 +149,7 @@ impl Say<'_> {
             format_short_number(estimate.low),
             format_short_number(estimate.high),
         );
-        self.select_sentence(
+        self.language.select_text(
             format!("{name} = {value} {unit} (95 % between {low} and {high})"),
             format!("{name} = {value} {unit}（95 %区间{low}至{high}）"),
         )
@@ -172,17 +163,18 @@ impl Say<'_> {
         let mut lines = Vec::new();
         if let (Some(before), Some(after)) = (fit.before.held_out_rmse, fit.after.held_out_rmse) {
             let (pair, runs) = (arrow(before, after), fit.held_out_runs.join(", "));
-            lines.push(self.select_sentence(
+            lines.push(self.language.select_text(
                 format!("error on runs that took no part in fitting ({runs}): {pair}"),
                 format!("未参与拟合的批次（{runs}）的误差：{pair}"),
             ));
         }
         let pair = arrow(fit.before.rmse, fit.after.rmse);
         lines.push(
-            self.select_sentence(format!("error on the fitted runs: {pair}"), format!("参与拟合批次的误差：{pair}")),
+            self.language
+                .select_text(format!("error on the fitted runs: {pair}"), format!("参与拟合批次的误差：{pair}")),
         );
         let (floor, rows, runs) = (format_short_number(fit.noise_floor), fit.rows, fit.runs);
-        lines.push(self.select_sentence(
+        lines.push(self.language.select_text(
             format!("ordinary noise: {floor} {unit}; {rows} rows in {runs} runs were compared"),
             format!("普通噪声：{floor} {unit}；共比较{runs}个批次{rows}行"),
         ));
@@ -193,7 +185,7 @@ impl Say<'_> {
         let mut lines: Vec<String> = diagnosis.missing.iter().map(|missing| self.describe_evidence(missing)).collect();
         lines.extend(diagnosis.alternatives.iter().flat_map(|other| self.describe_alternative(other)));
         if diagnosis.verdict == Verdict::Explained {
-            lines.push(self.select_text("no other explanation comes near", "没有其他接近的解释").to_owned());
+            lines.push(self.language.select_text("no other explanation comes near", "没有其他接近的解释").to_owned());
         }
         lines
     }
@@ -205,7 +197,7 @@ impl Say<'_> {
             format_short_number(missing.p_value),
             100.0 * missing.absorbed_share,
         );
-        self.select_sentence(
+        self.language.select_text(
             format!(
                 "{name}: information {information}; noise alone does as well in at most {p} of cases; the refitted model \
                  had hidden {absorbed:.0} % of it"
@@ -218,11 +210,12 @@ impl Say<'_> {
         let (name, instead) = (self.describe_effect(&other.effect), self.describe_effect(&other.instead_of));
         let experiment = self.select_experiment_text(other);
         vec![
-            self.select_sentence(
+            self.language.select_text(
                 format!("it could also be {name} instead of {instead}, {}", describe_odds(other.delta_ic)),
                 format!("也可能是{name}而不是{instead}，{}", describe_odds_zh(other.delta_ic)),
             ),
-            self.select_sentence(format!("  what separates them: {experiment}"), format!("  区分方法：{experiment}")),
+            self.language
+                .select_text(format!("  what separates them: {experiment}"), format!("  区分方法：{experiment}")),
         ]
     }
 
@@ -258,10 +251,11 @@ impl Say<'_> {
         };
         let (minutes, gain) =
             (format_short_number(experiment.minutes), format_short_number(experiment.expected_delta_ic));
-        let mut lines =
-            vec![self.select_sentence(format!("{statement} ({minutes} min)"), format!("{statement}（{minutes} min）"))];
+        let mut lines = vec![
+            self.language.select_text(format!("{statement} ({minutes} min)"), format!("{statement}（{minutes} min）")),
+        ];
         if experiment.expected_delta_ic > 0.0 {
-            lines.push(self.select_sentence(
+            lines.push(self.language.select_text(
                 format!("expected to separate the explanations by {gain} of information; `diagnose --experiment PLAN.csv` writes it as a plan"),
                 format!("预计区分信息量{gain}；`diagnose --experiment PLAN.csv`可将试验写成计划文件"),
             ));
@@ -274,7 +268,8 @@ impl Say<'_> {
         faults
             .map(|fault| {
                 let (kind, column, rows) = (fault.kind.describe(self.language), &fault.column, fault.rows);
-                self.select_sentence(format!("{kind} in {column}: {rows} rows"), format!("{column}：{kind}，{rows}行"))
+                self.language
+                    .select_text(format!("{kind} in {column}: {rows} rows"), format!("{column}：{kind}，{rows}行"))
             })
             .collect()
     }

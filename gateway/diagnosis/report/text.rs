@@ -32,10 +32,7 @@ pub(super) struct Tongue(pub(super) Language);
 impl Tongue {
     /// The text in the page's language.
     pub(super) fn pick_text<'a>(self, en: &'a str, zh: &'a str) -> &'a str {
-        match self.0 {
-            Language::En => en,
-            Language::Zh => zh,
-        }
+        self.0.select_text(en, zh)
     }
 
     /// Words in a row: `a, b and c`.
