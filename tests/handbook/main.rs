@@ -7,6 +7,7 @@ mod commands;
 mod documents;
 mod driver;
 mod effect;
+mod identifiers;
 mod run;
 mod settings;
 
@@ -56,7 +57,7 @@ fn links_lead_to_files_that_are_there() {
 }
 
 /// Files that a document names by their whole path; `NAME` and the like stand for a name of the reader's.
-fn named_files(text: &str) -> Vec<&str> {
+pub(crate) fn named_files(text: &str) -> Vec<&str> {
     let of_a_path = |letter: char| letter.is_ascii_alphanumeric() || "/_.".contains(letter);
     let rooms = ["adapters/", "gateway/", "rules/", "tests/"];
     let whole = |word: &&str| rooms.iter().any(|room| word.starts_with(room)) && word.ends_with(".rs");
