@@ -8,12 +8,14 @@
 //! | `role` | viewer, setter, armer, admin |
 //! | `persons` | the file of persons, and the differences between two readings of it |
 //! | `token` | made, hashed, known again |
+//! | `first_token` | the token that the first start prints: once, within a day |
 //! | `sessions` | who is signed in, for how long |
 //! | `tries` | wrong tokens, and who has to wait |
 //! | `account` | rows of the audit, and how many at most |
 //! | `sign_in` | all of these together: from a name and a token to a session, from a request to a person |
 
 mod account;
+mod first_token;
 mod persons;
 mod role;
 mod sessions;
@@ -21,6 +23,7 @@ mod sign_in;
 mod token;
 mod tries;
 
+pub use first_token::FirstToken;
 pub use persons::{
     FIRST, NAME_MAX, PERSONS_MAX, PersonDifference, PersonEntry, Persons, PersonsError, find_differences,
     permission_problem, persons_path,

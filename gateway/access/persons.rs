@@ -3,6 +3,7 @@
 //! The file is the one truth. Whoever changes it - the page, `cnc-gateway person`, an editor - is followed within a second by
 //! the running gateway, which writes every difference into the audit; see [`find_differences`].
 
+use super::first_token::FirstToken;
 use super::role::Role;
 use super::token::{Token, TokenError};
 use gateway_base::files;
@@ -35,6 +36,9 @@ pub struct PersonEntry {
     pub token_hash: String,
     /// Who wrote the entry.
     pub by: String,
+    /// The token is the one that the first start has printed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first: Option<FirstToken>,
 }
 
 /// Everybody who is known.
@@ -84,6 +88,14 @@ pub fn persons_path(data_dir: &Path) -> PathBuf {
 #[must_use]
 pub fn permission_problem(data_dir: &Path) -> Option<StatusProblem> {
     let file = persons_path(data_dir);
+    if let Err(error) = Persons::read(&file) {
+        let next = format!(
+            "`sudo chown --reference={} {}` where it belongs to another user; until then `cnc-gateway disarm` at the box and `POST /api/v1/disarm` give the machine back",
+            data_dir.display(),
+            file.display()
+        );
+        return Some(StatusProblem { what: format!("who may sign in cannot be read: {error}"), next });
+    }
     let mode = std::fs::metadata(&file).ok()?.permissions().mode();
     let what = match mode {
         _ if mode & 0o022 != 0 => "others can change who may do what here",
@@ -172,8 +184,40 @@ impl Persons {
         }
         let token = Token::from_random_bytes()?;
         let (name, token_hash, by) = (name.to_owned(), token.hash()?, by.to_owned());
-        self.persons.push(PersonEntry { name, role, token_hash, by });
+        self.persons.push(PersonEntry { name, role, token_hash, by, first: None });
         Ok(token)
+    }
+
+    /// The administrator whom the first start makes, at this time, seconds since 1970.
+    ///
+    /// # Errors
+    /// No token.
+    pub fn add_first(&mut self, now_s: u64) -> Result<Token, PersonsError> {
+        let token = self.add(FIRST, Role::Admin, "the first start")?;
+        self.find_entry_mut(FIRST)?.first =
+            Some(FirstToken { until_s: now_s.saturating_add(FirstToken::LASTS_S), used: false });
+        Ok(token)
+    }
+
+    /// An administrator of this name, in the place of whom the first start has made, where nobody has taken that one over. Gives the token, and
+    /// whether there was such a one.
+    ///
+    /// # Errors
+    /// As for [`Persons::add`].
+    pub fn replace_first(&mut self, name: &str, by: &str) -> Result<(Token, bool), PersonsError> {
+        let mut fresh = self.clone();
+        fresh.persons.retain(|entry| entry.first.is_none());
+        let revoked = fresh.persons.len() != self.persons.len();
+        let token = fresh.add(name, Role::Admin, by)?;
+        *self = fresh;
+        Ok((token, revoked))
+    }
+
+    /// The token of the first start has signed in.
+    pub(super) fn mark_first_used(&mut self, name: &str) {
+        if let Ok(PersonEntry { first: Some(first), .. }) = self.find_entry_mut(name) {
+            first.used = true;
+        }
     }
 
     /// Another role.
@@ -195,7 +239,7 @@ impl Persons {
         let token = Token::from_random_bytes()?;
         let hash = token.hash()?;
         let entry = self.find_entry_mut(name)?;
-        (entry.token_hash, entry.by) = (hash, by.to_owned());
+        (entry.token_hash, entry.by, entry.first) = (hash, by.to_owned(), None);
         Ok(token)
     }
 
@@ -220,6 +264,12 @@ impl Persons {
         let is_one = self.find_by_name(name).is_some_and(|entry| entry.role == Role::Admin);
         if goes && is_one && !another { Err(PersonsError::LastAdmin(name.to_owned())) } else { Ok(()) }
     }
+}
+
+/// The persons of the file. That there is none any more is no reason to know nobody.
+pub(super) fn read_persons(file: &Path) -> Result<Persons, PersonsError> {
+    let gone = || PersonsError::File(file.to_owned(), std::io::ErrorKind::NotFound.into());
+    Persons::read(file)?.ok_or_else(gone)
 }
 
 /// One difference between two readings of the file, for the audit.

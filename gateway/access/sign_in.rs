@@ -1,7 +1,8 @@
 //! From a name and a token to a session, and from a request to a person.
 
 use super::account::Account;
-use super::persons::{Persons, PersonsError, find_differences};
+use super::first_token::{FirstToken, read_or_create_persons};
+use super::persons::{NAME_MAX, Persons, PersonsError, find_differences, read_persons};
 use super::sessions::{SessionKey, Sessions, digest_cookie};
 use super::token::Token;
 use super::tries::Tries;
@@ -52,6 +53,10 @@ pub enum SignInError {
     Wait(Duration),
     /// The box is busy, or has no memory.
     Busy,
+    /// The token of the first start has signed in once, its time is over, or it came with a request instead of the form.
+    FirstToken,
+    /// Who may sign in cannot be read, for this reason.
+    Unreadable(String),
 }
 
 /// A session that has begun.
@@ -67,6 +72,8 @@ pub struct NewSession {
 struct CachedPersons {
     mark: Mark,
     persons: Persons,
+    /// Why the file cannot be read; `persons` are those who were known before then, after a start nobody.
+    trouble: Option<String>,
 }
 
 #[derive(Debug)]
@@ -105,16 +112,16 @@ impl Access {
     /// once.
     #[must_use]
     pub fn open(file: PathBuf, rules: Rules, orders: OrderSender) -> (Self, Option<Token>) {
-        let (persons, first) = match read_or_create_persons(&file) {
-            Ok(found) => found,
+        let (persons, first, trouble) = match read_or_create_persons(&file) {
+            Ok((persons, first)) => (persons, first, None),
             Err(error) => {
                 let text = format!("nobody can sign in on the page: {error}");
                 Notice::new(Severity::Error, "no_persons", text).write_to_logs();
-                (Persons::default(), None)
+                (Persons::default(), None, Some(error.to_string()))
             }
         };
         let nobody = persons.list_entries().first().map(|entry| entry.token_hash.clone()).unwrap_or_default();
-        let known = Mutex::new(CachedPersons { mark: read_mark(&file), persons });
+        let known = Mutex::new(CachedPersons { mark: read_mark(&file), persons, trouble });
         let access = Self {
             rules,
             file,
@@ -142,6 +149,22 @@ impl Access {
         lock(&self.known).persons.clone()
     }
 
+    /// Why the file of persons cannot be read, where that is so.
+    #[must_use]
+    pub fn trouble(&self) -> Option<String> {
+        lock(&self.known).trouble.clone()
+    }
+
+    /// Who gives the machine back while the file of persons cannot be read: nobody can be recognised then, and that must not keep an override
+    /// in force. `None` where the file can be read.
+    #[must_use]
+    pub fn find_stand_in(&self, name: &str) -> Option<Person> {
+        self.trouble()?;
+        let name: String = name.trim().chars().filter(|sign| !sign.is_control()).take(NAME_MAX).collect();
+        let name = if name.is_empty() { "somebody".to_owned() } else { name };
+        Some(Person { name: format!("{name} (not verified: the persons cannot be read)"), role: Role::Viewer })
+    }
+
     /// Is there still a person of this name?
     #[must_use]
     pub fn has_person(&self, name: &str) -> bool {
@@ -158,13 +181,22 @@ impl Access {
     /// Reads the file again if it has changed, and accounts for every difference.
     pub async fn reload_if_changed(&self) {
         let now = read_mark(&self.file);
-        if lock(&self.known).mark == now {
-            return;
+        {
+            let known = lock(&self.known);
+            // Permissions change no mark: a file that could not be read is tried again.
+            if known.mark == now && known.trouble.is_none() {
+                return;
+            }
         }
-        let read = match Persons::read(&self.file) {
-            Ok(read) => read.unwrap_or_default(),
+        let read = match read_persons(&self.file) {
+            Ok(read) => read,
             Err(error) => {
-                lock(&self.known).mark = now;
+                let trouble = Some(error.to_string());
+                let mut known = lock(&self.known);
+                known.mark = now;
+                if std::mem::replace(&mut known.trouble, trouble.clone()) == trouble {
+                    return;
+                }
                 let text = format!("{error}. Those who were known before still are");
                 return Notice::new(Severity::Error, "persons_refused", text).write_to_logs();
             }
@@ -172,6 +204,7 @@ impl Access {
         let before = {
             let mut known = lock(&self.known);
             known.mark = now;
+            known.trouble = None;
             std::mem::replace(&mut known.persons, read.clone())
         };
         for difference in find_differences(&before, &read) {
@@ -188,7 +221,7 @@ impl Access {
         change: impl FnOnce(&mut Persons) -> Result<T, PersonsError>,
     ) -> Result<T, PersonsError> {
         let _alone = self.changing.lock().await;
-        let mut persons = Persons::read(&self.file)?.unwrap_or_default();
+        let mut persons = read_persons(&self.file)?;
         let given = change(&mut persons)?;
         persons.write(&self.file)?;
         self.reload_if_changed().await;
@@ -202,6 +235,8 @@ impl Access {
     pub async fn sign_in(&self, name: &str, token: &Token, from: IpAddr) -> Result<NewSession, SignInError> {
         self.reload_if_changed().await;
         let person = self.check_token(name, token, from, "login", Urgency::Waits).await?;
+        self.check_first_token(&person.name, from, true)?;
+        self.spend_first_token(&person.name).await?;
         let hash = self.hash_of(&person.name).unwrap_or_default();
         let begun = lock(&self.sessions).begin_session((&person.name, &hash), self.rules.session, Instant::now());
         let cookie = begun.map_err(|_| SignInError::Busy)?;
@@ -242,6 +277,11 @@ impl Access {
                 Ok(Person { name: entry.name, role: entry.role })
             }
             None => {
+                if let Some(trouble) = self.trouble() {
+                    self.account.record_refusal(kind, &format!("from {from}: {trouble}"), name, Instant::now());
+                    let person = self.find_stand_in(name).filter(|_| urgency == Urgency::GivesBack);
+                    return person.ok_or(SignInError::Unreadable(trouble));
+                }
                 let left = lock(&self.tries).record_failure(from, name, Instant::now());
                 let wait = if left == 0 { "; it has to wait now" } else { "" };
                 let text = format!("from {from}: wrong name or token{wait}");
@@ -249,6 +289,11 @@ impl Access {
                 Err(SignInError::Wrong(left))
             }
         }
+    }
+
+    /// What is told of the token of this person, where it is that of the first start.
+    pub(super) fn first_token_of(&self, name: &str) -> Option<FirstToken> {
+        lock(&self.known).persons.find_by_name(name).and_then(|entry| entry.first)
     }
 
     /// Is it the token of this hash? Only a hash of an older version takes time.
@@ -289,7 +334,12 @@ impl Access {
             return Ok(person);
         }
         let (name, token) = given.split_once(':').unwrap_or((given, ""));
+        self.reload_if_changed().await;
         let person = self.check_token(name, &Token::from_typed_text(token), from, "login", urgency).await?;
+        // Whoever gives the machine back needs no more than the right token.
+        if urgency == Urgency::Waits {
+            self.check_first_token(&person.name, from, false)?;
+        }
         let (name, until) = (person.name.clone(), Instant::now() + BEARER_KEPT);
         let token_hash = self.hash_of(&name).unwrap_or_default();
         let mut bearers = lock(&self.bearers);
@@ -320,29 +370,17 @@ impl Access {
         }
     }
 
+    pub(super) fn record_refusal_of(&self, kind: &str, reason: &str, name: &str) {
+        self.account.record_refusal(kind, reason, name, Instant::now());
+    }
+
     /// A request was refused.
     pub fn record_refusal(&self, reason: &str, person: Option<&Person>) {
-        self.account.record_refusal(
-            "request_refused",
-            reason,
-            person.map_or("", |person| &person.name),
-            Instant::now(),
-        );
+        self.record_refusal_of("request_refused", reason, person.map_or("", |person| &person.name));
     }
 
     /// A request that changes something was answered; false when that will not be stored.
     pub async fn record_change(&self, outcome: &str, reason: &str, person: &Person) -> bool {
         self.account.append_row("change", outcome, reason, &person.name).await
     }
-}
-
-/// The persons of the file. Where there is none the first administrator is made.
-fn read_or_create_persons(file: &std::path::Path) -> Result<(Persons, Option<Token>), PersonsError> {
-    if let Some(persons) = Persons::read(file)? {
-        return Ok((persons, None));
-    }
-    let mut persons = Persons::default();
-    let token = persons.add(super::FIRST, Role::Admin, "the first start")?;
-    persons.write(file)?;
-    Ok((persons, Some(token)))
 }

@@ -3,9 +3,8 @@
 
 use super::list::{Fate, of_name};
 use super::list_names;
-use super::restore::RestoreError;
 use gateway_base::log::{Notice, Severity};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Folder in the data directory.
@@ -13,14 +12,12 @@ const FOLDER: &str = "restored";
 /// What has waited for longer is dropped: what the box has learned since is worth more.
 const WAITS_MAX: Duration = Duration::from_secs(24 * 3600);
 
-/// Lays these files ready, in the place of any that wait already.
-pub(super) fn lay_ready(data_dir: &Path, files: &[(String, String)]) -> Result<(), RestoreError> {
+/// Where these files are laid ready, and which of those that wait already have to go.
+pub(super) fn plan_waiting(data_dir: &Path, files: &[(String, String)]) -> (Vec<(PathBuf, String)>, Vec<PathBuf>) {
     let folder = data_dir.join(FOLDER);
-    let say = RestoreError::of_file(&folder);
-    clear(&folder).map_err(&say)?;
-    files
-        .iter()
-        .try_for_each(|(name, text)| gateway_base::files::replace_durably(&folder.join(name), text).map_err(&say))
+    let is_new = |name: &String| files.iter().any(|(new, _)| new == name);
+    let old = list_names(&folder).into_iter().filter(|name| !is_new(name)).map(|name| folder.join(name)).collect();
+    (files.iter().map(|(name, text)| (folder.join(name), text.clone())).collect(), old)
 }
 
 fn clear(folder: &Path) -> std::io::Result<()> {
@@ -65,12 +62,17 @@ mod tests {
         let place = directory.path();
         std::fs::write(place.join("wear.json"), "old").expect("written");
         assert!(install_waiting_files(place).is_none());
-        lay_ready(place, &[("wear.json".to_owned(), "new".to_owned())]).expect("laid");
+        let lay_ready = |text: &str| {
+            let (files, old) = plan_waiting(place, &[("wear.json".to_owned(), text.to_owned())]);
+            assert_eq!((files.len(), old), (1, Vec::new()));
+            gateway_base::files::replace_durably(&files[0].0, &files[0].1).expect("laid");
+        };
+        lay_ready("new");
         assert!(install_waiting_files(place).is_some_and(|notice| notice.operator.contains("wear.json")));
         let text = || std::fs::read_to_string(place.join("wear.json")).expect("there");
         assert_eq!(text(), "new");
         assert!(install_waiting_files(place).is_none() && !place.join(FOLDER).exists());
-        lay_ready(place, &[("wear.json".to_owned(), "too old".to_owned())]).expect("laid");
+        lay_ready("too old");
         let long_ago = std::time::SystemTime::now() - 2 * WAITS_MAX;
         std::fs::File::open(place.join(FOLDER)).and_then(|it| it.set_modified(long_ago)).expect("aged");
         assert!(install_waiting_files(place).is_some_and(|notice| notice.operator.contains("dropped")));

@@ -5,16 +5,21 @@
 //! annotations and what was identified; and the configuration, to be read. [`list`] names every file of the data directory, with
 //! the reason where it is not in an archive. The history is copied beside it ([`copy_history`]).
 //!
-//! A restore ([`restore_backup`]) checks everything first, then changes everything, and what it replaces is kept as an archive. The
+//! A restore ([`restore_backup`]) checks everything first, then changes everything or nothing, and what it replaces is kept as an archive. The
 //! configuration is not put back: it says which machine is polled, and a restart with the wrong one would poll another.
 
 pub mod archive;
 mod handover;
 pub mod list;
+mod origin;
+mod put_back;
 mod restore;
 mod schedule;
+mod target;
 
 pub use handover::install_waiting_files as take_restored;
+pub use origin::BoxOrigin;
+pub use put_back::PutBack;
 pub use restore::{RestoreError, RestoreRequest, restore_backup};
 pub use schedule::{BackupError, BackupSchedule, take_backup};
 
@@ -23,6 +28,7 @@ use gateway_base::convert::seconds_to_instant;
 use gateway_base::moment;
 use gateway_history::{HistoryError, Reader};
 use list::{Fate, LIST, of_name};
+use origin::ORIGIN;
 use std::path::{Path, PathBuf};
 
 /// The longest file that goes into a backup.
@@ -82,9 +88,10 @@ pub fn archive_name(what: &str, at_s: u64) -> String {
 /// The files of a backup.
 ///
 /// # Errors
-/// The wear models of the history cannot be read.
-pub fn collect_files(places: &BackupPaths) -> Result<Vec<ArchivedFile>, HistoryError> {
+/// The wear models of the history cannot be read, or the box has no number.
+pub fn collect_files(places: &BackupPaths) -> Result<Vec<ArchivedFile>, BackupError> {
     let mut taken = CopiedFiles::default();
+    taken.files.push((ORIGIN.to_owned(), BoxOrigin::of_box(&places.machine, &places.data_dir)?.to_json()));
     list_names(&places.scripts).into_iter().filter(|name| is_of_scripts(name)).for_each(|name| {
         taken.add_own_file(&places.scripts.join(&name), format!("scripts/{name}"));
     });
@@ -208,3 +215,5 @@ pub fn copy_history(from: &Path, to: &Path) -> Result<u64, HistoryError> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_target;

@@ -53,11 +53,13 @@ pub const LIST: &[Row] = &[
     ),
     ("offsets.json.unreadable", Fate::Left("a person has to look at it, at this box")),
     ("crashes/*", Fate::Left("reports of what broke off, for the support bundle")),
+    ("box-id", Fate::Left("it says which box this is; another box that is restored from the backup stays another one")),
     ("confirmed", Fate::Left("which version of the program is well, at this box")),
     ("backup-check/*", Fate::Left("a scratch folder, in which a backup is tried")),
     ("diagnoses/*", Fate::Left("reports to read, which decide nothing")),
     ("control.sock", Fate::Left("an entrance of the running process")),
     ("*-before-restore-*.tar.gz", Fate::Left("it is a backup itself")),
+    ("restore-kept/*", Fate::Left("what a restore was replacing when it was stopped")),
     ("restored/*", Fate::Left("a restore that waits for the next start")),
 ];
 

@@ -1,11 +1,16 @@
 //! A backup comes back: everything in it is checked, what is there now is kept, and then all of it takes its place.
 
 use super::list::{Fate, of_name};
-use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, configured_files, handover, is_of_scripts, list_names};
+use super::origin::ORIGIN;
+use super::put_back::{PutBack, Replacement};
+use super::{
+    BackupError, BackupPaths, BoxOrigin, DATA, DELIVERED, WEAR_MODELS, configured_files, handover, is_of_scripts,
+    list_names,
+};
 use crate::archive::ArchivedFile;
 use adapter_core::clock::TimeNs;
-use gateway_base::files::{keep_last, replace_durably, replace_file};
-use gateway_history::{HistoryError, Reader, store_wear_model};
+use gateway_base::files::keep_last;
+use gateway_history::{HistoryError, Reader, store_wear_models};
 use gateway_scripts::reload::read_directory;
 use gateway_scripts::settings;
 use rules::estimators::thermal::ThermalModel;
@@ -77,12 +82,43 @@ pub enum RestoreError {
     /// The wear models could not be read or stored.
     #[error("the wear models: {0}")]
     WearModels(#[from] HistoryError),
+    /// The number of this box cannot be read.
+    #[error("{0}")]
+    Origin(Box<BackupError>),
+    /// The archive is of another box, and nobody has said that this is meant.
+    #[error(
+        "the archive is {of}, and this box is {here}: scripts, settings and what was learned there would come into force here"
+    )]
+    OtherBox {
+        /// Which box the archive is of, in words.
+        of: String,
+        /// This box, in words.
+        here: String,
+    },
+    /// It broke off while files took their places.
+    #[error("{error}; {put_back}")]
+    BrokeOff {
+        /// What could not be done.
+        error: Box<RestoreError>,
+        /// What is there now.
+        put_back: PutBack,
+    },
 }
 
 impl RestoreError {
     /// Adds the path to what the system says.
     pub(super) fn of_file(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
         move |error| Self::File { path: path.to_owned(), error }
+    }
+
+    /// What is so after it: only what broke off half-way can have changed something, and says so itself.
+    #[must_use]
+    pub fn describe_state(&self) -> &'static str {
+        match self {
+            Self::BrokeOff { .. } => "",
+            Self::OtherBox { .. } => "nothing was changed; where that is meant, say so: --from-another-box",
+            _ => "nothing was changed",
+        }
     }
 }
 
@@ -95,6 +131,8 @@ pub struct RestoreRequest<'a> {
     pub at_ns: TimeNs,
     /// What is there now, and the name of its archive.
     pub before: (&'a [u8], &'a str),
+    /// Whoever restores has said that the archive may be of another box.
+    pub from_another_box: bool,
 }
 
 /// What an archive holds that this box has a place for.
@@ -123,18 +161,18 @@ pub fn restore_backup(
     if found.is_empty() {
         return Err(RestoreError::Empty);
     }
+    if !ask.from_another_box {
+        check_origin(places, files)?;
+    }
     found.check_contents(places)?;
+    let wear = find_new_models(&places.history, &found.wear)?;
+    let (texts, surplus) = found.plan_places(places, ask.by);
+    let replacement = Replacement::prepare(&places.data_dir, &texts, surplus)?;
     keep_before(&places.data_dir, ask.before)?;
-    put_scripts(&places.scripts, &found)?;
-    for (path, text) in &found.now {
-        replace_durably(path, text).map_err(RestoreError::of_file(path))?;
-    }
-    if let Some(body) = &found.settings {
-        let path = settings::values_path(&places.data_dir);
-        replace_durably(&path, &settings::sign_text(body, ask.by)).map_err(RestoreError::of_file(&path))?;
-    }
-    let models = store_wear_models(&places.history, &found.wear, ask.at_ns)?;
-    handover::lay_ready(&places.data_dir, &found.later)?;
+    let models = replacement.put_all(|| match wear.is_empty() {
+        true => Ok(0),
+        false => Ok(store_wear_models(&places.history, ask.at_ns, &wear).map(|()| wear.len())?),
+    })?;
     Ok(found.describe_restore(models, ask.before.1))
 }
 
@@ -172,6 +210,24 @@ impl Found {
 
     fn is_empty(&self) -> bool {
         self.scripts.is_empty() && self.now.is_empty() && self.later.is_empty() && self.wear.is_empty()
+    }
+
+    /// Every file with its place, and the files that go: a script that is not in the backup would still decide.
+    fn plan_places(&self, places: &BackupPaths, by: &str) -> (Vec<(PathBuf, String)>, Vec<PathBuf>) {
+        let (later, mut surplus) = handover::plan_waiting(&places.data_dir, &self.later);
+        let mut texts: Vec<(PathBuf, String)> = self.now.iter().cloned().chain(later).collect();
+        if let Some(body) = &self.settings {
+            texts.push((settings::values_path(&places.data_dir), settings::sign_text(body, by)));
+        }
+        if self.scripts.is_empty() {
+            return (texts, surplus);
+        }
+        texts.extend(self.scripts.iter().map(|file| (places.scripts.join(&file.name), file.text.clone())));
+        texts.extend(self.delivered.iter().map(|list| (places.scripts.join(DELIVERED), list.clone())));
+        let is_in_backup = |name: &String| self.scripts.iter().any(|file| file.name == *name);
+        let others = list_names(&places.scripts).into_iter().filter(|name| name.ends_with(".rhai"));
+        surplus.extend(others.filter(|name| !is_in_backup(name)).map(|name| places.scripts.join(name)));
+        (texts, surplus)
     }
 
     /// Everything as the box will read it.
@@ -243,19 +299,28 @@ fn join_lines<P: std::fmt::Display>(all: Vec<P>) -> RestoreError {
     RestoreError::Refused(all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
 }
 
-/// Stores the models that are not in force yet; how many.
-fn store_wear_models(history: &Path, wanted: &[WearRecord], at_ns: TimeNs) -> Result<usize, RestoreError> {
+/// Is the archive of this box?
+fn check_origin(places: &BackupPaths, files: &[ArchivedFile]) -> Result<(), RestoreError> {
+    let here =
+        BoxOrigin::of_box(&places.machine, &places.data_dir).map_err(|error| RestoreError::Origin(Box::new(error)))?;
+    let of = files.iter().find(|(name, _)| name == ORIGIN).and_then(|(_, json)| BoxOrigin::parse(json));
+    let name = |it: &BoxOrigin| format!("that of {} (number {})", it.machine, it.number);
+    match of {
+        Some(of) if of.number == here.number => Ok(()),
+        of => Err(RestoreError::OtherBox {
+            of: of.as_ref().map_or("of an older version, which did not say of which box".to_owned(), name),
+            here: name(&here),
+        }),
+    }
+}
+
+/// The models that are not in force yet.
+fn find_new_models<'a>(history: &Path, wanted: &'a [WearRecord]) -> Result<Vec<&'a WearRecord>, RestoreError> {
     let there = match wanted.is_empty() || !history.exists() {
         true => Vec::new(),
         false => Reader::open(history).and_then(|reader| reader.wear_models())?,
     };
-    let fresh = |record: &&WearRecord| !there.iter().any(|it| it.in_force && it.record == **record);
-    let mut stored = 0;
-    for record in wanted.iter().filter(fresh) {
-        store_wear_model(history, at_ns, record)?;
-        stored += 1;
-    }
-    Ok(stored)
+    Ok(wanted.iter().filter(|record| !there.iter().any(|it| it.in_force && it.record == **record)).collect())
 }
 
 fn keep_before(data_dir: &Path, (archive, name): (&[u8], &str)) -> Result<(), RestoreError> {
@@ -264,24 +329,4 @@ fn keep_before(data_dir: &Path, (archive, name): (&[u8], &str)) -> Result<(), Re
         .and_then(|()| std::fs::write(data_dir.join(name), archive))
         .and_then(|()| keep_last(data_dir, BEFORE_MAX, is_kept))
         .map_err(RestoreError::NotKept)
-}
-
-/// The scripts of the backup and no others: one that is not in it would still decide.
-fn put_scripts(directory: &Path, found: &Found) -> Result<(), RestoreError> {
-    if found.scripts.is_empty() {
-        return Ok(());
-    }
-    let say = RestoreError::of_file(directory);
-    for file in &found.scripts {
-        replace_file(&directory.join(&file.name), &file.text).map_err(&say)?;
-    }
-    if let Some(list) = &found.delivered {
-        replace_file(&directory.join(DELIVERED), list).map_err(&say)?;
-    }
-    let surplus = |name: &String| name.ends_with(".rhai") && !found.scripts.iter().any(|file| file.name == *name);
-    list_names(directory)
-        .into_iter()
-        .filter(surplus)
-        .try_for_each(|name| std::fs::remove_file(directory.join(name)))
-        .map_err(say)
 }

@@ -19,7 +19,7 @@ fn places(below: &Path) -> BackupPaths {
 }
 
 fn ask(name: &str) -> RestoreRequest<'_> {
-    RestoreRequest { by: "Wu", at_ns: 7, before: (b"before", name) }
+    RestoreRequest { by: "Wu", at_ns: 7, before: (b"before", name), from_another_box: true }
 }
 
 fn taken(places: &BackupPaths) -> Vec<ArchivedFile> {

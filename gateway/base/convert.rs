@@ -18,6 +18,12 @@ pub fn seconds_to_instant(at_s: u64) -> TimeNs {
     clamp_to_signed(at_s).saturating_mul(SECOND_NS)
 }
 
+/// Whole seconds since 1970 of an instant; none before 1970, which a clock says that was never set.
+#[must_use]
+pub fn instant_to_seconds(at_ns: TimeNs) -> u64 {
+    clamp_to_unsigned(at_ns.div_euclid(SECOND_NS))
+}
+
 /// What must not be negative: time since 1970, or a count as `SQLite` holds it. A clock that says less has not been set, and fewer
 /// than none is none. Only for figures to look at and to measure by; a number that names something is read with an error.
 #[must_use]
@@ -48,6 +54,7 @@ mod tests {
         assert_eq!((saturate_to_ns(span), duration_to_unsigned_ns(span)), (3_500_000_001, 3_500_000_001));
         assert_eq!((saturate_to_us(span), saturate_to_ms(span)), (3_500_000, 3_500));
         assert_eq!((saturate_to_ns(Duration::MAX), duration_to_unsigned_ns(Duration::MAX)), (i64::MAX, u64::MAX));
+        assert_eq!((instant_to_seconds(2 * SECOND_NS + 5), instant_to_seconds(-1)), (2, 0));
         assert_eq!((seconds_to_instant(2), seconds_to_instant(u64::MAX)), (2 * SECOND_NS, TimeNs::MAX));
         assert_eq!((clamp_to_unsigned(-1), clamp_to_unsigned(7)), (0, 7));
         assert_eq!((clamp_to_signed(u64::MAX), clamp_to_signed(7)), (i64::MAX, 7));

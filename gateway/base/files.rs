@@ -4,6 +4,7 @@
 //! disk never delays a tick; a change is taken when it has stood still for one look, so that no file is read while an editor
 //! is writing it. What the box writes itself takes its place in one step, so that nobody ever finds half a file.
 
+use crate::owner;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -157,15 +158,14 @@ pub fn advise_on_read_error(error: &std::io::Error) -> &'static str {
     }
 }
 
-/// A whole file in one step: written beside its place, then renamed. Its directory is made if need be.
+/// A whole file in one step: written beside its place, then renamed. Its directory is made if need be. Who owns the file and who may
+/// read it stays as it was, see [`crate::owner`].
 ///
 /// # Errors
 /// The file or its directory cannot be written; what was there before stays.
 pub fn replace_file(path: &Path, text: &str) -> std::io::Result<()> {
-    path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-    let fresh = temporary_path(path);
-    std::fs::write(&fresh, text)?;
-    std::fs::rename(&fresh, path)
+    let fresh = write_beside(path, text, Readers::AsBefore)?;
+    std::fs::rename(&fresh.path, path)
 }
 
 /// The same, and returns only when it would survive a power cut.
@@ -173,32 +173,86 @@ pub fn replace_file(path: &Path, text: &str) -> std::io::Result<()> {
 /// # Errors
 /// As for [`replace_file`].
 pub fn replace_durably(path: &Path, text: &str) -> std::io::Result<()> {
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(directory)?;
-    let fresh = temporary_path(path);
-    let mut file = std::fs::File::create(&fresh)?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()?;
-    std::fs::rename(&fresh, path)?;
-    std::fs::File::open(directory)?.sync_all()
+    rename_durably(&write_beside(path, text, Readers::AsBefore)?, path)
 }
 
-/// The same as [`replace_durably`], for a file that nobody but this user may read (mode 600).
+/// The same as [`replace_durably`], for a file that nobody but its owner may read (mode 600).
 ///
 /// # Errors
 /// As for [`replace_file`].
 pub fn replace_privately(path: &Path, text: &str) -> std::io::Result<()> {
+    rename_durably(&write_beside(path, text, Readers::OwnerAlone)?, path)
+}
+
+/// Who may read a file that is replaced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Readers {
+    /// Those who could before; of a new file, as the process makes files.
+    AsBefore,
+    /// Its owner alone.
+    OwnerAlone,
+}
+
+/// A file that is written and has not taken its place.
+#[derive(Debug)]
+pub struct FreshFile {
+    path: PathBuf,
+    file: std::fs::File,
+}
+
+impl FreshFile {
+    /// It takes its place, in one step, and returns only when it would survive a power cut.
+    ///
+    /// # Errors
+    /// The system refuses; what was there before stays, and this file is removed.
+    pub fn take_place(self, path: &Path) -> std::io::Result<()> {
+        rename_durably(&self, path).inspect_err(|_| self.remove())
+    }
+
+    /// It is not wanted.
+    pub fn discard(self) {
+        self.remove();
+    }
+
+    fn remove(&self) {
+        // What is left costs space only; the next one that is written there removes it.
+        let _left = std::fs::remove_file(&self.path);
+    }
+}
+
+/// Writes a text beside its place, for [`FreshFile::take_place`]: many files that take their places together are all written first.
+///
+/// # Errors
+/// As for [`replace_file`].
+pub fn prepare_replacement(path: &Path, text: &str) -> std::io::Result<FreshFile> {
+    write_beside(path, text, Readers::AsBefore)
+}
+
+fn write_beside(path: &Path, text: &str, readers: Readers) -> std::io::Result<FreshFile> {
     use std::os::unix::fs::OpenOptionsExt;
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(directory)?;
+    let directory = directory_of(path);
+    owner::create_directories(directory)?;
     let fresh = temporary_path(path);
     // One that was left behind may have another mode, or be a link to somewhere else.
     let _none_left = std::fs::remove_file(&fresh);
-    let mut file = std::fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&fresh)?;
+    let mode = if readers == Readers::OwnerAlone { 0o600 } else { 0o666 };
+    let mut file = std::fs::OpenOptions::new().write(true).create_new(true).mode(mode).open(&fresh)?;
     file.write_all(text.as_bytes())?;
-    file.sync_all()?;
-    std::fs::rename(&fresh, path)?;
-    std::fs::File::open(directory)?.sync_all()
+    owner::give_to_owner(&file, path, directory)?;
+    if let (Readers::AsBefore, Ok(before)) = (readers, std::fs::metadata(path)) {
+        file.set_permissions(before.permissions())?;
+    }
+    Ok(FreshFile { path: fresh, file })
+}
+
+fn rename_durably(fresh: &FreshFile, path: &Path) -> std::io::Result<()> {
+    fresh.file.sync_all()?;
+    std::fs::rename(&fresh.path, path)?;
+    std::fs::File::open(directory_of(path))?.sync_all()
+}
+
+fn directory_of(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Where a file is written before it takes its place.
@@ -217,6 +271,7 @@ pub fn compute_digest(bytes: &[u8]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::PermissionsExt;
 
     #[test]
     fn a_change_is_taken_once_when_it_has_come_to_rest() {
@@ -237,5 +292,14 @@ mod tests {
         assert_ne!(read_mark(&path), before);
         assert_eq!(read_text(&path, 3).expect("read"), "1234");
         assert_eq!(std::fs::read_dir(directory.path().join("deeper")).expect("there").count(), 1, "nothing is left");
+        let mode = || std::fs::metadata(&path).expect("there").permissions().mode() & 0o777;
+        for wanted in [0o640, 0o600, 0o644] {
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(wanted)).expect("set");
+            replace_file(&path, "1").expect("written");
+            replace_durably(&path, "2").expect("written");
+            assert_eq!(mode(), wanted, "who may read it stays");
+        }
+        replace_privately(&path, "3").expect("written");
+        assert_eq!(mode(), 0o600);
     }
 }

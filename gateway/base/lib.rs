@@ -6,6 +6,7 @@ pub mod convert;
 pub mod files;
 pub mod log;
 pub mod moment;
+pub mod owner;
 pub mod problem;
 pub mod row_rate;
 pub mod state_file;

@@ -30,7 +30,7 @@ pub(super) struct AnnotateArguments {
     /// Edge, axis or sensor, in your words; readings of one edge belong together.
     #[arg(long, value_name = "NAME", default_value = "")]
     of: String,
-    /// Configuration of the box; without it the built-in one.
+    /// Configuration of the box; without it that of the installed box, or the built-in one.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }

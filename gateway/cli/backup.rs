@@ -7,11 +7,11 @@ use crate::backup::{BackupPaths, RestoreRequest, archive_name, collect_files, co
 use crate::clock;
 use adapters::clock::SECOND_NS;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(super) struct BackupArguments {
-    /// Configuration of the box; without it the built-in one.
+    /// Configuration of the box; without it that of the installed box, or the built-in one.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Archive to write; without it a name with the time, in this directory.
@@ -26,9 +26,12 @@ pub(super) struct BackupArguments {
 pub(super) struct RestoreArguments {
     /// Archive that `backup` or the page has made.
     archive: PathBuf,
-    /// Configuration of the box; without it the built-in one.
+    /// Configuration of the box; without it that of the installed box, or the built-in one.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// The archive may be of another box: its scripts, settings and what was learned there come into force here.
+    #[arg(long)]
+    from_another_box: bool,
     /// Who restores; stands in the settings and their history.
     #[arg(long, value_name = "NAME", default_value = "at the box")]
     by: String,
@@ -43,6 +46,19 @@ fn to_cannot_run(what: impl ToString) -> CannotRun {
     CannotRun::new(what.to_string(), "")
 }
 
+/// The archive takes its name only when all of it is on the disk.
+fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut writing = path.as_os_str().to_owned();
+    writing.push(".writing");
+    let written = std::fs::write(&writing, bytes)
+        .and_then(|()| std::fs::File::open(&writing)?.sync_all())
+        .and_then(|()| std::fs::rename(&writing, path));
+    written.inspect_err(|_| {
+        // What is left of it has another name.
+        let _left = std::fs::remove_file(&writing);
+    })
+}
+
 pub(super) fn run_backup(arguments: &BackupArguments) -> CommandResult {
     let config = load_configuration(arguments.config.as_deref())?;
     let (_, at_s) = read_clock();
@@ -50,7 +66,7 @@ pub(super) fn run_backup(arguments: &BackupArguments) -> CommandResult {
         collect_files(&BackupPaths::from_config(&config, arguments.config.as_deref())).map_err(to_cannot_run)?;
     let archive = pack(&files, at_s).map_err(to_cannot_run)?;
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(archive_name("backup", at_s)));
-    std::fs::write(&out, &archive).map_err(|error| to_cannot_run(format!("{}: {error}", out.display())))?;
+    write_whole(&out, &archive).map_err(|error| to_cannot_run(format!("{}: {error}", out.display())))?;
     print_text(&format!("{}: {} files, {} bytes\n", out.display(), files.len(), archive.len()));
     match &arguments.history {
         Some(copy) => {
@@ -71,8 +87,14 @@ pub(super) fn run_restore(arguments: &RestoreArguments) -> CommandResult {
     let (at_ns, at_s) = read_clock();
     let before = collect_files(&places).map_err(to_cannot_run)?;
     let before = pack(&before, at_s).map_err(to_cannot_run)?;
-    let ask = RestoreRequest { by: &arguments.by, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
-    let done = crate::backup::restore_backup(&places, &files, ask).map_err(to_cannot_run)?;
+    let ask = RestoreRequest {
+        by: &arguments.by,
+        at_ns,
+        before: (&before, &archive_name("before-restore", at_s)),
+        from_another_box: arguments.from_another_box,
+    };
+    let done = crate::backup::restore_backup(&places, &files, ask)
+        .map_err(|error| CannotRun::new(error.to_string(), error.describe_state()))?;
     print_text(&format!("{done}\n"));
     Ok(CommandOutcome::Fine)
 }

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(super) struct CommissionArguments {
-    /// Configuration of the box; without it the built-in one.
+    /// Configuration of the box; without it that of the installed box, or the built-in one.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Look at the history from then on: 2026-01-31T08:15:00Z or -8h; without it at all of it.

@@ -1,5 +1,6 @@
 //! Which gateway on this box a command is for, and how it answers. Shared by `arm`, `disarm`, `acknowledge` and `person`.
 
+use super::installed::note_data_dir;
 use super::{CannotRun, load_configuration};
 use clap::Args;
 use std::path::PathBuf;
@@ -19,12 +20,13 @@ pub(super) struct GatewayOptions {
 }
 
 impl GatewayOptions {
-    /// The data directory that is meant: the one that is named, or that of a configuration, or the usual one.
+    /// The data directory that is meant: the one that is named, or that of a configuration, or that of the installed box.
     ///
     /// # Errors
     /// The configuration cannot be read.
     pub(super) fn data_dir(&self) -> Result<PathBuf, CannotRun> {
         if let Some(directory) = &self.data_dir {
+            note_data_dir(directory);
             return Ok(directory.clone());
         }
         Ok(load_configuration(self.config.as_deref())?.gateway.data_dir)

@@ -22,6 +22,7 @@ mod help_zh;
 mod history;
 mod history_upkeep;
 mod identify;
+mod installed;
 mod lang;
 mod metrics;
 mod model;
@@ -45,6 +46,7 @@ use crate::reload::read_directory;
 use ::rules::physics::explain::Language;
 use ::rules::script::{Host, ScriptProblem, list_shipped_scripts};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use installed::load_configuration;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -177,6 +179,7 @@ pub fn main() -> ExitCode {
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     lang::choose_language(arguments.lang);
     let done = dispatch_command(arguments);
+    installed::hand_over_data();
     log::flush();
     match done {
         Ok(CommandOutcome::Fine) => ExitCode::SUCCESS,
@@ -263,16 +266,6 @@ fn print_text(text: &str) {
 /// Prints a document on lines of its own.
 fn print_json(document: &serde_json::Value) {
     print_text(&format!("{document:#}\n"));
-}
-
-/// The configuration in a file, or the built-in one.
-fn load_configuration(file: Option<&Path>) -> Result<crate::config::Config, CannotRun> {
-    let environment =
-        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
-    crate::config::load(file, environment).map_err(|problems| {
-        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
-        CannotRun::new(lines.join("\n"), "")
-    })
 }
 
 /// The operations recipe in a file.

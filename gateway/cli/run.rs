@@ -1,5 +1,6 @@
 //! `cnc-gateway run`: the box, live.
 
+use super::installed::note_data_dir;
 use super::{CannotRun, CommandOutcome, CommandResult, LogArguments};
 use crate::config;
 use crate::demo;
@@ -49,6 +50,7 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 /// Runs the box until it is told to stop.
 pub(super) fn run(arguments: RunArguments, log: LogArguments) -> CommandResult {
     let plan = build_plan(arguments)?;
+    note_data_dir(&plan.config.gateway.data_dir);
     log.start_log(&plan.config.log);
     run::run(plan)?;
     Ok(CommandOutcome::Fine)

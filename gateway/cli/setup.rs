@@ -1,7 +1,8 @@
 //! `cnc-gateway setup`: the questions that a box needs answered, each tried at once, and the configuration from the answers.
 
+use super::installed::note_data_dir;
 use super::{CannotRun, CommandOutcome, CommandResult, lang, print_text};
-use crate::access::{self, Persons, Role};
+use crate::access::{self, Persons};
 use crate::doctor;
 use crate::setup::{AddressRange, SetupAnswers, scan_for_controls};
 use ::rules::physics::explain::Language;
@@ -110,6 +111,7 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
         return Err(CannotRun::new("a box needs a control or a meter", next));
     }
     let answers = SetupAnswers { machine, language, control, meters, page_from_network };
+    note_data_dir(&arguments.data_dir);
     write_configuration(&dialogue, arguments, &answers)?;
     add_administrator(&dialogue, arguments)?;
     dialogue.print_words((
@@ -251,23 +253,24 @@ fn write_configuration(
     };
     if out.exists() {
         let before = out.with_extension("before.toml");
-        std::fs::copy(out, &before).map_err(cannot)?;
-        give_to_owner_of_directory(&before);
+        let text = std::fs::read_to_string(out).map_err(cannot)?;
+        crate::files::replace_durably(&before, &text).map_err(cannot)?;
         print_text(&format!("{}: {}\n", dialogue.pick_text(("what was there before", "原来的配置")), before.display()));
     }
     crate::files::replace_durably(out, &text).map_err(cannot)?;
-    give_to_owner_of_directory(out);
     print_text(&format!("{}: {}\n", dialogue.pick_text(("written", "已写入")), out.display()));
     Ok(())
 }
 
-/// The first person, whose token is shown once.
+/// The person who may change everything, whose token is shown once. Whom the first start has made is removed: that token may stand in a
+/// log.
 fn add_administrator(dialogue: &Dialogue, arguments: &SetupArguments) -> Result<(), CannotRun> {
     let path = access::persons_path(&arguments.data_dir);
     let cannot =
         |error: access::PersonsError| CannotRun::new(error.to_string(), "cnc-gateway person add NAME --role admin");
     let mut persons = Persons::read(&path).map_err(cannot)?.unwrap_or_default();
-    if !persons.list_entries().is_empty() && arguments.admin.is_none() {
+    let is_managed = persons.list_entries().iter().any(|entry| entry.first.is_none());
+    if is_managed && arguments.admin.is_none() {
         return Ok(());
     }
     let name = match &arguments.admin {
@@ -277,23 +280,15 @@ fn add_administrator(dialogue: &Dialogue, arguments: &SetupArguments) -> Result<
             "admin",
         )?,
     };
-    let token = persons.add(&name, Role::Admin, "setup").map_err(cannot)?;
+    let (token, revoked) = persons.replace_first(&name, "setup").map_err(cannot)?;
     persons.write(&path).map_err(cannot)?;
-    give_to_owner_of_directory(&path);
     print_text(&format!(
         "{} {name}: {}\n",
         dialogue.pick_text(("token, shown only now, of", "令牌(仅显示一次):")),
         token.text()
     ));
-    Ok(())
-}
-
-/// A file that root wrote belongs to the user of the service, who owns the directory.
-fn give_to_owner_of_directory(path: &Path) {
-    use std::os::unix::fs::MetadataExt;
-    let owner = path.parent().and_then(|parent| std::fs::metadata(parent).ok());
-    if let Some(owner) = owner {
-        // Not root: the file belongs to whoever runs this, as the directory does.
-        let _not_root = std::os::unix::fs::chown(path, Some(owner.uid()), Some(owner.gid()));
+    if revoked {
+        dialogue.print_words(("the token of the first start is worth nothing any more", "首次启动时的令牌已作废"));
     }
+    Ok(())
 }

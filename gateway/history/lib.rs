@@ -121,5 +121,5 @@ pub use set_apart::{SetApart, set_apart};
 pub use space::{DiskRoom, disk_room};
 pub use sql::SQL_WITHIN;
 pub use status::HistoryFigures;
-pub use wear_models::{StoredWearModel, store_wear_model};
+pub use wear_models::{StoredWearModel, store_wear_model, store_wear_models};
 pub use writer::Writer;

@@ -27,11 +27,27 @@ pub struct StoredWearModel {
 /// # Errors
 /// The file cannot be opened or written, or the model has a number that cannot be stored.
 pub fn store_wear_model(path: &Path, at_ns: TimeNs, record: &WearRecord) -> Result<i64, HistoryError> {
+    insert_wear_model(&schema::open_for_writing(path)?, at_ns, record)
+}
+
+/// Stores all of these models or none, see [`store_wear_model`].
+///
+/// # Errors
+/// The same.
+pub fn store_wear_models(path: &Path, at_ns: TimeNs, records: &[&WearRecord]) -> Result<(), HistoryError> {
+    let mut db = schema::open_for_writing(path)?;
+    let all = db.transaction().with_activity("storing wear models")?;
+    for record in records {
+        insert_wear_model(&all, at_ns, record)?;
+    }
+    all.commit().with_activity("storing wear models")
+}
+
+fn insert_wear_model(db: &Connection, at_ns: TimeNs, record: &WearRecord) -> Result<i64, HistoryError> {
     let toml = record.to_toml().map_err(HistoryError::Question)?;
     let cuts = i64::try_from(record.cuts)
         .map_err(|error| rusqlite::Error::ToSqlConversionFailure(Box::new(error)))
         .with_activity("storing a wear model")?;
-    let db = schema::open_for_writing(path)?;
     let WearKey { machine, tool, work_material, operation } = &record.key;
     db.execute(
         "INSERT INTO wear_models (at_ns, machine, tool, work_material, operation, form, criterion_mm, cuts, residual_sd_w, r2,

@@ -65,6 +65,7 @@ async fn admit_request(Guarded { shared, route }: &Guarded, mut request: Request
         let unnamed = |problem| refuse(check_role(shared, route, None).err().unwrap_or(problem));
         request = with_body(request, route.body_max()).await.map_err(unnamed)?;
         (request, person) = identify_by_body(shared, request, &peer).await.map_err(refuse)?;
+        person = person.or_else(|| shared.access.find_stand_in(""));
     }
     if let Err(problem) = check_role(shared, route, person.as_ref()) {
         let what = format!("{} {} from {}: {}", route.verb().word(), route.path(), peer.from, problem.title);
@@ -175,6 +176,14 @@ pub(super) fn describe_sign_in_error(error: &SignInError) -> ApiProblem {
         ),
         SignInError::Wait(wait) => ApiProblem::too_many(*wait),
         SignInError::Busy => ApiProblem::unavailable("the box is busy", "try again in a few seconds"),
+        SignInError::FirstToken => ApiProblem::unauthorised(
+            "the token of the first start signs in once, at /sign-in, within a day",
+            "make a lasting one at the box: `sudo cnc-gateway setup`, or `sudo cnc-gateway person token NAME`",
+        ),
+        SignInError::Unreadable(why) => ApiProblem::unavailable(
+            format!("who may sign in cannot be read: {why}"),
+            "at the box: `sudo chown --reference=DATA_DIR DATA_DIR/persons.json`; giving the machine back works all the same",
+        ),
     }
 }
 

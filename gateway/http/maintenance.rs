@@ -4,19 +4,20 @@
 use super::ServerState;
 use super::diagnoses::respond_with_download;
 use super::guard::with_audit_note;
-use super::history::describe_history_error;
+use super::history::{HistoryQuery, describe_history_error};
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
+use super::query::QueryKeys;
 use super::route::Route;
 use super::rules::run_blocking;
 use axum::Json;
 use axum::body::Bytes;
-use axum::extract::State;
+use axum::extract::{Query as Pairs, State};
 use axum::response::Response;
 use axum::routing::{get, post};
 use gateway_access::Role;
 use gateway_backup::archive::{ArchivedFile, pack, unpack};
-use gateway_backup::{self as backup, BackupPaths, RestoreError, RestoreRequest, archive_name};
+use gateway_backup::{self as backup, BackupError, BackupPaths, RestoreError, RestoreRequest, archive_name};
 use gateway_base::convert::seconds_to_instant;
 use gateway_config::{Config, GateMode};
 use gateway_history::{Reader, RecordSpan, audit_document};
@@ -120,7 +121,10 @@ fn pack_archive(files: &[ArchivedFile], at_s: u64) -> Result<Vec<u8>, ApiProblem
 }
 
 fn collect_files(places: &BackupPaths) -> Result<Vec<ArchivedFile>, ApiProblem> {
-    backup::collect_files(places).map_err(|error| describe_history_error(&error))
+    backup::collect_files(places).map_err(|error| match &error {
+        BackupError::History(error) => describe_history_error(error),
+        error => ApiProblem::unavailable(error.to_string(), "look at the data directory"),
+    })
 }
 
 /// `GET /api/v1/backup`: a new backup as a download, without the rows of the history.
@@ -130,13 +134,24 @@ async fn download_backup(State(shared): State<ServerState>) -> Result<Response, 
     Ok(respond_with_download("application/gzip", &archive_name("backup", at_s), bytes))
 }
 
+/// The archive may be of another box: whoever restores has said so.
+fn is_from_another_box(pairs: Vec<(String, String)>) -> Result<bool, ApiProblem> {
+    const KEY: &str = "from_another_box";
+    match QueryKeys::from_pairs(pairs, &[KEY])?.find_text(KEY) {
+        None | Some("false") => Ok(false),
+        Some("true") => Ok(true),
+        Some(other) => Err(ApiProblem::bad_request(format!("{KEY}={other} is not usable"), "give true or false")),
+    }
+}
+
 /// `POST /api/v1/restore`: what a backup holds takes the place of what is in force; what was learned, at the next start.
 async fn restore_backup(
     State(shared): State<ServerState>,
     SignedIn(person): SignedIn,
+    Pairs(pairs): HistoryQuery,
     body: Bytes,
 ) -> Result<Response, ApiProblem> {
-    let at_s = now_s(&shared)?;
+    let (at_s, from_another_box) = (now_s(&shared)?, is_from_another_box(pairs)?);
     let done = run_blocking(move || {
         let files = unpack(&body).map_err(|error| {
             ApiProblem::bad_request(
@@ -146,11 +161,21 @@ async fn restore_backup(
         })?;
         let places = shared.configured.backup_paths();
         let before = pack_archive(&collect_files(&places)?, at_s)?;
-        let cannot = |error: RestoreError| {
-            ApiProblem::bad_request(error.to_string(), "nothing was changed; take the backup of a box of this version")
+        let cannot = |error: RestoreError| match &error {
+            RestoreError::OtherBox { .. } => ApiProblem::conflict(
+                error.to_string(),
+                "nothing was changed; where that is meant, send it with ?from_another_box=true",
+            ),
+            RestoreError::BrokeOff { .. } => ApiProblem::unavailable(error.to_string(), "look at the disk"),
+            error => ApiProblem::bad_request(error.to_string(), error.describe_state()),
         };
         let at_ns = seconds_to_instant(at_s);
-        let ask = RestoreRequest { by: &person.name, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
+        let ask = RestoreRequest {
+            by: &person.name,
+            at_ns,
+            before: (&before, &archive_name("before-restore", at_s)),
+            from_another_box,
+        };
         backup::restore_backup(&places, &files, ask).map_err(cannot)
     });
     let done = done.await?;

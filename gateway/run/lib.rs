@@ -363,10 +363,15 @@ fn open_access(config: &Config, post: control::OrderSender) -> Access {
     let (access, first) = Access::open(access::persons_path(&config.gateway.data_dir), rules, post);
     if let Some(token) = first {
         let name = access::FIRST;
-        log::say_to_operator_alone(&format!(
-            "to change something on the page, sign in as {name} with the token {}; it is shown only now",
-            token.text()
-        ));
+        log::say_to_operator_alone(&match log::is_kept_by_journal() {
+            true => "to change something on the page, make a token at the box: `sudo cnc-gateway setup`, or \
+                     `sudo cnc-gateway person token admin`"
+                .to_owned(),
+            false => format!(
+                "to change something on the page, sign in as {name} with the token {}; it is shown only now, and signs in once, within a day",
+                token.text()
+            ),
+        });
     }
     access
 }

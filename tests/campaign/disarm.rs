@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use testkit::process::{request, wait_for};
+use testkit::process::{request, run, stdout, text, wait_for};
 
 /// The aim: from the order to its answer.
 const WITHIN: Duration = Duration::from_millis(100);
@@ -32,9 +32,9 @@ struct Routes {
 
 impl Routes {
     fn of(held: &Plain, socket: PathBuf) -> Self {
-        let said = held.gateway.said();
-        let token = said.lines().find_map(|line| line.split_once("with the token ").map(|it| it.1));
-        let token = token.and_then(|rest| rest.split(';').next()).expect("the first token");
+        let data = socket.parent().expect("the data directory");
+        let made = run(&["person", "token", "admin", "--data-dir", text(data)]);
+        let token = stdout(&made).trim().rsplit(' ').next().expect("a token").to_owned();
         let named = format!("{{\"name\":\"admin\",\"token\":\"{token}\"}}");
         let head =
             format!("POST /api/v1/login HTTP/1.0\r\nHost: {}\r\nContent-Type: application/json\r\n", held.address);

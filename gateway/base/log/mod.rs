@@ -118,6 +118,16 @@ impl Notice {
     }
 }
 
+/// Does the journal of the system keep what is said to the operator? The service manager names the socket that it listens on.
+#[must_use]
+pub fn is_kept_by_journal() -> bool {
+    let Some(named) = std::env::var("JOURNAL_STREAM").ok() else { return false };
+    let is_named = |found: rustix::io::Result<rustix::fs::Stat>| {
+        found.is_ok_and(|found| named == format!("{}:{}", found.st_dev, found.st_ino))
+    };
+    is_named(rustix::fs::fstat(std::io::stderr())) || is_named(rustix::fs::fstat(std::io::stdout()))
+}
+
 /// A line for the operator that must not stand in any log: a token that is shown once.
 pub fn say_to_operator_alone(text: &str) {
     operator_outlet().queue_line(format!("{}   {text}\n", clock_text()).into_bytes());

@@ -1,8 +1,8 @@
 //! The archive of an update: a `.tar.gz` with the program in it, and a detached signature of minisign beside it.
 
-use super::UpdateError;
+use super::{UpdateError, UpdateKey};
 use flate2::read::GzDecoder;
-use minisign_verify::{PublicKey, Signature};
+use minisign_verify::Signature;
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -14,28 +14,6 @@ const BYTES_MAX: u64 = 256 * 1024 * 1024;
 const ENTRIES_MAX: usize = 64;
 /// The file that is the program.
 const PROGRAM: &str = "cnc-gateway";
-
-/// Where the public key comes from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum PublicKeySource {
-    /// A file as minisign writes it, with its comment.
-    File(PathBuf),
-    /// The key itself, the second line of that file.
-    Text(String),
-}
-
-impl PublicKeySource {
-    fn read(&self) -> Result<PublicKey, UpdateError> {
-        match self {
-            Self::Text(text) => PublicKey::from_base64(text.trim()).map_err(|_| UpdateError::Key(text.clone())),
-            Self::File(path) => {
-                let text = fs::read_to_string(path).map_err(UpdateError::file_error(path))?;
-                let bad = || UpdateError::Key(path.display().to_string());
-                PublicKey::decode(text.trim()).or_else(|_| PublicKey::from_base64(text.trim())).map_err(|_| bad())
-            }
-        }
-    }
-}
 
 /// An archive whose signature fits.
 #[derive(Debug)]
@@ -50,11 +28,10 @@ pub struct Bundle {
 ///
 /// # Errors
 /// See [`UpdateError`].
-pub fn read_bundle(path: &Path, key: &PublicKeySource) -> Result<Bundle, UpdateError> {
-    let key = key.read()?;
+pub fn read_bundle(path: &Path, key: &UpdateKey) -> Result<Bundle, UpdateError> {
     let signature = read_signature(path)?;
     let bytes = read_limited(path)?;
-    key.verify(&bytes, &signature, false).map_err(|_| UpdateError::Refused)?;
+    key.key.verify(&bytes, &signature, false).map_err(|_| UpdateError::Refused)?;
     let program = find_program(path, &bytes)?;
     Ok(Bundle { program, comment: signature.trusted_comment().to_owned() })
 }

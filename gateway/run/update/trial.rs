@@ -1,10 +1,10 @@
 //! Waiting until the service has confirmed a version, and going back when it does not.
 
-use super::slots::{Trial, VersionSlots};
-use super::{PACKAGE_SLOT, UpdateError};
+use super::UpdateError;
+use super::look::{ServiceControl, slot_of_process};
+use super::slots::{TRIAL_STARTS, Trial, VersionSlots, read_confirmed};
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// The service is well for this long before it confirms its own version: the time in which a leak of threads, a source that
@@ -17,39 +17,17 @@ const COPY_WITHIN: Duration = Duration::from_secs(1_200);
 /// The file in the data directory in which the service confirms a version: the name of its slot.
 pub(super) const CONFIRMED: &str = "confirmed";
 
-/// How the service is started anew.
-pub trait ServiceControl {
-    /// Starts it anew and returns when that was asked for.
-    ///
-    /// # Errors
-    /// The service manager refuses.
-    fn restart(&self) -> Result<(), UpdateError>;
-}
-
-/// The service of the package.
-#[derive(Debug, Clone, Copy)]
-pub struct SystemdService;
-
-impl ServiceControl for SystemdService {
-    fn restart(&self) -> Result<(), UpdateError> {
-        let output = Command::new("systemctl").args(["restart", "--no-block", "cnc-gateway.service"]).output();
-        match output {
-            Ok(output) if output.status.success() => Ok(()),
-            Ok(output) => Err(UpdateError::Service(String::from_utf8_lossy(&output.stderr).trim().to_owned())),
-            Err(error) => Err(UpdateError::Service(format!("systemctl cannot be started: {error}"))),
-        }
-    }
-}
-
-/// How a trial ended.
+/// How a trial ended. What runs after it is another question, see [`super::look_until_runs`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TrialOutcome {
-    /// The new version is well and stays.
+    /// The new version has said that it is well.
     Confirmed,
-    /// It was not; the one before runs again.
-    RolledBack {
+    /// It has not, and the link names another version again.
+    TakenBack {
         /// What spoke against the new version.
         reason: String,
+        /// The slot that the link names now.
+        linked: String,
     },
 }
 
@@ -57,49 +35,55 @@ pub enum TrialOutcome {
 /// does not confirm it in time.
 ///
 /// # Errors
-/// A file cannot be written, or the service cannot be started at all; the version before is in its place again then.
+/// A file cannot be written, or the service manager refuses.
 pub fn run_trial(
     slots: &VersionSlots,
-    new: &str,
+    trial: &Trial,
     data_dir: &Path,
     service: &dyn ServiceControl,
     within: Duration,
 ) -> Result<TrialOutcome, UpdateError> {
-    let before = slots.running_slot().unwrap_or_else(|| PACKAGE_SLOT.to_owned());
     let confirmed = data_dir.join(CONFIRMED);
     let _none_left = fs::remove_file(&confirmed);
-    slots.begin_trial(&Trial { before: before.clone(), new: new.to_owned(), starts: 0 })?;
-    slots.switch_to(new)?;
+    slots.begin_trial(trial)?;
+    slots.switch_to(&trial.new)?;
     let reason = match service.restart() {
-        Ok(()) => wait_for_confirmation(slots, new, &confirmed, within),
+        Ok(()) => wait_for_confirmation(slots, &trial.new, data_dir, within),
         Err(error) => Some(error.to_string()),
     };
-    match reason {
-        None => {
-            slots.end_trial()?;
-            slots.remove_others(&[&before, new]);
-            Ok(TrialOutcome::Confirmed)
-        }
-        Some(reason) => {
-            slots.switch_to(&before)?;
-            slots.end_trial()?;
-            service.restart()?;
-            Ok(TrialOutcome::RolledBack { reason })
-        }
+    let Some(reason) = reason else {
+        slots.end_trial()?;
+        slots.remove_others(&[&trial.before, &trial.new]);
+        return Ok(TrialOutcome::Confirmed);
+    };
+    if slots.linked_slot().as_deref() == Some(&trial.new) {
+        slots.go_back(&trial.before)?;
     }
+    slots.end_trial()?;
+    let linked = slots.linked_slot().unwrap_or_else(|| trial.before.clone());
+    // The guard may have gone back already, and the version before runs.
+    if service.read_state().slot.as_ref() != Some(&linked) {
+        service.restart()?;
+    }
+    Ok(TrialOutcome::TakenBack { reason, linked })
 }
 
 /// `None` when the version was confirmed; otherwise why not.
-fn wait_for_confirmation(slots: &VersionSlots, new: &str, confirmed: &Path, within: Duration) -> Option<String> {
+fn wait_for_confirmation(slots: &VersionSlots, new: &str, data_dir: &Path, within: Duration) -> Option<String> {
     let started = Instant::now();
     let mut waits_since = started;
-    let copying = confirmed.with_file_name(format!("history.db{}", gateway_history::COPYING));
+    let copying = data_dir.join(format!("history.db{}", gateway_history::COPYING));
     while waits_since.elapsed() < within {
-        if fs::read_to_string(confirmed).is_ok_and(|text| text == new) {
+        if read_confirmed(data_dir).as_deref() == Some(new) {
             return None;
         }
-        if slots.running_slot().as_deref() != Some(new) {
-            return Some("it was started several times and was not well".to_owned());
+        if slots.linked_slot().as_deref() != Some(new) {
+            return Some(match slots.read_rolled_back() {
+                Some(trial) if trial.new == new => {
+                    format!("it was started {TRIAL_STARTS} times and was not well for {} s", WELL_FOR.as_secs())
+                }
+                _ => "another version was put in its place meanwhile".to_owned(),
+            });
         }
         // A large history is copied before its tables change; that is no bad health.
         if copying.exists() && started.elapsed() < COPY_WITHIN {
@@ -110,20 +94,12 @@ fn wait_for_confirmation(slots: &VersionSlots, new: &str, confirmed: &Path, with
     Some(format!("it did not report good health within {} s", within.as_secs()))
 }
 
-/// The slot that this process was started from, where it was started from one.
-fn own_slot() -> Option<String> {
-    let program = fs::read_link("/proc/self/exe").ok()?;
-    let folder: PathBuf = program.parent()?.to_owned();
-    let in_versions = folder.parent()?.file_name()? == "versions";
-    in_versions.then(|| folder.file_name()?.to_str().map(str::to_owned))?
-}
-
 /// Says in the data directory that this version is well. Called once, by a service that has been well for [`WELL_FOR`].
 ///
 /// # Errors
 /// The file cannot be written.
 pub fn confirm_running_version(data_dir: &Path) -> std::io::Result<()> {
-    match own_slot() {
+    match slot_of_process("self") {
         Some(slot) => gateway_base::files::replace_durably(&data_dir.join(CONFIRMED), &slot),
         None => Ok(()),
     }

@@ -84,6 +84,7 @@ export const SYSTEM = {
     "Scripts, settings, recipe and models of {0} take the place of those in force, at once and while the machine runs; scripts that are not in it are removed. What was there is kept as an archive in the data directory. Give the machine back to its dial first.",
     "{0} 中的脚本、设置、工序表和模型将立即替换当前内容（机床运行中亦然），其中没有的脚本将被删除。原内容会在数据目录中存档。请先交还操作面板。",
   ],
+  restore_other: ["{0}. Restore it all the same?", "{0}。仍然恢复吗？"],
   recipe: ["Recipe: how each stretch of a program cuts", "工序表：程序各段的切削参数"],
   recipe_words: [
     "No controller can be asked for these. A change counts within two seconds; comments in the file are lost by a change made here.",

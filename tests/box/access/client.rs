@@ -9,7 +9,7 @@ pub(crate) struct Testbed {
     pub(crate) gateway: Gateway,
     pub(crate) address: String,
     pub(crate) config: PathBuf,
-    /// Of the first administrator.
+    /// Of the administrator, who was made before the first start.
     pub(crate) token: String,
     pub(crate) directory: tempfile::TempDir,
 }
@@ -26,10 +26,9 @@ pub(crate) fn testbed(http: &str) -> Testbed {
          [gate]\nmode = \"armed\"\nsource = \"lathe\"\n[http]\nlisten = \"127.0.0.1:0\"\n{http}"
     );
     std::fs::write(&config, written).expect("a configuration");
-    let (mut gateway, address) = started(&config);
-    let line = gateway.wait_said("with the token");
-    let token =
-        line.split("with the token ").nth(1).and_then(|rest| rest.split(';').next()).expect("a token").to_owned();
+    let made = run(&["person", "add", "admin", "--role", "admin", "--config", text(&config)]);
+    let token = stdout(&made).trim().rsplit(' ').next().expect("a token").to_owned();
+    let (gateway, address) = started(&config);
     Testbed { gateway, address, config, token, directory }
 }
 

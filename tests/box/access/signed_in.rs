@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use testkit::process::wait_for;
 
 #[test]
-fn a_first_token_signs_in_and_persons_come_and_go() {
+fn a_token_signs_in_and_persons_come_and_go() {
     let mut testbed = testbed("session_s = 12.0\n");
     let file = testbed.directory.path().join("data/persons.json");
     let kept = std::fs::read_to_string(&file).expect("persons");
@@ -50,7 +50,7 @@ fn a_first_token_signs_in_and_persons_come_and_go() {
     assert!(testbed.gateway.wait().success());
     let (mut again, _) = started(&testbed.config);
     again.wait_said("live page");
-    assert!(!again.stop().contains("with the token"), "the first token is shown once");
+    assert!(!again.stop().contains("with the token"), "nobody is made where there is somebody");
     let audit = testbed.audit();
     for (kind, outcome, about, count) in [
         ("persons", "known", "admin: admin", 2),

@@ -72,7 +72,12 @@ fn an_empty_box_goes_on_from_a_backup_and_no_file_is_forgotten() {
     assert_eq!(rows(&copy), rows(&old.join("data/history.db")));
 
     let again = furnish(&new);
-    let said = fine(&run(&["restore", text(&archive), "--config", text(&again), "--by", "Wu"]));
+    let refused = run(&["restore", text(&archive), "--config", text(&again), "--by", "Wu"]);
+    let why = stderr(&refused);
+    assert!(why.contains("--from-another-box") && why.contains("nothing was changed"), "{why}");
+    assert!(!new.join("data/settings.toml").exists() && !new.join("data/restored").exists());
+    let meant = ["restore", text(&archive), "--config", text(&again), "--by", "Wu", "--from-another-box"];
+    let said = fine(&run(&meant));
     assert!(said.contains("the settings") && said.contains("waits for the next start"), "{said}");
     assert!(new.join("data/restored/wear.json").exists() && !new.join("data/wear.json").exists());
     let waiting = fs::read(new.join("data/restored/scripts.json")).expect("there");

@@ -1,48 +1,19 @@
-//! What a package adds to the program: the guard before every start, the service manager, an update with its signature and its way back.
-//!
-//! The update under `tests/data/update` was signed with minisign itself; its program is a script that answers as version 9.9.9.
+//! What a package adds to the program: the guard before every start, the service manager, the first configuration.
 
+use super::service::{PackagedBox, current, start_guard, write_program};
 use std::fs;
-use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::fs::symlink;
 use std::os::unix::net::UnixDatagram;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use testkit::process::{Gateway, get, program, run, stderr, stdout, text, wait_for};
 
-const GUARD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/gateway/package/guard");
-const UPDATES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/update");
-
-/// A folder of versions as the package lays it out, with one version that runs.
-fn versions(place: &Path) -> PathBuf {
-    let home = place.join("home");
-    write_program(&home.join("versions/package/cnc-gateway"), "exit 0");
-    symlink("versions/package", home.join("current")).expect("a link");
-    home
-}
-
-fn write_program(path: &Path, body: &str) {
-    fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
-    fs::write(path, format!("#!/bin/sh\n{body}\n")).expect("written");
-    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("executable");
-}
-
-fn current(home: &Path) -> String {
-    fs::read_link(home.join("current")).expect("a link").to_string_lossy().into_owned()
-}
-
-/// What the service manager does before every start.
-fn start_guard(home: &Path, state: &Path) {
-    let status = Command::new("sh").arg(GUARD).arg(home).arg(state).status().expect("sh");
-    assert!(status.success());
-}
-
 #[test]
 fn a_version_that_nobody_confirms_is_taken_back_at_the_fourth_start() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let (home, state) = (versions(directory.path()), directory.path().join("state"));
-    fs::create_dir_all(&state).expect("a folder");
+    let packaged = PackagedBox::new();
+    let (home, state) = (packaged.home(), packaged.data());
     write_program(&home.join("versions/9.9.9/cnc-gateway"), "exit 1");
+    // As an update of an older version leaves it: no starts, and no way back.
     let begin = || {
         fs::write(home.join("trial"), "package 9.9.9 0\n").expect("written");
         fs::remove_file(home.join("current")).expect("removed");
@@ -64,172 +35,11 @@ fn a_version_that_nobody_confirms_is_taken_back_at_the_fourth_start() {
     assert_eq!(current(&home), "versions/9.9.9", "a version that is well stays");
 
     // The power failed while the trial was written: half a line, another name, a name that leads elsewhere.
-    for half in ["", "package", "package 9.9", "package ../../tmp 0\n", "nothing 9.9.9 0\n"] {
+    for half in ["", "package", "package 9.9", "package ../../tmp 0\n", "nothing 9.9.9 0\n", "package 9.9.9 x"] {
         fs::write(home.join("trial"), half).expect("written");
         start_guard(&home, &state);
         assert_eq!(current(&home), "versions/9.9.9", "{half:?}");
     }
-}
-
-/// `cnc-gateway update` in this place, started by `under` where that is given. The service is what `bin/systemctl` makes of it.
-fn update_command(place: &Path, under: &[&str]) -> Command {
-    let path = format!("{}:{}", place.join("bin").display(), std::env::var("PATH").unwrap_or_default());
-    let words = [under, &[env!("CARGO_BIN_EXE_cnc-gateway"), "update"]].concat();
-    let mut command = Command::new(words[0]);
-    command.args(&words[1..]).env("PATH", path).env_remove("RUST_LOG");
-    command.args(["--home", text(&place.join("home")), "--data-dir", text(&place.join("data"))]);
-    command
-}
-
-/// `cnc-gateway update` with a `systemctl` that does what the body says when the service is started anew.
-fn update(place: &Path, systemctl: &str, arguments: &[&str]) -> Output {
-    write_program(&place.join("bin/systemctl"), systemctl);
-    update_command(place, &[]).args(arguments).output().expect("started")
-}
-
-#[test]
-fn an_update_is_verified_tried_and_kept() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let place = directory.path();
-    let home = versions(place);
-    fs::create_dir_all(place.join("data")).expect("a folder");
-    let key = format!("{UPDATES}/minisign.pub");
-    let copy = place.join("cnc-gateway-9.9.9.tar.gz");
-    let signature = place.join("cnc-gateway-9.9.9.tar.gz.minisig");
-    fs::copy(format!("{UPDATES}/cnc-gateway-9.9.9.tar.gz"), &copy).expect("copied");
-
-    let refused = |output: &Output, part: &str| {
-        assert_eq!(output.status.code(), Some(2), "{}", stderr(output));
-        assert!(stderr(output).contains(part), "{}", stderr(output));
-        assert_eq!(current(&home), "versions/package");
-        assert!(!home.join("trial").exists());
-    };
-    refused(&update(place, "exit 0", &[text(&copy)]), "signature");
-    refused(&update(place, "exit 0", &[text(&copy), "--verify", &key]), "signature");
-    fs::copy(format!("{UPDATES}/cnc-gateway-9.9.9.tar.gz.minisig"), &signature).expect("copied");
-    let other_key = "RWQf6LRCGA9i53mlYecO4IzT51TGPpvWucNSCh1CBM0QTaLn73Y7GFO3";
-    refused(&update(place, "exit 0", &[text(&copy), "--verify", other_key]), "signature");
-    let good = fs::read(&copy).expect("read");
-    let mut altered = good.clone();
-    altered[good.len() / 2] ^= 1;
-    fs::write(&copy, altered).expect("written");
-    refused(&update(place, "exit 0", &[text(&copy), "--verify", &key]), "signature");
-    fs::write(&copy, good).expect("written");
-    refused(&update(place, "exit 1", &[text(&copy), "--verify", &key]), "");
-
-    let confirm = format!("printf 9.9.9 > {}", place.join("data/confirmed").display());
-    let output = update(place, &confirm, &[text(&copy), "--verify", &key]);
-    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
-    assert_eq!(current(&home), "versions/9.9.9");
-    assert!(stdout(&output).contains("not armed"), "{}", stdout(&output));
-    let told = update(place, "exit 0", &[]);
-    assert!(stdout(&told).contains("runs: 9.9.9"), "{}", stdout(&told));
-}
-
-/// A place in which the package and the update's way to confirm are laid out.
-fn box_for_update() -> (tempfile::TempDir, String) {
-    let directory = tempfile::tempdir().expect("a directory");
-    let place = directory.path();
-    versions(place);
-    fs::create_dir_all(place.join("data")).expect("a folder");
-    let confirm = format!("printf 9.9.9 > {}", place.join("data/confirmed").display());
-    write_program(&place.join("bin/systemctl"), &confirm);
-    (directory, confirm)
-}
-
-/// The signed update in that place, under another program where one is given.
-fn update_in(place: &Path, under: &[&str]) -> Command {
-    let mut command = update_command(place, under);
-    command.arg(format!("{UPDATES}/cnc-gateway-9.9.9.tar.gz")).args(["--verify", &format!("{UPDATES}/minisign.pub")]);
-    command.stdout(Stdio::null()).stderr(Stdio::null());
-    command
-}
-
-/// How many cuts left which version.
-#[derive(Debug)]
-struct Cuts {
-    before: usize,
-    on_trial: usize,
-    /// The program that the update brings.
-    new_program: Vec<u8>,
-}
-
-impl Cuts {
-    /// None yet. The update is made once without one.
-    fn new() -> Self {
-        let (place, _) = box_for_update();
-        assert!(update_in(place.path(), &[]).status().expect("started").success());
-        let new_program = fs::read(place.path().join("home/versions/9.9.9/cnc-gateway")).expect("read");
-        Self { before: 0, on_trial: 0, new_program }
-    }
-
-    fn words(&self) -> String {
-        format!("{} left the version before, {} the new one on trial", self.before, self.on_trial)
-    }
-
-    /// After a cut: a whole version runs, also after every start; the trial has an end; the next update works.
-    fn check(&mut self, place: &Path, confirm: &str, what: &str) {
-        let (home, data) = (place.join("home"), place.join("data"));
-        let before = fs::read(home.join("versions/package/cnc-gateway")).expect("read");
-        let whole = [&before, &self.new_program];
-        let runs = || fs::read(home.join("current/cnc-gateway")).is_ok_and(|program| whole.contains(&&program));
-        assert!(runs(), "{what}: nothing runs");
-        *if current(&home) == "versions/package" { &mut self.before } else { &mut self.on_trial } += 1;
-        for _ in 0..5 {
-            start_guard(&home, &data);
-            assert!(runs(), "{what}: nothing runs after a start");
-        }
-        assert!(!home.join("trial").exists(), "{what}: the trial has no end");
-        // The service was started before the cut and may have confirmed after it.
-        let confirmed = data.join("confirmed").exists();
-        assert!(confirmed || current(&home) == "versions/package", "{what}: kept, and nobody confirmed it");
-        let (archive, key) = (format!("{UPDATES}/cnc-gateway-9.9.9.tar.gz"), format!("{UPDATES}/minisign.pub"));
-        let again = update(place, confirm, &[&archive, "--verify", &key]);
-        let over = again.status.success() || stderr(&again).contains("is not newer");
-        assert!(over && current(&home) == "versions/9.9.9", "{what}: {}", stderr(&again));
-    }
-}
-
-#[test]
-fn an_update_that_is_killed_at_twenty_moments_leaves_a_version_that_runs() {
-    let (place, _) = box_for_update();
-    let began = Instant::now();
-    assert!(update_in(place.path(), &[]).status().expect("started").success());
-    let (whole, mut cuts) = (began.elapsed(), Cuts::new());
-    for step in 1..=20 {
-        let (place, confirm) = box_for_update();
-        let mut child = update_in(place.path(), &[]).spawn().expect("started");
-        std::thread::sleep(whole * step / 21);
-        let _ended_before = child.kill();
-        child.wait().expect("a child");
-        cuts.check(place.path(), &confirm, &format!("after {step}/21"));
-    }
-    println!("20 cuts of {whole:?}: {}", cuts.words());
-}
-
-/// The same at every call of the system that changes a file.
-#[test]
-#[ignore = "1 minute: an update killed at each call that changes a file; needs strace and the right to trace"]
-fn an_update_that_is_cut_at_any_call_leaves_a_version_that_runs() {
-    let calls =
-        ["mkdir", "write", "fsync", "fdatasync", "rename", "renameat2", "symlink", "symlinkat", "unlink", "unlinkat"];
-    let there = Command::new("strace").args(["-o", "/dev/null", "true"]).status();
-    assert!(there.is_ok_and(|status| status.success()), "strace is not installed or may not trace");
-    let (mut cuts, mut count) = (Cuts::new(), 0);
-    for call in calls {
-        for number in 1.. {
-            let (place, confirm) = box_for_update();
-            let (trace, inject) = (format!("trace={call}"), format!("inject={call}:signal=KILL:when={number}"));
-            let strace = ["strace", "-f", "-qq", "-o", "/dev/null", "-e", &trace, "-e", &inject];
-            if update_in(place.path(), &strace).status().expect("strace runs").success() {
-                break;
-            }
-            cuts.check(place.path(), &confirm, &format!("{call} {number}"));
-            count += 1;
-        }
-    }
-    println!("{count} cuts: {}", cuts.words());
-    assert!(count >= 20 && cuts.on_trial > 0, "{count} cuts: {}", cuts.words());
 }
 
 #[test]

@@ -58,6 +58,22 @@ export function careCard(context) {
   };
 }
 
+/** Sends the archive; one of another box is sent again when the person says that it is meant. */
+async function restored(file, note, fromAnotherBox) {
+  try {
+    const answer = await ask(`/api/v1/restore${fromAnotherBox ? "?from_another_box=true" : ""}`, {
+      method: "POST",
+      headers: { "content-type": "application/octet-stream" },
+      body: file,
+    });
+    say(note, answer.text);
+  } catch (error) {
+    const isOfAnother = error.status === 409 && !fromAnotherBox;
+    if (isOfAnother && confirm(t("restore_other", error.document.title))) await restored(file, note, true);
+    else say(note, error.message);
+  }
+}
+
 function warned(file, note) {
   const dialog = make(
     "dialog",
@@ -78,21 +94,7 @@ function warned(file, note) {
   );
   dialog.addEventListener("close", async () => {
     dialog.remove();
-    if (dialog.returnValue !== "yes") return;
-    try {
-      say(
-        note,
-        (
-          await ask("/api/v1/restore", {
-            method: "POST",
-            headers: { "content-type": "application/octet-stream" },
-            body: file,
-          })
-        ).text,
-      );
-    } catch (error) {
-      say(note, error.message);
-    }
+    if (dialog.returnValue === "yes") await restored(file, note, false);
   });
   document.body.append(dialog);
   dialog.showModal();
