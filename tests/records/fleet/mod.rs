@@ -13,6 +13,8 @@ mod pipeline;
 mod poison;
 mod postgres;
 mod questions;
+mod redated;
+mod restored;
 mod secured;
 mod sizes;
 mod told;
