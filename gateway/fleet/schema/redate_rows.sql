@@ -44,7 +44,7 @@ INSERT INTO incoming (box_id, epoch, sequence, at, kind, record)
 SELECT box_id, epoch, sequence, new_at, kind, fleet_shifted(record, by_ns) FROM moving
 WHERE record IS NOT NULL AND NOT (kind = 'gap' AND coalesce(fleet_time((fleet_shifted(record, by_ns) ->> 'until_ns')::bigint) <= new_at, false));
 -- What was heard last, and values that were older than those of the wrong time.
-UPDATE box_latest SET last_at = newest.last_at, cells = coalesce(fleet_cells(cells, newest.cells), '{}')
+UPDATE box_latest SET last_at = newest.last_at, cells = coalesce(fleet_cells(box_latest.cells, coalesce(newest.cells, '{}')), '{}')
 FROM (
   SELECT box_id, max(at) AS last_at, (
     SELECT jsonb_object_agg(series_id, CASE WHEN reason IS NULL THEN jsonb_build_array(at_us, value) ELSE jsonb_build_array(at_us, value, reason) END)

@@ -114,9 +114,10 @@ impl MqttSink {
             true => Err(RequestRefusal::RetainedMessage),
             false => request::document_of(&message.payload),
         };
-        let id = document.as_ref().map_or(Json::Null, |document| document.id.clone().map_or(Json::Null, Json::from));
+        let origin = request::origin_of(&message.payload);
+        let id = origin.id.clone().map_or(Json::Null, Json::from);
         let change = document.and_then(RequestDocument::into_change);
-        let Some(Reply { done, text }) = self.requests.submit_change(change).await else { return Ok(()) };
+        let Some(Reply { done, text }) = self.requests.submit_change(origin, change).await else { return Ok(()) };
         let says = json!({"done": done, "text": text, "id": id});
         let topic = self.format_topic("request/answer");
         let answer = Outgoing { topic, payload: says.to_string().into_bytes(), retain: false };

@@ -14,6 +14,7 @@ mod poison;
 mod postgres;
 mod questions;
 mod redated;
+mod resent;
 mod restored;
 mod secured;
 mod sizes;
