@@ -1,6 +1,6 @@
 //! `cnc-gateway fleet`: many boxes, one database.
 
-use super::{CannotRun, CommandOutcome, CommandResult, print_text};
+use super::{CannotRun, CommandOutcome, CommandResult, fleet_resend, print_text};
 use crate::fleet::ingest::{self, Done, IngestSettings};
 use crate::fleet::questions::{QUESTIONS, of_name};
 use crate::fleet::retention::{self, Going, KEEPING};
@@ -18,6 +18,8 @@ pub(super) enum Fleet {
     Ingest(IngestArguments),
     /// Create the stream that takes what the boxes send, unless it is there.
     Stream(StreamArguments),
+    /// Send a stretch of the history once more, to a sink that came later or whose receiver has lost it. On the box, which may run.
+    Resend(fleet_resend::ResendArguments),
     /// Remove what is too old from the database.
     Retain(RetainArguments),
     /// Print the tables, or a question over all machines.
@@ -149,6 +151,7 @@ pub(super) fn run(fleet: Fleet) -> CommandResult {
     match fleet {
         Fleet::Ingest(arguments) => runtime.block_on(ingest_stream(&arguments)),
         Fleet::Stream(arguments) => runtime.block_on(create_stream(&arguments)),
+        Fleet::Resend(arguments) => runtime.block_on(fleet_resend::resend_stretch(&arguments)),
         Fleet::Retain(arguments) => runtime.block_on(apply_retention(&arguments)),
         Fleet::Sql { name } => print_sql(name.as_deref()),
     }

@@ -16,6 +16,7 @@ mod doctor;
 mod effects;
 #[cfg(feature = "fleet")]
 mod fleet;
+mod fleet_resend;
 mod gateway_options;
 mod help;
 mod help_zh;

@@ -24,7 +24,7 @@ mod order_channel;
 mod server;
 
 pub use client::send_order;
-pub use network::{NetworkRequest, RequestRefusal, RequestedChange};
+pub use network::{NetworkRequest, RequestOrigin, RequestRefusal, RequestedChange};
 pub use order_channel::{OrderReceiver, OrderSender, PostedRequest, PostedRow, Wake, create_queues};
 pub use server::{Listening, listen_for_orders};
 

@@ -3,6 +3,7 @@
 //! Less than a person: it cannot arm, cannot disarm, and cannot let a second feed hold pass. What it asks is judged by the
 //! gate like the request of a script, at every tick, and only while the configuration of its sink says `allow_requests`.
 
+use adapter_core::clock::TimeNs;
 use std::fmt;
 use thiserror::Error;
 
@@ -60,6 +61,38 @@ pub enum RequestRefusal {
     /// The same of a command of Sparkplug.
     #[error("a retained command is no request: publish it without the retain flag")]
     RetainedCommand,
+    /// Nobody can say whether it is an old one.
+    #[error(
+        "when was this asked for? Add \"issued_at\":\"2026-01-31T08:15:00Z\" and an \"id\" of its own, so that a message that comes late or twice is not obeyed"
+    )]
+    WithoutOrigin,
+    /// It comes too late, or from a clock that is ahead.
+    #[error(
+        "issued {age_s:.0} s before now by the clock of this box, and at most {most_s} s are waited for: ask again, and compare the clocks"
+    )]
+    NotFresh {
+        /// By how much it is older than now, s; negative where it is of the future.
+        age_s: f64,
+        /// The greatest age, s.
+        most_s: i64,
+    },
+    /// It may have been obeyed before the box was started.
+    #[error("issued before this run of the box began: ask again")]
+    BeforeStart,
+    /// The same id has come before.
+    #[error("the request {id:?} has come before: give each one an id of its own")]
+    Repeated {
+        /// The asker's mark.
+        id: String,
+    },
+    /// A metric that a host may not write.
+    #[error(
+        "{metric} cannot be written over the network: only request/feed_override_pct and request/acknowledge_alarm"
+    )]
+    NotWritable {
+        /// Name of the metric at the broker.
+        metric: String,
+    },
     /// A metric that must be a number.
     #[error("{metric} is no number")]
     NoNumber {
@@ -123,11 +156,44 @@ impl fmt::Display for RequestedChange {
     }
 }
 
+/// Who asks, as the message says; nothing of it is verified.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RequestOrigin {
+    /// The asker's own mark of the request.
+    pub id: Option<String>,
+    /// What the asker calls himself.
+    pub asker: Option<String>,
+    /// When it was asked for, by the asker's clock, ns since 1970.
+    pub issued_ns: Option<TimeNs>,
+}
+
+impl RequestOrigin {
+    /// Of these words, cut and freed of control characters.
+    #[must_use]
+    pub fn from_words(id: Option<&str>, asker: Option<&str>, issued_ns: Option<TimeNs>) -> Self {
+        let clean = |text: &str| Some(clean_text(text)).filter(|text| !text.is_empty());
+        Self { id: id.and_then(clean), asker: asker.and_then(clean), issued_ns }
+    }
+}
+
+impl fmt::Display for RequestOrigin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.asker, &self.id) {
+            (Some(asker), Some(id)) => write!(f, "asked by {asker:?}, id {id:?}"),
+            (Some(asker), None) => write!(f, "asked by {asker:?}"),
+            (None, Some(id)) => write!(f, "id {id:?}"),
+            (None, None) => f.write_str("nobody says who asks"),
+        }
+    }
+}
+
 /// A change that is asked for, or why a message is none, with where it came from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NetworkRequest {
     /// Name of the sink in the configuration.
     pub sink: String,
+    /// Who asks, as the message says.
+    pub origin: RequestOrigin,
     /// What is asked for, or why it is refused before anybody looks at it.
     pub change: Result<RequestedChange, RequestRefusal>,
     /// So many messages before it came too fast and were thrown away.

@@ -36,7 +36,7 @@ pub struct IngestSettings {
     pub consumer: String,
     /// The PostgreSQL database that is written into.
     pub database: DatabaseSettings,
-    /// End when nothing is left to do.
+    /// End when everything is written that was in the stream at the beginning, whatever comes meanwhile.
     pub once: bool,
 }
 
@@ -103,6 +103,7 @@ impl Ingest<'_> {
         connection.create_consumer(&stream.name, consumer).await?;
         Notice::new(Severity::Info, "ingest_running", format!("taking items from stream {}", stream.name))
             .write_to_logs();
+        let last_number = if *once { Some(connection.read_last_number(&stream.name).await?) } else { None };
         let limits = FetchLimits { messages: BATCH_MESSAGES, bytes: BATCH_BYTES, patience: PATIENCE };
         let mut batch = connection.fetch_messages(&stream.name, consumer, limits).await?;
         loop {
@@ -112,10 +113,14 @@ impl Ingest<'_> {
             connection.acknowledge_messages(&batch);
             connection.flush().await?;
             batch = fetched?;
-            if batch.is_empty() {
+            if let Some(last_number) = last_number {
                 let backlog = connection.read_backlog(&stream.name, consumer).await?;
-                if *once && backlog.pending == 0 && backlog.under_way == 0 {
-                    return Ok(());
+                let nothing_left = batch.is_empty() && backlog.pending == 0 && backlog.under_way == 0;
+                if nothing_left || backlog.acknowledged_to >= last_number {
+                    // What has been given out meanwhile would be given to nobody else for a while.
+                    self.count_written(write(&mut database, &batch).await?);
+                    connection.acknowledge_messages(&batch);
+                    return connection.flush().await;
                 }
             }
             if self.last_report.elapsed() >= TELL_EVERY {
@@ -166,6 +171,7 @@ async fn write(database: &mut Database, messages: &[Message]) -> Result<Written,
     // Stretches that are still to be written; one that the database does not take is halved.
     let mut stretches = vec![(0, items.len())];
     while let Some((from, to)) = stretches.pop() {
+        database.settle_times(items[from..to].iter_mut().map(|(row, _)| row)).await.map_err(|error| error.said)?;
         let arrived = |(row, message): &'_ (FleetRow<'_>, &Message)| message.stored_us().unwrap_or(row.at_us());
         let mut rows: Vec<Arrived<'_>> =
             items[from..to].iter().map(|item| Arrived { row: &item.0, arrived_us: arrived(item) }).collect();

@@ -82,6 +82,8 @@ mod tests {
             box_name: "b".into(),
             machine: "m".into(),
             sequence: at_ns,
+            epoch: 1,
+            redated_ns: 0,
             at_ns: at_ns * 1000,
             kind: "sample".into(),
             historical,

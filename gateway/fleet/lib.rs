@@ -21,10 +21,12 @@
 mod copy;
 mod database;
 pub mod ingest;
+mod known_items;
 mod latest;
 mod means;
 mod names;
 pub mod questions;
+mod redate;
 pub mod retention;
 mod row;
 mod schema;

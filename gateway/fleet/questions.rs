@@ -22,6 +22,7 @@ questions! {
     "series-over-machines" => "series_over_machines",
     "machines-now" => "machines_now",
     "states-by-machine" => "states_by_machine",
+    "energy-by-day" => "energy_by_day",
     "energy-per-part" => "energy_per_part",
     "energy-per-operation" => "energy_per_operation",
     "oee-per-shift" => "oee_per_shift",

@@ -17,6 +17,11 @@ const TEXT_MAX: usize = 10_000;
 /// Values of one item: a box has some hundred series.
 const VALUES_MAX: usize = 5_000;
 
+/// Fields of records that are times.
+const TIMES: [&str; 6] = ["at_ns", "began_ns", "ended_ns", "from_ns", "to_ns", "until_ns"];
+/// Why there is a gap before the first sample of a run.
+const NOT_RUNNING: &str = "not_running";
+
 /// One item, ready to be written.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FleetRow<'a> {
@@ -24,7 +29,11 @@ pub(super) struct FleetRow<'a> {
     pub(super) machine: Cow<'a, str>,
     /// From 1 to the greatest `i64`.
     pub(super) sequence: i64,
+    /// Which life of the box has numbered it; 0 for boxes of before.
+    pub(super) epoch: i64,
     pub(super) at_ns: TimeNs,
+    /// By how much the box has moved its time already, ns.
+    pub(super) redated_ns: i64,
     pub(super) kind: Cow<'a, str>,
     pub(super) historical: bool,
     /// The cells of a sample.
@@ -52,6 +61,10 @@ struct ItemDocument<'a> {
     #[serde(borrow)]
     schema: Cow<'a, str>,
     sequence: u64,
+    #[serde(default)]
+    epoch: u64,
+    #[serde(default)]
+    redated_ns: i64,
     at_ns: TimeNs,
     #[serde(borrow)]
     kind: Cow<'a, str>,
@@ -156,6 +169,9 @@ impl<'a> FleetRow<'a> {
             Ok(sequence) if sequence > 0 => sequence,
             _ => return refuse_message("the number of the item is out of range"),
         };
+        let Ok(epoch) = i64::try_from(document.epoch) else {
+            return refuse_message("the epoch of the item is out of range");
+        };
         let at = jiff::Timestamp::from_nanosecond(i128::from(document.at_ns));
         let year = at.map(|at| at.to_zoned(jiff::tz::TimeZone::UTC).year());
         if !year.is_ok_and(|year| YEARS.contains(&year)) {
@@ -168,6 +184,8 @@ impl<'a> FleetRow<'a> {
             box_name: check_name("box", document.box_name)?,
             machine: check_name("machine", document.machine)?,
             sequence,
+            epoch,
+            redated_ns: document.redated_ns,
             at_ns: document.at_ns,
             kind: check_name("kind", document.kind)?,
             historical: document.historical,
@@ -198,6 +216,27 @@ impl<'a> FleetRow<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Its time is so much later: the clock of the box had been wrong when it was sent. Means are of other minutes then, and the box tells
+    /// those anew; a gap before the first sample of a run begins with the run before.
+    pub(super) fn shift_time(&mut self, by_ns: i64) {
+        self.redated_ns = self.redated_ns.saturating_add(by_ns);
+        if !self.means.is_empty() {
+            self.means.clear();
+            return;
+        }
+        if self.record.as_ref().is_none_or(|record| record["reason"] != NOT_RUNNING || self.kind != "gap") {
+            self.at_ns = self.at_ns.saturating_add(by_ns);
+        }
+        let Some(Json::Object(fields)) = &mut self.record else { return };
+        for name in TIMES {
+            if let Some(time) = fields.get_mut(name)
+                && let Some(at_ns) = time.as_i64()
+            {
+                *time = Json::from(at_ns.saturating_add(by_ns));
+            }
+        }
     }
 
     /// Microseconds since 1970; what is below a microsecond is cut off.

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use tokio_postgres::{Client, Transaction};
 
 /// The version of the tables that this program writes.
-const VERSION: i32 = 2;
+const VERSION: i32 = 3;
 /// The statements that create the tables of the fleet database.
 pub const TABLES: &str = include_str!("schema/tables.sql");
 /// The views and functions.
@@ -17,6 +17,11 @@ pub const VIEWS: &str = include_str!("schema/views.sql");
 pub(super) const RECORDS: &str = include_str!("schema/records.sql");
 /// From version 1: what makes room for the new tables, and what fills them.
 const FROM_1: [&str; 2] = [include_str!("schema/migrate_1.sql"), include_str!("schema/migrate_1_rows.sql")];
+
+/// From version 2: epochs of items, and times that move.
+const FROM_2: &str = include_str!("schema/migrate_2.sql");
+/// Items of a wrong clock: which move, and, after their partitions are there, everything made of them.
+pub(super) const REDATE: [&str; 2] = [include_str!("schema/redate.sql"), include_str!("schema/redate_rows.sql")];
 
 /// Of the advisory lock under which tables and partitions are created: any number that nothing else uses.
 const LOCK: i64 = 0x636e_6367_7731;
@@ -162,6 +167,7 @@ pub(super) async fn bring_up(client: &mut Client) -> Result<Partitioning, NatsEr
     match read_version(&transaction).await? {
         0 => create_tables(&transaction, partitioning).await?,
         1 => from_1(&transaction, partitioning).await?,
+        2 => from_2(&transaction).await?,
         VERSION => {}
         newer => {
             let what = format!("the tables have version {newer}, this program knows {VERSION}");
@@ -222,13 +228,32 @@ async fn from_1(transaction: &Transaction<'_>, partitioning: Partitioning) -> Re
     transaction.batch_execute(&text).await.map_err(moving)
 }
 
+async fn from_2(transaction: &Transaction<'_>) -> Result<(), NatsError> {
+    Notice::new(Severity::Info, "tables_move", "the tables are brought from version 2 to 3; this may take minutes")
+        .write_to_logs();
+    let moves = TABLES.split_inclusive(";\n").find(|text| text.contains("CREATE TABLE clock_moves"));
+    let text =
+        format!("{FROM_2}{}{VIEWS}\nINSERT INTO fleet_schema (version) VALUES ({VERSION});", moves.unwrap_or_default());
+    transaction.batch_execute(&text).await.map_err(to_nats_error("bringing the tables from version 2 to 3"))
+}
+
 /// Where the records of a batch lie before they go into their tables.
-pub(super) const INCOMING_RECORDS: &str = "CREATE TEMP TABLE incoming (box_id int, sequence bigint, at timestamptz, kind text, record jsonb) ON COMMIT DELETE ROWS;\n";
+pub(super) const INCOMING_RECORDS: &str = "CREATE TEMP TABLE incoming (box_id int, epoch bigint NOT NULL DEFAULT 0, sequence bigint, at timestamptz, kind text, record jsonb) ON COMMIT DELETE ROWS;\n";
 
 /// Creates the partitions that are missing, in a transaction of its own: creating one stops every other writer for a moment.
 pub(super) async fn create_partitions(client: &mut Client, wanted: &BTreeSet<Partition>) -> Result<(), DatabaseError> {
     let creating = |error| DatabaseError::new("creating the partition of a time", &error);
     let transaction = client.transaction().await.map_err(creating)?;
+    create_within(&transaction, wanted).await?;
+    transaction.commit().await.map_err(creating)
+}
+
+/// The same within a transaction.
+pub(super) async fn create_within(
+    transaction: &Transaction<'_>,
+    wanted: &BTreeSet<Partition>,
+) -> Result<(), DatabaseError> {
+    let creating = |error| DatabaseError::new("creating the partition of a time", &error);
     transaction.execute("SELECT pg_advisory_xact_lock($1)", &[&LOCK]).await.map_err(creating)?;
     for Partition { name, create } in wanted {
         let there =
@@ -237,7 +262,7 @@ pub(super) async fn create_partitions(client: &mut Client, wanted: &BTreeSet<Par
             transaction.batch_execute(create).await.map_err(creating)?;
         }
     }
-    transaction.commit().await.map_err(creating)
+    Ok(())
 }
 
 #[cfg(test)]

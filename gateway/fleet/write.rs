@@ -2,9 +2,11 @@
 
 use super::copy::CopyRows;
 use super::database::{self, DatabaseError, DatabaseSettings};
+use super::known_items::KnownItems;
 use super::latest::Latest;
 use super::means::{self, MeanRows};
 use super::names::Names;
+use super::redate::{self, KnownMoves};
 use super::row::FleetRow;
 use super::schema::{self, Partition, Partitioning};
 use gateway_nats::NatsError;
@@ -13,8 +15,7 @@ use tokio_postgres::error::SqlState;
 use tokio_postgres::{Client, Transaction};
 
 /// Columns of `items` in the order in which they are copied.
-const ITEM_COLUMNS: &str =
-    "sequence, at, at_ns, arrived, box_id, historical, kind, series, numbers, texts, reasons, record";
+const ITEM_COLUMNS: &str = "sequence, epoch, at, at_ns, arrived, box_id, historical, redated_ns, kind, series, numbers, texts, reasons, record";
 
 /// Where a batch lies that cannot be copied into its tables directly.
 const INCOMING: &str = "CREATE TEMP TABLE incoming_items (LIKE items) ON COMMIT DELETE ROWS;
@@ -54,6 +55,7 @@ pub(super) struct Database {
     partitioning: Partitioning,
     names: Names,
     partitions: BTreeSet<Partition>,
+    moves: KnownMoves,
 }
 
 /// Everything of a batch, ready to be copied.
@@ -75,36 +77,65 @@ impl Database {
         let (client, partitioning) = database::connect(settings).await?;
         let text = format!("{}{INCOMING}", schema::INCOMING_RECORDS);
         client.batch_execute(&text).await.map_err(|error| writing_error(error).said)?;
-        Ok(Self { client, partitioning, names: Names::default(), partitions: BTreeSet::new() })
+        let (names, moves) = (Names::default(), KnownMoves::default());
+        Ok(Self { client, partitioning, names, partitions: BTreeSet::new(), moves })
     }
 
-    /// Writes the rows in one transaction; nothing is written where it fails.
+    /// Gives items the time that they have by what the database knows of clocks that were wrong.
+    pub(super) async fn settle_times<'r, 'm: 'r>(
+        &mut self,
+        rows: impl Iterator<Item = &'r mut FleetRow<'m>>,
+    ) -> Result<(), DatabaseError> {
+        self.moves.renew(&self.client).await?;
+        rows.for_each(|row| self.moves.settle_time(row));
+        Ok(())
+    }
+
+    /// Writes the rows, whose times are settled, in one transaction; nothing is written where it fails.
     pub(super) async fn write(&mut self, rows: &mut [Arrived<'_>]) -> Result<BatchResult, DatabaseError> {
         if rows.is_empty() {
             return Ok(BatchResult::default());
         }
         self.names.resolve_names(&self.client, rows).await?;
+        let given = rows.len() as u64;
+        let mut rows = self.leave_out_known(rows).await?;
+        let left_out = given - rows.len() as u64;
         // Several write at a time: the same order everywhere leaves no two that wait for each other.
         rows.sort_by(|a, b| {
             (&a.row.box_name, a.row.at_ns, a.row.sequence).cmp(&(&b.row.box_name, b.row.at_ns, b.row.sequence))
         });
-        let encoded = self.encode_rows(rows);
+        let encoded = self.encode_rows(&rows);
         self.create_missing_partitions(&encoded.partitions).await?;
         let mut transaction = self.client.transaction().await.map_err(writing_error)?;
+        let moves = rows.iter().any(|arrived| redate::tells_moves(arrived.row));
+        if !self.moves.lock(&transaction, moves).await? {
+            let said = NatsError::new("another reader has put the clock of a box right meanwhile", "it is tried again");
+            return Err(DatabaseError { said, of_the_data: false });
+        }
         let count = encoded.items.row_count();
         let new = put_items(&mut transaction, encoded.items).await?;
         if encoded.records.row_count() > 0 {
-            copy_rows(&transaction, "incoming (box_id, sequence, at, kind, record)", encoded.records).await?;
+            copy_rows(&transaction, "incoming (box_id, epoch, sequence, at, kind, record)", encoded.records).await?;
             transaction.batch_execute(schema::RECORDS).await.map_err(writing_error)?;
+        }
+        copy_rows(&transaction, "incoming_latest", encoded.latest).await?;
+        transaction.batch_execute(MERGE_LATEST).await.map_err(writing_error)?;
+        if moves {
+            redate::move_items(&transaction, self.partitioning).await?;
         }
         for (level, rows) in encoded.means {
             copy_rows(&transaction, "incoming_means", rows).await?;
             transaction.batch_execute(&merge_means(level)).await.map_err(writing_error)?;
         }
-        copy_rows(&transaction, "incoming_latest", encoded.latest).await?;
-        transaction.batch_execute(MERGE_LATEST).await.map_err(writing_error)?;
         transaction.commit().await.map_err(writing_error)?;
-        Ok(BatchResult { new, known: count - new })
+        Ok(BatchResult { new, known: count - new + left_out })
+    }
+
+    /// Leaves out items that were made from a history once more where the database has them as they were sent first.
+    async fn leave_out_known<'r>(&self, rows: &[Arrived<'r>]) -> Result<Vec<Arrived<'r>>, DatabaseError> {
+        let mut known = KnownItems::default();
+        known.load(&self.client, &self.names, rows.iter().map(|arrived| arrived.row)).await?;
+        Ok(rows.iter().filter(|arrived| !known.holds(arrived.row)).copied().collect())
     }
 
     /// Notes what is not taken.
@@ -128,7 +159,12 @@ impl Database {
             put_item(&mut items, row, (box_id, *arrived_us), &series, record.as_deref());
             times.insert(("items", day_of(row.at_us())));
             if let Some(record) = &record {
-                let place = records.begin_row(5).append_int4(box_id).append_int8(row.sequence).append_time(row.at_us());
+                let place = records
+                    .begin_row(6)
+                    .append_int4(box_id)
+                    .append_int8(row.epoch)
+                    .append_int8(row.sequence)
+                    .append_time(row.at_us());
                 place.append_text(&row.kind).append_json(Some(record));
                 times.extend(RECORD_TABLES.iter().map(|table| (*table, day_of(row.at_us()))));
                 let until_us = row.record.as_ref().and_then(|record| record["until_ns"].as_i64()).map(|ns| ns / 1000);
@@ -175,13 +211,14 @@ fn put_item(
     record: Option<&str>,
 ) {
     items
-        .begin_row(12)
+        .begin_row(14)
         .append_int8(row.sequence)
+        .append_int8(row.epoch)
         .append_time(row.at_us())
         .append_int8(row.at_ns)
         .append_time(arrived_us)
         .append_int4(box_id);
-    items.append_flag(row.historical).append_text(&row.kind);
+    items.append_flag(row.historical).append_int8(row.redated_ns).append_text(&row.kind);
     if row.kind == "sample" {
         let texts: Vec<&str> = row.texts.iter().map(|(_, text)| &**text).collect();
         let reasons: Vec<&str> = row.missing.iter().map(|(_, reason)| &**reason).collect();

@@ -9,7 +9,7 @@ use super::audit;
 use super::block::{BLOCK_COLUMNS, Decoder, Encoder, LEVEL_FRESH, StoredBlock};
 use super::error::{Doing, HistoryError};
 use super::lock::Lock;
-use super::outbox;
+use super::outbox::{self, ItemMove, RedatedItems};
 use super::pyramid::{self, MINUTE_NS};
 use super::record::Audit;
 use super::record_sql::add_to_state_hours;
@@ -33,6 +33,8 @@ pub struct Redated {
     pub by_ns: (i64, i64),
     /// Items that had been sent under their old dates, `from..to`; empty where none were.
     pub sent: Range<u64>,
+    /// What receivers of items have to know, wherever they have them from.
+    pub moves: Vec<ItemMove>,
 }
 
 /// A segment to be moved.
@@ -68,16 +70,13 @@ pub fn set_clock(path: &Path, mark: &ClockMark, decided_ns: Option<TimeNs>) -> R
         let samples = segment.redate_segment(&writing, mark)?;
         let before = done.take();
         let (least, greatest) = before.as_ref().map_or((segment.by_ns, segment.by_ns), |done| done.by_ns);
-        let sent = outbox::redate_items(
-            &writing,
-            segment.marks.outbox,
-            segment.next_marks.as_ref().map(|marks| marks.outbox),
-            segment.by_ns,
-        )?;
+        let numbers = (segment.marks.outbox, segment.next_marks.as_ref().map(|marks| marks.outbox));
+        let RedatedItems { sent, moves } = outbox::redate_items(&writing, numbers, &segment.rows, segment.by_ns)?;
         done = Some(Redated {
             segments: before.as_ref().map_or(0, |done| done.segments) + 1,
             samples: before.as_ref().map_or(0, |done| done.samples) + samples,
             by_ns: (least.min(segment.by_ns), greatest.max(segment.by_ns)),
+            moves: before.iter().flat_map(|done| done.moves.clone()).chain(moves).collect(),
             sent: before
                 .filter(|done| !done.sent.is_empty())
                 .map_or(sent.clone(), |done| done.sent.start..sent.end.max(done.sent.end)),

@@ -244,8 +244,8 @@ fn write_machine(page: &mut Page, status: &Status) {
 }
 
 fn write_process(page: &mut Page, status: &Status) {
-    let info = [(format_label("version", status.version), 1.0)];
-    page.write_family("cncgw_build_info", "gauge", "Version of the program", info);
+    let labels = format!("{},{}", format_label("version", status.version), format_label("machine", &status.machine));
+    page.write_family("cncgw_build_info", "gauge", "Version of the program, and name of the machine", [(labels, 1.0)]);
     page.write_gauge("cncgw_uptime_seconds", "Seconds since the start of the process", status.uptime_s);
     page.write_counter("cncgw_ticks_total", "Ticks since the start", status.tick.count);
     page.write_counter("cncgw_ticks_skipped_total", "Ticks left out because the box was too late", status.tick.skipped);

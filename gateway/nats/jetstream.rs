@@ -80,6 +80,8 @@ pub struct Backlog {
     pub pending: u64,
     /// Messages that are given out and not acknowledged.
     pub under_way: u64,
+    /// Every message up to this number of the stream is acknowledged.
+    pub acknowledged_to: u64,
 }
 
 /// The error of an answer, with its number.
@@ -90,11 +92,11 @@ fn find_refusal(answer: &Json) -> Option<(u64, String)> {
 }
 
 impl Connection {
-    /// Stores the messages in this order and waits until all are acknowledged; how many of them were there already.
+    /// Stores the messages in this order and waits until all are acknowledged; the indices of those that were there already, in order.
     ///
     /// # Errors
     /// The index of the first that is not stored, and why.
-    pub async fn publish_all(&mut self, messages: &[Outgoing]) -> Result<u64, (usize, JetStreamFailure)> {
+    pub async fn publish_all(&mut self, messages: &[Outgoing]) -> Result<Vec<usize>, (usize, JetStreamFailure)> {
         let oversize = |message: &Outgoing| message.payload.len() + message.id.len() + 40 > self.max_payload();
         let sendable = messages.iter().position(oversize).unwrap_or(messages.len());
         let mut first_token = None;
@@ -105,7 +107,7 @@ impl Connection {
         }
         let first_token = first_token.unwrap_or(0);
         let mut open: Vec<bool> = vec![true; sendable];
-        let (mut left, mut duplicates) = (sendable, 0);
+        let (mut left, mut duplicates) = (sendable, Vec::new());
         let mut failed: Option<(usize, JetStreamFailure)> = None;
         let until = Instant::now() + DEADLINE;
         while left > 0 {
@@ -120,7 +122,8 @@ impl Connection {
             let Some(index) = index else { continue };
             (open[index], left) = (false, left - 1);
             match parse_acknowledgement(&came, &messages[index].subject) {
-                Ok(duplicate) => duplicates += u64::from(duplicate),
+                Ok(true) => duplicates.push(index),
+                Ok(false) => {}
                 Err(failure) if failed.as_ref().is_none_or(|(first, _)| index < *first) => {
                     failed = Some((index, failure))
                 }
@@ -134,7 +137,10 @@ impl Connection {
                 let what = format!("its {length} bytes are more than the {most} that the server takes");
                 Err((sendable, JetStreamFailure::Message(NatsError::new(what, "raise max_payload of the server"))))
             }
-            None => Ok(duplicates),
+            None => {
+                duplicates.sort_unstable();
+                Ok(duplicates)
+            }
         }
     }
 
@@ -194,6 +200,15 @@ impl Connection {
         Ok((number("messages"), number("bytes")))
     }
 
+    /// The number of the newest message of a stream.
+    ///
+    /// # Errors
+    /// What JetStream says.
+    pub async fn read_last_number(&mut self, name: &str) -> Result<u64, NatsError> {
+        let answer = self.call_api_or_fail(&format!("STREAM.INFO.{name}"), &json!({})).await?;
+        Ok(answer["state"]["last_seq"].as_u64().unwrap_or(0))
+    }
+
     /// Creates the durable consumer unless it exists. Several readers share it: each message is given to one of them, and
     /// again when it is not acknowledged.
     ///
@@ -214,7 +229,8 @@ impl Connection {
     pub async fn read_backlog(&mut self, stream: &str, consumer: &str) -> Result<Backlog, NatsError> {
         let answer = self.call_api_or_fail(&format!("CONSUMER.INFO.{stream}.{consumer}"), &json!({})).await?;
         let number = |key: &str| answer[key].as_u64().unwrap_or(0);
-        Ok(Backlog { pending: number("num_pending"), under_way: number("num_ack_pending") })
+        let acknowledged_to = answer["ack_floor"]["stream_seq"].as_u64().unwrap_or(0);
+        Ok(Backlog { pending: number("num_pending"), under_way: number("num_ack_pending"), acknowledged_to })
     }
 
     /// Messages of a consumer within these limits; fewer, or none, when the patience is over.

@@ -118,7 +118,7 @@ impl Commands {
         for _ in 0..ROWS_AT_ONCE_MAX {
             let Ok(PostedRequest { request, reply }) = self.orders.requests.try_recv() else { return };
             let answer = match health.is_storing() {
-                true => self.grant_request(&request, at_ns),
+                true => self.grant_request(&request, gate, at_ns),
                 false => Reply::from_refusal(ArmError::NoAudit.to_string()),
             };
             self.record_audit(network_requests::build_audit_row(&request, &answer, at_ns), gate, health);
@@ -126,12 +126,16 @@ impl Commands {
         }
     }
 
-    fn grant_request(&mut self, NetworkRequest { sink, change, .. }: &NetworkRequest, at_ns: TimeNs) -> Reply {
+    fn grant_request(&mut self, request: &NetworkRequest, gate: &Gate, at_ns: TimeNs) -> Reply {
+        let NetworkRequest { sink, change, .. } = request;
         match change {
             Ok(RequestedChange::AcknowledgeAlarm { code }) => {
                 self.acknowledge_alarm(code, &network_requests::format_author(sink), at_ns)
             }
-            Ok(change) => self.network.accept_change(sink, change, at_ns),
+            Ok(change) => {
+                let unarmed = gate.current_arming().err().map(|why| why.to_string());
+                self.network.accept_change(sink, change, unarmed.as_deref(), at_ns)
+            }
             Err(why) => Reply::from_refusal(why.to_string()),
         }
     }

@@ -49,7 +49,7 @@ impl ClockStart {
 }
 
 fn describe_redating(redated: &Redated) -> Notice {
-    let Redated { segments, samples, by_ns: (least, greatest), sent } = redated;
+    let Redated { segments, samples, by_ns: (least, greatest), sent, moves } = redated;
     let by = if least == greatest {
         format!("{} {}", format_span(*least), if *least >= 0 { "later" } else { "earlier" })
     } else {
@@ -61,8 +61,9 @@ fn describe_redating(redated: &Redated) -> Notice {
         format!("; items {} to {} may have been sent under their old dates", sent.start, sent.end - 1)
     };
     let text = format!("{samples} samples in {segments} segments, and what belongs to them, are dated {by} now{also}");
-    let detail =
-        serde_json::json!({ "by_ns": [least, greatest], "from_sequence": sent.start, "to_sequence": sent.end });
+    let detail = serde_json::json!({
+        "by_ns": [least, greatest], "from_sequence": sent.start, "to_sequence": sent.end, "moves": moves
+    });
     Notice::new(Severity::Warning, "clock_redated", text).with_detail(detail.to_string())
 }
 

@@ -28,6 +28,8 @@ pub mod opcua;
 pub mod open;
 pub mod parquet;
 mod requests;
+mod resend;
+mod sent_numbers;
 pub mod shdr;
 pub mod sink_config;
 pub mod sparkplug;
@@ -38,6 +40,7 @@ pub use board::Board;
 pub use drive::{Sinks, start_sinks};
 pub use open::open_sink;
 pub use requests::Requests;
+pub use resend::Resender;
 pub use status::SinkStatus;
 
 use gateway_history::Item;

@@ -3,15 +3,23 @@
 //! A sink hands every message that looks like a request to [`Requests::submit_change`], whether it is allowed or not: the tick writes
 //! all of them into the audit, carries out what is allowed, and says what became of it.
 
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::clock;
 use gateway_base::row_rate::RowRate;
-use gateway_control::{NetworkRequest, OrderSender, Reply, RequestRefusal, RequestedChange};
+use gateway_control::{NetworkRequest, OrderSender, Reply, RequestOrigin, RequestRefusal, RequestedChange};
+use std::collections::VecDeque;
 
 /// Requests per second on average, and at once. A plant's system asks a few times an hour and repeats once in half a minute;
 /// whoever sends more fills the audit and holds up data: each waits for the tick, at most a tenth of a second. What is beyond is
 /// thrown away unanswered, and counted.
 const PER_S: f64 = 1.0;
 const AT_ONCE: f64 = 10.0;
+
+/// A request that is older is not obeyed: whoever asked for it may have gone, and wishes otherwise by now. Clocks of a plant differ by
+/// less, and a broker hands on within a second.
+const AGE_MAX_S: i64 = 30;
+/// The asker's clock may be ahead of that of the box by so much.
+const AHEAD_MAX_NS: i64 = 5 * SECOND_NS;
 
 /// The way of one sink to the gate.
 #[derive(Debug)]
@@ -20,13 +28,24 @@ pub struct Requests {
     allowed: bool,
     orders: Option<OrderSender>,
     rate: RowRate,
+    /// What was issued before is refused: it may have been obeyed by the run before.
+    began_ns: TimeNs,
+    /// Marks of the requests that are young enough to come again.
+    seen: VecDeque<(TimeNs, String)>,
 }
 
 impl Requests {
     /// Of the sink of this name; `allowed` is what its configuration says.
     #[must_use]
     pub fn new(sink: &str, allowed: bool, orders: Option<OrderSender>) -> Self {
-        Self { sink: sink.to_owned(), allowed, orders, rate: RowRate::new(PER_S, AT_ONCE) }
+        Self {
+            sink: sink.to_owned(),
+            allowed,
+            orders,
+            rate: RowRate::new(PER_S, AT_ONCE),
+            began_ns: clock::now_ns(),
+            seen: VecDeque::new(),
+        }
     }
 
     /// Of a sink behind which there is no gate.
@@ -42,15 +61,78 @@ impl Requests {
     }
 
     /// Asks, and gives what became of it; `None` for what came too fast, which is not answered.
-    pub async fn submit_change(&mut self, change: Result<RequestedChange, RequestRefusal>) -> Option<Reply> {
-        let left_out = self.rate.may_pass(clock::now_ns())?;
+    pub async fn submit_change(
+        &mut self,
+        origin: RequestOrigin,
+        change: Result<RequestedChange, RequestRefusal>,
+    ) -> Option<Reply> {
+        let now_ns = clock::now_ns();
+        let left_out = self.rate.may_pass(now_ns)?;
+        let change = match (self.allowed, change) {
+            (false, change) => Err(refuse_change(&self.sink, change)),
+            (true, change) => change.and_then(|change| self.check_fresh(&origin, now_ns).map(|()| change)),
+        };
         let Some(post) = &self.orders else { return Some(Reply::from_refusal("there is no gate here")) };
-        let change = if self.allowed { change } else { Err(refuse_change(&self.sink, change)) };
-        Some(post.send_request(NetworkRequest { sink: self.sink.clone(), change, left_out }).await)
+        Some(post.send_request(NetworkRequest { sink: self.sink.clone(), origin, change, left_out }).await)
+    }
+
+    /// Is it asked for now, and for the first time? What the run before may have obeyed is older than this run, so nothing needs to be
+    /// remembered beyond a restart.
+    fn check_fresh(&mut self, origin: &RequestOrigin, now_ns: TimeNs) -> Result<(), RequestRefusal> {
+        let (Some(issued_ns), Some(id)) = (origin.issued_ns, &origin.id) else {
+            return Err(RequestRefusal::WithoutOrigin);
+        };
+        let age_ns = now_ns.saturating_sub(issued_ns);
+        if !(-AHEAD_MAX_NS..=AGE_MAX_S * SECOND_NS).contains(&age_ns) {
+            return Err(RequestRefusal::NotFresh { age_s: age_ns as f64 / SECOND_NS as f64, most_s: AGE_MAX_S });
+        }
+        if issued_ns < self.began_ns {
+            return Err(RequestRefusal::BeforeStart);
+        }
+        // The rate bounds how many there are.
+        let gone_ns = now_ns.saturating_sub(AGE_MAX_S * SECOND_NS);
+        self.seen.retain(|(issued_ns, _)| *issued_ns >= gone_ns);
+        if self.seen.iter().any(|(_, known)| known == id) {
+            return Err(RequestRefusal::Repeated { id: id.clone() });
+        }
+        self.seen.push_back((issued_ns, id.clone()));
+        Ok(())
     }
 }
 
 fn refuse_change(sink: &str, change: Result<RequestedChange, RequestRefusal>) -> RequestRefusal {
     let what = change.map_or_else(|_| "a message that is no request".to_owned(), |change| change.to_string());
     RequestRefusal::ClosedSink { sink: sink.to_owned(), what }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn origin(id: &str, issued_ns: TimeNs) -> RequestOrigin {
+        RequestOrigin::from_words(Some(id), Some("mes"), Some(issued_ns))
+    }
+
+    #[test]
+    fn a_request_is_obeyed_once_and_only_while_it_is_young() {
+        let mut requests = Requests::new("plant", true, None);
+        let began_ns = requests.began_ns;
+        let now_ns = began_ns + 100 * SECOND_NS;
+        let mut ask = |id: &str, age_s: i64| requests.check_fresh(&origin(id, now_ns - age_s * SECOND_NS), now_ns);
+        assert_eq!(ask("a", 0), Ok(()));
+        assert_eq!(ask("a", 0), Err(RequestRefusal::Repeated { id: "a".to_owned() }));
+        assert_eq!(ask("b", 30), Ok(()));
+        assert!(matches!(ask("c", 31), Err(RequestRefusal::NotFresh { .. })));
+        assert!(matches!(ask("c", -6), Err(RequestRefusal::NotFresh { .. })), "of the future");
+        assert_eq!(ask("c", -4), Ok(()));
+        let unsigned = RequestOrigin { id: Some("d".to_owned()), ..RequestOrigin::default() };
+        assert_eq!(requests.check_fresh(&unsigned, now_ns), Err(RequestRefusal::WithoutOrigin));
+        // Over a restart: what was obeyed before it is older than the new run.
+        let mut after = Requests::new("plant", true, None);
+        after.began_ns = now_ns + SECOND_NS;
+        let later_ns = after.began_ns + SECOND_NS;
+        assert_eq!(after.check_fresh(&origin("a", now_ns), later_ns), Err(RequestRefusal::BeforeStart));
+        assert_eq!(after.check_fresh(&origin("a", later_ns), later_ns), Ok(()));
+        assert!(after.seen.len() == 1 && requests.seen.len() == 3);
+    }
 }

@@ -27,7 +27,7 @@ FROM items_1 AS old
 JOIN boxes_1 ON boxes_1.box_id = old.box_id
 JOIN boxes ON right(boxes.box, 6) = right(boxes_1.box, 6)
 ON CONFLICT DO NOTHING;
-INSERT INTO incoming SELECT box_id, sequence, at, kind, record FROM items WHERE record IS NOT NULL;
+INSERT INTO incoming (box_id, sequence, at, kind, record) SELECT box_id, sequence, at, kind, record FROM items WHERE record IS NOT NULL;
 INSERT INTO box_latest SELECT box_id, max(at), max(arrived), max(sequence), '{}' FROM items GROUP BY box_id;
 INSERT INTO refused (received, stream_sequence, subject, reason, payload) SELECT received, -row_number() OVER (), subject, reason, payload FROM refused_1;
 DROP TABLE items_1, boxes_1, series_1, refused_1;

@@ -1,4 +1,4 @@
--- Version 2. What `cnc-gateway fleet ingest` creates. Times are those of the machines; `arrived` is when the stream had the item.
+-- Version 3. What `cnc-gateway fleet ingest` creates. Times are those of the machines; `arrived` is when the stream had the item.
 CREATE TABLE fleet_schema (
   version int PRIMARY KEY,
   since timestamptz NOT NULL DEFAULT now()
@@ -26,18 +26,20 @@ CREATE TABLE series (
 -- `series` names the numbers first, then the texts, then what is missing.
 CREATE TABLE items (
   sequence bigint NOT NULL,            -- numbers of a box have no holes
+  epoch bigint NOT NULL DEFAULT 0,     -- which life of the box has numbered it: a copy that is put back uses numbers once more
   at timestamptz NOT NULL,             -- to the microsecond
   at_ns bigint NOT NULL,               -- the same to the nanosecond, since 1970
   arrived timestamptz NOT NULL,
   box_id int NOT NULL,
   historical boolean NOT NULL,         -- came after newer ones, after an outage
+  redated_ns bigint NOT NULL DEFAULT 0, -- by how much its time was moved, because the clock of the box had been wrong
   kind text NOT NULL,                  -- sample, state, part, alarm, alarm_clear, decision, diagnosis, event, gap, minute, hour, day
   series int[],
   numbers float8[],
   texts text[],
   reasons text[],                      -- why there is no value: stale, machine_off, ...
   record jsonb,
-  PRIMARY KEY (box_id, at, sequence)
+  PRIMARY KEY (box_id, at, sequence, epoch)
 ) PARTITION BY RANGE (at);
 CREATE INDEX items_at ON items USING brin (at);
 -- Messages that are no items, or that the database does not take: kept to be looked at, never in the way.
@@ -93,10 +95,11 @@ CREATE TABLE state_list (
   since timestamptz NOT NULL,
   until timestamptz,                   -- empty: it is the newest
   box_id int NOT NULL,
+  epoch bigint NOT NULL DEFAULT 0,
   state text NOT NULL,
   program text, tool text,
   reason text,                         -- of no_data
-  PRIMARY KEY (box_id, since, sequence)
+  PRIMARY KEY (box_id, since, sequence, epoch)
 ) PARTITION BY RANGE (since);
 CREATE INDEX state_list_since ON state_list USING brin (since);
 CREATE TABLE part_list (
@@ -104,49 +107,61 @@ CREATE TABLE part_list (
   began timestamptz NOT NULL,
   ended timestamptz NOT NULL,
   box_id int NOT NULL,
+  epoch bigint NOT NULL DEFAULT 0,
   part text, program text,
   count bigint NOT NULL,
   cutting_s float8, energy_j float8,
   detail jsonb,
-  PRIMARY KEY (box_id, ended, sequence)
+  PRIMARY KEY (box_id, ended, sequence, epoch)
 ) PARTITION BY RANGE (ended);
 CREATE INDEX part_list_ended ON part_list USING brin (ended);
 CREATE TABLE operation_list (
   sequence bigint NOT NULL,            -- that of the part
   ended timestamptz NOT NULL,          -- of the part
   box_id int NOT NULL,
+  epoch bigint NOT NULL DEFAULT 0,
   place int NOT NULL,                  -- 1, 2, ... within the part
   operation text, program text, part text,
   seconds float8, cutting_s float8, energy_j float8, mean_power_w float8,
-  PRIMARY KEY (box_id, ended, sequence, place)
+  PRIMARY KEY (box_id, ended, sequence, place, epoch)
 ) PARTITION BY RANGE (ended);
 CREATE INDEX operation_list_ended ON operation_list USING brin (ended);
 -- An alarm is raised and cleared by two items, which may come in any order.
 CREATE TABLE alarm_marks (
   box_id int NOT NULL, source text NOT NULL, code text NOT NULL, at timestamptz NOT NULL, raised boolean NOT NULL,
-  sequence bigint NOT NULL,
+  sequence bigint NOT NULL, epoch bigint NOT NULL DEFAULT 0,
   severity text, en text, zh text,
   PRIMARY KEY (box_id, source, code, at, raised)
 );
 CREATE INDEX alarm_marks_at ON alarm_marks (at);
 CREATE TABLE gap_list (
   box_id int NOT NULL, since timestamptz NOT NULL, until timestamptz, reason text NOT NULL, sequence bigint NOT NULL,
+  epoch bigint NOT NULL DEFAULT 0,
   PRIMARY KEY (box_id, since)
 );
 CREATE TABLE event_list (
-  box_id int NOT NULL, at timestamptz NOT NULL, sequence bigint NOT NULL,
+  box_id int NOT NULL, at timestamptz NOT NULL, sequence bigint NOT NULL, epoch bigint NOT NULL DEFAULT 0,
   kind text, source text, text text, detail jsonb,
-  PRIMARY KEY (box_id, at, sequence)
+  PRIMARY KEY (box_id, at, sequence, epoch)
 );
 CREATE INDEX event_list_at ON event_list USING brin (at);
 CREATE TABLE decision_list (
-  box_id int NOT NULL, at timestamptz NOT NULL, sequence bigint NOT NULL, decision jsonb NOT NULL,
-  PRIMARY KEY (box_id, at, sequence)
+  box_id int NOT NULL, at timestamptz NOT NULL, sequence bigint NOT NULL, epoch bigint NOT NULL DEFAULT 0, decision jsonb NOT NULL,
+  PRIMARY KEY (box_id, at, sequence, epoch)
 );
 CREATE TABLE diagnosis_list (
-  box_id int NOT NULL, at timestamptz NOT NULL, sequence bigint NOT NULL,
+  box_id int NOT NULL, at timestamptz NOT NULL, sequence bigint NOT NULL, epoch bigint NOT NULL DEFAULT 0,
   verdict text, summary text, diagnosis jsonb,
-  PRIMARY KEY (box_id, at, sequence)
+  PRIMARY KEY (box_id, at, sequence, epoch)
+);
+-- Items that a box had sent with the time of a clock that was wrong: those of an epoch with these numbers are so much later.
+CREATE TABLE clock_moves (
+  box_id int NOT NULL REFERENCES boxes ON DELETE CASCADE,
+  told_epoch bigint NOT NULL, told_sequence bigint NOT NULL, place int NOT NULL, -- of the event that tells it
+  epoch bigint NOT NULL, from_sequence bigint NOT NULL, to_sequence bigint NOT NULL,
+  by_ns bigint NOT NULL,
+  from_at timestamptz, to_at timestamptz,  -- times of the samples before
+  PRIMARY KEY (box_id, told_epoch, told_sequence, place)
 );
 -- What only the shop knows: its shifts, and how long a cycle should take. Change the rows as they are here.
 CREATE TABLE shifts (

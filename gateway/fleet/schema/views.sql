@@ -7,6 +7,36 @@ CREATE OR REPLACE FUNCTION fleet_cells(a jsonb, b jsonb) RETURNS jsonb LANGUAGE 
       SELECT DISTINCT ON (key) key, value FROM (SELECT * FROM jsonb_each(a) UNION ALL SELECT * FROM jsonb_each(b)) AS every
       ORDER BY key, (value ->> 0)::bigint DESC) AS newest$$;
 
+-- These places of a list have no value.
+CREATE OR REPLACE FUNCTION fleet_emptied(list real[], places int[]) RETURNS real[] LANGUAGE sql IMMUTABLE PARALLEL SAFE AS
+  $$SELECT array_agg(CASE WHEN place = ANY (places) THEN NULL ELSE one END ORDER BY place) FROM unnest(list) WITH ORDINALITY AS each (one, place)$$;
+-- A record whose times are so much later.
+CREATE OR REPLACE FUNCTION fleet_shifted(record jsonb, by_ns bigint) RETURNS jsonb LANGUAGE sql IMMUTABLE PARALLEL SAFE AS
+  $$SELECT record || coalesce((SELECT jsonb_object_agg(key, value::text::bigint + by_ns) FROM jsonb_each(CASE jsonb_typeof(record) WHEN 'object' THEN record ELSE '{}' END)
+      WHERE key IN ('at_ns', 'began_ns', 'ended_ns', 'from_ns', 'to_ns', 'until_ns') AND jsonb_typeof(value) = 'number'), '{}')$$;
+-- The stretches of a box's states from `low` to `high` end where the next one begins.
+CREATE OR REPLACE FUNCTION fleet_join_states(box int, low timestamptz, high timestamptz) RETURNS void LANGUAGE sql AS $$
+  UPDATE state_list AS changed SET until = found.until
+  FROM (
+    SELECT box_id, since, sequence, epoch, lead(since) OVER (ORDER BY since, epoch, sequence) AS until
+    FROM (
+      (SELECT box_id, since, sequence, epoch FROM state_list WHERE box_id = box AND since < low ORDER BY since DESC, epoch DESC, sequence DESC LIMIT 1)
+      UNION ALL
+      (SELECT box_id, since, sequence, epoch FROM state_list WHERE box_id = box AND since >= low AND since <= high)
+      UNION ALL
+      (SELECT box_id, since, sequence, epoch FROM state_list WHERE box_id = box AND since > high ORDER BY since, epoch, sequence LIMIT 1)
+    ) AS near
+  ) AS found
+  WHERE changed.box_id = found.box_id AND changed.since = found.since AND changed.sequence = found.sequence AND changed.epoch = found.epoch
+    AND (found.until IS NOT NULL OR found.since <= high) AND changed.until IS DISTINCT FROM found.until$$;
+
+-- What each box is called: its machine, and where two boxes have one of the same name, the box as well.
+CREATE OR REPLACE VIEW labels AS
+  SELECT box_id, CASE count(*) OVER (PARTITION BY machine) WHEN 1 THEN machine ELSE machine || ' (' || box || ')' END AS label FROM boxes;
+-- Is the spindle or an axis at work in this state?
+CREATE OR REPLACE FUNCTION fleet_is_at_work(state text) RETURNS boolean LANGUAGE sql IMMUTABLE PARALLEL SAFE AS
+  $$SELECT state IN ('spindle_start', 'idle', 'cutting', 'rapid', 'speed_change')$$;
+
 -- A box that has gone is a row, too: `connected` says whether something has come within three minutes (a box sends at least once a
 -- minute).
 CREATE OR REPLACE VIEW last_seen AS
@@ -33,7 +63,7 @@ CREATE OR REPLACE VIEW machines_now AS
          newest.program, newest.tool, newest.state AS last_state, last_at, last_arrival, box_id
   FROM last_seen
   LEFT JOIN LATERAL (
-    SELECT state, since, program, tool FROM state_list WHERE state_list.box_id = last_seen.box_id ORDER BY since DESC, sequence DESC LIMIT 1
+    SELECT state, since, program, tool FROM state_list WHERE state_list.box_id = last_seen.box_id ORDER BY since DESC, epoch DESC, sequence DESC LIMIT 1
   ) AS newest ON true;
 
 -- Every value with the time for which it held: until the next one of its series, a gap, or what was heard last of the box. Conditions on

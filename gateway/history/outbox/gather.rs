@@ -3,8 +3,9 @@
 
 use super::handle::{Outbox, OutboxHead};
 use super::item::{SeriesInfo, is_deliverable};
-use super::line;
-use super::means::{self, MeanSchedule};
+use super::line::{self, NOT_RUNNING};
+use super::means::{self, Bucket, MeanSchedule};
+use super::means_again;
 use super::report::{OutboxReport, OutboxSettings};
 use super::store::{self, OutboxContents, Put};
 use crate::HistoryError;
@@ -17,7 +18,7 @@ use adapter_core::clock::TimeNs;
 use gateway_base::convert::saturate_to_ns;
 use rusqlite::Connection;
 use std::borrow::Cow;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -63,7 +64,12 @@ pub(crate) struct Gatherer {
     /// Time of the newest tick, of an earlier run too; with why there may be a gap after it.
     last: Option<(TimeNs, &'static str)>,
     means: MeanSchedule,
+    /// Means that are told once more, because rows were dated anew.
+    due_again: BTreeSet<Bucket>,
 }
+
+/// Means that are told once more in one commit, so that it stays short.
+const AGAIN_AT_ONCE: usize = 1000;
 
 /// What a transaction has taken, to be forgotten when it is durable.
 pub(crate) struct TransactionWork {
@@ -71,6 +77,8 @@ pub(crate) struct TransactionWork {
     put: Put,
     tidy: bool,
     means: MeanSchedule,
+    /// Means that were told once more.
+    again: usize,
 }
 
 fn build_series_info(series: &Series, settings: &OutboxSettings) -> SeriesInfo {
@@ -97,8 +105,9 @@ impl Gatherer {
             contents: stored,
             tidied: Instant::now(),
             tidy_after: Duration::ZERO,
-            last: newest_ns.map(|newest_ns| (newest_ns, "not_running")),
+            last: newest_ns.map(|newest_ns| (newest_ns, NOT_RUNNING)),
             means: MeanSchedule::new(newest_ns),
+            due_again: means_again::load_buckets(db)?,
             outbox,
         };
         gatherer.publish_state(&Reasons::default());
@@ -207,13 +216,18 @@ impl Gatherer {
         }
         lines.extend(ticks.map(|tick| (tick.at_ns, tick.text.as_str().into())));
         let mut means = self.means;
-        let due = means.collect_due_buckets(blocks);
+        let mut due = means.collect_due_buckets(blocks);
+        let again = self.due_again.len().min(AGAIN_AT_ONCE);
+        due.extend(self.due_again.iter().take(again));
+        if again > 0 && again == self.due_again.len() {
+            means_again::forget_stretches(db)?;
+        }
         let told = means::format_lines(db, &due, self.outbox.settings().tick)?;
         lines.extend(told.into_iter().map(|(at_ns, text)| (at_ns, text.into())));
         let ticks = self.pending_lines.iter().take_while(|line| line.row < end_row).count();
         let tidy = self.outbox.has_news() && self.is_due();
         let put = store::store_lines(db, &self.outbox, &self.contents, &lines, (tidy, ages))?;
-        Ok(TransactionWork { ticks, put, tidy, means })
+        Ok(TransactionWork { ticks, put, tidy, means, again })
     }
 
     /// What was put is durable.
@@ -227,6 +241,9 @@ impl Gatherer {
         );
         self.contents = taken.put.contents;
         self.means = taken.means;
+        for _ in 0..taken.again {
+            self.due_again.pop_first();
+        }
         self.outbox.mark_dropped(&taken.put.dropped);
         if taken.tidy {
             self.tidied = Instant::now();

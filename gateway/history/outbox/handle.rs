@@ -82,6 +82,7 @@ struct SharedOutbox {
 #[derive(Debug, Default)]
 struct OutboxState {
     box_id: String,
+    epoch: u64,
     figures: OutboxFigures,
     latest: Arc<Vec<Reading>>,
 }
@@ -122,6 +123,15 @@ impl Outbox {
         Self { shared: Arc::new(shared) }
     }
 
+    /// The outbox of a history that another process may be writing, for a sink that sends parts of it once more: it knows machine and box,
+    /// and no items.
+    #[must_use]
+    pub fn of_box(machine: &str, settings: OutboxSettings, box_id: &str) -> Self {
+        let outbox = Self::new(machine, settings, []);
+        outbox.set_identity(box_id.to_owned(), 0);
+        outbox
+    }
+
     /// Name of the machine as configured.
     #[must_use]
     pub fn machine(&self) -> &str {
@@ -129,10 +139,16 @@ impl Outbox {
     }
 
     /// Names this box and this history: letters, digits and `-` of the name that the machine had at first, `-`, and digits that
-    /// were made with the outbox. `<box>-<sequence>` names an item everywhere and for ever. Empty until the history is open.
+    /// were made with the outbox. With epoch and number it names an item everywhere and for ever. Empty until the history is open.
     #[must_use]
     pub fn box_id(&self) -> String {
         lock_mutex(&self.shared.state).box_id.clone()
+    }
+
+    /// The epoch of the items that are made since the history was opened; 0 before. Items of earlier lives have others.
+    #[must_use]
+    pub fn epoch(&self) -> u64 {
+        lock_mutex(&self.shared.state).epoch
     }
 
     /// What is gathered and how much of it is kept.
@@ -283,9 +299,10 @@ impl Outbox {
         }
     }
 
-    /// The writer's side: the name of this box.
-    pub(super) fn name_box(&self, name: String) {
-        lock_mutex(&self.shared.state).box_id = name;
+    /// The writer's side: the name of this box, and the epoch of its new items.
+    pub(super) fn set_identity(&self, name: String, epoch: u64) {
+        let mut state = lock_mutex(&self.shared.state);
+        (state.box_id, state.epoch) = (name, epoch);
     }
 
     /// The writer's side: has every sink that is connected delivered everything before `next`, or is it not to be waited for?

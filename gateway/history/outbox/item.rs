@@ -125,6 +125,10 @@ pub enum Content {
 pub struct Item {
     /// From 1, without holes over the life of the history database.
     pub sequence: u64,
+    /// Which opening of the history has numbered it: a copy that is put back numbers other items with the same numbers.
+    pub epoch: u64,
+    /// By how much its time was moved since it was made, because the clock turned out to have been wrong, ns.
+    pub redated_ns: i64,
     /// When it was true, nanoseconds since 1970-01-01 UTC.
     pub at_ns: TimeNs,
     /// The values, record, gap or summaries that the item carries.
@@ -152,13 +156,14 @@ impl Item {
         matches!(self.content, Content::Sample(_) | Content::Record(_))
     }
 
-    /// The item as a document (`item/1`): `sequence`, `time_utc`, `at_ns`, `kind`, and `values` (each with its unit) or
-    /// `record`; of means also `width_s`.
+    /// The item as a document (`item/1`): `sequence`, `epoch`, `time_utc`, `at_ns`, `kind`, and `values` (each with its unit) or
+    /// `record`; of means also `width_s`; `redated_ns` where its time was moved.
     #[must_use]
     pub fn to_json(&self) -> Json {
         let mut document = json!({
             "schema": "item/1",
             "sequence": self.sequence,
+            "epoch": self.epoch,
             "time_utc": moment::format_utc(self.at_ns),
             "at_ns": self.at_ns,
             "kind": self.kind(),
@@ -173,6 +178,9 @@ impl Item {
             }
         };
         document[key] = value;
+        if self.redated_ns != 0 {
+            document["redated_ns"] = Json::from(self.redated_ns);
+        }
         document
     }
 }

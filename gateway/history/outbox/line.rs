@@ -2,7 +2,7 @@
 //!
 //! `{"t":at_ns,"s":{"<series>":cell}}` is a sample, `{"t":at_ns,"r":{"<kind>":{...}}}` a record, `{"t":at_ns,"g":{"u":until_ns,
 //! "r":"reason"}}` a gap, `{"t":start_ns,"w":width_s,"m":{"<series>":[seconds,mean,least,greatest]}}` the means of a minute, hour
-//! or day. A cell is a number, a text, or `{"m":"reason"}`.
+//! or day. A cell is a number, a text, or `{"m":"reason"}`. Where the time was moved since, `"d"` says by how much, ns.
 
 use super::item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
 use crate::record::Record;
@@ -17,9 +17,14 @@ use std::sync::Arc;
 /// The JSON of a diagnosis beyond this is left out: it can be asked for on the box, and brokers refuse larger messages.
 const DIAGNOSIS_BYTES_MAX: usize = 200_000;
 
+/// Why there is a gap before the first sample of a run.
+pub(super) const NOT_RUNNING: &str = "not_running";
+
 #[derive(Debug, Deserialize)]
 struct OutboxLine {
     t: TimeNs,
+    #[serde(default)]
+    d: i64,
     #[serde(default)]
     s: Option<Map<String, Json>>,
     #[serde(default)]
@@ -77,17 +82,31 @@ pub(super) fn of_record(record: &Record) -> String {
     json!({ "t": record.at_ns(), "r": record }).to_string()
 }
 
-/// The same line, so much later; one that this version cannot read stays as it is. Gaps and means of a wrong time are of other
-/// minutes than those of the right one: they become an empty line, which keeps its number and is passed over.
+/// The same line, so much later; one that this version cannot read stays as it is. Means of a wrong time are of other minutes than those
+/// of the right one: they become an empty line, which keeps its number and is passed over.
 pub(super) fn shift_line(text: &str, by_ns: i64) -> String {
     let Some(Parsed(line)) = parse(text) else { return text.to_owned() };
-    match (line.s, line.r) {
-        (_, Some(mut record)) => {
+    let OutboxLine { t, d, s, r, g, .. } = line;
+    let moved_ns = d.saturating_add(by_ns);
+    match (s, r, g) {
+        (_, Some(mut record), _) => {
             record.shift_times(by_ns);
-            of_record(&record)
+            json!({"t": record.at_ns(), "d": moved_ns, "r": record}).to_string()
         }
-        (Some(cells), None) => json!({ "t": line.t.saturating_add(by_ns), "s": cells }).to_string(),
-        (None, None) => String::new(),
+        (Some(cells), ..) => json!({"t": t.saturating_add(by_ns), "d": moved_ns, "s": cells}).to_string(),
+        (.., Some(gap)) => shift_gap(t, gap, by_ns, moved_ns),
+        _ => String::new(),
+    }
+}
+
+/// A gap before the first sample of a run begins with the run before, which another clock may have dated: only its end moves. One whose
+/// end comes to lie before its beginning is none.
+fn shift_gap(from_ns: TimeNs, GapLine { u, r }: GapLine, by_ns: i64, moved_ns: i64) -> String {
+    let from_ns = if r == NOT_RUNNING { from_ns } else { from_ns.saturating_add(by_ns) };
+    let until_ns = u.map(|until_ns| until_ns.saturating_add(by_ns));
+    match until_ns {
+        Some(until_ns) if until_ns <= from_ns => String::new(),
+        _ => json!({"t": from_ns, "d": moved_ns, "g": {"u": until_ns, "r": r}}).to_string(),
     }
 }
 
@@ -111,8 +130,8 @@ impl Parsed {
     }
 
     /// The item; values of unknown series are left out.
-    pub(super) fn into_item(self, sequence: u64, known: &SeriesByNumber) -> Item {
-        let OutboxLine { t, s, r, g, w, m } = self.0;
+    pub(super) fn into_item(self, sequence: u64, epoch: u64, known: &SeriesByNumber) -> Item {
+        let OutboxLine { t, d, s, r, g, w, m } = self.0;
         let readings =
             |cells: Map<String, Json>| cells.iter().filter_map(|(id, cell)| parse_reading(id, cell, known)).collect();
         let content = match (r, g, m) {
@@ -124,7 +143,7 @@ impl Parsed {
             }
             _ => Content::Sample(s.map(readings).unwrap_or_default()),
         };
-        Item { sequence, at_ns: t, content }
+        Item { sequence, epoch, redated_ns: d, at_ns: t, content }
     }
 }
 

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// A bucket: the index of its level, and its number.
-type Bucket = (usize, i64);
+pub(super) type Bucket = (usize, i64);
 
 /// Which buckets are due.
 #[derive(Debug, Clone, Copy, PartialEq)]

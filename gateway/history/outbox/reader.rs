@@ -1,13 +1,17 @@
 //! How a sink reads the outbox: on a connection of its own that only reads, a bounded piece at a time.
 
+use super::epoch::Epochs;
 use super::item::{Item, SeriesInfo};
 use super::line::{self, SeriesByNumber};
 use super::number::read_item_number;
+use super::position::Position;
+use super::store::has_tables;
 use crate::HistoryError;
 use crate::error::Doing;
 use crate::schema::{known_series, open_for_reading};
+use adapter_core::clock::TimeNs;
 use gateway_base::convert::clamp_to_signed;
-use rusqlite::Connection;
+use rusqlite::{Connection, OptionalExtension};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -25,6 +29,7 @@ pub struct OutboxStretch {
 pub struct OutboxReader {
     db: Connection,
     known: SeriesByNumber,
+    epochs: Epochs,
 }
 
 /// A body that claims to be larger is damaged: a commit holds a minute at most.
@@ -36,7 +41,7 @@ impl OutboxReader {
     /// # Errors
     /// As [`Reader::open`](crate::Reader::open).
     pub fn open(path: &Path) -> Result<Self, HistoryError> {
-        let mut feed = Self { db: open_for_reading(path)?, known: SeriesByNumber::new() };
+        let mut feed = Self { db: open_for_reading(path)?, known: SeriesByNumber::new(), epochs: Epochs::default() };
         feed.load_series()?;
         Ok(feed)
     }
@@ -47,12 +52,34 @@ impl OutboxReader {
         Ok(())
     }
 
+    /// Time of the oldest item that sink `name` has still to deliver; `None` where it has none, or the outbox does not know it.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn oldest_waiting_ns(&mut self, name: &str) -> Result<Option<TimeNs>, HistoryError> {
+        if !has_tables(&self.db)? {
+            return Ok(None);
+        }
+        let text: Option<String> = self
+            .db
+            .query_row("SELECT position FROM outbox_sinks WHERE name = ?1", [name], |row| row.get(0))
+            .optional()
+            .with_activity("reading what a sink has delivered")?;
+        let Some(position) = text.and_then(|text| serde_json::from_str::<Position>(&text).ok()) else {
+            return Ok(None);
+        };
+        let oldest = self.read(position.lowest_undelivered(), u64::MAX, 1)?;
+        Ok(oldest.items.first().map(|item| item.at_ns))
+    }
+
     /// Items `from..to`, at most `items_max` of them.
     ///
     /// # Errors
     /// What `SQLite` says.
     pub fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<OutboxStretch, HistoryError> {
         let mut stretch = OutboxStretch { items: Vec::new(), to: from };
+        // The writer may have begun a new one since.
+        self.epochs = Epochs::load(&self.db)?;
         while stretch.to < to && stretch.items.len() < items_max {
             match self.row_at(stretch.to, to)? {
                 Some(row) => self.append_items(&mut stretch, &row, to, items_max)?,
@@ -88,7 +115,7 @@ impl OutboxReader {
             if parsed.names_unknown(&self.known) {
                 self.load_series()?;
             }
-            stretch.items.push(parsed.into_item(sequence, &self.known));
+            stretch.items.push(parsed.into_item(sequence, self.epochs.epoch_of(sequence), &self.known));
         }
         stretch.to = stretch.to.max((row.first + row.items).min(to));
         Ok(())

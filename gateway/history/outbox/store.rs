@@ -1,5 +1,6 @@
 //! The tables of the outbox: one row for the items of a commit, one for each sink.
 
+use super::epoch;
 use super::handle::{DeliveryState, Outbox, OutboxFigures};
 use super::number::{read_item_number, to_stored_number};
 use super::position::Position;
@@ -68,8 +69,9 @@ pub(super) fn open_outbox(db: &mut Connection, outbox: &Outbox) -> Result<Outbox
             .execute_batch("ALTER TABLE outbox_sinks ADD COLUMN connections INTEGER NOT NULL DEFAULT 0")
             .with_activity("extending the outbox")?;
     }
-    outbox.name_box(box_name(&opening, outbox.machine())?);
+    let name = box_name(&opening, outbox.machine())?;
     let next = next_sequence(&opening)?;
+    outbox.set_identity(name, epoch::begin_epoch(&opening, epoch::oldest_number(&opening, next)?, next)?);
     outbox.for_each_sink(|name, standing| load_delivery_state(&opening, name, next, standing))?;
     let names = outbox.sink_names();
     let mut statement = opening.prepare("SELECT name FROM outbox_sinks").with_activity("reading the sinks")?;
@@ -101,9 +103,7 @@ fn measure_outbox(db: &Connection, next_sequence: u64) -> Result<OutboxContents,
     .with_activity("measuring the outbox")
 }
 
-/// Items that a box makes in a week at most: a hundred a second.
-const SKIPPED: u64 = 100_000_000;
-/// From which number on the numbering goes, in `meta`.
+/// From which number on the numbering goes, in `meta`, where an older version of the program has left numbers out.
 const NUMBERS_FROM: &str = "outbox_numbers_from";
 
 /// The newest row is never removed: the numbering goes on from it.
@@ -114,22 +114,6 @@ fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
     let from = read_property(db, NUMBERS_FROM)?.and_then(|text| text.parse().ok()).unwrap_or(1);
     // A number 0 would name no item.
     Ok(stored.max(from).max(1))
-}
-
-/// An older copy of the history at `path` is to be used again: its numbers may have been given to other items since, so they go on far
-/// above. A receiver sees numbers that are missing, and none that comes twice.
-///
-/// # Errors
-/// The file cannot be opened or written.
-pub(crate) fn skip_numbers(path: &Path) -> Result<(), HistoryError> {
-    let db = open_for_writing(path)?;
-    if !has_tables(&db)? {
-        return Ok(());
-    }
-    let from = next_sequence(&db)?.saturating_add(SKIPPED).to_string();
-    db.execute("INSERT OR REPLACE INTO meta (key, value) VALUES (?1, ?2)", [NUMBERS_FROM, &from])
-        .with_activity("numbering the outbox")
-        .map(drop)
 }
 
 /// The number of the next item; 0 where there is no outbox.
@@ -189,7 +173,7 @@ pub(crate) fn known_box_id(db: &Connection) -> Result<Option<String>, HistoryErr
     read_property(db, "outbox_box_id")
 }
 
-fn read_property(db: &Connection, key: &str) -> Result<Option<String>, HistoryError> {
+pub(super) fn read_property(db: &Connection, key: &str) -> Result<Option<String>, HistoryError> {
     db.query_row("SELECT CAST(value AS TEXT) FROM meta WHERE key = ?1", [key], |row| row.get(0))
         .optional()
         .with_activity("reading the outbox")

@@ -75,6 +75,7 @@ pub(super) fn build_value_message(prefix: &str, reading: &Reading) -> Outgoing {
 fn build_flat_document(outbox: &Outbox, item: &Item, historical: bool) -> Json {
     let mut fields = build_common_fields(outbox, item.at_ns);
     fields.insert("sequence".to_owned(), json!(item.sequence));
+    fields.insert("epoch".to_owned(), json!(item.epoch));
     fields.insert("historical".to_owned(), json!(historical));
     match &item.content {
         Content::Sample(readings) => fields.extend(readings.iter().map(to_named_value)),

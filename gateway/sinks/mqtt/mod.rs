@@ -81,6 +81,8 @@ pub(super) struct MqttSink {
     described: BTreeSet<i64>,
     /// A message that is no item was left out, which was told.
     left_out: bool,
+    /// Nothing is told but items: another connection tells whether the box is there.
+    items_only: bool,
 }
 
 impl MqttSink {
@@ -97,7 +99,13 @@ impl MqttSink {
             alarms: BTreeSet::new(),
             described: BTreeSet::new(),
             left_out: false,
+            items_only: false,
         }
+    }
+
+    /// The same, which tells nothing but items.
+    pub(super) fn with_items_only(self) -> Self {
+        Self { items_only: true, ..self }
     }
 
     /// Hands a message to the gate and publishes what became of it.
@@ -106,9 +114,10 @@ impl MqttSink {
             true => Err(RequestRefusal::RetainedMessage),
             false => request::document_of(&message.payload),
         };
-        let id = document.as_ref().map_or(Json::Null, |document| document.id.clone().map_or(Json::Null, Json::from));
+        let origin = request::origin_of(&message.payload);
+        let id = origin.id.clone().map_or(Json::Null, Json::from);
         let change = document.and_then(RequestDocument::into_change);
-        let Some(Reply { done, text }) = self.requests.submit_change(change).await else { return Ok(()) };
+        let Some(Reply { done, text }) = self.requests.submit_change(origin, change).await else { return Ok(()) };
         let says = json!({"done": done, "text": text, "id": id});
         let topic = self.format_topic("request/answer");
         let answer = Outgoing { topic, payload: says.to_string().into_bytes(), retain: false };
@@ -146,10 +155,12 @@ impl MqttSink {
         Ok(())
     }
 
-    /// When everything that is known is to be written again; `None` while nothing has changed.
+    /// When everything that is known is to be written again; `None` while nothing has changed, and before the first item: there is no
+    /// time of which it would be.
     fn latest_due_time(&self) -> Option<Instant> {
         let next = || self.last_written.map_or_else(Instant::now, |told| told + self.target.latest);
-        (self.changed && !self.target.latest.is_zero()).then(next)
+        let known = self.outbox.watch_head().borrow().newest_ns.is_some();
+        (known && self.changed && !self.target.latest.is_zero()).then(next)
     }
 
     /// Writes everything that is known, if it is time.
@@ -232,6 +243,9 @@ impl Sink for MqttSink {
             let Outgoing { topic, payload, retain } = self.build_online_message(false);
             let will = Will { topic, payload, qos: Qos::AtLeastOnce, retain, at_leave: false };
             let name = client_name(&self.outbox.box_id(), &self.name);
+            if self.items_only {
+                return self.link.connect(&self.target.broker, &name, None).await;
+            }
             self.link.connect(&self.target.broker, &name, Some(will)).await?;
             self.request = None;
             self.described.clear();
@@ -282,7 +296,7 @@ impl Sink for MqttSink {
     fn close(&mut self) -> Pending<'_, ()> {
         Box::pin(async move {
             // Where this does not go through, the will says the same.
-            let gone = vec![self.build_online_message(false)];
+            let gone = if self.items_only { Vec::new() } else { vec![self.build_online_message(false)] };
             let _told = self.publish_messages(gone, Qos::AtLeastOnce).await;
             self.link.disconnect_client().await;
         })

@@ -54,12 +54,21 @@ impl Machine {
     pub(super) fn build_initial_lines(&self, now_ns: TimeNs) -> Vec<Line> {
         let at_ns = self.at_ns.max(now_ns);
         let line = |body| Line { at_ns, body };
-        let mut lines = vec![line(format!("{AVAILABILITY}|AVAILABLE"))];
+        let mut lines = vec![line(self.availability_line())];
         let values = join_cells(self.values.iter().map(|(name, value)| (*name, value.as_str())));
         lines.extend(values.map(line));
         lines.extend(self.list_conditions().into_iter().map(line));
         lines.extend(self.tools.iter().map(|tool| line(self.format_tool_asset(tool, at_ns))));
         lines
+    }
+
+    /// Is there a machine behind the box? It is there while the controller or a meter tells something of it.
+    fn is_available(&self) -> bool {
+        self.values.values().any(|value| value != UNAVAILABLE)
+    }
+
+    fn availability_line(&self) -> String {
+        format!("{AVAILABILITY}|{}", if self.is_available() { "AVAILABLE" } else { UNAVAILABLE })
     }
 
     /// Every condition as it stands.
@@ -75,7 +84,8 @@ impl Machine {
     /// The lines of an item; none where the standard has no counterpart.
     pub(super) fn build_item_lines(&mut self, item: &Item) -> Vec<Line> {
         self.at_ns = self.at_ns.max(item.at_ns);
-        let bodies = match &item.content {
+        let available = self.is_available();
+        let mut bodies = match &item.content {
             Content::Sample(readings) => self.build_sample_lines(readings, item.at_ns),
             Content::Record(record) => match &**record {
                 Record::Alarm(alarm) => {
@@ -94,6 +104,9 @@ impl Machine {
             Content::Gap(_) => self.clear_values(),
             Content::Means { .. } => Vec::new(),
         };
+        if available != self.is_available() {
+            bodies.insert(0, self.availability_line());
+        }
         bodies.into_iter().map(|body| Line { at_ns: item.at_ns, body }).collect()
     }
 
@@ -204,7 +217,8 @@ mod tests {
             ..Alarm::default()
         };
         let bodies = |lines: Vec<Line>| lines.into_iter().map(|line| line.body).collect::<Vec<_>>();
-        let item = |record| Item { sequence: 1, at_ns: 5, content: Content::Record(Box::new(record)) };
+        let of = |sequence, at_ns, content| Item { sequence, epoch: 1, redated_ns: 0, at_ns, content };
+        let item = |record| of(1, 5, Content::Record(Box::new(record)));
         assert_eq!(
             bodies(machine.build_item_lines(&item(alarm.into()))),
             ["servo|FAULT|SV0417|critical||(Y) SERVO ALARM", "motion_program|FAULT|PS0010|critical||IMPROPER G-CODE"]
@@ -217,8 +231,7 @@ mod tests {
         let greeting = bodies(machine.build_initial_lines(9));
         assert!(greeting.contains(&"servo|UNAVAILABLE||||".to_owned()), "nobody tells of alarms: {greeting:?}");
         assert!(greeting.contains(&"alarms|NORMAL||||".to_owned()), "{greeting:?}");
-        let gap =
-            Item { sequence: 2, at_ns: 8, content: Content::Gap(Gap { until_ns: None, reason: "stopped".into() }) };
+        let gap = of(2, 8, Content::Gap(Gap { until_ns: None, reason: "stopped".into() }));
         assert_eq!(machine.build_item_lines(&gap), [], "there were no values");
     }
 }

@@ -8,8 +8,9 @@
 //!
 //! A host may name a metric by its alias alone, as the birth gave it.
 
+use super::births::REBIRTH;
 use super::payload::{Metric, MetricValue, Payload, datatype};
-use gateway_control::{RequestRefusal, RequestedChange};
+use gateway_control::{RequestOrigin, RequestRefusal, RequestedChange};
 use serde_json::json;
 
 const FEED_OVERRIDE: (&str, u64) = ("request/feed_override_pct", 9);
@@ -42,35 +43,64 @@ pub(super) fn build_answer_metric(done: bool, text: &str, at_ms: u64) -> Metric 
     }
 }
 
-/// What a command asks for; empty where it asks for nothing that is known here. A message that the broker has kept is refused:
-/// it would come again at every connection.
-pub(super) fn parse_changes(payload: &Payload, retained: bool) -> Vec<Result<RequestedChange, RequestRefusal>> {
-    let changes = payload.metrics.iter().filter_map(parse_change).take(CHANGES_MAX);
-    let fresh = |change: Result<RequestedChange, RequestRefusal>| match retained {
-        true => Err(RequestRefusal::RetainedCommand),
-        false => change,
-    };
-    changes.map(fresh).collect()
+/// What one metric of a command asks for, and who asks.
+#[derive(Debug, PartialEq)]
+pub(super) struct AskedChange {
+    pub(super) origin: RequestOrigin,
+    pub(super) change: Result<RequestedChange, RequestRefusal>,
 }
 
-fn parse_change(metric: &Metric) -> Option<Result<RequestedChange, RequestRefusal>> {
-    let is = |(name, alias): (&str, u64)| match &metric.name {
-        Some(named) if !named.is_empty() => named == name,
-        _ => metric.alias == Some(alias),
+/// What a command asks for; empty where every metric of it is one that the node itself obeys. A metric that nobody may write is refused,
+/// so that it is told and accounted for. A message that the broker has kept is refused: it would come again at every connection.
+pub(super) fn parse_changes(payload: &Payload, retained: bool) -> Vec<AskedChange> {
+    let asked = payload.metrics.iter().filter(|metric| !is_own(metric)).take(CHANGES_MAX);
+    let parse = |metric: &Metric| AskedChange {
+        origin: origin_of(metric, payload.timestamp),
+        change: if retained { Err(RequestRefusal::RetainedCommand) } else { parse_change(metric) },
     };
-    if is(FEED_OVERRIDE) {
-        return Some(match (&metric.value, metric.is_null) {
+    asked.map(parse).collect()
+}
+
+/// What the node does without the gate.
+fn is_own(metric: &Metric) -> bool {
+    metric.name.as_deref() == Some(REBIRTH)
+}
+
+/// A command names nobody and has no mark; the time of its metric stands for both, so that the same command is not obeyed twice.
+fn origin_of(metric: &Metric, of_message: Option<u64>) -> RequestOrigin {
+    let Some(at_ms) = metric.timestamp.or(of_message) else { return RequestOrigin::default() };
+    let issued_ns = i64::try_from(at_ms).ok().map(|at_ms| at_ms.saturating_mul(1_000_000));
+    RequestOrigin::from_words(Some(&format!("{} at {at_ms}", name_of(metric))), None, issued_ns)
+}
+
+fn name_of(metric: &Metric) -> String {
+    let alias = || {
+        let known = [FEED_OVERRIDE, ACKNOWLEDGE_ALARM].into_iter().find(|(_, alias)| metric.alias == Some(*alias));
+        known.map_or_else(|| format!("alias {}", metric.alias.unwrap_or(0)), |(name, _)| name.to_owned())
+    };
+    metric.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(alias)
+}
+
+fn parse_change(metric: &Metric) -> Result<RequestedChange, RequestRefusal> {
+    let name = name_of(metric);
+    if name == FEED_OVERRIDE.0 {
+        return match (&metric.value, metric.is_null) {
             (None, _) | (_, Some(true)) => Ok(RequestedChange::Withdraw),
             (Some(value), _) => to_number(value).map_or_else(
                 || Err(RequestRefusal::NoNumber { metric: FEED_OVERRIDE.0 }),
                 |pct| RequestedChange::feed_override(pct, ""),
             ),
+        };
+    }
+    if name != ACKNOWLEDGE_ALARM.0 {
+        return Err(RequestRefusal::NotWritable {
+            metric: name.chars().filter(|it| !it.is_control()).take(120).collect(),
         });
     }
-    is(ACKNOWLEDGE_ALARM).then(|| match &metric.value {
+    match &metric.value {
         Some(MetricValue::Text(code)) => Ok(RequestedChange::acknowledge_alarm(code)),
         _ => Err(RequestRefusal::NoText { metric: ACKNOWLEDGE_ALARM.0 }),
-    })
+    }
 }
 
 /// Whole numbers are without sign in the payload: a negative one is far above what can be asked for, and refused there.
@@ -93,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_is_known_by_name_or_alias_and_everything_else_is_passed_over() {
+    fn a_request_is_known_by_name_or_alias_and_everything_else_is_refused() {
         let named = |name: &str, value| Metric::with_name(name, datatype::DOUBLE, 0, value);
         let by_alias = Metric { alias: Some(9), value: Some(MetricValue::Int(70)), ..Metric::default() };
         let all = payload(vec![
@@ -101,22 +131,26 @@ mod tests {
             by_alias,
             named("request/acknowledge_alarm", MetricValue::Text("overload".to_owned())),
             named("spindle_power_w", MetricValue::Double(1.0)),
-            named("request/answer", MetricValue::Text("x".to_owned())),
+            named("Node Control/Rebirth", MetricValue::Boolean(true)),
         ]);
         let expected = [
             RequestedChange::feed_override(80.0, ""),
             RequestedChange::feed_override(70.0, ""),
             Ok(RequestedChange::acknowledge_alarm("overload")),
+            Err(RequestRefusal::NotWritable { metric: "spindle_power_w".to_owned() }),
         ];
-        assert_eq!(parse_changes(&all, false), expected);
-        assert!(parse_changes(&all, true).iter().all(Result::is_err), "retained");
+        let asked = parse_changes(&all, false);
+        let origin = asked[0].origin.clone();
+        assert_eq!((origin.id.as_deref(), origin.issued_ns), (Some("request/feed_override_pct at 0"), Some(0)));
+        assert_eq!(asked.into_iter().map(|it| it.change).collect::<Vec<_>>(), expected);
+        assert!(parse_changes(&all, true).iter().all(|it| it.change.is_err()), "retained");
     }
 
     #[test]
     fn what_is_no_number_is_refused_and_null_withdraws() {
         let of = |value: Option<MetricValue>| {
             let metric = Metric { name: Some(FEED_OVERRIDE.0.to_owned()), value, ..Metric::default() };
-            parse_changes(&payload(vec![metric]), false).remove(0)
+            parse_changes(&payload(vec![metric]), false).remove(0).change
         };
         assert_eq!(of(None), Ok(RequestedChange::Withdraw));
         for bad in [

@@ -29,8 +29,9 @@ use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
 use crate::address::TargetError;
 use adapter_core::address::Keys;
+use commands::AskedChange;
 use gateway_base::clock;
-use gateway_control::{Reply, RequestRefusal, RequestedChange};
+use gateway_control::Reply;
 use gateway_history::{Cell, Outbox};
 use host::PrimaryHost;
 use mqtt::{Outgoing, Qos, Will};
@@ -106,7 +107,7 @@ pub(super) struct SparkplugSink {
     host: PrimaryHost,
     requests: Requests,
     /// What the network has asked for and is not answered yet.
-    requested_changes: Vec<Result<RequestedChange, RequestRefusal>>,
+    requested_changes: Vec<AskedChange>,
 }
 
 impl SparkplugSink {
@@ -141,8 +142,8 @@ impl SparkplugSink {
 
     /// Hands to the gate what was asked for, and tells what became of it.
     async fn answer_requests(&mut self) -> Result<(), SinkError> {
-        for change in std::mem::take(&mut self.requested_changes) {
-            let Some(Reply { done, text }) = self.requests.submit_change(change).await else { continue };
+        for AskedChange { origin, change } in std::mem::take(&mut self.requested_changes) {
+            let Some(Reply { done, text }) = self.requests.submit_change(origin, change).await else { continue };
             let (at_ms, kind) = (now_ms(), self.data_kind());
             let told = self.build_message(kind, vec![commands::build_answer_metric(done, &text, at_ms)], at_ms);
             self.publish_messages(vec![told]).await.map_err(|(_, failure)| failure.of_item(None))?;

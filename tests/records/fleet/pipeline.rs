@@ -3,10 +3,11 @@
 use crate::fleet::cluster::Cluster;
 use crate::fleet::postgres::Postgres;
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
+use gateway::clock::ClockMark;
 use gateway::history::{ExtraSeries, ExtraValue, Options, Outbox, OutboxSettings, Writer};
 use gateway::sinks::{Board, Sinks, drive};
 use std::time::Duration;
-use testkit::process::{run, stderr, stdout};
+use testkit::process::{run, stderr, stdout, wait_for};
 
 /// One stream and one database.
 pub(crate) struct Plant {
@@ -24,11 +25,21 @@ impl Plant {
 
     /// With these lines in the configuration of the NATS server.
     pub(crate) fn with(lines: &str) -> Option<Self> {
+        let plant = Self::start_servers(lines)?;
+        let made = run(&["fleet", "stream", &plant.address, "--max-gb", "4"]);
+        assert!(made.status.success(), "{}", stderr(&made));
+        Some(plant)
+    }
+
+    /// Without a stream yet.
+    pub(crate) fn without_stream() -> Option<Self> {
+        Self::start_servers("")
+    }
+
+    fn start_servers(lines: &str) -> Option<Self> {
         let cluster = Cluster::with(1, &format!("{{store}}\n{lines}"))?;
         let postgres = Postgres::start()?;
         let address = format!("{}/cnc", cluster.address());
-        let made = run(&["fleet", "stream", &address, "--max-gb", "4"]);
-        assert!(made.status.success(), "{}", stderr(&made));
         Some(Self { _cluster: cluster, postgres, address })
     }
 
@@ -46,6 +57,7 @@ pub(crate) struct Recorded {
     pub(crate) directory: tempfile::TempDir,
     pub(crate) writer: Option<Writer>,
     board: Board,
+    outbox: Outbox,
     sinks: Option<Sinks>,
     runtime: tokio::runtime::Runtime,
 }
@@ -59,6 +71,17 @@ impl Recorded {
 
     /// The same history, opened again, perhaps under another name.
     pub(crate) fn again(directory: tempfile::TempDir, machine: &str, tick: Duration, address: &str) -> Self {
+        Self::with_clock(directory, machine, tick, address, Options::default().clock)
+    }
+
+    /// The same, with what is thought of the clock.
+    pub(crate) fn with_clock(
+        directory: tempfile::TempDir,
+        machine: &str,
+        tick: Duration,
+        address: &str,
+        clock: ClockMark,
+    ) -> Self {
         let settings = OutboxSettings { tick, drain: Duration::from_secs(60), ..OutboxSettings::default() };
         let outbox = Outbox::new(machine, settings, ["fleet".to_owned()]);
         let extras = vec![ExtraSeries::new_text("machine_state", "state", "状态")];
@@ -66,6 +89,7 @@ impl Recorded {
             extras,
             group_commit: Duration::from_millis(100),
             outbox: Some(outbox.clone()),
+            clock,
             when_full: gateway::history::WhenFull::Wait,
             ..Options::default()
         };
@@ -78,7 +102,7 @@ impl Recorded {
         let board = Board::new(outbox.clone(), [("fleet".to_owned(), "nats".to_owned())]);
         let (post, _inbox) = gateway::control::create_queues();
         let sinks = runtime.block_on(async { drive::start_sinks(&[sink], &post, (&outbox, &board), &path) });
-        Self { directory, writer: Some(writer), board, sinks: Some(sinks), runtime }
+        Self { directory, writer: Some(writer), board, outbox, sinks: Some(sinks), runtime }
     }
 
     pub(crate) fn writer(&self) -> &Writer {
@@ -96,6 +120,30 @@ impl Recorded {
             sample.set_slot(*channel, slot);
         }
         self.writer().queue_sample(&sample, &[ExtraValue::Text(state)]);
+    }
+
+    /// Waits until everything is delivered, and gives what was not taken.
+    pub(crate) fn refused(&self) -> u64 {
+        self.writer().flush().expect("durable");
+        wait_for("everything is delivered", Duration::from_secs(30), || {
+            (self.board.list_sinks()[0].behind_items == 0).then_some(())
+        });
+        self.board.list_sinks()[0].refused
+    }
+
+    /// The last item that was not taken, and why.
+    pub(crate) fn refusal(&self) -> Option<String> {
+        self.board.list_sinks()[0].refusal.clone()
+    }
+
+    /// Name of the box, epoch and number of the next item.
+    pub(crate) fn identity(&self) -> (String, u64, u64) {
+        (self.outbox.box_id(), self.outbox.epoch(), self.outbox.watch_head().borrow().next_sequence)
+    }
+
+    /// Ends without a word: nothing more is sent, not even that it ends.
+    pub(crate) fn abandon(mut self) {
+        self.runtime.block_on(self.sinks.take().expect("running").stop());
     }
 
     /// Ends as a box does: the last commit waits for the sink.

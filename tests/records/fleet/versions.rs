@@ -8,6 +8,19 @@ use std::path::Path;
 use std::process::Command;
 use testkit::process::{run, stderr, stdout};
 
+#[test]
+fn tables_of_version_2_are_brought_up_with_everything_in_them() {
+    let Some(plant) = Plant::start() else { return };
+    plant.postgres.sql(include_str!("version_2.sql"));
+    publish(&plant, &[sample(8, 0)]);
+    assert!(plant.ingest().contains("1 rows written"));
+    let sql = |statement: &str| plant.postgres.sql(statement);
+    assert_eq!(sql("SELECT max(version) FROM fleet_schema"), "3");
+    assert_eq!(sql("SELECT sequence, epoch, redated_ns FROM items ORDER BY at"), "7|0|0\n8|0|0");
+    assert_eq!(sql("SELECT state, program FROM states"), "cutting|O1");
+    assert_eq!(sql("SELECT count(*) FROM readings"), "3");
+}
+
 /// A message of a box, made so many days ago.
 fn sample(sequence: u64, days_ago: i64) -> Outgoing {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("after 1970");
@@ -34,7 +47,7 @@ fn tables_of_version_1_are_brought_up_with_everything_in_them() {
     publish(&plant, &[sample(7, 0)]);
     assert!(plant.ingest().contains("1 rows written"));
     let sql = |statement: &str| plant.postgres.sql(statement);
-    assert_eq!(sql("SELECT max(version) FROM fleet_schema"), "2");
+    assert_eq!(sql("SELECT max(version) FROM fleet_schema"), "3");
     assert_eq!(
         sql("SELECT box, machine FROM boxes ORDER BY box"),
         "Lathe-8-3fa9c1|Lathe 8\nMill-2-00ff00|Mill 2",

@@ -84,7 +84,8 @@ fn a_gate_that_is_off_sees_the_request_and_writes_nothing() {
     let Some((_broker, mut host, mut sending)) = sparkplug("allow_requests = true\n[gate]\nmode = \"off\"\n") else {
         return;
     };
-    assert_eq!(ask(&mut host, FEED, "double", "70")["done"], true);
+    let answer = ask(&mut host, FEED, "double", "70");
+    assert!(answer["done"] == false && answer["text"].as_str().is_some_and(|text| text.contains("nothing is written")));
     let seen = wait_for("the request at the gate", PATIENCE, || {
         Some(gate(&sending)).filter(|gate| gate["wanted_pct"] == 70.0)
     });
@@ -94,7 +95,7 @@ fn a_gate_that_is_off_sees_the_request_and_writes_nothing() {
         (&Json::from("off"), &Json::from(100.0), &Json::Null)
     );
     sending.stop();
-    assert_eq!(outcomes(&sending, "network_request"), ["done"]);
+    assert_eq!(outcomes(&sending, "network_request"), ["not_written"]);
     assert_eq!(outcomes(&sending, "request")[0], "held");
     assert!(outcomes(&sending, "write").is_empty());
 }
@@ -108,7 +109,9 @@ fn what_the_network_asks_for_is_judged_like_a_script_and_written_only_when_a_per
         too_much["done"] == false && too_much["text"].as_str().is_some_and(|text| text.contains("from 0 to 100")),
         "{too_much}"
     );
-    assert_eq!(ask(&mut host, FEED, "double", "20")["done"], true);
+    assert_eq!(ask(&mut host, FEED, "double", "20")["done"], false, "nobody has armed");
+    let unwritable = ask(&mut host, "spindle_speed_rpm", "double", "100");
+    assert!(unwritable["text"].as_str().is_some_and(|text| text.contains("cannot be written")), "{unwritable}");
     wait_for("the request at the gate", PATIENCE, || (gate(&sending)["wanted_pct"] == 20.0).then_some(()));
     std::thread::sleep(Duration::from_secs(2));
     assert_eq!(gate(&sending)["written_pct"], Json::Null, "nobody has armed");
@@ -127,7 +130,9 @@ fn what_the_network_asks_for_is_judged_like_a_script_and_written_only_when_a_per
     wait_for("given back", PATIENCE, || gate(&sending)["wanted_pct"].is_null().then_some(()));
     sending.stop();
     assert!(outcomes(&sending, "write").contains(&"written".to_owned()), "the write names who asked");
-    assert!(outcomes(&sending, "network_request").starts_with(&["refused".to_owned(), "done".to_owned()]));
+    assert!(
+        outcomes(&sending, "network_request").starts_with(&["refused", "not_written", "refused"].map(str::to_owned))
+    );
 }
 
 fn publish(port: u16, topic: &str, lines: &str, more: &[&str]) {
@@ -150,7 +155,7 @@ fn a_plain_topic_asks_too_and_whatever_else_comes_there_is_refused() {
     let told = |count: usize| wait_for("an answer", PATIENCE, || answers().get(count - 1).cloned());
     assert!(told(1)["text"].as_str().is_some_and(|text| text.contains("retained")), "{:?}", answers());
     let asks = [
-        ("{\"request\":\"feed_override\",\"pct\":70,\"reason\":\"night\",\"id\":\"a1\"}", true, "70 %"),
+        ("{\"request\":\"feed_override\",\"pct\":70,\"reason\":\"night\"}", false, "70 %"),
         ("{\"request\":\"feed_override\",\"pct\":1e999}", false, "no request"),
         ("{\"request\":\"arm\",\"by\":\"me\"}", false, "no request"),
         ("hello", false, "no request"),
@@ -158,19 +163,58 @@ fn a_plain_topic_asks_too_and_whatever_else_comes_there_is_refused() {
         ("{\"request\":\"acknowledge_alarm\",\"code\":\"door (own.rhai)\"}", true, "was seen"),
     ];
     for (index, (line, done, says)) in asks.iter().enumerate() {
-        publish(broker.port, "works/lathe/request", &format!("{line}\n"), &[]);
+        publish(broker.port, "works/lathe/request", &stamp_request(line, &format!("a{index}"), 0), &[]);
         let answer = told(index + 2);
         assert_eq!(answer["done"], *done, "{line}: {answer}");
         assert!(answer["text"].as_str().is_some_and(|text| text.contains(says)), "{line}: {answer}");
     }
-    assert_eq!(answers()[1]["id"], "a1");
+    assert_eq!(answers()[1]["id"], "a0");
+    late_and_repeated(broker.port, &told, asks.len() + 2);
     wait_for("the request at the gate", PATIENCE, || (gate(&sending)["wanted_pct"] == 70.0).then_some(()));
     let acknowledged = || (sending.status()["acknowledged"][0]["by"] == "sink plant").then_some(());
     wait_for("the acknowledged alarm in the status", PATIENCE, acknowledged);
     flood(broker.port, &sending, &answers);
     sending.stop();
     let rows = outcomes(&sending, "network_request");
-    assert!(rows.iter().filter(|outcome| *outcome == "done").count() >= 2 && rows.len() < 60, "{} rows", rows.len());
+    assert!(rows.contains(&"done".to_owned()) && rows.contains(&"not_written".to_owned()), "{rows:?}");
+    assert!(rows.len() < 70, "{} rows", rows.len());
+    let names = |row: &Json| row["reason"].as_str().is_some_and(|why| why.contains("asked by \"mes\", id \"late\""));
+    assert!(sending.audit().iter().any(names), "the audit names who asked");
+}
+
+/// The line with this id, who asks, and when: so many seconds ago.
+fn stamp_request(line: &str, id: &str, ago_s: i64) -> String {
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("after 1970");
+    let at_ns = i64::try_from(since.as_nanos()).expect("before 2262") - ago_s * 1_000_000_000;
+    let at = gateway::moment::format_utc(at_ns);
+    match line.strip_suffix('}') {
+        Some(open) => format!("{open},\"id\":\"{id}\",\"from\":\"mes\",\"issued_at\":\"{at}\"}}\n"),
+        None => format!("{line}\n"),
+    }
+}
+
+/// What is old, comes again, or does not say when it was asked for is not obeyed; each is told under its own id.
+fn late_and_repeated(port: u16, told: &dyn Fn(usize) -> Json, first: usize) {
+    let withdraw = "{\"request\":\"withdraw\"}";
+    let malformed = stamp_request("{\"request\":\"feed_override\",\"pct\":\"much\"}", "m1", 0);
+    let asks = [
+        (stamp_request(withdraw, "late", 40), "late", "at most 30 s"),
+        (stamp_request(withdraw, "ahead", -20), "ahead", "at most 30 s"),
+        (stamp_request(withdraw, "a0", 0), "a0", "has come before"),
+        (format!("{withdraw}\n"), "", "issued_at"),
+        (malformed, "m1", "no request"),
+    ];
+    for (index, (line, id, says)) in asks.iter().enumerate() {
+        // No more than one a second passes on average.
+        std::thread::sleep(Duration::from_secs(1));
+        publish(port, "works/lathe/request", line, &[]);
+        let answer = told(first + index);
+        assert!(
+            answer["done"] == false && answer["text"].as_str().is_some_and(|text| text.contains(says)),
+            "{line}: {answer}"
+        );
+        assert_eq!(answer["id"].as_str().unwrap_or_default(), *id, "{answer}");
+    }
 }
 
 /// Two thousand requests at once: a few are answered, the rest is counted, and data goes on.
