@@ -62,7 +62,8 @@ fn a_text_that_changes_all_the_time_is_told_now_and_then() {
     let mut raised = 0;
     for tick in 0..600 {
         let at_s = 0.1 * f64::from(tick);
-        let decision = host.run_due_scripts(&sample(at_s, &[("spindle_load_pct", f64::from(tick % 97))]), &cutting(at_s, 1.0));
+        let decision =
+            host.run_due_scripts(&sample(at_s, &[("spindle_load_pct", f64::from(tick % 97))]), &cutting(at_s, 1.0));
         raised += decision.alarms.iter().filter(|change| change.raised).count();
     }
     assert_eq!(raised, 12, "every 5 s of 60");
