@@ -5,7 +5,7 @@ use super::to_seconds;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_pipeline::Tally;
 use rules::estimators::State;
-use rules::script::{Decision, OverrideRequest, ScriptProblem, Stop};
+use rules::script::{Decision, OverrideRequest, ScriptProblem, StopRequest};
 use std::sync::Arc;
 
 /// A longer step between two samples is a gap.
@@ -129,25 +129,20 @@ impl Lane {
         self.problems.extend(decision.problems.iter().take(room).cloned());
     }
 
-    /// A stop lasts for as long as it is asked for.
+    /// A stop lasts for as long as it is asked for; of requests that are the same, the first script's words count.
     fn update_stops(&mut self, at_ns: TimeNs, decisions: &[&Decision]) {
-        let asked = |word: &str| {
-            let requests = decisions.iter().flat_map(|decision| &decision.stops);
-            // The first script's words count.
-            requests.filter(|request| *request.stop.as_word() == *word).min_by_key(|request| request.script.clone())
-        };
-        let over = |spell: &Spell| spell.kind == SpellKind::Stop && asked(&spell.name).is_none();
-        self.finish_spells(at_ns, over);
-        for word in [Stop::FeedHold, Stop::ToolChange].map(Stop::as_word) {
-            let Some(request) = asked(word) else { continue };
-            let standing = |at: &&usize| self.spells[**at].kind == SpellKind::Stop && *self.spells[**at].name == *word;
-            if self.open.iter().find(standing).is_none() {
-                let (script, text, name) = (request.script.clone(), request.reason.clone(), Arc::from(word));
+        let mut asked: Vec<&StopRequest> = decisions.iter().flat_map(|decision| &decision.stops).collect();
+        asked.sort_by_key(|request| request.script.clone());
+        self.finish_spells(at_ns, |spell| {
+            spell.kind == SpellKind::Stop && !asked.iter().any(|request| is_spell_of(spell, request))
+        });
+        for request in asked {
+            if !self.open.iter().any(|at| is_spell_of(&self.spells[*at], request)) {
                 self.begin_spell(Spell {
                     kind: SpellKind::Stop,
-                    script,
-                    name,
-                    text,
+                    script: request.script.clone(),
+                    name: Arc::from(request.stop.as_word()),
+                    text: request.reason.clone(),
                     level: "",
                     from_ns: at_ns,
                     to_ns: None,
@@ -235,4 +230,10 @@ impl Lane {
 pub(super) fn requests_differ(a: Option<f64>, b: Option<f64>) -> bool {
     let (a, b) = (a.unwrap_or(100.0), b.unwrap_or(100.0));
     (a - b).abs() > SAME_PCT || a.is_finite() != b.is_finite()
+}
+/// Is this the time in which this request is made?
+fn is_spell_of(spell: &Spell, request: &StopRequest) -> bool {
+    spell.kind == SpellKind::Stop
+        && *spell.name == *request.stop.as_word()
+        && request.stop.is_same_request(&spell.text, &request.reason)
 }

@@ -14,9 +14,12 @@ use std::time::Duration;
 
 #[derive(Debug, Args)]
 pub(super) struct HistoryArguments {
-    /// History database.
-    #[arg(long, global = true, value_name = "DB", default_value = "cnc-gateway-data/history.db")]
-    history: PathBuf,
+    /// History database; without it that of the data directory.
+    #[arg(long, global = true, value_name = "DB", conflicts_with = "data_dir")]
+    history: Option<PathBuf>,
+    /// Data directory of the gateway.
+    #[arg(long, global = true, value_name = "DIR", default_value = "cnc-gateway-data")]
+    data_dir: PathBuf,
     #[command(subcommand)]
     question: Question,
 }
@@ -152,7 +155,7 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
-    let path = &arguments.history;
+    let path = &arguments.history.unwrap_or_else(|| arguments.data_dir.join("history.db"));
     let open = || Reader::open(path).map_err(|error| to_cannot_run(&error));
     let reader = match arguments.question {
         Question::Repair(repair) => return super::history_upkeep::repair_history(&repair, path),

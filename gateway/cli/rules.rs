@@ -65,9 +65,12 @@ struct BacktestArguments {
     /// Configuration file; without one the built-in configuration.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// History database; without it that of the configuration.
-    #[arg(long, value_name = "DB")]
+    /// History database; without it that of the data directory.
+    #[arg(long, value_name = "DB", conflicts_with = "data_dir")]
     history: Option<PathBuf>,
+    /// Data directory of the gateway; without it that of the configuration.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
     /// Least time between two samples, s: leaves samples out, which is faster and coarser. 0 takes every sample.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     every: f64,
@@ -196,7 +199,8 @@ fn problem_to_json(problem: &ScriptProblem) -> Value {
 
 fn compare_over_history(arguments: &BacktestArguments) -> CommandResult {
     let config = load_configuration(arguments.config.as_deref())?;
-    let history = arguments.history.clone().unwrap_or_else(|| config.history.path.clone());
+    let of_directory = arguments.data_dir.as_ref().map(|directory| directory.join("history.db"));
+    let history = arguments.history.clone().or(of_directory).unwrap_or_else(|| config.history.path.clone());
     let newest_ns = read_newest_ns(&history)?;
     if !(0.0..=3600.0).contains(&arguments.every) {
         return Err(CannotRun::new(format!("--every {} is outside 0 to 3600 s", arguments.every), ""));

@@ -10,6 +10,9 @@ use clap::Args;
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+/// Data directory of a box that the service manager starts.
+const DATA_DIR: &str = "/var/lib/cnc-gateway";
+
 /// Arguments of `setup`. What is not given is asked for, where there is a terminal.
 #[derive(Debug, Args)]
 pub(super) struct SetupArguments {
@@ -17,7 +20,7 @@ pub(super) struct SetupArguments {
     #[arg(long, value_name = "FILE", default_value = "/etc/cnc-gateway/cnc-gateway.toml")]
     out: PathBuf,
     /// Directory of the data of the box.
-    #[arg(long, value_name = "DIR", default_value = "/var/lib/cnc-gateway")]
+    #[arg(long, value_name = "DIR", default_value = DATA_DIR)]
     data_dir: PathBuf,
     /// Name of the machine.
     #[arg(long)]
@@ -71,6 +74,8 @@ impl Dialogue {
         let mut line = String::new();
         let read = std::io::stdin().lock().read_line(&mut line);
         match read {
+            // Answers that are piped in may end before the last question: the rest has its default.
+            Ok(0) if !std::io::stdin().is_terminal() => Ok(default.to_owned()),
             Ok(0) | Err(_) => Err(CannotRun::new("the answers ended before the last question", "nothing was written")),
             Ok(_) if line.trim().is_empty() => Ok(default.to_owned()),
             Ok(_) => Ok(line.trim().to_owned()),
@@ -84,7 +89,7 @@ impl Dialogue {
 }
 
 pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
-    let asks = !arguments.yes && std::io::stdin().is_terminal();
+    let asks = !arguments.yes;
     let zh = lang::language() == Language::Zh;
     let dialogue = Dialogue { zh, asks };
     // Otherwise the page opens in the language of the browser.
@@ -110,8 +115,11 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
         let next = "give --control ADDRESS or --meter ADDRESS; simulated://lathe is a machine to try with";
         return Err(CannotRun::new("a box needs a control or a meter", next));
     }
-    let answers = SetupAnswers { machine, language, control, meters, page_from_network };
     note_data_dir(&arguments.data_dir);
+    // What is started with this file must find the persons that are made here.
+    let data_dir = Some(arguments.data_dir.clone()).filter(|directory| directory.as_os_str() != DATA_DIR);
+    let data_dir = data_dir.map(std::path::absolute).transpose().map_err(CannotRun::from_error)?;
+    let answers = SetupAnswers { machine, language, data_dir, control, meters, page_from_network };
     write_configuration(&dialogue, arguments, &answers)?;
     add_administrator(&dialogue, arguments)?;
     dialogue.print_words((

@@ -3,7 +3,8 @@
 //!
 //! The same request does not pass again before two things have happened: the script has withdrawn it, and the operator has
 //! seen to it at the machine (started again after a feed hold, or after the program stood) or has acknowledged it on the
-//! box. A limit that chatters therefore stops the machine once and not fifty times.
+//! box. A limit that chatters therefore stops the machine once and not fifty times. A request of its own (a second worn edge) that was
+//! held back by the latch of another passes when that has been seen to, if a script still asks for it.
 
 use super::find_channel;
 use adapter_core::words::execution;
@@ -60,13 +61,71 @@ impl AskOutcome {
     }
 }
 
+/// A request that a script repeats from tick to tick.
+#[derive(Debug, Clone)]
+struct StandingRequest {
+    reason: Arc<str>,
+    /// It waits until the one that is latched has been seen to.
+    waits: bool,
+}
+
 /// One kind of request.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 struct Latch {
-    /// Did a script ask for it at the last tick?
-    wanted: bool,
-    /// Was it sent, and has nobody seen to it?
+    /// What scripts asked for at the last tick.
+    standing: Vec<StandingRequest>,
+    /// Was one sent, and has nobody seen to it?
     latched: bool,
+    /// The reason of the one that was sent last.
+    sent: Option<Arc<str>>,
+}
+
+impl Latch {
+    /// What becomes of a request at this tick; `None` where that has been said.
+    fn judge_request(&self, known: Option<&StandingRequest>, armed: bool) -> Option<AskOutcome> {
+        let outcome = match (self.latched, armed) {
+            (true, _) => AskOutcome::Latched,
+            (false, true) => AskOutcome::Sent,
+            (false, false) => AskOutcome::Shadow,
+        };
+        let new = known.is_none_or(|known| known.waits && outcome == AskOutcome::Sent);
+        new.then_some(outcome)
+    }
+
+    /// Does a latched request wait, because it is another one than the one that was sent?
+    fn makes_wait(&self, ask: &ScriptRequest, outcome: AskOutcome) -> bool {
+        let other = self.sent.as_ref().is_none_or(|sent| !is_same_request(ask.request, sent, &ask.reason));
+        outcome == AskOutcome::Latched && other
+    }
+
+    /// Takes what is asked for at this tick, at most one of each; gives what is new.
+    fn take_requests(&mut self, asks: &[&ScriptRequest], armed: bool) -> Vec<(ScriptRequest, AskOutcome)> {
+        let mut judged = Vec::new();
+        let before = std::mem::take(&mut self.standing);
+        for ask in asks {
+            let same = |reason: &Arc<str>| is_same_request(ask.request, reason, &ask.reason);
+            if self.standing.iter().any(|standing| same(&standing.reason)) {
+                continue;
+            }
+            let known = before.iter().find(|standing| same(&standing.reason));
+            let outcome = self.judge_request(known, armed);
+            let waits = outcome.map_or(known.is_some_and(|known| known.waits), |outcome| self.makes_wait(ask, outcome));
+            if outcome == Some(AskOutcome::Sent) {
+                (self.latched, self.sent) = (true, Some(ask.reason.clone()));
+            }
+            self.standing.push(StandingRequest { reason: ask.reason.clone(), waits });
+            judged.extend(outcome.map(|outcome| ((*ask).clone(), outcome)));
+        }
+        judged
+    }
+}
+
+/// Are two requests to the ladder one and the same? As scripts see it: [`Stop::is_same_request`].
+fn is_same_request(request: LadderRequest, reason: &str, other: &str) -> bool {
+    match request {
+        LadderRequest::FeedHold => Stop::FeedHold.is_same_request(reason, other),
+        LadderRequest::Stop => Stop::ToolChange.is_same_request(reason, other),
+    }
 }
 
 #[derive(Debug)]
@@ -92,16 +151,8 @@ impl Asks {
         self.seen_to(sample);
         let mut judged = Vec::new();
         for (latch, request) in self.latches.iter_mut().zip(LadderRequest::ALL) {
-            let ask = asks.iter().find(|ask| ask.request == request);
-            let wanted_before = std::mem::replace(&mut latch.wanted, ask.is_some());
-            let Some(ask) = ask.filter(|_| !wanted_before) else { continue };
-            let outcome = match (latch.latched, armed) {
-                (true, _) => AskOutcome::Latched,
-                (false, true) => AskOutcome::Sent,
-                (false, false) => AskOutcome::Shadow,
-            };
-            latch.latched |= outcome == AskOutcome::Sent;
-            judged.push((ask.clone(), outcome));
+            let of_kind: Vec<&ScriptRequest> = asks.iter().filter(|ask| ask.request == request).collect();
+            judged.extend(latch.take_requests(&of_kind, armed));
         }
         judged
     }
@@ -186,5 +237,26 @@ mod tests {
         asks.acknowledge_requests();
         assert_eq!(asks.judge_requests(&stop, &sample(active), true)[0].1, AskOutcome::Sent);
         assert_eq!(asks.judge_requests(&hold(), &sample(active), false)[0].1, AskOutcome::Shadow);
+    }
+
+    #[test]
+    fn each_worn_edge_has_a_request_that_passes() {
+        let edge = |name: &str| ScriptRequest {
+            request: LadderRequest::Stop,
+            reason: format!("edge {name} is worn").into(),
+            ..hold().remove(0)
+        };
+        let (one, both, third) = ([edge("T1")], [edge("T1"), edge("T3")], [edge("T3")]);
+        let mut asks = Asks::new();
+        let mut judge = |wanted: &[ScriptRequest], word: &str| -> Vec<(String, AskOutcome)> {
+            let judged = asks.judge_requests(wanted, &sample(word), true);
+            judged.into_iter().map(|(ask, outcome)| (ask.reason.to_string(), outcome)).collect()
+        };
+        let told = |name: &str, outcome| vec![(format!("edge {name} is worn"), outcome)];
+        assert_eq!(judge(&one, execution::ACTIVE), told("T1", AskOutcome::Sent));
+        assert_eq!(judge(&both, execution::ACTIVE), told("T3", AskOutcome::Latched), "T1 has not been seen to");
+        assert_eq!(judge(&both, execution::STOPPED), []);
+        assert_eq!(judge(&third, execution::ACTIVE), told("T3", AskOutcome::Sent), "T1 was changed, T3 was not");
+        assert_eq!(judge(&third, execution::ACTIVE), []);
     }
 }

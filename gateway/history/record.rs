@@ -18,7 +18,8 @@ pub struct Event {
     pub detail: String,
 }
 
-/// An alarm that begins. Raising one that is already raised counts up and changes nothing else.
+/// An alarm that begins. Raising one that is already raised counts up and changes nothing else; with another text or severity the
+/// row of the old one ends, and a new row begins.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Alarm {
     /// When it was raised.

@@ -47,7 +47,14 @@ fn store_event(db: &Connection, event: &Event) -> Result<(), rusqlite::Error> {
     )
 }
 
+/// An alarm that stands already counts up where it says the same; where it says something else the row of the old text ends.
 fn raise_alarm(db: &Connection, alarm: &Alarm) -> Result<(), rusqlite::Error> {
+    execute_change(
+        db,
+        "UPDATE alarms SET cleared_ns = max(?1, raised_ns) WHERE source = ?2 AND code = ?3 AND cleared_ns IS NULL
+         AND (severity, coalesce(en, ''), coalesce(zh, '')) <> (?4, ?5, ?6)",
+        params![alarm.at_ns, alarm.source, alarm.code, alarm.severity, alarm.en, alarm.zh],
+    )?;
     execute_change(
         db,
         "INSERT INTO alarms (code, source, severity, raised_ns, count, en, zh) VALUES (?1, ?2, ?3, ?4, 1, ?5, ?6)

@@ -19,6 +19,8 @@ pub(super) const ROUTES: &[Route] = &[
     Route::read("/twin", || get(serve_page)),
     Route::read("/rules", || get(serve_page)),
     Route::read("/audit", || get(serve_page)),
+    Route::read("/box", || get(serve_page)),
+    Route::read("/setup", || get(serve_page)),
     Route::read("/help", || get(serve_page)),
     Route::for_file("/web/{file}", || get(serve_web_file)),
 ];

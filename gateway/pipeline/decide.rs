@@ -3,7 +3,7 @@
 use adapter_core::clock::TimeNs;
 use gateway_gate::Verdict;
 use gateway_history::{Alarm, AlarmClear, Decision as DecisionRow, Event, Record};
-use rules::script::{AlarmChange, Axis, Decision, OffsetProposal, OverrideRequest, Stop, StopRequest};
+use rules::script::{AlarmChange, Axis, Decision, OffsetProposal, OverrideRequest, StopRequest};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ pub struct ShownChange {
 #[derive(Debug, Clone, Default)]
 pub struct Decisions {
     asked: Option<RoundedRequest>,
-    stops: Vec<(Stop, Arc<str>)>,
+    stops: Vec<StopRequest>,
     /// Whole micrometres: finer changes are not recorded one by one.
     offsets: Vec<(Axis, i64)>,
     recent: VecDeque<ShownChange>,
@@ -74,7 +74,7 @@ impl Decisions {
     /// A request to hold or to change the tool is recorded when it begins.
     fn record_stops(&mut self, decision: &Decision, keep: &mut impl FnMut(Record)) {
         for request in &decision.stops {
-            if !self.stops.iter().any(|(stop, script)| *stop == request.stop && *script == request.script) {
+            if !self.stops.iter().any(|known| known.is_same_request(request) && known.script == request.script) {
                 keep(stop_row(request, decision.at_ns).into());
                 let text = format!("{} asked for ({})", request.stop.as_word(), request.reason);
                 self.recent.push_front(ShownChange { at_ns: decision.at_ns, text });
@@ -82,7 +82,7 @@ impl Decisions {
             }
         }
         self.stops.clear();
-        self.stops.extend(decision.stops.iter().map(|request| (request.stop, request.script.clone())));
+        self.stops.extend_from_slice(&decision.stops);
     }
 
     /// A proposed offset is recorded when it has changed by a micrometre.

@@ -249,7 +249,9 @@ impl Ticker {
 
     fn list_alarms(&self) -> Vec<AlarmStatus> {
         let of_twin = self.twin.iter().flat_map(Twin::list_alarms);
-        report::list_alarms(&self.pipeline).into_iter().chain(of_twin).chain(self.commands.standing_alarm()).collect()
+        let of_thermal = self.thermal.iter().flat_map(Thermal::list_alarms);
+        let of_scripts = report::list_alarms(&self.pipeline).into_iter();
+        of_scripts.chain(of_twin).chain(of_thermal).chain(self.commands.standing_alarm()).collect()
     }
 
     fn list_problems(&self, history: &HistoryStatus) -> Vec<StatusProblem> {

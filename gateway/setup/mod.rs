@@ -7,6 +7,7 @@ pub use scan::{AddressRange, FoundControl, RangeError, scan_for_controls};
 
 use rules::physics::explain::Language;
 use rules::twin::format_toml_text;
+use std::path::PathBuf;
 
 /// What the box has to know to begin.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,6 +16,8 @@ pub struct SetupAnswers {
     pub machine: String,
     /// Language of the page; `None`: that of the browser.
     pub language: Option<Language>,
+    /// Directory of the data of the box, absolute, where it is another one than the service uses by itself.
+    pub data_dir: Option<PathBuf>,
     /// Address of the control, where there is one.
     pub control: Option<String>,
     /// Addresses of the meters.
@@ -31,6 +34,9 @@ impl SetupAnswers {
             "# Written by `cnc-gateway setup`. `cnc-gateway check --keys` explains every key; what is not written has its default.\n\n[gateway]\n",
         );
         text += &format!("name = {}\n", format_toml_text(&self.machine));
+        if let Some(directory) = &self.data_dir {
+            text += &format!("data_dir = {}\n", format_toml_text(&directory.display().to_string()));
+        }
         if let Some(language) = self.language {
             text += &format!("language = {}\n", format_toml_text(language_word(language)));
         }
@@ -71,6 +77,7 @@ mod tests {
         let answers = SetupAnswers {
             machine: "Drehmaschine \"7\" \\ 车床".to_owned(),
             language: Some(Language::Zh),
+            data_dir: None,
             control: Some("fanuc://192.168.1.10:8193".to_owned()),
             meters: vec!["modbus-tcp://192.168.1.20:502?profile=sdm630".to_owned()],
             page_from_network: true,

@@ -1,11 +1,13 @@
 // The frame of the page: one stream, the watchdog, the address of each view.
 import { Live } from "./live.js";
-import { ask, make, say } from "./parts.js";
+import { ask, make, say, send } from "./parts.js";
 import { clock, dateTime, duration } from "./format.js";
 import { language, own, setLanguage, t } from "./words.js";
 
 /** Address, and the module that draws it. A module is loaded when it is first looked at. */
-const VIEWS = ["now", "history", "wear", "thermal", "twin", "rules", "audit", "help"];
+const VIEWS = ["now", "history", "wear", "thermal", "twin", "rules", "audit", "box", "help"];
+/** Views that another one leads to. */
+const INNER = { setup: "box" };
 const at = (id) => document.getElementById(id);
 const live = new Live();
 // The view is loaded while the words of the box are asked for.
@@ -33,7 +35,7 @@ let mounted = null;
 
 function viewOf(path) {
   const word = path.split("/")[1] || "now";
-  return VIEWS.includes(word) ? word : "now";
+  return VIEWS.includes(word) || word in INNER ? word : "now";
 }
 
 async function show() {
@@ -67,7 +69,7 @@ function drawFrame() {
       make("a", "", t(`view_${word}`), {
         href: `/${word}`,
         "data-view": word,
-        "aria-current": word === view ? "page" : null,
+        "aria-current": word === (INNER[view] ?? view) ? "page" : null,
       }),
     ),
   );
@@ -92,6 +94,8 @@ function drawPerson() {
   if (!context.session) return;
   link.hidden = false;
   const person = context.session.person;
+  at("sign-out").hidden = !person;
+  say(at("sign-out"), t("sign_out"));
   link.textContent = person ? `${person.name} (${t(`role_${person.role}`)})` : t("sign_in");
   link.href = `/sign-in?next=${encodeURIComponent(location.pathname + location.search)}`;
 }
@@ -159,6 +163,11 @@ at("language").addEventListener("click", () => {
   show();
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show());
+
+at("sign-out").addEventListener("click", async () => {
+  await send("/api/v1/logout").catch(() => {});
+  whoIsHere();
+});
 
 /** For tests and for whoever looks closely: when the newest status is from, in the clock of the box. */
 globalThis.cncGateway = { live, view: () => mounted, when: () => (live.status ? dateTime(live.status.at_ms) : null) };

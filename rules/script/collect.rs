@@ -120,10 +120,14 @@ impl RunOutput {
         Ok(())
     }
 
-    /// The last reason given for each kind counts.
-    pub(super) fn request_stop(&mut self, stop: Stop, reason: ImmutableString) {
-        self.stops.retain(|(known, _)| *known != stop);
+    /// Of requests that are the same, the last reason counts.
+    pub(super) fn request_stop(&mut self, stop: Stop, reason: ImmutableString) -> ScriptResult<()> {
+        self.stops.retain(|(known, before)| *known != stop || !stop.is_same_request(before, &reason));
+        if self.stops.len() >= NAMES_MAX {
+            return Err(too_many("requests", NAMES_MAX));
+        }
         self.stops.push((stop, reason));
+        Ok(())
     }
 
     /// The last offset proposed for each axis counts.

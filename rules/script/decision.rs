@@ -14,7 +14,7 @@ pub struct Decision {
     pub at_ns: TimeNs,
     /// The feed override asked for; `None` means the programmed feed, 100 %.
     pub request: Option<OverrideRequest>,
-    /// Feed holds and tool changes asked for, at most one of each kind: the first script's that asks.
+    /// Feed holds and tool changes asked for, no two the same ([`Stop::is_same_request`]): the first script's that asks.
     pub stops: Vec<StopRequest>,
     /// Thermal offsets proposed, at most one per axis: the first script's that proposes.
     pub offsets: Vec<OffsetProposal>,
@@ -67,6 +67,16 @@ impl Stop {
             Self::ToolChange => "tool_change",
         }
     }
+
+    /// Are two requests of this kind, with these reasons, one and the same? A feed hold holds the whole machine, whatever the reason;
+    /// a tool change is for one edge, which the reason names, so another reason is another request.
+    #[must_use]
+    pub fn is_same_request(self, reason: &str, other: &str) -> bool {
+        match self {
+            Self::FeedHold => true,
+            Self::ToolChange => reason == other,
+        }
+    }
 }
 
 /// A request to hold the feed or to change the tool. Whether it is passed on, latched and only once, is the gate's.
@@ -80,6 +90,14 @@ pub struct StopRequest {
     pub script: Arc<str>,
     /// Which version of it.
     pub version: u64,
+}
+
+impl StopRequest {
+    /// Do both ask for the same?
+    #[must_use]
+    pub fn is_same_request(&self, other: &Self) -> bool {
+        self.stop == other.stop && self.stop.is_same_request(&self.reason, &other.reason)
+    }
 }
 
 /// An offset that would compensate the thermal error of an axis. Nothing has been checked: the number may be anything,
@@ -176,7 +194,7 @@ pub struct Alarm {
     pub en: Arc<str>,
     /// What the operator reads, Chinese.
     pub zh: Arc<str>,
-    /// Time of the sample at which it was raised, ns.
+    /// Time of the sample at which it was raised, or raised anew with another text, ns.
     pub since_ns: TimeNs,
 }
 

@@ -217,7 +217,7 @@ impl Host {
         offsets.clear();
         for slot in &self.slots {
             for request in slot.stops() {
-                if !stops.iter().any(|known| known.stop == request.stop) {
+                if !stops.iter().any(|known| known.is_same_request(request)) {
                     stops.push(request.clone());
                 }
             }

@@ -97,7 +97,7 @@ pub(super) const QUANTITIES: [QuantityRow; 11] = [
 pub(super) type FigureRow = (&'static str, &'static str, &'static str, &'static str, fn(&Estimates) -> Figure);
 
 /// Figures of the load and of the last part, which have no standard deviation of their own.
-pub(super) const FIGURES: [FigureRow; 12] = [
+pub(super) const FIGURES: [FigureRow; 15] = [
     (
         "feed_in_force_pct",
         "%",
@@ -137,6 +137,28 @@ pub(super) const FIGURES: [FigureRow; 12] = [
         "Greatest cutting power of the first parts at this place",
         "程序此处示教工件的最大切削功率",
         |it| it.loads.learned_peak_w,
+    ),
+    (
+        "learned_multiple",
+        "1",
+        "Cutting power, less two standard deviations, over the greatest of the first parts at this place; in a cut that is under way there",
+        "切削功率（减两倍标准差）与示教最大功率之比",
+        |it| it.loads.learned_multiple,
+    ),
+    (
+        "learned_air_share",
+        "1",
+        "Path fed through the air at this place beyond what the first parts did, over half of the cut there (5 s at most): from 1 on the \
+         cut is missing",
+        "此处空切路径超出示教部分之比：达到 1 即切削缺失",
+        |it| it.loads.learned_air_share,
+    ),
+    (
+        "learned_coolant_share",
+        "1",
+        "Share of the time in the cut at this place in which the coolant ran in the first parts",
+        "示教工件在此处切削时冷却液开启的时间比例",
+        |it| it.loads.learned_coolant_share,
     ),
     (
         "learned_override_pct",

@@ -78,14 +78,12 @@ impl Timers {
         self.alarms.get(name).is_some_and(|timer| timer.active) || self.latched.contains_key(name)
     }
 
-    /// The alarm stands until it is cleared.
+    /// The alarm stands until it is cleared, with the text that was given last.
     pub(super) fn raise_alarm(&mut self, name: ImmutableString, text: AlarmText) -> ScriptResult<()> {
-        if !self.latched.contains_key(name.as_str()) {
-            if self.latched.len() >= NAMES_MAX {
-                return Err(too_many("alarms", NAMES_MAX));
-            }
-            self.latched.insert(name, text);
+        if self.latched.len() >= NAMES_MAX && !self.latched.contains_key(name.as_str()) {
+            return Err(too_many("alarms", NAMES_MAX));
         }
+        self.latched.insert(name, text);
         Ok(())
     }
 

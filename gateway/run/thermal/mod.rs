@@ -6,6 +6,7 @@
 //! only where the configuration says so; the gate decides, as about every offset.
 
 pub mod outside;
+mod sensors;
 
 use super::health::Health;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -15,11 +16,14 @@ use gateway_base::log::{Notice, Severity};
 use gateway_base::state_file;
 use gateway_config::{self as config, Config};
 use gateway_history::{ExtraSeries, ExtraValue};
+use gateway_status::AlarmStatus;
 use outside::OutsideWatch;
 use rules::estimators::thermal::{
-    AxisSituation, Compensator, Corrected, FollowSettings, HoldReason, ThermalFollower, ThermalModel, ThermalPrediction,
+    AxisSituation, Compensator, Corrected, FollowSettings, HoldReason, SensorModel, SensorWatch, ThermalFollower,
+    ThermalModel, ThermalPrediction,
 };
 use rules::script::OffsetProposal;
+use sensors::SensorAlarms;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -49,6 +53,9 @@ pub struct Thermal {
     held: Option<HoldReason>,
     /// Since when the temperatures have been inside the range of identification, and what was told last.
     outside: OutsideWatch,
+    /// Which temperatures are believed, and what was told of the others.
+    sensor_watch: SensorWatch,
+    sensor_alarms: SensorAlarms,
     pulses: i64,
     values: [ExtraValue<'static>; COUNT],
     reason: Arc<str>,
@@ -66,7 +73,12 @@ impl Thermal {
         let refused = |what: String| CannotRun::new(format!("{} {what}", path.display()), next);
         let text = std::fs::read_to_string(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
         let model = ThermalModel::read(&text, &config.gateway.name).map_err(refused)?;
-        let names: Vec<&str> = model.law.terms.iter().map(|term| term.sensor.as_str()).collect();
+        let mut names: Vec<&str> = Vec::new();
+        for term in &model.law.terms {
+            if !names.contains(&term.sensor.as_str()) {
+                names.push(&term.sensor);
+            }
+        }
         let channel = |name: &&str| {
             ChannelId::from_name(name).ok_or_else(|| refused(format!("names {name:?}, which no channel is")))
         };
@@ -84,6 +96,8 @@ impl Thermal {
             settings: config.thermal.clone(),
             follower,
             compensator,
+            sensor_watch: SensorWatch::new(SensorModel::from_law(&model.law, &names), sensors.len()),
+            sensor_alarms: SensorAlarms::new(config.thermal.compensation.hold_s),
             temperatures_c: Vec::with_capacity(sensors.len()),
             sensors,
             error,
@@ -132,6 +146,11 @@ impl Thermal {
         health.set_thermal_values(&self.values);
     }
 
+    /// The alarms of sensors that are not believed.
+    pub fn list_alarms(&self) -> impl Iterator<Item = AlarmStatus> {
+        self.sensor_alarms.list_standing()
+    }
+
     /// Takes one tick; the offset to propose, where that is configured.
     pub fn propose_offset(&mut self, sample: &Sample, health: &mut Health) -> Option<OffsetProposal> {
         let dt_ns = self.last_ns.map(|last_ns| sample.at_ns - last_ns);
@@ -153,7 +172,13 @@ impl Thermal {
     fn update_prediction(&mut self, sample: &Sample, dt_ns: i64, health: &mut Health) {
         self.temperatures_c.clear();
         self.temperatures_c.extend(self.sensors.iter().map(|channel| sample.number(*channel)));
-        let predicted = self.follower.predictor_mut().predict_error(sample.at_ns, &self.temperatures_c);
+        let stand_in_sd_um = self.sensor_watch.replace_doubted(sample.at_ns, &mut self.temperatures_c);
+        let mut predicted = self.follower.predictor_mut().predict_error(sample.at_ns, &self.temperatures_c);
+        if let Ok(prediction) = &mut predicted {
+            prediction.error_um.sd = prediction.error_um.sd.hypot(stand_in_sd_um);
+        }
+        let sd_um = predicted.as_ref().ok().map(|it| it.error_um.sd);
+        self.sensor_alarms.follow(sample.at_ns, &self.sensor_watch, &self.sensors, sd_um, health);
         let residual = match &predicted {
             Ok(prediction) => self.compare_with_reading(prediction, sample, health),
             Err(_) => ExtraValue::Missing("no_prediction"),
@@ -194,7 +219,7 @@ impl Thermal {
             Err(_) => return ExtraValue::Missing("no_reading"),
         };
         let soon = self.read_ns.is_some_and(|then_ns| (0..READING_EVERY_NS).contains(&(sample.at_ns - then_ns)));
-        if self.settings.learn && !soon {
+        if self.settings.learn && !soon && self.sensor_watch.doubted().is_empty() {
             self.read_ns = Some(sample.at_ns);
             let correction = self.follower.correct_with_reading(prediction, measured_um);
             if let Ok(text) = serde_json::to_string(&self.follower.to_corrected_law()) {

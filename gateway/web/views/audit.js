@@ -1,10 +1,8 @@
-// Audit: what was asked for, let through, refused and written, who armed; a ramp of the override is one line. Below:
-// the sources, the store, the scripts, as an integrator needs them.
-import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
-import { bytes, clock, dateTime, duration, number, quantity, sourceName, when } from "/web/format.js";
+// Audit: what was asked for, let through, refused and written, who armed; a ramp of the override is one line.
+import { ask, card, fill, make, say, table } from "/web/parts.js";
+import { clock, dateTime, quantity, when } from "/web/format.js";
 import { box, has, t } from "/web/words.js";
-import { armDialog } from "/web/now-feed.js";
-import { systemView } from "/web/system.js";
+import { armDialog, disarm } from "/web/now-feed.js";
 
 const KINDS = [
   "",
@@ -73,8 +71,6 @@ export function mount(root, context) {
       fill(list, [make("p", "note bad", error.message)]);
     }
   };
-  const system = systemCards(context);
-  const more = systemView(context);
   root.append(
     gate.box,
     card("", [
@@ -83,22 +79,14 @@ export function mount(root, context) {
       note,
       list,
     ]),
-    system.box,
-    ...more.parts,
   );
   read();
-  if (context.session) more.session();
   state.timer = setInterval(read, 3000);
   return {
     update(status) {
       gate.update(status);
-      system.update(status);
-      more.update(status);
     },
-    session: () => {
-      gate.update(context.status());
-      more.session();
-    },
+    session: () => gate.update(context.status()),
     leave: () => clearInterval(state.timer),
   };
 }
@@ -221,13 +209,7 @@ function gateCard(context) {
   const back = make("button", "danger", t("back_to_dial"), {
     type: "button",
     hidden: true,
-    onclick: async () => {
-      try {
-        await send("/api/v1/disarm");
-      } catch (error) {
-        say(note, error.message);
-      }
-    },
+    onclick: () => disarm(back, context),
   });
   const box_ = make("section", "card ages", [
     make("div", "head", [make("h2", "", t("gate_title")), make("div", "buttons grow", [arm, back])]),
@@ -251,69 +233,4 @@ function gateCard(context) {
   return { box: box_, update };
 }
 
-function systemCards(context) {
-  const [sources, store, scripts] = [make("div", ""), make("div", ""), make("div", "")];
-  const columns = make("div", "columns", [
-    card(t("sources"), sources),
-    card(t("store"), store),
-    card(t("scripts"), scripts),
-  ]);
-  let drawn = 0;
-  const update = (status) => {
-    // Figures that change at every message are read by nobody: once a second is enough.
-    if (performance.now() - drawn < 1000) return;
-    drawn = performance.now();
-    fill(
-      sources,
-      status.sources
-        .map((s) => {
-          const facts = [t("polled_every", quantity(s.period_s, "s")), t("readings", s.readings.toLocaleString())];
-          if (s.round_trip_p50_ms !== null) facts.push(t("answers_in", quantity(s.round_trip_p50_ms, "ms")));
-          if (s.failures) facts.push(t("failed_polls", s.failures));
-          return row(sourceName(s.name), t(`source_${s.state}`), s.error ? box(s.error) : facts.join(" · "), {
-            dot: s.error ? "bad" : "good",
-            tone: s.error ? "bad" : "",
-          });
-        })
-        .concat(
-          status.alignment.map((a) =>
-            row(
-              t("meter_lag", context.name(a.power).split(/[,，]/)[0]),
-              a.missing
-                ? context.reason(a.missing)
-                : `${number(a.lag_s * 1000, "ms")} ± ${number(a.uncertainty_s * 1000, "ms")} ms`,
-              a.use === "merge" ? t("put_back") : t("shown_only"),
-            ),
-          ),
-        ),
-    );
-    const h = status.history;
-    fill(store, [
-      row(t("samples_stored"), h.rows.toLocaleString(), h.error ? box(h.error) : h.path, {
-        dot: h.error ? "bad" : "good",
-      }),
-      row(t("size_on_disk"), bytes(h.bytes)),
-      h.lasts_days === null ? null : row(t("disk_lasts"), `${number(Math.round(h.lasts_days))} ${t("d")}`),
-      row(t("running_since"), duration(status.uptime_s)),
-      row(t("parts_finished"), String(status.parts)),
-      row(t("box_version"), status.version),
-      row(
-        t("tick"),
-        `${number(status.tick.rate_hz)} Hz`,
-        t("tick_words", number(status.tick.late_p99_ms, "ms"), status.tick.skipped),
-      ),
-    ]);
-    const tone = { running: "good", waiting: "warn", reverted: "bad", suspended: "bad", refused: "bad" };
-    fill(
-      scripts,
-      status.scripts.map((s) =>
-        row(s.file, t(`script_${s.condition}`), s.error ? box(s.error) : t("version_of", s.version), {
-          dot: tone[s.condition] ?? "warn",
-          tone: tone[s.condition] === "bad" ? "bad" : "",
-        }),
-      ),
-    );
-  };
-  return { box: columns, update };
-}
 export const auditTime = dateTime;

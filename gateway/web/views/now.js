@@ -1,6 +1,6 @@
 // Now: what a machinist reads in three seconds. Everything is built once; only texts change, so nothing jumps.
 import { make, say } from "/web/parts.js";
-import { duration, number, plainName, when } from "/web/format.js";
+import { duration, number, plainName, quantity, when } from "/web/format.js";
 import { box, t } from "/web/words.js";
 import { absentCard, alarmCard } from "/web/now-alarms.js";
 import { gauges, temperatures } from "/web/now-values.js";
@@ -61,7 +61,8 @@ function stateCard() {
     "aria-label": t("machine_state"),
   });
   const update = (status, context) => {
-    say(word, context.state(status.state.word));
+    const silent = silentControl(context);
+    say(word, silent ?? context.state(status.state.word));
     word.dataset.word = status.state.word;
     word.dataset.ms = status.at_ms;
     const why = status.state.why ? ` · ${box_(status.state.why)}` : "";
@@ -91,5 +92,16 @@ function stateCard() {
       );
   };
   return { box, update };
+}
+/** Above this power a machine is not switched off, W: the supplies of a control alone take more. */
+const DRAWS_W = 50;
+/** A control that is silent while the machine draws power is not off: the head says so, in the place of a state that
+    nobody knows. */
+function silentControl(context) {
+  const control = ["execution", "mode"].map((key) => context.quantity(key)).find((it) => it);
+  if (!control?.missing || ["not_provided", "not_yet", "unsupported"].includes(control.missing)) return null;
+  const power = ["total_power_w", "spindle_power_w"].map((key) => context.quantity(key));
+  const measured = power.find((it) => it && !it.missing && Math.abs(it.value) > DRAWS_W);
+  return measured ? t("machine_draws", quantity(measured.value, measured.unit)) : null;
 }
 const box_ = (text) => box(text);

@@ -1,10 +1,9 @@
-// The lower half of Audit: sources with their doctor, receivers, the configuration in force, the recipe as a table,
+// Of the view Box: sources with their doctor, receivers, the configuration in force, the recipe as a table,
 // backup and help from afar.
 import { ask, card, fill, make, row, say, table } from "/web/parts.js";
 import { duration } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { careCard } from "/web/system-care.js";
-import { configurationFileCard } from "/web/configuration.js";
 import { doctorCard } from "/web/system-doctor.js";
 import { recipeCard } from "/web/system-recipe.js";
 
@@ -14,7 +13,6 @@ export function systemView(context) {
   const recipe = recipeCard(context);
   const configuration = configurationCard();
   const care = careCard(context);
-  const setUp = configurationFileCard(context);
   const known = ask("/api/v1/configuration")
     .then((it) => {
       configuration.give(it);
@@ -23,7 +21,7 @@ export function systemView(context) {
     })
     .catch((error) => configuration.fail(error));
   return {
-    parts: [make("div", "columns", [doctor.box, sinks.box, care.box]), recipe.box, setUp.box, configuration.box],
+    parts: [make("div", "columns", [doctor.box, sinks.box, care.box]), recipe.box, configuration.box],
     update(status) {
       sinks.update(status);
     },
@@ -32,7 +30,6 @@ export function systemView(context) {
         doctor.may();
         recipe.may();
         care.may();
-        setUp.may();
       });
     },
   };

@@ -89,10 +89,10 @@ function drawEdge(lamp, facts, status, context) {
   const wear = status.wear;
   const tool = context.quantity("tool");
   const name = tool && !tool.missing ? tool.value : "–";
-  // The alarm of a script names edges in its text: another one may be worn than the one in use.
-  const standing = (code) => status.alarms.filter((a) => a.code === code || a.code.startsWith(`${code} `));
+  // Each worn edge has an alarm of its own, which may be of another edge than the one in use.
+  const standing = (code) => status.alarms.filter((a) => a.code.startsWith(code));
   const named = (text) => text.split(/[^\w-]+/).includes(name);
-  const [worn, look] = [standing("tool_worn"), standing("tool_wear")];
+  const [worn, look] = [standing("tool_worn_"), standing("tool_wear")];
   const own_ = worn.some((a) => named(a.text));
   // A lamp that is grey beside a standing alarm is read as a fault: it is red for whichever edge is meant, and says
   // which.

@@ -52,6 +52,8 @@ export const NOW = {
     "在所选时间内，网关可在限值内升降进给。到时自动结束，也可随时“交还操作面板”。",
   ],
   arm_for: ["For how long", "持续时间"],
+  parts_of_another_moment: ["the power is changing: its parts are not known yet", "功率正在变化，分项未定"],
+  machine_draws: ["Control does not answer; the machine draws {0}", "数控系统无应答；机床功率 {0}"],
   braking: ["the spindle brakes and gives power back", "主轴制动，回馈电能"],
   finished_count: ["{0} finished", "已完成 {0} 件"],
   material: ["Material", "材料"],

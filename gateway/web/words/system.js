@@ -1,4 +1,4 @@
-// The view "Audit", lower half: receivers, doctor, configuration, backup, recipe. Key, English, Chinese.
+// The views "Box" and "Set up": receivers, doctor, configuration, backup, recipe. Key, English, Chinese.
 export const SYSTEM = {
   sinks: ["Receivers", "接收方"],
   no_sinks: ["Nothing leaves this box: no [[sink]] is configured.", "未配置 [[sink]]，无数据外发。"],
@@ -27,6 +27,25 @@ export const SYSTEM = {
   all_values: ["All values", "全部数值"],
   value: ["Value", "数值"],
   set_up: ["Set up this box", "设置本机"],
+  open_set_up: ["Set it up …", "打开设置……"],
+  sign_in_to_set_up: ["Sign in as an administrator to change this.", "请以管理员身份登录后修改。"],
+  tab_form: ["Form", "表单"],
+  tab_file: ["File", "文件"],
+  set_up_devices: ["Control and meters", "数控系统与电能表"],
+  set_up_box: ["The box", "网关"],
+  set_up_name: ["Name of the machine", "机床名称"],
+  set_up_language: ["Language", "语言"],
+  as_delivered: ["as the browser says", "按浏览器"],
+  take_over: ["Take over", "应用"],
+  persons: ["Persons", "人员"],
+  persons_words: ["Who may do more than read. A token is shown once.", "可执行读取以外操作的人员。令牌仅显示一次。"],
+  persons_for_admin: ["An administrator sees and changes the persons.", "仅管理员可查看和修改人员。"],
+  person_name: ["Name", "姓名"],
+  person_role: ["Role", "角色"],
+  add_person: ["Add", "添加"],
+  remove_person: ["Remove", "移除"],
+  new_token: ["New token", "新令牌"],
+  token_of: ["Token of {0}, shown only now: {1}", "{0} 的令牌（仅显示一次）：{1}"],
   set_up_words: [
     "Try a control or meter, add it, store, start anew. The gate and every way to write to the machine are changed at the box only.",
     "先测试数控系统或电能表，再添加、保存并重新启动。闸门与一切写入机床的设置只能在本机修改。",

@@ -6,7 +6,9 @@ use super::limits::LearnedLimits;
 use super::load_inputs::{LoadChannels, LoadMoment};
 use super::place::Place;
 use crate::NoEstimate;
+use crate::signals::seconds_between;
 use adapter_core::Sample;
+use adapter_core::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,6 +19,9 @@ pub const PLACES_MAX: usize = 1024;
 const BLOCK_MAX: usize = 24;
 /// Standard deviations of the cutting power by which an excess must exceed its limit.
 const SURE_SD: f64 = 2.0;
+
+/// Less than this share of the mean power of a place, beyond doubt, is none of its cut.
+const AIR_SHARE: f64 = 0.5;
 
 /// The texts that make a place, as they were seen last.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -37,6 +42,12 @@ pub(super) struct LearnedLoad {
     path_mm: f64,
     #[serde(skip)]
     part: Option<f64>,
+    /// When the machine came to this place, or a part began there.
+    #[serde(skip)]
+    here_since_ns: TimeNs,
+    /// Path through the air where no cut has made a place yet.
+    #[serde(skip)]
+    air_before: f64,
     #[serde(skip)]
     follower: OverrideFollower,
 }
@@ -58,6 +69,7 @@ impl LearnedLoad {
     ) {
         self.follow_part(sample, channels);
         self.follow_place(sample, channels);
+        self.watch_part(now, limits, loads);
         let power = now.cutting_power_w.filter(|_| now.cutting);
         let (Some((power_w, sd_w)), Some(key), Some(step_s)) = (power, &self.key, now.step_s) else {
             self.follower.reset_cut();
@@ -84,6 +96,7 @@ impl LearnedLoad {
                 let (key, used) = (key.clone(), self.changes);
                 self.make_room();
                 let mut place = Place::new(part, used);
+                place.parts.add_air(part, std::mem::take(&mut self.air_before));
                 place.learn_moment(self.path_mm, power_w, feed, step_s);
                 self.places.insert(key, place);
             }
@@ -109,10 +122,13 @@ impl LearnedLoad {
         loads.learned_power_w = Ok(expected.power_w * by_feed);
         loads.learned_band_w = Ok(expected.band_w * by_feed);
         loads.learned_peak_w = Ok(place.peak_w);
-        if now.state_s < limits.entry_s {
+        // At the entry, and where the machine has just come from another place, the power is not yet that of this one.
+        if now.state_s.min(seconds_between(self.here_since_ns, now.at_ns)) < limits.entry_s {
             self.follower.reset_cut();
             return;
         }
+        loads.learned_multiple =
+            Ok((power_w - SURE_SD * sd_w) / (place.peak_w.max(expected.power_w) * by_feed.max(1.0)));
         // The shares between which nothing is asked for; what the meter cannot tell is inside.
         let doubt = (expected.band_w + SURE_SD * sd_w / by_feed) / expected.power_w;
         let high = limits.high_share.max(1.0 + doubt);
@@ -129,12 +145,45 @@ impl LearnedLoad {
             if (pct - 100.0).abs() < 1e-9 { Err(NoEstimate::NothingToChange) } else { Ok(pct) };
     }
 
+    /// What this part does at the place besides taking power: how far it feeds through the air, whether the coolant runs.
+    fn watch_part(&mut self, now: &LoadMoment<'_>, limits: &LearnedLimits, loads: &mut Loads) {
+        let (Some(key), Some(step_s), Some((power_w, sd_w))) = (&self.key, now.step_s, now.cutting_power_w) else {
+            return;
+        };
+        let per_s = now.feed_mm_min.map_or(1.0, |feed| feed / 60.0);
+        let part = self.part.unwrap_or(0.0);
+        let Some(place) = self.places.get_mut(key) else {
+            self.air_before += if now.feeds_in_air { step_s * per_s } else { 0.0 };
+            return;
+        };
+        let learned = part - place.first_part >= limits.parts && place.is_known();
+        place.parts.follow_part(part, learned);
+        // Power near that of the cut is no air, whatever the state is called.
+        let missing = power_w + SURE_SD * sd_w < AIR_SHARE * place.mean_power_w();
+        if now.feeds_in_air && missing {
+            place.parts.add_air(part, step_s * per_s);
+        } else if now.cutting {
+            place.parts.add_cut(step_s * per_s, step_s, now.coolant_on.filter(|_| !learned));
+        }
+        if learned {
+            loads.learned_air_share = place.parts.missing_share(per_s).ok_or(NoEstimate::PlaceNotLearned);
+            loads.learned_coolant_share = place.parts.coolant_share().ok_or(NoEstimate::PlaceNotLearned);
+        }
+    }
+
     fn follow_part(&mut self, sample: &Sample, channels: &LoadChannels) {
         let part = sample.number(channels.part_count).ok();
         if part.is_some() && part != self.part {
             self.part = part;
-            self.path_mm = 0.0;
+            self.begin_here(sample.at_ns);
         }
+    }
+
+    /// The path begins anew, and what was seen before is of another place or part.
+    fn begin_here(&mut self, at_ns: TimeNs) {
+        self.path_mm = 0.0;
+        self.here_since_ns = at_ns;
+        self.follower.reset_cut();
     }
 
     /// The key is put together only where one of its texts has changed.
@@ -147,13 +196,20 @@ impl LearnedLoad {
         let block_before = self.texts.0[3].clone();
         self.texts = PlaceTexts(ids.map(|id| sample.text(id).map(Arc::from)));
         let [program, tool, operation, block] = &self.texts.0;
-        if *block != block_before {
-            self.path_mm = 0.0;
-        }
+        let (other_block, key_before) = (*block != block_before, self.key.take());
         self.key = program.as_ref().zip(tool.as_ref()).map(|(program, tool)| {
             let block: String = block.as_deref().unwrap_or_default().chars().take(BLOCK_MAX).collect();
             format!("{program}/{}/{}/{block}", crate::wear::tool_of(tool), operation.as_deref().unwrap_or_default())
         });
+        // The path of a place goes on where only an operation begins in its block.
+        if other_block {
+            self.path_mm = 0.0;
+        }
+        if self.key != key_before {
+            self.here_since_ns = sample.at_ns;
+            self.air_before = 0.0;
+            self.follower.reset_cut();
+        }
         self.changes += 1;
         if let Some(place) = self.key.as_ref().and_then(|key| self.places.get_mut(key)) {
             place.used = self.changes;

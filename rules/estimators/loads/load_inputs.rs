@@ -28,6 +28,7 @@ pub(super) struct LoadChannels {
     pub(super) operation: ChannelId,
     pub(super) block: ChannelId,
     pub(super) material: ChannelId,
+    coolant: ChannelId,
 }
 
 impl Default for LoadChannels {
@@ -48,6 +49,7 @@ impl Default for LoadChannels {
             operation: of("operation"),
             block: of("block"),
             material: of("work_material"),
+            coolant: of("coolant_on"),
         }
     }
 }
@@ -60,6 +62,10 @@ pub(super) struct LoadMoment<'a> {
     pub(super) step_s: Option<f64>,
     /// Something is being cut.
     pub(super) cutting: bool,
+    /// The spindle turns without load while the axes feed: through the air, not in rapid traverse.
+    pub(super) feeds_in_air: bool,
+    /// Does the coolant pump run?
+    pub(super) coolant_on: Option<bool>,
     /// For how long the machine has been in this state, s.
     pub(super) state_s: f64,
     /// Cutting power and its standard deviation, W.
@@ -95,6 +101,8 @@ impl LoadChannels {
             at_ns: sample.at_ns,
             step_s: last_ns.map(|last_ns| seconds_between(last_ns, sample.at_ns)),
             cutting: estimates.state == State::Cutting,
+            feeds_in_air: estimates.state == State::Idle && feed.is_some_and(|feed| feed > 0.0),
+            coolant_on: number(self.coolant).map(|on| on > 0.5),
             state_s: seconds_between(estimates.since_ns, sample.at_ns),
             cutting_power_w: estimates.cutting_power_w.ok().map(|it| (it.value, it.sd)),
             spindle_power_w: number(self.spindle_power),

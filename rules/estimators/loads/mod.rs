@@ -12,6 +12,7 @@
 //! | `curves` | learned curves of the load over the feed, and what they are of |
 //! | `constant_load` | constant load |
 //! | `place`, `learned_load` | the load of each place of a program, learned from the first parts |
+//! | `part_at_place` | what one part does at a place: path in the cut and through the air, coolant |
 
 mod constant_load;
 mod curves;
@@ -19,6 +20,7 @@ mod follower;
 mod learned_load;
 mod limits;
 mod load_inputs;
+mod part_at_place;
 mod place;
 
 #[cfg(test)]
@@ -57,6 +59,13 @@ pub struct Loads {
     pub learned_band_w: Figure,
     /// Greatest cutting power of the first parts at this place, W.
     pub learned_peak_w: Figure,
+    /// Cutting power beyond its doubt over the greatest of the first parts at this place; only in a cut that is under way there.
+    pub learned_multiple: Figure,
+    /// Path that this part has fed through the air at this place beyond what the first parts did, over what says that the cut is missing
+    /// (half of the cut, and at most 5 s): from 1 on it is.
+    pub learned_air_share: Figure,
+    /// Share of the time in the cut at this place in which the coolant ran in the first parts.
+    pub learned_coolant_share: Figure,
     /// Feed override that brings the power back into the learned band; only in a cut, and only where it is outside.
     pub learned_override_pct: Figure,
 }
@@ -73,6 +82,9 @@ impl Loads {
             learned_power_w: Err(reason),
             learned_band_w: Err(reason),
             learned_peak_w: Err(reason),
+            learned_multiple: Err(reason),
+            learned_air_share: Err(reason),
+            learned_coolant_share: Err(reason),
             learned_override_pct: Err(reason),
         }
     }
@@ -86,6 +98,9 @@ impl Loads {
             "learned_power_w" => Some(&mut self.learned_power_w),
             "learned_band_w" => Some(&mut self.learned_band_w),
             "learned_peak_w" => Some(&mut self.learned_peak_w),
+            "learned_multiple" => Some(&mut self.learned_multiple),
+            "learned_air_share" => Some(&mut self.learned_air_share),
+            "learned_coolant_share" => Some(&mut self.learned_coolant_share),
             "learned_override_pct" => Some(&mut self.learned_override_pct),
             _ => None,
         }

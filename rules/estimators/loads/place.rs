@@ -2,6 +2,7 @@
 //! the spread about it, and the peak. Facing at one speed takes three times as much at the rim as at the centre, so that a mean
 //! would call every rim too heavy.
 
+use super::part_at_place::PartAtPlace;
 use serde::{Deserialize, Serialize};
 
 /// Moments within this time share their noise, because the power is filtered, s.
@@ -32,6 +33,9 @@ pub(super) struct Place {
     pub(super) peak_w: f64,
     /// Mean override that was in force, as a share of the programmed feed.
     feed: f64,
+    /// What parts do there besides taking power.
+    #[serde(default)]
+    pub(super) parts: PartAtPlace,
 }
 
 /// What a place should take.
@@ -55,7 +59,13 @@ impl Place {
             power_square: 0.0,
             peak_w: 0.0,
             feed: 0.0,
+            parts: PartAtPlace::default(),
         }
+    }
+
+    /// The mean power of the place, W, at the feed that it was learned at.
+    pub(super) fn mean_power_w(&self) -> f64 {
+        self.power_w
     }
 
     /// Was it seen for long enough?

@@ -3,6 +3,7 @@
 use super::accuracy::{Accuracy, FIXED_LOSSES};
 use super::load_loss::{LoadLossLearned, StageLearned};
 use super::no_load::{NoLoadLearned, SpeedLearned};
+use crate::format_script_number as number;
 use crate::{SPEEDS_PER_STAGE, STAGES};
 use std::fmt::{self, Write as _};
 
@@ -19,11 +20,11 @@ impl NoLoadLearned {
                 continue;
             }
             let pairs: Vec<String> =
-                own.iter().map(|speed| format!("[{:.1}, {:.1}]", speed.speed_rpm, speed.power_w)).collect();
+                own.iter().map(|it| format!("[{}, {}]", number(it.speed_rpm), number(it.power_w))).collect();
             let _ = writeln!(text, "        no_load_stage_{stage}: [{}],", pairs.join(", "));
         }
         if let Some(drift) = self.drift {
-            let _ = writeln!(text, "        no_load_drift: {:.5},", drift.clamp(0.0, 0.5));
+            let _ = writeln!(text, "        no_load_drift: {},", number(drift.clamp(0.0, 0.5)));
         }
         text + "    }\n}\n"
     }
@@ -70,12 +71,13 @@ impl LoadLossLearned {
              fn settings() {\n    #{\n",
         );
         for StageLearned { stage, linear, quadratic_per_w, speed_rpm, .. } in &self.stages {
-            let _ = writeln!(text, "        load_loss_linear_stage_{stage}: {:.6},", linear.value);
-            let _ = writeln!(text, "        load_loss_quadratic_per_w_stage_{stage}: {:.10},", quadratic_per_w.value);
-            let _ = writeln!(text, "        load_loss_speed_rpm_stage_{stage}: {:.1},", speed_rpm.unwrap_or(0.0));
+            let _ = writeln!(text, "        load_loss_linear_stage_{stage}: {},", number(linear.value));
+            let _ =
+                writeln!(text, "        load_loss_quadratic_per_w_stage_{stage}: {},", number(quadratic_per_w.value));
+            let _ = writeln!(text, "        load_loss_speed_rpm_stage_{stage}: {},", number(speed_rpm.unwrap_or(0.0)));
         }
         let sd = self.stages.iter().map(|stage| stage.share_at_mean.standard_error).fold(0.0, f64::max);
-        let _ = writeln!(text, "        load_loss_sd: {:.6},", sd.min(0.5));
+        let _ = writeln!(text, "        load_loss_sd: {},", number(sd.min(0.5)));
         text + "    }\n}\n"
     }
 }

@@ -3,6 +3,7 @@
 use super::family::CurveFamily;
 use super::feed_curve::{CurveLearned, FeedCurves, Scatter};
 use super::plateaus::SAME;
+use crate::format_script_number;
 use std::fmt::{self, Write as _};
 
 /// The script that holds the curves: one law for all of them, and for none.
@@ -32,7 +33,8 @@ impl FeedCurves {
         let mut rows = String::new();
         for it in family.curves() {
             let [c0, c1, c2, c3] = it.curve.coefficients;
-            let numbers = [it.depth_mm, it.curve.feed_min, it.curve.feed_max, c0, c1, c2, c3, it.sd].map(format_float);
+            let numbers =
+                [it.depth_mm, it.curve.feed_min, it.curve.feed_max, c0, c1, c2, c3, it.sd].map(format_script_number);
             let _infallible = writeln!(rows, "    [{}],", numbers.join(", "));
         }
         let near = |plateau: &&super::plateaus::Plateau| (plateau.speed_rpm / speed_rpm - 1.0).abs() <= SAME;
@@ -46,8 +48,7 @@ impl FeedCurves {
             self.feature,
             unit_of_column(&self.feature),
             self.feed,
-            // A mean of measured speeds; a tenth of a turn is finer than any of them.
-            format_float((10.0 * speed_rpm).round() / 10.0),
+            format_script_number(speed_rpm),
         )
     }
 
@@ -75,15 +76,18 @@ impl FeedCurves {
 
     /// A target as the default of the setting in the unit of the curves.
     fn with_target(&self, text: &str, target: Option<f64>) -> String {
-        let wanted = target.unwrap_or_else(|| self.mean_level());
-        let (setting, default) = match unit_of_column(&self.feature) {
-            "W" => ("target_w", "0.0"),
-            "A" => ("target_a", "0.0"),
-            _ => ("target_load_pct", "70.0"),
+        let wanted = self.mean_level();
+        let setting = match unit_of_column(&self.feature) {
+            "W" => "target_w",
+            "A" => "target_a",
+            _ => "target_load_pct",
         };
-        // Three digits: a target is no measurement.
-        let rounded = format!("{:.1}", wanted.max(0.1));
-        text.replacen(&format!("setting(\"{setting}\", {default},"), &format!("setting(\"{setting}\", {rounded},"), 1)
+        // One that was given stands as it was given; the mean of the recording is rounded, as it is told.
+        let written = target.unwrap_or_else(|| (10.0 * wanted.max(0.1)).round() / 10.0);
+        let call = format!("setting(\"{setting}\", ");
+        let Some((before, rest)) = text.split_once(&call) else { return text.to_owned() };
+        let Some((_default, after)) = rest.split_once(',') else { return text.to_owned() };
+        format!("{before}{call}{},{after}", format_script_number(written))
     }
 }
 
@@ -95,13 +99,6 @@ fn unit_of_column(column: &str) -> &'static str {
         Some("pct") => "%",
         _ => "1",
     }
-}
-
-/// A number that a script reads as one, with a point in it and without an exponent.
-fn format_float(value: f64) -> String {
-    let text = format!("{value:.12}");
-    let text = text.trim_end_matches('0');
-    if text.ends_with('.') { format!("{text}0") } else { text.to_owned() }
 }
 
 impl fmt::Display for FeedCurves {

@@ -20,6 +20,7 @@
 //! | `predictor` | the law at work: error, uncertainty, residual, outside the range |
 //! | `follow` | a law that readings of a probe correct, by bounded steps |
 //! | `model` | the law as a file that the box runs |
+//! | `sensor_model`, `sensor_watch` | what a sensor should read from the others; which are believed, and what stands in |
 //! | `compensation` | clamp, dead band, slew, increments that add up |
 //! | `quadrature` | encoder lines A and B, and a decoder |
 //! | `pulse_insertion` | extra pulses between encoder and controller |
@@ -45,6 +46,8 @@ mod regression;
 mod report;
 mod script_text;
 mod selection;
+mod sensor_model;
+mod sensor_watch;
 
 pub use compensation::{
     AxisSituation, CompensationSettingError, CompensationSettings, CompensationStep, Compensator, Standing,
@@ -63,3 +66,5 @@ pub use quantities::Series;
 pub use recording::{LeftOut, ThermalRows, collect_rows};
 pub use regression::{Autocorrelation, ThermalCoefficient, ThermalFit, fit_static};
 pub use selection::{GradeChoice, Selection, SelectionSettings, SensorVerdict, select_sensors};
+pub use sensor_model::SensorModel;
+pub use sensor_watch::{DoubtedSensor, SensorFault, SensorWatch};

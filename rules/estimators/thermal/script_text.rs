@@ -2,6 +2,7 @@
 
 use super::law::{Path, ThermalLaw};
 use super::learn::ThermalLearned;
+use crate::format_script_number;
 use std::fmt::Write;
 
 impl ThermalLearned {
@@ -60,7 +61,8 @@ fn format_lag_states(law: &ThermalLaw) -> String {
     for name in lagged() {
         let _ = write!(
             text,
-            "    memory.late_{name} = first_order_c(memory.late_{name}, memory.before_{name}, {name}, dt_s, {tau_s:.1});\n    memory.before_{name} = {name};\n"
+            "    memory.late_{name} = first_order_c(memory.late_{name}, memory.before_{name}, {name}, dt_s, {});\n    memory.before_{name} = {name};\n",
+            format_script_number(tau_s)
         );
     }
     text
@@ -76,21 +78,21 @@ fn format_prediction(law: &ThermalLaw) -> String {
     };
     let list = |of: &dyn Fn(usize) -> String| (0..law.terms.len()).map(of).collect::<Vec<String>>().join(", ");
     let values = list(&value);
-    let coefficients = list(&|at| format!("{:.6}", law.terms[at].um_per_k));
+    let coefficients = list(&|at| format_script_number(law.terms[at].um_per_k));
     let temperatures = list(&|at| law.terms[at].sensor.clone());
-    let least = list(&|at| format!("{:.2}", law.terms[at].range_c.0));
-    let greatest = list(&|at| format!("{:.2}", law.terms[at].range_c.1));
+    let least = list(&|at| format_script_number(law.terms[at].range_c.0));
+    let greatest = list(&|at| format_script_number(law.terms[at].range_c.1));
     format!(
-        "    let predicted_um = predicted_thermal_error_um([{values}], [{coefficients}], {:.4});\n    \
+        "    let predicted_um = predicted_thermal_error_um([{values}], [{coefficients}], {});\n    \
          let outside_k = temperature_outside_k([{temperatures}], [{least}], [{greatest}]);\n    \
          if has(outside_k) {{\n        \
-         alarm_when(\"thermal_outside\", outside_k > {:.2}, 60.0, \"temperatures outside the range of identification: identify thermal again\");\n    }}\n    \
+         alarm_when(\"thermal_outside\", outside_k > {}, 60.0, \"temperatures outside the range of identification: identify thermal again\");\n    }}\n    \
          if has(thermal_error_um) && has(predicted_um){settled} {{\n        \
          let residual_um = thermal_error_um - predicted_um;\n        \
-         alarm_when(\"thermal_contradicted\", residual_um > {limit:.2} || residual_um < -{limit:.2}, 600.0, \"measured and predicted thermal error disagree: identify thermal again\");\n    }}\n}}\n",
-        law.intercept_um,
-        margin_k(law),
-        limit = 3.0 * law.residual_sd_um,
+         alarm_when(\"thermal_contradicted\", residual_um > {limit} || residual_um < -{limit}, 600.0, \"measured and predicted thermal error disagree: identify thermal again\");\n    }}\n}}\n",
+        format_script_number(law.intercept_um),
+        format_script_number(margin_k(law)),
+        limit = format_script_number(3.0 * law.residual_sd_um),
         settled =
             law.tau_s.map_or_else(String::new, |tau_s| format!(" && memory.seen_s > {:.0}", SETTLED_TAUS * tau_s)),
     )

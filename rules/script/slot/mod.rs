@@ -332,7 +332,7 @@ impl Slot {
             self.stops.clear();
         }
         for (stop, reason) in collected.stops.drain(..) {
-            self.stops.retain(|known| known.stop != stop);
+            self.stops.retain(|known| known.stop != stop || !stop.is_same_request(&known.reason, &reason));
             let reason = Arc::from(reason.as_str());
             self.stops.push(StopRequest { stop, reason, script: file.clone(), version: *version });
         }

@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// An edge with less than half its criterion is not worn.
 const HALF_WORN_MM: f64 = 0.15;
 /// A request of another feed counts when it lasts for this long, ticks.
-const ASKED_TICKS: u32 = 2;
+const ASKED_TICKS: u32 = 1;
 
 /// How a machine is set up, besides its seed.
 #[derive(Clone)]
@@ -106,7 +106,8 @@ fn shift(setup: &Setup, seed: u64) -> Counted {
 #[derive(Debug, Default)]
 struct Asked {
     hold: bool,
-    change: bool,
+    /// Reasons of the changes of edges.
+    changes: Vec<Arc<str>>,
     /// For so many ticks another feed.
     feed: u32,
 }
@@ -121,8 +122,8 @@ impl Counted {
             self.told.push(format!("{now_s:.0} s: feed hold"));
         }
         before.hold = holds;
-        let change = asks(Stop::ToolChange);
-        if let Some(request) = change.filter(|_| !before.change) {
+        let changes = decision.stops.iter().filter(|request| request.stop == Stop::ToolChange);
+        for request in changes.clone().filter(|request| !before.changes.contains(&request.reason)) {
             self.changes += 1;
             let moment = bench.machine.moment((now_s * 1e9) as i64);
             let (edge, wear_mm) = (edge_name(moment.panel.tool, moment.panel.edge.into()), moment.truth.flank_wear_mm);
@@ -133,7 +134,7 @@ impl Counted {
                 self.told.push(format!("{now_s:.0} s: {edge} at {wear_mm:.3} mm: {}", witness.unwrap_or_default()));
             }
         }
-        before.change = change.is_some();
+        before.changes = changes.map(|request| request.reason.clone()).collect();
     }
 
     fn count_feeds(&mut self, bench: &Bench, decision: &Decision, before: &mut Asked) {

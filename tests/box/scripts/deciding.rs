@@ -34,6 +34,42 @@ fn a_plain_alarm_stands_while_its_line_is_reached() {
 }
 
 #[test]
+fn another_text_of_a_standing_alarm_is_told_and_each_edge_has_its_request() {
+    let mut host = host(
+        "if part_count >= 1.0 { raise_alarm(\"worn\", \"warning\", `Edge T${part_count.to_int()} worn`, \"T\"); }\n\
+         for edge in 1..=part_count.to_int() { request_tool_change(`edge T${edge} is worn`); }\n\
+         if part_count >= 4.0 { clear_alarm(\"worn\"); }",
+    );
+    let mut told = Vec::new();
+    for tick in 0..40 {
+        let (at_s, part) = (f64::from(tick), f64::from(tick / 10 + 1));
+        let decision = host.run_due_scripts(&sample(at_s, &[("part_count", part)]), &cutting(at_s, 1.0));
+        let sign = |raised| if raised { '+' } else { '-' };
+        told.extend(decision.alarms.iter().map(|change| format!("{}{} at {at_s}", sign(change.raised), change.en)));
+        assert_eq!(decision.stops.len(), tick / 10 + 1, "one request for each edge");
+        let standing: Vec<_> = host.alarms().iter().map(|alarm| alarm.en.to_string()).collect();
+        assert_eq!(standing, if part < 4.0 { vec![format!("Edge T{part} worn")] } else { Vec::new() });
+    }
+    let right = ["+Edge T1 worn at 0", "-Edge T1 worn at 10", "+Edge T2 worn at 10", "-Edge T2 worn at 20"];
+    assert_eq!(told[..4], right);
+    assert_eq!(told[4..], ["+Edge T3 worn at 20", "-Edge T3 worn at 30"]);
+}
+
+/// A text with a measured number in it does not make a row of the history at every run.
+#[test]
+fn a_text_that_changes_all_the_time_is_told_now_and_then() {
+    let mut host = host("raise_alarm(\"load\", `load ${spindle_load_pct}`);");
+    let mut raised = 0;
+    for tick in 0..600 {
+        let at_s = 0.1 * f64::from(tick);
+        let decision =
+            host.run_due_scripts(&sample(at_s, &[("spindle_load_pct", f64::from(tick % 97))]), &cutting(at_s, 1.0));
+        raised += decision.alarms.iter().filter(|change| change.raised).count();
+    }
+    assert_eq!(raised, 12, "every 5 s of 60");
+}
+
+#[test]
 fn a_comparison_with_a_missing_value_is_false_and_arithmetic_waits() {
     let mut quiet = host("if spindle_load_pct > 50.0 || spindle_load_pct < 50.0 { alarm(\"a\", \"\") }");
     assert!(quiet.run_due_scripts(&sample(0.0, &[]), &Estimates::without_samples(0)).alarms.is_empty());

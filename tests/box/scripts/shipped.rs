@@ -82,7 +82,7 @@ fn the_shipped_tool_wear_takes_no_heavy_cut_for_a_worn_edge() {
 #[test]
 fn the_shipped_tool_wear_tells_a_worn_edge() {
     // Parts 5, 6 and 7 are worn; it is told when the third of them is over, and stands.
-    assert_eq!(parts(12, 1.8), ["+tool_worn in part 8"]);
+    assert_eq!(parts(12, 1.8), ["+tool_worn_T1 in part 8"]);
 }
 
 #[test]

@@ -60,7 +60,7 @@ fn a_worn_edge_is_told_and_a_sharp_one_is_not() {
     let witness = ["probably pass its wear criterion", "more than the limit of the wear model"]
         .iter()
         .any(|it| worn.contains(it));
-    assert!(worn.contains("\"tool_worn\"") && witness, "{worn}");
+    assert!(worn.contains("\"tool_worn_T") && witness, "{worn}");
     let sharp = alarms(0.5, "1800");
     assert!(!sharp.contains("tool_worn"), "{sharp}");
 }

@@ -68,21 +68,33 @@ export function feedCard(context) {
     back.hidden = !writes;
     arm.hidden = writes || !(context.session?.arming_allowed && context.session?.may?.arm);
   };
-  return { box: section, update };
+  const session = () => carryOutDisarm(back, context);
+  if (context.session) session();
+  return { box: section, update, session };
 }
 
-async function disarm(button, context) {
-  if (!context.session?.person) {
-    location.href = `/sign-in?next=${encodeURIComponent("/now")}`;
-    return;
-  }
+/** The address that carries the press on: whoever has to sign in first finds it done afterwards. */
+const DISARM = "disarm";
+
+export async function disarm(button, context) {
   button.disabled = true;
   try {
     await send("/api/v1/disarm");
   } catch (error) {
+    if (error.status === 401) {
+      location.href = `/sign-in?next=${encodeURIComponent(`/now?${DISARM}`)}`;
+      return;
+    }
     button.after(make("span", "note bad", error.message));
   }
   button.disabled = false;
+}
+
+/** What was pressed before signing in is carried out after it, once. */
+export function carryOutDisarm(button, context) {
+  if (!new URLSearchParams(location.search).has(DISARM) || !context.session?.person) return;
+  context.go("/now", { replace: true });
+  disarm(button, context);
 }
 
 /** Arming always asks for the token again. */

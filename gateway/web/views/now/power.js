@@ -11,19 +11,33 @@ const TREND_S = 600;
 /** Power that flows back is called braking from here on: more than the noise of a power meter about zero. Too low, a
     standing spindle is said to brake. */
 const BRAKING_W = 20;
+/** The parts are of the filtered power: they belong to what is read now where they add up to it within this share, or
+    within so many of their deviations. Wider: a change of the power is shown as a split that was never so. */
+const SAME_MOMENT_SHARE = 0.03;
+const SAME_MOMENT_SD = 2;
+const PARTS = ["no_load_power_w", "load_loss_w", "cutting_power_w"];
+
+/** The parts of the power, W, in whole watts that add up to `total`; or the word for why they are withheld. */
+export function split(quantity) {
+  const found = PARTS.map((key) => quantity(key));
+  const without = found.find((it) => !it || it.missing || typeof it.value !== "number");
+  const power = quantity("spindle_power_w");
+  if (without !== undefined || !power || power.missing) return { total: null, watts: null, why: null };
+  const watts = found.map((it) => Math.round(it.value));
+  const total = watts.reduce((sum, it) => sum + it, 0);
+  const sd = Math.hypot(...found.map((it) => it.uncertainty ?? 0));
+  const within = Math.max(SAME_MOMENT_SHARE * Math.abs(power.value), SAME_MOMENT_SD * sd, 5);
+  return Math.abs(total - power.value) <= within
+    ? { total, watts, why: null }
+    : { total: null, watts: null, why: "parts_of_another_moment" };
+}
 
 /** Where the spindle's power goes, as one strip: no-load, loss under load, cutting; what cannot be told apart is one
     colour. */
 export function strip() {
-  const bands = [
-    ["no_load_power_w", "line-a"],
-    ["load_loss_w", "line-c"],
-    ["cutting_power_w", "line-b"],
-    ["rest", "faint"],
-  ];
-  const pieces = bands.map(([key]) => make("div", `piece ${key}`));
+  const pieces = [...PARTS, "rest"].map((key) => make("div", `piece ${key}`));
   const bar = make("div", "power-bar", pieces, { role: "img" });
-  const labels = bands.slice(0, 3).map(([key]) => ({ key, value: make("b", "", "–"), note: make("span", "more", "") }));
+  const labels = PARTS.map((key) => ({ key, value: make("b", "", "–"), note: make("span", "more", "") }));
   const total = make("span", "value", "–", { "data-quantity": "spindle_power_w" });
   const machine = make("span", "grow note", "");
   const list = make(
@@ -53,18 +67,23 @@ export function strip() {
     const power = Math.max(0, value("spindle_power_w") ?? 0);
     greatest = Math.max(greatest * 0.9995, power, 500);
     const turning = Math.abs(value("spindle_speed_rpm") ?? 0) > 1;
+    const { total: sum, watts: parts, why } = split(context.quantity);
+    // What stands above the parts is what they add up to: a reader does the sum.
+    if (sum !== null) say(total, number(sum, "W"));
     let used = 0;
-    bands.slice(0, 3).forEach(([key], at) => {
-      const watts = turning ? Math.min(Math.max(0, value(key) ?? 0), Math.max(0, power - used)) : 0;
+    PARTS.forEach((_, at) => {
+      const watts = turning && parts ? Math.min(Math.max(0, parts[at]), Math.max(0, power - used)) : 0;
       used += watts;
       pieces[at].style.width = `${(100 * watts) / greatest}%`;
     });
     pieces[3].style.width = `${(100 * Math.max(0, power - used)) / greatest}%`;
-    for (const { key, value: cell, note } of labels) {
+    labels.forEach(({ key, value: cell, note }, at) => {
       const it = context.quantity(key);
-      say(cell, it && !it.missing ? shown(it.value, it.unit) : "–");
-      say(note, it?.missing ? context.reason(it.missing) : it ? `± ${shown(it.uncertainty, it.unit)}` : "");
-    }
+      const withheld = !it || it.missing || why;
+      say(cell, withheld ? "–" : shown(parts ? parts[at] : it.value, it.unit));
+      const deviation = it && !it.missing ? `± ${shown(it.uncertainty, it.unit)}` : "";
+      say(note, it?.missing ? context.reason(it.missing) : why ? t(why) : deviation);
+    });
     bar.setAttribute(
       "aria-label",
       t(

@@ -1,0 +1,109 @@
+//! Tells of temperatures that are not believed, one alarm for each sensor: the compensation goes on without it, or is taken back.
+
+use super::super::health::Health;
+use super::super::report::to_milliseconds;
+use adapters::ChannelId;
+use adapters::clock::{SECOND_NS, TimeNs};
+use gateway_history::{Alarm, AlarmClear};
+use gateway_status::AlarmStatus;
+use rules::estimators::thermal::{DoubtedSensor, SensorFault, SensorWatch};
+
+/// A sensor that is silent for a moment is none that is lost, ns.
+const LOST_NS: i64 = 30 * SECOND_NS;
+
+/// An alarm of a sensor that stands.
+#[derive(Debug, Clone)]
+struct StandingAlarm {
+    code: String,
+    fault: SensorFault,
+    since_ns: TimeNs,
+    en: String,
+    zh: String,
+}
+
+/// The alarms of the sensors of the thermal law.
+#[derive(Debug, Default)]
+pub(super) struct SensorAlarms {
+    /// Without a prediction the offset goes back to zero after this time, s.
+    hold_s: f64,
+    standing: Vec<StandingAlarm>,
+}
+
+impl SensorAlarms {
+    pub(super) fn new(hold_s: f64) -> Self {
+        Self { hold_s, standing: Vec::new() }
+    }
+
+    /// Raises and ends alarms by what the watch says now; `sd_um` is the deviation of the prediction, where there is one.
+    pub(super) fn follow(
+        &mut self,
+        at_ns: TimeNs,
+        watch: &SensorWatch,
+        sensors: &[ChannelId],
+        sd_um: Option<f64>,
+        health: &mut Health,
+    ) {
+        let code_of = |doubted: &DoubtedSensor| {
+            sensors.get(doubted.sensor).map(|channel| format!("thermal_sensor_{}", channel.name()))
+        };
+        let due = |doubted: &&DoubtedSensor| doubted.fault != SensorFault::Lost || at_ns - doubted.since_ns >= LOST_NS;
+        let doubted: Vec<(String, DoubtedSensor)> =
+            watch.doubted().iter().filter(due).filter_map(|it| Some((code_of(it)?, *it))).collect();
+        self.standing.retain(|alarm| {
+            let stays = doubted.iter().any(|(code, it)| *code == alarm.code && it.fault == alarm.fault);
+            if !stays {
+                let (code, source) = (alarm.code.clone(), super::SOURCE.to_owned());
+                health.keep_record(AlarmClear { at_ns, code, source }.into());
+            }
+            stays
+        });
+        for (code, doubted) in doubted {
+            if self.standing.iter().any(|alarm| alarm.code == code) {
+                continue;
+            }
+            let [en, zh] = self.describe(&doubted, sensors[doubted.sensor].name(), sd_um);
+            let (source, severity) = (super::SOURCE.to_owned(), "warning".to_owned());
+            let raised = Alarm { at_ns, code: code.clone(), source, severity, en: en.clone(), zh: zh.clone() };
+            health.keep_record(raised.into());
+            self.standing.push(StandingAlarm { code, fault: doubted.fault, since_ns: at_ns, en, zh });
+        }
+    }
+
+    /// What the operator reads, English and Chinese.
+    fn describe(&self, doubted: &DoubtedSensor, name: &str, sd_um: Option<f64>) -> [String; 2] {
+        let (what, zh_what) = match doubted.fault {
+            SensorFault::Lost => ("gives no value", "无数据"),
+            SensorFault::Jumped => ("has changed faster than heat can", "变化快于热过程"),
+            SensorFault::Frozen => ("stands still while the others have moved", "停止变化，而其他温度在变"),
+            SensorFault::Contradicted => ("is contradicted by the others", "与其他温度矛盾"),
+        };
+        let (then, zh_then) = match (doubted.stand_in_c, sd_um) {
+            (Some(stand_in), Some(sd_um)) => (
+                format!(
+                    "the compensation goes on without it, with {:.1} °C from the others; the prediction is uncertain by {sd_um:.1} um",
+                    stand_in.value
+                ),
+                format!("补偿不再使用该传感器，按其他温度取{:.1} °C；预测不确定度{sd_um:.1} um", stand_in.value),
+            ),
+            _ => (
+                format!(
+                    "there is no prediction without it: the offset stands, and goes back to 0 after {:.0} s",
+                    self.hold_s
+                ),
+                format!("缺少该温度无法预测：补偿量保持，{:.0} s后回零", self.hold_s),
+            ),
+        };
+        [format!("{name} {what}: {then}; look at the sensor"), format!("{name}{zh_what}：{zh_then}；请检查传感器")]
+    }
+
+    /// The alarms that stand.
+    pub(super) fn list_standing(&self) -> impl Iterator<Item = AlarmStatus> {
+        self.standing.iter().map(|alarm| AlarmStatus {
+            code: alarm.code.clone(),
+            severity: "warning".to_owned(),
+            text: alarm.en.clone(),
+            zh: alarm.zh.clone(),
+            since_ms: to_milliseconds(alarm.since_ns),
+        })
+    }
+}
